@@ -1,0 +1,3 @@
+"""Vibration of a brake shoe that slides on a rough wheel, with Amontons friction."""
+
+__version__ = "0.1.0"
