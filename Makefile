@@ -1,0 +1,86 @@
+# Everything runs in the virtual environment .venv; the system's Python is used only to create it.
+# All paths are relative, so a checkout below a directory whose name contains spaces works as well.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+RUN_STAMP := $(VENV)/.installed-for-running
+DEV_STAMP := $(VENV)/.installed-for-development
+PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+CASES := $(sort $(wildcard cases/*.toml))
+PYTEST_ARGS ?=
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.NOTPARALLEL: # two installations into one .venv at a time would collide
+.PHONY: help demo test lint format types imports derivations cases check clean
+
+help: ## list the targets (this text)
+	@echo "make TARGET, where TARGET is one of"
+	@sed -n 's/^\([a-z][a-z-]*\):[^#]*## \(.*\)$$/\1|\2/p' Makefile \
+	    | while IFS='|' read -r target text; do printf '  %-12s %s\n' "$$target" "$$text"; done
+	@echo "PYTHON=... chooses the Python (3.11 or later) that creates $(VENV)."
+
+$(BIN)/python:
+	@"$(PYTHON)" -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
+	    || { echo "brakecli needs Python 3.11 or later; name one: make PYTHON=/path/to/python3" >&2; exit 1; }
+	@"$(PYTHON)" -m venv $(VENV) \
+	    || { rm -rf $(VENV); \
+	         echo "cannot create $(VENV); is Python's venv module installed (python3-venv on Debian)?" >&2; \
+	         exit 1; }
+
+$(RUN_STAMP): pyproject.toml | $(BIN)/python
+	@echo "installing brakecli into $(VENV) ..."
+	@$(PIP) install --editable .
+	@touch $@
+
+$(DEV_STAMP): pyproject.toml | $(BIN)/python
+	@echo "installing brakecli and its development tools into $(VENV) ..."
+	@$(PIP) install --editable '.[dev]'
+	@touch $@ $(RUN_STAMP)
+
+demo: $(RUN_STAMP) ## install into .venv and run one real case, cases/relaxation.toml
+	@mkdir -p results
+	$(BIN)/brakecli run cases/relaxation.toml --force --output results/relaxation.h5
+	@echo
+	@echo "What to look at: the regime is 'relaxation'. In every cycle the shoe sticks to the wheel, is carried"
+	@echo "along, breaks loose and slips back; stick_fraction is the part of the time that it sticks."
+	@echo "The time histories and spectra are in results/relaxation.h5, for instance"
+	@echo "  xarray.open_dataset('results/relaxation.h5', group='history', engine='h5netcdf')"
+	@echo "Next: change a value, as in  $(BIN)/brakecli run cases/relaxation.toml --set friction.coefficient=0.5 -o results/mine.h5"
+
+test: $(DEV_STAMP) ## run the tests; PYTEST_ARGS='-k friction' narrows them down
+	$(BIN)/python -m pytest $(PYTEST_ARGS)
+
+lint: $(DEV_STAMP) ## check style and formatting, change nothing
+	$(BIN)/python -m ruff check .
+	$(BIN)/python -m ruff format --check .
+
+format: $(DEV_STAMP) ## rewrite the sources in the project's format
+	$(BIN)/python -m ruff check --fix .
+	$(BIN)/python -m ruff format .
+
+types: $(DEV_STAMP) ## check the type annotations
+	$(BIN)/python -m mypy
+
+imports: $(DEV_STAMP) ## check that imports point only down the list of layers
+	$(BIN)/lint-imports --no-cache --no-logo
+
+derivations: $(DEV_STAMP) ## derive every formula of the documentation again, with sympy
+	$(BIN)/python docs/derivations.py
+
+cases: $(RUN_STAMP) ## run every sample case into results/; one that fails, fails all
+	@mkdir -p results
+	@failed=; \
+	for case in $(CASES); do \
+	    name=$$(basename "$$case" .toml); \
+	    echo "run $$case"; \
+	    $(BIN)/brakecli run "$$case" --force --quiet --output "results/$$name.h5" || failed="$$failed $$name"; \
+	done; \
+	if [ -n "$$failed" ]; then echo "failed:$$failed" >&2; exit 1; fi
+
+check: lint types imports test cases ## all of lint, types, imports, test and cases
+
+clean: ## remove .venv, results and caches
+	rm -rf $(VENV) results build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
