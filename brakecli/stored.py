@@ -1,0 +1,193 @@
+"""The form of a result file, and reading one: exactly what was written, or UnreadableResultError.
+
+A result is HDF5 that opens as netCDF-4, followed by the 32 bytes of the SHA-256 of everything before them. HDF5
+ignores these; a reader knows by them, before the library sees a single byte, that the file is as it was written.
+The checksums inside do not do that: they leave out texts, and a hole of zeros passes them. A program that edits
+the file cuts the 32 bytes off: then the checksums inside have to do.
+"""
+
+import hashlib
+import stat
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from io import RawIOBase
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from brakecli.errors import UnreadableResultError
+
+FORMAT = "brakecli"
+FORMAT_VERSION = 1
+
+_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+_MACHINERY = {"CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_Encoding", "_FillValue"}
+
+
+@dataclass(frozen=True)
+class Variable:
+    """What is known of a variable without reading it."""
+
+    name: str
+    dims: tuple[str, ...]
+    shape: tuple[int, ...]
+    attributes: dict[str, Any]
+
+
+class StoredResult:
+    """An open result file; a group is named by its path, the root by ``/``."""
+
+    def __init__(self, path: Path, file: h5py.File) -> None:
+        """Take over a file that `open_result` has verified."""
+        self.path = path
+        self._file = file
+        self.attributes = _attributes(file)
+
+    def group_attributes(self, group: str) -> dict[str, Any]:
+        """The attributes of a group."""
+        with _explained(self.path):
+            return _attributes(self._group(group))
+
+    def groups(self, group: str = "/") -> tuple[str, ...]:
+        """The names of the groups within `group`."""
+        with _explained(self.path):
+            return tuple(name for name, node in self._group(group).items() if isinstance(node, h5py.Group))
+
+    def variables(self, group: str) -> dict[str, Variable]:
+        """The variables of a group, its axes included, by name."""
+        with _explained(self.path):
+            nodes = self._group(group).items()
+            return {name: _variable(name, node) for name, node in nodes if isinstance(node, h5py.Dataset)}
+
+    def read(self, group: str, name: str, start: int = 0, stop: int | None = None) -> NDArray[Any]:
+        """The rows `start` to `stop` of a variable, checked: no damage, and no number that is not finite."""
+        with _explained(self.path):
+            node = self._group(group).get(name)
+            if not isinstance(node, h5py.Dataset) or node.ndim == 0:
+                raise ValueError(f"there is no variable {name} in group {group}")
+            values = np.asarray(node[start:stop])
+            if values.dtype.kind == "S":
+                return np.char.decode(values, "utf-8")
+            if values.dtype.kind not in "iuf":
+                raise ValueError(f"variable {name} in group {group} holds no numbers")
+            if not np.isfinite(values).all():
+                raise ValueError(f"variable {name} in group {group} holds values that are not finite")
+            return values
+
+    def _group(self, group: str) -> h5py.Group:
+        node = self._file.get(group)
+        if not isinstance(node, h5py.Group):
+            raise ValueError(f"there is no group {group}")
+        return node
+
+
+@contextmanager
+def open_result(path: Path, kind: str | None = None) -> Iterator[StoredResult]:
+    """Open a result file for reading, once it is known to be complete, undamaged and of this `kind`.
+
+    Raises UnreadableResultError in every other case, and so does all reading from it.
+    """
+    with ExitStack() as stack:
+        with _explained(path):
+            if not stat.S_ISREG(path.stat().st_mode):  # a pipe would wait for ever
+                raise ValueError("this is no regular file")
+            stream = stack.enter_context(path.open("rb", buffering=0))
+            _verify(stream)
+            # h5py gets the very file that was verified, and does without the file locks of HDF5
+            result = StoredResult(path, stack.enter_context(h5py.File(stream, "r")))
+            _check_header(result.attributes, kind)
+        yield result
+
+
+def is_hdf5(path: Path) -> bool:
+    """Whether this is a regular file with the signature of HDF5, behind a user block or not."""
+    try:
+        if not stat.S_ISREG(path.stat().st_mode):  # looking into a pipe would use up what it holds
+            return False
+        size = path.stat().st_size
+        with path.open("rb") as file:
+            offset = 0
+            while offset < size:
+                file.seek(offset)
+                if file.read(len(_SIGNATURE)) == _SIGNATURE:
+                    return True
+                offset = max(512, 2 * offset)
+    except (OSError, ValueError):
+        pass
+    return False
+
+
+def digest(file: RawIOBase, length: int) -> bytes:
+    """The SHA-256 of the first `length` bytes."""
+    file.seek(0)
+    total = hashlib.sha256()
+    while length > 0 and (block := file.read(min(length, 1 << 20))):
+        total.update(block)
+        length -= len(block)
+    return total.digest()
+
+
+def _verify(file: RawIOBase) -> None:
+    """Compare the file with the digest behind its end, if there is anything behind its end."""
+    file.seek(0)
+    superblock = file.read(36) or b""
+    if not superblock.startswith(_SIGNATURE):
+        raise ValueError("this is no HDF5 file" if superblock else "the file is empty")
+    if superblock[8:9] != b"\x02":  # versions 0 and 1 are laid out otherwise, and never written by this program
+        raise ValueError(f'it was not written by this program, attribute format = "{FORMAT}" is missing')
+    end = int.from_bytes(superblock[28:36], "little")
+    behind = file.seek(0, 2) - end
+    if behind == 0:
+        return
+    file.seek(max(0, end))
+    if behind != 32 or file.read(32) != digest(file, end):
+        raise ValueError("the file is truncated, damaged or was altered by another program")
+
+
+def _check_header(attributes: dict[str, Any], kind: str | None) -> None:
+    found = attributes.get("format"), attributes.get("format_version"), attributes.get("complete")
+    if found[0] != FORMAT:
+        raise ValueError(f'it was not written by this program, attribute format = "{FORMAT}" is missing')
+    if found[1] != FORMAT_VERSION:
+        raise ValueError(f"its format version is {found[1]}, and only version {FORMAT_VERSION} is known here")
+    if found[2] != 1:
+        raise ValueError("it is incomplete, attribute complete is not 1")
+    if kind is not None and attributes.get("kind") != kind:
+        raise ValueError(f"it holds a result of kind {attributes.get('kind')!r}, and {kind!r} is needed")
+
+
+@contextmanager
+def _explained(path: Path) -> Iterator[None]:
+    """Turn whatever h5py raises on a damaged file into the one error that is promised."""
+    try:
+        yield
+    except Exception as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise UnreadableResultError(
+            f"{path}: cannot be read as a result: {' '.join(reason.split())}; name an intact result file, "
+            "or compute it again"
+        ) from error
+
+
+def _variable(name: str, node: h5py.Dataset) -> Variable:
+    dims = (name,) if node.is_scale else tuple(next(iter(dim.keys()), "") for dim in node.dims)
+    return Variable(name, dims, node.shape, _attributes(node))
+
+
+def _attributes(node: h5py.HLObject) -> dict[str, Any]:
+    """Attributes as str, int, float, list of str, or array; without those by which netCDF-4 ties dimensions."""
+    return {name: _plain(node.attrs[name]) for name in node.attrs if name not in _MACHINERY}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, bytes):
+        return value.decode()
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, np.ndarray) and value.dtype.kind == "O":
+        return value.tolist()
+    return value
