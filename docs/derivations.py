@@ -459,6 +459,36 @@ def energy_account() -> None:
     zero((k * (gap - height) ** 2 / 2).diff(height) + k * (gap - height))  # dV/dy = -F_y, spring by spring
 
 
+@check
+def scheme_energy() -> None:
+    """Energy: what weights other than one half (two-layer) and theta_1 = theta_3 (three-layer) take out."""
+    half, quarter = sp.Rational(1, 2), sp.Rational(1, 4)
+    move = (theta_2 * p + (1 - theta_2) * p_now) * h
+    inertia = m * (p - p_now) / h * move - m * (p**2 - p_now**2) / 2
+    zero(inertia - m * (theta_2 - half) * (p - p_now) ** 2)
+    spring = (theta_1 * x_new + (1 - theta_1) * x_now) * (x_new - x_now) - (x_new**2 - x_now**2) / 2
+    zero(spring - (theta_1 - half) * (x_new - x_now) ** 2)
+
+    def pair(new: sp.Expr, old: sp.Expr) -> sp.Expr:  # a spring's store for a pair of levels
+        return ((new + old) / 2) ** 2 / 2 + ((theta_1 + theta_3) / 2 - quarter) * (new - old) ** 2 / 2
+
+    move = (x_new - x_old) / 2
+    inertia = m * (x_new - 2 * x_now + x_old) / h**2 * move
+    zero(inertia - m * (((x_new - x_now) / h) ** 2 - ((x_now - x_old) / h) ** 2) / 2)
+    spring = (theta_1 * x_new + (1 - theta_1 - theta_3) * x_now + theta_3 * x_old) * move
+    zero(spring - (pair(x_new, x_now) - pair(x_now, x_old)) - (theta_1 - theta_3) * move**2)
+
+
+@check
+def unique_step() -> None:
+    """Step on a flat pad: r' < 0 on every branch where phi |a_12| < a_11, whatever the contact's stiffness."""
+    a_11, a, w, K, coupling, spare = sp.symbols("a_11 a w K coupling spare", positive=True)
+    for side in (1, -1):  # a_11 = phi |a_12| + spare; coupling = phi a_12 of either sign
+        for sign in (1, -1):
+            e_slope = (a_11 + side * sign * coupling) / a
+            at_least_zero(-(-1 - w * K * e_slope).subs(a_11, coupling + spare))
+
+
 def main() -> int:
     """Run all checks; 1 if any fails."""
     failed = 0
