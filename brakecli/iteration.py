@@ -32,20 +32,21 @@ from brakecli.kernels import (
     TANGENTIAL,
     X_0,
     Y_0,
+    borrowed,
     kernel,
     vector,
 )
 
 NEWTON, FIXED_POINT = 0, 1
 SOLVED, UNCONVERGED, NO_SOLUTION = 0, 1, 2
-MOST_NEWTON = 100
-MOST_FIXED_POINT = 500
+MOST = {"newton": 100, "fixed-point": 500}
+"""Evaluations of the contact that a step may take before it counts as not converged."""
 
 _RELATIVE = 1e-13
 """Relative change of F below which a step is solved: a few hundred roundings, so that both iterations agree to
 rounding; the gap's own rounding, times the contact's stiffness, is added to it."""
 
-_SOLVE = types.UniTuple(int64, 3)(types.FunctionType(EVALUATE), int64, float64, vector, vector, vector, vector)
+SOLVE = types.UniTuple(int64, 3)(types.FunctionType(EVALUATE), int64, float64, vector, vector, vector, vector)
 
 
 @kernel(types.UniTuple(float64, 2)(types.FunctionType(EVALUATE), float64, float64, vector, vector, vector, vector))
@@ -59,6 +60,7 @@ def _try_force(
     contact: NDArray[np.float64],
 ) -> tuple[float, float]:
     """Minimise for the normal force f, evaluate the contact there; the residual and the rounding in it (N)."""
+    angles, pad, problem, contact = borrowed(angles), borrowed(pad), borrowed(problem), borrowed(contact)
     a_11, a_12, a_22 = problem[A_11], problem[A_12], problem[A_22]
     d, e, side = minimise(a_11, a_12, a_22, problem[G_1], problem[G_2] + f, phi * f, problem[BELT])
     problem[D], problem[E], problem[SIDE], problem[F_Y] = d, e, side, f
@@ -70,7 +72,7 @@ def _try_force(
     return problem[RESIDUAL], rounding
 
 
-@kernel(_SOLVE)
+@kernel(SOLVE)
 def newton(
     evaluate: object,
     evaluations_allowed: int,
@@ -85,6 +87,7 @@ def newton(
     A rising point is one where the residual does not fall with F (r' >= 0): the step's solution need not be
     unique there, as in Painleve's paradox.
     """
+    angles, pad, problem, contact = borrowed(angles), borrowed(pad), borrowed(problem), borrowed(contact)
     low, high = 0.0, math.inf
     f = problem[F_Y]
     rising = 0
@@ -108,7 +111,7 @@ def newton(
             low = f
         else:
             high = f
-        if high - low <= _RELATIVE * high:
+        if high < math.inf and high - low <= _RELATIVE * high:
             return SOLVED, evaluation, rising
         if slope < 0.0:
             f -= r / slope
@@ -123,7 +126,7 @@ def newton(
     return UNCONVERGED, evaluations_allowed, rising
 
 
-@kernel(_SOLVE)
+@kernel(SOLVE)
 def fixed_point(
     evaluate: object,
     evaluations_allowed: int,
@@ -133,9 +136,11 @@ def fixed_point(
     problem: NDArray[np.float64],
     contact: NDArray[np.float64],
 ) -> tuple[int, int, int]:
-    """The paper's iteration, (13) and (24), from the guess problem[F_Y]; (outcome, evaluations, 0)."""
-    f = problem[F_Y]
-    for evaluation in range(1, evaluations_allowed + 1):
+    """The paper's iteration, (13) and (24), from d(0) = dⁿ, e(0) = eⁿ; (outcome, evaluations, 0)."""
+    gain = problem[GAIN]
+    evaluate(problem[X_0] + gain * problem[D], problem[Y_0] + gain * problem[E], angles, pad, contact)  # type: ignore[operator]
+    f = contact[NORMAL_FORCE]
+    for evaluation in range(2, evaluations_allowed + 1):
         r, rounding = _try_force(evaluate, phi, f, angles, pad, problem, contact)
         if abs(r) <= _RELATIVE * max(f, contact[NORMAL_FORCE]) + rounding:
             return SOLVED, evaluation, 0

@@ -1,0 +1,87 @@
+"""The vocabulary: each quantity's symbol, words, unit and equation, once; the contact states; the failures.
+
+Signs: x grows along the wheel's motion, y away from the wheel; F_x and F_y act on the shoe; F_y >= 0 presses it
+off the wheel; the wheel's surface moves with U (either sign).
+"""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A quantity of the model: the paper's symbol, words, SI unit and where the paper defines it."""
+
+    symbol: str
+    long_name: str
+    units: str
+    equation: str
+
+
+TIME = Quantity("t", "time", "s", "")
+HISTORY = {
+    "x": Quantity("x", "tangential displacement of the shoe, along the wheel's motion", "m", "(6)"),
+    "y": Quantity("y", "normal displacement of the shoe, away from the wheel", "m", "(7)"),
+    "vx": Quantity("ẋ", "tangential velocity of the shoe", "m/s", "(6)"),
+    "vy": Quantity("ẏ", "normal velocity of the shoe", "m/s", "(7)"),
+    "friction_force": Quantity("F_x", "friction force on the shoe", "N", "(3)-(5)"),
+    "normal_force": Quantity("F_y", "normal contact force on the shoe", "N", "(2)"),
+    "contact_fraction": Quantity("", "part of the pad that touches", "1", "(2)"),
+    "state": Quantity("", "state of the contact", "1", "(3)-(5)"),
+}
+"""The variables of a time history, in the order of its columns."""
+
+COEFFICIENTS = {
+    "m": Quantity("m", "mass of the shoe", "kg", "(6)"),
+    "b_xx": Quantity("bxx", "tangential damping of the links", "N s/m", "(6)"),
+    "b_xy": Quantity("bxy", "damping that couples the directions", "N s/m", "(6)-(7)"),
+    "b_yy": Quantity("byy", "normal damping of the links", "N s/m", "(7)"),
+    "c_xx": Quantity("cxx", "tangential stiffness of the links", "N/m", "(6)"),
+    "c_xy": Quantity("cxy", "stiffness that couples the directions", "N/m", "(6)-(7)"),
+    "c_yy": Quantity("cyy", "normal stiffness of the links", "N/m", "(7)"),
+    "sin_beta": Quantity("sin β", "tangential part of the load", "1", "(6)"),
+    "cos_beta": Quantity("cos β", "normal part of the load", "1", "(7)"),
+    "phi": Quantity("φ", "coefficient of friction", "1", "(3)"),
+}
+
+
+class ContactState(IntEnum):
+    """How the shoe moves on the wheel at a sample."""
+
+    BACKWARD_SLIP = -1
+    STICK = 0
+    FORWARD_SLIP = 1
+    SEPARATED = 2
+
+
+class Failure(IntEnum):
+    """Why a run ended before its time; each has a sentence with its remedy."""
+
+    NONE = 0
+    UNCONVERGED = 1
+    NO_SOLUTION = 2
+    DIVERGED = 3
+    NOT_CLOSED = 4
+
+    @property
+    def sentence(self) -> str:
+        """What happened and what to do."""
+        return _SENTENCES[self]
+
+
+_SENTENCES = {
+    Failure.NONE: "the run reached its end",
+    Failure.UNCONVERGED: (
+        "the iteration of a step did not converge; reduce solver.step, take solver.iteration = \"newton\", "
+        "or set solver.allow_unconverged = true to go on and count such steps"
+    ),
+    Failure.NO_SOLUTION: (
+        "a step has no solution: the friction force wedges the shoe into the wheel (as in Painlevé's paradox); "
+        "reduce solver.step or friction.coefficient"
+    ),
+    Failure.DIVERGED: "the motion grew beyond all bounds; reduce solver.step, or look at the stability of the case",
+    Failure.NOT_CLOSED: (
+        "the pad may no longer touch everywhere, so the closed form does not hold; "
+        "take contact.evaluator = \"auto\""
+    ),
+}
