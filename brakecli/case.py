@@ -203,7 +203,7 @@ class Solver(Table):
     scheme: Annotated[Scheme, from_text, Field(description="the time-stepping scheme")] = Scheme.TWO_LAYER
     theta: Annotated[
         tuple[Weight, ...],
-        from_list,
+        *from_list,
         quantity(
             "1",
             "weights of the layers: two for two-layer, 0.5 and 0.5 if left out; "
@@ -299,12 +299,12 @@ class _TomlSchema(GenerateJsonSchema):
         return described
 
 
-def json_schema() -> dict[str, Any]:
-    """The JSON Schema (draft 2020-12) of a case file.
+def json_schema(table: type[Table] = Case) -> dict[str, Any]:
+    """The JSON Schema (draft 2020-12) of a case file, or of one kind of table.
 
-    It accepts every valid case; most rules between keys are beyond it.
+    It accepts everything that is valid; most rules between keys are beyond it.
     """
-    return {"$schema": _TomlSchema.schema_dialect, **Case.model_json_schema(schema_generator=_TomlSchema)}
+    return {"$schema": _TomlSchema.schema_dialect, **table.model_json_schema(schema_generator=_TomlSchema)}
 
 
 def resolved_toml(case: Case) -> str:

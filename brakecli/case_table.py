@@ -11,12 +11,17 @@ from pydantic import (
     Field,
     ModelWrapValidatorHandler,
     ValidationError,
+    ValidatorFunctionWrapHandler,
+    WrapValidator,
     model_validator,
 )
-from pydantic_core import InitErrorDetails, PydanticCustomError
+from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
 SMALLEST, LARGEST = 1e-100, 1e100
 """Magnitudes between which every number other than zero must lie, so that products neither vanish nor overflow."""
+
+MOST_WRONG_ENTRIES = 20
+"""Most wrong entries that are told of one list."""
 
 
 def _within_scale(value: float) -> float:
@@ -30,15 +35,29 @@ def quantity(unit: str, description: str) -> Any:  # pydantic's Field is typed s
     return Field(description=description, json_schema_extra={"unit": unit})
 
 
+def _few_errors(values: Any, handler: ValidatorFunctionWrapHandler) -> Any:
+    """Report the first wrong entries of a list alone: thousands of them help nobody, and take seconds."""
+    try:
+        return handler(values)
+    except ValidationError as error:
+        if error.error_count() <= MOST_WRONG_ENTRIES:
+            raise
+        errors = [_repeated(each) for each in error.errors(include_url=False)[:MOST_WRONG_ENTRIES]]
+        what = f"has {error.error_count()} wrong entries, of which the first {len(errors)} are told"
+        errors.append(_rule(Broken((), what, "correct these first")))
+        raise ValidationError.from_exception_data("list", errors) from None
+
+
+# TOML has lists, a frozen case holds tuples.
+from_list = (Field(strict=False), WrapValidator(_few_errors))
 Number = Annotated[float, AfterValidator(_within_scale)]
 Positive = Annotated[float, Field(gt=0), AfterValidator(_within_scale)]
 NonNegative = Annotated[float, Field(ge=0), AfterValidator(_within_scale)]
 Angle = Annotated[float, Field(ge=-90, le=90), AfterValidator(_within_scale)]
 Weight = Annotated[float, Field(ge=0, le=1), AfterValidator(_within_scale)]
-from_list = Field(strict=False)  # TOML has lists, a frozen case holds tuples
-Series = Annotated[tuple[Number, ...], from_list]
-Lengths = Annotated[tuple[Positive, ...], from_list]
-Schedule = Annotated[tuple[Number, ...], from_list, Field(min_length=1)]
+Series = Annotated[tuple[Number, ...], *from_list]
+Lengths = Annotated[tuple[Positive, ...], *from_list]
+Schedule = Annotated[tuple[Number, ...], Field(min_length=1), *from_list]
 from_text = Field(strict=False)  # TOML has texts, a case holds members of an enum
 
 
@@ -92,17 +111,16 @@ class Table(BaseModel):
         try:
             table = handler(data)
         except ValidationError as error:
-            found = error.errors(include_url=False)
             if not isinstance(data, dict):
                 raise
-            errors = [_details(each["type"], each["loc"], each["input"], each.get("ctx")) for each in found]
+            found = error.errors(include_url=False)
+            errors = [_repeated(each) for each in found]
             table = cls._without({str(each["loc"][0]) for each in found}, data)
         # A rule that needs a wrong key meets no attribute: it waits until that key is right.
         with suppress(AttributeError) if errors else nullcontext():
             table._fill()
             for broken in table._broken_rules():
-                context = {"what": broken.what, "remedy": broken.remedy}
-                errors.append(_details("rule", broken.key, broken.found, context))
+                errors.append(_rule(broken))
         if errors:
             raise ValidationError.from_exception_data(cls.__name__, errors)
         return table
@@ -121,10 +139,14 @@ class Table(BaseModel):
         return table
 
 
-def _details(
-    kind: str, key: tuple[str | int, ...], found: object, context: dict[str, Any] | None
-) -> InitErrorDetails:
-    return InitErrorDetails(type=PydanticCustomError(kind, kind, context), loc=key, input=found)
+def _rule(broken: Broken) -> InitErrorDetails:
+    error = PydanticCustomError("rule", "rule", {"what": broken.what, "remedy": broken.remedy})
+    return InitErrorDetails(type=error, loc=broken.key, input=broken.found)
+
+
+def _repeated(error: ErrorDetails) -> InitErrorDetails:
+    kind = PydanticCustomError(error["type"], error["type"], error.get("ctx"))
+    return InitErrorDetails(type=kind, loc=error["loc"], input=error["input"])
 
 
 def _tell_alternatives(schema: dict[str, Any], model: type[Table]) -> None:
