@@ -13,23 +13,26 @@ from typing import Any, NamedTuple
 KeyPath = tuple[str | int, ...]
 
 LARGEST_TEXT = 1_000_000
-"""Most characters of a file: the largest that is read well within half a second."""
+"""Most characters of a file; with the limits below, whatever is wrong is told within half a second."""
 MOST_PARTS = 32
 """Most parts of a dotted key: the time that tomllib takes grows with their square."""
 MOST_STATEMENTS = 1000
 """Most keys and table headers of a file: the time to tell what is wrong grows with them."""
+MOST_MARKS = 50_000
+"""Most commas, brackets and signs of equality outside texts, and so most entries of all lists together."""
 
 _TOKEN = re.compile(
     r'"""(?:\\.|[^\\])*?(?:"{3,5}|\\?\Z)'
     r"|'''.*?(?:'{3,5}|\Z)"
     r'|"(?:\\[^\n]|[^"\\\n])*"?'
     r"|'[^'\n]*'?"
-    r"|#[^\n]*"
-    r"|[\[\]{}.,=\n]",
+    r"|#[^\n]*(?:\n[ \t\n]*#[^\n]*)*"
+    r"|\n[ \t\n]*"
+    r"|[\[\]{}.,=]",
     re.DOTALL,
 )
 _HEADER = re.compile(r"[ \t]*\[")
-_NOTHING = re.compile(r"[ \t\r]*(#.*)?")
+_NOTHING = re.compile(r"[ \t\n]*(#.*)?", re.DOTALL)
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 _POSITION = re.compile(r" \(at (?:line (\d+), column \d+|end of document)\)$")
 
@@ -72,7 +75,7 @@ def split(text: str) -> list[Statement]:
         line = text.count("\n", 0, text.index("\0")) + 1
         raise UnfitTextError(line, "holds a NUL character", "save the file as UTF-8 text, not as UTF-16")
     statements = []
-    start, line, first, depth, dots = 0, 1, 1, 0, 0
+    start, line, first, depth, dots, marks = 0, 1, 1, 0, 0, 0
     in_header = _HEADER.match(text)
     text = text.replace("\r\n", "\n") + "\n"
     for token in _TOKEN.finditer(text):
@@ -82,11 +85,15 @@ def split(text: str) -> list[Statement]:
             if dots == MOST_PARTS:
                 raise UnfitTextError(line, f"a key has more than {MOST_PARTS} parts", "shorten the key")
             continue
-        if mark in "[]{},=\n":
+        if mark[0] in "[]{},=\n":
             dots = 0
             depth += (mark in "[{") - (mark in "]}")
+            marks += mark[0] != "\n"
+            if marks > MOST_MARKS:
+                what = f"there are more than {MOST_MARKS} commas and brackets"
+                raise UnfitTextError(line, what, "give shorter lists")
         line += mark.count("\n")
-        if mark == "\n" and (depth <= 0 or in_header):
+        if mark[0] == "\n" and (depth <= 0 or in_header):
             statements.append(Statement(first, text[start : token.start()]))
             start, first, depth = token.end(), line, 0
             in_header = _HEADER.match(text, start)
@@ -122,7 +129,8 @@ class Located:
 
     def _enter(self, parsed: dict[str, Any], line: int) -> None:
         """Let the keys that follow belong to the table of a header, given as what tomllib makes of it."""
-        table, path, rest = self.data, (), parsed
+        table, rest = self.data, parsed
+        path: KeyPath = ()
         while rest:
             ((key, rest),) = rest.items()
             path = (*path, key)
