@@ -45,7 +45,7 @@ demo: $(RUN_STAMP) ## install into .venv and run one real case, cases/relaxation
 	@echo
 	@echo "What to look at: the regime is 'relaxation'. In every cycle the shoe sticks to the wheel, is carried"
 	@echo "along, breaks loose and slips back; stick_fraction is the part of the time that it sticks."
-	@echo "The time histories and spectra are in results/relaxation.h5, for instance"
+	@echo "The time histories and spectra are in results/relaxation.h5, for h5py, or for xarray with h5netcdf:"
 	@echo "  xarray.open_dataset('results/relaxation.h5', group='history', engine='h5netcdf')"
 	@echo "Next: change a value, as in  $(BIN)/brakecli run cases/relaxation.toml --set friction.coefficient=0.5 -o results/mine.h5"
 
