@@ -4,6 +4,7 @@ While ``NAME`` is written, ``.NAME.lock`` and ``.NAME.part`` stand beside it. Th
 holds it, however that ends, and the next process takes over whatever was left behind.
 """
 
+import errno
 import fcntl
 import os
 import signal
@@ -70,7 +71,7 @@ class OutputFile(FileIO):
         written = 0
         try:
             while written < len(view) and self.failure is None:
-                written += super().write(view[written:]) or 0
+                written += os.write(self.fileno(), view[written:])
         except OSError as error:
             self.failure = error
         return len(view)
@@ -87,7 +88,7 @@ class OutputFile(FileIO):
     def truncate(self, size: int | None = None) -> int:
         """Set the length, or remember why that failed."""
         try:
-            super().truncate(size)
+            os.ftruncate(self.fileno(), self.tell() if size is None else size)
         except OSError as error:
             self.failure = self.failure or error
         return self.tell() if size is None else size
@@ -158,11 +159,12 @@ def _checked_target(path: Path, *, force: bool) -> Path:
                 f"{path}: cannot write: the directory {target.parent} does not exist; "
                 "create it, or choose another output with -o"
             )
-        mode = target.stat().st_mode if target.exists() else None
+        try:
+            mode = target.stat().st_mode
+        except FileNotFoundError:
+            return target
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
         raise _cannot_write(path, error) from error
-    if mode is None:
-        return target
     if stat.S_ISDIR(mode):
         raise CannotWriteError(f"{path}: cannot write: this is a directory; name a file in it with -o")
     if not stat.S_ISREG(mode):  # replacing /dev/null would harm more than this command
@@ -275,7 +277,8 @@ def _exists(path: Path) -> UsageError:
 
 def _cannot_write(path: Path, error: OSError | ValueError) -> CannotWriteError:
     reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+    full = isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+    remedy = "free some space there, or choose" if full else "choose"
     return CannotWriteError(
-        f"{path}: cannot write: {reason[:1].lower()}{reason[1:]}; "
-        "make room for it there, or choose another output with -o"
+        f"{path}: cannot write: {reason[:1].lower()}{reason[1:]}; {remedy} another output with -o"
     )

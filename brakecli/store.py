@@ -54,11 +54,16 @@ class ResultFile:
     """
 
     def __init__(self, output: OutputFile) -> None:
-        """Begin an empty result in the file that `new_result` has opened."""
+        """Prepare a result in the file that `new_result` has opened."""
         self._output = output
         self._tables: dict[str, _Table] = {}
-        # v108: headers with checksums, and every HDF5 since 1.8 reads them. No cache, as chunks are written whole
-        self._file = h5py.File(output, "w", libver=("v108", "v108"), rdcc_nbytes=0)
+        self._file: Any = None
+
+    def open(self) -> None:
+        """Begin with an empty file."""
+        with self._hdf5():
+            # v108: headers with checksums, and any HDF5 since 1.8 reads it. No cache, as chunks are written whole
+            self._file = h5py.File(self._output, "w", libver=("v108", "v108"), rdcc_nbytes=0)
         self.set_attributes({"format": FORMAT, "format_version": FORMAT_VERSION})
 
     def set_attributes(self, attributes: Mapping[str, Any], group: str = "/") -> None:
@@ -99,10 +104,10 @@ class ResultFile:
         checked = _checked(f"{group}/{name}", values, column.dtype)
         if checked.dtype.kind == "S":
             column.attributes["_Encoding"] = "utf-8"  # by which xarray knows text from bytes
-        lengths = {axis: self._file[group][axis].shape[0] for axis in dims if axis != name}
-        if checked.shape != tuple(lengths.get(axis, checked.size) for axis in dims):
-            raise ValueError(f"{group}/{name}: its shape {checked.shape} is not that of its axes {lengths}")
         with self._hdf5():
+            lengths = {axis: self._file[group][axis].shape[0] for axis in dims if axis != name}
+            if checked.shape != tuple(lengths.get(axis, checked.size) for axis in dims):
+                raise ValueError(f"{group}/{name}: its shape {checked.shape} is not that of its axes {lengths}")
             self._create(group, column, checked.shape, checked.dtype, _chunk(checked.shape))[...] = checked
 
     def append(self, group: str, rows: Mapping[str, ArrayLike]) -> None:
@@ -155,17 +160,23 @@ class ResultFile:
                 if table.columns and (table.rows_waiting or not table.rows_stored):
                     self._store(group, table)
             self._file.attrs["complete"] = 1
-            self._file.close()
+        self.close()
         self._output.write(digest(self._output, self._output.seek(0, 2)))
         self._output.publish()
 
     def close(self) -> None:
-        """Let go of the file; without an earlier `commit`, what was written is lost."""
+        """Let go of the file, before its output is closed; without an earlier `commit` all is lost."""
         with signals_deferred():
-            self._file.close()
+            if self._file is not None:
+                self._file.close()
+            self._file = None
 
     @contextmanager
     def _hdf5(self) -> Iterator[None]:
+        """Around all calls of HDF5.
+
+        Its objects have to die within, too: Python loses an exception that a handler raises while one dies.
+        """
         self.check()
         with signals_deferred():
             yield
@@ -175,13 +186,16 @@ class ResultFile:
         """Write the waiting rows behind the stored ones."""
         end = table.rows_stored + table.rows_waiting
         with self._hdf5():
-            for name, column in table.columns.items():
-                if not table.rows_stored:  # only now, so that a short series gets a chunk of just its length
-                    self._create(group, column, (0,), column.dtype, (max(1, end),))
-                dataset = self._file[group][name]
-                dataset.resize(end, axis=0)
-                dataset[table.rows_stored :] = table.waiting[name][: table.rows_waiting]
+            for column in table.columns.values():
+                self._extend(group, column, table, end)
         table.rows_stored, table.rows_waiting = end, 0
+
+    def _extend(self, group: str, column: _Column, table: _Table, end: int) -> None:
+        if not table.rows_stored:  # created only now, so that a short series gets a chunk of just its length
+            self._create(group, column, (0,), column.dtype, (max(1, end),))
+        dataset = self._file[group][column.name]
+        dataset.resize(end, axis=0)
+        dataset[table.rows_stored :] = table.waiting[column.name][: table.rows_waiting]
 
     def _create(
         self,
@@ -218,6 +232,7 @@ def new_result(path: Path, *, force: bool) -> Iterator[ResultFile]:
     with new_output(path, force=force) as output:
         result = ResultFile(output)
         try:
+            result.open()
             yield result
         finally:
             result.close()

@@ -122,7 +122,7 @@ def is_hdf5(path: Path) -> bool:
 
 
 def digest(file: RawIOBase, length: int) -> bytes:
-    """The SHA-256 of the first `length` bytes."""
+    """The SHA-256 of the first `length` bytes; `file` is left standing behind them."""
     file.seek(0)
     total = hashlib.sha256()
     while length > 0 and (block := file.read(min(length, 1 << 20))):
@@ -143,8 +143,7 @@ def _verify(file: RawIOBase) -> None:
     behind = file.seek(0, 2) - end
     if behind == 0:
         return
-    file.seek(max(0, end))
-    if behind != 32 or file.read(32) != digest(file, end):
+    if behind != 32 or digest(file, end) != file.read(32):
         raise ValueError("the file is truncated, damaged or was altered by another program")
 
 
