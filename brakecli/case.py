@@ -139,7 +139,7 @@ class Contact(Table):
     """The elastic contact between shoe and wheel."""
 
     half_length: Annotated[Positive, quantity("m", "half length a of the contact")]
-    stiffness: Annotated[Positive, quantity("N/m²", "stiffness k of the contact per unit length")]
+    stiffness: Annotated[Positive, quantity("N/m²", "stiffness k of the contact per unit of its length")]
     evaluator: Annotated[
         Evaluator, from_text, Field(description='how the contact force is computed; "auto" takes the cheapest')
     ] = Evaluator.AUTO
@@ -154,14 +154,14 @@ class Contact(Table):
 
 
 class Profile(Table):
-    """A rough surface as a sum of harmonics; empty lists are a smooth surface."""
+    """A rough surface as a sum of sines; empty lists are a smooth surface."""
 
     alternatives = (("wavelengths",), ("wavenumbers",))
 
-    amplitudes: Annotated[Series, quantity("m", "amplitude of each harmonic")]
-    wavelengths: Annotated[Lengths | None, quantity("m", "wavelength of each harmonic")] = None
-    wavenumbers: Annotated[Lengths | None, quantity("rad/m", "wavenumber of each harmonic")] = None
-    phases_deg: Annotated[Series, quantity("deg", "phase of each harmonic, 0 if left out")] = Field(
+    amplitudes: Annotated[Series, quantity("m", "amplitude of each sine")]
+    wavelengths: Annotated[Lengths | None, quantity("m", "wavelength of each sine")] = None
+    wavenumbers: Annotated[Lengths | None, quantity("rad/m", "wavenumber of each sine")] = None
+    phases_deg: Annotated[Series, quantity("deg", "phase of each sine, 0 if left out")] = Field(
         default_factory=tuple
     )
 

@@ -118,7 +118,6 @@ W_BELT, W_FRICTION, W_DASHPOTS, W_LOAD, W_ROUGHNESS, W_SCHEME, STORE_X_BEFORE, F
 WORK_SIZE = 8
 
 
-
 @intrinsic  # type: ignore[untyped-decorator]
 def _without_count(typing: Any, array: Any) -> Any:
     def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -133,5 +132,7 @@ def _same(array: NDArray[np.float64]) -> NDArray[np.float64]:
     return array
 
 
-borrowed: Callable[[NDArray[np.float64]], NDArray[np.float64]] = _same if numba.config.DISABLE_JIT else _without_count
+borrowed: Callable[[NDArray[np.float64]], NDArray[np.float64]] = (
+    _same if numba.config.DISABLE_JIT else _without_count
+)
 """The array without its reference count, which costs a kernel 10 ns for each array that it passes on."""

@@ -72,7 +72,7 @@ class Failure(IntEnum):
 _SENTENCES = {
     Failure.NONE: "the run reached its end",
     Failure.UNCONVERGED: (
-        "the iteration of a step did not converge; reduce solver.step, take solver.iteration = \"newton\", "
+        'the iteration of a step did not converge; reduce solver.step, take solver.iteration = "newton", '
         "or set solver.allow_unconverged = true to go on and count such steps"
     ),
     Failure.NO_SOLUTION: (
@@ -81,7 +81,6 @@ _SENTENCES = {
     ),
     Failure.DIVERGED: "the motion grew beyond all bounds; reduce solver.step, or look at the stability of the case",
     Failure.NOT_CLOSED: (
-        "the pad may no longer touch everywhere, so the closed form does not hold; "
-        "take contact.evaluator = \"auto\""
+        'the pad may no longer touch everywhere, so the closed form does not hold; take contact.evaluator = "auto"'
     ),
 }

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli import contact, schemes
-from brakecli.case import Case, Evaluator, InitialState, Profile, Start
+from brakecli.case import Case, Evaluator, Profile
 from brakecli.coefficients import coefficients
 from brakecli.contact.pad import build_pad, default_nodes
 from brakecli.integrate import Drive, Grid
@@ -157,7 +157,9 @@ def set_up(case: Case) -> Setup:
         ),
         weights=Weights(times.step, *theta),
         belt=schedule(
-            wheel_case.times or (0.0,), wheel_case.angular_speeds or (wheel_case.angular_speed or 0.0,), wheel_case.radius
+            wheel_case.times or (0.0,),
+            wheel_case.angular_speeds or (wheel_case.angular_speed or 0.0,),
+            wheel_case.radius,
         ),
         load=schedule(load.times or (0.0,), load.forces or (load.force or 0.0,)),
         shoe=shoe,

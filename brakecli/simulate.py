@@ -156,9 +156,7 @@ class Motion:
         x, y = initial.x, initial.y
         if initial.at is InitialState.EQUILIBRIUM:
             load = float(value_at(setup.load, 0.0))
-            rest = equilibrium(
-                setup.coefficients, setup.evaluate, setup.pad, setup.wheel, load, setup.belt_speed
-            )
+            rest = equilibrium(setup.coefficients, setup.evaluate, setup.pad, setup.wheel, load, setup.belt_speed)
             x, y = x + rest.x, y + rest.y
         velocity, acceleration = (initial.vx, initial.vy), (0.0, 0.0)
         self._evaluate_at(x, y, 0.0)
@@ -207,7 +205,5 @@ class Motion:
         work.unconverged_steps = int(counts[integrate.UNCONVERGED])
         work.non_unique_steps = int(counts[integrate.RISING])
         work.most_evaluations = int(counts[integrate.MOST])
-        work.evaluators = {
-            kind: int(n) for kind, n in zip(KINDS, counts[integrate.KIND_0 :], strict=True) if n
-        }
+        work.evaluators = {kind: int(n) for kind, n in zip(KINDS, counts[integrate.KIND_0 :], strict=True) if n}
         work.unconverged = self.events[: min(work.unconverged_steps, integrate.EVENTS)].copy()

@@ -26,6 +26,7 @@ from brakecli.kernels import (
     FRACTION,
     KIND,
     NORMAL_FORCE,
+    SCRATCH,
     STIFFNESS,
     STORE,
     STORE_X,
@@ -56,22 +57,23 @@ def full_contact(
     k, length, n = pad[K], 2.0 * pad[HALF], int(pad[WHEEL_TERMS])
     at_omega, at_full = int(pad[AT_WHEEL]) + n, int(pad[AT_FULL])
     at_ss, at_cc, at_pr = int(pad[AT_SS]), int(pad[AT_CC]), int(pad[AT_PR])
-    mean_force = -k * length * pad[SHOE_MEAN]  # k ∫ (f2 - f1)
-    tangential, square, square_x = 0.0, pad[SHOE_SQUARE], 0.0  # ∂F/∂x, ∫ (f2 - f1)² and its derivative by x
+    sines, cosines = contact[SCRATCH : SCRATCH + n], contact[SCRATCH + n : SCRATCH + 2 * n]
+    mean_force, tangential = -k * length * pad[SHOE_MEAN], 0.0  # k ∫ (f2 - f1) and its derivative by x
     for i in range(n):
         omega = pad[at_omega + i]
-        sine, cosine = math.sin(omega * x + angles[i]), math.cos(omega * x + angles[i])
-        mean_force += pad[at_full + i] * sine
-        tangential += pad[at_full + i] * omega * cosine
-        ss, cc = -2.0 * pad[at_pr + i], -2.0 * pad[at_pr + n + i]
-        square += cosine * ss + sine * cc
+        psi = omega * x + angles[i]
+        sines[i], cosines[i] = math.sin(psi), math.cos(psi)
+        mean_force += pad[at_full + i] * sines[i]
+        tangential += pad[at_full + i] * omega * cosines[i]
+    square, square_x = pad[SHOE_SQUARE], 0.0  # ∫ (f2 - f1)² and its derivative by x
+    for i in range(n):
+        ss, cc = -pad[at_pr + i], -pad[at_pr + n + i]
+        square += cosines[i] * ss + sines[i] * cc
         for j in range(n):
-            psi = pad[at_omega + j] * x + angles[j]
-            other_s, other_c = pad[at_ss + i * n + j] * math.cos(psi), pad[at_cc + i * n + j] * math.sin(psi)
-            square += cosine * other_s + sine * other_c
-            ss += 2.0 * other_s
-            cc += 2.0 * other_c
-        square_x += omega * (cosine * cc - sine * ss)
+            ss += pad[at_ss + i * n + j] * cosines[j]
+            cc += pad[at_cc + i * n + j] * sines[j]
+        square += cosines[i] * ss + sines[i] * cc
+        square_x += 2.0 * pad[at_omega + i] * (cosines[i] * cc - sines[i] * ss)
     contact[NORMAL_FORCE] = mean_force - k * length * y
     contact[STIFFNESS] = k * length
     contact[TANGENTIAL] = tangential

@@ -22,7 +22,6 @@ from brakecli.kernels import (
     STORE,
     STORE_X,
     TANGENTIAL,
-    VALID,
     kernel,
     vector,
 )

@@ -43,6 +43,8 @@ from brakecli.kernels import (
 
 WEIGHTS = 3
 LAG = 1
+MEMORY = (X, Y, X_OLD, Y_OLD)
+VELOCITIES: tuple[int, ...] = ()
 
 
 def weighted_time(s: Weights) -> float:

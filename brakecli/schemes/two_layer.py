@@ -43,6 +43,8 @@ from brakecli.kernels import (
 
 WEIGHTS = 2
 LAG = 0
+MEMORY = (X, Y, VX, VY)
+VELOCITIES = (VX, VY)
 
 
 def weighted_time(s: Weights) -> float:

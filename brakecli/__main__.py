@@ -1,0 +1,5 @@
+"""`python -m brakecli` is `brakecli`."""
+
+from brakecli.cli import main
+
+main()

@@ -1,0 +1,178 @@
+"""What a case will cost and which limits it meets, before anything is computed."""
+
+import math
+from dataclasses import dataclass
+
+from brakecli.analysis.precision import RESOLVED, StepLimits, natural_frequencies, step_limits
+from brakecli.case import Iteration
+from brakecli.contact.pad import NODES_PER_WAVE
+from brakecli.errors import RefusedError
+from brakecli.history import ROW_BYTES
+from brakecli.setup import Setup
+
+MOST_STEPS = 1e11
+MOST_SECONDS = 24 * 3600.0
+MOST_BYTES = 1e11
+MOST_TABLE_BYTES = 4e9
+
+# Seconds, measured with `make cases` on one core; they only serve to tell minutes from days.
+_STEP_SECONDS = 1.5e-7
+_NODE_SECONDS = 1.2e-9  # per node, and again per node and wave of the wheel:
+_NODE_WAVE_SECONDS = 4e-10
+_EXACT_SECONDS = 1.5e-7  # per pair of waves in each cell
+_EVALUATIONS = 3.0  # of the contact in a step
+
+_UNSTABLE = 1e-5  # growth per step that no rounding of the eigenvalues explains
+_COARSE_NODES = NODES_PER_WAVE / 2
+
+
+@dataclass(frozen=True)
+class Check:
+    """The findings, in SI units; frequencies in Hz. `warnings` are sentences that name key and number."""
+
+    belt_speed: float
+    contact_stiffness: float
+    natural_frequencies: tuple[float, float]  # on the links and the contact that touches everywhere
+    link_frequencies: tuple[float, float]
+    passing_frequency: float  # of the shortest wave of the wheel
+    step: float
+    steps: int
+    steps_per_period: float
+    limits: StepLimits
+    evaluator: str
+    nodes: int
+    nodes_per_wave: float | None
+    seconds: float
+    memory: float  # bytes
+    file_size: float  # bytes
+    adjustments: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+
+def check(setup: Setup) -> Check:
+    """Look at a case without stepping it."""
+    case, times = setup.case, setup.timing
+    stiffness = setup.contact_stiffness
+    frequencies = natural_frequencies(setup.coefficients, stiffness)
+    speed = max(abs(float(value)) for value in setup.belt.values)
+    passing = speed * max(setup.wheel.turns, default=0.0)
+    shortest = max([*setup.shoe.turns, *setup.wheel.turns], default=0.0)
+    waves = 2.0 * case.contact.half_length * shortest
+    limits = step_limits(setup.coefficients, setup.weights, setup.scheme, stiffness, setup.wheel)
+    per_period = 1.0 / (frequencies[1] * times.step) if frequencies[1] > 0.0 else math.inf
+    found = Check(
+        belt_speed=setup.belt_speed,
+        contact_stiffness=stiffness,
+        natural_frequencies=frequencies,
+        link_frequencies=natural_frequencies(setup.coefficients, 0.0),
+        passing_frequency=passing,
+        step=times.step,
+        steps=times.steps,
+        steps_per_period=per_period,
+        limits=limits,
+        evaluator=setup.evaluator,
+        nodes=setup.nodes,
+        nodes_per_wave=setup.nodes / waves if setup.nodes and waves > 0.0 else None,
+        seconds=times.steps * _seconds_per_step(setup, waves),
+        memory=1.5e8 + 8.0 * setup.nodes * (2 * len(setup.wheel.g) + 2),
+        file_size=float(times.samples) * ROW_BYTES + 1e5,
+        adjustments=times.adjustments,
+        warnings=(),
+    )
+    return _with_warnings(setup, found)
+
+
+def _seconds_per_step(setup: Setup, waves: float) -> float:
+    """A rough guess at the time of one step."""
+    n_1, n_2 = len(setup.shoe.g), len(setup.wheel.g)
+    if setup.evaluator == "exact":
+        return _STEP_SECONDS + _EVALUATIONS * _EXACT_SECONDS * (1.0 + waves) * (n_1 + n_2) ** 2
+    if setup.nodes:
+        return _STEP_SECONDS + _EVALUATIONS * setup.nodes * (_NODE_SECONDS + _NODE_WAVE_SECONDS * n_2)
+    return _STEP_SECONDS * (1.0 + n_2**2 / 20.0)
+
+
+def _with_warnings(setup: Setup, found: Check) -> Check:
+    """Add what a careful user would want to know before the run."""
+    case, limits, warnings = setup.case, found.limits, []
+    if found.steps_per_period < RESOLVED:
+        warnings.append(
+            f"solver.step: {found.steps_per_period:.3g} steps per period of the fastest motion "
+            f"({found.natural_frequencies[1]:.4g} Hz): it is not resolved; take a step of at most "
+            f"{1.0 / (RESOLVED * found.natural_frequencies[1]):.2g} s"
+        )
+    if found.passing_frequency * found.step > 1.0 / RESOLVED:
+        warnings.append(
+            f"solver.step: {1.0 / (found.passing_frequency * found.step):.3g} steps per passing wave of the wheel "
+            f"({found.passing_frequency:.4g} Hz); take a step of at most "
+            f"{1.0 / (RESOLVED * found.passing_frequency):.2g} s"
+        )
+    nyquist = 0.5 / setup.timing.interval
+    for what, frequency in (
+        ("the contact resonance", found.natural_frequencies[1]),
+        ("the shortest wave of the wheel", found.passing_frequency),
+    ):
+        if frequency > nyquist:
+            warnings.append(
+                f"output.sample_interval: {what} at {frequency:.4g} Hz lies above half the sampling rate "
+                f"({nyquist:.4g} Hz) and would appear at a wrong place in the spectra; sample every "
+                f"{0.4 / frequency:.2g} s or more often"
+            )
+    if found.nodes_per_wave is not None and found.nodes_per_wave < _COARSE_NODES:
+        warnings.append(
+            f"contact.nodes: {found.nodes_per_wave:.3g} nodes per shortest wavelength; "
+            f"take at least {math.ceil(found.nodes * _COARSE_NODES / found.nodes_per_wave)}, or leave nodes out"
+        )
+    if case.solver.iteration is Iteration.FIXED_POINT and limits.contraction >= 1.0:
+        warnings.append(
+            f"solver.iteration: the fixed-point iteration may diverge (its bound of contraction is "
+            f'{limits.contraction:.3g}, above 1); take "newton", or a step of at most '
+            f"{found.step / math.sqrt(limits.contraction):.2g} s"
+        )
+    if not limits.unique:
+        warnings.append(
+            "friction.coefficient: a step may have more than one solution, as friction can wedge the shoe into the "
+            "wheel within a step; reduce solver.step or the coefficient"
+        )
+    if 1.0 + 1e-3 / found.steps < limits.growth and limits.growth > 1.0 + _UNSTABLE:
+        warnings.append(
+            f"solver.theta: the scheme itself multiplies disturbances by {limits.growth:.6g} in each step; "
+            + _stable_remedy(setup)
+        )
+    if setup.load.values.min() < 0.0:
+        warnings.append("load: the force is negative at times, it lifts the shoe off the wheel")
+    return Check(**{**found.__dict__, "warnings": tuple(warnings)})
+
+
+def _stable_remedy(setup: Setup) -> str:
+    if setup.scheme.WEIGHTS == 2:
+        return "take weights that add up to 1 or more, such as [0.5, 0.5], or reduce solver.step"
+    return "reduce solver.step, or take theta = [0.25, 0.5, 0.25]"
+
+
+def refuse(setup: Setup, found: Check, free_bytes: float) -> None:
+    """Raise RefusedError where a run would be too large, or unstable by its scheme."""
+    size = (
+        f"about {found.steps:.3g} steps, {_duration(found.seconds)}, {found.memory / 1e6:.0f} MB of memory, "
+        f"a file of {found.file_size / 1e6:.3g} MB"
+    )
+    remedy = "reduce solver.duration, or increase solver.step or output.sample_interval"
+    if found.steps > MOST_STEPS or found.seconds > MOST_SECONDS:
+        raise RefusedError(f"the run is too long: {size}; {remedy}")
+    if found.file_size > min(MOST_BYTES, free_bytes):
+        raise RefusedError(f"the file would be too large, {free_bytes / 1e6:.3g} MB are free: {size}; {remedy}")
+    if found.memory > MOST_TABLE_BYTES:
+        raise RefusedError(f"the contact's tables would be too large: {size}; reduce contact.nodes")
+    growth = found.limits.growth
+    if growth > 1.0 + _UNSTABLE and (growth - 1.0) * found.steps > 1.0:
+        raise RefusedError(
+            f"solver.theta: at this step the scheme is unstable, it multiplies disturbances by {growth:.6g} in "
+            f"each of {found.steps} steps; {_stable_remedy(setup)}"
+        )
+
+
+def _duration(seconds: float) -> str:
+    for unit, size in (("years", 3.156e7), ("days", 86400.0), ("hours", 3600.0), ("minutes", 60.0)):
+        if seconds >= 2.0 * size:
+            return f"{seconds / size:.3g} {unit}"
+    return f"{seconds:.2g} s"

@@ -1,0 +1,303 @@
+"""The command line: parse, call one function, print, exit. Heavy imports stay inside the commands."""
+
+import json
+import os
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from brakecli import __version__
+from brakecli.errors import BrakecliError, CannotWriteError, UsageError
+
+if TYPE_CHECKING:
+    from brakecli.case_reading import LoadedCase
+    from brakecli.check import Check
+    from brakecli.setup import Setup
+
+app = typer.Typer(
+    name="brakecli",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    help="Vibration of a brake shoe on a rough wheel: will it vibrate, how, and from which friction coefficient on.",
+)
+
+CaseArgument = Annotated[
+    str, typer.Argument(metavar="CASE.toml", help='Case file, or "-" for standard input.', show_default=False)
+]
+Override = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY.PATH=VALUE", help="Set a key of the case, the value in TOML; repeatable."),
+]
+AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output, nothing else.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but warnings and errors.")]
+Force = Annotated[bool, typer.Option("--force", help="Replace an existing output.")]
+
+
+class Terminated(BaseException):
+    """SIGTERM has arrived."""
+
+
+def main() -> None:
+    """Run the command line; every failure ends in a sentence on standard error and its exit code."""
+    signal.signal(signal.SIGTERM, _terminate)
+    try:
+        app()
+    except BrakecliError as error:
+        _end(str(error), error.exit_code)
+    except KeyboardInterrupt:
+        _end("interrupted; nothing was written", 130)
+    except Terminated:
+        _end("terminated; nothing was written", 143)
+    except MemoryError:
+        _end("out of memory; reduce contact.nodes, or sample less often", 3)
+    except BrokenPipeError:  # whoever read our output has gone
+        _silence_stdout()
+        sys.exit(0)
+
+
+def _terminate(number: int, frame: FrameType | None) -> None:
+    raise Terminated
+
+
+def _end(message: str, code: int) -> None:
+    for line in message.splitlines():
+        _tell(f"brakecli: {line}" if not line.startswith("brakecli") else line)
+    sys.exit(code)
+
+
+def _tell(message: str) -> None:
+    """One line on standard error, if there is one."""
+    try:
+        print(message, file=sys.stderr, flush=True)  # noqa: T201
+    except (OSError, ValueError):
+        pass
+
+
+def _print(text: str) -> None:
+    """Print results on standard output, which may be closed or full."""
+    if sys.stdout is None:
+        return
+    try:
+        print(text, flush=True)  # noqa: T201
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        _silence_stdout()
+        reason = (error.strerror or str(error)).lower()
+        raise CannotWriteError(f"standard output: cannot write: {reason}; redirect it elsewhere") from error
+
+
+def _silence_stdout() -> None:
+    """Let nothing try to write what is still in the buffer."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+
+
+def _print_json(numbers: dict[str, Any]) -> None:
+    _print(json.dumps(numbers, allow_nan=False, ensure_ascii=False, default=str))
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        _print(f"brakecli {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _common(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    pass
+
+
+@app.command("run")
+def run_command(
+    case: Annotated[
+        str,
+        typer.Argument(
+            metavar="CASE.toml",
+            help='Case file, "-" for standard input, or a result file, whose case is run again.',
+            show_default=False,
+        ),
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output", "-o", metavar="PATH", help="Result file  [default: the case's name with .h5, here]"
+        ),
+    ] = None,
+    overrides: Override = None,
+    force: Force = False,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+) -> None:
+    """Simulate one case; write time histories, spectra, regime and energy account to an HDF5 file."""
+    loaded = _load(case, overrides)
+    target = output or Path("case.h5" if case == "-" else Path(case).with_suffix(".h5").name)
+    if case != "-" and not _is_result(case) and target.exists() and Path(case).exists() and target.samefile(case):
+        raise UsageError(f"{target}: this is the case itself; choose another output with -o")
+    _announce_compilation(quiet)
+    from brakecli.report import run_table
+    from brakecli.run import run
+
+    with _progress(quiet) as bar:
+        report = run(loaded, target, force=force, begin=bar.begin, progress=bar.advance)
+    for line in (*report.check.adjustments, *(f"warning: {warning}" for warning in report.warnings)):
+        if not quiet or line.startswith("warning"):
+            _tell(f"brakecli: {line}")
+    if as_json:
+        seconds = {"solve_seconds": report.work.solve_seconds}
+        _print_json({"command": "run", "output": str(report.output), **report.numbers(), **seconds})
+    elif not quiet:
+        _print(run_table(report))
+    if report.failed:
+        _tell(f"brakecli: {report.output}: the history up to the failure was written")
+        raise BrakecliError(str(report.failure_sentence))
+
+
+@app.command("check")
+def check_command(
+    case: CaseArgument, overrides: Override = None, as_json: AsJson = False, quiet: Quiet = False
+) -> None:
+    """Validate a case and tell what a run would cost and which limits it meets, without stepping it."""
+    loaded = _load(case, overrides)
+    _announce_compilation(quiet)
+    import shutil
+
+    from brakecli.check import check, refuse
+    from brakecli.report import check_numbers, check_table
+    from brakecli.setup import set_up
+
+    setup = set_up(loaded.case)
+    found = check(setup)
+    if as_json:
+        _print_json({"command": "check", "valid": True, **check_numbers(found)})
+    elif not quiet:
+        _print(check_table(loaded.case.title, found))
+    for warning in found.warnings:
+        _tell(f"brakecli: warning: {warning}")
+    refuse(setup, found, float(shutil.disk_usage(Path.cwd()).free))
+
+
+@app.command("new")
+def new_command(
+    name: Annotated[str, typer.Argument(metavar="[NAME]", help="File to write, with or without .toml.")] = "case",
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Write a commented starter case that runs."""
+    from brakecli.case_reading import starter_text
+    from brakecli.output import new_output
+
+    path = Path(name if name.endswith(".toml") else f"{name}.toml")
+    with new_output(path, force=force) as file:
+        file.write(starter_text().encode())
+        file.publish()
+    if not quiet:
+        _print(f"{path}: written; run it with: brakecli run {path}")
+
+
+@app.command("schema")
+def schema_command() -> None:
+    """Print the JSON Schema of case files, for editors that know TOML."""
+    from brakecli.case import json_schema
+
+    _print(json.dumps(json_schema(), indent=2, ensure_ascii=False))
+
+
+@app.command("plot")
+def plot_command(
+    result: Annotated[Path, typer.Argument(metavar="FILE.h5", help="Result of a run.", show_default=False)],
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="PATH", help="Picture  [default: FILE.png, here]")
+    ] = None,
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Draw the histories, the motion relative to the wheel and the spectrum of a run (needs matplotlib)."""
+    from brakecli.plots import plot_run
+
+    target = output or Path(result.with_suffix(".png").name)
+    plot_run(result, target, force=force)
+    if not quiet:
+        _print(f"{target}: written")
+
+
+def _is_result(source: str) -> bool:
+    if source == "-":
+        return False
+    from brakecli.stored import is_hdf5
+
+    return is_hdf5(Path(source))
+
+
+def _load(source: str, overrides: list[str] | None) -> "LoadedCase":
+    """The case of a case file, or the stored case of a result file."""
+    from brakecli.case_reading import LoadedCase, parse_case, read_case
+
+    if source == "-" or Path(source).suffix == ".toml" or not _is_result(source):
+        return read_case(source, overrides or ())
+    from brakecli.stored import open_result
+
+    with open_result(Path(source), kind="run") as stored:
+        text, resolved = stored.attributes["case_toml"], stored.attributes["resolved_toml"]
+    again = parse_case(resolved, f"{source} (its resolved case)", overrides or ())
+    return LoadedCase(again.case, text, again.resolved)
+
+
+def _announce_compilation(quiet: bool) -> None:
+    """Kernels are compiled as they are imported, once for each version: say so before it takes seconds."""
+    from brakecli.kernels import cache_is_cold
+
+    if not quiet and cache_is_cold():
+        _tell("brakecli: compiling kernels, once for this version …")
+
+
+class _Bar:
+    """Progress on a terminal: steps, rate and time left. Elsewhere nothing."""
+
+    def __init__(self, bar: Any = None) -> None:
+        self._bar, self._task = bar, None
+
+    def begin(self, setup: "Setup", found: "Check") -> None:
+        if self._bar is not None:
+            self._task = self._bar.add_task("steps", total=found.steps)
+
+    def advance(self, steps: int) -> None:
+        if self._bar is not None:
+            self._bar.update(self._task, completed=steps)
+
+
+@contextmanager
+def _progress(quiet: bool) -> Iterator[_Bar]:
+    if quiet or sys.stderr is None or not sys.stderr.isatty():
+        yield _Bar()
+        return
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TaskProgressColumn,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+
+    columns: tuple[Any, ...] = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(show_speed=True))
+    with Progress(
+        *columns, MofNCompleteColumn(), TimeRemainingColumn(), console=Console(stderr=True), transient=True
+    ) as bar:
+        yield _Bar(bar)
+
+
+if __name__ == "__main__":
+    main()

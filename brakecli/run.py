@@ -1,0 +1,251 @@
+"""One run, from a case to a finished result file: what `brakecli run` does."""
+
+import shutil
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numba
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from brakecli import __version__
+from brakecli.analysis.energy import EnergyAccount
+from brakecli.analysis.regime import Context, Regime, Verdict, classify, forced_lines
+from brakecli.analysis.spectra import SPECTRAL, Spectrum, peak, spectrum
+from brakecli.case_reading import LoadedCase
+from brakecli.check import Check, check, refuse
+from brakecli.model import HISTORY, TIME, ContactState, Failure
+from brakecli.setup import Setup, set_up
+from brakecli.simulate import Motion, Work
+from brakecli.store import ResultFile, new_result
+
+
+@dataclass(frozen=True)
+class RunReport:
+    """Everything that a run has found out; numbers in SI units."""
+
+    output: Path
+    title: str
+    setup: Setup
+    check: Check
+    work: Work
+    energy: EnergyAccount
+    verdict: Verdict
+    spectrum_peak: float | None  # Hz, of vx
+    warnings: tuple[str, ...]
+
+    @property
+    def failed(self) -> bool:
+        """Whether the run ended before its time."""
+        return self.work.failure is not Failure.NONE
+
+    @property
+    def braking_torque(self) -> float:
+        """Mean torque of the friction force on the wheel's axis, R F_x, N m."""
+        return self.setup.case.wheel.radius * self.verdict.mean_friction_force
+
+    def numbers(self) -> dict[str, Any]:
+        """Names and values as `--json` gives them and the file's attributes hold them."""
+        work, verdict, solver = self.work, self.verdict, self.setup.case.solver
+        return {
+            "status": "failed" if self.failed else "done",
+            "failure": self.failure_sentence,
+            "regime": str(verdict.regime),
+            "excitation": str(verdict.excitation),
+            "frequency": verdict.frequency,
+            "amplitude": verdict.amplitude,
+            "settled_from": verdict.settled_from * self.setup.timing.interval,
+            "mean_friction_force": verdict.mean_friction_force,
+            "braking_torque": self.braking_torque,
+            "stick_fraction": verdict.stick_fraction,
+            "contact_loss_fraction": verdict.contact_loss_fraction,
+            "spectrum_peak": self.spectrum_peak,
+            "reasons": list(verdict.reasons),
+            "evidence": verdict.evidence,
+            "scheme": str(solver.scheme),
+            "theta": list(solver.theta),
+            "iteration": str(solver.iteration),
+            "step": self.setup.timing.step,
+            "evaluators": work.evaluators,
+            "nodes": self.setup.nodes,
+            "steps": work.steps,
+            "contact_evaluations": work.contact_evaluations,
+            "most_evaluations_in_a_step": work.most_evaluations,
+            "unconverged_steps": work.unconverged_steps,
+            "non_unique_steps": work.non_unique_steps,
+            "energy": {
+                **asdict(self.energy),
+                "closing_error": self.energy.closing_error,
+                "relative_closing_error": self.energy.relative_closing_error,
+            },
+            "adjustments": list(self.check.adjustments),
+            "warnings": list(self.warnings),
+        }
+
+    @property
+    def failure_sentence(self) -> str | None:
+        """What ended the run before its time."""
+        if not self.failed:
+            return None
+        return f"t = {self.work.failure_time:.6g} s: {self.work.failure.sentence}"
+
+
+def run(
+    loaded: LoadedCase,
+    output: Path,
+    *,
+    force: bool,
+    begin: Callable[[Setup, Check], None] = lambda setup, found: None,
+    progress: Callable[[int], None] = lambda steps: None,
+) -> RunReport:
+    """Simulate a case and write its result file.
+
+    `begin` is told of the run before it starts, `progress` the steps done. Raises RefusedError,
+    CannotWriteError or UsageError before anything is computed, CannotWriteError also later; a run that fails
+    numerically is written up to there and reported.
+    """
+    setup = set_up(loaded.case)
+    found = check(setup)
+    with new_result(output, force=force) as result:
+        refuse(setup, found, float(shutil.disk_usage(output.resolve().parent).free))
+        begin(setup, found)
+        _declare_history(result)
+        interval = setup.timing.interval
+
+        def sink(rows: NDArray[np.float64]) -> None:
+            first = result.rows("history")
+            columns = dict(zip(HISTORY, rows.T, strict=True))
+            result.append("history", {"time": interval * np.arange(first, first + len(rows)), **columns})
+
+        motion = Motion(setup)
+        work, energy = motion.run(sink, progress)
+        report = _analyse(setup, found, work, energy, result, output)
+        _write(result, loaded, report)
+        result.commit()
+    return report
+
+
+@dataclass(frozen=True)
+class _Written:
+    """The history of a file that is being written, as the analysis reads it."""
+
+    result: ResultFile
+    interval: float
+
+    @property
+    def samples(self) -> int:
+        return self.result.rows("history")
+
+    def read(self, name: str, start: int, stop: int) -> NDArray[np.float64]:
+        return self.result.read("history", name, start, stop)
+
+
+def context(setup: Setup) -> Context:
+    """What the classifier is told of a case."""
+    steady = len(setup.belt.times) == 1 and len(setup.load.times) == 1
+    highest = 0.5 / setup.timing.interval
+    lines = forced_lines(setup.belt_speed, [float(turns) for turns in setup.wheel.turns], highest)
+    return Context(setup.belt_speed, steady, lines)
+
+
+def _analyse(
+    setup: Setup, found: Check, work: Work, energy: EnergyAccount, result: ResultFile, output: Path
+) -> RunReport:
+    """Regime, spectra and warnings of the finished history; the spectra go into the file at once."""
+    history = _Written(result, setup.timing.interval)
+    verdict = classify(history, context(setup))
+    if work.failure is not Failure.NONE:
+        reason = f"the run ended early: {work.failure.sentence}"
+        verdict = Verdict(
+            **{**verdict.__dict__, "regime": Regime.UNDECIDED, "frequency": None, "reasons": (reason,)}
+        )
+    lines = spectrum(history, verdict.settled_from)
+    _write_spectrum(result, lines)
+    warnings = list(found.warnings)
+    if work.unconverged_steps and work.failure is Failure.NONE:
+        warnings.append(
+            f"{work.unconverged_steps} of {work.steps} steps did not converge, as the case allows; their times and "
+            "residuals are in the file, the history is not to be trusted there"
+        )
+    if work.non_unique_steps:
+        warnings.append(
+            f"{work.non_unique_steps} steps met a point where their solution need not be unique (the contact "
+            "force rises with itself); reduce solver.step or friction.coefficient"
+        )
+    top = peak(lines.frequency, lines.density["vx"])
+    return RunReport(output, setup.case.title, setup, found, work, energy, verdict, top, tuple(warnings))
+
+
+def _declare_history(result: ResultFile) -> None:
+    result.axis("history", "time", TIME.units, TIME.long_name)
+    for name, quantity in HISTORY.items():
+        if name == "state":
+            flags = {
+                "flag_values": np.array([int(state) for state in ContactState], dtype=np.int8),
+                "flag_meanings": " ".join(state.name.lower() for state in ContactState),
+            }
+            result.variable(
+                "history", name, ("time",), quantity.units, quantity.long_name, dtype=np.int8, attributes=flags
+            )
+        else:
+            result.variable("history", name, ("time",), quantity.units, quantity.long_name)
+
+
+def _write_spectrum(result: ResultFile, lines: Spectrum) -> None:
+    result.axis("spectrum", "frequency", "Hz", "frequency", lines.frequency)
+    for name in SPECTRAL:
+        quantity = HISTORY[name]
+        result.variable(
+            "spectrum",
+            name,
+            ("frequency",),
+            f"({quantity.units})2 Hz-1",
+            f"power spectral density of: {quantity.long_name}",
+            lines.density[name],
+        )
+    result.set_attributes({"first_sample": lines.start, "segments": lines.segments, "window": "hann"}, "spectrum")
+
+
+def _write(result: ResultFile, loaded: LoadedCase, report: RunReport) -> None:
+    """Everything but the arrays: the case, the versions, the numbers."""
+    numbers = report.numbers()
+    groups = {"regime/evidence": "evidence", "energy": "energy", "evaluators": "evaluators"}
+    result.set_attributes(
+        {
+            "kind": "run",
+            "title": report.title,
+            "case_toml": loaded.text,
+            "resolved_toml": loaded.resolved,
+            "brakecli_version": __version__,
+            **_versions(),
+            **_present({name: value for name, value in numbers.items() if name not in groups.values()}),
+        }
+    )
+    for group, name in groups.items():
+        result.set_attributes(_present(numbers[name]), group)
+    if len(report.work.unconverged):
+        result.axis(
+            "unconverged", "event", "1", "steps that did not converge", np.arange(len(report.work.unconverged))
+        )
+        for column, (name, units) in enumerate({"time": "s", "residual": "N"}.items()):
+            values = np.nan_to_num(report.work.unconverged[:, column], nan=np.finfo(float).max)
+            result.variable("unconverged", name, ("event",), units, f"{name} of an unconverged step", values)
+
+
+def _versions() -> dict[str, str]:
+    return {
+        "numpy_version": np.__version__,
+        "scipy_version": scipy.__version__,
+        "numba_version": numba.__version__,
+        "h5py_version": h5py.__version__,
+        "hdf5_version": h5py.version.hdf5_version,
+    }
+
+
+def _present(values: Mapping[str, Any]) -> dict[str, Any]:
+    """The values that are there: an attribute cannot be nothing, nor an empty list."""
+    return {name: value for name, value in values.items() if value is not None and value != []}
