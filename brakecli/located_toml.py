@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 KeyPath = tuple[str | int, ...]
 
-LARGEST_TEXT = 1_000_000
+LARGEST_TEXT = 500_000
 """Most characters of a file; with the limits below, whatever is wrong is told within half a second."""
 MOST_PARTS = 32
 """Most parts of a dotted key: the time that tomllib takes grows with their square."""
@@ -136,6 +136,7 @@ class Located:
             path = (*path, key)
             inner = table.setdefault(key, [] if isinstance(rest, list) else {})
             if isinstance(rest, list) and isinstance(inner, list):
+                self.lines.setdefault(path, line)
                 inner.append({})
                 rest = {}
             if isinstance(inner, list) and inner:
