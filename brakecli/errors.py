@@ -43,6 +43,7 @@ class CaseError(BrakecliError):
     exit_code = 2
 
     def __init__(self, problems: Sequence[Problem]) -> None:
+        """Tell every problem, a line each."""
         super().__init__("\n".join(str(problem) for problem in problems))
         self.problems = tuple(problems)
 

@@ -10,13 +10,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
-import numba
 import numpy as np
-from numba import float64, types, void
+from numba import float64, njit, types, void
 from numba.core import cgutils
+from numba.core import config as numba_config
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
+config: Any = numba_config  # its settings come from the environment, so type checkers know none of them
 F = TypeVar("F", bound=Callable[..., Any])
 
 
@@ -68,20 +69,19 @@ CACHE = _cache_directory()
 
 def cache_is_cold() -> bool:
     """Whether kernels have to be compiled first, which takes some seconds."""
-    return not numba.config.DISABLE_JIT and (CACHE is None or not any(CACHE.iterdir()))
+    return not config.DISABLE_JIT and (CACHE is None or not any(CACHE.iterdir()))
 
 
 def kernel(signature: Any, *, fastmath: frozenset[str] = frozenset()) -> Callable[[F], F]:
     """Compile a function ahead of its first call for one signature, strictly (no fastmath unless named)."""
 
     def compile_(function: F) -> F:
-        before = numba.config.CACHE_DIR
-        numba.config.CACHE_DIR = str(CACHE or before)
+        before, config.CACHE_DIR = config.CACHE_DIR, str(CACHE or config.CACHE_DIR)
         try:
-            options = {"cache": CACHE is not None, "fastmath": set(fastmath), "forceinline": True}
-            return numba.njit(signature, **options)(function)  # type: ignore[no-any-return]
+            compiled: Any = njit(signature, cache=CACHE is not None, fastmath=set(fastmath), forceinline=True)
+            return compiled(function)  # type: ignore[no-any-return]
         finally:
-            numba.config.CACHE_DIR = before
+            config.CACHE_DIR = before
 
     return compile_
 
@@ -118,7 +118,7 @@ W_BELT, W_FRICTION, W_DASHPOTS, W_LOAD, W_ROUGHNESS, W_SCHEME, STORE_X_BEFORE, F
 WORK_SIZE = 8
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def _without_count(typing: Any, array: Any) -> Any:
     def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         struct = context.make_array(signature.args[0])(context, builder, arguments[0])
@@ -132,7 +132,5 @@ def _same(array: NDArray[np.float64]) -> NDArray[np.float64]:
     return array
 
 
-borrowed: Callable[[NDArray[np.float64]], NDArray[np.float64]] = (
-    _same if numba.config.DISABLE_JIT else _without_count
-)
+borrowed: Any = _same if config.DISABLE_JIT else _without_count
 """The array without its reference count, which costs a kernel 10 ns for each array that it passes on."""

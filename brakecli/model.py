@@ -79,7 +79,7 @@ _SENTENCES = {
         "a step has no solution: the friction force wedges the shoe into the wheel (as in Painlevé's paradox); "
         "reduce solver.step or friction.coefficient"
     ),
-    Failure.DIVERGED: "the motion grew beyond all bounds; reduce solver.step, or look at the stability of the case",
+    Failure.DIVERGED: "the motion grew beyond all bounds; reduce solver.step",
     Failure.NOT_CLOSED: (
         'the pad may no longer touch everywhere, so the closed form does not hold; take contact.evaluator = "auto"'
     ),

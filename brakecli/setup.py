@@ -140,8 +140,9 @@ def set_up(case: Case) -> Setup:
         evaluator = Evaluator.CLOSED_FORM
     nodes = case.contact.nodes or default_nodes(case.contact.half_length, shoe, wheel)
     times = timing(case)
+    turning, load = case.wheel, case.load
+    speeds = turning.angular_speeds or (turning.angular_speed or 0.0,)
     theta = (*case.solver.theta, 0.0)[:3]
-    wheel_case, load = case.wheel, case.load
     return Setup(
         case=case,
         timing=times,
@@ -156,11 +157,7 @@ def set_up(case: Case) -> Setup:
             phi=case.friction.coefficient,
         ),
         weights=Weights(times.step, *theta),
-        belt=schedule(
-            wheel_case.times or (0.0,),
-            wheel_case.angular_speeds or (wheel_case.angular_speed or 0.0,),
-            wheel_case.radius,
-        ),
+        belt=schedule(turning.times or (0.0,), speeds, turning.radius),
         load=schedule(load.times or (0.0,), load.forces or (load.force or 0.0,)),
         shoe=shoe,
         wheel=wheel,

@@ -57,6 +57,7 @@ class Motion:
     """
 
     def __init__(self, setup: Setup) -> None:
+        """Put the shoe at its start."""
         self.setup = setup
         self.work = Work()
         self.angles = np.zeros(setup.wheel.g.size)

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -151,8 +152,8 @@ def _sustained(history: History, context: Context, start: int, evidence: dict[st
         reason = f"sustained without stick: {harmonic:.0%} of the energy of vx in one line and its harmonics"
     else:
         reason = (
-            f"irregular: stick in {stick_cycles:.0%} of the cycles, {harmonic:.0%} of the energy of vx in one line "
-            "and its harmonics; run longer, or look at the spectrum"
+            f"irregular: stick in {stick_cycles:.0%} of the cycles, {harmonic:.0%} of the energy of vx in one "
+            "line and its harmonics; run longer, or look at the spectrum"
         )
         return _verdict(history, start, Regime.UNDECIDED, reason, evidence, Excitation.SELF_EXCITED)
     return _verdict(history, start, regime, reason, evidence, excitation, frequency)
@@ -204,7 +205,7 @@ def _envelope(history: History) -> tuple[NDArray[np.float64], NDArray[np.float64
     """Standard deviation of vx (m/s) in equal windows, and the times of their centres (s)."""
     edges = np.linspace(0, history.samples, WINDOWS + 1).astype(int)
     deviations = []
-    for begin, end in zip(edges[:-1], edges[1:], strict=True):
+    for begin, end in pairwise(edges):
         count, total, square = 0, 0.0, 0.0
         shift = float(history.read("vx", begin, begin + 1)[0])
         for first in range(begin, end, LONGEST):
@@ -242,7 +243,7 @@ def _power(values: NDArray[np.float64], interval: float) -> tuple[NDArray[np.flo
     """Power of a signal under a Hann window, and its frequencies (Hz)."""
     scale = float(np.max(np.abs(values))) or 1.0
     power = np.abs(np.fft.rfft(values / scale * np.hanning(len(values)))) ** 2
-    return power, np.fft.rfftfreq(len(values), interval)
+    return power, np.fft.rfftfreq(len(values), interval).astype(np.float64)
 
 
 def _share(power: NDArray[np.float64], frequencies: NDArray[np.float64], lines: Sequence[float]) -> float:

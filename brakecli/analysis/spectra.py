@@ -37,7 +37,7 @@ def spectrum(history: History, start: int) -> Spectrum:
     size = min(LONGEST_SEGMENT, max(min(SHORTEST_SEGMENT, length), 2 * length // (SEGMENTS_WANTED + 1)))
     hop = max(1, size - size // 2)
     segments = 1 + (length - size) // hop
-    frequency = np.fft.rfftfreq(size, history.interval)
+    frequency: NDArray[np.float64] = np.fft.rfftfreq(size, history.interval).astype(np.float64)
     return Spectrum(
         frequency,
         {name: _density(history, name, start, size, hop, segments) for name in SPECTRAL},

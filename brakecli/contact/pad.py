@@ -86,7 +86,7 @@ def _node_tables(
     xi = -a + spacing * (np.arange(nodes + 2) - 0.5)
 
     def mean(f: Surface) -> NDArray[np.float64]:
-        return (f.g * np.sinc(f.omega * spacing / (2.0 * np.pi)))[:, None]  # type: ignore[no-any-return]
+        return (f.g * np.sinc(f.omega * spacing / (2.0 * np.pi)))[:, None]
 
     waves = np.outer(wheel.omega, xi)
     f1 = np.sum(mean(shoe) * np.sin(np.outer(shoe.omega, xi) + shoe.phase[:, None]), axis=0)
