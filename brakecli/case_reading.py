@@ -28,6 +28,7 @@ from brakecli.located_toml import (
     parse,
     printable,
     split,
+    too_large,
 )
 
 _Table = TypeVar("_Table", bound=Table)
@@ -69,6 +70,8 @@ def read_text(source: str, label: str) -> str:
         reason = getattr(error, "strerror", None) or str(error)
         what = f"cannot be read: {reason[0].lower()}{reason[1:]}"
         raise CaseError([Problem(label, "", what, 'name a TOML file, or "-" for standard input')]) from error
+    if len(data) > LARGEST_TEXT:
+        raise CaseError([_problem(too_large(), label)])
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError as error:

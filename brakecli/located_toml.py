@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 KeyPath = tuple[str | int, ...]
 
 LARGEST_TEXT = 500_000
-"""Most characters of a file; with the limits below, whatever is wrong is told within half a second."""
+"""Most bytes of a file; with the limits below, whatever is wrong is told within half a second."""
 MOST_PARTS = 32
 """Most parts of a dotted key: the time that tomllib takes grows with their square."""
 MOST_STATEMENTS = 1000
@@ -59,21 +59,30 @@ class Finding(NamedTuple):
 class UnfitTextError(Exception):
     """The text is nothing that should be given to tomllib."""
 
-    def __init__(self, line: int, what: str, remedy: str) -> None:
-        """Say what is wrong, in which line, and what to do."""
-        super().__init__(what)
-        self.finding = Finding(line, (), what, remedy)
+    def __init__(self, finding: Finding) -> None:
+        """Hold what is wrong with the text."""
+        super().__init__(finding.what)
+        self.finding = finding
+
+
+def too_large() -> Finding:
+    """What is wrong with a text of more than `LARGEST_TEXT` bytes."""
+    return Finding(0, (), f"is larger than {LARGEST_TEXT} bytes", "give a shorter file")
+
+
+def _unfit(line: int, what: str, remedy: str) -> UnfitTextError:
+    return UnfitTextError(Finding(line, (), what, remedy))
 
 
 def split(text: str) -> list[Statement]:
     """The statements of a text, be they valid or not. Raises `UnfitTextError`."""
     if len(text) > LARGEST_TEXT:
-        raise UnfitTextError(0, f"is larger than {LARGEST_TEXT} bytes", "give a shorter file")
+        raise UnfitTextError(too_large())
     if text.startswith("\ufeff"):
-        raise UnfitTextError(1, "begins with a byte order mark", "save the file as UTF-8 without one")
+        raise _unfit(1, "begins with a byte order mark", "save the file as UTF-8 without one")
     if "\0" in text:
         line = text.count("\n", 0, text.index("\0")) + 1
-        raise UnfitTextError(line, "holds a NUL character", "save the file as UTF-8 text, not as UTF-16")
+        raise _unfit(line, "holds a NUL character", "save the file as UTF-8 text, not as UTF-16")
     statements = []
     start, line, first, depth, dots, marks = 0, 1, 1, 0, 0, 0
     in_header = _HEADER.match(text)
@@ -83,7 +92,7 @@ def split(text: str) -> list[Statement]:
         if mark == ".":
             dots += 1
             if dots == MOST_PARTS:
-                raise UnfitTextError(line, f"a key has more than {MOST_PARTS} parts", "shorten the key")
+                raise _unfit(line, f"a key has more than {MOST_PARTS} parts", "shorten the key")
             continue
         if mark[0] in "[]{},=\n":
             dots = 0
@@ -91,7 +100,7 @@ def split(text: str) -> list[Statement]:
             marks += mark[0] != "\n"
             if marks > MOST_MARKS:
                 what = f"there are more than {MOST_MARKS} commas and brackets"
-                raise UnfitTextError(line, what, "give shorter lists")
+                raise _unfit(line, what, "give shorter lists")
         line += mark.count("\n")
         if mark[0] == "\n" and (depth <= 0 or in_header):
             statements.append(Statement(first, text[start : token.start()]))
@@ -101,7 +110,7 @@ def split(text: str) -> list[Statement]:
     statements = [statement for statement in statements if not _NOTHING.fullmatch(statement.text)]
     if len(statements) > MOST_STATEMENTS:
         line = statements[MOST_STATEMENTS].line
-        raise UnfitTextError(line, f"there are more than {MOST_STATEMENTS} keys", "give a shorter file")
+        raise _unfit(line, f"there are more than {MOST_STATEMENTS} keys", "give a shorter file")
     return statements
 
 

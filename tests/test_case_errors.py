@@ -3,15 +3,21 @@
 import io
 import sys
 import time
+import tomllib
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
+import tomli_w
+from hypothesis import given
+from hypothesis import strategies as st
 
 from brakecli.case import Case
 from brakecli.case_problems import tables
 from brakecli.case_reading import parse_case, read_case
 from brakecli.errors import CaseError, Problem
-from brakecli.located_toml import LARGEST_TEXT, MOST_MARKS, MOST_PARTS, MOST_STATEMENTS
+from brakecli.located_toml import LARGEST_TEXT, MOST_MARKS, MOST_PARTS, MOST_STATEMENTS, Located, split
 
 CONSTANT = """\
 title = "constant wheel and load"
@@ -398,7 +404,16 @@ def test_a_table_that_is_a_list_is_told() -> None:
 
 def test_an_empty_file_lacks_every_required_table() -> None:
     found = where("# nothing\n")
-    assert [key for _, key in found] == "shoe wheel link1 link2 load friction contact solver".split()
+    assert [key for _, key in found] == [
+        "shoe",
+        "wheel",
+        "link1",
+        "link2",
+        "load",
+        "friction",
+        "contact",
+        "solver",
+    ]
     assert {place for place, _ in found} == {"case.toml"}
 
 
@@ -474,17 +489,10 @@ def test_the_line_of_a_header_counts_where_its_key_is_missing() -> None:
 
 def test_strange_keys_and_values_are_shown_as_plain_text() -> None:
     (line,) = told(CONSTANT + '"\\u001b[31m\\n" = "\\u009b\\u202e"\n')
-    assert line.startswith('case.toml:50: output."\\u001b[31m\\n": is unknown (found "\\u009b\\u202e")')
+    assert line.startswith('case.toml:48: output."\\u001b[31m\\n": is unknown (found "\\u009b\\u202e")')
 
 
 # Files that are no case
-
-
-def quick(text: str) -> tuple[Problem, ...]:
-    start = time.process_time()
-    found = problems(text)
-    assert time.process_time() - start < 0.5
-    return found
 
 
 HOSTILE = {
@@ -514,7 +522,12 @@ HOSTILE = {
 
 @pytest.mark.parametrize("text", HOSTILE.values(), ids=HOSTILE.keys())
 def test_a_hostile_file_is_refused_within_half_a_second(text: str) -> None:
-    assert quick(text)
+    times = []
+    for _ in range(3):  # a busy machine takes longer now and then
+        start = time.process_time()
+        assert problems(text)
+        times.append(time.process_time() - start)
+    assert min(times) < 0.5
 
 
 def test_a_key_of_more_than_32_parts_is_refused_and_one_of_32_is_only_unknown() -> None:
@@ -522,7 +535,7 @@ def test_a_key_of_more_than_32_parts_is_refused_and_one_of_32_is_only_unknown() 
     (deep,) = problems(".".join("a" * 33) + " = 1")
     assert (deep.where, deep.what) == ("case.toml:1", "a key has more than 32 parts")
     assert "a: is unknown" in told(".".join("a" * 32) + " = 1")[-1]
-    parse_case(CONSTANT + "# " + "a." * 40 + "\n[initial]".replace("[initial]", ""), "case.toml")
+    parse_case(CONSTANT + "# " + "a." * 40, "case.toml")
 
 
 def test_dots_in_texts_and_lists_of_numbers_are_no_deep_key() -> None:
@@ -568,6 +581,7 @@ def test_of_a_long_list_the_first_wrong_entries_are_told_and_their_number() -> N
         (CONSTANT.replace("[shoe]", "[shoe] # für").encode("latin-1"), "2", "is not UTF-8 (found byte 0xfc)"),
         (b"\x89HDF\r\n\x1a\n" + bytes(1000), "1", "is not UTF-8 (found byte 0x89)"),
         (b"#" * (LARGEST_TEXT + 5), "", f"is larger than {LARGEST_TEXT} bytes"),
+        (("#" + "ω" * (LARGEST_TEXT // 2)).encode(), "", f"is larger than {LARGEST_TEXT} bytes"),
     ],
 )
 def test_bytes_that_are_not_utf_8_text_are_refused(tmp_path: Path, data: bytes, place: str, what: str) -> None:
@@ -591,7 +605,7 @@ def test_a_file_that_cannot_be_read_is_a_usage_error(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "case.toml").write_text(CONSTANT)
-    with pytest.raises(CaseError, match="cannot be read: [a-z]") as caught:
+    with pytest.raises(CaseError, match=r"cannot be read: [a-z]") as caught:
         read_case(name)
     assert caught.value.exit_code == 2
 
@@ -614,7 +628,8 @@ def test_problems_of_overrides_name_the_override_and_come_after_those_of_the_fil
     text = change(CONSTANT, ("mass = 10.0", "mass = -10.0"))
     assert told(text, "link1.stiffness=-1", "solver.dration=2", "contact={half_length=1, stiffness=nan}") == [
         "case.toml:3: shoe.mass: is out of range (found -10.0); give a number above 0, in kg",
-        "--set link1.stiffness=-1: link1.stiffness: is out of range (found -1); give a number of at least 0, in N/m",
+        "--set link1.stiffness=-1: link1.stiffness: is out of range (found -1);"
+        " give a number of at least 0, in N/m",
         '--set solver.dration=2: solver.dration: is unknown (found 2); did you mean "duration"?',
         "--set contact={half_length=1, stiffness=nan}: contact.stiffness: is not finite (found nan);"
         " give a number above 0, in N/m²",
@@ -683,3 +698,56 @@ def test_a_table_created_by_an_override_is_told_there() -> None:
     text = CONSTANT[: CONSTANT.index("[roughness.shoe]")] + CONSTANT[CONSTANT.index("[initial]") :]
     override = "roughness.wheel.amplitudes=[1]"
     assert where(text, override) == [(f"--set {override}", "roughness.wheel.wavelengths")]
+
+
+# Any file
+
+
+TREES = st.recursive(
+    st.integers() | st.booleans() | st.text(st.characters(exclude_categories=["Cs"])) | st.dates() | st.floats(),
+    lambda inner: (
+        st.lists(inner, max_size=3) | st.dictionaries(st.text("ab.\"'\n #[]=é", max_size=4), inner, max_size=3)
+    ),
+    max_leaves=12,
+)
+DOCUMENTS = st.dictionaries(st.text("ab.\"'\n #[]=é", max_size=4), TREES, max_size=4)
+
+
+@given(DOCUMENTS)
+def test_statement_by_statement_a_text_says_the_same_as_in_one_piece(document: dict[str, Any]) -> None:
+    text = tomli_w.dumps(document)
+    located = Located(split(text))
+    assert repr(located.data) == repr(tomllib.loads(text))  # nan is not equal to itself
+    assert not located.findings
+
+
+@given(st.data())
+def test_no_edit_of_a_case_raises_anything_but_a_case_error(data: st.DataObject) -> None:
+    text = CONSTANT
+    for _ in range(data.draw(st.integers(1, 4))):
+        start = data.draw(st.integers(0, len(text)))
+        end = data.draw(st.integers(start, min(len(text), start + 40)))
+        new = data.draw(st.text("\n[]{}=.,\"'\\#\r\t 1e-ab_", max_size=6) | st.text(max_size=3))
+        text = text[:start] + new + text[end:]
+    with suppress(CaseError):
+        parse_case(text, "case.toml")
+
+
+@given(st.text("\n[]{}=.,\"'\\#\r\t 1e-a", max_size=60), st.text("[]{}=.,\"'\\# 1ea", max_size=20))
+def test_no_text_and_no_override_raises_anything_but_a_case_error(text: str, override: str) -> None:
+    with pytest.raises(CaseError):
+        parse_case(text, "case.toml", [override])
+
+
+def test_tables_in_a_list_have_lines_of_their_own() -> None:
+    text = "case = 1\n[[axis]]\nstart = 1\n[[axis]]\nstart = 2\n[axis.more]\nstop = 3\n"
+    assert Located(split(text)).lines == {
+        ("case",): 1,
+        ("axis",): 2,
+        ("axis", 0): 2,
+        ("axis", 0, "start"): 3,
+        ("axis", 1): 4,
+        ("axis", 1, "start"): 5,
+        ("axis", 1, "more"): 6,
+        ("axis", 1, "more", "stop"): 7,
+    }
