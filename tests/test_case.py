@@ -19,6 +19,7 @@ from brakecli.case_problems import tables
 from brakecli.case_reading import parse_case, read_case, starter_text
 
 jsonschema = import_module("jsonschema")  # imported so because it has no type hints
+VALIDATOR = jsonschema.Draft202012Validator(json_schema())
 
 SMALL = """
 shoe.mass = 10
@@ -125,7 +126,7 @@ def test_resolved_toml_reads_back_as_the_same_case_to_the_last_bit(document: dic
 @given(documents)
 def test_the_json_schema_accepts_every_valid_case(document: dict[str, Any]) -> None:
     Case.model_validate(document)
-    jsonschema.Draft202012Validator(json_schema()).validate(document)
+    VALIDATOR.validate(document)
 
 
 def test_keys_left_out_get_their_defaults() -> None:
@@ -214,7 +215,7 @@ def test_the_shipped_schema_is_the_one_the_models_give() -> None:
 
 def test_the_schema_is_valid_and_accepts_the_starter_case() -> None:
     jsonschema.Draft202012Validator.check_schema(json_schema())
-    jsonschema.Draft202012Validator(json_schema()).validate(tomllib.loads(starter_text()))
+    VALIDATOR.validate(tomllib.loads(starter_text()))
 
 
 @pytest.mark.parametrize(
@@ -233,14 +234,13 @@ def test_the_schema_is_valid_and_accepts_the_starter_case() -> None:
 def test_the_schema_refuses_wrong_values(table: str, key: str, value: object) -> None:
     document = tomllib.loads(starter_text())
     document[table][key] = value
-    validator = jsonschema.Draft202012Validator(json_schema())
-    assert not validator.is_valid(document)
+    assert not VALIDATOR.is_valid(document)
 
 
 def test_the_schema_refuses_two_alternatives_at_once() -> None:
     document = tomllib.loads(starter_text())
     document["load"] |= {"times": [0.0], "forces": [1.0]}
-    assert not jsonschema.Draft202012Validator(json_schema()).is_valid(document)
+    assert not VALIDATOR.is_valid(document)
 
 
 def test_the_starter_mentions_every_key() -> None:
