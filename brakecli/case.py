@@ -14,6 +14,7 @@ from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
 from brakecli.case_table import (
+    MOST_WRONG_ENTRIES,
     Angle,
     Broken,
     Lengths,
@@ -73,9 +74,10 @@ def _broken_schedule(times: Series | None, key: str, values: Series | None) -> I
     if len(times) != len(values):
         what = f"has {_entries(values)} where times has {len(times)}"
         yield Broken((key,), what, "give one value for each time", values)
-    for index, (earlier, later) in enumerate(pairwise(times), start=1):
-        if later <= earlier:
-            yield Broken(("times", index), "is not later than the time before it", "let the times increase", later)
+    late = [index for index, (before, time) in enumerate(pairwise(times), start=1) if time <= before]
+    for index in late[:MOST_WRONG_ENTRIES]:
+        what = "is not later than the time before it"
+        yield Broken(("times", index), what, "let the times increase", times[index])
 
 
 def _entries(values: Series) -> str:

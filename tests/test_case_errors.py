@@ -512,6 +512,10 @@ HOSTILE = {
     "one key again and again": "a = 1\n" * MOST_STATEMENTS,
     "a long list": "a = [" + "nan, " * (MOST_MARKS - 10) + "]",
     "a long list of wrong entries": CONSTANT.replace("[1e-6, 7e-7]", "[" + "nan," * (MOST_MARKS - 100) + "]"),
+    "a long schedule that runs backwards": CONSTANT.replace(
+        "force = 5000.0",
+        f"times = {list(range(MOST_MARKS // 2 - 50, 0, -1))}\nforces = {[1] * (MOST_MARKS // 2 - 50)}",
+    ),
     "open texts": '"""\n\\"""\n' * 50_000,
     "open quotes": 'a = "' + '\\"' * (LARGEST_TEXT // 2 - 10),
     "a long text": 'a = """' + "\\\\" * (LARGEST_TEXT // 2 - 10) + '"""',
