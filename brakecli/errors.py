@@ -17,7 +17,8 @@ class BrakecliError(Exception):
 class Problem:
     """One thing that is wrong with an input file.
 
-    `where` is ``FILE:LINE`` (or ``FILE`` where no line can be named, ``--set N`` for an override), `key` the
+    `where` is ``FILE:LINE`` (or ``FILE`` where no line can be named, ``--set key.path=VALUE`` for an
+    override), `key` the
     dotted key path or "" for the file as a whole.
     """
 

@@ -75,7 +75,7 @@ _BOUND = 1e15  # m and m/s: beyond it a motion is no motion of a brake
 
 # IntEnum members are not known to compiled code, their numbers are.
 _BACKWARD, _STICK, _FORWARD, _SEPARATED = (int(state) for state in ContactState)
-_NONE, _UNCONVERGED, _NO_SOLUTION, _DIVERGED, _NOT_CLOSED = (int(failure) for failure in Failure)
+_NONE, _UNCONVERGED, _NO_SOLUTION, _DIVERGED, _NOT_CLOSED = (int(failure) for failure in tuple(Failure)[:5])
 
 _matrix = float64[:, ::1]
 _counts = int64[::1]

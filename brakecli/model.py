@@ -55,13 +55,14 @@ class ContactState(IntEnum):
 
 
 class Failure(IntEnum):
-    """Why a run ended before its time; each has a sentence with its remedy."""
+    """Why a run is not worth having; each has a sentence with its remedy."""
 
     NONE = 0
     UNCONVERGED = 1
     NO_SOLUTION = 2
     DIVERGED = 3
     NOT_CLOSED = 4
+    UNBALANCED = 5
 
     @property
     def sentence(self) -> str:
@@ -82,5 +83,9 @@ _SENTENCES = {
     Failure.DIVERGED: "the motion grew beyond all bounds; reduce solver.step",
     Failure.NOT_CLOSED: (
         'the pad may no longer touch everywhere, so the closed form does not hold; take contact.evaluator = "auto"'
+    ),
+    Failure.UNBALANCED: (
+        "the energy account does not close, so the step does not resolve the motion and the history is not to be "
+        "trusted; reduce solver.step"
     ),
 }

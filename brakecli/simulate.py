@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli import integrate, iteration
-from brakecli.analysis.energy import EnergyAccount, account
+from brakecli.analysis.energy import OPEN_ACCOUNT, EnergyAccount, account
 from brakecli.analysis.equilibrium import equilibrium
 from brakecli.case import InitialState, Start
 from brakecli.contact import KINDS
@@ -93,6 +93,8 @@ class Motion:
             sink(self._sample()[None, :])
         self._count()
         energy = account(self._start_energy, self._energy(), self.works)
+        if self.work.failure is Failure.NONE and abs(energy.relative_closing_error) > OPEN_ACCOUNT:
+            self.work.failure, self.work.failure_time = Failure.UNBALANCED, self.setup.timing.step * last
         return self.work, energy
 
     def _most_steps(self) -> int:
