@@ -56,4 +56,5 @@ def account(
     """The account between two states, each as energies (kinetic, links, contact), from the works in between."""
     changes = [after - before for before, after in zip(start, end, strict=True)]
     passed = [float(works[item]) for item in (W_BELT, W_FRICTION, W_DASHPOTS, W_LOAD, W_ROUGHNESS, W_SCHEME)]
-    return EnergyAccount(*changes, *passed, max(sum(start), sum(end)))
+    items = [*changes, *passed, max(sum(start), sum(end))]
+    return EnergyAccount(*items)

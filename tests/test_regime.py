@@ -1,0 +1,144 @@
+"""Regimes of runs whose regime is known, and of histories made by hand."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from brakecli.analysis.regime import Context, Excitation, Regime, classify, forced_lines
+from brakecli.history import ArrayHistory
+from brakecli.model import HISTORY
+from brakecli.run import context
+from brakecli.setup import set_up
+from tests.examples import COULOMB, ROUGH, SQUEAL, make, simulate
+
+INTERVAL = 1e-4
+TIME = INTERVAL * np.arange(20000)
+
+
+def judged(case: Any) -> Any:
+    result = simulate(case)
+    return classify(ArrayHistory(case.output.sample_interval, result.rows), context(set_up(case)))
+
+
+def made(vx: NDArray[np.float64], state: float | NDArray[np.float64] = -1.0) -> ArrayHistory:
+    rows = np.zeros((len(vx), len(HISTORY)))
+    names = list(HISTORY)
+    rows[:, names.index("vx")] = vx
+    rows[:, names.index("x")] = np.cumsum(vx) * INTERVAL
+    rows[:, names.index("state")] = state
+    return ArrayHistory(INTERVAL, rows)
+
+
+@pytest.mark.parametrize(
+    ("phi", "omega", "regime"),
+    [
+        (0.5, 0.1, Regime.DAMPED),
+        (0.6, 0.1, Regime.RELAXATION),
+        (0.8, 0.3, Regime.RELAXATION),
+        (0.6, 0.6, Regime.QUASI_HARMONIC),
+    ],
+)
+def test_the_three_regimes_of_the_paper(phi: float, omega: float, regime: Regime) -> None:
+    case = make(SQUEAL, friction__coefficient=phi, wheel__angular_speed=omega, solver__duration=2.0)
+    verdict = judged(case)
+    assert verdict.regime is regime
+    sustained = regime is not Regime.DAMPED
+    assert verdict.excitation is (Excitation.SELF_EXCITED if sustained else Excitation.NONE)
+    assert (verdict.frequency is not None) == sustained
+    assert sustained is False or verdict.frequency == pytest.approx(174.0, abs=1.0)
+    assert (verdict.stick_fraction > 0.02) == (regime is Regime.RELAXATION)
+
+
+def test_a_shoe_shaken_by_roughness_below_its_critical_friction_is_damped_and_forced() -> None:
+    verdict = judged(make(ROUGH, solver__duration=1.0, solver__step=2e-5))
+    assert (verdict.regime, verdict.excitation) == (Regime.DAMPED, Excitation.FORCED)
+    assert verdict.frequency is None
+
+
+def test_a_shoe_at_rest_on_a_standing_wheel_is_damped() -> None:
+    verdict = judged(make(COULOMB))
+    assert verdict.regime is Regime.DAMPED
+    assert "rest" in verdict.reasons[0]
+    assert verdict.stick_fraction == 1.0
+
+
+def test_a_shoe_that_is_carried_along_is_not_called_damped() -> None:
+    changes: dict[str, Any] = {"link2__stiffness": 0.0, "link2__damping": 0.0, "solver__duration": 0.5}
+    verdict = judged(make(SQUEAL, **changes))
+    assert verdict.regime is Regime.UNDECIDED
+    assert "carried along" in verdict.reasons[0]
+
+
+def test_a_shoe_that_lost_contact_is_not_called_damped() -> None:
+    verdict = judged(make(SQUEAL, load__force=-5000.0, solver__duration=1.0))
+    assert verdict.regime is Regime.UNDECIDED
+    assert "contact" in verdict.reasons[0]
+    assert verdict.contact_loss_fraction == 1.0
+
+
+def test_an_unloaded_shoe_at_rest_is_named() -> None:
+    verdict = judged(make(SQUEAL, load__force=0.0))
+    assert "contact" in verdict.reasons[0] or verdict.regime is Regime.UNDECIDED
+
+
+@pytest.mark.parametrize(("rate", "word"), [(2.0, "growing"), (-1.0, "decaying")])
+def test_a_motion_that_still_grows_or_decays_is_undecided_and_says_how_fast(rate: float, word: str) -> None:
+    verdict = classify(made(1e-3 * np.exp(rate * TIME) * np.sin(2 * np.pi * 170.0 * TIME)), Context(1.0))
+    assert verdict.regime is Regime.UNDECIDED
+    assert word in verdict.reasons[0]
+    assert verdict.evidence["envelope_slope"] == pytest.approx(rate, rel=0.02)
+
+
+def test_a_decay_to_nothing_is_damped() -> None:
+    verdict = classify(made(np.exp(-5.0 * TIME) * np.sin(2 * np.pi * 170.0 * TIME)), Context(1.0))
+    assert verdict.regime is Regime.DAMPED
+
+
+def test_stick_in_some_cycles_only_is_irregular() -> None:
+    vx = 0.02 * np.sin(2 * np.pi * 170.0 * TIME)
+    state = np.where((vx > 0.019) & (np.floor(170.0 * TIME) % 3 == 0), 0.0, -1.0)
+    verdict = classify(made(vx, state), Context(0.02))
+    assert verdict.regime is Regime.UNDECIDED
+    assert "irregular" in verdict.reasons[0]
+
+
+def test_a_line_of_the_roughness_is_forced_and_another_is_not() -> None:
+    lines = forced_lines(2.0, [1.0 / 0.02], 5000.0)
+    assert lines[0] == pytest.approx(100.0)
+    assert len(lines) == 10
+    forced = classify(made(np.sin(2 * np.pi * 100.0 * TIME)), Context(2.0, True, lines))
+    other = classify(made(np.sin(2 * np.pi * 151.0 * TIME)), Context(2.0, True, lines))
+    assert (forced.regime, forced.excitation) == (Regime.DAMPED, Excitation.FORCED)
+    assert (other.regime, other.excitation) == (Regime.QUASI_HARMONIC, Excitation.SELF_EXCITED)
+
+
+@pytest.mark.parametrize("samples", [1, 2, 50, 159])
+def test_too_few_samples_are_undecided(samples: int) -> None:
+    verdict = classify(made(np.sin(np.arange(samples))), Context(1.0))
+    assert verdict.regime is Regime.UNDECIDED
+    assert "samples" in verdict.reasons[0]
+
+
+def test_too_few_cycles_and_too_coarse_samples_are_undecided() -> None:
+    slow = classify(made(np.sin(2 * np.pi * 2.0 * TIME)), Context(1.0))
+    coarse = classify(made(np.sin(2 * np.pi * 2500.0 * TIME + 0.3)), Context(1.0))
+    assert "cycles" in slow.reasons[0]
+    assert "samples a cycle" in coarse.reasons[0]
+    assert slow.regime is coarse.regime is Regime.UNDECIDED
+
+
+def test_a_changing_wheel_speed_is_undecided() -> None:
+    verdict = classify(made(np.sin(2 * np.pi * 170.0 * TIME)), Context(1.0, steady=False))
+    assert verdict.regime is Regime.UNDECIDED
+    assert "changes with time" in verdict.reasons[0]
+
+
+def test_verdict_does_not_depend_on_length_or_sampling() -> None:
+    base: dict[str, Any] = {"friction__coefficient": 0.7, "solver__duration": 1.0}
+    changes: list[dict[str, Any]] = [{}, {"solver__duration": 2.0}, {"output__sample_interval": 5e-5}]
+    verdicts = [judged(make(SQUEAL, **{**base, **change})) for change in changes]
+    assert {verdict.regime for verdict in verdicts} == {Regime.RELAXATION}
+    frequencies = [verdict.frequency for verdict in verdicts]
+    assert np.ptp(frequencies) < 0.1
