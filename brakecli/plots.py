@@ -1,0 +1,457 @@
+"""One picture of a run: the motion in detail, its whole history, its phase portrait and its spectrum.
+
+What is drawn is gathered first (`Picture`), in SI units and in pieces: a run of 10^8 samples takes no more memory
+than a short one.
+"""
+
+import math
+import textwrap
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brakecli.case import Case
+from brakecli.case_reading import parse_case
+from brakecli.errors import CaseError, UnreadableResultError, UsageError
+from brakecli.model import ContactState
+from brakecli.output import new_output
+from brakecli.stored import StoredResult, open_result
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+Reader = Callable[[str, int, int], NDArray[Any]]
+"""The samples start … stop - 1 of a variable of the history."""
+
+SUFFIXES = (".pdf", ".png", ".svg")
+CYCLES = 12
+MOST_DETAIL = 100_000
+"""Samples drawn one by one, at most."""
+FEW = 4000
+"""Samples of the detail where no frequency tells how long a cycle is."""
+COLUMNS = 1200
+"""Columns of the envelope: about the width of its panel in pixels."""
+BLOCK = 1 << 20
+"""Samples read at a time."""
+
+# Okabe and Ito's colours, told apart also without red or green.
+_BLUE, _ORANGE, _VERMILION, _GREEN, _GREY = "#0072B2", "#E69F00", "#D55E00", "#009E73", "#9A9A9A"
+_STYLE = {
+    "font.size": 9.5,
+    "axes.titlesize": 10.5,
+    "axes.titlelocation": "left",
+    "axes.titlepad": 8.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": "#555555",
+    "axes.labelcolor": "#222222",
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.formatter.useoffset": False,
+    "grid.color": "#E4E4E4",
+    "grid.linewidth": 0.7,
+    "xtick.color": "#444444",
+    "ytick.color": "#444444",
+    "lines.linewidth": 1.2,
+    "lines.solid_joinstyle": "round",
+    "legend.frameon": True,
+    "legend.framealpha": 0.85,
+    "legend.edgecolor": "none",
+    "legend.fontsize": 8.5,
+    "legend.handlelength": 1.6,
+    "svg.hashsalt": "brakecli",  # the same picture gives the same bytes
+}
+_DASHES = (0, (5, 3))
+_SHADES = ((ContactState.STICK, _ORANGE, "stick"), (ContactState.SEPARATED, _GREY, "no contact"))
+_UNDATED = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
+
+
+@dataclass(frozen=True)
+class Detail:
+    """The part of the history that is drawn sample by sample; `belt` is U (m/s)."""
+
+    name: str
+    time: Array
+    x: Array
+    vx: Array
+    state: NDArray[Any]
+    belt: Array
+    interval: float
+
+
+@dataclass(frozen=True)
+class Picture:
+    """Everything that is drawn, in SI units."""
+
+    title: str
+    summary: str
+    detail: Detail
+    span: tuple[float, float]  # s, of the whole run
+    time: Array  # of the envelope's columns
+    lowest: Array
+    highest: Array
+    frequency: Array
+    density: Array
+    spectrum_from: float  # s
+    fundamental: float | None  # Hz
+    peak: float | None  # Hz
+    passing: tuple[float, ...]  # Hz
+
+
+def plot_run(result: Path, target: Path, *, force: bool) -> None:
+    """Draw the result of a run into a PNG, PDF or SVG file, by the suffix of `target`.
+
+    Raises UsageError for another suffix, an existing target without `force`, or where matplotlib is missing;
+    UnreadableResultError; CannotWriteError.
+    """
+    suffix = target.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise UsageError(
+            f"{target}: its suffix names no kind of picture (found {target.suffix!r}); name a file that ends in "
+            f"{', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]} with -o"
+        )
+    if target.exists() and result.exists() and target.samefile(result):
+        raise UsageError(f"{target}: this is the result itself; choose another output with -o")
+    _require_matplotlib()
+    with open_result(result, kind="run") as stored, new_output(target, force=force) as file:
+        picture = gather(stored)
+        file.write(render(picture, suffix))
+        file.publish()
+
+
+def _require_matplotlib() -> None:
+    try:
+        import matplotlib.figure  # noqa: F401
+    except ImportError as error:
+        raise UsageError(
+            f"matplotlib cannot be imported ({error}); install it with: python -m pip install 'matplotlib>=3.9'"
+        ) from error
+
+
+# What is drawn
+
+
+def gather(result: StoredResult) -> Picture:
+    """Read from a result what its picture shows; raises UnreadableResultError where it is not there."""
+    variables = result.variables("history")
+    needed = ("time", "x", "vx", "state")
+    shapes = {variables[name].shape for name in needed if name in variables}
+    if not variables.keys() >= set(needed) or len(shapes) != 1 or not (samples := max(shapes)[0]):
+        raise _unreadable(result, f"its history has no {', '.join(needed)} of equal length above 0")
+
+    def read(name: str, start: int, stop: int) -> NDArray[Any]:
+        return result.read("history", name, start, stop)
+
+    case = _case(result)
+    start, end = (float(read("time", i, i + 1)[0]) for i in (0, samples - 1))
+    interval = (end - start) / (samples - 1) if samples > 1 else case.output.sample_interval
+    fundamental, peak = _number(result, "frequency"), _number(result, "spectrum_peak")
+    places, lowest, highest = envelope(lambda first, last: read("x", first, last), samples)
+    first_sample = result.group_attributes("spectrum").get("first_sample", 0)
+    return Picture(
+        title=case.title or "Case without a title",
+        summary=_summary(result),
+        detail=_detail(read, samples, interval, case, result),
+        span=(start, end),
+        time=start + interval * places,
+        lowest=lowest,
+        highest=highest,
+        frequency=result.read("spectrum", "frequency"),
+        density=result.read("spectrum", "vx"),
+        spectrum_from=start + interval * float(first_sample),
+        fundamental=fundamental,
+        peak=peak,
+        passing=_passing(case),
+    )
+
+
+def envelope(
+    read: Callable[[int, int], Array], samples: int, columns: int = COLUMNS
+) -> tuple[Array, Array, Array]:
+    """Middle (in samples) of each column, least and greatest value of the samples that fall into it.
+
+    Columns are equally wide; there are never more of them than samples. At most `BLOCK` samples are read at once.
+    """
+    columns = min(columns, samples)
+    lowest: Array = np.full(columns, np.inf)
+    highest: Array = np.full(columns, -np.inf)
+    for begin in range(0, samples, BLOCK):
+        values = read(begin, min(begin + BLOCK, samples))
+        column = np.arange(begin, begin + len(values)) * columns // samples
+        np.minimum.at(lowest, column, values)
+        np.maximum.at(highest, column, values)
+    firsts = -(-np.arange(columns + 1) * samples // columns)
+    middles: Array = 0.5 * (firsts[:-1] + firsts[1:] - 1).astype(np.float64)
+    return middles, lowest, highest
+
+
+def episodes(state: NDArray[Any], wanted: ContactState) -> list[tuple[int, int]]:
+    """First and last sample of every unbroken stretch of a state."""
+    inside = np.concatenate([[False], state == wanted, [False]])
+    edges = np.flatnonzero(inside[1:] != inside[:-1])
+    return [(int(first), int(behind) - 1) for first, behind in edges.reshape(-1, 2)]
+
+
+def _detail(read: Reader, samples: int, interval: float, case: Case, result: StoredResult) -> Detail:
+    """The last cycles of the run, or of the motion where it has come to rest."""
+    fundamental = _number(result, "frequency")
+    frequency = fundamental or _number(result, "spectrum_peak")
+    wanted = CYCLES / (frequency * interval) if frequency else FEW
+    length = min(samples, MOST_DETAIL, max(2, round(min(wanted, MOST_DETAIL))))
+    stop, name = samples, "End of the run" if length < samples else "Whole run"
+    if fundamental:
+        name = "Settled motion"
+    elif result.attributes.get("status") == "failed":
+        name = "Motion up to the failure"
+    elif (rest := _last_motion(read, samples) + length // 8 + 1) < samples:
+        stop, name = rest, "Last motion, then stick"
+    first = max(0, stop - length)
+    time, x, vx, state = (read(variable, first, stop) for variable in ("time", "x", "vx", "state"))
+    return Detail(name, time, x, vx, state, _belt(case, time), interval)
+
+
+def _last_motion(read: Reader, samples: int) -> int:
+    """Samples up to the last one that does not stick, searched from the end."""
+    for stop in range(samples, 0, -BLOCK):
+        begin = max(0, stop - BLOCK)
+        moving = np.flatnonzero(read("state", begin, stop) != ContactState.STICK)
+        if moving.size:
+            return begin + int(moving[-1]) + 1
+    return 0
+
+
+def _belt(case: Case, time: Array) -> Array:
+    """U (m/s) at some times."""
+    wheel = case.wheel
+    speeds: Any = wheel.angular_speeds or (wheel.angular_speed or 0.0,)
+    speed: Array = wheel.radius * np.interp(time, wheel.times or (0.0,), speeds)
+    return speed
+
+
+def _passing(case: Case) -> tuple[float, ...]:
+    """Frequencies (Hz) at which the waves of the wheel pass; none where its speed changes."""
+    wheel, profile = case.wheel, case.roughness.wheel
+    if profile is None or (wheel.angular_speeds and len(set(wheel.angular_speeds)) > 1):
+        return ()
+    speed = abs(float(_belt(case, np.zeros(1))[0]))
+    waves = [1.0 / length for length in profile.wavelengths or ()]
+    waves += [number / (2.0 * np.pi) for number in profile.wavenumbers or ()]
+    return tuple(sorted(speed * wave for wave in waves if speed > 0.0))
+
+
+def _summary(result: StoredResult) -> str:
+    """Regime, excitation and numbers in one line."""
+    attributes = result.attributes
+    if attributes.get("status") == "failed":
+        return f"failed at {str(attributes.get('failure', '')).partition(';')[0]}"
+    regime, excitation = str(attributes.get("regime")), str(attributes.get("excitation"))
+    parts = [regime if excitation == "none" else f"{regime}, {excitation}"]
+    if regime == "undecided":
+        parts = [f"{parts[0]}: {'; '.join(str(reason) for reason in attributes.get('reasons', ()))}"]
+    if frequency := _number(result, "frequency"):
+        parts.append(f"{frequency:.4g} Hz")
+    if (amplitude := _number(result, "amplitude")) and excitation != "none":
+        factor, unit = _prefixed(amplitude, "m")
+        parts.append(f"amplitude of x {amplitude * factor:.3g} {unit}")
+    for name, words in (("stick_fraction", "stick"), ("contact_loss_fraction", "contact lost")):
+        if share := _number(result, name):
+            parts.append(f"{words} {share:.1%} of the time")
+    return "   ·   ".join(parts)
+
+
+def _number(result: StoredResult, name: str) -> float | None:
+    value = result.attributes.get(name)
+    return float(value) if isinstance(value, int | float) else None
+
+
+def _case(result: StoredResult) -> Case:
+    try:
+        return parse_case(str(result.attributes.get("resolved_toml", "")), "its resolved case").case
+    except CaseError as error:
+        raise _unreadable(result, f"the case it holds is none: {error.problems[0]}") from error
+
+
+def _unreadable(result: StoredResult, reason: str) -> UnreadableResultError:
+    return UnreadableResultError(f"{result.path}: cannot be drawn: {reason}; compute it again")
+
+
+# How it is drawn
+
+
+def render(picture: Picture, suffix: str) -> bytes:
+    """The picture as the bytes of a file of this suffix; nothing in them depends on when or where."""
+    with _matplotlib():
+        figure = draw(picture)
+        stream = BytesIO()
+        figure.savefig(stream, format=suffix[1:], dpi=150, metadata=_UNDATED.get(suffix))
+        return stream.getvalue()
+
+
+@contextmanager
+def _matplotlib() -> Iterator[None]:
+    """Matplotlib's own defaults and ours, whatever the user's say; a glyph that its font lacks is no alarm."""
+    import matplotlib.style
+
+    with matplotlib.style.context(["default", _STYLE]), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield
+
+
+def draw(picture: Picture) -> "Figure":
+    """The figure with its four panels."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(10.4, 7.2))
+    figure.set_layout_engine("constrained", rect=(0.005, 0.005, 0.99, 0.9), wspace=0.05, hspace=0.06)
+    title, summary = (textwrap.shorten(text, 128, placeholder=" …") for text in (picture.title, picture.summary))
+    figure.text(0.012, 0.978, title, size=13, weight="bold", va="top", parse_math=False)
+    figure.text(0.012, 0.938, summary, size=10.0, color="#444444", va="top", parse_math=False)
+    panels = figure.subplots(2, 2, width_ratios=(1.55, 1.0))
+    _draw_detail(panels[0, 0], picture.detail)
+    _draw_portrait(panels[0, 1], picture.detail)
+    _draw_history(panels[1, 0], picture)
+    _draw_spectrum(panels[1, 1], picture)
+    return figure
+
+
+def _draw_detail(axes: "Axes", detail: Detail) -> None:
+    factor, unit = _prefixed(_reach(detail), "m/s")
+    axes.plot(detail.time, factor * detail.vx, color=_BLUE, marker=_marker(detail.time))
+    for state, colour, label in _SHADES:
+        spans = [
+            (detail.time[first] - 0.5 * detail.interval, (last - first + 1) * detail.interval)
+            for first, last in episodes(detail.state, state)
+        ]
+        if spans:
+            across = axes.get_xaxis_transform()
+            axes.broken_barh(
+                spans, (0, 1), transform=across, color=colour, alpha=0.3, lw=0, zorder=0.5, label=label
+            )
+    if _is_near(detail):
+        label = f"U = {factor * detail.belt[-1]:.4g} {unit}" if np.ptp(detail.belt) == 0.0 else "U"
+        axes.plot(detail.time, factor * detail.belt, color=_VERMILION, ls=_DASHES, lw=1.1, label=label)
+    if len(detail.time) > 1:
+        axes.set_xlim(detail.time[0], detail.time[-1])
+    axes.set(title=f"{detail.name}: tangential velocity", xlabel="time (s)", ylabel=f"velocity ẋ ({unit})")
+    _note_far(axes, detail)
+    _legend_above(axes)
+
+
+def _draw_portrait(axes: "Axes", detail: Detail) -> None:
+    centre = _centre(detail.x)
+    x_factor, x_unit = _prefixed(_largest(detail.x - centre), "m")
+    factor, unit = _prefixed(_reach(detail), "m/s")
+    x, vx = x_factor * (detail.x - centre), factor * detail.vx
+    axes.plot(x, vx, color=_BLUE, lw=0.9, marker=_marker(x))
+    stick = detail.state == ContactState.STICK
+    axes.plot(x[stick], vx[stick], color=_ORANGE, ls="none", marker="o", ms=3.0)
+    if _is_near(detail):
+        for value in sorted({float(detail.belt.min()), float(detail.belt.max())}):
+            axes.axhline(factor * value, color=_VERMILION, ls=_DASHES, lw=1.1)
+    axes.locator_params(axis="x", nbins=6)
+    about = f" − ({centre:.12g} m)".replace("-", "−") if centre else ""
+    axes.set(title="Phase portrait", xlabel=f"displacement x{about} ({x_unit})", ylabel=f"velocity ẋ ({unit})")
+    _note_far(axes, detail)
+
+
+def _is_near(detail: Detail) -> bool:
+    """Whether the wheel's surface speed fits beside the motion without flattening it."""
+    moving = _largest(detail.vx)
+    return moving == 0.0 or _largest(detail.belt) <= 4.0 * moving
+
+
+def _reach(detail: Detail) -> float:
+    """The largest velocity (m/s) to be drawn."""
+    return max(_largest(detail.vx), _largest(detail.belt) if _is_near(detail) else 0.0)
+
+
+def _note_far(axes: "Axes", detail: Detail) -> None:
+    if not _is_near(detail):
+        note = f"U = {detail.belt[-1]:.4g} m/s, off the scale"
+        axes.set_title(note, loc="right", size=8.5, color=_VERMILION)
+
+
+def _draw_history(axes: "Axes", picture: Picture) -> None:
+    factor, unit = _prefixed(max(_largest(picture.lowest), _largest(picture.highest)), "m")
+    time, detail = picture.time, picture.detail.time
+    axes.fill_between(time, factor * picture.lowest, factor * picture.highest, color=_BLUE, lw=0.9)
+    if len(time) < 3:
+        axes.plot(time, factor * picture.lowest, color=_BLUE, marker="o", ms=4.0)
+    if len(detail) > 1 and detail[-1] - detail[0] < 0.9 * (picture.span[1] - picture.span[0]):
+        axes.axvspan(detail[0], detail[-1], color=_GREEN, alpha=0.25, lw=0, zorder=0.5, label="drawn above")
+    if picture.span[1] > picture.span[0]:
+        axes.set_xlim(*picture.span)
+    _legend_above(axes)
+    axes.set(title="Whole run: tangential displacement", xlabel="time (s)", ylabel=f"displacement x ({unit})")
+
+
+def _draw_spectrum(axes: "Axes", picture: Picture) -> None:
+    axes.set(title=f"Spectrum of ẋ from {picture.spectrum_from:.4g} s on")
+    axes.set(xlabel="frequency (Hz)", ylabel="power spectral density ((m/s)²/Hz)")
+    shown = picture.density > 0.0
+    shown[:1] = False  # the mean was removed
+    if not shown.any():
+        axes.set(xticks=[], yticks=[])
+        axes.text(0.5, 0.5, "no motion", transform=axes.transAxes, ha="center", color="#666666")
+        return
+    line = picture.fundamental or picture.peak
+    highest = min(picture.frequency[-1], max([6.5 * (line or np.inf), *(1.3 * f for f in picture.passing)]))
+    near = shown & (picture.frequency <= highest)
+    near = near if near.any() else shown
+    frequency, density = picture.frequency[near], picture.density[near]
+    lowest = max(0.3 * float(density.min()), 1e-10 * float(density.max()))
+    axes.semilogy(frequency, density, color=_BLUE, lw=1.0, marker=_marker(frequency))
+    axes.set_ylim(lowest, 30.0 * float(density.max()))
+    axes.set_xlim(0.0, min(highest, max(1.3 * float(frequency[density > lowest][-1]), 2.0 * (line or 0.0))))
+    words = "fundamental" if picture.fundamental else "highest peak"
+    for wave in picture.passing:
+        label = "waves of the wheel pass" if wave == picture.passing[0] else None
+        axes.axvline(wave, color=_VERMILION, ls=_DASHES, lw=0.9, zorder=0.8, label=label)
+    if line:
+        axes.axvline(line, color=_GREEN, ls=(0, (1, 1.5)), lw=1.4, zorder=0.9, label=f"{words} {line:.4g} Hz")
+    if axes.get_legend_handles_labels()[1]:
+        axes.legend(loc="upper right")
+
+
+def _legend_above(axes: "Axes") -> None:
+    """A legend, if there is anything to tell, with room for it above the data."""
+    if axes.get_legend_handles_labels()[1]:
+        low, high = axes.get_ylim()
+        axes.set_ylim(low, high + 0.14 * (high - low))
+        axes.legend(loc="upper right", ncols=3)
+
+
+def _marker(values: NDArray[Any]) -> str:
+    """Dots where samples are so few that a line would not show them."""
+    return "." if len(values) < 40 else ""
+
+
+def _largest(values: Array) -> float:
+    return float(np.max(np.abs(values), initial=0.0))
+
+
+def _prefixed(largest: float, unit: str) -> tuple[float, str]:
+    """By what to multiply values up to `largest` for a unit that makes them easy to read, and its name."""
+    if 0.0 < largest < 1e6:
+        for exponent, prefix in ((3, "k"), (0, ""), (-3, "m"), (-6, "µ"), (-9, "n"), (-12, "p")):
+            if largest >= 10.0**exponent:
+                return 10.0**-exponent, prefix + unit
+    return 1.0, unit
+
+
+def _centre(values: Array) -> float:
+    """What to subtract from values that differ too little for readable ticks, in round numbers; else 0."""
+    middle, width = 0.5 * float(values.min() + values.max()), float(np.ptp(values))
+    if not 0.0 < width < 0.1 * abs(middle):
+        return 0.0
+    digits = math.ceil(math.log10(abs(middle) / width))
+    return float(f"{middle:.{digits}e}")
