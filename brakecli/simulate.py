@@ -3,13 +3,14 @@
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brakecli import integrate, iteration
 from brakecli.analysis.energy import OPEN_ACCOUNT, EnergyAccount, account
-from brakecli.analysis.equilibrium import equilibrium
+from brakecli.analysis.equilibrium import equilibrium, mean_contact
 from brakecli.case import InitialState, Start
 from brakecli.contact import KINDS
 from brakecli.contact.pad import build_contact
@@ -159,7 +160,8 @@ class Motion:
         x, y = initial.x, initial.y
         if initial.at is InitialState.EQUILIBRIUM:
             load = float(value_at(setup.load, 0.0))
-            rest = equilibrium(setup.coefficients, setup.evaluate, setup.pad, setup.wheel, load, setup.belt_speed)
+            mean = partial(mean_contact, setup.evaluate, setup.pad, setup.wheel)
+            rest = equilibrium(setup.coefficients, mean, setup.pad, load, setup.belt_speed)
             x, y = x + rest.x, y + rest.y
         velocity, acceleration = (initial.vx, initial.vy), (0.0, 0.0)
         self._evaluate_at(x, y, 0.0)

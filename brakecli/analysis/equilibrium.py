@@ -1,10 +1,12 @@
 """Steady sliding: the position at which (6)-(7) hold without motion, averaged over the wheel's roughness."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 from scipy.optimize import brentq
 
 from brakecli.contact.closed_form import CLEAR, FULL, coverage
@@ -15,6 +17,7 @@ from brakecli.roughness import Surface, wheel_angles
 
 PLACES = 1024
 """Positions of the wheel that an average takes, over 50 of its longest waves."""
+TABLE = 129
 
 
 @dataclass(frozen=True)
@@ -51,9 +54,32 @@ def mean_contact(evaluate: Any, pad: NDArray[np.float64], wheel: Surface, y: flo
     return float(force), float(stiffness), float(fraction)
 
 
-def equilibrium(
-    c: Coefficients, evaluate: Any, pad: NDArray[np.float64], wheel: Surface, load: float, belt: float
-) -> Equilibrium:
+Mean = Callable[[float], tuple[float, float, float]]
+"""Mean force (N), stiffness (N/m) and touching part of the contact at a height y (m)."""
+
+
+def tabulated(mean: Mean, pad: NDArray[np.float64]) -> Mean:
+    """The same, interpolated between `TABLE` heights where the pad touches in part: for many calls.
+
+    The force is a cubic through its values and slopes; its error falls with the fourth power of the spacing.
+    """
+    full, top = -pad[WHEEL_BOUND] - pad[SHOE_TOP], pad[WHEEL_BOUND] + pad[SHOE_BOTTOM]
+    if full == top:
+        return mean
+    heights = np.linspace(full, top, TABLE)
+    values = np.array([mean(float(y)) for y in heights])
+    force = CubicHermiteSpline(heights, values[:, 0], -values[:, 1])
+    slope, fraction = force.derivative(), PchipInterpolator(heights, values[:, 2])
+
+    def interpolated(y: float) -> tuple[float, float, float]:
+        if not full < y < top:
+            return mean(y)
+        return float(force(y)), -float(slope(y)), float(fraction(y))
+
+    return interpolated
+
+
+def equilibrium(c: Coefficients, mean: Mean, pad: NDArray[np.float64], load: float, belt: float) -> Equilibrium:
     """Steady sliding under the load Q (N) on a wheel that moves with U (m/s); no friction acts where U = 0.
 
     With F_x = sign(U) phi F_y, (6) gives x for a height y and (7) remains: one equation in y. Raises CaseError
@@ -71,7 +97,7 @@ def equilibrium(
     uplift = 1.0 - lean * grip  # of F_y, after what its friction takes away through the links
 
     def unbalanced(y: float) -> float:
-        return spring * y + push - uplift * mean_contact(evaluate, pad, wheel, y)[0]
+        return spring * y + push - uplift * mean(y)[0]
 
     full, top = -pad[WHEEL_BOUND] - pad[SHOE_TOP], pad[WHEEL_BOUND] + pad[SHOE_BOTTOM]
     stiffness = 2.0 * pad[HALF] * pad[K]
@@ -86,7 +112,7 @@ def equilibrium(
             y = brentq(unbalanced, full, top, xtol=1e-15 * max(abs(full), abs(top), 1e-300), rtol=1e-14)
         else:
             raise _none("the friction force lifts more than the load presses (self-locking)")
-    force, mean_stiffness, fraction = mean_contact(evaluate, pad, wheel, float(y))
+    force, mean_stiffness, fraction = mean(float(y))
     x = (grip * force - q_x) / c.c_xx - lean * y if c.c_xx > 0.0 else 0.0
     return Equilibrium(float(x), float(y), force, mean_stiffness, fraction)
 

@@ -1,0 +1,241 @@
+"""What `brakecli stability` says of a case: steady sliding, modes, critical friction, and the scheme's share."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from scipy.optimize import brentq
+
+from brakecli.analysis.equilibrium import Equilibrium, Mean, equilibrium, mean_contact, tabulated
+from brakecli.analysis.precision import amplification, natural_frequencies
+from brakecli.analysis.stability import Crossing, Instability, Mode, crossings, eigensystem, is_undamped, modes
+from brakecli.errors import CaseError
+from brakecli.kernels import Coefficients
+from brakecli.schedules import value_at
+from brakecli.setup import Setup
+
+LARGEST_FRICTION = 10.0
+"""Up to here a critical friction coefficient is looked for on rough surfaces, whose stiffness depends on it."""
+FRICTIONS = 401
+_MARGIN = 1e-9  # growth per step that counts as growth: above the rounding of simple eigenvalues
+_CLEAR_MARGIN = 1e-6  # above that of double ones, where a direction has no spring
+
+StiffnessAt = Callable[[float], float]
+
+
+@dataclass(frozen=True)
+class Discrete:
+    """What the case's scheme makes of the same motion at its step.
+
+    `spectral_radius`: factor of the fastest disturbance in a step at the case's φ; `growth` (1/s) is its
+    logarithm over the step. `step_limit` (s): the frictionless shoe is stable below; None where any step is.
+    `critical_friction`: where the radius passes one, `bias` its distance from the exact one.
+    """
+
+    spectral_radius: float
+    growth: float
+    step_limit: float | None
+    critical_friction: float | None
+    bias: float | None
+
+
+@dataclass(frozen=True)
+class StabilityReport:
+    """Linear stability of the steady sliding of a case; None stands for what does not exist."""
+
+    belt_speed: float
+    friction: float
+    equilibrium: Equilibrium | None
+    no_equilibrium: str | None
+    contact_stiffness: float  # N/m, mean -∂F_y/∂y at the equilibrium
+    stable: bool | None
+    eigenvalues: tuple[complex, ...]
+    modes: tuple[Mode, ...]
+    crossings: tuple[Crossing, ...]
+    undamped_flutter: float | None  # φ, closed forms for the contact stiffness above
+    undamped_divergence: float | None
+    discrete: Discrete | None
+
+    @property
+    def critical(self) -> Crossing | None:
+        """The smallest friction coefficient at which stability is lost."""
+        return next((crossing for crossing in self.crossings if crossing.lost), None)
+
+    def numbers(self) -> dict[str, Any]:
+        """Names and values as `--json` gives them."""
+        critical = self.critical
+        return {
+            "belt_speed": self.belt_speed,
+            "friction_coefficient": self.friction,
+            "critical_friction": critical.friction if critical else None,
+            "instability": str(critical.instability) if critical else None,
+            "critical_frequency": critical.frequency if critical else None,
+            "stable": self.stable,
+            "eigenvalues": [[value.real, value.imag] for value in self.eigenvalues],
+            "modes": [mode.__dict__ for mode in self.modes],
+            "crossings": [
+                {**crossing.__dict__, "instability": str(crossing.instability)} for crossing in self.crossings
+            ],
+            "undamped_flutter_friction": self.undamped_flutter,
+            "undamped_divergence_friction": self.undamped_divergence,
+            "contact_stiffness": self.contact_stiffness,
+            "equilibrium": self.equilibrium.__dict__ if self.equilibrium else None,
+            "no_equilibrium": self.no_equilibrium,
+            "discrete": self.discrete.__dict__ if self.discrete else None,
+        }
+
+
+def stability(setup: Setup) -> StabilityReport:
+    """Linear stability of steady sliding at the speed and load of t = 0."""
+    c, belt = setup.coefficients, setup.belt_speed
+    rest, reason = None, None
+    mean = partial(mean_contact, setup.evaluate, setup.pad, setup.wheel)
+    load = float(value_at(setup.load, 0.0))
+    try:
+        rest = equilibrium(c, mean, setup.pad, load, belt)
+    except CaseError as error:
+        reason = error.problems[0].what
+    k = rest.stiffness if rest else setup.contact_stiffness
+    grip = math.copysign(c.phi, belt) if belt else 0.0
+    values, _ = eigensystem(c, k, grip)
+    found: list[Crossing] = []
+    stiffness_at: StiffnessAt = lambda phi: k  # noqa: E731
+    if belt != 0.0 and setup.smooth:
+        found = crossings(c, k, belt) if k > 0.0 else []
+    elif belt != 0.0:
+        stiffness_at = _mean_stiffness(setup, tabulated(mean, setup.pad), load)
+        found = _rough_crossings(c, belt, stiffness_at)
+    flutter, divergence = undamped_critical(c, k, belt)
+    lost = next((crossing for crossing in found if crossing.lost), None)
+    fastest = float(values.real.max())
+    tolerance = 0.0 if is_undamped(c) else 1e-12 * float(np.abs(values).max())
+    return StabilityReport(
+        belt_speed=belt,
+        friction=c.phi,
+        equilibrium=rest,
+        no_equilibrium=reason,
+        contact_stiffness=k,
+        stable=fastest <= tolerance if rest else None,
+        eigenvalues=tuple(complex(value) for value in values),
+        modes=tuple(modes(c, k, grip)),
+        crossings=tuple(found),
+        undamped_flutter=flutter,
+        undamped_divergence=divergence,
+        discrete=_discrete(setup, stiffness_at, lost) if rest else None,
+    )
+
+
+def undamped_critical(c: Coefficients, k: float, belt: float) -> tuple[float | None, float | None]:
+    """Closed forms without dashpots: φ of flutter, |cxy|/K + (cxx - cyy - K)²/(4|cxy| K), where cxy sign(U) < 0,
+    and of divergence (self-locking), (cxx (cyy + K) - cxy²)/(K |cxy|), where cxy sign(U) > 0.
+    """
+    pull = math.copysign(1.0, belt) * c.c_xy
+    if belt == 0.0 or c.c_xy == 0.0 or k == 0.0:
+        return None, None
+    if pull < 0.0:
+        return (abs(c.c_xy) + (c.c_xx - c.c_yy - k) ** 2 / (4.0 * abs(c.c_xy))) / k, None
+    return None, (c.c_xx * (c.c_yy + k) - c.c_xy**2) / (k * abs(c.c_xy))
+
+
+def _mean_stiffness(setup: Setup, mean: Mean, load: float) -> StiffnessAt:
+    """Mean stiffness of the contact as it depends on φ through the mean force; NaN where there is none."""
+
+    def at(phi: float) -> float:
+        c = setup.coefficients._replace(phi=phi)
+        try:
+            return equilibrium(c, mean, setup.pad, load, setup.belt_speed).stiffness
+        except CaseError:
+            return math.nan
+
+    return at
+
+
+def _rough_crossings(c: Coefficients, belt: float, stiffness_at: StiffnessAt) -> list[Crossing]:
+    """Changes of stability on rough surfaces, whose mean stiffness depends on φ."""
+
+    def first_mode(phi: float) -> Mode | None:
+        k = stiffness_at(phi)
+        return modes(c._replace(phi=phi), k, math.copysign(phi, belt))[0] if math.isfinite(k) else None
+
+    def unstable(phi: float) -> bool | None:
+        mode = first_mode(phi)
+        return None if mode is None else mode.growth > 0.0
+
+    frictions = [float(phi) for phi in np.linspace(0.0, LARGEST_FRICTION, FRICTIONS)]
+    verdicts = [unstable(phi) for phi in frictions]
+    found = []
+    for (low, high), (before, after) in zip(pairwise(frictions), pairwise(verdicts), strict=True):
+        if before is None or after is None or before == after:
+            continue
+        for _ in range(50):  # by halves: without dashpots the growth is zero on one side
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if unstable(middle) == before else (low, middle)
+        mode = first_mode(high if after else low)
+        oscillates = mode is not None and mode.frequency > 0.0
+        kind = Instability.FLUTTER if oscillates else Instability.DIVERGENCE
+        found.append(Crossing(0.5 * (low + high), kind, mode.frequency if mode else 0.0, after))
+    return found
+
+
+def _mirrored(c: Coefficients) -> Coefficients:
+    """The same shoe seen from behind: x and U change sign, and so do the couplings."""
+    return c._replace(b_xy=-c.b_xy, c_xy=-c.c_xy, sin_beta=-c.sin_beta)
+
+
+def _discrete(setup: Setup, stiffness_at: StiffnessAt, exact: Crossing | None) -> Discrete | None:
+    """What the scheme makes of steady sliding; nothing where there is none, or no contact."""
+    c, belt = setup.coefficients, setup.belt_speed
+    if belt < 0.0:
+        c = _mirrored(c)
+    if belt == 0.0 or not stiffness_at(c.phi) > 0.0:
+        return None
+
+    def radius(phi: float, h: float = setup.weights.h) -> float:
+        k = stiffness_at(phi)
+        if not k > 0.0:
+            return 0.0
+        matrix = amplification(c._replace(phi=phi), setup.weights._replace(h=h), setup.scheme, k)
+        return float(np.abs(np.linalg.eigvals(matrix)).max())
+
+    at_case = radius(c.phi)
+    critical = None
+    reach = 2.0 * exact.friction if exact else LARGEST_FRICTION
+    frictions = np.linspace(0.0, reach, 41)
+    radii = [radius(float(phi)) - 1.0 - _MARGIN for phi in frictions]
+    if radii[0] > 0.0:
+        critical = 0.0
+    else:
+        first = next((i for i in range(40) if radii[i + 1] > 0.0), None)
+        if first is not None:
+            low, high = float(frictions[first]), float(frictions[first + 1])
+            critical = float(brentq(lambda phi: radius(phi) - 1.0 - _MARGIN, low, high, xtol=1e-12))
+    return Discrete(
+        spectral_radius=at_case,
+        growth=math.log(at_case) / setup.weights.h if at_case > 0.0 else -math.inf,
+        step_limit=_step_limit(lambda h: radius(0.0, h), natural_frequencies(c, stiffness_at(0.0))[1]),
+        critical_friction=critical,
+        bias=critical - exact.friction if critical is not None and exact else None,
+    )
+
+
+def _step_limit(radius: Callable[[float], float], frequency: float) -> float | None:
+    """The largest stable step (s), looked for between ωh = 0.01 and 10⁴ at the highest natural frequency (Hz).
+
+    0 where the scheme is unstable at any step, None where it is stable at all of them.
+    """
+    ladder = 10.0 ** np.arange(-2.0, 4.1, 0.25) / (2.0 * math.pi * frequency)
+    stable = [radius(float(h)) <= 1.0 + _CLEAR_MARGIN for h in ladder]
+    if all(stable):
+        return None
+    first = stable.index(False)
+    if first == 0:
+        return 0.0
+    low, high = float(ladder[first - 1]), float(ladder[first])
+    for _ in range(60):
+        middle = math.sqrt(low * high)
+        low, high = (middle, high) if radius(middle) <= 1.0 + _CLEAR_MARGIN else (low, middle)
+    return low
