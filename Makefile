@@ -13,7 +13,7 @@ PYTEST_ARGS ?=
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .NOTPARALLEL: # two installations into one .venv at a time would collide
-.PHONY: help demo test lint format types imports derivations cases check clean
+.PHONY: help demo test lint format types imports derivations cases picture check clean
 
 help: ## list the targets (this text)
 	@echo "make TARGET, where TARGET is one of"
@@ -78,6 +78,11 @@ cases: $(RUN_STAMP) ## run every sample case into results/; one that fails, fail
 	    $(BIN)/brakecli run "$$case" --force --quiet --output "results/$$name.h5" || failed="$$failed $$name"; \
 	done; \
 	if [ -n "$$failed" ]; then echo "failed:$$failed" >&2; exit 1; fi
+
+picture: $(DEV_STAMP) ## draw docs/picture.png, from cases/relaxation.toml
+	@mkdir -p results
+	$(BIN)/brakecli run cases/relaxation.toml --force --quiet --output results/relaxation.h5
+	$(BIN)/brakecli plot results/relaxation.h5 --force --output docs/picture.png
 
 check: lint types imports test cases ## all of lint, types, imports, test and cases
 
