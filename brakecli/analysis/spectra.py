@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import signal
 
 from brakecli.history import History
 
@@ -48,6 +47,8 @@ def spectrum(history: History, start: int) -> Spectrum:
 
 def _density(history: History, name: str, start: int, size: int, hop: int, segments: int) -> NDArray[np.float64]:
     """Mean periodogram of the segments, some of them at a time."""
+    from scipy import signal  # half a second, which a command without spectra need not wait for
+
     total = np.zeros(size // 2 + 1)
     for first in range(0, segments, SEGMENTS_AT_ONCE):
         count = min(SEGMENTS_AT_ONCE, segments - first)
