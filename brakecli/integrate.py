@@ -125,15 +125,18 @@ def sample(
     counts[EVALUATIONS] += 1
     normal = contact[NORMAL_FORCE]
     bound = c.phi * normal
+    belt_slope = slope_at(drive.belt, t)
+    sliding = v_x - belt
+    if abs(sliding) <= 1e-15 * (abs(belt) + abs(belt_slope * t)):  # the step took U at its own rounding of t
+        sliding = 0.0
     needed = (
-        c.m * slope_at(drive.belt, t)
+        c.m * belt_slope
         + c.b_xx * belt
         + c.b_xy * v_y
         + c.c_xx * x
         + c.c_xy * y
         + value_at(drive.load, t) * c.sin_beta
     )
-    sliding = v_x - belt
     if normal == 0.0:
         side, friction = _SEPARATED, 0.0
     elif abs(sliding) <= grid.lag * s.h * bound / c.m and abs(needed) <= bound:
@@ -226,10 +229,10 @@ def advance(
                 return _UNCONVERGED
         if contact[VALID] == 0.0:
             return _NOT_CLOSED
-        counts[KIND_0 + int(contact[KIND])] += 1
         finish(c, s, state, load, belt_now, belt_next, problem, contact, work)  # type: ignore[operator]
         if not abs(state[X]) + abs(state[Y]) + abs(state[VX]) + abs(state[VY]) < _BOUND:
             return _DIVERGED
+        counts[KIND_0 + int(contact[KIND])] += 1
         counts[LEVEL] += 1
         part += 1
         if part == grid.per_sample:

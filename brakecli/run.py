@@ -91,7 +91,8 @@ class RunReport:
         """What ended the run before its time."""
         if not self.failed:
             return None
-        return f"t = {self.work.failure_time:.6g} s: {self.work.failure.sentence}"
+        when = f"t = {self.work.failure_time:.6g} s: " if self.work.failure_time is not None else ""
+        return when + self.work.failure.sentence
 
 
 def run(

@@ -95,7 +95,7 @@ class Motion:
         self._count()
         energy = account(self._start_energy, self._energy(), self.works)
         if self.work.failure is Failure.NONE and abs(energy.relative_closing_error) > OPEN_ACCOUNT:
-            self.work.failure, self.work.failure_time = Failure.UNBALANCED, self.setup.timing.step * last
+            self.work.failure = Failure.UNBALANCED
         return self.work, energy
 
     def _most_steps(self) -> int:

@@ -254,3 +254,24 @@ def test_a_run_keeps_no_more_than_a_block_in_memory() -> None:
     motion.run(lambda rows: sizes.append(len(rows)))
     assert sum(sizes) == 10**6 + 1
     assert max(sizes) <= simulation.BLOCK_ROWS
+
+
+def test_a_shoe_that_sticks_to_a_slowing_wheel_sticks_at_every_sample() -> None:
+    # A free shoe on a slowing wheel: only friction holds it, and it holds. U at a sample and U in the step
+    # before it are rounded apart.
+    case = make(
+        {
+            **COULOMB,
+            "link1": {"stiffness": 0.0},
+            "link2": {"stiffness": 0.0},
+            "wheel": {"radius": 0.3, "times": [0.0, 7.3], "angular_speeds": [1.7, 0.1]},
+            "initial": {"y": -1.1, "vx": 1.7 * 0.3},
+            "solver": {"step": 0.003, "duration": 6.0},
+            "output": {"sample_interval": 0.021},
+        }
+    )
+    result = simulate(case)
+    assert np.all(result.state == 0)
+    slope = 0.3 * (0.1 - 1.7) / 7.3
+    assert result.friction_force == pytest.approx(slope, rel=1e-12)  # m dU/dt, with m = 1 kg
+    assert np.abs(result.vx - (0.51 + slope * result.time)).max() < 1e-14

@@ -35,6 +35,7 @@ WINDOWS = 40
 LONGEST = 1 << 20
 """Samples at the end of the history in which cycles are counted and lines are weighed."""
 SETTLED_WITHIN = 0.05  # of the final amplitude: windows that are settled
+REACH_WITHIN = 0.02  # of the final peak to peak of x: its least and largest values in windows that are settled
 DECAYED_TO = 0.02  # of the largest amplitude: a motion that has died out
 FEWEST_CYCLES = 10
 SAMPLES_PER_CYCLE = 8
@@ -92,8 +93,9 @@ def classify(history: History, context: Context) -> Verdict:
         return _verdict(history, half, Regime.UNDECIDED, reason)
     if history.samples < 4 * WINDOWS:
         return _verdict(history, half, Regime.UNDECIDED, f"fewer than {4 * WINDOWS} samples; run longer")
-    envelope, centres = _envelope(history)
-    final = float(np.mean(envelope[-WINDOWS // 4 :]))
+    (envelope, least, largest), centres = _windows(history)
+    last = slice(-WINDOWS // 4, None)
+    final = float(np.mean(envelope[last]))
     evidence = {"envelope_final": final, "envelope_largest": float(envelope.max()), **_slope(envelope, centres)}
     if not context.steady:
         reason = "the wheel's speed or the load changes with time, so the motion cannot settle"
@@ -107,6 +109,8 @@ def classify(history: History, context: Context) -> Verdict:
         evidence |= {"forced_share": forced}
         return _verdict(history, half, Regime.DAMPED, reason, evidence, Excitation.FORCED)
     settled = np.abs(envelope - final) <= SETTLED_WITHIN * final
+    for bound in (least, largest):
+        settled &= np.abs(bound - np.mean(bound[last])) <= REACH_WITHIN * np.mean((largest - least)[last])
     first = WINDOWS - int(np.argmin(settled[::-1])) if not settled.all() else 1
     if first > WINDOWS - WINDOWS // 4:
         if _is_steady(evidence):  # an amplitude that beats or wanders, without a trend
@@ -155,7 +159,7 @@ def _sustained(history: History, context: Context, start: int, evidence: dict[st
             f"irregular: stick in {stick_cycles:.0%} of the cycles, {harmonic:.0%} of the energy of vx in one "
             "line and its harmonics; run longer, or look at the spectrum"
         )
-        return _verdict(history, start, Regime.UNDECIDED, reason, evidence, Excitation.SELF_EXCITED)
+        return _verdict(history, start, Regime.UNDECIDED, reason, evidence)
     return _verdict(history, start, regime, reason, evidence, excitation, frequency)
 
 
@@ -178,12 +182,11 @@ def _verdict(
     frequency: float | None = None,
 ) -> Verdict:
     """Add the means and fractions from sample `start` on, read in pieces."""
-    lowest, highest, count = np.inf, -np.inf, history.samples - start
-    stick, lost, friction = 0, 0, 0.0
+    lowest, highest = _extremes(history, start, history.samples)
+    count, stick, lost, friction = history.samples - start, 0, 0, 0.0
     for begin in range(start, history.samples, LONGEST):
         end = min(begin + LONGEST, history.samples)
-        x, state = history.read("x", begin, end), history.read("state", begin, end)
-        lowest, highest = min(lowest, float(x.min())), max(highest, float(x.max()))
+        state = history.read("state", begin, end)
         stick += int(np.sum(state == ContactState.STICK))
         lost += int(np.sum(state == ContactState.SEPARATED))
         friction += float(np.sum(history.read("friction_force", begin, end)))
@@ -201,19 +204,33 @@ def _verdict(
     )
 
 
-def _envelope(history: History) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Standard deviation of vx (m/s) in equal windows, and the times of their centres (s)."""
+def _windows(history: History) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """In equal windows, rows of: standard deviation of vx (m/s), least and largest x (m); and the times of their
+    centres (s).
+    """
     edges = np.linspace(0, history.samples, WINDOWS + 1).astype(int)
-    deviations = []
-    for begin, end in pairwise(edges):
-        count, total, square = 0, 0.0, 0.0
-        shift = float(history.read("vx", begin, begin + 1)[0])
-        for first in range(begin, end, LONGEST):
-            values = history.read("vx", first, min(first + LONGEST, end)) - shift
-            count, total = count + len(values), total + float(values.sum())
-            square += float(values @ values)
-        deviations.append(np.sqrt(max(square / count - (total / count) ** 2, 0.0)))
-    return np.array(deviations), 0.5 * (edges[:-1] + edges[1:]) * history.interval
+    rows = [(_deviation(history, begin, end), *_extremes(history, begin, end)) for begin, end in pairwise(edges)]
+    return np.array(rows).T, 0.5 * (edges[:-1] + edges[1:]) * history.interval
+
+
+def _deviation(history: History, begin: int, end: int) -> float:
+    """Standard deviation of vx, read in pieces, with sums taken from its first value on."""
+    count, total, square = 0, 0.0, 0.0
+    first = float(history.read("vx", begin, begin + 1)[0])
+    for start in range(begin, end, LONGEST):
+        values = history.read("vx", start, min(start + LONGEST, end)) - first
+        count, total = count + len(values), total + float(values.sum())
+        square += float(values @ values)
+    return float(np.sqrt(max(square / count - (total / count) ** 2, 0.0)))
+
+
+def _extremes(history: History, begin: int, end: int) -> tuple[float, float]:
+    """Least and largest x, read in pieces."""
+    least, largest = np.inf, -np.inf
+    for start in range(begin, end, LONGEST):
+        values = history.read("x", start, min(start + LONGEST, end))
+        least, largest = min(least, float(values.min())), max(largest, float(values.max()))
+    return least, largest
 
 
 def _slope(envelope: NDArray[np.float64], centres: NDArray[np.float64]) -> dict[str, float]:
