@@ -1,5 +1,16 @@
-"""`python -m brakecli` is `brakecli`."""
+"""`python -m brakecli` and the installed command."""
 
-from brakecli.cli import main
+from brakecli.process import guard_streams, handle_signals
 
-main()
+
+def main() -> None:
+    """Run the command line; signals are heard before anything large is imported."""
+    handle_signals()
+    guard_streams()
+    from brakecli.cli import main as run
+
+    run()
+
+
+if __name__ == "__main__":
+    main()

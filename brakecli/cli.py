@@ -2,18 +2,17 @@
 
 import json
 import os
-import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from brakecli import __version__
-from brakecli.errors import BrakecliError, CannotWriteError, UsageError
+from brakecli.errors import BrakecliError, UsageError
+from brakecli.process import Interrupted, unwinding
 
 if TYPE_CHECKING:
     from brakecli.case_reading import LoadedCase
@@ -26,7 +25,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
-    help="Vibration of a brake shoe on a rough wheel: will it vibrate, how, and from which friction coefficient on.",
+    help="Vibration of a brake shoe on a rough wheel: will it vibrate, how, from which friction coefficient on.",
 )
 
 CaseArgument = Annotated[
@@ -41,30 +40,18 @@ Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but wa
 Force = Annotated[bool, typer.Option("--force", help="Replace an existing output.")]
 
 
-class Terminated(BaseException):
-    """SIGTERM has arrived."""
-
-
 def main() -> None:
     """Run the command line; every failure ends in a sentence on standard error and its exit code."""
-    signal.signal(signal.SIGTERM, _terminate)
     try:
         app()
     except BrakecliError as error:
         _end(str(error), error.exit_code)
-    except KeyboardInterrupt:
-        _end("interrupted; nothing was written", 130)
-    except Terminated:
-        _end("terminated; nothing was written", 143)
+    except Interrupted as error:
+        _end(f"{error}; nothing unfinished was left behind", error.exit_code)
     except MemoryError:
         _end("out of memory; reduce contact.nodes, or sample less often", 3)
-    except BrokenPipeError:  # whoever read our output has gone
-        _silence_stdout()
-        sys.exit(0)
-
-
-def _terminate(number: int, frame: FrameType | None) -> None:
-    raise Terminated
+    except OSError as error:  # of a file that is none of ours, such as the cache of compiled code
+        _end(f"{error.filename or 'a file'}: cannot be read or written: {error.strerror or error}", 74)
 
 
 def _end(message: str, code: int) -> None:
@@ -74,34 +61,19 @@ def _end(message: str, code: int) -> None:
 
 
 def _tell(message: str) -> None:
-    """One line on standard error, if there is one."""
-    try:
-        print(message, file=sys.stderr, flush=True)  # noqa: T201
-    except (OSError, ValueError):
-        pass
+    """One line on standard error."""
+    print(message, file=sys.stderr, flush=True)  # noqa: T201
 
 
 def _print(text: str) -> None:
-    """Print results on standard output, which may be closed or full."""
-    if sys.stdout is None:
-        return
-    try:
-        print(text, flush=True)  # noqa: T201
-    except BrokenPipeError:
-        raise
-    except OSError as error:
-        _silence_stdout()
-        reason = (error.strerror or str(error)).lower()
-        raise CannotWriteError(f"standard output: cannot write: {reason}; redirect it elsewhere") from error
+    """Print results on standard output."""
+    print(text, flush=True)  # noqa: T201
 
 
-def _silence_stdout() -> None:
-    """Let nothing try to write what is still in the buffer."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-
-
-def _print_json(numbers: dict[str, Any]) -> None:
-    _print(json.dumps(numbers, allow_nan=False, ensure_ascii=False, default=str))
+def _print_json(value: dict[str, Any], indent: int | None = None) -> None:
+    """Print as JSON, in ASCII where standard output is not UTF-8."""
+    ascii_only = (sys.stdout.encoding or "").lower().replace("-", "") != "utf8"
+    _print(json.dumps(value, allow_nan=False, ensure_ascii=ascii_only, indent=indent))
 
 
 def _version(wanted: bool) -> None:
@@ -143,13 +115,13 @@ def run_command(
     """Simulate one case; write time histories, spectra, regime and energy account to an HDF5 file."""
     loaded = _load(case, overrides)
     target = output or Path("case.h5" if case == "-" else Path(case).with_suffix(".h5").name)
-    if case != "-" and not _is_result(case) and target.exists() and Path(case).exists() and target.samefile(case):
+    if case != "-" and not _is_result(case) and _is_same_file(target, case):
         raise UsageError(f"{target}: this is the case itself; choose another output with -o")
     _announce_compilation(quiet)
     from brakecli.report import run_table
     from brakecli.run import run
 
-    with _progress(quiet) as bar:
+    with unwinding(), _progress(quiet) as bar:
         report = run(loaded, target, force=force, begin=bar.begin, progress=bar.advance)
     for line in (*report.check.adjustments, *(f"warning: {warning}" for warning in report.warnings)):
         if not quiet or line.startswith("warning"):
@@ -171,39 +143,45 @@ def check_command(
     """Validate a case and tell what a run would cost and which limits it meets, without stepping it."""
     loaded = _load(case, overrides)
     _announce_compilation(quiet)
-    import shutil
-
-    from brakecli.check import check, refuse
+    from brakecli.check import check, free_bytes, refuse, within_range
     from brakecli.report import check_numbers, check_table
     from brakecli.setup import set_up
 
-    setup = set_up(loaded.case)
-    found = check(setup)
+    with within_range():
+        setup = set_up(loaded.case)
+        found = check(setup)
     if as_json:
         _print_json({"command": "check", "valid": True, **check_numbers(found)})
     elif not quiet:
         _print(check_table(loaded.case.title, found))
     for warning in found.warnings:
         _tell(f"brakecli: warning: {warning}")
-    refuse(setup, found, float(shutil.disk_usage(Path.cwd()).free))
+    refuse(setup, found, free_bytes(Path()))
 
 
 @app.command("new")
 def new_command(
-    name: Annotated[str, typer.Argument(metavar="[NAME]", help="File to write, with or without .toml.")] = "case",
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the file, with or without .toml.")] = "case",
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="PATH", help="File to write  [default: NAME.toml]")
+    ] = None,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
     """Write a commented starter case that runs."""
+    import shlex
+
     from brakecli.case_reading import starter_text
     from brakecli.output import new_output
 
-    path = Path(name if name.endswith(".toml") else f"{name}.toml")
-    with new_output(path, force=force) as file:
+    if not name:
+        raise UsageError("the name is empty; give one, or leave it out for case.toml")
+    path = output or Path(name if name.endswith(".toml") else f"{name}.toml")
+    with unwinding(), new_output(path, force=force) as file:
         file.write(starter_text().encode())
         file.publish()
     if not quiet:
-        _print(f"{path}: written; run it with: brakecli run {path}")
+        _print(f"{path}: written; run it with: brakecli run {shlex.quote(str(path))}")
 
 
 @app.command("schema")
@@ -211,7 +189,7 @@ def schema_command() -> None:
     """Print the JSON Schema of case files, for editors that know TOML."""
     from brakecli.case import json_schema
 
-    _print(json.dumps(json_schema(), indent=2, ensure_ascii=False))
+    _print_json(json_schema(), indent=2)
 
 
 @app.command("plot")
@@ -227,17 +205,28 @@ def plot_command(
     from brakecli.plots import plot_run
 
     target = output or Path(result.with_suffix(".png").name)
-    plot_run(result, target, force=force)
+    with unwinding():
+        plot_run(result, target, force=force)
     if not quiet:
         _print(f"{target}: written")
 
 
 def _is_result(source: str) -> bool:
+    """Whether this is a result file, or was one: by its name, or by its content."""
     if source == "-":
         return False
+    if Path(source).suffix == ".h5" and os.path.isfile(source):  # noqa: PTH113 - pathlib's may raise
+        return True
     from brakecli.stored import is_hdf5
 
     return is_hdf5(Path(source))
+
+
+def _is_same_file(one: Path, other: str) -> bool:
+    try:
+        return one.samefile(other)
+    except (OSError, ValueError):  # one of them does not exist, or cannot
+        return False
 
 
 def _load(source: str, overrides: list[str] | None) -> "LoadedCase":
@@ -297,7 +286,3 @@ def _progress(quiet: bool) -> Iterator[_Bar]:
         *columns, MofNCompleteColumn(), TimeRemainingColumn(), console=Console(stderr=True), transient=True
     ) as bar:
         yield _Bar(bar)
-
-
-if __name__ == "__main__":
-    main()

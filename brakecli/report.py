@@ -1,6 +1,8 @@
 """What a run or a check has found, as a table for people and as names and values for programs."""
 
+import io
 import math
+import sys
 from dataclasses import asdict
 from typing import Any
 
@@ -11,6 +13,9 @@ from brakecli.check import Check
 from brakecli.run import RunReport
 
 Rows = list[tuple[str, str]]
+
+NARROWEST = 40
+"""Columns of a table, whatever the terminal says: in fewer nothing can be read."""
 
 
 def run_table(report: RunReport) -> str:
@@ -94,7 +99,9 @@ def _table(title: str, rows: Rows) -> str:
     table.add_column(overflow="fold")
     for name, value in rows:
         table.add_row(name, value)
-    console = Console()
-    with console.capture() as capture:
-        console.print(table, markup=False)
-    return capture.get().rstrip("\n")
+    file, colours = io.StringIO(), sys.stdout.isatty() or None
+    # Titles and file names are no markup.
+    console = Console(file=file, force_terminal=colours, markup=False, emoji=False, highlight=False)
+    console.width = max(console.width, NARROWEST)
+    console.print(table)
+    return "\n".join(line.rstrip() for line in file.getvalue().splitlines())
