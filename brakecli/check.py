@@ -1,7 +1,13 @@
 """What a case will cost and which limits it meets, before anything is computed."""
 
 import math
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
 
 from brakecli.analysis.precision import RESOLVED, StepLimits, natural_frequencies, step_limits
 from brakecli.case import Iteration
@@ -131,8 +137,8 @@ def _with_warnings(setup: Setup, found: Check) -> Check:
         )
     if not limits.unique:
         warnings.append(
-            "friction.coefficient: a step may have more than one solution, as friction can wedge the shoe into the "
-            "wheel within a step; reduce solver.step or the coefficient"
+            "friction.coefficient: a step may have more than one solution, as friction can wedge the shoe into "
+            "the wheel within a step; reduce solver.step or the coefficient"
         )
     if 1.0 + 1e-3 / found.steps < limits.growth and limits.growth > 1.0 + _UNSTABLE:
         warnings.append(
@@ -144,10 +150,33 @@ def _with_warnings(setup: Setup, found: Check) -> Check:
     return Check(**{**found.__dict__, "warnings": tuple(warnings)})
 
 
-def _stable_remedy(setup: Setup) -> str:
+def _stable_remedy(setup: Setup, shorter: str = "reduce solver.step") -> str:
     if setup.scheme.WEIGHTS == 2:
-        return "take weights that add up to 1 or more, such as [0.5, 0.5], or reduce solver.step"
-    return "reduce solver.step, or take theta = [0.25, 0.5, 0.25]"
+        return f"{shorter}, or take weights that add up to 1 or more, such as [0.5, 0.5]"
+    return f"{shorter}, or take theta = [0.25, 0.5, 0.25]"
+
+
+def _blows_up(growth: float, steps: float) -> bool:
+    return growth > 1.0 + _UNSTABLE and (growth - 1.0) * steps > 1.0
+
+
+def _longest_stable_step(setup: Setup) -> float | None:
+    """The longest step (s) at which a run of this duration would not blow up, rounded down to two digits."""
+    duration = setup.timing.samples * setup.timing.interval
+
+    def is_stable(step: float) -> bool:
+        weights = setup.weights._replace(h=step)
+        limits = step_limits(setup.coefficients, weights, setup.scheme, setup.contact_stiffness, setup.wheel)
+        return not _blows_up(limits.growth, duration / step)
+
+    low, high = 1e-6 * setup.timing.step, setup.timing.step
+    if not is_stable(low):
+        return None
+    while high > 1.001 * low:
+        middle = math.sqrt(low * high)
+        low, high = (middle, high) if is_stable(middle) else (low, middle)
+    digit: float = 10.0 ** (math.floor(math.log10(low)) - 1)
+    return math.floor(low / digit) * digit
 
 
 def refuse(setup: Setup, found: Check, free_bytes: float) -> None:
@@ -164,11 +193,34 @@ def refuse(setup: Setup, found: Check, free_bytes: float) -> None:
     if found.memory > MOST_TABLE_BYTES:
         raise RefusedError(f"the contact's tables would be too large: {size}; reduce contact.nodes")
     growth = found.limits.growth
-    if growth > 1.0 + _UNSTABLE and (growth - 1.0) * found.steps > 1.0:
+    if _blows_up(growth, found.steps):
+        longest = _longest_stable_step(setup)
+        shorter = f"take a solver.step of at most {longest:.2g} s" if longest else "reduce solver.step"
         raise RefusedError(
             f"solver.theta: at this step the scheme is unstable, it multiplies disturbances by {growth:.6g} in "
-            f"each of {found.steps} steps; {_stable_remedy(setup)}"
+            f"each of {found.steps} steps; {_stable_remedy(setup, shorter)}"
         )
+
+
+def free_bytes(directory: Path) -> float:
+    """What is free on the disk of a directory; infinite where that cannot be told."""
+    try:
+        return float(shutil.disk_usage(directory).free)
+    except OSError:
+        return math.inf
+
+
+@contextmanager
+def within_range() -> Iterator[None]:
+    """Turn an overflow of numbers that no brake has, however the code meets it, into a refusal."""
+    try:
+        with np.errstate(over="raise", divide="raise", invalid="raise"):
+            yield
+    except (ArithmeticError, np.linalg.LinAlgError) as error:
+        raise RefusedError(
+            f"the numbers of the case are too large, too small or too far apart to compute with ({error}); look "
+            "for values in other units than m, kg, s and N"
+        ) from error
 
 
 def _duration(seconds: float) -> str:

@@ -1,6 +1,5 @@
 """One run, from a case to a finished result file: what `brakecli run` does."""
 
-import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -10,15 +9,16 @@ import h5py
 import numba
 import numpy as np
 import scipy
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from brakecli import __version__
 from brakecli.analysis.energy import EnergyAccount
 from brakecli.analysis.regime import Context, Regime, Verdict, classify, forced_lines
 from brakecli.analysis.spectra import SPECTRAL, Spectrum, peak, spectrum
 from brakecli.case_reading import LoadedCase
-from brakecli.check import Check, check, refuse
+from brakecli.check import Check, check, free_bytes, refuse, within_range
 from brakecli.model import HISTORY, TIME, ContactState, Failure
+from brakecli.schedules import value_at
 from brakecli.setup import Setup, set_up
 from brakecli.simulate import Motion, Work
 from brakecli.store import ResultFile, new_result
@@ -109,25 +109,34 @@ def run(
     CannotWriteError or UsageError before anything is computed, CannotWriteError also later; a run that fails
     numerically is written up to there and reported.
     """
-    setup = set_up(loaded.case)
-    found = check(setup)
-    with new_result(output, force=force) as result:
-        refuse(setup, found, float(shutil.disk_usage(output.resolve().parent).free))
-        begin(setup, found)
-        _declare_history(result)
-        interval = setup.timing.interval
+    with within_range():
+        setup = set_up(loaded.case)
+        found = check(setup)
+        with new_result(output, force=force) as result:
+            refuse(setup, found, free_bytes(output.resolve().parent))
+            begin(setup, found)
+            _declare_history(result)
+            interval = setup.timing.interval
 
-        def sink(rows: NDArray[np.float64]) -> None:
-            first = result.rows("history")
-            columns = dict(zip(HISTORY, rows.T, strict=True))
-            result.append("history", {"time": interval * np.arange(first, first + len(rows)), **columns})
+            def sink(rows: NDArray[np.float64]) -> None:
+                _require_finite("a force", rows)
+                first = result.rows("history")
+                columns = dict(zip(HISTORY, rows.T, strict=True))
+                result.append("history", {"time": interval * np.arange(first, first + len(rows)), **columns})
 
-        motion = Motion(setup)
-        work, energy = motion.run(sink, progress)
-        report = _analyse(setup, found, work, energy, result, output)
-        _write(result, loaded, report)
-        result.commit()
+            motion = Motion(setup)
+            work, energy = motion.run(sink, progress)
+            _require_finite("an energy", list(asdict(energy).values()))
+            report = _analyse(setup, found, work, energy, result, output)
+            _write(result, loaded, report)
+            result.commit()
     return report
+
+
+def _require_finite(what: str, values: ArrayLike) -> None:
+    """Compiled code overflows without a word; the motion itself is bounded by the loop."""
+    if not np.isfinite(values).all():
+        raise FloatingPointError(f"{what} overflows")
 
 
 @dataclass(frozen=True)
@@ -149,8 +158,9 @@ def context(setup: Setup) -> Context:
     """What the classifier is told of a case."""
     steady = len(setup.belt.times) == 1 and len(setup.load.times) == 1
     highest = 0.5 / setup.timing.interval
-    lines = forced_lines(setup.belt_speed, [float(turns) for turns in setup.wheel.turns], highest)
-    return Context(setup.belt_speed, steady, lines)
+    last_speed = float(value_at(setup.belt, setup.timing.samples * setup.timing.interval))
+    lines = forced_lines(last_speed, [float(turns) for turns in setup.wheel.turns], highest)
+    return Context(last_speed, steady, lines)
 
 
 def _analyse(
@@ -169,8 +179,8 @@ def _analyse(
     warnings = list(found.warnings)
     if work.unconverged_steps and work.failure is Failure.NONE:
         warnings.append(
-            f"{work.unconverged_steps} of {work.steps} steps did not converge, as the case allows; their times and "
-            "residuals are in the file, the history is not to be trusted there"
+            f"{work.unconverged_steps} of {work.steps} steps did not converge, as the case allows; their times "
+            "and residuals are in the file, the history is not to be trusted there"
         )
     if work.non_unique_steps:
         warnings.append(
