@@ -13,12 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from brakecli import __version__
 from brakecli.analysis.energy import EnergyAccount
-from brakecli.analysis.regime import Context, Regime, Verdict, classify, forced_lines
+from brakecli.analysis.regime import Verdict, classify
 from brakecli.analysis.spectra import SPECTRAL, Spectrum, peak, spectrum
 from brakecli.case_reading import LoadedCase
 from brakecli.check import Check, check, free_bytes, refuse, within_range
+from brakecli.classify import context, failed, verdict_numbers
 from brakecli.model import HISTORY, TIME, ContactState, Failure
-from brakecli.schedules import value_at
 from brakecli.setup import Setup, set_up
 from brakecli.simulate import Motion, Work
 from brakecli.store import ResultFile, new_result
@@ -54,18 +54,8 @@ class RunReport:
         return {
             "status": "failed" if self.failed else "done",
             "failure": self.failure_sentence,
-            "regime": str(verdict.regime),
-            "excitation": str(verdict.excitation),
-            "frequency": verdict.frequency,
-            "amplitude": verdict.amplitude,
-            "settled_from": verdict.settled_from * self.setup.timing.interval,
-            "mean_friction_force": verdict.mean_friction_force,
-            "braking_torque": self.braking_torque,
-            "stick_fraction": verdict.stick_fraction,
-            "contact_loss_fraction": verdict.contact_loss_fraction,
+            **verdict_numbers(verdict, self.setup),
             "spectrum_peak": self.spectrum_peak,
-            "reasons": list(verdict.reasons),
-            "evidence": verdict.evidence,
             "scheme": str(solver.scheme),
             "theta": list(solver.theta),
             "iteration": str(solver.iteration),
@@ -88,11 +78,14 @@ class RunReport:
 
     @property
     def failure_sentence(self) -> str | None:
-        """What ended the run before its time."""
-        if not self.failed:
-            return None
-        when = f"t = {self.work.failure_time:.6g} s: " if self.work.failure_time is not None else ""
-        return when + self.work.failure.sentence
+        """What ended the run before its time, or made it worthless."""
+        return failure_sentence(self.work) if self.failed else None
+
+
+def failure_sentence(work: Work) -> str:
+    """The sentence of a failure with its time, where it has one."""
+    when = f"t = {work.failure_time:.6g} s: " if work.failure_time is not None else ""
+    return when + work.failure.sentence
 
 
 def run(
@@ -154,15 +147,6 @@ class _Written:
         return self.result.read("history", name, start, stop)
 
 
-def context(setup: Setup) -> Context:
-    """What the classifier is told of a case."""
-    steady = len(setup.belt.times) == 1 and len(setup.load.times) == 1
-    highest = 0.5 / setup.timing.interval
-    last_speed = float(value_at(setup.belt, setup.timing.samples * setup.timing.interval))
-    lines = forced_lines(last_speed, [float(turns) for turns in setup.wheel.turns], highest)
-    return Context(last_speed, steady, lines)
-
-
 def _analyse(
     setup: Setup, found: Check, work: Work, energy: EnergyAccount, result: ResultFile, output: Path
 ) -> RunReport:
@@ -170,10 +154,7 @@ def _analyse(
     history = _Written(result, setup.timing.interval)
     verdict = classify(history, context(setup))
     if work.failure is not Failure.NONE:
-        reason = f"the run ended early: {work.failure.sentence}"
-        verdict = Verdict(
-            **{**verdict.__dict__, "regime": Regime.UNDECIDED, "frequency": None, "reasons": (reason,)}
-        )
+        verdict = failed(verdict, failure_sentence(work))
     lines = spectrum(history, verdict.settled_from)
     _write_spectrum(result, lines)
     warnings = list(found.warnings)
@@ -224,7 +205,12 @@ def _write_spectrum(result: ResultFile, lines: Spectrum) -> None:
 def _write(result: ResultFile, loaded: LoadedCase, report: RunReport) -> None:
     """Everything but the arrays: the case, the versions, the numbers."""
     numbers = report.numbers()
-    groups = {"regime/evidence": "evidence", "energy": "energy", "evaluators": "evaluators"}
+    groups = {
+        "regime/evidence": "evidence",
+        "regime/thresholds": "thresholds",
+        "energy": "energy",
+        "evaluators": "evaluators",
+    }
     result.set_attributes(
         {
             "kind": "run",
