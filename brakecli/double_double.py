@@ -43,7 +43,7 @@ def two_product(a: float, b: float) -> tuple[float, float]:
 
 @kernel(_PAIR(float64, float64, float64, float64))
 def add(a: float, a_low: float, b: float, b_low: float) -> tuple[float, float]:
-    """(a + a_low) + (b + b_low) to about 32 digits."""
+    """(a + a_low) + (b + b_low) to about 32 digits of the larger of the two, not of a difference."""
     s, e = two_sum(a, b)
     return two_sum(s, e + (a_low + b_low))
 

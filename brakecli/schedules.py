@@ -18,8 +18,8 @@ from brakecli.kernels import kernel, vector
 class Schedule(NamedTuple):
     """A piecewise linear function of time: knots, values, slopes and the integral from t = 0 up to each knot.
 
-    Values, slopes and integrals are sums of two doubles (`..._low` the smaller), exact for the decimal numbers
-    that the case file gives.
+    Values, slopes and integrals are sums of two doubles (`..._low` the smaller), to 32 digits of what follows
+    from the given doubles exactly.
     """
 
     times: NDArray[np.float64]
@@ -89,7 +89,8 @@ def slope_at(s: Schedule, t: float) -> float:
 
 @kernel(types.UniTuple(float64, 2)(SCHEDULE, float64, float64))
 def integral_at(s: Schedule, t: float, t_low: float) -> tuple[float, float]:
-    """Integral from 0 to t + t_low, as a sum of two doubles."""
+    """Integral from 0 to t + t_low, as a sum of two doubles; t_low may be of any size, beyond a knot as well."""
+    t, t_low = two_sum(t, t_low)
     k = max(segment(t, s.times), 0)
     slope, slope_low = s.slopes[k], s.slopes_low[k]
     if t < s.times[0]:
