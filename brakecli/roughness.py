@@ -58,8 +58,10 @@ def surface(
 
 def height(f: Surface, xi: NDArray[np.float64]) -> NDArray[np.float64]:
     """f(xi) in m at places xi (m), (1)."""
-    waves: NDArray[np.float64] = f.g @ np.sin(np.outer(f.omega, xi) + f.phase[:, None])
-    return waves
+    f_xi = np.zeros(xi.size)
+    for g, omega, phase in zip(f.g, f.omega, f.phase, strict=True):  # no table of all waves at all places
+        f_xi += g * np.sin(omega * xi + phase)
+    return f_xi
 
 
 @kernel(void(SURFACE, float64, float64, vector))

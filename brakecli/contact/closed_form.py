@@ -74,7 +74,7 @@ def full_contact(
             cc += pad[at_cc + i * n + j] * sines[j]
         square += cosines[i] * ss + sines[i] * cc
         square_x += 2.0 * pad[at_omega + i] * (cosines[i] * cc - sines[i] * ss)
-    contact[NORMAL_FORCE] = mean_force - k * length * y
+    contact[NORMAL_FORCE] = max(mean_force - k * length * y, 0.0)  # rounding, or a pad that touches in part
     contact[STIFFNESS] = k * length
     contact[TANGENTIAL] = tangential
     contact[FRACTION] = 1.0
@@ -105,5 +105,4 @@ def evaluate(
     else:
         full_contact(x, y, angles, pad, contact)
         if covered == PARTLY:
-            contact[NORMAL_FORCE] = max(contact[NORMAL_FORCE], 0.0)
             contact[VALID] = 0.0

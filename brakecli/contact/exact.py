@@ -1,7 +1,8 @@
 """The contact exactly: the roots of the gap bound the touching intervals, and on each the integral is closed.
 
-No pair of roots is missed: a cell is passed only when bounds on the gap's slope and curvature prove that it has
-no root, or that the gap is monotone there; otherwise it is halved.
+No pair of roots is missed: a cell is passed only when bounds on the gap's derivatives prove that it has no root,
+or that the gap is monotone there; otherwise it is halved. A gap that is within its rounding all over a cell
+counts as touching or not by its sign in the middle, so that the walk ends also where two equal profiles meet.
 """
 
 import math
@@ -11,7 +12,7 @@ from numba import float64, int64, types, void
 from numpy.typing import NDArray
 
 from brakecli.contact.closed_form import CLEAR, FULL, clear, coverage
-from brakecli.contact.pad import AT_SHOE, AT_WHEEL, CELL, CURVATURE, HALF, SHOE_TERMS, WHEEL_TERMS, K
+from brakecli.contact.pad import AT_SHOE, AT_WHEEL, CELL, HALF, SHOE_TERMS, WHEEL_TERMS, K
 from brakecli.kernels import (
     EVALUATE,
     FRACTION,
@@ -30,16 +31,22 @@ from brakecli.kernels import (
 # wavenumber, phase, and for one interval the phase in its middle (sine, cosine) and the half width times omega.
 SINE, COSINE, HALF_TURN = 3, 4, 5
 
+_EPSILON = 2.220446049250313e-16
 
-@kernel(types.UniTuple(float64, 2)(float64, float64, int64, vector))
-def _gap(xi: float, y: float, n: int, waves: NDArray[np.float64]) -> tuple[float, float]:
-    """The gap f2 - f1 - y at xi, m, and its slope."""
-    gap, slope = -y, 0.0
+
+@kernel(types.UniTuple(float64, 4)(float64, float64, int64, vector))
+def _gap(xi: float, y: float, n: int, waves: NDArray[np.float64]) -> tuple[float, float, float, float]:
+    """The gap f2 - f1 - y at xi, m, and its first three derivatives."""
+    gap, slope, second, third = -y, 0.0, 0.0, 0.0
     for i in range(n):
-        psi = waves[n + i] * xi + waves[2 * n + i]
-        gap += waves[i] * math.sin(psi)
-        slope += waves[i] * waves[n + i] * math.cos(psi)
-    return gap, slope
+        omega = waves[n + i]
+        psi = omega * xi + waves[2 * n + i]
+        sine, cosine = waves[i] * math.sin(psi), waves[i] * omega * math.cos(psi)
+        gap += sine
+        slope += cosine
+        second -= omega * omega * sine
+        third -= omega * omega * cosine
+    return gap, slope, second, third
 
 
 @kernel(float64(float64, float64, float64, float64, int64, vector))
@@ -47,7 +54,7 @@ def _root(left: float, right: float, at_left: float, y: float, n: int, waves: ND
     """The root of a gap that is monotone on [left, right] and changes sign: Newton inside the bracket."""
     xi = 0.5 * (left + right)
     for _ in range(100):
-        gap, slope = _gap(xi, y, n, waves)
+        gap, slope, _, _ = _gap(xi, y, n, waves)
         if (gap > 0.0) == (at_left > 0.0):
             left = xi
         else:
@@ -109,6 +116,17 @@ def _add_interval(
     contact[STORE_X] += work - y * rise
 
 
+@kernel(types.UniTuple(float64, 2)(float64, float64, int64, vector))
+def _bounds(y: float, end: float, n: int, waves: NDArray[np.float64]) -> tuple[float, float]:
+    """Bounds of the gap's fourth derivative, and of the rounding in the gap (m)."""
+    fourth, rounding = 0.0, abs(y)
+    for i in range(n):
+        g, omega = abs(waves[i]), waves[n + i]
+        fourth += g * (omega * omega) * (omega * omega)
+        rounding += g * (1.0 + omega * end + abs(waves[2 * n + i]))
+    return fourth, _EPSILON * rounding
+
+
 @kernel(void(float64, int64, int64, vector, vector, vector))
 def _add_touching(
     y: float,
@@ -119,34 +137,38 @@ def _add_touching(
     contact: NDArray[np.float64],
 ) -> None:
     """Walk over the pad and add every interval on which the gap is positive."""
-    end, curvature, widest = pad[HALF], pad[CURVATURE], pad[CELL]
+    end, widest = pad[HALF], pad[CELL]
+    fourth, rounding = _bounds(y, end, n, waves)
     left, width = -end, widest
     touching, start = False, left
     while left < end:
         right = min(left + width, end)
-        width = right - left
-        gap, slope = _gap(0.5 * (left + right), y, n, waves)
-        tiny = width <= 1e-13 * end
-        if not tiny and abs(gap) <= 0.5 * abs(slope) * width + 0.125 * curvature * width * width:
-            if abs(slope) <= 0.5 * curvature * width:
-                width *= 0.5  # neither free of roots nor monotone for sure
+        half = 0.5 * (right - left)
+        gap, slope, second, third = _gap(0.5 * (left + right), y, n, waves)
+        # Taylor: by how much the gap and its slope may differ in the cell from what they are in its middle.
+        bend = half * (abs(second) + half / 2.0 * (abs(third) + half / 3.0 * fourth))
+        change = half * (abs(slope) + half / 2.0 * (abs(second) + half / 3.0 * (abs(third) + half / 4.0 * fourth)))
+        if abs(gap) <= change and abs(gap) + change > rounding:
+            if abs(slope) <= bend:
+                width = half  # neither free of roots nor monotone for sure
                 continue
-            at_left, _ = _gap(left, y, n, waves)
-            at_right, _ = _gap(right, y, n, waves)
-            if (at_left > 0.0) != (at_right > 0.0):
-                root = _root(left, right, at_left, y, n, waves)
-                if at_left > 0.0:
-                    _add_interval(start if touching else left, root, y, wheel_terms, n, waves, contact)
-                touching, start = at_left <= 0.0, root
-                left, width = right, min(2.0 * width, widest)
+            gap, _, _, _ = _gap(left, y, n, waves)
+            at_right, _, _, _ = _gap(right, y, n, waves)
+            if (gap > 0.0) != (at_right > 0.0):
+                root = _root(left, right, gap, y, n, waves)
+                if touching or gap > 0.0:
+                    _add_interval(
+                        start if touching else left, root if gap > 0.0 else left, y, wheel_terms, n, waves, contact
+                    )
+                touching, start = at_right > 0.0, root
+                left, width = right, min(4.0 * half, widest)
                 continue
-            gap = at_left
         if gap > 0.0 and not touching:
             touching, start = True, left
         elif gap <= 0.0 and touching:
             _add_interval(start, left, y, wheel_terms, n, waves, contact)
             touching = False
-        left, width = right, min(2.0 * width, widest)
+        left, width = right, min(4.0 * half, widest)
     if touching:
         _add_interval(start, end, y, wheel_terms, n, waves, contact)
 
@@ -179,7 +201,7 @@ def evaluate(
         _add_touching(y, wheel_terms, n, pad, waves, contact)
     contact[FRACTION] = contact[STIFFNESS] / (2.0 * pad[HALF])
     k = pad[K]
-    contact[NORMAL_FORCE] *= k
+    contact[NORMAL_FORCE] = max(k * contact[NORMAL_FORCE], 0.0)  # not below zero by rounding
     contact[STIFFNESS] *= k
     contact[TANGENTIAL] *= k
     contact[STORE] *= k

@@ -13,8 +13,8 @@ from brakecli.kernels import SCRATCH
 from brakecli.roughness import Surface, height
 
 (K, HALF, SHOE_TERMS, WHEEL_TERMS, NODES, SHOE_TOP, SHOE_BOTTOM, WHEEL_BOUND, SHOE_MEAN, SHOE_SQUARE) = range(10)
-(CURVATURE, CELL, AT_SHOE, AT_WHEEL, AT_FULL, AT_SS, AT_CC, AT_PR, AT_NODES, AT_SIN, AT_COS) = range(10, 21)
-HEADER = 21
+(CELL, AT_SHOE, AT_WHEEL, AT_FULL, AT_SS, AT_CC, AT_PR, AT_NODES, AT_SIN, AT_COS) = range(10, 20)
+HEADER = 20
 
 NODES_PER_WAVE = 16
 """Nodes per shortest wavelength that `nodes` is chosen for; measured in tests/test_contact.py."""
@@ -47,7 +47,6 @@ def build_pad(k: float, half_length: float, shoe: Surface, wheel: Surface, nodes
     header[[K, HALF, SHOE_TERMS, WHEEL_TERMS, NODES]] = k, half_length, shoe.g.size, wheel.g.size, nodes
     header[[SHOE_TOP, SHOE_BOTTOM, WHEEL_BOUND]] = top, bottom, np.abs(wheel.g).sum()
     header[[SHOE_MEAN, SHOE_SQUARE]] = shoe_mean, shoe_square
-    header[CURVATURE] = sum(float(np.abs(f.g) @ f.omega**2) for f in (shoe, wheel))
     header[CELL] = 2.0 * half_length / max(8.0, 8.0 * half_length * max([*shoe.turns, *wheel.turns], default=0.0))
     place = HEADER
     for index, block in blocks.items():
