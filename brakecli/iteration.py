@@ -91,7 +91,7 @@ def newton(
     low, high = 0.0, math.inf
     f = problem[F_Y]
     rising = 0
-    width = math.inf
+    before_last = last = math.inf  # lengths of steps
     for evaluation in range(1, evaluations_allowed + 1):
         r, rounding = _try_force(evaluate, phi, f, angles, pad, problem, contact)
         gain = problem[GAIN]
@@ -113,14 +113,13 @@ def newton(
             high = f
         if high < math.inf and high - low <= _RELATIVE * high:
             return SOLVED, evaluation, rising
-        if slope < 0.0:
-            f -= r / slope
-        # Outside the bracket, or too slow to halve it in three evaluations: halve it, or open it upwards.
-        slow = evaluation % 3 == 0 and high - low > 0.5 * width
-        if evaluation % 3 == 0:
-            width = high - low
-        if slope >= 0.0 or slow or not (low <= f <= high):
-            f = 0.5 * (low + high) if high < math.inf else 10.0 * max(low, contact[NORMAL_FORCE])
+        new = f - r / slope if slope < 0.0 else math.inf
+        # Outside the bracket, or a step not half of that before the last: halve the bracket, or open it upwards.
+        # The bracket's own width tells nothing: Newton's iteration may come from one side and leave the other.
+        if not (low <= new <= high) or new == math.inf or abs(new - f) > 0.5 * before_last:
+            new = 0.5 * (low + high) if high < math.inf else 10.0 * max(low, contact[NORMAL_FORCE])
+        before_last, last = last, abs(new - f)
+        f = new
         if f > 1e200:
             return NO_SOLUTION, evaluation, rising
     return UNCONVERGED, evaluations_allowed, rising
@@ -146,5 +145,5 @@ def fixed_point(
             return SOLVED, evaluation, 0
         f = contact[NORMAL_FORCE]
         if not f < 1e200:
-            break
+            return UNCONVERGED, evaluation, 0
     return UNCONVERGED, evaluations_allowed, 0
