@@ -119,11 +119,13 @@ class _Judge:
         return self._sustained()
 
     def _contact(self) -> Verdict | None:
-        """Contact lost for good, or stick throughout, in the second half."""
+        """Never in contact; or contact lost for good, or stick throughout, in the second half."""
         gone, stuck = (
             fraction_in_state(self.history, state, self.start) == 1.0
             for state in (ContactState.SEPARATED, ContactState.STICK)
         )
+        if gone and fraction_in_state(self.history, ContactState.SEPARATED, 0) == 1.0:
+            return self._undecided("the shoe has never touched the wheel; check the sign and size of load.force")
         if gone:
             return self._undecided("the shoe has lost contact for good; check the sign and size of load.force")
         if stuck and self.context.belt_speed == 0.0:
