@@ -72,15 +72,18 @@ def test_a_shoe_that_is_carried_along_is_not_called_damped() -> None:
 
 
 def test_a_shoe_that_lost_contact_is_not_called_damped() -> None:
-    verdict = judged(make(SQUEAL, load__force=-5000.0, solver__duration=1.0))
+    load = {"load__force": None, "load__times": [0.0, 0.1], "load__forces": [5000.0, -5000.0]}
+    verdict = judged(make(SQUEAL, solver__duration=1.0, **load))
     assert verdict.regime is Regime.UNDECIDED
-    assert "contact" in verdict.reasons[0]
+    assert "lost contact for good" in verdict.reasons[0]
     assert verdict.contact_loss_fraction == 1.0
 
 
-def test_an_unloaded_shoe_at_rest_is_named() -> None:
-    verdict = judged(make(SQUEAL, load__force=0.0))
-    assert "contact" in verdict.reasons[0] or verdict.regime is Regime.UNDECIDED
+@pytest.mark.parametrize("force", [-5000.0, 0.0])
+def test_a_shoe_that_never_touched_is_not_called_damped(force: float) -> None:
+    verdict = judged(make(SQUEAL, load__force=force))
+    assert verdict.regime is Regime.UNDECIDED
+    assert "never touched" in verdict.reasons[0]
 
 
 @pytest.mark.parametrize(("rate", "word"), [(2.0, "growing"), (-1.0, "decaying")])
