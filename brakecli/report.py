@@ -1,4 +1,4 @@
-"""What a run or a check has found, as a table for people and as names and values for programs."""
+"""What a command has found, as a table for people and as names and values for programs."""
 
 import io
 import math
@@ -9,8 +9,10 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from brakecli.analysis.stability import Crossing, Mode
 from brakecli.check import Check
 from brakecli.run import RunReport
+from brakecli.stability import Discrete, StabilityReport
 
 Rows = list[tuple[str, str]]
 
@@ -80,6 +82,97 @@ def check_numbers(found: Check) -> dict[str, Any]:
     return {name: value for name, value in {**values, **limits}.items() if not _infinite(value)}
 
 
+def verdict_table(source: str, numbers: dict[str, Any]) -> str:
+    """A verdict, from the names and values that `--json` gives."""
+    regime, excitation = numbers["regime"], numbers["excitation"]
+    rows: Rows = [
+        ("regime", regime if excitation == "none" else f"{regime} ({excitation})"),
+        ("because", "; ".join(numbers["reasons"])),
+        ("frequency", _unit(numbers["frequency"], "Hz")),
+        ("amplitude of x", _unit(numbers["amplitude"], "m")),
+        ("stick", _share(numbers["stick_fraction"])),
+        ("lost contact", _share(numbers["contact_loss_fraction"])),
+        *((name.replace("_", " "), f"{value:.6g}") for name, value in numbers["evidence"].items()),
+    ]
+    return _table(source, rows)
+
+
+def stability_table(title: str, report: StabilityReport) -> str:
+    """Steady sliding, its modes and its critical friction."""
+    rest, critical = report.equilibrium, report.critical
+    rows: Rows = [
+        ("surface speed U", _unit(report.belt_speed, "m/s")),
+        (
+            "steady sliding",
+            f"y = {rest.y:.5g} m, F_y = {rest.normal_force:.5g} N, {rest.contact_fraction:.1%} of the pad touches"
+            if rest
+            else f"none: {report.no_equilibrium}",
+        ),
+        ("contact stiffness K", _unit(report.contact_stiffness, "N/m")),
+        ("critical friction", _crossing(critical) if critical else "none"),
+        *(("also changes at", _crossing(crossing)) for crossing in report.crossings if crossing is not critical),
+        ("without dashpots", _undamped(report)),
+        (f"at φ = {report.friction:g}", {True: "stable", False: "unstable", None: "-"}[report.stable]),
+        *((f"mode at {mode.frequency:.5g} Hz", _mode(mode)) for mode in report.modes),
+    ]
+    if report.discrete:
+        rows += _discrete_rows(report.discrete)
+    return _table(title, rows)
+
+
+def vary_table(key: str, entries: list[dict[str, Any]]) -> str:
+    """Critical friction along a parameter."""
+    rows = [
+        (
+            f"{entry['value']:.6g}",
+            _unit(entry["critical_friction"], ""),
+            entry["instability"] or "-",
+            _unit(entry["discrete_critical_friction"], ""),
+        )
+        for entry in entries
+    ]
+    return _grid((key, "critical friction", "instability", "as the scheme has it"), rows)
+
+
+def _crossing(crossing: Crossing) -> str:
+    change = "lost" if crossing.lost else "regained"
+    return f"{crossing.friction:.7g}: stability {change} by {crossing.instability}" + (
+        f" at {crossing.frequency:.5g} Hz" if crossing.frequency else ""
+    )
+
+
+def _undamped(report: StabilityReport) -> str:
+    named = (("flutter", report.undamped_flutter), ("divergence", report.undamped_divergence))
+    return (
+        ", ".join(f"{name} at {phi:.7g}" for name, phi in named if phi is not None)
+        or "neither flutter nor divergence"
+    )
+
+
+def _mode(mode: Mode) -> str:
+    motion = f"grows at {mode.growth:.4g} 1/s" if mode.growth > 0.0 else f"decays at {-mode.growth:.4g} 1/s"
+    shape = f", y/x {mode.shape:.3g} at {mode.shape_phase:.0f}°" if mode.shape is not None else ", along y alone"
+    return f"{motion}, damping ratio {mode.damping_ratio:.3g}{shape}"
+
+
+def _discrete_rows(discrete: Discrete) -> Rows:
+    limit = "any" if discrete.step_limit is None else f"up to {discrete.step_limit:.4g} s"
+    if discrete.critical_friction is None:
+        critical = "none"
+    else:
+        bias = "" if discrete.bias is None else f", {discrete.bias:+.2g} off"
+        critical = f"{discrete.critical_friction:.7g}{bias}"
+    return [
+        ("the scheme's growth", f"{discrete.growth:.5g} 1/s, a factor {discrete.spectral_radius:.8g} a step"),
+        ("its critical friction", critical),
+        ("its stable steps", "none" if discrete.step_limit == 0.0 else limit),
+    ]
+
+
+def _share(value: float | None) -> str:
+    return "-" if value is None else f"{value:.2%} of the time"
+
+
 def _infinite(value: object) -> bool:
     return isinstance(value, float) and math.isinf(value)
 
@@ -99,6 +192,20 @@ def _table(title: str, rows: Rows) -> str:
     table.add_column(overflow="fold")
     for name, value in rows:
         table.add_row(name, value)
+    return _drawn(table)
+
+
+def _grid(headers: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
+    """Rows under headers."""
+    table = Table(box=None, padding=(0, 2, 0, 0))
+    for header in headers:
+        table.add_column(header, overflow="fold")
+    for row in rows:
+        table.add_row(*row)
+    return _drawn(table)
+
+
+def _drawn(table: Table) -> str:
     file, colours = io.StringIO(), sys.stdout.isatty() or None
     # Titles and file names are no markup.
     console = Console(file=file, force_terminal=colours, markup=False, emoji=False, highlight=False)
