@@ -121,8 +121,13 @@ def run_command(
     from brakecli.report import run_table
     from brakecli.run import run
 
-    with unwinding(), _progress(quiet) as bar:
-        report = run(loaded, target, force=force, begin=bar.begin, progress=bar.advance)
+    with unwinding() as recall, _progress(quiet) as bar:
+
+        def progress(steps: int) -> None:
+            recall()
+            bar.advance(steps)
+
+        report = run(loaded, target, force=force, begin=bar.begin, progress=progress)
     for line in (*report.check.adjustments, *(f"warning: {warning}" for warning in report.warnings)):
         if not quiet or line.startswith("warning"):
             _tell(f"brakecli: {line}")
@@ -209,6 +214,39 @@ def plot_command(
         plot_run(result, target, force=force)
     if not quiet:
         _print(f"{target}: written")
+
+
+@app.command("stability")
+def stability_command(
+    case: CaseArgument,
+    overrides: Override = None,
+    vary: Annotated[
+        str | None,
+        typer.Option("--vary", metavar="KEY=START:STOP:NUM", help="Tabulate critical friction along a key."),
+    ] = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+) -> None:
+    """Critical friction coefficient, eigenvalues and growth of steady sliding, without stepping in time."""
+    from brakecli.vary import parse_vary, varied
+
+    chosen = parse_vary(vary) if vary is not None else None
+    loaded = _load(case, overrides)
+    _announce_compilation(quiet)
+    from brakecli.check import within_range
+    from brakecli.report import stability_table, vary_table
+    from brakecli.setup import set_up
+    from brakecli.stability import stability
+
+    with within_range():
+        report = stability(set_up(loaded.case))
+        entries = varied(loaded, chosen) if chosen else []
+    if as_json:
+        _print_json({"command": "stability", **report.numbers(), **({"vary": entries} if chosen else {})})
+    elif not quiet:
+        _print(stability_table(loaded.case.title, report))
+        if chosen:
+            _print("\n" + vary_table(chosen.key, entries))
 
 
 def _is_result(source: str) -> bool:

@@ -3,6 +3,7 @@
 import io
 import math
 import sys
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -195,7 +196,7 @@ def _table(title: str, rows: Rows) -> str:
     return _drawn(table)
 
 
-def _grid(headers: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
+def _grid(headers: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """Rows under headers."""
     table = Table(box=None, padding=(0, 2, 0, 0))
     for header in headers:
