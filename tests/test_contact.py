@@ -360,6 +360,38 @@ def test_exact_finds_every_patch_and_hole_at_grazing_extremes(depth: float) -> N
     assert checked > 80
 
 
+def test_the_force_is_never_below_zero_by_rounding() -> None:
+    """A patch whose depth is its own rounding: friction phi F_y would feed the motion."""
+    rng = np.random.default_rng(26)
+    positive = 0
+    for _ in range(60):
+        gap = random_gap(rng)
+        pad, top = gap.pad(0), max(gap.value(xi) for xi in gap.extremes)
+        for ulps in range(-40, 41, 4):
+            force = gap.evaluate("exact", dy=top + ulps * math.ulp(gap.crest), pad=pad)[NORMAL_FORCE]
+            assert force >= 0.0
+            positive += force > 0.0
+    assert positive > 100
+
+
+@pytest.mark.parametrize("depth", [1e-2, 1e-3, 1e-4, 1e-6])
+def test_exact_finds_the_edges_of_a_hole_with_a_flat_bottom(depth: float) -> None:
+    """Three derivatives vanish at the bottom, so that only the fourth tells that the pad touches beside it:
+    g (cos wξ - cos(2wξ)/4) is 3g/4 - g w⁴ ξ⁴/8 there, here upside down and anywhere on the pad.
+    """
+    rng, length, g = np.random.default_rng(25), 0.05, 4e-5
+    omega = 2 * math.pi / length
+    half = (8 * depth) ** 0.25 / omega
+    for _ in range(300):
+        shift = rng.uniform(-0.01, 0.01)  # cosines are sines with phases: f2 = -g (cos - cos/4)
+        wheel = (Wave(g, length, -90.0), Wave(g / 4, length / 2, 90.0))
+        gap = Gap((), wheel, 0.02, shift, -g * (0.75 - depth))
+        found = gap.evaluate("exact")
+        hole = 2 * gap.a - found[STIFFNESS] / gap.k
+        # The next term makes the hole wider by (w half)²/24 of itself; rounding of the bottom, to the fourth root.
+        assert hole == pytest.approx(2 * half, rel=(omega * half) ** 2 / 12 + 0.25 * gap.rounding / (depth * g))
+
+
 def test_exact_agrees_with_a_brute_force_scan() -> None:
     """A sum over 400 000 places knows the touching length to a spacing per root, and the force to slope h²/8."""
     rng = np.random.default_rng(24)

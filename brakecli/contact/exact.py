@@ -70,10 +70,8 @@ def _root(left: float, right: float, at_left: float, y: float, n: int, waves: ND
 
 @kernel(float64(float64, float64))
 def _sinc_of(sine: float, z: float) -> float:
-    """sin(z)/z for a sine that is already known; by its series where the quotient would lose digits."""
-    if abs(z) < 1e-2:
-        return 1.0 - z * z / 6.0 * (1.0 - z * z / 20.0)
-    return sine / z
+    """sin(z)/z for a sine that is already known; the quotient loses no digits, however small z is."""
+    return sine / z if z != 0.0 else 1.0
 
 
 @kernel(void(float64, float64, float64, int64, int64, vector, vector))
