@@ -38,11 +38,30 @@ def handle_signals() -> None:
 
 
 @contextmanager
-def unwinding() -> Iterator[None]:
-    """Within, a signal raises `Interrupted`, so that unfinished files are removed."""
-    before = _handle(_raise)
+def unwinding() -> Iterator[Callable[[], None]]:
+    """Within, the first signal raises `Interrupted`, so that unfinished files are removed.
+
+    Later ones are not heard, as they would cut through the cleaning up. C code that calls back into Python, such
+    as that in front of a compiled function, may turn an interruption into another exception, or lose it: whatever
+    takes long calls what this yields now and then, which raises it again.
+    """
+    arrived: list[int] = []
+
+    def recall() -> None:
+        if arrived:
+            raise Interrupted(arrived[0])
+
+    def hear(number: int, frame: FrameType | None) -> None:
+        if not arrived:
+            arrived.append(number)
+            recall()
+
+    before = _handle(hear)
     try:
-        yield
+        yield recall
+    except Exception:
+        recall()
+        raise
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
@@ -62,10 +81,6 @@ def _leave(number: int, frame: FrameType | None) -> None:
         os.write(2, f"brakecli: {_WORDS[signal.Signals(number)]}\n".encode())
     finally:
         os._exit(128 + number)
-
-
-def _raise(number: int, frame: FrameType | None) -> None:
-    raise Interrupted(number)
 
 
 def guard_streams() -> None:
