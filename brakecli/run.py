@@ -158,7 +158,7 @@ def _analyse(
     lines = spectrum(history, verdict.settled_from)
     _write_spectrum(result, lines)
     warnings = list(found.warnings)
-    if work.unconverged_steps and work.failure is Failure.NONE:
+    if work.unconverged_steps and setup.case.solver.allow_unconverged:
         warnings.append(
             f"{work.unconverged_steps} of {work.steps} steps did not converge, as the case allows; their times "
             "and residuals are in the file, the history is not to be trusted there"
