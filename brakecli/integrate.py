@@ -75,7 +75,7 @@ _BOUND = 1e15  # m and m/s: beyond it a motion is no motion of a brake
 
 # IntEnum members are not known to compiled code, their numbers are.
 _BACKWARD, _STICK, _FORWARD, _SEPARATED = (int(state) for state in ContactState)
-_NONE, _UNCONVERGED, _NO_SOLUTION, _DIVERGED, _NOT_CLOSED = (int(failure) for failure in tuple(Failure)[:5])
+_NONE, _UNCONVERGED, _DIVERGED, _NOT_CLOSED = (int(failure) for failure in tuple(Failure)[:4])
 
 _matrix = float64[:, ::1]
 _counts = int64[::1]
@@ -223,8 +223,6 @@ def advance(
                 events[counts[UNCONVERGED], 0] = t + t_low
                 events[counts[UNCONVERGED], 1] = problem[RESIDUAL]
             counts[UNCONVERGED] += 1
-            if outcome != 1:
-                return _NO_SOLUTION
             if grid.go_on == 0 or not math.isfinite(problem[F_Y]):
                 return _UNCONVERGED
         if contact[VALID] == 0.0:

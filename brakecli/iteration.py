@@ -38,7 +38,7 @@ from brakecli.kernels import (
 )
 
 NEWTON, FIXED_POINT = 0, 1
-SOLVED, UNCONVERGED, NO_SOLUTION = 0, 1, 2
+SOLVED, UNCONVERGED = 0, 1
 MOST = {"newton": 100, "fixed-point": 500}
 """Evaluations of the contact that a step may take before it counts as not converged."""
 
@@ -85,7 +85,8 @@ def newton(
     """Bracketed Newton iteration from the guess problem[F_Y] >= 0; (outcome, evaluations, rising points).
 
     A rising point is one where the residual does not fall with F (r' >= 0): the step's solution need not be
-    unique there, as in Painleve's paradox.
+    unique there, as in Painleve's paradox. There is always one: where F = 0 the residual is not negative, and for
+    a large F, since a11 a22 > a12², the shoe either sticks and lifts off or slips and lifts off.
     """
     angles, pad, problem, contact = borrowed(angles), borrowed(pad), borrowed(problem), borrowed(contact)
     low, high = 0.0, math.inf
@@ -120,8 +121,6 @@ def newton(
             new = 0.5 * (low + high) if high < math.inf else 10.0 * max(low, contact[NORMAL_FORCE])
         before_last, last = last, abs(new - f)
         f = new
-        if f > 1e200:
-            return NO_SOLUTION, evaluation, rising
     return UNCONVERGED, evaluations_allowed, rising
 
 

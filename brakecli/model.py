@@ -59,10 +59,9 @@ class Failure(IntEnum):
 
     NONE = 0
     UNCONVERGED = 1
-    NO_SOLUTION = 2
-    DIVERGED = 3
-    NOT_CLOSED = 4
-    UNBALANCED = 5
+    DIVERGED = 2
+    NOT_CLOSED = 3
+    UNBALANCED = 4
 
     @property
     def sentence(self) -> str:
@@ -75,10 +74,6 @@ _SENTENCES = {
     Failure.UNCONVERGED: (
         'the iteration of a step did not converge; reduce solver.step, take solver.iteration = "newton", '
         "or set solver.allow_unconverged = true to go on and count such steps"
-    ),
-    Failure.NO_SOLUTION: (
-        "a step has no solution: the friction force wedges the shoe into the wheel (as in Painlevé's paradox); "
-        "reduce solver.step or friction.coefficient"
     ),
     Failure.DIVERGED: "the motion grew beyond all bounds; reduce solver.step",
     Failure.NOT_CLOSED: (

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from brakecli import contact
 from brakecli.contact.pad import SHOE_TERMS, build_contact, build_pad
 from brakecli.friction import minimise
-from brakecli.iteration import MOST, NO_SOLUTION, SOLVED, UNCONVERGED, fixed_point, newton
+from brakecli.iteration import MOST, SOLVED, UNCONVERGED, fixed_point, newton
 from brakecli.kernels import (
     A_11,
     A_12,
@@ -386,6 +386,5 @@ def test_the_reported_slope_is_the_residual_s_derivative() -> None:
     assert compared > 50
 
 
-def test_outcomes_are_distinct_and_pads_count_their_waves() -> None:
-    assert len({SOLVED, UNCONVERGED, NO_SOLUTION}) == 3
+def test_pads_count_their_waves() -> None:
     assert build_pad(1.0, A, surface([1e-6], wavelengths=[0.1]), FLAT, 0)[SHOE_TERMS] == 1

@@ -7,9 +7,9 @@ import pytest
 from numpy.typing import NDArray
 
 from brakecli.analysis.regime import Context, Excitation, Regime, classify, forced_lines
+from brakecli.classify import context
 from brakecli.history import ArrayHistory
 from brakecli.model import HISTORY
-from brakecli.classify import context
 from brakecli.setup import set_up
 from tests.examples import COULOMB, ROUGH, SQUEAL, make, simulate
 

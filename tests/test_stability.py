@@ -19,8 +19,15 @@ def random_shoe(rng: np.random.Generator, damping: float) -> tuple[Coefficients,
     alpha, beta = rng.uniform(-80.0, 80.0, 2)
     b_1, b_2 = damping * rng.uniform(0.1, 1.0, 2)
     shoe = coefficients(
-        mass=10.0 ** rng.uniform(-1.0, 2.0), c_1=c_1, b_1=b_1, beta_deg=beta, c_2=c_2, b_2=b_2, alpha_deg=alpha, phi=0.5
-    )  # fmt: skip
+        mass=10.0 ** rng.uniform(-1.0, 2.0),
+        c_1=c_1,
+        b_1=b_1,
+        beta_deg=beta,
+        c_2=c_2,
+        b_2=b_2,
+        alpha_deg=alpha,
+        phi=0.5,
+    )
     return shoe, k
 
 
