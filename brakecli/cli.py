@@ -216,6 +216,59 @@ def plot_command(
         _print(f"{target}: written")
 
 
+@app.command("classify")
+def classify_command(
+    source: Annotated[
+        str,
+        typer.Argument(
+            metavar="FILE",
+            help="Result of a run; with --quantity a measured signal: CSV, or FILE.h5:/path in any HDF5 file.",
+            show_default=False,
+        ),
+    ],
+    quantity: Annotated[
+        str | None, typer.Option("--quantity", help="What was measured: displacement, velocity or force.")
+    ] = None,
+    column: Annotated[
+        str | None, typer.Option("--column", help="Column of the signal, by name or number.")
+    ] = None,
+    time_column: Annotated[
+        str | None, typer.Option("--time-column", help="Column of the time (s), by name or number.")
+    ] = None,
+    sample_rate: Annotated[
+        float | None, typer.Option("--sample-rate", metavar="HZ", help="Samples per second.")
+    ] = None,
+    belt_speed: Annotated[
+        float | None, typer.Option("--belt-speed", metavar="M/S", help="Speed of the wheel's surface, if known.")
+    ] = None,
+    stiffness: Annotated[
+        float | None,
+        typer.Option("--stiffness", metavar="N/M", help="Stiffness behind a measured force, if known."),
+    ] = None,
+    thresholds: Annotated[
+        list[str] | None,
+        typer.Option("--threshold", metavar="NAME=VALUE", help="Move a threshold of the rules; repeatable."),
+    ] = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+) -> None:
+    """Tell the regime of a stored run or of a measured signal, with the evidence."""
+    from brakecli.judge import judge
+
+    options = {"column": column, "time_column": time_column, "sample_rate": sample_rate}
+    known = {"belt_speed": belt_speed, "stiffness": stiffness}
+    _announce_compilation(quiet or quantity is not None)
+    from brakecli.report import verdict_table
+
+    numbers = judge(source, quantity, options, known, thresholds or ())
+    for warning in numbers.get("warnings", ()):
+        _tell(f"brakecli: warning: {warning}")
+    if as_json:
+        _print_json({"command": "classify", "source": source, **numbers})
+    elif not quiet:
+        _print(verdict_table(source, numbers))
+
+
 @app.command("stability")
 def stability_command(
     case: CaseArgument,

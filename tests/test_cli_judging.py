@@ -1,0 +1,138 @@
+"""The commands that judge: `classify` and `stability`, as their users meet them."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.commands import ROOT, brakecli, each
+
+RELAXATION = ROOT / "cases" / "relaxation.toml"
+MODE_COUPLING = ROOT / "cases" / "mode-coupling.toml"
+
+
+@pytest.fixture(scope="module")
+def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the result of a short run and a measured signal."""
+    folder: Path = tmp_path_factory.mktemp("judging")
+    run = brakecli("run", RELAXATION, "-o", "run.h5", "--set", "solver.duration=1.0", "--quiet", cwd=folder)
+    assert run.code == 0, run
+    time = np.arange(4000) / 1000.0
+    table = np.column_stack([time, np.mod(time, 0.05) - 0.025])  # a sawtooth of 20 Hz
+    np.savetxt(folder / "saw.csv", table, delimiter=",", header="t,force", comments="")
+    return folder
+
+
+def test_classify_repeats_the_verdict_of_the_run(here: Path) -> None:
+    run, again = each(
+        here,
+        [
+            ["run", RELAXATION, "-o", "b.h5", "--set", "solver.duration=1.0", "--json"],
+            ["classify", "run.h5", "--json"],
+        ],
+    )
+    shared = (
+        "regime",
+        "excitation",
+        "frequency",
+        "amplitude",
+        "stick_fraction",
+        "contact_loss_fraction",
+        "evidence",
+    )
+    assert {name: run.json[name] for name in shared} == {name: again.json[name] for name in shared}
+    assert again.json["regime"] == "relaxation"
+
+
+def test_thresholds_are_options_and_are_told(here: Path) -> None:
+    strict, wrong, bad = each(
+        here,
+        [
+            ["classify", "run.h5", "--threshold", "fewest_cycles=1e6", "--json"],
+            ["classify", "run.h5", "--threshold", "fewest_cycle=3"],
+            ["classify", "run.h5", "--threshold", "fewest_cycles=-1"],
+        ],
+    )
+    assert strict.json["regime"] == "undecided"
+    assert strict.json["thresholds"]["fewest_cycles"] == 1e6
+    wrong.told(2, "did you mean fewest_cycles")
+    bad.told(2, "is not a number from 0 on")
+
+
+def test_a_measured_signal_is_classified(here: Path) -> None:
+    options = ["--quantity", "force", "--time-column", "t", "--column", "force"]
+    done = brakecli("classify", "saw.csv", *options, "--json", cwd=here)
+    assert done.json["regime"] == "relaxation"
+    assert done.json["frequency"] == pytest.approx(20.0, rel=0.02)
+    inside = ["classify", "run.h5:/history/vx", "--quantity", "velocity", "--sample-rate", "20000"]
+    table, known = each(here, [["classify", "saw.csv", *options], [*inside, "--belt-speed", "0.05", "--json"]])
+    assert "relaxation" in table.out
+    assert known.json["regime"] == "relaxation"
+
+
+def test_options_that_do_not_fit_are_bad_usage(here: Path) -> None:
+    done = each(
+        here,
+        [
+            ["classify", "run.h5", "--column", "1"],
+            ["classify", "saw.csv", "--quantity", "speed", "--time-column", "t"],
+            ["classify", "saw.csv", "--quantity", "force", "--sample-rate", "-5"],
+            ["stability", RELAXATION, "--vary", "link2.angle_deg=1:2"],
+            ["stability", RELAXATION, "--vary", "link2.angle_deg=80:100:3"],
+            ["stability", RELAXATION, "--vary", "link2.angle=1:2:2"],
+        ],
+    )
+    words = ["--quantity", "displacement", "positive", "START:STOP:NUM", "from -90 to 90", "angle_deg"]
+    assert len(done) == len(words)
+    for result, word in zip(done, words, strict=True):
+        result.told(2, word)
+
+
+def test_files_that_are_no_results_end_in_four_and_never_in_a_number(here: Path) -> None:
+    (here / "empty.h5").write_bytes(b"")
+    (here / "text.csv").write_text("no numbers here\n")
+    whole = (here / "run.h5").read_bytes()
+    (here / "half.h5").write_bytes(whole[: len(whole) // 2])
+    (here / "changed.h5").write_bytes(whole[:5000] + bytes([whole[5000] ^ 1]) + whole[5001:])
+    names = ["empty.h5", "text.csv", "half.h5", "changed.h5", "absent.h5", "saw.csv"]
+    done = each(here, [["classify", name, "--json"] for name in names])
+    signal = each(
+        here, [["classify", name, "--quantity", "force", "--sample-rate", "9", "--json"] for name in names[:2]]
+    )
+    assert len(done) == 6
+    for result in (*done, *signal):
+        result.told(4)
+        assert result.out == ""
+
+
+def test_stability_tells_the_minimal_model_and_what_a_scheme_makes_of_it(here: Path) -> None:
+    changes = [
+        "--set",
+        "solver.step=0.1",
+        "--set",
+        "output.sample_interval=0.1",
+        "--set",
+        "solver.theta=[1.0, 1.0]",
+    ]
+    done = brakecli("stability", MODE_COUPLING, *changes, "--json", cwd=here)
+    assert done.json["critical_friction"] == pytest.approx(0.75, abs=1e-9)
+    assert done.json["instability"] == "flutter"
+    assert done.json["stable"] is False
+    fastest = max(done.json["eigenvalues"])
+    assert fastest == pytest.approx([0.2020717687680948, math.copysign(1.4285772641803685, fastest[1])], abs=1e-9)
+    assert done.json["discrete"]["critical_friction"] == pytest.approx(0.8115, abs=5e-5)
+
+
+def test_stability_has_no_critical_friction_on_a_standing_wheel(here: Path) -> None:
+    done = brakecli("stability", RELAXATION, "--set", "wheel.angular_speed=0", "--json", cwd=here)
+    assert done.json["critical_friction"] is None
+
+
+def test_stability_varies_a_key(here: Path) -> None:
+    table, numbers = each(
+        here, [["stability", RELAXATION, "--vary", "link2.angle_deg=-5:5:3", *more] for more in ([], ["--json"])]
+    )
+    assert "as the scheme has it" in table.out
+    kinds = [entry["instability"] for entry in numbers.json["vary"]]
+    assert kinds == ["divergence", None, "flutter"]
