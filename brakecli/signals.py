@@ -110,7 +110,9 @@ def _columns(source: str, path: Path, column: str | None, time_column: str | Non
             raise UsageError(f"{source}: which column is the signal? give --column; there are {_listed(layout)}")
         value = others[0]
     chosen = [value] if time is None else [value, time]
-    table = _table(source, path, layout, [*chosen, layout.columns - 1])  # the last one shows that rows are whole
+    if layout.columns - 1 not in chosen:
+        chosen.append(layout.columns - 1)  # shows that rows are whole
+    table = _table(source, path, layout, chosen)
     return table[:, 0], None if time is None else table[:, 1]
 
 

@@ -14,9 +14,11 @@ _BAND = 0.3
 """Of the mean size of the velocity: ripple within it is no cycle."""
 _SPIKES = (8.0, 0.35)
 """A spike leaves the median of its neighbours by so many deviations, and by this part of the signal's range."""
-_NOISE_SHARE = 0.7
+_NOISE_SHARE = 0.6
 _SMOOTHED_AWAY = 0.15
 _DRIFT_CYCLES = 8.0
+_COARSE = 24
+_LINES_LEFT = 0.5
 CERTAIN = 15.0
 """A line's power over the mean power of the noise: one bin in three million of pure noise."""
 
@@ -40,7 +42,7 @@ class Motion:
     @property
     def largest(self) -> int:
         """The widest smoothing at which statistics make sense."""
-        return max(1, len(self.velocity) // 40)
+        return max(1, len(self.velocity) // 100)
 
     def smoothed(self, m: int, stride: int = 1) -> Array:
         """The velocity, smoothed over m samples; that of a displacement twice, since its noise is steeper."""
@@ -53,6 +55,7 @@ class Motion:
         """Variance of the noise of the velocity smoothed over m samples."""
         return self.noise**2 / m if self.measured_velocity else 2.0 * self.noise**2 / m**3
 
+    @cached_property
     def variances(self) -> list[tuple[int, float]]:
         """Smoothings, and the variance of the velocity there: those that show more than noise, up to the one that
         smooths the motion itself away.
@@ -71,7 +74,7 @@ class Motion:
 
     def quiet_scale(self, share: float = 0.02) -> int:
         """The least smoothing at which noise is no more than this share of the variance, or the least."""
-        parts = [(m, self.noise_at(m) / variance) for m, variance in self.variances()]
+        parts = [(m, self.noise_at(m) / variance) for m, variance in self.variances]
         quiet = [m for m, part in parts if part <= share]
         return quiet[0] if quiet else min(parts, key=lambda p: p[1], default=(1, 1.0))[0]
 
@@ -104,35 +107,56 @@ def stride_of(m: int) -> int:
 def condition(values: Array, is_velocity: bool) -> Motion:
     """Take out gaps, spikes and drift, each told in the notes."""
     notes: list[str] = []
-    filled = _bridged(values)
-    cycle = _cycle(_motion(filled, is_velocity))
-    piece = _longest_piece(values, max(1.0, 0.25 * cycle), notes)
-    values = _bridged(values[piece])
+    if not np.isfinite(values).all():
+        cycle = _cycle(_motion(_bridged(values), is_velocity))
+        values = _bridged(values[_longest_piece(values, max(1.0, 0.25 * cycle), notes)])
     values, spikes = _without_spikes(values, is_velocity)
     if spikes:
         notes.append(f"{spikes} spikes removed")
     motion = _motion(values, is_velocity)
     width = int(_DRIFT_CYCLES * _cycle(motion))
     if 2 * width >= len(values):
-        return _motion(values, is_velocity, tuple(notes))
-    from scipy.ndimage import uniform_filter1d
-
-    drift = uniform_filter1d(motion.velocity, width, mode="reflect")
+        return Motion(motion.velocity, motion.raw, motion.noise, is_velocity, tuple(notes))
+    drift = _running_mean(motion.velocity, width)
     if float(drift.std()) > 0.1 * float(np.sqrt(max(_signal_variance(motion), 0.0))):
         notes.append("drift removed")
     return Motion(motion.velocity - drift, motion.raw, motion.noise, is_velocity, tuple(notes))
 
 
+def _running_mean(values: Array, width: int) -> Array:
+    from scipy.ndimage import uniform_filter1d
+
+    mean: Array = uniform_filter1d(values, max(1, width), mode="reflect")
+    return mean
+
+
 def denoised(motion: Motion) -> tuple[Array, Array]:
     """The velocity made of those lines only that stand out of the noise, and their power over rfft's bins."""
-    spectrum = np.fft.rfft(motion.velocity)
+    velocity = motion.velocity[: _handy(len(motion.velocity))]
+    spectrum = np.fft.rfft(velocity)
     turn = np.linspace(0.0, np.pi, len(spectrum))
     gain = np.ones(len(turn)) if motion.measured_velocity else 2.0 - 2.0 * np.cos(turn)
     power = np.abs(spectrum) ** 2
-    floor = CERTAIN * len(motion.velocity) * motion.noise**2 * gain
-    spectrum[(power <= floor) | (turn == 0.0)] = 0.0
-    power[(power <= floor) | (turn == 0.0)] = 0.0
-    return np.fft.irfft(spectrum, len(motion.velocity)), power
+    hidden = (power <= CERTAIN * len(velocity) * motion.noise**2 * gain) | (turn == 0.0)
+    spectrum[hidden] = 0.0
+    power[hidden] = 0.0
+    return np.fft.irfft(spectrum, len(velocity)), power
+
+
+def line_share(power: Array, bands: int) -> float:
+    """Part of the energy in the strongest bands, each 6 % to either side."""
+    left, total, found = power.copy(), float(power.sum()), 0.0
+    for _ in range(bands):
+        peak = int(np.argmax(left))
+        band = slice(int(peak / 1.06), int(peak * 1.06) + 2)
+        found += float(left[band].sum())
+        left[band] = 0.0
+    return found / total if total > 0.0 else 0.0
+
+
+def _handy(count: int) -> int:
+    """Of many samples, so many that their Fourier transform is fast."""
+    return count - count % 1024 if count > 1 << 16 else count
 
 
 def trend(motion: Motion, m: int, start: int, windows: int) -> Trend:
@@ -162,6 +186,7 @@ def _noise(values: Array) -> float:
     """Standard deviation of white noise: the lesser of what third differences and the spectrum's floor allow."""
     rough = np.diff(values, 3)
     local = float(np.median(np.abs(rough - np.median(rough)))) / 0.6745 / np.sqrt(20.0)
+    values = values[: _handy(len(values))]
     line = np.linspace(values[0], values[-1], len(values))
     floor = np.median(np.abs(np.fft.rfft(values - line)) ** 2) / np.log(2.0) / len(values)
     return float(min(local, np.sqrt(floor)))
@@ -173,7 +198,9 @@ def _signal_variance(motion: Motion) -> float:
 
 
 def _cycle(motion: Motion) -> float:
-    """Samples of a cycle, roughly."""
+    """Samples of a cycle, roughly; what is slower than a part of the record is left out."""
+    steady = motion.velocity - _running_mean(motion.velocity, len(motion.velocity) // _COARSE)
+    motion = Motion(steady, motion.raw, motion.noise, motion.measured_velocity)
     m = motion.quiet_scale()
     velocity = motion.smoothed(m)
     band = _BAND * float(np.abs(velocity).mean())
@@ -221,9 +248,8 @@ def _without_spikes(values: Array, is_velocity: bool) -> tuple[Array, int]:
         return values, 0
     cleaned = _bridged(np.where(spikes, np.nan, values))
     if is_velocity and count >= 5 and abs(float(np.mean(np.sign(away[spikes])))) > 0.6:
-        rest = _motion(cleaned, True)
-        m = rest.quiet_scale()
-        remains = float(rest.smoothed(m).var()) - rest.noise_at(m)
-        if remains < 0.5 * float(rest.smoothed(m).var()) or count * 5 > len(values) / _cycle(rest):
+        rest = cleaned[: _handy(len(cleaned))]
+        power = np.abs(np.fft.rfft(rest - _running_mean(rest, len(rest) // _COARSE))) ** 2
+        if line_share(power, 3) < _LINES_LEFT:  # nothing is left without them
             return values, 0
     return cleaned, count

@@ -11,7 +11,16 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.analysis.conditioning import CERTAIN, Motion, condition, count_turns, denoised, stride_of, trend
+from brakecli.analysis.conditioning import (
+    CERTAIN,
+    Motion,
+    condition,
+    count_turns,
+    denoised,
+    line_share,
+    stride_of,
+    trend,
+)
 from brakecli.analysis.regime import Excitation, Regime
 
 Array = NDArray[np.float64]
@@ -20,10 +29,9 @@ _FINE = 1000.0
 """Samples of a cycle, after interpolation, among which a plateau is sought …"""
 _PLATEAU_SAMPLES = 1 << 20
 """… in so many samples at most."""
+_PARTS = 7
 _SHORTEST_PLATEAU = 0.03
 """Of the time."""
-_OVERTONE = 0.01
-"""Of the energy: a line that tells stick from two lines in step."""
 
 
 class Quantity(StrEnum):
@@ -56,12 +64,15 @@ class Thresholds:
     """Rank correlation of the envelope with time beyond which it may grow or decay …"""
     trend_ratio: float = 1.25
     """… if its last third is so many times its first third, or the reverse."""
+    trend_order_large: float = 0.6
+    trend_ratio_large: float = 4.0
+    """The same for a change that is large."""
     skewness_unlikely: float = 0.3
     """Skewness of the velocity up to which there is no stick, except for a short one at the belt's speed …"""
     skewness_certain: float = 0.9
     """… and from which there is. Two lines in step reach 0.816 and no more."""
-    two_lines_share: float = 0.96
-    """Between these two it is stick if the two strongest lines hold less than this part of the energy."""
+    overtones: float = 0.03
+    """Between these two it is stick if the third to eighth multiple hold this part of the energy."""
     plateau: float = 2.6
     """Time at the belt's speed, over the time next to it, from which it is stick; a sine reaches 2.41."""
     line_share: float = 0.7
@@ -155,10 +166,10 @@ class _Judge:
             "bulk_spread": stick.spread,
             "events": float(stick.events),
         }
-        if not motion.variances():
+        if not motion.variances:
             self.above_noise = False
             return self._undecided("nothing stands out of the noise; measure closer, or with less noise")
-        cycles, frequency = self._cycles(stick, power)
+        cycles, frequency = self._cycles(stick, power, len(clean) * self.interval)
         self.windows = int(np.clip(cycles / 3.0, 1, 40))
         period = 1.0 / (frequency * self.interval)
         self.evidence |= {"cycles": cycles, "samples_per_cycle": period}
@@ -191,7 +202,7 @@ class _Judge:
                 f"the velocity stays at the belt's speed for {fraction:.0%} of the time, in every cycle or nearly"
             )
             return Regime.RELAXATION, reason, frequency, fraction
-        share = _line_share(power, 3)
+        share = line_share(power, 3)
         self.evidence |= {"line_share": share}
         if flat:
             return self._undecided(
@@ -211,9 +222,8 @@ class _Judge:
         """Skewness at the smoothing that shows it best, and what goes with it."""
         motion, best, sign = self.motion, 0.0, 1.0
         scale = self.scale
-        for m, variance in motion.variances():
-            velocity = motion.smoothed(m, stride_of(m))
-            skewness = float(np.mean((velocity - velocity.mean()) ** 3)) / variance**1.5
+        for m, _ in motion.variances:
+            skewness = _skewness(motion.smoothed(m, stride_of(m)))
             if abs(skewness) > max(best, 4.0 * np.sqrt(6.0 * m / len(motion.velocity))):
                 best, sign, scale = abs(skewness), -np.sign(skewness), m
         if best < self.limits.skewness_certain:
@@ -228,42 +238,43 @@ class _Judge:
         spread = float(bulk.std()) / float(bulk.mean())
         return Stick(best, spread, events, float(np.mean(velocity > -0.5 * middle)))
 
-    def _cycles(self, stick: Stick, power: Array) -> tuple[float, float]:
-        """How many, and how many a second."""
+    def _cycles(self, stick: Stick, power: Array, length: float) -> tuple[float, float]:
+        """How many, and how many a second; `length` of what the power was taken from, in seconds."""
         duration = len(self.motion.velocity) * self.interval
         strongest = int(np.argmax(power))
         certain = stick.skewness >= self.limits.skewness_certain and stick.events >= self.limits.fewest_cycles
         if certain or power[strongest] == 0.0:
             return float(stick.events), max(stick.events, 1) / duration
-        return float(strongest), max(strongest, 1) / duration
+        return strongest * duration / length, max(strongest, 1) / length
 
     def _unsettled(self, cycles: float) -> tuple[Regime, str, float | None, float | None] | None:
         """Why the motion is not sustained; moves the start behind a transient."""
         limits, motion = self.limits, self.motion
         windows = int(np.clip(cycles / 3.0, 4, 40))
         whole = trend(motion, self.scale, 0, windows)
-        last, largest = float(whole.envelope[-max(1, windows // 4) :].mean()), float(whole.envelope.max())
+        last, largest = float(whole.envelope[-max(1, windows // 4) :].mean()), float(np.sort(whole.envelope)[-3])
         floor = np.sqrt(motion.noise_at(self.scale))
-        self.evidence |= {"envelope_ratio": whole.ratio, "envelope_order": whole.order, "died_to": last / largest}
-        early = int(np.argmax(whole.envelope)) < windows // 2
+        self.evidence |= {
+            "envelope_ratio": whole.ratio,
+            "envelope_order": whole.order,
+            "died_to": last / max(largest, 1e-300),
+        }
+        early = bool(whole.envelope[: windows // 2].max() >= largest)
         if early and last <= max(limits.decayed_to * largest, min(0.2 * largest, 0.5 * floor)):
-            return (
-                Regime.DAMPED,
-                f"the vibration has died out: down to {last / largest:.2g} of its largest",
-                None,
-                None,
-            )
+            share = last / max(largest, 1e-300)
+            return Regime.DAMPED, f"the vibration has died out: down to {share:.2g} of its largest", None, None
         found = whole
         for start in (0, len(motion.velocity) // 4, len(motion.velocity) // 2):
             found = trend(motion, self.scale, start, windows)
-            beyond = max(found.ratio, 1.0 / max(found.ratio, 1e-9)) > limits.trend_ratio
-            if not (beyond and abs(found.order) > limits.trend_order):
+            change = max(found.ratio, 1.0 / max(found.ratio, 1e-9))
+            slow = change > limits.trend_ratio and abs(found.order) > limits.trend_order
+            if not slow and not (
+                change > limits.trend_ratio_large and abs(found.order) > limits.trend_order_large
+            ):
                 self.start = start
                 return None
-        word, remedy = (
-            ("growing", "until it has settled") if found.ratio > 1.0 else ("decaying", "until it has died out")
-        )
-        return self._undecided(f"still {word}; measure longer, {remedy}")
+        word, end = ("growing", "settled") if found.ratio > 1.0 else ("decaying", "died out")
+        return self._undecided(f"still {word}; measure longer, until it has {end}")
 
     def _sticks(self, stick: Stick, power: Array, frequency: float) -> bool | None:
         """Whether the velocity is skewed by stick, and not by two lines in step; None if noise hides which."""
@@ -272,14 +283,16 @@ class _Judge:
             return False
         if stick.skewness >= limits.skewness_certain:
             return True
-        share = _line_share(power, 2)
-        self.evidence |= {"two_lines_share": share}
-        if share < limits.two_lines_share:
+        strongest = int(np.argmax(power))
+        bands = [slice(int(0.97 * n * strongest), int(1.03 * n * strongest) + 2) for n in range(3, 9)]
+        overtones = sum(float(power[band].sum()) for band in bands) / float(power.sum())
+        self.evidence |= {"overtones": overtones}
+        if overtones > limits.overtones:
             return True
         turn = 2.0 * np.pi * min(4.0 * frequency * self.interval, 0.5)
         gain = 1.0 if motion.measured_velocity else 2.0 - 2.0 * np.cos(turn)
         hidden = CERTAIN * len(motion.velocity) * motion.noise**2 * gain
-        return None if hidden > _OVERTONE * float(power.sum()) else False
+        return None if hidden > limits.overtones / 3.0 * float(power.sum()) else False
 
     def _plateau(self, clean: Array) -> tuple[float, float]:
         """Part of the time at the belt's speed (or at the velocity's extreme value) and next to it."""
@@ -299,20 +312,15 @@ class _Judge:
         return max(results, key=lambda r: r[0] / max(r[1], 1e-9))
 
 
+def _skewness(values: Array) -> float:
+    """The median of equal parts', which a single jump does not change."""
+    parts = [part - part.mean() for part in np.array_split(values, _PARTS)]
+    return float(np.median([np.mean(p * p * p) / max(float(np.mean(p * p)), 1e-300) ** 1.5 for p in parts]))
+
+
 def _extreme_modes(values: Array, reach: float) -> list[float]:
     """The most frequent values of the upper and of the lower quarter of the range."""
     edges = np.arange(values.min(), values.max() + 0.01 * reach, 0.01 * reach)
     counts, quarter = np.histogram(values, edges)[0], max(1, len(edges) // 4)
     places = int(np.argmax(counts[:quarter])), len(counts) - quarter + int(np.argmax(counts[-quarter:]))
     return [float(0.5 * (edges[i] + edges[i + 1])) for i in places]
-
-
-def _line_share(power: Array, bands: int) -> float:
-    """Part of the energy in the strongest bands, each 6 % to either side."""
-    left, total, found = power.copy(), float(power.sum()), 0.0
-    for _ in range(bands):
-        peak = int(np.argmax(left))
-        band = slice(int(peak / 1.06), int(peak * 1.06) + 2)
-        found += float(left[band].sum())
-        left[band] = 0.0
-    return found / total if total > 0.0 else 0.0
