@@ -40,7 +40,14 @@ def context(setup: Setup) -> Context:
     lines = forced_lines(last_speed, [float(turns) for turns in setup.wheel.turns], highest)
     compression = float(np.abs(setup.load.values).max()) / (setup.coefficients.c_yy + setup.contact_stiffness)
     fastest = natural_frequencies(setup.coefficients, setup.contact_stiffness)[1]
-    return Context(last_speed, steady, lines, quiet=_ROUNDING * compression * fastest)
+    return Context(
+        last_speed,
+        steady,
+        lines,
+        quiet=_ROUNDING * compression * fastest,
+        coefficients=setup.coefficients,
+        load=float(value_at(setup.load, 0.0)),
+    )
 
 
 def classify_result(path: Path, thresholds: Thresholds) -> dict[str, Any]:

@@ -93,7 +93,7 @@ def verdict_table(source: str, numbers: dict[str, Any]) -> str:
         ("amplitude of x", _unit(numbers["amplitude"], "m")),
         ("stick", _share(numbers["stick_fraction"])),
         ("lost contact", _share(numbers["contact_loss_fraction"])),
-        *((name.replace("_", " "), f"{value:.6g}") for name, value in numbers["evidence"].items()),
+        *((name.replace("_", " "), _numbers(value)) for name, value in numbers["evidence"].items()),
     ]
     return _table(source, rows)
 
@@ -168,6 +168,10 @@ def _discrete_rows(discrete: Discrete) -> Rows:
         ("its critical friction", critical),
         ("its stable steps", "none" if discrete.step_limit == 0.0 else limit),
     ]
+
+
+def _numbers(value: float | Sequence[float]) -> str:
+    return f"{value:.6g}" if isinstance(value, float | int) else ", ".join(f"{item:.4g}" for item in value) or "-"
 
 
 def _share(value: float | None) -> str:

@@ -145,3 +145,29 @@ def test_verdict_does_not_depend_on_length_or_sampling() -> None:
     assert {verdict.regime for verdict in verdicts} == {Regime.RELAXATION}
     frequencies = [verdict.frequency for verdict in verdicts]
     assert np.ptp(frequencies) < 0.1
+
+
+def test_evidence_names_lines_harmonics_and_powers() -> None:
+    verdict = judged(make(SQUEAL, friction__coefficient=0.7, solver__duration=2.0))
+    evidence = verdict.evidence
+    assert evidence["line_frequencies"][0] == pytest.approx(verdict.frequency, abs=1.0)
+    assert evidence["line_shares"][0] > 0.99
+    assert set(evidence["line_forced"]) == {0.0}
+    assert len(evidence["harmonics"]) == 4
+    assert 0.01 < evidence["harmonics"][0] < 0.1
+    assert evidence["largest_vx_over_belt_speed"] == 1.0
+    # A settled motion stores no more and no less: what it takes from the belt becomes heat, but for what the ends
+    # of the record hold more than its beginning: Q times 2 y over 1.8 s is 1 W at most.
+    assert abs(evidence["power_rest"]) < 1.0
+    assert evidence["power_belt"] == pytest.approx(
+        evidence["power_friction"] + evidence["power_dashpots"] + evidence["power_load"] + evidence["power_rest"]
+    )
+    assert evidence["power_friction"] > 0.0
+
+
+def test_lines_of_the_roughness_are_told_from_others() -> None:
+    lines = forced_lines(2.0, [1.0 / 0.02], 5000.0)
+    both = np.sin(2 * np.pi * 100.0 * TIME) + np.sin(2 * np.pi * 151.0 * TIME + 1.0)
+    evidence = classify(made(both), Context(2.0, True, lines)).evidence
+    found = dict(zip(evidence["line_frequencies"], evidence["line_forced"], strict=True))
+    assert {round(frequency): flag for frequency, flag in found.items()} == {100: 1.0, 151: 0.0}

@@ -3,13 +3,14 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.analysis.spectra import upward_crossings
 from brakecli.history import History
+from brakecli.kernels import Coefficients
 from brakecli.model import ContactState
 
 Array = NDArray[np.float64]
@@ -18,6 +19,9 @@ LONGEST = 1 << 20
 """Samples read at a time, and samples at the end of a history in which cycles are counted and lines weighed."""
 LINE_BINS = 4
 """A line takes so many bins on either side: the Hann window's main lobe, and what it wanders within the record."""
+MOST_LINES = 8
+LEAST_LINE = 1e-3
+HARMONICS = 5
 MOST_CYCLES_PER_PERIOD = 4
 SAME = 0.02  # squared difference, over twice the variance, between one period of vx and the next
 
@@ -132,7 +136,7 @@ class Cycles:
     count: int
     period: float = 0.0
     frequency: float = 0.0
-    evidence: dict[str, float] = field(default_factory=dict)
+    evidence: dict[str, Any] = field(default_factory=dict)
 
 
 def cycles_of(history: History, start: int) -> Cycles:
@@ -153,12 +157,13 @@ def cycles_of(history: History, start: int) -> Cycles:
     state = history.read("state", history.samples - len(velocity), history.samples)
     sticks = np.flatnonzero((state[1:] == ContactState.STICK) & (state[:-1] != ContactState.STICK)) + 1
     per_cycle = np.histogram(sticks, crossings)[0] if len(crossings) > 1 else np.zeros(1)
-    evidence = {
+    evidence: dict[str, Any] = {
         "cycles": float(len(crossings) - 1),
         "samples_per_cycle": period,
         "rises_per_cycle": float(rises),
         "fundamental_share": share_of(power, frequencies, [frequency]),
         "harmonic_share": share_of(power, frequencies, multiples),
+        "harmonics": harmonics_of(power, frequencies, frequency),
         "stick_cycles": float(np.mean(per_cycle > 0)),
         "stick_episodes_per_cycle": float(np.mean(per_cycle)),
     }
@@ -175,6 +180,59 @@ def _rises_per_period(velocity: Array, period: float) -> int:
         if float(np.mean((velocity[shift:] - velocity[:-shift]) ** 2)) <= 2.0 * SAME * variance:
             return rises
     return 1
+
+
+def lines_of(power: Array, frequencies: Array, forced: Sequence[float]) -> dict[str, list[float]]:
+    """The strongest lines of vx: frequencies (Hz), parts of its energy, and 1 where roughness acts there.
+
+    A line is a peak with `LINE_BINS` on either side; what holds less than a thousandth is no line.
+    """
+    left, total = power.copy(), float(power.sum())
+    found: dict[str, list[float]] = {"line_frequencies": [], "line_shares": [], "line_forced": []}
+    while total > 0.0 and len(found["line_shares"]) < MOST_LINES:
+        top = int(np.argmax(left))
+        near = slice(max(top - LINE_BINS, 0), top + LINE_BINS + 1)
+        share = float(left[near].sum()) / total
+        if share < LEAST_LINE:
+            break
+        left[near] = 0.0
+        distance = min((abs(line - frequencies[top]) for line in forced), default=np.inf)
+        found["line_frequencies"].append(float(frequencies[top]))
+        found["line_shares"].append(share)
+        found["line_forced"].append(float(distance <= LINE_BINS * frequencies[1]))
+    return found
+
+
+def harmonics_of(power: Array, frequencies: Array, fundamental: float) -> list[float]:
+    """Amplitudes of vx at the first multiples of a fundamental (Hz), over that of the fundamental."""
+    parts = [share_of(power, frequencies, [n * fundamental]) for n in range(1, HARMONICS + 1)]
+    return [float(np.sqrt(part / parts[0])) for part in parts[1:]] if parts[0] > 0.0 else []
+
+
+def powers_of(history: History, start: int, c: Coefficients, belt: float, load: float) -> dict[str, float]:
+    """Mean powers (W) from sample `start` on, at constant U (m/s) and Q (N): the belt's, and what becomes of it.
+
+    What is left, `power_rest`, is the work of the roughness and the change of what is stored; on flat surfaces it
+    falls with the length of the settled part.
+    """
+    sums = np.zeros(4)
+    names = ("vx", "vy", "friction_force")
+    pieces = zip(*(blocks(history, name, start, history.samples) for name in names), strict=True)
+    for v_x, v_y, friction in pieces:
+        sums += (
+            belt * friction.sum(),
+            -float(friction @ (v_x - belt)),
+            float(c.b_xx * v_x @ v_x + 2.0 * c.b_xy * v_x @ v_y + c.b_yy * v_y @ v_y),
+            load * (c.sin_beta * v_x.sum() + c.cos_beta * v_y.sum()),
+        )
+    taken, heat, dashpots, lifted = (float(value) for value in sums / (history.samples - start))
+    return {
+        "power_belt": taken,
+        "power_friction": heat,
+        "power_dashpots": dashpots,
+        "power_load": lifted,
+        "power_rest": taken - heat - dashpots - lifted,
+    }
 
 
 def power_of(values: Array, interval: float) -> tuple[Array, Array]:

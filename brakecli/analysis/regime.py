@@ -13,11 +13,14 @@ from brakecli.analysis.evidence import (
     fraction_in_state,
     largest_values,
     last_samples,
+    lines_of,
     mean,
     power_of,
+    powers_of,
     share_of,
 )
 from brakecli.history import History
+from brakecli.kernels import Coefficients
 from brakecli.model import ContactState
 
 
@@ -65,13 +68,15 @@ class Context:
     """What is known of the case behind a history.
 
     `belt_speed` U (m/s), `steady`: U and Q are constant, `forced`: lines of the roughness (Hz), `quiet`: size of
-    vx (m/s) that is no more than rounding.
+    vx (m/s) that is no more than rounding, `coefficients` and `load` Q (N) for the balance of powers.
     """
 
     belt_speed: float
     steady: bool = True
     forced: tuple[float, ...] = ()
     quiet: float = 0.0
+    coefficients: Coefficients | None = None
+    load: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -214,7 +219,12 @@ class _Judge:
     ) -> Verdict:
         """Add the means and fractions of the settled part."""
         least, largest = extremes(self.history, "x", self.start, self.history.samples)
-        self.evidence |= largest_values(self.history, self.start, self.context.belt_speed)
+        belt, c = self.context.belt_speed, self.context.coefficients
+        self.evidence |= largest_values(self.history, self.start, belt)
+        power, frequencies = power_of(last_samples(self.history, "vx", self.start), self.history.interval)
+        self.evidence |= lines_of(power, frequencies, self.context.forced)
+        if c is not None and self.context.steady:
+            self.evidence |= powers_of(self.history, self.start, c, belt, self.context.load)
         return Verdict(
             regime=regime,
             excitation=excitation,
