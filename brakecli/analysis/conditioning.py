@@ -18,6 +18,7 @@ _NOISE_SHARE = 0.6
 _SMOOTHED_AWAY = 0.15
 _DRIFT_CYCLES = 8.0
 _COARSE = 24
+_SHORTEST = 8
 _LINES_LEFT = 0.5
 CERTAIN = 15.0
 """A line's power over the mean power of the noise: one bin in three million of pure noise."""
@@ -107,9 +108,12 @@ def stride_of(m: int) -> int:
 def condition(values: Array, is_velocity: bool) -> Motion:
     """Take out gaps, spikes and drift, each told in the notes."""
     notes: list[str] = []
-    if not np.isfinite(values).all():
+    if len(values) >= _SHORTEST and not np.isfinite(values).all():
         cycle = _cycle(_motion(_bridged(values), is_velocity))
         values = _bridged(values[_longest_piece(values, max(1.0, 0.25 * cycle), notes)])
+    if len(values) < _SHORTEST:
+        raw = values if is_velocity else np.diff(values)
+        return Motion(raw - raw.mean() if len(raw) else raw, raw, 0.0, is_velocity, tuple(notes))
     values, spikes = _without_spikes(values, is_velocity)
     if spikes:
         notes.append(f"{spikes} spikes removed")
@@ -165,9 +169,11 @@ def trend(motion: Motion, m: int, start: int, windows: int) -> Trend:
     envelope = np.sqrt(np.maximum([float(p.var()) - motion.noise_at(m) for p in parts], 0.0))
     third = max(1, windows // 3)
     first, last = float(envelope[:third].mean()), float(envelope[-third:].mean())
+    if float(np.ptp(envelope)) == 0.0:
+        return Trend(envelope, 1.0, 0.0)
     ranks = np.argsort(np.argsort(envelope)).astype(float)
     order = float(np.corrcoef(ranks, np.arange(windows))[0, 1])
-    return Trend(envelope, last / first if first > 0.0 else np.inf, order)
+    return Trend(envelope, last / max(first, 1e-300), order)
 
 
 def count_turns(velocity: Array, low: float, high: float) -> int:

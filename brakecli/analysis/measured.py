@@ -1,7 +1,7 @@
 """The regime of a measured signal, which carries no flags: see docs/measured-signals.md.
 
 Stick shows in the distribution of the velocity: long at one value, the belt's, then short and fast in the other
-direction. So its skewness is large, and its bulk is narrow. The velocity is smoothed over m samples; of m = 1, 2,
+direction. So its skewness is large. The velocity is smoothed over m samples; of m = 1, 2,
 4 … that one is taken which shows the skewness best, so that one procedure serves any sampling rate and noise.
 """
 
@@ -30,6 +30,7 @@ _FINE = 1000.0
 _PLATEAU_SAMPLES = 1 << 20
 """… in so many samples at most."""
 _PARTS = 7
+_FEWEST_SAMPLES = 64
 _SHORTEST_PLATEAU = 0.03
 """Of the time."""
 
@@ -101,10 +102,9 @@ class MeasuredVerdict:
 
 @dataclass(frozen=True)
 class Stick:
-    """What speaks for stick: events, their spread, time on the plateau."""
+    """What speaks for stick: skewness of the velocity, events, part of the time."""
 
     skewness: float
-    spread: float  # of the slow part of the velocity over its mean
     events: int
     fraction: float
 
@@ -118,27 +118,26 @@ def classify_signal(
     thresholds: Thresholds = Thresholds(),
 ) -> MeasuredVerdict:
     """The regime of a measured signal; `belt_speed` in m/s, `stiffness` in N/m (of a force) where known."""
-    motion = condition(signal.values, quantity == Quantity.VELOCITY)
-    scale, level = 1.0, None if belt_speed is None else abs(belt_speed)
+    size = float(np.nanmax(np.abs(signal.values), initial=0.0))  # squares of the smallest numbers must not vanish
+    motion = condition(signal.values / (size or 1.0), quantity == Quantity.VELOCITY)
+    scale, level = size, None if belt_speed is None else abs(belt_speed)
     if quantity == Quantity.FORCE:
-        scale = np.nan if stiffness is None else 1.0 / stiffness
+        scale = np.nan if stiffness is None else size / stiffness
         level = None if belt_speed is None or stiffness is None else abs(belt_speed) * stiffness
-    if level is not None and quantity != Quantity.VELOCITY:
+    if quantity == Quantity.VELOCITY:
+        scale *= signal.interval
+    elif level is not None:
         level *= signal.interval
-    judge = _Judge(motion, signal.interval, level, thresholds)
+    judge = _Judge(motion, signal.interval, None if level is None else level / (size or 1.0), thresholds)
     regime, reason, frequency, stick = judge.verdict()
-    amplitude = (
-        scale
-        * motion.amplitude(judge.start, judge.windows)
-        * (signal.interval if quantity == Quantity.VELOCITY else 1.0)
-    )
+    amplitude = scale * motion.amplitude(judge.start, judge.windows) if judge.above_noise else np.nan
     return MeasuredVerdict(
         regime,
         (reason,),
         frequency=frequency,
-        amplitude=amplitude if np.isfinite(amplitude) and judge.above_noise else None,
+        amplitude=amplitude if np.isfinite(amplitude) else None,
         stick_fraction=stick,
-        evidence=judge.evidence,
+        evidence={**judge.evidence, "noise": size * motion.noise},
         warnings=(*signal.notes, *motion.notes, *judge.notes),
         thresholds=thresholds,
     )
@@ -157,13 +156,15 @@ class _Judge:
         """Regime, reason, frequency (Hz), part of the time in stick."""
         motion, limits = self.motion, self.limits
         count = len(motion.velocity)
+        if count < _FEWEST_SAMPLES:
+            self.above_noise = False
+            return self._undecided(f"only {count} samples in one piece; measure longer")
         self.scale = motion.quiet_scale()
         stick = self._stick()
         clean, power = denoised(motion)
-        self.evidence |= {"samples": float(count), "noise": motion.noise, "skewness": stick.skewness}
+        self.evidence |= {"samples": float(count), "skewness": stick.skewness}
         self.evidence |= {
             "smoothed_over": float(self.scale),
-            "bulk_spread": stick.spread,
             "events": float(stick.events),
         }
         if not motion.variances:
@@ -208,6 +209,10 @@ class _Judge:
             return self._undecided(
                 "the velocity is cut off flat on one side, as by short stick; give the belt speed"
             )
+        if self._reaches_belt(clean):
+            return self._undecided(
+                "the velocity just reaches the belt's; with less noise it would show if it stays"
+            )
         if share < limits.line_share:
             return self._undecided(
                 f"irregular without stick: {share:.0%} of the energy in three lines; measure longer"
@@ -232,11 +237,10 @@ class _Judge:
         velocity = velocity - velocity.mean()
         bulk = velocity[velocity > 0.0]
         if not len(bulk):
-            return Stick(best, np.inf, 0, 0.0)
+            return Stick(best, 0, 0.0)
         middle, noise = float(np.median(bulk)), float(np.sqrt(motion.noise_at(scale)))
         events = count_turns(velocity, -max(0.5 * middle, 4.0 * noise), 0.25 * middle)
-        spread = float(bulk.std()) / float(bulk.mean())
-        return Stick(best, spread, events, float(np.mean(velocity > -0.5 * middle)))
+        return Stick(best, events, float(np.mean(velocity > -0.5 * middle)))
 
     def _cycles(self, stick: Stick, power: Array, length: float) -> tuple[float, float]:
         """How many, and how many a second; `length` of what the power was taken from, in seconds."""
@@ -294,6 +298,11 @@ class _Judge:
         hidden = CERTAIN * len(motion.velocity) * motion.noise**2 * gain
         return None if hidden > limits.overtones / 3.0 * float(power.sum()) else False
 
+    def _reaches_belt(self, clean: Array) -> bool:
+        """Whether the velocity's largest values, in either direction, are about the belt's."""
+        least, most = np.quantile(clean + self.motion.raw.mean(), [0.01, 0.99])
+        return self.level is not None and any(0.95 * self.level <= v <= 1.2 * self.level for v in (-least, most))
+
     def _plateau(self, clean: Array) -> tuple[float, float]:
         """Part of the time at the belt's speed (or at the velocity's extreme value) and next to it."""
         finer = int(np.ceil(_FINE / self.evidence["samples_per_cycle"]))
@@ -315,7 +324,7 @@ class _Judge:
 def _skewness(values: Array) -> float:
     """The median of equal parts', which a single jump does not change."""
     parts = [part - part.mean() for part in np.array_split(values, _PARTS)]
-    return float(np.median([np.mean(p * p * p) / max(float(np.mean(p * p)), 1e-300) ** 1.5 for p in parts]))
+    return float(np.median([np.mean(p * p * p) / max(float(np.mean(p * p)), 1e-100) ** 1.5 for p in parts]))
 
 
 def _extreme_modes(values: Array, reach: float) -> list[float]:
