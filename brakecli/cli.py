@@ -119,8 +119,9 @@ def run_command(
         raise UsageError(f"{target}: this is the case itself; choose another output with -o")
     _announce_compilation(quiet)
     from brakecli.report import run_table
-    from brakecli.run import run
+    from brakecli.run import load_kernels, run
 
+    load_kernels(loaded)
     with unwinding() as recall, _progress(quiet) as bar:
 
         def progress(steps: int) -> None:

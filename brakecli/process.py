@@ -41,9 +41,9 @@ def handle_signals() -> None:
 def unwinding() -> Iterator[Callable[[], None]]:
     """Within, the first signal raises `Interrupted`, so that unfinished files are removed.
 
-    Later ones are not heard, as they would cut through the cleaning up. C code that calls back into Python, such
-    as that in front of a compiled function, may turn an interruption into another exception, or lose it: whatever
-    takes long calls what this yields now and then, which raises it again.
+    Later ones are not heard, as they would cut through the cleaning up. The C code in front of a compiled function
+    calls back into Python, and loses exceptions or turns them into others: an interruption there has to wait until
+    what this yields is called, as whatever takes long does now and then.
     """
     arrived: list[int] = []
 
@@ -54,7 +54,8 @@ def unwinding() -> Iterator[Callable[[], None]]:
     def hear(number: int, frame: FrameType | None) -> None:
         if not arrived:
             arrived.append(number)
-            recall()
+            if not _is_called_from_c(frame):
+                recall()
 
     before = _handle(hear)
     try:
@@ -65,6 +66,14 @@ def unwinding() -> Iterator[Callable[[], None]]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def _is_called_from_c(frame: FrameType | None) -> bool:
+    while frame is not None:
+        if frame.f_globals.get("__name__", "").partition(".")[0] in ("numba", "llvmlite"):
+            return True
+        frame = frame.f_back
+    return False
 
 
 def _handle(handler: Callable[[int, FrameType | None], None]) -> dict[signal.Signals, Any]:

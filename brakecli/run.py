@@ -88,6 +88,13 @@ def failure_sentence(work: Work) -> str:
     return when + work.failure.sentence
 
 
+def load_kernels(loaded: LoadedCase) -> None:
+    """Compile what a run of a case needs, or load it: this takes seconds only once."""
+    with within_range():
+        setup = set_up(loaded.case)
+    _ = setup.scheme, setup.evaluate
+
+
 def run(
     loaded: LoadedCase,
     output: Path,
