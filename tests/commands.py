@@ -1,0 +1,165 @@
+"""Running the command line as its users do: in processes of its own, with an environment that is known.
+
+Most of the time of a short command goes into imports. A server of command lines, which is this module run as a
+program, imports once and forks for each command.
+"""
+
+import atexit
+import json
+import os
+import subprocess
+import sys
+import traceback
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryFile
+from typing import Any
+
+import h5py
+
+ROOT = Path(__file__).parents[1]
+COMMAND = [sys.executable, "-W", "error", "-m", "brakecli"]
+LIMIT = 100.0  # s; kernels may have to be compiled first
+
+TINY = """\
+title = "Tiny"
+shoe.mass = 10.0
+wheel = { radius = 0.5, angular_speed = 0.1 }
+link1 = { stiffness = 1e7, damping = 300.0 }
+link2 = { stiffness = 1.2e7, damping = 300.0, angle_deg = 5.0 }
+load.force = 5000.0
+friction.coefficient = 0.6
+contact = { half_length = 0.05, stiffness = 2e7 }
+solver = { step = 1e-5, duration = 0.02 }
+output.sample_interval = 1e-4
+"""
+
+
+def environment(**changes: str | None) -> dict[str, str]:
+    """The tests' own environment without anything that changes how output looks; None takes a variable out."""
+    kept = {name: os.environ[name] for name in ("PATH", "HOME", "XDG_CACHE_HOME") if name in os.environ}
+    known: dict[str, str | None] = {**kept, "PYTHONPATH": str(ROOT), "COLUMNS": "100", "LC_ALL": "C.UTF-8"}
+    return {name: value for name, value in (known | changes).items() if value is not None}
+
+
+@dataclass(frozen=True)
+class Done:
+    """A command that has ended."""
+
+    code: int
+    out: str
+    err: str
+
+    @property
+    def json(self) -> dict[str, Any]:
+        """The JSON object on standard output; nothing else may be there."""
+        value: dict[str, Any] = json.loads(self.out)
+        return value
+
+    def told(self, code: int, *words: str) -> str:
+        """Standard error, once it is sure that the command ended so and told these words in whole sentences."""
+        assert self.code == code, self
+        assert "Traceback" not in self.err, self
+        for word in words:
+            assert word in self.err, self
+        return self.err
+
+
+def brakecli(*arguments: str | Path, cwd: Path, stdin: str | None = None, **changes: str | None) -> Done:
+    """Run one command to its end: a fork, unless it needs another environment or standard input."""
+    words = [str(argument) for argument in arguments]
+    if stdin is None and not changes:
+        server = _server()
+        assert server.stdin is not None
+        assert server.stdout is not None
+        server.stdin.write(json.dumps([str(cwd), words]) + "\n")
+        server.stdin.flush()
+        return Done(*json.loads(server.stdout.readline()))
+    done = subprocess.run(
+        [*COMMAND, *words],
+        cwd=cwd,
+        input=(stdin or "").encode(),
+        capture_output=True,
+        timeout=LIMIT,
+        env=environment(**changes),
+    )
+    return Done(done.returncode, done.stdout.decode(), done.stderr.decode())
+
+
+def each(cwd: Path, commands: Sequence[Sequence[str | Path]]) -> list[Done]:
+    """Run commands one after the other."""
+    return [brakecli(*arguments, cwd=cwd) for arguments in commands]
+
+
+@cache
+def _server() -> subprocess.Popen[str]:
+    server = subprocess.Popen(
+        [sys.executable, "-W", "error", "-m", "tests.commands"],
+        cwd=ROOT,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        env=environment(OPENBLAS_NUM_THREADS="1"),  # a process with threads should not fork
+    )
+    atexit.register(server.communicate)  # which ends it
+    return server
+
+
+def _serve() -> None:
+    import brakecli.report  # noqa: F401 - all that a run needs
+    from brakecli.__main__ import main
+
+    for line in sys.stdin:
+        cwd, words = json.loads(line)
+        with TemporaryFile() as out, TemporaryFile() as err, Path(os.devnull).open("rb") as nothing:
+            child = os.fork()
+            if child == 0:
+                os.chdir(cwd)
+                for number, file in enumerate((nothing, out, err)):
+                    os.dup2(file.fileno(), number)
+                os._exit(_code_of(main, ["brakecli", *words]))
+            code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+            texts = []
+            for file in (out, err):
+                file.seek(0)
+                texts.append(file.read().decode())
+        print(json.dumps([code, *texts]), flush=True)  # noqa: T201
+
+
+def _code_of(main: Callable[[], None], arguments: list[str]) -> int:
+    sys.argv = arguments
+    try:
+        main()
+    except SystemExit as end:
+        return int(end.code or 0)
+    except BaseException:
+        traceback.print_exc()
+        return 1
+    finally:
+        sys.stdout.flush()
+        sys.stderr.flush()
+    return 0
+
+
+def variants(cwd: Path, *overrides: Sequence[str]) -> list[Done]:
+    """Run the tiny case with overrides, once for each list of them, into 0.h5, 1.h5, …"""
+    (cwd / "tiny.toml").write_text(TINY)
+    settings = [[part for override in group for part in ("--set", override)] for group in overrides]
+    return each(cwd, [["run", "tiny.toml", "--json", "-o", f"{n}.h5", *group] for n, group in enumerate(settings)])
+
+
+def attributes(path: Path, group: str = "/") -> dict[str, Any]:
+    """The attributes of a group of a result file, as any HDF5 program sees them."""
+    with h5py.File(path) as file:
+        return dict(file[group].attrs)
+
+
+def left_in(directory: Path) -> set[str]:
+    """The names of all files there, hidden ones too."""
+    return {path.name for path in directory.iterdir()}
+
+
+if __name__ == "__main__":
+    _serve()
