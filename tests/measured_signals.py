@@ -125,6 +125,20 @@ def _row(label: str, outcomes: Counter[str]) -> str:
     return f"| {label} | {outcomes['right']} | {outcomes['undecided']} | {outcomes['wrong']} |"
 
 
+def clipped(stick: float, samples: int = 20000, per_cycle: float = 99.7) -> Array:
+    """A velocity that is a sine but for the top, which is cut off at 1 for this part of the time."""
+    phase = 2.0 * np.pi * np.arange(samples) / per_cycle
+    velocity: Array = np.minimum(np.cos(phase) / np.cos(np.pi * stick), 1.0)
+    return velocity
+
+
+def _short_stick(stick: float, decibels: float, belt_speed: float | None) -> str:
+    velocity = clipped(stick)
+    noise = 10.0 ** (-decibels / 20.0) * velocity.std() * np.random.default_rng(1).normal(0.0, 1.0, len(velocity))
+    signal = Signal(velocity + noise, 1e-3, "synthetic")
+    return str(classify_signal(signal, quantity=Quantity.VELOCITY, belt_speed=belt_speed).regime)
+
+
 def main() -> None:
     """Print the tables."""
     lines = ["| samples a cycle, cycles, signal to noise | right | undecided | wrong |", "|---|---|---|---|"]
@@ -139,6 +153,16 @@ def main() -> None:
     kinds = ("spikes", "drift", "offset", "turned round", "short gaps", "long gap", "jump")
     lines += [_row(kind, tally(50, 100, 20, kind)) for kind in kinds]
     lines += ["| **30 cycles** | | | |", *(_row(kind, tally(50, 30, 20, kind)) for kind in kinds)]
+    lines += [
+        "",
+        "| stick at the top of a sine | without noise | 40 dB | 30 dB | 20 dB |",
+        "|---|---|---|---|---|",
+    ]
+    for stick in (0.03, 0.05, 0.08, 0.1, 0.2, 0.3):
+        cells = [
+            " / ".join(_short_stick(stick, noise, belt) for belt in (1.0, None)) for noise in (200, 40, 30, 20)
+        ]
+        lines.append(f"| {stick:.0%} | {' | '.join(cells)} |")
     print("\n".join(lines))  # noqa: T201
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from brakecli.analysis.measured import MeasuredVerdict, Quantity, Signal, Thresholds, classify_signal
 from brakecli.analysis.regime import Excitation, Regime
-from tests.measured_signals import Array, disturbed, measured, motions, outcome, stick_slip, verdict
+from tests.measured_signals import Array, clipped, disturbed, measured, motions, outcome, stick_slip, verdict
 
 IN_DOUBT = {
     "two lines in step": "at 10 dB and few samples noise hides the overtones that tell stick from two lines",
@@ -79,16 +79,9 @@ def test_events_and_time_of_stick_are_counted() -> None:
         assert found.stick_fraction == pytest.approx(1.0 - slip, abs=0.06)
 
 
-def _clipped(stick: float, samples: int = 20000, per_cycle: int = 100) -> Array:
-    """A velocity that is a sine but for the top, which is cut off at 1 for this part of the time."""
-    phase = 2.0 * np.pi * np.arange(samples) / per_cycle * 1.003
-    clipped: Array = np.minimum(np.cos(phase) / np.cos(np.pi * stick), 1.0)
-    return clipped
-
-
 @pytest.mark.parametrize("stick", [0.08, 0.1, 0.2])
 def test_short_stick_is_told_by_the_speed_of_the_belt(stick: float) -> None:
-    signal = Signal(_clipped(stick), 1e-3, "s")
+    signal = Signal(clipped(stick), 1e-3, "s")
     known = classify_signal(signal, quantity=Quantity.VELOCITY, belt_speed=1.0)
     assert known.regime == Regime.RELAXATION
     assert known.stick_fraction == pytest.approx(stick, abs=0.03)
