@@ -291,6 +291,10 @@ def render(picture: Picture, suffix: str) -> bytes:
     """The picture as the bytes of a file of this suffix; nothing in them depends on when or where."""
     with _matplotlib():
         figure = draw(picture)
+        figure.draw_without_rendering()
+        figure.set_layout_engine("none")
+        for axes in figure.axes:  # the layout's last digits depend on the order in which it solved for them
+            axes.set_position(tuple(round(bound, 6) for bound in axes.get_position().bounds))
         stream = BytesIO()
         figure.savefig(stream, format=suffix[1:], dpi=150, metadata=_UNDATED.get(suffix))
         return stream.getvalue()
