@@ -36,6 +36,7 @@ _COARSE_NODES = NODES_PER_WAVE / 2
 class Check:
     """The findings, in SI units; frequencies in Hz. `warnings` are sentences that name key and number."""
 
+    coefficients: dict[str, float]  # of (6)-(7), named as in `model.COEFFICIENTS`
     belt_speed: float
     contact_stiffness: float
     natural_frequencies: tuple[float, float]  # on the links and the contact that touches everywhere
@@ -67,6 +68,7 @@ def check(setup: Setup) -> Check:
     limits = step_limits(setup.coefficients, setup.weights, setup.scheme, stiffness, setup.wheel)
     per_period = 1.0 / (frequencies[1] * times.step) if frequencies[1] > 0.0 else math.inf
     found = Check(
+        coefficients=setup.coefficients._asdict(),
         belt_speed=setup.belt_speed,
         contact_stiffness=stiffness,
         natural_frequencies=frequencies,

@@ -12,6 +12,7 @@ from rich.table import Table
 
 from brakecli.analysis.stability import Crossing, Mode
 from brakecli.check import Check
+from brakecli.model import COEFFICIENTS
 from brakecli.run import RunReport
 from brakecli.stability import Discrete, StabilityReport
 
@@ -56,6 +57,10 @@ def check_table(title: str, found: Check) -> str:
     link_low, link_high = found.link_frequencies
     limits = found.limits
     rows: Rows = [
+        *(
+            (f"{quantity.symbol}, {quantity.long_name}", _unit(found.coefficients[name], quantity.units))
+            for name, quantity in COEFFICIENTS.items()
+        ),
         ("surface speed U", _unit(found.belt_speed, "m/s")),
         ("contact stiffness 2ak", _unit(found.contact_stiffness, "N/m")),
         ("natural frequencies", f"{low:.5g} and {high:.5g} Hz in full contact"),
