@@ -58,7 +58,10 @@ def check_table(title: str, found: Check) -> str:
     limits = found.limits
     rows: Rows = [
         *(
-            (f"{quantity.symbol}, {quantity.long_name}", _unit(found.coefficients[name], quantity.units))
+            (
+                f"{quantity.symbol}, {quantity.long_name}",
+                _unit(found.coefficients[name], quantity.units.removeprefix("1")),
+            )
             for name, quantity in COEFFICIENTS.items()
         ),
         ("surface speed U", _unit(found.belt_speed, "m/s")),
