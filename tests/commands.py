@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from tempfile import TemporaryFile
+from tempfile import TemporaryDirectory, TemporaryFile
 from typing import Any
 
 import h5py
@@ -54,8 +54,12 @@ class Done:
 
     @property
     def json(self) -> dict[str, Any]:
-        """The JSON object on standard output; nothing else may be there."""
-        value: dict[str, Any] = json.loads(self.out)
+        """The JSON object on standard output; nothing else may be there, and no NaN or infinity in it."""
+
+        def refuse(constant: str) -> None:
+            raise AssertionError(f"{constant} is no JSON")
+
+        value: dict[str, Any] = json.loads(self.out, parse_constant=refuse)
         return value
 
     def told(self, code: int, *words: str) -> str:
@@ -86,6 +90,12 @@ def brakecli(*arguments: str | Path, cwd: Path, stdin: str | None = None, **chan
         env=environment(**changes),
     )
     return Done(done.returncode, done.stdout.decode(), done.stderr.decode())
+
+
+def warm_up() -> None:
+    """See to it that kernels are compiled, so that no command has to do so, or to say that it does."""
+    with TemporaryDirectory() as folder:
+        variants(Path(folder), [])
 
 
 def each(cwd: Path, commands: Sequence[Sequence[str | Path]]) -> list[Done]:
@@ -153,7 +163,7 @@ def variants(cwd: Path, *overrides: Sequence[str]) -> list[Done]:
 def attributes(path: Path, group: str = "/") -> dict[str, Any]:
     """The attributes of a group of a result file, as any HDF5 program sees them."""
     with h5py.File(path) as file:
-        return dict(file[group].attrs)
+        return {name: getattr(value, "tolist", lambda v=value: v)() for name, value in file[group].attrs.items()}
 
 
 def left_in(directory: Path) -> set[str]:
