@@ -67,7 +67,8 @@ def read_text(source: str, label: str) -> str:
                 data = file.read(LARGEST_TEXT + 1)
     except (OSError, ValueError, AttributeError) as error:
         # ValueError: a NUL in the path, or standard input is closed; AttributeError: there is no standard input.
-        reason = getattr(error, "strerror", None) or str(error)
+        closed = isinstance(error, AttributeError)
+        reason = "it is closed" if closed else getattr(error, "strerror", None) or str(error)
         what = f"cannot be read: {reason[0].lower()}{reason[1:]}"
         raise CaseError([Problem(label, "", what, 'name a TOML file, or "-" for standard input')]) from error
     if len(data) > LARGEST_TEXT:

@@ -81,7 +81,7 @@ class Motion:
         `progress` is told the steps done after each block.
         """
         lag, last = self.setup.scheme.LAG, self.setup.timing.steps
-        size = 1000
+        size = 1  # what a step costs is known after the first
         while self.work.failure is Failure.NONE and self.counts[integrate.LEVEL] < last + lag:
             start = time.perf_counter()
             rows = self._block(min(last + lag, int(self.counts[integrate.LEVEL]) + size))
@@ -94,7 +94,7 @@ class Motion:
             sink(self._sample()[None, :])
         self._count()
         energy = account(self._start_energy, self._energy(), self.works)
-        if self.work.failure is Failure.NONE and abs(energy.relative_closing_error) > OPEN_ACCOUNT:
+        if self.work.failure is Failure.NONE and not abs(energy.relative_closing_error) <= OPEN_ACCOUNT:
             self.work.failure = Failure.UNBALANCED
         return self.work, energy
 
