@@ -3,6 +3,7 @@
 import os
 import random
 import re
+import shlex
 import signal
 import socket
 import subprocess
@@ -63,8 +64,8 @@ def here(tmp_path: Path) -> Path:
 
 def shell(line: str, cwd: Path, **changes: str | None) -> Done:
     """Run a line of the shell in which $B stands for the command."""
-    settings = environment(B=" ".join(COMMAND), **changes)
-    done = subprocess.run(["bash", "-c", line], cwd=cwd, capture_output=True, timeout=LIMIT, env=settings)
+    command, settings = line.replace("$B", shlex.join(COMMAND)), environment(**changes)
+    done = subprocess.run(["bash", "-c", command], cwd=cwd, capture_output=True, timeout=LIMIT, env=settings)
     return Done(done.returncode, done.stdout.decode(), done.stderr.decode())
 
 
