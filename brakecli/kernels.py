@@ -78,8 +78,11 @@ def kernel(signature: Any, *, fastmath: frozenset[str] = frozenset()) -> Callabl
     def compile_(function: F) -> F:
         before, config.CACHE_DIR = config.CACHE_DIR, str(CACHE or config.CACHE_DIR)
         try:
-            compiled: Any = njit(signature, cache=CACHE is not None, fastmath=set(fastmath), forceinline=True)
-            return compiled(function)  # type: ignore[no-any-return]
+            options: dict[str, Any] = {"fastmath": set(fastmath), "forceinline": True}
+            try:
+                return njit(signature, cache=CACHE is not None, **options)(function)  # type: ignore[no-any-return]
+            except OSError:  # a cache that cannot be written or read, on a full disk: do without
+                return njit(signature, **options)(function)  # type: ignore[no-any-return]
         finally:
             config.CACHE_DIR = before
 
