@@ -15,11 +15,12 @@ from hypothesis import strategies as st
 from matplotlib.image import imread
 from numpy.typing import NDArray
 
-from brakecli import cli, plots
+from brakecli import cli, picture
 from brakecli.case_reading import parse_case
 from brakecli.errors import BrakecliError, UnreadableResultError, UsageError
 from brakecli.model import HISTORY, ContactState
-from brakecli.plots import Picture, draw, envelope, episodes, gather, plot_run
+from brakecli.picture import Picture, envelope, episodes, gather
+from brakecli.plots import draw, plot_run
 from brakecli.store import new_result, open_result
 
 CASE = """
@@ -127,7 +128,7 @@ def test_stick_is_shaded_half_an_interval_around_each_of_its_samples(tmp_path: P
 def test_envelope_is_the_least_and_greatest_value_of_each_column(
     samples: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(plots, "BLOCK", 333)
+    monkeypatch.setattr(picture, "BLOCK", 333)
     values = np.random.default_rng(1).normal(size=samples)
     asked: list[int] = []
 
