@@ -79,6 +79,11 @@ def failed(verdict: Verdict, failure: str) -> Verdict:
     return Verdict(**{**verdict.__dict__, **changes})
 
 
+def braking_torque(verdict: Verdict, setup: Setup) -> float:
+    """Mean torque of the friction force on the wheel's axis, R F_x, N m."""
+    return setup.case.wheel.radius * verdict.mean_friction_force
+
+
 def verdict_numbers(verdict: Verdict, setup: Setup) -> dict[str, Any]:
     """Names and values of a verdict as `--json` gives them and result files hold them."""
     return {
@@ -89,7 +94,7 @@ def verdict_numbers(verdict: Verdict, setup: Setup) -> dict[str, Any]:
         "settled": int(verdict.settled),
         "settled_from": verdict.settled_from * setup.timing.interval,
         "mean_friction_force": verdict.mean_friction_force,
-        "braking_torque": setup.case.wheel.radius * verdict.mean_friction_force,
+        "braking_torque": braking_torque(verdict, setup),
         "stick_fraction": verdict.stick_fraction,
         "contact_loss_fraction": verdict.contact_loss_fraction,
         "reasons": list(verdict.reasons),

@@ -12,6 +12,7 @@ from rich.table import Table
 
 from brakecli.analysis.stability import Crossing, Mode
 from brakecli.check import Check
+from brakecli.classify import braking_torque
 from brakecli.model import COEFFICIENTS
 from brakecli.run import RunReport
 from brakecli.stability import Discrete, StabilityReport
@@ -36,7 +37,7 @@ def run_table(report: RunReport) -> str:
         ("amplitude of x", _unit(verdict.amplitude, "m")),
         ("peak of the spectrum of vx", _unit(report.spectrum_peak, "Hz")),
         ("mean friction force", _unit(verdict.mean_friction_force, "N")),
-        ("braking torque", _unit(report.braking_torque, "N m")),
+        ("braking torque", _unit(braking_torque(verdict, report.setup), "N m")),
         ("stick, lost contact", f"{verdict.stick_fraction:.2%}, {verdict.contact_loss_fraction:.2%} of the time"),
         ("settled part", f"from {verdict.settled_from * times.interval:.4g} s on"),
         ("scheme", f"{report.setup.case.solver.scheme} {_weights(report)}, {report.setup.case.solver.iteration}"),

@@ -43,11 +43,6 @@ class RunReport:
         """Whether the run ended before its time."""
         return self.work.failure is not Failure.NONE
 
-    @property
-    def braking_torque(self) -> float:
-        """Mean torque of the friction force on the wheel's axis, R F_x, N m."""
-        return self.setup.case.wheel.radius * self.verdict.mean_friction_force
-
     def numbers(self) -> dict[str, Any]:
         """Names and values as `--json` gives them and the file's attributes hold them."""
         work, verdict, solver = self.work, self.verdict, self.setup.case.solver

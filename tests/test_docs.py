@@ -1,0 +1,35 @@
+"""The documentation names what files and commands give."""
+
+from pathlib import Path
+
+from brakecli.analysis import regime
+from brakecli.case_reading import parse_case, starter_text
+from brakecli.run import run
+from brakecli.setup import set_up
+from brakecli.stability import stability
+from brakecli.stored import open_result
+from tests.commands import ROOT
+
+
+def test_every_name_in_a_result_is_documented(tmp_path: Path) -> None:
+    pages = "".join((ROOT / "docs" / page).read_text() for page in ("result-format.md", "regimes.md"))
+    run(parse_case(starter_text(), "starter"), tmp_path / "run.h5", force=False)
+    with open_result(tmp_path / "run.h5") as stored:
+        names = [*stored.attributes, *stored.variables("history"), *stored.variables("spectrum")]
+        for group in ("regime/evidence", "regime/thresholds", "energy", "evaluators", "spectrum"):
+            names += stored.group_attributes(group)
+    assert len(names) > 70
+    assert [name for name in names if f"`{name}`" not in pages] == []
+
+
+def test_every_threshold_stands_in_the_documentation_with_its_default() -> None:
+    page = (ROOT / "docs" / "regimes.md").read_text()
+    for name, value in vars(regime.Thresholds()).items():
+        assert f"| `{name}` | {value:g} |" in page
+
+
+def test_every_name_of_stability_is_documented() -> None:
+    page = (ROOT / "docs" / "stability.md").read_text()
+    numbers = stability(set_up(parse_case(starter_text(), "starter").case)).numbers()
+    names = [*numbers, *numbers["discrete"]]
+    assert [name for name in names if f"`{name}`" not in page] == []
