@@ -3,7 +3,7 @@
 The tables and keys are those of the case file, version 1. `brakecli.case_reading` makes a case of a TOML file.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from enum import StrEnum
 from itertools import pairwise
 from typing import Annotated, Any
@@ -307,6 +307,14 @@ def json_schema(table: type[Table] = Case) -> dict[str, Any]:
     It accepts everything that is valid; most rules between keys are beyond it.
     """
     return {"$schema": _TomlSchema.schema_dialect, **table.model_json_schema(schema_generator=_TomlSchema)}
+
+
+def changed(case: Case, **tables: Mapping[str, object]) -> Case:
+    """The case with some keys of some tables changed, valid again; raises pydantic's ValidationError."""
+    parts = {name: getattr(case, name) for name in Case.model_fields}
+    for name, keys in tables.items():
+        parts[name] = {**{key: getattr(parts[name], key) for key in type(parts[name]).model_fields}, **keys}
+    return Case.model_validate(parts)
 
 
 def resolved_toml(case: Case) -> str:

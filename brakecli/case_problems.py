@@ -135,6 +135,8 @@ def _expected(path: KeyPath, schema: dict[str, Any]) -> str:
 
 
 def _kind(node: dict[str, Any]) -> str:
+    if "type" not in node:
+        return "a value"
     kind = {
         "number": "a number",
         "integer": "a whole number",

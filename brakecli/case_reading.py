@@ -4,8 +4,9 @@ import json
 import re
 import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass
+from functools import cache
 from importlib import resources
 from operator import itemgetter
 from pathlib import Path
@@ -154,40 +155,60 @@ def _override(
     data: dict[str, Any], overrides: Sequence[str], kind: type[Table]
 ) -> tuple[dict[KeyPath, int], list[tuple[int, Problem]]]:
     """Apply overrides to the data; tell which key was set by which of them, and what is wrong with the rest."""
-    alternatives = {path: table.alternatives for path, table in tables(kind)}
     set_by: dict[KeyPath, int] = {}
     problems = []
     for index, override in enumerate(overrides):
-        parsed = _parse_override(override)
+        parsed = parse_override(override)
         if isinstance(parsed, Finding):
             problem = Problem(_option(override), "", parsed.what, parsed.remedy)
             problems.append((_order(index), problem))
             continue
         path, value = parsed
-        *parents, key = path
-        table: Any = data
-        for end, parent in enumerate(parents, start=1):
-            if isinstance(table, dict):
-                if parent not in table:
-                    table[parent] = {}
-                    set_by[tuple(parents[:end])] = index
-                table = table[parent]
-        if not isinstance(table, dict):
-            what = f"{key_text(tuple(parents))} is not a table"
+        try:
+            created = put(data, path, value, kind, kept=set_by)
+        except TypeError:
+            what = f"{key_text(path[:-1])} is not a table"
             problem = Problem(_option(override), key_text(path), what, "set a key of a table")
             problems.append((_order(index), problem))
             continue
-        table[key] = value
-        set_by[path] = index
-        groups = alternatives.get(tuple(parents), ())
-        if any(key in group for group in groups):
-            for other in (other for group in groups if key not in group for other in group):
-                if (*parents, other) not in set_by:
-                    table.pop(other, None)
+        set_by |= dict.fromkeys((*created, path), index)
     return set_by, problems
 
 
-def _parse_override(override: str) -> tuple[tuple[str, ...], object] | Finding:
+def put(
+    data: dict[str, Any], path: tuple[str, ...], value: object, kind: type[Table], kept: Container[KeyPath] = ()
+) -> list[tuple[str, ...]]:
+    """Set a key in the data of a table of some kind; the paths of the tables that it took to create.
+
+    Of keys that exclude each other the ones given before are removed, unless they are to be kept. Raises TypeError
+    where something on the path is no table.
+    """
+    *parents, key = path
+    table: Any = data
+    created = []
+    for end, parent in enumerate(parents, start=1):
+        if isinstance(table, dict):
+            if parent not in table:
+                table[parent] = {}
+                created.append(path[:end])
+            table = table[parent]
+    if not isinstance(table, dict):
+        raise TypeError(path)
+    table[key] = value
+    groups = _alternatives(kind).get(tuple(parents), ())
+    if any(key in group for group in groups):
+        for other in (other for group in groups if key not in group for other in group):
+            if (*parents, other) not in kept:
+                table.pop(other, None)
+    return created
+
+
+@cache
+def _alternatives(kind: type[Table]) -> dict[KeyPath, tuple[tuple[str, ...], ...]]:
+    return {path: table.alternatives for path, table in tables(kind)}
+
+
+def parse_override(override: str) -> tuple[tuple[str, ...], object] | Finding:
     """The key path and the value of an override, or what is wrong with it."""
     try:
         override.encode()
@@ -197,12 +218,8 @@ def _parse_override(override: str) -> tuple[tuple[str, ...], object] | Finding:
     except UnfitTextError as error:
         return error.finding
     key, _, value = override.partition("=")
-    rest: Any = parse(f"{key}=0")
-    path: tuple[str, ...] = ()
-    while isinstance(rest, dict) and len(rest) == 1:
-        ((part, rest),) = rest.items()
-        path = (*path, part)
-    if "=" not in override or "\n" in key or rest != 0:
+    path = key_path(key)
+    if "=" not in override or not path:
         return Finding(0, (), f"does not begin with a key (found {printable(key)})", "write --set key.path=VALUE")
     parsed = parse(f"value={value}")
     if isinstance(parsed, dict) and parsed.keys() == {"value"}:
@@ -211,3 +228,13 @@ def _parse_override(override: str) -> tuple[tuple[str, ...], object] | Finding:
     if re.fullmatch(r"[^\W\d][\w .-]*", value):
         remedy = f"texts need quotes: --set {key}={shlex.quote(json.dumps(value, ensure_ascii=False))}"
     return Finding(0, (), f"the value is not valid TOML (found {printable(value)})", remedy)
+
+
+def key_path(text: str) -> tuple[str, ...]:
+    """The parts of a key path as TOML writes it; none if it is not one."""
+    rest: Any = parse(f"{text}=0") if "\n" not in text else None
+    path: tuple[str, ...] = ()
+    while isinstance(rest, dict) and len(rest) == 1:
+        ((part, rest),) = rest.items()
+        path = (*path, part)
+    return path if rest == 0 else ()

@@ -184,7 +184,7 @@ def _longest_stable_step(setup: Setup) -> float | None:
 def refuse(setup: Setup, found: Check, free_bytes: float) -> None:
     """Raise RefusedError where a run would be too large, or unstable by its scheme."""
     size = (
-        f"about {found.steps:.3g} steps, {_duration(found.seconds)}, {found.memory / 1e6:.0f} MB of memory, "
+        f"about {found.steps:.3g} steps, {duration_text(found.seconds)}, {found.memory / 1e6:.0f} MB of memory, "
         f"a file of {found.file_size / 1e6:.3g} MB"
     )
     remedy = "reduce solver.duration, or increase solver.step or output.sample_interval"
@@ -225,7 +225,8 @@ def within_range() -> Iterator[None]:
         ) from error
 
 
-def _duration(seconds: float) -> str:
+def duration_text(seconds: float) -> str:
+    """A time in the unit that people would say it in."""
     for unit, size in (("years", 3.156e7), ("days", 86400.0), ("hours", 3600.0), ("minutes", 60.0)):
         if seconds >= 2.0 * size:
             return f"{seconds / size:.3g} {unit}"

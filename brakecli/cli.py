@@ -128,7 +128,10 @@ def run_command(
             recall()
             bar.advance(steps)
 
-        report = run(loaded, target, force=force, begin=bar.begin, progress=progress)
+        def begin(setup: "Setup", found: "Check") -> None:
+            bar.begin("steps", found.steps)
+
+        report = run(loaded, target, force=force, begin=begin, progress=progress)
     for line in (*report.check.adjustments, *(f"warning: {warning}" for warning in report.warnings)):
         if not quiet or line.startswith("warning"):
             _tell(f"brakecli: {line}")
@@ -142,11 +145,120 @@ def run_command(
         raise BrakecliError(str(report.failure_sentence))
 
 
+@app.command("sweep")
+def sweep_command(
+    file: Annotated[
+        str,
+        typer.Argument(metavar="SWEEP.toml", help='Sweep file, or "-" for standard input.', show_default=False),
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output", "-o", metavar="PATH", help="Result file  [default: the sweep's name with .h5, here]"
+        ),
+    ] = None,
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set", metavar="KEY.PATH=VALUE", help="Set a key of the base case or of [critical]; repeatable."
+        ),
+    ] = None,
+    jobs: Annotated[
+        int | None,
+        typer.Option("--jobs", "-j", min=1, max=4096, help="Worker processes  [default: one for each core]"),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            "--scheduler",
+            metavar="ADDRESS",
+            envvar="DASK_SCHEDULER_ADDRESS",
+            help="Compute on a dask cluster: the scheduler's address, as tcp://host:8786.",
+        ),
+    ] = None,
+    scheduler_file: Annotated[
+        str | None,
+        typer.Option("--scheduler-file", metavar="FILE", help="The same, by the scheduler's file."),
+    ] = None,
+    task_size: Annotated[
+        int | None,
+        typer.Option("--task-size", min=1, help="Points of a task  [default: as many as take 0.2 s]"),
+    ] = None,
+    force: Annotated[
+        bool,
+        typer.Option("--force", help="Replace an existing output, and drop finished points of another sweep."),
+    ] = False,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+) -> None:
+    """Simulate a grid of cases, or search for a critical parameter at each.
+
+    The same command goes on where an interrupted one has ended.
+    """
+    from brakecli.sweep.reading import read_sweep
+
+    loaded = read_sweep(file, overrides or ())
+    target = output or Path("sweep.h5" if file == "-" else Path(file).with_suffix(".h5").name)
+    if file != "-" and _is_same_file(target, file):
+        raise UsageError(f"{target}: this is the sweep itself; choose another output with -o")
+    _announce_compilation(quiet)
+    from brakecli.report import sweep_table
+    from brakecli.run import load_kernels
+    from brakecli.sweep.driver import Progress as Points
+    from brakecli.sweep.driver import choose_engine, sweep
+    from brakecli.sweep.estimate import Estimate
+
+    load_kernels(loaded.base)
+    with unwinding() as recall, _progress(quiet) as bar:
+
+        def begin(found: Estimate, resumed: int) -> None:
+            if not quiet:
+                before = f"; {resumed} of them are there already" if resumed else ""
+                _tell(f"brakecli: {found.sentence()}{before}")
+            bar.begin("points", found.points)
+
+        def progress(points: Points) -> None:
+            recall()
+            bar.advance(points.done, f"points, {points.failed} failed" if points.failed else None)
+
+        with choose_engine(loaded.plan, jobs, scheduler, scheduler_file) as engine:
+            report = sweep(
+                loaded, target, engine, force=force, task_size=task_size, begin=begin, progress=progress
+            )
+    found = report.findings
+    for note in report.notes:
+        _tell(f"brakecli: warning: {note}")
+    if found.warned:
+        _tell(f"brakecli: warning: {found.warned} points ran with warnings, the first: {found.first_warning}")
+    if as_json:
+        _print_json({"command": "sweep", "output": str(report.output), **report.numbers()})
+    elif not quiet:
+        _print(sweep_table(report))
+    if found.failed:
+        for failure in found.failures:
+            where = ", ".join(f"{key} = {value}" for key, value in failure["parameters"].items())
+            _tell(f"brakecli: point {failure['point']}{f' ({where})' if where else ''}: {failure['reason']}")
+        raise BrakecliError(
+            f"{report.output}: {found.failed} of {found.points} points failed; all others were written"
+        )
+
+
 @app.command("check")
 def check_command(
-    case: CaseArgument, overrides: Override = None, as_json: AsJson = False, quiet: Quiet = False
+    case: Annotated[
+        str,
+        typer.Argument(
+            metavar="FILE.toml", help='Case or sweep file, or "-" for standard input.', show_default=False
+        ),
+    ],
+    overrides: Override = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
 ) -> None:
-    """Validate a case and tell what a run would cost and which limits it meets, without stepping it."""
+    """Validate a case or a sweep and tell what it would cost and which limits it meets, without stepping it."""
+    if _is_sweep(case):
+        _check_sweep(case, overrides, as_json, quiet)
+        return
     loaded = _load(case, overrides)
     _announce_compilation(quiet)
     from brakecli.check import check, free_bytes, refuse, within_range
@@ -314,6 +426,34 @@ def _is_result(source: str) -> bool:
     return is_hdf5(Path(source))
 
 
+def _is_sweep(source: str) -> bool:
+    """Whether a file is meant to be a sweep; standard input can be read only once, and holds a case."""
+    from brakecli.case_reading import read_text
+    from brakecli.sweep.reading import is_sweep
+
+    return source != "-" and not _is_result(source) and is_sweep(read_text(source, source))
+
+
+def _check_sweep(source: str, overrides: list[str] | None, as_json: bool, quiet: bool) -> None:
+    from brakecli.sweep.reading import read_sweep
+
+    loaded = read_sweep(source, overrides or ())
+    _announce_compilation(quiet)
+    from dataclasses import asdict
+
+    from brakecli.check import free_bytes
+    from brakecli.report import estimate_table
+    from brakecli.sweep.driver import cores
+    from brakecli.sweep.estimate import estimate, refuse_sweep
+
+    found = estimate(loaded.plan, cores())
+    if as_json:
+        _print_json({"command": "check", "valid": True, **asdict(found)})
+    elif not quiet:
+        _print(estimate_table(loaded.title, found))
+    refuse_sweep(found, free_bytes(Path()))
+
+
 def _is_same_file(one: Path, other: str) -> bool:
     try:
         return one.samefile(other)
@@ -344,18 +484,18 @@ def _announce_compilation(quiet: bool) -> None:
 
 
 class _Bar:
-    """Progress on a terminal: steps, rate and time left. Elsewhere nothing."""
+    """Progress on a terminal: steps or points, rate and time left. Elsewhere nothing."""
 
     def __init__(self, bar: Any = None) -> None:
         self._bar, self._task = bar, None
 
-    def begin(self, setup: "Setup", found: "Check") -> None:
+    def begin(self, what: str, total: int) -> None:
         if self._bar is not None:
-            self._task = self._bar.add_task("steps", total=found.steps)
+            self._task = self._bar.add_task(what, total=total)
 
-    def advance(self, steps: int) -> None:
+    def advance(self, done: int, what: str | None = None) -> None:
         if self._bar is not None:
-            self._bar.update(self._task, completed=steps)
+            self._bar.update(self._task, completed=done, **({"description": what} if what else {}))
 
 
 @contextmanager

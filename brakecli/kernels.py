@@ -45,7 +45,7 @@ class Weights(NamedTuple):
     theta_3: float
 
 
-def _source_hash() -> str:
+def source_hash() -> str:
     """Hash of the package's sources: a cached caller would keep the old code of an edited helper otherwise."""
     digest = hashlib.sha256()
     for path in sorted(Path(__file__).parent.rglob("*.py")):
@@ -57,7 +57,7 @@ def _cache_directory() -> Path | None:
     """Where machine code is kept, or None where nothing can be written (then nothing is cached)."""
     base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
     try:
-        directory = (Path(base) if base else Path.home() / ".cache") / "brakecli" / _source_hash()
+        directory = (Path(base) if base else Path.home() / ".cache") / "brakecli" / source_hash()
         directory.mkdir(parents=True, exist_ok=True)
     except (OSError, RuntimeError):
         return None

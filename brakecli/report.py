@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
+import numpy as np
 from rich.console import Console
 from rich.table import Table
 
@@ -16,9 +17,13 @@ from brakecli.classify import braking_torque
 from brakecli.model import COEFFICIENTS
 from brakecli.run import RunReport
 from brakecli.stability import Discrete, StabilityReport
+from brakecli.sweep.estimate import Estimate
+from brakecli.sweep.plan import label
+from brakecli.sweep.result import SweepReport
 
 Rows = list[tuple[str, str]]
 
+MOST_LISTED_POINTS = 30
 NARROWEST = 40
 """Columns of a table, whatever the terminal says: in fewer nothing can be read."""
 
@@ -142,6 +147,68 @@ def vary_table(key: str, entries: list[dict[str, Any]]) -> str:
         for entry in entries
     ]
     return _grid((key, "critical friction", "instability", "as the scheme has it"), rows)
+
+
+def sweep_table(report: SweepReport) -> str:
+    """Summary of a sweep; of a small one every point."""
+    found = report.findings
+    rows: Rows = [
+        ("points", f"{found.points}" + (f", {report.resumed} of them computed before" if report.resumed else "")),
+        ("regimes", ", ".join(f"{name} {count}" for name, count in found.regimes.items())),
+    ]
+    if found.critical is not None and report.loaded.sweep.critical is not None:
+        count, least, largest = found.critical
+        span = f"{least:.6g} to {largest:.6g}, " if count else ""
+        parameter = report.loaded.sweep.critical.parameter
+        rows.append((f"critical {parameter}", f"{span}found at {count} of {found.points} points"))
+    rows += [("note", sentence) for sentence in found.sentences]
+    if found.failed:
+        rows.append(("failed", f"{found.failed} points"))
+    rows += [("time", f"{report.seconds:.3g} s"), ("file", str(report.output))]
+    listed = _points_table(report) + "\n\n" if found.points <= MOST_LISTED_POINTS else ""
+    return listed + _table(report.loaded.title, rows)
+
+
+def _points_table(report: SweepReport) -> str:
+    """A row for each point: its place on the axes, and what was found there."""
+    found, plan = report.findings, report.loaded.plan
+    values = found.variables or {}
+    shown: dict[str, str] = {"regime": "regime", "frequency": "frequency, Hz", "amplitude": "amplitude, m"}
+    if found.critical is not None:
+        shown = {
+            "regime": "regime",
+            "critical": "critical",
+            "critical_error": "±",
+            "critical_eigenvalue": "by eigenvalues",
+            "critical_sustained": "vibrates from",
+            "critical_status": "search",
+        }
+    columns = [np.array(values[name], dtype=object).ravel() for name in shown]
+    rows = []
+    for index in range(found.points):
+        places = plan.places(index % plan.points)
+        place = [label(axis.value(at)) for axis, at in zip(plan.sweep.axis, places, strict=True)]
+        way = [("up", "down")[index // plan.points]] if "direction" in found.dimensions else []
+        cells = [_cell(column[index]) for column in columns]
+        rows.append((*way, *place, *cells))
+    names = ["way"] if "direction" in found.dimensions else []
+    return _grid((*names, *(axis.parameter[0] for axis in plan.sweep.axis), *shown.values()), rows)
+
+
+def _cell(value: object) -> str:
+    return "-" if value is None else f"{value:.5g}" if isinstance(value, float) else str(value)
+
+
+def estimate_table(title: str, found: Estimate) -> str:
+    """What a sweep would cost."""
+    rows: Rows = [
+        ("points", str(found.points)),
+        ("workers", str(found.workers)),
+        ("time", f"about {found.seconds:.2g} s"),
+        ("memory", f"about {found.memory / 1e6:.0f} MB"),
+        ("file", f"about {found.file_size / 1e6:.2g} MB"),
+    ]
+    return _table(title, rows)
 
 
 def _crossing(crossing: Crossing) -> str:

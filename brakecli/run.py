@@ -220,7 +220,7 @@ def _write(result: ResultFile, loaded: LoadedCase, report: RunReport) -> None:
             "case_toml": loaded.text,
             "resolved_toml": loaded.resolved,
             "brakecli_version": __version__,
-            **_versions(),
+            **versions(),
             **_present({name: value for name, value in numbers.items() if name not in groups.values()}),
         }
     )
@@ -235,7 +235,8 @@ def _write(result: ResultFile, loaded: LoadedCase, report: RunReport) -> None:
             result.variable("unconverged", name, ("event",), units, f"{name} of an unconverged step", values)
 
 
-def _versions() -> dict[str, str]:
+def versions() -> dict[str, str]:
+    """The versions of the numerical libraries."""
     return {
         "numpy_version": np.__version__,
         "scipy_version": scipy.__version__,

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from brakecli.analysis.equilibrium import Equilibrium, Mean, equilibrium, mean_contact, tabulated
-from brakecli.analysis.precision import amplification, natural_frequencies
+from brakecli.analysis.precision import natural_frequencies, spectral_radius
 from brakecli.analysis.stability import Crossing, Instability, Mode, crossings, eigensystem, is_undamped, modes
 from brakecli.errors import CaseError
 from brakecli.kernels import Coefficients
@@ -21,7 +21,7 @@ from brakecli.setup import Setup
 LARGEST_FRICTION = 10.0
 """Up to here a critical friction coefficient is looked for on rough surfaces, whose stiffness depends on it."""
 FRICTIONS = 401
-_MARGIN = 1e-9  # growth per step that counts as growth: above the rounding of simple eigenvalues
+MARGIN = 1e-9  # growth per step that counts as growth: above the rounding of simple eigenvalues
 _CLEAR_MARGIN = 1e-6  # above that of double ones, where a direction has no spring
 
 StiffnessAt = Callable[[float], float]
@@ -181,16 +181,9 @@ def _rough_crossings(c: Coefficients, belt: float, stiffness_at: StiffnessAt) ->
     return found
 
 
-def _mirrored(c: Coefficients) -> Coefficients:
-    """The same shoe seen from behind: x and U change sign, and so do the couplings."""
-    return c._replace(b_xy=-c.b_xy, c_xy=-c.c_xy, sin_beta=-c.sin_beta)
-
-
 def _discrete(setup: Setup, stiffness_at: StiffnessAt, exact: Crossing | None) -> Discrete | None:
     """What the scheme makes of steady sliding; nothing where there is none, or no contact."""
     c, belt = setup.coefficients, setup.belt_speed
-    if belt < 0.0:
-        c = _mirrored(c)
     if belt == 0.0 or not stiffness_at(c.phi) > 0.0:
         return None
 
@@ -198,21 +191,20 @@ def _discrete(setup: Setup, stiffness_at: StiffnessAt, exact: Crossing | None) -
         k = stiffness_at(phi)
         if not k > 0.0:
             return 0.0
-        matrix = amplification(c._replace(phi=phi), setup.weights._replace(h=h), setup.scheme, k)
-        return float(np.abs(np.linalg.eigvals(matrix)).max())
+        return spectral_radius(c._replace(phi=phi), setup.weights._replace(h=h), setup.scheme, k, belt)
 
     at_case = radius(c.phi)
     critical = None
     reach = 2.0 * exact.friction if exact else LARGEST_FRICTION
     frictions = np.linspace(0.0, reach, 41)
-    radii = [radius(float(phi)) - 1.0 - _MARGIN for phi in frictions]
+    radii = [radius(float(phi)) - 1.0 - MARGIN for phi in frictions]
     if radii[0] > 0.0:
         critical = 0.0
     else:
         first = next((i for i in range(40) if radii[i + 1] > 0.0), None)
         if first is not None:
             low, high = float(frictions[first]), float(frictions[first + 1])
-            critical = float(brentq(lambda phi: radius(phi) - 1.0 - _MARGIN, low, high, xtol=1e-12))
+            critical = float(brentq(lambda phi: radius(phi) - 1.0 - MARGIN, low, high, xtol=1e-12))
     return Discrete(
         spectral_radius=at_case,
         growth=math.log(at_case) / setup.weights.h if at_case > 0.0 else -math.inf,

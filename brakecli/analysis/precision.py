@@ -99,3 +99,10 @@ def amplification(c: Coefficients, s: Weights, scheme: Any, contact_stiffness: f
         neighbours.append(step(state))
     matrix: NDArray[np.float64] = (np.array(neighbours) - step(base.copy())).T / small
     return matrix
+
+
+def spectral_radius(c: Coefficients, s: Weights, scheme: Any, contact_stiffness: float, belt: float) -> float:
+    """Factor by which the scheme multiplies the fastest disturbance of steady sliding in a step, U (m/s) ≠ 0."""
+    if belt < 0.0:  # the same shoe seen from behind: x and U change sign, and so do the couplings
+        c = c._replace(b_xy=-c.b_xy, c_xy=-c.c_xy, sin_beta=-c.sin_beta)
+    return float(np.abs(np.linalg.eigvals(amplification(c, s, scheme, contact_stiffness))).max())
