@@ -216,11 +216,11 @@ def _hysteresis(columns: Columns) -> NDArray[Any] | None:
     if columns.plan.passes != 2:
         return None
     regime, amplitude = columns["regime"], columns["amplitude"]
-    done = (columns["status"] == _DONE).all(axis=0)
+    decided = ((columns["status"] == _DONE) & (regime != b"undecided")).all(axis=0)
     larger = np.fmax(amplitude[0], amplitude[1])
     apart = np.nan_to_num(np.abs(amplitude[0] - amplitude[1])) > SAME_AMPLITUDE * np.nan_to_num(larger)
     lasting = (regime != b"damped").any(axis=0)
-    return np.asarray(done & ((regime[0] != regime[1]) | (apart & lasting)), dtype=np.int64)
+    return np.asarray(decided & ((regime[0] != regime[1]) | (apart & lasting)), dtype=np.int64)
 
 
 def _sentences(columns: Columns, hysteresis: NDArray[Any] | None) -> list[str]:
@@ -235,6 +235,10 @@ def _sentences(columns: Columns, hysteresis: NDArray[Any] | None) -> list[str]:
             if count
             else "no hysteresis: the motion is the same on the way up and on the way down"
         )
+        if open_ := int(((columns["regime"] == b"undecided").any(axis=0)).sum()):
+            sentences.append(
+                f"hysteresis cannot be told at {open_} points, whose regime is undecided in a direction"
+            )
     critical = plan.sweep.critical
     if critical is not None:
         sustained = columns["critical_sustained"]
