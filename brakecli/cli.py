@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from brakecli import __version__
-from brakecli.errors import BrakecliError, UsageError
+from brakecli.errors import BrakecliError, CaseError, UsageError
 from brakecli.process import Interrupted, unwinding
 
 if TYPE_CHECKING:
@@ -195,9 +195,14 @@ def sweep_command(
 
     The same command goes on where an interrupted one has ended.
     """
-    from brakecli.sweep.reading import read_sweep
+    from brakecli.sweep.reading import is_case, read_sweep
 
-    loaded = read_sweep(file, overrides or ())
+    try:
+        loaded = read_sweep(file, overrides or ())
+    except CaseError as error:
+        if file != "-" and is_case(file):
+            raise UsageError(f"{file}: this is a case; simulate it with: brakecli run {file}") from error
+        raise
     target = output or Path("sweep.h5" if file == "-" else Path(file).with_suffix(".h5").name)
     if file != "-" and _is_same_file(target, file):
         raise UsageError(f"{target}: this is the sweep itself; choose another output with -o")
@@ -312,19 +317,25 @@ def schema_command() -> None:
 
 @app.command("plot")
 def plot_command(
-    result: Annotated[Path, typer.Argument(metavar="FILE.h5", help="Result of a run.", show_default=False)],
+    result: Annotated[
+        Path, typer.Argument(metavar="FILE.h5", help="Result of a run or of a sweep.", show_default=False)
+    ],
     output: Annotated[
         Path | None, typer.Option("--output", "-o", metavar="PATH", help="Picture  [default: FILE.png, here]")
+    ] = None,
+    select: Annotated[
+        list[str] | None,
+        typer.Option("--select", metavar="KEY=VALUE", help="Draw one value of a sweep's axis; repeatable."),
     ] = None,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
-    """Draw the histories, the motion relative to the wheel and the spectrum of a run (needs matplotlib)."""
-    from brakecli.plots import plot_run
+    """Draw the motion of a run, or the critical values or regimes of a sweep over its axes (needs matplotlib)."""
+    from brakecli.plots import plot_result
 
     target = output or Path(result.with_suffix(".png").name)
     with unwinding():
-        plot_run(result, target, force=force)
+        plot_result(result, target, force=force, select=select or ())
     if not quiet:
         _print(f"{target}: written")
 
@@ -428,10 +439,9 @@ def _is_result(source: str) -> bool:
 
 def _is_sweep(source: str) -> bool:
     """Whether a file is meant to be a sweep; standard input can be read only once, and holds a case."""
-    from brakecli.case_reading import read_text
     from brakecli.sweep.reading import is_sweep
 
-    return source != "-" and not _is_result(source) and is_sweep(read_text(source, source))
+    return source != "-" and not _is_result(source) and is_sweep(source)
 
 
 def _check_sweep(source: str, overrides: list[str] | None, as_json: bool, quiet: bool) -> None:
@@ -466,7 +476,12 @@ def _load(source: str, overrides: list[str] | None) -> "LoadedCase":
     from brakecli.case_reading import LoadedCase, parse_case, read_case
 
     if source == "-" or Path(source).suffix == ".toml" or not _is_result(source):
-        return read_case(source, overrides or ())
+        try:
+            return read_case(source, overrides or ())
+        except CaseError as error:
+            if _is_sweep(source):
+                raise UsageError(f"{source}: this is a sweep; compute it with: brakecli sweep {source}") from error
+            raise
     from brakecli.stored import open_result
 
     with open_result(Path(source), kind="run") as stored:

@@ -136,6 +136,7 @@ def test_the_error_bar_holds_the_bias_of_the_scheme() -> None:
     )
     assert answer.value == pytest.approx(0.8115433, abs=1e-3)  # what the amplification matrix gives for this step
     assert answer.bias == pytest.approx(0.8115433 - 0.75, abs=1e-6)
+    assert answer.value is not None
     assert answer.error is not None
     assert abs(answer.value - 0.75) <= answer.error
 

@@ -8,7 +8,7 @@ import pytest
 
 from brakecli.errors import CaseError
 from brakecli.sweep.plan import Plan
-from brakecli.sweep.reading import LoadedSweep, is_sweep, parse_sweep
+from brakecli.sweep.reading import LoadedSweep, is_case, is_sweep, parse_sweep
 from tests.commands import TINY
 
 GRID = """\
@@ -152,7 +152,8 @@ AXIS = '[[axis]]\nparameter = "link2.angle_deg"\n'
         ('[[axis]]\nparameter = []\nvalues = [1.0]', "axis[0].parameter: is too short"),
         ('[[axis]]\nparameter = "a b"\nvalues = [1.0]', "axis[0].parameter: is no key path"),
         (AXIS + "values = [1.0]\n" + AXIS + "values = [2.0]", "axis[1].parameter: is set twice"),
-        (AXIS + "values = [1.0]\n" + CRITICAL.replace("friction.coefficient", "link2.angle_deg"), "is set by an axis"),
+        (AXIS + "values = [1.0]\n" + CRITICAL.replace("friction.coefficient", "link2.angle_deg"),
+         "is set by an axis"),
         (AXIS + "values = [1.0]\ndirection = 'up'\n" + CRITICAL, "is given together with [critical]"),
         (AXIS + "values = ['a']\ndirection = 'up'\n", "axis[0].direction: needs numbers to follow"),
         (CRITICAL + "tolerance = 0.0", "critical.tolerance: is out of range"),
@@ -183,5 +184,8 @@ def test_values_that_fit_only_together_are_no_problem(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "expected"), [(GRID, True), (CRITICAL, True), (TINY, False), ("", False), ("=", False)]
 )
-def test_a_sweep_is_told_from_a_case_by_its_keys(text: str, expected: Any) -> None:
-    assert is_sweep(text) is expected
+def test_a_sweep_is_told_from_a_case_by_its_keys(tmp_path: Path, text: str, expected: Any) -> None:
+    path = tmp_path / "file.toml"
+    path.write_text(text)
+    assert is_sweep(str(path)) is expected
+    assert is_case(str(path)) is (text == TINY)

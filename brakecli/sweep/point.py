@@ -46,7 +46,7 @@ FIELDS = {
     "status": Field("S8", "", "how the computation of the point has ended"),
     "reason": Field(TEXT, "", "why the regime is as it is, or why the point failed"),
     "warning": Field(TEXT, "", "first warning of the run, empty if there is none"),
-    "warnings": Field("i8", "1", "number of warnings"),
+    "warning_count": Field("i8", "1", "number of warnings"),
     "regime": Field("S16", "", "regime of the motion"),
     "excitation": Field("S16", "", "where the energy of a sustained motion comes from"),
     "frequency": Field("f8", "Hz", "fundamental frequency of vx of a sustained motion"),
@@ -213,7 +213,7 @@ def _filled(kind: np.dtype[Any], outcome: Outcome) -> NDArray[Any]:
     record = blank(kind, Status.DONE if done else Status.FAILED, "; ".join(verdict.reasons))
     values: dict[str, Any] = {
         "warning": _clipped(outcome.warnings[0]) if outcome.warnings else b"",
-        "warnings": len(outcome.warnings),
+        "warning_count": len(outcome.warnings),
         "regime": verdict.regime.encode(),
         "excitation": verdict.excitation.encode(),
         "frequency": math.nan if verdict.frequency is None else verdict.frequency,

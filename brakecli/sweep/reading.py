@@ -58,13 +58,24 @@ def parse_sweep(text: str, label: str, folder: Path, overrides: Sequence[str] = 
     return LoadedSweep(sweep, text, resolved, base, plan)
 
 
-def is_sweep(text: str) -> bool:
-    """Whether a text is meant to be a sweep: by the keys that no case has."""
+def is_sweep(path: str) -> bool:
+    """Whether a file is meant to be a sweep: by the keys that no case has."""
+    keys = _keys(path)
+    return bool(keys & {"case", "axis", "critical"}) and "shoe" not in keys
+
+
+def is_case(path: str) -> bool:
+    """Whether a file is meant to be a case: by the keys that no sweep has."""
+    keys = _keys(path)
+    return "shoe" in keys and not keys & {"axis", "critical"}
+
+
+def _keys(path: str) -> set[str]:
+    """The keys at the top of a file, as far as they can be read."""
     try:
-        data = Located(split(text)).data
-    except UnfitTextError:
-        return False
-    return any(key in data for key in ("case", "axis", "critical")) and "shoe" not in data
+        return set(Located(split(read_text(path, path))).data)
+    except (UnfitTextError, CaseError):
+        return set()
 
 
 def _is_own(override: str) -> bool:

@@ -119,7 +119,7 @@ class SweepReport:
 def findings(columns: Columns) -> Findings:
     """Look through the variables of a sweep."""
     plan = columns.plan
-    status, warnings = columns["status"], columns["warnings"]
+    status, warnings = columns["status"], columns["warning_count"]
     failed = np.flatnonzero(status.ravel() != _DONE)
     reasons = columns["reason"].ravel()[failed[:MOST_FAILURES]]
     failures = [
