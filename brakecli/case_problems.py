@@ -128,7 +128,7 @@ def _expected(path: KeyPath, schema: dict[str, Any]) -> str:
         required = node.get("required", []) + node.get("oneOf", [{}])[0].get("required", [])
         return f"the table [{key_text(path)}]" + (f" with {' and '.join(required)}" if required else "")
     measured = f", in {unit}" if unit not in ("", "1") else ""
-    if node["type"] == "array":
+    if "array" in node["type"]:
         at_least = " of at least one entry" if "minItems" in node else ""
         return f"a list{at_least}, each {_kind(node['items'])}{measured}"
     return _kind(node) + measured

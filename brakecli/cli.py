@@ -308,11 +308,17 @@ def new_command(
 
 
 @app.command("schema")
-def schema_command() -> None:
-    """Print the JSON Schema of case files, for editors that know TOML."""
-    from brakecli.case import json_schema
+def schema_command(
+    kind: Annotated[str, typer.Argument(metavar="[case|sweep]", help="Which kind of file.")] = "case",
+) -> None:
+    """Print the JSON Schema of case files, or of sweep files, for editors that know TOML."""
+    from brakecli.case import Case, json_schema
+    from brakecli.sweep.tables import Sweep
 
-    _print_json(json_schema(), indent=2)
+    tables = {"case": Case, "sweep": Sweep}
+    if kind not in tables:
+        raise UsageError(f"schema {kind}: there is none; give {' or '.join(tables)}")
+    _print_json(json_schema(tables[kind]), indent=2)
 
 
 @app.command("plot")

@@ -8,6 +8,8 @@ from brakecli.run import run
 from brakecli.setup import set_up
 from brakecli.stability import stability
 from brakecli.stored import open_result
+from brakecli.sweep.driver import choose_engine, sweep
+from brakecli.sweep.reading import parse_sweep
 from tests.commands import ROOT
 
 
@@ -20,6 +22,22 @@ def test_every_name_in_a_result_is_documented(tmp_path: Path) -> None:
             names += stored.group_attributes(group)
     assert len(names) > 70
     assert [name for name in names if f"`{name}`" not in pages] == []
+
+
+def test_every_name_of_a_sweep_is_documented(tmp_path: Path) -> None:
+    page = (ROOT / "docs" / "sweeps.md").read_text()
+    (tmp_path / "case.toml").write_text(starter_text())
+    axis = '[[axis]]\nparameter = "friction.coefficient"\nvalues = [0.5, 0.7]\n'
+    critical = '[critical]\nparameter = "friction.coefficient"\nlower = 0.0\nupper = 1.0\nmethod = "eigenvalue"\n'
+    for number, text in enumerate((f'{axis}direction = "both"\n', critical)):
+        overrides = ["solver.duration=0.05"]
+        loaded = parse_sweep(f'case = "case.toml"\n{text}', "sweep.toml", tmp_path, overrides)
+        with choose_engine(loaded.plan, 1) as engine:
+            report = sweep(loaded, tmp_path / f"{number}.h5", engine, force=False)
+        with open_result(tmp_path / f"{number}.h5", kind="sweep") as stored:
+            names = [*stored.attributes, *stored.variables("/"), *report.numbers()]
+        shared = (ROOT / "docs" / "result-format.md").read_text()
+        assert [name for name in names if f"`{name}`" not in page + shared and "_coefficient" not in name] == []
 
 
 def test_every_threshold_stands_in_the_documentation_with_its_default() -> None:

@@ -1,14 +1,18 @@
 """Sweep files: what they may say, and how every problem of one is told."""
 
+import tomllib
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from brakecli.case import json_schema
 from brakecli.errors import CaseError
 from brakecli.sweep.plan import Plan
 from brakecli.sweep.reading import LoadedSweep, is_case, is_sweep, parse_sweep
+from brakecli.sweep.tables import Sweep
 from tests.commands import TINY
 
 GRID = """\
@@ -189,3 +193,10 @@ def test_a_sweep_is_told_from_a_case_by_its_keys(tmp_path: Path, text: str, expe
     path.write_text(text)
     assert is_sweep(str(path)) is expected
     assert is_case(str(path)) is (text == TINY)
+
+
+def test_the_schema_of_sweep_files_accepts_what_is_accepted_here() -> None:
+    validator = import_module("jsonschema").Draft202012Validator(json_schema(Sweep))
+    for text in (GRID, CRITICAL):
+        validator.validate(tomllib.loads('case = "tiny.toml"\n' + text.replace('case = "tiny.toml"\n', "")))
+    assert not validator.is_valid(tomllib.loads(GRID.replace("paramter", "parameter").replace("num", "number")))

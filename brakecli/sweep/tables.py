@@ -47,7 +47,11 @@ class Axis(Table):
 
     parameter: Annotated[
         tuple[str, ...],
-        Field(min_length=1, description="key path of the case, or a list of key paths that take the same values"),
+        Field(
+            min_length=1,
+            description="key path of the case, or a list of key paths that take the same values",
+            json_schema_extra={"type": ["string", "array"]},
+        ),
         *from_list,
         BeforeValidator(_one_is_a_list),
     ]
