@@ -231,7 +231,8 @@ class Solver(Table):
     )
     step: Annotated[Positive | None, quantity("s", "time step h")] = None
     tolerance: Annotated[
-        Tolerance | None, quantity("1", "relative error that event-driven, which has no step, keeps each component to")
+        Tolerance | None,
+        quantity("1", "relative error to which event-driven keeps x, y and velocities"),
     ] = None
     duration: Annotated[Positive, quantity("s", "time to simulate")]
     allow_unconverged: Annotated[

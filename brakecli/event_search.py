@@ -5,8 +5,7 @@ import math
 from numba import float64, int64, types
 
 from brakecli.kernels import VX, Y, kernel
-from brakecli.phases import EPSILON, PLANT, SIDE, TAU, TIME, Plant, clear_height, margins, rounding
-from brakecli.schedules import value_at
+from brakecli.phases import BELT, EPSILON, PLANT, SIDE, Plant, clear_height, margins, rounding
 
 NONE = -1
 LOOKS = 8
@@ -22,7 +21,7 @@ def _allowances(p: Plant) -> tuple[float, float, float]:
     m = p.memory
     height = 4.0 * EPSILON * (abs(m[Y]) + clear_height(p.pad))
     if m[SIDE] != 0.0:
-        return 4.0 * EPSILON * (abs(m[VX]) + abs(value_at(p.drive.belt, m[TIME] + m[TAU]))), 0.0, height
+        return 4.0 * EPSILON * (abs(m[VX]) + abs(m[BELT])), 0.0, height
     along, _ = rounding(p)
     return 2.0 * along, 2.0 * along, height
 
@@ -107,7 +106,11 @@ def first_event(p: Plant, h: float) -> tuple[int, float]:
                     left = _first_positive(p, which, h, theta, allowed[which])
                     if left == 0.0:
                         return which, 0.0
-            elif look > 1 and before_last[which] > last[which] <= now[which] and rise * rise > 7.0 * bend * last[which]:
+            elif (
+                look > 1
+                and before_last[which] > last[which] <= now[which]
+                and rise * rise > 7.0 * bend * last[which]
+            ):
                 # The parabola falls to an eighth of the place in the middle.
                 place, value = _lowest(p, which, h, (look - 2) / LOOKS, theta)
                 if value < -allowed[which]:

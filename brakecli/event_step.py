@@ -2,19 +2,18 @@
 
 import math
 
-from numba import float64, int64, void
 import numpy as np
+from numba import float64, int64, void
 from numpy.typing import NDArray
 
 from brakecli.contact.pad import CELL, WHEEL_TERMS
 from brakecli.event_search import NONE, first_event
-from brakecli.integrate import BOUND, KIND_0, MOST, EVALUATIONS
+from brakecli.integrate import BOUND, DRIVE, EVALUATIONS, GRID, KIND_0, MOST, Drive, Grid
 from brakecli.kernels import KIND, VALID, VX, VY, W_BELT, X, Y, kernel, vector
 from brakecli.model import Failure
 from brakecli.phases import (
-    ANCHOR,
-    ANCHOR_LOW,
     BEGIN,
+    BELT,
     BELT_SLOPE,
     END,
     EPSILON,
@@ -22,7 +21,6 @@ from brakecli.phases import (
     EVENTS_TIME,
     LARGEST,
     LEVEL_AT,
-    LOAD_SLOPE,
     PLANT,
     POWER,
     SIDE,
@@ -35,11 +33,13 @@ from brakecli.phases import (
     TAU_DONE,
     TIME,
     TIME_DONE,
+    TOLERANCE,
     TOUCHING,
     TOUCHING_DONE,
     WORK_RATES,
     WORKS,
     Plant,
+    arrive,
     clear_height,
     full_stiffness,
     margin_slope,
@@ -49,8 +49,8 @@ from brakecli.phases import (
     switch,
     take_hold,
 )
-from brakecli.runge_kutta import A, END_STAGE, NODES, SIZE, STAGES, combined, local_error, make_continuous
-from brakecli.schedules import SCHEDULE, Schedule, integral_at, segment, slope_at, value_at
+from brakecli.runge_kutta import END_STAGE, NODES, SIZE, STAGES, A, combined, local_error, make_continuous
+from brakecli.schedules import SCHEDULE, Schedule, segment
 
 _LOCAL = 0.1
 """Error of a step over the tolerance of the histories, to which the errors of all steps add up."""
@@ -72,39 +72,39 @@ def _to_knot(s: Schedule, t: float) -> float:
     return s.times[k] - t if k < s.times.size else math.inf  # type: ignore[no-any-return]
 
 
-@kernel(float64(PLANT), inlined=False)
-def _longest(p: Plant) -> float:
-    """The longest step (s): bounded by the fastest motion, the passing waves and the knots of the schedules."""
-    c, m, t = p.c, p.memory, p.memory[TIME] + p.memory[TAU]
+@kernel(float64(PLANT, float64), inlined=False)
+def _longest(p: Plant, duration: float) -> float:
+    """The longest step (s), by the fastest motion and the passing waves; `duration` where nothing limits it."""
+    c, m = p.c, p.memory
     stiffness = (1.0 + c.phi) * full_stiffness(p.pad) if m[TOUCHING] != 0.0 else 0.0
     bound = c.c_xx + c.c_yy + 2.0 * abs(c.c_xy) + stiffness  # of the largest eigenvalue of the stiffness
-    longest = p.grid.samples * p.grid.interval
+    longest = duration
     if bound * longest * longest > _RADIANS * _RADIANS * c.m:
         longest = _RADIANS / math.sqrt(bound / c.m)
     if p.pad[WHEEL_TERMS] > 0.0 and m[TOUCHING] != 0.0 and m[SIDE] != 0.0:
         # A fourth of the shortest wave, so that no patch comes and goes unseen.
-        slide = abs(m[VX] - value_at(p.drive.belt, t)) + abs(m[SLOPES + 2] - m[BELT_SLOPE]) * m[STEP]
+        slide = abs(m[VX] - m[BELT]) + abs(m[SLOPES + 2] - m[BELT_SLOPE]) * m[STEP]
         if slide * longest > p.pad[CELL]:
             longest = p.pad[CELL] / slide
     return longest
 
 
-@kernel(void(PLANT), inlined=False)
-def first_step(p: Plant) -> None:
+@kernel(void(PLANT, DRIVE, GRID), inlined=False)
+def first_step(p: Plant, drive: Drive, grid: Grid) -> None:
     """Find the phase of the initial state, and a step to begin with."""
     m = p.memory
+    m[TOLERANCE] = _LOCAL * grid.tolerance
+    arrive(p, drive)
     for i in range(SIZE):
         m[LARGEST + i] = abs(m[i])
     height = m[Y] - clear_height(p.pad)
     m[TOUCHING] = 0.0 if height > 0.0 or (height == 0.0 and m[VY] > 0.0) else 1.0
-    m[BELT_SLOPE] = slope_at(p.drive.belt, 0.0)
-    sliding = m[VX] - value_at(p.drive.belt, 0.0)
-    if sliding == 0.0:
+    if m[VX] == m[BELT]:
         take_hold(p)
     else:
-        m[SIDE] = math.copysign(1.0, sliding)
+        m[SIDE] = 1.0 if m[VX] > m[BELT] else -1.0
     slopes(p, 0, 0.0, m[X], m[Y], m[VX], m[VY])
-    m[STEP] = _FIRST * _longest(p)
+    m[STEP] = _FIRST * _longest(p, grid.samples * grid.interval)
 
 
 @kernel(float64(PLANT, float64, float64), inlined=False)
@@ -121,13 +121,14 @@ def _try(p: Plant, h: float, allowed: float) -> float:
         if stage == END_STAGE + 1:
             along, across = rounding(p)
             for i in range(SIZE):
-                if m[SIDE] == 0.0 and (i == X or i == VX):
+                tangential = i in (X, VX)
+                if m[SIDE] == 0.0 and tangential:
                     continue
-                noise = h * (along if i == X or i == VX else across) / p.c.m
+                noise = h * (along if tangential else across) / p.c.m
                 floor = noise if i >= VX else h * noise
                 floor += 4.0 * EPSILON * max(abs(m[BEGIN + i]), abs(m[END + i]))
                 largest = max(m[LARGEST + i], abs(m[END + i]))
-                error = h * local_error(m, SLOPES, i) / (_LOCAL * p.grid.tolerance * largest + floor + 1e-300)
+                error = h * local_error(m, SLOPES, i) / (m[TOLERANCE] * largest + floor + 1e-300)
                 if not error < math.inf:
                     return math.inf
                 worst = max(worst, error)
@@ -136,7 +137,7 @@ def _try(p: Plant, h: float, allowed: float) -> float:
         x, y = m[BEGIN + X] + h * combined(m, SLOPES, stage, X), m[BEGIN + Y] + h * combined(m, SLOPES, stage, Y)
         v_x = m[BEGIN + VX] + h * combined(m, SLOPES, stage, VX)
         v_y = m[BEGIN + VY] + h * combined(m, SLOPES, stage, VY)
-        x, v_x = slopes(p, stage, m[TAU] + NODES[stage] * h, x, y, v_x, v_y)
+        slopes(p, stage, NODES[stage] * h, x, y, v_x, v_y)
         if stage == END_STAGE:
             m[END + X], m[END + Y], m[END + VX], m[END + VY] = x, y, v_x, v_y
             if p.contact[VALID] == 0.0:
@@ -160,17 +161,13 @@ def _to_event(p: Plant, which: int, h: float) -> float:
         return h
     for i in range(SIZE):
         m[END + i] += rest * m[SLOPES + SIZE * END_STAGE + i]
-    if m[SIDE] == 0.0:
-        travel, travel_low = integral_at(p.drive.belt, m[TIME], m[TAU] + h + rest)
-        m[END + X] = (m[ANCHOR] + travel) + (m[ANCHOR_LOW] + travel_low)
-        m[END + VX] = value_at(p.drive.belt, m[TIME] + (m[TAU] + h + rest))
     return h + rest
 
 
-@kernel(void(PLANT, vector, float64, int64), inlined=False)
-def _take(p: Plant, work: NDArray[np.float64], h: float, last: int) -> None:
+@kernel(void(PLANT, DRIVE, GRID, vector, float64, int64), inlined=False)
+def _take(p: Plant, drive: Drive, grid: Grid, work: NDArray[np.float64], h: float, last: int) -> None:
     """Take the step that has been made; `last` is 1 where it reaches the end of the run."""
-    m, interval = p.memory, p.grid.interval
+    m, interval = p.memory, grid.interval
     m[TIME_DONE], m[TAU_DONE], m[STEP_DONE] = m[TIME], m[TAU], h
     m[SIDE_DONE], m[TOUCHING_DONE] = m[SIDE], m[TOUCHING]
     for item in range(WORKS):
@@ -189,8 +186,9 @@ def _take(p: Plant, work: NDArray[np.float64], h: float, last: int) -> None:
     m[LEVEL_AT] += whole
     m[TAU] = max(tau - whole * interval, 0.0)
     if last == 1:
-        m[LEVEL_AT], m[TAU] = p.grid.samples, 0.0
+        m[LEVEL_AT], m[TAU] = grid.samples, 0.0
     m[TIME] = interval * m[LEVEL_AT]
+    arrive(p, drive)
     m[SWITCHES] = 0.0
     p.counts[KIND_0 + int(p.contact[KIND])] += 1
 
@@ -207,22 +205,20 @@ def _enter(p: Plant, which: int, longest: float) -> int:
     return _STALLED if m[EVENTS] > _MOST_EVENTS else _NONE
 
 
-@kernel(int64(PLANT, vector), inlined=False)
-def step(p: Plant, work: NDArray[np.float64]) -> int:
+@kernel(int64(PLANT, DRIVE, GRID, vector), inlined=False)
+def step(p: Plant, drive: Drive, grid: Grid, work: NDArray[np.float64]) -> int:
     """Take one step, up to an event at most; a `Failure`."""
     m, evaluations = p.memory, p.counts[EVALUATIONS]
     t = m[TIME] + m[TAU]
-    to_end = (p.grid.samples - m[LEVEL_AT]) * p.grid.interval - m[TAU]
-    longest = _longest(p)
-    limit = min(longest, _to_knot(p.drive.belt, t), _to_knot(p.drive.load, t))
+    to_end = (grid.samples - m[LEVEL_AT]) * grid.interval - m[TAU]
+    longest = _longest(p, grid.samples * grid.interval)
+    limit = min(longest, _to_knot(drive.belt, t), _to_knot(drive.load, t))
     last = 1 if to_end <= limit else 0
     limit = min(limit, to_end)
     h, growth = min(m[STEP], limit), _MOST
     while True:
         if h < limit:
             last = 0
-        m[BELT_SLOPE] = slope_at(p.drive.belt, t + 0.5 * h)
-        m[LOAD_SLOPE] = slope_at(p.drive.load, t + 0.5 * h)
         error = _try(p, h, 1.0)
         factor = max(_LEAST, min(growth, _SAFETY * error**-0.125)) if error > 0.0 else growth
         if error <= 1.0:
@@ -241,7 +237,7 @@ def step(p: Plant, work: NDArray[np.float64]) -> int:
         return _enter(p, which, longest)
     if which != NONE:
         h, last = _to_event(p, which, theta * h), 0
-    _take(p, work, h, last)
+    _take(p, drive, grid, work, h, last)
     p.counts[MOST] = max(p.counts[MOST], p.counts[EVALUATIONS] - evaluations)
     if not abs(m[X]) + abs(m[Y]) + abs(m[VX]) + abs(m[VY]) < BOUND:
         return _DIVERGED

@@ -72,9 +72,7 @@ def cache_is_cold() -> bool:
     return not config.DISABLE_JIT and (CACHE is None or not any(CACHE.iterdir()))
 
 
-def kernel(
-    signature: Any, *, fastmath: frozenset[str] = frozenset(), inlined: bool = True
-) -> Callable[[F], F]:
+def kernel(signature: Any, *, fastmath: frozenset[str] = frozenset(), inlined: bool = True) -> Callable[[F], F]:
     """Compile a function ahead of its first call for one signature, strictly (no fastmath unless named).
 
     A large one that is called in many places is better not `inlined`: compiling takes ten times as long else.

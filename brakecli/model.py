@@ -85,7 +85,7 @@ _SENTENCES = {
         "trusted; reduce solver.step"
     ),
     Failure.STALLED: (
-        "the steps shrink to nothing: stick, slip, lift-off and touch-down follow each other without progress, or the "
-        "tolerance is below what the forces are known to; increase solver.tolerance"
+        "the steps shrink to nothing: stick, slip, lift-off and touch-down follow each other without progress, or "
+        "the tolerance is below what the forces are known to; increase solver.tolerance"
     ),
 }

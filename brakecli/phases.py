@@ -2,8 +2,8 @@
 
 A phase is a side of the friction law (stick, or slip in one direction) on a pad that may touch or that is clear of
 the wheel. Within a phase the forces on a flat pad are smooth: its normal force is continued linearly beyond zero,
-and an event ends the phase where it vanishes. On a rough pad patches that appear, merge or vanish make kinks of the
-order gap^(3/2) inside a phase; the control of the step finds them.
+and an event ends the phase where it vanishes. On a rough pad patches that appear, merge or vanish make kinks of
+the order gap^(3/2) inside a phase; the control of the step finds them.
 """
 
 from typing import NamedTuple
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from brakecli.contact.closed_form import FULL, clear, coverage, full_contact
 from brakecli.contact.pad import HALF, SHOE_BOTTOM, SHOE_TERMS, SHOE_TOP, WHEEL_BOUND, WHEEL_TERMS, K
 from brakecli.double_double import two_sum
-from brakecli.integrate import DRIVE, EVALUATIONS, GRID, Drive, Grid
+from brakecli.integrate import DRIVE, EVALUATIONS, Drive
 from brakecli.kernels import (
     COEFFICIENTS,
     EVALUATE,
@@ -36,31 +36,37 @@ from brakecli.kernels import (
 )
 from brakecli.roughness import wheel_angles
 from brakecli.runge_kutta import END_STAGE, POWERS, SIZE, STAGES, interpolated
-from brakecli.schedules import integral_at, value_at
+from brakecli.schedules import integral_at, slope_at, value_at
 
-# `memory`: the state of an event-driven motion. Its first entries are those of `kernels`, the motion reached.
+# `memory`: the state of an event-driven motion. Its first entries are those of `kernels`, the motion reached, at
+# which the next step begins.
 (
     SIDE,  # sign of the sliding velocity, 0 in stick
     TOUCHING,  # 0 where the pad is clear of the wheel for sure
     STARTED,
-    TIME,  # of the sample interval that has been reached, s
+    LEVEL_AT,  # number of the sample interval that has been reached
+    TIME,  # when it began, s
     TAU,  # time since then, s
-    LEVEL_AT,  # and its number
+    BELT,  # U, its slope (m/s²) and the travel of the wheel, a sum of two doubles
+    BELT_SLOPE,
+    TRAVEL,
+    TRAVEL_LOW,
+    LOAD,  # Q and its slope (N/s)
+    LOAD_SLOPE,
+    ANCHOR,  # x - travel in stick, a sum of two doubles
+    ANCHOR_LOW,
+    TOLERANCE,
     STEP,  # to try next, s
+    SWITCHES,  # changes of phase without a step in between
+    EVENTS,  # events without progress
+    EVENTS_TIME,  # since then, s
     STEP_DONE,  # the step that the continuous solution belongs to, s,
     TIME_DONE,  # when it began
     TAU_DONE,
     SIDE_DONE,  # and its phase
     TOUCHING_DONE,
-    ANCHOR,  # x - travel in stick, a sum of two doubles
-    ANCHOR_LOW,
-    BELT_SLOPE,  # of U in this step, m/s²
-    LOAD_SLOPE,  # of Q, N/s
-    SWITCHES,  # changes of phase without a step in between
-    EVENTS,  # events without progress
-    EVENTS_TIME,  # since then, s
     ROW,  # the sample at the level that counts
-) = range(STATE_SIZE, STATE_SIZE + 20)
+) = range(STATE_SIZE, STATE_SIZE + 25)
 LARGEST = ROW + 8  # of x, y and their velocities so far
 BEGIN = LARGEST + SIZE
 END = BEGIN + SIZE
@@ -78,8 +84,6 @@ class Plant(NamedTuple):
 
     evaluate: object
     c: Coefficients
-    drive: Drive
-    grid: Grid
     pad: NDArray[np.float64]
     angles: NDArray[np.float64]
     memory: NDArray[np.float64]
@@ -88,7 +92,7 @@ class Plant(NamedTuple):
 
 
 PLANT = types.NamedTuple(
-    [types.FunctionType(EVALUATE), COEFFICIENTS, DRIVE, GRID, vector, vector, vector, vector, int64[::1]], Plant
+    [types.FunctionType(EVALUATE), COEFFICIENTS, vector, vector, vector, vector, int64[::1]], Plant
 )
 _PAIR = types.UniTuple(float64, 2)
 _TRIPLE = types.UniTuple(float64, 3)
@@ -120,7 +124,7 @@ def rounding(p: Plant) -> tuple[float, float]:
     """Rounding in the tangential and in the normal balance of forces, N."""
     c, pad, m = p.c, p.pad, p.memory
     x, y, v_x, v_y = abs(m[X]), abs(m[Y]), abs(m[VX]), abs(m[VY])
-    load, normal = abs(value_at(p.drive.load, m[TIME] + m[TAU])), 0.0
+    load, normal = abs(m[LOAD]), 0.0
     if m[TOUCHING] != 0.0:
         normal = full_stiffness(pad) * (y + pad[WHEEL_BOUND] + max(pad[SHOE_TOP], pad[SHOE_BOTTOM]))
     along = c.b_xx * v_x + abs(c.b_xy) * v_y + c.c_xx * x + abs(c.c_xy) * y + load * abs(c.sin_beta)
@@ -129,9 +133,26 @@ def rounding(p: Plant) -> tuple[float, float]:
     return 4.0 * EPSILON * along, 4.0 * EPSILON * (across + normal)
 
 
-@kernel(float64(PLANT, float64, float64, float64, float64, float64), inlined=False)
-def press(p: Plant, touching: float, x: float, y: float, travel: float, travel_low: float) -> float:
-    """F_y (N) in the phase, and the rest of `contact`; the closed form while a bound proves full contact."""
+@kernel(void(PLANT, DRIVE), inlined=False)
+def arrive(p: Plant, drive: Drive) -> None:
+    """What acts from outside at the time reached and, as no knot lies inside a step, all through the next step."""
+    m, t, tau = p.memory, p.memory[TIME], p.memory[TAU]
+    after = t + tau + 4.0 * EPSILON * (t + tau)  # a knot within the rounding of the time has been reached
+    m[BELT], m[BELT_SLOPE] = value_at(drive.belt, t + tau), slope_at(drive.belt, after)
+    m[LOAD], m[LOAD_SLOPE] = value_at(drive.load, t + tau), slope_at(drive.load, after)
+    m[TRAVEL], m[TRAVEL_LOW] = integral_at(drive.belt, t, tau)
+    if drive.wheel.g.size > 0:
+        wheel_angles(drive.wheel, m[TRAVEL], m[TRAVEL_LOW], p.angles)
+    if m[STARTED] != 0.0 and m[SIDE] == 0.0:  # no drift can build up
+        m[X], m[VX] = (m[ANCHOR] + m[TRAVEL]) + (m[ANCHOR_LOW] + m[TRAVEL_LOW]), m[BELT]
+
+
+@kernel(float64(PLANT, float64, float64, float64), inlined=False)
+def press(p: Plant, x: float, y: float, touching: float) -> float:
+    """F_y (N) in the phase and the rest of `contact`; the closed form while a bound proves full contact.
+
+    x is less what the wheel has travelled since the time that `angles` belong to.
+    """
     pad, contact = p.pad, p.contact
     if touching == 0.0:
         clear(x, y, p.angles, pad, contact)
@@ -142,33 +163,25 @@ def press(p: Plant, touching: float, x: float, y: float, travel: float, travel_l
         contact[NORMAL_FORCE] = -contact[STIFFNESS] * y  # Eq. (2), continued: an event ends the phase at y = 0
         contact[FRACTION] = 1.0 if y < 0.0 else 0.0
         contact[STORE_X], contact[KIND], contact[VALID] = 0.0, 0.0, 1.0
-        return contact[NORMAL_FORCE]  # type: ignore[no-any-return]
-    if p.drive.wheel.g.size > 0:
-        wheel_angles(p.drive.wheel, travel, travel_low, p.angles)
-    if coverage(y, pad) == FULL:
+    elif coverage(y, pad) == FULL:
         full_contact(x, y, p.angles, pad, contact)
     else:
         p.evaluate(x, y, p.angles, pad, contact)  # type: ignore[operator]
     return contact[NORMAL_FORCE]  # type: ignore[no-any-return]
 
 
-@kernel(_PAIR(PLANT, int64, float64, float64, float64, float64, float64), inlined=False)
-def slopes(
-    p: Plant, stage: int, tau: float, x: float, y: float, v_x: float, v_y: float
-) -> tuple[float, float]:
-    """(6)-(7) as equations of first order, and the powers of the energy account; x and its velocity, as taken.
+@kernel(void(PLANT, int64, float64, float64, float64, float64, float64), inlined=False)
+def slopes(p: Plant, stage: int, since: float, x: float, y: float, v_x: float, v_y: float) -> None:
+    """(6)-(7) as equations of first order, and the powers of the energy account, `since` the begin of the step.
 
-    In stick these two are the wheel's: no drift can build up.
+    In stick x and its velocity are the wheel's, whatever is given.
     """
-    c, drive, m = p.c, p.drive, p.memory
-    t, side = m[TIME], m[SIDE]
-    belt, load = value_at(drive.belt, t + tau), value_at(drive.load, t + tau)
-    travel, travel_low = 0.0, 0.0
-    if side == 0.0 or drive.wheel.g.size > 0:
-        travel, travel_low = integral_at(drive.belt, t, tau)
+    c, m = p.c, p.memory
+    side, load = m[SIDE], m[LOAD] + m[LOAD_SLOPE] * since
+    belt, travel = m[BELT] + m[BELT_SLOPE] * since, (m[BELT] + 0.5 * m[BELT_SLOPE] * since) * since
     if side == 0.0:
-        x, v_x = (m[ANCHOR] + travel) + (m[ANCHOR_LOW] + travel_low), belt
-    normal = press(p, m[TOUCHING], x, y, travel, travel_low)
+        x, v_x = m[X] + travel, belt
+    normal = press(p, x - travel, y, m[TOUCHING])
     against_x, against_y = resistance(c, load, x, y, v_x, v_y)
     friction = -side * c.phi * normal if side != 0.0 else c.m * m[BELT_SLOPE] + against_x
     at, sliding = SLOPES + SIZE * stage, v_x - belt
@@ -181,7 +194,6 @@ def slopes(
     m[at + 2] = c.b_xx * v_x * v_x + 2.0 * c.b_xy * v_x * v_y + c.b_yy * v_y * v_y
     m[at + 3] = load * (c.sin_beta * v_x + c.cos_beta * v_y)
     m[at + 4] = p.contact[STORE_X] * sliding
-    return x, v_x
 
 
 @kernel(_TRIPLE(PLANT, float64, float64), inlined=False)
@@ -191,18 +203,16 @@ def margins(p: Plant, h: float, theta: float) -> tuple[float, float, float]:
     In slip the sliding velocity (m/s) and nothing; in stick how far the force needed is within the friction cone
     (N), on the side of backward slip and of forward slip; then the height (m) before the pad is clear, or is not.
     """
-    c, drive, m = p.c, p.drive, p.memory
+    c, m, since = p.c, p.memory, theta * h
     y = interpolated(m, BEGIN, POWER, Y, theta)
     height = clear_height(p.pad) - y if m[TOUCHING] != 0.0 else y - clear_height(p.pad)
-    t, tau = m[TIME], m[TAU] + theta * h
-    belt = value_at(drive.belt, t + tau)
+    belt = m[BELT] + m[BELT_SLOPE] * since
     if m[SIDE] != 0.0:
         return m[SIDE] * (interpolated(m, BEGIN, POWER, VX, theta) - belt), 1.0, height
-    travel, travel_low = integral_at(drive.belt, t, tau)
-    x = (m[ANCHOR] + travel) + (m[ANCHOR_LOW] + travel_low)
-    bound = c.phi * press(p, m[TOUCHING], x, y, travel, travel_low)
+    x = m[X] + (m[BELT] + 0.5 * m[BELT_SLOPE] * since) * since
+    bound = c.phi * press(p, m[X], y, m[TOUCHING])
     v_y = interpolated(m, BEGIN, POWER, VY, theta)
-    against_x, _ = resistance(c, value_at(drive.load, t + tau), x, y, belt, v_y)
+    against_x, _ = resistance(c, m[LOAD] + m[LOAD_SLOPE] * since, x, y, belt, v_y)
     needed = c.m * m[BELT_SLOPE] + against_x
     return bound - needed, bound + needed, height
 
@@ -223,14 +233,11 @@ def margin_slope(p: Plant, which: int) -> float:
 @kernel(void(PLANT), inlined=False)
 def take_hold(p: Plant) -> None:
     """The side where the shoe moves with the wheel: stick if friction can hold it there, else slip, (3)-(5)."""
-    c, drive, m = p.c, p.drive, p.memory
-    t, tau = m[TIME], m[TAU]
-    travel, travel_low = integral_at(drive.belt, t, tau)
-    anchor, anchor_low = two_sum(m[X], -travel)
-    m[ANCHOR], m[ANCHOR_LOW] = anchor, anchor_low - travel_low
-    m[VX] = value_at(drive.belt, t + tau)
-    normal = press(p, m[TOUCHING], m[X], m[Y], travel, travel_low)
-    against_x, _ = resistance(c, value_at(drive.load, t + tau), m[X], m[Y], m[VX], m[VY])
+    c, m = p.c, p.memory
+    anchor, anchor_low = two_sum(m[X], -m[TRAVEL])
+    m[ANCHOR], m[ANCHOR_LOW], m[VX] = anchor, anchor_low - m[TRAVEL_LOW], m[BELT]
+    normal = press(p, m[X], m[Y], m[TOUCHING])
+    against_x, _ = resistance(c, m[LOAD], m[X], m[Y], m[VX], m[VY])
     needed, (along, _) = c.m * m[BELT_SLOPE] + against_x, rounding(p)
     if abs(needed) <= c.phi * normal + along:
         m[SIDE] = 0.0
@@ -249,4 +256,4 @@ def switch(p: Plant, which: int) -> None:
         m[SIDE] = -1.0 if which == 0 else 1.0  # friction cannot pull that hard, or cannot push
     else:
         take_hold(p)
-    slopes(p, 0, m[TAU], m[X], m[Y], m[VX], m[VY])
+    slopes(p, 0, 0.0, m[X], m[Y], m[VX], m[VY])

@@ -16,12 +16,11 @@ and of one that steps on the grid of the case, in the common loop `brakecli.inte
 
 or of one whose steps are its own, held to a tolerance, on the grid of samples alone:
 
-- kernels `advance` and `sample`, which do what those of `brakecli.integrate` do, with its arguments less `prepare`,
-  `finish` and `solve`.
+- kernels `advance` and `sample`, which do what those of `brakecli.integrate` do, with their arguments less
+  `prepare`, `finish` and `solve`.
 """
 
 from collections.abc import Callable
-
 from functools import partial
 from importlib import import_module
 from types import ModuleType

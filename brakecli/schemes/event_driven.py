@@ -9,7 +9,7 @@ from numba import float64, int64, types, void
 from numpy.typing import NDArray
 
 from brakecli.event_step import first_step, step
-from brakecli.integrate import DRIVE, GRID, LEVEL, Drive, Grid
+from brakecli.integrate import COLUMNS, DRIVE, GRID, LEVEL, Drive, Grid
 from brakecli.kernels import (
     COEFFICIENTS,
     EVALUATE,
@@ -44,6 +44,8 @@ from brakecli.phases import (
     TIME_DONE,
     TOUCHING,
     TOUCHING_DONE,
+    TRAVEL,
+    TRAVEL_LOW,
     Plant,
     press,
     resistance,
@@ -91,11 +93,11 @@ def mechanical_energy(
     return 0.5 * c.m * float(state[VX] ** 2 + state[VY] ** 2), float(links), (x, y), 0.0
 
 
-@kernel(void(PLANT, int64, vector), inlined=False)
-def _sample(p: Plant, level: int, row: NDArray[np.float64]) -> None:
-    """Write the sample of a level that the motion has reached: from the continuous solution, with its forces."""
-    c, drive, m = p.c, p.drive, p.memory
-    t = p.grid.interval * level
+@kernel(void(PLANT, DRIVE, float64, int64), inlined=False)
+def _sample(p: Plant, drive: Drive, interval: float, level: int) -> None:
+    """Put the sample of a level that the motion has reached into the state, with the forces at its time."""
+    c, m = p.c, p.memory
+    t = interval * level
     travel, travel_low = integral_at(drive.belt, t, 0.0)
     belt, belt_slope = value_at(drive.belt, t), slope_at(drive.belt, t)
     side, touching = m[SIDE], m[TOUCHING]
@@ -107,7 +109,8 @@ def _sample(p: Plant, level: int, row: NDArray[np.float64]) -> None:
         v_x, v_y = interpolated(m, BEGIN, POWER, VX, theta), interpolated(m, BEGIN, POWER, VY, theta)
         if side == 0.0:
             x, v_x = (m[ANCHOR] + travel) + (m[ANCHOR_LOW] + travel_low), belt
-    normal = max(press(p, touching, x, y, travel, travel_low), 0.0)
+    passed = (travel - m[TRAVEL]) + (travel_low - m[TRAVEL_LOW])
+    normal = max(press(p, x - passed, y, touching), 0.0)
     bound = c.phi * normal
     against_x, _ = resistance(c, value_at(drive.load, t), x, y, v_x, v_y)
     needed = c.m * belt_slope + against_x
@@ -119,8 +122,8 @@ def _sample(p: Plant, level: int, row: NDArray[np.float64]) -> None:
         state, friction = _FORWARD, -bound
     else:
         state, friction = _BACKWARD, bound
-    row[0], row[1], row[2], row[3] = x, y, v_x, v_y
-    row[4], row[5], row[6], row[7] = friction, normal, p.contact[FRACTION], state
+    m[ROW], m[ROW + 1], m[ROW + 2], m[ROW + 3] = x, y, v_x, v_y
+    m[ROW + 4], m[ROW + 5], m[ROW + 6], m[ROW + 7] = friction, normal, p.contact[FRACTION], state
 
 
 @kernel(
@@ -152,7 +155,8 @@ def sample(
     row: NDArray[np.float64],
 ) -> None:
     """Write the sample at the level that has been reached."""
-    row[:] = state[ROW : ROW + row.size]
+    for column in range(COLUMNS):  # a slice would take seconds to compile
+        row[column] = state[ROW + column]
 
 
 @kernel(
@@ -196,22 +200,23 @@ def advance(
     `rows` gets the samples before that of counts[LEVEL], which waits in the state; a failure adds it.
     """
     m, row, steps = borrowed(state), 0, 0
-    p = Plant(evaluate, c, drive, grid, borrowed(pad), borrowed(angles), m, borrowed(contact), borrowed(counts))
-    waiting = m[ROW : ROW + 8]
+    p = Plant(evaluate, c, borrowed(pad), borrowed(angles), m, borrowed(contact), borrowed(counts))
     if m[STARTED] == 0.0:
-        first_step(p)
-        _sample(p, 0, waiting)
+        first_step(p, drive, grid)
+        _sample(p, drive, grid.interval, 0)
         m[STARTED] = 1.0
     while True:
         while counts[LEVEL] < stop and counts[LEVEL] < m[LEVEL_AT]:
-            rows[row] = waiting
+            for column in range(COLUMNS):
+                rows[row, column] = m[ROW + column]
             row += 1
             counts[LEVEL] += 1
-            _sample(p, counts[LEVEL], waiting)
+            _sample(p, drive, grid.interval, counts[LEVEL])
         if counts[LEVEL] == stop or steps == _BUDGET:
             return _NONE
-        failure = step(p, borrowed(work))
+        failure = step(p, drive, grid, borrowed(work))
         steps += 1
         if failure != _NONE:
-            rows[row] = waiting
+            for column in range(COLUMNS):
+                rows[row, column] = m[ROW + column]
             return failure
