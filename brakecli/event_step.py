@@ -52,7 +52,7 @@ from brakecli.phases import (
 from brakecli.runge_kutta import END_STAGE, NODES, SIZE, STAGES, A, combined, local_error, make_continuous
 from brakecli.schedules import SCHEDULE, Schedule, segment
 
-_LOCAL = 0.1
+_LOCAL = 0.05
 """Error of a step over the tolerance of the histories, to which the errors of all steps add up."""
 _SAFETY, _LEAST, _MOST = 0.9, 0.2, 6.0
 _RADIANS = 2.0  # of the fastest motion, in a step: the looks at the margins follow it
