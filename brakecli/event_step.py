@@ -49,11 +49,24 @@ from brakecli.phases import (
     switch,
     take_hold,
 )
-from brakecli.runge_kutta import END_STAGE, NODES, SIZE, STAGES, A, combined, local_error, make_continuous
+from brakecli.runge_kutta import (
+    END_STAGE,
+    NODES,
+    SIZE,
+    STAGES,
+    A,
+    combined,
+    interpolated,
+    interpolated_slope,
+    local_error,
+    make_continuous,
+)
 from brakecli.schedules import SCHEDULE, Schedule, segment
 
 _LOCAL = 0.05
 """Error of a step over the tolerance of the histories, to which the errors of all steps add up."""
+_EARLY, _LATE = 0.47, 0.93
+_DEFECT = 20.0
 _SAFETY, _LEAST, _MOST = 0.9, 0.2, 6.0
 _RADIANS = 2.0  # of the fastest motion, in a step: the looks at the margins follow it
 _FIRST = 0.05  # of the longest step
@@ -107,6 +120,27 @@ def first_step(p: Plant, drive: Drive, grid: Grid) -> None:
     m[STEP] = _FIRST * _longest(p, grid.samples * grid.interval)
 
 
+@kernel(float64(PLANT, float64), inlined=False)
+def _defect(p: Plant, h: float) -> float:
+    """By how much the continuous solution misses (6)-(7) inside a step, over what the tolerance leaves it.
+
+    The error estimate is a linear functional of the slopes, which vanishes for a kink at certain places of a step.
+    """
+    m, worst = p.memory, 0.0
+    along, across = rounding(p)
+    for theta in (_EARLY, _LATE):
+        x, y = interpolated(m, BEGIN, POWER, X, theta), interpolated(m, BEGIN, POWER, Y, theta)
+        v_x, v_y = interpolated(m, BEGIN, POWER, VX, theta), interpolated(m, BEGIN, POWER, VY, theta)
+        slopes(p, STAGES - 1, theta * h, x, y, v_x, v_y)
+        for i in (VX, VY):
+            if m[SIDE] == 0.0 and i == VX:
+                continue
+            defect = abs(interpolated_slope(m, POWER, i, theta) - h * m[SLOPES + SIZE * (STAGES - 1) + i])
+            noise = h * (along if i == VX else across) / p.c.m
+            worst = max(worst, defect / (_DEFECT * m[TOLERANCE] * m[LARGEST + i] + noise + 1e-300))
+    return worst
+
+
 @kernel(float64(PLANT, float64, float64), inlined=False)
 def _try(p: Plant, h: float, allowed: float) -> float:
     """Make the stages of a step, its end and, if its error is allowed, its continuous solution; the error.
@@ -143,7 +177,7 @@ def _try(p: Plant, h: float, allowed: float) -> float:
             if p.contact[VALID] == 0.0:
                 return math.inf
     make_continuous(m, SLOPES, BEGIN, END, POWER, h)
-    return worst
+    return worst if p.contact[KIND] == 0.0 else max(worst, _defect(p, h))
 
 
 @kernel(float64(PLANT, int64, float64), inlined=False)

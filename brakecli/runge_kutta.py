@@ -139,3 +139,16 @@ def interpolated(
     for p in range(POWERS - 1, -1, -1):
         total = (total + memory[at_powers + SIZE * p + component]) * (theta if p % 2 == 0 else rest)
     return memory[at_begin + component] + total  # type: ignore[no-any-return]
+
+
+@kernel(float64(vector, int64, int64, float64))
+def interpolated_slope(memory: NDArray[np.float64], at_powers: int, component: int, theta: float) -> float:
+    """Derivative of `interpolated` by theta."""
+    total, slope, rest = 0.0, 0.0, 1.0 - theta
+    for p in range(POWERS - 1, -1, -1):
+        total += memory[at_powers + SIZE * p + component]
+        if p % 2 == 0:
+            total, slope = total * theta, slope * theta + total
+        else:
+            total, slope = total * rest, slope * rest - total
+    return slope
