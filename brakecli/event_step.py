@@ -67,6 +67,7 @@ _LOCAL = 0.05
 """Error of a step over the tolerance of the histories, to which the errors of all steps add up."""
 _EARLY, _LATE = 0.47, 0.93
 _DEFECT = 20.0
+_TINY = 1e-300
 _SAFETY, _LEAST, _MOST = 0.9, 0.2, 6.0
 _RADIANS = 2.0  # of the fastest motion, in a step: the looks at the margins follow it
 _FIRST = 0.05  # of the longest step
@@ -137,7 +138,8 @@ def _defect(p: Plant, h: float) -> float:
                 continue
             defect = abs(interpolated_slope(m, POWER, i, theta) - h * m[SLOPES + SIZE * (STAGES - 1) + i])
             noise = h * (along if i == VX else across) / p.c.m
-            worst = max(worst, defect / (_DEFECT * m[TOLERANCE] * m[LARGEST + i] + noise + 1e-300))
+            largest = max(m[LARGEST + i], abs(m[END + i]))
+            worst = max(worst, defect / (_DEFECT * m[TOLERANCE] * largest + noise + _TINY))
     return worst
 
 
@@ -162,7 +164,7 @@ def _try(p: Plant, h: float, allowed: float) -> float:
                 floor = noise if i >= VX else h * noise
                 floor += 4.0 * EPSILON * max(abs(m[BEGIN + i]), abs(m[END + i]))
                 largest = max(m[LARGEST + i], abs(m[END + i]))
-                error = h * local_error(m, SLOPES, i) / (m[TOLERANCE] * largest + floor + 1e-300)
+                error = h * local_error(m, SLOPES, i) / (m[TOLERANCE] * largest + floor + _TINY)
                 if not error < math.inf:
                     return math.inf
                 worst = max(worst, error)
