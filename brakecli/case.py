@@ -24,6 +24,7 @@ from brakecli.case_table import (
     Schedule,
     Series,
     Table,
+    Tolerance,
     Weight,
     from_list,
     from_text,
@@ -45,6 +46,14 @@ class Scheme(StrEnum):
 
     TWO_LAYER = "two-layer"
     THREE_LAYER = "three-layer"
+    EVENT_DRIVEN = "event-driven"
+
+
+_THETA: dict[Scheme, tuple[float, ...]] = {
+    Scheme.TWO_LAYER: (0.5, 0.5),
+    Scheme.THREE_LAYER: (0.25, 0.5, 0.25),
+    Scheme.EVENT_DRIVEN: (),
+}
 
 
 class Iteration(StrEnum):
@@ -202,6 +211,8 @@ class Initial(Table):
 class Solver(Table):
     """How the equations of motion are solved, and for how long."""
 
+    alternatives = (("step",), ("tolerance",))
+
     scheme: Annotated[Scheme, from_text, Field(description="the time-stepping scheme")] = Scheme.TWO_LAYER
     theta: Annotated[
         tuple[Weight, ...],
@@ -209,7 +220,7 @@ class Solver(Table):
         quantity(
             "1",
             "weights of the layers: two for two-layer, 0.5 and 0.5 if left out; "
-            "three that add up to 1 for three-layer, 0.25, 0.5 and 0.25 if left out",
+            "three that add up to 1 for three-layer, 0.25, 0.5 and 0.25 if left out; none for event-driven",
         ),
     ] = Field(default_factory=tuple)
     iteration: Annotated[Iteration, from_text, Field(description="how the equations of a step are solved")] = (
@@ -218,7 +229,11 @@ class Solver(Table):
     start: Annotated[Start, from_text, Field(description="how the second layer of three-layer is found")] = (
         Start.CONSISTENT
     )
-    step: Annotated[Positive, quantity("s", "time step h")]
+    step: Annotated[Positive | None, quantity("s", "time step h")] = None
+    tolerance: Annotated[
+        Tolerance | None,
+        quantity("1", "relative error to which event-driven keeps x, y and velocities"),
+    ] = None
     duration: Annotated[Positive, quantity("s", "time to simulate")]
     allow_unconverged: Annotated[
         bool, Field(description="whether a run goes on after a step that did not converge")
@@ -226,11 +241,20 @@ class Solver(Table):
 
     def _fill(self) -> None:
         if "theta" not in self.model_fields_set:
-            two_layer = self.scheme == Scheme.TWO_LAYER
-            self.__dict__["theta"] = (0.5, 0.5) if two_layer else (0.25, 0.5, 0.25)
+            self.__dict__["theta"] = _THETA[self.scheme]
 
     def _broken_rules(self) -> Iterator[Broken]:
-        count = 2 if self.scheme == Scheme.TWO_LAYER else 3
+        yield from super()._broken_rules()
+        yield from self._not_of_event_driven() if self.scheme == Scheme.EVENT_DRIVEN else self._not_of_layers()
+        if self.start == Start.PAPER and self.scheme != Scheme.THREE_LAYER:
+            what = "is for the three-layer scheme alone"
+            yield Broken(("start",), what, 'leave start out, or set scheme to "three-layer"', self.start)
+
+    def _not_of_layers(self) -> Iterator[Broken]:
+        if self.tolerance is not None:
+            what = f"is not yet for {self.scheme}, but for event-driven alone"
+            yield Broken(("tolerance",), what, "give step instead", self.tolerance)
+        count = len(_THETA[self.scheme])
         if len(self.theta) != count:
             what = f"has {_entries(self.theta)} where {self.scheme} has {count} weights"
             yield Broken(("theta",), what, f"give {count} weights, or leave theta out", self.theta)
@@ -238,9 +262,20 @@ class Solver(Table):
             yield Broken(
                 ("theta",), f"adds up to {sum(self.theta):.12g}", "let the weights add up to 1", self.theta
             )
-        if self.start == Start.PAPER and self.scheme == Scheme.TWO_LAYER:
-            what = "is for the three-layer scheme alone"
-            yield Broken(("start",), what, 'leave start out, or set scheme to "three-layer"', self.start)
+
+    def _not_of_event_driven(self) -> Iterator[Broken]:
+        if self.step is not None:
+            what = "is not for event-driven, which finds its steps itself"
+            yield Broken(("step",), what, "give tolerance instead, such as 1e-10", self.step)
+        if self.theta:
+            what = "is not for event-driven, which has no weights"
+            yield Broken(("theta",), what, "leave theta out", self.theta)
+        if self.iteration == Iteration.FIXED_POINT:
+            what = "is not for event-driven, which solves no equations in a step"
+            yield Broken(("iteration",), what, "leave iteration out", self.iteration)
+        if self.allow_unconverged:
+            what = "is not for event-driven, in which nothing has to converge"
+            yield Broken(("allow_unconverged",), what, "leave allow_unconverged out", self.allow_unconverged)
 
 
 class Output(Table):
@@ -274,14 +309,21 @@ class Case(Table):
     output: Output = Field(default_factory=Output)
 
     def _fill(self) -> None:
-        if "sample_interval" not in self.output.model_fields_set:
+        if "sample_interval" not in self.output.model_fields_set and self.solver.step is not None:
             self.__dict__["output"] = Output(sample_interval=self.solver.step)
 
     def _broken_rules(self) -> Iterator[Broken]:
         interval, step = self.output.sample_interval, self.solver.step
-        if interval < step * (1 - 1e-9):
+        if step is None and "sample_interval" not in self.output.model_fields_set:
+            what = "is missing, and there is no time step to take its place"
+            yield Broken(("output", "sample_interval"), what, "give a number above 0, in s")
+        if step is not None and interval < step * (1 - 1e-9):
             what = f"is below the time step of {step!r} s"
             yield Broken(("output", "sample_interval"), what, "make it at least one time step", interval)
+        if self.solver.scheme == Scheme.EVENT_DRIVEN and self.contact.evaluator == Evaluator.MIDPOINT:
+            what = "has a kink at every node, and event-driven is exact"
+            remedy = 'leave evaluator out, or set it to "exact"'
+            yield Broken(("contact", "evaluator"), what, remedy, self.contact.evaluator)
         if self.solver.start == Start.PAPER and (self.initial.vx or self.initial.vy):
             what = "takes the second layer for equal to the first, but the initial velocity is not zero"
             remedy = 'set start to "consistent", or initial.vx and initial.vy to 0'

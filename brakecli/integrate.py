@@ -49,7 +49,8 @@ class Grid(NamedTuple):
     """The grid of time: samples every `interval` s, `per_sample` steps between them.
 
     `weighted` and `lag` are the scheme's (see `brakecli.schemes`); `most` bounds the evaluations of one step;
-    `go_on` is 1 where steps that did not converge are counted and do not end the run.
+    `go_on` is 1 where steps that did not converge are counted and do not end the run. `samples` is the number of
+    the last sample, `tolerance` the error that a scheme with steps of its own keeps.
     """
 
     interval: float
@@ -58,10 +59,12 @@ class Grid(NamedTuple):
     lag: int
     most: int
     go_on: int
+    samples: int
+    tolerance: float
 
 
 DRIVE = types.NamedTuple([SCHEDULE, SCHEDULE, SURFACE], Drive)
-GRID = types.NamedTuple([float64, int64, float64, int64, int64, int64], Grid)
+GRID = types.NamedTuple([float64, int64, float64, int64, int64, int64, int64, float64], Grid)
 
 # `counts`: the level reached, and the work so far. KIND_0 + i counts the steps that evaluator i took.
 LEVEL, EVALUATIONS, UNCONVERGED, RISING, MOST, KIND_0 = range(6)
@@ -71,7 +74,8 @@ COLUMNS = 8
 EVENTS = 1000
 """How many unconverged steps are kept with their time and residual; all are counted."""
 
-_BOUND = 1e15  # m and m/s: beyond it a motion is no motion of a brake
+BOUND = 1e15
+"""Position (m) and velocity (m/s) beyond which a motion is no motion of a brake."""
 
 # IntEnum members are not known to compiled code, their numbers are.
 _BACKWARD, _STICK, _FORWARD, _SEPARATED = (int(state) for state in ContactState)
@@ -228,7 +232,7 @@ def advance(
         if contact[VALID] == 0.0:
             return _NOT_CLOSED
         finish(c, s, state, load, belt_now, belt_next, problem, contact, work)  # type: ignore[operator]
-        if not abs(state[X]) + abs(state[Y]) + abs(state[VX]) + abs(state[VY]) < _BOUND:
+        if not abs(state[X]) + abs(state[Y]) + abs(state[VX]) + abs(state[VY]) < BOUND:
             return _DIVERGED
         counts[KIND_0 + int(contact[KIND])] += 1
         counts[LEVEL] += 1

@@ -72,13 +72,16 @@ def cache_is_cold() -> bool:
     return not config.DISABLE_JIT and (CACHE is None or not any(CACHE.iterdir()))
 
 
-def kernel(signature: Any, *, fastmath: frozenset[str] = frozenset()) -> Callable[[F], F]:
-    """Compile a function ahead of its first call for one signature, strictly (no fastmath unless named)."""
+def kernel(signature: Any, *, fastmath: frozenset[str] = frozenset(), inlined: bool = True) -> Callable[[F], F]:
+    """Compile a function ahead of its first call for one signature, strictly (no fastmath unless named).
+
+    A large one that is called in many places is better not `inlined`: compiling takes ten times as long else.
+    """
 
     def compile_(function: F) -> F:
         before, config.CACHE_DIR = config.CACHE_DIR, str(CACHE or config.CACHE_DIR)
         try:
-            options: dict[str, Any] = {"fastmath": set(fastmath), "forceinline": True}
+            options: dict[str, Any] = {"fastmath": set(fastmath), "forceinline": inlined}
             try:
                 return njit(signature, cache=CACHE is not None, **options)(function)  # type: ignore[no-any-return]
             except OSError:  # a cache that cannot be written or read, on a full disk: do without

@@ -62,6 +62,7 @@ class Failure(IntEnum):
     DIVERGED = 2
     NOT_CLOSED = 3
     UNBALANCED = 4
+    STALLED = 5
 
     @property
     def sentence(self) -> str:
@@ -82,5 +83,9 @@ _SENTENCES = {
     Failure.UNBALANCED: (
         "the energy account does not close, so the step does not resolve the motion and the history is not to be "
         "trusted; reduce solver.step"
+    ),
+    Failure.STALLED: (
+        "the steps shrink to nothing: stick, slip, lift-off and touch-down follow each other without progress, or "
+        "the tolerance is below what the forces are known to; increase solver.tolerance"
     ),
 }

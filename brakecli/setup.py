@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli import contact, schemes
-from brakecli.case import Case, Evaluator, Profile
+from brakecli.case import Case, Evaluator, Profile, Scheme
 from brakecli.coefficients import coefficients
 from brakecli.contact.pad import build_pad, default_nodes
 from brakecli.integrate import Drive, Grid
@@ -45,7 +45,8 @@ class Timing:
 
 def timing(case: Case) -> Timing:
     """Fit the step into the sample interval and the interval into the duration."""
-    step, interval, duration = case.solver.step, case.output.sample_interval, case.solver.duration
+    interval, duration = case.output.sample_interval, case.solver.duration
+    step = case.solver.step or interval  # a scheme with steps of its own sees the grid of samples alone
     per_sample, samples = _at_least(interval / step), _at_least(duration / interval)
     adjustments = []
     if abs(interval / step - per_sample) > WHOLE * per_sample:
@@ -128,6 +129,8 @@ class Setup:
             self.scheme.LAG,
             MOST[self.case.solver.iteration],
             int(self.case.solver.allow_unconverged),
+            self.timing.samples,
+            self.case.solver.tolerance or 0.0,
         )
 
 
@@ -138,11 +141,13 @@ def set_up(case: Case) -> Setup:
     smooth = shoe.g.size == 0 and wheel.g.size == 0
     if evaluator is Evaluator.AUTO and smooth:
         evaluator = Evaluator.CLOSED_FORM
+    elif evaluator is Evaluator.AUTO and case.solver.scheme is Scheme.EVENT_DRIVEN:
+        evaluator = Evaluator.EXACT
     nodes = case.contact.nodes or default_nodes(case.contact.half_length, shoe, wheel)
     times = timing(case)
     turning, load = case.wheel, case.load
     speeds = turning.angular_speeds or (turning.angular_speed or 0.0,)
-    theta = (*case.solver.theta, 0.0)[:3]
+    theta = (*case.solver.theta, 0.0, 0.0, 0.0)[:3]
     return Setup(
         case=case,
         timing=times,

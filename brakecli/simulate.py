@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli import integrate, iteration
+from brakecli import integrate, iteration, schemes
 from brakecli.analysis.energy import OPEN_ACCOUNT, EnergyAccount, account
 from brakecli.analysis.equilibrium import equilibrium, mean_contact
 from brakecli.case import InitialState, Start
@@ -68,6 +68,8 @@ class Motion:
         self.counts = np.zeros(integrate.COUNTS_SIZE, dtype=np.int64)
         self.events = np.zeros((integrate.EVENTS, 2))
         self.counts[integrate.LEVEL] = setup.scheme.LAG
+        solve = iteration.newton if setup.case.solver.iteration == "newton" else iteration.fixed_point
+        self._advance, self._sample_into = schemes.loop(setup.scheme, setup.evaluate, solve)
         self.state = self._begin()
         self._start_energy = self._energy()
 
@@ -107,12 +109,7 @@ class Motion:
         setup, lag, per_sample = self.setup, self.setup.scheme.LAG, self.setup.timing.per_sample
         first = int(self.counts[integrate.LEVEL]) - lag
         rows = np.zeros((-(-(stop - lag) // per_sample) + (-first // per_sample), integrate.COLUMNS))
-        solve = iteration.newton if setup.case.solver.iteration == "newton" else iteration.fixed_point
-        failure = integrate.advance(
-            setup.evaluate,
-            setup.scheme.prepare,
-            setup.scheme.finish,
-            solve,
+        failure = self._advance(
             setup.coefficients,
             setup.weights,
             setup.drive,
@@ -139,8 +136,7 @@ class Motion:
         """The sample at the level that has been reached."""
         row = np.zeros(integrate.COLUMNS)
         setup = self.setup
-        integrate.sample(
-            setup.evaluate,
+        self._sample_into(
             setup.coefficients,
             setup.weights,
             setup.drive,
@@ -205,7 +201,7 @@ class Motion:
     def _count(self) -> None:
         """Read the loop's counters."""
         counts, work = self.counts, self.work
-        work.steps = int(counts[integrate.LEVEL]) - self.setup.scheme.LAG
+        work.steps = int(counts[integrate.KIND_0 :].sum())
         work.contact_evaluations = int(counts[integrate.EVALUATIONS])
         work.unconverged_steps = int(counts[integrate.UNCONVERGED])
         work.non_unique_steps = int(counts[integrate.RISING])

@@ -2,7 +2,8 @@
 
 On flat surfaces every phase (touching or open; slip either way or stick) is linear with constant coefficients.
 Phases are advanced by exact propagators over a fine grid; where a phase's condition breaks, the instant is
-found by root finding on the exact solution.
+found by root finding on the exact solution, as the series of its matrix exponential. A condition that breaks and
+holds again within one step of the grid is not seen: the grid is to be fine beside every motion.
 """
 
 from collections.abc import Callable
@@ -69,30 +70,56 @@ class PiecewiseExact:
             return True, 0
         return True, -side
 
-    def run(self, start: Vector, touching: bool, side: int, samples: int) -> NDArray[np.float64]:
-        """Samples at every grid time, from a state in a known phase."""
+    def first_phase(self, start: Vector) -> tuple[bool, int]:
+        """The phase of a state that is on the border of none."""
+        assert start[1] != 0.0
+        assert start[2] != self.belt
+        return start[1] < 0.0, (1 if start[2] > self.belt else -1) if start[1] < 0.0 else 0
+
+    def run(self, start: Vector, touching: bool, side: int, samples: int, per_sample: int = 1) -> Vector:
+        """Samples, `per_sample` grid times apart, from a state in a known phase."""
         z = np.append(start, 1.0)
-        rows = [z[:4].copy()]
+        rows, self.visited = [z[:4].copy()], [(touching, side)]
         for _ in range(samples):
-            left = self.grid
-            while left > 0.0:
-                z, left, touching, side = self._advance(z, left, touching, side)
+            for _ in range(per_sample):
+                left = self.grid
+                while left > 0.0:
+                    z, left, touching, side = self._advance(z, left, touching, side)
             rows.append(z[:4].copy())
         return np.array(rows)
 
     def _advance(self, z: Vector, span: float, touching: bool, side: int) -> tuple[Vector, float, bool, int]:
         a = self.generator(touching, side)
-        end = expm(a * span) @ z
-        first, which = span, -1
-        for index, margin in enumerate(self.margins(touching, side)):
-            if margin(end) < 0.0 and margin(expm(a * 1e-9 * span) @ z) > 0.0:
-                t = brentq(
-                    lambda t, m=margin: m(expm(a * t) @ z), 1e-9 * span, span, xtol=1e-15 * span, rtol=1e-14
-                )
-                if t < first:
-                    first, which = t, index
+        if span == self.grid:
+            if (touching, side) not in self.propagators:
+                self.propagators[touching, side] = expm(a * span)
+            end = self.propagators[touching, side] @ z
+        else:
+            end = expm(a * span) @ z
+        margins = self.margins(touching, side)
+        broken = [index for index, margin in enumerate(margins) if margin(end) < 0.0]
+        if not broken:
+            return end, 0.0, touching, side
+        terms = [z]  # of the series of expm(a t) z, with t in spans: a step of the grid is a part of a period
+        for power in range(1, 30):
+            terms.append(a @ terms[-1] * (span / power))
+
+        def at(part: float) -> Vector:
+            total = terms[-1]
+            for term in reversed(terms[:-1]):
+                total = total * part + term
+            return total
+
+        first, which = 1.0, -1
+        for index in broken:
+            begin = next((part for part in (1e-9, 1e-6, 1e-4, 1e-2, 0.1) if margins[index](at(part)) > 0.0), None)
+            if begin is not None:
+                root = brentq(lambda part, m=margins[index]: m(at(part)), begin, 1.0, xtol=1e-15, rtol=1e-14)
+                if root < first:
+                    first, which = root, index
         if which < 0:
             return end, 0.0, touching, side
-        z = expm(a * first) @ z
+        z = at(first)
         touching, side = self.next_phase(z, touching, side, which)
-        return z, span - first, touching, side
+        self.visited.append((touching, side))
+        return z, span * (1.0 - first), touching, side
