@@ -1,11 +1,8 @@
-"""One picture of a run: the motion in detail, its whole history, its phase portrait and its spectrum."""
+"""Pictures of results. That of a run: motion in detail, whole history, phase portrait and spectrum."""
 
 import math
-import textwrap
-import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
-from io import BytesIO
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,111 +10,51 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.errors import UsageError
+from brakecli.figures import BLUE, DASHES, GREEN, GREY, ORANGE, VERMILION, check_target, headed, layout, render
 from brakecli.model import ContactState
 from brakecli.output import new_output
 from brakecli.picture import Array, Detail, Picture, episodes, gather, prefixed
-from brakecli.stored import open_result
+from brakecli.stored import StoredResult, open_result
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-SUFFIXES = (".pdf", ".png", ".svg")
-
-# Okabe and Ito's colours, told apart also without red or green.
-_BLUE, _ORANGE, _VERMILION, _GREEN, _GREY = "#0072B2", "#E69F00", "#D55E00", "#009E73", "#9A9A9A"
-_STYLE = {
-    "font.size": 9.5,
-    "axes.titlesize": 10.5,
-    "axes.titlelocation": "left",
-    "axes.titlepad": 8.0,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.edgecolor": "#555555",
-    "axes.labelcolor": "#222222",
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "axes.formatter.useoffset": False,
-    "grid.color": "#E4E4E4",
-    "grid.linewidth": 0.7,
-    "xtick.color": "#444444",
-    "ytick.color": "#444444",
-    "lines.linewidth": 1.2,
-    "lines.solid_joinstyle": "round",
-    "legend.frameon": True,
-    "legend.framealpha": 0.85,
-    "legend.edgecolor": "none",
-    "legend.fontsize": 8.5,
-    "legend.handlelength": 1.6,
-    "svg.hashsalt": "brakecli",  # the same picture gives the same bytes
-}
-_DASHES = (0, (5, 3))
-_SHADES = ((ContactState.STICK, _ORANGE, "stick"), (ContactState.SEPARATED, _GREY, "no contact"))
-_UNDATED = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
+_SHADES = ((ContactState.STICK, ORANGE, "stick"), (ContactState.SEPARATED, GREY, "no contact"))
 
 
-def plot_run(result: Path, target: Path, *, force: bool) -> None:
-    """Draw the result of a run into a PNG, PDF or SVG file, by the suffix of `target`.
+def plot_result(result: Path, target: Path, *, force: bool, select: Sequence[str] = ()) -> None:
+    """Draw a result, by its kind, into a PNG, PDF or SVG file, by the suffix of `target`.
 
-    Raises UsageError for another suffix, an existing target without `force`, or where matplotlib is missing;
-    UnreadableResultError; CannotWriteError.
+    `select` holds `KEY=VALUE` for axes of a sweep of which one value is to be drawn. Raises UsageError for another
+    suffix, an existing target without `force`, for what cannot be drawn or selected, or where matplotlib is
+    missing; UnreadableResultError; CannotWriteError.
     """
-    suffix = target.suffix.lower()
-    if suffix not in SUFFIXES:
-        raise UsageError(
-            f"{target}: its suffix names no kind of picture (found {target.suffix!r}); name a file that ends in "
-            f"{', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]} with -o"
-        )
-    if target.exists() and result.exists() and target.samefile(result):
-        raise UsageError(f"{target}: this is the result itself; choose another output with -o")
-    _require_matplotlib()
-    with open_result(result, kind="run") as stored, new_output(target, force=force) as file:
-        picture = gather(stored)
-        file.write(render(picture, suffix))
+    check_target(result, target)
+    with open_result(result) as stored, new_output(target, force=force) as file:
+        file.write(render(_drawing(stored, select), target.suffix.lower()))
         file.publish()
 
 
-def _require_matplotlib() -> None:
-    try:
-        import matplotlib.figure  # noqa: F401
-    except ImportError as error:
-        raise UsageError(
-            f"matplotlib cannot be imported ({error}); install it with: python -m pip install 'matplotlib>=3.9'"
-        ) from error
+def _drawing(stored: StoredResult, select: Sequence[str]) -> Callable[[], "Figure"]:
+    """What draws this result; all that it draws is read here."""
+    kind = stored.attributes.get("kind")
+    if kind == "sweep":
+        from brakecli.sweep_plots.figure import draw_sweep
+        from brakecli.sweep_plots.picture import gather_sweep
 
-
-def render(picture: Picture, suffix: str) -> bytes:
-    """The picture as the bytes of a file of this suffix; nothing in them depends on when or where."""
-    with _matplotlib():
-        figure = draw(picture)
-        figure.draw_without_rendering()
-        figure.set_layout_engine("none")
-        for axes in figure.axes:  # the layout's last digits depend on the order in which it solved for them
-            axes.set_position(tuple(round(bound, 6) for bound in axes.get_position().bounds))
-        stream = BytesIO()
-        figure.savefig(stream, format=suffix[1:], dpi=150, metadata=_UNDATED.get(suffix))
-        return stream.getvalue()
-
-
-@contextmanager
-def _matplotlib() -> Iterator[None]:
-    """Matplotlib's own defaults and ours, whatever the user's say; a glyph that its font lacks is no alarm."""
-    import matplotlib.style
-
-    with matplotlib.style.context(["default", _STYLE]), warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        yield
+        return partial(draw_sweep, gather_sweep(stored, select))
+    if kind != "run":
+        raise UsageError(f"{stored.path}: holds a result of kind {kind!r}; name the result of a run or of a sweep")
+    if select:
+        raise UsageError(f"{stored.path}: --select is for sweeps (found {select[0]!r}); leave it out for a run")
+    return partial(draw, gather(stored))
 
 
 def draw(picture: Picture) -> "Figure":
     """The figure with its four panels."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(10.4, 7.2))
-    figure.set_layout_engine("constrained", rect=(0.005, 0.005, 0.99, 0.9), wspace=0.05, hspace=0.06)
-    title, summary = (textwrap.shorten(text, 128, placeholder=" …") for text in (picture.title, picture.summary))
-    figure.text(0.012, 0.978, title, size=13, weight="bold", va="top", parse_math=False)
-    figure.text(0.012, 0.938, summary, size=10.0, color="#444444", va="top", parse_math=False)
+    figure = headed(10.4, 7.2, picture.title, picture.summary)
+    layout(figure).set(wspace=0.05, hspace=0.06)
     panels = figure.subplots(2, 2, width_ratios=(1.55, 1.0))
     _draw_detail(panels[0, 0], picture.detail)
     _draw_portrait(panels[0, 1], picture.detail)
@@ -128,7 +65,7 @@ def draw(picture: Picture) -> "Figure":
 
 def _draw_detail(axes: "Axes", detail: Detail) -> None:
     factor, unit = prefixed(_reach(detail), "m/s")
-    axes.plot(detail.time, factor * detail.vx, color=_BLUE, marker=_marker(detail.time))
+    axes.plot(detail.time, factor * detail.vx, color=BLUE, marker=_marker(detail.time))
     for state, colour, label in _SHADES:
         spans = [
             (detail.time[first] - 0.5 * detail.interval, (last - first + 1) * detail.interval)
@@ -141,7 +78,7 @@ def _draw_detail(axes: "Axes", detail: Detail) -> None:
             )
     if _is_near(detail):
         label = f"U = {factor * detail.belt[-1]:.4g} {unit}" if np.ptp(detail.belt) == 0.0 else "U"
-        axes.plot(detail.time, factor * detail.belt, color=_VERMILION, ls=_DASHES, lw=1.1, label=label)
+        axes.plot(detail.time, factor * detail.belt, color=VERMILION, ls=DASHES, lw=1.1, label=label)
     if len(detail.time) > 1:
         axes.set_xlim(detail.time[0], detail.time[-1])
     axes.set(title=f"{detail.name}: tangential velocity", xlabel="time (s)", ylabel=f"velocity ẋ ({unit})")
@@ -154,12 +91,12 @@ def _draw_portrait(axes: "Axes", detail: Detail) -> None:
     x_factor, x_unit = prefixed(_largest(detail.x - centre), "m")
     factor, unit = prefixed(_reach(detail), "m/s")
     x, vx = x_factor * (detail.x - centre), factor * detail.vx
-    axes.plot(x, vx, color=_BLUE, lw=0.9, marker=_marker(x))
+    axes.plot(x, vx, color=BLUE, lw=0.9, marker=_marker(x))
     stick = detail.state == ContactState.STICK
-    axes.plot(x[stick], vx[stick], color=_ORANGE, ls="none", marker="o", ms=3.0)
+    axes.plot(x[stick], vx[stick], color=ORANGE, ls="none", marker="o", ms=3.0)
     if _is_near(detail):
         for value in sorted({float(detail.belt.min()), float(detail.belt.max())}):
-            axes.axhline(factor * value, color=_VERMILION, ls=_DASHES, lw=1.1)
+            axes.axhline(factor * value, color=VERMILION, ls=DASHES, lw=1.1)
     axes.locator_params(axis="x", nbins=6)
     about = f" − ({centre:.12g} m)".replace("-", "−") if centre else ""
     axes.set(title="Phase portrait", xlabel=f"displacement x{about} ({x_unit})", ylabel=f"velocity ẋ ({unit})")
@@ -180,17 +117,17 @@ def _reach(detail: Detail) -> float:
 def _note_far(axes: "Axes", detail: Detail) -> None:
     if not _is_near(detail):
         note = f"U = {detail.belt[-1]:.4g} m/s, off the scale"
-        axes.set_title(note, loc="right", size=8.5, color=_VERMILION)
+        axes.set_title(note, loc="right", size=8.5, color=VERMILION)
 
 
 def _draw_history(axes: "Axes", picture: Picture) -> None:
     factor, unit = prefixed(max(_largest(picture.lowest), _largest(picture.highest)), "m")
     time, detail = picture.time, picture.detail.time
-    axes.fill_between(time, factor * picture.lowest, factor * picture.highest, color=_BLUE, lw=0.9)
+    axes.fill_between(time, factor * picture.lowest, factor * picture.highest, color=BLUE, lw=0.9)
     if len(time) < 3:
-        axes.plot(time, factor * picture.lowest, color=_BLUE, marker="o", ms=4.0)
+        axes.plot(time, factor * picture.lowest, color=BLUE, marker="o", ms=4.0)
     if len(detail) > 1 and detail[-1] - detail[0] < 0.9 * (picture.span[1] - picture.span[0]):
-        axes.axvspan(detail[0], detail[-1], color=_GREEN, alpha=0.25, lw=0, zorder=0.5, label="drawn above")
+        axes.axvspan(detail[0], detail[-1], color=GREEN, alpha=0.25, lw=0, zorder=0.5, label="drawn above")
     if picture.span[1] > picture.span[0]:
         axes.set_xlim(*picture.span)
     _legend_above(axes)
@@ -212,15 +149,15 @@ def _draw_spectrum(axes: "Axes", picture: Picture) -> None:
     near = near if near.any() else shown
     frequency, density = picture.frequency[near], picture.density[near]
     lowest = max(0.3 * float(density.min()), 1e-10 * float(density.max()))
-    axes.semilogy(frequency, density, color=_BLUE, lw=1.0, marker=_marker(frequency))
+    axes.semilogy(frequency, density, color=BLUE, lw=1.0, marker=_marker(frequency))
     axes.set_ylim(lowest, 30.0 * float(density.max()))
     axes.set_xlim(0.0, min(highest, max(1.3 * float(frequency[density > lowest][-1]), 2.0 * (line or 0.0))))
     words = "fundamental" if picture.fundamental else "highest peak"
     for wave in picture.passing:
         label = "waves of the wheel pass" if wave == picture.passing[0] else None
-        axes.axvline(wave, color=_VERMILION, ls=_DASHES, lw=0.9, zorder=0.8, label=label)
+        axes.axvline(wave, color=VERMILION, ls=DASHES, lw=0.9, zorder=0.8, label=label)
     if line:
-        axes.axvline(line, color=_GREEN, ls=(0, (1, 1.5)), lw=1.4, zorder=0.9, label=f"{words} {line:.4g} Hz")
+        axes.axvline(line, color=GREEN, ls=(0, (1, 1.5)), lw=1.4, zorder=0.9, label=f"{words} {line:.4g} Hz")
     if axes.get_legend_handles_labels()[1]:
         axes.legend(loc="upper right")
 

@@ -20,7 +20,7 @@ from brakecli.case_reading import parse_case
 from brakecli.errors import BrakecliError, UnreadableResultError, UsageError
 from brakecli.model import HISTORY, ContactState
 from brakecli.picture import Picture, envelope, episodes, gather
-from brakecli.plots import draw, plot_run
+from brakecli.plots import draw, plot_result
 from brakecli.store import new_result, open_result
 
 CASE = """
@@ -90,7 +90,7 @@ def test_each_suffix_gives_a_whole_picture_of_its_kind_and_the_same_bytes_again(
     result = write(tmp_path / "r.h5", sine(2000), frequency=1.0)
     for suffix in (".png", ".SVG", ".pdf"):
         for name in ("a", "b"):
-            plot_run(result, tmp_path / f"{name}{suffix}", force=False)
+            plot_result(result, tmp_path / f"{name}{suffix}", force=False)
         assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes()
     image = imread(tmp_path / "a.png")
     assert image.shape == (1080, 1560, 4)
@@ -154,7 +154,7 @@ def test_a_history_of_few_samples_is_drawn(samples: int, tmp_path: Path) -> None
     for number, moved in enumerate((still, sine(samples))):
         attributes = {"status": "failed", "regime": "undecided", "failure": "t = 0 s: it broke; mend it"}
         result = write(tmp_path / f"{number}.h5", moved, **attributes)
-        plot_run(result, tmp_path / f"{number}.png", force=False)
+        plot_result(result, tmp_path / f"{number}.png", force=False)
         with open_result(result) as stored:
             picture = gather(stored)
         assert picture.detail.time.size == samples
@@ -164,7 +164,7 @@ def test_a_history_of_few_samples_is_drawn(samples: int, tmp_path: Path) -> None
 @pytest.mark.parametrize("scale", [0.0, 1e-300, 1e-12, 1e9, 1e300])
 def test_motions_of_any_size_are_drawn(scale: float, tmp_path: Path) -> None:
     moved = {"x": scale * sine(500)["x"], "vx": scale * sine(500)["vx"], "state": np.full(500, 1)}
-    plot_run(write(tmp_path / "r.h5", moved), tmp_path / "r.png", force=False)
+    plot_result(write(tmp_path / "r.h5", moved), tmp_path / "r.png", force=False)
     assert imread(tmp_path / "r.png").shape == (1080, 1560, 4)
 
 
@@ -226,13 +226,13 @@ def test_another_suffix_is_refused_and_the_three_are_named(tmp_path: Path) -> No
     result = write(tmp_path / "r.h5", sine(500))
     for name in ("r.gif", "r"):
         with pytest.raises(UsageError, match=r"\.pdf, \.png or \.svg"):
-            plot_run(result, tmp_path / name, force=False)
+            plot_result(result, tmp_path / name, force=False)
 
 
 def test_a_result_is_never_replaced_by_its_picture(tmp_path: Path) -> None:
     result = write(tmp_path / "r.png", sine(500))
     with pytest.raises(UsageError, match="the result itself"):
-        plot_run(result, result, force=True)
+        plot_result(result, result, force=True)
 
 
 def test_without_matplotlib_the_message_says_how_to_install_it(
@@ -240,7 +240,7 @@ def test_without_matplotlib_the_message_says_how_to_install_it(
 ) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     with pytest.raises(UsageError, match="pip install"):
-        plot_run(tmp_path / "r.h5", tmp_path / "r.png", force=False)
+        plot_result(tmp_path / "r.h5", tmp_path / "r.png", force=False)
 
 
 def test_a_result_without_what_is_drawn_is_unreadable(tmp_path: Path) -> None:
@@ -253,6 +253,6 @@ def test_a_result_without_what_is_drawn_is_unreadable(tmp_path: Path) -> None:
         result.set_attributes({"kind": "run"})
         result.commit()
     with pytest.raises(BrakecliError) as other:
-        plot_run(tmp_path / "empty.h5", tmp_path / "r.png", force=False)
+        plot_result(tmp_path / "empty.h5", tmp_path / "r.png", force=False)
     assert other.value.exit_code == 4
     assert not (tmp_path / "r.png").exists()
