@@ -351,7 +351,8 @@ class _Bar:
 
     def begin(self, setup: "Setup", found: "Check") -> None:
         if self._bar is not None:
-            self._task = self._bar.add_task("steps", total=found.steps)
+            name = "steps" if found.step is not None else "samples"
+            self._task = self._bar.add_task(name, total=setup.timing.steps)
 
     def advance(self, steps: int) -> None:
         if self._bar is not None:
