@@ -27,6 +27,7 @@ class PiecewiseExact:
         self.grid = grid
         self.generators: dict[tuple[bool, int], NDArray[np.float64]] = {}
         self.propagators: dict[tuple[bool, int], NDArray[np.float64]] = {}
+        self.conditions: dict[tuple[bool, int], NDArray[np.float64]] = {}
 
     def generator(self, touching: bool, side: int) -> NDArray[np.float64]:
         """ż = A z for z = (x, y, vx, vy, 1)."""
@@ -48,6 +49,11 @@ class PiecewiseExact:
 
     def margins(self, touching: bool, side: int) -> Vector:
         """Rows whose products with z are positive while the phase lasts."""
+        if (touching, side) not in self.conditions:
+            self.conditions[touching, side] = self._margins(touching, side)
+        return self.conditions[touching, side]
+
+    def _margins(self, touching: bool, side: int) -> Vector:
         found = [[0.0, -1.0 if touching else 1.0, 0.0, 0.0, 0.0]]
         if touching and side != 0:
             found.append([0.0, 0.0, side, 0.0, -side * self.belt])
@@ -112,7 +118,9 @@ class PiecewiseExact:
         for index in np.flatnonzero(broken | dips):
             row, last = margins[index], 1.0
             if dips[index]:
-                last = brentq(lambda part, row=row: row @ a @ at(part), 0.0, 1.0)
+                if row @ a @ at(1e-9) >= 0.0 or row @ a @ at(1.0) <= 0.0:
+                    continue  # by rounding alone
+                last = brentq(lambda part, row=row: row @ a @ at(part), 1e-9, 1.0)
                 if row @ at(last) >= 0.0:
                     continue
             begin = next((part for part in (1e-9, 1e-6, 1e-4, 1e-2, 0.1) if row @ at(part * last) > 0.0), None)
