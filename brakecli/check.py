@@ -14,6 +14,7 @@ from brakecli.case import Iteration
 from brakecli.contact.pad import NODES_PER_WAVE
 from brakecli.errors import RefusedError
 from brakecli.history import ROW_BYTES
+from brakecli.schemes import has_own_steps
 from brakecli.setup import Setup
 
 MOST_STEPS = 1e11
@@ -27,6 +28,9 @@ _NODE_SECONDS = 1.2e-9  # per node, and again per node and wave of the wheel:
 _NODE_WAVE_SECONDS = 4e-10
 _EXACT_SECONDS = 1.5e-7  # per pair of waves in each cell
 _EVALUATIONS = 3.0  # of the contact in a step
+_OWN_STEPS = 25.0  # in a period, of a scheme that finds them itself, at a tolerance of 1e-10
+_OWN_STEP_SECONDS = 4e-6
+_OWN_EVALUATIONS = 27.0
 
 _UNSTABLE = 1e-5  # growth per step that no rounding of the eigenvalues explains
 _COARSE_NODES = NODES_PER_WAVE / 2
@@ -42,7 +46,7 @@ class Check:
     natural_frequencies: tuple[float, float]  # on the links and the contact that touches everywhere
     link_frequencies: tuple[float, float]
     passing_frequency: float  # of the shortest wave of the wheel
-    step: float
+    step: float | None  # None: the scheme finds its steps itself, and `steps` is a rough guess
     steps: int
     steps_per_period: float
     limits: StepLimits
@@ -66,7 +70,9 @@ def check(setup: Setup) -> Check:
     shortest = max([*setup.shoe.turns, *setup.wheel.turns], default=0.0)
     waves = 2.0 * case.contact.half_length * shortest
     limits = step_limits(setup.coefficients, setup.weights, setup.scheme, stiffness, setup.wheel)
-    per_period = 1.0 / (frequencies[1] * times.step) if frequencies[1] > 0.0 else math.inf
+    own = has_own_steps(setup.scheme)
+    steps = _own_steps(setup, frequencies[1], passing * waves) if own else times.steps
+    per_period = 1.0 / (frequencies[1] * times.step) if frequencies[1] > 0.0 and not own else math.inf
     found = Check(
         coefficients=setup.coefficients._asdict(),
         belt_speed=setup.belt_speed,
@@ -74,14 +80,14 @@ def check(setup: Setup) -> Check:
         natural_frequencies=frequencies,
         link_frequencies=natural_frequencies(setup.coefficients, 0.0),
         passing_frequency=passing,
-        step=times.step,
-        steps=times.steps,
+        step=None if own else times.step,
+        steps=steps,
         steps_per_period=per_period,
         limits=limits,
         evaluator=setup.evaluator,
         nodes=setup.nodes,
         nodes_per_wave=setup.nodes / waves if setup.nodes and waves > 0.0 else None,
-        seconds=times.steps * _seconds_per_step(setup, waves),
+        seconds=steps * _seconds_per_step(setup, waves),
         memory=1.5e8 + 8.0 * setup.nodes * (2 * len(setup.wheel.g) + 2),
         file_size=float(times.samples) * ROW_BYTES + 1e5,
         adjustments=times.adjustments,
@@ -90,11 +96,25 @@ def check(setup: Setup) -> Check:
     return _with_warnings(setup, found)
 
 
+def _own_steps(setup: Setup, frequency: float, patches: float) -> int:
+    """A rough guess at the steps of a scheme that finds them itself: some in a period, more where patches change.
+
+    `frequency` (Hz) is the highest natural one, `patches` (1/s) how many waves pass each other on the pad.
+    """
+    tolerance = setup.case.solver.tolerance or 1.0
+    in_a_period = _OWN_STEPS * (1e-10 / tolerance) ** 0.125
+    return 1 + int(setup.timing.samples * setup.timing.interval * (frequency * in_a_period + 4.0 * patches))
+
+
 def _seconds_per_step(setup: Setup, waves: float) -> float:
     """A rough guess at the time of one step."""
     n_1, n_2 = len(setup.shoe.g), len(setup.wheel.g)
+    own = has_own_steps(setup.scheme)
     if setup.evaluator == "exact":
-        return _STEP_SECONDS + _EVALUATIONS * _EXACT_SECONDS * (1.0 + waves) * (n_1 + n_2) ** 2
+        evaluations = _OWN_EVALUATIONS if own else _EVALUATIONS
+        return _STEP_SECONDS + evaluations * _EXACT_SECONDS * (1.0 + waves) * (n_1 + n_2) ** 2
+    if own:
+        return _OWN_STEP_SECONDS * (1.0 + n_2**2 / 20.0)
     if setup.nodes:
         return _STEP_SECONDS + _EVALUATIONS * setup.nodes * (_NODE_SECONDS + _NODE_WAVE_SECONDS * n_2)
     return _STEP_SECONDS * (1.0 + n_2**2 / 20.0)
@@ -109,7 +129,7 @@ def _with_warnings(setup: Setup, found: Check) -> Check:
             f"({found.natural_frequencies[1]:.4g} Hz): it is not resolved; take a step of at most "
             f"{1.0 / (RESOLVED * found.natural_frequencies[1]):.2g} s"
         )
-    if found.passing_frequency * found.step > 1.0 / RESOLVED:
+    if found.step is not None and found.passing_frequency * found.step > 1.0 / RESOLVED:
         warnings.append(
             f"solver.step: {1.0 / (found.passing_frequency * found.step):.3g} steps per passing wave of the wheel "
             f"({found.passing_frequency:.4g} Hz); take a step of at most "
@@ -135,7 +155,7 @@ def _with_warnings(setup: Setup, found: Check) -> Check:
         warnings.append(
             f"solver.iteration: the fixed-point iteration may diverge (its bound of contraction is "
             f'{limits.contraction:.3g}, above 1); take "newton", or a step of at most '
-            f"{found.step / math.sqrt(limits.contraction):.2g} s"
+            f"{setup.timing.step / math.sqrt(limits.contraction):.2g} s"
         )
     if not limits.unique:
         warnings.append(
@@ -187,7 +207,8 @@ def refuse(setup: Setup, found: Check, free_bytes: float) -> None:
         f"about {found.steps:.3g} steps, {duration_text(found.seconds)}, {found.memory / 1e6:.0f} MB of memory, "
         f"a file of {found.file_size / 1e6:.3g} MB"
     )
-    remedy = "reduce solver.duration, or increase solver.step or output.sample_interval"
+    coarser = "solver.tolerance" if found.step is None else "solver.step"
+    remedy = f"reduce solver.duration, or increase {coarser} or output.sample_interval"
     if found.steps > MOST_STEPS or found.seconds > MOST_SECONDS:
         raise RefusedError(f"the run is too long: {size}; {remedy}")
     if found.file_size > min(MOST_BYTES, free_bytes):

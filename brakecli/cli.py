@@ -129,7 +129,7 @@ def run_command(
             bar.advance(steps)
 
         def begin(setup: "Setup", found: "Check") -> None:
-            bar.begin("steps", found.steps)
+            bar.begin("steps" if found.step is not None else "samples", setup.timing.steps)
 
         report = run(loaded, target, force=force, begin=begin, progress=progress)
     for line in (*report.check.adjustments, *(f"warning: {warning}" for warning in report.warnings)):

@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from brakecli.analysis.stability import Crossing, Mode
+from brakecli.case import Solver
 from brakecli.check import Check
 from brakecli.classify import braking_torque
 from brakecli.model import COEFFICIENTS
@@ -45,9 +46,9 @@ def run_table(report: RunReport) -> str:
         ("braking torque", _unit(braking_torque(verdict, report.setup), "N m")),
         ("stick, lost contact", f"{verdict.stick_fraction:.2%}, {verdict.contact_loss_fraction:.2%} of the time"),
         ("settled part", f"from {verdict.settled_from * times.interval:.4g} s on"),
-        ("scheme", f"{report.setup.case.solver.scheme} {_weights(report)}, {report.setup.case.solver.iteration}"),
+        ("scheme", _scheme(report.setup.case.solver)),
         ("contact", shares + (f", {report.setup.nodes} nodes" if "midpoint" in work.evaluators else "")),
-        ("steps", f"{work.steps} of {times.step:.4g} s, {work.contact_evaluations} contact evaluations"),
+        ("steps", f"{work.steps}{_step(report)}, {work.contact_evaluations} contact evaluations"),
         ("energy account", f"closes to {abs(energy.relative_closing_error):.1e} of its largest item"),
         ("time of the loop", f"{work.solve_seconds:.3g} s"),
         ("file", str(report.output)),
@@ -75,7 +76,10 @@ def check_table(title: str, found: Check) -> str:
         ("natural frequencies", f"{low:.5g} and {high:.5g} Hz in full contact"),
         ("without contact", f"{link_low:.5g} and {link_high:.5g} Hz"),
         ("shortest wave passes at", _unit(found.passing_frequency, "Hz")),
-        ("step", f"{found.step:.6g} s, {found.steps} steps"),
+        (
+            "step",
+            f"{found.step:.6g} s, {found.steps} steps" if found.step else f"its own, about {found.steps} steps",
+        ),
         ("steps per period", f"{found.steps_per_period:.4g} of the fastest motion"),
         ("fixed-point contraction", f"{limits.contraction:.3g} (it may diverge from 1 on)"),
         ("solution of a step", "sure to be unique" if limits.unique else "not sure to be unique"),
@@ -258,8 +262,15 @@ def _infinite(value: object) -> bool:
     return isinstance(value, float) and math.isinf(value)
 
 
-def _weights(report: RunReport) -> str:
-    return "(" + ", ".join(f"{weight:.4g}" for weight in report.setup.case.solver.theta) + ")"
+def _scheme(solver: Solver) -> str:
+    if solver.tolerance is not None:
+        return f"{solver.scheme}, tolerance {solver.tolerance:.4g}"
+    weights = ", ".join(f"{weight:.4g}" for weight in solver.theta)
+    return f"{solver.scheme} ({weights}), {solver.iteration}"
+
+
+def _step(report: RunReport) -> str:
+    return "" if report.check.step is None else f" of {report.check.step:.4g} s"
 
 
 def _unit(value: float | None, unit: str) -> str:

@@ -16,6 +16,7 @@ from brakecli.analysis.stability import Crossing, Instability, Mode, crossings, 
 from brakecli.errors import CaseError
 from brakecli.kernels import Coefficients
 from brakecli.schedules import value_at
+from brakecli.schemes import has_own_steps
 from brakecli.setup import Setup
 
 LARGEST_FRICTION = 10.0
@@ -31,9 +32,10 @@ StiffnessAt = Callable[[float], float]
 class Discrete:
     """What the case's scheme makes of the same motion at its step.
 
-    `spectral_radius`: factor of the fastest disturbance in a step at the case's φ; `growth` (1/s) is its
-    logarithm over the step. `step_limit` (s): the frictionless shoe is stable below; None where any step is.
-    `critical_friction`: where the radius passes one, `bias` its distance from the exact one.
+    `spectral_radius`: factor of the fastest disturbance in a step at the case's φ (in a sample interval, where the
+    scheme finds its steps itself); `growth` (1/s) is its logarithm over that time. `step_limit` (s): the
+    frictionless shoe is stable below; None where any step is. `critical_friction`: where the radius passes one,
+    `bias` its distance from the exact one.
     """
 
     spectral_radius: float
@@ -125,7 +127,7 @@ def stability(setup: Setup) -> StabilityReport:
         crossings=tuple(found),
         undamped_flutter=flutter,
         undamped_divergence=divergence,
-        discrete=_discrete(setup, stiffness_at, lost) if rest else None,
+        discrete=_discrete(setup, stiffness_at, lost, fastest) if rest else None,
     )
 
 
@@ -181,11 +183,15 @@ def _rough_crossings(c: Coefficients, belt: float, stiffness_at: StiffnessAt) ->
     return found
 
 
-def _discrete(setup: Setup, stiffness_at: StiffnessAt, exact: Crossing | None) -> Discrete | None:
-    """What the scheme makes of steady sliding; nothing where there is none, or no contact."""
+def _discrete(setup: Setup, stiffness_at: StiffnessAt, exact: Crossing | None, fastest: float) -> Discrete | None:
+    """What the scheme makes of steady sliding, which grows with `fastest` (1/s); None without contact."""
     c, belt = setup.coefficients, setup.belt_speed
     if belt == 0.0 or not stiffness_at(c.phi) > 0.0:
         return None
+    if has_own_steps(setup.scheme):  # it makes of it what it is
+        critical = exact.friction if exact else None
+        bias = 0.0 if exact else None
+        return Discrete(math.exp(fastest * setup.weights.h), fastest, None, critical, bias)
 
     def radius(phi: float, h: float = setup.weights.h) -> float:
         k = stiffness_at(phi)

@@ -3,10 +3,8 @@
 On flat surfaces every phase (touching or open; slip either way or stick) is linear with constant coefficients.
 Phases are advanced by exact propagators over a fine grid; where a phase's condition breaks, the instant is
 found by root finding on the exact solution, as the series of its matrix exponential. A condition that breaks and
-holds again within one step of the grid is not seen: the grid is to be fine beside every motion.
+holds again within one step of the grid is found by its slope; the grid is to be fine beside every motion.
 """
-
-from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +27,7 @@ class PiecewiseExact:
         self.grid = grid
         self.generators: dict[tuple[bool, int], NDArray[np.float64]] = {}
         self.propagators: dict[tuple[bool, int], NDArray[np.float64]] = {}
+        self.conditions: dict[tuple[bool, int], NDArray[np.float64]] = {}
 
     def generator(self, touching: bool, side: int) -> NDArray[np.float64]:
         """ż = A z for z = (x, y, vx, vy, 1)."""
@@ -48,15 +47,22 @@ class PiecewiseExact:
         c = self.c
         return float(c.b_xx * self.belt + c.b_xy * z[3] + c.c_xx * z[0] + c.c_xy * z[1] + self.q_x)
 
-    def margins(self, touching: bool, side: int) -> list[Callable[[Vector], float]]:
-        """Functions that are positive while the phase lasts."""
-        found: list[Callable[[Vector], float]] = [lambda z: -z[1] if touching else z[1]]
+    def margins(self, touching: bool, side: int) -> Vector:
+        """Rows whose products with z are positive while the phase lasts."""
+        if (touching, side) not in self.conditions:
+            self.conditions[touching, side] = self._margins(touching, side)
+        return self.conditions[touching, side]
+
+    def _margins(self, touching: bool, side: int) -> Vector:
+        found = [[0.0, -1.0 if touching else 1.0, 0.0, 0.0, 0.0]]
         if touching and side != 0:
-            found.append(lambda z: side * (z[2] - self.belt))
+            found.append([0.0, 0.0, side, 0.0, -side * self.belt])
         if touching and side == 0:
-            found.append(lambda z: -self.phi * self.stiffness * z[1] - self.needed(z))
-            found.append(lambda z: -self.phi * self.stiffness * z[1] + self.needed(z))
-        return found
+            c = self.c
+            needed = np.array([c.c_xx, c.c_xy, 0.0, c.b_xy, c.b_xx * self.belt + self.q_x])
+            bound = np.array([0.0, -self.phi * self.stiffness, 0.0, 0.0, 0.0])
+            found += [list(bound - needed), list(bound + needed)]
+        return np.array(found)
 
     def next_phase(self, z: Vector, touching: bool, side: int, event: int) -> tuple[bool, int]:
         """The phase after the condition `event` of this phase broke at z."""
@@ -90,15 +96,13 @@ class PiecewiseExact:
 
     def _advance(self, z: Vector, span: float, touching: bool, side: int) -> tuple[Vector, float, bool, int]:
         a = self.generator(touching, side)
-        if span == self.grid:
-            if (touching, side) not in self.propagators:
-                self.propagators[touching, side] = expm(a * span)
-            end = self.propagators[touching, side] @ z
-        else:
-            end = expm(a * span) @ z
+        if (touching, side) not in self.propagators:
+            self.propagators[touching, side] = expm(a * self.grid)
+        end = self.propagators[touching, side] @ z if span == self.grid else expm(a * span) @ z
         margins = self.margins(touching, side)
-        broken = [index for index, margin in enumerate(margins) if margin(end) < 0.0]
-        if not broken:
+        broken = margins @ end < 0.0
+        dips = ~broken & (margins @ (a @ z) < 0.0) & (margins @ (a @ end) > 0.0)
+        if not broken.any() and not dips.any():
             return end, 0.0, touching, side
         terms = [z]  # of the series of expm(a t) z, with t in spans: a step of the grid is a part of a period
         for power in range(1, 30):
@@ -111,12 +115,19 @@ class PiecewiseExact:
             return total
 
         first, which = 1.0, -1
-        for index in broken:
-            begin = next((part for part in (1e-9, 1e-6, 1e-4, 1e-2, 0.1) if margins[index](at(part)) > 0.0), None)
+        for index in np.flatnonzero(broken | dips):
+            row, last = margins[index], 1.0
+            if dips[index]:
+                if row @ a @ at(1e-9) >= 0.0 or row @ a @ at(1.0) <= 0.0:
+                    continue  # by rounding alone
+                last = brentq(lambda part, row=row: row @ a @ at(part), 1e-9, 1.0)
+                if row @ at(last) >= 0.0:
+                    continue
+            begin = next((part for part in (1e-9, 1e-6, 1e-4, 1e-2, 0.1) if row @ at(part * last) > 0.0), None)
             if begin is not None:
-                root = brentq(lambda part, m=margins[index]: m(at(part)), begin, 1.0, xtol=1e-15, rtol=1e-14)
+                root = brentq(lambda part, row=row: row @ at(part), begin * last, last, xtol=1e-15, rtol=1e-14)
                 if root < first:
-                    first, which = root, index
+                    first, which = root, int(index)
         if which < 0:
             return end, 0.0, touching, side
         z = at(first)

@@ -70,7 +70,7 @@ def thetas(scheme: str) -> st.SearchStrategy[dict[str, Any]]:
 links = st.fixed_dictionaries(
     {"stiffness": non_negatives}, optional={"damping": non_negatives, "angle_deg": angles}
 )
-solvers = st.builds(
+layer_solvers = st.builds(
     lambda first, second: first | second,
     st.sampled_from(["two-layer", "three-layer"]).flatmap(thetas),
     st.fixed_dictionaries(
@@ -78,6 +78,18 @@ solvers = st.builds(
         optional={"iteration": st.sampled_from(list(Iteration)).map(str), "allow_unconverged": st.booleans()},
     ),
 )
+solvers = layer_solvers | st.fixed_dictionaries(
+    {"scheme": st.just("event-driven"), "tolerance": st.floats(1e-13, 1e-2), "duration": positives}
+)
+
+
+def with_what_the_scheme_needs(document: dict[str, Any]) -> dict[str, Any]:
+    if document["solver"].get("scheme") == "event-driven":
+        document["output"] = {"sample_interval": document["solver"]["duration"]}
+        document["contact"].pop("evaluator", None)
+    return document
+
+
 documents = st.fixed_dictionaries(
     {
         "shoe": st.fixed_dictionaries({"mass": positives}),
@@ -111,7 +123,7 @@ documents = st.fixed_dictionaries(
             | dict.fromkeys(["x", "y", "vx", "vy"], numbers),
         ),
     },
-)
+).map(with_what_the_scheme_needs)
 
 
 @given(documents)

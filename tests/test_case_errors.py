@@ -74,6 +74,11 @@ VARYING = (
     .replace("wavelengths = [0.02, 0.011]", "wavenumbers = [300.0, 500.0]")
     .replace("[1e-6, 8e-7]\nwavenumbers = [300.0, 500.0]", "[1e-6, 8e-7]\nwavelengths = [0.02, 0.011]")
 )
+EVENT_DRIVEN = (
+    CONSTANT.replace('"two-layer"', '"event-driven"')
+    .replace("theta = [0.5, 0.5]\n", "")
+    .replace("step = 1e-5", "tolerance = 1e-10")
+)
 
 VALUES = ("nan", "inf", "-1", "0", "1e999", "1e-320", '"text"', "true", "2020-01-01", "[1, 2]")
 """What is put into every field, as TOML."""
@@ -118,6 +123,7 @@ ALLOWED = {
     "solver.iteration": set(),
     "solver.start": set(),
     "solver.step": POSITIVE,
+    "solver.tolerance": set(),
     "solver.duration": POSITIVE,
     "solver.allow_unconverged": {"true"},
     "output.sample_interval": POSITIVE,
@@ -162,7 +168,7 @@ def where(text: str, *overrides: str) -> list[tuple[str, str]]:
 def put(key: str, value: str) -> tuple[str, int]:
     """A case with a value written into one of its fields, and the line of that field."""
     table, _, name = key.rpartition(".")
-    for text in (CONSTANT, VARYING):
+    for text in (CONSTANT, VARYING, EVENT_DRIVEN):
         lines = text.splitlines()
         first = lines.index(f"[{table}]") if table else -1
         for index in range(first + 1, len(lines)):
@@ -177,6 +183,7 @@ def put(key: str, value: str) -> tuple[str, int]:
 def test_the_cases_of_this_file_are_valid() -> None:
     parse_case(CONSTANT, "constant")
     parse_case(VARYING, "varying")
+    parse_case(EVENT_DRIVEN, "event-driven")
 
 
 def test_the_table_of_allowed_values_has_every_field() -> None:
@@ -236,6 +243,7 @@ def test_a_problem_reads_file_line_key_what_found_and_remedy() -> None:
 
 REMEDIES = {
     ("contact.evaluator", '"quick"'): 'give one of "auto", "closed-form", "midpoint", "exact"',
+    ("solver.tolerance", "1e-14"): "give a number from 1e-13 to 0.01",
     ("contact.nodes", "1"): "give a whole number from 2 to 10000000",
     ("link1.angle_deg", "91"): "give a number from -90 to 90, in deg",
     ("link1.damping", "-1"): "give a number of at least 0, in N·s/m",
@@ -308,6 +316,50 @@ def test_the_paper_start_needs_a_shoe_at_rest() -> None:
     parse_case(three, "case.toml", ['initial.at="equilibrium"', "initial.x=1e-6"])
     moving = change(three, ("vy = 0.0", "vy = 0.1"))
     assert where(moving) == [(lines_of(moving, "start")[0], "solver.start")]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "what"),
+    [
+        (
+            "tolerance = 1e-10",
+            "step = 1e-5",
+            "solver.step",
+            "is not for event-driven, which finds its steps itself",
+        ),
+        ("tolerance = 1e-10", "", "solver.step", "is missing; give step, or tolerance"),
+        (
+            "tolerance = 1e-10",
+            "tolerance = 1e-10\nstep = 1e-5",
+            "solver.tolerance",
+            "is given together with step (found 1e-10); keep one of the two",
+        ),
+        ("duration = 1.0", "duration = 1.0\ntheta = [0.5, 0.5]", "solver.theta", "which has no weights"),
+        ('"newton"', '"fixed-point"', "solver.iteration", "which solves no equations in a step"),
+        ('"consistent"', '"paper"', "solver.start", "is for the three-layer scheme alone"),
+        ("= false", "= true", "solver.allow_unconverged", "in which nothing has to converge"),
+        ("sample_interval = 1e-4", "", "output.sample_interval", "there is no time step to take its place"),
+        ('"auto"', '"midpoint"', "contact.evaluator", "has a kink at every node, and event-driven is exact"),
+    ],
+)
+def test_what_is_not_for_the_event_driven_scheme_is_told(old: str, new: str, line: str, what: str) -> None:
+    first, *_ = told(change(EVENT_DRIVEN, (old, new)))
+    assert f" {line}: " in first
+    assert what in first
+
+
+@pytest.mark.parametrize("scheme", ["two-layer", "three-layer"])
+def test_a_tolerance_is_not_yet_for_a_scheme_of_layers(scheme: str) -> None:
+    text = change(EVENT_DRIVEN, ("event-driven", scheme))
+    (line,) = told(text)
+    assert f"solver.tolerance: is not yet for {scheme}, but for event-driven alone (found 1e-10)" in line
+
+
+def test_an_override_makes_a_case_event_driven() -> None:
+    solver = parse_case(
+        CONSTANT, "case.toml", ['solver.scheme="event-driven"', "solver.tolerance=1e-10", "solver.theta=[]"]
+    ).case.solver
+    assert (solver.step, solver.theta, solver.tolerance) == (None, (), 1e-10)
 
 
 def test_an_interval_of_one_step_to_rounding_is_allowed() -> None:

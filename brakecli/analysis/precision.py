@@ -25,6 +25,7 @@ from brakecli.kernels import (
     Y,
 )
 from brakecli.roughness import Surface, surface
+from brakecli.schemes import has_own_steps
 
 RESOLVED = 20
 """Steps per period (and per passing wave) below which a warning names the number."""
@@ -52,7 +53,12 @@ class StepLimits:
 
 
 def step_limits(c: Coefficients, s: Weights, scheme: Any, contact_stiffness: float, wheel: Surface) -> StepLimits:
-    """The limits of a scheme at its step, for a contact of stiffness 2ak (N/m) on this wheel."""
+    """The limits of a scheme at its step, for a contact of stiffness 2ak (N/m) on this wheel.
+
+    A scheme that finds its steps itself solves no equations in them and is as stable as the motion.
+    """
+    if has_own_steps(scheme):
+        return StepLimits(contraction=0.0, unique=True, growth=1.0)
     problem = np.zeros(PROBLEM_SIZE)
     scheme.prepare(c, s, np.zeros(STATE_SIZE), 0.0, 0.0, 0.0, problem)
     a_11, a_12, a_22, gain = (float(problem[i]) for i in (A_11, A_12, A_22, GAIN))
@@ -71,6 +77,7 @@ def step_limits(c: Coefficients, s: Weights, scheme: Any, contact_stiffness: flo
 def amplification(c: Coefficients, s: Weights, scheme: Any, contact_stiffness: float) -> NDArray[np.float64]:
     """Amplification matrix of a scheme for steady sliding in full, smooth contact (stiffness 2ak, N/m), U > 0.
 
+    The scheme is one that steps on the grid of the case.
     It acts on the scheme's own memory of the motion, with velocities times h. The scheme's own step is taken
     from a deep, loaded equilibrium and from neighbours of it: while nothing opens or sticks, the step is affine
     and differences are exact.
