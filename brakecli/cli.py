@@ -248,6 +248,65 @@ def sweep_command(
         )
 
 
+@app.command("compare-schemes")
+def compare_command(
+    case: CaseArgument,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output", "-o", metavar="PATH", help="Result file  [default: the case's name with -schemes.h5, here]"
+        ),
+    ] = None,
+    overrides: Override = None,
+    schemes: Annotated[
+        str | None,
+        typer.Option("--schemes", metavar="NAME,…", help="Only these: two-layer, three-layer, event-driven."),
+    ] = None,
+    steps: Annotated[
+        str | None, typer.Option("--steps", metavar="H,…", help="Time steps in s, whole parts of the largest.")
+    ] = None,
+    budget: Annotated[
+        float, typer.Option("--budget", metavar="SECONDS", min=1.0, max=86400.0, help="Time to spend, about.")
+    ] = 60.0,
+    target_error: Annotated[
+        float,
+        typer.Option("--target-error", metavar="E", min=1e-12, max=1.0, help="Name the cheapest that meets it."),
+    ] = 1e-3,
+    force: Force = False,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+) -> None:
+    """Compare every scheme, its weights, starts and iterations by error and cost; recommend one."""
+    loaded = _load(case, overrides)
+    target = output or Path(("case" if case == "-" else Path(case).stem) + "-schemes.h5")
+    _announce_compilation(quiet)
+    from brakecli.compare.comparison import compare
+    from brakecli.compare.methods import parse_schemes, parse_steps
+    from brakecli.compare.result import ComparisonReport, write
+    from brakecli.output import new_output
+    from brakecli.report import comparison_table
+    from brakecli.run import load_kernels
+
+    chosen, ladder = parse_schemes(schemes), parse_steps(steps)
+    load_kernels(loaded)
+    with unwinding() as recall, _progress(quiet) as bar:
+        with new_output(target, force=force):  # whether it can be written is known before anything is computed
+            pass
+
+        def progress(what: str, done: int, total: int) -> None:
+            recall()
+            bar.begin(what, total)
+            bar.advance(done)
+
+        found = compare(loaded.case, schemes=chosen, steps=ladder, budget=budget, progress=progress)
+        report = ComparisonReport(target, loaded.case.title, found, target_error)
+        write(target, loaded, report, force=force)
+    if as_json:
+        _print_json({"command": "compare-schemes", "output": str(target), **report.numbers()})
+    elif not quiet:
+        _print(comparison_table(report))
+
+
 @app.command("check")
 def check_command(
     case: Annotated[
@@ -313,9 +372,10 @@ def schema_command(
 ) -> None:
     """Print the JSON Schema of case files, or of sweep files, for editors that know TOML."""
     from brakecli.case import Case, json_schema
+    from brakecli.case_table import Table
     from brakecli.sweep.tables import Sweep
 
-    tables = {"case": Case, "sweep": Sweep}
+    tables: dict[str, type[Table]] = {"case": Case, "sweep": Sweep}
     if kind not in tables:
         raise UsageError(f"schema {kind}: there is none; give {' or '.join(tables)}")
     _print_json(json_schema(tables[kind]), indent=2)
@@ -511,7 +571,9 @@ class _Bar:
         self._bar, self._task = bar, None
 
     def begin(self, what: str, total: int) -> None:
-        if self._bar is not None:
+        if self._bar is not None and self._task is not None:
+            self._bar.update(self._task, description=what, total=total)
+        elif self._bar is not None:
             self._task = self._bar.add_task(what, total=total)
 
     def advance(self, done: int, what: str | None = None) -> None:

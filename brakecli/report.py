@@ -15,6 +15,8 @@ from brakecli.analysis.stability import Crossing, Mode
 from brakecli.case import Solver
 from brakecli.check import Check
 from brakecli.classify import braking_torque
+from brakecli.compare.comparison import Entry
+from brakecli.compare.result import ComparisonReport
 from brakecli.model import COEFFICIENTS
 from brakecli.run import RunReport
 from brakecli.stability import Discrete, StabilityReport
@@ -201,6 +203,59 @@ def _points_table(report: SweepReport) -> str:
 
 def _cell(value: object) -> str:
     return "-" if value is None else f"{value:.5g}" if isinstance(value, float) else str(value)
+
+
+def comparison_table(report: ComparisonReport) -> str:
+    """The entries that no other beats, the finest of each other method, and what is recommended."""
+    found, best = report.comparison, report.recommended
+    able = [entry for entry in found.entries if entry.errors is not None]
+    failed = [entry for entry in found.entries if entry.work is not None and entry.errors is None]
+    front = sorted((entry for entry in able if entry.on_front), key=lambda entry: entry.wall_seconds or 0.0)
+    finest = {entry.rung.method: entry for entry in able if not entry.on_front}
+    headers = ("method", "step, s", "error", "order", "bias of φ", "evaluations", "time, ms")
+    rows: Rows = [
+        ("compared over", f"{found.duration:.6g} s of motion"),
+        ("reference", f"event-driven, good to {found.reference_error:.1e}, {found.reference_seconds:.3g} s"),
+        ("times", f"median of {found.repeats} turns, of the loop alone"),
+    ]
+    if found.left_out:
+        rows.append(("left out", f"{found.left_out} entries, for want of time: give a larger --budget"))
+    if failed:
+        rows.append(("failed", f"{len(failed)} entries, such as {_name(failed[0])}: {failed[0].failure}"))
+    if best is None or best.errors is None:
+        rows.append(("recommended", f"none meets {report.target:g}"))
+    else:
+        error = best.errors.error
+        margin = f"error {error:.2g}, {report.target / error:.3g} times below {report.target:g}"
+        rows.append(("recommended", f"{_name(best)}: {margin}"))
+    rows.append(("file", str(report.output)))
+    parts = [
+        "No other is better in both error and time:\n" + _grid(headers, [_entry_row(entry) for entry in front]),
+        "The finest of the others:\n" + _grid(headers, [_entry_row(entry) for entry in finest.values()]),
+        _table(report.title, rows),
+    ]
+    return "\n\n".join(parts)
+
+
+def _name(entry: Entry) -> str:
+    rung = entry.rung
+    return f"{rung.method.label()}, " + (
+        f"step {rung.step:.3g} s" if rung.step is not None else f"tolerance {rung.tolerance:g}"
+    )
+
+
+def _entry_row(entry: Entry) -> tuple[str, ...]:
+    rung, work = entry.rung, entry.work
+    bias = entry.critical_bias
+    return (
+        rung.method.label(),
+        f"{rung.step:.3g}" if rung.step is not None else f"to {rung.tolerance:g}",
+        f"{entry.errors.error:.2e}" if entry.errors is not None else "-",
+        "-" if entry.order is None else f"{entry.order:.2f}",
+        "-" if bias is None else f"{bias:.1e}",
+        str(work.contact_evaluations if work else 0),
+        "-" if entry.wall_seconds is None else f"{entry.wall_seconds * 1e3:.3g}",
+    )
 
 
 def estimate_table(title: str, found: Estimate) -> str:

@@ -19,6 +19,8 @@ from brakecli.stored import FORMAT, FORMAT_VERSION, StoredResult, Variable, dige
 
 __all__ = ["ResultFile", "StoredResult", "Variable", "is_hdf5", "new_result", "open_result"]
 
+FILL = 9.969209968386869e36
+"""What netCDF puts where a number is missing; it stands in the attribute ``_FillValue`` then."""
 _CHUNK = 16384
 """Values in a chunk, at most: 128 KiB of float64."""
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from brakecli import contact
 from brakecli.analysis.precision import spectral_radius
 from brakecli.case import Case, Evaluator, Iteration, Scheme, Start
 from brakecli.check import check, refuse, within_range
@@ -18,7 +19,7 @@ from brakecli.compare.methods import Method, Rung, case_of, ladder, methods, run
 from brakecli.errors import BrakecliError, RefusedError
 from brakecli.model import Failure
 from brakecli.run import failure_sentence
-from brakecli.schemes import has_own_steps
+from brakecli.schemes import has_own_steps, load
 from brakecli.setup import Setup, set_up
 from brakecli.simulate import Motion, Work
 from brakecli.stability import MARGIN, StabilityReport, stability
@@ -40,11 +41,19 @@ class Entry:
     errors: Errors | None = None
     work: Work | None = None
     failure: str = ""
+    samples: int = 0
     seconds: list[float] = field(default_factory=list)
     order: float | None = None
     critical_bias: float | None = None
     step_limit: float | None = None  # s; infinite where any step is stable
     on_front: bool = False
+
+    @property
+    def iterations(self) -> int:
+        """Evaluations of the contact in the steps, one for each iteration; none where steps are explicit."""
+        if self.work is None or self.rung.step is None:
+            return 0
+        return self.work.contact_evaluations - self.samples
 
     @property
     def wall_seconds(self) -> float | None:
@@ -88,9 +97,12 @@ def compare(
     progress: Progress = lambda what, done, total: None,
 ) -> Comparison:
     """Compare the methods on a case within about `budget` s. Raises RefusedError where there is no reference."""
-    begin = time.perf_counter()
     with within_range():
         setup = set_up(case)
+        kinds = methods(setup, schemes)
+        for method in kinds:  # compilation is no part of the budget
+            _ = load(method.scheme), contact.load("exact" if method.evaluator == "auto" else method.evaluator)
+        begin = time.perf_counter()
         found = ladder(setup, steps)
         interval = found[0]
         report = stability(setup)
@@ -98,7 +110,6 @@ def compare(
         duration, reference, reference_seconds = _reference(case, interval, REFERENCE_SHARE * budget)
         rough_reference = _rows(_reference_case(case, interval, duration, CHECK))[0]
         reference_error = errors(rough_reference, reference, interval).error
-        kinds = methods(setup, schemes)
         entries = [Entry(rung) for method in kinds for rung in rungs(method, found)]
         left_out = _first_round(case, entries, reference, (interval, duration), begin + 0.8 * budget, progress)
         _judge(setup, report, entries)
@@ -117,8 +128,7 @@ def _reference_case(case: Case, interval: float, duration: float, tolerance: flo
 def _rows(case: Case) -> tuple[NDArray[np.float64], Work]:
     """Samples and work of a run; raises RefusedError."""
     setup = set_up(case)
-    if not has_own_steps(setup.scheme):
-        refuse(setup, check(setup), math.inf)
+    refuse(setup, check(setup), math.inf)
     blocks: list[NDArray[np.float64]] = []
     work, _ = Motion(setup).run(lambda rows: blocks.append(rows.copy()))
     return np.concatenate(blocks), work
@@ -166,7 +176,7 @@ def _first_round(
             entry.failure = " ".join(str(error).split())
             continue
         last[entry.rung.method] = work.solve_seconds
-        entry.work = work
+        entry.work, entry.samples = work, len(rows)
         if work.failure is not Failure.NONE:
             entry.failure = failure_sentence(work)
         else:

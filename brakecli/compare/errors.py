@@ -20,8 +20,8 @@ class Errors:
 
     `largest` of each quantity over the samples; `mean`: the same in the mean over time (L1), as one sample on
     the other side of a jump of the friction force makes its largest error 2. `error`: the largest of x, y, vx
-    and vy. `amplitude` and `phase` (rad): of the strongest line of vx over the last quarter of the time, None where
-    there is none.
+    and vy. `amplitude` and `phase` (rad): of the strongest line of vx over the last quarter of the time, None
+    where there is none.
     """
 
     error: float

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from brakecli.analysis.precision import natural_frequencies
 from brakecli.case import Case, Evaluator, Iteration, Scheme, Start, changed
+from brakecli.errors import UsageError
 from brakecli.setup import Setup
 
 HALF, QUARTERS, NUMEROV = (0.5, 0.5), (0.25, 0.5, 0.25), (1 / 12, 10 / 12, 1 / 12)
@@ -32,9 +33,8 @@ class Method(NamedTuple):
         start = ", paper's start" if self.start is Start.PAPER else ""
         iteration = ", fixed point" if self.iteration is Iteration.FIXED_POINT else ""
         nodes = f", {self.nodes} nodes" if self.evaluator is Evaluator.MIDPOINT else ""
-        return f"{self.scheme}{weights}{start}{iteration}{nodes}" + (
-            ", exact contact" if self.evaluator is Evaluator.EXACT and self.scheme is not Scheme.EVENT_DRIVEN else ""
-        )
+        exact = ", exact contact" if self.evaluator is Evaluator.EXACT else ""
+        return f"{self.scheme}{weights}{start}{iteration}{nodes}{exact}"
 
 
 class Rung(NamedTuple):
@@ -107,6 +107,31 @@ def case_of(case: Case, rung: Rung, interval: float, duration: float) -> Case:
         contact={"evaluator": method.evaluator, "nodes": method.nodes or None},
         output={"sample_interval": interval},
     )
+
+
+def parse_schemes(text: str | None) -> list[str]:
+    """Names of schemes, separated by commas; raises UsageError."""
+    names = [name.strip() for name in (text or "").split(",") if name.strip()]
+    for name in names:
+        if name not in set(Scheme):
+            raise UsageError(f"--schemes {text}: there is no scheme {name}; give some of {', '.join(Scheme)}")
+    return names
+
+
+def parse_steps(text: str | None) -> list[float]:
+    """Steps (s), separated by commas; raises UsageError."""
+    if text is None:
+        return []
+    try:
+        steps = [float(part) for part in text.split(",")]
+    except ValueError:
+        steps = []
+    if not steps or not all(1e-100 < step < 1e100 for step in steps):
+        raise UsageError(f"--steps {text}: is no list of steps; write, for instance, --steps 1e-5,5e-6")
+    largest = max(steps)
+    if any(abs(largest / step - round(largest / step)) > 1e-9 * largest / step for step in steps):
+        raise UsageError(f"--steps {text}: all must be whole parts of the largest; halve it, for instance")
+    return steps
 
 
 def _fraction(weight: float) -> str:

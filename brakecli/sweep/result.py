@@ -12,14 +12,12 @@ from brakecli import __version__
 from brakecli.case import json_schema
 from brakecli.case_reading import key_path
 from brakecli.run import versions
-from brakecli.store import ResultFile
+from brakecli.store import FILL, ResultFile
 from brakecli.sweep.journal import Journal
 from brakecli.sweep.plan import Plan, label
 from brakecli.sweep.point import CRITICAL_FIELDS, FIELDS, Status, line_points
 from brakecli.sweep.reading import LoadedSweep
 
-FILL = 9.969209968386869e36
-"""What netCDF puts where a number is missing."""
 MOST_FAILURES = 100
 MOST_TOLD = 10_000
 """Points up to which every number is told as JSON; of more, the file holds them."""

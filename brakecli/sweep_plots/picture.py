@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from brakecli.case_reading import parse_table
 from brakecli.errors import CaseError, UnreadableResultError, UsageError
+from brakecli.store import FILL
 from brakecli.stored import StoredResult, Variable
 from brakecli.sweep.plan import label
-from brakecli.sweep.result import FILL
 from brakecli.sweep.tables import Critical, Sweep
 
 Array = NDArray[np.float64]
