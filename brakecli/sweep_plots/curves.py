@@ -21,6 +21,7 @@ from brakecli.sweep_plots.marks import (
     regimes,
     set_log_ticks,
     set_scale,
+    set_ticks,
 )
 from brakecli.sweep_plots.picture import Array, SweepPicture, labelled
 
@@ -48,7 +49,7 @@ def draw_critical(axes: "Axes", picture: SweepPicture) -> None:
     numbers = picture.axes[0].texts is None
     size = _size(len(x))
     line: dict[str, Any] = {"marker": ".", "ms": 0.6 * size}
-    line = line if numbers else {"ls": "none", "marker": "_", "ms": 26}
+    line = line if numbers else {"ls": "none", "marker": "_", "ms": 16}
     axes.plot(x, picture["critical_eigenvalue"][0], color=DARK, lw=1.1, label="by eigenvalues", **line)
     regained = picture["critical_status"][0] == Outcome.REGAINED
     if critical.method is Method.SIMULATION:
@@ -65,6 +66,7 @@ def draw_critical(axes: "Axes", picture: SweepPicture) -> None:
     set_scale(axes, "x", picture.axes[0])
     axes.set_ylabel(labelled(f"critical {critical.parameter}", picture.units["critical"]), parse_math=False)
     drawn = np.concatenate([value, picture["critical_eigenvalue"][0], sustained])
+    set_ticks(axes.yaxis, _largest(drawn) or max(abs(critical.lower), abs(critical.upper)))
     if np.isfinite(drawn).any():
         _widen(axes, drawn)
     else:
@@ -80,6 +82,7 @@ def draw_difference(axes: "Axes", picture: SweepPicture) -> None:
     axes.axhline(0.0, color=DARK, lw=1.1)
     axes.errorbar(x, difference, error, **_bars(size))
     set_scale(axes, "x", picture.axes[0])
+    set_ticks(axes.yaxis, _largest(np.abs(difference) + error))
     axes.margins(y=0.15)
     axes.set_ylabel(labelled("simulation\nless eigenvalue", picture.units["critical"]), parse_math=False)
 
@@ -104,7 +107,7 @@ def draw_motion(axes: "Axes", picture: SweepPicture, name: str) -> None:
             look = {"marker": marker or REGIME_MARKERS[regime], "mfc": REGIME_COLOURS[regime], "mec": DARK}
             axes.plot(x[chosen], y[chosen], ls="none", mew=0.6, ms=size, **look)
         if (shaken := forced(picture)[number] & np.isfinite(y)).any():
-            axes.plot(x[shaken], y[shaken], ls="none", marker=".", color="white", ms=0.5 * size, mec="none")
+            axes.plot(x[shaken], y[shaken], ls="none", marker=".", color=DARK, ms=0.5 * size, mec="none")
     _name_regimes(axes, picture)
     _shade_hysteresis(axes, picture)
     set_scale(axes, "x", picture.axes[0])
@@ -126,8 +129,7 @@ def _name_regimes(axes: "Axes", picture: SweepPicture) -> None:
         look: dict[str, Any] = {"marker": marker, "mfc": REGIME_COLOURS[regime], "mec": DARK, "mew": 0.6}
         axes.plot([], [], ls="none", ms=7, label=str(regime), **look)
     if forced(picture).any():
-        label = "white dot: forced by the wheel's waves"
-        axes.plot([], [], ls="none", marker=".", ms=4, mfc="white", mec=DARK, mew=0.6, label=label)
+        axes.plot([], [], ls="none", marker=".", ms=4, color=DARK, label="forced by the wheel's waves")
 
 
 def _shade_hysteresis(axes: "Axes", picture: SweepPicture) -> None:
@@ -136,7 +138,7 @@ def _shade_hysteresis(axes: "Axes", picture: SweepPicture) -> None:
         return
     edges = cell_edges(picture.axes[0].values, logarithmic=picture.axes[0].logarithmic)
     label = "up and down differ"
-    for place in np.flatnonzero(picture["hysteresis"][0]):
+    for place in np.flatnonzero(picture["hysteresis"][0] == 1):
         axes.axvspan(edges[place], edges[place + 1], color=GREEN, alpha=0.16, lw=0, zorder=0.5, label=label)
         label = "_"
 
@@ -198,8 +200,12 @@ def _mark(axes: "Axes", x: Array, marks: Any) -> None:
 
 def _prefixed(picture: SweepPicture, name: str) -> tuple[float, str]:
     unit = picture.units[name]
-    largest = np.max(picture[name], where=np.isfinite(picture[name]), initial=0.0)
-    return prefixed(float(largest), unit) if unit == "m" else (1.0, unit)
+    return prefixed(_largest(picture[name]), unit) if unit == "m" else (1.0, unit)
+
+
+def _largest(values: Array) -> float:
+    """The largest magnitude of those that are there."""
+    return float(np.max(np.abs(values), where=np.isfinite(values), initial=0.0))
 
 
 def _size(points: int) -> float:
