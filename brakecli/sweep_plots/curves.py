@@ -94,9 +94,9 @@ def draw_motion(axes: "Axes", picture: SweepPicture, name: str) -> None:
     """
     x, numbers = picture.axes[0].values, picture.axes[0].texts is None
     factor, unit = _prefixed(picture, name)
-    size = _size(len(x))
+    size, small = _size(len(x)), picture[name] < _least(picture, name)
     for number, direction in enumerate(picture.directions):
-        y = factor * picture[name][number]
+        y = factor * np.where(small[number], np.nan, picture[name][number])
         marker, dashes = _DIRECTIONS.get(direction, ("", "-"))
         if numbers:
             label = f"on the way {direction}" if direction else None
@@ -107,7 +107,7 @@ def draw_motion(axes: "Axes", picture: SweepPicture, name: str) -> None:
             look = {"marker": marker or REGIME_MARKERS[regime], "mfc": REGIME_COLOURS[regime], "mec": DARK}
             axes.plot(x[chosen], y[chosen], ls="none", mew=0.6, ms=size, **look)
         if (shaken := forced(picture)[number] & np.isfinite(y)).any():
-            axes.plot(x[shaken], y[shaken], ls="none", marker=".", color=DARK, ms=0.5 * size, mec="none")
+            axes.plot(x[shaken], y[shaken], ls="none", marker="o", color=DARK, ms=0.4 * size, mec="white", mew=0.5)
     _name_regimes(axes, picture)
     _shade_hysteresis(axes, picture)
     set_scale(axes, "x", picture.axes[0])
@@ -118,7 +118,6 @@ def draw_motion(axes: "Axes", picture: SweepPicture, name: str) -> None:
     if not np.isfinite(picture[name]).any():
         axes.set_yticks([])
         axes.text(0.5, 0.5, "no sustained vibration", transform=axes.transAxes, ha="center", color="#666666")
-    small = (factor * picture[name] < axes.get_ylim()[0]) & (picture["status"] == "done")
     _mark(axes, x, [Mark("smaller than drawn", small, "v", DARK, False, "bottom"), failed(picture)])
 
 
@@ -129,7 +128,7 @@ def _name_regimes(axes: "Axes", picture: SweepPicture) -> None:
         look: dict[str, Any] = {"marker": marker, "mfc": REGIME_COLOURS[regime], "mec": DARK, "mew": 0.6}
         axes.plot([], [], ls="none", ms=7, label=str(regime), **look)
     if forced(picture).any():
-        axes.plot([], [], ls="none", marker=".", ms=4, color=DARK, label="forced by the wheel's waves")
+        axes.plot([], [], ls="none", marker="o", ms=3, color=DARK, label="forced by the wheel's waves")
 
 
 def _shade_hysteresis(axes: "Axes", picture: SweepPicture) -> None:
@@ -153,6 +152,15 @@ def cell_edges(values: Array, *, logarithmic: bool) -> Array:
     return np.exp(edges) if logarithmic else edges
 
 
+def _least(picture: SweepPicture, name: str) -> float:
+    """The least amplitude that is drawn on a logarithmic axis; 0 where the axis is linear."""
+    values = picture[name]
+    lasting = values[np.isin(picture["regime"], SUSTAINED) & (values > 0.0)]
+    if name != "amplitude" or not lasting.size or lasting.max() <= _WIDE * lasting.min():
+        return 0.0
+    return float(max(lasting.min() / 30.0, np.nanmin(values[values > 0.0])))
+
+
 def _set_height(axes: "Axes", picture: SweepPicture, name: str, factor: float) -> None:
     """Amplitudes from 0 on, or on a logarithmic axis if those that last are of very different size."""
     values = factor * picture[name]
@@ -161,9 +169,7 @@ def _set_height(axes: "Axes", picture: SweepPicture, name: str, factor: float) -
     if name != "amplitude":
         _widen(axes, values)
         return
-    lasting = values[np.isin(picture["regime"], SUSTAINED) & (values > 0.0)]
-    if lasting.size and lasting.max() > _WIDE * lasting.min():
-        floor = max(lasting.min() / 30.0, np.nanmin(values[values > 0.0]))
+    if floor := factor * _least(picture, name):
         axes.set_yscale("log")
         axes.set_ylim(0.5 * floor, 2.0 * np.nanmax(values))
         set_log_ticks(axes.yaxis, 4.0 * np.nanmax(values) / floor)

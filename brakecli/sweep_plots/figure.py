@@ -1,5 +1,7 @@
 """The figure of a sweep: which panels it has, and what stands around them."""
 
+import textwrap
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -44,7 +46,10 @@ def draw_sweep(picture: SweepPicture) -> "Figure":
 
 def _headed(picture: SweepPicture, width: float, height: float) -> "Figure":
     """An empty figure below its heading."""
-    lines = [picture.summary, *picture.findings[:2]]
+    wrapped = [
+        textwrap.wrap(each, round(12.0 * width), max_lines=2, placeholder=" …") for each in picture.findings
+    ]
+    lines = [picture.summary, *chain.from_iterable(wrapped[:2])]
     if picture.chosen:
         lines.insert(1, "   ·   ".join(picture.chosen))
     return headed(width, height + 0.21 * len(lines), picture.title, *lines)
@@ -167,7 +172,7 @@ def _add_legend(figure: "Figure") -> None:
             entries.setdefault(text, handle)
     if not entries:
         return
-    order = [*map(str, REGIME_COLOURS)]
+    order = [*map(str, REGIME_COLOURS), "by simulation", "by eigenvalues"]
     texts = sorted(entries, key=lambda text: order.index(text) if text in order else len(order))
     (width, height), columns = figure.get_size_inches(), len(texts)
     while columns > 1 and _columns_width(texts, columns) > width - 0.4:

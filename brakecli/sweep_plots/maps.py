@@ -46,7 +46,7 @@ def draw_regimes(axes: "Axes", picture: SweepPicture, direction: int = 0) -> Non
         axes.plot([], [], ls="none", marker="s", ms=9, mfc=REGIME_COLOURS[regime], mec="none", label=str(regime))
     if forced(picture).any():
         label = "forced by the wheel's waves"
-        _sign(axes, picture, forced(picture)[direction], marker=".", color=DARK, label=label)
+        _sign(axes, picture, forced(picture)[direction], marker="o", color=DARK, mec="white", label=label)
     if "hysteresis" in picture.variables:
         where = picture["hysteresis"][direction] == 1
         _sign(axes, picture, where, marker="$≠$", color=DARK, label="up and down differ")
