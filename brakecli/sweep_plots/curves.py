@@ -21,6 +21,7 @@ from brakecli.sweep_plots.marks import (
     regimes,
     set_log_ticks,
     set_scale,
+    set_ticks,
 )
 from brakecli.sweep_plots.picture import Array, SweepPicture, labelled
 
@@ -48,7 +49,7 @@ def draw_critical(axes: "Axes", picture: SweepPicture) -> None:
     numbers = picture.axes[0].texts is None
     size = _size(len(x))
     line: dict[str, Any] = {"marker": ".", "ms": 0.6 * size}
-    line = line if numbers else {"ls": "none", "marker": "_", "ms": 26}
+    line = line if numbers else {"ls": "none", "marker": "_", "ms": 16}
     axes.plot(x, picture["critical_eigenvalue"][0], color=DARK, lw=1.1, label="by eigenvalues", **line)
     regained = picture["critical_status"][0] == Outcome.REGAINED
     if critical.method is Method.SIMULATION:
@@ -65,6 +66,7 @@ def draw_critical(axes: "Axes", picture: SweepPicture) -> None:
     set_scale(axes, "x", picture.axes[0])
     axes.set_ylabel(labelled(f"critical {critical.parameter}", picture.units["critical"]), parse_math=False)
     drawn = np.concatenate([value, picture["critical_eigenvalue"][0], sustained])
+    set_ticks(axes.yaxis, _largest(drawn) or max(abs(critical.lower), abs(critical.upper)))
     if np.isfinite(drawn).any():
         _widen(axes, drawn)
     else:
@@ -80,6 +82,7 @@ def draw_difference(axes: "Axes", picture: SweepPicture) -> None:
     axes.axhline(0.0, color=DARK, lw=1.1)
     axes.errorbar(x, difference, error, **_bars(size))
     set_scale(axes, "x", picture.axes[0])
+    set_ticks(axes.yaxis, _largest(np.abs(difference) + error))
     axes.margins(y=0.15)
     axes.set_ylabel(labelled("simulation\nless eigenvalue", picture.units["critical"]), parse_math=False)
 
@@ -91,9 +94,9 @@ def draw_motion(axes: "Axes", picture: SweepPicture, name: str) -> None:
     """
     x, numbers = picture.axes[0].values, picture.axes[0].texts is None
     factor, unit = _prefixed(picture, name)
-    size = _size(len(x))
+    size, small = _size(len(x)), picture[name] < _least(picture, name)
     for number, direction in enumerate(picture.directions):
-        y = factor * picture[name][number]
+        y = factor * np.where(small[number], np.nan, picture[name][number])
         marker, dashes = _DIRECTIONS.get(direction, ("", "-"))
         if numbers:
             label = f"on the way {direction}" if direction else None
@@ -104,7 +107,7 @@ def draw_motion(axes: "Axes", picture: SweepPicture, name: str) -> None:
             look = {"marker": marker or REGIME_MARKERS[regime], "mfc": REGIME_COLOURS[regime], "mec": DARK}
             axes.plot(x[chosen], y[chosen], ls="none", mew=0.6, ms=size, **look)
         if (shaken := forced(picture)[number] & np.isfinite(y)).any():
-            axes.plot(x[shaken], y[shaken], ls="none", marker=".", color="white", ms=0.5 * size, mec="none")
+            axes.plot(x[shaken], y[shaken], ls="none", marker="o", color=DARK, ms=0.4 * size, mec="white", mew=0.5)
     _name_regimes(axes, picture)
     _shade_hysteresis(axes, picture)
     set_scale(axes, "x", picture.axes[0])
@@ -115,7 +118,6 @@ def draw_motion(axes: "Axes", picture: SweepPicture, name: str) -> None:
     if not np.isfinite(picture[name]).any():
         axes.set_yticks([])
         axes.text(0.5, 0.5, "no sustained vibration", transform=axes.transAxes, ha="center", color="#666666")
-    small = (factor * picture[name] < axes.get_ylim()[0]) & (picture["status"] == "done")
     _mark(axes, x, [Mark("smaller than drawn", small, "v", DARK, False, "bottom"), failed(picture)])
 
 
@@ -126,8 +128,7 @@ def _name_regimes(axes: "Axes", picture: SweepPicture) -> None:
         look: dict[str, Any] = {"marker": marker, "mfc": REGIME_COLOURS[regime], "mec": DARK, "mew": 0.6}
         axes.plot([], [], ls="none", ms=7, label=str(regime), **look)
     if forced(picture).any():
-        label = "white dot: forced by the wheel's waves"
-        axes.plot([], [], ls="none", marker=".", ms=4, mfc="white", mec=DARK, mew=0.6, label=label)
+        axes.plot([], [], ls="none", marker="o", ms=3, color=DARK, label="forced by the wheel's waves")
 
 
 def _shade_hysteresis(axes: "Axes", picture: SweepPicture) -> None:
@@ -136,7 +137,7 @@ def _shade_hysteresis(axes: "Axes", picture: SweepPicture) -> None:
         return
     edges = cell_edges(picture.axes[0].values, logarithmic=picture.axes[0].logarithmic)
     label = "up and down differ"
-    for place in np.flatnonzero(picture["hysteresis"][0]):
+    for place in np.flatnonzero(picture["hysteresis"][0] == 1):
         axes.axvspan(edges[place], edges[place + 1], color=GREEN, alpha=0.16, lw=0, zorder=0.5, label=label)
         label = "_"
 
@@ -151,6 +152,15 @@ def cell_edges(values: Array, *, logarithmic: bool) -> Array:
     return np.exp(edges) if logarithmic else edges
 
 
+def _least(picture: SweepPicture, name: str) -> float:
+    """The least amplitude that is drawn on a logarithmic axis; 0 where the axis is linear."""
+    values = picture[name]
+    lasting = values[np.isin(picture["regime"], SUSTAINED) & (values > 0.0)]
+    if name != "amplitude" or not lasting.size or lasting.max() <= _WIDE * lasting.min():
+        return 0.0
+    return float(max(lasting.min() / 30.0, np.nanmin(values[values > 0.0])))
+
+
 def _set_height(axes: "Axes", picture: SweepPicture, name: str, factor: float) -> None:
     """Amplitudes from 0 on, or on a logarithmic axis if those that last are of very different size."""
     values = factor * picture[name]
@@ -159,9 +169,7 @@ def _set_height(axes: "Axes", picture: SweepPicture, name: str, factor: float) -
     if name != "amplitude":
         _widen(axes, values)
         return
-    lasting = values[np.isin(picture["regime"], SUSTAINED) & (values > 0.0)]
-    if lasting.size and lasting.max() > _WIDE * lasting.min():
-        floor = max(lasting.min() / 30.0, np.nanmin(values[values > 0.0]))
+    if floor := factor * _least(picture, name):
         axes.set_yscale("log")
         axes.set_ylim(0.5 * floor, 2.0 * np.nanmax(values))
         set_log_ticks(axes.yaxis, 4.0 * np.nanmax(values) / floor)
@@ -198,8 +206,12 @@ def _mark(axes: "Axes", x: Array, marks: Any) -> None:
 
 def _prefixed(picture: SweepPicture, name: str) -> tuple[float, str]:
     unit = picture.units[name]
-    largest = np.max(picture[name], where=np.isfinite(picture[name]), initial=0.0)
-    return prefixed(float(largest), unit) if unit == "m" else (1.0, unit)
+    return prefixed(_largest(picture[name]), unit) if unit == "m" else (1.0, unit)
+
+
+def _largest(values: Array) -> float:
+    """The largest magnitude of those that are there."""
+    return float(np.max(np.abs(values), where=np.isfinite(values), initial=0.0))
 
 
 def _size(points: int) -> float:

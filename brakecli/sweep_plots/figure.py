@@ -1,5 +1,7 @@
 """The figure of a sweep: which panels it has, and what stands around them."""
 
+import textwrap
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +18,7 @@ from brakecli.sweep_plots.maps import (
     draw_critical_map,
     draw_regimes,
 )
-from brakecli.sweep_plots.marks import REGIME_COLOURS, log_ticks
+from brakecli.sweep_plots.marks import REGIME_COLOURS, log_ticks, set_ticks
 from brakecli.sweep_plots.picture import MOST_PANELS, SweepPicture
 
 if TYPE_CHECKING:
@@ -24,6 +26,8 @@ if TYPE_CHECKING:
     from matplotlib.colors import Normalize
     from matplotlib.figure import Figure
 
+_LONG_TITLE = 34
+"""Characters of a panel's title from which on it takes two lines."""
 _WIDTH, _MAP_WIDTH, _PANEL_WIDTH = 8.8, 10.4, 3.0
 """Inches: of curves, of two maps or one, and of each map where they stand side by side."""
 
@@ -41,8 +45,13 @@ def draw_sweep(picture: SweepPicture) -> "Figure":
 
 
 def _headed(picture: SweepPicture, width: float, height: float) -> "Figure":
-    """An empty figure below its heading; one row of its room is for the legend."""
-    lines = [picture.summary, *picture.findings[:2]]
+    """An empty figure below its heading."""
+    wrapped = [
+        textwrap.wrap(each, round(12.0 * width), max_lines=2, placeholder=" …") for each in picture.findings
+    ]
+    lines = [picture.summary, *chain.from_iterable(wrapped[:2])]
+    if picture.chosen:
+        lines.insert(1, "   ·   ".join(picture.chosen))
     return headed(width, height + 0.21 * len(lines), picture.title, *lines)
 
 
@@ -121,7 +130,7 @@ def _draw_slices(picture: SweepPicture) -> "Figure":
         meshes = [draw_amplitude(axes, each, factor, norm) for axes, each in zip(panels[1], slices, strict=True)]
         _add_colours(figure, meshes[0], panels[1], *_amplitude_label(picture))
     for axes, name in zip(panels[0], names, strict=True):
-        axes.set_title(name, parse_math=False)
+        axes.set_title(name if len(name) < _LONG_TITLE else name.replace(" = ", "\n= "), parse_math=False)
     for axes in panels.flat:
         axes.label_outer()
     return figure
@@ -142,12 +151,15 @@ def _add_colours(
     from matplotlib.colors import LogNorm
 
     extend = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}[beyond]
+    low, high = (value or 0.0 for value in mesh.get_clim())
     ticks: dict[str, Any] = {}
     if isinstance(mesh.norm, LogNorm):
-        locator, formatter = log_ticks(float(mesh.norm.vmax or 1.0) / float(mesh.norm.vmin or 1.0))
+        locator, formatter = log_ticks(high / low)
         ticks = {"ticks": locator, "format": formatter}
     bar = figure.colorbar(mesh, ax=panels, extend=extend, aspect=30, pad=0.015, **ticks)
     bar.minorticks_off()
+    if not ticks:
+        set_ticks(bar.ax.yaxis, max(abs(low), abs(high)))
     bar.set_label(label, parse_math=False)
     bar.outline.set_visible(False)
 
@@ -160,7 +172,7 @@ def _add_legend(figure: "Figure") -> None:
             entries.setdefault(text, handle)
     if not entries:
         return
-    order = [*map(str, REGIME_COLOURS)]
+    order = [*map(str, REGIME_COLOURS), "by simulation", "by eigenvalues"]
     texts = sorted(entries, key=lambda text: order.index(text) if text in order else len(order))
     (width, height), columns = figure.get_size_inches(), len(texts)
     while columns > 1 and _columns_width(texts, columns) > width - 0.4:

@@ -45,12 +45,11 @@ def draw_regimes(axes: "Axes", picture: SweepPicture, direction: int = 0) -> Non
     for regime, _ in regimes(picture):
         axes.plot([], [], ls="none", marker="s", ms=9, mfc=REGIME_COLOURS[regime], mec="none", label=str(regime))
     if forced(picture).any():
-        _sign(
-            axes, picture, forced(picture)[direction], marker=".", color="white", mec=DARK, label="forced by waves"
-        )
+        label = "forced by the wheel's waves"
+        _sign(axes, picture, forced(picture)[direction], marker="o", color=DARK, mec="white", label=label)
     if "hysteresis" in picture.variables:
         where = picture["hysteresis"][direction] == 1
-        _sign(axes, picture, where, marker="_", color=DARK, label="up and down differ")
+        _sign(axes, picture, where, marker="$≠$", color=DARK, label="up and down differ")
     _sign_mark(axes, picture, [failed(picture)], direction)
 
 

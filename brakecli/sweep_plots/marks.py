@@ -11,7 +11,7 @@ from brakecli.analysis.regime import Excitation, Regime
 from brakecli.figures import BLUE, GREY, ORANGE, VERMILION
 from brakecli.sweep.critical import Outcome
 from brakecli.sweep.point import Status
-from brakecli.sweep_plots.picture import Axis, SweepPicture
+from brakecli.sweep_plots.picture import Axis, SweepPicture, readable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,6 +33,8 @@ DARK = "#333333"
 SUSTAINED = (Regime.RELAXATION, Regime.QUASI_HARMONIC)
 _MOST_TEXTS = 30
 _MOST_CHARACTERS = 70
+_SMALL, _LARGE = 1e-2, 1e5
+"""Values of an axis outside these have powers of ten."""
 _FEW = 6
 """Values of an axis up to which each has its tick."""
 _WIDE = 300.0
@@ -73,7 +75,7 @@ def missing(picture: SweepPicture) -> Iterator[Mark]:
     critical = picture.critical
     assert critical is not None
     status, sustained = picture["critical_status"], picture["sustained_status"]
-    low, high = f"{critical.lower:g}", f"{critical.upper:g}"
+    low, high = readable(critical.lower), readable(critical.upper)
     yield Mark(f"stable up to {high}", status == Outcome.STABLE, "^", BLUE, False, "top")
     yield Mark(f"unstable from {low} on", status == Outcome.UNSTABLE, "v", BLUE, True, "bottom")
     yield Mark("no steady sliding", status == Outcome.NO_SLIDING, "s", DARK, False, "bottom")
@@ -122,7 +124,17 @@ def set_scale(axes: "Axes", side: Literal["x", "y"], along: Axis) -> None:
         (axes.set_xscale if side == "x" else axes.set_yscale)("log")
         set_log_ticks(axis, along.values[-1] / along.values[0])
     elif len(along.values) <= _FEW and np.diff(along.values).min(initial=np.inf) > 0.1 * np.ptp(along.values):
-        axis.set_ticks(along.values, labels=[f"{value:.6g}" for value in along.values])
+        axis.set_ticks(along.values, labels=[readable(float(value)) for value in along.values])
+    else:
+        set_ticks(axis, float(np.abs(along.values).max()))
+
+
+def set_ticks(axis: Any, largest: float) -> None:
+    """Ticks up to a value of which each reads as it is, without a power of ten at the end of the axis."""
+    from matplotlib.ticker import FuncFormatter
+
+    if not _SMALL <= largest < _LARGE:
+        axis.set_major_formatter(FuncFormatter(lambda value, _: readable(value)))
 
 
 def set_log_ticks(axis: Any, ratio: float) -> None:
@@ -141,12 +153,4 @@ def log_ticks(ratio: float) -> tuple["LogLocator", "FuncFormatter"]:
     from matplotlib.ticker import FuncFormatter, LogLocator
 
     subs = (1.0, 2.0, 5.0) if ratio < _WIDE else (1.0,)
-    return LogLocator(subs=subs), FuncFormatter(lambda value, _: _tick(value))
-
-
-def _tick(value: float) -> str:
-    if 1e-3 <= value < 1e5:
-        return f"{value:g}"
-    mantissa, _, exponent = f"{value:.0e}".partition("e")
-    power = f"10^{{{int(exponent)}}}"
-    return f"${power}$" if mantissa == "1" else f"${mantissa}\\cdot{power}$"
+    return LogLocator(subs=subs), FuncFormatter(lambda value, _: readable(value))

@@ -1,6 +1,7 @@
 """What a picture of a sweep shows, gathered from its result: numbers over rising axes, missing ones as NaN."""
 
 import math
+import textwrap
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -31,7 +32,9 @@ _NEEDED_CRITICAL = (
 )
 _LEAST_LOG = 5.0
 """Ratio of the ends of an axis from which on it may be logarithmic: ticks of less are easier to read on a line."""
+_LONGEST_KEY = 45
 _MOST_LISTED = 12
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 MOST_PANELS = 5
 """Values of a third axis, at most: its maps stand side by side."""
 
@@ -49,7 +52,7 @@ class Axis:
     @property
     def label(self) -> str:
         """Key path and unit."""
-        return labelled(self.key, self.units)
+        return labelled(textwrap.shorten(self.key, _LONGEST_KEY, placeholder=" …"), self.units)
 
     @property
     def logarithmic(self) -> bool:
@@ -64,7 +67,7 @@ class Axis:
         """The value at a place, with its key and unit."""
         if self.texts is not None:
             return f"{self.key} = {self.texts[place]}"
-        return f"{self.key} = {self.values[place]:.6g} {_plain(self.units)}".rstrip()
+        return f"{self.key} = {readable(float(self.values[place]))} {_plain(self.units)}".rstrip()
 
 
 @dataclass(frozen=True)
@@ -91,7 +94,7 @@ class SweepPicture:
 
     @property
     def summary(self) -> str:
-        """Points, what they have come to, and what was selected, in one line."""
+        """Points, and what they have come to, in one line."""
         status = self["status"]
         failed = int((status != "done").sum())
         parts = [f"{status.size} point{'s' if status.size != 1 else ''}"]
@@ -101,10 +104,11 @@ class SweepPicture:
         else:
             known = self["critical"][np.isfinite(self["critical"])]
             units = _plain(self.units["critical"])
-            span = f": {known.min():.4g} to {known.max():.4g} {units}" if known.size else ""
+            ends = (readable(float(f"{value:.4g}")) for value in (known.min(), known.max())) if known.size else ()
+            span = f": {' to '.join(ends)} {units}" if known.size else ""
             parts.append(f"critical value found at {known.size}{span.rstrip()}")
         parts += [f"failed {failed}"] if failed else []
-        return "   ·   ".join([*parts, *self.chosen])
+        return "   ·   ".join(parts)
 
     def at(self, axis: int, place: int) -> "SweepPicture":
         """What is left of the picture at one place of an axis."""
@@ -119,6 +123,16 @@ class SweepPicture:
         return replace(
             self, directions=self.directions[direction : direction + 1], variables=variables, chosen=chosen
         )
+
+
+def readable(value: float) -> str:
+    """A number to six digits, with a power of ten where it is large or small."""
+    if value == 0.0 or 1e-3 <= abs(value) < 1e5:
+        return f"{value:.6g}".replace("-", "−")
+    mantissa, _, exponent = f"{value:.5e}".partition("e")
+    digits = mantissa.rstrip("0").rstrip(".").replace("-", "−")
+    power = "10" + str(int(exponent)).translate(_RAISED)
+    return {"1": power, "−1": f"−{power}"}.get(digits, f"{digits}·{power}")
 
 
 def labelled(name: str, units: str) -> str:
@@ -161,8 +175,8 @@ def gather_sweep(result: StoredResult, select: Sequence[str] = ()) -> SweepPictu
         long_names={name: str(known[name].attributes.get("long_name", "")) for name in variables},
         critical=sweep.critical,
     )
-    for wanted in select:
-        picture = _selected(picture, wanted, result)
+    for wanted in select:  # what was found of the whole does not hold of a part
+        picture = replace(_selected(picture, wanted, result), findings=())
     for axis in picture.axes:
         if len(axis.values) == 1:
             picture = picture.at(picture.axes.index(axis), 0)
