@@ -83,7 +83,7 @@ _STALLED = int(Failure.STALLED)
 def _to_knot(s: Schedule, t: float) -> float:
     """Time (s) to the next knot of a schedule; one within the rounding of t has been reached."""
     k = segment(t + 4.0 * EPSILON * abs(t), s.times) + 1
-    return s.times[k] - t if k < s.times.size else math.inf  # type: ignore[no-any-return]
+    return s.times[k] - t if k < s.times.size else math.inf
 
 
 @kernel(float64(PLANT, float64), inlined=False)

@@ -227,7 +227,7 @@ def margin_slope(p: Plant, which: int) -> float:
         return m[SIDE] * (m[at + 2] - m[BELT_SLOPE])  # type: ignore[no-any-return]
     bound = -c.phi * p.contact[STIFFNESS] * m[at + 1]
     needed, _ = resistance(c, m[LOAD_SLOPE], m[at], m[at + 1], m[at + 2], m[at + 3])
-    return bound - needed if which == 0 else bound + needed
+    return bound - needed if which == 0 else bound + needed  # type: ignore[no-any-return]
 
 
 @kernel(void(PLANT), inlined=False)

@@ -64,7 +64,6 @@ def check_table(title: str, found: Check) -> str:
     """What a run would cost and which limits it meets."""
     low, high = found.natural_frequencies
     link_low, link_high = found.link_frequencies
-    limits = found.limits
     rows: Rows = [
         *(
             (
@@ -82,10 +81,7 @@ def check_table(title: str, found: Check) -> str:
             "step",
             f"{found.step:.6g} s, {found.steps} steps" if found.step else f"its own, about {found.steps} steps",
         ),
-        ("steps per period", f"{found.steps_per_period:.4g} of the fastest motion"),
-        ("fixed-point contraction", f"{limits.contraction:.3g} (it may diverge from 1 on)"),
-        ("solution of a step", "sure to be unique" if limits.unique else "not sure to be unique"),
-        ("scheme", f"multiplies a frictionless disturbance by at most {limits.growth:.8g} a step"),
+        *(_step_rows(found) if found.step else ()),
         ("contact", found.evaluator + (f", {found.nodes} nodes" if found.nodes else "")),
         ("nodes per shortest wave", _unit(found.nodes_per_wave, "")),
         ("time", f"about {found.seconds:.2g} s"),
@@ -94,6 +90,17 @@ def check_table(title: str, found: Check) -> str:
         *(("adjusted", text) for text in found.adjustments),
     ]
     return _table(title, rows)
+
+
+def _step_rows(found: Check) -> Rows:
+    """What the step of the case means for its scheme."""
+    limits = found.limits
+    return [
+        ("steps per period", f"{found.steps_per_period:.4g} of the fastest motion"),
+        ("fixed-point contraction", f"{limits.contraction:.3g} (it may diverge from 1 on)"),
+        ("solution of a step", "sure to be unique" if limits.unique else "not sure to be unique"),
+        ("scheme", f"multiplies a frictionless disturbance by at most {limits.growth:.8g} a step"),
+    ]
 
 
 def check_numbers(found: Check) -> dict[str, Any]:

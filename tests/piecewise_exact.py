@@ -98,22 +98,22 @@ class PiecewiseExact:
         a = self.generator(touching, side)
         if (touching, side) not in self.propagators:
             self.propagators[touching, side] = expm(a * self.grid)
-        end = self.propagators[touching, side] @ z if span == self.grid else expm(a * span) @ z
-        margins = self.margins(touching, side)
-        broken = margins @ end < 0.0
-        dips = ~broken & (margins @ (a @ z) < 0.0) & (margins @ (a @ end) > 0.0)
-        if not broken.any() and not dips.any():
-            return end, 0.0, touching, side
         terms = [z]  # of the series of expm(a t) z, with t in spans: a step of the grid is a part of a period
-        for power in range(1, 30):
-            terms.append(a @ terms[-1] * (span / power))
 
         def at(part: float) -> Vector:
+            while len(terms) < 30:
+                terms.append(a @ terms[-1] * (span / len(terms)))
             total = terms[-1]
             for term in reversed(terms[:-1]):
                 total = total * part + term
             return total
 
+        end = self.propagators[touching, side] @ z if span == self.grid else at(1.0)
+        margins = self.margins(touching, side)
+        broken = margins @ end < 0.0
+        dips = ~broken & (margins @ (a @ z) < 0.0) & (margins @ (a @ end) > 0.0)
+        if not broken.any() and not dips.any():
+            return end, 0.0, touching, side
         first, which = 1.0, -1
         for index in np.flatnonzero(broken | dips):
             row, last = margins[index], 1.0

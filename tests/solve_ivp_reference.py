@@ -4,7 +4,9 @@ Only the contact integral is the project's own, by its exact evaluator, which ha
 Constant speed and load.
 """
 
+from functools import partial
 from itertools import count
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,23 +59,33 @@ class SolveIvp:
             return 0
         return -1 if needed > 0.0 else 1
 
+    def margins(self, side: int) -> list[Any]:
+        """Functions that fall through zero where a phase ends."""
+
+        def slides(t: float, z: Vector) -> float:
+            return float(side * (z[2] - self.belt))
+
+        def holds_back(t: float, z: Vector) -> float:
+            return self.c.phi * self.normal(t, z) - self.against(z)[0]
+
+        def holds_on(t: float, z: Vector) -> float:
+            return self.c.phi * self.normal(t, z) + self.against(z)[0]
+
+        events: list[Any] = [slides] if side else [holds_back, holds_on]
+        for event in events:
+            event.terminal, event.direction = True, -1
+        return events
+
     def run(self, start: Vector, times: Vector) -> Vector:
         """The motion at the times; the start slides."""
         z, t, side, rows = start.copy(), 0.0, 1 if start[2] > self.belt else -1, [start]
         for _ in count():
             self.visited.append(side)
-            slides = [lambda t, z, s=side: s * (z[2] - self.belt)]
-            holds = [
-                lambda t, z: self.c.phi * self.normal(t, z) - self.against(z)[0],
-                lambda t, z: self.c.phi * self.normal(t, z) + self.against(z)[0],
-            ]
-            events = slides if side else holds
-            for event in events:
-                event.terminal, event.direction = True, -1  # type: ignore[attr-defined]
+            events = self.margins(side)
             later = times[times > t]
             size = np.abs(np.array(rows)).max(axis=0)
             found = solve_ivp(
-                lambda t, z, s=side: self.slope(s, t, z),
+                partial(self.slope, side),
                 (t, times[-1]),
                 z,
                 "DOP853",
@@ -86,8 +98,9 @@ class SolveIvp:
             rows += list(np.transpose(found.y))
             if found.status == 0:
                 return np.array(rows)
-            which = next(index for index, hit in enumerate(found.t_events) if hit.size)
-            t, z = float(found.t_events[which][0]), found.y_events[which][0].copy()
+            hits, states = found.t_events or [], found.y_events or []
+            which = next(index for index, hit in enumerate(hits) if hit.size)
+            t, z = float(hits[which][0]), states[which][0].copy()
             z[2] = self.belt
             side = self.hold(t, z) if side else (-1 if which == 0 else 1)
         raise AssertionError

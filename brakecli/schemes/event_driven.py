@@ -14,6 +14,7 @@ from brakecli.kernels import (
     COEFFICIENTS,
     EVALUATE,
     FRACTION,
+    KIND,
     VX,
     VY,
     Coefficients,
@@ -58,8 +59,8 @@ LAG = 0
 MEMORY = (X, Y, VX, VY)
 VELOCITIES = (VX, VY)
 
-_BUDGET = 512
-"""Steps of one call: where samples are far apart, an interruption need not wait for the next."""
+_BUDGET, _EXACT = 4096, 64
+"""Steps of one call, and as how many one counts that finds patches: an interruption need not wait for a sample."""
 
 _NONE = int(Failure.NONE)
 _BACKWARD, _STICK, _FORWARD, _SEPARATED = (int(state) for state in ContactState)
@@ -212,10 +213,10 @@ def advance(
             row += 1
             counts[LEVEL] += 1
             _sample(p, drive, grid.interval, counts[LEVEL])
-        if counts[LEVEL] == stop or steps == _BUDGET:
+        if counts[LEVEL] == stop or steps >= _BUDGET:
             return _NONE
         failure = step(p, drive, grid, borrowed(work))
-        steps += 1
+        steps += 1 if p.contact[KIND] == 0.0 else _EXACT
         if failure != _NONE:
             for column in range(COLUMNS):
                 rows[row, column] = m[ROW + column]
