@@ -47,13 +47,21 @@ class Scheme(StrEnum):
     TWO_LAYER = "two-layer"
     THREE_LAYER = "three-layer"
     EVENT_DRIVEN = "event-driven"
+    AUTO = "auto"
 
 
 _THETA: dict[Scheme, tuple[float, ...]] = {
+    Scheme.AUTO: (),
     Scheme.TWO_LAYER: (0.5, 0.5),
     Scheme.THREE_LAYER: (0.25, 0.5, 0.25),
     Scheme.EVENT_DRIVEN: (),
 }
+
+
+DEFAULT_TOLERANCE = 1e-3
+"""Relative error of the histories where a case gives neither step nor tolerance."""
+EVENT_TOLERANCE = 1e-10
+"""Tolerance of event-driven where a case gives it a step."""
 
 
 class Iteration(StrEnum):
@@ -211,9 +219,11 @@ class Initial(Table):
 class Solver(Table):
     """How the equations of motion are solved, and for how long."""
 
-    alternatives = (("step",), ("tolerance",))
-
-    scheme: Annotated[Scheme, from_text, Field(description="the time-stepping scheme")] = Scheme.TWO_LAYER
+    scheme: Annotated[
+        Scheme,
+        from_text,
+        Field(description='the time-stepping scheme; without a step "auto", which chooses one, else "two-layer"'),
+    ] = Scheme.AUTO
     theta: Annotated[
         tuple[Weight, ...],
         *from_list,
@@ -229,10 +239,10 @@ class Solver(Table):
     start: Annotated[Start, from_text, Field(description="how the second layer of three-layer is found")] = (
         Start.CONSISTENT
     )
-    step: Annotated[Positive | None, quantity("s", "time step h")] = None
+    step: Annotated[Positive | None, quantity("s", "time step h; or tolerance instead")] = None
     tolerance: Annotated[
         Tolerance | None,
-        quantity("1", "relative error to which event-driven keeps x, y and velocities"),
+        quantity("1", "relative error that the histories are kept to, 0.001 if there is no step either"),
     ] = None
     duration: Annotated[Positive, quantity("s", "time to simulate")]
     allow_unconverged: Annotated[
@@ -240,20 +250,30 @@ class Solver(Table):
     ] = False
 
     def _fill(self) -> None:
+        if "scheme" not in self.model_fields_set and self.step is not None:
+            self.__dict__["scheme"] = Scheme.TWO_LAYER
         if "theta" not in self.model_fields_set:
             self.__dict__["theta"] = _THETA[self.scheme]
 
+    @property
+    def promise(self) -> float | None:
+        """The relative error that the histories must keep; None where the step is given."""
+        return None if self.step is not None else self.tolerance or DEFAULT_TOLERANCE
+
     def _broken_rules(self) -> Iterator[Broken]:
-        yield from super()._broken_rules()
-        yield from self._not_of_event_driven() if self.scheme == Scheme.EVENT_DRIVEN else self._not_of_layers()
+        if self.step is not None and self.tolerance is not None:
+            what = "is given together with step"
+            yield Broken(("tolerance",), what, "keep one of the two", self.tolerance)
+        if self.step is not None and self.scheme == Scheme.AUTO:
+            what = 'is given, but "auto" chooses the step'
+            yield Broken(("step",), what, "leave scheme out, or give tolerance instead of step", self.step)
+        own_steps = self.scheme in (Scheme.EVENT_DRIVEN, Scheme.AUTO)
+        yield from self._not_of_own_steps() if own_steps else self._not_of_layers()
         if self.start == Start.PAPER and self.scheme != Scheme.THREE_LAYER:
             what = "is for the three-layer scheme alone"
             yield Broken(("start",), what, 'leave start out, or set scheme to "three-layer"', self.start)
 
     def _not_of_layers(self) -> Iterator[Broken]:
-        if self.tolerance is not None:
-            what = f"is not yet for {self.scheme}, but for event-driven alone"
-            yield Broken(("tolerance",), what, "give step instead", self.tolerance)
         count = len(_THETA[self.scheme])
         if len(self.theta) != count:
             what = f"has {_entries(self.theta)} where {self.scheme} has {count} weights"
@@ -263,18 +283,15 @@ class Solver(Table):
                 ("theta",), f"adds up to {sum(self.theta):.12g}", "let the weights add up to 1", self.theta
             )
 
-    def _not_of_event_driven(self) -> Iterator[Broken]:
-        if self.step is not None:
-            what = "is not for event-driven, which finds its steps itself"
-            yield Broken(("step",), what, "give tolerance instead, such as 1e-10", self.step)
+    def _not_of_own_steps(self) -> Iterator[Broken]:
         if self.theta:
-            what = "is not for event-driven, which has no weights"
+            what = f"is not for {self.scheme}, which has no weights"
             yield Broken(("theta",), what, "leave theta out", self.theta)
         if self.iteration == Iteration.FIXED_POINT:
-            what = "is not for event-driven, which solves no equations in a step"
+            what = f"is not for {self.scheme}"
             yield Broken(("iteration",), what, "leave iteration out", self.iteration)
         if self.allow_unconverged:
-            what = "is not for event-driven, in which nothing has to converge"
+            what = f"is not for {self.scheme}"
             yield Broken(("allow_unconverged",), what, "leave allow_unconverged out", self.allow_unconverged)
 
 
@@ -320,10 +337,13 @@ class Case(Table):
         if step is not None and interval < step * (1 - 1e-9):
             what = f"is below the time step of {step!r} s"
             yield Broken(("output", "sample_interval"), what, "make it at least one time step", interval)
-        if self.solver.scheme == Scheme.EVENT_DRIVEN and self.contact.evaluator == Evaluator.MIDPOINT:
-            what = "has a kink at every node, and event-driven is exact"
-            remedy = 'leave evaluator out, or set it to "exact"'
-            yield Broken(("contact", "evaluator"), what, remedy, self.contact.evaluator)
+        exact = self.solver.scheme == Scheme.EVENT_DRIVEN or step is None
+        if exact and self.contact.evaluator == Evaluator.MIDPOINT:
+            what = "is given, but event-driven is exact, and a tolerance is kept by nodes of its own"
+            yield Broken(("contact", "evaluator"), what, "leave evaluator out", self.contact.evaluator)
+        elif exact and self.contact.nodes is not None:
+            what = "is given, but a tolerance chooses nodes itself, and event-driven takes none"
+            yield Broken(("contact", "nodes"), what, "leave nodes out", self.contact.nodes)
         if self.solver.start == Start.PAPER and (self.initial.vx or self.initial.vy):
             what = "takes the second layer for equal to the first, but the initial velocity is not zero"
             remedy = 'set start to "consistent", or initial.vx and initial.vy to 0'

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from brakecli.analysis.precision import RESOLVED, StepLimits, natural_frequencies, step_limits
-from brakecli.case import Iteration
+from brakecli.case import EVENT_TOLERANCE, Iteration
 from brakecli.contact.pad import NODES_PER_WAVE
 from brakecli.errors import RefusedError
 from brakecli.history import ROW_BYTES
@@ -101,7 +101,7 @@ def _own_steps(setup: Setup, frequency: float, patches: float) -> int:
 
     `frequency` (Hz) is the highest natural one, `patches` (1/s) how many waves pass each other on the pad.
     """
-    tolerance = setup.case.solver.tolerance or 1.0
+    tolerance = setup.case.solver.tolerance or EVENT_TOLERANCE
     in_a_period = _OWN_STEPS * (1e-10 / tolerance) ** 0.125
     return 1 + int(setup.timing.samples * setup.timing.interval * (frequency * in_a_period + 4.0 * patches))
 

@@ -143,6 +143,9 @@ def run_command(
     if report.failed:
         _tell(f"brakecli: {report.output}: the history up to the failure was written")
         raise BrakecliError(str(report.failure_sentence))
+    certificate = report.certificate
+    if certificate is not None and not certificate.certified and loaded.case.solver.tolerance is not None:
+        raise BrakecliError(f"{report.output}: was written, but solver.tolerance is not sure to be kept")
 
 
 @app.command("sweep")

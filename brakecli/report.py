@@ -49,6 +49,7 @@ def run_table(report: RunReport) -> str:
         ("stick, lost contact", f"{verdict.stick_fraction:.2%}, {verdict.contact_loss_fraction:.2%} of the time"),
         ("settled part", f"from {verdict.settled_from * times.interval:.4g} s on"),
         ("scheme", _scheme(report.setup.case.solver)),
+        *([("tolerance", report.certificate.sentence())] if report.certificate is not None else []),
         ("contact", shares + (f", {report.setup.nodes} nodes" if "midpoint" in work.evaluators else "")),
         ("steps", f"{work.steps}{_step(report)}, {work.contact_evaluations} contact evaluations"),
         ("energy account", f"closes to {abs(energy.relative_closing_error):.1e} of its largest item"),

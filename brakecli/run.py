@@ -16,6 +16,7 @@ from brakecli.analysis.energy import EnergyAccount
 from brakecli.analysis.regime import Verdict, classify
 from brakecli.analysis.spectra import SPECTRAL, Spectrum, peak, spectrum
 from brakecli.case_reading import LoadedCase
+from brakecli.certify import Certificate, certify
 from brakecli.check import Check, check, free_bytes, refuse, within_range
 from brakecli.classify import context, failed, verdict_numbers
 from brakecli.model import HISTORY, TIME, ContactState, Failure
@@ -34,6 +35,7 @@ class RunReport:
     check: Check
     work: Work
     energy: EnergyAccount
+    certificate: Certificate | None  # where the case gives no step
     verdict: Verdict
     spectrum_peak: float | None  # Hz, of vx
     warnings: tuple[str, ...]
@@ -55,7 +57,7 @@ class RunReport:
             "theta": list(solver.theta),
             "iteration": str(solver.iteration) if self.check.step is not None else None,
             "step": self.check.step,
-            "tolerance": solver.tolerance,
+            **certificate_numbers(self.certificate),
             "evaluators": work.evaluators,
             "nodes": self.setup.nodes,
             "steps": work.steps,
@@ -76,6 +78,19 @@ class RunReport:
     def failure_sentence(self) -> str | None:
         """What ended the run before its time, or made it worthless."""
         return failure_sentence(self.work) if self.failed else None
+
+
+def certificate_numbers(certificate: Certificate | None) -> dict[str, Any]:
+    """Names and values of what a tolerance has come to; null where the case gives a step."""
+    if certificate is None:
+        return {"tolerance": None, "certified": None, "estimated_error": None, "certified_until": None}
+    return {
+        "tolerance": certificate.tolerance,
+        "certified": int(certificate.certified),
+        "estimated_error": certificate.estimated_error,
+        "certified_until": certificate.certified_until,
+        "certified_by": certificate.method,
+    }
 
 
 def failure_sentence(work: Work) -> str:
@@ -120,10 +135,15 @@ def run(
                 columns = dict(zip(HISTORY, rows.T, strict=True))
                 result.append("history", {"time": interval * np.arange(first, first + len(rows)), **columns})
 
-            motion = Motion(setup)
-            work, energy = motion.run(sink, progress)
+            certificate = None
+            if setup.case.solver.promise is None:
+                work, energy = Motion(setup).run(sink, progress)
+            else:
+                motion = certify(setup.case, progress)
+                setup, work, energy, certificate = motion.setup, motion.work, motion.energy, motion.certificate
+                sink(motion.rows)
             _require_finite("an energy", list(asdict(energy).values()))
-            report = _analyse(setup, found, work, energy, result, output)
+            report = _analyse(setup, found, work, energy, certificate, result, output)
             _write(result, loaded, report)
             result.commit()
     return report
@@ -151,7 +171,13 @@ class _Written:
 
 
 def _analyse(
-    setup: Setup, found: Check, work: Work, energy: EnergyAccount, result: ResultFile, output: Path
+    setup: Setup,
+    found: Check,
+    work: Work,
+    energy: EnergyAccount,
+    certificate: Certificate | None,
+    result: ResultFile,
+    output: Path,
 ) -> RunReport:
     """Regime, spectra and warnings of the finished history; the spectra go into the file at once."""
     history = _Written(result, setup.timing.interval)
@@ -171,8 +197,11 @@ def _analyse(
             f"{work.non_unique_steps} steps met a point where their solution need not be unique (the contact "
             "force rises with itself); reduce solver.step or friction.coefficient"
         )
+    if certificate is not None and not certificate.certified:
+        warnings.append(f"solver.tolerance: {certificate.sentence()}")
     top = peak(lines.frequency, lines.density["vx"])
-    return RunReport(output, setup.case.title, setup, found, work, energy, verdict, top, tuple(warnings))
+    told = tuple(warnings)
+    return RunReport(output, setup.case.title, setup, found, work, energy, certificate, verdict, top, told)
 
 
 def _declare_history(result: ResultFile) -> None:

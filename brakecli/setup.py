@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli import contact, schemes
-from brakecli.case import Case, Evaluator, Profile, Scheme
+from brakecli.case import EVENT_TOLERANCE, Case, Evaluator, Profile, Scheme
 from brakecli.coefficients import coefficients
 from brakecli.contact.pad import build_pad, default_nodes
 from brakecli.integrate import Drive, Grid
@@ -46,9 +46,16 @@ class Timing:
 def timing(case: Case) -> Timing:
     """Fit the step into the sample interval and the interval into the duration."""
     interval, duration = case.output.sample_interval, case.solver.duration
-    step = case.solver.step or interval  # a scheme with steps of its own sees the grid of samples alone
+    step = case.solver.step or interval
+    own_steps = case.solver.scheme in (Scheme.EVENT_DRIVEN, Scheme.AUTO)
+    if own_steps:  # it sees the grid of samples alone
+        step = interval
     per_sample, samples = _at_least(interval / step), _at_least(duration / interval)
     adjustments = []
+    if own_steps and case.solver.step is not None:
+        adjustments.append(
+            f"solver.step: not used, event-driven finds its steps itself, to a tolerance of {EVENT_TOLERANCE:g}"
+        )
     if abs(interval / step - per_sample) > WHOLE * per_sample:
         adjustments.append(
             f"solver.step: reduced from {step:g} s to {interval / per_sample:.9g} s, "
@@ -92,7 +99,8 @@ class Setup:
     @cached_property
     def scheme(self) -> ModuleType:
         """The scheme's module."""
-        return schemes.load(self.case.solver.scheme)
+        scheme = self.case.solver.scheme
+        return schemes.load(Scheme.EVENT_DRIVEN if scheme is Scheme.AUTO else scheme)
 
     @cached_property
     def evaluate(self) -> Any:
@@ -115,6 +123,11 @@ class Setup:
         return float(value_at(self.belt, 0.0))
 
     @property
+    def _tolerance(self) -> float:
+        """What a scheme with steps of its own keeps."""
+        return EVENT_TOLERANCE if self.case.solver.step is not None else self.case.solver.promise or 0.0
+
+    @property
     def drive(self) -> Drive:
         """What acts from outside."""
         return Drive(self.belt, self.load, self.wheel)
@@ -130,7 +143,7 @@ class Setup:
             MOST[self.case.solver.iteration],
             int(self.case.solver.allow_unconverged),
             self.timing.samples,
-            self.case.solver.tolerance or 0.0,
+            self._tolerance,
         )
 
 
@@ -141,7 +154,7 @@ def set_up(case: Case) -> Setup:
     smooth = shoe.g.size == 0 and wheel.g.size == 0
     if evaluator is Evaluator.AUTO and smooth:
         evaluator = Evaluator.CLOSED_FORM
-    elif evaluator is Evaluator.AUTO and case.solver.scheme is Scheme.EVENT_DRIVEN:
+    elif evaluator is Evaluator.AUTO and case.solver.scheme in (Scheme.EVENT_DRIVEN, Scheme.AUTO):
         evaluator = Evaluator.EXACT
     nodes = case.contact.nodes or default_nodes(case.contact.half_length, shoe, wheel)
     times = timing(case)

@@ -17,7 +17,7 @@ from brakecli.case import Case, changed
 from brakecli.errors import CaseError
 from brakecli.setup import set_up
 from brakecli.stability import MARGIN, stability
-from brakecli.sweep.growth import Growth, Sliding, growth, sliding
+from brakecli.sweep.growth import Growth, Sliding, growth, sliding, with_step
 from brakecli.sweep.tables import Critical, Method
 
 SCANNED = 9
@@ -70,12 +70,13 @@ Judge = Callable[[Case], Verdict | None]
 
 def search(critical: Critical, case_at: CaseAt, judge: Judge) -> Search:
     """Look for the critical value of the parameter that `case_at` sets; `judge` runs a case to its verdict."""
-    exact, bias = _by_eigenvalues(critical, case_at)
+    stepped = lambda value: with_step(case_at(value))  # noqa: E731 - where a tolerance is promised, there is no step
+    exact, bias = _by_eigenvalues(critical, stepped)
     if critical.method is Method.EIGENVALUE:
         error = None if exact.value is None else 0.5 * (exact.high - exact.low)
         low, high = (None, None) if exact.value is None else (exact.low, exact.high)
         return Search(exact.outcome, exact.value, low, high, error, bias, exact.value)
-    found = _by_simulation(critical, case_at)
+    found = _by_simulation(critical, stepped)
 
     def lasts(value: float) -> bool | None:
         verdict = _vibrates(judge(case := case_at(value)))

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from brakecli.analysis.equilibrium import equilibrium, mean_contact
 from brakecli.analysis.precision import natural_frequencies
 from brakecli.analysis.stability import is_undamped
-from brakecli.case import Case, changed
+from brakecli.case import Case, Scheme, changed
 from brakecli.errors import CaseError
 from brakecli.model import HISTORY, Failure
 from brakecli.schedules import value_at
@@ -35,6 +35,8 @@ ROUGH_PERIODS = 40
 """Of the slowest motion, that surfaces which open are watched for, and …"""
 PASSES = 20
 """… passes of the wheel's longest wave."""
+STEPS_PER_PERIOD = 200
+"""Of the two-layer scheme, where the case gives no step."""
 _PER_PERIOD = 20
 _STATE = list(HISTORY).index("state")
 
@@ -70,6 +72,19 @@ class Sliding:
     def grip(self) -> float:
         """sign(U) φ."""
         return math.copysign(self.setup.coefficients.phi, self.setup.belt_speed)
+
+
+def with_step(case: Case) -> Case:
+    """The case with the step that growth is measured with, where it promises an error instead."""
+    if case.solver.scheme not in (Scheme.AUTO, Scheme.EVENT_DRIVEN) and case.solver.step is not None:
+        return case
+    setup = set_up(case)
+    fast = natural_frequencies(setup.coefficients, setup.contact_stiffness)[1]
+    passing = abs(setup.belt_speed) * float(max(setup.wheel.turns, default=0.0))
+    interval = case.output.sample_interval
+    step = interval / math.ceil(interval * STEPS_PER_PERIOD * max(fast, passing))
+    solver = {"scheme": Scheme.TWO_LAYER, "theta": (0.5, 0.5), "step": step, "tolerance": None}
+    return changed(case, solver=solver)
 
 
 def sliding(case: Case) -> Sliding | None:

@@ -11,13 +11,15 @@ from numpy.typing import NDArray
 
 from brakecli.analysis.regime import Verdict, classify
 from brakecli.case import Case
+from brakecli.certify import certify
 from brakecli.check import check, refuse, within_range
 from brakecli.classify import braking_torque, context, failed
 from brakecli.errors import BrakecliError
 from brakecli.history import ArrayHistory
 from brakecli.model import Failure
-from brakecli.roughness import TWO_PI
+from brakecli.roughness import TWO_PI, wheel_angles
 from brakecli.run import failure_sentence
+from brakecli.schedules import integral_at
 from brakecli.setup import Setup, set_up
 from brakecli.simulate import Motion, Work
 from brakecli.sweep.critical import Search, search
@@ -60,6 +62,7 @@ FIELDS = {
     "steps": Field("i8", "1", "time steps"),
     "contact_evaluations": Field("i8", "1", "evaluations of the contact force"),
     "unconverged_steps": Field("i8", "1", "steps that did not converge"),
+    "estimated_error": Field("f8", "1", "relative error of the histories, where a tolerance was given"),
 }
 CRITICAL_FIELDS = {
     "critical_status": Field("S24", "", "what the search for the critical value has come to"),
@@ -91,7 +94,7 @@ class Outcome:
     verdict: Verdict
     warnings: tuple[str, ...]
     end: NDArray[np.float64]  # x, y, ẋ, ẏ
-    angles: NDArray[np.float64]  # of the wheel's waves at the end, rad
+    estimated_error: float  # of the histories, relative; NaN where the case gives a step
 
 
 def simulate(case: Case) -> Outcome:
@@ -100,10 +103,14 @@ def simulate(case: Case) -> Outcome:
         setup = set_up(case)
         found = check(setup)
         refuse(setup, found, math.inf)
-        blocks: list[NDArray[np.float64]] = []
-        motion = Motion(setup)
-        work, _ = motion.run(lambda rows: blocks.append(rows.copy()))
-        rows = np.concatenate(blocks)
+        certificate = None
+        if case.solver.promise is None:
+            blocks: list[NDArray[np.float64]] = []
+            work, _ = Motion(setup).run(lambda rows: blocks.append(rows.copy()))
+            rows = np.concatenate(blocks)
+        else:
+            motion = certify(case)
+            setup, rows, work, certificate = motion.setup, motion.rows, motion.work, motion.certificate
         if not np.isfinite(rows).all():
             raise FloatingPointError("a force overflows")
         verdict = classify(ArrayHistory(setup.timing.interval, rows), context(setup))
@@ -112,7 +119,10 @@ def simulate(case: Case) -> Outcome:
         verdict = failed(verdict, failure_sentence(work))
     elif work.unconverged_steps:
         warnings.append(f"{work.unconverged_steps} of {work.steps} steps did not converge, as the case allows")
-    return Outcome(setup, work, verdict, tuple(warnings), rows[-1, :4], motion.angles.copy())
+    if certificate is not None and not certificate.certified:
+        warnings.append(f"solver.tolerance: {certificate.sentence()}")
+    error = math.nan if certificate is None else certificate.estimated_error
+    return Outcome(setup, work, verdict, tuple(warnings), rows[-1, :4], error)
 
 
 def blank(kind: np.dtype[Any], status: Status, reason: str) -> NDArray[Any]:
@@ -175,7 +185,11 @@ def _continued(outcome: Outcome) -> dict[tuple[str, ...], Any]:
     start: dict[tuple[str, ...], Any] = {("initial",): {"x": x, "y": y, "vx": v_x, "vy": v_y}}
     wheel = outcome.setup.case.roughness.wheel
     if wheel is not None:
-        phases = iter(outcome.angles)  # a wave of no amplitude has none
+        setup = outcome.setup
+        angles = np.zeros(setup.wheel.g.size)
+        travel = integral_at(setup.belt, setup.timing.samples * setup.timing.interval, 0.0)
+        wheel_angles(setup.wheel, *travel, angles)
+        phases = iter(angles)  # a wave of no amplitude has none
         turned = [math.degrees(next(phases) % TWO_PI) if g else 0.0 for g in wheel.amplitudes]
         start["roughness", "wheel", "phases_deg"] = turned
     return start
@@ -227,6 +241,7 @@ def _filled(kind: np.dtype[Any], outcome: Outcome) -> NDArray[Any]:
         "steps": work.steps,
         "contact_evaluations": work.contact_evaluations,
         "unconverged_steps": work.unconverged_steps,
+        "estimated_error": outcome.estimated_error,
     }
     for name, value in values.items():
         record[name] = value

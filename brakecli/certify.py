@@ -1,0 +1,222 @@
+"""A run that keeps its promise: scheme, evaluator, nodes and step by the error that the histories may have.
+
+The error is never taken from one run: two runs of different fineness are compared, and the finer one is the
+answer. What they differ by is the error of the coarser one, so the answer is better than it is said to be.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brakecli.analysis.energy import EnergyAccount
+from brakecli.analysis.precision import natural_frequencies
+from brakecli.case import Case, Evaluator, Scheme, changed
+from brakecli.contact.pad import default_nodes
+from brakecli.model import Failure
+from brakecli.setup import Setup, set_up
+from brakecli.simulate import Motion, Work
+
+FIRST_EVENT_TOLERANCE, LEAST_EVENT_TOLERANCE = 1e-6, 1e-13
+EVENT_RATIO = 1e-2
+"""From one tolerance of the event-driven scheme to the next: its errors fall by about as much."""
+EVENT_MARGIN = 1e-3
+"""The coarser tolerance is at most this part of the promise: an event that is missed must not be missed twice."""
+LAYERED_FROM = 3e-4
+"""Promises from which on the layered schemes are cheaper, where surfaces open: docs/accuracy.md."""
+FIRST_STEPS = 40
+"""Steps per period of the fastest motion, and per passing wave, that a ladder of steps begins with."""
+MOST_RUNGS = 12
+MOST_SECONDS = 900.0
+"""Time of the loop after which no finer run is begun."""
+
+_MOTION = 4  # x, y, vx, vy: the first columns of a sample
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """What a tolerance has come to.
+
+    `estimated_error`: how far the histories may be off, relative to the largest value of each of x, y, vx and vy.
+    `certified_until` (s): up to here they keep the promise where they do not to the end.
+    """
+
+    tolerance: float
+    certified: bool
+    estimated_error: float
+    certified_until: float
+    method: str
+    runs: int
+
+    def sentence(self) -> str:
+        """The certificate in words."""
+        if self.certified:
+            return f"error at most {self.estimated_error:.1e}, by {self.method}"
+        return (
+            f"{self.tolerance:g} cannot be certified: {self.method} give {self.estimated_error:.1e}; up to "
+            f"{self.certified_until:.4g} s they keep it"
+        )
+
+
+@dataclass(frozen=True)
+class Certified:
+    """A motion with its certificate; `setup` is that of the run which is the answer, and so are its numbers.
+
+    `work` counts that run alone, but its `solve_seconds` are those of all runs together.
+    """
+
+    setup: Setup
+    rows: NDArray[np.float64]
+    work: Work
+    energy: EnergyAccount
+    certificate: Certificate
+
+
+@dataclass(frozen=True)
+class _Run:
+    setup: Setup
+    rows: NDArray[np.float64]
+    work: Work
+    energy: EnergyAccount
+
+
+Tell = Callable[[int], None]
+
+
+def certify(case: Case, progress: Tell = lambda samples: None) -> Certified:
+    """Compute a case to the error that it promises; `progress` is told the samples of the run in progress.
+
+    Smooth surfaces, and rough ones that touch everywhere, go to the event-driven scheme, whose cost hardly
+    depends on the error. Where surfaces open, that scheme needs the exact contact integral, which is dear: down
+    to `LAYERED_FROM` a ladder of steps and nodes of the two-layer scheme is cheaper.
+    """
+    promise = case.solver.promise
+    assert promise is not None
+    scheme = case.solver.scheme
+    if scheme is Scheme.AUTO:
+        layered = promise >= LAYERED_FROM and _opens(case)
+        found = _by_steps(case, promise, progress) if layered else _by_events(case, promise, progress)
+        if layered and not found.certificate.certified and found.work.solve_seconds < MOST_SECONDS:
+            again = _by_events(case, promise, progress)
+            found = min(found, again, key=lambda each: each.certificate.estimated_error)
+        return found
+    if scheme is Scheme.EVENT_DRIVEN:
+        return _by_events(case, promise, progress)
+    return _by_steps(case, promise, progress)
+
+
+def _opens(case: Case) -> bool:
+    """Whether the surfaces are rough and touch in part now and then, by a coarse run."""
+    setup = set_up(case)
+    if setup.smooth:
+        return False
+    step, interval = _coarsest(setup)
+    pilot = _run(_stepped(case, step, interval, 0), lambda samples: None)
+    return set(pilot.work.evaluators) != {"closed-form"}
+
+
+def _by_events(case: Case, promise: float, progress: Tell) -> Certified:
+    """Event-driven runs, each to a hundredth of the tolerance of the one before."""
+    tolerance = min(FIRST_EVENT_TOLERANCE, EVENT_MARGIN * promise)
+    before: _Run | None = None
+    seconds, runs = 0.0, 0
+    while True:
+        tolerance = max(tolerance, LEAST_EVENT_TOLERANCE)
+        run = _run(_event_case(case, tolerance), progress)
+        seconds, runs = seconds + run.work.solve_seconds, runs + 1
+        if before is not None:
+            until, error = _compare(before, run, promise)
+            failed = run.work.failure is not Failure.NONE
+            if error <= promise or failed or tolerance <= LEAST_EVENT_TOLERANCE or seconds > MOST_SECONDS:
+                method = f"event-driven runs to {tolerance / EVENT_RATIO:.0e} and {tolerance:.0e}"
+                kept = error <= promise and not failed
+                return _answer(run, Certificate(promise, kept, error, until, method, runs), seconds)
+        before, tolerance = run, EVENT_RATIO * tolerance
+
+
+def _by_steps(case: Case, promise: float, progress: Tell) -> Certified:
+    """Runs with steps half as long, and twice as many nodes, as those before.
+
+    The last difference bounds the error of the finer run while errors fall at least by half; it must not be
+    smaller by luck: a quarter of the difference before bounds it from below, as errors of second order fall.
+    """
+    setup = set_up(case)
+    step, interval = _coarsest(setup)
+    nodes = 0 if setup.smooth else default_nodes(case.contact.half_length, setup.shoe, setup.wheel)
+    before: _Run | None = None
+    last = math.inf
+    seconds, runs = 0.0, 0
+    for rung in range(MOST_RUNGS):
+        run = _run(_stepped(case, step / 2**rung, interval, nodes * 2**rung), progress)
+        seconds, runs = seconds + run.work.solve_seconds, runs + 1
+        if before is not None and run.work.failure is before.work.failure is Failure.NONE:
+            until, difference = _compare(before, run, promise)
+            error = max(difference, last / 4.0) if math.isfinite(last) else math.inf
+            last = difference
+            method = f"{run.setup.case.solver.scheme} runs of {run.setup.timing.step * 2:.3g} and half of that"
+            if error <= promise:
+                return _answer(run, Certificate(promise, True, error, until, method, runs), seconds)
+            slower = 4.5 * run.work.solve_seconds if nodes else 2.2 * run.work.solve_seconds
+            if seconds + slower > MOST_SECONDS:
+                break
+        before = run
+    error = max(last, promise * 1.0000001) if math.isfinite(last) else 1.0
+    method = f"the finest of {runs} runs, with steps of {run.setup.timing.step:.3g} s,"
+    return _answer(run, Certificate(promise, False, error, 0.0, method, runs), seconds)
+
+
+def _answer(run: _Run, certificate: Certificate, seconds: float) -> Certified:
+    run.work.solve_seconds = seconds
+    return Certified(run.setup, run.rows, run.work, run.energy, certificate)
+
+
+def _compare(coarse: _Run, fine: _Run, promise: float) -> tuple[float, float]:
+    """Until when (s) two runs differ by no more than the promise, and by how much they differ at most."""
+    count = min(len(coarse.rows), len(fine.rows))
+    if count < len(fine.rows):
+        return 0.0, 1.0
+    one, other = coarse.rows[:, :_MOTION], fine.rows[:, :_MOTION]
+    scale = np.abs(other).max(axis=0)
+    apart = (np.abs(one - other) / np.where(scale > 0.0, scale, 1.0)).max(axis=1)
+    late = np.flatnonzero(apart > promise)
+    until = (int(late[0]) - 1 if len(late) else count - 1) * fine.setup.timing.interval
+    return max(until, 0.0), float(apart.max())
+
+
+def _coarsest(setup: Setup) -> tuple[float, float]:
+    """The step (s) that a ladder begins with, and the sample interval."""
+    interval = setup.timing.interval
+    fast = natural_frequencies(setup.coefficients, setup.contact_stiffness)[1]
+    speed = float(np.abs(setup.belt.values).max())
+    passing = speed * float(max(setup.wheel.turns, default=0.0))
+    wanted = 1.0 / (FIRST_STEPS * max(fast, passing, 1e-300))
+    return interval / max(1, math.ceil(interval / wanted)), interval
+
+
+def _stepped(case: Case, step: float, interval: float, nodes: int) -> Case:
+    """The case with a step; a scheme that is to be chosen is two-layer."""
+    scheme = case.solver.scheme
+    chosen = {"scheme": Scheme.TWO_LAYER, "theta": (0.5, 0.5)} if scheme is Scheme.AUTO else {}
+    exact = case.contact.evaluator is Evaluator.EXACT
+    return changed(
+        case,
+        solver={"step": step, "tolerance": None, **chosen},
+        contact={"nodes": None if exact or not nodes else nodes},
+        output={"sample_interval": interval},
+    )
+
+
+def _event_case(case: Case, tolerance: float) -> Case:
+    return changed(case, solver={"scheme": Scheme.EVENT_DRIVEN, "theta": (), "tolerance": tolerance})
+
+
+def _run(case: Case, progress: Tell) -> _Run:
+    setup = set_up(case)
+    blocks: list[NDArray[np.float64]] = []
+    per_sample = setup.timing.per_sample
+    work, energy = Motion(setup).run(
+        lambda rows: blocks.append(rows.copy()), lambda steps: progress(steps // per_sample)
+    )
+    return _Run(setup, np.concatenate(blocks), work, energy)
