@@ -77,13 +77,16 @@ class Motion:
         self,
         sink: Callable[[NDArray[np.float64]], None],
         progress: Callable[[int], None] = lambda steps: None,
+        *,
+        first_block: int = 1,
     ) -> tuple[Work, EnergyAccount]:
         """Step to the end or to a failure; give every block of samples (rows of `model.HISTORY`) to `sink`.
 
-        `progress` is told the steps done after each block.
+        `progress` is told the steps done after each block. `first_block` (steps) is one where it is not known what
+        a step costs; each block adds some 0.1 ms of its own to `solve_seconds`.
         """
         lag, last = self.setup.scheme.LAG, self.setup.timing.steps
-        size = 1  # what a step costs is known after the first
+        size = min(first_block, self._most_steps())
         while self.work.failure is Failure.NONE and self.counts[integrate.LEVEL] < last + lag:
             start = time.perf_counter()
             rows = self._block(min(last + lag, int(self.counts[integrate.LEVEL]) + size))

@@ -3,14 +3,14 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
 
-from brakecli.analysis.equilibrium import Equilibrium, Mean, equilibrium, mean_contact, tabulated
+from brakecli.analysis.equilibrium import Equilibrium, equilibrium, mean_contact, tabulated
 from brakecli.analysis.precision import natural_frequencies, spectral_radius
 from brakecli.analysis.stability import Crossing, Instability, Mode, crossings, eigensystem, is_undamped, modes
 from brakecli.errors import CaseError
@@ -109,7 +109,7 @@ def stability(setup: Setup) -> StabilityReport:
     if belt != 0.0 and setup.smooth:
         found = crossings(c, k, belt) if k > 0.0 else []
     elif belt != 0.0:
-        stiffness_at = _mean_stiffness(setup, tabulated(mean, setup.pad), load)
+        stiffness_at = mean_stiffness(setup)
         found = _rough_crossings(c, belt, stiffness_at)
     flutter, divergence = undamped_critical(c, k, belt)
     lost = next((crossing for crossing in found if crossing.lost), None)
@@ -143,9 +143,12 @@ def undamped_critical(c: Coefficients, k: float, belt: float) -> tuple[float | N
     return None, (c.c_xx * (c.c_yy + k) - c.c_xy**2) / (k * abs(c.c_xy))
 
 
-def _mean_stiffness(setup: Setup, mean: Mean, load: float) -> StiffnessAt:
-    """Mean stiffness of the contact as it depends on φ through the mean force; NaN where there is none."""
+def mean_stiffness(setup: Setup) -> StiffnessAt:
+    """Mean stiffness of a rough contact as it depends on φ through the mean force; NaN where there is none."""
+    mean = tabulated(partial(mean_contact, setup.evaluate, setup.pad, setup.wheel), setup.pad)
+    load = float(value_at(setup.load, 0.0))
 
+    @cache
     def at(phi: float) -> float:
         c = setup.coefficients._replace(phi=phi)
         try:
@@ -185,46 +188,59 @@ def _rough_crossings(c: Coefficients, belt: float, stiffness_at: StiffnessAt) ->
 
 def _discrete(setup: Setup, stiffness_at: StiffnessAt, exact: Crossing | None, fastest: float) -> Discrete | None:
     """What the scheme makes of steady sliding, which grows with `fastest` (1/s); None without contact."""
-    c, belt = setup.coefficients, setup.belt_speed
-    if belt == 0.0 or not stiffness_at(c.phi) > 0.0:
+    c = setup.coefficients
+    if setup.belt_speed == 0.0 or not stiffness_at(c.phi) > 0.0:
         return None
     if has_own_steps(setup.scheme):  # it makes of it what it is
         critical = exact.friction if exact else None
         bias = 0.0 if exact else None
         return Discrete(math.exp(fastest * setup.weights.h), fastest, None, critical, bias)
-
-    def radius(phi: float, h: float = setup.weights.h) -> float:
-        k = stiffness_at(phi)
-        if not k > 0.0:
-            return 0.0
-        return spectral_radius(c._replace(phi=phi), setup.weights._replace(h=h), setup.scheme, k, belt)
-
-    at_case = radius(c.phi)
-    critical = None
-    reach = 2.0 * exact.friction if exact else LARGEST_FRICTION
-    frictions = np.linspace(0.0, reach, 41)
-    radii = [radius(float(phi)) - 1.0 - MARGIN for phi in frictions]
-    if radii[0] > 0.0:
-        critical = 0.0
-    else:
-        first = next((i for i in range(40) if radii[i + 1] > 0.0), None)
-        if first is not None:
-            low, high = float(frictions[first]), float(frictions[first + 1])
-            critical = float(brentq(lambda phi: radius(phi) - 1.0 - MARGIN, low, high, xtol=1e-12))
+    at_case = _radius(setup, stiffness_at, c.phi, setup.weights.h)
+    critical = discrete_critical(setup, stiffness_at, exact)
     return Discrete(
         spectral_radius=at_case,
         growth=math.log(at_case) / setup.weights.h if at_case > 0.0 else -math.inf,
-        step_limit=_step_limit(lambda h: radius(0.0, h), natural_frequencies(c, stiffness_at(0.0))[1]),
+        step_limit=step_limit(setup, stiffness_at),
         critical_friction=critical,
         bias=critical - exact.friction if critical is not None and exact else None,
     )
 
 
-def _step_limit(radius: Callable[[float], float], frequency: float) -> float | None:
-    """The largest stable step (s), looked for between ωh = 0.01 and 10⁴ at the highest natural frequency (Hz).
+def _radius(setup: Setup, stiffness_at: StiffnessAt, phi: float, h: float) -> float:
+    """Spectral radius of the case's scheme at another φ and step (s)."""
+    k = stiffness_at(phi)
+    if not k > 0.0:
+        return 0.0
+    c, weights = setup.coefficients._replace(phi=phi), setup.weights._replace(h=h)
+    return spectral_radius(c, weights, setup.scheme, k, setup.belt_speed)
+
+
+def discrete_critical(setup: Setup, stiffness_at: StiffnessAt, exact: Crossing | None) -> float | None:
+    """φ at which steady sliding loses stability in the case's scheme at its step, U ≠ 0; None where nowhere.
+
+    The scheme is one that steps on the grid of the case. It is looked for up to twice the exact value.
+    """
+
+    def excess(phi: float) -> float:
+        return _radius(setup, stiffness_at, phi, setup.weights.h) - 1.0 - MARGIN
+
+    reach = 2.0 * exact.friction if exact else LARGEST_FRICTION
+    frictions = [float(phi) for phi in np.linspace(0.0, reach, 41)]
+    if excess(0.0) > 0.0:
+        return 0.0
+    for low, high in pairwise(frictions):
+        if excess(high) > 0.0:
+            return float(brentq(excess, low, high, xtol=1e-12))
+    return None
+
+
+def step_limit(setup: Setup, stiffness_at: StiffnessAt) -> float | None:
+    """The largest stable step (s), looked for between ωh = 0.01 and 10⁴ at the highest natural frequency.
 
     0 where the scheme is unstable at any step, None where it is stable at all of them.
     """
+    radius = partial(_radius, setup, stiffness_at, 0.0)
+    frequency = natural_frequencies(setup.coefficients, stiffness_at(0.0))[1]
     ladder = 10.0 ** np.arange(-2.0, 4.1, 0.25) / (2.0 * math.pi * frequency)
     stable = [radius(float(h)) <= 1.0 + _CLEAR_MARGIN for h in ladder]
     if all(stable):

@@ -8,10 +8,8 @@ from statistics import median
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from brakecli import contact
-from brakecli.analysis.precision import spectral_radius
 from brakecli.case import Case, Evaluator, Iteration, Scheme, Start
 from brakecli.check import check, refuse, within_range
 from brakecli.compare.errors import Errors, errors
@@ -19,18 +17,19 @@ from brakecli.compare.methods import Method, Rung, case_of, ladder, methods, run
 from brakecli.errors import BrakecliError, RefusedError
 from brakecli.model import Failure
 from brakecli.run import failure_sentence
-from brakecli.schemes import has_own_steps, load
+from brakecli.schemes import load
 from brakecli.setup import Setup, set_up
 from brakecli.simulate import Motion, Work
-from brakecli.stability import MARGIN, StabilityReport, stability
+from brakecli.stability import StabilityReport, discrete_critical, mean_stiffness, stability, step_limit
 
 REFERENCE, CHECK = 1e-12, 1e-10
 """Tolerances of the reference, and of the run that tells how good it is."""
 REFERENCE_SHARE = 0.3
 """Part of the budget that the reference may take."""
 FEWEST_SAMPLES = 64
-FIRST_PART = 1.0 / 64.0
 MOST_REPEATS = 7
+LONGEST_CALL = 1.0
+"""Loops that take less (s) are timed in one call; longer ones in blocks, whose own time is small beside theirs."""
 
 
 @dataclass
@@ -108,8 +107,7 @@ def compare(
         report = stability(setup)
         progress("reference", 0, 0)
         duration, reference, reference_seconds = _reference(case, interval, REFERENCE_SHARE * budget)
-        rough_reference = _rows(_reference_case(case, interval, duration, CHECK))[0]
-        reference_error = errors(rough_reference, reference, interval).error
+        reference_error = _reference_error(_reference_case(case, interval, duration, CHECK), reference, interval)
         entries = [Entry(rung) for method in kinds for rung in rungs(method, found)]
         left_out = _first_round(case, entries, reference, (interval, duration), begin + 0.8 * budget, progress)
         _judge(setup, report, entries)
@@ -125,27 +123,36 @@ def _reference_case(case: Case, interval: float, duration: float, tolerance: flo
     return case_of(case, Rung(method, None, tolerance), interval, duration)
 
 
-def _rows(case: Case) -> tuple[NDArray[np.float64], Work]:
-    """Samples and work of a run; raises RefusedError."""
+def _rows(case: Case, *, at_once: bool = False) -> tuple[NDArray[np.float64], Work]:
+    """Samples and work of a run, in one block if `at_once`; raises RefusedError."""
     setup = set_up(case)
     refuse(setup, check(setup), math.inf)
     blocks: list[NDArray[np.float64]] = []
-    work, _ = Motion(setup).run(lambda rows: blocks.append(rows.copy()))
+    first = setup.timing.steps if at_once else 1
+    work, _ = Motion(setup).run(lambda rows: blocks.append(rows.copy()), first_block=first)
     return np.concatenate(blocks), work
 
 
 def _reference(case: Case, interval: float, budget: float) -> tuple[float, NDArray[np.float64], float]:
     """The longest part of the motion whose reference fits the budget (s), from the start on, and its samples."""
-    whole = case.solver.duration
-    duration = max(FIRST_PART * whole, FEWEST_SAMPLES * interval)
+    whole = max(case.solver.duration, FEWEST_SAMPLES * interval)
+    duration = FEWEST_SAMPLES * interval
     while True:
-        duration = min(duration, max(whole, FEWEST_SAMPLES * interval))
+        duration = min(duration, whole)
         rows, work = _rows(_reference_case(case, interval, duration, REFERENCE))
         if work.failure is not Failure.NONE:
             raise RefusedError(f"there is no reference to compare with: {failure_sentence(work)}")
         if duration >= whole or 3.0 * work.solve_seconds > budget:
-            return duration, rows, work.solve_seconds
+            return (len(rows) - 1) * interval, rows, work.solve_seconds
         duration *= min(4.0, 0.7 * budget / max(work.solve_seconds, 1e-3))
+
+
+def _reference_error(case: Case, reference: NDArray[np.float64], interval: float) -> float:
+    """By how much the reference differs from a run at a looser tolerance."""
+    rows, work = _rows(case)
+    if work.failure is not Failure.NONE:
+        raise RefusedError(f"it is not known how good the reference is: {failure_sentence(work)}")
+    return errors(rows, reference, interval).error
 
 
 def _first_round(
@@ -188,21 +195,29 @@ def _first_round(
 def _repeat(
     case: Case, entries: list[Entry], grid: tuple[float, float], deadline: float, progress: Progress
 ) -> int:
-    """Time all that ran again, in turns, as often as the budget allows; how many times each."""
+    """Time all that ran again, in turns, as often as the budget allows; how many times each.
+
+    The times of the first round, which found memory and caches cold, count only where there are no others.
+    """
     timed = [entry for entry in entries if entry.seconds]
-    for repeat in range(1, MOST_REPEATS):
+    for repeat in range(MOST_REPEATS):
         expected = 1.3 * sum(entry.seconds[-1] for entry in timed) + 0.005 * len(timed)
         if time.perf_counter() + expected > deadline:
-            return repeat
+            return max(repeat, 1)
         for done, entry in enumerate(timed):
             progress(f"times, turn {repeat + 1}", done, len(timed))
-            entry.seconds.append(_rows(case_of(case, entry.rung, *grid))[1].solve_seconds)
+            at_once = entry.seconds[-1] < LONGEST_CALL
+            seconds = _rows(case_of(case, entry.rung, *grid), at_once=at_once)[1].solve_seconds
+            entry.seconds = [*entry.seconds, seconds] if repeat else [seconds]
     return MOST_REPEATS
 
 
 def _judge(setup: Setup, report: StabilityReport, entries: list[Entry]) -> None:
     """Add what the amplification matrices say, and the observed orders."""
-    limits: dict[tuple[str, tuple[float, ...]], float] = {}
+    stiffness_at = mean_stiffness(setup) if not setup.smooth else lambda phi: report.contact_stiffness
+    exact = report.critical
+    limits: dict[tuple[str, tuple[float, ...]], float | None] = {}
+    biases: dict[tuple[str, tuple[float, ...], float], float | None] = {}
     before: Entry | None = None
     for entry in entries:
         method, step = entry.rung.method, entry.rung.step
@@ -210,42 +225,23 @@ def _judge(setup: Setup, report: StabilityReport, entries: list[Entry]) -> None:
             entry.order = _order(before, entry)
         before = entry
         if step is None:
-            entry.step_limit, entry.critical_bias = math.inf, 0.0 if report.critical else None
+            entry.step_limit, entry.critical_bias = math.inf, 0.0 if exact else None
             continue
-        at = set_up(case_of(setup.case, entry.rung, step, step))
-        key = (str(method.scheme), method.theta)
-        if key not in limits:
-            discrete = stability(at).discrete
-            limits[key] = math.nan if discrete is None else discrete.step_limit or math.inf
-            if discrete is not None and discrete.step_limit == 0.0:
-                limits[key] = 0.0
-        entry.step_limit = None if math.isnan(limits[key]) else limits[key]
-        entry.critical_bias = _bias(at, report)
-
-
-def _bias(setup: Setup, report: StabilityReport) -> float | None:
-    """φ at which the scheme's spectral radius passes one, less the exact one; the contact's stiffness is kept."""
-    if report.critical is None or has_own_steps(setup.scheme):
-        return None
-    c, exact = setup.coefficients, report.critical.friction
-
-    def excess(friction: float) -> float:
-        at = c._replace(phi=friction)
-        k = report.contact_stiffness
-        return spectral_radius(at, setup.weights, setup.scheme, k, setup.belt_speed) - 1.0 - MARGIN
-
-    frictions = [float(value) for value in np.linspace(0.0, 2.0 * exact, 9)]
-    values = [excess(friction) for friction in frictions]
-    if values[0] > 0.0:
-        return -exact
-    first = next((place for place in range(1, 9) if values[place] > 0.0), None)
-    if first is None:
-        return None
-    return float(brentq(excess, frictions[first - 1], frictions[first], xtol=1e-12)) - exact
+        if report.discrete is None:  # no steady sliding that could lose its stability
+            continue
+        scheme = str(method.scheme), method.theta
+        if (*scheme, step) not in biases:
+            at = set_up(case_of(setup.case, entry.rung, step, step))
+            if scheme not in limits:
+                limit = step_limit(at, stiffness_at)
+                limits[scheme] = math.inf if limit is None else limit
+            found = discrete_critical(at, stiffness_at, exact) if exact else None
+            biases[*scheme, step] = found - exact.friction if found is not None and exact else None
+        entry.step_limit, entry.critical_bias = limits[scheme], biases[*scheme, step]
 
 
 def _order(coarse: Entry, fine: Entry) -> float | None:
-    """Observed order between two rungs: how the error falls with the step, or with the evaluations."""
+    """Observed order between two rungs: how the error falls with the step."""
     if coarse.errors is None or fine.errors is None or not (fine.errors.error > 0.0 < coarse.errors.error):
         return None
     if coarse.rung.step is None or fine.rung.step is None:

@@ -77,7 +77,8 @@ def ladder(setup: Setup, steps: Sequence[float] = ()) -> list[float]:
     if steps:
         return sorted(steps, reverse=True)
     fast = natural_frequencies(setup.coefficients, setup.contact_stiffness)[1]
-    passing = abs(setup.belt_speed) * float(max(setup.wheel.turns, default=0.0))
+    speed = max(abs(float(value)) for value in setup.belt.values)
+    passing = speed * float(max(setup.wheel.turns, default=0.0))
     coarsest = 1.0 / (COARSEST * max(fast, passing))
     return [coarsest / 2**rung for rung in range(RUNGS)]
 
@@ -131,6 +132,8 @@ def parse_steps(text: str | None) -> list[float]:
     largest = max(steps)
     if any(abs(largest / step - round(largest / step)) > 1e-9 * largest / step for step in steps):
         raise UsageError(f"--steps {text}: all must be whole parts of the largest; halve it, for instance")
+    if len({round(largest / step) for step in steps}) < len(steps):
+        raise UsageError(f"--steps {text}: names a step twice; give each once")
     return steps
 
 
