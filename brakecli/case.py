@@ -219,6 +219,9 @@ class Initial(Table):
 class Solver(Table):
     """How the equations of motion are solved, and for how long."""
 
+    alternatives = (("step",), ("tolerance",))
+    one_is_needed = False
+
     scheme: Annotated[
         Scheme,
         from_text,
@@ -261,9 +264,7 @@ class Solver(Table):
         return None if self.step is not None else self.tolerance or DEFAULT_TOLERANCE
 
     def _broken_rules(self) -> Iterator[Broken]:
-        if self.step is not None and self.tolerance is not None:
-            what = "is given together with step"
-            yield Broken(("tolerance",), what, "keep one of the two", self.tolerance)
+        yield from super()._broken_rules()
         if self.step is not None and self.scheme == Scheme.AUTO:
             what = 'is given, but "auto" chooses the step'
             yield Broken(("step",), what, "leave scheme out, or give tolerance instead of step", self.step)

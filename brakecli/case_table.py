@@ -83,14 +83,16 @@ class Table(BaseModel):
     )
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = ()
-    """Groups of keys of which exactly one is given."""
+    """Groups of keys of which exactly one is given …"""
+    one_is_needed: ClassVar[bool] = True
+    """… or, if this is not set, at most one."""
 
     def _broken_rules(self) -> Iterator[Broken]:
         """Yield every rule between keys that does not hold."""
         given = [group for group in self.alternatives if any(getattr(self, key) is not None for key in group)]
         if not given:
             choices = ", or ".join(" and ".join(group) for group in self.alternatives)
-            if choices:
+            if choices and self.one_is_needed:
                 yield Broken((self.alternatives[0][0],), "is missing", f"give {choices}")
         elif len(given) > 1:
             key = next(key for key in given[1] if getattr(self, key) is not None)
@@ -151,5 +153,8 @@ def _repeated(error: ErrorDetails) -> InitErrorDetails:
 
 
 def _tell_alternatives(schema: dict[str, Any], model: type[Table]) -> None:
-    if model.alternatives:
-        schema["oneOf"] = [{"required": list(group)} for group in model.alternatives]
+    groups = [{"required": list(group)} for group in model.alternatives]
+    if groups and model.one_is_needed:
+        schema["oneOf"] = groups
+    elif groups:
+        schema["not"] = {"allOf": groups}

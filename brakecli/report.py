@@ -51,6 +51,8 @@ def run_table(report: RunReport) -> str:
         ("scheme", _scheme(report.setup.case.solver)),
         *([("tolerance", report.certificate.sentence())] if report.certificate is not None else []),
         ("contact", shares + (f", {report.setup.nodes} nodes" if "midpoint" in work.evaluators else "")),
+        ("modelled", "; ".join(report.scene[0])),
+        ("left out", "; ".join(report.scene[1]) or "nothing"),
         ("steps", f"{work.steps}{_step(report)}, {work.contact_evaluations} contact evaluations"),
         ("energy account", f"closes to {abs(energy.relative_closing_error):.1e} of its largest item"),
         ("time of the loop", f"{work.solve_seconds:.3g} s"),

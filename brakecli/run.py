@@ -20,6 +20,7 @@ from brakecli.certify import Certificate, certify
 from brakecli.check import Check, check, free_bytes, refuse, within_range
 from brakecli.classify import context, failed, verdict_numbers
 from brakecli.model import HISTORY, TIME, ContactState, Failure
+from brakecli.scene import scene
 from brakecli.setup import Setup, set_up
 from brakecli.simulate import Motion, Work
 from brakecli.store import ResultFile, new_result
@@ -70,9 +71,16 @@ class RunReport:
                 "closing_error": self.energy.closing_error,
                 "relative_closing_error": self.energy.relative_closing_error,
             },
+            "modelled": self.scene[0],
+            "left_out": self.scene[1],
             "adjustments": list(self.check.adjustments),
             "warnings": list(self.warnings),
         }
+
+    @property
+    def scene(self) -> tuple[list[str], list[str]]:
+        """What was modelled, and what was left out and why."""
+        return scene(self.setup, self.work)
 
     @property
     def failure_sentence(self) -> str | None:
