@@ -32,6 +32,8 @@ MOST_RUNGS = 12
 MOST_SECONDS = 900.0
 """Time of the loop after which no finer run is begun."""
 
+ROUNDING = 1e-12
+"""No estimate is below this: runs that share their rounding agree better than they are right."""
 _MOTION = 4  # x, y, vx, vy: the first columns of a sample
 
 
@@ -182,7 +184,7 @@ def _compare(coarse: _Run, fine: _Run, promise: float) -> tuple[float, float]:
     apart = (np.abs(one - other) / np.where(scale > 0.0, scale, 1.0)).max(axis=1)
     late = np.flatnonzero(apart > promise)
     until = (int(late[0]) - 1 if len(late) else count - 1) * fine.setup.timing.interval
-    return max(until, 0.0), float(apart.max())
+    return max(until, 0.0), max(float(apart.max()), ROUNDING)
 
 
 def _coarsest(setup: Setup) -> tuple[float, float]:

@@ -1,0 +1,123 @@
+"""A tolerance is a promise: what is certified is true, and what is not true is not certified."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from brakecli import certify as module
+from brakecli.case import Case, Scheme, changed
+from brakecli.certify import Certified, certify
+from brakecli.compare.errors import errors
+from brakecli.scene import scene
+from brakecli.setup import set_up
+from tests.commands import TINY, attributes, brakecli
+from tests.examples import COULOMB, ROUGH, SQUEAL, make, simulate
+
+FULL = {"amplitudes": [1e-6, 7e-7], "wavelengths": [0.02, 0.011]}
+
+
+def promised(base: dict[str, Any], tolerance: float, **changes: Any) -> Case:
+    """A case with a tolerance in the place of its step."""
+    solver = {"solver__step": None, "solver__tolerance": tolerance}
+    return make({**base, "output": {"sample_interval": 1e-4}}, **solver, **changes)
+
+
+def truth(case: Case) -> np.ndarray[Any, Any]:
+    """The event-driven motion to 1e-12, which tests/test_event_driven.py holds to independent solutions."""
+    exact = changed(case, solver={"scheme": "event-driven", "tolerance": 1e-12, "step": None, "theta": ()})
+    return simulate(exact).rows
+
+
+def kept(found: Certified, case: Case) -> float:
+    """The true error of an answer, which must not be above the estimate."""
+    error = errors(found.rows, truth(case), found.setup.timing.interval).error
+    assert error <= found.certificate.estimated_error + 1e-11  # what the truth itself may be off
+    return error
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-4, 1e-6, 1e-9])
+@pytest.mark.parametrize("friction", [0.3, 0.7])
+def test_smooth_surfaces_keep_any_tolerance(tolerance: float, friction: float) -> None:
+    case = promised(SQUEAL, tolerance, friction__coefficient=friction, solver__duration=0.3)
+    found = certify(case)
+    assert found.certificate.certified
+    assert found.certificate.certified_until == pytest.approx(0.3)
+    assert kept(found, case) <= tolerance
+    assert found.setup.case.solver.scheme is Scheme.EVENT_DRIVEN
+
+
+def test_rough_surfaces_in_full_contact_never_see_a_quadrature() -> None:
+    case = promised(SQUEAL, 1e-4, roughness__shoe=FULL, roughness__wheel=FULL, initial__at="equilibrium")
+    found = certify(case)
+    assert found.certificate.certified
+    assert set(found.work.evaluators) == {"closed-form"}
+    assert kept(found, case) <= 1e-4
+    assert any("quadrature" in sentence for sentence in scene(found.setup, found.work)[1])
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-5])
+def test_surfaces_that_open_keep_their_tolerance_too(tolerance: float) -> None:
+    rough = {**ROUGH, "contact": {"half_length": 0.05, "stiffness": 5e7}}
+    case = promised(rough, tolerance, solver__duration=0.004)
+    found = certify(case)
+    assert found.certificate.certified
+    assert kept(found, case) <= tolerance
+    layered = tolerance >= module.LAYERED_FROM
+    assert found.setup.case.solver.scheme is (Scheme.TWO_LAYER if layered else Scheme.EVENT_DRIVEN)
+
+
+@pytest.mark.parametrize("scheme", ["two-layer", "three-layer"])
+def test_a_scheme_that_is_named_is_kept(scheme: str) -> None:
+    case = promised(SQUEAL, 1e-3, solver__scheme=scheme, solver__duration=0.05)
+    found = certify(case)
+    assert str(found.setup.case.solver.scheme) == scheme
+    assert found.certificate.certified
+    assert kept(found, case) <= 1e-3
+
+
+def test_steps_that_do_not_get_there_are_not_certified(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "MOST_RUNGS", 4)
+    found = certify(promised(SQUEAL, 1e-8, solver__scheme="two-layer", solver__duration=0.05))
+    assert not found.certificate.certified
+    assert found.certificate.estimated_error > 1e-8
+    assert "cannot be certified" in found.certificate.sentence()
+
+
+def test_a_tolerance_below_rounding_is_not_certified_and_says_what_it_can_stand_for(tmp_path: Path) -> None:
+    (tmp_path / "tiny.toml").write_text(TINY.replace("step = 1e-5, duration = 0.02", "duration = 0.5"))
+    done = brakecli("run", "tiny.toml", "--set", "solver.tolerance=1e-13", "--json", cwd=tmp_path)
+    done.told(1, "cannot be certified", "was written, but solver.tolerance is not sure to be kept")
+    assert done.json["certified"] == 0
+    assert 1e-13 < done.json["estimated_error"] < 1e-9
+    assert attributes(tmp_path / "tiny.h5")["certified"] == 0
+
+
+def test_a_case_without_a_step_keeps_a_thousandth(tmp_path: Path) -> None:
+    (tmp_path / "tiny.toml").write_text(TINY.replace("step = 1e-5, duration = 0.02", "duration = 0.02"))
+    done = brakecli("run", "tiny.toml", "--json", cwd=tmp_path)
+    assert done.code == 0
+    assert (done.json["tolerance"], done.json["certified"]) == (1e-3, 1)
+    assert done.json["estimated_error"] <= 1e-3
+    assert done.json["scheme"] == "event-driven"
+    again = brakecli("run", "tiny.h5", "-o", "again.h5", cwd=tmp_path)
+    assert again.code == 0
+    assert (tmp_path / "again.h5").read_bytes() == (tmp_path / "tiny.h5").read_bytes()
+
+
+def test_no_friction_no_load_and_no_roughness_are_named_as_left_out() -> None:
+    case = promised(SQUEAL, 1e-3, friction__coefficient=0.0, link1__damping=0.0, link2__damping=0.0)
+    found = certify(case)
+    _, left = scene(found.setup, found.work)
+    for words in ("quadrature", "there is no friction", "dashpots"):
+        assert any(words in sentence for sentence in left), left
+
+
+def test_the_coulomb_oscillator_ends_where_it_must() -> None:
+    case = changed(make(COULOMB), solver={"scheme": "auto", "theta": (), "step": None, "tolerance": 1e-8})
+    found = certify(changed(case, output={"sample_interval": 0.01}))
+    assert found.certificate.certified
+    start = set_up(case)
+    assert start.timing.samples == len(found.rows) - 1
+    assert found.rows[-1, 0] == pytest.approx(15.0 - 205.0**0.5, abs=1e-8 * 15.0)
