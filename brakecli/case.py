@@ -342,9 +342,6 @@ class Case(Table):
         if exact and self.contact.evaluator == Evaluator.MIDPOINT:
             what = "is given, but event-driven is exact, and a tolerance is kept by nodes of its own"
             yield Broken(("contact", "evaluator"), what, "leave evaluator out", self.contact.evaluator)
-        elif exact and self.contact.nodes is not None:
-            what = "is given, but a tolerance chooses nodes itself, and event-driven takes none"
-            yield Broken(("contact", "nodes"), what, "leave nodes out", self.contact.nodes)
         if self.solver.start == Start.PAPER and (self.initial.vx or self.initial.vy):
             what = "takes the second layer for equal to the first, but the initial velocity is not zero"
             remedy = 'set start to "consistent", or initial.vx and initial.vy to 0'

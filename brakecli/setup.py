@@ -56,6 +56,8 @@ def timing(case: Case) -> Timing:
         adjustments.append(
             f"solver.step: not used, event-driven finds its steps itself, to a tolerance of {EVENT_TOLERANCE:g}"
         )
+    if case.solver.promise is not None and case.contact.nodes is not None:
+        adjustments.append("contact.nodes: not used, the tolerance chooses nodes itself")
     if abs(interval / step - per_sample) > WHOLE * per_sample:
         adjustments.append(
             f"solver.step: reduced from {step:g} s to {interval / per_sample:.9g} s, "

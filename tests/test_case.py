@@ -78,15 +78,21 @@ layer_solvers = st.builds(
         optional={"iteration": st.sampled_from(list(Iteration)).map(str), "allow_unconverged": st.booleans()},
     ),
 )
-solvers = layer_solvers | st.fixed_dictionaries(
-    {"scheme": st.just("event-driven"), "tolerance": st.floats(1e-13, 1e-2), "duration": positives}
+promising_solvers = st.fixed_dictionaries(
+    {"duration": positives},
+    optional={
+        "scheme": st.sampled_from(["event-driven", "auto", "two-layer", "three-layer"]),
+        "tolerance": st.floats(1e-13, 1e-2),
+    },
 )
+solvers = layer_solvers | promising_solvers
 
 
 def with_what_the_scheme_needs(document: dict[str, Any]) -> dict[str, Any]:
-    if document["solver"].get("scheme") == "event-driven":
+    if "step" not in document["solver"]:
         document["output"] = {"sample_interval": document["solver"]["duration"]}
         document["contact"].pop("evaluator", None)
+        document["contact"].pop("nodes", None)
     return document
 
 

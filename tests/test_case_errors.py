@@ -18,6 +18,7 @@ from brakecli.case_problems import tables
 from brakecli.case_reading import parse_case, read_case
 from brakecli.errors import CaseError, Problem
 from brakecli.located_toml import LARGEST_TEXT, MOST_MARKS, MOST_PARTS, MOST_STATEMENTS, Located, split
+from brakecli.setup import timing
 
 CONSTANT = """\
 title = "constant wheel and load"
@@ -323,23 +324,16 @@ def test_the_paper_start_needs_a_shoe_at_rest() -> None:
     [
         (
             "tolerance = 1e-10",
-            "step = 1e-5",
-            "solver.step",
-            "is not for event-driven, which finds its steps itself",
-        ),
-        ("tolerance = 1e-10", "", "solver.step", "is missing; give step, or tolerance"),
-        (
-            "tolerance = 1e-10",
             "tolerance = 1e-10\nstep = 1e-5",
             "solver.tolerance",
             "is given together with step (found 1e-10); keep one of the two",
         ),
         ("duration = 1.0", "duration = 1.0\ntheta = [0.5, 0.5]", "solver.theta", "which has no weights"),
-        ('"newton"', '"fixed-point"', "solver.iteration", "which solves no equations in a step"),
+        ('"newton"', '"fixed-point"', "solver.iteration", "is not for event-driven"),
         ('"consistent"', '"paper"', "solver.start", "is for the three-layer scheme alone"),
-        ("= false", "= true", "solver.allow_unconverged", "in which nothing has to converge"),
+        ("= false", "= true", "solver.allow_unconverged", "is not for event-driven"),
         ("sample_interval = 1e-4", "", "output.sample_interval", "there is no time step to take its place"),
-        ('"auto"', '"midpoint"', "contact.evaluator", "has a kink at every node, and event-driven is exact"),
+        ('"auto"', '"midpoint"', "contact.evaluator", "event-driven is exact"),
     ],
 )
 def test_what_is_not_for_the_event_driven_scheme_is_told(old: str, new: str, line: str, what: str) -> None:
@@ -348,11 +342,26 @@ def test_what_is_not_for_the_event_driven_scheme_is_told(old: str, new: str, lin
     assert what in first
 
 
-@pytest.mark.parametrize("scheme", ["two-layer", "three-layer"])
-def test_a_tolerance_is_not_yet_for_a_scheme_of_layers(scheme: str) -> None:
-    text = change(EVENT_DRIVEN, ("event-driven", scheme))
-    (line,) = told(text)
-    assert f"solver.tolerance: is not yet for {scheme}, but for event-driven alone (found 1e-10)" in line
+def test_a_step_chooses_two_layer_and_none_leaves_the_choice() -> None:
+    plain = change(CONSTANT, ('scheme = "two-layer"\n', ""), ("theta = [0.5, 0.5]\n", ""))
+    assert parse_case(plain, "case.toml").case.solver.scheme == "two-layer"
+    free = parse_case(change(plain, ("step = 1e-5\n", "")), "case.toml").case.solver
+    assert (free.scheme, free.step, free.tolerance, free.promise) == ("auto", None, None, 1e-3)
+    kept = parse_case(plain, "case.toml", ["solver.tolerance=1e-5"]).case.solver
+    assert (kept.scheme, kept.step, kept.promise) == ("auto", None, 1e-5)
+    (line,) = told(change(plain, ("[solver]", '[solver]\nscheme = "auto"')))
+    assert 'solver.step: is given, but "auto" chooses the step' in line
+
+
+def test_nodes_are_chosen_by_the_tolerance() -> None:
+    case = parse_case(CONSTANT, "case.toml", ["solver={duration=1.0, tolerance=1e-4}"]).case
+    assert "contact.nodes: not used, the tolerance chooses nodes itself" in timing(case).adjustments
+
+
+def test_event_driven_takes_the_step_of_a_case_for_its_samples_alone() -> None:
+    case = parse_case(CONSTANT, "case.toml", ['solver.scheme="event-driven"', "solver.theta=[]"]).case
+    (told_,) = timing(case).adjustments
+    assert "solver.step: not used, event-driven finds its steps itself, to a tolerance of 1e-10" in told_
 
 
 def test_an_override_makes_a_case_event_driven() -> None:

@@ -15,12 +15,11 @@ from numpy.typing import NDArray
 from brakecli.errors import UnreadableResultError, UsageError
 from brakecli.figures import style
 from brakecli.plots import plot_result
-from brakecli.store import new_result, open_result
+from brakecli.store import FILL, new_result, open_result
 from brakecli.sweep.driver import choose_engine, sweep
 from brakecli.sweep.plan import label
 from brakecli.sweep.point import CRITICAL_FIELDS, FIELDS
 from brakecli.sweep.reading import parse_sweep
-from brakecli.store import FILL
 from brakecli.sweep.tables import Sweep
 from brakecli.sweep_plots.curves import cell_edges, draw_critical, draw_difference, draw_motion
 from brakecli.sweep_plots.figure import draw_sweep
