@@ -170,9 +170,9 @@ def _try(p: Plant, h: float, allowed: float) -> float:
                 worst = max(worst, error)
             if worst > allowed:
                 return worst
-        x, y = m[BEGIN + X] + h * combined(m, SLOPES, stage, X), m[BEGIN + Y] + h * combined(m, SLOPES, stage, Y)
-        v_x = m[BEGIN + VX] + h * combined(m, SLOPES, stage, VX)
-        v_y = m[BEGIN + VY] + h * combined(m, SLOPES, stage, VY)
+        x, y, v_x, v_y = combined(m, SLOPES, stage)
+        x, y = m[BEGIN + X] + h * x, m[BEGIN + Y] + h * y
+        v_x, v_y = m[BEGIN + VX] + h * v_x, m[BEGIN + VY] + h * v_y
         slopes(p, stage, NODES[stage] * h, x, y, v_x, v_y)
         if stage == END_STAGE:
             m[END + X], m[END + Y], m[END + VX], m[END + VY] = x, y, v_x, v_y
