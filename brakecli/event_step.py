@@ -65,15 +65,17 @@ from brakecli.schedules import SCHEDULE, Schedule, segment
 
 _LOCAL = 0.05
 """Error of a step over the tolerance of the histories, to which the errors of all steps add up."""
-_EARLY, _LATE = 0.47, 0.93
-_DEFECT = 20.0
-_TINY = 1e-300
+_DEFECT, _EARLY, _LATE = 20.0, 0.47, 0.93
+"""Defect of a step over the error that it is allowed, and where it is taken: between the stages."""
 _SAFETY, _LEAST, _MOST = 0.9, 0.2, 6.0
-_RADIANS = 2.0  # of the fastest motion, in a step: the looks at the margins follow it
-_FIRST = 0.05  # of the longest step
-_MOST_SWITCHES = 60
-_MOST_EVENTS = 1000
-_NO_PROGRESS = 1e-6  # of the longest step
+"""Of the step that the error asks for: what is taken, and the bounds of its change."""
+_RADIANS = 2.0
+"""Of the fastest motion, in a step: the looks at the margins are to follow it."""
+_FIRST = 0.05
+"""The first step over the longest."""
+_MOST_SWITCHES, _MOST_EVENTS, _NO_PROGRESS = 60, 1000, 1e-6
+"""Phases that end at once, and events within a part of the longest step, before a run ends."""
+_TINY = 1e-300  # no division by zero where nothing moves
 
 _NONE, _NOT_CLOSED, _DIVERGED = int(Failure.NONE), int(Failure.NOT_CLOSED), int(Failure.DIVERGED)
 _STALLED = int(Failure.STALLED)
@@ -170,26 +172,28 @@ def _try(p: Plant, h: float, allowed: float) -> float:
                 worst = max(worst, error)
             if worst > allowed:
                 return worst
-        x, y = m[BEGIN + X] + h * combined(m, SLOPES, stage, X), m[BEGIN + Y] + h * combined(m, SLOPES, stage, Y)
-        v_x = m[BEGIN + VX] + h * combined(m, SLOPES, stage, VX)
-        v_y = m[BEGIN + VY] + h * combined(m, SLOPES, stage, VY)
+        x, y, v_x, v_y = combined(m, SLOPES, stage)
+        x, y = m[BEGIN + X] + h * x, m[BEGIN + Y] + h * y
+        v_x, v_y = m[BEGIN + VX] + h * v_x, m[BEGIN + VY] + h * v_y
         slopes(p, stage, NODES[stage] * h, x, y, v_x, v_y)
         if stage == END_STAGE:
             m[END + X], m[END + Y], m[END + VX], m[END + VY] = x, y, v_x, v_y
             if p.contact[VALID] == 0.0:
                 return math.inf
     make_continuous(m, SLOPES, BEGIN, END, POWER, h)
+    m[STEP_DONE] = h
     return worst if p.contact[KIND] == 0.0 else max(worst, _defect(p, h))
 
 
 @kernel(float64(PLANT, int64, float64), inlined=False)
 def _to_event(p: Plant, which: int, h: float) -> float:
-    """Make the step that ends at an event, located to rounding; its length.
+    """Make the step that ends at an event, located to rounding; its length, or 0 where the contact is not closed.
 
     A step to where the continuous solution has it, and from there one of Newton's, so short that it is exact.
     """
     m = p.memory
-    _try(p, h, math.inf)
+    if _try(p, h, math.inf) == math.inf:
+        return 0.0
     margin = margins(p, h, 1.0)[which]
     slope = margin_slope(p, which)
     rest = -margin / slope if slope != 0.0 else 0.0
@@ -204,7 +208,7 @@ def _to_event(p: Plant, which: int, h: float) -> float:
 def _take(p: Plant, drive: Drive, grid: Grid, work: NDArray[np.float64], h: float, last: int) -> None:
     """Take the step that has been made; `last` is 1 where it reaches the end of the run."""
     m, interval = p.memory, grid.interval
-    m[TIME_DONE], m[TAU_DONE], m[STEP_DONE] = m[TIME], m[TAU], h
+    m[TIME_DONE], m[TAU_DONE] = m[TIME], m[TAU]
     m[SIDE_DONE], m[TOUCHING_DONE] = m[SIDE], m[TOUCHING]
     for item in range(WORKS):
         total = 0.0
@@ -260,7 +264,7 @@ def step(p: Plant, drive: Drive, grid: Grid, work: NDArray[np.float64]) -> int:
         if error <= 1.0:
             break
         h, growth = h * factor, 1.0
-        if not h > 1e-15 * longest or t + h == t:
+        if not h > EPSILON * longest or m[TAU] + h == m[TAU]:
             return _STALLED if p.contact[VALID] == 1.0 else _NOT_CLOSED
     m[STEP] = max(h * factor, m[STEP] if h == limit else 0.0)
     which, theta = first_event(p, h)
@@ -273,6 +277,8 @@ def step(p: Plant, drive: Drive, grid: Grid, work: NDArray[np.float64]) -> int:
         return _enter(p, which, longest)
     if which != NONE:
         h, last = _to_event(p, which, theta * h), 0
+        if h == 0.0:
+            return _NOT_CLOSED
     _take(p, drive, grid, work, h, last)
     p.counts[MOST] = max(p.counts[MOST], p.counts[EVALUATIONS] - evaluations)
     if not abs(m[X]) + abs(m[Y]) + abs(m[VX]) + abs(m[VY]) < BOUND:

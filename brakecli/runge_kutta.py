@@ -92,13 +92,17 @@ DENSE = _numbers("""
 """The upper coefficients of the continuous solution."""
 
 
-@kernel(float64(vector, int64, int64, int64))
-def combined(memory: NDArray[np.float64], at_slopes: int, stage: int, component: int) -> float:
-    """Σ A[stage, j] k_j of one component: what the step so far advances by, over the step."""
-    total = 0.0
+@kernel(types.UniTuple(float64, 4)(vector, int64, int64))
+def combined(memory: NDArray[np.float64], at_slopes: int, stage: int) -> tuple[float, float, float, float]:
+    """Σ A[stage, j] k_j of every component: what the step so far advances by, over the step."""
+    x, y, v_x, v_y = 0.0, 0.0, 0.0, 0.0
     for j in range(stage):
-        total += A[stage, j] * memory[at_slopes + SIZE * j + component]
-    return total
+        weight, at = A[stage, j], at_slopes + SIZE * j
+        x += weight * memory[at]
+        y += weight * memory[at + 1]
+        v_x += weight * memory[at + 2]
+        v_y += weight * memory[at + 3]
+    return x, y, v_x, v_y
 
 
 @kernel(float64(vector, int64, int64))

@@ -8,12 +8,14 @@ import pytest
 from numpy.typing import NDArray
 
 from brakecli.case import Case
+from brakecli.check import check
 from brakecli.kernels import X
 from brakecli.model import ContactState, Failure
 from brakecli.phases import EVENTS, EVENTS_TIME, SWITCHES
 from brakecli.runge_kutta import DENSE, END_STAGE, FIFTH, NODES, THIRD, A
 from brakecli.setup import set_up
 from brakecli.simulate import Motion
+from brakecli.stability import stability
 from tests.examples import COULOMB, MODE_COUPLING, ROUGH, SQUEAL, Result, make, simulate
 from tests.piecewise_exact import PiecewiseExact
 from tests.solve_ivp_reference import SolveIvp
@@ -55,7 +57,7 @@ def flat_case(rng: np.random.Generator, tolerance: float) -> tuple[dict[str, Any
             "vx": size * omega * rng.normal(),
             "vy": size * omega * rng.normal(),
         },
-        "solver": {"scheme": "event-driven", "tolerance": tolerance, "duration": 40 / omega},
+        "solver": {"scheme": "event-driven", "tolerance": tolerance, "duration": 30 / omega},
         "output": {"sample_interval": 0.1 / omega},
     }, omega
 
@@ -360,6 +362,23 @@ def test_phases_that_end_at_once_are_a_failure_with_a_name() -> None:
 def test_closed_form_that_does_not_hold_is_a_failure() -> None:
     result = simulate(event_driven(ROUGH, 1e-6, contact__evaluator="closed-form", contact__nodes=None))
     assert result.work.failure is Failure.NOT_CLOSED
+
+
+def test_no_step_limits_or_biases_the_scheme() -> None:
+    setup = set_up(event_driven(SQUEAL))
+    report = stability(setup)
+    assert report.critical is not None
+    assert report.discrete is not None
+    assert report.discrete.step_limit is None
+    assert report.discrete.bias == 0.0
+    assert report.discrete.critical_friction == report.critical.friction
+    assert report.discrete.growth == max(value.real for value in report.eigenvalues)
+    found = check(setup)
+    assert found.step is None
+    assert found.limits.growth == 1.0
+    assert found.warnings == ()
+    # A rough guess: within a factor of three.
+    assert found.steps == pytest.approx(simulate(event_driven(SQUEAL)).work.steps, rel=2.0)
 
 
 def test_the_tableau_meets_the_order_conditions_of_quadrature() -> None:
