@@ -62,14 +62,12 @@ def regimes(results: Results) -> None:
                 axis.scatter(
                     speed[here], friction[here], s=95, marker="s", c=colour, edgecolors=GREY, lw=0.6, label=regime
                 )
-        axis.axhline(
-            float(results["beta-flat"].critical_eigenvalue.sel({BOTH: 300.0, BETA: 0.0})), color=VERMILION, ls="--"
-        )
+        critical = results["beta-flat"].critical_eigenvalue.sel({BOTH: 300.0, BETA: 0.0})
+        axis.axhline(float(critical), color=VERMILION, ls="--", label="critical, by eigenvalues")
         axis.set(xscale="log", xlabel="surface speed U (m/s)", ylabel="friction coefficient φ", title=title)
         axis.grid(False)
-    axes[0].text(0.0095, 0.581, "critical, by eigenvalues", color=VERMILION, size=8.0)
     handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4)
+    figure.legend(handles, labels, loc="outside lower center", ncols=5)
     save(figure, "regimes")
 
 
@@ -115,7 +113,8 @@ def alpha(results: Results) -> None:
     axes[1].set(title="Smooth, c2 away from c1 + K as well")
     for axis in axes:
         axis.set(xlabel="angle α of link 2 (°)", xlim=(0.0, 31.0), ylim=(0.0, 5.0))
-        axis.legend(loc="upper left")
+    axes[0].legend(loc="upper left")
+    axes[1].legend(loc="upper left", bbox_to_anchor=(0.14, 1.0))
     save(figure, "alpha")
 
 
@@ -140,6 +139,11 @@ def beta(results: Results) -> None:
     save(figure, "beta")
 
 
+def together(*curves: xr.DataArray) -> xr.DataArray:
+    """The values of several curves over c2 as one."""
+    return xr.concat([each.drop_vars(K, errors="ignore") for each in curves], C2).sortby(C2)
+
+
 def ratio(results: Results) -> None:
     """The critical friction coefficient by the stiffness of link 2."""
     figure, axes = panels(9.6, 2)
@@ -152,17 +156,20 @@ def ratio(results: Results) -> None:
             words = f"K/c1 = {share:g}" if damping else None
             dots(axes[0], wide.critical.sel({K: k / PAD, BOTH: damping}), C1, colour, words, marker)
         axes[0].plot(1.0 + share, (1.0 + 1.0 / share) * math.tan(math.radians(5.0)), "*", color=colour, ms=11)
-    fine = fine.critical_eigenvalue.sel({K: KB / PAD})
+    fine = fine.sel({K: KB / PAD})
+    finest = results.refined[0.2].isel({K: 0})
     for (first, second), colour, words in (
         ((0.0, 0.0), GREY, "no dashpots"),
         ((300.0, 300.0), BLUE, "both dashpots"),
         ((300.0, 0.0), PURPLE, "b1 alone"),
         ((0.0, 300.0), ORANGE, "b2 alone"),
     ):
-        curve(axes[1], fine.sel({FIRST: first, SECOND: second}), C1, colour)
+        both = [each.critical_eigenvalue.sel({FIRST: first, SECOND: second}, drop=True) for each in (fine, finest)]
+        curve(axes[1], together(*both), C1, colour)
         axes[1].plot([], [], color=colour, label=words)
     dots(axes[1], results["ratio-rough"].critical.sel({BOTH: 300.0}), C1, GREEN, "both, rough, full contact", "x")
-    curve(axes[1], opened.critical_eigenvalue, C1, VERMILION)
+    nearest = results.refined["open"].critical_eigenvalue.isel({FIRST: 0, SECOND: 0}, drop=True)
+    curve(axes[1], together(opened.critical_eigenvalue, nearest), C1, VERMILION)
     dots(axes[1], opened.critical, C1, VERMILION, "both, rough, partly open", "s")
     axes[0].set(title="Smooth: dots without dashpots, rings with", yscale="log", ylim=(0.1, 12.0))
     axes[0].set(ylabel="critical friction coefficient")
