@@ -313,9 +313,10 @@ def schema_command(
 ) -> None:
     """Print the JSON Schema of case files, or of sweep files, for editors that know TOML."""
     from brakecli.case import Case, json_schema
+    from brakecli.case_table import Table
     from brakecli.sweep.tables import Sweep
 
-    tables = {"case": Case, "sweep": Sweep}
+    tables: dict[str, type[Table]] = {"case": Case, "sweep": Sweep}
     if kind not in tables:
         raise UsageError(f"schema {kind}: there is none; give {' or '.join(tables)}")
     _print_json(json_schema(tables[kind]), indent=2)
