@@ -13,7 +13,7 @@ PYTEST_ARGS ?=
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .NOTPARALLEL: # two installations into one .venv at a time would collide
-.PHONY: help demo test lint format types imports derivations cases picture check clean
+.PHONY: help demo test lint format types imports derivations cases picture paper check clean
 
 help: ## list the targets (this text)
 	@echo "make TARGET, where TARGET is one of"
@@ -83,6 +83,10 @@ picture: $(DEV_STAMP) ## draw docs/picture.png, from cases/relaxation.toml
 	@mkdir -p results
 	$(BIN)/brakecli run cases/relaxation.toml --force --quiet --output results/relaxation.h5
 	$(BIN)/brakecli plot results/relaxation.h5 --force --output docs/picture.png
+
+paper: $(DEV_STAMP) ## reproduce the paper's claims into docs/paper-claims.md, with pictures (some minutes)
+	@mkdir -p results/paper
+	$(BIN)/python docs/paper_claims.py
 
 check: lint types imports test cases ## all of lint, types, imports, test and cases
 

@@ -6,6 +6,7 @@ import time
 import tomllib
 from collections import deque
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.check import free_bytes
+from brakecli.errors import CannotWriteError
 from brakecli.store import new_result
 from brakecli.sweep.engines import Engine, Job, LocalEngine, Task
 from brakecli.sweep.estimate import Estimate, estimate, refuse_sweep
@@ -122,7 +124,7 @@ def sweep(
     """
     plan, start = loaded.plan, time.perf_counter()
     found = estimate(plan, engine.workers)
-    with new_result(output, force=force) as result:
+    with _keeping(_journal_path(output)), new_result(output, force=force) as result:
         refuse_sweep(found, free_bytes(output.resolve().parent))
         with Journal(
             _journal_path(output), identity(plan), record_type(plan), plan.units, plan.unit_length, force=force
@@ -137,6 +139,18 @@ def sweep(
             result.commit()
             journal.discard()
     return report
+
+
+@contextmanager
+def _keeping(journal: Path) -> Iterator[None]:
+    """Say of what could not be written that the finished points are kept, if they are."""
+    try:
+        yield
+    except CannotWriteError as error:
+        if os.path.lexists(journal):
+            sentence = f"{error}; finished points are kept, and the same command goes on with them"
+            raise CannotWriteError(sentence) from error
+        raise
 
 
 def identity(plan: Plan) -> dict[str, Any]:

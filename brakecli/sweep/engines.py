@@ -4,6 +4,7 @@ An engine takes tasks, neighbouring units of the sweep, gives back their records
 a worker has died of. The records do not depend on the engine, nor on how the units were cut into tasks.
 """
 
+import fcntl
 import os
 import signal
 import threading
@@ -11,11 +12,16 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from multiprocessing import connection, get_context, parent_process
+from multiprocessing import connection, get_context, parent_process, resource_tracker
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 from types import TracebackType
 from typing import NamedTuple, Protocol, Self
+
+from brakecli.errors import BrakecliError
+from brakecli.output import signals_deferred
+
+_SIGNALS = (signal.SIGHUP, signal.SIGINT, signal.SIGTERM)
 
 
 class Job(NamedTuple):
@@ -47,6 +53,32 @@ class Finished(NamedTuple):
 
 Work = Callable[[Job, int, int], bytes]
 """work(job, first, count): the records of some units. A function of a module, so that workers find it."""
+
+
+class Attempt(NamedTuple):
+    """What has come of a task in a worker: records and seconds, or why there are none."""
+
+    records: bytes | None
+    seconds: float
+    failure: str = ""
+
+
+def attempt(work: Work, job: Job, first: int, size: int) -> Attempt:
+    """Compute a task. What goes wrong within is the task's own fault, not that of the worker or the network."""
+    begin = time.perf_counter()
+    try:
+        return Attempt(work(job, first, size), time.perf_counter() - begin)
+    except MemoryError:
+        return Attempt(None, 0.0, "it ran out of memory")
+    except Exception as error:  # of one task, which must not cost the others
+        return Attempt(None, 0.0, f"{type(error).__name__}: {first_line(error)}")
+
+
+def first_line(error: object) -> str:
+    """The first line of an error's text, or else its kind."""
+    return (str(error).splitlines() or [type(error).__name__])[0]
+
+
 Supply = Callable[[], Task | None]
 """The next task, None where there is none now; asked again after each task that has ended."""
 
@@ -115,6 +147,8 @@ class LocalEngine:
                     yield self._collect(worker)
 
     def _hand_out(self, supply: Supply) -> None:
+        for worker in [each for each in self._pool if each.task is None and not each.process.is_alive()]:
+            self._remove(worker)  # it has died since its last task, and of none
         idle = [worker for worker in self._pool if worker.task is None]
         while idle or len(self._pool) < self.workers:
             task = supply()
@@ -124,31 +158,44 @@ class LocalEngine:
             worker.task = task
             try:
                 worker.pipe.send(task)
-            except OSError:  # it has died since its last task; its pipe tells so when it is read
+            except OSError:  # it has died this moment; its pipe tells so when it is read
                 continue
 
     def _start(self) -> _Worker:
         context = get_context("spawn")  # a forked child would keep our locks and our threads' memory
         ours, theirs = context.Pipe()
         process = context.Process(target=_serve, args=(theirs, self._job, self._work), daemon=True)
-        with _single_threaded():
-            process.start()
-        theirs.close()
         worker = _Worker(process, ours)
-        self._pool.append(worker)
+        try:
+            resource_tracker.ensure_running()  # here, as it lets signals through
+            with _single_threaded(), _signals_blocked():
+                process.start()
+                self._pool.append(worker)
+        except OSError as error:
+            raise BrakecliError(
+                f"a worker process cannot be started: {error.strerror or error}; finished points are kept, run "
+                "the same command again with fewer --jobs"
+            ) from error
+        finally:
+            theirs.close()
         return worker
+
+    def _remove(self, worker: _Worker) -> None:
+        self._pool.remove(worker)
+        worker.process.join()
+        worker.pipe.close()
 
     def _collect(self, worker: _Worker) -> Finished:
         task, worker.task = worker.task, None
         assert task is not None
         try:
-            records, seconds = worker.pipe.recv()
+            found: Attempt = worker.pipe.recv()
         except (EOFError, OSError):
-            worker.process.join()
-            worker.pipe.close()
-            self._pool.remove(worker)
+            self._remove(worker)
             return Finished(task, None, 0.0, _death(worker.process.exitcode or 0))
-        return Finished(task, records, seconds)
+        if found.records is None:  # it ends itself after that
+            self._remove(worker)
+        return Finished(task, found.records, found.seconds, found.failure)
 
 
 def _death(code: int) -> str:
@@ -175,23 +222,50 @@ def _single_threaded() -> Iterator[None]:
                 os.environ[name] = value
 
 
+@contextmanager
+def _signals_blocked() -> Iterator[None]:
+    """Start a process that hears no signals until it is ready: Python's start would end in a traceback."""
+    with signals_deferred():
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
+        try:
+            yield
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _serve(pipe: Connection, job: Job, work: Work) -> None:
     """Compute tasks until the parent ends. Its Ctrl-C is not ours: the parent kills us."""
     for number in (signal.SIGINT, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    threading.Thread(target=_die_with_parent, daemon=True).start()
+    for number in (signal.SIGTERM, signal.SIGIO):
+        signal.signal(number, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, _SIGNALS)
+    parent = parent_process()
+    assert parent is not None
+    _die_with(parent.sentinel)
     while True:
         try:
             task = pipe.recv()
-            begin = time.perf_counter()
-            pipe.send((work(job, task.first, task.size), time.perf_counter() - begin))
+            found = attempt(work, job, task.first, task.size)
+            pipe.send(found)
         except (EOFError, OSError):
+            return
+        if found.records is None:  # who knows in what state this process is
             return
 
 
-def _die_with_parent() -> None:
-    parent = parent_process()
-    if parent is not None:
-        connection.wait([parent.sentinel])
-    os._exit(1)
+def _die_with(sentinel: int) -> None:
+    """End this process with its parent: the system sends SIGIO, which no computation holds up.
+
+    A thread sees to it on systems that send nothing.
+    """
+    fcntl.fcntl(sentinel, fcntl.F_SETOWN, os.getpid())
+    fcntl.fcntl(sentinel, fcntl.F_SETFL, fcntl.fcntl(sentinel, fcntl.F_GETFL) | os.O_ASYNC)
+    if connection.wait([sentinel], timeout=0):  # it has ended before that
+        os._exit(1)
+
+    def watch() -> None:
+        connection.wait([sentinel])
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()

@@ -29,6 +29,8 @@ SATURATED = 1e-3
 """Of the static compression: a difference as large as this no longer follows the linear equations to 1e-3."""
 FADED = 1e-5
 """Of its first size: a difference as small as this holds no more than four digits."""
+DEPARTED = 2.0
+"""Times as far from steady sliding as roughness alone takes a run: it is on its way to a limit cycle."""
 PERIODS = 40
 """Of the fastest motion, that smooth surfaces are watched for: their disturbances are exactly linear."""
 ROUGH_PERIODS = 40
@@ -122,6 +124,8 @@ def growth(found: Sliding) -> Growth | None:
     # D[t]: columns are the differences of the neighbours, rows x, y, ẋ, ẏ, each in its scale.
     maps = np.array([(other[:, :4] - base[:, :4]) / (DISTURBANCE * scales) for other in others]).transpose(1, 2, 0)
     last = _last_linear(setup, [base, *others], np.abs(maps).max(axis=(1, 2)))
+    if not setup.smooth:
+        last = min(last, _last_forced(found, base, interval, slow))
     first = max(1, last // 4)
     if last - first < 4:  # out of steady sliding at once
         return Growth(fast, fast, 0.0)
@@ -176,6 +180,20 @@ def _last_linear(setup: Setup, runs: list[NDArray[np.float64]], sizes: NDArray[n
             ended |= run[:, _STATE] != slides
     ended[0] = False
     return int(np.argmax(ended)) - 1 if ended.any() else len(sizes) - 1
+
+
+def _last_forced(found: Sliding, base: NDArray[np.float64], interval: float, slow: float) -> int:
+    """The last sample up to which a run on rough surfaces only does what roughness forces on it.
+
+    An unstable one leaves that for a limit cycle, on which differences do not grow. It is gone when it moves
+    `DEPARTED` times as far from steady sliding as in its first periods and its first passing wave.
+    """
+    away = np.abs(base[:, :2] - np.array([found.x, found.y])).max(axis=1)
+    passing = abs(found.setup.belt_speed) * float(found.setup.wheel.turns.min(initial=np.inf))
+    seconds = max(3.0 / slow if slow > 0.0 else 0.0, 1.0 / passing)
+    opening = max(1, int(seconds / interval))
+    gone = np.flatnonzero(away > DEPARTED * away[:opening].max())
+    return int(gone[0]) - 1 if len(gone) else len(base) - 1
 
 
 def _rate(start: NDArray[np.float64], end: NDArray[np.float64], time: float) -> float:

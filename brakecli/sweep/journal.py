@@ -17,7 +17,7 @@ from typing import Any, BinaryIO, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.errors import CannotWriteError, RefusedError
+from brakecli.errors import BrakecliError, CannotWriteError, RefusedError
 
 Identity = Mapping[str, Any]
 """What makes a sweep that one: keys and values, none of them a mapping."""
@@ -68,12 +68,13 @@ class Journal:
         count, rest = divmod(len(records), self._kind.itemsize * self._length)
         if rest or self.finished[first : first + count].any():
             raise ValueError(f"units {first} … hold {len(records)} bytes, or are there already")
+        offset = self._file.seek(0, os.SEEK_END)
         try:
-            offset = self._file.seek(0, os.SEEK_END)
-            self._file.write(_HEAD.pack(first, count, zlib.crc32(records)) + records)
-            self._file.flush()
+            _write(self._file, _HEAD.pack(first, count, zlib.crc32(records)) + records)
             os.fsync(self._file.fileno())
         except OSError as error:
+            with suppress(OSError):
+                os.ftruncate(self._file.fileno(), offset)
             raise _cannot_write(self.path, error) from error
         self._note(_Block(first, count, offset + _HEAD.size))
 
@@ -82,7 +83,9 @@ class Journal:
         values = np.empty((len(self.finished), self._length), self._kind[name])
         for block in self._blocks:
             self._file.seek(block.offset)
-            data = self._file.read(block.size * self._length * self._kind.itemsize)
+            data = self._file.read(size := block.size * self._length * self._kind.itemsize)
+            if len(data) < size:
+                raise BrakecliError(f"{self.path}: was cut short while in use; run the same command again")
             records = np.frombuffer(data, self._kind).reshape(block.size, self._length)
             values[block.first : block.first + block.size] = records[name]
         return values
@@ -96,6 +99,9 @@ class Journal:
         header = json.dumps(dict(identity)).encode() + b"\n"
         try:
             file = open(os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666), "r+b", buffering=0)  # noqa: SIM115, PTH123
+        except OSError as error:
+            raise _cannot_write(self.path, error) from error
+        try:
             found = file.read(_LONGEST_HEADER)
             found = found[: found.find(b"\n") + 1]
             if found and found != header and not force:
@@ -103,12 +109,23 @@ class Journal:
             if found == header:
                 self._read(file, len(header))
             else:
+                os.ftruncate(file.fileno(), 0)
                 file.seek(0)
-                file.truncate()
-                file.write(header)
+                self._begin(file, header)
         except OSError as error:
+            file.close()
             raise _cannot_write(self.path, error) from error
+        except BaseException:
+            file.close()
+            raise
         return file
+
+    def _begin(self, file: BinaryIO, header: bytes) -> None:
+        try:
+            _write(file, header)
+        except OSError:
+            self.discard()  # it holds nothing
+            raise
 
     def _read(self, file: BinaryIO, offset: int) -> None:
         """Note the blocks of a journal, and cut off one that was not finished."""
@@ -126,11 +143,18 @@ class Journal:
                 break
             self._note(_Block(first, count, offset + _HEAD.size))
             offset += _HEAD.size + size
-        file.truncate(offset)
+        os.ftruncate(file.fileno(), offset)
 
     def _note(self, block: _Block) -> None:
         self._blocks.append(block)
         self.finished[block.first : block.first + block.size] = True
+
+
+def _write(file: BinaryIO, data: bytes) -> None:
+    """Write all of it: a disk that is nearly full takes a part."""
+    view = memoryview(data)
+    while view:
+        view = view[os.write(file.fileno(), view) :]
 
 
 def _differences(path: Path, found: bytes, identity: Identity) -> str:
@@ -139,7 +163,7 @@ def _differences(path: Path, found: bytes, identity: Identity) -> str:
     try:
         there = json.loads(found)
         keys = [key for key in {**there, **identity} if there.get(key) != identity.get(key)]
-    except (ValueError, TypeError):
+    except (ValueError, TypeError, AttributeError, RecursionError):
         return f"{path}: holds no finished points; remove it, or start anew with --force"
     told = [
         f"{key} was {there.get(key, 'not set')!s:.60}, is {identity.get(key, 'not set')!s:.60}" for key in keys
@@ -152,6 +176,5 @@ def _differences(path: Path, found: bytes, identity: Identity) -> str:
 def _cannot_write(path: Path, error: OSError) -> CannotWriteError:
     reason = (error.strerror or str(error)).lower()
     return CannotWriteError(
-        f"{path}: cannot write: {reason}; finished points are kept there, free some space and run the same "
-        "command again, or choose another output with -o"
+        f"{path}: cannot write: {reason}; free some space there, or choose another output with -o"
     )
