@@ -121,7 +121,8 @@ def _opens(case: Case) -> bool:
 
 def _by_events(case: Case, promise: float, progress: Tell) -> Certified:
     """Event-driven runs, each to a hundredth of the tolerance of the one before."""
-    tolerance = min(FIRST_EVENT_TOLERANCE, EVENT_MARGIN * promise)
+    # Two tolerances at least, as runs to the same one agree in any case.
+    tolerance = max(min(FIRST_EVENT_TOLERANCE, EVENT_MARGIN * promise), LEAST_EVENT_TOLERANCE / EVENT_RATIO)
     before: _Run | None = None
     seconds, runs = 0.0, 0
     while True:

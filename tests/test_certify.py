@@ -37,7 +37,7 @@ def kept(found: Certified, case: Case) -> float:
     return error
 
 
-@pytest.mark.parametrize("tolerance", [1e-2, 1e-4, 1e-6, 1e-9])
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-4, 1e-6, 1e-9, 1e-10])
 @pytest.mark.parametrize("friction", [0.3, 0.7])
 def test_smooth_surfaces_keep_any_tolerance(tolerance: float, friction: float) -> None:
     case = promised(SQUEAL, tolerance, friction__coefficient=friction, solver__duration=0.3)
@@ -75,6 +75,11 @@ def test_a_scheme_that_is_named_is_kept(scheme: str) -> None:
     assert str(found.setup.case.solver.scheme) == scheme
     assert found.certificate.certified
     assert kept(found, case) <= 1e-3
+
+
+def test_no_run_is_compared_with_itself() -> None:
+    found = certify(promised(SQUEAL, 1e-12, solver__duration=0.05))
+    assert found.certificate.method == "event-driven runs to 1e-11 and 1e-13"
 
 
 def test_steps_that_do_not_get_there_are_not_certified(monkeypatch: pytest.MonkeyPatch) -> None:
