@@ -14,6 +14,7 @@ from brakecli.case import EVENT_TOLERANCE, Iteration
 from brakecli.contact.pad import NODES_PER_WAVE
 from brakecli.errors import RefusedError
 from brakecli.history import ROW_BYTES
+from brakecli.integrate import COLUMNS
 from brakecli.schemes import has_own_steps
 from brakecli.setup import Setup
 
@@ -215,6 +216,12 @@ def refuse(setup: Setup, found: Check, free_bytes: float) -> None:
         raise RefusedError(f"the file would be too large, {free_bytes / 1e6:.3g} MB are free: {size}; {remedy}")
     if found.memory > MOST_TABLE_BYTES:
         raise RefusedError(f"the contact's tables would be too large: {size}; reduce contact.nodes")
+    compared = 2.0 * 8.0 * COLUMNS * setup.timing.samples
+    if setup.case.solver.promise is not None and compared > MOST_TABLE_BYTES:
+        raise RefusedError(
+            f"two histories of {setup.timing.samples:.3g} samples are compared to keep the tolerance, which takes "
+            f"{compared / 1e9:.3g} GB of memory; increase output.sample_interval, or give solver.step instead"
+        )
     growth = found.limits.growth
     if _blows_up(growth, found.steps):
         longest = _longest_stable_step(setup)
