@@ -21,6 +21,7 @@ from brakecli.check import Check, check, free_bytes, refuse, within_range
 from brakecli.classify import context, failed, verdict_numbers
 from brakecli.model import HISTORY, TIME, ContactState, Failure
 from brakecli.scene import scene
+from brakecli.schemes import has_own_steps
 from brakecli.setup import Setup, set_up
 from brakecli.simulate import Motion, Work
 from brakecli.store import ResultFile, new_result
@@ -56,8 +57,8 @@ class RunReport:
             "spectrum_peak": self.spectrum_peak,
             "scheme": str(solver.scheme),
             "theta": list(solver.theta),
-            "iteration": str(solver.iteration) if self.check.step is not None else None,
-            "step": self.check.step,
+            "iteration": None if has_own_steps(self.setup.scheme) else str(solver.iteration),
+            "step": None if has_own_steps(self.setup.scheme) else self.setup.timing.step,
             **certificate_numbers(self.certificate),
             "evaluators": work.evaluators,
             "nodes": self.setup.nodes,
