@@ -387,7 +387,8 @@ def schema_command(
 @app.command("plot")
 def plot_command(
     result: Annotated[
-        Path, typer.Argument(metavar="FILE.h5", help="Result of a run or of a sweep.", show_default=False)
+        Path,
+        typer.Argument(metavar="FILE.h5", help="Result of a run, a sweep or a comparison.", show_default=False),
     ],
     output: Annotated[
         Path | None, typer.Option("--output", "-o", metavar="PATH", help="Picture  [default: FILE.png, here]")
@@ -399,7 +400,7 @@ def plot_command(
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
-    """Draw the motion of a run, or the critical values or regimes of a sweep over its axes (needs matplotlib)."""
+    """Draw the motion of a run, values of a sweep, or errors of a comparison (needs matplotlib)."""
     from brakecli.plots import plot_result
 
     target = output or Path(result.with_suffix(".png").name)

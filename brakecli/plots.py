@@ -44,10 +44,15 @@ def _drawing(stored: StoredResult, select: Sequence[str]) -> Callable[[], "Figur
         from brakecli.sweep_plots.picture import gather_sweep
 
         return partial(draw_sweep, gather_sweep(stored, select))
-    if kind != "run":
-        raise UsageError(f"{stored.path}: holds a result of kind {kind!r}; name the result of a run or of a sweep")
+    if kind not in ("run", "comparison"):
+        known = "a run, of a sweep or of a comparison"
+        raise UsageError(f"{stored.path}: holds a result of kind {kind!r}; name the result of {known}")
     if select:
-        raise UsageError(f"{stored.path}: --select is for sweeps (found {select[0]!r}); leave it out for a run")
+        raise UsageError(f"{stored.path}: --select is for sweeps (found {select[0]!r}); leave it out for a {kind}")
+    if kind == "comparison":
+        from brakecli.compare_plots import draw_comparison, gather_comparison
+
+        return partial(draw_comparison, gather_comparison(stored))
     return partial(draw, gather(stored))
 
 

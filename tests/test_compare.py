@@ -36,7 +36,7 @@ from tests.commands import ROOT, TINY, attributes, brakecli, left_in
 from tests.examples import MODE_COUPLING, ROUGH, SQUEAL, make
 
 COLUMNS = {name: place for place, name in enumerate(HISTORY)}
-STEPS = [0.2, 0.1, 0.05, 0.025, 0.0125]
+STEPS = [0.1, 0.05, 0.025, 0.0125, 0.00625]
 ENTRY_NAMES = {
     "scheme", "theta", "start", "iteration", "evaluator", "nodes", "step", "error", "observed_order",
     "contact_evaluations", "wall_seconds",
@@ -45,7 +45,7 @@ ENTRY_NAMES = {
 
 def smooth(friction: float = 0.5, **changes: Any) -> Case:
     """Always in contact, always in slip: the motion is smooth."""
-    return make(MODE_COUPLING, friction__coefficient=friction, **changes)
+    return make(MODE_COUPLING, friction__coefficient=friction, solver__duration=6.4, **changes)
 
 
 @cache
@@ -83,7 +83,7 @@ def test_errors_are_relative_to_the_largest_value_in_each_quantity() -> None:
     found = errors(rows, reference, 1e-3)
     assert found.error == found.largest["x"] == pytest.approx(0.25, rel=1e-12)
     assert found.mean["x"] == pytest.approx(0.25 / len(rows), rel=1e-9)
-    assert found.largest["vy"] == found.mean["vy"] == pytest.approx(0.125, rel=1e-9)
+    assert [found.largest["vy"], found.mean["vy"]] == pytest.approx([0.125, 0.125], rel=1e-9)
     assert found.largest["y"] == found.mean["y"] == found.largest["vx"] == 0.0
 
 
@@ -235,12 +235,11 @@ def test_the_bias_of_weights_of_one_is_as_published() -> None:
 
 
 def test_on_rough_surfaces_the_bias_is_that_of_stability_too() -> None:
-    case = read_case(str(ROOT / "cases" / "accuracy" / "C.toml"), ["solver.duration=1e-3"]).case
+    path, solver = str(ROOT / "cases" / "accuracy" / "C.toml"), ["solver.theta=[1.0, 1.0]", "solver.duration=1e-3"]
+    case = read_case(path, [*solver, "solver.step=2e-5", "output.sample_interval=2e-5"]).case
     found = compare(case, schemes=["two-layer"], steps=[2e-5], budget=1.0)
     (entry,) = entries_of(found, "two-layer", (1.0, 1.0))
-    table = {"scheme": "two-layer", "theta": (1.0, 1.0), "step": 2e-5, "duration": 1e-3}
-    same = Case.model_validate({**case.model_dump(exclude_unset=True), "solver": table})
-    known = stability(set_up(same)).discrete
+    known = stability(set_up(case)).discrete
     assert known is not None
     assert known.bias is not None
     assert abs(known.bias) > 1e-3

@@ -27,7 +27,8 @@ REFERENCE, CHECK = 1e-12, 1e-10
 REFERENCE_SHARE = 0.3
 """Part of the budget that the reference may take."""
 FEWEST_SAMPLES = 64
-MOST_REPEATS = 7
+MOST_REPEATS, SLOW_REPEATS, SLOW = 21, 3, 0.1
+"""Turns of most loops, and of those that take long (s): there, chance matters less."""
 LONGEST_CALL = 1.0
 """Loops that take less (s) are timed in one call; longer ones in blocks, whose own time is small beside theirs."""
 
@@ -163,7 +164,10 @@ def _first_round(
     deadline: float,
     progress: Progress,
 ) -> int:
-    """Run every rung once, the coarse ones first, and measure its error; how many there was no time for."""
+    """Run every rung once, the coarse ones first, and measure its error; how many there was no time for.
+
+    The coarsest of each method is run in any case.
+    """
     places: dict[Method, int] = {}
     order = []
     for entry in entries:
@@ -171,9 +175,9 @@ def _first_round(
         order.append((place, entry))
     left_out = 0
     last: dict[Method, float] = {}
-    for done, (_, entry) in enumerate(sorted(order, key=lambda pair: pair[0])):
+    for done, (place, entry) in enumerate(sorted(order, key=lambda pair: pair[0])):
         progress("errors", done, len(entries))
-        if time.perf_counter() + 2.0 * last.get(entry.rung.method, 0.0) > deadline:
+        if place and time.perf_counter() + 2.0 * last.get(entry.rung.method, 0.0) > deadline:
             entry.failure = "left out: no time within the budget"
             left_out += 1
             continue
@@ -201,6 +205,8 @@ def _repeat(
     """
     timed = [entry for entry in entries if entry.seconds]
     for repeat in range(MOST_REPEATS):
+        if repeat == SLOW_REPEATS:
+            timed = [entry for entry in timed if entry.seconds[-1] < SLOW]
         expected = 1.3 * sum(entry.seconds[-1] for entry in timed) + 0.005 * len(timed)
         if time.perf_counter() + expected > deadline:
             return max(repeat, 1)
