@@ -13,7 +13,7 @@ PYTEST_ARGS ?=
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .NOTPARALLEL: # two installations into one .venv at a time would collide
-.PHONY: help demo test lint format types imports derivations cases picture paper check clean
+.PHONY: help demo test lint format types imports derivations cases accuracy picture paper check clean
 
 help: ## list the targets (this text)
 	@echo "make TARGET, where TARGET is one of"
@@ -78,6 +78,14 @@ cases: $(RUN_STAMP) ## run every sample case into results/; one that fails, fail
 	    $(BIN)/brakecli run "$$case" --force --quiet --output "results/$$name.h5" || failed="$$failed $$name"; \
 	done; \
 	if [ -n "$$failed" ]; then echo "failed:$$failed" >&2; exit 1; fi
+
+accuracy: $(DEV_STAMP) ## compare all schemes on cases/accuracy and draw the pictures of docs/accuracy.md
+	@mkdir -p results
+	@for case in S B C; do \
+	    $(BIN)/brakecli compare-schemes "cases/accuracy/$$case.toml" --budget 60 --force \
+	        --output "results/accuracy-$$case.h5" || exit 1; \
+	    $(BIN)/brakecli plot "results/accuracy-$$case.h5" --force --output "docs/accuracy-$$case.png" || exit 1; \
+	done
 
 picture: $(DEV_STAMP) ## draw docs/picture.png, from cases/relaxation.toml
 	@mkdir -p results

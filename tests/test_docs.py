@@ -4,6 +4,8 @@ from pathlib import Path
 
 from brakecli.analysis import regime
 from brakecli.case_reading import parse_case, starter_text
+from brakecli.compare.comparison import compare
+from brakecli.compare.result import ComparisonReport, write
 from brakecli.run import run
 from brakecli.setup import set_up
 from brakecli.stability import stability
@@ -38,6 +40,19 @@ def test_every_name_of_a_sweep_is_documented(tmp_path: Path) -> None:
             names = [*stored.attributes, *stored.variables("/"), *report.numbers()]
         shared = (ROOT / "docs" / "result-format.md").read_text()
         assert [name for name in names if f"`{name}`" not in page + shared and "_coefficient" not in name] == []
+
+
+def test_every_name_of_a_comparison_is_documented(tmp_path: Path) -> None:
+    page = "".join((ROOT / "docs" / page).read_text() for page in ("accuracy.md", "result-format.md"))
+    loaded = parse_case(starter_text(), "starter", ["solver.duration=0.01"])
+    found = compare(loaded.case, schemes=["event-driven"], budget=1.0)
+    report = ComparisonReport(tmp_path / "r.h5", loaded.case.title, found, 1e-3)
+    write(report.output, loaded, report, force=False)
+    numbers = report.numbers()
+    with open_result(report.output, kind="comparison") as stored:
+        names = [*stored.attributes, *stored.variables("/"), *numbers, *numbers["entries"][0]]
+    assert len(set(names)) > 50
+    assert [name for name in names if f"`{name}`" not in page] == []
 
 
 def test_every_threshold_stands_in_the_documentation_with_its_default() -> None:
