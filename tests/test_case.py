@@ -278,9 +278,9 @@ def test_each_alternative_of_the_starter_is_valid() -> None:
     case = parse_case(starter_text() + "\n" + "\n".join(roughness), "rough").case
     assert case.roughness.shoe is not None
     assert case.roughness.wheel is not None
-    keys = ("times", "angular_speeds", "forces", "nodes", "start", "theta")
+    keys = ("times", "angular_speeds", "forces", "nodes", "step", "theta", "iteration", "start")
     commented = [line[2:] for line in lines if line.startswith(tuple(f"# {key} = " for key in keys))]
-    tables_of = ["wheel", "wheel", "load", "load", "contact", "solver", "solver"]
+    tables_of = ["wheel", "wheel", "load", "load", "contact", *["solver"] * 5]
     overrides = [f"{table}.{line}" for table, line in zip(tables_of, commented, strict=True)]
     solver = parse_case(starter_text(), "all", [*overrides, 'solver.scheme="three-layer"']).case.solver
     assert solver.theta == (0.25, 0.5, 0.25)
