@@ -199,7 +199,12 @@ def _draw(axes: "Axes", picture: ComparisonPicture, along: str, factor: float) -
     best = picture.recommended
     if best is not None and math.isfinite(picture[along][best]):
         at = factor * picture[along][best], picture["error"][best]
-        ring = {"marker": "o", "markersize": 16.0, "markerfacecolor": "none", "markeredgecolor": GREEN}
+        ring: dict[str, Any] = {
+            "marker": "o",
+            "markersize": 16.0,
+            "markerfacecolor": "none",
+            "markeredgecolor": GREEN,
+        }
         axes.plot(*at, ls="none", markeredgewidth=2.2, zorder=4.0, label="recommended", **ring)
 
 
@@ -208,7 +213,7 @@ def _draw_front(axes: "Axes", picture: ComparisonPicture) -> None:
     on = np.flatnonzero((picture["on_front"] == 1) & (picture["error"] <= LARGEST) & (picture["error"] > 0.0))
     on = on[np.argsort(picture["wall_seconds"][on], kind="stable")]
     x, y = 1e3 * picture["wall_seconds"][on], picture["error"][on]
-    look = {"color": GREY, "alpha": 0.45, "lw": 8.0, "solid_capstyle": "round", "zorder": 0.9}
+    look: dict[str, Any] = {"color": GREY, "alpha": 0.45, "lw": 8.0, "solid_capstyle": "round", "zorder": 0.9}
     axes.plot(x, y, label="no other is better in both", **look)
 
 
@@ -220,11 +225,11 @@ def _draw_slopes(axes: "Axes", picture: ComparisonPicture) -> None:
         return
     low, high = float(x[stepped].min()), float(x[stepped].max())
     top = 1.5 * float(y[stepped].max())
+    note: dict[str, Any] = {"xytext": (4, 0), "textcoords": "offset points", "va": "center", "size": 8.5}
     for order in (1, 2):
         ends = np.array([low, high])
         axes.plot(ends, top * (ends / low) ** -order, color="#777777", lw=0.9, ls=(0, (1, 2)), zorder=0.8)
-        note = {"xytext": (4, 0), "textcoords": "offset points", "va": "center", "size": 8.5, "color": "#555555"}
-        axes.annotate(f"order {order}", (high, top * (high / low) ** -order), **note)
+        axes.annotate(f"order {order}", (high, top * (high / low) ** -order), color="#555555", **note)
 
 
 def _set_ticks(axes: "Axes") -> None:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from matplotlib.image import imread
+from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from brakecli.case_reading import parse_case
@@ -165,8 +166,9 @@ def test_what_is_missing_or_no_result_any_more_leaves_a_gap(tmp_path: Path) -> N
 
 def test_order_one_and_two_are_drawn_beside_the_curves(tmp_path: Path) -> None:
     axes = drawn(write(tmp_path / "r.h5")).axes[1]
-    guides = [each.get_xydata() for each in axes.get_lines() if len(each.get_xdata()) == 2]
-    slopes = [np.diff(np.log(xy[:, 1]))[0] / np.diff(np.log(xy[:, 0]))[0] for xy in guides if xy[0, 0] > 2.0]
+    lines = [np.array(each.get_xydata()) for each in axes.get_lines()]
+    guides = [np.log(xy) for xy in lines if len(xy) == 2 and xy[0, 0] > 2.0]  # the target spans 0 to 1
+    slopes = [np.diff(xy[:, 1])[0] / np.diff(xy[:, 0])[0] for xy in guides]
     np.testing.assert_allclose(slopes, [-1.0, -2.0], rtol=1e-9)
     assert [text.get_text() for text in axes.texts] == ["order 1", "order 2"]
 
@@ -176,6 +178,7 @@ def test_errors_that_the_reference_cannot_tell_are_shaded(tmp_path: Path) -> Non
     assert "within the reference's error" in legend(figure)
     for axes in figure.axes:
         (band,) = axes.patches
+        assert isinstance(band, Rectangle)
         assert band.get_bbox().y1 == pytest.approx(5e-3)
 
 
