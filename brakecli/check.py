@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from brakecli.analysis.precision import RESOLVED, StepLimits, natural_frequencies, step_limits
+from brakecli.analysis.precision import RESOLVED, StepLimits, amplification, natural_frequencies, step_limits
+from brakecli.analysis.stability import eigensystem
 from brakecli.case import EVENT_TOLERANCE, Iteration
 from brakecli.contact.pad import NODES_PER_WAVE
 from brakecli.errors import RefusedError
@@ -35,6 +36,8 @@ _OWN_EVALUATIONS = 27.0
 
 _UNSTABLE = 1e-5  # growth per step that no rounding of the eigenvalues explains
 _COARSE_NODES = NODES_PER_WAVE / 2
+_TAKEN = 0.01  # part of the fastest motion that a scheme may take out of a run unsaid
+_ROUNDING = 1e-8  # of the factors of a step
 
 
 @dataclass(frozen=True)
@@ -130,6 +133,11 @@ def _with_warnings(setup: Setup, found: Check) -> Check:
             f"({found.natural_frequencies[1]:.4g} Hz): it is not resolved; take a step of at most "
             f"{1.0 / (RESOLVED * found.natural_frequencies[1]):.2g} s"
         )
+    elif (rate := _settling_rate(setup)) * (found.step or 0.0) > 2.0 * math.pi / RESOLVED:
+        warnings.append(
+            f"solver.step: the dashpots settle a motion at a rate of {rate:.4g} 1/s, which is not resolved; take a "
+            f"step of at most {2.0 * math.pi / (RESOLVED * rate):.2g} s, or event-driven"
+        )
     if found.step is not None and found.passing_frequency * found.step > 1.0 / RESOLVED:
         warnings.append(
             f"solver.step: {1.0 / (found.passing_frequency * found.step):.3g} steps per passing wave of the wheel "
@@ -168,9 +176,32 @@ def _with_warnings(setup: Setup, found: Check) -> Check:
             f"solver.theta: the scheme itself multiplies disturbances by {limits.growth:.6g} in each step; "
             + _stable_remedy(setup)
         )
+    taken = 0.0 if found.step is None else _taken(setup, found.steps)
+    if taken > _TAKEN:
+        warnings.append(
+            f"solver.theta: with these weights the scheme itself damps, it takes {100.0 * taken:.3g} % of the "
+            "fastest motion away by the end of the run, and its errors are of first order; take theta = "
+            + ("[0.5, 0.5]" if setup.scheme.WEIGHTS == 2 else "[0.25, 0.5, 0.25]")
+        )
     if setup.load.values.min() < 0.0:
         warnings.append("load: the force is negative at times, it lifts the shoe off the wheel")
     return Check(**{**found.__dict__, "warnings": tuple(warnings)})
+
+
+def _settling_rate(setup: Setup) -> float:
+    """The fastest rate (1/s) of the frictionless shoe: that of its dashpots where they are overcritical."""
+    values, _ = eigensystem(setup.coefficients, setup.contact_stiffness, 0.0)
+    return float(np.abs(values).max())
+
+
+def _taken(setup: Setup, steps: int) -> float:
+    """Part of the fastest motion, without dashpots and friction, that the scheme takes away in so many steps."""
+    c = setup.coefficients._replace(b_xx=0.0, b_xy=0.0, b_yy=0.0, phi=0.0)
+    factors = np.linalg.eigvals(amplification(c, setup.weights, setup.scheme, setup.contact_stiffness))
+    left = float(np.abs(factors[np.argmax(np.abs(np.angle(factors)))]))  # not a direction without a spring
+    if left > 1.0 - _ROUNDING:
+        return 0.0
+    return -math.expm1(steps * math.log(left)) if left > 0.0 else 1.0
 
 
 def _stable_remedy(setup: Setup, shorter: str = "reduce solver.step") -> str:
