@@ -217,7 +217,7 @@ def sweep_command(
     from brakecli.sweep.estimate import Estimate
 
     load_kernels(loaded.base)
-    with unwinding() as recall, _progress(quiet) as bar:
+    with _kept(target), unwinding() as recall, _progress(quiet) as bar:
 
         def begin(found: Estimate, resumed: int) -> None:
             if not quiet:
@@ -505,6 +505,17 @@ def _is_result(source: str) -> bool:
     from brakecli.stored import is_hdf5
 
     return is_hdf5(Path(source))
+
+
+@contextmanager
+def _kept(target: Path) -> Iterator[None]:
+    """Say that an interrupted sweep can be taken up again."""
+    try:
+        yield
+    except Interrupted:
+        if Path(f"{os.path.realpath(target)}.partial").exists():
+            _tell(f"brakecli: {target}: finished points are kept; the same command goes on with them")
+        raise
 
 
 def _is_sweep(source: str) -> bool:

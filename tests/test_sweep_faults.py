@@ -47,7 +47,7 @@ from tests.sweep_helpers import (
 )
 
 QUICK = 2.0  # s, within which an interruption ends a command
-GRID = (frictions(40), axis("link2.angle_deg", "values = [1.0, 3.0, 5.0, 7.0]"))
+GRID = (frictions(40), axis("link2.angle_deg", "values = [1.0, 3.0, 5.0]"))
 SLOWER = TINY.replace("duration = 0.02", "duration = 0.6")  # 30 ms a point
 
 pytestmark = pytest.mark.usefixtures("compiled")
@@ -92,7 +92,7 @@ def test_a_sweep_killed_five_times_ends_with_the_bytes_of_an_undisturbed_one(goo
             wait_until(lambda process=process: workers(process.pid))  # type: ignore[misc]
             if computing:
                 wait_until(lambda size=size: journal_size(here) > max(size, 1500))  # type: ignore[misc]
-            time.sleep(chance.uniform(0.0, 0.5))
+            time.sleep(chance.uniform(0.0, 0.25))
             crew = children(process.pid)
             assert process.poll() is None
             process.kill()
@@ -101,7 +101,7 @@ def test_a_sweep_killed_five_times_ends_with_the_bytes_of_an_undisturbed_one(goo
         assert journal_size(here) >= size
         size = journal_size(here)
     last = run("sweep", "s.toml", cwd=here)
-    assert re.search(r"160 points on . workers?: .*; [1-9]\d* of them are there already", last.told(0))
+    assert re.search(r"120 points on . workers?: .*; [1-9]\d* of them are there already", last.told(0))
     assert left_in(here) == {"tiny.toml", "s.toml", "s.h5"}
     assert (here / "s.h5").read_bytes() == (good / "s.h5").read_bytes()
 
@@ -296,6 +296,18 @@ def test_whichever_write_fails_the_old_file_stays_and_the_journal_can_be_used(tm
     assert outcomes == ["old"] * (len(outcomes) - 2) + ["new", "new"]
 
 
+def test_a_disk_that_takes_a_part_of_each_write_gets_all_of_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    loaded = write_sweep(tmp_path, frictions(6))
+    inline(loaded, tmp_path / "expected.h5")
+    monkeypatch.setattr(os, "write", lambda file, data: SYSTEM_CALLS["write"](file, memoryview(data)[:333]))
+    with pytest.raises(KeyboardInterrupt):
+        inline(loaded, tmp_path / "s.h5", task_size=2, limit=2)
+    assert inline(loaded, tmp_path / "s.h5").resumed == 4
+    assert (tmp_path / "s.h5").read_bytes() == (tmp_path / "expected.h5").read_bytes()
+
+
 def test_a_block_that_could_not_be_written_leaves_a_journal_to_go_on_with(tmp_path: Path) -> None:
     loaded = write_sweep(tmp_path, frictions(6))
     with pytest.raises(KeyboardInterrupt):
@@ -383,7 +395,7 @@ def test_an_interrupted_sweep_is_resumed_by_the_same_command(good: Path, here: P
     assert left_in(here) == {"tiny.toml", "s.toml", "s.h5.partial"}
     done = run("sweep", "s.toml", "--json", cwd=here)
     resumed = done.json["resumed_points"]
-    assert 5 < resumed < 160
+    assert 5 < resumed < 120
     assert f"; {resumed} of them are there already" in done.told(0)
     assert (here / "s.h5").read_bytes() == (good / "s.h5").read_bytes()
 
@@ -568,15 +580,15 @@ def memory_of(folder: Path, points: int) -> dict[str, Any]:
     return found
 
 
-MARGIN = 60_000_000
-"""Bytes that a hundred times as many points may need more, in the parent: the texts of all points at a time, as
-the result is written variable by variable, the longest of up to 240 bytes a point and once more as characters."""
+POINT_BYTES = 1000
+"""What a point may cost the parent: of each variable all values are there at a time, and the widest are texts of
+240 bytes, once as stored and once as characters of four bytes each; 660 bytes were measured."""
 WORKER_MARGIN = 10_000_000
-"""… and in a worker, which knows of one task at a time: what allocation leaves unused."""
+"""Bytes; a worker knows of one task at a time, and what it needs besides depends on how memory was handed out."""
 
 
 @pytest.mark.slow
 def test_a_hundred_thousand_points_need_no_more_memory_than_a_thousand(tmp_path: Path) -> None:
     few, many = memory_of(tmp_path, 1000), memory_of(tmp_path, 100_000)
-    assert many["parent"] < few["parent"] + MARGIN
+    assert many["parent"] < few["parent"] + POINT_BYTES * 99_000
     assert many["workers"] < few["workers"] + WORKER_MARGIN

@@ -23,7 +23,7 @@ _GROWTH_SECONDS = 0.03
 _EIGENVALUE_SECONDS = 0.1
 _WORKER_BYTES = 1.8e8
 _SAMPLE_BYTES = 8.0 * 24
-_POINT_BYTES = 16.0  # of the parent
+_POINT_BYTES = 1000.0  # of the parent, which holds each variable whole while it writes it
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,9 @@ def estimate(plan: Plan, workers: int) -> Estimate:
         points=plan.points,
         workers=workers,
         seconds=2.0 + passes * plan.points * each / workers,
-        memory=_WORKER_BYTES * (workers + 1) + _SAMPLE_BYTES * samples * workers + _POINT_BYTES * plan.points,
+        memory=_WORKER_BYTES * (workers + 1)
+        + _SAMPLE_BYTES * samples * workers
+        + _POINT_BYTES * passes * plan.points,
         file_size=float(passes * plan.points * record) + 1e5,
     )
 
