@@ -96,6 +96,9 @@ paper: $(DEV_STAMP) ## reproduce the paper's claims into docs/paper-claims.md, w
 	@mkdir -p results/paper
 	$(BIN)/python docs/paper_claims.py
 
+extremes: $(DEV_STAMP) ## go through the extremes of everything and write docs/extremes.md (a minute)
+	$(BIN)/python -m benchmarks.extremes
+
 check: lint types imports test cases ## all of lint, types, imports, test and cases
 
 clean: ## remove .venv, results and caches

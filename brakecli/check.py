@@ -135,7 +135,7 @@ def _with_warnings(setup: Setup, found: Check) -> Check:
         )
     elif (rate := _settling_rate(setup)) * (found.step or 0.0) > 2.0 * math.pi / RESOLVED:
         warnings.append(
-            f"solver.step: the dashpots settle a motion at a rate of {rate:.4g} 1/s, which is not resolved; take a "
+            f"solver.step: the dashpots settle a motion at a rate of {rate:.4g} 1/s: it is not resolved; take a "
             f"step of at most {2.0 * math.pi / (RESOLVED * rate):.2g} s, or event-driven"
         )
     if found.step is not None and found.passing_frequency * found.step > 1.0 / RESOLVED:
