@@ -47,6 +47,12 @@ def test_nothing_on_rough_surfaces_is_silently_wrong(family: Any) -> None:
             assert outcome.kind != "silently wrong", (value, scheme.text, outcome)
 
 
+def test_nothing_is_silently_wrong_where_several_extremes_meet() -> None:
+    points = list(extremes.together(20))
+    assert len(points) == 20
+    assert [outcome for point in points for outcome in point.values() if outcome.kind == "silently wrong"] == []
+
+
 def test_an_error_that_nothing_is_said_of_is_silently_wrong() -> None:
     tables = extremes.FLAT
     at = extremes.pace(tables)
