@@ -61,7 +61,7 @@ def random_case(rng: np.random.Generator, kind: str) -> Case:
         tables["initial"] = {"at": "equilibrium", "x": 0.1 * compression}
     case = Case.model_validate(tables)
     fast = natural_frequencies(set_up(case).coefficients, contact)[1]
-    periods = rng.uniform(10.0, 40.0) if "open" in kind else rng.uniform(20.0, 200.0)
+    periods = rng.uniform(3.0, 8.0) if "open" in kind else rng.uniform(20.0, 200.0)
     return changed(case, solver={"duration": periods / fast}, output={"sample_interval": 1.0 / (20.0 * fast)})
 
 
