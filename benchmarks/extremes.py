@@ -619,16 +619,43 @@ def together_text() -> str:
         right = [outcome.error for outcome in mine if outcome.kind == "right"]
         counts = (str(sum(outcome.kind == kind for outcome in mine)) for kind in KINDS)
         rows.append([scheme.text, *counts, _size(float(np.median(right))), _size(max(right))])
-    ranges = ", ".join(f"`{key}` 10^{low} to 10^{high}" for key, (low, high) in DRAWN.items())
+    ranges = table(
+        ["drawn", "from", "to"], [[f"`{key}`", f"1e{low}", f"1e{high}"] for key, (low, high) in DRAWN.items()]
+    )
+    wrong = [
+        f"- {scheme.text}, off by {outcome.error:.2g}: {_differences(tables)}"
+        for tables, point in zip(drawn(POINTS), points, strict=True)
+        for scheme, outcome in point.items()
+        if outcome.kind == "silently wrong"
+    ]
+    told = "\n".join(wrong) or "None is silently wrong."
     return f"""## Several at a time
 
-{POINTS} points, drawn with a fixed seed: three quantities of {ranges}, in SI units and evenly in their
-logarithms, and each angle anywhere in a third of the points. Smooth surfaces. The bound above is for one thing at a
-time: a shoe that sticks from the start on, say, moves by less than friction lets it in a step. Here right is what
-is off by at most {MOST_ERROR:g}, or by the tolerance of the event-driven scheme.
+{POINTS} points on smooth surfaces, drawn with a fixed seed: three quantities of these, in SI units and evenly in
+their logarithms, and each angle anywhere in a third of the points.
+
+{ranges}
+
+The bound above is for one thing at a time. Here right is what is off by at most {MOST_ERROR:g}, or by the
+tolerance of the event-driven scheme.
 
 {table(["scheme", *KINDS, "median error of right ones", "largest"], rows)}
+
+Silently wrong, each by what it changes in the base case (a shoe that all but sticks to a wheel that all but stands
+moves more slowly than friction lets it in one step, and its ẋ is known no better than that until it sticks):
+
+{told}
 """
+
+
+def _differences(tables: Tables) -> str:
+    """What tables change in the base case."""
+    return ", ".join(
+        f"{name}.{key} = {value:.6g}"
+        for name, table_ in tables.items()
+        for key, value in table_.items()
+        if FLAT[name].get(key) != value
+    )
 
 
 def limits_text() -> str:
