@@ -2,8 +2,8 @@
 
     python -m benchmarks.sweep
 
-Needs a machine with two idle cores. The points of the first part take about 0.3 s each; one worker and two take turns,
-so that a machine that slows down slows both.
+Needs a machine with two idle cores. The points of the first part take about 0.3 s each; one worker and two take
+turns, so that a machine that slows down slows both.
 """
 
 import statistics

@@ -142,9 +142,9 @@ def _by_events(case: Case, promise: float, progress: Tell) -> Certified:
 def _by_steps(case: Case, promise: float, progress: Tell) -> Certified:
     """Runs with steps half as long, and twice as many nodes, as those before.
 
-    Differences that fall by a factor r from rung to rung leave an error of the last one over r - 1. Twice that is
-    the estimate, and at least twice the last difference and half the one before: kinks and jumps make differences
-    fall unevenly, and one that is small by luck must not pass.
+    Differences that fall by a factor r from rung to rung leave an error of the last one over r - 1. Thrice that is
+    the estimate, and at least thrice the last difference and three quarters of the one before: kinks and jumps
+    make differences fall unevenly, and one that is small by luck must not pass.
     """
     setup = set_up(case)
     step, interval = _coarsest(setup)
@@ -166,7 +166,7 @@ def _by_steps(case: Case, promise: float, progress: Tell) -> Certified:
             if seconds + slower > MOST_SECONDS:
                 break
         before = run
-    error = max(2.0 * last, promise * 1.0000001) if math.isfinite(last) else 1.0
+    error = max(3.0 * last, promise * 1.0000001) if math.isfinite(last) else 1.0
     method = f"the finest of {runs} runs, with steps of {run.setup.timing.step:.3g} s,"
     return _answer(run, Certificate(promise, False, error, 0.0, method, runs), seconds)
 
@@ -175,7 +175,7 @@ def _remaining(before: float, last: float) -> float:
     """The error that is left after two differences in a row."""
     if not math.isfinite(before) or last >= before:
         return math.inf
-    return 2.0 * max(last, last / (before / last - 1.0), before / 4.0) if last > 0.0 else ROUNDING
+    return 3.0 * max(last, last / (before / last - 1.0), before / 4.0) if last > 0.0 else ROUNDING
 
 
 def _answer(run: _Run, certificate: Certificate, seconds: float) -> Certified:

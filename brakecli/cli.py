@@ -47,7 +47,7 @@ def main() -> None:
     except BrakecliError as error:
         _end(str(error), error.exit_code)
     except Interrupted as error:
-        _end(f"{error}; nothing unfinished was left behind", error.exit_code)
+        _end(f"{error}; {error.left}", error.exit_code)
     except MemoryError:
         _end("out of memory; reduce contact.nodes, or sample less often", 3)
     except OSError as error:  # of a file that is none of ours, such as the cache of compiled code
@@ -512,9 +512,9 @@ def _kept(target: Path) -> Iterator[None]:
     """Say that an interrupted sweep can be taken up again."""
     try:
         yield
-    except Interrupted:
+    except Interrupted as error:
         if Path(f"{os.path.realpath(target)}.partial").exists():
-            _tell(f"brakecli: {target}: finished points are kept; the same command goes on with them")
+            error.left = "finished points are kept, and the same command goes on with them"
         raise
 
 

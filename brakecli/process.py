@@ -27,6 +27,7 @@ class Interrupted(BaseException):
         """Remember which."""
         super().__init__(_WORDS[signal.Signals(number)])
         self.exit_code = 128 + number
+        self.left = "nothing unfinished was left behind"
 
 
 def handle_signals() -> None:
