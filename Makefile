@@ -13,7 +13,8 @@ PYTEST_ARGS ?=
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .NOTPARALLEL: # two installations into one .venv at a time would collide
-.PHONY: help demo test lint format types imports derivations cases accuracy picture paper check clean
+.PHONY: help demo test lint format types imports derivations cases accuracy promises picture paper extremes \
+    bench-sweep check clean
 
 help: ## list the targets (this text)
 	@echo "make TARGET, where TARGET is one of"
@@ -95,6 +96,12 @@ picture: $(DEV_STAMP) ## draw docs/picture.png, from cases/relaxation.toml
 paper: $(DEV_STAMP) ## reproduce the paper's claims into docs/paper-claims.md, with pictures (some minutes)
 	@mkdir -p results/paper
 	$(BIN)/python docs/paper_claims.py
+
+promises: $(DEV_STAMP) ## random cases at five tolerances: the tables of docs/accuracy.md (some minutes)
+	$(BIN)/python -m benchmarks.promises
+
+bench-sweep: $(DEV_STAMP) ## what a sweep costs beside its points; needs two idle cores (some minutes)
+	$(BIN)/python -m benchmarks.sweep
 
 extremes: $(DEV_STAMP) ## go through the extremes of everything and write docs/extremes.md (a minute)
 	$(BIN)/python -m benchmarks.extremes
