@@ -641,8 +641,7 @@ tolerance of the event-driven scheme.
 
 {table(["scheme", *KINDS, "median error of right ones", "largest"], rows)}
 
-Silently wrong, each by what it changes in the base case (a shoe that all but sticks to a wheel that all but stands
-moves more slowly than friction lets it in one step, and its ẋ is known no better than that until it sticks):
+Silently wrong, each by what it changes in the base case:
 
 {told}
 """

@@ -144,6 +144,14 @@ def _with_warnings(setup: Setup, found: Check) -> Check:
             f"({found.passing_frequency:.4g} Hz); take a step of at most "
             f"{1.0 / (RESOLVED * found.passing_frequency):.2g} s"
         )
+    speed = float(np.abs(setup.belt.values).max())
+    grip = case.friction.coefficient * float(np.abs(setup.load.values).max()) / setup.coefficients.m
+    if 0.0 < speed < grip * (found.step or 0.0):
+        warnings.append(
+            f"solver.step: friction changes the shoe's velocity by up to {grip * (found.step or 0.0):.3g} m/s in "
+            f"a step, more than the wheel's {speed:.3g} m/s: stick and slip are not resolved; take a step of at "
+            f"most {speed / grip:.2g} s, or event-driven"
+        )
     nyquist = 0.5 / setup.timing.interval
     for what, frequency in (
         ("the contact resonance", found.natural_frequencies[1]),

@@ -19,6 +19,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from brakecli.errors import RefusedError
 from brakecli.sweep.cluster import ClusterEngine
 from brakecli.sweep.driver import sweep
 from brakecli.sweep.engines import Finished, Job, LocalEngine, Supply, Work
@@ -259,6 +260,14 @@ def memory(file: str) -> None:
     print(json.dumps({**numbers, "parent": peak("self"), "seconds": report.seconds}))  # noqa: T201
 
 
+def refused(file: str) -> None:
+    """Try a sweep that is too large, and tell the largest memory of this process, in bytes."""
+    try:
+        local(read_sweep(file), Path(file).with_suffix(".h5"), work)
+    except RefusedError:
+        print(peak("self"))  # noqa: T201
+
+
 def _peak_or_nothing(pid: int) -> int:
     try:
         return peak(pid)
@@ -276,5 +285,10 @@ def on_cluster(file: str, name: str, address: str) -> None:
 
 
 if __name__ == "__main__":
-    actions: dict[str, Callable[..., None]] = {"stuck": stuck, "memory": memory, "on_cluster": on_cluster}
+    actions: dict[str, Callable[..., None]] = {
+        "stuck": stuck,
+        "memory": memory,
+        "refused": refused,
+        "on_cluster": on_cluster,
+    }
     actions[sys.argv[1]](*sys.argv[2:])
