@@ -401,7 +401,9 @@ def test_extreme_speeds_and_frictions_end_in_a_regime_with_its_reason(here: Path
     )
     results = dict(zip([*speeds, *(f"φ {friction}" for friction in frictions)], done, strict=True))
     for name, result in results.items():
-        assert result.told(0) == "", name
+        warned = "stick and slip are not resolved" in result.told(0)
+        assert warned == (name in ("1e-9", "φ 50.0")), name  # friction there outruns the wheel within a step
+        assert warned or result.told(0) == "", name
         numbers = result.json
         assert numbers["reasons"][0]
     still = results["0.0"].json

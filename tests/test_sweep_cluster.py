@@ -39,6 +39,10 @@ IMPATIENT = (
     "from brakecli.__main__ import main; main()"
 )
 COMMAND = [sys.executable, "-W", "error", "-c", IMPATIENT]
+LATE = (  # results are fetched long after they are there, so that a worker dies in between
+    "import distributed, time; soon = distributed.wait; "
+    "distributed.wait = lambda *a, **k: (soon(*a, **k), time.sleep(2.0)); "
+)
 
 pytestmark = pytest.mark.usefixtures("compiled")
 
@@ -300,11 +304,12 @@ def test_a_scheduler_that_dies_ends_the_sweep_with_a_sentence(here: Path) -> Non
     assert left_in(here) - {"dask"} == {"tiny.toml", "s.toml", "s.h5.partial"}
 
 
-def test_a_cluster_without_workers_is_waited_for_and_then_given_up(here: Path) -> None:
+@pytest.mark.parametrize("before", ["", LATE])
+def test_a_cluster_without_workers_is_waited_for_and_then_given_up(here: Path, before: str) -> None:
     with cluster_of(here / "dask") as cluster:
         only = cluster.worker("--no-nanny")
         command = ["sweep", "s.toml", "-q", "--scheduler", cluster.address]
-        with started(*command, cwd=here, command=COMMAND) as process:
+        with started(*command, cwd=here, command=[*COMMAND[:-1], before + IMPATIENT]) as process:
             wait_until(lambda: journal_size(here) > 1500)
             only.kill()
             done = ended(process)

@@ -18,6 +18,8 @@ from brakecli.sweep.worker import fingerprint
 CONNECT_SECONDS = 20
 WAIT_SECONDS = 60.0
 """How long to wait for a worker to come (back) before giving up."""
+FETCH_SECONDS = 5.0
+"""How long to wait for a finished result, whose worker may have died with it: dask then computes it again."""
 LOOK_SECONDS = 1.0
 """How often to look which workers there are."""
 TASKS_PER_THREAD = 3
@@ -90,9 +92,16 @@ class ClusterEngine:
             with self._client.as_current(), suppress(TimeoutError):
                 wait(list(running), timeout=0.5, return_when="FIRST_COMPLETED")
             for future in [each for each in running if each.done()]:
-                task, seen = running.pop(future), time.monotonic()
-                if future.status != "error" or not isinstance(future.exception(), KilledWorker):
-                    yield self._collected(future, task)
+                task = running[future]
+                died = future.status == "error" and isinstance(future.exception(), KilledWorker)
+                try:
+                    found = None if died else self._collected(future, task)
+                except TimeoutError:
+                    continue
+                del running[future]
+                seen = time.monotonic()
+                if found is not None:
+                    yield found
                 elif task.last_try and task is not alone:
                     suspects.append(task)
                 else:
@@ -123,7 +132,7 @@ class ClusterEngine:
             if isinstance(error, OtherVersionError):
                 raise self._refused(str(error))
             raise self._lost(f"a worker cannot compute ({first_line(error)})")
-        found: Attempt = future.result()
+        found: Attempt = future.result(timeout=FETCH_SECONDS)
         return Finished(task, found.records, found.seconds, found.failure)
 
     @property

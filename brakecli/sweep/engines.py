@@ -142,9 +142,9 @@ class LocalEngine:
             if not busy:
                 return
             ready = connection.wait([worker.pipe for worker in busy], timeout=1.0)
-            for worker in busy:
-                if worker.pipe in ready:
-                    yield self._collect(worker)
+            finished = [self._collect(worker) for worker in busy if worker.pipe in ready]
+            self._hand_out(supply)  # before the results are written, which a worker need not wait for
+            yield from finished
 
     def _hand_out(self, supply: Supply) -> None:
         for worker in [each for each in self._pool if each.task is None and not each.process.is_alive()]:
