@@ -33,37 +33,32 @@ def seconds(loaded: LoadedSweep, workers: int, folder: Path) -> float:
         return sweep(loaded, folder / "sweep.h5", engine, force=True).seconds
 
 
+def alone(loaded: LoadedSweep, chunks: int, size: int) -> float:
+    """Seconds of a point without a sweep, of chunks spread over all points, which are not equally expensive."""
+    points = loaded.plan.points
+    begin = time.perf_counter()
+    for first in range(0, points, points // chunks):
+        compute(loaded.plan, first, size)
+    return (time.perf_counter() - begin) / (chunks * size)
+
+
 def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        probe = load(folder, 1, 1.0)
+        probe = load(folder, 200, 1.0)
         compute(probe.plan, 0, 1)
-        begin = time.perf_counter()
-        compute(probe.plan, 0, 1)
-        duration = 0.3 / (time.perf_counter() - begin)
-        loaded = load(folder, 200, duration)
-        begin = time.perf_counter()
-        compute(loaded.plan, 0, 20)
-        each = (time.perf_counter() - begin) / 20
-        print(f"200 points of {each:.3f} s")
+        loaded = load(folder, 200, 0.3 / alone(probe, 10, 1))
+        print(f"200 points of {alone(loaded, 20, 1):.3f} s")
         ratios = []
         for turn in range(ROUNDS):
             one, two = seconds(loaded, 1, folder), seconds(loaded, 2, folder)
             ratios.append(one / two)
-            overhead = (one / 200 - each) * 1e3
-            print(f"round {turn + 1}: one worker {one:.2f} s, two {two:.2f} s: {ratios[-1]:.3f} times", end="; ")
-            print(f"{overhead:.2f} ms a point beside its work, start-up included", flush=True)
+            print(f"round {turn + 1}: one worker {one:.2f} s, two {two:.2f} s: {ratios[-1]:.3f} times", flush=True)
         print(f"two workers give {statistics.median(ratios):.3f} times one (median of {ROUNDS})")
         small = load(folder, 20_000, 5e-4)
-        begin = time.perf_counter()
-        compute(small.plan, 0, 2000)
-        alone = (time.perf_counter() - begin) / 2000
-        swept = seconds(small, 1, folder) / 20_000
-        print(
-            f"small points: {alone * 1e3:.2f} ms each alone, {swept * 1e3:.2f} ms in a sweep on one worker",
-            end=": ",
-        )
-        print(f"{(swept - alone) * 1e3:.2f} ms of overhead a point")
+        each, swept = alone(small, 20, 100) * 1e3, seconds(small, 1, folder) / 20_000 * 1e3
+        print(f"small points: {each:.2f} ms each alone, {swept:.2f} ms in a sweep on one worker", end=": ")
+        print(f"{swept - each:.2f} ms of overhead a point")
 
 
 if __name__ == "__main__":
