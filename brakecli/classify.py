@@ -1,14 +1,18 @@
 """The regime of a stored run, told anew from its history: what `brakecli classify RESULT.h5` does."""
 
+import math
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from brakecli.analysis.equilibrium import equilibrium, mean_contact
 from brakecli.analysis.precision import natural_frequencies
 from brakecli.analysis.regime import Context, Regime, Thresholds, Verdict, classify, forced_lines
+from brakecli.analysis.stability import eigensystem
 from brakecli.case_reading import parse_case
 from brakecli.errors import CaseError, UnreadableResultError
 from brakecli.schedules import value_at
@@ -47,7 +51,19 @@ def context(setup: Setup) -> Context:
         quiet=_ROUNDING * compression * fastest,
         coefficients=setup.coefficients,
         load=float(value_at(setup.load, 0.0)),
+        growth=partial(_growth, setup, last_speed),
     )
+
+
+def _growth(setup: Setup, belt_speed: float) -> float:
+    """How fast a disturbance of steady sliding grows (1/s), by the mean stiffness of the contact; 0 if not."""
+    c, mean = setup.coefficients, partial(mean_contact, setup.evaluate, setup.pad, setup.wheel)
+    try:
+        rest = equilibrium(c, mean, setup.pad, float(value_at(setup.load, 0.0)), belt_speed)
+    except CaseError:
+        return 0.0
+    values, _ = eigensystem(c, rest.stiffness, math.copysign(c.phi, belt_speed))
+    return max(float(values.real.max()), 0.0)
 
 
 def classify_result(path: Path, thresholds: Thresholds) -> dict[str, Any]:

@@ -238,6 +238,8 @@ def comparison_table(report: ComparisonReport) -> str:
         error = best.errors.error
         margin = f"error {error:.2g}, {report.target / error:.3g} times below {report.target:g}"
         rows.append(("recommended", f"{_name(best)}: {margin}"))
+        if (finer := found.finer_error(best)) > report.target:
+            rows.append(("", f"by chance: at a finer step its error is {finer:.2g}; choose one with more margin"))
     rows.append(("file", str(report.output)))
     parts = [
         "No other is better in both error and time:\n" + _grid(headers, [_entry_row(entry) for entry in front]),

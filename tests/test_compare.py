@@ -1,6 +1,7 @@
 """Comparisons of methods: what is measured is what it says, and it agrees with what is known otherwise."""
 
 import math
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,7 @@ from brakecli.compare.methods import (
 from brakecli.compare.result import ComparisonReport
 from brakecli.errors import UsageError
 from brakecli.model import HISTORY
+from brakecli.report import comparison_table
 from brakecli.schemes import load
 from brakecli.setup import set_up
 from brakecli.stability import stability
@@ -287,6 +289,21 @@ def test_recommended_is_the_cheapest_that_meets_the_target(target: float) -> Non
     assert best.errors.error <= target
     able = [e for e in found.entries if e.errors and e.errors.error + found.reference_error <= target]
     assert best.wall_seconds == min(entry.wall_seconds or math.inf for entry in able)
+
+
+def test_an_error_that_is_low_by_chance_is_told() -> None:
+    """The coarsest step is given an error that meets the target, which all finer ones miss."""
+    found = smooth_comparison()
+    coarsest, *finer = [e for e in entries_of(found, "two-layer", (0.5, 0.5)) if e.errors is not None]
+    assert coarsest.errors is not None
+    worst = max(entry.errors.error for entry in finer if entry.errors is not None)
+    assert found.finer_error(coarsest) == worst
+    assert found.finer_error(finer[-1]) == 0.0
+    target = 1e-3 * min(entry.errors.error for entry in finer if entry.errors is not None)
+    lucky = replace(coarsest, errors=replace(coarsest.errors, error=target / 2.0))
+    for entries, told in (((lucky, *finer), True), ((lucky,), False)):
+        chosen = replace(found, entries=entries, reference_error=0.0)
+        assert ("by chance" in comparison_table(ComparisonReport(Path("x.h5"), "t", chosen, target))) == told
 
 
 def test_nothing_is_recommended_where_nothing_meets_the_target() -> None:

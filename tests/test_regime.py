@@ -117,6 +117,41 @@ def test_a_line_of_the_roughness_is_forced_and_another_is_not() -> None:
     assert (other.regime, other.excitation) == (Regime.QUASI_HARMONIC, Excitation.SELF_EXCITED)
 
 
+@pytest.mark.parametrize(
+    ("powers_of_e", "regime", "excitation"),
+    [
+        (0.0, Regime.DAMPED, Excitation.FORCED),
+        (1e-4, Regime.DAMPED, Excitation.FORCED),
+        (2.0, Regime.UNDECIDED, Excitation.NONE),
+        (30.0, Regime.QUASI_HARMONIC, Excitation.SELF_EXCITED),
+    ],
+)
+def test_where_sliding_is_unstable_a_motion_is_not_forced(
+    powers_of_e: float, regime: Regime, excitation: Excitation
+) -> None:
+    """By its growth over the whole run: none, none but rounding, too little to see, and enough from any start."""
+    duration = len(TIME) * (TIME[1] - TIME[0])
+    lines = forced_lines(2.0, [1.0 / 0.02], 5000.0)
+    known = Context(2.0, True, lines, growth=lambda: powers_of_e / duration)
+    verdict = classify(made(np.sin(2 * np.pi * 100.0 * TIME)), known)
+    assert (verdict.regime, verdict.excitation) == (regime, excitation)
+    assert ("run at least" in verdict.reasons[0]) == (regime is Regime.UNDECIDED)
+
+
+@pytest.mark.parametrize("duration", [0.5, 2.0])
+def test_squeal_on_a_wheel_of_many_waves_is_not_called_forced(duration: float) -> None:
+    """In a short run the lines of two waves cover the whole spectrum, and with it the line of the squeal."""
+    roughness = {
+        "shoe": {"amplitudes": [2e-6, 1e-6], "wavelengths": [0.020, 0.011]},
+        "wheel": {"amplitudes": [4e-6, 2e-6], "wavelengths": [0.030, 0.017]},
+    }
+    changes: dict[str, Any] = {"wheel__angular_speed": 4.0, "load__force": 5000.0, "output__sample_interval": 2e-4}
+    case = make(SQUEAL | {"roughness": roughness}, friction__coefficient=0.7, solver__duration=duration, **changes)
+    verdict = judged(case)
+    assert (verdict.evidence["forced_share"] > 0.8) == (duration == 0.5)
+    assert verdict.regime is (Regime.UNDECIDED if duration == 0.5 else Regime.QUASI_HARMONIC)
+
+
 @pytest.mark.parametrize("samples", [1, 2, 50, 159])
 def test_too_few_samples_are_undecided(samples: int) -> None:
     verdict = classify(made(np.sin(np.arange(samples))), Context(1.0))

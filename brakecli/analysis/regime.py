@@ -1,6 +1,7 @@
 """What kind of vibration a history shows, and why: the rules. What they go by is measured in `evidence`."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
@@ -41,6 +42,10 @@ class Excitation(StrEnum):
     NONE = "none"
 
 
+_GROWN, _NOTHING = math.log(1e9), 1e-3
+"""Growth rate times duration: from rounding to the size of the motion; no more than rounding of eigenvalues."""
+
+
 @dataclass(frozen=True)
 class Thresholds:
     """Where the rules draw their lines; kept with every verdict."""
@@ -68,7 +73,8 @@ class Context:
     """What is known of the case behind a history.
 
     `belt_speed` U (m/s), `steady`: U and Q are constant, `forced`: lines of the roughness (Hz), `quiet`: size of
-    vx (m/s) that is no more than rounding, `coefficients` and `load` Q (N) for the balance of powers.
+    vx (m/s) that is no more than rounding, `coefficients` and `load` Q (N) for the balance of powers, `growth`
+    (1/s): how fast a small disturbance of steady sliding grows, 0 where it does not.
     """
 
     belt_speed: float
@@ -77,6 +83,7 @@ class Context:
     quiet: float = 0.0
     coefficients: Coefficients | None = None
     load: float = 0.0
+    growth: Callable[[], float] = lambda: 0.0
 
 
 @dataclass(frozen=True)
@@ -168,6 +175,15 @@ class _Judge:
         self.evidence["forced_share"] = share
         if share < self.limits.forced_share:
             return None
+        growth = self.context.growth()
+        powers_of_e = growth * self.history.samples * self.history.interval
+        if powers_of_e > _GROWN:  # so its own vibration falls on the same lines
+            return None
+        if powers_of_e > _NOTHING:
+            return self._undecided(
+                f"{share:.0%} of the energy of vx lies on the lines of the roughness, but sliding is unstable: "
+                f"the shoe's own vibration grows at {growth:.3g} 1/s; run at least {_GROWN / growth:.2g} s"
+            )
         text = f"only the roughness shakes the shoe: {share:.0%} of the energy of vx lies on its lines"
         return self._verdict(Regime.DAMPED, text, Excitation.FORCED)
 

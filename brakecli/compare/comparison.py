@@ -83,6 +83,12 @@ class Comparison:
         ]
         return min(able, key=lambda entry: entry.wall_seconds or math.inf, default=None)
 
+    def finer_error(self, entry: Entry) -> float:
+        """The largest error of the same method at finer steps; above the entry's own, that is low by chance."""
+        method, step = entry.rung.method, entry.rung.step or 0.0
+        finer = (each for each in self.entries if each.rung.method == method and (each.rung.step or step) < step)
+        return max((each.errors.error for each in finer if each.errors is not None), default=0.0)
+
 
 Progress = Callable[[str, int, int], None]
 """Told what is done, how many rungs are done, and of how many."""
