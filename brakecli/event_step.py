@@ -71,6 +71,8 @@ _SAFETY, _LEAST, _MOST = 0.9, 0.2, 6.0
 """Of the step that the error asks for: what is taken, and the bounds of its change."""
 _RADIANS = 2.0
 """Of the fastest motion, in a step: the looks at the margins are to follow it."""
+_DECAY = 4.0
+"""Powers of e by which the fastest decay goes on in a step; up to six the steps are stable, but wrong in between."""
 _FIRST = 0.05
 """The first step over the longest."""
 _MOST_SWITCHES, _MOST_EVENTS, _NO_PROGRESS = 60, 1000, 1e-6
@@ -97,6 +99,9 @@ def _longest(p: Plant, duration: float) -> float:
     longest = duration
     if bound * longest * longest > _RADIANS * _RADIANS * c.m:
         longest = _RADIANS / math.sqrt(bound / c.m)
+    rate = (c.b_xx + c.b_yy) / c.m  # at least that of the fastest decay
+    if rate * longest > _DECAY:
+        longest = _DECAY / rate
     if p.pad[WHEEL_TERMS] > 0.0 and m[TOUCHING] != 0.0 and m[SIDE] != 0.0:
         # A fourth of the shortest wave, so that no patch comes and goes unseen.
         slide = abs(m[VX] - m[BELT]) + abs(m[SLOPES + 2] - m[BELT_SLOPE]) * m[STEP]
