@@ -72,7 +72,7 @@ _SAFETY, _LEAST, _MOST = 0.9, 0.2, 6.0
 _RADIANS = 2.0
 """Of the fastest motion, in a step: the looks at the margins are to follow it."""
 _DECAY = 4.0
-"""Powers of e by which the fastest decay goes on in a step; up to six the steps are stable, but wrong in between."""
+"""Powers of e by which the fastest decay goes on in a step; steps are stable up to six, but wrong in between."""
 _FIRST = 0.05
 """The first step over the longest."""
 _MOST_SWITCHES, _MOST_EVENTS, _NO_PROGRESS = 60, 1000, 1e-6

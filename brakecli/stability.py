@@ -242,7 +242,13 @@ def step_limit(setup: Setup, stiffness_at: StiffnessAt) -> float | None:
     radius = partial(_radius, setup, stiffness_at, 0.0)
     frequency = natural_frequencies(setup.coefficients, stiffness_at(0.0))[1]
     ladder = 10.0 ** np.arange(-2.0, 4.1, 0.25) / (2.0 * math.pi * frequency)
-    stable = [radius(float(h)) <= 1.0 + _CLEAR_MARGIN for h in ladder]
+
+    def is_stable(h: float) -> bool:
+        # Entries of the matrix are rounded to ε (ωh)² / 10⁻³; double eigenvalues are known to the root of that.
+        rounding = math.sqrt(np.finfo(float).eps / 1e-3) * 2.0 * math.pi * frequency * h
+        return bool(radius(h) <= 1.0 + max(_CLEAR_MARGIN, rounding))
+
+    stable = [is_stable(float(h)) for h in ladder]
     if all(stable):
         return None
     first = stable.index(False)
@@ -251,5 +257,5 @@ def step_limit(setup: Setup, stiffness_at: StiffnessAt) -> float | None:
     low, high = float(ladder[first - 1]), float(ladder[first])
     for _ in range(60):
         middle = math.sqrt(low * high)
-        low, high = (middle, high) if radius(middle) <= 1.0 + _CLEAR_MARGIN else (low, middle)
+        low, high = (middle, high) if is_stable(middle) else (low, middle)
     return low

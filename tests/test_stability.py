@@ -6,11 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from brakecli.analysis.precision import natural_frequencies
 from brakecli.analysis.stability import Instability, crossings, eigensystem, growth, modes
 from brakecli.coefficients import coefficients
 from brakecli.kernels import Coefficients
 from brakecli.setup import set_up
-from brakecli.stability import stability, undamped_critical
+from brakecli.stability import stability, step_limit, undamped_critical
 from tests.examples import MODE_COUPLING, ROUGH, SQUEAL, make, simulate
 
 
@@ -186,6 +187,24 @@ def test_limits_of_stability_are_those_of_theory(
     step = report.discrete.step_limit
     assert (step is None) == (limit is None)
     assert limit is None or step == pytest.approx(limit / math.sqrt(3.0), rel=1e-5)  # ω² = 3 is the highest
+
+
+@pytest.mark.parametrize(
+    ("scheme", "theta", "limit"),
+    [
+        ("two-layer", (0.5, 0.5), None),
+        ("two-layer", (1.0, 0.5), None),
+        ("three-layer", (0.25, 0.5, 0.25), None),
+        ("three-layer", (1 / 12, 10 / 12, 1 / 12), math.sqrt(6.0)),
+    ],
+)
+def test_no_limit_is_seen_in_the_rounding_of_a_contact_that_is_all_but_rigid(
+    scheme: str, theta: tuple[float, ...], limit: float | None
+) -> None:
+    setup = set_up(make(SQUEAL, contact__stiffness=1e16, solver__scheme=scheme, solver__theta=list(theta)))
+    found = step_limit(setup, lambda friction: setup.contact_stiffness)
+    omega = 2.0 * math.pi * natural_frequencies(setup.coefficients, setup.contact_stiffness)[1]
+    assert found == (limit if limit is None else pytest.approx(limit / omega, rel=1e-4))
 
 
 @pytest.mark.parametrize(("scheme", "theta"), [("two-layer", (0.6, 0.7)), ("three-layer", (0.3, 0.4, 0.3))])
