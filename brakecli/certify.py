@@ -7,6 +7,7 @@ answer. What they differ by is the error of the coarser one, so the answer is be
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from brakecli.analysis.energy import EnergyAccount
 from brakecli.analysis.precision import natural_frequencies
 from brakecli.case import Case, Evaluator, Scheme, changed
+from brakecli.check import evaluation_seconds
 from brakecli.contact.pad import default_nodes
 from brakecli.model import HISTORY, ContactState, Failure
 from brakecli.setup import Setup, set_up
@@ -29,6 +31,15 @@ LAYERED_FROM = 3e-4
 FIRST_STEPS = 40
 """Steps per period of the fastest motion, and per passing wave, that a ladder of steps begins with."""
 MOST_RUNGS = 12
+WORTH_A_PILOT = 0.2
+"""A finer run of the ladder that is guessed to take longer (s) is weighed against event-driven ones …"""
+PILOT = 32
+"""… of which one over this part of the motion is made to count its work …"""
+EVEN_CHANCE = 0.5
+"""… and is not begun beyond this part of their time: as likely as not it would not be the last one.
+
+Time is guessed from counted work, not measured: the same case is to give the same bytes wherever it runs.
+"""
 MOST_SECONDS = 900.0
 """Time of the loop after which no finer run is begun."""
 
@@ -93,17 +104,20 @@ def certify(case: Case, progress: Tell = lambda samples: None) -> Certified:
 
     Smooth surfaces, and rough ones that touch everywhere, go to the event-driven scheme, whose cost hardly
     depends on the error. Where surfaces open, that scheme needs the exact contact integral, which is dear: while
-    friction does not jump, a ladder of steps and nodes of the two-layer scheme is cheaper down to `LAYERED_FROM`.
+    friction does not jump, a ladder of steps and nodes of the two-layer scheme may be cheaper down to
+    `LAYERED_FROM`. It is left where its next run takes long beside all the event-driven ones.
     """
     promise = case.solver.promise
     assert promise is not None
     scheme = case.solver.scheme
     if scheme is Scheme.AUTO:
-        layered = promise >= LAYERED_FROM and _opens_and_slides(case)
-        found = _by_steps(case, promise, progress) if layered else _by_events(case, promise, progress)
-        if layered and not found.certificate.certified and found.work.solve_seconds < MOST_SECONDS:
-            again = _by_events(case, promise, progress)
+        if promise < LAYERED_FROM or not _opens_and_slides(case):
+            return _by_events(case, promise, progress)
+        found = _by_steps(case, promise, progress, _dearer_than_events(case, promise))
+        if not found.certificate.certified and found.work.solve_seconds < MOST_SECONDS:
+            again, spent = _by_events(case, promise, progress), found.work.solve_seconds
             found = min(found, again, key=lambda each: each.certificate.estimated_error)
+            found.work.solve_seconds = spent + again.work.solve_seconds
         return found
     if scheme is Scheme.EVENT_DRIVEN:
         return _by_events(case, promise, progress)
@@ -120,10 +134,37 @@ def _opens_and_slides(case: Case) -> bool:
     return set(pilot.work.evaluators) != {"closed-form"} and not _jumps(pilot)
 
 
+def _dearer_than_events(case: Case, promise: float) -> Callable[[float], bool]:
+    """Tells whether a run takes too long beside two event-driven ones, a part of which is run when first asked."""
+
+    @cache
+    def events() -> float:
+        timing = set_up(case).timing
+        samples = max(1, timing.samples // PILOT)
+        pilot = changed(
+            _event_case(case, _first_event_tolerance(promise)), solver={"duration": samples * timing.interval}
+        )
+        found = _run(pilot, lambda samples: None)
+        return float(_guessed_seconds(found) * timing.samples / samples * (1.0 + EVENT_RATIO**-0.125))
+
+    return lambda seconds: seconds > WORTH_A_PILOT and seconds > EVEN_CHANCE * events()
+
+
+def _guessed_seconds(run: _Run) -> float:
+    """Of the evaluations of a contact that is open in part, beside which others cost nothing."""
+    taken = run.work.evaluators
+    part = 1.0 - taken.get("closed-form", 0) / max(sum(taken.values()), 1)
+    return float(part * run.work.contact_evaluations * evaluation_seconds(run.setup))
+
+
+def _first_event_tolerance(promise: float) -> float:
+    # Two tolerances at least, as runs to the same one agree in any case.
+    return max(min(FIRST_EVENT_TOLERANCE, EVENT_MARGIN * promise), LEAST_EVENT_TOLERANCE / EVENT_RATIO)
+
+
 def _by_events(case: Case, promise: float, progress: Tell) -> Certified:
     """Event-driven runs, each to a hundredth of the tolerance of the one before."""
-    # Two tolerances at least, as runs to the same one agree in any case.
-    tolerance = max(min(FIRST_EVENT_TOLERANCE, EVENT_MARGIN * promise), LEAST_EVENT_TOLERANCE / EVENT_RATIO)
+    tolerance = _first_event_tolerance(promise)
     before: _Run | None = None
     seconds, runs = 0.0, 0
     while True:
@@ -140,7 +181,9 @@ def _by_events(case: Case, promise: float, progress: Tell) -> Certified:
         before, tolerance = run, EVENT_RATIO * tolerance
 
 
-def _by_steps(case: Case, promise: float, progress: Tell) -> Certified:
+def _by_steps(
+    case: Case, promise: float, progress: Tell, dear: Callable[[float], bool] = lambda seconds: False
+) -> Certified:
     """Runs with steps half as long, and twice as many nodes, as those before.
 
     Differences that fall by a factor r from rung to rung leave an error of the last one over r - 1. Thrice that is
@@ -164,7 +207,7 @@ def _by_steps(case: Case, promise: float, progress: Tell) -> Certified:
             if error <= promise:
                 return _answer(run, Certificate(promise, True, error, until, method, runs), seconds)
             slower = 4.5 * run.work.solve_seconds if nodes else 2.2 * run.work.solve_seconds
-            if seconds + slower > MOST_SECONDS:
+            if seconds + slower > MOST_SECONDS or dear(4.0 * _guessed_seconds(run)):
                 break
         before = run
     error = max(3.0 * last, promise * 1.0000001) if math.isfinite(last) else 1.0

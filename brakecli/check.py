@@ -28,7 +28,7 @@ MOST_TABLE_BYTES = 4e9
 _STEP_SECONDS = 1.5e-7
 _NODE_SECONDS = 1.2e-9  # per node, and again per node and wave of the wheel:
 _NODE_WAVE_SECONDS = 4e-10
-_EXACT_SECONDS = 1.5e-7  # per pair of waves in each cell
+_EXACT_SECONDS = 5e-6  # per wave on the pad
 _EVALUATIONS = 3.0  # of the contact in a step
 _OWN_STEPS = 25.0  # in a period, of a scheme that finds them itself, at a tolerance of 1e-10
 _OWN_STEP_SECONDS = 4e-6
@@ -91,7 +91,7 @@ def check(setup: Setup) -> Check:
         evaluator=setup.evaluator,
         nodes=setup.nodes,
         nodes_per_wave=setup.nodes / waves if setup.nodes and waves > 0.0 else None,
-        seconds=steps * _seconds_per_step(setup, waves),
+        seconds=steps * _seconds_per_step(setup),
         memory=1.5e8 + 8.0 * setup.nodes * (2 * len(setup.wheel.g) + 2),
         file_size=float(times.samples) * ROW_BYTES + 1e5,
         adjustments=times.adjustments,
@@ -110,18 +110,24 @@ def _own_steps(setup: Setup, frequency: float, patches: float) -> int:
     return 1 + int(setup.timing.samples * setup.timing.interval * (frequency * in_a_period + 4.0 * patches))
 
 
-def _seconds_per_step(setup: Setup, waves: float) -> float:
+def _seconds_per_step(setup: Setup) -> float:
     """A rough guess at the time of one step."""
-    n_1, n_2 = len(setup.shoe.g), len(setup.wheel.g)
-    own = has_own_steps(setup.scheme)
+    own, n_2 = has_own_steps(setup.scheme), len(setup.wheel.g)
     if setup.evaluator == "exact":
-        evaluations = _OWN_EVALUATIONS if own else _EVALUATIONS
-        return _STEP_SECONDS + evaluations * _EXACT_SECONDS * (1.0 + waves) * (n_1 + n_2) ** 2
+        return _STEP_SECONDS + (_OWN_EVALUATIONS if own else _EVALUATIONS) * evaluation_seconds(setup)
     if own:
         return _OWN_STEP_SECONDS * (1.0 + n_2**2 / 20.0)
     if setup.nodes:
-        return _STEP_SECONDS + _EVALUATIONS * setup.nodes * (_NODE_SECONDS + _NODE_WAVE_SECONDS * n_2)
+        return _STEP_SECONDS + _EVALUATIONS * evaluation_seconds(setup)
     return _STEP_SECONDS * (1.0 + n_2**2 / 20.0)
+
+
+def evaluation_seconds(setup: Setup) -> float:
+    """A rough guess at the time that one evaluation of a contact which is open in part takes."""
+    if setup.evaluator == "exact":
+        shortest = max([*setup.shoe.turns, *setup.wheel.turns], default=0.0)
+        return _EXACT_SECONDS * (1.0 + 2.0 * setup.case.contact.half_length * shortest)
+    return setup.nodes * (_NODE_SECONDS + _NODE_WAVE_SECONDS * len(setup.wheel.g))
 
 
 def _with_warnings(setup: Setup, found: Check) -> Check:

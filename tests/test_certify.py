@@ -68,6 +68,19 @@ def test_surfaces_that_open_keep_their_tolerance_too(tolerance: float) -> None:
     assert found.setup.case.solver.scheme is (Scheme.TWO_LAYER if layered else Scheme.EVENT_DRIVEN)
 
 
+def test_a_ladder_that_grows_dear_beside_events_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    case = promised({**ROUGH, "contact": {"half_length": 0.05, "stiffness": 5e7}}, 1e-3, solver__duration=0.004)
+    monkeypatch.setattr(module, "WORTH_A_PILOT", 0.0)
+    dear = module._dearer_than_events(case, 1e-3)
+    assert not dear(1e-6)
+    assert dear(1e6)
+    monkeypatch.setattr(module, "EVEN_CHANCE", 0.0)  # so any finer run is too dear
+    found = certify(case)
+    assert found.setup.case.solver.scheme is Scheme.EVENT_DRIVEN
+    assert found.certificate.certified
+    assert kept(found, case) <= 1e-3
+
+
 @pytest.mark.parametrize("scheme", ["two-layer", "three-layer"])
 def test_a_scheme_that_is_named_is_kept(scheme: str) -> None:
     case = promised(SQUEAL, 1e-3, solver__scheme=scheme, solver__duration=0.05)

@@ -164,7 +164,7 @@ def test_workers_that_die_idle_cost_no_point(tmp_path: Path) -> None:
             if (task := next(tasks)) is None and not killed:
                 (idle,) = (each.process for each in engine._pool if each.task is None)
                 idle.kill()
-                wait_until(lambda: not alive(idle.pid or 0))
+                wait_until(lambda: not idle.is_alive())  # all of its threads
                 killed.append(idle.pid or 0)
             return task
 
