@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -74,6 +75,7 @@ def step_limits(c: Coefficients, s: Weights, scheme: Any, contact_stiffness: flo
     )
 
 
+@lru_cache(maxsize=16)  # a sweep over friction asks for the same two at every point
 def amplification(c: Coefficients, s: Weights, scheme: Any, contact_stiffness: float) -> NDArray[np.float64]:
     """Amplification matrix of a scheme for steady sliding in full, smooth contact (stiffness 2ak, N/m), U > 0.
 
@@ -105,6 +107,7 @@ def amplification(c: Coefficients, s: Weights, scheme: Any, contact_stiffness: f
         state[index] += small * scale
         neighbours.append(step(state))
     matrix: NDArray[np.float64] = (np.array(neighbours) - step(base.copy())).T / small
+    matrix.flags.writeable = False
     return matrix
 
 
