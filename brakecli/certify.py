@@ -17,7 +17,7 @@ from brakecli.analysis.precision import natural_frequencies
 from brakecli.case import Case, Evaluator, Scheme, changed
 from brakecli.check import evaluation_seconds
 from brakecli.contact.pad import default_nodes
-from brakecli.model import HISTORY, ContactState, Failure
+from brakecli.model import HISTORY, Failure
 from brakecli.setup import Setup, set_up
 from brakecli.simulate import Motion, Work
 
@@ -31,6 +31,8 @@ LAYERED_FROM = 3e-4
 FIRST_STEPS = 40
 """Steps per period of the fastest motion, and per passing wave, that a ladder of steps begins with."""
 MOST_RUNGS = 12
+STEPS_BETWEEN_KNOTS = 4
+"""Steps that what speed or load do between two knots takes at least, to be seen."""
 WORTH_A_PILOT = 0.2
 """A finer run of the ladder that is guessed to take longer (s) is weighed against event-driven ones …"""
 PILOT = 32
@@ -111,9 +113,9 @@ def certify(case: Case, progress: Tell = lambda samples: None) -> Certified:
     assert promise is not None
     scheme = case.solver.scheme
     if scheme is Scheme.AUTO:
-        if promise < LAYERED_FROM or not _opens_and_slides(case):
+        if promise < LAYERED_FROM or not _opens_and_slides(case, progress):
             return _by_events(case, promise, progress)
-        found = _by_steps(case, promise, progress, _dearer_than_events(case, promise))
+        found = _by_steps(case, promise, progress, _dearer_than_events(case, promise, progress))
         if not found.certificate.certified and found.work.solve_seconds < MOST_SECONDS:
             again, spent = _by_events(case, promise, progress), found.work.solve_seconds
             found = min(found, again, key=lambda each: each.certificate.estimated_error)
@@ -124,17 +126,20 @@ def certify(case: Case, progress: Tell = lambda samples: None) -> Certified:
     return _by_steps(case, promise, progress)
 
 
-def _opens_and_slides(case: Case) -> bool:
-    """Whether the surfaces are rough and touch in part now and then, and friction never jumps, by a coarse run."""
+def _opens_and_slides(case: Case, progress: Tell) -> bool:
+    """Whether the surfaces are rough and touch in part now and then, and friction never jumps, by a coarse run.
+
+    Not where speed or load change with time, as steps would have to be short beside what they do.
+    """
     setup = set_up(case)
-    if setup.smooth:
+    if setup.smooth or len(setup.belt.times) > 1 or len(setup.load.times) > 1:
         return False
     step, interval = _coarsest(setup)
-    pilot = _run(_stepped(case, step, interval, 0), lambda samples: None)
-    return set(pilot.work.evaluators) != {"closed-form"} and not _jumps(pilot)
+    pilot = _run(_stepped(case, step, interval, 0), lambda samples: progress(0))
+    return set(pilot.work.evaluators) != {"closed-form"} and not pilot.work.turns
 
 
-def _dearer_than_events(case: Case, promise: float) -> Callable[[float], bool]:
+def _dearer_than_events(case: Case, promise: float, progress: Tell) -> Callable[[float], bool]:
     """Tells whether a run takes too long beside two event-driven ones, a part of which is run when first asked."""
 
     @cache
@@ -144,7 +149,7 @@ def _dearer_than_events(case: Case, promise: float) -> Callable[[float], bool]:
         pilot = changed(
             _event_case(case, _first_event_tolerance(promise)), solver={"duration": samples * timing.interval}
         )
-        found = _run(pilot, lambda samples: None)
+        found = _run(pilot, lambda samples: progress(0))
         return float(_guessed_seconds(found) * timing.samples / samples * (1.0 + EVENT_RATIO**-0.125))
 
     return lambda seconds: seconds > WORTH_A_PILOT and seconds > EVEN_CHANCE * events()
@@ -188,9 +193,11 @@ def _by_steps(
 
     Differences that fall by a factor r from rung to rung leave an error of the last one over r - 1. Thrice that is
     the estimate, and at least thrice the last difference and three quarters of the one before: kinks and jumps
-    make differences fall unevenly, and one that is small by luck must not pass.
+    make differences fall unevenly, and one that is small by luck must not pass. Nor must differences of runs that
+    all step over what speed or load do between two knots.
     """
     setup = set_up(case)
+    longest = _shortest_span(setup) / STEPS_BETWEEN_KNOTS * (1.0 + 1e-9)
     step, interval = _coarsest(setup)
     nodes = 0 if setup.smooth else default_nodes(case.contact.half_length, setup.shoe, setup.wheel)
     before: _Run | None = None
@@ -202,6 +209,8 @@ def _by_steps(
         if before is not None and run.work.failure is before.work.failure is Failure.NONE:
             until, difference = _compare(before, run, promise)
             error = max(_remaining(last, difference), _unseen(run))
+            if run.setup.timing.step > longest:
+                error = math.inf
             last = difference
             method = f"{run.setup.case.solver.scheme} runs of {run.setup.timing.step * 2:.3g} and half of that"
             if error <= promise:
@@ -210,9 +219,15 @@ def _by_steps(
             if seconds + slower > MOST_SECONDS or dear(4.0 * _guessed_seconds(run)):
                 break
         before = run
-    error = max(3.0 * last, promise * 1.0000001) if math.isfinite(last) else 1.0
+    seen = math.isfinite(last) and run.setup.timing.step <= longest
+    error = max(3.0 * last, _unseen(run), promise * 1.0000001) if seen else 1.0
     method = f"the finest of {runs} runs, with steps of {run.setup.timing.step:.3g} s,"
     return _answer(run, Certificate(promise, False, error, 0.0, method, runs), seconds)
+
+
+def _shortest_span(setup: Setup) -> float:
+    """Between two knots of speed or load, s; infinite where there are none."""
+    return min(float(np.diff(each.times).min(initial=math.inf)) for each in (setup.belt, setup.load))
 
 
 def _unseen(run: _Run) -> float:
@@ -220,17 +235,11 @@ def _unseen(run: _Run) -> float:
 
     Where a jump falls right behind a time that all rungs step on, they agree on what is wrong by up to this.
     """
-    if not _jumps(run):
+    if not run.work.turns:
         return 0.0
     c, fastest = run.setup.coefficients, float(np.abs(run.rows[:, _COLUMNS["vx"]]).max())
     jump = 2.0 * c.phi * float(run.rows[:, _COLUMNS["normal_force"]].max()) * run.setup.timing.step / c.m
     return jump / fastest if fastest > 0.0 else math.inf
-
-
-def _jumps(run: _Run) -> bool:
-    """Whether friction has changed its direction, or the shoe has stuck."""
-    states = run.rows[:, _COLUMNS["state"]]
-    return len(np.unique(states[states != ContactState.SEPARATED])) > 1
 
 
 def _remaining(before: float, last: float) -> float:
@@ -246,13 +255,18 @@ def _answer(run: _Run, certificate: Certificate, seconds: float) -> Certified:
 
 
 def _compare(coarse: _Run, fine: _Run, promise: float) -> tuple[float, float]:
-    """Until when (s) two runs differ by no more than the promise, and by how much they differ at most."""
+    """Until when (s) two runs differ by no more than the promise, and by how much they differ at most.
+
+    What never exceeds the rounding of the motion does not count, as velocities of a shoe that stays where it is.
+    """
     count = min(len(coarse.rows), len(fine.rows))
     if count < len(fine.rows):
         return 0.0, 1.0
     one, other = coarse.rows[:, :_MOTION], fine.rows[:, :_MOTION]
-    scale = np.abs(other).max(axis=0)
-    apart = (np.abs(one - other) / np.where(scale > 0.0, scale, 1.0)).max(axis=1)
+    largest, setup = np.abs(other).max(axis=0), fine.setup
+    rate = 2.0 * math.pi * natural_frequencies(setup.coefficients, setup.contact_stiffness)[1]
+    rounding = ROUNDING * largest[:2].max() * np.array([1.0, 1.0, rate, rate])
+    apart = (np.abs(one - other) / np.where(largest > rounding, largest, math.inf)).max(axis=1)
     late = np.flatnonzero(apart > promise)
     until = (int(late[0]) - 1 if len(late) else count - 1) * fine.setup.timing.interval
     return max(until, 0.0), max(float(apart.max()), ROUNDING)
@@ -265,6 +279,7 @@ def _coarsest(setup: Setup) -> tuple[float, float]:
     speed = float(np.abs(setup.belt.values).max())
     passing = speed * float(max(setup.wheel.turns, default=0.0))
     wanted = 1.0 / (FIRST_STEPS * max(fast, passing, 1e-300))
+    wanted = min(wanted, max(_shortest_span(setup) / STEPS_BETWEEN_KNOTS, wanted / 2**MOST_RUNGS))
     return interval / max(1, math.ceil(interval / wanted)), interval
 
 

@@ -5,7 +5,19 @@ import math
 from numba import float64, int64, types
 
 from brakecli.kernels import VX, Y, kernel
-from brakecli.phases import BELT, EPSILON, PLANT, SIDE, Plant, clear_height, margins, rounding
+from brakecli.phases import (
+    BELT,
+    BELT_SLOPE,
+    EPSILON,
+    PLANT,
+    SIDE,
+    TAU,
+    TIME,
+    Plant,
+    clear_height,
+    margins,
+    rounding,
+)
 
 NONE = -1
 LOOKS = 8
@@ -21,7 +33,8 @@ def _allowances(p: Plant) -> tuple[float, float, float]:
     m = p.memory
     height = 4.0 * EPSILON * (abs(m[Y]) + clear_height(p.pad))
     if m[SIDE] != 0.0:
-        return 4.0 * EPSILON * (abs(m[VX]) + abs(m[BELT])), 0.0, height
+        late = abs(m[BELT_SLOPE]) * (m[TIME] + m[TAU])  # the wheel's velocity at a time that is rounded
+        return 4.0 * EPSILON * (abs(m[VX]) + abs(m[BELT]) + late), 0.0, height
     along, _ = rounding(p)
     return 2.0 * along, 2.0 * along, height
 

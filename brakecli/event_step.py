@@ -67,6 +67,8 @@ _LOCAL = 0.05
 """Error of a step over the tolerance of the histories, to which the errors of all steps add up."""
 _DEFECT, _EARLY, _LATE = 20.0, 0.47, 0.93
 """Defect of a step over the error that it is allowed, and where it is taken: between the stages."""
+_DENSE_ROUNDING = 63.0
+"""Rounding of the continuous solution's slope there over that of the slopes of the stages."""
 _SAFETY, _LEAST, _MOST = 0.9, 0.2, 6.0
 """Of the step that the error asks for: what is taken, and the bounds of its change."""
 _RADIANS = 2.0
@@ -144,7 +146,7 @@ def _defect(p: Plant, h: float) -> float:
             if m[SIDE] == 0.0 and i == VX:
                 continue
             defect = abs(interpolated_slope(m, POWER, i, theta) - h * m[SLOPES + SIZE * (STAGES - 1) + i])
-            noise = h * (along if i == VX else across) / p.c.m
+            noise = _DENSE_ROUNDING * h * (along if i == VX else across) / p.c.m
             largest = max(m[LARGEST + i], abs(m[END + i]))
             worst = max(worst, defect / (_DEFECT * m[TOLERANCE] * largest + noise + _TINY))
     return worst

@@ -66,8 +66,9 @@ class Grid(NamedTuple):
 DRIVE = types.NamedTuple([SCHEDULE, SCHEDULE, SURFACE], Drive)
 GRID = types.NamedTuple([float64, int64, float64, int64, int64, int64, int64, float64], Grid)
 
-# `counts`: the level reached, and the work so far. KIND_0 + i counts the steps that evaluator i took.
-LEVEL, EVALUATIONS, UNCONVERGED, RISING, MOST, KIND_0 = range(6)
+# `counts`: the level reached, and the work so far. KIND_0 + i counts the steps that evaluator i took, TURNS those
+# after which the shoe in contact slides the other way, or sticks; steps of a scheme's own are not counted there.
+LEVEL, EVALUATIONS, UNCONVERGED, RISING, MOST, TURNS, KIND_0 = range(7)
 COUNTS_SIZE = KIND_0 + 3
 
 COLUMNS = 8
@@ -231,7 +232,10 @@ def advance(
                 return _UNCONVERGED
         if contact[VALID] == 0.0:
             return _NOT_CLOSED
+        before = state[VX] - belt_now
         finish(c, s, state, load, belt_now, belt_next, problem, contact, work)  # type: ignore[operator]
+        if before * (state[VX] - belt_next) <= 0.0 and problem[F_Y] > 0.0:
+            counts[TURNS] += 1
         if not abs(state[X]) + abs(state[Y]) + abs(state[VX]) + abs(state[VY]) < BOUND:
             return _DIVERGED
         counts[KIND_0 + int(contact[KIND])] += 1

@@ -232,14 +232,17 @@ def margin_slope(p: Plant, which: int) -> float:
 
 @kernel(void(PLANT), inlined=False)
 def take_hold(p: Plant) -> None:
-    """The side where the shoe moves with the wheel: stick if friction can hold it there, else slip, (3)-(5)."""
+    """The side where the shoe moves with the wheel: stick if friction can hold it there, else slip, (3)-(5).
+
+    A shoe that slips on keeps its velocity: the wheel's is as uncertain as the time, however fast it changes.
+    """
     c, m = p.c, p.memory
-    anchor, anchor_low = two_sum(m[X], -m[TRAVEL])
-    m[ANCHOR], m[ANCHOR_LOW], m[VX] = anchor, anchor_low - m[TRAVEL_LOW], m[BELT]
     normal = press(p, m[X], m[Y], m[TOUCHING])
-    against_x, _ = resistance(c, m[LOAD], m[X], m[Y], m[VX], m[VY])
+    against_x, _ = resistance(c, m[LOAD], m[X], m[Y], m[BELT], m[VY])
     needed, (along, _) = c.m * m[BELT_SLOPE] + against_x, rounding(p)
     if abs(needed) <= c.phi * normal + along:
+        anchor, anchor_low = two_sum(m[X], -m[TRAVEL])
+        m[ANCHOR], m[ANCHOR_LOW], m[VX] = anchor, anchor_low - m[TRAVEL_LOW], m[BELT]
         m[SIDE] = 0.0
     else:
         m[SIDE] = -1.0 if needed > 0.0 else 1.0

@@ -46,6 +46,7 @@ class Work:
     unconverged_steps: int = 0
     non_unique_steps: int = 0
     most_evaluations: int = 0  # of one step
+    turns: int = 0  # steps after which friction points the other way, or holds
     evaluators: dict[str, int] = field(default_factory=dict)  # steps that each evaluator took
     solve_seconds: float = 0.0
     unconverged: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2)))  # time (s), residual (N)
@@ -209,5 +210,6 @@ class Motion:
         work.unconverged_steps = int(counts[integrate.UNCONVERGED])
         work.non_unique_steps = int(counts[integrate.RISING])
         work.most_evaluations = int(counts[integrate.MOST])
+        work.turns = int(counts[integrate.TURNS])
         work.evaluators = {kind: int(n) for kind, n in zip(KINDS, counts[integrate.KIND_0 :], strict=True) if n}
         work.unconverged = self.events[: min(work.unconverged_steps, integrate.EVENTS)].copy()

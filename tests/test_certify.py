@@ -10,6 +10,7 @@ from brakecli import certify as module
 from brakecli.case import Case, Scheme, changed
 from brakecli.certify import Certified, certify
 from brakecli.compare.errors import errors
+from brakecli.model import HISTORY
 from brakecli.scene import scene
 from brakecli.setup import set_up
 from tests.commands import TINY, attributes, brakecli
@@ -71,7 +72,7 @@ def test_surfaces_that_open_keep_their_tolerance_too(tolerance: float) -> None:
 def test_a_ladder_that_grows_dear_beside_events_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
     case = promised({**ROUGH, "contact": {"half_length": 0.05, "stiffness": 5e7}}, 1e-3, solver__duration=0.004)
     monkeypatch.setattr(module, "WORTH_A_PILOT", 0.0)
-    dear = module._dearer_than_events(case, 1e-3)
+    dear = module._dearer_than_events(case, 1e-3, lambda samples: None)
     assert not dear(1e-6)
     assert dear(1e6)
     monkeypatch.setattr(module, "EVEN_CHANCE", 0.0)  # so any finer run is too dear
@@ -79,6 +80,72 @@ def test_a_ladder_that_grows_dear_beside_events_is_left(monkeypatch: pytest.Monk
     assert found.setup.case.solver.scheme is Scheme.EVENT_DRIVEN
     assert found.certificate.certified
     assert kept(found, case) <= 1e-3
+
+
+WAVE = {  # a shoe that opens over a long wave of the wheel
+    "shoe": {"mass": 10.0},
+    "wheel": {"radius": 0.5, "angular_speed": 1.0},
+    "link1": {"stiffness": 2e7, "damping": 2000.0},
+    "link2": {"stiffness": 1e7, "damping": 1000.0, "angle_deg": 5.0},
+    "load": {"force": 1000.0},
+    "friction": {"coefficient": 0.6},
+    "contact": {"half_length": 0.05, "stiffness": 5e7},
+    "roughness": {"wheel": {"amplitudes": [2e-4], "wavelengths": [0.03]}},
+    "initial": {"at": "equilibrium"},
+    "solver": {"step": 1e-5, "duration": 0.03},
+}
+PULSE = {"times": [0.0170123, 0.0170128, 0.0170133], "forces": [1e3, 1e6, 1e3]}
+START, WIDTH = 0.020001, 12e-6
+BACK = {  # the wheel turns back and forth between two samples
+    "radius": 0.5,
+    "times": [START, START + 0.01 * WIDTH, START + 0.99 * WIDTH, START + WIDTH],
+    "angular_speeds": [1.0, -1.0, -1.0, 1.0],
+}
+
+
+@pytest.mark.parametrize("changes", [{"load": PULSE}, {"wheel": BACK}])
+@pytest.mark.parametrize("scheme", ["auto", "two-layer", "three-layer"])
+def test_what_happens_between_two_steps_is_not_overlooked(scheme: str, changes: dict[str, Any]) -> None:
+    case = promised({**WAVE, **changes}, 1e-2, solver__scheme=scheme)
+    found = certify(case)
+    assert found.certificate.certified
+    assert kept(found, case) <= 1e-2
+
+
+def test_what_no_step_can_follow_is_not_certified(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "MOST_RUNGS", 4)
+    case = promised({**WAVE, "load": PULSE}, 1e-2, solver__scheme="two-layer")
+    found = certify(case)
+    assert not found.certificate.certified
+    assert kept(found, case) <= found.certificate.estimated_error
+
+
+def test_what_lasts_for_some_steps_is_certified() -> None:
+    longer = {"times": [0.0170123, 0.0175, 0.018], "forces": [1e3, 3e3, 1e3]}
+    case = promised({**WAVE, "load": longer}, 1e-2, solver__scheme="two-layer")
+    found = certify(case)
+    assert found.certificate.certified
+    assert kept(found, case) <= 1e-2
+
+
+def test_friction_that_turns_between_two_samples_is_counted() -> None:
+    step = {"solver__scheme": "two-layer", "solver__step": 1e-6, "output__sample_interval": 1e-4}
+    still, turned = (simulate(make({**WAVE, **changes}, **step)) for changes in ({}, {"wheel": BACK}))
+    assert still.work.turns == 0
+    assert turned.work.turns >= 2
+    column = list(HISTORY).index("state")
+    assert set(still.rows[:, column]) == set(turned.rows[:, column])
+
+
+@pytest.mark.parametrize("promise", [1e-3, 1e-9])
+def test_a_shoe_that_nothing_moves_keeps_any_promise_in_a_few_steps(promise: float) -> None:
+    """A wave that divides the length of the pad presses alike wherever it is; what moves is rounding."""
+    wave = {"wheel": {"amplitudes": [4.2432e-5], "wavelengths": [0.1]}}
+    case = promised({**WAVE, "roughness": wave}, promise, wheel__angular_speed=20.0, friction__coefficient=0.3)
+    found = certify(changed(case, solver={"scheme": "event-driven", "duration": 0.02}))
+    assert found.certificate.certified
+    assert found.work.steps < 2000
+    assert np.abs(found.rows[:, 2:4]).max() < 1e-15
 
 
 @pytest.mark.parametrize("scheme", ["two-layer", "three-layer"])

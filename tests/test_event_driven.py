@@ -226,6 +226,19 @@ def stick_from_the_start(**changes: Any) -> Result:
     return simulate(event_driven(base, 1e-10, **changes))
 
 
+@pytest.mark.parametrize(("ramp", "speed"), [(1e-9, 20.0), (1e-8, 4.0), (1e-6, 20.0)])
+def test_a_wheel_that_turns_back_late_moves_the_shoe_as_one_that_does_so_early(ramp: float, speed: float) -> None:
+    """Its velocity at a time that is rounded to ε t is uncertain by 2 U ε t / ramp, 1e-6 m/s, were it taken."""
+
+    def after(start: float) -> NDArray[np.float64]:
+        wheel = {"radius": 0.5, "times": [start, start + ramp], "angular_speeds": [speed, -speed]}
+        base = {**SQUEAL, "wheel": wheel, "initial": {"at": "equilibrium"}, "output": {"sample_interval": 1e-3}}
+        case = event_driven(base, 1e-12, friction__coefficient=0.3, solver__duration=start + 0.05)
+        return simulate(case).rows[-50:]
+
+    assert error(after(0.7), after(0.01)) < 1e-10
+
+
 def test_a_stuck_shoe_moves_with_the_wheel_to_rounding() -> None:
     result = stick_from_the_start()
     assert set(result.state) == {STICK}
