@@ -75,7 +75,7 @@ def check(setup: Setup) -> Check:
     waves = 2.0 * case.contact.half_length * shortest
     limits = step_limits(setup.coefficients, setup.weights, setup.scheme, stiffness, setup.wheel)
     own = has_own_steps(setup.scheme)
-    steps = _own_steps(setup, frequencies[1], passing * waves) if own else times.steps
+    steps, runs = _own_steps(setup, frequencies[1], passing) if own else (times.steps, 1.0)
     per_period = 1.0 / (frequencies[1] * times.step) if frequencies[1] > 0.0 and not own else math.inf
     found = Check(
         coefficients=setup.coefficients._asdict(),
@@ -91,7 +91,7 @@ def check(setup: Setup) -> Check:
         evaluator=setup.evaluator,
         nodes=setup.nodes,
         nodes_per_wave=setup.nodes / waves if setup.nodes and waves > 0.0 else None,
-        seconds=steps * _seconds_per_step(setup),
+        seconds=runs * steps * _seconds_per_step(setup),
         memory=1.5e8 + 8.0 * setup.nodes * (2 * len(setup.wheel.g) + 2),
         file_size=float(times.samples) * ROW_BYTES + 1e5,
         adjustments=times.adjustments,
@@ -100,26 +100,37 @@ def check(setup: Setup) -> Check:
     return _with_warnings(setup, found)
 
 
-def _own_steps(setup: Setup, frequency: float, patches: float) -> int:
-    """A rough guess at the steps of a scheme that finds them itself: some in a period, more where patches change.
+def _own_steps(setup: Setup, frequency: float, passing: float) -> tuple[int, float]:
+    """A rough guess at the steps of a scheme that finds them itself, and at what all its runs cost over the last.
 
-    `frequency` (Hz) is the highest natural one, `patches` (1/s) how many waves pass each other on the pad.
+    `frequency` (Hz) is the highest natural one, `passing` (Hz) that of the shortest wave of the wheel.
     """
-    tolerance = setup.case.solver.tolerance or EVENT_TOLERANCE
-    in_a_period = _OWN_STEPS * (1e-10 / tolerance) ** 0.125
-    return 1 + int(setup.timing.samples * setup.timing.interval * (frequency * in_a_period + 4.0 * patches))
+    promise, c = setup.case.solver.promise, setup.coefficients
+    tolerance = EVENT_TOLERANCE if promise is None else max(min(1e-5 * promise, 1e-8), 1e-13)
+    rate = frequency * _OWN_STEPS * (1e-10 / tolerance) ** 0.125 + 8.0 * passing + 0.25 * (c.b_xx + c.b_yy) / c.m
+    duration = setup.timing.samples * setup.timing.interval
+    return 1 + int(min(duration * rate, 1e300)), 1.0 if promise is None else 1.6
 
 
 def _seconds_per_step(setup: Setup) -> float:
     """A rough guess at the time of one step."""
     own, n_2 = has_own_steps(setup.scheme), len(setup.wheel.g)
-    if setup.evaluator == "exact":
-        return _STEP_SECONDS + (_OWN_EVALUATIONS if own else _EVALUATIONS) * evaluation_seconds(setup)
     if own:
-        return _OWN_STEP_SECONDS * (1.0 + n_2**2 / 20.0)
+        return _OWN_STEP_SECONDS * (1.0 + n_2**2 / 20.0) + (
+            _OWN_EVALUATIONS * _open_part(setup) * evaluation_seconds(setup) if setup.evaluator == "exact" else 0.0
+        )
+    if setup.evaluator == "exact":
+        return _STEP_SECONDS + _EVALUATIONS * evaluation_seconds(setup)
     if setup.nodes:
         return _STEP_SECONDS + _EVALUATIONS * evaluation_seconds(setup)
     return _STEP_SECONDS * (1.0 + n_2**2 / 20.0)
+
+
+def _open_part(setup: Setup) -> float:
+    """Of the time, that in which rough surfaces may be open in part: little if the load presses them together."""
+    heights = float(np.abs(setup.shoe.g).sum() + np.abs(setup.wheel.g).sum())
+    spring = setup.coefficients.c_yy + setup.contact_stiffness
+    return 0.04 if heights * spring < float(np.abs(setup.load.values).min()) else 0.12
 
 
 def evaluation_seconds(setup: Setup) -> float:
