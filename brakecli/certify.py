@@ -150,6 +150,8 @@ def _dearer_than_events(case: Case, promise: float, progress: Tell) -> Callable[
             _event_case(case, _first_event_tolerance(promise)), solver={"duration": samples * timing.interval}
         )
         found = _run(pilot, lambda samples: progress(0))
+        if found.work.failure is not Failure.NONE:
+            return math.inf
         return float(_guessed_seconds(found) * timing.samples / samples * (1.0 + EVENT_RATIO**-0.125))
 
     return lambda seconds: seconds > WORTH_A_PILOT and seconds > EVEN_CHANCE * events()
@@ -266,7 +268,8 @@ def _compare(coarse: _Run, fine: _Run, promise: float) -> tuple[float, float]:
     largest, setup = np.abs(other).max(axis=0), fine.setup
     rate = 2.0 * math.pi * natural_frequencies(setup.coefficients, setup.contact_stiffness)[1]
     rounding = ROUNDING * largest[:2].max() * np.array([1.0, 1.0, rate, rate])
-    apart = (np.abs(one - other) / np.where(largest > rounding, largest, math.inf)).max(axis=1)
+    moves = np.maximum(np.abs(one).max(axis=0), largest) > rounding
+    apart = (np.abs(one - other) / np.where(moves, np.maximum(largest, rounding), math.inf)).max(axis=1)
     late = np.flatnonzero(apart > promise)
     until = (int(late[0]) - 1 if len(late) else count - 1) * fine.setup.timing.interval
     return max(until, 0.0), max(float(apart.max()), ROUNDING)
