@@ -160,7 +160,10 @@ def mean_stiffness(setup: Setup) -> StiffnessAt:
 
 
 def _rough_crossings(c: Coefficients, belt: float, stiffness_at: StiffnessAt) -> list[Crossing]:
-    """Changes of stability on rough surfaces, whose mean stiffness depends on φ."""
+    """Changes of stability on rough surfaces, whose mean stiffness depends on φ.
+
+    Where steady sliding ends, it is lost by self-locking.
+    """
 
     def first_mode(phi: float) -> Mode | None:
         k = stiffness_at(phi)
@@ -174,15 +177,16 @@ def _rough_crossings(c: Coefficients, belt: float, stiffness_at: StiffnessAt) ->
     verdicts = [unstable(phi) for phi in frictions]
     found = []
     for (low, high), (before, after) in zip(pairwise(frictions), pairwise(verdicts), strict=True):
-        if before is None or after is None or before == after:
+        if before is None or before == after or (before and after is None):
             continue
         for _ in range(50):  # by halves: without dashpots the growth is zero on one side
             middle = 0.5 * (low + high)
             low, high = (middle, high) if unstable(middle) == before else (low, middle)
-        mode = first_mode(high if after else low)
+        lost = unstable(high) is not False
+        mode = first_mode(high if lost else low)
         oscillates = mode is not None and mode.frequency > 0.0
         kind = Instability.FLUTTER if oscillates else Instability.DIVERGENCE
-        found.append(Crossing(0.5 * (low + high), kind, mode.frequency if mode else 0.0, after))
+        found.append(Crossing(0.5 * (low + high), kind, mode.frequency if mode else 0.0, lost))
     return found
 
 

@@ -226,6 +226,82 @@ def test_a_start_from_rest_needs_no_less_friction_where_nothing_coexists() -> No
     assert answer.sustained == pytest.approx(answer.value, abs=1e-3)
 
 
+@pytest.mark.parametrize("speed", [0.16782197452490075, 10.0])
+def test_slow_sliding_is_no_stick_to_a_three_layer_scheme(speed: float) -> None:
+    """Friction changes its velocity by more than the wheel's in a step, and its samples read as stick."""
+    tables = {
+        "shoe": {"mass": 0.310697},
+        "wheel": {"radius": 0.5, "angular_speed": speed},
+        "link1": {"stiffness": 41683.334, "angle_deg": 19.533686},
+        "link2": {"stiffness": 376572.5, "angle_deg": -15.361746},
+        "load": {"force": 1491.1643},
+        "friction": {"coefficient": 0.3},
+        "contact": {"half_length": 0.0138968, "stiffness": 1333325.8},
+        "solver": {"scheme": "three-layer", "step": 1.7406422e-4, "duration": 0.05},
+    }
+    answer = found(tables, 2.9353636, 15.732434, tolerance=1e-3)
+    exact = stability(set_up(make(tables))).critical
+    assert exact is not None
+    assert answer.outcome is Outcome.FOUND
+    assert answer.value == pytest.approx(exact.friction, abs=1e-3)
+
+
+def test_a_linear_motion_that_fades_slowly_does_not_last() -> None:
+    """A run of 11 ms just below the critical value, in which the amplitude falls by less than it beats."""
+    tables = {
+        "shoe": {"mass": 0.3758825},
+        "wheel": {"radius": 0.5, "angular_speed": 1.1062112},
+        "link1": {"stiffness": 2986894.5, "damping": 42.954388},
+        "link2": {"stiffness": 109023354.0, "damping": 306.16288, "angle_deg": 36.433232},
+        "load": {"force": 897.52732},
+        "friction": {"coefficient": 0.3},
+        "contact": {"half_length": 0.0966432, "stiffness": 241389442.0},
+        "solver": {"step": 1.9945717e-6, "duration": 0.0112227},
+    }
+    answer = found(tables, 0.2, 1.8, tolerance=1e-3)
+    assert answer.value == pytest.approx(0.889988, abs=1e-3)
+    assert answer.sustained == pytest.approx(answer.value, abs=1e-3)
+
+
+def test_a_start_that_takes_long_to_settle_is_given_the_time() -> None:
+    """Over its own duration the amplitude still falls, towards a limit cycle far below the critical value."""
+    tables = {
+        "shoe": {"mass": 1.1845788},
+        "wheel": {"radius": 0.5, "angular_speed": 2.5175146},
+        "link1": {"stiffness": 156538.24, "damping": 1.2650601},
+        "link2": {"stiffness": 44718.626, "damping": 0.9819066, "angle_deg": 20.719246},
+        "load": {"force": 2593.4866},
+        "friction": {"coefficient": 0.3},
+        "contact": {"half_length": 0.0129496, "stiffness": 5016209.9},
+        "solver": {"step": 3.610138e-4, "duration": 0.5244317},
+    }
+    answer = found(tables, 4.0, 20.0, tolerance=1e-2)
+    assert answer.value == pytest.approx(5.683, abs=1e-2)
+    assert (answer.sustained, answer.sustained_outcome) == (None, Outcome.SUSTAINED)
+    verdict = judge(make(tables, friction__coefficient=4.0, solver__duration=6.0))
+    assert verdict is not None
+    assert verdict.regime == "relaxation"
+
+
+def test_self_locking_on_rough_surfaces_in_full_contact_is_that_on_flat_ones() -> None:
+    tables = {
+        "shoe": {"mass": 1.0},
+        "wheel": {"radius": 0.5, "angular_speed": -1.2},
+        "link1": {"stiffness": 7.5e5, "damping": 40.0},
+        "link2": {"stiffness": 3.8e6, "damping": 48.0, "angle_deg": 31.0},
+        "load": {"force": 2000.0},
+        "friction": {"coefficient": 0.3},
+        "contact": {"half_length": 0.05, "stiffness": 2.2e7},
+        "solver": {"step": 2e-5, "duration": 0.1},
+    }
+    flat = stability(set_up(make(tables))).critical
+    rough = stability(set_up(make(tables, roughness__wheel=WAVES))).critical
+    assert flat is not None
+    assert rough is not None
+    assert flat.instability == rough.instability == "divergence"
+    assert rough.friction == pytest.approx(flat.friction, rel=1e-6)
+
+
 def test_roughness_that_opens_the_contact_moves_the_critical_friction() -> None:
     tables = {**ROUGH, "link2": {"stiffness": 2.2e7, "angle_deg": 10.0}, "link1": {"stiffness": 2e7}}
     flat = found({**tables, "roughness": {}}, 0.0, 4.0, method=Method.EIGENVALUE)

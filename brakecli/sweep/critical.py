@@ -70,7 +70,10 @@ Judge = Callable[[Case], Verdict | None]
 
 def search(critical: Critical, case_at: CaseAt, judge: Judge) -> Search:
     """Look for the critical value of the parameter that `case_at` sets; `judge` runs a case to its verdict."""
-    stepped = lambda value: with_step(case_at(value))  # noqa: E731 - where a tolerance is promised, there is no step
+
+    def stepped(value: float) -> Case:
+        return with_step(case_at(value))  # where a tolerance is promised, there is no step
+
     exact, bias = _by_eigenvalues(critical, stepped)
     if critical.method is Method.EIGENVALUE:
         error = None if exact.value is None else 0.5 * (exact.high - exact.low)
@@ -79,11 +82,15 @@ def search(critical: Critical, case_at: CaseAt, judge: Judge) -> Search:
     found = _by_simulation(critical, stepped)
 
     def lasts(value: float) -> bool | None:
-        verdict = _vibrates(judge(case := case_at(value)))
-        stable = found.outcome is Outcome.FOUND and value <= found.low
-        if verdict is None or (verdict and stable):  # beside stable sliding it may yet fade away
-            verdict = _vibrates(judge(changed(case, solver={"duration": LONGER * case.solver.duration})))
-        return verdict
+        known = None if found.outcome is not Outcome.FOUND else value >= found.high
+        linear = _never_opens(stepped(value))
+        case = case_at(value)
+        longer = changed(case, solver={"duration": LONGER * case.solver.duration})
+        # Beside stable sliding it may yet fade away, or has not yet come to where it lasts.
+        verdict = None if known is False else _vibrates(judge(case), case.solver.duration, known, linear)
+        if verdict is not None:
+            return verdict
+        return _vibrates(judge(longer), longer.solver.duration, known, linear)
 
     lasting = _sustained(critical, lasts, found)
     if found.value is None:
@@ -223,22 +230,33 @@ def _by_simulation(critical: Critical, case_at: CaseAt) -> _Change:
     return _Change(outcome, value, low, high, min(spread, critical.upper - critical.lower))
 
 
-def _vibrates(verdict: Verdict | None) -> bool | None:
+def _never_opens(case: Case) -> bool:
+    """Whether surfaces that slide on each other touch everywhere: then their motion is linear."""
+    found = sliding(case)
+    return found is not None and found.stiffness >= 0.999 * found.setup.contact_stiffness
+
+
+def _vibrates(verdict: Verdict | None, duration: float, unstable: bool | None, linear: bool) -> bool | None:
     """Whether a run has ended in vibration that lasts by itself; None where that cannot be told.
 
-    What neither sticks nor lifts off is on its way by the linear equations, however slowly: it lasts if it grows.
+    `unstable`: what is known of steady sliding. Where it is unstable no vibration can die out. A `linear` motion
+    that neither sticks nor lifts off is on its way by the same equations: it lasts if sliding is unstable. One
+    that does is on its way to a limit cycle if it fades by less than a factor e in all the `duration` (s) of the run.
     """
     if verdict is None or verdict.contact_loss_fraction == 1.0 or verdict.stick_fraction == 1.0:
         return None
+    limited = verdict.stick_fraction > 0.0 or verdict.contact_loss_fraction > 0.0
+    if unstable or (unstable is False and linear and not limited):
+        return unstable
     if verdict.regime is Regime.DAMPED:
         return False
+    if verdict.regime is not Regime.UNDECIDED:
+        return True
     slope = verdict.evidence.get("envelope_slope")
+    if limited:
+        return slope is None or slope * duration > -1.0
     error = verdict.evidence.get("envelope_slope_error", 0.0)
-    limited = verdict.stick_fraction > 0.0 or verdict.contact_loss_fraction > 0.0
-    decided = verdict.regime is not Regime.UNDECIDED
-    if slope is not None and abs(slope) > 3.0 * error and not (limited and decided):
-        return bool(slope > 0.0)
-    return True if decided or limited else None
+    return bool(slope > 0.0) if slope is not None and abs(slope) > 3.0 * error else None
 
 
 def _sustained(
@@ -255,10 +273,6 @@ def _sustained(
         stride = tolerance
         while at(low) is True and low > critical.lower:
             low, high = max(critical.lower, low - stride), low
-            stride *= GALLOP
-        stride = tolerance
-        while at(high) is False and high < critical.upper:
-            low, high = high, min(critical.upper, high + stride)
             stride *= GALLOP
     if at(low) is None or at(high) is None:
         return None, Outcome.UNDECIDED

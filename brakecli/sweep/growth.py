@@ -40,7 +40,7 @@ PASSES = 20
 STEPS_PER_PERIOD = 200
 """Of the two-layer scheme, where the case gives no step."""
 _PER_PERIOD = 20
-_STATE = list(HISTORY).index("state")
+_VX, _NORMAL_FORCE = (list(HISTORY).index(name) for name in ("vx", "normal_force"))
 
 
 @dataclass(frozen=True)
@@ -175,9 +175,9 @@ def _last_linear(setup: Setup, runs: list[NDArray[np.float64]], sizes: NDArray[n
     """The last sample up to which the differences follow linear equations and are more than rounding."""
     ended = (sizes > SATURATED / DISTURBANCE) | (sizes < FADED)
     if setup.smooth:  # a flat pad sticks or lifts off wholly: the motion has left steady sliding
-        slides = -math.copysign(1.0, setup.belt_speed)
-        for run in runs:
-            ended |= run[:, _STATE] != slides
+        for run in runs:  # by its own velocity: a three-layer scheme's slow sliding may pass for stick
+            ended |= (run[:, _VX] - setup.belt_speed) * setup.belt_speed >= 0.0
+            ended |= run[:, _NORMAL_FORCE] == 0.0
     ended[0] = False
     return int(np.argmax(ended)) - 1 if ended.any() else len(sizes) - 1
 
