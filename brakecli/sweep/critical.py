@@ -241,7 +241,7 @@ def _vibrates(verdict: Verdict | None, duration: float, unstable: bool | None, l
 
     `unstable`: what is known of steady sliding. Where it is unstable no vibration can die out. A `linear` motion
     that neither sticks nor lifts off is on its way by the same equations: it lasts if sliding is unstable. One
-    that does is on its way to a limit cycle if it fades by less than a factor e in all the `duration` (s) of the run.
+    that does is on its way to a limit cycle if it fades by less than a factor e in all its `duration` (s).
     """
     if verdict is None or verdict.contact_loss_fraction == 1.0 or verdict.stick_fraction == 1.0:
         return None
