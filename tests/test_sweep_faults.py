@@ -407,10 +407,12 @@ def test_an_interrupted_sweep_is_resumed_by_the_same_command(good: Path, here: P
 def test_a_second_sweep_into_the_same_output_is_refused_and_names_the_first(here: Path) -> None:
     with started("sweep", "s.toml", "-q", cwd=here) as first:
         wait_until(lambda: journal_size(here) > 2000)
+        first.send_signal(signal.SIGSTOP)  # or it might be finished before the second has looked
         second = run("sweep", "s.toml", "-q", "--force", cwd=here)
         second.told(2, f"s.h5: is being written by process {first.pid} on {socket.gethostname()}; wait until")
         assert first.poll() is None
         first.send_signal(signal.SIGTERM)
+        first.send_signal(signal.SIGCONT)
         ended(first).told(143)
 
 

@@ -125,8 +125,10 @@ class ClusterEngine:
         return self._client.submit(_attempt, *arguments, pure=False)
 
     def _collected(self, future: Any, task: Task) -> Finished:
-        if future.status in ("cancelled", "lost"):
+        if future.status == "cancelled":
             raise self._lost("the scheduler has gone")
+        if future.status == "lost":  # with its worker; it is computed again
+            raise TimeoutError
         if future.status == "error":
             error = future.exception()
             if isinstance(error, OtherVersionError):
