@@ -119,9 +119,7 @@ def _seconds_per_step(setup: Setup) -> float:
         return _OWN_STEP_SECONDS * (1.0 + n_2**2 / 20.0) + (
             _OWN_EVALUATIONS * _open_part(setup) * evaluation_seconds(setup) if setup.evaluator == "exact" else 0.0
         )
-    if setup.evaluator == "exact":
-        return _STEP_SECONDS + _EVALUATIONS * evaluation_seconds(setup)
-    if setup.nodes:
+    if setup.evaluator == "exact" or setup.nodes:
         return _STEP_SECONDS + _EVALUATIONS * evaluation_seconds(setup)
     return _STEP_SECONDS * (1.0 + n_2**2 / 20.0)
 

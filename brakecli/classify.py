@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from brakecli.analysis.equilibrium import equilibrium, mean_contact
 from brakecli.analysis.precision import natural_frequencies
 from brakecli.analysis.regime import Context, Regime, Thresholds, Verdict, classify, forced_lines
-from brakecli.analysis.stability import eigensystem
+from brakecli.analysis.stability import growth
 from brakecli.case_reading import parse_case
 from brakecli.errors import CaseError, UnreadableResultError
 from brakecli.schedules import value_at
@@ -62,8 +62,7 @@ def _growth(setup: Setup, belt_speed: float) -> float:
         rest = equilibrium(c, mean, setup.pad, float(value_at(setup.load, 0.0)), belt_speed)
     except CaseError:
         return 0.0
-    values, _ = eigensystem(c, rest.stiffness, math.copysign(c.phi, belt_speed))
-    return max(float(values.real.max()), 0.0)
+    return max(growth(c, rest.stiffness, math.copysign(c.phi, belt_speed)), 0.0)
 
 
 def classify_result(path: Path, thresholds: Thresholds) -> dict[str, Any]:

@@ -264,7 +264,7 @@ def _sustained(
 ) -> tuple[float | None, Outcome]:
     """The least value at which vibration lasts from the case's own start, as far as it lasts above it.
 
-    From where stability is lost the search strides away, ever faster, and then narrows down by halves.
+    From where stability is lost the search strides down, ever faster, and then narrows down by halves.
     """
     at = cache(vibrates)
     low, high, tolerance = critical.lower, critical.upper, critical.tolerance
