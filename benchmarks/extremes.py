@@ -17,17 +17,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from brakecli.analysis.precision import natural_frequencies
-from brakecli.analysis.stability import eigensystem
-from brakecli.case import Case
-from brakecli.certify import certify
-from brakecli.check import check, refuse, within_range
-from brakecli.compare.errors import errors
+from brakecli.analysis.stability.discrete import natural_frequencies
+from brakecli.analysis.stability.modes import eigensystem
+from brakecli.analysis.stability.report import stability
+from brakecli.case.case import Case
+from brakecli.case.system import Setup, set_up
+from brakecli.comparison.deviation import errors
 from brakecli.errors import RefusedError
-from brakecli.model import HISTORY, Failure
-from brakecli.setup import Setup, set_up
-from brakecli.simulate import Motion, Work
-from brakecli.stability import stability
+from brakecli.runs.limits import check, refuse, within_range
+from brakecli.runs.tolerance import certify
+from brakecli.solver.motion import Motion, Work
+from brakecli.solver.quantities import HISTORY, Failure
 
 Rows = NDArray[np.float64]
 Tables = dict[str, dict[str, Any]]

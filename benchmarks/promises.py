@@ -4,7 +4,8 @@
 
 Cases are drawn with a fixed seed, a fifth of each kind: flat ones that slide, flat ones that stick or lift off,
 rough ones in full contact, rough ones that open, and rough ones that open and stick. The truth is the event-driven
-scheme at a tolerance of 1e-12, itself held to matrix exponentials and to SciPy in tests/test_event_driven.py.
+scheme at a tolerance of 1e-12, itself held to matrix exponentials and to SciPy in
+tests/solver/test_event_driven.py.
 """
 
 import math
@@ -14,14 +15,14 @@ from typing import Any
 
 import numpy as np
 
-from brakecli.analysis.precision import natural_frequencies
-from brakecli.case import Case, changed
-from brakecli.certify import certify
-from brakecli.compare.errors import errors
+from brakecli.analysis.stability.discrete import natural_frequencies
+from brakecli.case.case import Case, changed
+from brakecli.case.system import set_up
+from brakecli.comparison.deviation import errors
 from brakecli.errors import BrakecliError
-from brakecli.model import HISTORY, ContactState, Failure
-from brakecli.setup import set_up
-from brakecli.simulate import Motion
+from brakecli.runs.tolerance import certify
+from brakecli.solver.motion import Motion
+from brakecli.solver.quantities import HISTORY, ContactState, Failure
 
 KINDS = (
     "flat, sliding",

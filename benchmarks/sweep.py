@@ -12,9 +12,9 @@ import tempfile
 import time
 from pathlib import Path
 
-from brakecli.sweep.driver import choose_engine, sweep
-from brakecli.sweep.point import compute
-from brakecli.sweep.reading import LoadedSweep, read_sweep
+from brakecli.sweeps.driver import choose_engine, sweep
+from brakecli.sweeps.file import LoadedSweep, read_sweep
+from brakecli.sweeps.point import compute
 
 CASE = Path(__file__).parents[1] / "cases" / "relaxation.toml"
 ROUNDS = 3

@@ -1,13 +1,13 @@
 """`python -m brakecli` and the installed command."""
 
-from brakecli.process import guard_streams, handle_signals
+from brakecli.files.os_signals import guard_streams, handle_signals
 
 
 def main() -> None:
     """Run the command line; signals are heard before anything large is imported."""
     handle_signals()
     guard_streams()
-    from brakecli.cli import main as run
+    from brakecli.cli.commands import main as run
 
     run()
 

@@ -11,10 +11,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from brakecli.case import Case, changed
-from brakecli.case_reading import parse_case
-from brakecli.setup import set_up
-from brakecli.stability import stability
+from brakecli.analysis.stability.report import stability
+from brakecli.case.case import Case, changed
+from brakecli.case.read import parse_case
+from brakecli.case.system import set_up
 
 ROOT = Path(__file__).parents[1]
 CASES, RESULTS = ROOT / "cases" / "paper", ROOT / "results" / "paper"

@@ -118,7 +118,7 @@ def _server() -> subprocess.Popen[str]:
 
 
 def _serve() -> None:
-    import brakecli.report  # noqa: F401 - all that a run needs
+    import brakecli.cli.tables  # noqa: F401 - all that a run needs
     from brakecli.__main__ import main
 
     for line in sys.stdin:

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.analysis.energy import EnergyAccount
-from brakecli.case import Case
-from brakecli.model import HISTORY
-from brakecli.setup import set_up
-from brakecli.simulate import Motion, Work
+from brakecli.case.case import Case
+from brakecli.case.system import set_up
+from brakecli.solver.energy import EnergyAccount
+from brakecli.solver.motion import Motion, Work
+from brakecli.solver.quantities import HISTORY
 
 SQUEAL: dict[str, Any] = {  # flat; linear critical friction coefficient 0.575 with these dashpots
     "shoe": {"mass": 10.0},

@@ -2,16 +2,16 @@
 
 from pathlib import Path
 
-from brakecli.analysis import regime
-from brakecli.case_reading import parse_case, starter_text
-from brakecli.compare.comparison import compare
-from brakecli.compare.result import ComparisonReport, write
-from brakecli.run import run
-from brakecli.setup import set_up
-from brakecli.stability import stability
-from brakecli.stored import open_result
-from brakecli.sweep.driver import choose_engine, sweep
-from brakecli.sweep.reading import parse_sweep
+from brakecli.analysis.regime import rules
+from brakecli.analysis.stability.report import stability
+from brakecli.case.read import parse_case, starter_text
+from brakecli.case.system import set_up
+from brakecli.comparison.compare import compare
+from brakecli.comparison.result import ComparisonReport, write
+from brakecli.files.read import open_result
+from brakecli.runs.run import run
+from brakecli.sweeps.driver import choose_engine, sweep
+from brakecli.sweeps.file import parse_sweep
 from tests.commands import ROOT
 
 
@@ -57,7 +57,7 @@ def test_every_name_of_a_comparison_is_documented(tmp_path: Path) -> None:
 
 def test_every_threshold_stands_in_the_documentation_with_its_default() -> None:
     page = (ROOT / "docs" / "regimes.md").read_text()
-    for name, value in vars(regime.Thresholds()).items():
+    for name, value in vars(rules.Thresholds()).items():
         assert f"| `{name}` | {value:g} |" in page
 
 

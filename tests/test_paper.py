@@ -10,17 +10,17 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from brakecli.analysis.regime import Excitation, Regime
-from brakecli.analysis.stability import Instability, crossings, growth, stiffness_matrix
-from brakecli.case import Case
-from brakecli.case_reading import parse_case
-from brakecli.roughness import TWO_PI
-from brakecli.setup import set_up
-from brakecli.stability import stability
-from brakecli.sweep.critical import Outcome, Search, search
-from brakecli.sweep.point import simulate
-from brakecli.sweep.reading import is_sweep, read_sweep
-from brakecli.sweep.tables import Critical
+from brakecli.analysis.regime.rules import Excitation, Regime
+from brakecli.analysis.stability.modes import Instability, crossings, growth, stiffness_matrix
+from brakecli.analysis.stability.report import stability
+from brakecli.case.case import Case
+from brakecli.case.read import parse_case
+from brakecli.case.system import set_up
+from brakecli.solver.roughness import TWO_PI
+from brakecli.sweeps.critical import Outcome, Search, search
+from brakecli.sweeps.file import is_sweep, read_sweep
+from brakecli.sweeps.point import simulate
+from brakecli.sweeps.tables import Critical
 from tests.commands import ROOT
 
 FOLDER = ROOT / "cases" / "paper"

@@ -1,0 +1,118 @@
+"""What a run will cost and which limits it meets, from the case alone: nothing is stepped but one linear step."""
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brakecli.solver import implicit_step as iteration
+from brakecli.solver.compile import (
+    A_11,
+    A_12,
+    A_22,
+    FORCE,
+    GAIN,
+    PROBLEM_SIZE,
+    STATE_SIZE,
+    WORK_SIZE,
+    Y_OLD,
+    Coefficients,
+    Weights,
+    Y,
+)
+from brakecli.solver.contact.closed_form import evaluate as closed_form
+from brakecli.solver.contact.pad import build_contact, build_pad
+from brakecli.solver.roughness import Surface, surface
+from brakecli.solver.schemes import has_own_steps
+
+RESOLVED = 20
+"""Steps per period (and per passing wave) below which a warning names the number."""
+
+
+def natural_frequencies(c: Coefficients, contact_stiffness: float) -> tuple[float, float]:
+    """Undamped natural frequencies (Hz, rising) of the shoe on its links and a contact stiffness (N/m)."""
+    stiffness = np.array([[c.c_xx, c.c_xy], [c.c_xy, c.c_yy + contact_stiffness]])
+    low, high = np.sqrt(np.maximum(np.linalg.eigvalsh(stiffness / c.m), 0.0)) / (2.0 * math.pi)
+    return float(low), float(high)
+
+
+@dataclass(frozen=True)
+class StepLimits:
+    """How one step of the scheme takes the contact.
+
+    `contraction`: bound of the factor by which the paper's fixed-point iteration changes its error, above one it
+    may diverge. `unique`: whether a step is sure to have one solution. `growth`: by how much the scheme itself
+    multiplies a disturbance of the frictionless, fully touching shoe in a step: above one it is unstable.
+    """
+
+    contraction: float
+    unique: bool
+    growth: float
+
+
+def step_limits(c: Coefficients, s: Weights, scheme: Any, contact_stiffness: float, wheel: Surface) -> StepLimits:
+    """The limits of a scheme at its step, for a contact of stiffness 2ak (N/m) on this wheel.
+
+    A scheme that finds its steps itself solves no equations in them and is as stable as the motion.
+    """
+    if has_own_steps(scheme):
+        return StepLimits(contraction=0.0, unique=True, growth=1.0)
+    problem = np.zeros(PROBLEM_SIZE)
+    scheme.prepare(c, s, np.zeros(STATE_SIZE), 0.0, 0.0, 0.0, problem)
+    a_11, a_12, a_22, gain = (float(problem[i]) for i in (A_11, A_12, A_22, GAIN))
+    a = a_11 * a_22 - a_12 * a_12
+    steepest = contact_stiffness * float(np.abs(wheel.g) @ wheel.omega)  # bound of |∂F_y/∂x|
+    lift, least = (a_11 + c.phi * abs(a_12)) / a, (a_11 - c.phi * abs(a_12)) / a  # ∂e/∂F on the slip branches
+    rise = gain * (contact_stiffness * max(0.0, -least) + steepest * (abs(a_12) + c.phi * a_22) / a)
+    matrix = amplification(c._replace(phi=0.0), s, scheme, contact_stiffness)
+    return StepLimits(
+        contraction=float(gain * contact_stiffness * max(lift, 1.0 / a_22)),
+        unique=bool(rise < 1.0),
+        growth=float(np.abs(np.linalg.eigvals(matrix)).max()),
+    )
+
+
+@lru_cache(maxsize=16)  # a sweep over friction asks for the same two at every point
+def amplification(c: Coefficients, s: Weights, scheme: Any, contact_stiffness: float) -> NDArray[np.float64]:
+    """Amplification matrix of a scheme for steady sliding in full, smooth contact (stiffness 2ak, N/m), U > 0.
+
+    The scheme is one that steps on the grid of the case.
+    It acts on the scheme's own memory of the motion, with velocities times h. The scheme's own step is taken
+    from a deep, loaded equilibrium and from neighbours of it: while nothing opens or sticks, the step is affine
+    and differences are exact.
+    """
+    pad = build_pad(contact_stiffness, 0.5, surface(), surface(), 0)
+    small, no_waves = 1e-3, np.zeros(0)
+    far = 1e3 / s.h  # a belt so fast that nothing sticks
+    # y = -1, x = 0 is the equilibrium under a load of the size of the contact stiffness.
+    loaded = c._replace(sin_beta=c.c_xy / contact_stiffness + c.phi, cos_beta=1.0 + c.c_yy / contact_stiffness)
+    memory = list(scheme.MEMORY)
+    scales = np.array([1.0 / s.h if index in scheme.VELOCITIES else 1.0 for index in memory])
+
+    def step(state: NDArray[np.float64]) -> NDArray[np.float64]:
+        problem, contact = np.zeros(PROBLEM_SIZE), build_contact(pad)
+        scheme.prepare(loaded, s, state, contact_stiffness, far, far, problem)
+        iteration.newton(closed_form, iteration.MOST["newton"], c.phi, no_waves, pad, problem, contact)
+        scheme.finish(loaded, s, state, contact_stiffness, far, far, problem, contact, np.zeros(WORK_SIZE))
+        return state[memory] / scales  # type: ignore[no-any-return]
+
+    base = np.zeros(STATE_SIZE)
+    base[[Y, Y_OLD]], base[FORCE] = -1.0, contact_stiffness
+    neighbours = []
+    for index, scale in zip(memory, scales, strict=True):
+        state = base.copy()
+        state[index] += small * scale
+        neighbours.append(step(state))
+    matrix: NDArray[np.float64] = (np.array(neighbours) - step(base.copy())).T / small
+    matrix.flags.writeable = False
+    return matrix
+
+
+def spectral_radius(c: Coefficients, s: Weights, scheme: Any, contact_stiffness: float, belt: float) -> float:
+    """Factor by which the scheme multiplies the fastest disturbance of steady sliding in a step, U (m/s) ≠ 0."""
+    if belt < 0.0:  # the same shoe seen from behind: x and U change sign, and so do the couplings
+        c = c._replace(b_xy=-c.b_xy, c_xy=-c.c_xy, sin_beta=-c.sin_beta)
+    return float(np.abs(np.linalg.eigvals(amplification(c, s, scheme, contact_stiffness))).max())

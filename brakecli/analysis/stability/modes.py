@@ -1,0 +1,168 @@
+"""Linear stability of steady sliding: eigenvalues, modes and the critical friction coefficient.
+
+Linearised about steady sliding with U ≠ 0, (6)-(7) read m z̈ + B ż + S z = 0 with the contact's stiffness K and
+S = [[cxx, cxy + sign(U) φ K], [cxy, cyy + K]]. Friction makes S unsymmetric: two modes can meet and flutter, or
+the wedge that friction and links form can lock (divergence).
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brakecli.solver.compile import Coefficients
+
+Complex = NDArray[np.complex128]
+
+
+class Instability(StrEnum):
+    """How steady sliding is lost."""
+
+    FLUTTER = "flutter"
+    DIVERGENCE = "divergence"
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One mode of the linearised motion: growth rate (1/s), frequency (Hz), damping ratio (negative: it grows),
+    and the shape as y/x: its size and its phase (deg), None where x does not move.
+    """
+
+    growth: float
+    frequency: float
+    damping_ratio: float
+    shape: float | None
+    shape_phase: float | None
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """A friction coefficient at which stability changes, how, at which frequency (Hz), and whether it is lost."""
+
+    friction: float
+    instability: Instability
+    frequency: float
+    lost: bool
+
+
+def stiffness_matrix(c: Coefficients, contact_stiffness: float, grip: float) -> NDArray[np.float64]:
+    """S, N/m, with the contact stiffness K (N/m) and grip = sign(U) φ."""
+    return np.array([[c.c_xx, c.c_xy + grip * contact_stiffness], [c.c_xy, c.c_yy + contact_stiffness]])
+
+
+def is_undamped(c: Coefficients) -> bool:
+    """Whether no dashpot acts at all: then what is stable is only marginally so."""
+    return c.b_xx == 0.0 and c.b_yy == 0.0
+
+
+def eigensystem(c: Coefficients, contact_stiffness: float, grip: float) -> tuple[Complex, Complex]:
+    """The four eigenvalues (1/s) and the displacement parts of their vectors, in columns.
+
+    Without dashpots they are square roots of the eigenvalues of -S/m, so that a marginal motion has no spurious
+    growth from rounding.
+    """
+    s = stiffness_matrix(c, contact_stiffness, grip) / c.m
+    if is_undamped(c):
+        trace, determinant = s[0, 0] + s[1, 1], s[0, 0] * s[1, 1] - s[0, 1] * s[1, 0]
+        root = np.emath.sqrt((0.5 * (s[0, 0] - s[1, 1])) ** 2 + s[0, 1] * s[1, 0])
+        large = 0.5 * trace + root
+        squares = np.array([large, determinant / large if large != 0.0 else 0.5 * trace - root], dtype=complex)
+        vectors = np.array([_null_vector(s, square) for square in squares]).T
+        roots = np.sqrt(-squares)
+        return np.concatenate([roots, -roots]), np.concatenate([vectors, vectors], axis=1)
+    matrix = np.zeros((4, 4))
+    matrix[:2, 2:] = np.eye(2)
+    matrix[2:, :2] = -s
+    matrix[2:, 2:] = -np.array([[c.b_xx, c.b_xy], [c.b_xy, c.b_yy]]) / c.m
+    values, vectors = np.linalg.eig(matrix)
+    return values.astype(complex), vectors[:2].astype(complex)
+
+
+def _null_vector(s: NDArray[np.float64], square: complex) -> Complex:
+    """The vector with (S/m - square) v = 0, from the row that tells more."""
+    rows = s - square * np.eye(2)
+    row = rows[np.argmax(np.abs(rows).sum(axis=1))]
+    vector = np.array([-row[1], row[0]], dtype=complex)
+    size = np.linalg.norm(vector)
+    return vector / size if size > 0.0 else np.array([1.0, 0.0], dtype=complex)
+
+
+def modes(c: Coefficients, contact_stiffness: float, grip: float) -> list[Mode]:
+    """The modes, the one that grows fastest (decays slowest) first; a pair of eigenvalues is one mode."""
+    values, vectors = eigensystem(c, contact_stiffness, grip)
+    found = []
+    for value, vector in zip(values, vectors.T, strict=True):
+        if value.imag < 0.0:
+            continue
+        moves = abs(vector[0]) > 1e-12 * abs(vector[1])
+        ratio = vector[1] / vector[0] if moves else 0.0
+        found.append(
+            Mode(
+                growth=float(value.real),
+                frequency=float(value.imag / (2.0 * math.pi)),
+                damping_ratio=float(-value.real / abs(value)) if value != 0.0 else 0.0,
+                shape=float(abs(ratio)) if moves else None,
+                shape_phase=float(np.degrees(np.angle(ratio))) if moves else None,
+            )
+        )
+    return sorted(found, key=lambda mode: -mode.growth)
+
+
+def growth(c: Coefficients, contact_stiffness: float, grip: float) -> float:
+    """Growth rate (1/s) of the fastest disturbance; negative where all decay."""
+    return float(eigensystem(c, contact_stiffness, grip)[0].real.max())
+
+
+def crossings(c: Coefficients, contact_stiffness: float, belt: float) -> list[Crossing]:
+    """Every φ > 0 at which stability changes for a contact stiffness K that does not depend on φ; none if U = 0.
+
+    det(m s² + B s + S) = a4 s⁴ + a3 s³ + a2 s² + a1 s + a0, of which only a1 and a0 contain φ, linearly. A real
+    eigenvalue passes zero where a0 = 0; a pair passes the imaginary axis where Hurwitz' a1 a2 a3 - a1² a4 -
+    a0 a3² = 0 with a1/a3 > 0. Without dashpots two imaginary pairs meet where a2² = 4 a4 a0.
+    """
+    if belt == 0.0:
+        return []
+    pull = math.copysign(contact_stiffness, belt)
+    s = stiffness_matrix(c, contact_stiffness, 0.0)
+    a4, a3 = c.m**2, c.m * (c.b_xx + c.b_yy)
+    a2 = c.m * (s[0, 0] + s[1, 1]) + c.b_xx * c.b_yy - c.b_xy**2
+    a1 = np.array([c.b_xx * s[1, 1] + c.b_yy * s[0, 0] - 2.0 * c.b_xy * c.c_xy, -c.b_xy * pull])  # + φ ...
+    a0 = np.array([s[0, 0] * s[1, 1] - c.c_xy**2, -c.c_xy * pull])
+    found = [(phi, Instability.DIVERGENCE, 0.0) for phi in _positive_roots(a0)]
+    if is_undamped(c):
+        gap = 0.5 * (s[0, 0] - s[1, 1])  # a2² - 4 a4 a0 without the cancellation
+        meeting = c.m**2 * 4.0 * np.array([gap**2 + c.c_xy**2, c.c_xy * pull])
+        speed = math.sqrt(0.5 * a2 / a4) / (2.0 * math.pi)
+        found += [(phi, Instability.FLUTTER, speed) for phi in _positive_roots(meeting)]
+    else:
+        hurwitz = np.append(a2 * a3 * a1 - a3**2 * a0, 0.0) - a4 * np.convolve(a1, a1)
+        for phi in _positive_roots(hurwitz):
+            turning = (a1[0] + a1[1] * phi) / a3
+            if turning > 0.0:
+                found.append((phi, Instability.FLUTTER, math.sqrt(turning) / (2.0 * math.pi)))
+    return _changes(sorted(found), lambda phi: growth(c, contact_stiffness, math.copysign(phi, belt)))
+
+
+def _positive_roots(coefficients: NDArray[np.float64]) -> list[float]:
+    """Real roots > 0 of a polynomial with rising powers."""
+    scale = np.abs(coefficients).max()
+    if scale == 0.0:
+        return []
+    roots = np.polynomial.polynomial.polyroots(np.trim_zeros(coefficients / scale, "b"))
+    return [float(root.real) for root in roots if abs(root.imag) <= 1e-9 * abs(root) and root.real > 0.0]
+
+
+def _changes(found: list[tuple[float, Instability, float]], growth_at: Callable[[float], float]) -> list[Crossing]:
+    """Those candidates at which the sign of the growth really changes, seen half way to their neighbours."""
+    friction = [phi for phi, _, _ in found]
+    edges = [0.0, *friction, 2.0 * friction[-1]] if friction else []
+    unstable = [growth_at(0.5 * (low + high)) > 0.0 for low, high in pairwise(edges)]
+    return [
+        Crossing(phi, kind, frequency, after)
+        for (phi, kind, frequency), before, after in zip(found, unstable[:-1], unstable[1:], strict=True)
+        if before != after
+    ]

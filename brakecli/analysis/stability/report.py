@@ -1,0 +1,273 @@
+"""What `brakecli stability` says of a case: steady sliding, modes, critical friction, and the scheme's share."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache, partial
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from scipy.optimize import brentq
+
+from brakecli.analysis.stability.discrete import natural_frequencies, spectral_radius
+from brakecli.analysis.stability.modes import (
+    Crossing,
+    Instability,
+    Mode,
+    crossings,
+    eigensystem,
+    is_undamped,
+    modes,
+)
+from brakecli.case.system import Setup
+from brakecli.errors import CaseError
+from brakecli.solver.compile import Coefficients
+from brakecli.solver.schedules import value_at
+from brakecli.solver.schemes import has_own_steps
+from brakecli.solver.steady_sliding import Equilibrium, equilibrium, mean_contact, tabulated
+
+LARGEST_FRICTION = 10.0
+"""Up to here a critical friction coefficient is looked for on rough surfaces, whose stiffness depends on it."""
+FRICTIONS = 401
+MARGIN = 1e-9  # growth per step that counts as growth: above the rounding of simple eigenvalues
+_CLEAR_MARGIN = 1e-6  # above that of double ones, where a direction has no spring
+
+StiffnessAt = Callable[[float], float]
+
+
+@dataclass(frozen=True)
+class Discrete:
+    """What the case's scheme makes of the same motion at its step.
+
+    `spectral_radius`: factor of the fastest disturbance in a step at the case's φ (in a sample interval, where the
+    scheme finds its steps itself); `growth` (1/s) is its logarithm over that time. `step_limit` (s): the
+    frictionless shoe is stable below; None where any step is. `critical_friction`: where the radius passes one,
+    `bias` its distance from the exact one.
+    """
+
+    spectral_radius: float
+    growth: float
+    step_limit: float | None
+    critical_friction: float | None
+    bias: float | None
+
+
+@dataclass(frozen=True)
+class StabilityReport:
+    """Linear stability of the steady sliding of a case; None stands for what does not exist."""
+
+    belt_speed: float
+    friction: float
+    equilibrium: Equilibrium | None
+    no_equilibrium: str | None
+    contact_stiffness: float  # N/m, mean -∂F_y/∂y at the equilibrium
+    stable: bool | None
+    eigenvalues: tuple[complex, ...]
+    modes: tuple[Mode, ...]
+    crossings: tuple[Crossing, ...]
+    undamped_flutter: float | None  # φ, closed forms for the contact stiffness above
+    undamped_divergence: float | None
+    discrete: Discrete | None
+
+    @property
+    def critical(self) -> Crossing | None:
+        """The smallest friction coefficient at which stability is lost."""
+        return next((crossing for crossing in self.crossings if crossing.lost), None)
+
+    def numbers(self) -> dict[str, Any]:
+        """Names and values as `--json` gives them."""
+        critical = self.critical
+        return {
+            "belt_speed": self.belt_speed,
+            "friction_coefficient": self.friction,
+            "critical_friction": critical.friction if critical else None,
+            "instability": str(critical.instability) if critical else None,
+            "critical_frequency": critical.frequency if critical else None,
+            "stable": self.stable,
+            "eigenvalues": [[value.real, value.imag] for value in self.eigenvalues],
+            "modes": [mode.__dict__ for mode in self.modes],
+            "crossings": [
+                {**crossing.__dict__, "instability": str(crossing.instability)} for crossing in self.crossings
+            ],
+            "undamped_flutter_friction": self.undamped_flutter,
+            "undamped_divergence_friction": self.undamped_divergence,
+            "contact_stiffness": self.contact_stiffness,
+            "equilibrium": self.equilibrium.__dict__ if self.equilibrium else None,
+            "no_equilibrium": self.no_equilibrium,
+            "discrete": self.discrete.__dict__ if self.discrete else None,
+        }
+
+
+def stability(setup: Setup) -> StabilityReport:
+    """Linear stability of steady sliding at the speed and load of t = 0."""
+    c, belt = setup.coefficients, setup.belt_speed
+    rest, reason = None, None
+    mean = partial(mean_contact, setup.evaluate, setup.pad, setup.wheel)
+    load = float(value_at(setup.load, 0.0))
+    try:
+        rest = equilibrium(c, mean, setup.pad, load, belt)
+    except CaseError as error:
+        reason = error.problems[0].what
+    k = rest.stiffness if rest else setup.contact_stiffness
+    grip = math.copysign(c.phi, belt) if belt else 0.0
+    values, _ = eigensystem(c, k, grip)
+    found: list[Crossing] = []
+    stiffness_at: StiffnessAt = lambda phi: k  # noqa: E731
+    if belt != 0.0 and setup.smooth:
+        found = crossings(c, k, belt) if k > 0.0 else []
+    elif belt != 0.0:
+        stiffness_at = mean_stiffness(setup)
+        found = _rough_crossings(c, belt, stiffness_at)
+    flutter, divergence = undamped_critical(c, k, belt)
+    lost = next((crossing for crossing in found if crossing.lost), None)
+    fastest = float(values.real.max())
+    tolerance = 0.0 if is_undamped(c) else 1e-12 * float(np.abs(values).max())
+    return StabilityReport(
+        belt_speed=belt,
+        friction=c.phi,
+        equilibrium=rest,
+        no_equilibrium=reason,
+        contact_stiffness=k,
+        stable=fastest <= tolerance if rest else None,
+        eigenvalues=tuple(complex(value) for value in values),
+        modes=tuple(modes(c, k, grip)),
+        crossings=tuple(found),
+        undamped_flutter=flutter,
+        undamped_divergence=divergence,
+        discrete=_discrete(setup, stiffness_at, lost, fastest) if rest else None,
+    )
+
+
+def undamped_critical(c: Coefficients, k: float, belt: float) -> tuple[float | None, float | None]:
+    """Closed forms without dashpots: φ of flutter, |cxy|/K + (cxx - cyy - K)²/(4|cxy| K), where cxy sign(U) < 0,
+    and of divergence (self-locking), (cxx (cyy + K) - cxy²)/(K |cxy|), where cxy sign(U) > 0.
+    """
+    pull = math.copysign(1.0, belt) * c.c_xy
+    if belt == 0.0 or c.c_xy == 0.0 or k == 0.0:
+        return None, None
+    if pull < 0.0:
+        return (abs(c.c_xy) + (c.c_xx - c.c_yy - k) ** 2 / (4.0 * abs(c.c_xy))) / k, None
+    return None, (c.c_xx * (c.c_yy + k) - c.c_xy**2) / (k * abs(c.c_xy))
+
+
+def mean_stiffness(setup: Setup) -> StiffnessAt:
+    """Mean stiffness of a rough contact as it depends on φ through the mean force; NaN where there is none."""
+    mean = tabulated(partial(mean_contact, setup.evaluate, setup.pad, setup.wheel), setup.pad)
+    load = float(value_at(setup.load, 0.0))
+
+    @cache
+    def at(phi: float) -> float:
+        c = setup.coefficients._replace(phi=phi)
+        try:
+            return equilibrium(c, mean, setup.pad, load, setup.belt_speed).stiffness
+        except CaseError:
+            return math.nan
+
+    return at
+
+
+def _rough_crossings(c: Coefficients, belt: float, stiffness_at: StiffnessAt) -> list[Crossing]:
+    """Changes of stability on rough surfaces, whose mean stiffness depends on φ.
+
+    Where steady sliding ends, it is lost by self-locking.
+    """
+
+    def first_mode(phi: float) -> Mode | None:
+        k = stiffness_at(phi)
+        return modes(c._replace(phi=phi), k, math.copysign(phi, belt))[0] if math.isfinite(k) else None
+
+    def unstable(phi: float) -> bool | None:
+        mode = first_mode(phi)
+        return None if mode is None else mode.growth > 0.0
+
+    frictions = [float(phi) for phi in np.linspace(0.0, LARGEST_FRICTION, FRICTIONS)]
+    verdicts = [unstable(phi) for phi in frictions]
+    found = []
+    for (low, high), (before, after) in zip(pairwise(frictions), pairwise(verdicts), strict=True):
+        if before is None or before == after or (before and after is None):
+            continue
+        for _ in range(50):  # by halves: without dashpots the growth is zero on one side
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if unstable(middle) == before else (low, middle)
+        lost = unstable(high) is not False
+        mode = first_mode(high if lost else low)
+        oscillates = mode is not None and mode.frequency > 0.0
+        kind = Instability.FLUTTER if oscillates else Instability.DIVERGENCE
+        found.append(Crossing(0.5 * (low + high), kind, mode.frequency if mode else 0.0, lost))
+    return found
+
+
+def _discrete(setup: Setup, stiffness_at: StiffnessAt, exact: Crossing | None, fastest: float) -> Discrete | None:
+    """What the scheme makes of steady sliding, which grows with `fastest` (1/s); None without contact."""
+    c = setup.coefficients
+    if setup.belt_speed == 0.0 or not stiffness_at(c.phi) > 0.0:
+        return None
+    if has_own_steps(setup.scheme):  # it makes of it what it is
+        critical = exact.friction if exact else None
+        bias = 0.0 if exact else None
+        return Discrete(math.exp(fastest * setup.weights.h), fastest, None, critical, bias)
+    at_case = _radius(setup, stiffness_at, c.phi, setup.weights.h)
+    critical = discrete_critical(setup, stiffness_at, exact)
+    return Discrete(
+        spectral_radius=at_case,
+        growth=math.log(at_case) / setup.weights.h if at_case > 0.0 else -math.inf,
+        step_limit=step_limit(setup, stiffness_at),
+        critical_friction=critical,
+        bias=critical - exact.friction if critical is not None and exact else None,
+    )
+
+
+def _radius(setup: Setup, stiffness_at: StiffnessAt, phi: float, h: float) -> float:
+    """Spectral radius of the case's scheme at another φ and step (s)."""
+    k = stiffness_at(phi)
+    if not k > 0.0:
+        return 0.0
+    c, weights = setup.coefficients._replace(phi=phi), setup.weights._replace(h=h)
+    return spectral_radius(c, weights, setup.scheme, k, setup.belt_speed)
+
+
+def discrete_critical(setup: Setup, stiffness_at: StiffnessAt, exact: Crossing | None) -> float | None:
+    """φ at which steady sliding loses stability in the case's scheme at its step, U ≠ 0; None where nowhere.
+
+    The scheme is one that steps on the grid of the case. It is looked for up to twice the exact value.
+    """
+
+    def excess(phi: float) -> float:
+        return _radius(setup, stiffness_at, phi, setup.weights.h) - 1.0 - MARGIN
+
+    reach = 2.0 * exact.friction if exact else LARGEST_FRICTION
+    frictions = [float(phi) for phi in np.linspace(0.0, reach, 41)]
+    if excess(0.0) > 0.0:
+        return 0.0
+    for low, high in pairwise(frictions):
+        if excess(high) > 0.0:
+            return float(brentq(excess, low, high, xtol=1e-12))
+    return None
+
+
+def step_limit(setup: Setup, stiffness_at: StiffnessAt) -> float | None:
+    """The largest stable step (s), looked for between ωh = 0.01 and 10⁴ at the highest natural frequency.
+
+    0 where the scheme is unstable at any step, None where it is stable at all of them.
+    """
+    radius = partial(_radius, setup, stiffness_at, 0.0)
+    frequency = natural_frequencies(setup.coefficients, stiffness_at(0.0))[1]
+    ladder = 10.0 ** np.arange(-2.0, 4.1, 0.25) / (2.0 * math.pi * frequency)
+
+    def is_stable(h: float) -> bool:
+        # Entries of the matrix are rounded to ε (ωh)² / 10⁻³; double eigenvalues are known to the root of that.
+        rounding = math.sqrt(np.finfo(float).eps / 1e-3) * 2.0 * math.pi * frequency * h
+        return bool(radius(h) <= 1.0 + max(_CLEAR_MARGIN, rounding))
+
+    stable = [is_stable(float(h)) for h in ladder]
+    if all(stable):
+        return None
+    first = stable.index(False)
+    if first == 0:
+        return 0.0
+    low, high = float(ladder[first - 1]), float(ladder[first])
+    for _ in range(60):
+        middle = math.sqrt(low * high)
+        low, high = (middle, high) if is_stable(middle) else (low, middle)
+    return low

@@ -1,0 +1,276 @@
+"""Comparing methods on one case: a reference, a first round for the errors, further rounds for the times."""
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from statistics import median
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brakecli.analysis.stability.report import (
+    StabilityReport,
+    discrete_critical,
+    mean_stiffness,
+    stability,
+    step_limit,
+)
+from brakecli.case.case import Case, Evaluator, Iteration, Scheme, Start
+from brakecli.case.system import Setup, set_up
+from brakecli.comparison.deviation import Errors, errors
+from brakecli.comparison.methods import Method, Rung, case_of, ladder, methods, rungs
+from brakecli.errors import BrakecliError, RefusedError
+from brakecli.runs.limits import check, refuse, within_range
+from brakecli.runs.run import failure_sentence
+from brakecli.solver import contact
+from brakecli.solver.motion import Motion, Work
+from brakecli.solver.quantities import Failure
+from brakecli.solver.schemes import load
+
+REFERENCE, CHECK = 1e-12, 1e-10
+"""Tolerances of the reference, and of the run that tells how good it is."""
+REFERENCE_SHARE = 0.3
+"""Part of the budget that the reference may take."""
+FEWEST_SAMPLES = 64
+MOST_REPEATS, SLOW_REPEATS, SLOW = 21, 3, 0.1
+"""Turns of most loops, and of those that take long (s): there, chance matters less."""
+LONGEST_CALL = 1.0
+"""Loops that take less (s) are timed in one call; longer ones in blocks, whose own time is small beside theirs."""
+
+
+@dataclass
+class Entry:
+    """A rung with what came of it; None where it does not exist."""
+
+    rung: Rung
+    errors: Errors | None = None
+    work: Work | None = None
+    failure: str = ""
+    samples: int = 0
+    seconds: list[float] = field(default_factory=list)
+    order: float | None = None
+    critical_bias: float | None = None
+    step_limit: float | None = None  # s; infinite where any step is stable
+    on_front: bool = False
+
+    @property
+    def iterations(self) -> int:
+        """Evaluations of the contact in the steps, one for each iteration; none where steps are explicit."""
+        if self.work is None or self.rung.step is None:
+            return 0
+        return self.work.contact_evaluations - self.samples
+
+    @property
+    def wall_seconds(self) -> float | None:
+        """Median time of the loop alone, s."""
+        return median(self.seconds) if self.seconds else None
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """All entries on one case."""
+
+    setup: Setup
+    duration: float  # s; less than the case's where the reference would take too long
+    interval: float
+    reference_error: float
+    reference_seconds: float
+    repeats: int
+    left_out: int  # rungs that the budget did not allow
+    entries: tuple[Entry, ...]
+
+    def cheapest(self, target: float) -> Entry | None:
+        """The entry that takes the least time of those whose error is at most `target`."""
+        able = [
+            entry
+            for entry in self.entries
+            if entry.errors is not None and entry.errors.error + self.reference_error <= target and entry.seconds
+        ]
+        return min(able, key=lambda entry: entry.wall_seconds or math.inf, default=None)
+
+    def finer_error(self, entry: Entry) -> float:
+        """The largest error of the same method at finer steps; above the entry's own, that is low by chance."""
+        method, step = entry.rung.method, entry.rung.step or 0.0
+        finer = (each for each in self.entries if each.rung.method == method and (each.rung.step or step) < step)
+        return max((each.errors.error for each in finer if each.errors is not None), default=0.0)
+
+
+Progress = Callable[[str, int, int], None]
+"""Told what is done, how many rungs are done, and of how many."""
+
+
+def compare(
+    case: Case,
+    *,
+    schemes: Sequence[str] = (),
+    steps: Sequence[float] = (),
+    budget: float = 60.0,
+    progress: Progress = lambda what, done, total: None,
+) -> Comparison:
+    """Compare the methods on a case within about `budget` s. Raises RefusedError where there is no reference."""
+    with within_range():
+        setup = set_up(case)
+        kinds = methods(setup, schemes)
+        for method in kinds:  # compilation is no part of the budget
+            _ = load(method.scheme), contact.load("exact" if method.evaluator == "auto" else method.evaluator)
+        begin = time.perf_counter()
+        found = ladder(setup, steps)
+        interval = found[0]
+        report = stability(setup)
+        progress("reference", 0, 0)
+        duration, reference, reference_seconds = _reference(case, interval, REFERENCE_SHARE * budget)
+        reference_error = _reference_error(_reference_case(case, interval, duration, CHECK), reference, interval)
+        entries = [Entry(rung) for method in kinds for rung in rungs(method, found)]
+        left_out = _first_round(case, entries, reference, (interval, duration), begin + 0.8 * budget, progress)
+        _judge(setup, report, entries)
+        repeats = _repeat(case, entries, (interval, duration), begin + budget, progress)
+    _fronts(entries)
+    return Comparison(
+        setup, duration, interval, reference_error, reference_seconds, repeats, left_out, tuple(entries)
+    )
+
+
+def _reference_case(case: Case, interval: float, duration: float, tolerance: float) -> Case:
+    method = Method(Scheme.EVENT_DRIVEN, (), Start.CONSISTENT, Iteration.NEWTON, Evaluator.AUTO, 0)
+    return case_of(case, Rung(method, None, tolerance), interval, duration)
+
+
+def _rows(case: Case, *, at_once: bool = False) -> tuple[NDArray[np.float64], Work]:
+    """Samples and work of a run, in one block if `at_once`; raises RefusedError."""
+    setup = set_up(case)
+    refuse(setup, check(setup), math.inf)
+    blocks: list[NDArray[np.float64]] = []
+    first = setup.timing.steps if at_once else 1
+    work, _ = Motion(setup).run(lambda rows: blocks.append(rows.copy()), first_block=first)
+    return np.concatenate(blocks), work
+
+
+def _reference(case: Case, interval: float, budget: float) -> tuple[float, NDArray[np.float64], float]:
+    """The longest part of the motion whose reference fits the budget (s), from the start on, and its samples."""
+    whole = max(case.solver.duration, FEWEST_SAMPLES * interval)
+    duration = FEWEST_SAMPLES * interval
+    while True:
+        duration = min(duration, whole)
+        rows, work = _rows(_reference_case(case, interval, duration, REFERENCE))
+        if work.failure is not Failure.NONE:
+            raise RefusedError(f"there is no reference to compare with: {failure_sentence(work)}")
+        if duration >= whole or 3.0 * work.solve_seconds > budget:
+            return (len(rows) - 1) * interval, rows, work.solve_seconds
+        duration *= min(4.0, 0.7 * budget / max(work.solve_seconds, 1e-3))
+
+
+def _reference_error(case: Case, reference: NDArray[np.float64], interval: float) -> float:
+    """By how much the reference differs from a run at a looser tolerance."""
+    rows, work = _rows(case)
+    if work.failure is not Failure.NONE:
+        raise RefusedError(f"it is not known how good the reference is: {failure_sentence(work)}")
+    return errors(rows, reference, interval).error
+
+
+def _first_round(
+    case: Case,
+    entries: list[Entry],
+    reference: NDArray[np.float64],
+    grid: tuple[float, float],
+    deadline: float,
+    progress: Progress,
+) -> int:
+    """Run every rung once, the coarse ones first, and measure its error; how many there was no time for.
+
+    The coarsest of each method is run in any case.
+    """
+    places: dict[Method, int] = {}
+    order = []
+    for entry in entries:
+        places[entry.rung.method] = place = places.get(entry.rung.method, -1) + 1
+        order.append((place, entry))
+    left_out = 0
+    last: dict[Method, float] = {}
+    for done, (place, entry) in enumerate(sorted(order, key=lambda pair: pair[0])):
+        progress("errors", done, len(entries))
+        if place and time.perf_counter() + 2.0 * last.get(entry.rung.method, 0.0) > deadline:
+            entry.failure = "left out: no time within the budget"
+            left_out += 1
+            continue
+        try:
+            rows, work = _rows(case_of(case, entry.rung, *grid))
+        except BrakecliError as error:
+            entry.failure = " ".join(str(error).split())
+            continue
+        last[entry.rung.method] = work.solve_seconds
+        entry.work, entry.samples = work, len(rows)
+        if work.failure is not Failure.NONE:
+            entry.failure = failure_sentence(work)
+        else:
+            entry.seconds.append(work.solve_seconds)
+            entry.errors = errors(rows, reference, grid[0])
+    return left_out
+
+
+def _repeat(
+    case: Case, entries: list[Entry], grid: tuple[float, float], deadline: float, progress: Progress
+) -> int:
+    """Time all that ran again, in turns, as often as the budget allows; how many times each.
+
+    The times of the first round, which found memory and caches cold, count only where there are no others.
+    """
+    timed = [entry for entry in entries if entry.seconds]
+    for repeat in range(MOST_REPEATS):
+        if repeat == SLOW_REPEATS:
+            timed = [entry for entry in timed if entry.seconds[-1] < SLOW]
+        expected = 1.3 * sum(entry.seconds[-1] for entry in timed) + 0.005 * len(timed)
+        if time.perf_counter() + expected > deadline:
+            return max(repeat, 1)
+        for done, entry in enumerate(timed):
+            progress(f"times, turn {repeat + 1}", done, len(timed))
+            at_once = entry.seconds[-1] < LONGEST_CALL
+            seconds = _rows(case_of(case, entry.rung, *grid), at_once=at_once)[1].solve_seconds
+            entry.seconds = [*entry.seconds, seconds] if repeat else [seconds]
+    return MOST_REPEATS
+
+
+def _judge(setup: Setup, report: StabilityReport, entries: list[Entry]) -> None:
+    """Add what the amplification matrices say, and the observed orders."""
+    stiffness_at = mean_stiffness(setup) if not setup.smooth else lambda phi: report.contact_stiffness
+    exact = report.critical
+    limits: dict[tuple[str, tuple[float, ...]], float | None] = {}
+    biases: dict[tuple[str, tuple[float, ...], float], float | None] = {}
+    before: Entry | None = None
+    for entry in entries:
+        method, step = entry.rung.method, entry.rung.step
+        if before is not None and before.rung.method == method:
+            entry.order = _order(before, entry)
+        before = entry
+        if step is None:
+            entry.step_limit, entry.critical_bias = math.inf, 0.0 if exact else None
+            continue
+        if report.discrete is None:  # no steady sliding that could lose its stability
+            continue
+        scheme = str(method.scheme), method.theta
+        if (*scheme, step) not in biases:
+            at = set_up(case_of(setup.case, entry.rung, step, step))
+            if scheme not in limits:
+                limit = step_limit(at, stiffness_at)
+                limits[scheme] = math.inf if limit is None else limit
+            found = discrete_critical(at, stiffness_at, exact) if exact else None
+            biases[*scheme, step] = found - exact.friction if found is not None and exact else None
+        entry.step_limit, entry.critical_bias = limits[scheme], biases[*scheme, step]
+
+
+def _order(coarse: Entry, fine: Entry) -> float | None:
+    """Observed order between two rungs: how the error falls with the step."""
+    if coarse.errors is None or fine.errors is None or not (fine.errors.error > 0.0 < coarse.errors.error):
+        return None
+    if coarse.rung.step is None or fine.rung.step is None:
+        return None
+    return math.log(coarse.errors.error / fine.errors.error) / math.log(coarse.rung.step / fine.rung.step)
+
+
+def _fronts(entries: list[Entry]) -> None:
+    """Mark the entries that no other beats in both error and time."""
+    best = math.inf
+    able = [entry for entry in entries if entry.errors is not None and entry.wall_seconds is not None]
+    for entry in sorted(able, key=lambda each: (each.wall_seconds, each.errors.error if each.errors else 0.0)):
+        if entry.errors is not None and entry.errors.error < best:
+            entry.on_front, best = True, entry.errors.error

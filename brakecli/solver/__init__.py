@@ -1,0 +1,1 @@
+"""The paper's equations: numbers moved through time. No TOML, no pydantic, no file."""

@@ -1,0 +1,60 @@
+"""The energy account of a run: what came in, what went out, what is stored, and what does not add up."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brakecli.solver.compile import W_BELT, W_DASHPOTS, W_FRICTION, W_LOAD, W_ROUGHNESS, W_SCHEME
+
+OPEN_ACCOUNT = 0.1
+"""Relative closing error from which on a motion is not worth having: the step does not resolve it."""
+
+
+@dataclass(frozen=True)
+class EnergyAccount:
+    """Energies (J) over a whole run.
+
+    change of (kinetic + links + contact) = belt - friction - dashpots - load + roughness - scheme + closing error
+
+    `belt`: work F_x U of the moving wheel on the shoe. `friction`: heat of sliding, phi F_y |ẋ - U|. `load`: work
+    against the pressing force. `roughness`: work of the passing roughness, (∂V/∂s)(ẋ - U) with s = x - travel:
+    the model gives the rough contact no tangential reaction, so this is not balanced by the wheel. `scheme`:
+    what the difference scheme itself takes out of the motion, zero for weights of one half. `stored` is the
+    larger of kinetic + links + contact at the start and at the end. The closing error of a second-order scheme
+    falls with h², down to what the midpoint rule knows of the roughness.
+    """
+
+    kinetic: float
+    links: float
+    contact: float
+    belt: float
+    friction: float
+    dashpots: float
+    load: float
+    roughness: float
+    scheme: float
+    stored: float
+
+    @property
+    def closing_error(self) -> float:
+        """J."""
+        passed = self.belt - self.friction - self.dashpots - self.load + self.roughness - self.scheme
+        return self.kinetic + self.links + self.contact - passed
+
+    @property
+    def relative_closing_error(self) -> float:
+        """Closing error over the largest item of the account, the store included; 0 where all are zero."""
+        items = (self.kinetic, self.links, self.contact, self.belt, self.friction, self.dashpots, self.load)
+        largest = max(abs(item) for item in (*items, self.roughness, self.scheme, self.stored))
+        return self.closing_error / largest if largest > 0.0 else 0.0
+
+
+def account(
+    start: tuple[float, float, float], end: tuple[float, float, float], works: NDArray[np.float64]
+) -> EnergyAccount:
+    """The account between two states, each as energies (kinetic, links, contact), from the works in between."""
+    changes = [after - before for before, after in zip(start, end, strict=True)]
+    passed = [float(works[item]) for item in (W_BELT, W_FRICTION, W_DASHPOTS, W_LOAD, W_ROUGHNESS, W_SCHEME)]
+    items = [*changes, *passed, max(sum(start), sum(end))]
+    return EnergyAccount(*items)

@@ -1,0 +1,32 @@
+"""Amontons friction, set-valued: the minimisation that every step of every scheme comes down to, (14)-(17)."""
+
+from numba import float64, types
+
+from brakecli.solver.compile import kernel
+
+
+@kernel(types.UniTuple(float64, 3)(float64, float64, float64, float64, float64, float64, float64))
+def minimise(
+    a_11: float, a_12: float, a_22: float, g_1: float, g_2: float, g_0: float, belt: float
+) -> tuple[float, float, float]:
+    """Minimiser (d, e) of a11 d²/2 + a12 d e + a22 e²/2 - g1 d - g2 e + g0 |d - U|, and the sign of d - U.
+
+    a is positive definite and g0 = phi F_y >= 0. The sign is 0 in stick, where d is U exactly.
+    """
+    a = a_11 * a_22 - a_12 * a_12
+    free = (g_1 * a_22 - g_2 * a_12) / a
+    bound = g_0 * a_22 / a
+    if free - bound > belt:  # Eq. (15)
+        return free - bound, (g_2 * a_11 - g_1 * a_12 + g_0 * a_12) / a, 1.0
+    if free + bound < belt:  # Eq. (16)
+        return free + bound, (g_2 * a_11 - g_1 * a_12 - g_0 * a_12) / a, -1.0
+    return belt, (g_2 - a_12 * belt) / a_22, 0.0  # Eq. (17)
+
+
+@kernel(types.UniTuple(float64, 2)(float64, float64, float64, float64, float64))
+def slopes(a_11: float, a_12: float, a_22: float, phi: float, side: float) -> tuple[float, float]:
+    """Derivatives of d and e by the normal force F (g2 grows with F, g0 with phi F) on the branch `side`."""
+    if side == 0.0:
+        return 0.0, 1.0 / a_22
+    a = a_11 * a_22 - a_12 * a_12
+    return (-a_12 - side * phi * a_22) / a, (a_11 + side * phi * a_12) / a

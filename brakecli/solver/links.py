@@ -1,0 +1,37 @@
+"""The coefficients of (6)-(7) from the two inclined links."""
+
+import math
+
+from brakecli.solver.compile import Coefficients
+
+
+def coefficients(
+    *,
+    mass: float,
+    c_1: float,
+    b_1: float,
+    beta_deg: float,
+    c_2: float,
+    b_2: float,
+    alpha_deg: float,
+    phi: float,
+) -> Coefficients:
+    """Coefficients for link 1 at `beta_deg` to the vertical and link 2 at `alpha_deg` to the friction plane."""
+    sin_beta, cos_beta = _sin_cos(beta_deg)
+    sin_alpha, cos_alpha = _sin_cos(alpha_deg)
+
+    def tensor(one: float, two: float) -> tuple[float, float, float]:  # xx, xy, yy
+        return (
+            one * sin_beta**2 + two * cos_alpha**2,
+            one * sin_beta * cos_beta - two * sin_alpha * cos_alpha,
+            one * cos_beta**2 + two * sin_alpha**2,
+        )
+
+    return Coefficients(mass, *tensor(b_1, b_2), *tensor(c_1, c_2), sin_beta, cos_beta, phi)
+
+
+def _sin_cos(degrees: float) -> tuple[float, float]:
+    """Sine and cosine, exact at 0 and ±90 degrees, where the links decouple x from y."""
+    if abs(degrees) == 90.0:
+        return math.copysign(1.0, degrees), 0.0
+    return math.sin(math.radians(degrees)), math.cos(math.radians(degrees))

@@ -1,0 +1,77 @@
+"""Rough surfaces as sums of sines, (1), and the phases of the wheel's harmonics as it turns."""
+
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import NamedTuple
+
+import numpy as np
+from numba import float64, types, void
+from numpy.typing import NDArray
+
+from brakecli.solver.compile import kernel, vector
+from brakecli.solver.double_double import multiply, split
+
+PI = Fraction(314159265358979323846264338327950288419716939937511, 10**50)
+TWO_PI = 2.0 * math.pi
+
+
+class Surface(NamedTuple):
+    """A profile f(xi) = sum of g sin(omega xi + phase): amplitudes (m), wavenumbers (rad/m), phases (rad).
+
+    `turns` + `turns_low` is the exact number of waves per metre, 1/wavelength.
+    """
+
+    g: NDArray[np.float64]
+    omega: NDArray[np.float64]
+    phase: NDArray[np.float64]
+    turns: NDArray[np.float64]
+    turns_low: NDArray[np.float64]
+
+
+SURFACE = types.NamedUniTuple(vector, len(Surface._fields), Surface)
+
+
+def surface(
+    amplitudes: Sequence[float] = (),
+    *,
+    wavelengths: Sequence[float] | None = None,
+    wavenumbers: Sequence[float] | None = None,
+    phases_deg: Sequence[float] | None = None,
+) -> Surface:
+    """Surface from lists of equal length; a term of no amplitude is left out, and none at all is smooth."""
+    if wavelengths is not None:
+        turns = [1 / Fraction(length) for length in wavelengths]
+    else:
+        turns = [Fraction(number) / (2 * PI) for number in wavenumbers or ()]
+    phases = phases_deg or [0.0] * len(turns)
+    terms = [term for term in zip(amplitudes, turns, phases, strict=True) if term[0] != 0.0]
+    pairs = np.array([split(turn) for _, turn, _ in terms]).reshape(-1, 2)
+    return Surface(
+        np.array([g for g, _, _ in terms], dtype=float),
+        np.array([float(2 * PI * turn) for _, turn, _ in terms], dtype=float),
+        np.radians(np.array([phase for _, _, phase in terms], dtype=float)),
+        pairs[:, 0].copy(),
+        pairs[:, 1].copy(),
+    )
+
+
+def height(f: Surface, xi: NDArray[np.float64]) -> NDArray[np.float64]:
+    """f(xi) in m at places xi (m), (1)."""
+    f_xi = np.zeros(xi.size)
+    for g, omega, phase in zip(f.g, f.omega, f.phase, strict=True):  # no table of all waves at all places
+        f_xi += g * np.sin(omega * xi + phase)
+    return f_xi
+
+
+@kernel(void(SURFACE, float64, float64, vector))
+def wheel_angles(wheel: Surface, travel: float, travel_low: float, angles: NDArray[np.float64]) -> None:
+    """Phase in rad of each harmonic at xi = 0 after the wheel has travelled: phase - omega travel, reduced.
+
+    The waves are counted in turns with 32 digits and only their fraction is kept, so that the phase is as exact
+    after 10^7 m as at the start.
+    """
+    for i in range(wheel.g.size):
+        waves, waves_low = multiply(travel, travel_low, wheel.turns[i], wheel.turns_low[i])
+        fraction = (waves - math.floor(waves)) + waves_low
+        angles[i] = wheel.phase[i] - TWO_PI * fraction

@@ -1,0 +1,103 @@
+"""The wheel's surface speed U(t), its travel, and the load Q(t): constant or piecewise linear in time.
+
+Before the first knot and after the last a schedule holds its value.
+"""
+
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import NamedTuple
+
+import numpy as np
+from numba import float64, int64, types
+from numpy.typing import NDArray
+
+from brakecli.solver.compile import kernel, vector
+from brakecli.solver.double_double import add, multiply, split, two_sum
+
+
+class Schedule(NamedTuple):
+    """A piecewise linear function of time: knots, values, slopes and the integral from t = 0 up to each knot.
+
+    Values, slopes and integrals are sums of two doubles (`..._low` the smaller), to 32 digits of what follows
+    from the given doubles exactly.
+    """
+
+    times: NDArray[np.float64]
+    values: NDArray[np.float64]
+    values_low: NDArray[np.float64]
+    slopes: NDArray[np.float64]
+    slopes_low: NDArray[np.float64]
+    integrals: NDArray[np.float64]
+    integrals_low: NDArray[np.float64]
+
+
+SCHEDULE = types.NamedUniTuple(vector, len(Schedule._fields), Schedule)
+
+
+def schedule(times: Sequence[float], values: Sequence[float], scale: float = 1.0) -> Schedule:
+    """Schedule through (times, scale * values); one pair makes a constant. The times increase strictly."""
+    t = [Fraction(time) for time in times]
+    v = [Fraction(value) * Fraction(scale) for value in values]
+    slopes = [(v[i + 1] - v[i]) / (t[i + 1] - t[i]) for i in range(len(t) - 1)] + [Fraction(0)]
+    integrals = [Fraction(0)]
+    for i in range(len(t) - 1):
+        integrals.append(integrals[-1] + (v[i] + v[i + 1]) / 2 * (t[i + 1] - t[i]))
+    at_zero = _integral_to(Fraction(0), t, v, slopes, integrals)
+    columns = [v, slopes, [integral - at_zero for integral in integrals]]
+    pairs = [np.array([split(value) for value in column]).T.copy() for column in columns]
+    return Schedule(np.array([float(time) for time in t]), *(row.copy() for pair in pairs for row in pair))
+
+
+def _integral_to(
+    time: Fraction, t: list[Fraction], v: list[Fraction], slopes: list[Fraction], integrals: list[Fraction]
+) -> Fraction:
+    """Exact integral from the first knot to `time`."""
+    if time < t[0]:
+        return v[0] * (time - t[0])
+    k = max(i for i, knot in enumerate(t) if knot <= time)
+    return integrals[k] + (v[k] + slopes[k] * (time - t[k]) / 2) * (time - t[k])
+
+
+@kernel(int64(float64, vector))
+def segment(t: float, times: NDArray[np.float64]) -> int:
+    """Index of the last knot at or before t, -1 before the first."""
+    low, high = -1, times.size
+    while high - low > 1:
+        middle = (low + high) // 2
+        if times[middle] <= t:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@kernel(float64(SCHEDULE, float64))
+def value_at(s: Schedule, t: float) -> float:
+    """Value at time t (s)."""
+    k = segment(t, s.times)
+    if k < 0:
+        return s.values[0]  # type: ignore[no-any-return]
+    return s.values[k] + s.slopes[k] * (t - s.times[k])  # type: ignore[no-any-return]
+
+
+@kernel(float64(SCHEDULE, float64))
+def slope_at(s: Schedule, t: float) -> float:
+    """Time derivative just after time t."""
+    k = segment(t, s.times)
+    return s.slopes[k] if k >= 0 else 0.0
+
+
+@kernel(types.UniTuple(float64, 2)(SCHEDULE, float64, float64))
+def integral_at(s: Schedule, t: float, t_low: float) -> tuple[float, float]:
+    """Integral from 0 to t + t_low, as a sum of two doubles; t_low may be of any size, beyond a knot as well."""
+    t, t_low = two_sum(t, t_low)
+    k = max(segment(t, s.times), 0)
+    slope, slope_low = s.slopes[k], s.slopes_low[k]
+    if t < s.times[0]:
+        slope, slope_low = 0.0, 0.0
+    after, after_low = two_sum(t, -s.times[k])
+    after, after_low = add(after, after_low, t_low, 0.0)
+    mean, mean_low = multiply(after, after_low, 0.5 * slope, 0.5 * slope_low)
+    mean, mean_low = add(mean, mean_low, s.values[k], s.values_low[k])
+    part, part_low = multiply(after, after_low, mean, mean_low)
+    return add(part, part_low, s.integrals[k], s.integrals_low[k])

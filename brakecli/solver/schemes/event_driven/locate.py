@@ -1,0 +1,138 @@
+"""The first event in a step: which margin of the phase runs out, and where, on the continuous solution."""
+
+import math
+
+from numba import float64, int64, types
+
+from brakecli.solver.compile import VX, Y, kernel
+from brakecli.solver.schemes.event_driven.phases import (
+    BELT,
+    BELT_SLOPE,
+    EPSILON,
+    PLANT,
+    SIDE,
+    TAU,
+    TIME,
+    Plant,
+    clear_height,
+    margins,
+    rounding,
+)
+
+NONE = -1
+LOOKS = 8
+"""Places of a step at which the margins are looked at; a step is at most two radians of the fastest motion."""
+
+_NEAR = 1e-12
+_GOLDEN = 0.3819660112501051
+
+
+@kernel(types.UniTuple(float64, 3)(PLANT))
+def _allowances(p: Plant) -> tuple[float, float, float]:
+    """How far each margin may be below zero by rounding alone."""
+    m = p.memory
+    height = 4.0 * EPSILON * (abs(m[Y]) + clear_height(p.pad))
+    if m[SIDE] != 0.0:
+        late = abs(m[BELT_SLOPE]) * (m[TIME] + m[TAU])  # the wheel's velocity at a time that is rounded
+        return 4.0 * EPSILON * (abs(m[VX]) + abs(m[BELT]) + late), 0.0, height
+    along, _ = rounding(p)
+    return 2.0 * along, 2.0 * along, height
+
+
+@kernel(float64(PLANT, int64, float64, float64, float64), inlined=False)
+def _root(p: Plant, which: int, h: float, left: float, right: float) -> float:
+    """Where a margin passes zero between left and right: the secant inside the bracket, halved if it lags.
+
+    Near enough for Newton's iteration on the true motion to make it exact.
+    """
+    low, high = margins(p, h, left)[which], margins(p, h, right)[which]
+    if low <= 0.0:
+        return left
+    place, moved = left, 0
+    for turn in range(100):
+        new = left + (right - left) * (low / (low - high))
+        if turn > 20 or not left < new < right:
+            new = 0.5 * (left + right)
+        if abs(new - place) <= _NEAR * right or right - left <= _NEAR * right:
+            return new
+        place = new
+        value = margins(p, h, place)[which]
+        if value > 0.0:
+            left, low = place, value
+            high *= 0.5 if moved == 1 else 1.0  # Illinois: the end that stays twice counts less
+            moved = 1
+        elif value < 0.0:
+            right, high = place, value
+            low *= 0.5 if moved == -1 else 1.0
+            moved = -1
+        else:
+            return place
+    return right
+
+
+@kernel(types.UniTuple(float64, 2)(PLANT, int64, float64, float64, float64), inlined=False)
+def _lowest(p: Plant, which: int, h: float, left: float, right: float) -> tuple[float, float]:
+    """Where a margin is lowest between left and right, and its value; by the golden section, until below zero."""
+    a, b = left + _GOLDEN * (right - left), right - _GOLDEN * (right - left)
+    at_a, at_b = margins(p, h, a)[which], margins(p, h, b)[which]
+    for _ in range(40):  # to 1e-8 of the bracket, and 1e-16 in the value
+        if at_a < 0.0 or at_b < 0.0:
+            break
+        if at_a < at_b:
+            right, b, at_b = b, a, at_a
+            a = left + _GOLDEN * (right - left)
+            at_a = margins(p, h, a)[which]
+        else:
+            left, a, at_a = a, b, at_b
+            b = right - _GOLDEN * (right - left)
+            at_b = margins(p, h, b)[which]
+    return (a, at_a) if at_a < at_b else (b, at_b)
+
+
+@kernel(float64(PLANT, int64, float64, float64, float64), inlined=False)
+def _first_positive(p: Plant, which: int, h: float, theta: float, allowed: float) -> float:
+    """A place before theta at which a margin that begins at zero is positive; 0 if there is none."""
+    for _ in range(8):
+        theta *= 0.125
+        if margins(p, h, theta)[which] > allowed:
+            return theta
+    return 0.0
+
+
+@kernel(types.Tuple((int64, float64))(PLANT, float64), inlined=False)
+def first_event(p: Plant, h: float) -> tuple[int, float]:
+    """The margin that runs out first and the part of the step at which it does; 0 where it never was positive.
+
+    Between three places a margin may also dip below zero: it is followed down where a parabola says that it may.
+    """
+    allowed = _allowances(p)
+    before_last = last = margins(p, h, 0.0)
+    for look in range(1, LOOKS + 1):
+        theta, found, first = look / LOOKS, NONE, math.inf
+        now = margins(p, h, theta)
+        for which in range(3):
+            left, right = (look - 1) / LOOKS, 0.0
+            bend, rise = before_last[which] - 2.0 * last[which] + now[which], now[which] - before_last[which]
+            if now[which] < -allowed[which]:
+                right = theta
+                if look == 1 and last[which] <= allowed[which]:
+                    left = _first_positive(p, which, h, theta, allowed[which])
+                    if left == 0.0:
+                        return which, 0.0
+            elif (
+                look > 1
+                and before_last[which] > last[which] <= now[which]
+                and rise * rise > 7.0 * bend * last[which]
+            ):
+                # The parabola falls to an eighth of the place in the middle.
+                place, value = _lowest(p, which, h, (look - 2) / LOOKS, theta)
+                if value < -allowed[which]:
+                    left, right = (look - 2) / LOOKS, place
+            if right > 0.0:
+                root = _root(p, which, h, left, right)
+                if root < first:
+                    found, first = which, root
+        if found != NONE:
+            return found, first
+        before_last, last = last, now
+    return NONE, 1.0

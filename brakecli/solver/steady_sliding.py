@@ -1,0 +1,123 @@
+"""Steady sliding: the position at which (6)-(7) hold without motion, averaged over the wheel's roughness."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
+from scipy.optimize import brentq
+
+from brakecli.errors import CaseError, Problem
+from brakecli.solver.compile import FRACTION, NORMAL_FORCE, STIFFNESS, Coefficients
+from brakecli.solver.contact.closed_form import CLEAR, FULL, coverage
+from brakecli.solver.contact.pad import HALF, SHOE_BOTTOM, SHOE_MEAN, SHOE_TOP, WHEEL_BOUND, K, build_contact
+from brakecli.solver.roughness import Surface, wheel_angles
+
+PLACES = 1024
+"""Positions of the wheel that an average takes, over 50 of its longest waves."""
+TABLE = 129
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """Steady sliding: position (m), normal force (N), mean stiffness -∂F_y/∂y (N/m), part that touches."""
+
+    x: float
+    y: float
+    normal_force: float
+    stiffness: float
+    contact_fraction: float
+
+
+def mean_contact(evaluate: Any, pad: NDArray[np.float64], wheel: Surface, y: float) -> tuple[float, float, float]:
+    """Force (N), stiffness (N/m) and touching part at a height y (m), averaged over the travel of the wheel.
+
+    Full contact averages to its closed form; else places over many waves are averaged under a Hann window, so
+    that waves that do not close leave a trace of 1e-6 only.
+    """
+    covered = coverage(y, pad)
+    length = 2.0 * pad[HALF]
+    if covered == CLEAR:
+        return 0.0, 0.0, 0.0
+    if covered == FULL:
+        return -pad[K] * length * (y + pad[SHOE_MEAN]), pad[K] * length, 1.0
+    places = np.zeros(1) if wheel.g.size == 0 else 50.0 / wheel.turns.min() * (np.arange(PLACES) + 0.5) / PLACES
+    weights = np.ones(1) if wheel.g.size == 0 else 2.0 * np.sin(np.pi * (np.arange(PLACES) + 0.5) / PLACES) ** 2
+    found, angles, contact = np.zeros(3), np.zeros(wheel.g.size), build_contact(pad)
+    for place, weight in zip(places, weights, strict=True):
+        wheel_angles(wheel, float(place), 0.0, angles)
+        evaluate(0.0, y, angles, pad, contact)
+        found += weight * contact[[NORMAL_FORCE, STIFFNESS, FRACTION]]
+    force, stiffness, fraction = found / len(places)
+    return float(force), float(stiffness), float(fraction)
+
+
+Mean = Callable[[float], tuple[float, float, float]]
+"""Mean force (N), stiffness (N/m) and touching part of the contact at a height y (m)."""
+
+
+def tabulated(mean: Mean, pad: NDArray[np.float64]) -> Mean:
+    """The same, interpolated between `TABLE` heights where the pad touches in part: for many calls.
+
+    The force is a cubic through its values and slopes; its error falls with the fourth power of the spacing.
+    """
+    full, top = -pad[WHEEL_BOUND] - pad[SHOE_TOP], pad[WHEEL_BOUND] + pad[SHOE_BOTTOM]
+    if full == top:
+        return mean
+    heights = np.linspace(full, top, TABLE)
+    values = np.array([mean(float(y)) for y in heights])
+    force = CubicHermiteSpline(heights, values[:, 0], -values[:, 1])
+    slope, fraction = force.derivative(), PchipInterpolator(heights, values[:, 2])
+
+    def interpolated(y: float) -> tuple[float, float, float]:
+        if not full < y < top:
+            return mean(y)
+        return float(force(y)), -float(slope(y)), float(fraction(y))
+
+    return interpolated
+
+
+def equilibrium(c: Coefficients, mean: Mean, pad: NDArray[np.float64], load: float, belt: float) -> Equilibrium:
+    """Steady sliding under the load Q (N) on a wheel that moves with U (m/s); no friction acts where U = 0.
+
+    With F_x = sign(U) phi F_y, (6) gives x for a height y and (7) remains: one equation in y. Raises CaseError
+    where it has no solution.
+    """
+    grip = float(np.sign(belt)) * c.phi
+    q_x, q_y = load * c.sin_beta, load * c.cos_beta
+    if c.c_xx > 0.0:
+        lean = c.c_xy / c.c_xx
+    elif grip == 0.0 and q_x == 0.0:
+        lean = 0.0
+    else:
+        raise _none("no link holds the shoe along the wheel")
+    spring, push = c.c_yy - lean * c.c_xy, q_y - lean * q_x
+    uplift = 1.0 - lean * grip  # of F_y, after what its friction takes away through the links
+
+    def unbalanced(y: float) -> float:
+        return spring * y + push - uplift * mean(y)[0]
+
+    full, top = -pad[WHEEL_BOUND] - pad[SHOE_TOP], pad[WHEEL_BOUND] + pad[SHOE_BOTTOM]
+    stiffness = 2.0 * pad[HALF] * pad[K]
+    whole = spring + uplift * stiffness
+    y = -(push + uplift * stiffness * pad[SHOE_MEAN]) / whole if whole != 0.0 else np.inf
+    if not y <= full:
+        if unbalanced(top) < 0.0:
+            if spring == 0.0:
+                raise _none("the load lifts the shoe off the wheel and no link holds it")
+            y = -push / spring
+        elif unbalanced(full) < 0.0:
+            y = brentq(unbalanced, full, top, xtol=1e-15 * max(abs(full), abs(top), 1e-300), rtol=1e-14)
+        else:
+            raise _none("the friction force lifts more than the load presses (self-locking)")
+    force, mean_stiffness, fraction = mean(float(y))
+    x = (grip * force - q_x) / c.c_xx - lean * y if c.c_xx > 0.0 else 0.0
+    return Equilibrium(float(x), float(y), force, mean_stiffness, fraction)
+
+
+def _none(reason: str) -> CaseError:
+    return CaseError(
+        [Problem("the case", "initial.at", f"there is no steady sliding: {reason}", 'start from at = "rest"')]
+    )

@@ -1,0 +1,102 @@
+"""What a sweep will cost, before anything is computed."""
+
+import math
+import os
+from dataclasses import dataclass
+
+from brakecli.case.system import set_up
+from brakecli.errors import CaseError, RefusedError
+from brakecli.runs.limits import MOST_BYTES, check, duration_text, refuse, within_range
+from brakecli.sweeps.plan import Plan
+from brakecli.sweeps.point import record_type
+from brakecli.sweeps.tables import Method
+
+MOST_POINTS = 10_000_000
+MOST_SECONDS = 30 * 86400.0
+
+# Seconds and bytes, measured with `make bench-sweep`; they only serve to tell minutes from days.
+_POINT_SECONDS = 5e-3  # of setting up and judging a run
+_SAMPLE_SECONDS = 1e-7
+_SEARCH_RUNS = 12.0  # for the least sustained value
+_SEARCH_GROWTHS = 20.0
+_GROWTH_SECONDS = 0.03
+_EIGENVALUE_SECONDS = 0.1
+_WORKER_BYTES = 1.8e8
+_SAMPLE_BYTES = 8.0 * 24
+_POINT_BYTES = 1000.0  # of the parent, which holds each variable whole while it writes it
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Points, time (s, all workers together), memory and size of the result (bytes) of a sweep."""
+
+    points: int
+    workers: int
+    seconds: float
+    memory: float
+    file_size: float
+
+    def sentence(self) -> str:
+        """The estimate in words."""
+        noun, crew = ("point" if self.points == 1 else "points"), ("worker" if self.workers == 1 else "workers")
+        return (
+            f"{self.points} {noun} on {self.workers} {crew}: about {duration_text(self.seconds)}, "
+            f"{self.memory / 1e6:.0f} MB of memory, a file of {self.file_size / 1e6:.2g} MB"
+        )
+
+
+def estimate(plan: Plan, workers: int) -> Estimate:
+    """Estimate a sweep by the base case and by two corners of its grid; raises RefusedError where these are."""
+    found = []
+    for point in sorted({0, plan.points - 1}):
+        try:
+            with within_range():
+                setup = set_up(plan.case(plan.settings(point)))
+                checked = check(setup)
+                refuse(setup, checked, math.inf)
+        except (CaseError, RefusedError):  # the point is marked as failed when its turn comes
+            continue
+        found.append((checked.seconds, setup.timing.samples))
+    seconds = sum(pair[0] for pair in found) / max(len(found), 1)
+    samples = max((pair[1] for pair in found), default=0)
+    run = seconds + _POINT_SECONDS + _SAMPLE_SECONDS * samples
+    critical = plan.sweep.critical
+    each = run
+    if critical is not None:
+        each += _EIGENVALUE_SECONDS
+        if critical.method is Method.SIMULATION:
+            each += _SEARCH_RUNS * run + _SEARCH_GROWTHS * _GROWTH_SECONDS
+    record = record_type(plan).itemsize
+    passes = plan.passes
+    return Estimate(
+        points=plan.points,
+        workers=workers,
+        seconds=2.0 + passes * plan.points * each / workers,
+        memory=_WORKER_BYTES * (workers + 1)
+        + _SAMPLE_BYTES * samples * workers
+        + _POINT_BYTES * passes * plan.points,
+        file_size=float(passes * plan.points * record) + 1e5,
+    )
+
+
+def refuse_sweep(found: Estimate, free_bytes: float) -> None:
+    """Raise RefusedError where a sweep would be too large."""
+    if found.points > MOST_POINTS or found.seconds > MOST_SECONDS:
+        raise RefusedError(f"the sweep is too large: {found.sentence()}; take fewer points, or shorter runs")
+    if 2.0 * found.file_size > min(MOST_BYTES, free_bytes):  # finished points and the result, beside each other
+        raise RefusedError(
+            f"the file would be too large, {free_bytes / 1e6:.3g} MB are free: {found.sentence()}; take fewer "
+            "points"
+        )
+    if found.memory > _physical_bytes():
+        raise RefusedError(
+            f"the sweep needs more memory than there is: {found.sentence()}; take fewer "
+            "--jobs, or sample less often"
+        )
+
+
+def _physical_bytes() -> float:
+    try:
+        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    except (ValueError, OSError):
+        return math.inf

@@ -1,0 +1,276 @@
+"""One point of a sweep: its run, its verdict, its critical parameter, as a record of fixed size."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brakecli.analysis.regime.of_run import braking_torque, context, failed
+from brakecli.analysis.regime.rules import Verdict, classify
+from brakecli.case.case import Case
+from brakecli.case.system import Setup, set_up
+from brakecli.errors import BrakecliError
+from brakecli.runs.limits import check, refuse, within_range
+from brakecli.runs.run import failure_sentence
+from brakecli.runs.tolerance import certify
+from brakecli.solver.history import ArrayHistory
+from brakecli.solver.motion import Motion, Work
+from brakecli.solver.quantities import Failure
+from brakecli.solver.roughness import TWO_PI, wheel_angles
+from brakecli.solver.schedules import integral_at
+from brakecli.sweeps.critical import Search, search
+from brakecli.sweeps.plan import Plan
+from brakecli.sweeps.tables import Direction
+
+
+class Status(StrEnum):
+    """How the computation of a point has ended."""
+
+    DONE = "done"
+    FAILED = "failed"
+    CRASHED = "crashed"
+
+
+class Field(NamedTuple):
+    """A variable of the result: its type in a record, its unit, and what it is. A float may be missing: NaN."""
+
+    kind: str
+    units: str
+    long_name: str
+
+
+TEXT = "S240"
+FIELDS = {
+    "status": Field("S8", "", "how the computation of the point has ended"),
+    "reason": Field(TEXT, "", "why the regime is as it is, or why the point failed"),
+    "warning": Field(TEXT, "", "first warning of the run, empty if there is none"),
+    "warning_count": Field("i8", "1", "number of warnings"),
+    "regime": Field("S16", "", "regime of the motion"),
+    "excitation": Field("S16", "", "where the energy of a sustained motion comes from"),
+    "frequency": Field("f8", "Hz", "fundamental frequency of vx of a sustained motion"),
+    "amplitude": Field("f8", "m", "half of peak to peak of x, settled part"),
+    "stick_fraction": Field("f8", "1", "part of the time in stick, settled part"),
+    "contact_loss_fraction": Field("f8", "1", "part of the time without contact, settled part"),
+    "mean_friction_force": Field("f8", "N", "mean friction force on the shoe, settled part"),
+    "braking_torque": Field("f8", "N m", "mean torque of the friction force, settled part"),
+    "settled": Field("i8", "1", "whether a settled part was found (0, 1)"),
+    "settled_from": Field("f8", "s", "begin of the settled part"),
+    "steps": Field("i8", "1", "time steps"),
+    "contact_evaluations": Field("i8", "1", "evaluations of the contact force"),
+    "unconverged_steps": Field("i8", "1", "steps that did not converge"),
+    "estimated_error": Field("f8", "1", "relative error of the histories, where a tolerance was given"),
+}
+CRITICAL_FIELDS = {
+    "critical_status": Field("S24", "", "what the search for the critical value has come to"),
+    "critical": Field("f8", "", "critical value: steady sliding loses its stability there"),
+    "critical_lower": Field("f8", "", "lower end of the bracket of the critical value"),
+    "critical_upper": Field("f8", "", "upper end of the bracket of the critical value"),
+    "critical_error": Field("f8", "", "error bar of the critical value, bias of the scheme included"),
+    "critical_bias": Field("f8", "", "critical value of the scheme at its step less the exact one"),
+    "critical_eigenvalue": Field("f8", "", "critical value by eigenvalues"),
+    "critical_sustained": Field("f8", "", "least value at which vibration lasts from the case's own start"),
+    "sustained_status": Field("S24", "", "what the search for the least sustained value has come to"),
+}
+
+Recall = Callable[[], None]
+
+
+def record_type(plan: Plan) -> np.dtype[Any]:
+    """What a point of the sweep is stored as."""
+    fields = FIELDS | (CRITICAL_FIELDS if plan.sweep.critical is not None else {})
+    return np.dtype([(name, field.kind) for name, field in fields.items()])
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A run in memory, as far as a sweep is interested in it."""
+
+    setup: Setup
+    work: Work
+    verdict: Verdict
+    warnings: tuple[str, ...]
+    end: NDArray[np.float64]  # x, y, ẋ, ẏ
+    estimated_error: float  # of the histories, relative; NaN where the case gives a step
+
+
+def simulate(case: Case) -> Outcome:
+    """Run a case in memory; raises RefusedError, and CaseError where it has no start."""
+    with within_range():
+        setup = set_up(case)
+        found = check(setup)
+        refuse(setup, found, math.inf)
+        certificate = None
+        if case.solver.promise is None:
+            blocks: list[NDArray[np.float64]] = []
+            work, _ = Motion(setup).run(lambda rows: blocks.append(rows.copy()))
+            rows = np.concatenate(blocks)
+        else:
+            motion = certify(case)
+            setup, rows, work, certificate = motion.setup, motion.rows, motion.work, motion.certificate
+        if not np.isfinite(rows).all():
+            raise FloatingPointError("a force overflows")
+        verdict = classify(ArrayHistory(setup.timing.interval, rows), context(setup))
+    warnings = list(found.warnings)
+    if work.failure is not Failure.NONE:
+        verdict = failed(verdict, failure_sentence(work))
+    elif work.unconverged_steps:
+        warnings.append(f"{work.unconverged_steps} of {work.steps} steps did not converge, as the case allows")
+    if certificate is not None and not certificate.certified:
+        warnings.append(f"solver.tolerance: {certificate.sentence()}")
+    error = math.nan if certificate is None else certificate.estimated_error
+    return Outcome(setup, work, verdict, tuple(warnings), rows[-1, :4], error)
+
+
+def blank(kind: np.dtype[Any], status: Status, reason: str) -> NDArray[Any]:
+    """The record of a point without a result."""
+    record = np.zeros(1, kind)
+    for name in kind.names or ():
+        if kind[name].kind == "f":
+            record[name] = math.nan
+    record["status"], record["reason"], record["regime"] = status.encode(), _clipped(reason), b"undecided"
+    record["excitation"] = b"none"
+    return record
+
+
+def compute(plan: Plan, first: int, count: int) -> NDArray[Any]:
+    """The records of some neighbouring points, each computed for itself."""
+    return np.concatenate([_point(plan, index) for index in range(first, first + count)])
+
+
+def follow(plan: Plan, line: int) -> NDArray[Any]:
+    """The records of one line of points, in the order of the grid, each started from the end of the one before.
+
+    The wheel goes on turning from one point to the next: its waves keep the phases that they have come to.
+    """
+    records = []
+    start: dict[tuple[str, ...], Any] = {}
+    for point in line_points(plan, line):
+        kind = record_type(plan)
+        try:
+            outcome = simulate(plan.case(plan.settings(point) | start))
+        except (BrakecliError, FloatingPointError, MemoryError) as error:
+            records.append((point, blank(kind, Status.FAILED, _sentence(error))))
+            continue
+        records.append((point, _filled(kind, outcome)))
+        if outcome.work.failure is Failure.NONE:
+            start = _continued(outcome)
+    return np.concatenate([record for _, record in sorted(records, key=lambda pair: pair[0])])
+
+
+def line_points(plan: Plan, line: int) -> list[int]:
+    """The points of a line along the followed axis, in the order in which the motion passes them.
+
+    With `direction = "both"` the first half of the lines goes up, the second down.
+    """
+    axis = plan.followed
+    assert axis is not None
+    shape = plan.shape
+    lines = plan.points // shape[axis]
+    inner = math.prod(shape[axis + 1 :])
+    outer, rest = divmod(line % lines, inner)
+    points = [(outer * shape[axis] + place) * inner + rest for place in range(shape[axis])]
+    direction = plan.sweep.axis[axis].direction
+    down = direction is Direction.DOWN or (direction is Direction.BOTH and line >= lines)
+    value = plan.sweep.axis[axis].value
+    return sorted(points, key=lambda point: value(plan.places(point)[axis]), reverse=down)
+
+
+def _continued(outcome: Outcome) -> dict[tuple[str, ...], Any]:
+    """The start of a case where another has ended."""
+    x, y, v_x, v_y = (float(value) for value in outcome.end)
+    start: dict[tuple[str, ...], Any] = {("initial",): {"x": x, "y": y, "vx": v_x, "vy": v_y}}
+    wheel = outcome.setup.case.roughness.wheel
+    if wheel is not None:
+        setup = outcome.setup
+        angles = np.zeros(setup.wheel.g.size)
+        travel = integral_at(setup.belt, setup.timing.samples * setup.timing.interval, 0.0)
+        wheel_angles(setup.wheel, *travel, angles)
+        phases = iter(angles)  # a wave of no amplitude has none
+        turned = [math.degrees(next(phases) % TWO_PI) if g else 0.0 for g in wheel.amplitudes]
+        start["roughness", "wheel", "phases_deg"] = turned
+    return start
+
+
+def _point(plan: Plan, point: int) -> NDArray[Any]:
+    kind = record_type(plan)
+    settings = plan.settings(point)
+    try:
+        record = _filled(kind, simulate(plan.case(settings)))
+        critical = plan.sweep.critical
+        if critical is not None:
+            from brakecli.case.read import key_path
+
+            path = key_path(critical.parameter)
+            with within_range():
+                found = search(critical, lambda value: plan.case({**settings, path: value}), _verdict)
+            _note(record, found)
+    except (BrakecliError, FloatingPointError, MemoryError) as error:
+        return blank(kind, Status.FAILED, _sentence(error))
+    return record
+
+
+def _verdict(case: Case) -> Verdict | None:
+    try:
+        outcome = simulate(case)
+    except BrakecliError:
+        return None
+    return outcome.verdict if outcome.work.failure is Failure.NONE else None
+
+
+def _filled(kind: np.dtype[Any], outcome: Outcome) -> NDArray[Any]:
+    verdict, work = outcome.verdict, outcome.work
+    done = work.failure is Failure.NONE
+    record = blank(kind, Status.DONE if done else Status.FAILED, "; ".join(verdict.reasons))
+    values: dict[str, Any] = {
+        "warning": _clipped(outcome.warnings[0]) if outcome.warnings else b"",
+        "warning_count": len(outcome.warnings),
+        "regime": verdict.regime.encode(),
+        "excitation": verdict.excitation.encode(),
+        "frequency": math.nan if verdict.frequency is None else verdict.frequency,
+        "amplitude": verdict.amplitude,
+        "stick_fraction": verdict.stick_fraction,
+        "contact_loss_fraction": verdict.contact_loss_fraction,
+        "mean_friction_force": verdict.mean_friction_force,
+        "braking_torque": braking_torque(verdict, outcome.setup),
+        "settled": int(verdict.settled),
+        "settled_from": verdict.settled_from * outcome.setup.timing.interval,
+        "steps": work.steps,
+        "contact_evaluations": work.contact_evaluations,
+        "unconverged_steps": work.unconverged_steps,
+        "estimated_error": outcome.estimated_error,
+    }
+    for name, value in values.items():
+        record[name] = value
+    return record
+
+
+def _note(record: NDArray[Any], found: Search) -> None:
+    """Put the critical values into a record."""
+    numbers = {
+        "critical": found.value,
+        "critical_lower": found.lower,
+        "critical_upper": found.upper,
+        "critical_error": found.error,
+        "critical_bias": found.bias,
+        "critical_eigenvalue": found.eigenvalue,
+        "critical_sustained": found.sustained,
+    }
+    for name, value in numbers.items():
+        record[name] = math.nan if value is None else value
+    record["critical_status"] = found.outcome.encode()
+    record["sustained_status"] = found.sustained_outcome.encode()
+
+
+def _sentence(error: BaseException) -> str:
+    if isinstance(error, MemoryError):
+        return "out of memory; sample less often, or reduce contact.nodes"
+    return "; ".join(str(error).splitlines())
+
+
+def _clipped(text: str) -> bytes:
+    """As much of a text as a record holds, in whole characters."""
+    return text.encode()[: int(TEXT[1:])].decode(errors="ignore").encode()

@@ -1,0 +1,234 @@
+"""The points of a sweep on many machines, by dask.distributed; this process alone writes."""
+
+import json
+import logging
+import time
+from collections import deque
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from brakecli.errors import BrakecliError, RefusedError, UsageError
+from brakecli.sweeps.workers.local import Attempt, Finished, Job, Supply, Task, Work, attempt, first_line
+from brakecli.sweeps.workers.task import fingerprint
+
+CONNECT_SECONDS = 20
+WAIT_SECONDS = 60.0
+"""How long to wait for a worker to come (back) before giving up."""
+FETCH_SECONDS = 5.0
+"""How long to wait for a finished result, whose worker may have died with it: dask then computes it again."""
+LOOK_SECONDS = 1.0
+"""How often to look which workers there are."""
+TASKS_PER_THREAD = 3
+
+
+class ClusterEngine:
+    """The workers of a dask scheduler. A worker that dies is replaced by others, which dask sees to."""
+
+    def __init__(self, job: Job, work: Work, address: str | None, scheduler_file: str | None) -> None:
+        """Connect to a scheduler and compare versions; raises UsageError or RefusedError."""
+        self._job, self._work = job, work
+        self._option = "--scheduler" if scheduler_file is None else "--scheduler-file"
+        self._name = str(address) if scheduler_file is None else scheduler_file
+        address = str(address) if scheduler_file is None else self._read(scheduler_file)
+        self._client = self._connected(address)
+        self._versions = fingerprint()
+        try:
+            self._client.wait_for_workers(1, timeout=WAIT_SECONDS)
+            self._compare()
+            self.workers = max(1, sum(self._client.nthreads().values()))
+        except BrakecliError:
+            self._leave()
+            raise
+        except TimeoutError as error:
+            self._leave()
+            raise UsageError(f"{self._where}: has no workers; start some with: dask worker {address}") from error
+        except Exception as error:
+            self._leave()
+            raise UsageError(f"{self._where}: the scheduler does not answer ({first_line(error)})") from error
+        except BaseException:
+            self._leave()
+            raise
+
+    def __enter__(self) -> Self:
+        """Nothing more to start."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Leave, which cancels what is still to be computed; scheduler and workers go on."""
+        self._leave()
+
+    def run(self, supply: Supply) -> Iterator[Finished]:
+        """Compute until there are no more tasks."""
+        try:
+            yield from self._run(supply)
+        except (BrakecliError, GeneratorExit):
+            raise
+        except Exception as error:  # dask raises many kinds once its scheduler is gone
+            raise self._lost(f"the scheduler has gone ({first_line(error)})") from error
+
+    def _run(self, supply: Supply) -> Iterator[Finished]:
+        from distributed import KilledWorker, wait
+
+        running: dict[Any, Task] = {}
+        suspects: deque[Task] = deque()  # last tries that died with a worker which had other tasks, too
+        alone = None
+        self._known = self._addresses()
+        looked = seen = time.monotonic()
+        while True:
+            while len(running) < TASKS_PER_THREAD * self.workers and (task := supply()) is not None:
+                running[self._submit(task)] = task
+            if suspects and not running:
+                alone = suspects.popleft()
+                running[self._submit(alone)] = alone
+            if not running:
+                yield from self._gone()
+                return
+            with self._client.as_current(), suppress(TimeoutError):
+                wait(list(running), timeout=0.5, return_when="FIRST_COMPLETED")
+            for future in [each for each in running if each.done()]:
+                task = running[future]
+                died = future.status == "error" and isinstance(future.exception(), KilledWorker)
+                try:
+                    found = None if died else self._collected(future, task)
+                except TimeoutError:
+                    continue
+                del running[future]
+                seen = time.monotonic()
+                if found is not None:
+                    yield found
+                elif task.last_try and task is not alone:
+                    suspects.append(task)
+                else:
+                    yield Finished(task, None, 0.0, "several workers of the cluster have died of it")
+            if time.monotonic() - looked > LOOK_SECONDS:
+                yield from self._gone()
+                looked = time.monotonic()
+                seen = looked if self._known else seen
+            if time.monotonic() - seen > WAIT_SECONDS + LOOK_SECONDS:
+                raise self._lost("has no workers any more")
+
+    def _gone(self) -> Iterator[Finished]:
+        """The workers that are no longer there."""
+        now = self._addresses()
+        gone, self._known = sorted(self._known - now), now
+        for address in gone:
+            yield Finished(None, None, 0.0, f"the worker at {address} has gone")
+
+    def _submit(self, task: Task) -> Any:
+        arguments = (self._work, self._job, task.first, task.size, self._versions)
+        return self._client.submit(_attempt, *arguments, pure=False)
+
+    def _collected(self, future: Any, task: Task) -> Finished:
+        if future.status == "cancelled":
+            raise self._lost("the scheduler has gone")
+        if future.status == "lost":  # with its worker; it is computed again
+            raise TimeoutError
+        if future.status == "error":
+            error = future.exception()
+            if isinstance(error, OtherVersionError):
+                raise self._refused(str(error))
+            raise self._lost(f"a worker cannot compute ({first_line(error)})")
+        found: Attempt = future.result(timeout=FETCH_SECONDS)
+        return Finished(task, found.records, found.seconds, found.failure)
+
+    @property
+    def _where(self) -> str:
+        return f"{self._option} {self._name}"
+
+    def _lost(self, how: str) -> BrakecliError:
+        return BrakecliError(f"{self._where}: {how}; finished points are kept, run the same command again")
+
+    def _refused(self, difference: str) -> RefusedError:
+        return RefusedError(f"{self._where}: {difference}; install the same version there")
+
+    def _addresses(self) -> set[str]:
+        try:
+            return set(self._client.scheduler_info(n_workers=-1)["workers"])
+        except TypeError:  # older versions tell of all workers anyway
+            return set(self._client.scheduler_info()["workers"])
+
+    def _read(self, scheduler_file: str) -> str:
+        """The address in a scheduler's file; dask itself would wait for ever for the file to come."""
+        try:
+            return str(json.loads(Path(scheduler_file).read_text())["address"])
+        except OSError as error:
+            reason = (error.strerror or str(error)).lower()
+        except (ValueError, KeyError, TypeError, RecursionError):
+            reason = "it holds no address"
+        raise UsageError(
+            f"{self._where}: cannot be read: {reason}; start a scheduler with: "
+            f"dask scheduler --scheduler-file {scheduler_file}"
+        )
+
+    def _connected(self, address: str) -> Any:
+        try:
+            from distributed import Client
+        except ImportError as error:
+            raise UsageError(
+                f"{self._option}: needs dask.distributed, which is not installed; pip install 'brakecli[cluster]'"
+            ) from error
+
+        _silence("distributed", "tornado", "asyncio")
+
+        class _Client(Client):
+            def __del__(self) -> None:
+                """Where its start has failed there is nothing to close; dask would try to, and complain."""
+
+        quiet: Any = _Client
+        try:
+            return quiet(address, timeout=CONNECT_SECONDS, set_as_default=False)
+        except Exception as error:  # dask raises many kinds, of all its layers
+            raise UsageError(
+                f"{self._where}: no scheduler answers ({first_line(error)}); start one with: dask scheduler"
+            ) from error
+
+    def _leave(self) -> None:
+        with suppress(Exception):
+            self._client.close(timeout=1)
+
+    def _compare(self) -> None:
+        """Refuse workers of another version: their results would not be the same."""
+        try:
+            found = self._client.run(_own_versions)
+        except Exception as error:
+            raise UsageError(
+                f"{self._where}: a worker cannot load brakecli ({first_line(error)}); install the same version "
+                "there"
+            ) from error
+        for worker, theirs in sorted(found.items()):
+            if difference := _difference(self._versions, theirs, f"the worker at {worker}"):
+                raise self._refused(difference)
+
+
+def _silence(*packages: str) -> None:
+    """Keep the logs of packages off standard error; dask's loggers have got levels of their own by now."""
+    for name in {*packages, *logging.root.manager.loggerDict}:
+        if name.partition(".")[0] in packages:
+            logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+
+
+class OtherVersionError(Exception):
+    """A worker has come that is of another version."""
+
+
+def _attempt(work: Work, job: Job, first: int, size: int, versions: Mapping[str, str]) -> Attempt:
+    if difference := _difference(versions, _own_versions(), "a worker that has come later"):
+        raise OtherVersionError(difference)
+    return attempt(work, job, first, size)
+
+
+@cache
+def _own_versions() -> Mapping[str, str]:
+    """Of the sources that this process has loaded; a long-lived worker does not notice that they have changed."""
+    return fingerprint()
+
+
+def _difference(ours: Mapping[str, str], theirs: Mapping[str, str], who: str) -> str:
+    different = [key for key in ours if theirs.get(key) != ours[key]]
+    return "".join(f"{key} is {theirs.get(key)} on {who} and {ours[key]} here" for key in different[:1])

@@ -1,0 +1,208 @@
+"""Regimes of runs whose regime is known, and of histories made by hand."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from brakecli.analysis.regime.of_run import context
+from brakecli.analysis.regime.rules import Context, Excitation, Regime, classify, forced_lines
+from brakecli.case.system import set_up
+from brakecli.solver.history import ArrayHistory
+from brakecli.solver.quantities import HISTORY
+from tests.examples import COULOMB, ROUGH, SQUEAL, make, simulate
+
+INTERVAL = 1e-4
+TIME = INTERVAL * np.arange(20000)
+
+
+def judged(case: Any) -> Any:
+    result = simulate(case)
+    return classify(ArrayHistory(case.output.sample_interval, result.rows), context(set_up(case)))
+
+
+def made(vx: NDArray[np.float64], state: float | NDArray[np.float64] = -1.0) -> ArrayHistory:
+    rows = np.zeros((len(vx), len(HISTORY)))
+    names = list(HISTORY)
+    rows[:, names.index("vx")] = vx
+    rows[:, names.index("x")] = np.cumsum(vx) * INTERVAL
+    rows[:, names.index("state")] = state
+    return ArrayHistory(INTERVAL, rows)
+
+
+@pytest.mark.parametrize(
+    ("phi", "omega", "regime"),
+    [
+        (0.5, 0.1, Regime.DAMPED),
+        (0.6, 0.1, Regime.RELAXATION),
+        (0.8, 0.3, Regime.RELAXATION),
+        (0.6, 0.6, Regime.QUASI_HARMONIC),
+    ],
+)
+def test_the_three_regimes_of_the_paper(phi: float, omega: float, regime: Regime) -> None:
+    case = make(SQUEAL, friction__coefficient=phi, wheel__angular_speed=omega, solver__duration=2.0)
+    verdict = judged(case)
+    assert verdict.regime is regime
+    sustained = regime is not Regime.DAMPED
+    assert verdict.excitation is (Excitation.SELF_EXCITED if sustained else Excitation.NONE)
+    assert (verdict.frequency is not None) == sustained
+    assert sustained is False or verdict.frequency == pytest.approx(174.0, abs=1.0)
+    assert (verdict.stick_fraction > 0.02) == (regime is Regime.RELAXATION)
+
+
+def test_a_shoe_shaken_by_roughness_below_its_critical_friction_is_damped_and_forced() -> None:
+    verdict = judged(make(ROUGH, solver__duration=1.0, solver__step=2e-5))
+    assert (verdict.regime, verdict.excitation) == (Regime.DAMPED, Excitation.FORCED)
+    assert verdict.frequency is None
+
+
+def test_a_shoe_at_rest_on_a_standing_wheel_is_damped() -> None:
+    verdict = judged(make(COULOMB))
+    assert verdict.regime is Regime.DAMPED
+    assert "rest" in verdict.reasons[0]
+    assert verdict.stick_fraction == 1.0
+
+
+def test_a_shoe_that_is_carried_along_is_not_called_damped() -> None:
+    changes: dict[str, Any] = {"link2__stiffness": 0.0, "link2__damping": 0.0, "solver__duration": 0.5}
+    verdict = judged(make(SQUEAL, **changes))
+    assert verdict.regime is Regime.UNDECIDED
+    assert "carried along" in verdict.reasons[0]
+
+
+def test_a_shoe_that_lost_contact_is_not_called_damped() -> None:
+    load = {"load__force": None, "load__times": [0.0, 0.1], "load__forces": [5000.0, -5000.0]}
+    verdict = judged(make(SQUEAL, solver__duration=1.0, **load))
+    assert verdict.regime is Regime.UNDECIDED
+    assert "lost contact for good" in verdict.reasons[0]
+    assert verdict.contact_loss_fraction == 1.0
+
+
+@pytest.mark.parametrize("force", [-5000.0, 0.0])
+def test_a_shoe_that_never_touched_is_not_called_damped(force: float) -> None:
+    verdict = judged(make(SQUEAL, load__force=force))
+    assert verdict.regime is Regime.UNDECIDED
+    assert "never touched" in verdict.reasons[0]
+
+
+@pytest.mark.parametrize(("rate", "word"), [(2.0, "growing"), (-1.0, "decaying")])
+def test_a_motion_that_still_grows_or_decays_is_undecided_and_says_how_fast(rate: float, word: str) -> None:
+    verdict = classify(made(1e-3 * np.exp(rate * TIME) * np.sin(2 * np.pi * 170.0 * TIME)), Context(1.0))
+    assert verdict.regime is Regime.UNDECIDED
+    assert word in verdict.reasons[0]
+    assert verdict.evidence["envelope_slope"] == pytest.approx(rate, rel=0.02)
+
+
+def test_a_decay_to_nothing_is_damped() -> None:
+    verdict = classify(made(np.exp(-5.0 * TIME) * np.sin(2 * np.pi * 170.0 * TIME)), Context(1.0))
+    assert verdict.regime is Regime.DAMPED
+
+
+def test_stick_in_some_cycles_only_is_irregular() -> None:
+    vx = 0.02 * np.sin(2 * np.pi * 170.0 * TIME)
+    state = np.where((vx > 0.019) & (np.floor(170.0 * TIME) % 3 == 0), 0.0, -1.0)
+    verdict = classify(made(vx, state), Context(0.02))
+    assert verdict.regime is Regime.UNDECIDED
+    assert "irregular" in verdict.reasons[0]
+
+
+def test_a_line_of_the_roughness_is_forced_and_another_is_not() -> None:
+    lines = forced_lines(2.0, [1.0 / 0.02], 5000.0)
+    assert lines[0] == pytest.approx(100.0)
+    assert len(lines) == 10
+    forced = classify(made(np.sin(2 * np.pi * 100.0 * TIME)), Context(2.0, True, lines))
+    other = classify(made(np.sin(2 * np.pi * 151.0 * TIME)), Context(2.0, True, lines))
+    assert (forced.regime, forced.excitation) == (Regime.DAMPED, Excitation.FORCED)
+    assert (other.regime, other.excitation) == (Regime.QUASI_HARMONIC, Excitation.SELF_EXCITED)
+
+
+@pytest.mark.parametrize(
+    ("powers_of_e", "regime", "excitation"),
+    [
+        (0.0, Regime.DAMPED, Excitation.FORCED),
+        (1e-4, Regime.DAMPED, Excitation.FORCED),
+        (2.0, Regime.UNDECIDED, Excitation.NONE),
+        (30.0, Regime.QUASI_HARMONIC, Excitation.SELF_EXCITED),
+    ],
+)
+def test_where_sliding_is_unstable_a_motion_is_not_forced(
+    powers_of_e: float, regime: Regime, excitation: Excitation
+) -> None:
+    """By its growth over the whole run: none, none but rounding, too little to see, and enough from any start."""
+    duration = len(TIME) * (TIME[1] - TIME[0])
+    lines = forced_lines(2.0, [1.0 / 0.02], 5000.0)
+    known = Context(2.0, True, lines, growth=lambda: powers_of_e / duration)
+    verdict = classify(made(np.sin(2 * np.pi * 100.0 * TIME)), known)
+    assert (verdict.regime, verdict.excitation) == (regime, excitation)
+    assert ("run at least" in verdict.reasons[0]) == (regime is Regime.UNDECIDED)
+
+
+@pytest.mark.parametrize("duration", [0.5, 2.0])
+def test_squeal_on_a_wheel_of_many_waves_is_not_called_forced(duration: float) -> None:
+    """In a short run the lines of two waves cover the whole spectrum, and with it the line of the squeal."""
+    roughness = {
+        "shoe": {"amplitudes": [2e-6, 1e-6], "wavelengths": [0.020, 0.011]},
+        "wheel": {"amplitudes": [4e-6, 2e-6], "wavelengths": [0.030, 0.017]},
+    }
+    changes: dict[str, Any] = {"wheel__angular_speed": 4.0, "load__force": 5000.0, "output__sample_interval": 2e-4}
+    case = make(SQUEAL | {"roughness": roughness}, friction__coefficient=0.7, solver__duration=duration, **changes)
+    verdict = judged(case)
+    assert (verdict.evidence["forced_share"] > 0.8) == (duration == 0.5)
+    assert verdict.regime is (Regime.UNDECIDED if duration == 0.5 else Regime.QUASI_HARMONIC)
+
+
+@pytest.mark.parametrize("samples", [1, 2, 50, 159])
+def test_too_few_samples_are_undecided(samples: int) -> None:
+    verdict = classify(made(np.sin(np.arange(samples))), Context(1.0))
+    assert verdict.regime is Regime.UNDECIDED
+    assert "samples" in verdict.reasons[0]
+
+
+def test_too_few_cycles_and_too_coarse_samples_are_undecided() -> None:
+    slow = classify(made(np.sin(2 * np.pi * 2.0 * TIME)), Context(1.0))
+    coarse = classify(made(np.sin(2 * np.pi * 2500.0 * TIME + 0.3)), Context(1.0))
+    assert "cycles" in slow.reasons[0]
+    assert "samples a cycle" in coarse.reasons[0]
+    assert slow.regime is coarse.regime is Regime.UNDECIDED
+
+
+def test_a_changing_wheel_speed_is_undecided() -> None:
+    verdict = classify(made(np.sin(2 * np.pi * 170.0 * TIME)), Context(1.0, steady=False))
+    assert verdict.regime is Regime.UNDECIDED
+    assert "changes with time" in verdict.reasons[0]
+
+
+def test_verdict_does_not_depend_on_length_or_sampling() -> None:
+    base: dict[str, Any] = {"friction__coefficient": 0.7, "solver__duration": 1.0}
+    changes: list[dict[str, Any]] = [{}, {"solver__duration": 2.0}, {"output__sample_interval": 5e-5}]
+    verdicts = [judged(make(SQUEAL, **{**base, **change})) for change in changes]
+    assert {verdict.regime for verdict in verdicts} == {Regime.RELAXATION}
+    frequencies = [verdict.frequency for verdict in verdicts]
+    assert np.ptp(frequencies) < 0.1
+
+
+def test_evidence_names_lines_harmonics_and_powers() -> None:
+    verdict = judged(make(SQUEAL, friction__coefficient=0.7, solver__duration=2.0))
+    evidence = verdict.evidence
+    assert evidence["line_frequencies"][0] == pytest.approx(verdict.frequency, abs=1.0)
+    assert evidence["line_shares"][0] > 0.99
+    assert set(evidence["line_forced"]) == {0.0}
+    assert len(evidence["harmonics"]) == 4
+    assert 0.01 < evidence["harmonics"][0] < 0.1
+    assert evidence["largest_vx_over_belt_speed"] == 1.0
+    # A settled motion stores no more and no less: what it takes from the belt becomes heat, but for what the ends
+    # of the record hold more than its beginning: Q times 2 y over 1.8 s is 1 W at most.
+    assert abs(evidence["power_rest"]) < 1.0
+    assert evidence["power_belt"] == pytest.approx(
+        evidence["power_friction"] + evidence["power_dashpots"] + evidence["power_load"] + evidence["power_rest"]
+    )
+    assert evidence["power_friction"] > 0.0
+
+
+def test_lines_of_the_roughness_are_told_from_others() -> None:
+    lines = forced_lines(2.0, [1.0 / 0.02], 5000.0)
+    both = np.sin(2 * np.pi * 100.0 * TIME) + np.sin(2 * np.pi * 151.0 * TIME + 1.0)
+    evidence = classify(made(both), Context(2.0, True, lines)).evidence
+    found = dict(zip(evidence["line_frequencies"], evidence["line_forced"], strict=True))
+    assert {round(frequency): flag for frequency, flag in found.items()} == {100: 1.0, 151: 0.0}

@@ -1,0 +1,143 @@
+"""Reading a measured signal: every usual layout is read, every broken file is a named error."""
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from brakecli.analysis.regime.of_signal import Signal
+from brakecli.analysis.regime.signal_file import read_signal
+from brakecli.errors import UnreadableResultError, UsageError
+
+
+def read(
+    path: Path | str, column: str | None = None, time: str | None = None, rate: float | None = None
+) -> Signal:
+    return read_signal(str(path), column=column, time_column=time, sample_rate=rate)
+
+
+def written(tmp_path: Path, content: str | bytes) -> Path:
+    path = tmp_path / "signal.csv"
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return path
+
+
+LAYOUTS = {
+    "comma": "t,x\n0,1\n0.1,2.5\n0.2,4\n",
+    "semicolon": "t;x\n0;1\n0.1;2.5\n0.2;4\n",
+    "decimal comma": "t;x\n0;1\n0,1;2,5\n0,2;4\n",
+    "tab": "t\tx\n0\t1\n0.1\t2.5\n0.2\t4\n",
+    "spaces": "t x\n0 1\n0.1  2.5\n0.2 4\n",
+    "comments": "# made up\n% twice\nt,x\n0,1\n0.1,2.5\n0.2,4\n",
+    "units": "t,x\ns,mm\n0,1\n0.1,2.5\n0.2,4\n",
+    "quotes": '"t","x"\n"0","1"\n"0.1","2.5"\n"0.2","4"\n',
+    "byte order mark, CRLF": "\ufefft,x\r\n0,1\r\n0.1,2.5\r\n0.2,4\r\n",
+    "trailing separator": "t,x,\n0,1,\n0.1,2.5,\n0.2,4,\n",
+}
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_every_usual_layout_gives_the_same_signal(layout: str, tmp_path: Path) -> None:
+    path = written(tmp_path, LAYOUTS[layout])
+    for names in (("x", "t"), ("2", "1")):
+        signal = read(path, *names)
+        assert signal.values.tolist() == [1.0, 2.5, 4.0]
+        assert signal.interval == pytest.approx(0.1)
+
+
+def test_a_single_column_needs_no_name(tmp_path: Path) -> None:
+    signal = read(written(tmp_path, "1\n2\n4\n"), rate=50.0)
+    assert signal.values.tolist() == [1.0, 2.0, 4.0]
+    assert signal.interval == 0.02
+
+
+def test_missing_values_and_jumps_of_time_are_gaps(tmp_path: Path) -> None:
+    missing = read(written(tmp_path, "t,x\n0,1\n1,\n2,nan\n3,4\n"), time="t").values
+    assert np.isnan(missing).tolist() == [False, True, True, False]
+    jump = read(written(tmp_path, "0,1\n1,2\n2,3\n6,7\n7,8\n8,10\n"), time="1")
+    assert np.isnan(jump.values).tolist() == [False, False, False, True, True, True, False, False, False]
+    assert "1 jumps of time" in jump.notes[0]
+
+
+def test_irregular_sampling_is_resampled_and_told(tmp_path: Path) -> None:
+    times = np.arange(50) + 0.2 * np.sin(np.arange(50))
+    content = "\n".join(f"{t},{3.0 * t}" for t in times)
+    signal = read(written(tmp_path, content), time="1")
+    assert np.ptp(np.diff(signal.values)) == pytest.approx(0.0, abs=1e-9)  # a straight line stays one
+    assert "resampled" in signal.notes[0]
+
+
+BROKEN = {
+    "empty": b"",
+    "blank": b" \n\n",
+    "text": b"hello\nworld\n",
+    "binary": bytes(range(256)) * 4,
+    "a short row": b"1,2\n3\n4,5\n",
+    "a word": b"1,2\n3,x\n4,5\n",
+    "one sample": b"1,2\n",
+    "nothing but nan": b"1,nan\n2,nan\n",
+    "constant": b"1,2\n2,2\n3,2\n",
+    "time stands still": b"1,2\n1,3\n2,4\n",
+    "time runs back": b"1,2\n3,3\n2,4\n",
+    "no time": b"1,2\nnan,3\n2,4\n",
+    "beyond all measure": b"1,2\n2,1e300\n3,4\n",
+    "damaged bytes": b"1,2\n\xff\xfe,3\n2,4\n",
+}
+
+
+@pytest.mark.parametrize("kind", BROKEN)
+def test_a_broken_file_is_unreadable_and_never_a_number(kind: str, tmp_path: Path) -> None:
+    with pytest.raises(UnreadableResultError, match=r"signal\.csv: .+; .+"):
+        read(written(tmp_path, BROKEN[kind]), "2", "1")
+
+
+def test_a_missing_column_is_told_with_those_there_are(tmp_path: Path) -> None:
+    with pytest.raises(UnreadableResultError, match="no column force; there are t, x"):
+        read(written(tmp_path, "t,x\n0,1\n1,2\n"), "force", "t")
+
+
+def test_wrong_options_are_told_apart_from_a_wrong_file(tmp_path: Path) -> None:
+    path = written(tmp_path, "a,b,c\n0,1,2\n1,2,4\n")
+    with pytest.raises(UsageError, match="--sample-rate HZ, or --time-column"):
+        read(path, "a")
+    with pytest.raises(UsageError, match="leave one out"):
+        read(path, "b", "a", 1.0)
+    with pytest.raises(UsageError, match="which column"):
+        read(path, time="a")
+    for rate in (0.0, -1.0, np.nan, np.inf):
+        with pytest.raises(UsageError, match="above 0 Hz"):
+            read(path, "a", rate=rate)
+
+
+def test_a_dataset_of_any_hdf5_file_is_a_signal(tmp_path: Path) -> None:
+    path = tmp_path / "some.h5"
+    with h5py.File(path, "w") as file:
+        file["lab/force"] = np.arange(5, dtype=np.float32)
+        file["table"] = np.zeros((2, 2))
+        file["words"] = "hello"
+    assert read(f"{path}:/lab/force", rate=10.0).values.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
+    with pytest.raises(UnreadableResultError, match="no dataset /lab/x, only /lab/force"):
+        read(f"{path}:/lab/x", rate=10.0)
+    for name in ("table", "words", "lab"):
+        with pytest.raises(UnreadableResultError):
+            read(f"{path}:/{name}", rate=10.0)
+    with pytest.raises(UsageError, match="has no columns"):
+        read(f"{path}:/lab/force", "force", rate=10.0)
+
+
+def test_a_damaged_hdf5_file_is_unreadable_wherever_it_is_cut(tmp_path: Path) -> None:
+    path = tmp_path / "some.h5"
+    with h5py.File(path, "w") as file:
+        file["x"] = np.arange(5000.0)
+    whole = path.read_bytes()
+    for length in (0, 5, 100, 800, len(whole) // 2, len(whole) - 1):
+        path.write_bytes(whole[:length])
+        with pytest.raises(UnreadableResultError):
+            read(f"{path}:/x", rate=10.0)
+
+
+def test_what_is_no_file_is_unreadable(tmp_path: Path) -> None:
+    for source in (tmp_path, tmp_path / "none.csv", f"{tmp_path / 'none.h5'}:/x"):
+        with pytest.raises(UnreadableResultError):
+            read(source, rate=1.0)

@@ -1,0 +1,91 @@
+"""Power spectral densities and cycles of signals that are known."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from brakecli.analysis.regime import spectra
+from brakecli.analysis.regime.spectra import SPECTRAL, peak, spectrum, upward_crossings
+from brakecli.solver.history import ArrayHistory
+from brakecli.solver.quantities import HISTORY
+
+INTERVAL = 1e-4
+
+
+def history(vx: NDArray[np.float64]) -> ArrayHistory:
+    rows = np.zeros((len(vx), len(HISTORY)))
+    rows[:, list(HISTORY).index("vx")] = vx
+    return ArrayHistory(INTERVAL, rows)
+
+
+def sine(frequency: float, samples: int = 20000, amplitude: float = 0.03) -> NDArray[np.float64]:
+    wave: NDArray[np.float64] = amplitude * np.sin(2.0 * np.pi * frequency * INTERVAL * np.arange(samples) + 0.3)
+    return wave
+
+
+def test_density_integrates_to_the_variance() -> None:
+    lines = spectrum(history(5.0 + sine(173.3)), 0)
+    spacing = lines.frequency[1]
+    # Parseval's identity; the ends of windows that do not close on a period weigh within a percent.
+    assert lines.density["vx"].sum() * spacing == pytest.approx(0.5 * 0.03**2, rel=0.01)
+
+
+def test_white_noise_has_a_flat_density() -> None:
+    noise = np.random.default_rng(1).normal(0.0, 2.0, 1 << 16)
+    density = spectrum(history(noise), 0).density["vx"]
+    # One-sided: variance over half the sampling rate; 9 segments leave a scatter of 1/3 on each of 7000 lines.
+    assert density[5:-5].mean() == pytest.approx(4.0 / (0.5 / INTERVAL), rel=0.02)
+
+
+@pytest.mark.parametrize("frequency", [40.0, 173.3, 1234.56])
+def test_peak_lies_within_a_tenth_of_a_bin(frequency: float) -> None:
+    lines = spectrum(history(sine(frequency)), 0)
+    found = peak(lines.frequency, lines.density["vx"])
+    assert found == pytest.approx(frequency, abs=0.1 * lines.frequency[1])
+
+
+def test_a_long_history_takes_segments_of_bounded_length(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(spectra, "LONGEST_SEGMENT", 256)
+    read: list[int] = []
+
+    class Watched(ArrayHistory):
+        def read(self, name: str, start: int, stop: int) -> NDArray[np.float64]:
+            read.append(stop - start)
+            return super().read(name, start, stop)
+
+    lines = spectrum(Watched(INTERVAL, history(sine(500.0)).rows), 1000)
+    assert lines.segments == (19000 - 256) // 128 + 1
+    assert max(read) <= 256 + 15 * 128
+    assert peak(lines.frequency, lines.density["vx"]) == pytest.approx(500.0, abs=4.0)
+
+
+@pytest.mark.parametrize("value", [0.0, 1.0, -0.0, 5e-324, 1e-310, 1e15])
+@pytest.mark.parametrize("samples", [1, 2, 3, 17, 1000])
+def test_constant_signals_have_no_density_and_no_nan(value: float, samples: int) -> None:
+    lines = spectrum(history(np.full(samples, value)), 0)
+    assert len(lines.frequency) == len(lines.density["vx"])
+    for name in SPECTRAL:
+        assert np.all(np.isfinite(lines.density[name]))
+        # Removing the mean of a constant leaves its rounding.
+        assert lines.density[name].max() <= 1e-28 * max(value * value, 1e-300)
+    assert peak(lines.frequency, lines.density["y"]) is None
+
+
+def test_the_smallest_signals_keep_their_shape() -> None:
+    scaled = spectrum(history(sine(173.3, amplitude=1e-140)), 0)
+    assert peak(scaled.frequency, scaled.density["vx"]) == pytest.approx(173.3, abs=0.5)
+
+
+def test_cycles_are_counted_through_ripple() -> None:
+    t = INTERVAL * np.arange(20000)
+    signal = np.sin(2 * np.pi * 20.0 * t - 0.1) + 0.15 * np.sin(2 * np.pi * 900.0 * t)
+    crossings = upward_crossings(signal, 0.3)
+    assert len(crossings) == 39  # the first lies too near the start to have left the band
+    assert np.mean(np.diff(crossings)) == pytest.approx(500.0, abs=2.0)
+
+
+def test_crossings_of_a_sine_are_interpolated() -> None:
+    crossings = upward_crossings(sine(100.37), 0.01)
+    # Linear interpolation between samples x apart errs by (ωx)³/60 of a sample at most here.
+    period = (crossings[-1] - crossings[0]) / (len(crossings) - 1)
+    assert 1.0 / (period * INTERVAL) == pytest.approx(100.37, rel=1e-6)

@@ -1,0 +1,262 @@
+"""Linear stability of steady sliding, against closed forms, eigenvalues and runs."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from brakecli.analysis.stability.discrete import natural_frequencies
+from brakecli.analysis.stability.modes import Instability, crossings, eigensystem, growth, modes
+from brakecli.analysis.stability.report import stability, step_limit, undamped_critical
+from brakecli.case.system import set_up
+from brakecli.solver.compile import Coefficients
+from brakecli.solver.links import coefficients
+from tests.examples import MODE_COUPLING, ROUGH, SQUEAL, make, simulate
+
+
+def random_shoe(rng: np.random.Generator, damping: float) -> tuple[Coefficients, float]:
+    c_1, c_2, k = 10.0 ** rng.uniform(5.0, 8.0, 3)
+    alpha, beta = rng.uniform(-80.0, 80.0, 2)
+    b_1, b_2 = damping * rng.uniform(0.1, 1.0, 2)
+    shoe = coefficients(
+        mass=10.0 ** rng.uniform(-1.0, 2.0),
+        c_1=c_1,
+        b_1=b_1,
+        beta_deg=beta,
+        c_2=c_2,
+        b_2=b_2,
+        alpha_deg=alpha,
+        phi=0.5,
+    )
+    return shoe, k
+
+
+def full_matrix(c: Coefficients, k: float, grip: float) -> Any:
+    a = np.zeros((4, 4))
+    a[:2, 2:] = np.eye(2)
+    a[2:] = -np.array([[c.c_xx, c.c_xy + grip * k, c.b_xx, c.b_xy], [c.c_xy, c.c_yy + k, c.b_xy, c.b_yy]]) / c.m
+    return a
+
+
+def test_minimal_model_loses_stability_at_three_quarters() -> None:
+    report = stability(set_up(make(MODE_COUPLING)))
+    assert report.critical is not None
+    assert report.critical.friction == pytest.approx(0.75, abs=1e-12)
+    assert report.critical.instability is Instability.FLUTTER
+    assert report.critical.frequency * 2 * math.pi == pytest.approx(math.sqrt(2.0), abs=1e-12)
+    assert report.modes[0].growth == pytest.approx(0.2020717687680948, abs=1e-12)
+    assert report.modes[0].frequency * 2 * math.pi == pytest.approx(1.4285772641803685, abs=1e-12)
+    assert report.stable is False
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_closed_form_agrees_with_eigenvalues_on_random_undamped_shoes(sign: float) -> None:
+    rng = np.random.default_rng(2)
+    flutter, divergence = 0, 0
+    for _ in range(1000):
+        c, k = random_shoe(rng, 0.0)
+        phi_flutter, phi_divergence = undamped_critical(c, k, sign)
+        phi = phi_flutter if phi_flutter is not None else phi_divergence
+        assert phi is not None
+        found = [crossing for crossing in crossings(c, k, sign) if crossing.lost]
+        assert found[0].friction == pytest.approx(phi, rel=1e-9)
+        below, above = (np.linalg.eigvals(full_matrix(c, k, sign * phi * (1.0 + e))) for e in (-1e-3, 1e-3))
+        size = np.abs(above).max()
+        # 10^-3 above, a pair that has met splits by about sqrt(10^-3) of its distance; rounding splits by 1e-7.
+        assert below.real.max() < 1e-6 * size
+        assert above.real.max() > below.real.max() + 1e-7 * size
+        flutter, divergence = flutter + (phi_flutter is not None), divergence + (phi_divergence is not None)
+    assert flutter > 300
+    assert divergence > 300
+
+
+def test_every_crossing_of_random_damped_shoes_is_found() -> None:
+    rng = np.random.default_rng(3)
+    lost = 0
+    for _ in range(300):
+        c, k = random_shoe(rng, 10.0 ** rng.uniform(1.0, 4.0))
+        found = crossings(c, k, 1.0)
+        frictions = np.linspace(0.0, 3.0, 3001)[1:]
+        rates = np.array([np.linalg.eigvals(full_matrix(c, k, phi)).real.max() for phi in frictions])
+        changes = frictions[1:][(rates[1:] > 0.0) != (rates[:-1] > 0.0)]
+        inside = [crossing.friction for crossing in found if crossing.friction < 3.0]
+        assert len(inside) == len(changes)
+        assert np.allclose(inside, changes, atol=1.1e-3)
+        lost += len(inside)
+    assert lost > 50
+
+
+def test_growth_is_zero_at_a_crossing() -> None:
+    setup = set_up(make(SQUEAL))
+    crossing = crossings(setup.coefficients, setup.contact_stiffness, 1.0)[0]
+    assert crossing.friction == pytest.approx(0.575, abs=5e-4)
+    rate = growth(setup.coefficients, setup.contact_stiffness, crossing.friction)
+    assert abs(rate) < 1e-8 * 2 * math.pi * crossing.frequency
+    values, _ = eigensystem(setup.coefficients, setup.contact_stiffness, crossing.friction)
+    assert values[np.argmax(values.real)].imag / (2 * math.pi) == pytest.approx(
+        math.copysign(crossing.frequency, values[np.argmax(values.real)].imag), rel=1e-9
+    )
+
+
+@pytest.mark.parametrize("alpha", [1.0, 5.0, 20.0, 45.0])
+@pytest.mark.parametrize("ratio", [0.02, 0.2, 1.0])
+def test_least_critical_friction_lies_at_c2_equal_c1_plus_k(alpha: float, ratio: float) -> None:
+    c_1, k = 1e7, ratio * 1e7
+
+    def critical(c_2: float) -> float:
+        c = coefficients(mass=10, c_1=c_1, b_1=0, beta_deg=0, c_2=c_2, b_2=0, alpha_deg=alpha, phi=0)
+        flutter = undamped_critical(c, k, 1.0)[0]
+        assert flutter is not None
+        return flutter
+
+    least = critical(c_1 + k)
+    assert least == pytest.approx((1.0 + c_1 / k) * math.tan(math.radians(alpha)), rel=1e-12)
+    assert all(critical((c_1 + k) * factor) > least for factor in (0.5, 0.9, 0.99, 1.01, 1.1, 2.0))
+
+
+def test_decoupled_shoe_never_loses_stability() -> None:
+    report = stability(set_up(make(SQUEAL, link2__angle_deg=0.0)))
+    assert report.critical is None
+    assert report.crossings == ()
+    assert report.stable is True
+
+
+def test_positive_coupling_diverges_and_does_not_flutter() -> None:
+    report = stability(set_up(make(SQUEAL, link2__angle_deg=-5.0)))
+    assert report.critical is not None
+    assert report.critical.instability is Instability.DIVERGENCE
+    assert report.undamped_flutter is None
+    assert report.critical.friction == pytest.approx(report.undamped_divergence, rel=1e-12)
+
+
+@pytest.mark.parametrize("base", [SQUEAL, MODE_COUPLING])
+def test_wheel_turning_backwards_is_the_mirror_image(base: dict[str, Any]) -> None:
+    forwards = stability(set_up(make(base)))
+    angles = {f"{link}__angle_deg": -base[link].get("angle_deg", 0.0) for link in ("link1", "link2")}
+    backwards = stability(set_up(make(base, wheel__angular_speed=-base["wheel"]["angular_speed"], **angles)))
+    assert forwards.critical is not None
+    assert backwards.critical is not None
+    assert backwards.critical.friction == pytest.approx(forwards.critical.friction, rel=1e-12)
+    assert forwards.discrete is not None
+    assert backwards.discrete is not None
+    assert backwards.discrete.spectral_radius == pytest.approx(forwards.discrete.spectral_radius, rel=1e-12)
+
+
+def test_a_standing_wheel_has_no_critical_friction() -> None:
+    report = stability(set_up(make(SQUEAL, wheel__angular_speed=0.0)))
+    assert report.critical is None
+    assert report.discrete is None
+
+
+def test_a_shoe_that_clears_the_wheel_says_so() -> None:
+    lifted = stability(set_up(make(SQUEAL, load__force=-1.0)))
+    assert lifted.equilibrium is not None
+    assert lifted.equilibrium.contact_fraction == 0.0
+    assert lifted.critical is None
+    free = stability(set_up(make(SQUEAL, load__force=-1.0, link1__stiffness=0.0, link2__angle_deg=0.0)))
+    assert free.equilibrium is None
+    assert "lifts the shoe" in str(free.no_equilibrium)
+    assert free.stable is None
+
+
+@pytest.mark.parametrize(("theta", "critical"), [((1.0, 1.0), 0.8115), ((0.5, 0.5), 0.75)])
+def test_weights_move_the_critical_friction_as_published(theta: tuple[float, float], critical: float) -> None:
+    report = stability(set_up(make(MODE_COUPLING, solver__theta=theta, solver__step=0.1)))
+    assert report.discrete is not None
+    assert report.discrete.critical_friction == pytest.approx(critical, abs=5e-5)
+    assert report.discrete.bias == pytest.approx(critical - 0.75, abs=5e-5)
+
+
+@pytest.mark.parametrize(
+    ("scheme", "theta", "limit"),
+    [
+        ("two-layer", (0.5, 0.5), None),
+        ("two-layer", (0.0, 1.0), 2.0),
+        ("two-layer", (0.0, 0.0), 0.0),
+        ("three-layer", (0.25, 0.5, 0.25), None),
+        ("three-layer", (0.0, 1.0, 0.0), 2.0),
+        ("three-layer", (1 / 12, 10 / 12, 1 / 12), math.sqrt(6.0)),
+    ],
+)
+def test_limits_of_stability_are_those_of_theory(
+    scheme: str, theta: tuple[float, ...], limit: float | None
+) -> None:
+    report = stability(set_up(make(MODE_COUPLING, solver__scheme=scheme, solver__theta=theta)))
+    assert report.discrete is not None
+    step = report.discrete.step_limit
+    assert (step is None) == (limit is None)
+    assert limit is None or step == pytest.approx(limit / math.sqrt(3.0), rel=1e-5)  # ω² = 3 is the highest
+
+
+@pytest.mark.parametrize(
+    ("scheme", "theta", "limit"),
+    [
+        ("two-layer", (0.5, 0.5), None),
+        ("two-layer", (1.0, 0.5), None),
+        ("three-layer", (0.25, 0.5, 0.25), None),
+        ("three-layer", (1 / 12, 10 / 12, 1 / 12), math.sqrt(6.0)),
+    ],
+)
+def test_no_limit_is_seen_in_the_rounding_of_a_contact_that_is_all_but_rigid(
+    scheme: str, theta: tuple[float, ...], limit: float | None
+) -> None:
+    setup = set_up(make(SQUEAL, contact__stiffness=1e16, solver__scheme=scheme, solver__theta=list(theta)))
+    found = step_limit(setup, lambda friction: setup.contact_stiffness)
+    omega = 2.0 * math.pi * natural_frequencies(setup.coefficients, setup.contact_stiffness)[1]
+    assert found == (limit if limit is None else pytest.approx(limit / omega, rel=1e-4))
+
+
+@pytest.mark.parametrize(("scheme", "theta"), [("two-layer", (0.6, 0.7)), ("three-layer", (0.3, 0.4, 0.3))])
+def test_discrete_growth_is_that_of_a_run_with_the_same_step(scheme: str, theta: tuple[float, ...]) -> None:
+    case = make(
+        MODE_COUPLING, solver__scheme=scheme, solver__theta=theta, solver__step=0.02, solver__duration=80.0,
+        initial__x=1e-7,
+    )  # fmt: skip
+    report = stability(set_up(case))
+    assert report.discrete is not None
+    late = simulate(case).vx[-2000:]
+    recurrence = np.linalg.lstsq(np.column_stack([late[1:-1], late[:-2]]), late[2:], rcond=None)[0]
+    assert math.log(math.sqrt(-recurrence[1])) / 0.02 == pytest.approx(report.discrete.growth, abs=1e-6)
+
+
+def test_roughness_in_full_contact_does_not_move_the_critical_friction() -> None:
+    rough = {"roughness__wheel": {"amplitudes": [1e-5], "wavelengths": [0.03]}}
+    flat, touching = stability(set_up(make(SQUEAL))), stability(set_up(make(SQUEAL, **rough)))
+    assert flat.critical is not None
+    assert touching.critical is not None
+    assert touching.critical.friction == pytest.approx(flat.critical.friction, abs=1e-9)
+
+
+def test_roughness_that_opens_the_pad_softens_the_contact() -> None:
+    report = stability(set_up(make(ROUGH)))
+    assert report.equilibrium is not None
+    assert 0.5 < report.equilibrium.contact_fraction < 0.95
+    full = set_up(make(ROUGH)).contact_stiffness
+    assert report.contact_stiffness == pytest.approx(report.equilibrium.contact_fraction * full, rel=1e-9)
+
+
+def test_mean_stiffness_is_the_slope_of_the_mean_force() -> None:
+    from functools import partial
+
+    from brakecli.solver.steady_sliding import mean_contact, tabulated
+
+    setup = set_up(make(ROUGH))
+    mean = partial(mean_contact, setup.evaluate, setup.pad, setup.wheel)
+    table = tabulated(mean, setup.pad)
+    tried = 0
+    for y in (-1e-4, -3e-5, 1e-5, 6e-5):
+        # Over 1024 places of 256 nodes each, kinks in steps of 1e-8 m average out to a relative 1e-3.
+        slope = (mean(y - 1e-7)[0] - mean(y + 1e-7)[0]) / 2e-7
+        assert mean(y)[1] == pytest.approx(slope, rel=2e-3)
+        assert table(y)[0] == pytest.approx(mean(y)[0], rel=1e-4)
+        assert table(y)[1] == pytest.approx(mean(y)[1], rel=1e-2)
+        tried += 1
+    assert tried == 4
+
+
+def test_modes_of_a_decoupled_shoe_have_the_ratios_of_single_oscillators() -> None:
+    c = coefficients(mass=10, c_1=1e7, b_1=200, beta_deg=0, c_2=4e6, b_2=300, alpha_deg=0, phi=0.3)
+    found = modes(c, 0.0, 0.0)
+    expected = sorted((300 / (2 * math.sqrt(4e7)), 200 / (2 * math.sqrt(1e8))))
+    assert sorted(mode.damping_ratio for mode in found) == pytest.approx(expected, rel=1e-12)

@@ -1,0 +1,106 @@
+"""Any case, rough ones too, by scipy's Runge-Kutta method with its events: a second program for the same motion.
+
+Only the contact integral is the project's own, by its exact evaluator, which has its own proof in test_contact.py.
+Constant speed and load.
+"""
+
+from functools import partial
+from itertools import count
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from brakecli.case.system import Setup
+from brakecli.solver import contact
+from brakecli.solver.compile import NORMAL_FORCE
+from brakecli.solver.contact.pad import build_contact
+
+Vector = NDArray[np.float64]
+
+
+class SolveIvp:
+    """The motion (x, y, vx, vy) of a case, phase by phase: slip either way, or stick."""
+
+    def __init__(self, setup: Setup, relative: float, max_step: float) -> None:
+        self.setup, self.relative, self.max_step = setup, relative, max_step
+        self.c, self.belt, self.q = setup.coefficients, setup.belt_speed, float(setup.load.values[0])
+        self.evaluate, self.pad, self.filled = contact.load("exact"), setup.pad, build_contact(setup.pad)
+        self.visited: list[int] = []
+        self.evaluations = 0
+
+    def normal(self, t: float, z: Vector) -> float:
+        """F_y."""
+        self.evaluations += 1
+        wheel = self.setup.wheel
+        angles = wheel.phase - wheel.omega * (self.belt * t)
+        self.evaluate(z[0], z[1], angles, self.pad, self.filled)
+        return float(self.filled[NORMAL_FORCE])
+
+    def against(self, z: Vector) -> tuple[float, float]:
+        """Forces of links and load."""
+        c, (x, y, v_x, v_y) = self.c, z
+        return (
+            c.b_xx * v_x + c.b_xy * v_y + c.c_xx * x + c.c_xy * y + self.q * c.sin_beta,
+            c.b_xy * v_x + c.b_yy * v_y + c.c_xy * x + c.c_yy * y + self.q * c.cos_beta,
+        )
+
+    def slope(self, side: int, t: float, z: Vector) -> list[float]:
+        """(6)-(7) in a phase."""
+        normal, (against_x, against_y) = self.normal(t, z), self.against(z)
+        pull = -side * self.c.phi * normal - against_x if side else 0.0
+        return [z[2], z[3], pull / self.c.m, (normal - against_y) / self.c.m]
+
+    def hold(self, t: float, z: Vector) -> int:
+        """The phase where the shoe moves with the wheel."""
+        needed = self.against(z)[0]
+        if abs(needed) <= self.c.phi * self.normal(t, z):
+            return 0
+        return -1 if needed > 0.0 else 1
+
+    def margins(self, side: int) -> list[Any]:
+        """Functions that fall through zero where a phase ends."""
+
+        def slides(t: float, z: Vector) -> float:
+            return float(side * (z[2] - self.belt))
+
+        def holds_back(t: float, z: Vector) -> float:
+            return self.c.phi * self.normal(t, z) - self.against(z)[0]
+
+        def holds_on(t: float, z: Vector) -> float:
+            return self.c.phi * self.normal(t, z) + self.against(z)[0]
+
+        events: list[Any] = [slides] if side else [holds_back, holds_on]
+        for event in events:
+            event.terminal, event.direction = True, -1
+        return events
+
+    def run(self, start: Vector, times: Vector) -> Vector:
+        """The motion at the times; the start slides."""
+        z, t, side, rows = start.copy(), 0.0, 1 if start[2] > self.belt else -1, [start]
+        for _ in count():
+            self.visited.append(side)
+            events = self.margins(side)
+            later = times[times > t]
+            size = np.abs(np.array(rows)).max(axis=0)
+            found = solve_ivp(
+                partial(self.slope, side),
+                (t, times[-1]),
+                z,
+                "DOP853",
+                later,
+                events=events,
+                rtol=self.relative,
+                atol=self.relative * size,
+                max_step=self.max_step,
+            )
+            rows += list(np.transpose(found.y))
+            if found.status == 0:
+                return np.array(rows)
+            hits, states = found.t_events or [], found.y_events or []
+            which = next(index for index, hit in enumerate(hits) if hit.size)
+            t, z = float(hits[which][0]), states[which][0].copy()
+            z[2] = self.belt
+            side = self.hold(t, z) if side else (-1 if which == 0 else 1)
+        raise AssertionError

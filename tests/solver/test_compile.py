@@ -1,0 +1,46 @@
+"""Compiling kernels, with a cache that works and with one that does not."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+COUNT = """
+import resource, signal
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+{limit}
+from brakecli.solver import friction
+from brakecli.solver import compile as kernels
+print(friction.minimise(1.0, 0.0, 1.0, 3.0, 0.0, 1.0, 0.0))
+print(kernels.cache_is_cold())
+"""
+
+
+def python(program: str, cache: Path) -> str:
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache), "NUMBA_DISABLE_JIT": "0"}
+    done = subprocess.run(
+        [sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True
+    )
+    return done.stdout
+
+
+def test_a_second_process_finds_the_machine_code_of_the_first(tmp_path: Path) -> None:
+    python(COUNT.format(limit=""), tmp_path)
+    stored = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.nbc")}
+    assert stored
+    python(COUNT.format(limit=""), tmp_path)
+    assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.nbc")} == stored
+
+
+@pytest.mark.parametrize("limit", ["", "resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))"])
+def test_kernels_compile_without_a_cache_where_the_disk_is_full(limit: str, tmp_path: Path) -> None:
+    out = python(COUNT.format(limit=limit), tmp_path)
+    assert out.splitlines()[0] == "(2.0, 0.0, 1.0)"
+
+
+def test_kernels_compile_where_no_cache_can_be_made(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("in the way")
+    out = python(COUNT.format(limit=""), tmp_path / "file")
+    assert out.splitlines() == ["(2.0, 0.0, 1.0)", "True"]

@@ -1,0 +1,432 @@
+"""The event-driven scheme against two independent references, exact solutions and identities."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from brakecli.analysis.stability.report import stability
+from brakecli.case.case import Case
+from brakecli.case.system import set_up
+from brakecli.runs.limits import check
+from brakecli.solver.compile import X
+from brakecli.solver.motion import Motion
+from brakecli.solver.quantities import ContactState, Failure
+from brakecli.solver.schemes.event_driven.dop853 import DENSE, END_STAGE, FIFTH, NODES, THIRD, A
+from brakecli.solver.schemes.event_driven.phases import EVENTS, EVENTS_TIME, SWITCHES
+from tests.examples import COULOMB, MODE_COUPLING, ROUGH, SQUEAL, Result, make, simulate
+from tests.solver.piecewise_exact import PiecewiseExact
+from tests.solver.solve_ivp_reference import SolveIvp
+
+STICK, SEPARATED = ContactState.STICK, ContactState.SEPARATED
+
+
+def event_driven(base: dict[str, Any], tolerance: float = 1e-10, **changes: Any) -> Case:
+    """A shared case by this scheme, sampled as it was."""
+    interval = base.get("output", {}).get("sample_interval", base["solver"]["step"])
+    changes = {"output__sample_interval": interval, **changes}
+    own = {"solver__scheme": "event-driven", "solver__tolerance": tolerance, "solver__step": None}
+    return make(base, **own, **changes)
+
+
+def error(rows: NDArray[np.float64], exact: NDArray[np.float64]) -> float:
+    """The largest deviation over the largest value, of the worst of x, y and their velocities."""
+    return float((np.abs(rows[:, :4] - exact[:, :4]).max(axis=0) / np.abs(exact[:, :4]).max(axis=0)).max())
+
+
+def flat_case(rng: np.random.Generator, tolerance: float) -> tuple[dict[str, Any], float]:
+    """A smooth shoe thrown onto the wheel, and a frequency ω (rad/s): stiffnesses are 0.1 to 10 times m ω²."""
+    omega, m, load = 10 ** rng.uniform(2, 3.5), 10 ** rng.uniform(-1, 2), 10 ** rng.uniform(2, 4)
+    c_1, c_2, k = (m * omega**2 * 10 ** rng.uniform(-1, 1) for _ in range(3))
+    b_1, b_2 = (m * omega * 10 ** rng.uniform(-3, -0.5) for _ in range(2))
+    size = load / (m * omega**2)
+    belt = float(rng.choice([-1, 1])) * size * omega * 10 ** rng.uniform(-2, 0.3)
+    return {
+        "shoe": {"mass": m},
+        "wheel": {"radius": 0.5, "angular_speed": 2.0 * belt},
+        "link1": {"stiffness": c_1, "damping": b_1, "angle_deg": rng.uniform(-60, 60)},
+        "link2": {"stiffness": c_2, "damping": b_2, "angle_deg": rng.uniform(-60, 60)},
+        "load": {"force": load},
+        "friction": {"coefficient": rng.uniform(0, 1.2)},
+        "contact": {"half_length": 0.05, "stiffness": k / 0.1},
+        "initial": {
+            "x": size * rng.normal(),
+            "y": -size * rng.uniform(0.1, 1),
+            "vx": size * omega * rng.normal(),
+            "vy": size * omega * rng.normal(),
+        },
+        "solver": {"scheme": "event-driven", "tolerance": tolerance, "duration": 30 / omega},
+        "output": {"sample_interval": 0.1 / omega},
+    }, omega
+
+
+def amplification(case: dict[str, Any], rows: NDArray[np.float64]) -> float:
+    """By how much the motion amplifies a disturbance of 1e-7 of any component at its start."""
+    sizes = dict(zip(("x", "y", "vx", "vy"), np.abs(rows[:, :4]).max(axis=0), strict=True))
+    disturbed = [
+        {**case, "initial": {**case["initial"], name: case["initial"][name] + 1e-7 * size}}
+        for name, size in sizes.items()
+    ]
+    return max(error(simulate(Case.model_validate(each)).rows, rows) for each in disturbed) / 1e-7
+
+
+def test_flat_motions_are_exact_through_stick_and_lift_off() -> None:
+    # A step errs by its rounding, about 1e-15 of the motion; 1e4 times that of some ten steps is 1e-10.
+    rng = np.random.default_rng(1)
+    kept = stuck = opened = both = 0
+    for _ in range(100):
+        case, omega = flat_case(rng, 1e-13)
+        result = simulate(Case.model_validate(case))
+        assert result.work.failure is Failure.NONE
+        if amplification(case, result.rows) > 1e4:
+            continue
+        reference = PiecewiseExact(set_up(Case.model_validate(case)), 0.05 / omega)
+        start = result.rows[0, :4]
+        exact = reference.run(start, *reference.first_phase(start), samples=len(result.rows) - 1, per_sample=2)
+        assert error(result.rows, exact) < 1e-10
+        sticks = any(side == 0 and touching for touching, side in reference.visited)
+        opens = any(not touching for touching, _ in reference.visited)
+        kept, stuck, opened, both = kept + 1, stuck + sticks, opened + opens, both + (sticks and opens)
+    assert kept == 100  # none amplifies that much
+    assert stuck >= 60
+    assert opened >= 80
+    assert both >= 50
+
+
+def test_overcritical_dashpots_leave_the_tolerance_between_steps() -> None:
+    """Steps at the limit of stability end where they should, but what they give in between is wrong by 3e-7."""
+    rng = np.random.default_rng(5)
+    for _ in range(60):
+        case, omega = flat_case(rng, 1e-10)
+        for link in ("link1", "link2"):
+            case[link]["damping"] = case["shoe"]["mass"] * omega * 10 ** rng.uniform(0.3, 1.7)
+        result = simulate(Case.model_validate(case))
+        reference = PiecewiseExact(set_up(Case.model_validate(case)), 0.005 / omega)
+        start = result.rows[0, :4]
+        exact = reference.run(start, *reference.first_phase(start), samples=len(result.rows) - 1, per_sample=20)
+        assert error(result.rows, exact) < 1e-10
+
+
+def rough_case(rng: np.random.Generator, tolerance: float) -> tuple[dict[str, Any], float]:
+    """A rough shoe on a rough wheel: amplitudes of a tenth to all of the compression, waves of 0.2 to 3 pads."""
+    case, omega = flat_case(rng, tolerance)
+    size = case["load"]["force"] / (case["shoe"]["mass"] * omega**2)
+    shortest = 2 * abs(case["wheel"]["angular_speed"] * 0.5) / omega  # passes in two radians of the motion
+    case["roughness"] = {}
+    for surface in ("shoe", "wheel"):
+        n = int(rng.integers(1, 3))
+        lengths = np.maximum(0.05 * 10 ** rng.uniform(-0.7, 0.5, n), shortest)
+        case["roughness"][surface] = {
+            "amplitudes": (size * rng.uniform(0.1, 0.6, n)).tolist(),
+            "wavelengths": lengths.tolist(),
+            "phases_deg": rng.uniform(0, 360, n).tolist(),
+        }
+    case["solver"]["duration"], case["output"]["sample_interval"] = 20 / omega, 0.2 / omega
+    return case, omega
+
+
+def test_rough_motions_agree_with_an_independent_solver() -> None:
+    # scipy's error estimate is blind to kinks at certain places of a step: its tolerance of 1e-12 alone leaves
+    # errors of up to 1e-8. A longest step of 0.003/ω bounds what a kink can do there.
+    rng = np.random.default_rng(5)
+    seen: set[float] = set()
+    partly = phases = 0
+    for _ in range(6):
+        case, omega = rough_case(rng, 1e-11)
+        result = simulate(Case.model_validate(case))
+        assert result.work.failure is Failure.NONE
+        assert amplification(case, result.rows) < 1e4
+        reference = SolveIvp(set_up(Case.model_validate(case)), 1e-13, 0.003 / omega)
+        exact = reference.run(result.rows[0, :4], result.time)
+        assert error(result.rows, exact) < 1e-9
+        seen |= set(result.state)
+        partly += int(np.sum((result.contact_fraction > 0.0) & (result.contact_fraction < 1.0)))
+        phases += len(reference.visited)
+    assert seen == {-1.0, 0.0, 1.0, 2.0}
+    assert partly > 200
+    assert phases > 30
+
+
+def test_the_error_falls_with_the_tolerance() -> None:
+    # Through stick and lift-off, against exact phases. The errors of all steps add up to about the tolerance.
+    rng = np.random.default_rng(2)
+    tolerances = 10.0 ** np.arange(-4, -12, -1)
+    worst = np.zeros(tolerances.size)
+    for _ in range(20):
+        case, omega = flat_case(rng, 1e-13)
+        for index, tolerance in enumerate(tolerances):
+            case["solver"]["tolerance"] = float(tolerance)
+            result = simulate(Case.model_validate(case))
+            if index == 0:
+                reference = PiecewiseExact(set_up(Case.model_validate(case)), 0.05 / omega)
+                start = result.rows[0, :4]
+                phase = reference.first_phase(start)
+                exact = reference.run(start, *phase, samples=len(result.rows) - 1, per_sample=2)
+            worst[index] = max(worst[index], error(result.rows, exact))
+    assert np.all(np.diff(worst) < 0)
+    assert np.all(worst < 10 * tolerances)  # motions that amplify what came before
+    assert np.polyfit(np.log(tolerances), np.log(worst), 1)[0] == pytest.approx(1.0, abs=0.15)
+
+
+def test_coulomb_oscillator_comes_to_its_exact_rest() -> None:
+    for tolerance in (1e-6, 1e-9, 1e-12):
+        result = simulate(event_driven(COULOMB, tolerance))
+        # x is up to 13.3; six half cycles of free vibration amplify nothing.
+        assert result.x[-1] == pytest.approx(0.6821789367236466, abs=13.3 * tolerance)
+        assert result.state[-1] == STICK
+        assert result.vx[-1] == 0.0
+
+
+def test_mode_coupling_grows_as_the_eigenvalues_say() -> None:
+    # The growing mode alone: stiffness [[2, 1/3], [-1, 2]] has the eigenvalue 2 - i/√3 with (1, -i√3), so
+    # x = A exp(γt) cos(ωt), y = √3 A exp(γt) sin(ωt). U is so high that nothing sticks; nothing opens.
+    growth, omega, a = 0.2020717687680948, 1.4285772641803685, 1e-3
+    start = {"initial__x": a, "initial__vx": a * growth, "initial__vy": a * omega * math.sqrt(3.0)}
+    result = simulate(event_driven(MODE_COUPLING, 1e-12, solver__duration=30.0, **start))
+    rest = simulate(event_driven(MODE_COUPLING, 1e-12, initial__x=0.0, solver__duration=0.01)).rows[0]
+    t, spiral = result.time, a * np.exp(growth * result.time)
+    assert result.contact_fraction.min() == 1.0
+    assert spiral[-1] > 400 * a
+    # The equilibrium is at about 200 m: rounding of 200 m, grown by 430, in x of up to 0.4 m.
+    grown = 430 * np.spacing(np.abs(rest[:2]).max())
+    np.testing.assert_allclose(result.x - rest[0], spiral * np.cos(omega * t), atol=100 * grown)
+    np.testing.assert_allclose(result.y - rest[1], math.sqrt(3.0) * spiral * np.sin(omega * t), atol=100 * grown)
+
+
+def test_the_energy_account_closes_to_the_tolerance() -> None:
+    closed = 0
+    for base, duration in ((SQUEAL, 0.1), (ROUGH, 0.004), (COULOMB, 60.0)):
+        for tolerance in (1e-6, 1e-9):
+            result = simulate(event_driven(base, tolerance, solver__duration=duration))
+            assert abs(result.energy.relative_closing_error) < 10 * tolerance
+            assert result.energy.scheme == 0.0
+            closed += 1
+    assert closed == 6
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_mirror_image_of_a_motion_is_a_motion(seed: int) -> None:
+    case, _ = flat_case(np.random.default_rng(seed), 1e-10)
+    mirrored = {**case, "wheel": {**case["wheel"], "angular_speed": -case["wheel"]["angular_speed"]}}
+    for link in ("link1", "link2"):
+        mirrored[link] = {**case[link], "angle_deg": -case[link]["angle_deg"]}
+    initial = case["initial"]
+    mirrored["initial"] = {**initial, "x": -initial["x"], "vx": -initial["vx"]}
+    one, other = (simulate(Case.model_validate(each)) for each in (case, mirrored))
+    np.testing.assert_array_equal(other.rows[:, [1, 3, 5, 6]], one.rows[:, [1, 3, 5, 6]])
+    np.testing.assert_array_equal(other.rows[:, [0, 2, 4]], -one.rows[:, [0, 2, 4]])
+
+
+def stick_from_the_start(**changes: Any) -> Result:
+    """A shoe pressed on so hard by so rough a friction that the wheel carries it along."""
+    base = {**SQUEAL, "friction": {"coefficient": 5.0}, "solver": {"step": 1e-5, "duration": 0.002}}
+    base["initial"] = {"y": -4e-4, "vx": 0.05, "x": -1e-4}
+    return simulate(event_driven(base, 1e-10, **changes))
+
+
+@pytest.mark.parametrize(("ramp", "speed"), [(1e-9, 20.0), (1e-8, 4.0), (1e-6, 20.0)])
+def test_a_wheel_that_turns_back_late_moves_the_shoe_as_one_that_does_so_early(ramp: float, speed: float) -> None:
+    """Its velocity at a time that is rounded to ε t is uncertain by 2 U ε t / ramp, 1e-6 m/s, were it taken."""
+
+    def after(start: float) -> NDArray[np.float64]:
+        wheel = {"radius": 0.5, "times": [start, start + ramp], "angular_speeds": [speed, -speed]}
+        base = {**SQUEAL, "wheel": wheel, "initial": {"at": "equilibrium"}, "output": {"sample_interval": 1e-3}}
+        case = event_driven(base, 1e-12, friction__coefficient=0.3, solver__duration=start + 0.05)
+        return simulate(case).rows[-50:]
+
+    assert error(after(0.7), after(0.01)) < 1e-10
+
+
+def test_a_stuck_shoe_moves_with_the_wheel_to_rounding() -> None:
+    result = stick_from_the_start()
+    assert set(result.state) == {STICK}
+    assert len(result.rows) == 21
+    assert np.all(result.vx == 0.05)
+    # The travel from -1e-4 m on: one rounding of a sum of at most 1e-4 m here, and one there.
+    assert np.abs(result.x - (0.05 * result.time - 1e-4)).max() <= 2 * np.spacing(1e-4)
+
+
+def test_a_stuck_shoe_follows_a_wheel_that_speeds_up() -> None:
+    speeds = {"angular_speed": None, "times": [0.0, 0.001], "angular_speeds": [0.1, 0.3]}
+    result = stick_from_the_start(**{f"wheel__{key}": value for key, value in speeds.items()})
+    assert set(result.state) == {STICK}
+    t = result.time
+    travel = np.where(t < 0.001, 0.05 * t + 50.0 * t**2, 1e-4 + 0.15 * (t - 0.001))
+    assert np.abs(result.x - (travel - 1e-4)).max() < 1e-18
+    np.testing.assert_allclose(result.vx, np.where(t < 0.001, 0.05 + 100.0 * t, 0.15), rtol=4e-16)
+
+
+def test_knots_of_the_schedules_end_a_step() -> None:
+    """A load and a speed that jump in slope within a sample: the same motion whatever is sampled."""
+    kinks = {
+        "wheel__angular_speed": None,
+        "wheel__times": [0.0101, 0.0203],
+        "wheel__angular_speeds": [0.1, 0.02],
+        "load__force": None,
+        "load__times": [0.0, 0.00707, 0.0150001],
+        "load__forces": [5000.0, 9000.0, 4000.0],
+    }
+    fine = simulate(event_driven(SQUEAL, 1e-12, solver__duration=0.03, output__sample_interval=1e-5, **kinks))
+    coarse = simulate(event_driven(SQUEAL, 1e-12, solver__duration=0.03, output__sample_interval=1e-3, **kinks))
+    assert error(coarse.rows, fine.rows[::100]) < 1e-11
+    assert {-1.0, 0.0} <= set(fine.state)
+    errors = []
+    for step in (2e-6, 1e-6, 5e-7):
+        layers = simulate(
+            make(
+                SQUEAL,
+                solver__duration=0.03,
+                solver__step=step,
+                output__sample_interval=1e-3,
+                **kinks,
+            )
+        )
+        errors.append(error(layers.rows, coarse.rows))
+    assert errors[2] < errors[1] < errors[0] < 1e-3
+
+
+def test_a_run_may_be_cut_into_blocks_anywhere() -> None:
+    whole = simulate(event_driven(SQUEAL, solver__duration=0.02))
+    motion = Motion(set_up(event_driven(SQUEAL, solver__duration=0.02)))
+    rows = [motion._block(stop) for stop in range(1, motion.setup.timing.steps + 1)]
+    np.testing.assert_array_equal(np.concatenate(rows), whole.rows[:-1])
+
+
+def test_samples_far_apart_end_where_close_ones_do() -> None:
+    # More steps than a call of the loop takes, between two samples; the motion does not depend on its samples.
+    close = simulate(event_driven(SQUEAL, 1e-12, solver__duration=0.4))
+    far = simulate(event_driven(SQUEAL, 1e-12, solver__duration=0.4, output__sample_interval=0.4))
+    assert far.work.steps > 1000
+    assert len(far.rows) == 2
+    assert error(far.rows, close.rows[[0, -1]]) < 1e-9
+
+
+def test_a_wheel_at_rest_holds_the_shoe() -> None:
+    base = {**SQUEAL, "wheel": {"radius": 0.5, "angular_speed": 0.0}, "initial": {"at": "equilibrium", "vx": 0.05}}
+    result = simulate(event_driven(base, 1e-10))
+    assert result.state[0] == ContactState.FORWARD_SLIP
+    assert set(result.state[-100:]) == {STICK}
+    assert np.all(result.vx[-100:] == 0.0)
+    assert np.ptp(result.x[-100:]) == 0.0
+
+
+def test_a_shoe_pulled_off_for_good_swings_freely() -> None:
+    base = {**COULOMB, "load": {"force": -5.0}, "initial": {"y": 0.5, "x": 1.0}}
+    result = simulate(event_driven(base, 1e-11, solver__duration=20.0))
+    assert set(result.state) == {SEPARATED}
+    assert result.work.contact_evaluations == 0
+    t = result.time  # m = c1 = c2 = 1: x = cos t, and y swings about 5
+    np.testing.assert_allclose(result.x, np.cos(t), atol=1e-10)
+    np.testing.assert_allclose(result.y, 5.0 - 4.5 * np.cos(t), atol=1e-10 * 9.5)
+    assert np.all(result.rows[:, 4:7] == 0.0)
+
+
+def test_a_shoe_without_springs_flies_and_lands() -> None:
+    # Thrown up with 3 m/s against a load of 2 N: y = 3 t - t² for 3 s. Then the contact alone, with ω² = 10, turns
+    # it about y = -0.2: y = -0.2 + 0.2 cos ωτ - 3/ω sin ωτ, until y = 0 at tan(ωτ/2) = -3/(0.2 ω).
+    base = {
+        **COULOMB,
+        "link1": {"stiffness": 0.0},
+        "link2": {"stiffness": 0.0},
+        "load": {"force": 2.0},
+        "initial": {"vy": 3.0},
+    }
+    result = simulate(event_driven(base, 1e-12, solver__duration=6.0, output__sample_interval=0.01))
+    t, omega = result.time, math.sqrt(10.0)
+    turned = 2.0 * (math.pi - math.atan(3.0 / (0.2 * omega))) / omega
+    since, again = t - 3.0, t - 3.0 - turned
+    landed = -0.2 + 0.2 * np.cos(omega * since) - 3.0 / omega * np.sin(omega * since)
+    exact = np.where(since < 0.0, 3.0 * t - t * t, np.where(again < 0.0, landed, 3.0 * again - again**2))
+    np.testing.assert_allclose(result.y, exact, atol=1e-11 * 2.25)
+    assert {float(SEPARATED), float(STICK)} == set(result.state)  # x rests on a wheel at rest
+
+
+def test_a_touch_that_only_grazes_ends() -> None:
+    # y = 5.5 + 5.5 cos t: the lowest point of each swing is the wheel itself, to rounding.
+    base = {**COULOMB, "load": {"force": -5.5}, "initial": {"y": 11.0, "x": 1.0}}
+    result = simulate(event_driven(base, 1e-12, solver__duration=60.0))
+    assert result.work.failure is Failure.NONE
+    np.testing.assert_allclose(result.y, 5.5 + 5.5 * np.cos(result.time), atol=1e-9)
+
+
+def test_rest_on_the_border_of_the_friction_cone_ends() -> None:
+    # The spring pulls with exactly what friction can hold: x = 1 at rest, from the start on.
+    base = {**COULOMB, "initial": {"at": "equilibrium", "x": 1.0}}
+    result = simulate(event_driven(base, 1e-12, solver__duration=10.0))
+    assert result.work.failure is Failure.NONE
+    assert np.abs(result.x - 1.0).max() <= 1e-12
+
+
+def test_steps_that_shrink_to_nothing_are_a_failure_with_a_name() -> None:
+    motion = Motion(set_up(event_driven(SQUEAL)))
+    motion.state[X] = math.nan  # no step from here has a known error
+    work, _ = motion.run(lambda rows: None)
+    assert work.failure is Failure.STALLED
+    assert "solver.tolerance" in work.failure.sentence
+
+
+def test_events_without_progress_are_a_failure_with_a_name() -> None:
+    motion = Motion(set_up(event_driven(SQUEAL)))
+    motion.state[[EVENTS, EVENTS_TIME]] = 1000.0, 1e9  # as if 1000 of them had come, and no time gone by
+    work, _ = motion.run(lambda rows: None)
+    assert work.failure is Failure.STALLED
+    assert work.steps > 0
+
+
+def test_phases_that_end_at_once_are_a_failure_with_a_name() -> None:
+    # At rest on a wheel at rest, as the load comes on: the coupling pulls harder than friction holds from 0 on.
+    case = event_driven(SQUEAL, wheel__angular_speed=0.0, friction__coefficient=0.1)
+    assert simulate(case).work.failure is Failure.NONE
+    motion = Motion(set_up(case))
+    motion.state[SWITCHES] = 60.0
+    work, _ = motion.run(lambda rows: None)
+    assert work.failure is Failure.STALLED
+    assert work.steps == 0
+
+
+def test_closed_form_that_does_not_hold_is_a_failure() -> None:
+    result = simulate(event_driven(ROUGH, 1e-6, contact__evaluator="closed-form", contact__nodes=None))
+    assert result.work.failure is Failure.NOT_CLOSED
+
+
+def test_no_step_limits_or_biases_the_scheme() -> None:
+    setup = set_up(event_driven(SQUEAL))
+    report = stability(setup)
+    assert report.critical is not None
+    assert report.discrete is not None
+    assert report.discrete.step_limit is None
+    assert report.discrete.bias == 0.0
+    assert report.discrete.critical_friction == report.critical.friction
+    assert report.discrete.growth == max(value.real for value in report.eigenvalues)
+    found = check(setup)
+    assert found.step is None
+    assert found.limits.growth == 1.0
+    assert found.warnings == ()
+    # A rough guess: within a factor of three.
+    assert found.steps == pytest.approx(simulate(event_driven(SQUEAL)).work.steps, rel=2.0)
+
+
+def test_the_tableau_meets_the_order_conditions_of_quadrature() -> None:
+    """Σ b c^q = 1/(q + 1) and Σ a = c; the errors of lower orders vanish below these; t^q is continued exactly."""
+    b = A[END_STAGE, :END_STAGE]
+    c = NODES[:END_STAGE]
+    for power in range(8):
+        assert b @ c**power == pytest.approx(1.0 / (power + 1), abs=2e-15)
+    np.testing.assert_allclose(A.sum(axis=1), NODES, atol=2e-15)
+    for weights, order in ((THIRD, 3), (FIFTH, 5)):
+        for power in range(order):
+            assert weights[:END_STAGE] @ c**power == pytest.approx(0.0, abs=2e-15)
+    # The continuous solution of y' = q t^(q-1) is t^q, up to its order.
+    for power in range(1, 8):
+        k = power * NODES ** (power - 1)
+        upper = DENSE @ k
+        for t in (0.2, 0.5, 0.9):
+            r = 1.0 - t
+            first, last = (1.0 if power == 1 else 0.0), float(power)
+            rows = [1.0, first - 1.0, 2.0 - (first + last), *upper]
+            value = 0.0
+            for p in range(6, -1, -1):
+                value = (value + rows[p]) * (t if p % 2 == 0 else r)
+            assert value == pytest.approx(t**power, abs=1e-13)

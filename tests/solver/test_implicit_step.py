@@ -1,0 +1,390 @@
+"""One implicit step: both iterations against the scalar equation that they solve, from soft to very stiff."""
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from brakecli.solver import contact
+from brakecli.solver.compile import (
+    A_11,
+    A_12,
+    A_22,
+    BELT,
+    D_SLOPE,
+    E_SLOPE,
+    F_Y,
+    G_1,
+    G_2,
+    GAIN,
+    NORMAL_FORCE,
+    PROBLEM_SIZE,
+    RESIDUAL,
+    SIDE,
+    STIFFNESS,
+    TANGENTIAL,
+    VALID,
+    X_0,
+    Y_0,
+    D,
+    E,
+)
+from brakecli.solver.contact.pad import SHOE_TERMS, build_contact, build_pad
+from brakecli.solver.friction import minimise
+from brakecli.solver.implicit_step import MOST, SOLVED, UNCONVERGED, fixed_point, newton
+from brakecli.solver.roughness import Surface, surface
+
+EPS = 2.0**-52
+A = 0.05
+FLAT = surface()
+
+
+class Step:
+    """The problem of one step on a pad, and the exact function F -> F_y(x(F), y(F))."""
+
+    def __init__(
+        self,
+        *,
+        k: float,
+        shoe: Surface = FLAT,
+        wheel: Surface = FLAT,
+        angles: NDArray[np.float64] | None = None,
+        evaluator: str = "exact",
+        phi: float = 0.3,
+        **entries: float,
+    ) -> None:
+        self.shoe, self.wheel, self.phi, self.k = shoe, wheel, phi, k
+        self.evaluate: Any = contact.load(evaluator)
+        self.pad = build_pad(k, A, shoe, wheel, 128)
+        self.contact = build_contact(self.pad)
+        self.angles = np.zeros(wheel.g.size) if angles is None else angles
+        self.problem = np.zeros(PROBLEM_SIZE)
+        places = {"a_11": A_11, "a_12": A_12, "a_22": A_22, "g_1": G_1, "g_2": G_2, "x_0": X_0, "y_0": Y_0}
+        places |= {"gain": GAIN, "belt": BELT, "guess": F_Y, "d": D, "e": E}
+        for name, value in entries.items():
+            self.problem[places[name]] = value
+        self.given = self.problem.copy()
+
+    @property
+    def crest(self) -> float:
+        return float(np.abs(self.shoe.g).sum() + np.abs(self.wheel.g).sum())
+
+    def force_at(self, force: float) -> float:
+        """F_y where the minimiser puts the shoe under the normal force `force`."""
+        p = self.given
+        d, e, _ = minimise(p[A_11], p[A_12], p[A_22], p[G_1], p[G_2] + force, self.phi * force, p[BELT])
+        filled = build_contact(self.pad)
+        self.evaluate(p[X_0] + p[GAIN] * d, p[Y_0] + p[GAIN] * e, self.angles, self.pad, filled)
+        return float(filled[NORMAL_FORCE])
+
+    def run(self, solve: Any = newton, most: int = MOST["newton"]) -> tuple[int, int, int]:
+        self.problem[:] = self.given
+        outcome: tuple[int, int, int] = solve(
+            self.evaluate, most, self.phi, self.angles, self.pad, self.problem, self.contact
+        )
+        return outcome
+
+    @property
+    def force(self) -> float:
+        return float(self.problem[F_Y])
+
+    def lipschitz(self) -> float:
+        """A bound of |dF_y/dF| on any branch: 2ak and the whole rise of the wheel under the pad."""
+        p = self.given
+        a = p[A_11] * p[A_22] - p[A_12] ** 2
+        d_slope = (abs(p[A_12]) + self.phi * p[A_22]) / a
+        e_slope = max((p[A_11] + self.phi * abs(p[A_12])) / a, 1 / p[A_22])
+        steep = min(
+            2 * float(np.abs(self.wheel.g).sum()) * 20, 2 * A * float(np.abs(self.wheel.g) @ self.wheel.omega)
+        )
+        return float(p[GAIN] * self.k * (2 * A * e_slope + steep * d_slope))
+
+    def noise(self) -> float:
+        """What rounding of the position and of the phases does to F_y: 2ak times that of the gap.
+
+        The phases are below 2 pi (a + |x|)/lambda + 2 pi: some 100 rad.
+        """
+        p = self.problem
+        y = abs(p[Y_0]) + abs(p[GAIN] * p[E])
+        x = abs(p[X_0]) + abs(p[GAIN] * p[D])
+        # d and e round with a11 a22 - a12², which loses less than two digits here.
+        steep = float(np.abs(self.wheel.g) @ self.wheel.omega)
+        return float(2 * A * self.k * EPS * (4 * y + 100 * self.crest + 4 * steep * x) * 4)
+
+    def tolerance(self) -> float:
+        """A solved step knows F to 1e-13: as a Newton correction, or as the width of the bracket."""
+        force = max(self.force, float(self.contact[NORMAL_FORCE]))
+        return 2e-13 * (1 + self.lipschitz()) * force + self.noise()
+
+
+def rough(rng: np.random.Generator, scale: float, most: int = 4) -> Surface:
+    n = int(rng.integers(0, most))
+    return surface(
+        (scale * rng.uniform(0.1, 1, n)).tolist(),
+        wavelengths=(10 ** rng.uniform(-2.3, -1, n)).tolist(),
+        phases_deg=rng.uniform(0, 360, n).tolist(),
+    )
+
+
+def random_steps(
+    seed: int, count: int, stiffness: tuple[float, float], coupling: float = 0.5, evaluator: str | None = None
+) -> Iterator[tuple[float, Step]]:
+    """Steps with gain 2ak/a22 between the powers of ten given, in and out of contact, and that ratio."""
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        scale = 10 ** rng.uniform(-9, -3)
+        shoe, wheel = rough(rng, scale), rough(rng, scale)
+        height = float(shoe.g.sum() + wheel.g.sum()) or scale
+        k, a_22 = 10 ** rng.uniform(2, 14), 10 ** rng.uniform(0, 8)
+        a_11 = a_22 * rng.uniform(0.5, 2)
+        ratio = 10 ** rng.uniform(*stiffness)
+        gain = ratio * a_22 / (2 * A * k)
+        push = height / gain  # the velocity that moves the shoe by the roughness's height
+        name = evaluator or str(rng.choice(["exact", "midpoint", "auto"]))
+        yield (
+            ratio,
+            Step(
+                k=k,
+                shoe=shoe,
+                wheel=wheel,
+                angles=rng.uniform(-6, 0, wheel.g.size),
+                evaluator=name if evaluator or shoe.g.size + wheel.g.size else "closed-form",
+                phi=float(rng.choice([0.0, 0.3, 1.0, 5.0])),
+                a_11=a_11,
+                a_22=a_22,
+                a_12=coupling * rng.uniform(-1, 1) * math.sqrt(a_11 * a_22),
+                gain=gain,
+                x_0=rng.uniform(-1e-3, 1e-3),
+                y_0=height * rng.uniform(-1.5, 1.0),
+                g_1=a_11 * push * rng.normal(),
+                g_2=a_22 * push * rng.normal(),
+                belt=push * rng.normal() * 10 ** rng.uniform(-2, 1),
+            ),
+        )
+
+
+@pytest.mark.parametrize("evaluator", ["closed-form", "midpoint", "exact", "auto"])
+def test_both_iterations_agree_where_both_converge(evaluator: str) -> None:
+    """The fixed point stops on changes of 1e-13 F; with a contraction below 0.8 it is within four of them."""
+    compared = 0
+    for _, step in random_steps(31, 400, (-4.0, 0.0), evaluator=evaluator):
+        contraction = step.lipschitz()
+        if contraction > 0.8:
+            continue
+        outcome, _, rising = step.run(newton)
+        by_newton, valid = step.force, step.contact[VALID]
+        paper, evaluations, _ = step.run(fixed_point, MOST["fixed-point"])
+        assert (outcome, rising, paper) == (SOLVED, 0, SOLVED)
+        assert evaluations <= 2 + math.log(1e-16) / math.log(max(contraction, 1e-16)) + 1 or step.noise() > 0
+        if evaluator == "closed-form" and not valid:
+            continue
+        compared += 1
+        tolerance = (1e-13 * max(by_newton, step.force) + step.noise()) / (1 - contraction)
+        assert step.force == pytest.approx(by_newton, rel=0, abs=2 * tolerance)
+    assert compared > 50
+
+
+@pytest.mark.parametrize("seed", [32, 33, 34])
+def test_newton_solves_every_step_from_any_guess(seed: int) -> None:
+    """A solution always exists: F_y >= 0 at F = 0, and as F grows either the shoe slips and is lifted off, or it
+    sticks (phi a22 > |a12|) and is lifted off. The residual at the answer is rounding.
+    """
+    rng, touching = np.random.default_rng(seed), 0
+    for _, step in random_steps(seed, 700, (-4.0, 4.0), coupling=0.95):
+        guess = 0.0 if rng.random() < 0.2 else 2 * A * step.k * step.crest * 10 ** rng.uniform(-3, 1)
+        step.given[F_Y] = guess
+        outcome, evaluations, _ = step.run()
+        assert outcome == SOLVED
+        assert evaluations < MOST["newton"]
+        assert step.force >= 0.0
+        residual = step.force_at(step.force) - step.force
+        assert abs(residual) <= step.tolerance()
+        assert step.problem[RESIDUAL] == residual
+        touching += step.force > 0.0
+    assert touching > 300
+
+
+@pytest.mark.parametrize(("off", "mean", "most"), [(1e-3, 2.7, 5), (0.25, 4.5, 12)])
+def test_newton_takes_few_evaluations_from_a_force_nearby(off: float, mean: float, most: int) -> None:
+    """As from the force of the step before. Above all it must not fall back to halving while it converges from one
+    side, which leaves the other side of the bracket where it was (22 to 28 evaluations then).
+    """
+    rng, taken = np.random.default_rng(35), []
+    for _, step in random_steps(35, 600, (-3.0, 3.7), coupling=0.1):
+        assert step.run()[0] == SOLVED
+        if step.force == 0.0:
+            continue
+        step.given[F_Y] = step.force * (1.0 + off * rng.uniform(-1, 1))
+        outcome, evaluations, _ = step.run()
+        assert outcome == SOLVED
+        taken.append(evaluations)
+    assert len(taken) > 200
+    assert np.mean(taken) < mean  # measured 2.6 and 4.0
+    assert np.percentile(taken, 99) <= most  # measured 4 and 10
+
+
+@pytest.mark.parametrize("ratio", [2.0, 10.0, 300.0, 5000.0])
+@pytest.mark.parametrize("phi", [0.0, 0.3, 5.0])
+def test_newton_converges_where_the_fixed_point_cannot(ratio: float, phi: float) -> None:
+    """A flat pad under a given approach: F = 2ak (depth - gain F/a22)+ with e's own part known, so that
+    F = 2ak depth/(1 + ratio). The paper's iteration multiplies an error by -ratio and jumps between two forces.
+    """
+    k, a_22 = 1e8, 1e6
+    gain, stiffness = ratio * a_22 / (2 * A * k), 2 * A * k
+    step = Step(k=k, phi=phi, a_11=1e6, a_22=a_22, gain=gain, y_0=-1e-5, evaluator="closed-form", guess=5.0)
+    outcome, evaluations, rising = step.run()
+    assert (outcome, rising) == (SOLVED, 0)
+    assert evaluations <= 3
+    assert step.force == pytest.approx(stiffness * 1e-5 / (1 + ratio), rel=1e-12)
+    assert abs(step.force_at(step.force) - step.force) <= step.tolerance()
+    outcome, evaluations, _ = step.run(fixed_point, MOST["fixed-point"])
+    assert (outcome, evaluations) == (UNCONVERGED, MOST["fixed-point"])
+    assert abs(step.problem[RESIDUAL]) > 0.1 * step.force  # and the residual tells how far off
+
+
+def test_a_fixed_point_that_fails_is_never_taken_for_solved() -> None:
+    outcomes = []
+    for _, step in random_steps(36, 500, (-1.0, 4.0)):
+        outcome, evaluations, _ = step.run(fixed_point, MOST["fixed-point"])
+        outcomes.append(outcome)
+        residual = abs(step.force_at(step.force) - step.force)
+        if outcome == SOLVED:
+            assert residual <= step.tolerance()
+        else:
+            assert outcome == UNCONVERGED
+            assert evaluations == MOST["fixed-point"]
+            assert abs(step.problem[RESIDUAL]) == residual > 0.0
+    assert 50 < outcomes.count(SOLVED) < 450
+
+
+@pytest.mark.parametrize("evaluator", ["closed-form", "midpoint", "exact", "auto"])
+@pytest.mark.parametrize("guess", [0.0, 1e-300, 1.0, 1e9])
+def test_an_open_contact_carries_nothing(evaluator: str, guess: float) -> None:
+    wheel = surface([1e-5], wavelengths=[0.02])
+    step = Step(
+        k=1e8, wheel=wheel, evaluator=evaluator, a_11=1e6, a_22=1e6, gain=1e-3, y_0=1.1e-5, guess=guess, g_1=3.0
+    )
+    outcome, evaluations, rising = step.run()
+    assert (outcome, rising, step.force, step.contact[NORMAL_FORCE]) == (SOLVED, 0, 0.0, 0.0)
+    assert evaluations <= 60
+    assert step.problem[D] == 3.0 / 1e6
+
+
+@pytest.mark.parametrize("evaluator", ["closed-form", "midpoint", "exact", "auto"])
+@pytest.mark.parametrize("solve", [newton, fixed_point])
+def test_a_shoe_that_just_touches_is_solved(evaluator: str, solve: Any) -> None:
+    """y at the edge of contact, and some units in the last place on either side of it."""
+    for ulps in range(-3, 4):
+        y = -1e-5 + ulps * math.ulp(1e-5)
+        step = Step(k=1e8, evaluator=evaluator, a_11=1e6, a_22=1e6, gain=0.05, y_0=y, g_2=1e-5 / 0.05 * 1e6)
+        outcome, _, _ = step.run(solve)
+        assert outcome == SOLVED
+        # The edge lies at e = 2e-4, whose rounding the contact turns into force.
+        assert 0.0 <= step.force <= 2 * A * 1e8 * 8 * math.ulp(1e-5)
+
+
+def test_a_stuck_shoe_moves_with_the_wheel_exactly() -> None:
+    stuck = 0
+    for _, step in random_steps(37, 300, (-2.0, 3.0)):
+        for solve, most in ((newton, 100), (fixed_point, 500)):
+            if step.run(solve, most)[0] == SOLVED and step.problem[SIDE] == 0.0:
+                stuck += 1
+                assert step.problem[D] == step.given[BELT]
+    assert stuck > 30
+
+
+def test_an_explicit_scheme_evaluates_the_contact_once() -> None:
+    checked = 0
+    for _, step in random_steps(38, 50, (-2.0, 3.0)):
+        step.given[GAIN] = 0.0
+        step.given[F_Y] = 123.0
+        assert step.run() == (SOLVED, 1, 0)
+        by_newton = step.problem[[D, E, F_Y, SIDE]].copy()
+        assert step.force == step.contact[NORMAL_FORCE] == step.force_at(0.0)
+        assert step.run(fixed_point, 500)[0] == SOLVED
+        np.testing.assert_array_equal(step.problem[[D, E, F_Y, SIDE]], by_newton)
+        checked += 1
+    assert checked == 50
+
+
+# --- a wedge: the friction force presses the shoe on -----------------------------------------------------------
+
+
+def wedge(guess: float, y_0: float) -> Step:
+    """A flat pad on which more force means more depth while the shoe slips forwards: phi |a12| > a11, as in
+    Painleve's paradox. With F it sinks, y = y0 + 1.42e-4 - 1.26e-5 F, until it sticks: from 9.1 N, which is
+    g1 a22/(phi a22 - |a12|), on; then y = y0 + 3e-6 F.
+    """
+    return Step(
+        k=1e8,
+        phi=2.0,
+        a_11=1e6,
+        a_12=-0.9e6,
+        a_22=1e6,
+        gain=3.0,
+        y_0=y_0,
+        g_1=10.0,
+        evaluator="closed-form",
+        guess=guess,
+    )
+
+
+@pytest.mark.parametrize("guess", [0.0, 0.1, 1.0, 5.0, 9.0, 9.2, 100.0, 1e9])
+def test_a_wedge_is_told_and_does_not_hang(guess: float) -> None:
+    step = wedge(guess, y_0=-1.5e-4)  # touching at F = 0 already: only stick holds
+    p = step.given
+    a = p[A_11] * p[A_22] - p[A_12] ** 2
+    assert p[GAIN] * 2 * A * step.k * (step.phi * abs(p[A_12]) - p[A_11]) / a > 1.0
+    outcome, evaluations, rising = step.run()
+    assert outcome == SOLVED
+    assert evaluations <= 60
+    assert step.problem[SIDE] == 0.0
+    assert step.force == pytest.approx(1e7 * 1.5e-4 / (1 + 1e7 * 3e-6), rel=1e-12)
+    if guess < 9.0909:
+        assert rising > 0
+
+
+def test_a_wedge_has_three_solutions_of_which_one_is_found() -> None:
+    """Just above the wheel the shoe may fly past, F = 0, or catch on it: r has three roots on F >= 0."""
+    step = wedge(0.0, y_0=-1.2e-4)
+    forces = np.linspace(0.0, 100.0, 10001)
+    residuals = np.array([step.force_at(f) - f for f in forces])
+    roots = 1 + int(np.count_nonzero(np.diff(residuals[1:] > 0)))  # F = 0 is one of them
+    assert (residuals[0], roots) == (0.0, 3)
+    found, risen = set(), 0
+    for guess in (0.0, 1.0, 1.75, 3.0, 50.0, 1e3, 1e6):
+        step.given[F_Y] = guess
+        outcome, _, rising = step.run()
+        assert outcome == SOLVED
+        assert abs(step.force_at(step.force) - step.force) <= step.tolerance()
+        found.add(round(step.force, 6))
+        risen += rising
+    assert found == {0.0, round(1200 / 31, 6)}  # never the unstable one between them
+    assert risen > 0
+
+
+def test_the_reported_slope_is_the_residual_s_derivative() -> None:
+    """Newton's slope from D_SLOPE, E_SLOPE and the contact's derivatives, against differences along F."""
+    compared = 0
+    for _, step in random_steps(39, 200, (-2.0, 1.0), evaluator="exact"):
+        if step.run()[0] != SOLVED or step.force == 0.0:
+            continue
+        p, c = step.problem, step.contact
+        slope = p[GAIN] * (c[TANGENTIAL] * p[D_SLOPE] - c[STIFFNESS] * p[E_SLOPE])
+        eta = 1e-5 * step.force
+        sides = [step.force_at(step.force + s * eta) for s in (-1.0, 0.0, 1.0)]
+        backward, forward = (sides[1] - sides[0]) / eta, (sides[2] - sides[1]) / eta
+        # Where the two one-sided quotients agree there is no kink nearby, and they bound the derivative.
+        spread = abs(forward - backward)
+        if spread > 1e-3 * abs(slope):
+            continue
+        compared += 1
+        assert 0.5 * (forward + backward) == pytest.approx(slope, rel=0, abs=spread + step.noise() / eta)
+    assert compared > 50
+
+
+def test_pads_count_their_waves() -> None:
+    assert build_pad(1.0, A, surface([1e-6], wavelengths=[0.1]), FLAT, 0)[SHOE_TERMS] == 1

@@ -1,0 +1,277 @@
+"""What a run does whatever the case: samples, blocks, symmetry, iterations, extremes."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from brakecli.analysis.stability.discrete import step_limits
+from brakecli.case.system import set_up
+from brakecli.solver import motion as simulation
+from brakecli.solver.motion import Motion
+from brakecli.solver.quantities import Failure
+from tests.examples import COULOMB, MODE_COUPLING, ROUGH, SQUEAL, make, simulate
+
+SCHEMES = [("two-layer", (0.5, 0.5)), ("three-layer", (0.25, 0.5, 0.25))]
+
+
+@pytest.mark.parametrize(("scheme", "theta"), SCHEMES)
+def test_cutting_a_run_into_blocks_changes_no_bit(
+    scheme: str, theta: tuple[float, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    case = make(ROUGH, solver__scheme=scheme, solver__theta=theta, wheel__angular_speed=0.2)
+    whole = simulate(case)
+    monkeypatch.setattr(simulation, "BLOCK_SECONDS", 0.0)  # blocks of one step after the first
+    pieces = simulate(case)
+    assert np.array_equal(whole.rows, pieces.rows)
+    assert whole.energy == pieces.energy
+    assert len(whole.rows) == 201
+
+
+@pytest.mark.parametrize(("scheme", "theta"), SCHEMES)
+@pytest.mark.parametrize("per_sample", [1, 3, 10])
+def test_samples_do_not_depend_on_how_many_steps_lie_between_them(
+    scheme: str, theta: tuple[float, ...], per_sample: int
+) -> None:
+    fine = simulate(make(SQUEAL, solver__scheme=scheme, solver__theta=theta, output__sample_interval=1e-5))
+    coarse = simulate(
+        make(
+            SQUEAL,
+            solver__scheme=scheme,
+            solver__theta=theta,
+            output__sample_interval=per_sample * 1e-5,
+            solver__duration=0.09,
+        )
+    )
+    assert len(coarse.rows) == 9000 // per_sample + 1
+    # The steps differ by the rounding of the interval's quotient only.
+    assert np.allclose(coarse.rows[:100], fine.rows[::per_sample][:100], rtol=1e-9, atol=1e-14)
+
+
+@pytest.mark.parametrize(("scheme", "theta"), SCHEMES)
+@pytest.mark.parametrize("base", [SQUEAL, ROUGH])
+def test_a_wheel_that_turns_the_other_way_gives_the_mirror_image(
+    scheme: str, theta: tuple[float, ...], base: dict[str, Any]
+) -> None:
+    changes: dict[str, Any] = {"solver__scheme": scheme, "solver__theta": theta, "wheel__angular_speed": 0.2}
+    forwards = simulate(make(base, **changes))
+    angles = {f"{link}__angle_deg": -base[link].get("angle_deg", 0.0) for link in ("link1", "link2")}
+    rough = base.get("roughness", {})
+    mirrored = {  # sin(-ωξ) = -sin(ωξ): a phase of 180° keeps the profile's mirror image
+        f"roughness__{name}": {**profile, "phases_deg": [180.0] * len(profile["amplitudes"])}
+        for name, profile in rough.items()
+    }
+    backwards = simulate(make(base, **{**changes, "wheel__angular_speed": -0.2}, **angles, **mirrored))
+    signs = np.array([-1.0, 1.0, -1.0, 1.0, -1.0, 1.0, 1.0, 1.0])
+    assert np.allclose(backwards.rows[:, :7], (forwards.rows * signs)[:, :7], rtol=1e-6, atol=1e-9)
+    slip = forwards.state < 2
+    assert np.mean(backwards.state[slip] == -forwards.state[slip]) > 0.999
+
+
+@pytest.mark.parametrize(("scheme", "theta"), SCHEMES)
+def test_both_iterations_give_the_same_history(scheme: str, theta: tuple[float, ...]) -> None:
+    changes: dict[str, Any] = {"solver__scheme": scheme, "solver__theta": theta, "wheel__angular_speed": 0.2}
+    newton = simulate(make(ROUGH, **changes))
+    paper = simulate(make(ROUGH, solver__iteration="fixed-point", **changes))
+    scale = np.abs(newton.rows).max(axis=0)
+    # Each step is solved to 1e-13 of its force; 2000 steps of a motion that does not amplify keep within 1e-9.
+    assert np.all(np.abs(newton.rows - paper.rows).max(axis=0)[:6] <= 1e-9 * scale[:6])
+    assert paper.work.contact_evaluations > newton.work.contact_evaluations
+
+
+def test_a_run_that_the_fixed_point_cannot_solve_says_so() -> None:
+    case = make(SQUEAL, contact__stiffness=1e14, solver__iteration="fixed-point")
+    limits = step_limits(*_limits_of(case))
+    assert limits.contraction > 1.0
+    work = simulate(case).work
+    assert work.failure is Failure.UNCONVERGED
+    assert work.unconverged_steps == 1
+    assert work.unconverged.shape == (1, 2)
+    assert simulate(make(SQUEAL, contact__stiffness=1e14)).work.failure is Failure.NONE
+
+
+def _limits_of(case: Any) -> Any:
+    setup = set_up(case)
+    return setup.coefficients, setup.weights, setup.scheme, setup.contact_stiffness, setup.wheel
+
+
+@pytest.mark.parametrize("number", [2.0, 50.0, 5000.0])
+@pytest.mark.parametrize(("scheme", "theta"), SCHEMES)
+def test_newton_solves_contacts_far_too_stiff_for_the_fixed_point(
+    scheme: str, theta: tuple[float, ...], number: float
+) -> None:
+    weight = 0.25 if scheme == "two-layer" else 0.5  # θ1 θ2, or 2 θ1 · ½
+    stiffness = number * 10.0 / (weight * 1e-10) / 0.1
+    case = make(SQUEAL, solver__scheme=scheme, solver__theta=theta, contact__stiffness=stiffness)
+    result = simulate(case)
+    assert result.work.unconverged_steps == 0
+    assert result.work.most_evaluations <= 8
+    # Every step is solved; that a step is too long for the bounces shows in the account, and is named.
+    closes = abs(result.energy.relative_closing_error) < 0.1
+    assert result.work.failure is (Failure.NONE if closes else Failure.UNBALANCED)
+    assert closes or scheme == "three-layer"
+
+
+@pytest.mark.parametrize("stiffness", [1.0, 1e4, 1e8, 1e12, 1e16])
+@pytest.mark.parametrize("phi", [0.0, 0.5, 5.0])
+@pytest.mark.parametrize("base", [SQUEAL, ROUGH])
+def test_any_stiffness_and_friction_end_in_a_solution_or_a_named_failure(
+    base: dict[str, Any], phi: float, stiffness: float
+) -> None:
+    case = make(base, contact__stiffness=stiffness, friction__coefficient=phi, solver__duration=0.005)
+    result = simulate(case)
+    assert np.all(np.isfinite(result.rows))
+    assert np.all(result.normal_force >= 0.0)
+    assert np.all(np.abs(result.friction_force) <= phi * result.normal_force * (1.0 + 1e-12))
+    if result.work.failure is Failure.NONE:
+        assert result.work.unconverged_steps == 0
+        assert len(result.rows) == 51
+    else:
+        assert result.work.failure is Failure.UNBALANCED
+
+
+@pytest.mark.parametrize("alpha", [-90.0, 0.0, 90.0])
+@pytest.mark.parametrize("beta", [-90.0, 0.0, 90.0])
+def test_links_at_right_angles_do_not_couple_the_directions(alpha: float, beta: float) -> None:
+    case = make(SQUEAL, link1__angle_deg=beta, link2__angle_deg=alpha, friction__coefficient=0.0)
+    result = simulate(case)
+    assert set_up(case).coefficients.c_xy == 0.0
+    assert np.all(np.isfinite(result.rows))
+    if beta == 0.0:  # the load acts along y alone
+        assert np.all(result.x == 0.0)
+    else:
+        assert np.all(result.y == 0.0)
+
+
+@pytest.mark.parametrize("speed", [0.0, 1e-9, -1.0, 2e3])
+def test_any_speed_of_the_wheel_is_computed(speed: float) -> None:
+    result = simulate(make(ROUGH, wheel__angular_speed=speed, solver__duration=0.005))
+    assert result.work.failure is Failure.NONE
+    assert np.all(np.isfinite(result.rows))
+
+
+@pytest.mark.parametrize(("scheme", "theta"), SCHEMES)
+def test_steady_sliding_stays_where_it_is(scheme: str, theta: tuple[float, ...]) -> None:
+    case = make(
+        SQUEAL, initial__at="equilibrium", friction__coefficient=0.3, solver__scheme=scheme, solver__theta=theta
+    )
+    result = simulate(case)
+    assert np.ptp(result.x) < 1e-12 * abs(result.x[0])
+    assert result.friction_force == pytest.approx(0.3 * result.normal_force, rel=1e-12)
+
+
+@pytest.mark.parametrize("step", [1e-5, 5e-6, 2.5e-6])
+def test_three_layer_scheme_tells_stick_by_its_cycles_not_by_its_flicker(step: float) -> None:
+    changes: dict[str, Any] = {
+        "solver__step": step,
+        "solver__duration": 0.4,
+        "output__sample_interval": 2e-5,
+        "friction__coefficient": 0.7,
+    }
+    fractions, episodes = [], []
+    for scheme, theta in SCHEMES:
+        result = simulate(make(SQUEAL, solver__scheme=scheme, solver__theta=theta, **changes))
+        stick = result.state[result.time > 0.2] == 0
+        fractions.append(stick.mean())
+        episodes.append(np.sum(stick[1:] & ~stick[:-1]))
+    assert episodes[0] == episodes[1] == 35  # once in each of the cycles of 0.2 s at 174 Hz
+    # Stick is taken to begin within h φF/m of the wheel's speed: some steps early, in a cycle of 575 h/1e-5.
+    assert fractions[1] == pytest.approx(fractions[0], abs=4.0 * step * 174.0 + 0.002)
+
+
+@pytest.mark.parametrize(("scheme", "theta"), SCHEMES)
+def test_friction_force_does_not_zigzag_in_stick(scheme: str, theta: tuple[float, ...]) -> None:
+    result = simulate(
+        make(SQUEAL, solver__scheme=scheme, solver__theta=theta, friction__coefficient=0.7,
+             output__sample_interval=1e-5, solver__duration=0.2)
+    )  # fmt: skip
+    stick = (result.state == 0) & (result.time > 0.1)
+    inside = stick[2:] & stick[1:-1] & stick[:-2]
+    second = np.abs(np.diff(result.friction_force, 2))[inside]
+    assert second.size > 100
+    # A smooth force changes its slope by ω²h²F a step: (1100 · 1e-5)² of 600 N is 0.07 N.
+    assert second.max() < 0.2
+
+
+def test_load_and_speed_schedules_act_at_their_times() -> None:
+    # A free mass without links: the load decides ÿ, and the open contact nothing.
+    case = make(
+        {
+            **COULOMB,
+            "initial": {"y": 1.0},
+            "link1": {"stiffness": 0.0},
+            "link2": {"stiffness": 0.0},
+            "load": {"times": [1.0, 2.0], "forces": [0.0, -1.0]},
+            "solver": {"step": 0.01, "duration": 3.0},
+        }
+    )
+    result = simulate(case)
+    t = result.time
+    exact = 1.0 + np.where(
+        t < 1.0, 0.0, np.where(t < 2.0, (t - 1.0) ** 3 / 6.0, 1 / 6 + (t - 2.0) / 2 + (t - 2) ** 2 / 2)
+    )
+    assert np.abs(result.y - exact).max() < 0.01**2 * 2.0  # the trapezoidal rule's h²/12 ∫|Q''| and its knots
+
+
+def test_an_unstable_scheme_is_known_by_its_amplification() -> None:
+    for step, stable in ((1.9, True), (2.1, False)):  # explicit three-layer: ωh < 2, with ω² = 3 at most here
+        case = make(
+            MODE_COUPLING, solver__scheme="three-layer", solver__theta=(0.0, 1.0, 0.0), friction__coefficient=0.0,
+            solver__step=step / np.sqrt(3.0),
+        )  # fmt: skip
+        assert (step_limits(*_limits_of(case)).growth < 1.0 + 1e-9) == stable
+    for step, stable in ((2.4, True), (2.5, False)):  # weights of Numerov: ωh < √6
+        case = make(
+            MODE_COUPLING, solver__scheme="three-layer", solver__theta=(1 / 12, 10 / 12, 1 / 12),
+            friction__coefficient=0.0, solver__step=step / np.sqrt(3.0),
+        )  # fmt: skip
+        assert (step_limits(*_limits_of(case)).growth < 1.0 + 1e-9) == stable
+
+
+def test_motion_that_blows_up_is_named() -> None:
+    case = make(MODE_COUPLING, solver__scheme="three-layer", solver__theta=(0.0, 1.0, 0.0), solver__step=1.5,
+                solver__duration=3000.0)  # fmt: skip
+    result = simulate(case)
+    assert result.work.failure is Failure.DIVERGED
+    assert np.all(np.isfinite(result.rows))
+
+
+def test_closed_form_refuses_a_pad_that_may_open() -> None:
+    work = simulate(make(ROUGH, contact__evaluator="closed-form")).work
+    assert work.failure is Failure.NOT_CLOSED
+
+
+def test_auto_takes_the_closed_form_where_the_pad_touches_and_says_so() -> None:
+    work = simulate(make(ROUGH, load__force=5000.0, solver__duration=0.2)).work
+    assert set(work.evaluators) == {"closed-form", "midpoint"}
+    assert sum(work.evaluators.values()) == work.steps
+    assert simulate(make(SQUEAL)).work.evaluators == {"closed-form": 10000}
+
+
+def test_a_run_keeps_no_more_than_a_block_in_memory() -> None:
+    motion = Motion(set_up(make(SQUEAL, solver__duration=10.0, output__sample_interval=1e-5)))
+    sizes: list[int] = []
+    motion.run(lambda rows: sizes.append(len(rows)))
+    assert sum(sizes) == 10**6 + 1
+    assert max(sizes) <= simulation.BLOCK_ROWS
+
+
+def test_a_shoe_that_sticks_to_a_slowing_wheel_sticks_at_every_sample() -> None:
+    # A free shoe on a slowing wheel: only friction holds it, and it holds. U at a sample and U in the step
+    # before it are rounded apart.
+    case = make(
+        {
+            **COULOMB,
+            "link1": {"stiffness": 0.0},
+            "link2": {"stiffness": 0.0},
+            "wheel": {"radius": 0.3, "times": [0.0, 7.3], "angular_speeds": [1.7, 0.1]},
+            "initial": {"y": -1.1, "vx": 1.7 * 0.3},
+            "solver": {"step": 0.003, "duration": 6.0},
+            "output": {"sample_interval": 0.021},
+        }
+    )
+    result = simulate(case)
+    assert np.all(result.state == 0)
+    slope = 0.3 * (0.1 - 1.7) / 7.3
+    assert result.friction_force == pytest.approx(slope, rel=1e-12)  # m dU/dt, with m = 1 kg
+    assert np.abs(result.vx - (0.51 + slope * result.time)).max() < 1e-14

@@ -1,0 +1,312 @@
+"""Critical values by the growth of small disturbances, held against eigenvalues and closed forms."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from brakecli.analysis.stability.discrete import natural_frequencies
+from brakecli.analysis.stability.modes import growth as eigenvalue_growth
+from brakecli.analysis.stability.report import stability
+from brakecli.case.case import Case
+from brakecli.case.system import set_up
+from brakecli.sweeps.critical import Outcome, Search, search
+from brakecli.sweeps.growth import growth, sliding
+from brakecli.sweeps.point import _verdict as judge
+from brakecli.sweeps.tables import Critical, Method
+from tests.analysis.test_regime_table import random_case
+from tests.examples import MODE_COUPLING, ROUGH, SQUEAL, make
+
+WAVES = {"amplitudes": [1e-6, 7e-7], "wavelengths": [0.02, 0.011]}
+
+
+def found(
+    tables: dict[str, Any], lower: float, upper: float, key: str = "friction__coefficient", **changes: Any
+) -> Search:
+    """Search along a key of the case; `changes` are keys of [critical], or, as table__key, of the case."""
+    search_keys = {name: value for name, value in changes.items() if "__" not in name}
+    case_keys = {name: value for name, value in changes.items() if "__" in name}
+    critical = Critical(parameter=key.replace("__", "."), lower=lower, upper=upper, **search_keys)
+
+    def case_at(value: float) -> Case:
+        return make(tables, **{**case_keys, key: value})
+
+    return search(critical, case_at, judge)
+
+
+def rates(case: Case) -> tuple[float, float]:
+    """Growth rate by neighbouring runs and by eigenvalues, 1/s."""
+    steady = sliding(case)
+    assert steady is not None
+    measured = growth(steady)
+    assert measured is not None
+    return measured.rate, eigenvalue_growth(steady.setup.coefficients, steady.stiffness, steady.grip)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3, 0.57, 0.58, 0.9])
+@pytest.mark.parametrize("scheme", ["two-layer", "three-layer"])
+def test_growth_of_differences_is_that_of_the_eigenvalues(friction: float, scheme: str) -> None:
+    case = make(SQUEAL, friction__coefficient=friction, solver__step=2e-6, solver__scheme=scheme)
+    by_runs, by_eigenvalues = rates(case)
+    # Both schemes are of second order: relative error (ωh)²/12 of ω and likewise of the growth, ω = 6900 1/s here;
+    # times 10, as growth is a small difference of larger rates.
+    assert by_runs == pytest.approx(by_eigenvalues, abs=10.0 * (6900.0 * 2e-6) ** 2 / 12.0 * 50.0)
+
+
+@pytest.mark.parametrize("start", ["consistent", "paper"])
+def test_growth_does_not_depend_on_the_start_of_the_scheme(start: str) -> None:
+    by_runs, by_eigenvalues = rates(
+        make(SQUEAL, solver__scheme="three-layer", solver__start=start, solver__step=2e-6)
+    )
+    assert by_runs == pytest.approx(by_eigenvalues, rel=1e-3)
+
+
+def test_growth_on_a_wheel_that_turns_backwards_is_that_of_the_mirror_image() -> None:
+    forward = rates(make(SQUEAL))[0]
+    changes = {"wheel__angular_speed": -0.1, "link2__angle_deg": -5.0}
+    assert rates(make(SQUEAL, **changes))[0] == pytest.approx(forward, rel=1e-6)
+
+
+def test_roughness_in_full_contact_does_not_change_the_growth_of_disturbances() -> None:
+    flat = rates(make(SQUEAL))[0]
+    rough = rates(make(SQUEAL, roughness__shoe=WAVES, roughness__wheel=WAVES))[0]
+    # Differences of runs are linear to DISTURBANCE; what is left is the rounding of runs, 1e-9 of them over 30 ms.
+    assert rough == pytest.approx(flat, abs=1e-3)
+
+
+def test_strong_dashpots_that_hide_modes_within_rounding_do_not_hide_the_growth() -> None:
+    case = make(SQUEAL, link1__damping=3e4, link2__damping=1e3, friction__coefficient=0.2)
+    by_runs, by_eigenvalues = rates(case)
+    assert by_runs == pytest.approx(by_eigenvalues, rel=1e-2)
+
+
+def test_an_unstable_shoe_on_open_surfaces_is_not_measured_on_its_limit_cycle() -> None:
+    """The contact is softer by a tenth; growth by the mean stiffness is right to some per cent away from zero."""
+    case = make(
+        SQUEAL,
+        load__force=50.0,
+        wheel__angular_speed=4.0,
+        link2__angle_deg=20.0,
+        friction__coefficient=3.125,
+        roughness__shoe={"amplitudes": [2e-6, 1e-6], "wavelengths": [0.020, 0.011]},
+        roughness__wheel={"amplitudes": [4e-6, 2e-6], "wavelengths": [0.030, 0.017]},
+        solver__step=2e-5,
+        solver__duration=0.5,
+        output__sample_interval=2e-4,
+    )
+    by_runs, by_eigenvalues = rates(case)
+    assert by_runs == pytest.approx(by_eigenvalues, rel=0.1)
+
+
+def test_the_speed_and_the_load_of_the_start_are_held() -> None:
+    moving = make(
+        SQUEAL,
+        wheel__angular_speed=None,
+        wheel__times=[0.0, 0.01],
+        wheel__angular_speeds=[0.1, 5.0],
+        load__force=None,
+        load__times=[0.0, 0.01],
+        load__forces=[5000.0, 100.0],
+    )
+    assert rates(moving)[0] == rates(make(SQUEAL))[0]
+
+
+def test_no_steady_sliding_has_no_growth() -> None:
+    assert sliding(make(SQUEAL, wheel__angular_speed=0.0)) is None
+    assert sliding(make(SQUEAL, load__force=-5000.0)) is None
+
+
+def test_the_critical_friction_of_20_random_flat_damped_shoes_is_bracketed() -> None:
+    rng = np.random.default_rng(5)
+    tried = 0
+    while tried < 20:
+        tables = random_case(rng)
+        exact = stability(set_up(make(tables))).critical
+        if exact is None or exact.friction > 3.0:
+            continue
+        setup = set_up(make(tables))
+        fast = natural_frequencies(setup.coefficients, setup.contact_stiffness)[1]
+        tables["solver"] = {"step": 1.0 / (100.0 * fast), "duration": 50.0 / fast}
+        tolerance = 1e-3 * exact.friction
+        answer = found(tables, 0.0, rng.uniform(1.3, 3.0) * exact.friction, tolerance=tolerance)
+        assert answer.outcome is Outcome.FOUND
+        assert answer.value is not None
+        assert answer.lower is not None
+        assert answer.upper is not None
+        assert answer.error is not None
+        assert answer.lower <= exact.friction <= answer.upper, tables
+        assert answer.upper - answer.lower <= tolerance
+        assert abs(answer.value - exact.friction) <= answer.error
+        assert answer.eigenvalue == exact.friction
+        tried += 1
+
+
+def test_without_dashpots_flutter_is_found_though_nothing_decays_below_it() -> None:
+    answer = found(MODE_COUPLING, 0.0, 2.0, tolerance=1e-4, solver__duration=5.0)
+    assert answer.value == pytest.approx(0.75, abs=1e-4)
+    assert answer.eigenvalue == pytest.approx(0.75, abs=1e-12)
+
+
+def test_the_error_bar_holds_the_bias_of_the_scheme() -> None:
+    answer = found(
+        MODE_COUPLING, 0.0, 2.0, solver__theta=[1.0, 1.0], solver__step=0.1, output__sample_interval=0.1
+    )
+    assert answer.value == pytest.approx(0.8115433, abs=1e-3)  # what the amplification matrix gives for this step
+    assert answer.bias == pytest.approx(0.8115433 - 0.75, abs=1e-6)
+    assert answer.value is not None
+    assert answer.error is not None
+    assert abs(answer.value - 0.75) <= answer.error
+
+
+def test_divergence_is_found_where_steady_sliding_ends() -> None:
+    tables = {**SQUEAL, "link2": {**SQUEAL["link2"], "angle_deg": -30.0}}
+    exact = stability(set_up(make(tables))).critical
+    assert exact is not None
+    assert exact.instability == "divergence"
+    answer = found(tables, 0.0, 1.5 * exact.friction, tolerance=1e-3)
+    assert answer.lower is not None
+    assert answer.upper is not None
+    assert answer.lower <= exact.friction <= answer.upper
+
+
+def test_roughness_in_full_contact_does_not_move_the_critical_friction() -> None:
+    flat = found(SQUEAL, 0.3, 0.9, tolerance=1e-4)
+    rough = found(SQUEAL, 0.3, 0.9, tolerance=1e-4, roughness__shoe=WAVES, roughness__wheel=WAVES)
+    assert flat.value is not None
+    # The growth rises by 140 1/s per unit of friction here, and roughness moves it by less than 1e-3 1/s.
+    assert rough.value == pytest.approx(flat.value, abs=0.05 * 1e-4 + 1e-3 / 140.0)
+    assert rough.eigenvalue == pytest.approx(flat.eigenvalue, rel=1e-12)
+
+
+def test_another_parameter_than_friction_is_searched_by_both_methods() -> None:
+    answer = found(SQUEAL, 1.0, 10.0, "link2__angle_deg", tolerance=1e-3)
+    assert answer.outcome is Outcome.REGAINED  # the steeper the link, the more friction it takes
+    assert answer.value == pytest.approx(answer.eigenvalue, abs=1e-3)
+    alone = found(SQUEAL, 1.0, 10.0, "link2__angle_deg", method=Method.EIGENVALUE)
+    assert alone.value == answer.eigenvalue
+    at = stability(set_up(make(SQUEAL, link2__angle_deg=alone.value))).critical
+    assert at is not None
+    assert at.friction == pytest.approx(SQUEAL["friction"]["coefficient"], abs=1e-7)
+
+
+@pytest.mark.parametrize("method", list(Method))
+def test_a_range_without_a_change_says_so(method: Method) -> None:
+    assert found(SQUEAL, 0.0, 0.3, method=method).outcome is Outcome.STABLE
+    assert found(SQUEAL, 0.8, 1.2, method=method).outcome is Outcome.UNSTABLE
+    assert found(SQUEAL, 0.0, 1.0, method=method, wheel__angular_speed=0.0).outcome is Outcome.NO_SLIDING
+    assert found(SQUEAL, 0.0, 0.3, method=method).value is None
+
+
+def test_vibration_that_lasts_below_the_critical_friction_is_hysteresis() -> None:
+    """A stiff contact on a slow wheel: from rest the shoe lifts and sticks far below the loss of stability."""
+    tables = {
+        "shoe": {"mass": 15.7},
+        "wheel": {"radius": 0.5, "angular_speed": 0.0106},
+        "link1": {"stiffness": 1.6e7, "damping": 85.0, "angle_deg": 27.8},
+        "link2": {"stiffness": 2.85e7, "damping": 199.0, "angle_deg": 16.4},
+        "load": {"force": 1144.0},
+        "friction": {"coefficient": 1.0},
+        "contact": {"half_length": 0.05, "stiffness": 6e7},
+        "solver": {"step": 2e-5, "duration": 0.5},
+    }
+    answer = found(tables, 0.0, 4.0, tolerance=0.05)
+    assert answer.outcome is Outcome.FOUND
+    assert answer.lower is not None
+    assert answer.sustained is not None
+    assert answer.sustained < 0.5 * answer.lower
+    for friction, lasts in ((answer.sustained - 0.1, False), (answer.sustained + 0.1, True)):
+        verdict = judge(make(tables, friction__coefficient=friction, solver__duration=8.0))
+        assert verdict is not None
+        assert (verdict.regime != "damped") is lasts
+
+
+def test_a_start_from_rest_needs_no_less_friction_where_nothing_coexists() -> None:
+    answer = found(SQUEAL, 0.3, 0.9, tolerance=1e-3, solver__duration=0.5)
+    assert answer.sustained == pytest.approx(answer.value, abs=1e-3)
+
+
+@pytest.mark.parametrize("speed", [0.16782197452490075, 10.0])
+def test_slow_sliding_is_no_stick_to_a_three_layer_scheme(speed: float) -> None:
+    """Friction changes its velocity by more than the wheel's in a step, and its samples read as stick."""
+    tables = {
+        "shoe": {"mass": 0.310697},
+        "wheel": {"radius": 0.5, "angular_speed": speed},
+        "link1": {"stiffness": 41683.334, "angle_deg": 19.533686},
+        "link2": {"stiffness": 376572.5, "angle_deg": -15.361746},
+        "load": {"force": 1491.1643},
+        "friction": {"coefficient": 0.3},
+        "contact": {"half_length": 0.0138968, "stiffness": 1333325.8},
+        "solver": {"scheme": "three-layer", "step": 1.7406422e-4, "duration": 0.05},
+    }
+    answer = found(tables, 2.9353636, 15.732434, tolerance=1e-3)
+    exact = stability(set_up(make(tables))).critical
+    assert exact is not None
+    assert answer.outcome is Outcome.FOUND
+    assert answer.value == pytest.approx(exact.friction, abs=1e-3)
+
+
+def test_a_linear_motion_that_fades_slowly_does_not_last() -> None:
+    """A run of 11 ms just below the critical value, in which the amplitude falls by less than it beats."""
+    tables = {
+        "shoe": {"mass": 0.3758825},
+        "wheel": {"radius": 0.5, "angular_speed": 1.1062112},
+        "link1": {"stiffness": 2986894.5, "damping": 42.954388},
+        "link2": {"stiffness": 109023354.0, "damping": 306.16288, "angle_deg": 36.433232},
+        "load": {"force": 897.52732},
+        "friction": {"coefficient": 0.3},
+        "contact": {"half_length": 0.0966432, "stiffness": 241389442.0},
+        "solver": {"step": 1.9945717e-6, "duration": 0.0112227},
+    }
+    answer = found(tables, 0.2, 1.8, tolerance=1e-3)
+    assert answer.value == pytest.approx(0.889988, abs=1e-3)
+    assert answer.sustained == pytest.approx(answer.value, abs=1e-3)
+
+
+def test_a_start_that_takes_long_to_settle_is_given_the_time() -> None:
+    """Over its own duration the amplitude still falls, towards a limit cycle far below the critical value."""
+    tables = {
+        "shoe": {"mass": 1.1845788},
+        "wheel": {"radius": 0.5, "angular_speed": 2.5175146},
+        "link1": {"stiffness": 156538.24, "damping": 1.2650601},
+        "link2": {"stiffness": 44718.626, "damping": 0.9819066, "angle_deg": 20.719246},
+        "load": {"force": 2593.4866},
+        "friction": {"coefficient": 0.3},
+        "contact": {"half_length": 0.0129496, "stiffness": 5016209.9},
+        "solver": {"step": 3.610138e-4, "duration": 0.5244317},
+    }
+    answer = found(tables, 4.0, 20.0, tolerance=1e-2)
+    assert answer.value == pytest.approx(5.683, abs=1e-2)
+    assert (answer.sustained, answer.sustained_outcome) == (None, Outcome.SUSTAINED)
+    verdict = judge(make(tables, friction__coefficient=4.0, solver__duration=6.0))
+    assert verdict is not None
+    assert verdict.regime == "relaxation"
+
+
+def test_self_locking_on_rough_surfaces_in_full_contact_is_that_on_flat_ones() -> None:
+    tables = {
+        "shoe": {"mass": 1.0},
+        "wheel": {"radius": 0.5, "angular_speed": -1.2},
+        "link1": {"stiffness": 7.5e5, "damping": 40.0},
+        "link2": {"stiffness": 3.8e6, "damping": 48.0, "angle_deg": 31.0},
+        "load": {"force": 2000.0},
+        "friction": {"coefficient": 0.3},
+        "contact": {"half_length": 0.05, "stiffness": 2.2e7},
+        "solver": {"step": 2e-5, "duration": 0.1},
+    }
+    flat = stability(set_up(make(tables))).critical
+    rough = stability(set_up(make(tables, roughness__wheel=WAVES))).critical
+    assert flat is not None
+    assert rough is not None
+    assert flat.instability == rough.instability == "divergence"
+    assert rough.friction == pytest.approx(flat.friction, rel=1e-6)
+
+
+def test_roughness_that_opens_the_contact_moves_the_critical_friction() -> None:
+    tables = {**ROUGH, "link2": {"stiffness": 2.2e7, "angle_deg": 10.0}, "link1": {"stiffness": 2e7}}
+    flat = found({**tables, "roughness": {}}, 0.0, 4.0, method=Method.EIGENVALUE)
+    rough = found(tables, 0.0, 4.0, method=Method.EIGENVALUE)
+    assert flat.value is not None
+    assert rough.value is not None
+    assert abs(rough.value - flat.value) > 0.05 * flat.value
+    assert math.isfinite(rough.value)

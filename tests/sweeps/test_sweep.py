@@ -1,0 +1,291 @@
+"""Sweeps from their files to their results: every point as its own run gives it."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from brakecli.case.case import resolved_toml
+from brakecli.case.read import parse_case
+from brakecli.sweeps.driver import Dealer, choose_engine, sweep
+from brakecli.sweeps.file import LoadedSweep, parse_sweep
+from brakecli.sweeps.plan import plan_of
+from brakecli.sweeps.point import Status, _continued, blank, line_points, record_type, simulate
+from brakecli.sweeps.result import SweepReport
+from brakecli.sweeps.workers.local import Task
+from tests.commands import TINY, attributes, brakecli, left_in
+
+CASE = TINY.replace("0.02", "0.4").replace("1e-5", "2e-5").replace("1e-4", "2e-4")
+GRID = """\
+title = "Speed and friction"
+case = "tiny.toml"
+[[axis]]
+parameter = "wheel.angular_speed"
+values = [0.1, 0.6]
+[[axis]]
+parameter = "friction.coefficient"
+start = 0.4
+stop = 0.8
+num = 3
+"""
+
+
+def load(folder: Path, text: str, case: str = CASE, *overrides: str) -> LoadedSweep:
+    (folder / "tiny.toml").write_text(case)
+    return parse_sweep(text, "sweep.toml", folder, overrides)
+
+
+def run(folder: Path, text: str, case: str = CASE, **options: Any) -> SweepReport:
+    loaded = load(folder, text, case)
+    with choose_engine(loaded.plan, 2) as engine:
+        return sweep(loaded, folder / "sweep.h5", engine, force=False, **options)
+
+
+def opened(path: Path) -> xr.Dataset:
+    with xr.open_dataset(path, engine="h5netcdf") as dataset:
+        return dataset.load()
+
+
+def test_every_point_is_what_a_run_of_its_own_gives(tmp_path: Path) -> None:
+    report = run(tmp_path, GRID)
+    found = opened(tmp_path / "sweep.h5")
+    assert found.regime.dims == ("wheel_angular_speed", "friction_coefficient")
+    assert (found.status == "done").all()
+    tried = 0
+    for speed in found.wheel_angular_speed.values:
+        for friction in found.friction_coefficient.values:
+            overrides = [f"wheel.angular_speed={speed}", f"friction.coefficient={friction}"]
+            outcome = simulate(parse_case(CASE, "tiny", overrides).case)
+            point = found.sel(wheel_angular_speed=speed, friction_coefficient=friction)
+            verdict = outcome.verdict
+            assert str(point.regime.values) == verdict.regime
+            assert str(point.excitation.values) == verdict.excitation
+            assert float(point.amplitude) == verdict.amplitude
+            assert float(point.stick_fraction) == verdict.stick_fraction
+            assert int(point.steps) == outcome.work.steps
+            assert int(point.contact_evaluations) == outcome.work.contact_evaluations
+            assert str(point.reason.values) == "; ".join(verdict.reasons)
+            frequency = float(point.frequency)
+            assert np.isnan(frequency) if verdict.frequency is None else frequency == verdict.frequency
+            tried += 1
+    assert tried == report.findings.points == 6
+    assert set(report.findings.regimes) >= {"damped", "relaxation"}
+
+
+def test_the_file_says_what_it_holds_and_nothing_is_left_beside_it(tmp_path: Path) -> None:
+    run(tmp_path, GRID)
+    assert left_in(tmp_path) == {"tiny.toml", "sweep.h5"}
+    found = attributes(tmp_path / "sweep.h5")
+    loaded = load(tmp_path, GRID)
+    assert (found["kind"], found["complete"], found["format_version"]) == ("sweep", 1, 1)
+    assert (found["sweep_toml"], found["case_toml"]) == (GRID, CASE)
+    assert found["resolved_toml"] == resolved_toml(loaded.base.case)
+    assert (found["points"], found["failed_points"], found["title"]) == (6, 0, "Speed and friction")
+    variables = opened(tmp_path / "sweep.h5")
+    for name, variable in variables.variables.items():
+        assert "long_name" in variable.attrs, name
+        assert "units" in variable.attrs, name
+    assert variables.wheel_angular_speed.units == "rad/s"
+    assert variables.wheel_angular_speed.parameters == "wheel.angular_speed"
+
+
+def test_an_axis_of_texts_and_a_search_without_axes_have_their_dimension(tmp_path: Path) -> None:
+    text = 'case = "tiny.toml"\n[[axis]]\nparameter = "solver.scheme"\nvalues = ["two-layer", "three-layer"]\n'
+    run(tmp_path, text)
+    assert list(opened(tmp_path / "sweep.h5").solver_scheme.values) == ["two-layer", "three-layer"]
+    (tmp_path / "sweep.h5").unlink()
+    text = 'case = "tiny.toml"\n[critical]\nparameter = "friction.coefficient"\nlower = 0.3\nupper = 0.9\n'
+    report = run(tmp_path, text)
+    found = opened(tmp_path / "sweep.h5")
+    assert found.critical.dims == ("point",)
+    assert float(found.critical_lower[0]) < 0.5753762 < float(found.critical_upper[0])  # stability's answer
+    assert str(found.critical_status.values[0]) == "found"
+    assert found.critical.parameter == "friction.coefficient"
+    assert report.findings.critical is not None
+    assert report.findings.critical[0] == 1
+
+
+def test_points_that_fail_are_listed_and_the_others_are_there(tmp_path: Path) -> None:
+    text = 'case = "tiny.toml"\n[[axis]]\nparameter = "output.sample_interval"\nvalues = [2e-4, 1e-6, 4e-4]\n'
+    (tmp_path / "tiny.toml").write_text(CASE)
+    (tmp_path / "s.toml").write_text(text.replace("1e-6", "1e-4"))
+    assert brakecli("sweep", "s.toml", "-o", "right.h5", cwd=tmp_path).code == 0
+    text += '[[axis]]\nparameter = "solver.step"\nvalues = [2e-5, 5e-7]\n'
+    (tmp_path / "s.toml").write_text(text)
+    done = brakecli("sweep", "s.toml", "--json", cwd=tmp_path)
+    done.told(
+        1, "point 2 (output.sample_interval = 1e-06, solver.step = 2e-05)", "is below the time step", "1 of 6"
+    )
+    assert done.json["failed_points"] == 1
+    assert done.json["failures"][0]["point"] == 2
+    assert done.json["regime"][0] == ["undecided", "undecided"] or len(done.json["regime"]) == 3
+    found = opened(tmp_path / "s.h5")
+    assert (found.status == "done").sum() == 5
+    assert np.isnan(found.amplitude.values[1, 0])
+
+
+def test_a_run_that_fails_numerically_fails_its_point(tmp_path: Path) -> None:
+    text = 'case = "tiny.toml"\n[[axis]]\nparameter = "contact.stiffness"\nvalues = [2e7, 4e12]\n'
+    case = CASE.replace("solver = {", 'solver = { iteration = "fixed-point", ')
+    report = run(tmp_path, text, case)
+    assert report.findings.failed == 1
+    assert "did not converge" in report.findings.failures[0]["reason"]
+
+
+@pytest.mark.parametrize("direction", ["up", "down"])
+def test_each_point_of_a_followed_axis_starts_where_the_one_before_has_ended(
+    tmp_path: Path, direction: str
+) -> None:
+    text = GRID + f'direction = "{direction}"\n'
+    report = run(tmp_path, text)
+    found = opened(tmp_path / "sweep.h5")
+    order = [0.4, 0.6, 0.8] if direction == "up" else [0.8, 0.6, 0.4]
+    for speed in (0.1, 0.6):
+        initial: dict[str, float] = {}
+        for friction in order:
+            overrides = [f"wheel.angular_speed={speed}", f"friction.coefficient={friction}"]
+            overrides += [f"initial.{key}={value!r}" for key, value in initial.items()]
+            outcome = simulate(parse_case(CASE, "tiny", overrides).case)
+            initial = dict(zip(("x", "y", "vx", "vy"), (float(value) for value in outcome.end), strict=True))
+            place = list(found.friction_coefficient.values.round(6)).index(friction)
+            point = found.sel(wheel_angular_speed=speed).isel(friction_coefficient=place)
+            assert float(point.amplitude) == pytest.approx(outcome.verdict.amplitude, rel=1e-9)
+    assert report.findings.failed == 0
+
+
+def test_the_wheel_goes_on_turning_from_one_point_to_the_next(tmp_path: Path) -> None:
+    """Following a key that changes nothing is one long run: also its second half starts on the waves it met."""
+    waves = "roughness.wheel = { amplitudes = [2e-6, 0.0, 1e-6], wavelengths = [0.013, 0.5, 0.0071] }\n"
+    case = CASE + waves
+    text = 'case = "tiny.toml"\n[[axis]]\nparameter = "solver.allow_unconverged"\nvalues = [false, true]\n'
+    loaded = load(tmp_path, text, case)
+    whole = simulate(parse_case(case, "tiny", ["solver.duration=0.8"]).case)
+    first = simulate(loaded.base.case)
+    second = simulate(loaded.plan.case(_continued(first)))
+    # Phases pass through degrees, and the second run starts anew from four numbers: rounding, times its growth.
+    np.testing.assert_allclose(second.end, whole.end, rtol=1e-6, atol=1e-9 * np.abs(whole.end).max())
+
+
+def test_lines_go_up_and_down_through_every_point_once() -> None:
+    axes = '[[axis]]\nparameter = "link2.angle_deg"\nvalues = [1.0, 2.0]\n'
+    followed = '[[axis]]\nparameter = "friction.coefficient"\nvalues = [0.5, 0.1, 0.9]\ndirection = "both"\n'
+    last = '[[axis]]\nparameter = "shoe.mass"\nvalues = [1.0, 2.0, 3.0, 4.0]\n'
+    plan = plan_of(f'case = "x"\n{axes}{followed}{last}', "")
+    lines = [line_points(plan, line) for line in range(plan.units)]
+    assert (plan.units, plan.unit_length, plan.passes) == (16, 3, 2)
+    for way in (lines[:8], lines[8:]):
+        assert sorted(point for line in way for point in line) == list(range(24))
+    value = plan.sweep.axis[1].value
+    for line in lines:
+        others = {(plan.places(point)[0], plan.places(point)[2]) for point in line}
+        assert len(others) == 1
+    assert [value(plan.places(point)[1]) for point in lines[0]] == [0.1, 0.5, 0.9]
+    assert [value(plan.places(point)[1]) for point in lines[8]] == [0.9, 0.5, 0.1]
+
+
+def test_hysteresis_between_up_and_down_is_found_and_told(tmp_path: Path) -> None:
+    """A shoe that vibrates on a stiff contact goes on doing so where one at rest on it stays at rest."""
+    case = """\
+shoe.mass = 15.7
+wheel = { radius = 0.5, angular_speed = 0.0106 }
+link1 = { stiffness = 1.6e7, damping = 85.0, angle_deg = 27.8 }
+link2 = { stiffness = 2.85e7, damping = 199.0, angle_deg = 16.4 }
+load.force = 1144.0
+friction.coefficient = 1.0
+contact = { half_length = 0.05, stiffness = 6e7 }
+initial.at = "equilibrium"
+initial.x = 1e-9
+solver = { step = 2e-5, duration = 4.0 }
+output.sample_interval = 1e-4
+"""
+    axis = '[[axis]]\nparameter = "friction.coefficient"\nvalues = [0.2, 1.0, 2.0, 3.4]\ndirection = "both"\n'
+    report = run(tmp_path, 'case = "tiny.toml"\n' + axis, case)
+    found = opened(tmp_path / "sweep.h5")
+    up, down = found.sel(direction="up"), found.sel(direction="down")
+    assert list(up.regime.values[:3]) == ["damped"] * 3
+    assert list(down.regime.values[1:]) == ["relaxation"] * 3
+    assert list(found.hysteresis.values[1:3]) == [1, 1]
+    assert (
+        "hysteresis at 2 of 4 points: friction.coefficient = 1; friction.coefficient = 2"
+        in report.findings.sentences[0]
+    )
+
+
+def test_the_summary_and_the_json_carry_the_names_of_the_file(tmp_path: Path) -> None:
+    (tmp_path / "tiny.toml").write_text(CASE)
+    (tmp_path / "s.toml").write_text(GRID)
+    done = brakecli("sweep", "s.toml", "--json", "--set", "solver.duration=0.1", cwd=tmp_path)
+    assert done.code == 0
+    assert "6 points on" in done.err
+    found = opened(tmp_path / "s.h5")
+    assert done.json["dimensions"] == list(found.regime.dims)
+    assert done.json["axes"]["friction_coefficient"]["values"] == found.friction_coefficient.values.tolist()
+    for name in found.data_vars:
+        values = np.array(done.json[str(name)], dtype=object)
+        assert values.shape == found[name].shape, name
+    assert done.json["regime"] == found.regime.values.tolist()
+    again = brakecli("sweep", "s.toml", cwd=tmp_path)
+    again.told(2, "s.h5: exists already")
+    table = brakecli("sweep", "s.toml", "--force", "--set", "solver.duration=0.1", cwd=tmp_path)
+    for words in ("Speed and friction", "wheel.angular_speed", "friction.coefficient", "regimes", "s.h5"):
+        assert words in table.out
+    quiet = brakecli("sweep", "s.toml", "--force", "--quiet", "--set", "solver.duration=0.1", cwd=tmp_path)
+    assert (quiet.code, quiet.out, quiet.err) == (0, "", "")
+
+
+def test_a_sweep_comes_from_standard_input_as_well(tmp_path: Path) -> None:
+    (tmp_path / "tiny.toml").write_text(CASE)
+    done = brakecli("sweep", "-", "--json", "--set", "solver.duration=0.05", cwd=tmp_path, stdin=GRID)
+    assert done.json["output"] == "sweep.h5"
+    assert left_in(tmp_path) == {"tiny.toml", "sweep.h5"}
+
+
+def test_check_tells_what_a_sweep_would_cost(tmp_path: Path) -> None:
+    (tmp_path / "tiny.toml").write_text(CASE)
+    (tmp_path / "s.toml").write_text(GRID)
+    found = brakecli("check", "s.toml", "--json", cwd=tmp_path)
+    assert found.json["points"] == 6
+    assert found.json["seconds"] > 0.0
+    assert "points" in brakecli("check", "s.toml", cwd=tmp_path).out
+    (tmp_path / "s.toml").write_text(GRID.replace("coefficient", "coeficient"))
+    brakecli("check", "s.toml", cwd=tmp_path).told(2, "s.toml:7: friction.coeficient: is unknown")
+    (tmp_path / "s.toml").write_text(GRID.replace("num = 3", "num = 1000000000"))
+    brakecli("check", "s.toml", cwd=tmp_path).told(3, "the sweep is too large: 2000000000 points")
+
+
+def test_a_sweep_given_to_run_and_a_case_given_to_sweep_are_told_apart(tmp_path: Path) -> None:
+    (tmp_path / "tiny.toml").write_text(CASE)
+    (tmp_path / "s.toml").write_text(GRID)
+    brakecli("run", "s.toml", cwd=tmp_path).told(2, "brakecli sweep s.toml")
+    brakecli("sweep", "tiny.toml", cwd=tmp_path).told(2, "brakecli run tiny.toml")
+
+
+def test_tasks_are_as_long_as_their_work_is_short() -> None:
+    dealer = Dealer(np.zeros(1000, dtype=bool), None)
+    first = dealer()
+    assert first == Task(0, 1)
+    dealer.learn(first, 0.004)
+    assert dealer() == Task(1, 50)  # 0.2 s of 4 ms each
+    dealer.learn(Task(1, 50), 49.0)
+    assert dealer() == Task(51, 1)
+
+
+def test_only_what_is_missing_is_dealt_and_lost_units_come_again_one_by_one() -> None:
+    finished = np.zeros(10, dtype=bool)
+    finished[[0, 4, 5]] = True
+    dealer = Dealer(finished, 2)
+    assert [dealer() for _ in range(5)] == [Task(1, 2), Task(3, 1), Task(6, 2), Task(8, 2), None]
+    assert dealer.retry(Task(6, 2))
+    assert [dealer() for _ in range(3)] == [Task(6, 1, True), Task(7, 1, True), None]
+    assert not dealer.retry(Task(6, 1, True))
+    backwards = Dealer(finished, 2, -1)
+    assert [backwards() for _ in range(2)] == [Task(6, 2), Task(8, 2)]
+
+
+def test_a_record_holds_text_whole_or_cut_between_characters() -> None:
+    kind = record_type(plan_of('case = "x"\n[[axis]]\nparameter = "shoe.mass"\nvalues = [1.0]\n', ""))
+    record = blank(kind, Status.FAILED, "ß" * 200)
+    assert record["reason"][0].decode() == "ß" * 120
+    assert record["status"][0] == b"failed"
