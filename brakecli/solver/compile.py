@@ -46,9 +46,9 @@ class Weights(NamedTuple):
 
 
 def source_hash() -> str:
-    """Hash of the package's sources: a cached caller would keep the old code of an edited helper otherwise."""
+    """Hash of the sources of the solver: otherwise a cached caller would keep the old code of an edited helper."""
     digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parents[1].rglob("*.py")):
+    for path in sorted(Path(__file__).parent.rglob("*.py")):
         digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
 
