@@ -6,16 +6,12 @@ from functools import cached_property
 from types import ModuleType
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from brakecli.case.case import EVENT_TOLERANCE, Case, Evaluator, Profile, Scheme
 from brakecli.solver import contact, schemes
-from brakecli.solver.compile import Coefficients, Weights
-from brakecli.solver.contact.pad import build_pad, default_nodes
+from brakecli.solver.contact.pad import Pad, build_pad, default_nodes
 from brakecli.solver.implicit_step import MOST
 from brakecli.solver.links import coefficients
-from brakecli.solver.loop import Drive, Grid
+from brakecli.solver.records import Coefficients, Drive, Grid, Weights
 from brakecli.solver.roughness import Surface, surface
 from brakecli.solver.schedules import Schedule, schedule, value_at
 
@@ -92,7 +88,7 @@ class Setup:
     evaluator: str  # the one that runs: "auto" on smooth surfaces is "closed-form"
 
     @cached_property
-    def pad(self) -> NDArray[np.float64]:
+    def pad(self) -> Pad:
         """Constants and tables of the contact."""
         return build_pad(
             self.case.contact.stiffness, self.case.contact.half_length, self.shoe, self.wheel, self.nodes
@@ -132,7 +128,7 @@ class Setup:
     @property
     def drive(self) -> Drive:
         """What acts from outside."""
-        return Drive(self.belt, self.load, self.wheel)
+        return Drive(self.belt, self.load, self.wheel.waves)
 
     @property
     def grid(self) -> Grid:

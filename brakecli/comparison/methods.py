@@ -77,7 +77,7 @@ def ladder(setup: Setup, steps: Sequence[float] = ()) -> list[float]:
     if steps:
         return sorted(steps, reverse=True)
     fast = natural_frequencies(setup.coefficients, setup.contact_stiffness)[1]
-    speed = max(abs(float(value)) for value in setup.belt.values)
+    speed = max(abs(float(value)) for value in setup.belt["value"])
     passing = speed * float(max(setup.wheel.turns, default=0.0))
     coarsest = 1.0 / (COARSEST * max(fast, passing))
     return [coarsest / 2**rung for rung in range(RUNGS)]

@@ -22,7 +22,7 @@ from brakecli.case.system import Setup
 from brakecli.errors import RefusedError
 from brakecli.solver.contact.pad import NODES_PER_WAVE
 from brakecli.solver.history import ROW_BYTES
-from brakecli.solver.loop import COLUMNS
+from brakecli.solver.quantities import HISTORY
 from brakecli.solver.schemes import has_own_steps
 
 MOST_STEPS = 1e11
@@ -75,7 +75,7 @@ def check(setup: Setup) -> Check:
     case, times = setup.case, setup.timing
     stiffness = setup.contact_stiffness
     frequencies = natural_frequencies(setup.coefficients, stiffness)
-    speed = max(abs(float(value)) for value in setup.belt.values)
+    speed = max(abs(float(value)) for value in setup.belt["value"])
     passing = speed * max(setup.wheel.turns, default=0.0)
     shortest = max([*setup.shoe.turns, *setup.wheel.turns], default=0.0)
     waves = 2.0 * case.contact.half_length * shortest
@@ -134,7 +134,7 @@ def _open_part(setup: Setup) -> float:
     """Of the time, that in which rough surfaces may be open in part: little if the load presses them together."""
     heights = float(np.abs(setup.shoe.g).sum() + np.abs(setup.wheel.g).sum())
     spring = setup.coefficients.c_yy + setup.contact_stiffness
-    return 0.04 if heights * spring < float(np.abs(setup.load.values).min()) else 0.12
+    return 0.04 if heights * spring < float(np.abs(setup.load["value"]).min()) else 0.12
 
 
 def evaluation_seconds(setup: Setup) -> float:
@@ -165,8 +165,8 @@ def _with_warnings(setup: Setup, found: Check) -> Check:
             f"({found.passing_frequency:.4g} Hz); take a step of at most "
             f"{1.0 / (RESOLVED * found.passing_frequency):.2g} s"
         )
-    speed = float(np.abs(setup.belt.values).max())
-    grip = case.friction.coefficient * float(np.abs(setup.load.values).max()) / setup.coefficients.m
+    speed = float(np.abs(setup.belt["value"]).max())
+    grip = case.friction.coefficient * float(np.abs(setup.load["value"]).max()) / setup.coefficients.m
     if 0.0 < speed < grip * (found.step or 0.0):
         warnings.append(
             f"solver.step: friction changes the shoe's velocity by up to {grip * (found.step or 0.0):.3g} m/s in "
@@ -212,7 +212,7 @@ def _with_warnings(setup: Setup, found: Check) -> Check:
             "fastest motion away by the end of the run, and its errors are of first order; take theta = "
             + ("[0.5, 0.5]" if setup.scheme.WEIGHTS == 2 else "[0.25, 0.5, 0.25]")
         )
-    if setup.load.values.min() < 0.0:
+    if setup.load["value"].min() < 0.0:
         warnings.append("load: the force is negative at times, it lifts the shoe off the wheel")
     return Check(**{**found.__dict__, "warnings": tuple(warnings)})
 
@@ -276,7 +276,7 @@ def refuse(setup: Setup, found: Check, free_bytes: float) -> None:
         raise RefusedError(f"the file would be too large, {free_bytes / 1e6:.3g} MB are free: {size}; {remedy}")
     if found.memory > MOST_TABLE_BYTES:
         raise RefusedError(f"the contact's tables would be too large: {size}; reduce contact.nodes")
-    compared = 2.0 * 8.0 * COLUMNS * setup.timing.samples
+    compared = 2.0 * 8.0 * len(HISTORY) * setup.timing.samples
     if setup.case.solver.promise is not None and compared > MOST_TABLE_BYTES:
         raise RefusedError(
             f"two histories of {setup.timing.samples:.3g} samples are compared to keep the tolerance, which takes "

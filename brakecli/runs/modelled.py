@@ -35,7 +35,7 @@ def scene(setup: Setup, work: Work) -> tuple[list[str], list[str]]:
         used.append("stick and slip as a set-valued law, solved for in every step")
     if setup.wheel.g.size == 0:
         left.append("the wheel's phase: its surface is the same everywhere")
-    if not setup.load.values.any():
+    if not setup.load["value"].any():
         left.append("the load: it is zero")
     if not (case.link1.damping or case.link2.damping):
         left.append("dashpots: they are zero")

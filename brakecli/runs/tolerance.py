@@ -132,7 +132,7 @@ def _opens_and_slides(case: Case, progress: Tell) -> bool:
     Not where speed or load change with time, as steps would have to be short beside what they do.
     """
     setup = set_up(case)
-    if setup.smooth or len(setup.belt.times) > 1 or len(setup.load.times) > 1:
+    if setup.smooth or len(setup.belt) > 1 or len(setup.load) > 1:
         return False
     step, interval = _coarsest(setup)
     pilot = _run(_stepped(case, step, interval, 0), lambda samples: progress(0))
@@ -229,7 +229,7 @@ def _by_steps(
 
 def _shortest_span(setup: Setup) -> float:
     """Between two knots of speed or load, s; infinite where there are none."""
-    return min(float(np.diff(each.times).min(initial=math.inf)) for each in (setup.belt, setup.load))
+    return min(float(np.diff(each["time"]).min(initial=math.inf)) for each in (setup.belt, setup.load))
 
 
 def _unseen(run: _Run) -> float:
@@ -279,7 +279,7 @@ def _coarsest(setup: Setup) -> tuple[float, float]:
     """The step (s) that a ladder begins with, and the sample interval."""
     interval = setup.timing.interval
     fast = natural_frequencies(setup.coefficients, setup.contact_stiffness)[1]
-    speed = float(np.abs(setup.belt.values).max())
+    speed = float(np.abs(setup.belt["value"]).max())
     passing = speed * float(max(setup.wheel.turns, default=0.0))
     wanted = 1.0 / (FIRST_STEPS * max(fast, passing, 1e-300))
     wanted = min(wanted, max(_shortest_span(setup) / STEPS_BETWEEN_KNOTS, wanted / 2**MOST_RUNGS))

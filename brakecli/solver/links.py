@@ -2,7 +2,7 @@
 
 import math
 
-from brakecli.solver.compile import Coefficients
+from brakecli.solver.records import Coefficients
 
 
 def coefficients(

@@ -10,30 +10,21 @@ from numpy.typing import NDArray
 
 from brakecli.case.case import InitialState, Start
 from brakecli.case.system import Setup
-from brakecli.solver import implicit_step as iteration
-from brakecli.solver import loop as integrate
-from brakecli.solver import schemes
-from brakecli.solver.compile import (
-    FORCE,
-    FORCE_BEFORE,
-    NORMAL_FORCE,
-    PROBLEM_SIZE,
-    STORE,
-    STORE_X,
-    STORE_X_BEFORE,
-    WORK_SIZE,
-)
+from brakecli.solver import implicit_step, schemes
 from brakecli.solver.contact import KINDS
-from brakecli.solver.contact.pad import build_contact
+from brakecli.solver.contact.pad import build_layer
 from brakecli.solver.energy import OPEN_ACCOUNT, EnergyAccount, account
 from brakecli.solver.friction import minimise
-from brakecli.solver.quantities import Failure
+from brakecli.solver.quantities import HISTORY, Failure
+from brakecli.solver.records import COUNTS, PROBLEM, WORK, Plant, new
 from brakecli.solver.roughness import wheel_angles
 from brakecli.solver.schedules import integral_at, slope_at, value_at
 from brakecli.solver.steady_sliding import equilibrium, mean_contact
 
+EVENTS = 1000
+"""How many unconverged steps are kept with their time and residual; all are counted."""
 BLOCK_SECONDS = 0.1
-"""Time that one call of the compiled loop should take: between calls Ctrl-C is heard and progress is told."""
+"""Time that one call of the compiled loop should take: between calls Ctrl-C is heard and progress is reported."""
 BLOCK_ROWS = 16384
 
 
@@ -64,16 +55,24 @@ class Motion:
         """Put the shoe at its start."""
         self.setup = setup
         self.work = Work()
-        self.angles = np.zeros(setup.wheel.g.size)
-        self.contact = build_contact(setup.pad)
-        self.problem = np.zeros(PROBLEM_SIZE)
-        self.works = np.zeros(WORK_SIZE)
-        self.counts = np.zeros(integrate.COUNTS_SIZE, dtype=np.int64)
-        self.events = np.zeros((integrate.EVENTS, 2))
-        self.counts[integrate.LEVEL] = setup.scheme.LAG
-        solve = iteration.newton if setup.case.solver.iteration == "newton" else iteration.fixed_point
-        self._advance, self._sample_into = schemes.loop(setup.scheme, setup.evaluate, solve)
-        self.state = self._begin()
+        self.events = np.zeros((EVENTS, 2))
+        solve = implicit_step.newton if setup.case.solver.iteration == "newton" else implicit_step.fixed_point
+        self.plant = Plant(
+            c=setup.coefficients,
+            s=setup.weights,
+            grid=setup.grid,
+            drive=setup.drive,
+            layer=build_layer(setup.evaluate, setup.pad),
+            plug=schemes.plug(setup.scheme, solve),
+            state=new(setup.scheme.STATE),
+            problem=new(PROBLEM),
+            work=new(WORK),
+            counts=new(COUNTS),
+        )
+        self.counts = self.plant.counts
+        self.counts.level = setup.scheme.LAG
+        self._loop = schemes.loop(setup.scheme)
+        self._begin()
         self._start_energy = self._energy()
 
     def run(
@@ -90,18 +89,18 @@ class Motion:
         """
         lag, last = self.setup.scheme.LAG, self.setup.timing.steps
         size = min(first_block, self._most_steps())
-        while self.work.failure is Failure.NONE and self.counts[integrate.LEVEL] < last + lag:
+        while self.work.failure is Failure.NONE and self.counts.level < last + lag:
             start = time.perf_counter()
-            rows = self._block(min(last + lag, int(self.counts[integrate.LEVEL]) + size))
+            rows = self._block(min(last + lag, int(self.counts.level) + size))
             seconds = time.perf_counter() - start
             self.work.solve_seconds += seconds
             size = min(int(size * min(10.0, BLOCK_SECONDS / max(seconds, 1e-9))) + 1, self._most_steps())
             sink(rows)
-            progress(int(self.counts[integrate.LEVEL]) - lag)
+            progress(int(self.counts.level) - lag)
         if self.work.failure is Failure.NONE:
             sink(self._sample()[None, :])
         self._count()
-        energy = account(self._start_energy, self._energy(), self.works)
+        energy = account(self._start_energy, self._energy(), self.plant.work)
         if self.work.failure is Failure.NONE and not abs(energy.relative_closing_error) <= OPEN_ACCOUNT:
             self.work.failure = Failure.UNBALANCED
         return self.work, energy
@@ -113,26 +112,11 @@ class Motion:
     def _block(self, stop: int) -> NDArray[np.float64]:
         """Step to level `stop`; the samples on the way."""
         setup, lag, per_sample = self.setup, self.setup.scheme.LAG, self.setup.timing.per_sample
-        first = int(self.counts[integrate.LEVEL]) - lag
-        rows = np.zeros((-(-(stop - lag) // per_sample) + (-first // per_sample), integrate.COLUMNS))
-        failure = self._advance(
-            setup.coefficients,
-            setup.weights,
-            setup.drive,
-            setup.grid,
-            setup.pad,
-            self.angles,
-            self.state,
-            self.problem,
-            self.contact,
-            self.works,
-            self.counts,
-            rows,
-            self.events,
-            stop,
-        )
+        first = int(self.counts.level) - lag
+        rows = np.zeros((-(-(stop - lag) // per_sample) + (-first // per_sample), len(HISTORY)))
+        failure = self._loop.advance(self.plant, rows, self.events, stop)
         self.work.failure = Failure(failure)
-        done = int(self.counts[integrate.LEVEL]) - lag
+        done = int(self.counts.level) - lag
         if failure:
             self.work.failure_time = setup.timing.step * done
             done += 1  # the sample of the failing step's own level has been taken
@@ -140,24 +124,12 @@ class Motion:
 
     def _sample(self) -> NDArray[np.float64]:
         """The sample at the level that has been reached."""
-        row = np.zeros(integrate.COLUMNS)
-        setup = self.setup
-        self._sample_into(
-            setup.coefficients,
-            setup.weights,
-            setup.drive,
-            setup.grid,
-            setup.pad,
-            self.angles,
-            self.state,
-            self.contact,
-            self.counts,
-            row,
-        )
+        row = np.zeros(len(HISTORY))
+        self._loop.sample(self.plant, row)
         return row
 
-    def _begin(self) -> NDArray[np.float64]:
-        """The state at the scheme's first level, with the contact force there as the first guess."""
+    def _begin(self) -> None:
+        """Fill the state at the scheme's first level, with the contact force there as the first guess."""
         setup, initial = self.setup, self.setup.case.initial
         x, y = initial.x, initial.y
         if initial.at is InitialState.EQUILIBRIUM:
@@ -167,13 +139,12 @@ class Motion:
             x, y = x + rest.x, y + rest.y
         velocity, acceleration = (initial.vx, initial.vy), (0.0, 0.0)
         self._evaluate_at(x, y, 0.0)
-        force = self.contact[NORMAL_FORCE]
+        plant, contact = self.plant, self.plant.layer.contact
         if setup.case.solver.start is Start.CONSISTENT:
-            acceleration = self._acceleration((x, y), velocity, force)
-        state: NDArray[np.float64] = setup.scheme.begin(setup.weights, (x, y), velocity, acceleration)
-        state[FORCE] = self.works[FORCE_BEFORE] = force
-        self.works[STORE_X_BEFORE] = self.contact[STORE_X]
-        return state
+            acceleration = self._acceleration((x, y), velocity, contact.normal_force)
+        setup.scheme.begin(setup.weights, plant.state, (x, y), velocity, acceleration)
+        plant.state.force = plant.work.force_before = contact.normal_force
+        plant.work.store_x_before = contact.store_x
 
     def _acceleration(
         self, position: tuple[float, float], velocity: tuple[float, float], force: float
@@ -194,24 +165,24 @@ class Motion:
         """Evaluate the contact, `steps` steps after t = 0."""
         t, part = divmod(steps, self.setup.timing.per_sample)
         travel = integral_at(self.setup.belt, t * self.setup.timing.interval, part * self.setup.timing.step)
-        wheel_angles(self.setup.wheel, *travel, self.angles)
-        self.setup.evaluate(x, y, self.angles, self.setup.pad, self.contact)
+        wheel_angles(self.plant.drive.wheel, *travel, self.plant.layer.angles)
+        self.setup.evaluate(x, y, self.plant.layer)
 
     def _energy(self) -> tuple[float, float, float]:
         """Kinetic energy, energy of the links and of the contact (J), where the scheme places them."""
-        scheme, setup = self.setup.scheme, self.setup
-        kinetic, links, (x, y), back = scheme.mechanical_energy(setup.coefficients, setup.weights, self.state)
-        self._evaluate_at(x, y, int(self.counts[integrate.LEVEL]) - back)
-        return kinetic, links, float(self.contact[STORE])
+        setup, plant = self.setup, self.plant
+        kinetic, links, (x, y), back = setup.scheme.mechanical_energy(plant.c, plant.s, plant.state)
+        self._evaluate_at(x, y, int(self.counts.level) - back)
+        return kinetic, links, float(plant.layer.contact.store)
 
     def _count(self) -> None:
         """Read the loop's counters."""
         counts, work = self.counts, self.work
-        work.steps = int(counts[integrate.KIND_0 :].sum())
-        work.contact_evaluations = int(counts[integrate.EVALUATIONS])
-        work.unconverged_steps = int(counts[integrate.UNCONVERGED])
-        work.non_unique_steps = int(counts[integrate.RISING])
-        work.most_evaluations = int(counts[integrate.MOST])
-        work.turns = int(counts[integrate.TURNS])
-        work.evaluators = {kind: int(n) for kind, n in zip(KINDS, counts[integrate.KIND_0 :], strict=True) if n}
-        work.unconverged = self.events[: min(work.unconverged_steps, integrate.EVENTS)].copy()
+        work.steps = int(counts.kinds.sum())
+        work.contact_evaluations = int(counts.evaluations)
+        work.unconverged_steps = int(counts.unconverged)
+        work.non_unique_steps = int(counts.rising)
+        work.most_evaluations = int(counts.most)
+        work.turns = int(counts.turns)
+        work.evaluators = {kind: int(n) for kind, n in zip(KINDS, counts.kinds, strict=True) if n}
+        work.unconverged = self.events[: min(work.unconverged_steps, EVENTS)].copy()

@@ -5,14 +5,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 from scipy.optimize import brentq
 
 from brakecli.errors import CaseError, Problem
-from brakecli.solver.compile import FRACTION, NORMAL_FORCE, STIFFNESS, Coefficients
 from brakecli.solver.contact.closed_form import CLEAR, FULL, coverage
-from brakecli.solver.contact.pad import HALF, SHOE_BOTTOM, SHOE_MEAN, SHOE_TOP, WHEEL_BOUND, K, build_contact
+from brakecli.solver.contact.pad import Pad, build_layer
+from brakecli.solver.records import Coefficients
 from brakecli.solver.roughness import Surface, wheel_angles
 
 PLACES = 1024
@@ -31,25 +30,27 @@ class Equilibrium:
     contact_fraction: float
 
 
-def mean_contact(evaluate: Any, pad: NDArray[np.float64], wheel: Surface, y: float) -> tuple[float, float, float]:
+def mean_contact(evaluate: Any, pad: Pad, wheel: Surface, y: float) -> tuple[float, float, float]:
     """Force (N), stiffness (N/m) and touching part at a height y (m), averaged over the travel of the wheel.
 
     Full contact averages to its closed form; else places over many waves are averaged under a Hann window, so
     that waves that do not close leave a trace of 1e-6 only.
     """
-    covered = coverage(y, pad)
-    length = 2.0 * pad[HALF]
+    numbers = pad.constants
+    covered = coverage(y, numbers)
+    length = 2.0 * numbers.half_length
     if covered == CLEAR:
         return 0.0, 0.0, 0.0
     if covered == FULL:
-        return -pad[K] * length * (y + pad[SHOE_MEAN]), pad[K] * length, 1.0
+        return -numbers.k * length * (y + numbers.shoe_mean), numbers.k * length, 1.0
     places = np.zeros(1) if wheel.g.size == 0 else 50.0 / wheel.turns.min() * (np.arange(PLACES) + 0.5) / PLACES
     weights = np.ones(1) if wheel.g.size == 0 else 2.0 * np.sin(np.pi * (np.arange(PLACES) + 0.5) / PLACES) ** 2
-    found, angles, contact = np.zeros(3), np.zeros(wheel.g.size), build_contact(pad)
+    found, layer, waves = np.zeros(3), build_layer(evaluate, pad), wheel.waves
     for place, weight in zip(places, weights, strict=True):
-        wheel_angles(wheel, float(place), 0.0, angles)
-        evaluate(0.0, y, angles, pad, contact)
-        found += weight * contact[[NORMAL_FORCE, STIFFNESS, FRACTION]]
+        wheel_angles(waves, float(place), 0.0, layer.angles)
+        evaluate(0.0, y, layer)
+        contact = layer.contact
+        found += weight * np.array([contact.normal_force, contact.stiffness, contact.fraction])
     force, stiffness, fraction = found / len(places)
     return float(force), float(stiffness), float(fraction)
 
@@ -58,12 +59,12 @@ Mean = Callable[[float], tuple[float, float, float]]
 """Mean force (N), stiffness (N/m) and touching part of the contact at a height y (m)."""
 
 
-def tabulated(mean: Mean, pad: NDArray[np.float64]) -> Mean:
+def tabulated(mean: Mean, pad: Pad) -> Mean:
     """The same, interpolated between `TABLE` heights where the pad touches in part: for many calls.
 
     The force is a cubic through its values and slopes; its error falls with the fourth power of the spacing.
     """
-    full, top = -pad[WHEEL_BOUND] - pad[SHOE_TOP], pad[WHEEL_BOUND] + pad[SHOE_BOTTOM]
+    full, top = pad.edges
     if full == top:
         return mean
     heights = np.linspace(full, top, TABLE)
@@ -79,7 +80,7 @@ def tabulated(mean: Mean, pad: NDArray[np.float64]) -> Mean:
     return interpolated
 
 
-def equilibrium(c: Coefficients, mean: Mean, pad: NDArray[np.float64], load: float, belt: float) -> Equilibrium:
+def equilibrium(c: Coefficients, mean: Mean, pad: Pad, load: float, belt: float) -> Equilibrium:
     """Steady sliding under the load Q (N) on a wheel that moves with U (m/s); no friction acts where U = 0.
 
     With F_x = sign(U) phi F_y, (6) gives x for a height y and (7) remains: one equation in y. Raises CaseError
@@ -99,10 +100,10 @@ def equilibrium(c: Coefficients, mean: Mean, pad: NDArray[np.float64], load: flo
     def unbalanced(y: float) -> float:
         return spring * y + push - uplift * mean(y)[0]
 
-    full, top = -pad[WHEEL_BOUND] - pad[SHOE_TOP], pad[WHEEL_BOUND] + pad[SHOE_BOTTOM]
-    stiffness = 2.0 * pad[HALF] * pad[K]
+    numbers, (full, top) = pad.constants, pad.edges
+    stiffness = 2.0 * numbers.half_length * numbers.k
     whole = spring + uplift * stiffness
-    y = -(push + uplift * stiffness * pad[SHOE_MEAN]) / whole if whole != 0.0 else np.inf
+    y = -(push + uplift * stiffness * numbers.shoe_mean) / whole if whole != 0.0 else np.inf
     if not y <= full:
         if unbalanced(top) < 0.0:
             if spring == 0.0:

@@ -188,7 +188,7 @@ def _continued(outcome: Outcome) -> dict[tuple[str, ...], Any]:
         setup = outcome.setup
         angles = np.zeros(setup.wheel.g.size)
         travel = integral_at(setup.belt, setup.timing.samples * setup.timing.interval, 0.0)
-        wheel_angles(setup.wheel, *travel, angles)
+        wheel_angles(setup.wheel.waves, *travel, angles)
         phases = iter(angles)  # a wave of no amplitude has none
         turned = [math.degrees(next(phases) % TWO_PI) if g else 0.0 for g in wheel.amplitudes]
         start["roughness", "wheel", "phases_deg"] = turned

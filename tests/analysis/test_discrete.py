@@ -8,7 +8,6 @@ from brakecli.analysis.stability.discrete import amplification, natural_frequenc
 from brakecli.case.system import set_up
 from brakecli.errors import RefusedError
 from brakecli.runs.limits import check, refuse
-from brakecli.solver.compile import VX, VY, X, Y
 from tests.examples import MODE_COUPLING, ROUGH, SQUEAL, make, simulate
 
 
@@ -123,4 +122,4 @@ def test_runs_beyond_a_limit_are_refused(changes: dict[str, object], words: str)
 
 def test_memory_of_the_amplification_is_the_state() -> None:
     setup = set_up(make(SQUEAL))
-    assert setup.scheme.MEMORY == (X, Y, VX, VY)
+    assert setup.scheme.MEMORY == ("x", "y", "v_x", "v_y")

@@ -10,8 +10,8 @@ from brakecli.analysis.stability.discrete import natural_frequencies
 from brakecli.analysis.stability.modes import Instability, crossings, eigensystem, growth, modes
 from brakecli.analysis.stability.report import stability, step_limit, undamped_critical
 from brakecli.case.system import set_up
-from brakecli.solver.compile import Coefficients
 from brakecli.solver.links import coefficients
+from brakecli.solver.records import Coefficients
 from tests.examples import MODE_COUPLING, ROUGH, SQUEAL, make, simulate
 
 

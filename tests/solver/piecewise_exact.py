@@ -20,7 +20,7 @@ class PiecewiseExact:
     """Exact motion (x, y, vx, vy) of a flat case with constant speed and load."""
 
     def __init__(self, setup: Setup, grid: float) -> None:
-        c, q = setup.coefficients, float(setup.load.values[0])
+        c, q = setup.coefficients, float(setup.load["value"][0])
         self.belt, self.phi, self.stiffness = setup.belt_speed, c.phi, setup.contact_stiffness
         self.c = c
         self.q_x, self.q_y = q * c.sin_beta, q * c.cos_beta

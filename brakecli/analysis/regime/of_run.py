@@ -38,11 +38,11 @@ class StoredHistory:
 
 def context(setup: Setup) -> Context:
     """What the classifier is told of a case."""
-    steady = len(setup.belt.times) == 1 and len(setup.load.times) == 1
+    steady = len(setup.belt) == 1 and len(setup.load) == 1
     highest = 0.5 / setup.timing.interval
     last_speed = float(value_at(setup.belt, setup.timing.samples * setup.timing.interval))
     lines = forced_lines(last_speed, [float(turns) for turns in setup.wheel.turns], highest)
-    compression = float(np.abs(setup.load.values).max()) / (setup.coefficients.c_yy + setup.contact_stiffness)
+    compression = float(np.abs(setup.load["value"]).max()) / (setup.coefficients.c_yy + setup.contact_stiffness)
     fastest = natural_frequencies(setup.coefficients, setup.contact_stiffness)[1]
     return Context(
         last_speed,

@@ -22,7 +22,7 @@ from brakecli.analysis.stability.modes import (
 )
 from brakecli.case.system import Setup
 from brakecli.errors import CaseError
-from brakecli.solver.compile import Coefficients
+from brakecli.solver.records import Coefficients
 from brakecli.solver.schedules import value_at
 from brakecli.solver.schemes import has_own_steps
 from brakecli.solver.steady_sliding import Equilibrium, equilibrium, mean_contact, tabulated
