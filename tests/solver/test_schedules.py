@@ -4,7 +4,6 @@ import math
 from fractions import Fraction
 from itertools import pairwise
 
-import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
@@ -148,4 +147,3 @@ def test_a_schedule_is_one_contiguous_array_of_knots() -> None:
     s: Schedule = schedule([0.0, 1.0], [1.0, 2.0])
     assert s.flags.c_contiguous
     assert s.dtype == KNOT
-        assert column.size == 2
