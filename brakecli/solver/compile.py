@@ -50,13 +50,15 @@ def kernel(signature: Any, *, fastmath: frozenset[str] = frozenset(), inlined: b
     """Compile a function ahead of its first call for one signature, strictly (no fastmath unless named).
 
     A large one that is called in many places is better not `inlined`: otherwise compilation takes ten times
-    longer.
+    longer. Such a one, and one whose name begins with an underscore, cannot be called from Python: to wrap their
+    arguments would take longer than to compile them.
     """
 
     def compile_(function: F) -> F:
         before, config.CACHE_DIR = config.CACHE_DIR, str(CACHE or config.CACHE_DIR)
         try:
-            options: dict[str, Any] = {"fastmath": set(fastmath), "forceinline": inlined}
+            options: dict[str, Any] = {"fastmath": set(fastmath), "forceinline": inlined, "no_cfunc_wrapper": True}
+            options["no_cpython_wrapper"] = not inlined or function.__name__.startswith("_")
             try:
                 return njit(signature, cache=CACHE is not None, **options)(function)  # type: ignore[no-any-return]
             except OSError:  # a cache that cannot be written or read, on a full disk: do without
