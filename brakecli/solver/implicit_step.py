@@ -14,9 +14,6 @@ from brakecli.solver.friction import minimise, slopes
 from brakecli.solver.records import EVALUATE, LAYER, PROBLEM_TYPE, SOLVE, Layer
 
 SOLVED, UNCONVERGED = 0, 1
-MOST = {"newton": 100, "fixed-point": 500}
-"""Evaluations of the contact that a step may take before it counts as not converged."""
-
 _RELATIVE = 1e-13
 """Relative change of F below which a step is solved: a few hundred roundings, so that both iterations agree to
 rounding; the gap's own rounding, times the contact's stiffness, is added to it."""

@@ -64,7 +64,7 @@ CONTACT = record(
     fraction=float,  # part of the pad that touches, 0 to 1
     store=float,  # V = k/2 ∫ max(gap, 0)² dξ, J
     store_x=float,  # ∂V/∂x, N
-    kind=int,  # the evaluator that did the work, index into `contact.KINDS`
+    kind=int,  # the evaluator that did the work, place in `contact.kinds()`
     valid=int,  # 0 where its assumptions do not hold
 )
 """What an evaluator finds."""
@@ -87,7 +87,7 @@ COUNTS = record(
     rising=int,  # steps whose solution need not be unique
     most=int,  # evaluations in one step
     turns=int,  # steps after which a touching shoe slides the other way, or sticks; not of a scheme's own steps
-    kinds=(int, 3),  # steps that each evaluator of `contact.KINDS` took
+    kinds=(int, 3),  # steps that each of `contact.kinds()` took
 )
 
 PAD = record(

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from brakecli.case.system import Setup
 from brakecli.solver import contact
 from brakecli.solver.contact.pad import build_layer
+from brakecli.solver.system import System
 
 Vector = NDArray[np.float64]
 
@@ -22,18 +22,18 @@ Vector = NDArray[np.float64]
 class SolveIvp:
     """The motion (x, y, vx, vy) of a case, phase by phase: slip either way, or stick."""
 
-    def __init__(self, setup: Setup, relative: float, max_step: float) -> None:
-        self.setup, self.relative, self.max_step = setup, relative, max_step
-        self.c, self.belt, self.q = setup.coefficients, setup.belt_speed, float(setup.load["value"][0])
+    def __init__(self, system: System, relative: float, max_step: float) -> None:
+        self.system, self.relative, self.max_step = system, relative, max_step
+        self.c, self.belt, self.q = system.coefficients, system.belt_speed, float(system.load["value"][0])
         self.evaluate = contact.load("exact")
-        self.layer = build_layer(self.evaluate, setup.pad)
+        self.layer = build_layer(self.evaluate, system.pad)
         self.visited: list[int] = []
         self.evaluations = 0
 
     def normal(self, t: float, z: Vector) -> float:
         """F_y."""
         self.evaluations += 1
-        wheel = self.setup.wheel
+        wheel = self.system.wheel
         self.layer.angles[:] = wheel.phase - wheel.omega * (self.belt * t)
         self.evaluate(z[0], z[1], self.layer)
         return float(self.layer.contact.normal_force)

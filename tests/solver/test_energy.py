@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brakecli.case.system import set_up
-from brakecli.solver.motion import Motion
+from brakecli.case.system import system_of
+from brakecli.solver.motion import Stepping
 from tests.examples import MODE_COUPLING, ROUGH, SQUEAL, make, simulate
 
 SCHEMES = [
@@ -93,10 +93,10 @@ def test_friction_never_feeds_energy_in_the_frame_of_the_wheel(
 ) -> None:
     base: dict[str, Any] = SQUEAL if flat else {**ROUGH, "wheel": {"radius": 0.5, "angular_speed": 0.1}}
     case = make(base, solver__scheme=scheme, solver__theta=theta, friction__coefficient=0.8, solver__step=2e-5)
-    motion = Motion(set_up(case))
+    motion = Stepping(system_of(case))
     slips, sticks = 0, 0
     for _ in range(1500):
-        motion._block(int(motion.counts.level) + 1)
+        motion.block(int(motion.counts.level) + 1)
         p = motion.plant.problem
         friction = p.a_11 * p.d + p.a_12 * p.e - p.g_1
         sliding = p.d - p.belt

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from brakecli.solver import contact
 from brakecli.solver.contact.pad import build_layer, build_pad
 from brakecli.solver.friction import minimise
-from brakecli.solver.implicit_step import MOST, SOLVED, UNCONVERGED, fixed_point, newton
+from brakecli.solver.implicit_step import SOLVED, UNCONVERGED, fixed_point, newton
+from brakecli.solver.method import MOST
 from brakecli.solver.records import CONTACT, PROBLEM, new
 from brakecli.solver.roughness import Surface, surface
 

@@ -1,18 +1,44 @@
-"""The normal contact force, (2): one file per way of computing it, loaded by the name that the case gives.
+"""The normal contact force, (2): one file and one row of `EVALUATORS` for each way of computing it.
+
+The rows are plain data; a file is imported when it is used.
 
 Contract of an evaluator module: `evaluate(x, y, layer)`, a kernel of the signature `records.EVALUATE`, fills
 `layer.contact`, a record of `records.CONTACT`, for the shoe at (x, y) and the phases `layer.angles` of the wheel's
 harmonics (`roughness.wheel_angles`). It takes constants and tables from `layer.pad` and `layer.tables`, changes
-nothing but the contact and `layer.scratch`, and names itself by its index into `KINDS`.
+nothing but the contact and `layer.scratch`, and notes its place in `kinds()`.
 """
 
+from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
-KINDS = ("closed-form", "midpoint", "exact")
+
+@dataclass(frozen=True)
+class Evaluator:
+    """What a way of computing the contact states of itself; `needs_nodes`: it takes quadrature nodes."""
+
+    module: str
+    needs_nodes: bool = False
+
+
+EVALUATORS: dict[str, Evaluator] = {
+    "auto": Evaluator("brakecli.solver.contact.auto", needs_nodes=True),
+    "closed-form": Evaluator("brakecli.solver.contact.closed_form"),
+    "midpoint": Evaluator("brakecli.solver.contact.midpoint", needs_nodes=True),
+    "exact": Evaluator("brakecli.solver.contact.exact"),
+}
+"""`auto` hands over to the others."""
+
+
 CLOSED_FORM, MIDPOINT, EXACT = range(3)
+"""Places in `kinds()`."""
+
+
+def kinds() -> tuple[str, ...]:
+    """The evaluators that do the work, in the order of the kinds that they note."""
+    return tuple(name for name in EVALUATORS if name != "auto")
 
 
 def load(name: str) -> Any:
-    """The kernel `evaluate` of the evaluator of this name; it is compiled on the first call of a new version."""
-    return import_module(f"brakecli.solver.contact.{name.replace('-', '_')}").evaluate
+    """The kernel `evaluate` of an evaluator; it is compiled on the first call of a new version."""
+    return import_module(EVALUATORS[name].module).evaluate

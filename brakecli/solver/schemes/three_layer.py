@@ -2,12 +2,13 @@
 
 from typing import Any
 
-from brakecli.solver import records
+from brakecli.solver import loop, records
 from brakecli.solver.compile import kernel
 from brakecli.solver.energy import Mechanical, links_energy
 from brakecli.solver.records import Coefficients, Pair, Weights
 
 STATE = records.STATE
+advance, sample = loop.advance, loop.sample
 WEIGHTS = 3
 LAG = 1
 MEMORY = ("x", "y", "x_old", "y_old")

@@ -2,12 +2,13 @@
 
 from typing import Any
 
-from brakecli.solver import records
+from brakecli.solver import loop, records
 from brakecli.solver.compile import kernel
 from brakecli.solver.energy import Mechanical, energy_at_level
 from brakecli.solver.records import Coefficients, Pair, Weights
 
 STATE = records.STATE
+advance, sample = loop.advance, loop.sample
 WEIGHTS = 2
 LAG = 0
 MEMORY = ("x", "y", "v_x", "v_y")
