@@ -56,7 +56,7 @@ def timing(case: Case) -> Timing:
         adjustments.append(
             f"solver.step: not used, event-driven finds its steps itself, to a tolerance of {EVENT_TOLERANCE:g}"
         )
-    if case.solver.promise is not None and case.contact.nodes is not None:
+    if case.solver.effective_tolerance is not None and case.contact.nodes is not None:
         adjustments.append("contact.nodes: not used, the tolerance chooses nodes itself")
     if abs(interval / step - per_sample) > WHOLE * per_sample:
         adjustments.append(
@@ -127,7 +127,9 @@ class Setup:
     @property
     def _tolerance(self) -> float:
         """What a scheme with steps of its own keeps."""
-        return EVENT_TOLERANCE if self.case.solver.step is not None else self.case.solver.promise or 0.0
+        return (
+            EVENT_TOLERANCE if self.case.solver.step is not None else self.case.solver.effective_tolerance or 0.0
+        )
 
     @property
     def drive(self) -> Drive:

@@ -111,7 +111,7 @@ def _own_steps(setup: Setup, frequency: float, passing: float) -> tuple[int, flo
 
     `frequency` (Hz) is the highest natural one, `passing` (Hz) that of the shortest wave of the wheel.
     """
-    promise, c = setup.case.solver.promise, setup.coefficients
+    promise, c = setup.case.solver.effective_tolerance, setup.coefficients
     tolerance = EVENT_TOLERANCE if promise is None else max(min(1e-5 * promise, 1e-8), 1e-13)
     rate = frequency * _OWN_STEPS * (1e-10 / tolerance) ** 0.125 + 8.0 * passing + 0.25 * (c.b_xx + c.b_yy) / c.m
     duration = setup.timing.samples * setup.timing.interval
@@ -277,7 +277,7 @@ def refuse(setup: Setup, found: Check, free_bytes: float) -> None:
     if found.memory > MOST_TABLE_BYTES:
         raise RefusedError(f"the contact's tables would be too large: {size}; reduce contact.nodes")
     compared = 2.0 * 8.0 * COLUMNS * setup.timing.samples
-    if setup.case.solver.promise is not None and compared > MOST_TABLE_BYTES:
+    if setup.case.solver.effective_tolerance is not None and compared > MOST_TABLE_BYTES:
         raise RefusedError(
             f"two histories of {setup.timing.samples:.3g} samples are compared to keep the tolerance, which takes "
             f"{compared / 1e9:.3g} GB of memory; increase output.sample_interval, or give solver.step instead"

@@ -145,7 +145,7 @@ def run(
                 result.append("history", {"time": interval * np.arange(first, first + len(rows)), **columns})
 
             certificate = None
-            if setup.case.solver.promise is None:
+            if setup.case.solver.effective_tolerance is None:
                 work, energy = Motion(setup).run(sink, progress)
             else:
                 motion = certify(setup.case, progress)

@@ -109,7 +109,7 @@ def certify(case: Case, progress: Tell = lambda samples: None) -> Certified:
     friction does not jump, a ladder of steps and nodes of the two-layer scheme may be cheaper down to
     `LAYERED_FROM`. It is left where its next run takes long beside all the event-driven ones.
     """
-    promise = case.solver.promise
+    promise = case.solver.effective_tolerance
     assert promise is not None
     scheme = case.solver.scheme
     if scheme is Scheme.AUTO:

@@ -104,7 +104,7 @@ def simulate(case: Case) -> Outcome:
         found = check(setup)
         refuse(setup, found, math.inf)
         certificate = None
-        if case.solver.promise is None:
+        if case.solver.effective_tolerance is None:
             blocks: list[NDArray[np.float64]] = []
             work, _ = Motion(setup).run(lambda rows: blocks.append(rows.copy()))
             rows = np.concatenate(blocks)

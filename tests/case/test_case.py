@@ -14,12 +14,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from brakecli.case.case import Case, InitialState, Iteration, Scheme, Start, json_schema, resolved_toml
+from brakecli.case.case import Case, InitialState, Iteration, Scheme, Start, resolved_toml
 from brakecli.case.read import parse_case, read_case, starter_text
-from brakecli.case.wording import tables
+from brakecli.case.tables import json_schema, tables_within
 
 jsonschema = import_module("jsonschema")  # imported so because it has no type hints
-VALIDATOR = jsonschema.Draft202012Validator(json_schema())
+VALIDATOR = jsonschema.Draft202012Validator(json_schema(Case))
 
 SMALL = """
 shoe.mass = 10
@@ -214,9 +214,9 @@ def test_a_case_built_in_python_obeys_the_same_rules() -> None:
 
 
 def test_every_key_has_a_description_and_every_float_a_unit() -> None:
-    schema = json_schema()
+    schema = json_schema(Case)
     seen = 0
-    for path, table in tables(Case):
+    for path, table in tables_within(Case).items():
         properties = schema["$defs"][table.__name__]["properties"] if path else schema["properties"]
         for key, node in properties.items():
             kind = node.get("items", node).get("type")
@@ -228,11 +228,11 @@ def test_every_key_has_a_description_and_every_float_a_unit() -> None:
 
 def test_the_shipped_schema_is_the_one_the_models_give() -> None:
     shipped = resources.files("brakecli.case").joinpath("case.schema.json").read_text(encoding="utf-8")
-    assert json.loads(shipped) == json_schema()
+    assert json.loads(shipped) == json_schema(Case)
 
 
 def test_the_schema_is_valid_and_accepts_the_starter_case() -> None:
-    jsonschema.Draft202012Validator.check_schema(json_schema())
+    jsonschema.Draft202012Validator.check_schema(json_schema(Case))
     VALIDATOR.validate(tomllib.loads(starter_text()))
 
 
@@ -264,9 +264,9 @@ def test_the_schema_refuses_two_alternatives_at_once() -> None:
 def test_the_starter_mentions_every_key() -> None:
     text = starter_text()
     seen = 0
-    for path, table in tables(Case):
+    for path, table in tables_within(Case).items():
         for key in table.model_fields:
-            if (*path, key) not in dict(tables(Case)):
+            if (*path, key) not in tables_within(Case):
                 assert f"\n{key} = " in text or f"\n# {key} = " in text, (path, key)
                 seen += 1
     assert seen > 30

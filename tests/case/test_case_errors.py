@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 from brakecli.case.case import Case
 from brakecli.case.read import parse_case, read_case
 from brakecli.case.system import timing
-from brakecli.case.toml_lines import LARGEST_TEXT, MOST_MARKS, MOST_PARTS, MOST_STATEMENTS, Located, split
-from brakecli.case.wording import tables
+from brakecli.case.tables import tables_within
+from brakecli.case.toml_lines import LARGEST_TEXT, MOST_MARKS, MOST_PARTS, MOST_STATEMENTS, Located
 from brakecli.errors import CaseError, Problem
 
 CONSTANT = """\
@@ -188,7 +188,7 @@ def test_the_cases_of_this_file_are_valid() -> None:
 
 
 def test_the_table_of_allowed_values_has_every_field() -> None:
-    inner = dict(tables(Case))
+    inner = tables_within(Case)
     fields = {
         ".".join(map(str, (*path, key)))
         for path, table in inner.items()
@@ -328,9 +328,9 @@ def test_the_paper_start_needs_a_shoe_at_rest() -> None:
             "solver.tolerance",
             "is given together with step (found 1e-10); keep one of the two",
         ),
-        ("duration = 1.0", "duration = 1.0\ntheta = [0.5, 0.5]", "solver.theta", "which has no weights"),
+        ("duration = 1.0", "duration = 1.0\ntheta = [0.5, 0.5]", "solver.theta", "is not for event-driven"),
         ('"newton"', '"fixed-point"', "solver.iteration", "is not for event-driven"),
-        ('"consistent"', '"paper"', "solver.start", "is for the three-layer scheme alone"),
+        ('"consistent"', '"paper"', "solver.start", "is only for the three-layer scheme"),
         ("= false", "= true", "solver.allow_unconverged", "is not for event-driven"),
         ("sample_interval = 1e-4", "", "output.sample_interval", "there is no time step to take its place"),
         ('"auto"', '"midpoint"', "contact.evaluator", "event-driven is exact"),
@@ -346,9 +346,9 @@ def test_a_step_chooses_two_layer_and_none_leaves_the_choice() -> None:
     plain = change(CONSTANT, ('scheme = "two-layer"\n', ""), ("theta = [0.5, 0.5]\n", ""))
     assert parse_case(plain, "case.toml").case.solver.scheme == "two-layer"
     free = parse_case(change(plain, ("step = 1e-5\n", "")), "case.toml").case.solver
-    assert (free.scheme, free.step, free.tolerance, free.promise) == ("auto", None, None, 1e-3)
+    assert (free.scheme, free.step, free.tolerance, free.effective_tolerance) == ("auto", None, None, 1e-3)
     kept = parse_case(plain, "case.toml", ["solver.tolerance=1e-5"]).case.solver
-    assert (kept.scheme, kept.step, kept.promise) == ("auto", None, 1e-5)
+    assert (kept.scheme, kept.step, kept.effective_tolerance) == ("auto", None, 1e-5)
     (line,) = told(change(plain, ("[solver]", '[solver]\nscheme = "auto"')))
     assert 'solver.step: is given, but "auto" chooses the step' in line
 
@@ -634,7 +634,7 @@ def test_of_a_long_list_the_first_wrong_entries_are_told_and_their_number() -> N
     assert len(found) == 21
     assert found[0].key == "roughness.wheel.amplitudes[0]"
     assert found[-1].key == "roughness.wheel.amplitudes"
-    assert found[-1].what == "has 1000 wrong entries, of which the first 20 are told"
+    assert found[-1].what == "has 1000 wrong entries, of which the first 20 are reported"
 
 
 @pytest.mark.parametrize(
@@ -781,9 +781,9 @@ DOCUMENTS = st.dictionaries(st.text("ab.\"'\n #[]=é", max_size=4), TREES, max_s
 @given(DOCUMENTS)
 def test_statement_by_statement_a_text_says_the_same_as_in_one_piece(document: dict[str, Any]) -> None:
     text = tomli_w.dumps(document)
-    located = Located(split(text))
+    located = Located(text)
     assert repr(located.data) == repr(tomllib.loads(text))  # nan is not equal to itself
-    assert not located.findings
+    assert not located.problems
 
 
 @given(st.data())
@@ -806,7 +806,7 @@ def test_no_text_and_no_override_raises_anything_but_a_case_error(text: str, ove
 
 def test_tables_in_a_list_have_lines_of_their_own() -> None:
     text = "case = 1\n[[axis]]\nstart = 1\n[[axis]]\nstart = 2\n[axis.more]\nstop = 3\n"
-    assert Located(split(text)).lines == {
+    assert Located(text).lines == {
         ("case",): 1,
         ("axis",): 2,
         ("axis", 0): 2,

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brakecli.case.case import json_schema
+from brakecli.case.tables import json_schema
 from brakecli.errors import CaseError
 from brakecli.sweeps.file import LoadedSweep, is_case, is_sweep, parse_sweep
 from brakecli.sweeps.plan import Plan
@@ -151,10 +151,10 @@ AXIS = '[[axis]]\nparameter = "link2.angle_deg"\n'
         (AXIS + "values = [1.0]\nstart = 1.0", "is given together with"),
         (AXIS + "start = 1.0\nstop = 2.0\nnum = 0", "axis[0].num: is out of range (found 0)"),
         (AXIS + "start = 0.0\nstop = 2.0\nnum = 3\nspacing = 'log'", "axis[0].start: is not above 0"),
-        (AXIS + "values = [1.0]\nspacing = 'log'", "axis[0].spacing: is for start and stop"),
+        (AXIS + "values = [1.0]\nspacing = 'log'", "axis[0].spacing: is only for start and stop"),
         (AXIS + "start = nan\nstop = 2.0\nnum = 3", "axis[0].start"),
         ('[[axis]]\nparameter = []\nvalues = [1.0]', "axis[0].parameter: is too short"),
-        ('[[axis]]\nparameter = "a b"\nvalues = [1.0]', "axis[0].parameter: is no key path"),
+        ('[[axis]]\nparameter = "a b"\nvalues = [1.0]', "axis[0].parameter: is not a key path"),
         (AXIS + "values = [1.0]\n" + AXIS + "values = [2.0]", "axis[1].parameter: is set twice"),
         (AXIS + "values = [1.0]\n" + CRITICAL.replace("friction.coefficient", "link2.angle_deg"),
          "is set by an axis"),
