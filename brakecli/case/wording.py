@@ -117,7 +117,7 @@ def _expected(path: KeyPath, kind: type[Table]) -> str:
 def _value(node: dict[str, Any]) -> str:
     text = _KINDS.get(node.get("type", ""), "a value")
     if "exclusiveMinimum" in node:
-        return f"{text} above {node['exclusiveMinimum']:g}"
+        return f"{text} above {node['exclusiveMinimum']:.9g}"
     if "maximum" in node:
-        return f"{text} from {node['minimum']} to {node['maximum']}"
-    return f"{text} of at least {node['minimum']:g}" if "minimum" in node else text
+        return f"{text} from {node['minimum']:.9g} to {node['maximum']:.9g}"
+    return f"{text} of at least {node['minimum']:.9g}" if "minimum" in node else text
