@@ -3,7 +3,8 @@
 import pytest
 
 from brakecli.case.read import parse_case
-from brakecli.case.system import timing
+from brakecli.case.system import system_of
+from brakecli.runs.limits import adjustments
 from tests.case.examples import CONSTANT, EVENT_DRIVEN, change, lines_of, messages, where
 
 RULES = [
@@ -83,12 +84,12 @@ def test_a_step_chooses_two_layer_and_none_leaves_the_choice() -> None:
 
 def test_nodes_are_chosen_by_the_tolerance() -> None:
     case = parse_case(CONSTANT, "case.toml", ["solver={duration=1.0, tolerance=1e-4}"]).case
-    assert "contact.nodes: not used, the tolerance chooses nodes itself" in timing(case).adjustments
+    assert "contact.nodes: not used, the tolerance chooses nodes itself" in adjustments(system_of(case))
 
 
 def test_event_driven_takes_the_step_of_a_case_for_its_samples_alone() -> None:
     case = parse_case(CONSTANT, "case.toml", ['solver.scheme="event-driven"', "solver.theta=[]"]).case
-    (adjustment,) = timing(case).adjustments
+    (adjustment,) = adjustments(system_of(case))
     assert "solver.step: not used, event-driven finds its steps itself, to a tolerance of 1e-10" in adjustment
 
 
