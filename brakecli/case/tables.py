@@ -46,7 +46,7 @@ def _few_errors(values: Any, handler: Callable[[Any], Any]) -> Any:
         if count <= MOST_WRONG_ENTRIES:
             raise
         what = f"has {count} wrong entries, of which the first {MOST_WRONG_ENTRIES} are reported"
-        errors = [*_again(error)[:MOST_WRONG_ENTRIES], _as_error(Problem((), what, "correct these first"))]
+        errors = [*_again(error, MOST_WRONG_ENTRIES), _as_error(Problem((), what, "correct these first"))]
         raise ValidationError.from_exception_data("list", errors) from None
 
 
@@ -157,15 +157,15 @@ def _as_error(problem: Problem) -> InitErrorDetails:
     return InitErrorDetails(type=kind, loc=problem.path, input=None)
 
 
-def _again(error: ValidationError) -> list[InitErrorDetails]:
-    """The errors of a validation in a form that can be raised again."""
+def _again(error: ValidationError, most: int | None = None) -> list[InitErrorDetails]:
+    """The errors of a validation, or the first of them, in a form that can be raised again."""
     return [
         InitErrorDetails(
             type=PydanticCustomError(each["type"], each["type"], each.get("ctx")),
             loc=each["loc"],
             input=each["input"],
         )
-        for each in error.errors(include_url=False)
+        for each in error.errors(include_url=False)[:most]
     ]
 
 

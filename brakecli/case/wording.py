@@ -40,20 +40,24 @@ def problems(error: ValidationError, kind: type[Table]) -> Iterator[Problem]:
     """Everything that is wrong with a table, in plain words."""
     tables = tables_within(kind)
     errors = error.errors(include_url=False)
-    meant = {each["loc"]: _nearest(each["loc"], tables) for each in errors if each["type"] == "extra_forbidden"}
+    meant = {each["loc"]: _meant(each["loc"], tables) for each in errors if each["type"] == "extra_forbidden"}
+    misspelt = {paths[0] for paths in meant.values() if paths}
     for each in errors:
         path, value = each["loc"], each["input"]
         match each["type"]:
             case "rule":
                 yield replace(each["ctx"]["problem"], path=path)
             case "extra_forbidden":
-                yield Problem(path, "is unknown" + found(value), _suggestion(path, meant[path], tables))
-                if (
-                    meant[path] and meant[path] in tables and isinstance(value, dict)
-                ):  # the name of a table is misspelt
-                    yield from _within(path, tables[meant[path]], value)
+                remedy = f"did you mean {' or '.join(_name(near, tables) for near in meant[path])}?"
+                if not meant[path]:
+                    parent = _without_places(path[:-1])
+                    keys = ", ".join(tables[parent].model_fields)
+                    remedy = f"the keys {f'of {_name(parent, tables)}' if parent else 'at the top'} are {keys}"
+                yield Problem(path, "is unknown" + found(value), remedy)
+                if meant[path] and meant[path][0] in tables and isinstance(value, dict):
+                    yield from _within(path, tables[meant[path][0]], value)
             case "missing":
-                if path not in meant.values():  # otherwise it is misspelt
+                if path not in misspelt:
                     yield Problem(path, MISSING, f"give {_expected(path, kind)}")
             case reason:
                 too_large = reason == "float_type" and type(value) is int
@@ -62,6 +66,7 @@ def problems(error: ValidationError, kind: type[Table]) -> Iterator[Problem]:
 
 
 def _within(path: KeyPath, kind: type[Table], data: dict[str, Any]) -> Iterator[Problem]:
+    """What is wrong with the keys of a table whose own name is misspelt."""
     try:
         kind.model_validate(data)
     except ValidationError as error:
@@ -69,32 +74,22 @@ def _within(path: KeyPath, kind: type[Table], data: dict[str, Any]) -> Iterator[
             yield replace(problem, path=path + problem.path)
 
 
-def _nearest(path: KeyPath, tables: dict[KeyPath, type[Table]]) -> KeyPath:
-    """The key path that an unknown one was probably meant to be; empty if none comes near."""
-    key = str(path[-1])
-    for table, kind in tables.items():
-        if key in kind.model_fields:
-            return (*table, key)
-    for table in (_names(path[:-1]), *tables):
-        if near := get_close_matches(key, tables[table].model_fields, n=1, cutoff=0.7):
-            return (*table, near[0])
-    return ()
+def _meant(path: KeyPath, tables: dict[KeyPath, type[Table]]) -> list[KeyPath]:
+    """The key paths that an unknown one was probably meant to be; empty if none comes near."""
+    parent, key = _without_places(path[:-1]), str(path[-1])
+    known = dict.fromkeys(name for kind in tables.values() for name in kind.model_fields)
+    if key not in known:
+        if near := get_close_matches(key, tables[parent].model_fields, n=1, cutoff=0.7):
+            return [(*parent, near[0])]
+        key = next(iter(get_close_matches(key, known, n=1, cutoff=0.7)), "")
+    return [(*table, key) for table, kind in tables.items() if key in kind.model_fields]
 
 
-def _suggestion(path: KeyPath, meant: KeyPath, tables: dict[KeyPath, type[Table]]) -> str:
-    parent = _names(path[:-1])
-    if not meant:
-        keys = ", ".join(tables[parent].model_fields)
-        return f"the keys {f'of [{key_text(parent)}]' if parent else 'at the top'} are {keys}"
-    if meant in tables:
-        return f"did you mean [{key_text(meant)}]?"
-    if meant[:-1] == parent:
-        return f'did you mean "{meant[-1]}"?'
-    owners = [f"[{key_text(table)}]" for table, kind in tables.items() if meant[-1] in kind.model_fields]
-    return f"did you mean {meant[-1]} of {' or '.join(owners)}?"
+def _name(path: KeyPath, tables: dict[KeyPath, type[Table]]) -> str:
+    return f"[{key_text(path)}]" if path in tables else key_text(path)
 
 
-def _names(path: KeyPath) -> KeyPath:
+def _without_places(path: KeyPath) -> KeyPath:
     """A key path without the places in lists."""
     return tuple(part for part in path if isinstance(part, str))
 

@@ -13,7 +13,7 @@ from brakecli.sweeps.plan import Plan, given_toml
 from brakecli.sweeps.tables import Sweep
 
 MOST_TRIED = 1000
-"""Listed values of an axis that are tried before the start; of a range both ends are."""
+"""Most listed values of an axis that are tried before the sweep starts. Both ends of a range are always tried."""
 
 _OWN_KEYS = {("case",), ("critical",)}
 
@@ -30,21 +30,21 @@ class LoadedSweep:
 
     @property
     def title(self) -> str:
-        """The title of the sweep, or else that of its case."""
+        """The title of the sweep, otherwise that of its case."""
         return self.sweep.title or self.base.case.title
 
 
 def read_sweep(source: str, overrides: Sequence[str] = ()) -> LoadedSweep:
     """Read a sweep from a path, or from standard input where the path is "-". Raises `CaseError`.
 
-    Overrides set keys of the base case, those of `critical` and `case` excepted.
+    Overrides of `critical` and `case` belong to the sweep, all others to its base case.
     """
     folder = Path() if source == "-" else Path(source).parent
     return parse_sweep(*read_text(source), folder, overrides)
 
 
 def parse_sweep(text: str, label: str, folder: Path, overrides: Sequence[str] = ()) -> LoadedSweep:
-    """Make a sweep of its text; its base case is looked for from `folder` on. Raises `CaseError`."""
+    """Make a sweep of its text; the path of its base case begins at `folder`. Raises `CaseError`."""
     own = [override for override in overrides if key_path(override.partition("=")[0])[:1] in _OWN_KEYS]
     sweep = parse_table(Sweep, text, label, own)
     others = [override for override in overrides if override not in own]
@@ -58,13 +58,13 @@ def parse_sweep(text: str, label: str, folder: Path, overrides: Sequence[str] = 
 
 
 def is_sweep(path: str) -> bool:
-    """Whether a file is meant to be a sweep: by the keys that no case has."""
+    """Whether a file is meant to be a sweep: it has keys that no case has."""
     keys = _keys(path)
     return bool(keys & {"case", "axis", "critical"}) and "shoe" not in keys
 
 
 def is_case(path: str) -> bool:
-    """Whether a file is meant to be a case: by the keys that no sweep has."""
+    """Whether a file is meant to be a case: it has keys that no sweep has."""
     keys = _keys(path)
     return "shoe" in keys and not keys & {"axis", "critical"}
 

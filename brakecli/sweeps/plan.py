@@ -25,7 +25,7 @@ Settings = Mapping[tuple[str, ...], Any]
 
 @dataclass(frozen=True)
 class Plan:
-    """A sweep with its base case, both as TOML that stands for itself: all that a worker needs.
+    """A sweep with its base case, both as complete TOML texts: all that a worker needs.
 
     `case_text` holds the keys that were given, overrides applied, so that a default which follows from another key
     follows it at every point.
@@ -60,13 +60,13 @@ class Plan:
 
     @property
     def passes(self) -> int:
-        """How many times the grid is gone through: twice where the motion is followed both up and down."""
+        """How often the grid is computed: twice where the motion is followed both up and down."""
         axis = self.followed
         return 2 if axis is not None and self.sweep.axis[axis].direction is Direction.BOTH else 1
 
     @property
     def unit_length(self) -> int:
-        """Points of a unit, which is computed in one go: one, or a line along the followed axis."""
+        """Points of a unit, which one task computes: a single point, or a line along the followed axis."""
         return 1 if self.followed is None else self.shape[self.followed]
 
     @property
@@ -123,7 +123,7 @@ plan_of = lru_cache(maxsize=4)(Plan)
 
 
 def label(value: Any) -> str:
-    """A value of an axis as text: as TOML writes it, but for the quotes of texts."""
+    """A value of an axis as TOML writes it, but a text without its quotes."""
     if isinstance(value, str):
         return value
     return f"{value:.9g}" if isinstance(value, float) else json.dumps(value)

@@ -1,4 +1,4 @@
-"""A sweep file's tables: the axes of the grid, and the critical parameter that is looked for at each point."""
+"""A sweep file's tables: the axes of the grid, and the critical parameter that is sought at each point."""
 
 import math
 from collections.abc import Iterator
@@ -20,7 +20,7 @@ class Spacing(StrEnum):
 
 
 class Direction(StrEnum):
-    """Whether each point of an axis starts from the end of the one before it, and which way that goes."""
+    """How the motion is followed along an axis, where each point starts from the end of the one before it."""
 
     UP = "up"
     DOWN = "down"
@@ -109,13 +109,13 @@ def _not_a_key_path(text: str) -> Iterator[Problem]:
 
 
 class Critical(Table):
-    """The parameter whose critical value is looked for: the least at which steady sliding loses its stability."""
+    """The parameter whose critical value is sought: the least at which steady sliding loses its stability."""
 
     parameter: str = Field(description="key path of the case, such as friction.coefficient")
     lower: Number = Field(description="where the search begins")
     upper: Number = Field(description="where the search ends")
     tolerance: Positive = Field(1e-3, description="largest width of the bracket at the end of the search")
-    method: Method = choice("runs, or eigenvalues alone", Method.SIMULATION)
+    method: Method = choice("by runs, or only by eigenvalues", Method.SIMULATION)
 
     def _broken_rules(self) -> Iterator[Problem]:
         if self.upper <= self.lower:

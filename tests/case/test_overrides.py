@@ -47,7 +47,7 @@ def test_problems_of_overrides_name_the_override_and_come_after_those_of_the_fil
         "case.toml:3: shoe.mass: is out of range (found -10.0); give a number above 0, in kg",
         "--set link1.stiffness=-1: link1.stiffness: is out of range (found -1);"
         " give a number of at least 0, in N/m",
-        '--set solver.dration=2: solver.dration: is unknown (found 2); did you mean "duration"?',
+        "--set solver.dration=2: solver.dration: is unknown (found 2); did you mean solver.duration?",
         "--set contact={half_length=1, stiffness=nan}: contact.stiffness: is not finite (found nan);"
         " give a number above 0, in N/m²",
     ]

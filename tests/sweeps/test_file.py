@@ -1,4 +1,4 @@
-"""Sweep files: what they may say, and how every problem of one is told."""
+"""Sweep files: what they may say, and how every problem of one is reported."""
 
 import tomllib
 from importlib import import_module
@@ -121,18 +121,18 @@ def test_the_texts_of_a_plan_stand_for_it(tmp_path: Path) -> None:
     assert again.case(again.settings(17)) == plan.case(plan.settings(17))
 
 
-def test_every_problem_of_a_sweep_is_told_at_once_with_its_line(tmp_path: Path) -> None:
+def test_every_problem_of_a_sweep_is_reported_at_once_with_its_line(tmp_path: Path) -> None:
     text = (
         'case = "tiny.toml"\n[[axis]]\nparamter = "link2.angle_deg"\nstart = 1\nstop = 2\n[critical]\nlower = 1\n'
     )
-    told = "\n".join(problems(tmp_path, text))
+    reported = "\n".join(problems(tmp_path, text))
     for words in (
-        'sweep.toml:3: axis[0].paramter: is unknown (found "link2.angle_deg"); did you mean "parameter"?',
+        'sweep.toml:3: axis[0].paramter: is unknown (found "link2.angle_deg"); did you mean axis.parameter?',
         "axis[0].num: is missing",
         "critical.parameter: is missing",
         "critical.upper: is missing",
     ):
-        assert words in told
+        assert words in reported
 
 
 AXIS = '[[axis]]\nparameter = "link2.angle_deg"\n'
