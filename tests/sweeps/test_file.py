@@ -155,6 +155,7 @@ AXIS = '[[axis]]\nparameter = "link2.angle_deg"\n'
         (AXIS + "start = nan\nstop = 2.0\nnum = 3", "axis[0].start"),
         ('[[axis]]\nparameter = []\nvalues = [1.0]', "axis[0].parameter: is too short"),
         ('[[axis]]\nparameter = "a b"\nvalues = [1.0]', "axis[0].parameter: is not a key path"),
+        ('[[axis]]\nparameter = "' + "a." * 40 + 'a"\nvalues = [1.0]', "axis[0].parameter: is not a key path"),
         (AXIS + "values = [1.0]\n" + AXIS + "values = [2.0]", "axis[1].parameter: is set twice"),
         (AXIS + "values = [1.0]\n" + CRITICAL.replace("friction.coefficient", "link2.angle_deg"),
          "is set by an axis"),
