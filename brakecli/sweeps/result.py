@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli import __version__
-from brakecli.case.case import json_schema
+from brakecli.case.case import Case
 from brakecli.case.read import key_path
+from brakecli.case.tables import key_schema
 from brakecli.files.write import FILL, ResultFile
 from brakecli.runs.run import versions
 from brakecli.sweeps.file import LoadedSweep
@@ -201,12 +202,7 @@ def _write_variable(result: ResultFile, name: str, columns: Columns) -> None:
 
 def unit(parameter: str) -> str:
     """The unit of a key of the case, by the schema of its file; empty where it has none."""
-    schema = json_schema()
-    node: Any = schema
-    for part in key_path(parameter):
-        node = schema["$defs"][node["$ref"].rpartition("/")[2]] if "$ref" in node else node
-        node = node.get("properties", {}).get(part, {})
-    return str(node.get("unit", ""))
+    return str(key_schema(Case, key_path(parameter)).get("unit", ""))
 
 
 def _hysteresis(columns: Columns) -> NDArray[Any] | None:
