@@ -11,20 +11,15 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import NDArray
 
-from brakecli.case.case import Evaluator, Iteration, Scheme, Start
+from brakecli.case.case import Evaluator, Iteration, Start
 from brakecli.errors import UsageError
 from brakecli.files.read import StoredResult
 from brakecli.files.write import FILL
 from brakecli.plots import style
+from brakecli.solver.schemes import SCHEMES
 
 _TEXTS = ("method", "scheme", "theta", "start", "iteration", "evaluator", "failure")
 _NUMBERS = ("step", "tolerance", "error", "wall_seconds", "contact_evaluations", "nodes", "on_front")
-_SCHEMES: dict[str, dict[str, Any]] = {
-    Scheme.TWO_LAYER: {"color": style.BLUE},
-    Scheme.THREE_LAYER: {"color": style.VERMILION},
-    Scheme.EVENT_DRIVEN: {"color": "#222222", "markersize": 9.0, "linewidth": 2.0, "zorder": 3.0},
-}
-"""How the curves of each scheme look, where it differs from the look of all others."""
 _MARKERS = {
     "0.5, 0.5": "o",
     "1, 0.5": "^",
@@ -142,16 +137,22 @@ def _looks(picture: ComparisonPicture) -> dict[str, dict[str, Any]]:
     looks = {}
     for label in dict.fromkeys(picture["method"].tolist()):
         entry = {name: values[picture["method"] == label][0] for name, values in picture.columns.items()}
-        look = {"color": style.GREEN, "markersize": 5.0, "linewidth": 1.1, "zorder": 2.0}
-        look |= _SCHEMES.get(entry["scheme"], {}) | {"marker": _MARKERS.get(entry["theta"], "P")}
-        if entry["evaluator"] == Evaluator.EXACT and entry["scheme"] != Scheme.EVENT_DRIVEN:
-            look["color"] = _EXACT
+        scheme = SCHEMES.get(entry["scheme"])
+        colour, own = (scheme.colour, scheme.own_steps) if scheme else (style.GREEN, False)
+        marker = _MARKERS.get(entry["theta"], "P")
+        if entry["evaluator"] == Evaluator.EXACT and not own:
+            colour = _EXACT
         elif entry["evaluator"] == Evaluator.MIDPOINT and entry["nodes"] in others:
-            marker = _NODE_MARKERS[others.index(entry["nodes"]) % len(_NODE_MARKERS)]
-            look |= {"color": _OTHER_NODES, "marker": marker}
-        look["markerfacecolor"] = "white" if entry["start"] == Start.PAPER else look["color"]
-        look["linestyle"] = (0, (2, 1.5)) if entry["iteration"] == Iteration.FIXED_POINT else "-"
-        looks[label] = look
+            colour, marker = _OTHER_NODES, _NODE_MARKERS[others.index(entry["nodes"]) % len(_NODE_MARKERS)]
+        looks[label] = {
+            "color": colour,
+            "marker": marker,
+            "markersize": 9.0 if own else 5.0,
+            "markerfacecolor": "white" if entry["start"] == Start.PAPER else colour,
+            "linestyle": (0, (2, 1.5)) if entry["iteration"] == Iteration.FIXED_POINT else "-",
+            "linewidth": 2.0 if own else 1.1,
+            "zorder": 3.0 if own else 2.0,
+        }
     return looks
 
 

@@ -14,13 +14,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from brakecli.case.case import Case
 from brakecli.case.read import parse_case
+from brakecli.case.system import system_of
 from brakecli.errors import CaseError
 from brakecli.files.read import StoredResult
 from brakecli.plots import style
 from brakecli.plots.style import Array
 from brakecli.solver.quantities import ContactState
+from brakecli.solver.schedules import Schedule
 
 Reader = Callable[[str, int, int], NDArray[Any]]
 """Reads the samples start … stop - 1 of a variable of the history."""
@@ -75,7 +76,7 @@ class RunPicture:
     spectrum_from: float  # s
     fundamental: float | None  # Hz
     peak: float | None  # Hz
-    passing: tuple[float, ...]  # Hz
+    passing: tuple[float, ...]  # Hz, of the waves of a wheel that turns steadily
 
 
 def gather(result: StoredResult) -> RunPicture:
@@ -89,6 +90,8 @@ def gather(result: StoredResult) -> RunPicture:
         case = parse_case(str(result.attributes.get("resolved_toml", "")), "its resolved case").case
     except CaseError as error:
         raise style.unreadable(result, f"the case in it is not valid: {error.problems[0]}") from error
+    system = system_of(case)
+    steady, speed = np.ptp(system.belt.values) == 0.0, system.fastest_belt
     read = partial(result.read, "history")
     start, end = (float(read("time", i, i + 1)[0]) for i in (0, samples - 1))
     interval = (end - start) / (samples - 1) if samples > 1 else case.output.sample_interval
@@ -97,14 +100,14 @@ def gather(result: StoredResult) -> RunPicture:
     return RunPicture(
         title=case.title or "Case without a title",
         summary=_summary(result),
-        detail=_detail(read, samples, interval, case, result),
+        detail=_detail(read, samples, interval, system.belt, result),
         span=(start, end),
         envelope=(start + interval * places, lowest, highest),
         spectrum=(result.read("spectrum", "frequency"), result.read("spectrum", "vx")),
         spectrum_from=start + interval * float(first_sample),
         fundamental=_number(result, "frequency"),
         peak=_number(result, "spectrum_peak"),
-        passing=_passing(case),
+        passing=tuple(sorted(speed * system.wheel.turns)) if steady and speed else (),
     )
 
 
@@ -135,7 +138,7 @@ def episodes(state: NDArray[Any], wanted: ContactState) -> list[tuple[int, int]]
     return [(int(first), int(behind) - 1) for first, behind in edges.reshape(-1, 2)]
 
 
-def _detail(read: Reader, samples: int, interval: float, case: Case, result: StoredResult) -> Detail:
+def _detail(read: Reader, samples: int, interval: float, belt: Schedule, result: StoredResult) -> Detail:
     """The last cycles of the run, or of the motion where it has come to rest."""
     fundamental = _number(result, "frequency")
     frequency = fundamental or _number(result, "spectrum_peak")
@@ -150,7 +153,7 @@ def _detail(read: Reader, samples: int, interval: float, case: Case, result: Sto
         stop, name = rest, "Last motion, then stick"
     first = max(0, stop - length)
     time, x, vx, state = (read(variable, first, stop) for variable in ("time", "x", "vx", "state"))
-    return Detail(name, time, x, vx, state, _belt(case, time), interval)
+    return Detail(name, time, x, vx, state, np.interp(time, belt.times, belt.values), interval)
 
 
 def _last_motion(read: Reader, samples: int) -> int:
@@ -161,25 +164,6 @@ def _last_motion(read: Reader, samples: int) -> int:
         if moving.size:
             return begin + int(moving[-1]) + 1
     return 0
-
-
-def _belt(case: Case, time: Array) -> Array:
-    """U (m/s) at some times."""
-    wheel = case.wheel
-    speeds: Any = wheel.angular_speeds or (wheel.angular_speed or 0.0,)
-    speed: Array = wheel.radius * np.interp(time, wheel.times or (0.0,), speeds)
-    return speed
-
-
-def _passing(case: Case) -> tuple[float, ...]:
-    """Frequencies (Hz) at which the waves of the wheel pass; none where its speed changes."""
-    wheel, profile = case.wheel, case.roughness.wheel
-    speed = abs(float(_belt(case, np.zeros(1))[0]))
-    if profile is None or speed == 0.0 or len(set(wheel.angular_speeds or ())) > 1:
-        return ()
-    waves = [1.0 / length for length in profile.wavelengths or ()]
-    waves += [number / (2.0 * np.pi) for number in profile.wavenumbers or ()]
-    return tuple(sorted(speed * wave for wave in waves))
 
 
 def _summary(result: StoredResult) -> str:

@@ -191,11 +191,9 @@ def _axis(result: StoredResult, variable: Variable, dimension: str) -> tuple[Axi
     """An axis, and the order in which its values rise."""
     values = result.read("/", dimension)
     key, units = (str(variable.attributes.get(name, "")) for name in ("long_name", "units"))
-    if values.dtype.kind == "U":
-        places = np.arange(len(values))
-        return Axis(dimension, key, units, places.astype(np.float64), tuple(values.tolist())), places
-    order = np.argsort(values, kind="stable")
-    return Axis(dimension, key, units, values[order].astype(np.float64)), order
+    texts = tuple(values.tolist()) if values.dtype.kind == "U" else None
+    order = np.arange(len(values)) if texts else np.argsort(values, kind="stable")
+    return Axis(dimension, key, units, (order if texts else values[order]).astype(np.float64), texts), order
 
 
 def _selected(picture: SweepPicture, wanted: str, result: StoredResult) -> SweepPicture:
@@ -204,22 +202,17 @@ def _selected(picture: SweepPicture, wanted: str, result: StoredResult) -> Sweep
     value, both = value.strip("\"'"), len(picture.directions) > 1
     if key == "direction" and both and value in picture.directions:
         return picture.towards(value)
+    problem, choices = "no axis has this key or value", [axis.key for axis in picture.axes] + both * ["direction"]
+    if key == "direction" and both:
+        choices = ["up", "down"]
     for number, axis in enumerate(picture.axes):
-        if key not in (axis.dimension, *axis.key.split(", ")):
-            continue
-        if (place := axis.place(value)) is not None:
-            return picture.at(number, place)
-        texts = axis.texts or [label(float(each)) for each in axis.values]
-        more = " …" if len(texts) > _MOST_LISTED else ""
-        problem = f"no point has this value; give one of {', '.join(texts[:_MOST_LISTED])}{more}"
-        break
-    else:
-        keys = ", ".join([axis.key for axis in picture.axes] + both * ["direction"])
-        remedy = (
-            "give up or down" if key == "direction" and both else f"give one of {keys}" if keys else "leave it out"
-        )
-        problem = f"no axis has this key or value; {remedy}, as KEY=VALUE"
-    raise UsageError(f"{result.path}: --select {wanted}: {problem}")
+        if key in (axis.dimension, *axis.key.split(", ")):
+            if (place := axis.place(value)) is not None:
+                return picture.at(number, place)
+            problem, choices = "no point has this value", [*(axis.texts or map(label, axis.values.tolist()))]
+    more = " …" if len(choices) > _MOST_LISTED else ""
+    remedy = f"give one of {', '.join(choices[:_MOST_LISTED])}{more}" if choices else "leave it out"
+    raise UsageError(f"{result.path}: --select {wanted}: {problem}; {remedy}, as KEY=VALUE")
 
 
 def _check_drawable(picture: SweepPicture, result: StoredResult) -> None:

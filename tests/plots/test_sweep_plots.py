@@ -103,7 +103,7 @@ def test_an_axis_of_one_value_is_named_and_not_drawn(tmp_path: Path) -> None:
         ({"axis": [ANGLE, SPEED]}, ["link2.angle_deg=2.5"], "give one of 1, 2, 3, 4, 5, 6, 7, 8"),
         ({"axis": [ANGLE, SPEED]}, ["link2.angle_deg=nan"], "no point has this value"),
         ({"axis": [SCHEME, ANGLE]}, ["solver.scheme"], "give one of two-layer, three-layer"),
-        ({"axis": [{**ANGLE, "direction": "both"}]}, ["direction=left"], "give up or down"),
+        ({"axis": [{**ANGLE, "direction": "both"}]}, ["direction=left"], "give one of up, down"),
         ({"axis": [ANGLE, SPEED, {**ANGLE, "parameter": "a.b"}]}, [], "one of three axes may have 5 values"),
         ({"axis": [{**ANGLE, "direction": "both"}, SPEED, SCHEME]}, [], "3 axes in two directions are too many"),
         ({"axis": [ANGLE, SPEED, SCHEME, {**SCHEME, "parameter": "a.b"}]}, [], "4 axes are too many"),
