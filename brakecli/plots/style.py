@@ -123,10 +123,9 @@ def add_legend_above(figure: Figure, first: Sequence[str]) -> None:
 
 
 def _legend_width(texts: list[str], columns: int) -> float:
-    """Approximate width (inches) of a legend with this number of columns."""
-    rows = -(-len(texts) // columns)
-    widths = [max(map(len, texts[first : first + rows])) for first in range(0, len(texts), rows)]
-    return sum(0.075 * width + 0.45 for width in widths)
+    """Approximate width (inches) of a legend with this number of columns, filled as Matplotlib fills them."""
+    longest = [max(map(len, column)) for column in np.array_split(texts, columns)]
+    return sum(0.075 * length + 0.45 for length in longest)
 
 
 def unreadable(result: StoredResult, reason: str) -> UnreadableResultError:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from brakecli.plots.style import applied
 from tests.plots.helpers import ANGLE, CRITICAL, REGIMES, columns, drawn, gathered, legend, panels, points, write
 
 
@@ -92,3 +93,16 @@ def test_both_ways_are_curves_of_their_own_and_their_difference_is_shaded(tmp_pa
     assert bands == [[2.5, 3.5], [3.5, 4.5]]
     one_way = gathered(result, ["direction=down"])
     np.testing.assert_array_equal(one_way["amplitude"], picture["amplitude"][1:])
+
+
+def test_a_long_legend_takes_more_rows_and_stays_inside_the_figure(tmp_path: Path) -> None:
+    values = columns((2, 8), critical=False)
+    values["status"][:, 5], values["excitation"][:, 2] = "failed", "forced"
+    table = {"axis": [{**ANGLE, "direction": "both"}]}
+    figure = drawn(write(tmp_path / "r.h5", table, {**values, "hysteresis": np.arange(8) % 2}))
+    with applied():
+        figure.draw_without_rendering()
+    (found,) = figure.legends
+    assert len(legend(figure)) == 9
+    assert found.get_window_extent().x1 <= figure.bbox.x1
+    assert found.get_window_extent().y0 > figure.axes[0].get_window_extent().y1
