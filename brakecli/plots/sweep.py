@@ -154,11 +154,10 @@ def gather(result: StoredResult, select: Sequence[str] = ()) -> SweepPicture:
         raise style.unreadable(result, "its variables do not lie on the same axes")
     dims = known["status"].dims
     both = dims[:1] == ("direction",)
-    variables = {name: result.read("/", name)[... if both else np.newaxis] for name in names}
-    variables = {
-        name: np.where(values == FILL, np.nan, values) if values.dtype.kind == "f" else values
-        for name, values in variables.items()
-    }
+    variables = {}
+    for name in names:
+        values = result.read("/", name)[... if both else np.newaxis]
+        variables[name] = np.where(values == FILL, np.nan, values) if values.dtype.kind == "f" else values
     if both and "hysteresis" in known and known["hysteresis"].dims == dims[1:]:
         variables["hysteresis"] = np.stack(2 * [result.read("/", "hysteresis")])
     axes = []
@@ -211,8 +210,8 @@ def _selected(picture: SweepPicture, wanted: str, result: StoredResult) -> Sweep
                 return picture.at(number, place)
             problem, choices = "no point has this value", [*(axis.texts or map(label, axis.values.tolist()))]
     more = " …" if len(choices) > _MOST_LISTED else ""
-    remedy = f"give one of {', '.join(choices[:_MOST_LISTED])}{more}" if choices else "leave it out"
-    raise UsageError(f"{result.path}: --select {wanted}: {problem}; {remedy}, as KEY=VALUE")
+    remedy = f"give one of {', '.join(choices[:_MOST_LISTED])}{more}, as KEY=VALUE" if choices else "leave it out"
+    raise UsageError(f"{result.path}: --select {wanted}: {problem}; {remedy}")
 
 
 def _check_drawable(picture: SweepPicture, result: StoredResult) -> None:
