@@ -1,6 +1,6 @@
 """One run, from a case to a finished result file: what `brakecli run` does."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -12,33 +12,31 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from brakecli import __version__
-from brakecli.analysis.regime.of_run import context, failed, verdict_numbers
-from brakecli.analysis.regime.rules import Verdict, classify
-from brakecli.analysis.regime.spectra import SPECTRAL, Spectrum, peak, spectrum
+from brakecli.analysis.regime.of_run import RunVerdict, context, failed
+from brakecli.analysis.regime.rules import classify
+from brakecli.analysis.regime.spectra import peak, spectrum
 from brakecli.case.read import LoadedCase
 from brakecli.case.system import Setup, set_up
+from brakecli.files import fields
 from brakecli.files.write import ResultFile, new_result
 from brakecli.runs.limits import Check, check, free_bytes, refuse, within_range
 from brakecli.runs.modelled import scene
 from brakecli.runs.tolerance import Certificate, certify
 from brakecli.solver.energy import EnergyAccount
 from brakecli.solver.motion import Motion, Work
-from brakecli.solver.quantities import HISTORY, TIME, ContactState, Failure
+from brakecli.solver.quantities import HISTORY, ContactState, Failure
 from brakecli.solver.schemes import has_own_steps
 
 
 @dataclass(frozen=True)
-class RunReport:
+class RunReport(RunVerdict):
     """Everything that a run has found out; numbers in SI units."""
 
     output: Path
-    title: str
-    setup: Setup
     check: Check
     work: Work
     energy: EnergyAccount
     certificate: Certificate | None  # where the case gives no step
-    verdict: Verdict
     spectrum_peak: float | None  # Hz, of vx
     warnings: tuple[str, ...]
 
@@ -47,59 +45,47 @@ class RunReport:
         """Whether the run ended before its time."""
         return self.work.failure is not Failure.NONE
 
-    def numbers(self) -> dict[str, Any]:
-        """Names and values as `--json` gives them and the file's attributes hold them."""
-        work, verdict, solver = self.work, self.verdict, self.setup.case.solver
-        return {
-            "status": "failed" if self.failed else "done",
-            "failure": self.failure_sentence,
-            **verdict_numbers(verdict, self.setup),
-            "spectrum_peak": self.spectrum_peak,
-            "scheme": str(solver.scheme),
-            "theta": list(solver.theta),
-            "iteration": None if has_own_steps(self.setup.scheme) else str(solver.iteration),
-            "step": None if has_own_steps(self.setup.scheme) else self.setup.timing.step,
-            **certificate_numbers(self.certificate),
-            "evaluators": work.evaluators,
-            "nodes": self.setup.nodes,
-            "steps": work.steps,
-            "contact_evaluations": work.contact_evaluations,
-            "most_evaluations_in_a_step": work.most_evaluations,
-            "unconverged_steps": work.unconverged_steps,
-            "non_unique_steps": work.non_unique_steps,
-            "energy": {
-                **asdict(self.energy),
-                "closing_error": self.energy.closing_error,
-                "relative_closing_error": self.energy.relative_closing_error,
-            },
-            "modelled": self.scene[0],
-            "left_out": self.scene[1],
-            "adjustments": list(self.check.adjustments),
-            "warnings": list(self.warnings),
-        }
-
     @property
-    def scene(self) -> tuple[list[str], list[str]]:
-        """What was modelled, and what was left out and why."""
-        return scene(self.setup, self.work)
+    def status(self) -> str:
+        """How the run has ended, in a word."""
+        return "failed" if self.failed else "done"
 
     @property
     def failure_sentence(self) -> str | None:
         """What ended the run before its time, or made it worthless."""
         return failure_sentence(self.work) if self.failed else None
 
+    @property
+    def title(self) -> str:
+        """The title of the case."""
+        return self.setup.case.title
 
-def certificate_numbers(certificate: Certificate | None) -> dict[str, Any]:
-    """Names and values of what a tolerance has come to; null where the case gives a step."""
-    if certificate is None:
-        return {"tolerance": None, "certified": None, "estimated_error": None, "certified_until": None}
-    return {
-        "tolerance": certificate.tolerance,
-        "certified": int(certificate.certified),
-        "estimated_error": certificate.estimated_error,
-        "certified_until": certificate.certified_until,
-        "certified_by": certificate.method,
-    }
+    @property
+    def iteration(self) -> str | None:
+        """How the equations of a step are solved; None where the scheme finds its steps itself."""
+        return None if has_own_steps(self.setup.scheme) else self.setup.case.solver.iteration
+
+    @property
+    def step(self) -> float | None:
+        """The time step, s; None where the scheme finds its steps itself."""
+        return None if has_own_steps(self.setup.scheme) else self.setup.timing.step
+
+    @property
+    def modelled(self) -> list[str]:
+        """What of the model the run has used."""
+        return scene(self.setup, self.work)[0]
+
+    @property
+    def left_out(self) -> list[str]:
+        """What of the model the run has left out, and why that was safe."""
+        return scene(self.setup, self.work)[1]
+
+    def numbers(self) -> dict[str, Any]:
+        """Names and values as `--json` gives them."""
+        numbers = fields.values(fields.RUN, self)
+        if self.certificate is None:
+            del numbers["certified_by"]
+        return numbers
 
 
 def failure_sentence(work: Work) -> str:
@@ -194,7 +180,10 @@ def _analyse(
     if work.failure is not Failure.NONE:
         verdict = failed(verdict, failure_sentence(work))
     lines = spectrum(history, verdict.settled_from)
-    _write_spectrum(result, lines)
+    result.axis("spectrum", fields.FREQUENCY, lines.frequency)
+    for name, density in lines.density.items():
+        result.variable("spectrum", fields.SPECTRUM[name], ("frequency",), density)
+    result.set_attributes({"first_sample": lines.start, "segments": lines.segments, "window": "hann"}, "spectrum")
     warnings = list(found.warnings)
     if work.unconverged_steps and setup.case.solver.allow_unconverged:
         warnings.append(
@@ -209,69 +198,34 @@ def _analyse(
     if certificate is not None and not certificate.certified:
         warnings.append(f"solver.tolerance: {certificate.sentence()}")
     top = peak(lines.frequency, lines.density["vx"])
-    told = tuple(warnings)
-    return RunReport(output, setup.case.title, setup, found, work, energy, certificate, verdict, top, told)
+    return RunReport(setup, verdict, output, found, work, energy, certificate, top, tuple(warnings))
 
 
 def _declare_history(result: ResultFile) -> None:
-    result.axis("history", "time", TIME.units, TIME.long_name)
-    for name, quantity in HISTORY.items():
-        if name == "state":
-            flags = {
-                "flag_values": np.array([int(state) for state in ContactState], dtype=np.int8),
-                "flag_meanings": " ".join(state.name.lower() for state in ContactState),
-            }
-            result.variable(
-                "history", name, ("time",), quantity.units, quantity.long_name, dtype=np.int8, attributes=flags
-            )
-        else:
-            result.variable("history", name, ("time",), quantity.units, quantity.long_name)
-
-
-def _write_spectrum(result: ResultFile, lines: Spectrum) -> None:
-    result.axis("spectrum", "frequency", "Hz", "frequency", lines.frequency)
-    for name in SPECTRAL:
-        quantity = HISTORY[name]
-        result.variable(
-            "spectrum",
-            name,
-            ("frequency",),
-            f"({quantity.units})2 Hz-1",
-            f"power spectral density of: {quantity.long_name}",
-            lines.density[name],
-        )
-    result.set_attributes({"first_sample": lines.start, "segments": lines.segments, "window": "hann"}, "spectrum")
+    flags = {
+        "flag_values": np.array([int(state) for state in ContactState], dtype=np.int8),
+        "flag_meanings": " ".join(state.name.lower() for state in ContactState),
+    }
+    for field in fields.HISTORY:
+        result.variable("history", field, ("time",), attributes=flags if field.name == "state" else None)
 
 
 def _write(result: ResultFile, loaded: LoadedCase, report: RunReport) -> None:
     """Everything but the arrays: the case, the versions, the numbers."""
-    numbers = report.numbers()
-    groups = {
-        "regime/evidence": "evidence",
-        "regime/thresholds": "thresholds",
-        "energy": "energy",
-        "evaluators": "evaluators",
-    }
-    result.set_attributes(
-        {
-            "kind": "run",
-            "title": report.title,
-            "case_toml": loaded.text,
-            "resolved_toml": loaded.resolved,
-            "brakecli_version": __version__,
-            **versions(),
-            **_present({name: value for name, value in numbers.items() if name not in groups.values()}),
-        }
-    )
-    for group, name in groups.items():
-        result.set_attributes(_present(numbers[name]), group)
-    if len(report.work.unconverged):
-        result.axis(
-            "unconverged", "event", "1", "steps that did not converge", np.arange(len(report.work.unconverged))
-        )
-        for column, (name, units) in enumerate({"time": "s", "residual": "N"}.items()):
-            values = np.nan_to_num(report.work.unconverged[:, column], nan=np.finfo(float).max)
-            result.variable("unconverged", name, ("event",), units, f"{name} of an unconverged step", values)
+    result.set_attributes(origin("run", report.title, loaded))
+    result.set_fields(fields.RUN, report.numbers())
+    if len(events := report.work.unconverged):
+        event, *columns = fields.UNCONVERGED
+        result.axis("unconverged", event, np.arange(len(events)))
+        for field, values in zip(columns, events.T, strict=True):
+            finite = np.nan_to_num(values, nan=np.finfo(float).max)
+            result.variable("unconverged", field, ("event",), finite)
+
+
+def origin(kind: str, title: str, loaded: LoadedCase) -> dict[str, Any]:
+    """The attributes that say where a result comes from: the case and the versions."""
+    case = {"case_toml": loaded.text, "resolved_toml": loaded.resolved}
+    return {"kind": kind, "title": title, **case, "brakecli_version": __version__, **versions()}
 
 
 def versions() -> dict[str, str]:
@@ -283,8 +237,3 @@ def versions() -> dict[str, str]:
         "h5py_version": h5py.__version__,
         "hdf5_version": h5py.version.hdf5_version,
     }
-
-
-def _present(values: Mapping[str, Any]) -> dict[str, Any]:
-    """The values that are there: an attribute cannot be nothing, nor an empty list."""
-    return {name: value for name, value in values.items() if value is not None and value != []}

@@ -1,7 +1,7 @@
 """The regime of a stored run, told anew from its history: what `brakecli classify RESULT.h5` does."""
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from brakecli.analysis.stability.modes import growth
 from brakecli.case.read import parse_case
 from brakecli.case.system import Setup, set_up
 from brakecli.errors import CaseError, UnreadableResultError
+from brakecli.files import fields
 from brakecli.files.read import StoredResult, open_result
 from brakecli.solver.schedules import value_at
 from brakecli.solver.steady_sliding import equilibrium, mean_contact
@@ -81,7 +82,7 @@ def classify_result(path: Path, thresholds: Thresholds) -> dict[str, Any]:
         failure = stored.attributes.get("failure")
     if failure:
         verdict = failed(verdict, str(failure))
-    return {**verdict_numbers(verdict, setup), "failure": failure}
+    return {**fields.values(fields.VERDICT, RunVerdict(setup, verdict)), "failure": failure}
 
 
 def failed(verdict: Verdict, failure: str) -> Verdict:
@@ -94,25 +95,19 @@ def failed(verdict: Verdict, failure: str) -> Verdict:
     return Verdict(**{**verdict.__dict__, **changes})
 
 
-def braking_torque(verdict: Verdict, setup: Setup) -> float:
-    """Mean torque of the friction force on the wheel's axis, R F_x, N m."""
-    return setup.case.wheel.radius * verdict.mean_friction_force
+@dataclass(frozen=True)
+class RunVerdict:
+    """The verdict on a run of a case."""
 
+    setup: Setup
+    verdict: Verdict
 
-def verdict_numbers(verdict: Verdict, setup: Setup) -> dict[str, Any]:
-    """Names and values of a verdict as `--json` gives them and result files hold them."""
-    return {
-        "regime": str(verdict.regime),
-        "excitation": str(verdict.excitation),
-        "frequency": verdict.frequency,
-        "amplitude": verdict.amplitude,
-        "settled": int(verdict.settled),
-        "settled_from": verdict.settled_from * setup.timing.interval,
-        "mean_friction_force": verdict.mean_friction_force,
-        "braking_torque": braking_torque(verdict, setup),
-        "stick_fraction": verdict.stick_fraction,
-        "contact_loss_fraction": verdict.contact_loss_fraction,
-        "reasons": list(verdict.reasons),
-        "evidence": verdict.evidence,
-        "thresholds": asdict(verdict.thresholds),
-    }
+    @property
+    def settled_from(self) -> float:
+        """Begin of the settled part, s."""
+        return self.verdict.settled_from * self.setup.timing.interval
+
+    @property
+    def braking_torque(self) -> float:
+        """Mean torque of the friction force on the wheel's axis, R F_x, N m."""
+        return self.setup.case.wheel.radius * self.verdict.mean_friction_force
