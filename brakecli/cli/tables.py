@@ -13,11 +13,12 @@ from rich.table import Table
 
 from brakecli.analysis.stability.modes import Crossing, Mode
 from brakecli.analysis.stability.report import Discrete, StabilityReport
-from brakecli.case.case import Solver
 from brakecli.comparison.compare import Entry
+from brakecli.comparison.methods import method_label
 from brakecli.comparison.result import ComparisonReport
 from brakecli.runs.limits import Check
 from brakecli.runs.run import RunReport
+from brakecli.solver.method import Method
 from brakecli.solver.quantities import COEFFICIENTS
 from brakecli.sweeps.cost import Estimate
 from brakecli.sweeps.plan import label
@@ -32,7 +33,7 @@ NARROWEST = 40
 
 def run_table(report: RunReport) -> str:
     """Summary of a run."""
-    verdict, work, energy = report.verdict, report.work, report.energy
+    verdict, system, work, energy = report.verdict, report.motion.system, report.motion.work, report.motion.energy
     shares = ", ".join(f"{kind} {count / max(work.steps, 1):.1%}" for kind, count in work.evaluators.items())
     rows: Rows = [
         (
@@ -47,9 +48,9 @@ def run_table(report: RunReport) -> str:
         ("braking torque", _unit(report.braking_torque, "N m")),
         ("stick, lost contact", f"{verdict.stick_fraction:.2%}, {verdict.contact_loss_fraction:.2%} of the time"),
         ("settled part", f"from {report.settled_from:.4g} s on"),
-        ("scheme", _scheme(report.setup.case.solver)),
+        ("scheme", _scheme(system.method)),
         *([("tolerance", report.certificate.sentence())] if report.certificate is not None else []),
-        ("contact", shares + (f", {report.setup.nodes} nodes" if "midpoint" in work.evaluators else "")),
+        ("contact", shares + (f", {system.nodes} nodes" if "midpoint" in work.evaluators else "")),
         ("modelled", "; ".join(report.modelled)),
         ("left out", "; ".join(report.left_out) or "nothing"),
         ("steps", f"{work.steps}{_step(report)}, {work.contact_evaluations} contact evaluations"),
@@ -58,7 +59,7 @@ def run_table(report: RunReport) -> str:
         ("file", str(report.output)),
     ]
     if report.failed:
-        rows.insert(0, ("failed", str(report.failure_sentence)))
+        rows.insert(0, ("failed", str(work.failure_sentence)))
     return _table(report.title, rows)
 
 
@@ -220,7 +221,7 @@ def comparison_table(report: ComparisonReport) -> str:
     able = [entry for entry in found.entries if entry.errors is not None]
     failed = [entry for entry in found.entries if entry.work is not None and entry.errors is None]
     front = sorted((entry for entry in able if entry.on_front), key=lambda entry: entry.wall_seconds or 0.0)
-    finest = {entry.rung.method: entry for entry in able if not entry.on_front}
+    finest = {entry.rung.kind: entry for entry in able if not entry.on_front}
     headers = ("method", "step, s", "error", "order", "bias of φ", "evaluations", "time, ms")
     rows: Rows = [
         ("compared over", f"{found.duration:.6g} s of motion"),
@@ -250,7 +251,7 @@ def comparison_table(report: ComparisonReport) -> str:
 
 def _name(entry: Entry) -> str:
     rung = entry.rung
-    return f"{rung.method.label()}, " + (
+    return f"{method_label(rung.kind)}, " + (
         f"step {rung.step:.3g} s" if rung.step is not None else f"tolerance {rung.tolerance:g}"
     )
 
@@ -259,7 +260,7 @@ def _entry_row(entry: Entry) -> tuple[str, ...]:
     rung, work = entry.rung, entry.work
     bias = entry.critical_bias
     return (
-        rung.method.label(),
+        method_label(rung.kind),
         f"{rung.step:.3g}" if rung.step is not None else f"to {rung.tolerance:g}",
         f"{entry.errors.error:.2e}" if entry.errors is not None else "-",
         "-" if entry.order is None else f"{entry.order:.2f}",
@@ -328,11 +329,11 @@ def _infinite(value: object) -> bool:
     return isinstance(value, float) and math.isinf(value)
 
 
-def _scheme(solver: Solver) -> str:
-    if solver.tolerance is not None:
-        return f"{solver.scheme}, tolerance {solver.tolerance:.4g}"
-    weights = ", ".join(f"{weight:.4g}" for weight in solver.theta)
-    return f"{solver.scheme} ({weights}), {solver.iteration}"
+def _scheme(method: Method) -> str:
+    if method.own_steps:
+        return f"{method.scheme}, tolerance {method.tolerance:.4g}"
+    weights = ", ".join(f"{weight:.4g}" for weight in method.theta)
+    return f"{method.scheme} ({weights}), {method.iteration}"
 
 
 def _step(report: RunReport) -> str:

@@ -6,7 +6,7 @@ import numpy as np
 
 from brakecli.analysis.stability.report import stability
 from brakecli.case.read import LoadedCase, parse_case
-from brakecli.case.system import set_up
+from brakecli.case.system import system_of
 from brakecli.errors import UsageError
 from brakecli.files import fields
 
@@ -42,5 +42,5 @@ def varied(loaded: LoadedCase, vary: Vary) -> list[dict[str, Any]]:
     entries = []
     for value in vary.values:
         case = parse_case(loaded.resolved, "--vary", (f"{vary.key}={value!r}",)).case
-        entries.append({"value": value, **fields.values(fields.VARIED, stability(set_up(case)))})
+        entries.append({"value": value, **fields.values(fields.VARIED, stability(system_of(case)))})
     return entries

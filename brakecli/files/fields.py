@@ -153,7 +153,9 @@ ENERGY = (
 )
 RUN = (
     Field("status", "", "how the run has ended: done or failed", TEXT),
-    Field("failure", "", "time and reason of a failure, and what to do", TEXT, source="failure_sentence"),
+    Field(
+        "failure", "", "time and reason of a failure, and what to do", TEXT, source="motion.work.failure_sentence"
+    ),
     *VERDICT,
     Field(
         "spectrum_peak",
@@ -162,7 +164,7 @@ RUN = (
         label="peak of the spectrum of vx",
     ),
     *_within(
-        "setup.case.solver",
+        "system.method",
         Field("scheme", "", "time-stepping scheme", TEXT),
         Field("theta", "1", "weights of the layers", OBJECT),
     ),
@@ -177,23 +179,37 @@ RUN = (
         Field("certified_by", "", "how the error is known", TEXT, source="method"),
     ),
     Field(
-        "evaluators", "", "steps by way of computing the contact", OBJECT, "work.evaluators", group="evaluators"
+        "evaluators",
+        "",
+        "steps by way of computing the contact",
+        OBJECT,
+        "motion.work.evaluators",
+        group="evaluators",
     ),
-    Field("nodes", "1", "cells of the midpoint sum, 0 where it could not be needed", "i8", source="setup.nodes"),
+    *_within("motion.work", Field("evaluators", "", "steps that each evaluator took", OBJECT, group="evaluators")),
+    Field("nodes", "1", "cells of the midpoint sum, 0 where it could not be needed", "i8", source="system.nodes"),
     *_within(
-        "work",
+        "motion.work",
         Field("steps", "1", "time steps", "i8"),
         Field("contact_evaluations", "1", "evaluations of the contact force", "i8"),
         Field("most_evaluations_in_a_step", "1", "largest number in one step", "i8", source="most_evaluations"),
         Field("unconverged_steps", "1", "steps that did not converge", "i8"),
         Field("non_unique_steps", "1", "steps that met a point where their solution need not be unique", "i8"),
     ),
-    Field("energy", "", "the account of energies over the whole run", OBJECT, group="energy", rows=ENERGY),
+    Field(
+        "energy",
+        "",
+        "the account of energies over the whole run",
+        OBJECT,
+        "motion.energy",
+        group="energy",
+        rows=ENERGY,
+    ),
     Field("modelled", "", "what of the model the run has used", OBJECT),
     Field("left_out", "", "what of the model the run has left out, and why that was safe", OBJECT),
     Field("adjustments", "", "how step and duration were made to fit", OBJECT, source="check.adjustments"),
     Field("warnings", "", "what a careful user should know", OBJECT),
-    Field("solve_seconds", "s", "time of the loop", source="work.solve_seconds", in_file=False),
+    Field("solve_seconds", "s", "time of the loop", source="motion.work.solve_seconds", in_file=False),
 )
 HISTORY = (
     Field("time", TIME.units, TIME.long_name),
@@ -302,9 +318,9 @@ SWEEP = (
 _COMPARED = ("x", "y", "vx", "vy", "friction_force", "normal_force")
 ENTRY_PLACE = Field("entry", "1", "a method at one step or tolerance")
 ENTRY = (
+    Field("method", "", "the method in a few words", TEXT, source="rung.label"),
     *_within(
-        "rung.method",
-        Field("method", "", "the method in a few words", TEXT, source="label"),
+        "rung.kind",
         Field("scheme", "", "time-stepping scheme", TEXT),
         Field("theta", "", "weights of the layers; in the file one text", TEXT),
         Field("start", "", "how the second layer is found", TEXT),

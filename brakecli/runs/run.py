@@ -12,30 +12,28 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from brakecli import __version__
-from brakecli.analysis.regime.of_run import RunVerdict, context, failed
-from brakecli.analysis.regime.rules import classify
+from brakecli.analysis.regime.of_run import RunVerdict, verdict_on
 from brakecli.analysis.regime.spectra import peak, spectrum
 from brakecli.case.read import LoadedCase
-from brakecli.case.system import Setup, set_up
+from brakecli.case.system import system_of
 from brakecli.files import fields
 from brakecli.files.write import ResultFile, new_result
 from brakecli.runs.limits import Check, check, free_bytes, refuse, within_range
-from brakecli.runs.modelled import scene
+from brakecli.runs.modelled import modelled
 from brakecli.runs.tolerance import Certificate, certify
-from brakecli.solver.energy import EnergyAccount
-from brakecli.solver.motion import Motion, Work
-from brakecli.solver.quantities import HISTORY, ContactState, Failure
-from brakecli.solver.schemes import has_own_steps
+from brakecli.solver.motion import Motion, Progress, Sink, solve
+from brakecli.solver.quantities import HISTORY, ContactState
+from brakecli.solver.system import System
 
 
 @dataclass(frozen=True)
 class RunReport(RunVerdict):
-    """Everything that a run has found out; numbers in SI units."""
+    """Everything that a run has found out; numbers in SI units. `fields.RUN` says where each of them is."""
 
+    title: str
     output: Path
+    motion: Motion
     check: Check
-    work: Work
-    energy: EnergyAccount
     certificate: Certificate | None  # where the case gives no step
     spectrum_peak: float | None  # Hz, of vx
     warnings: tuple[str, ...]
@@ -43,7 +41,7 @@ class RunReport(RunVerdict):
     @property
     def failed(self) -> bool:
         """Whether the run ended before its time."""
-        return self.work.failure is not Failure.NONE
+        return self.motion.work.failed
 
     @property
     def status(self) -> str:
@@ -51,34 +49,25 @@ class RunReport(RunVerdict):
         return "failed" if self.failed else "done"
 
     @property
-    def failure_sentence(self) -> str | None:
-        """What ended the run before its time, or made it worthless."""
-        return failure_sentence(self.work) if self.failed else None
-
-    @property
-    def title(self) -> str:
-        """The title of the case."""
-        return self.setup.case.title
-
-    @property
     def iteration(self) -> str | None:
         """How the equations of a step are solved; None where the scheme finds its steps itself."""
-        return None if has_own_steps(self.setup.scheme) else self.setup.case.solver.iteration
+        method = self.system.method
+        return None if method.own_steps else method.iteration
 
     @property
     def step(self) -> float | None:
         """The time step, s; None where the scheme finds its steps itself."""
-        return None if has_own_steps(self.setup.scheme) else self.setup.timing.step
+        return None if self.system.method.own_steps else self.system.step
 
     @property
     def modelled(self) -> list[str]:
         """What of the model the run has used."""
-        return scene(self.setup, self.work)[0]
+        return modelled(self.motion)[0]
 
     @property
     def left_out(self) -> list[str]:
         """What of the model the run has left out, and why that was safe."""
-        return scene(self.setup, self.work)[1]
+        return modelled(self.motion)[1]
 
     def numbers(self) -> dict[str, Any]:
         """Names and values as `--json` gives them."""
@@ -86,68 +75,6 @@ class RunReport(RunVerdict):
         if self.certificate is None:
             del numbers["certified_by"]
         return numbers
-
-
-def failure_sentence(work: Work) -> str:
-    """The sentence of a failure with its time, where it has one."""
-    when = f"t = {work.failure_time:.6g} s: " if work.failure_time is not None else ""
-    return when + work.failure.sentence
-
-
-def load_kernels(loaded: LoadedCase) -> None:
-    """Compile what a run of a case needs, or load it: this takes seconds only once."""
-    with within_range():
-        setup = set_up(loaded.case)
-    _ = setup.scheme, setup.evaluate
-
-
-def run(
-    loaded: LoadedCase,
-    output: Path,
-    *,
-    force: bool,
-    begin: Callable[[Setup, Check], None] = lambda setup, found: None,
-    progress: Callable[[int], None] = lambda steps: None,
-) -> RunReport:
-    """Simulate a case and write its result file.
-
-    `begin` is told of the run before it starts, `progress` the steps done. Raises RefusedError,
-    CannotWriteError or UsageError before anything is computed, CannotWriteError also later; a run that fails
-    numerically is written up to there and reported.
-    """
-    with within_range():
-        setup = set_up(loaded.case)
-        found = check(setup)
-        with new_result(output, force=force) as result:
-            refuse(setup, found, free_bytes(output.resolve().parent))
-            begin(setup, found)
-            _declare_history(result)
-            interval = setup.timing.interval
-
-            def sink(rows: NDArray[np.float64]) -> None:
-                _require_finite("a force", rows)
-                first = result.rows("history")
-                columns = dict(zip(HISTORY, rows.T, strict=True))
-                result.append("history", {"time": interval * np.arange(first, first + len(rows)), **columns})
-
-            certificate = None
-            if setup.case.solver.promise is None:
-                work, energy = Motion(setup).run(sink, progress)
-            else:
-                motion = certify(setup.case, progress)
-                setup, work, energy, certificate = motion.setup, motion.work, motion.energy, motion.certificate
-                sink(motion.rows)
-            _require_finite("an energy", list(asdict(energy).values()))
-            report = _analyse(setup, found, work, energy, certificate, result, output)
-            _write(result, loaded, report)
-            result.commit()
-    return report
-
-
-def _require_finite(what: str, values: ArrayLike) -> None:
-    """Compiled code overflows without a word; the motion itself is bounded by the loop."""
-    if not np.isfinite(values).all():
-        raise FloatingPointError(f"{what} overflows")
 
 
 @dataclass(frozen=True)
@@ -164,28 +91,81 @@ class _Written:
     def read(self, name: str, start: int, stop: int) -> NDArray[np.float64]:
         return self.result.read("history", name, start, stop)
 
+    def append(self, rows: NDArray[np.float64]) -> None:
+        _require_finite("a force", rows)
+        time = self.interval * np.arange(self.samples, self.samples + len(rows))
+        self.result.append("history", {"time": time, **dict(zip(HISTORY, rows.T, strict=True))})
 
-def _analyse(
-    setup: Setup,
-    found: Check,
-    work: Work,
-    energy: EnergyAccount,
-    certificate: Certificate | None,
-    result: ResultFile,
+
+def load_kernels(loaded: LoadedCase) -> None:
+    """Compile what a run of a case needs, or load it: this takes seconds only once."""
+    with within_range():
+        system = system_of(loaded.case)
+    _ = system.scheme, system.evaluate
+
+
+def run(
+    loaded: LoadedCase,
     output: Path,
+    *,
+    force: bool,
+    begin: Callable[[System, Check], None] = lambda system, found: None,
+    progress: Progress = lambda steps: None,
 ) -> RunReport:
-    """Regime, spectra and warnings of the finished history; the spectra go into the file at once."""
-    history = _Written(result, setup.timing.interval)
-    verdict = classify(history, context(setup))
-    if work.failure is not Failure.NONE:
-        verdict = failed(verdict, failure_sentence(work))
-    lines = spectrum(history, verdict.settled_from)
-    result.axis("spectrum", fields.FREQUENCY, lines.frequency)
-    for name, density in lines.density.items():
-        result.variable("spectrum", fields.SPECTRUM[name], ("frequency",), density)
-    result.set_attributes({"first_sample": lines.start, "segments": lines.segments, "window": "hann"}, "spectrum")
-    warnings = list(found.warnings)
-    if work.unconverged_steps and setup.case.solver.allow_unconverged:
+    """Simulate a case and write its result file.
+
+    `begin` receives the system and its limits before the run starts, `progress` the steps done. Raises
+    RefusedError, CannotWriteError or UsageError before anything is computed, CannotWriteError also later. A run
+    that fails numerically is written up to the failure and reported.
+    """
+    with within_range():
+        system = system_of(loaded.case)
+        found = check(system)
+        with new_result(output, force=force) as result:
+            refuse(system, found, free_bytes(output.resolve().parent))
+            begin(system, found)
+            _declare_history(result)
+            history = _Written(result, system.interval)
+            motion, certificate = motion_of(system, progress, history.append)
+            _require_finite("an energy", list(asdict(motion.energy).values()))
+            verdict = verdict_on(history, motion.system, motion.work.failure_sentence)
+            top = _write_spectrum(result, history, verdict.settled_from)
+            warnings = (*found.warnings, *_warnings(motion, certificate))
+            report = RunReport(
+                motion.system, verdict, loaded.case.title, output, motion, found, certificate, top, warnings
+            )
+            result.set_attributes(origin("run", report.title, loaded))
+            result.set_fields(fields.RUN, report.numbers())
+            _write_unconverged(result, motion.work.unconverged)
+            result.commit()
+    return report
+
+
+def motion_of(
+    system: System, progress: Progress = lambda steps: None, sink: Sink | None = None
+) -> tuple[Motion, Certificate | None]:
+    """The motion of a system: at the step of its method, or to its tolerance, with a certificate.
+
+    Samples go to `sink` where there is one.
+    """
+    if system.method.step is not None:
+        return solve(system, sink=sink, progress=progress), None
+    certified = certify(system, progress)
+    if sink is not None:
+        sink(certified.motion.rows)
+    return certified.motion, certified.certificate
+
+
+def _require_finite(what: str, values: ArrayLike) -> None:
+    """Compiled code overflows silently; the loop bounds only the motion itself."""
+    if not np.isfinite(values).all():
+        raise FloatingPointError(f"{what} overflows")
+
+
+def _warnings(motion: Motion, certificate: Certificate | None) -> list[str]:
+    """What a careful user should know of a finished motion."""
+    work, warnings = motion.work, []
+    if work.unconverged_steps and motion.system.method.allow_unconverged:
         warnings.append(
             f"{work.unconverged_steps} of {work.steps} steps did not converge, as the case allows; their times "
             "and residuals are in the file, the history is not to be trusted there"
@@ -197,8 +177,7 @@ def _analyse(
         )
     if certificate is not None and not certificate.certified:
         warnings.append(f"solver.tolerance: {certificate.sentence()}")
-    top = peak(lines.frequency, lines.density["vx"])
-    return RunReport(setup, verdict, output, found, work, energy, certificate, top, tuple(warnings))
+    return warnings
 
 
 def _declare_history(result: ResultFile) -> None:
@@ -210,16 +189,25 @@ def _declare_history(result: ResultFile) -> None:
         result.variable("history", field, ("time",), attributes=flags if field.name == "state" else None)
 
 
-def _write(result: ResultFile, loaded: LoadedCase, report: RunReport) -> None:
-    """Everything but the arrays: the case, the versions, the numbers."""
-    result.set_attributes(origin("run", report.title, loaded))
-    result.set_fields(fields.RUN, report.numbers())
-    if len(events := report.work.unconverged):
-        event, *columns = fields.UNCONVERGED
-        result.axis("unconverged", event, np.arange(len(events)))
-        for field, values in zip(columns, events.T, strict=True):
-            finite = np.nan_to_num(values, nan=np.finfo(float).max)
-            result.variable("unconverged", field, ("event",), finite)
+def _write_spectrum(result: ResultFile, history: _Written, start: int) -> float | None:
+    """Write the spectra of the samples from `start` on; the frequency (Hz) of the highest peak of vx."""
+    lines = spectrum(history, start)
+    result.axis("spectrum", fields.FREQUENCY, lines.frequency)
+    for name, density in lines.density.items():
+        result.variable("spectrum", fields.SPECTRUM[name], ("frequency",), density)
+    result.set_attributes({"first_sample": lines.start, "segments": lines.segments, "window": "hann"}, "spectrum")
+    return peak(lines.frequency, lines.density["vx"])
+
+
+def _write_unconverged(result: ResultFile, events: NDArray[np.float64]) -> None:
+    """Write times and residuals of steps that did not converge, if there are any."""
+    if not len(events):
+        return
+    event, *columns = fields.UNCONVERGED
+    result.axis("unconverged", event, np.arange(len(events)))
+    for field, values in zip(columns, events.T, strict=True):
+        finite = np.nan_to_num(values, nan=np.finfo(float).max)
+        result.variable("unconverged", field, ("event",), finite)
 
 
 def origin(kind: str, title: str, loaded: LoadedCase) -> dict[str, Any]:

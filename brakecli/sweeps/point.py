@@ -9,18 +9,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.analysis.regime.of_run import RunVerdict, context, failed
-from brakecli.analysis.regime.rules import Verdict, classify
+from brakecli.analysis.regime.of_run import RunVerdict, verdict_on
+from brakecli.analysis.regime.rules import Verdict
 from brakecli.case.case import Case
-from brakecli.case.system import set_up
+from brakecli.case.system import system_of
 from brakecli.errors import BrakecliError
 from brakecli.files import fields
 from brakecli.runs.limits import check, refuse, within_range
-from brakecli.runs.run import failure_sentence
-from brakecli.runs.tolerance import Certificate, certify
+from brakecli.runs.run import motion_of
+from brakecli.runs.tolerance import Certificate
 from brakecli.solver.history import ArrayHistory
-from brakecli.solver.motion import Motion, Work
-from brakecli.solver.quantities import Failure
+from brakecli.solver.motion import Motion
 from brakecli.solver.roughness import TWO_PI, wheel_angles
 from brakecli.solver.schedules import integral_at
 from brakecli.sweeps.critical import search
@@ -51,17 +50,17 @@ def fields_of(plan: Plan) -> tuple[fields.Field, ...]:
 
 @dataclass(frozen=True)
 class Outcome(RunVerdict):
-    """A run in memory, as far as a sweep is interested in it."""
+    """A run in memory, as far as a sweep is interested in it. `fields.POINT` says where each number is."""
 
-    work: Work
+    case: Case
+    motion: Motion
     certificate: Certificate | None  # where the case gives no step
     warnings: tuple[str, ...]
-    end: NDArray[np.float64]  # x, y, ẋ, ẏ
 
     @property
     def status(self) -> Status:
         """How the computation of the point has ended."""
-        return Status.DONE if self.work.failure is Failure.NONE else Status.FAILED
+        return Status.FAILED if self.motion.work.failed else Status.DONE
 
     @property
     def reason(self) -> str:
@@ -82,28 +81,20 @@ class Outcome(RunVerdict):
 def simulate(case: Case) -> Outcome:
     """Run a case in memory; raises RefusedError, and CaseError where it has no start."""
     with within_range():
-        setup = set_up(case)
-        found = check(setup)
-        refuse(setup, found, math.inf)
-        certificate = None
-        if case.solver.promise is None:
-            blocks: list[NDArray[np.float64]] = []
-            work, _ = Motion(setup).run(lambda rows: blocks.append(rows.copy()))
-            rows = np.concatenate(blocks)
-        else:
-            motion = certify(case)
-            setup, rows, work, certificate = motion.setup, motion.rows, motion.work, motion.certificate
-        if not np.isfinite(rows).all():
+        system = system_of(case)
+        found = check(system)
+        refuse(system, found, math.inf)
+        motion, certificate = motion_of(system)
+        if not np.isfinite(motion.rows).all():
             raise FloatingPointError("a force overflows")
-        verdict = classify(ArrayHistory(setup.timing.interval, rows), context(setup))
-    warnings = list(found.warnings)
-    if work.failure is not Failure.NONE:
-        verdict = failed(verdict, failure_sentence(work))
-    elif work.unconverged_steps:
+        history = ArrayHistory(system.interval, motion.rows)
+        verdict = verdict_on(history, motion.system, motion.work.failure_sentence)
+    warnings, work = list(found.warnings), motion.work
+    if work.unconverged_steps and not work.failed:
         warnings.append(f"{work.unconverged_steps} of {work.steps} steps did not converge, as the case allows")
     if certificate is not None and not certificate.certified:
         warnings.append(f"solver.tolerance: {certificate.sentence()}")
-    return Outcome(setup, verdict, work, certificate, tuple(warnings), rows[-1, :4])
+    return Outcome(motion.system, verdict, case, motion, certificate, tuple(warnings))
 
 
 def blank(kind: np.dtype[Any], status: Status, reason: str) -> NDArray[Any]:
@@ -137,7 +128,7 @@ def follow(plan: Plan, line: int) -> NDArray[Any]:
             records.append((point, blank(kind, Status.FAILED, _sentence(error))))
             continue
         records.append((point, _filled(kind, outcome)))
-        if outcome.work.failure is Failure.NONE:
+        if not outcome.motion.work.failed:
             start = _continued(outcome)
     return np.concatenate([record for _, record in sorted(records, key=lambda pair: pair[0])])
 
@@ -162,14 +153,13 @@ def line_points(plan: Plan, line: int) -> list[int]:
 
 def _continued(outcome: Outcome) -> dict[tuple[str, ...], Any]:
     """The start of a case where another has ended."""
-    x, y, v_x, v_y = (float(value) for value in outcome.end)
+    x, y, v_x, v_y = (float(value) for value in outcome.motion.rows[-1, :4])
     start: dict[tuple[str, ...], Any] = {("initial",): {"x": x, "y": y, "vx": v_x, "vy": v_y}}
-    wheel = outcome.setup.case.roughness.wheel
+    wheel = outcome.case.roughness.wheel
     if wheel is not None:
-        setup = outcome.setup
-        angles = np.zeros(setup.wheel.g.size)
-        travel = integral_at(setup.belt, setup.timing.samples * setup.timing.interval, 0.0)
-        wheel_angles(setup.wheel, *travel, angles)
+        system = outcome.motion.system
+        angles = np.zeros(system.wheel.g.size)
+        wheel_angles(system.wheel, *integral_at(system.belt, system.sampled_duration, 0.0), angles)
         phases = iter(angles)  # a wave of no amplitude has none
         turned = [math.degrees(next(phases) % TWO_PI) if g else 0.0 for g in wheel.amplitudes]
         start["roughness", "wheel", "phases_deg"] = turned
@@ -199,7 +189,7 @@ def _verdict(case: Case) -> Verdict | None:
         outcome = simulate(case)
     except BrakecliError:
         return None
-    return outcome.verdict if outcome.work.failure is Failure.NONE else None
+    return None if outcome.motion.work.failed else outcome.verdict
 
 
 def _filled(kind: np.dtype[Any], outcome: Outcome) -> NDArray[Any]:

@@ -1,7 +1,7 @@
 """The regime of a stored run, told anew from its history: what `brakecli classify RESULT.h5` does."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -10,15 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.analysis.regime.rules import Context, Regime, Thresholds, Verdict, classify, forced_lines
-from brakecli.analysis.stability.discrete import natural_frequencies
 from brakecli.analysis.stability.modes import growth
 from brakecli.case.read import parse_case
-from brakecli.case.system import Setup, set_up
+from brakecli.case.system import system_of
 from brakecli.errors import CaseError, UnreadableResultError
 from brakecli.files import fields
 from brakecli.files.read import StoredResult, open_result
+from brakecli.solver.history import History
 from brakecli.solver.schedules import value_at
-from brakecli.solver.steady_sliding import equilibrium, mean_contact
+from brakecli.solver.steady_sliding import steady_sliding
+from brakecli.solver.system import System
 
 _ROUNDING = 1e-9
 """A velocity of this part of the static compression, per period of the fastest motion, is no motion."""
@@ -37,32 +38,28 @@ class StoredHistory:
         return self.stored.read("history", name, start, stop)
 
 
-def context(setup: Setup) -> Context:
-    """What the classifier is told of a case."""
-    steady = len(setup.belt.times) == 1 and len(setup.load.times) == 1
-    highest = 0.5 / setup.timing.interval
-    last_speed = float(value_at(setup.belt, setup.timing.samples * setup.timing.interval))
-    lines = forced_lines(last_speed, [float(turns) for turns in setup.wheel.turns], highest)
-    compression = float(np.abs(setup.load.values).max()) / (setup.coefficients.c_yy + setup.contact_stiffness)
-    fastest = natural_frequencies(setup.coefficients, setup.contact_stiffness)[1]
+def context(system: System) -> Context:
+    """What the classifier has to know of a system."""
+    last_speed = float(value_at(system.belt, system.sampled_duration))
+    compression = float(np.abs(system.load.values).max()) / (system.coefficients.c_yy + system.contact_stiffness)
     return Context(
         last_speed,
-        steady,
-        lines,
-        quiet=_ROUNDING * compression * fastest,
-        coefficients=setup.coefficients,
-        load=float(value_at(setup.load, 0.0)),
-        growth=partial(_growth, setup, last_speed),
+        steady=len(system.belt.times) == 1 and len(system.load.times) == 1,
+        forced=forced_lines(last_speed, [float(turns) for turns in system.wheel.turns], 0.5 / system.interval),
+        quiet=_ROUNDING * compression * system.natural_frequencies[1],
+        coefficients=system.coefficients,
+        load=system.load_at_start,
+        growth=partial(_growth, system, last_speed),
     )
 
 
-def _growth(setup: Setup, belt_speed: float) -> float:
+def _growth(system: System, belt_speed: float) -> float:
     """How fast a disturbance of steady sliding grows (1/s), by the mean stiffness of the contact; 0 if not."""
-    c, mean = setup.coefficients, partial(mean_contact, setup.evaluate, setup.pad, setup.wheel)
     try:
-        rest = equilibrium(c, mean, setup.pad, float(value_at(setup.load, 0.0)), belt_speed)
+        rest = steady_sliding(system, belt=belt_speed)
     except CaseError:
         return 0.0
+    c = system.coefficients
     return max(growth(c, rest.stiffness, math.copysign(c.phi, belt_speed)), 0.0)
 
 
@@ -70,44 +67,42 @@ def classify_result(path: Path, thresholds: Thresholds) -> dict[str, Any]:
     """Names and values of the verdict on a stored run; raises UnreadableResultError for anything else."""
     with open_result(path, kind="run") as stored:
         try:
-            setup = set_up(parse_case(str(stored.attributes["resolved_toml"]), str(path)).case)
+            system = system_of(parse_case(str(stored.attributes["resolved_toml"]), str(path)).case)
         except (CaseError, KeyError) as error:
             raise UnreadableResultError(f"{path}: holds no case of this version; run its case again") from error
         variable = stored.variables("history").get("time")
         if variable is None or variable.shape[0] < 1:
             raise UnreadableResultError(f"{path}: has no history; run its case again")
-        verdict = classify(
-            StoredHistory(stored, setup.timing.interval, variable.shape[0]), context(setup), thresholds
-        )
+        history = StoredHistory(stored, system.interval, variable.shape[0])
         failure = stored.attributes.get("failure")
-    if failure:
-        verdict = failed(verdict, str(failure))
-    return {**fields.values(fields.VERDICT, RunVerdict(setup, verdict)), "failure": failure}
+        verdict = verdict_on(history, system, failure, thresholds)
+    return {**fields.values(fields.VERDICT, RunVerdict(system, verdict)), "failure": failure}
 
 
-def failed(verdict: Verdict, failure: str) -> Verdict:
-    """The verdict on a run that is not worth having: none, with what was measured."""
-    changes: dict[str, Any] = {
-        "regime": Regime.UNDECIDED,
-        "frequency": None,
-        "reasons": (f"the run failed: {failure}",),
-    }
-    return Verdict(**{**verdict.__dict__, **changes})
+def verdict_on(
+    history: History, system: System, failure: str | None, thresholds: Thresholds | None = None
+) -> Verdict:
+    """The verdict on the motion of a system; a run that has failed has no regime."""
+    verdict = classify(history, context(system), thresholds or Thresholds())
+    if not failure:
+        return verdict
+    reasons = (f"the run failed: {failure}",)
+    return replace(verdict, regime=Regime.UNDECIDED, frequency=None, reasons=reasons)
 
 
 @dataclass(frozen=True)
 class RunVerdict:
-    """The verdict on a run of a case."""
+    """The verdict on the motion of a system."""
 
-    setup: Setup
+    system: System
     verdict: Verdict
 
     @property
     def settled_from(self) -> float:
         """Begin of the settled part, s."""
-        return self.verdict.settled_from * self.setup.timing.interval
+        return self.verdict.settled_from * self.system.interval
 
     @property
     def braking_torque(self) -> float:
         """Mean torque of the friction force on the wheel's axis, R F_x, N m."""
-        return self.setup.case.wheel.radius * self.verdict.mean_friction_force
+        return self.system.radius * self.verdict.mean_friction_force
