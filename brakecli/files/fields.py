@@ -109,7 +109,7 @@ ORIGIN = (
     Field("case_toml", "", "the case as it was read, to the letter", TEXT),
     Field("resolved_toml", "", "the case that was run: overrides applied, every default filled in", TEXT),
     *(
-        Field(f"{library}_version", "", f"version of {library} that computed and wrote the result", TEXT)
+        Field(f"{library}_version", "", f"version of {library}", TEXT)
         for library in ("brakecli", "numpy", "scipy", "numba", "h5py", "hdf5")
     ),
 )
@@ -153,9 +153,7 @@ ENERGY = (
 )
 RUN = (
     Field("status", "", "how the run has ended: done or failed", TEXT),
-    Field(
-        "failure", "", "time and reason of a failure, and what to do", TEXT, source="motion.work.failure_sentence"
-    ),
+    *_within("motion.work", Field("failure", "", "time and reason of a failure", TEXT, source="failure_sentence")),
     *VERDICT,
     Field(
         "spectrum_peak",
@@ -178,21 +176,13 @@ RUN = (
         Field("certified_until", "s", "up to here the error stays below the tolerance"),
         Field("certified_by", "", "how the error is known", TEXT, source="method"),
     ),
-    Field(
-        "evaluators",
-        "",
-        "steps by way of computing the contact",
-        OBJECT,
-        "motion.work.evaluators",
-        group="evaluators",
-    ),
     *_within("motion.work", Field("evaluators", "", "steps that each evaluator took", OBJECT, group="evaluators")),
     Field("nodes", "1", "cells of the midpoint sum, 0 where it could not be needed", "i8", source="system.nodes"),
     *_within(
         "motion.work",
         Field("steps", "1", "time steps", "i8"),
         Field("contact_evaluations", "1", "evaluations of the contact force", "i8"),
-        Field("most_evaluations_in_a_step", "1", "largest number in one step", "i8", source="most_evaluations"),
+        Field("most_evaluations_in_a_step", "1", "most evaluations in one step", "i8", source="most_evaluations"),
         Field("unconverged_steps", "1", "steps that did not converge", "i8"),
         Field("non_unique_steps", "1", "steps that met a point where their solution need not be unique", "i8"),
     ),
@@ -213,12 +203,14 @@ RUN = (
 )
 HISTORY = (
     Field("time", TIME.units, TIME.long_name),
-    *(
-        Field(name, each.units, each.long_name, "i1" if name == "state" else "f8")
-        for name, each in QUANTITIES.items()
-    ),
+    *(Field(name, q.units, q.long_name, "i1" if name == "state" else "f8") for name, q in QUANTITIES.items()),
 )
 FREQUENCY = Field("frequency", "Hz", "frequency")
+WELCH = (
+    Field("first_sample", "1", "number of the first sample used, from 0", "i8", source="start"),
+    Field("segments", "1", "segments averaged", "i8"),
+    Field("window", "", "window of each segment", TEXT),
+)
 SPECTRUM = {
     field.name: Field(field.name, f"({field.units})2 Hz-1", f"power spectral density of: {field.meaning}")
     for field in HISTORY
@@ -294,7 +286,7 @@ CRITICAL = (
     ),
 )
 """Numbers have the unit of the parameter that is looked for."""
-HYSTERESIS = Field("hysteresis", "1", "whether the motions on the way up and down differ (0, 1)", "i8")
+DIFFERENCE = (Field("hysteresis", "1", "whether the motions on the way up and down differ (0, 1)", "i8"),)
 DIRECTION = Field("direction", "", "direction in which the motion was followed", TEXT)
 BASE_POINT = Field("point", "1", "the base case")
 SWEEP = (

@@ -195,7 +195,7 @@ def _write_spectrum(result: ResultFile, history: _Written, start: int) -> float 
     result.axis("spectrum", fields.FREQUENCY, lines.frequency)
     for name, density in lines.density.items():
         result.variable("spectrum", fields.SPECTRUM[name], ("frequency",), density)
-    result.set_attributes({"first_sample": lines.start, "segments": lines.segments, "window": "hann"}, "spectrum")
+    result.set_attributes(fields.values(fields.WELCH, lines), "spectrum")
     return peak(lines.frequency, lines.density["vx"])
 
 

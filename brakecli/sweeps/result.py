@@ -162,7 +162,7 @@ def write(result: ResultFile, report: SweepReport, columns: Columns) -> None:
             attributes = {"parameter": critical.parameter} if numeric else {}
             result.column(of_parameter, columns.names, columns.decoded(field.name), **attributes)
     if found.hysteresis is not None:
-        result.variable("/", fields.HYSTERESIS, found.dimensions[1:], found.hysteresis)
+        result.column(*fields.DIFFERENCE, found.dimensions[1:], found.hysteresis)
 
 
 def unit(parameter: str) -> str:
