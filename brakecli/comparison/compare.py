@@ -59,7 +59,7 @@ class Entry:
         return self.work.contact_evaluations - self.samples
 
     @property
-    def largest_stable_step(self) -> float | None:
+    def stable_step(self) -> float | None:
         """The limit on the step, s; None where there is none, or where it is not known."""
         return None if self.step_limit is None or math.isinf(self.step_limit) else self.step_limit
 

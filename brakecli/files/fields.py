@@ -28,8 +28,6 @@ class Field:
     """The NumPy type of many of them. A float may be missing: null in JSON, `_FillValue` in a file."""
     source: str = ""
     """Path of attributes, keys and methods that leads from a report to the value; the name if empty."""
-    label: str = ""
-    """Words for the terminal; the name if empty."""
     missing: Any = None
     """What stands for a value that does not exist."""
     in_file: bool = True
@@ -38,11 +36,6 @@ class Field:
     """Group of the file whose attributes hold the items of an object."""
     rows: "tuple[Field, ...]" = ()
     """The items of an object, or of each object in a list."""
-
-    @property
-    def title(self) -> str:
-        """The words for the terminal."""
-        return self.label or self.name.replace("_", " ")
 
     def read(self, report: object) -> Any:
         """The value that a report holds, as JSON writes it."""
@@ -122,7 +115,7 @@ VERDICT = (
         Field("regime", "", "regime of the motion", "S16"),
         Field("excitation", "", "where the energy of a sustained motion comes from", "S16"),
         Field("frequency", "Hz", "fundamental frequency of vx of a sustained motion"),
-        Field("amplitude", "m", "half of peak to peak of x, settled part", label="amplitude of x"),
+        Field("amplitude", "m", "half of peak to peak of x, settled part"),
         Field("settled", "1", "whether a settled part was found (0, 1); otherwise it is the second half", "i8"),
     ),
     Field("settled_from", "s", "begin of the settled part"),
@@ -130,8 +123,8 @@ VERDICT = (
     Field("braking_torque", "N m", "mean torque of the friction force, settled part"),
     *_within(
         "verdict",
-        Field("stick_fraction", "1", "part of the time in stick, settled part", label="stick"),
-        Field("contact_loss_fraction", "1", "part of the time off the wheel, settled part", label="lost contact"),
+        Field("stick_fraction", "1", "part of the time in stick, settled part"),
+        Field("contact_loss_fraction", "1", "part of the time off the wheel, settled part"),
         Field("reasons", "", "why the regime is as it is", OBJECT),
         Field("evidence", "", "what the rules went by", OBJECT, group="regime/evidence"),
         Field("thresholds", "", "where the rules drew their lines", OBJECT, group="regime/thresholds"),
@@ -155,12 +148,7 @@ RUN = (
     Field("status", "", "how the run has ended: done or failed", TEXT),
     *_within("motion.work", Field("failure", "", "time and reason of a failure", TEXT, source="failure_sentence")),
     *VERDICT,
-    Field(
-        "spectrum_peak",
-        "Hz",
-        "place of the highest peak of the spectrum of vx above 0 Hz",
-        label="peak of the spectrum of vx",
-    ),
+    Field("spectrum_peak", "Hz", "place of the highest peak of the spectrum of vx above 0 Hz"),
     *_within(
         "system.method",
         Field("scheme", "", "time-stepping scheme", TEXT),
@@ -186,15 +174,7 @@ RUN = (
         Field("unconverged_steps", "1", "steps that did not converge", "i8"),
         Field("non_unique_steps", "1", "steps that met a point where their solution need not be unique", "i8"),
     ),
-    Field(
-        "energy",
-        "",
-        "the account of energies over the whole run",
-        OBJECT,
-        "motion.energy",
-        group="energy",
-        rows=ENERGY,
-    ),
+    *_within("motion", Field("energy", "", "the account of energies", OBJECT, group="energy", rows=ENERGY)),
     Field("modelled", "", "what of the model the run has used", OBJECT),
     Field("left_out", "", "what of the model the run has left out, and why that was safe", OBJECT),
     Field("adjustments", "", "how step and duration were made to fit", OBJECT, source="check.adjustments"),
@@ -261,29 +241,17 @@ POINT = (
     *named(RUN, "steps", "contact_evaluations", "unconverged_steps", "estimated_error"),
 )
 CRITICAL = (
-    Field("critical_status", "", "how the search for the critical value has ended", "S24", "outcome", "search"),
+    Field("critical_status", "", "how the search for the critical value has ended", "S24", source="outcome"),
     Field("critical", "", "critical value: steady sliding loses its stability there", source="value"),
     Field("critical_lower", "", "lower end of the bracket of the critical value", source="lower"),
     Field("critical_upper", "", "upper end of the bracket of the critical value", source="upper"),
-    Field(
-        "critical_error", "", "error bar of the critical value, with the bias of the scheme", "f8", "error", "±"
-    ),
+    Field("critical_error", "", "error bar of the critical value, with the bias of the scheme", source="error"),
     Field("critical_bias", "", "critical value of the scheme at its step less the exact one", source="bias"),
-    Field("critical_eigenvalue", "", "critical value by eigenvalues", "f8", "eigenvalue", "by eigenvalues"),
+    Field("critical_eigenvalue", "", "critical value by eigenvalues", source="eigenvalue"),
     Field(
-        "critical_sustained",
-        "",
-        "least value at which vibration lasts from the case's own start",
-        source="sustained",
-        label="vibrates from",
+        "critical_sustained", "", "least value at which vibration lasts from the case's start", source="sustained"
     ),
-    Field(
-        "sustained_status",
-        "",
-        "how the search for the least sustained value has ended",
-        "S24",
-        source="sustained_outcome",
-    ),
+    Field("sustained_status", "", "how the search for that value has ended", "S24", source="sustained_outcome"),
 )
 """Numbers have the unit of the parameter that is looked for."""
 DIFFERENCE = (Field("hysteresis", "1", "whether the motions on the way up and down differ (0, 1)", "i8"),)
@@ -338,12 +306,7 @@ ENTRY = (
     ),
     Field("critical_bias", "1", "critical friction of the scheme at its step less the exact one"),
     Field("observed_order", "1", "order by which the error falls from the step before", source="order"),
-    Field(
-        "step_limit",
-        "s",
-        "largest stable step; missing where any step is stable, or not known",
-        source="largest_stable_step",
-    ),
+    Field("step_limit", "s", "largest stable step; missing where any is stable, or unknown", source="stable_step"),
     *_within(
         "work",
         Field("steps", "1", "time steps", "i8", missing=0),
@@ -367,13 +330,7 @@ COMPARISON = (
         Field("left_out", "1", "entries that there was no time for", "i8"),
     ),
     Field("target_error", "1", "the error to be met", source="target"),
-    Field(
-        "recommended",
-        "",
-        "the cheapest entry that meets it, with the reference's error on top; in the file its place along `entry`",
-        OBJECT,
-        rows=ENTRY,
-    ),
+    Field("recommended", "", "cheapest entry that meets the target; in the file its place", OBJECT, rows=ENTRY),
     Field("margin", "1", "`target_error` over the error of the recommended entry"),
     *_json_only(Field("entries", "", "all entries", OBJECT, source="comparison.entries", rows=ENTRY)),
 )
