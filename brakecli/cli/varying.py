@@ -9,6 +9,7 @@ from brakecli.case.read import LoadedCase, parse_case
 from brakecli.case.system import system_of
 from brakecli.errors import UsageError
 from brakecli.files import fields
+from brakecli.files.field import values_of
 
 MOST = 10_000
 
@@ -42,5 +43,5 @@ def varied(loaded: LoadedCase, vary: Vary) -> list[dict[str, Any]]:
     entries = []
     for value in vary.values:
         case = parse_case(loaded.resolved, "--vary", (f"{vary.key}={value!r}",)).case
-        entries.append({"value": value, **fields.values(fields.VARIED, stability(system_of(case)))})
+        entries.append({"value": value, **values_of(fields.VARIED, stability(system_of(case)))})
     return entries

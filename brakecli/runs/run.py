@@ -17,6 +17,7 @@ from brakecli.analysis.regime.spectra import peak, spectrum
 from brakecli.case.read import LoadedCase
 from brakecli.case.system import system_of
 from brakecli.files import fields
+from brakecli.files.field import values_of
 from brakecli.files.write import ResultFile, new_result
 from brakecli.runs.limits import Check, check, free_bytes, refuse, within_range
 from brakecli.runs.modelled import modelled
@@ -71,7 +72,7 @@ class RunReport(RunVerdict):
 
     def numbers(self) -> dict[str, Any]:
         """Names and values as `--json` gives them."""
-        numbers = fields.values(fields.RUN, self)
+        numbers = values_of(fields.RUN, self)
         if self.certificate is None:
             del numbers["certified_by"]
         return numbers
@@ -195,7 +196,7 @@ def _write_spectrum(result: ResultFile, history: _Written, start: int) -> float 
     result.axis("spectrum", fields.FREQUENCY, lines.frequency)
     for name, density in lines.density.items():
         result.variable("spectrum", fields.SPECTRUM[name], ("frequency",), density)
-    result.set_attributes(fields.values(fields.WELCH, lines), "spectrum")
+    result.set_attributes(values_of(fields.WELCH, lines), "spectrum")
     return peak(lines.frequency, lines.density["vx"])
 
 

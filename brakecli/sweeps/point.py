@@ -15,6 +15,7 @@ from brakecli.case.case import Case
 from brakecli.case.system import system_of
 from brakecli.errors import BrakecliError
 from brakecli.files import fields
+from brakecli.files.field import Field, values_of
 from brakecli.runs.limits import check, refuse, within_range
 from brakecli.runs.run import motion_of
 from brakecli.runs.tolerance import Certificate
@@ -43,7 +44,7 @@ def record_type(plan: Plan) -> np.dtype[Any]:
     return np.dtype([(field.name, field.kind) for field in fields_of(plan)])
 
 
-def fields_of(plan: Plan) -> tuple[fields.Field, ...]:
+def fields_of(plan: Plan) -> tuple[Field, ...]:
     """What is known of each point of the sweep."""
     return fields.POINT + (fields.CRITICAL if plan.sweep.critical is not None else ())
 
@@ -178,7 +179,7 @@ def _point(plan: Plan, point: int) -> NDArray[Any]:
             path = key_path(critical.parameter)
             with within_range():
                 found = search(critical, lambda value: plan.case({**settings, path: value}), _verdict)
-            _fill(record, fields.values(fields.CRITICAL, found))
+            _fill(record, values_of(fields.CRITICAL, found))
     except (BrakecliError, FloatingPointError, MemoryError) as error:
         return blank(kind, Status.FAILED, _sentence(error))
     return record
@@ -194,7 +195,7 @@ def _verdict(case: Case) -> Verdict | None:
 
 def _filled(kind: np.dtype[Any], outcome: Outcome) -> NDArray[Any]:
     record = blank(kind, outcome.status, outcome.reason)
-    _fill(record, fields.values(fields.POINT, outcome))
+    _fill(record, values_of(fields.POINT, outcome))
     return record
 
 

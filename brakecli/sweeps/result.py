@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from brakecli.case.case import json_schema
 from brakecli.case.read import key_path
 from brakecli.files import fields
+from brakecli.files.field import Field, plain, values_of
 from brakecli.files.write import ResultFile
 from brakecli.runs.run import origin
 from brakecli.sweeps.file import LoadedSweep
@@ -102,7 +103,7 @@ class SweepReport:
 
     def numbers(self) -> dict[str, Any]:
         """Names and values as `--json` gives them: the variables of the file, null where a number is missing."""
-        return {**fields.values(fields.SWEEP, self), **(self.findings.variables or {})}
+        return {**values_of(fields.SWEEP, self), **(self.findings.variables or {})}
 
 
 def findings(columns: Columns) -> Findings:
@@ -134,7 +135,7 @@ def findings(columns: Columns) -> Findings:
         critical=critical,
         hysteresis=hysteresis,
         sentences=tuple(_sentences(columns, hysteresis)),
-        variables={each.name: fields.plain(columns[each.name]) for each in fields_of(plan)} if told else None,
+        variables={each.name: plain(columns[each.name]) for each in fields_of(plan)} if told else None,
     )
 
 
@@ -149,7 +150,7 @@ def write(result: ResultFile, report: SweepReport, columns: Columns) -> None:
     for axis in plan.sweep.axis:
         values = [axis.value(place) for place in range(axis.size)]
         data = np.array(values, dtype=np.float64) if axis.numeric else np.array([label(value) for value in values])
-        field = fields.Field(axis.name, unit(axis.parameter[0]), ", ".join(axis.parameter))
+        field = Field(axis.name, unit(axis.parameter[0]), ", ".join(axis.parameter))
         result.variable("/", field, (axis.name,), data, {"parameters": list(axis.parameter)})
     if not plan.sweep.axis:
         result.axis("/", fields.BASE_POINT, np.zeros(1))

@@ -21,7 +21,7 @@ import numpy as np
 import pytest
 
 from brakecli.errors import CannotWriteError, UnreadableResultError, UsageError
-from brakecli.files.fields import Field
+from brakecli.files.field import Field
 from brakecli.files.read import open_result
 from brakecli.files.write import ResultFile, new_result
 

@@ -17,7 +17,7 @@ from brakecli.comparison.compare import compare
 from brakecli.comparison.methods import method_label
 from brakecli.comparison.result import ComparisonReport
 from brakecli.errors import UnreadableResultError, UsageError
-from brakecli.files.fields import Field
+from brakecli.files.field import Field
 from brakecli.files.read import open_result
 from brakecli.files.write import FILL, new_result
 from brakecli.plots.comparison import LARGEST, draw_comparison, gather_comparison

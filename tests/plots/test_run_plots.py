@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from brakecli.case.read import parse_case
 from brakecli.cli import commands as cli
 from brakecli.errors import BrakecliError, UnreadableResultError, UsageError
-from brakecli.files.fields import Field
+from brakecli.files.field import Field
 from brakecli.files.read import open_result
 from brakecli.files.write import new_result
 from brakecli.plots import run as picture

@@ -13,8 +13,9 @@ from matplotlib.image import imread
 from numpy.typing import NDArray
 
 from brakecli.errors import UnreadableResultError, UsageError
+from brakecli.files.field import Field
 from brakecli.files.fields import CRITICAL as CRITICAL_FIELDS
-from brakecli.files.fields import POINT, Field
+from brakecli.files.fields import POINT
 from brakecli.files.read import open_result
 from brakecli.files.write import FILL, new_result
 from brakecli.plots.result import plot_result

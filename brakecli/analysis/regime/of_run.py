@@ -15,6 +15,7 @@ from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError, UnreadableResultError
 from brakecli.files import fields
+from brakecli.files.field import values_of
 from brakecli.files.read import StoredResult, open_result
 from brakecli.solver.history import History
 from brakecli.solver.schedules import value_at
@@ -76,7 +77,7 @@ def classify_result(path: Path, thresholds: Thresholds) -> dict[str, Any]:
         history = StoredHistory(stored, system.interval, variable.shape[0])
         failure = stored.attributes.get("failure")
         verdict = verdict_on(history, system, failure, thresholds)
-    return {**fields.values(fields.VERDICT, RunVerdict(system, verdict)), "failure": failure}
+    return {**values_of(fields.VERDICT, RunVerdict(system, verdict)), "failure": failure}
 
 
 def verdict_on(

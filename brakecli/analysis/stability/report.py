@@ -22,6 +22,7 @@ from brakecli.analysis.stability.modes import (
 )
 from brakecli.errors import CaseError
 from brakecli.files import fields
+from brakecli.files.field import values_of
 from brakecli.solver.compile import Coefficients
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.steady_sliding import SteadySliding, steady_sliding, tabulated
@@ -77,7 +78,7 @@ class StabilityReport:
 
     def numbers(self) -> dict[str, Any]:
         """Names and values as `--json` gives them."""
-        return fields.values(fields.STABILITY, self)
+        return values_of(fields.STABILITY, self)
 
 
 def stability(system: System) -> StabilityReport:
