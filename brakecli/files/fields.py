@@ -37,7 +37,7 @@ VERDICT = (
         Field("amplitude", "m", "half of peak to peak of x, settled part"),
         Field("settled", "1", "whether a settled part was found (0, 1); otherwise it is the second half", "i8"),
     ),
-    Field("settled_from", "s", "begin of the settled part"),
+    Field("settled_from", "s", "start of the settled part"),
     *within("verdict", Field("mean_friction_force", "N", "mean friction force on the shoe, settled part")),
     Field("braking_torque", "N m", "mean torque of the friction force, settled part"),
     *within(
@@ -45,8 +45,8 @@ VERDICT = (
         Field("stick_fraction", "1", "part of the time in stick, settled part"),
         Field("contact_loss_fraction", "1", "part of the time off the wheel, settled part"),
         Field("reasons", "", "why the regime is as it is", OBJECT),
-        Field("evidence", "", "what the rules went by", OBJECT, group="regime/evidence"),
-        Field("thresholds", "", "where the rules drew their lines", OBJECT, group="regime/thresholds"),
+        Field("evidence", "", "numbers by which the rules decided", OBJECT, group="regime/evidence"),
+        Field("thresholds", "", "limits of the rules", OBJECT, group="regime/thresholds"),
     ),
 )
 ENERGY = (
@@ -60,7 +60,7 @@ ENERGY = (
     Field("roughness", "J", "work of the passing roughness"),
     Field("scheme", "J", "what the difference scheme itself takes out; 0 for weights of one half"),
     Field("stored", "J", "the larger of the stored energies, all three together, at the start and at the end"),
-    Field("closing_error", "J", "what is left"),
+    Field("closing_error", "J", "what the other items leave open"),
     Field("relative_closing_error", "1", "closing error over the largest item, `stored` included"),
 )
 RUN = (
