@@ -9,12 +9,15 @@ import tomli_w
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from brakecli.files.write import FILL, new_result, open_result
+from brakecli.files.field import Field
+from brakecli.files.fields import CRITICAL as CRITICAL_FIELDS
+from brakecli.files.fields import POINT
+from brakecli.files.read import open_result
+from brakecli.files.write import FILL, new_result
 from brakecli.plots.result import draw
 from brakecli.plots.style import applied
 from brakecli.plots.sweep import SweepPicture, gather
 from brakecli.sweeps.plan import label
-from brakecli.sweeps.point import CRITICAL_FIELDS, FIELDS
 from brakecli.sweeps.tables import Sweep
 
 ANGLE = {"parameter": "link2.angle_deg", "start": 1.0, "stop": 8.0, "num": 8}
@@ -30,9 +33,9 @@ Columns = dict[str, NDArray[Any]]
 def columns(shape: tuple[int, ...], *, critical: bool) -> Columns:
     """Every variable of a sweep, its numbers all different; each regime in turn."""
     count = int(np.prod(shape))
-    fields = FIELDS | (CRITICAL_FIELDS if critical else {})
     values: Columns = {
-        name: (np.zeros(shape) if field.kind[0] in "fi" else np.full(shape, "x")) for name, field in fields.items()
+        field.name: (np.zeros(shape) if field.kind[0] in "fi" else np.full(shape, "x"))
+        for field in (*POINT, *(CRITICAL_FIELDS if critical else ()))
     }
     places = np.arange(count, dtype=float).reshape(shape)
     values["status"] = np.full(shape, "done", "U24")
@@ -65,19 +68,20 @@ def write(path: Path, table: dict[str, Any], changed: Columns | None = None, **a
         dims = [axis.name for axis in model.axis] or ["point"]
         if both:
             dims.insert(0, "direction")
-            result.axis("/", "direction", "", "direction", np.array(["up", "down"]))
+            result.axis("/", Field("direction", "", "direction"), np.array(["up", "down"]))
         for axis in model.axis:
             along = [axis.value(place) for place in range(axis.size)]
             data = np.array(along) if axis.numeric else np.array([label(each) for each in along])
             key = ", ".join(axis.parameter)
-            result.axis("/", axis.name, UNITS.get(axis.parameter[0], "1"), key, data)
+            result.axis("/", Field(axis.name, UNITS.get(axis.parameter[0], "1"), key), data)
         if not model.axis:
-            result.axis("/", "point", "1", "the base case", np.zeros(1))
+            result.axis("/", Field("point", "1", "the base case"), np.zeros(1))
+        known = {field.name: field for field in (*POINT, *CRITICAL_FIELDS)}
         for name, array in values.items():
-            field = (FIELDS | CRITICAL_FIELDS).get(name)
+            field = known.get(name) or Field(name, "1", name)
             data = np.where(np.isnan(array), FILL, array) if array.dtype.kind == "f" else array
-            units, long_name = (field.units or "1", field.long_name) if field else ("1", name)
-            result.variable("/", name, dims[array.ndim == len(dims) - 1 :], units, long_name, data)
+            shown = Field(name, field.units or "1", field.meaning)
+            result.variable("/", shown, dims[array.ndim == len(dims) - 1 :], data)
         result.commit()
     return path
 

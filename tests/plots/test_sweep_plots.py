@@ -11,7 +11,8 @@ from matplotlib.image import imread
 from numpy.typing import NDArray
 
 from brakecli.errors import UnreadableResultError, UsageError
-from brakecli.files.write import new_result, open_result
+from brakecli.files.read import open_result
+from brakecli.files.write import new_result
 from brakecli.plots.result import plot_result
 from brakecli.plots.style import applied, readable
 from brakecli.plots.sweep import Axis

@@ -19,7 +19,7 @@ import h5py
 import pytest
 
 from brakecli.errors import CannotWriteError, RefusedError
-from brakecli.files.write import open_result
+from brakecli.files.read import open_result
 from brakecli.sweeps.file import read_sweep
 from brakecli.sweeps.workers.local import LocalEngine, Task, Work
 from brakecli.sweeps.workers.task import work

@@ -21,6 +21,8 @@ from brakecli.analysis.stability.modes import (
     modes,
 )
 from brakecli.errors import CaseError
+from brakecli.files import fields
+from brakecli.files.field import values_of
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.records import Coefficients
 from brakecli.solver.steady_sliding import SteadySliding, steady_sliding, tabulated
@@ -76,26 +78,7 @@ class StabilityReport:
 
     def numbers(self) -> dict[str, Any]:
         """Names and values as `--json` gives them."""
-        critical = self.critical
-        return {
-            "belt_speed": self.belt_speed,
-            "friction_coefficient": self.friction,
-            "critical_friction": critical.friction if critical else None,
-            "instability": str(critical.instability) if critical else None,
-            "critical_frequency": critical.frequency if critical else None,
-            "stable": self.stable,
-            "eigenvalues": [[value.real, value.imag] for value in self.eigenvalues],
-            "modes": [mode.__dict__ for mode in self.modes],
-            "crossings": [
-                {**crossing.__dict__, "instability": str(crossing.instability)} for crossing in self.crossings
-            ],
-            "undamped_flutter_friction": self.undamped_flutter,
-            "undamped_divergence_friction": self.undamped_divergence,
-            "contact_stiffness": self.contact_stiffness,
-            "equilibrium": self.equilibrium.__dict__ if self.equilibrium else None,
-            "no_equilibrium": self.no_equilibrium,
-            "discrete": self.discrete.__dict__ if self.discrete else None,
-        }
+        return values_of(fields.STABILITY, self)
 
 
 def stability(system: System) -> StabilityReport:

@@ -19,7 +19,7 @@ from types import TracebackType
 from typing import NamedTuple, Protocol, Self
 
 from brakecli.errors import BrakecliError
-from brakecli.files.atomic import signals_deferred
+from brakecli.files.os_signals import signals_deferred
 
 _SIGNALS = (signal.SIGHUP, signal.SIGINT, signal.SIGTERM)
 
