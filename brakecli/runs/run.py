@@ -120,23 +120,22 @@ def run(
     output: Path,
     *,
     force: bool,
-    begin: Callable[[Setup, Check], None] = lambda setup, found: None,
-    progress: Callable[[int], None] = lambda steps: None,
+    progress: Callable[[str, int, int], None] = lambda what, done, total: None,
 ) -> RunReport:
     """Simulate a case and write its result file.
 
-    `begin` is told of the run before it starts, `progress` the steps done. Raises RefusedError,
-    CannotWriteError or UsageError before anything is computed, CannotWriteError also later; a run that fails
-    numerically is written up to there and reported.
+    `progress` is called now and then with what is counted, how many are done, and how many there are. Raises
+    RefusedError, CannotWriteError or UsageError before anything is computed, CannotWriteError also later; a run
+    that fails numerically is written up to there and reported.
     """
     with within_range():
         setup = set_up(loaded.case)
         found = check(setup)
         with new_result(output, force=force) as result:
             refuse(setup, found, free_bytes(output.resolve().parent))
-            begin(setup, found)
             _declare_history(result)
-            interval = setup.timing.interval
+            interval, steps = setup.timing.interval, setup.timing.steps
+            advance = lambda done: progress("steps" if found.step else "samples", done, steps)  # noqa: E731
 
             def sink(rows: NDArray[np.float64]) -> None:
                 _require_finite("a force", rows)
@@ -146,9 +145,9 @@ def run(
 
             certificate = None
             if setup.case.solver.promise is None:
-                work, energy = Motion(setup).run(sink, progress)
+                work, energy = Motion(setup).run(sink, advance)
             else:
-                motion = certify(setup.case, progress)
+                motion = certify(setup.case, advance)
                 setup, work, energy, certificate = motion.setup, motion.work, motion.energy, motion.certificate
                 sink(motion.rows)
             _require_finite("an energy", list(asdict(energy).values()))

@@ -16,7 +16,7 @@ from matplotlib.image import imread
 from numpy.typing import NDArray
 
 from brakecli.case.read import parse_case
-from brakecli.cli import commands as cli
+from brakecli.cli import app as cli
 from brakecli.errors import BrakecliError, UnreadableResultError, UsageError
 from brakecli.files.write import new_result, open_result
 from brakecli.plots import run as picture

@@ -1,4 +1,4 @@
-"""The commands that judge: `classify` and `stability`, as their users meet them."""
+"""`classify` and `stability`, as their users meet them."""
 
 import math
 from pathlib import Path
@@ -15,7 +15,7 @@ MODE_COUPLING = ROOT / "cases" / "mode-coupling.toml"
 @pytest.fixture(scope="module")
 def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the result of a short run and a measured signal."""
-    folder: Path = tmp_path_factory.mktemp("judging")
+    folder: Path = tmp_path_factory.mktemp("classify")
     run = brakecli("run", RELAXATION, "-o", "run.h5", "--set", "solver.duration=1.0", "--quiet", cwd=folder)
     assert run.code == 0, run
     time = np.arange(4000) / 1000.0
@@ -83,7 +83,7 @@ def test_options_that_do_not_fit_are_bad_usage(here: Path) -> None:
             ["stability", RELAXATION, "--vary", "link2.angle=1:2:2"],
         ],
     )
-    words = ["--quantity", "displacement", "positive", "START:STOP:NUM", "from -90 to 90", "angle_deg"]
+    words = ["--quantity", "displacement", "above 0 Hz", "START:STOP:NUM", "from -90 to 90", "angle_deg"]
     assert len(done) == len(words)
     for result, word in zip(done, words, strict=True):
         result.told(2, word)
