@@ -24,20 +24,20 @@ def command(
 def _check_case(file: str, overrides: list[str] | None, as_json: bool, quiet: bool) -> None:
     loaded = load_case(file, overrides)
     announce_compilation(quiet)
-    from brakecli.case.system import set_up
+    from brakecli.case.system import system_of
     from brakecli.cli.tables import check_table
     from brakecli.runs.limits import check, free_bytes, refuse, within_range
 
     with within_range():
-        setup = set_up(loaded.case)
-        found = check(setup)
+        system = system_of(loaded.case)
+        found = check(system)
     values = {"valid": True, **asdict(found), **asdict(found.limits)}
     del values["limits"]
     numbers = {name: value for name, value in values.items() if value not in (math.inf, -math.inf)}
     title = loaded.case.title
     show_result("check", numbers, check_table, title, found, as_json=as_json, quiet=quiet)
     warn(*found.warnings)
-    refuse(setup, found, free_bytes(Path()))
+    refuse(system, found, free_bytes(Path()))
 
 
 def _check_sweep(file: str, overrides: list[str] | None, as_json: bool, quiet: bool) -> None:

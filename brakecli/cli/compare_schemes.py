@@ -25,6 +25,7 @@ def command(
     loaded = load_case(case, overrides)
     target = result_path(output, case, ending="-schemes.h5")
     announce_compilation(quiet)
+    from brakecli.case.system import system_of
     from brakecli.cli.tables import comparison_table
     from brakecli.comparison.compare import compare
     from brakecli.comparison.methods import parse_schemes, parse_steps
@@ -34,10 +35,11 @@ def command(
 
     chosen, ladder = parse_schemes(schemes), parse_steps(steps)
     load_kernels(loaded)
+    system = system_of(loaded.case)
     with progress(quiet) as show_progress:
         with new_output(target, force=force):  # whether it can be written is known before anything is computed
             pass
-        found = compare(loaded.case, schemes=chosen, steps=ladder, budget=budget, progress=show_progress)
+        found = compare(system, schemes=chosen, steps=ladder, budget=budget, progress=show_progress)
         report = ComparisonReport(target, loaded.case.title, found, target_error)
         write(target, loaded, report, force=force)
     numbers = {"output": str(target), **report.numbers()}

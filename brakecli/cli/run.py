@@ -33,11 +33,11 @@ def command(
     if not quiet:
         say(*report.check.adjustments)
     warn(*report.warnings)
-    numbers = {"output": str(report.output), **report.numbers(), "solve_seconds": report.work.solve_seconds}
+    numbers = {"output": str(report.output), **report.numbers(), "solve_seconds": report.motion.work.solve_seconds}
     show_result("run", numbers, run_table, report, as_json=as_json, quiet=quiet)
     if report.failed:
         say(f"{report.output}: the history up to the failure was written")
-        raise BrakecliError(str(report.failure_sentence))
+        raise BrakecliError(str(report.motion.work.failure_sentence))
     certificate = report.certificate
     if certificate is not None and not certificate.certified and loaded.case.solver.tolerance is not None:
         raise BrakecliError(f"{report.output}: was written, but solver.tolerance is not sure to be kept")

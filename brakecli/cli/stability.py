@@ -28,12 +28,12 @@ def command(
     loaded = load_case(case, overrides)
     announce_compilation(quiet)
     from brakecli.analysis.stability.report import stability
-    from brakecli.case.system import set_up
+    from brakecli.case.system import system_of
     from brakecli.cli.tables import stability_table
     from brakecli.runs.limits import within_range
 
     with within_range():
-        report = stability(set_up(loaded.case))
+        report = stability(system_of(loaded.case))
         entries = _critical_friction_along(loaded, key, values)
     numbers, found = report.numbers(), (loaded.case.title, report, key, entries)
     if key:
@@ -65,12 +65,12 @@ def _critical_friction_along(loaded: "LoadedCase", key: str, values: Sequence[fl
     """Critical friction, its kind, and the scheme's answer at each value; raises CaseError for a wrong one."""
     from brakecli.analysis.stability.report import stability
     from brakecli.case.read import parse_case
-    from brakecli.case.system import set_up
+    from brakecli.case.system import system_of
 
     entries = []
     for value in values:
         case = parse_case(loaded.resolved, "--vary", (f"{key}={value!r}",)).case
-        report = stability(set_up(case))
+        report = stability(system_of(case))
         numbers = report.numbers()
         entries.append(
             {

@@ -12,9 +12,11 @@ from rich.table import Table
 from brakecli.analysis.stability.modes import Crossing, Mode
 from brakecli.analysis.stability.report import Discrete, StabilityReport
 from brakecli.comparison.compare import Entry
+from brakecli.comparison.methods import method_label
 from brakecli.comparison.result import ComparisonReport, entry_numbers
 from brakecli.runs.limits import Check
 from brakecli.runs.run import RunReport
+from brakecli.solver.method import Method
 from brakecli.solver.quantities import COEFFICIENTS
 from brakecli.sweeps.cost import Estimate
 from brakecli.sweeps.plan import label
@@ -73,11 +75,11 @@ ENTRIES = (
 
 def run_table(report: RunReport) -> str:
     """Summary of a run."""
-    numbers, work, solver = report.numbers(), report.work, report.setup.case.solver
-    weights = ", ".join(f"{weight:.4g}" for weight in solver.theta)
+    numbers, system, work = report.numbers(), report.motion.system, report.motion.work
     shares = ", ".join(f"{kind} {count / max(work.steps, 1):.1%}" for kind, count in work.evaluators.items())
-    nodes = f", {report.setup.nodes} nodes" if "midpoint" in work.evaluators else ""
+    nodes = f", {system.nodes} nodes" if "midpoint" in work.evaluators else ""
     step = "" if report.check.step is None else f" of {report.check.step:.4g} s"
+    energy = numbers["energy"]
     rows = [
         Row("failed", [numbers["failure"]] if report.failed else []),
         *_verdict_rows(numbers),
@@ -85,22 +87,23 @@ def run_table(report: RunReport) -> str:
         Row("mean friction force", numbers["mean_friction_force"], "N"),
         Row("braking torque", numbers["braking_torque"], "N m"),
         Row("settled part", f"from {numbers['settled_from']:.4g} s on"),
-        Row(
-            "scheme",
-            f"{solver.scheme} ({weights}), {solver.iteration}"
-            if solver.tolerance is None
-            else f"{solver.scheme}, tolerance {solver.tolerance:.4g}",
-        ),
+        Row("scheme", _scheme(system.method)),
         Row("tolerance", [report.certificate.sentence()] if report.certificate else []),
         Row("contact", shares + nodes),
         Row("modelled", "; ".join(numbers["modelled"])),
         Row("left out", "; ".join(numbers["left_out"]) or "nothing"),
         Row("steps", f"{work.steps}{step}, {work.contact_evaluations} contact evaluations"),
-        Row("energy account", f"closes to {abs(report.energy.relative_closing_error):.1e} of its largest item"),
+        Row("energy account", f"closes to {abs(energy['relative_closing_error']):.1e} of its largest item"),
         Row("time of the loop", work.solve_seconds, "s", ".3g"),
         Row("file", str(report.output)),
     ]
     return _table(report.title, rows)
+
+
+def _scheme(method: Method) -> str:
+    if method.own_steps:
+        return f"{method.scheme}, tolerance {method.tolerance:.4g}"
+    return f"{method.scheme} ({', '.join(f'{weight:.4g}' for weight in method.theta)}), {method.iteration}"
 
 
 def verdict_table(source: str, numbers: Mapping[str, Any]) -> str:
@@ -260,7 +263,7 @@ def comparison_table(report: ComparisonReport) -> str:
     able = [entry for entry in found.entries if entry.errors is not None]
     failed = [entry for entry in found.entries if entry.work is not None and entry.errors is None]
     front = sorted((entry for entry in able if entry.on_front), key=lambda entry: entry.wall_seconds or 0.0)
-    finest = {entry.rung.method: entry for entry in able if not entry.on_front}
+    finest = {entry.rung.kind: entry for entry in able if not entry.on_front}
     rows = [
         Row("compared over", f"{found.duration:.6g} s of motion"),
         Row("reference", f"event-driven, good to {found.reference_error:.1e}, {found.reference_seconds:.3g} s"),
@@ -291,7 +294,7 @@ def comparison_table(report: ComparisonReport) -> str:
 
 def _name(entry: Entry) -> str:
     rung = entry.rung
-    return f"{rung.method.label()}, " + (
+    return f"{method_label(rung.kind)}, " + (
         f"step {rung.step:.3g} s" if rung.step is not None else f"tolerance {rung.tolerance:g}"
     )
 
