@@ -4,13 +4,13 @@ from pathlib import Path
 from typing import Annotated
 
 from brakecli.cli.inputs import load_case, result_path
-from brakecli.cli.options import AsJson, Case, Force, Overrides, Quiet, option, output_option
+from brakecli.cli.options import AsJson, CaseArgument, Force, Overrides, Quiet, option, output_option
 from brakecli.cli.output import show_result
 from brakecli.cli.progress import announce_compilation, progress
 
 
 def command(
-    case: Case,
+    case: CaseArgument,
     output: Annotated[Path | None, output_option("Result file", "the case's name with -schemes.h5, here")] = None,
     overrides: Overrides = None,
     schemes: Annotated[str | None, option("Only these: two-layer, three-layer, event-driven.", "NAME,…")] = None,

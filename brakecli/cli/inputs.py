@@ -51,9 +51,9 @@ def is_sweep(source: str) -> bool:
 
 
 def result_path(output: Path | None, source: str, kind: str = "case", ending: str = ".h5") -> Path:
-    """Where a result goes: to `output`, or into this directory under the name of its source.
+    """Where a result goes: to `output`, or into the current directory under the name of its source.
 
-    Raises UsageError if that is the source itself; a result file may be replaced by its own repetition.
+    Raises UsageError if that is the source itself; a result file may be replaced by the same run again.
     """
     target = output or Path((kind if source == "-" else Path(source).stem) + ending)
     if source != "-" and not _is_result(source):
@@ -65,8 +65,6 @@ def result_path(output: Path | None, source: str, kind: str = "case", ending: st
 
 def _is_result(source: str) -> bool:
     """Whether this is a result file, or was one: by its name, or by its content."""
-    if source == "-":
-        return False
     if Path(source).suffix == ".h5" and os.path.isfile(source):  # noqa: PTH113 - pathlib's may raise
         return True
     from brakecli.files.read import is_hdf5

@@ -25,7 +25,7 @@ def set_option(target: str) -> Any:
     return option(f"Set a key of {target}; repeatable.", "KEY.PATH=VALUE", "--set")
 
 
-Case = Annotated[str, source_argument("CASE.toml", 'Case file, or "-" for standard input.')]
+CaseArgument = Annotated[str, source_argument("CASE.toml", 'Case file, or "-" for standard input.')]
 Overrides = Annotated[list[str] | None, set_option("the case, the value in TOML")]
 AsJson = Annotated[bool, option("Print one JSON object on standard output, nothing else.", None, "--json")]
 Quiet = Annotated[bool, option("Print nothing but warnings and errors.", None, "--quiet", "-q")]

@@ -21,9 +21,9 @@ def announce_compilation(quiet: bool) -> None:
 
 @contextmanager
 def progress(quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
-    """Within, a signal raises `Interrupted`, the next time at the latest that what this yields is called.
+    """Yield a function that shows on a terminal what is counted, how many are done, and how many there are.
 
-    It is called with what is counted, how many are done, and how many there are, and shows them on a terminal.
+    Within, a signal raises `Interrupted`: at once, or when that function is called next.
     """
     with unwinding() as recall:
         if quiet or sys.stderr is None or not sys.stderr.isatty():

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
 from brakecli.cli.inputs import load_case
-from brakecli.cli.options import AsJson, Case, Overrides, Quiet, option
+from brakecli.cli.options import AsJson, CaseArgument, Overrides, Quiet, option
 from brakecli.cli.output import show_result
 from brakecli.cli.progress import announce_compilation
 from brakecli.errors import UsageError
@@ -17,7 +17,7 @@ MOST_VALUES = 10_000
 
 
 def command(
-    case: Case,
+    case: CaseArgument,
     overrides: Overrides = None,
     vary: Annotated[str | None, option("Tabulate critical friction along a key.", "KEY=START:STOP:NUM")] = None,
     as_json: AsJson = False,

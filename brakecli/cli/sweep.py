@@ -36,7 +36,7 @@ def command(
 ) -> None:
     """Simulate a grid of cases, or search for a critical parameter at each.
 
-    The same command goes on where an interrupted one has ended.
+    The same command continues an interrupted sweep.
     """
     loaded = load_sweep(file, overrides)
     target = result_path(output, file, kind="sweep")

@@ -219,7 +219,7 @@ def _discrete_rows(discrete: Discrete) -> list[Row]:
 
 
 def sweep_table(report: SweepReport) -> str:
-    """Summary of a sweep; of a small one every point."""
+    """Summary of a sweep, and every point of a small one."""
     found, critical = report.findings, report.loaded.sweep.critical
     rows = [
         Row("points", f"{found.points}" + (f", {report.resumed} of them computed before" * (report.resumed > 0))),

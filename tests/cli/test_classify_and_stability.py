@@ -45,7 +45,7 @@ def test_classify_repeats_the_verdict_of_the_run(here: Path) -> None:
     assert again.json["regime"] == "relaxation"
 
 
-def test_thresholds_are_options_and_are_told(here: Path) -> None:
+def test_thresholds_are_options_and_are_reported(here: Path) -> None:
     strict, wrong, bad = each(
         here,
         [
@@ -89,7 +89,7 @@ def test_options_that_do_not_fit_are_bad_usage(here: Path) -> None:
         result.told(2, word)
 
 
-def test_files_that_are_no_results_end_in_four_and_never_in_a_number(here: Path) -> None:
+def test_files_that_are_not_results_end_in_four_and_never_in_a_number(here: Path) -> None:
     (here / "empty.h5").write_bytes(b"")
     (here / "text.csv").write_text("no numbers here\n")
     whole = (here / "run.h5").read_bytes()
@@ -106,7 +106,7 @@ def test_files_that_are_no_results_end_in_four_and_never_in_a_number(here: Path)
         assert result.out == ""
 
 
-def test_stability_tells_the_minimal_model_and_what_a_scheme_makes_of_it(here: Path) -> None:
+def test_stability_reports_the_minimal_model_and_what_a_scheme_makes_of_it(here: Path) -> None:
     changes = [
         "--set",
         "solver.step=0.1",

@@ -182,7 +182,7 @@ def test_titles_and_file_names_are_shown_as_they_are(folder: Path) -> None:
     assert "[red]r.h5\n" in done.out
 
 
-def test_adjusted_steps_and_durations_are_told(tmp_path: Path) -> None:
+def test_adjusted_steps_and_durations_are_reported(tmp_path: Path) -> None:
     (tmp_path / "tiny.toml").write_text(TINY)
     changes = ["--set", "solver.step=1.3e-5", "--set", "solver.duration=0.01234"]
     run, quiet, check = each(
@@ -234,7 +234,7 @@ def test_the_schema_is_the_shipped_file(tmp_path: Path) -> None:
     assert done.json == ascii_only.json == json.loads(shipped)
 
 
-def test_check_tells_cost_and_limits_and_writes_nothing(tmp_path: Path) -> None:
+def test_check_reports_cost_and_limits_and_writes_nothing(tmp_path: Path) -> None:
     (tmp_path / "tiny.toml").write_text(TINY)
     table, numbers, quiet = each(tmp_path, [["check", "tiny.toml", *flag] for flag in ([], ["--json"], ["-q"])])
     assert table.told(0) == numbers.told(0) == quiet.told(0) == quiet.out == ""
@@ -253,7 +253,7 @@ def test_check_tells_cost_and_limits_and_writes_nothing(tmp_path: Path) -> None:
     assert left_in(tmp_path) == {"tiny.toml"}
 
 
-def test_the_version_is_told() -> None:
+def test_the_version_is_printed() -> None:
     assert brakecli("--version", cwd=ROOT) == Done(0, f"brakecli {__version__}\n", "")
 
 
@@ -270,7 +270,7 @@ def test_every_command_has_help_and_a_place_in_the_documentation() -> None:
         assert f"brakecli {command}" in documentation, command
 
 
-# how it is told
+# how it is shown
 
 
 def test_help_imports_no_numerical_library() -> None:
