@@ -227,6 +227,22 @@ def test_new_takes_its_place_from_a_name_or_an_output(tmp_path: Path) -> None:
     empty.told(2, "the name is empty")
 
 
+def test_no_command_replaces_the_file_that_it_reads(tmp_path: Path) -> None:
+    axis = '[[axis]]\nparameter = "load.force"\nvalues = [1.0]\n'
+    texts = {"tiny.toml": TINY, "sweep.toml": 'case = "tiny.toml"\n' + axis}
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text)
+    commands = [["run", "tiny.toml"], ["compare-schemes", "tiny.toml"], ["sweep", "sweep.toml"]]
+    done = each(tmp_path, [[*command, "-o", command[1], "--force"] for command in commands])
+    for result, kind in zip(done, ("case", "case", "sweep"), strict=True):
+        result.told(2, f"this is the {kind} itself; choose another output with -o")
+    assert {name: (tmp_path / name).read_text() for name in texts} == texts
+
+
+def test_a_directory_is_not_a_result_to_draw(tmp_path: Path) -> None:
+    brakecli("plot", ".", cwd=tmp_path).told(2, "name a file that ends in .pdf, .png or .svg")
+
+
 def test_the_schema_is_the_shipped_file(tmp_path: Path) -> None:
     done, ascii_only = (brakecli("schema", cwd=tmp_path, PYTHONIOENCODING=code) for code in ("utf-8", "ascii"))
     shipped = resources.files("brakecli.case").joinpath("case.schema.json").read_text(encoding="utf-8")
