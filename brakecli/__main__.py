@@ -7,7 +7,7 @@ def main() -> None:
     """Run the command line; signals are heard before anything large is imported."""
     handle_signals()
     guard_streams()
-    from brakecli.cli.commands import main as run
+    from brakecli.cli.app import main as run
 
     run()
 
