@@ -6,8 +6,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
-from scipy.optimize import brentq
 
 from brakecli.errors import CaseError, Problem
 from brakecli.solver.compile import FRACTION, NORMAL_FORCE, STIFFNESS, Coefficients
@@ -63,6 +61,8 @@ def tabulated(mean: Mean, pad: NDArray[np.float64]) -> Mean:
 
     The force is a cubic through its values and slopes; its error falls with the fourth power of the spacing.
     """
+    from scipy.interpolate import CubicHermiteSpline, PchipInterpolator  # smooth cases need not wait for it
+
     full, top = -pad[WHEEL_BOUND] - pad[SHOE_TOP], pad[WHEEL_BOUND] + pad[SHOE_BOTTOM]
     if full == top:
         return mean
@@ -109,6 +109,8 @@ def equilibrium(c: Coefficients, mean: Mean, pad: NDArray[np.float64], load: flo
                 raise _none("the load lifts the shoe off the wheel and no link holds it")
             y = -push / spring
         elif unbalanced(full) < 0.0:
+            from scipy.optimize import brentq  # only surfaces that open wait for it
+
             y = brentq(unbalanced, full, top, xtol=1e-15 * max(abs(full), abs(top), 1e-300), rtol=1e-14)
         else:
             raise _none("the friction force lifts more than the load presses (self-locking)")
