@@ -1,28 +1,30 @@
 """What a command has found, as a table for people and as names and values for programs."""
 
+from __future__ import annotations
+
 import io
 import math
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
-from brakecli.analysis.regime.of_run import braking_torque
-from brakecli.analysis.stability.modes import Crossing, Mode
-from brakecli.analysis.stability.report import Discrete, StabilityReport
-from brakecli.case.case import Solver
-from brakecli.comparison.compare import Entry
-from brakecli.comparison.result import ComparisonReport
-from brakecli.runs.limits import Check
-from brakecli.runs.run import RunReport
 from brakecli.solver.quantities import COEFFICIENTS
-from brakecli.sweeps.cost import Estimate
-from brakecli.sweeps.plan import label
-from brakecli.sweeps.result import SweepReport
+
+if TYPE_CHECKING:  # what one command prints need not wait for the modules of the others
+    from rich.table import Table
+
+    from brakecli.analysis.stability.modes import Crossing, Mode
+    from brakecli.analysis.stability.report import Discrete, StabilityReport
+    from brakecli.case.case import Solver
+    from brakecli.comparison.compare import Entry
+    from brakecli.comparison.result import ComparisonReport
+    from brakecli.runs.limits import Check
+    from brakecli.runs.run import RunReport
+    from brakecli.sweeps.cost import Estimate
+    from brakecli.sweeps.result import SweepReport
 
 Rows = list[tuple[str, str]]
 
@@ -33,6 +35,8 @@ NARROWEST = 40
 
 def run_table(report: RunReport) -> str:
     """Summary of a run."""
+    from brakecli.analysis.regime.of_run import braking_torque
+
     verdict, work, energy, times = report.verdict, report.work, report.energy, report.setup.timing
     shares = ", ".join(f"{kind} {count / max(work.steps, 1):.1%}" for kind, count in work.evaluators.items())
     rows: Rows = [
@@ -199,6 +203,8 @@ def _points_table(report: SweepReport) -> str:
             "critical_sustained": "vibrates from",
             "critical_status": "search",
         }
+    from brakecli.sweeps.plan import label
+
     columns = [np.array(values[name], dtype=object).ravel() for name in shown]
     rows = []
     for index in range(found.points):
@@ -346,6 +352,8 @@ def _unit(value: float | None, unit: str) -> str:
 
 def _table(title: str, rows: Rows) -> str:
     """Rows in two columns, as wide as the terminal."""
+    from rich.table import Table
+
     table = Table(title=title or None, show_header=False, box=None, title_justify="left", padding=(0, 2, 0, 0))
     table.add_column(style="bold")
     table.add_column(overflow="fold")
@@ -356,6 +364,8 @@ def _table(title: str, rows: Rows) -> str:
 
 def _grid(headers: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """Rows under headers."""
+    from rich.table import Table
+
     table = Table(box=None, padding=(0, 2, 0, 0))
     for header in headers:
         table.add_column(header, overflow="fold")
@@ -365,6 +375,8 @@ def _grid(headers: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def _drawn(table: Table) -> str:
+    from rich.console import Console
+
     file, colours = io.StringIO(), sys.stdout.isatty() or None
     # Titles and file names are no markup.
     console = Console(file=file, force_terminal=colours, markup=False, emoji=False, highlight=False)
