@@ -1,4 +1,4 @@
-"""Power spectral densities and the fundamental frequency of a history."""
+"""Power spectral densities, their peak, and the rises of a signal through zero."""
 
 from dataclasses import dataclass
 
@@ -22,7 +22,7 @@ SPECTRAL = ("x", "y", "vx", "vy", "friction_force", "normal_force", "contact_fra
 
 @dataclass(frozen=True)
 class Spectrum:
-    """One-sided power spectral densities (unit² per Hz) over frequencies (Hz), of samples start … stop - 1."""
+    """One-sided power spectral densities (unit² per Hz) over frequencies (Hz), from sample `start` on."""
 
     frequency: Array
     density: dict[str, Array]
@@ -33,7 +33,7 @@ class Spectrum:
 def spectrum(history: History, start: int) -> Spectrum:
     """Welch's estimate (Hann window, half overlap, mean removed) of the samples from `start` on.
 
-    Segments are as long as leaves about `SEGMENTS_WANTED` of them, within `LONGEST_SEGMENT`.
+    The length of the segments, at most `LONGEST_SEGMENT`, leaves about `SEGMENTS_WANTED` of them.
     """
     length = history.samples - start
     size = min(LONGEST_SEGMENT, max(min(SHORTEST_SEGMENT, length), 2 * length // (SEGMENTS_WANTED + 1)))
@@ -60,7 +60,7 @@ def _window(size: int, interval: float) -> Array:
 
 def _summed_periodograms(segments: Array, window: Array) -> Array:
     """Sum of the one-sided power spectral densities of segments, one in a row."""
-    # Brought to a scale of one, so that squares of the smallest numbers do not vanish.
+    # Squares of the smallest numbers would vanish, so the segments are brought to a scale of one.
     scale = float(np.max(np.abs(segments), initial=0.0)) or 1.0
     power = np.empty((len(window) // 2 + 1, len(segments)))
     for column, segment in zip(power.T, segments / scale, strict=True):
@@ -83,16 +83,21 @@ def peak(frequency: Array, density: Array) -> float | None:
     return float(frequency[i] + np.clip(shift, -0.5, 0.5) * (frequency[1] - frequency[0]))
 
 
+def rises(values: Array, low: float, high: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """The last samples below `low` and the first ones above `high`, of every rise from one to the other."""
+    side = np.where(values > high, 1, np.where(values < low, -1, 0)).astype(np.int8)
+    marked = np.flatnonzero(side)
+    found = np.flatnonzero((side[marked[:-1]] < 0) & (side[marked[1:]] > 0))
+    return marked[found], marked[found + 1]
+
+
 def upward_crossings(values: Array, band: float) -> Array:
     """Places (in samples) where a signal rises through zero between leaving -band and reaching +band.
 
     The band keeps ripple on a slow cycle from counting as cycles. The places are interpolated linearly.
     """
-    side = np.where(values > band, 1, np.where(values < -band, -1, 0))
-    marked = np.flatnonzero(side)
-    rises = np.flatnonzero((side[marked[:-1]] < 0) & (side[marked[1:]] > 0))
     places = []
-    for low, high in zip(marked[rises], marked[rises + 1], strict=True):
+    for low, high in zip(*rises(values, -band, band), strict=True):
         i = low + int(np.argmax(values[low : high + 1] >= 0.0)) - 1
         places.append(i + values[i] / (values[i] - values[i + 1]))
     return np.array(places)
