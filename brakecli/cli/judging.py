@@ -12,7 +12,7 @@ from brakecli.analysis.regime.of_run import classify_result
 from brakecli.analysis.regime.signal_file import read_signal
 from brakecli.errors import UnreadableResultError, UsageError
 
-_Thresholds = TypeVar("_Thresholds", rules.Thresholds, of_signal.Thresholds)
+_Thresholds = TypeVar("_Thresholds", rules.Thresholds, of_signal.SignalThresholds)
 
 
 def judge(
@@ -40,15 +40,15 @@ def judge(
                 f"{error}; for a measured signal say with --quantity what it is"
             ) from error
     try:
-        kind = of_signal.Quantity(quantity)
+        kind = of_signal.Measurand(quantity)
     except ValueError as error:
-        names = ", ".join(of_signal.Quantity)
+        names = ", ".join(of_signal.Measurand)
         raise UsageError(f"--quantity {quantity}: is not known; give one of {names}") from error
     for name, value in {**known, "sample_rate": reading["sample_rate"]}.items():
         if value is not None and not (math.isfinite(value) and (value > 0.0 or name == "belt_speed")):
             raise UsageError(f"--{name.replace('_', '-')} {value}: is not a positive number; give one in SI units")
     signal = read_signal(source, **reading)
-    lines = _moved(of_signal.Thresholds(), thresholds)
+    lines = _moved(of_signal.SignalThresholds(), thresholds)
     verdict = of_signal.classify_signal(signal, quantity=kind, thresholds=lines, **known)
     numbers = dataclasses.asdict(verdict)
     return {**numbers, "regime": str(verdict.regime), "excitation": str(verdict.excitation)}
