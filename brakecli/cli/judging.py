@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from brakecli.analysis.regime import of_signal, rules
-from brakecli.analysis.regime.of_run import classify_result
 from brakecli.analysis.regime.signal_file import read_signal
 from brakecli.errors import UnreadableResultError, UsageError
 
@@ -32,6 +31,8 @@ def judge(
         if given:
             option = "--" + given[0].replace("_", "-")
             raise UsageError(f"{option}: is for a measured signal; say with --quantity what was measured")
+        from brakecli.analysis.regime.of_run import classify_result
+
         limits = _moved(rules.Thresholds(), thresholds)
         try:
             return classify_result(Path(source), limits)

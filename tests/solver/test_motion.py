@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from brakecli.analysis.stability.discrete import step_limits
-from brakecli.case.system import set_up
+from brakecli.case.system import system_of
 from brakecli.solver import motion as simulation
-from brakecli.solver.motion import Motion
+from brakecli.solver.motion import solve
 from brakecli.solver.quantities import Failure
 from tests.examples import COULOMB, MODE_COUPLING, ROUGH, SQUEAL, make, simulate
 
@@ -81,18 +81,13 @@ def test_both_iterations_give_the_same_history(scheme: str, theta: tuple[float, 
 
 def test_a_run_that_the_fixed_point_cannot_solve_says_so() -> None:
     case = make(SQUEAL, contact__stiffness=1e14, solver__iteration="fixed-point")
-    limits = step_limits(*_limits_of(case))
+    limits = step_limits(system_of(case))
     assert limits.contraction > 1.0
     work = simulate(case).work
     assert work.failure is Failure.UNCONVERGED
     assert work.unconverged_steps == 1
     assert work.unconverged.shape == (1, 2)
     assert simulate(make(SQUEAL, contact__stiffness=1e14)).work.failure is Failure.NONE
-
-
-def _limits_of(case: Any) -> Any:
-    setup = set_up(case)
-    return setup.coefficients, setup.weights, setup.scheme, setup.contact_stiffness, setup.wheel
 
 
 @pytest.mark.parametrize("number", [2.0, 50.0, 5000.0])
@@ -135,7 +130,7 @@ def test_any_stiffness_and_friction_end_in_a_solution_or_a_named_failure(
 def test_links_at_right_angles_do_not_couple_the_directions(alpha: float, beta: float) -> None:
     case = make(SQUEAL, link1__angle_deg=beta, link2__angle_deg=alpha, friction__coefficient=0.0)
     result = simulate(case)
-    assert set_up(case).coefficients.c_xy == 0.0
+    assert system_of(case).coefficients.c_xy == 0.0
     assert np.all(np.isfinite(result.rows))
     if beta == 0.0:  # the load acts along y alone
         assert np.all(result.x == 0.0)
@@ -219,13 +214,13 @@ def test_an_unstable_scheme_is_known_by_its_amplification() -> None:
             MODE_COUPLING, solver__scheme="three-layer", solver__theta=(0.0, 1.0, 0.0), friction__coefficient=0.0,
             solver__step=step / np.sqrt(3.0),
         )  # fmt: skip
-        assert (step_limits(*_limits_of(case)).growth < 1.0 + 1e-9) == stable
+        assert (step_limits(system_of(case)).growth < 1.0 + 1e-9) == stable
     for step, stable in ((2.4, True), (2.5, False)):  # weights of Numerov: ωh < √6
         case = make(
             MODE_COUPLING, solver__scheme="three-layer", solver__theta=(1 / 12, 10 / 12, 1 / 12),
             friction__coefficient=0.0, solver__step=step / np.sqrt(3.0),
         )  # fmt: skip
-        assert (step_limits(*_limits_of(case)).growth < 1.0 + 1e-9) == stable
+        assert (step_limits(system_of(case)).growth < 1.0 + 1e-9) == stable
 
 
 def test_motion_that_blows_up_is_named() -> None:
@@ -249,9 +244,9 @@ def test_auto_takes_the_closed_form_where_the_pad_touches_and_says_so() -> None:
 
 
 def test_a_run_keeps_no_more_than_a_block_in_memory() -> None:
-    motion = Motion(set_up(make(SQUEAL, solver__duration=10.0, output__sample_interval=1e-5)))
     sizes: list[int] = []
-    motion.run(lambda rows: sizes.append(len(rows)))
+    system = system_of(make(SQUEAL, solver__duration=10.0, output__sample_interval=1e-5))
+    solve(system, sink=lambda rows: sizes.append(len(rows)))
     assert sum(sizes) == 10**6 + 1
     assert max(sizes) <= simulation.BLOCK_ROWS
 

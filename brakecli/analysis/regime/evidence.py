@@ -3,15 +3,17 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.analysis.regime.spectra import upward_crossings
-from brakecli.solver.compile import Coefficients
 from brakecli.solver.history import History
 from brakecli.solver.quantities import ContactState
+
+if TYPE_CHECKING:  # measured signals need not wait for compiled code
+    from brakecli.solver.compile import Coefficients
 
 Array = NDArray[np.float64]
 
@@ -226,7 +228,7 @@ def _rises_per_cycle(velocity: Array, period: float) -> int:
     return 1
 
 
-def powers_of(part: Part, c: Coefficients, belt: float, load: float) -> dict[str, float]:
+def powers_of(part: Part, c: "Coefficients", belt: float, load: float) -> dict[str, float]:
     """Mean powers (W) at constant U (m/s) and Q (N): the belt's, and what becomes of it.
 
     What is left, `power_rest`, is the work of the roughness and the change of the energy in the links and the

@@ -4,12 +4,14 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from brakecli.analysis.regime.evidence import Envelope, Part, cycles_of, envelope_of, powers_of
-from brakecli.solver.compile import Coefficients
 from brakecli.solver.history import History
 from brakecli.solver.quantities import ContactState
+
+if TYPE_CHECKING:
+    from brakecli.solver.compile import Coefficients
 
 
 class Regime(StrEnum):
@@ -58,7 +60,7 @@ class Context:
     steady: bool = True  # whether U and Q are constant
     forced: tuple[float, ...] = ()  # Hz, lines of the roughness
     quiet: float = 0.0  # m/s, size of vx that may come from rounding
-    coefficients: Coefficients | None = None  # with `load` Q (N) for the balance of powers
+    coefficients: "Coefficients | None" = None  # with `load` Q (N) for the balance of powers
     load: float = 0.0
     growth: Callable[[], float] = lambda: 0.0  # 1/s, of a small disturbance of steady sliding; 0 where it decays
 
