@@ -101,7 +101,7 @@ def disturbed(values: Array, per_cycle: int, kind: str, seed: int = 9) -> Array:
 
 def verdict(values: Array, per_cycle: int, quantity: Measurand) -> SignalVerdict:
     """The verdict, without any knowledge of the belt."""
-    return classify_signal(Signal(values, 1.0 / per_cycle, "synthetic"), quantity=quantity)
+    return classify_signal(Signal(values, 1.0 / per_cycle), quantity=quantity)
 
 
 def outcome(found: Regime, true: Regime) -> str:
@@ -135,7 +135,7 @@ def clipped(stick: float, samples: int = 20000, per_cycle: float = 99.7) -> Arra
 def _short_stick(stick: float, decibels: float, belt_speed: float | None) -> str:
     velocity = clipped(stick)
     noise = 10.0 ** (-decibels / 20.0) * velocity.std() * np.random.default_rng(1).normal(0.0, 1.0, len(velocity))
-    signal = Signal(velocity + noise, 1e-3, "synthetic")
+    signal = Signal(velocity + noise, 1e-3)
     return str(classify_signal(signal, quantity=Measurand.VELOCITY, belt_speed=belt_speed).regime)
 
 

@@ -1,7 +1,7 @@
 """What the rules of the regimes go by: envelope, cycles, stick, lines and powers of a history."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -176,34 +176,23 @@ def envelope_of(history: History) -> Envelope:
     return Envelope(vx, least, largest, np.array(0.5 * (edges[:-1] + edges[1:]) * history.interval))
 
 
-@dataclass(frozen=True)
-class Cycles:
-    """Cycles of vx: how many, their period (samples), the fundamental frequency (Hz), and what else they show."""
-
-    count: int
-    period: float = 0.0
-    frequency: float = 0.0
-    evidence: dict[str, Any] = field(default_factory=dict)
-
-
-def cycles_of(part: Part) -> Cycles:
-    """Count the cycles of vx by its rises through the mean.
+def cycles_of(part: Part) -> dict[str, Any]:
+    """What the cycles of vx show; they are counted by its rises through the mean. Empty if there are none.
 
     A motion that repeats only after two to four rises has that long a period.
     """
     velocity = part.last("vx")
     crossings = upward_crossings(velocity, 0.3 * float(velocity.std()))
     if len(crossings) < 2:
-        return Cycles(0)
+        return {}
     period = float(crossings[-1] - crossings[0]) / (len(crossings) - 1)
     rises = _rises_per_cycle(velocity, period)
     crossings, period = crossings[::rises], period * rises
-    frequency = 1.0 / (period * part.history.interval)
-    power = part.power()
+    frequency, power = 1.0 / (period * part.history.interval), part.power()
     state = part.history.read("state", part.stop - len(velocity), part.stop)
     sticks = np.flatnonzero((state[1:] == ContactState.STICK) & (state[:-1] != ContactState.STICK)) + 1
     per_cycle = np.histogram(sticks, crossings)[0] if len(crossings) > 1 else np.zeros(1)
-    evidence = {
+    return {
         "cycles": float(len(crossings) - 1),
         "samples_per_cycle": period,
         "rises_per_cycle": float(rises),
@@ -213,7 +202,6 @@ def cycles_of(part: Part) -> Cycles:
         "stick_cycles": float(np.mean(per_cycle > 0)),
         "stick_episodes_per_cycle": float(np.mean(per_cycle)),
     }
-    return Cycles(len(crossings) - 1, period, frequency, evidence)
 
 
 def _rises_per_cycle(velocity: Array, period: float) -> int:

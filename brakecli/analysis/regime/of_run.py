@@ -1,7 +1,7 @@
-"""The regime of a stored run, told anew from its history: what `brakecli classify RESULT.h5` does."""
+"""The regime of a run, and of the history in its result file: what `brakecli classify RESULT.h5` does."""
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import System
 
 _ROUNDING = 1e-9
-"""A velocity of this part of the static compression, per period of the fastest motion, is no motion."""
+"""A velocity up to this part of the static compression, times the highest frequency, may come from rounding."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class StoredHistory:
 
 
 def context(system: System) -> Context:
-    """What the classifier has to know of a system."""
+    """What the rules have to know of a system."""
     last_speed = float(value_at(system.belt, system.sampled_duration))
     compression = float(np.abs(system.load.values).max()) / (system.coefficients.c_yy + system.contact_stiffness)
     return Context(
@@ -52,7 +52,7 @@ def context(system: System) -> Context:
 
 
 def _growth(system: System, belt_speed: float) -> float:
-    """How fast a disturbance of steady sliding grows (1/s), by the mean stiffness of the contact; 0 if not."""
+    """Growth of a disturbance of steady sliding (1/s), by the mean stiffness of the contact; 0 if it decays."""
     try:
         rest = steady_sliding(system, belt=belt_speed)
     except CaseError:
@@ -79,13 +79,8 @@ def classify_result(path: Path, thresholds: Thresholds) -> dict[str, Any]:
 
 
 def failed(verdict: Verdict, failure: str) -> Verdict:
-    """The verdict on a run that is not worth having: none, with what was measured."""
-    changes: dict[str, Any] = {
-        "regime": Regime.UNDECIDED,
-        "frequency": None,
-        "reasons": (f"the run failed: {failure}",),
-    }
-    return Verdict(**{**verdict.__dict__, **changes})
+    """The verdict on a run that has failed: `undecided`, with what was measured."""
+    return replace(verdict, regime=Regime.UNDECIDED, frequency=None, reasons=(f"the run failed: {failure}",))
 
 
 def braking_torque(verdict: Verdict, system: System) -> float:
@@ -96,17 +91,11 @@ def braking_torque(verdict: Verdict, system: System) -> float:
 def verdict_numbers(verdict: Verdict, system: System) -> dict[str, Any]:
     """Names and values of a verdict as `--json` gives them and result files hold them."""
     return {
+        **asdict(verdict),
         "regime": str(verdict.regime),
         "excitation": str(verdict.excitation),
-        "frequency": verdict.frequency,
-        "amplitude": verdict.amplitude,
         "settled": int(verdict.settled),
         "settled_from": verdict.settled_from * system.interval,
-        "mean_friction_force": verdict.mean_friction_force,
         "braking_torque": braking_torque(verdict, system),
-        "stick_fraction": verdict.stick_fraction,
-        "contact_loss_fraction": verdict.contact_loss_fraction,
         "reasons": list(verdict.reasons),
-        "evidence": verdict.evidence,
-        "thresholds": asdict(verdict.thresholds),
     }

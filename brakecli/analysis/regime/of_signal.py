@@ -7,6 +7,7 @@ that shows the skewness best is used, so that one procedure serves any sampling 
 
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,7 +40,6 @@ class Signal:
 
     values: Array
     interval: float  # s
-    source: str
     notes: tuple[str, ...] = ()
 
 
@@ -90,8 +90,7 @@ class SignalVerdict:
     thresholds: SignalThresholds = field(default_factory=SignalThresholds)
 
 
-@dataclass(frozen=True)
-class Stick:
+class Stick(NamedTuple):
     """What speaks for stick: skewness of the velocity, events, part of the time."""
 
     skewness: float
@@ -251,7 +250,9 @@ class _Rules:
         flat = top > self.limits.plateau * beside
         if flat and np.isfinite(self.belt):
             fraction = max(0.0, top - 0.5 * beside)
-            reason = f"the velocity stays at the belt's speed for {fraction:.0%} of the time, in most cycles"
+            reason = (
+                f"the velocity stays at the belt's speed for {fraction:.0%} of the time, in most cycles or all"
+            )
             return self._verdict(Regime.RELAXATION, reason, self.frequency, fraction)
         share = line_share(self.power, 3)
         self.evidence |= {"line_share": share}

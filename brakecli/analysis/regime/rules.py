@@ -179,18 +179,20 @@ class _Rules:
     def _sustained(self) -> Verdict:
         """A motion whose amplitude has settled: cycles, stick, lines."""
         found = cycles_of(self.settled_part)
-        self.evidence |= found.evidence
-        if found.count < self.limits.fewest_cycles:
-            return self._undecided(f"only {found.count} cycles in the settled part; run longer")
-        if found.period < self.limits.samples_per_cycle:
-            return self._undecided(f"only {found.period:.1f} samples a cycle; reduce output.sample_interval")
-        stick, harmonic = found.evidence["stick_cycles"], found.evidence["harmonic_share"]
+        self.evidence |= found
+        cycles = found.get("cycles", 0.0)
+        if cycles < self.limits.fewest_cycles:
+            return self._undecided(f"only {cycles:.0f} cycles in the settled part; run longer")
+        period, stick, harmonic = found["samples_per_cycle"], found["stick_cycles"], found["harmonic_share"]
+        if period < self.limits.samples_per_cycle:
+            return self._undecided(f"only {period:.1f} samples a cycle; reduce output.sample_interval")
+        frequency = 1.0 / (period * self.history.interval)
         if stick >= self.limits.stick_cycles:
-            text = f"sustained, with stick in {stick:.0%} of {found.count} cycles"
-            return self._verdict(Regime.RELAXATION, text, Excitation.SELF_EXCITED, found.frequency)
+            text = f"sustained, with stick in {stick:.0%} of {cycles:.0f} cycles"
+            return self._verdict(Regime.RELAXATION, text, Excitation.SELF_EXCITED, frequency)
         if stick == 0.0 and harmonic >= self.limits.harmonic_share:
             text = f"sustained without stick: {harmonic:.0%} of the energy of vx in one line and its harmonics"
-            return self._verdict(Regime.QUASI_HARMONIC, text, Excitation.SELF_EXCITED, found.frequency)
+            return self._verdict(Regime.QUASI_HARMONIC, text, Excitation.SELF_EXCITED, frequency)
         return self._undecided(
             f"irregular: stick in {stick:.0%} of the cycles, {harmonic:.0%} of the energy of vx in one line and "
             "its harmonics; run longer, or look at the spectrum"

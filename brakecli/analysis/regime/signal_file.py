@@ -46,7 +46,7 @@ def read_signal(source: str, *, column: str | None, time_column: str | None, sam
         if inside is not None and (column is not None or time_column is not None):
             raise UsageError("a dataset has no columns; leave out --column, and give --sample-rate HZ")
         values, times = _columns(path, column, time_column) if inside is None else (_dataset(path, inside), None)
-        return _signal(source, values, times, sample_rate)
+        return _signal(values, times, sample_rate)
     except (UsageError, UnreadableResultError) as error:
         raise type(error)(f"{source}: {error}") from error
     except OSError as error:
@@ -185,7 +185,7 @@ def _is_number(cell: str, decimal_comma: bool) -> bool:
     return True
 
 
-def _signal(source: str, values: Array, times: Array | None, sample_rate: float | None) -> Signal:
+def _signal(values: Array, times: Array | None, sample_rate: float | None) -> Signal:
     """Equally spaced values, NaN in gaps."""
     good = np.isfinite(values)
     numbers = values[good]
@@ -199,12 +199,12 @@ def _signal(source: str, values: Array, times: Array | None, sample_rate: float 
         raise UnreadableResultError("values beyond 1e100 cannot be measured; name another column, or use SI units")
     values = np.where(good, values, np.nan)
     if times is not None:
-        return _evenly(source, values, times)
+        return _evenly(values, times)
     assert sample_rate is not None
-    return Signal(values, 1.0 / sample_rate, source)
+    return Signal(values, 1.0 / sample_rate)
 
 
-def _evenly(source: str, values: Array, times: Array) -> Signal:
+def _evenly(values: Array, times: Array) -> Signal:
     """The signal over equal steps of time; jumps of time become gaps."""
     if not np.isfinite(times).all():
         raise UnreadableResultError("a time is not a number; remove the rows without a time")
@@ -216,7 +216,7 @@ def _evenly(source: str, values: Array, times: Array) -> Signal:
     within = steps[steps < _GAP * step]
     step = float(within.mean())
     if float(np.abs(steps - step).max()) <= _UNEVEN * step:
-        return Signal(values, float(times[-1] - times[0]) / (len(times) - 1), source)
+        return Signal(values, float(times[-1] - times[0]) / (len(times) - 1))
     count = int((times[-1] - times[0]) / step + 1.5)
     if count > _LONGEST * len(times):
         raise UnreadableResultError("more gaps than record; give one piece of it")
@@ -231,4 +231,4 @@ def _evenly(source: str, values: Array, times: Array) -> Signal:
         notes.append(f"{len(jumps)} jumps of time taken as gaps")
     if float(np.abs(within - step).max()) > _UNEVEN * step:
         notes.append(f"sampled irregularly, resampled at {1.0 / step:.6g} Hz")
-    return Signal(even, step, source, tuple(notes))
+    return Signal(even, step, tuple(notes))
