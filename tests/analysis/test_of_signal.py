@@ -25,7 +25,7 @@ IN_DOUBT = {
 @pytest.mark.parametrize("per_cycle", [10, 20, 50, 200, 1000])
 @pytest.mark.parametrize("quantity", list(Measurand))
 def test_no_motion_is_mistaken_for_another(per_cycle: int, quantity: Measurand) -> None:
-    told = 0
+    checked = 0
     for motion in motions(per_cycle, 100):
         for decibels in (40, 20, 10):
             values = measured(motion.displacement, per_cycle, quantity, decibels)
@@ -33,25 +33,25 @@ def test_no_motion_is_mistaken_for_another(per_cycle: int, quantity: Measurand) 
             result = outcome(found.regime, motion.regime)
             doubtful = motion.name in IN_DOUBT and decibels == 10 and per_cycle <= 20
             assert result == "right" or (doubtful and result == "undecided"), (motion.name, decibels, found)
-            told += 1
-    assert told == 69
+            checked += 1
+    assert checked == 69
 
 
 @pytest.mark.parametrize("kind", ["spikes", "drift", "offset", "turned round", "short gaps", "long gap"])
 @pytest.mark.parametrize("quantity", [Measurand.DISPLACEMENT, Measurand.VELOCITY])
 def test_disturbances_do_not_change_the_regime(kind: str, quantity: Measurand) -> None:
-    told = 0
+    checked = 0
     for motion in motions(50, 100):
         values = disturbed(measured(motion.displacement, 50, quantity, 20), 50, kind)
-        told += 1
+        checked += 1
         if motion.name == "noise" and kind == "spikes":
             continue  # spikes in nothing but noise are events, for all that a signal can show
         found = verdict(values, 50, quantity).regime
         assert outcome(found, motion.regime) != "wrong", motion.name
-    assert told == 23
+    assert checked == 23
 
 
-def test_what_was_mended_is_told() -> None:
+def test_what_was_changed_is_reported() -> None:
     values = measured(np.sin(2.0 * np.pi * np.arange(5000) / 50), 50, Measurand.DISPLACEMENT, 40)
     for kind, words in {
         "spikes": "spikes removed",
@@ -93,7 +93,7 @@ def test_events_and_time_of_stick_are_counted() -> None:
 
 
 @pytest.mark.parametrize("stick", [0.08, 0.1, 0.2])
-def test_short_stick_is_told_by_the_speed_of_the_belt(stick: float) -> None:
+def test_short_stick_shows_by_the_speed_of_the_belt(stick: float) -> None:
     signal = Signal(clipped(stick), 1e-3)
     known = classify_signal(signal, quantity=Measurand.VELOCITY, belt_speed=1.0)
     assert known.regime == Regime.RELAXATION
@@ -143,7 +143,7 @@ def test_short_and_hostile_signals_are_undecided_at_worst() -> None:
             assert all(np.isfinite(list(found.evidence.values()))), found.evidence
 
 
-def test_a_measurement_does_not_tell_what_drives_it_and_keeps_its_thresholds() -> None:
+def test_a_measurement_does_not_show_what_drives_it_and_keeps_its_thresholds() -> None:
     found = classify_signal(
         Signal(np.sin(0.1 * np.arange(5000)), 1.0),
         quantity=Measurand.DISPLACEMENT,

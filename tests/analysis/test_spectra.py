@@ -7,15 +7,11 @@ from numpy.typing import NDArray
 from brakecli.analysis.regime import spectra
 from brakecli.analysis.regime.spectra import SPECTRAL, peak, spectrum, upward_crossings
 from brakecli.solver.history import ArrayHistory
-from brakecli.solver.quantities import HISTORY
-
-INTERVAL = 1e-4
+from tests.analysis.histories import INTERVAL, history_of
 
 
 def history(vx: NDArray[np.float64]) -> ArrayHistory:
-    rows = np.zeros((len(vx), len(HISTORY)))
-    rows[:, list(HISTORY).index("vx")] = vx
-    return ArrayHistory(INTERVAL, rows)
+    return history_of(len(vx), vx=vx)
 
 
 def sine(frequency: float, samples: int = 20000, amplitude: float = 0.03) -> NDArray[np.float64]:
