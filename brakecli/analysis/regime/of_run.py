@@ -1,7 +1,7 @@
-"""The regime of a run, and of the history in its result file: what `brakecli classify RESULT.h5` does."""
+"""The regime of a stored run, told anew from its history: what `brakecli classify RESULT.h5` does."""
 
 import math
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -79,8 +79,13 @@ def classify_result(path: Path, thresholds: Thresholds) -> dict[str, Any]:
 
 
 def failed(verdict: Verdict, failure: str) -> Verdict:
-    """The verdict on a run that has failed: `undecided`, with what was measured."""
-    return replace(verdict, regime=Regime.UNDECIDED, frequency=None, reasons=(f"the run failed: {failure}",))
+    """The verdict on a run that is not worth having: none, with what was measured."""
+    changes: dict[str, Any] = {
+        "regime": Regime.UNDECIDED,
+        "frequency": None,
+        "reasons": (f"the run failed: {failure}",),
+    }
+    return Verdict(**{**verdict.__dict__, **changes})
 
 
 def braking_torque(verdict: Verdict, system: System) -> float:
@@ -91,11 +96,17 @@ def braking_torque(verdict: Verdict, system: System) -> float:
 def verdict_numbers(verdict: Verdict, system: System) -> dict[str, Any]:
     """Names and values of a verdict as `--json` gives them and result files hold them."""
     return {
-        **asdict(verdict),
         "regime": str(verdict.regime),
         "excitation": str(verdict.excitation),
+        "frequency": verdict.frequency,
+        "amplitude": verdict.amplitude,
         "settled": int(verdict.settled),
         "settled_from": verdict.settled_from * system.interval,
+        "mean_friction_force": verdict.mean_friction_force,
         "braking_torque": braking_torque(verdict, system),
+        "stick_fraction": verdict.stick_fraction,
+        "contact_loss_fraction": verdict.contact_loss_fraction,
         "reasons": list(verdict.reasons),
+        "evidence": verdict.evidence,
+        "thresholds": asdict(verdict.thresholds),
     }
