@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -75,6 +76,7 @@ class Part:
         count = self.stop - self.start
         return float(np.sqrt(max(square / count - (total / count) ** 2, 0.0)))
 
+    @cached_property
     def power(self) -> "Power":
         """Power spectrum of the last samples of vx, under a Hann window."""
         values = self.last("vx")
@@ -188,7 +190,7 @@ def cycles_of(part: Part) -> dict[str, Any]:
     period = float(crossings[-1] - crossings[0]) / (len(crossings) - 1)
     rises = _rises_per_cycle(velocity, period)
     crossings, period = crossings[::rises], period * rises
-    frequency, power = 1.0 / (period * part.history.interval), part.power()
+    frequency, power = 1.0 / (period * part.history.interval), part.power
     state = part.history.read("state", part.stop - len(velocity), part.stop)
     sticks = np.flatnonzero((state[1:] == ContactState.STICK) & (state[:-1] != ContactState.STICK)) + 1
     per_cycle = np.histogram(sticks, crossings)[0] if len(crossings) > 1 else np.zeros(1)

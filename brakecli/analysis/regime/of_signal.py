@@ -172,7 +172,7 @@ class _Rules:
         return self._verdict(Regime.UNDECIDED, reason)
 
     def _stick(self) -> Stick:
-        """Skewness at the smoothing that shows it best, and what goes with it."""
+        """Skewness at the smoothing that shows it best, and the events of slip that go with it."""
         velocity, best, sign, scale = self.velocity, 0.0, 1.0, self.scale
         for m, _ in velocity.variances:
             skewness = _skewness(velocity.thinned(m))
@@ -198,7 +198,7 @@ class _Rules:
         return strongest * self.duration / length, max(strongest, 1) / length
 
     def _unsettled(self, cycles: float) -> SignalVerdict | None:
-        """Died out, still growing or still decaying; otherwise the start moves behind a transient."""
+        """Decides where the motion has died out, still grows or decays; moves the start behind a transient."""
         limits, velocity = self.limits, self.velocity
         windows = int(np.clip(cycles / 3.0, 4, 40))
         whole = velocity.trend(self.scale, 0, windows)
@@ -224,7 +224,7 @@ class _Rules:
         return self._undecided(f"still {word}; measure longer, until it has {end}")
 
     def _sticking(self) -> SignalVerdict | None:
-        """The velocity is skewed by stick, and not by two lines in step; undecided if noise hides which."""
+        """Decides where stick has skewed the velocity; undecided if noise hides whether two lines in step did."""
         limits, stick, velocity, total = self.limits, self.stick, self.velocity, float(self.power.sum())
         if stick.events < limits.fewest_cycles or stick.skewness < limits.skewness_unlikely:
             return None
@@ -244,7 +244,7 @@ class _Rules:
         return self._verdict(Regime.RELAXATION, reason, stick.events / self.duration, stick.fraction)
 
     def _without_stick(self) -> SignalVerdict:
-        """The regime of a motion that neither grows nor dies out, nor sticks for long."""
+        """Decides on a motion that neither grows nor dies out, nor sticks for long."""
         top, beside = self._plateau()
         self.evidence |= {"plateau": top / max(beside, 1e-9), "plateau_time": top}
         flat = top > self.limits.plateau * beside
@@ -273,7 +273,7 @@ class _Rules:
         return self._verdict(Regime.QUASI_HARMONIC, reason, self.frequency, 0.0)
 
     def _plateau(self) -> tuple[float, float]:
-        """Part of the time at the belt's speed (or at the velocity's extreme value) and next to it."""
+        """Part of the time at the belt's speed (or an extreme velocity), and part of the time next to it."""
         finer = int(np.ceil(_FINE / self.evidence["samples_per_cycle"]))
         clean = self.clean[: _PLATEAU_SAMPLES // finer]
         clean = finer * np.fft.irfft(np.fft.rfft(clean), finer * len(clean))
@@ -291,7 +291,7 @@ class _Rules:
 
 
 def _skewness(values: Array) -> float:
-    """The median of equal parts', which a single jump does not change."""
+    """Median of the skewness of equal parts, which a single jump does not change."""
     parts = [part - part.mean() for part in np.array_split(values, _PARTS)]
     return float(np.median([np.mean(p * p * p) / max(float(np.mean(p * p)), 1e-100) ** 1.5 for p in parts]))
 

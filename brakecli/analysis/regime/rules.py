@@ -73,8 +73,8 @@ class Verdict:
     excitation: Excitation
     frequency: float | None  # Hz, fundamental of vx when sustained
     amplitude: float  # m, half of peak to peak of x
-    settled_from: int  # sample
-    settled: bool  # whether a settled part was found; otherwise `settled_from` is the middle
+    settled_from: int  # sample; the middle where no settled part was found
+    settled: bool  # whether a settled part was found
     stick_fraction: float
     contact_loss_fraction: float
     mean_friction_force: float  # N
@@ -111,7 +111,7 @@ class _Rules:
         return Part(self.history, start, self.history.samples)
 
     def _contact(self) -> Verdict | None:
-        """Never in contact; or contact lost for good, or stick throughout, in the second half."""
+        """Decides where the second half is without contact, or stick throughout."""
         check = "check the sign and size of load.force"
         if self.settled_part.fraction(ContactState.SEPARATED) == 1.0:
             if self._part(0).fraction(ContactState.SEPARATED) == 1.0:
@@ -124,7 +124,7 @@ class _Rules:
         return self._undecided("the shoe sticks throughout and is carried along by the wheel; run longer")
 
     def _unmoved(self) -> Verdict | None:
-        """Too short, not steady, never moved, or died out."""
+        """Decides where the run is too short or not steady, and where nothing has moved or all has died out."""
         if self.history.samples < Envelope.FEWEST_SAMPLES:
             return self._undecided(f"fewer than {Envelope.FEWEST_SAMPLES} samples; run longer")
         envelope = self.envelope = envelope_of(self.history)
@@ -142,10 +142,10 @@ class _Rules:
         return None
 
     def _forced(self) -> Verdict | None:
-        """Only the roughness shakes the shoe."""
+        """Decides where only the roughness shakes the shoe."""
         if not self.context.forced:
             return None
-        share = self.evidence["forced_share"] = self.settled_part.power().share(self.context.forced)
+        share = self.evidence["forced_share"] = self.settled_part.power.share(self.context.forced)
         if share < self.limits.forced_share:
             return None
         growth = self.context.growth()
@@ -161,7 +161,7 @@ class _Rules:
         return self._verdict(Regime.DAMPED, text, Excitation.FORCED)
 
     def _trend(self) -> Verdict | None:
-        """Not settled: still growing or decaying."""
+        """Decides where the motion still grows or decays; otherwise it finds the settled part."""
         first = self.envelope.settled_window(self.limits.settled_within, self.limits.reach_within)
         if first is not None:
             self.settled_part, self.settled = self._part(first * self.history.samples // Envelope.WINDOWS), True
@@ -177,7 +177,7 @@ class _Rules:
         )
 
     def _sustained(self) -> Verdict:
-        """A motion whose amplitude has settled: cycles, stick, lines."""
+        """Decides on a motion whose amplitude has settled, by its cycles, stick and lines."""
         found = cycles_of(self.settled_part)
         self.evidence |= found
         cycles = found.get("cycles", 0.0)
@@ -208,12 +208,12 @@ class _Rules:
         excitation: Excitation = Excitation.NONE,
         frequency: float | None = None,
     ) -> Verdict:
-        """Add the means and fractions of the settled part."""
+        """The verdict, with the means and fractions of the settled part."""
         part, belt, c = self.settled_part, self.context.belt_speed, self.context.coefficients
         self.evidence |= {f"amplitude_{name}": part.amplitude(name) for name in ("y", "vx", "vy")}
         if belt != 0.0:
             self.evidence["largest_vx_over_belt_speed"] = part.extremes("vx")[int(belt > 0.0)] / belt
-        self.evidence |= part.power().lines(self.context.forced)
+        self.evidence |= part.power.lines(self.context.forced)
         if c is not None and self.context.steady:
             self.evidence |= powers_of(part, c, belt, self.context.load)
         return Verdict(
