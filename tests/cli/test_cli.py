@@ -303,6 +303,13 @@ def test_a_run_waits_for_no_library_that_it_does_not_need(tmp_path: Path) -> Non
     assert loaded.isdisjoint({*unused, "matplotlib", "pint", "brakecli.sweeps", "brakecli.comparison"})
 
 
+def test_a_measured_signal_waits_for_no_compiled_code(tmp_path: Path) -> None:
+    np.savetxt(tmp_path / "signal.csv", np.sin(0.1 * np.arange(2000.0)))
+    loaded = loaded_by(["classify", "signal.csv", "--sample-rate", "1e3", "--quantity", "displacement"], tmp_path)
+    assert "brakecli.analysis.regime.of_signal" in loaded
+    assert loaded.isdisjoint({"numba", "h5py", "scipy.signal", "scipy.stats", "scipy.optimize", "matplotlib"})
+
+
 def on_a_terminal(arguments: list[str], cwd: Path, **changes: str) -> tuple[int, str, str]:
     """Run with standard error on a terminal; the exit code and both outputs."""
     ours, theirs = pty.openpty()
