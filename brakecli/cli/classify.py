@@ -66,17 +66,17 @@ def _classify_signal(
     source: str, quantity: str, reading: _Options, machine: _Options, changes: Sequence[str]
 ) -> dict[str, Any]:
     """Names and values of the verdict on a measured signal; `machine` holds what is known of the machine."""
-    from brakecli.analysis.regime.of_signal import Quantity, Thresholds, classify_signal
+    from brakecli.analysis.regime.of_signal import Measurand, SignalThresholds, classify_signal
     from brakecli.analysis.regime.signal_file import read_signal
 
-    if quantity not in set(Quantity):
-        raise UsageError(f"--quantity {quantity}: is not known; give one of {', '.join(Quantity)}")
-    for name, value in machine.items():
+    if quantity not in set(Measurand):
+        raise UsageError(f"--quantity {quantity}: is not known; give one of {', '.join(Measurand)}")
+    for name, value in {**machine, "sample_rate": reading["sample_rate"]}.items():
         if value is not None and not (math.isfinite(value) and (value > 0.0 or name == "belt_speed")):
             raise UsageError(f"--{name.replace('_', '-')} {value}: is not a positive number; give one in SI units")
     signal = read_signal(source, **reading)
-    thresholds = Thresholds(**_values(changes, Thresholds))
-    verdict = classify_signal(signal, quantity=Quantity(quantity), thresholds=thresholds, **machine)
+    thresholds = SignalThresholds(**_values(changes, SignalThresholds))
+    verdict = classify_signal(signal, quantity=Measurand(quantity), thresholds=thresholds, **machine)
     return dataclasses.asdict(verdict)
 
 

@@ -13,9 +13,11 @@ def announce_compilation(quiet: bool) -> None:
 
     They are compiled as they are imported: a command calls this before it imports them.
     """
+    if quiet:
+        return
     from brakecli.solver.compile import cache_is_cold
 
-    if not quiet and cache_is_cold():
+    if cache_is_cold():
         say("compiling kernels, once for this version …")
 
 

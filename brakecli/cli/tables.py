@@ -1,26 +1,28 @@
 """What a command has found, as tables for people."""
 
+from __future__ import annotations
+
 import io
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
-from brakecli.analysis.stability.modes import Crossing, Mode
-from brakecli.analysis.stability.report import Discrete, StabilityReport
-from brakecli.comparison.compare import Entry
-from brakecli.comparison.methods import method_label
-from brakecli.comparison.result import ComparisonReport, entry_numbers
-from brakecli.runs.limits import Check
-from brakecli.runs.run import RunReport
-from brakecli.solver.method import Method
 from brakecli.solver.quantities import COEFFICIENTS
-from brakecli.sweeps.cost import Estimate
-from brakecli.sweeps.plan import label
-from brakecli.sweeps.result import SweepReport
+
+if TYPE_CHECKING:  # what one command prints need not wait for the modules of the others
+    from rich.table import Table
+
+    from brakecli.analysis.stability.modes import Crossing, Mode
+    from brakecli.analysis.stability.report import Discrete, StabilityReport
+    from brakecli.comparison.compare import Entry
+    from brakecli.comparison.result import ComparisonReport
+    from brakecli.runs.limits import Check
+    from brakecli.runs.run import RunReport
+    from brakecli.solver.method import Method
+    from brakecli.sweeps.cost import Estimate
+    from brakecli.sweeps.result import SweepReport
 
 MOST_LISTED_POINTS = 30
 NARROWEST = 40
@@ -242,6 +244,8 @@ def sweep_table(report: SweepReport) -> str:
 def _points_table(report: SweepReport) -> str:
     """A row for each point: its place on the axes, and what was found there."""
     found, plan = report.findings, report.loaded.plan
+    from brakecli.sweeps.plan import label
+
     known = POINTS if found.critical is None else CRITICAL_POINTS
     columns = [*(Column(axis.name, axis.parameter[0]) for axis in plan.sweep.axis), *known]
     if "direction" in found.dimensions:
@@ -293,6 +297,8 @@ def comparison_table(report: ComparisonReport) -> str:
 
 
 def _name(entry: Entry) -> str:
+    from brakecli.comparison.methods import method_label
+
     rung = entry.rung
     return f"{method_label(rung.kind)}, " + (
         f"step {rung.step:.3g} s" if rung.step is not None else f"tolerance {rung.tolerance:g}"
@@ -300,6 +306,8 @@ def _name(entry: Entry) -> str:
 
 
 def _entries_table(entries: Iterable[Entry]) -> str:
+    from brakecli.comparison.result import entry_numbers
+
     records = [entry_numbers(entry) for entry in entries]
     for record in records:
         record["milliseconds"] = 1e3 * record["wall_seconds"]
@@ -309,6 +317,8 @@ def _entries_table(entries: Iterable[Entry]) -> str:
 
 def _table(title: str, rows: Sequence[Row]) -> str:
     """Rows in two columns, as wide as the terminal."""
+    from rich.table import Table
+
     table = Table(title=title or None, show_header=False, box=None, title_justify="left", padding=(0, 2, 0, 0))
     table.add_column(style="bold")
     table.add_column(overflow="fold")
@@ -320,6 +330,8 @@ def _table(title: str, rows: Sequence[Row]) -> str:
 
 def _grid(columns: Sequence[Column], records: Iterable[Mapping[str, Any]]) -> str:
     """A line for each record, under headers."""
+    from rich.table import Table
+
     table = Table(box=None, padding=(0, 2, 0, 0))
     for column in columns:
         table.add_column(column.header, overflow="fold")
@@ -336,6 +348,8 @@ def _text(value: str | float | None, form: str, unit: str = "") -> str:
 
 
 def _drawn(table: Table) -> str:
+    from rich.console import Console
+
     file, colours = io.StringIO(), sys.stdout.isatty() or None
     # Titles and file names are not markup.
     console = Console(file=file, force_terminal=colours, markup=False, emoji=False, highlight=False)

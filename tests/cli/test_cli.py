@@ -289,19 +289,41 @@ def test_every_command_has_help_and_a_place_in_the_documentation() -> None:
 # how it is shown
 
 
-def test_help_imports_no_numerical_library() -> None:
+def loaded_by(arguments: list[str], cwd: Path | None = None) -> set[str]:
+    """The names of the modules that a command has loaded by its end."""
     code = (
-        "import sys; sys.argv = ['brakecli', '--help']\n"
+        f"import sys; sys.argv = {['brakecli', *arguments]}\n"
         "from brakecli.__main__ import main\n"
         "try: main()\n"
-        "except SystemExit: print('loaded:', *sys.modules, file=sys.stderr)\n"
+        "except SystemExit: pass\n"
+        "print('loaded:', *sys.modules, file=sys.stderr)\n"
     )
+    command = [sys.executable, "-c", code]
     done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, env=environment(), timeout=LIMIT, check=True
+        command, capture_output=True, text=True, cwd=cwd, env=environment(), timeout=LIMIT, check=True
     )
-    loaded = {name.split(".")[0] for name in done.stderr.split("loaded:")[1].split()}
+    return set(done.stderr.split("loaded:")[1].split())
+
+
+def test_help_imports_no_numerical_library() -> None:
+    loaded = loaded_by(["--help"])
     assert "typer" in loaded
     assert loaded.isdisjoint({"numpy", "numba", "h5py", "scipy", "pydantic", "matplotlib", "rich"})
+
+
+def test_a_run_waits_for_no_library_that_it_does_not_need(tmp_path: Path) -> None:
+    (tmp_path / "tiny.toml").write_text(TINY)
+    loaded = loaded_by(["run", "tiny.toml"], tmp_path)
+    assert {"numba", "h5py", "brakecli.solver.loop"} <= loaded
+    unused = {"scipy.signal", "scipy.stats", "scipy.interpolate", "scipy.optimize", "scipy.ndimage"}
+    assert loaded.isdisjoint({*unused, "matplotlib", "pint", "brakecli.sweeps", "brakecli.comparison"})
+
+
+def test_a_measured_signal_waits_for_no_compiled_code(tmp_path: Path) -> None:
+    np.savetxt(tmp_path / "signal.csv", np.sin(0.1 * np.arange(2000.0)))
+    loaded = loaded_by(["classify", "signal.csv", "--sample-rate", "1e3", "--quantity", "displacement"], tmp_path)
+    assert "brakecli.analysis.regime.of_signal" in loaded
+    assert loaded.isdisjoint({"numba", "h5py", "scipy.signal", "scipy.stats", "scipy.optimize", "matplotlib"})
 
 
 def on_a_terminal(arguments: list[str], cwd: Path, **changes: str) -> tuple[int, str, str]:
