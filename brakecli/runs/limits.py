@@ -17,6 +17,7 @@ from brakecli.analysis.stability.discrete import (
     step_limits,
 )
 from brakecli.analysis.stability.modes import eigensystem
+from brakecli.analysis.stability.search import bisect
 from brakecli.case.case import EVENT_TOLERANCE, Iteration
 from brakecli.case.system import Setup
 from brakecli.errors import RefusedError
@@ -255,9 +256,7 @@ def _longest_stable_step(setup: Setup) -> float | None:
     low, high = 1e-6 * setup.timing.step, setup.timing.step
     if not is_stable(low):
         return None
-    while high > 1.001 * low:
-        middle = math.sqrt(low * high)
-        low, high = (middle, high) if is_stable(middle) else (low, middle)
+    low, _ = bisect(is_stable, low, high, ratio=1.001, geometric=True)
     digit: float = 10.0 ** (math.floor(math.log10(low)) - 1)
     return math.floor(low / digit) * digit
 
