@@ -16,8 +16,9 @@ from brakecli.analysis.stability.modes import growth as eigenvalue_growth
 from brakecli.analysis.stability.report import MARGIN, stability
 from brakecli.analysis.stability.search import bisect
 from brakecli.case.case import Case, changed
-from brakecli.case.system import set_up
+from brakecli.case.system import system_of
 from brakecli.errors import CaseError
+from brakecli.solver.system import System
 from brakecli.sweeps.growth import Growth, Sliding, growth, sliding, with_step
 from brakecli.sweeps.tables import Critical, Method
 
@@ -68,6 +69,7 @@ class Search(NamedTuple):
 
 
 CaseAt = Callable[[float], Case]
+SystemAt = Callable[[float], System]
 VerdictOf = Callable[[Case], Verdict | None]
 Unstable = Callable[[float], bool | None]
 """Whether steady sliding is unstable at a value of the parameter; None where there is none."""
@@ -86,8 +88,8 @@ class _Change(NamedTuple):
 def search(critical: Critical, case_at: CaseAt, verdict_of: VerdictOf) -> Search:
     """Look for the critical value of the parameter that `case_at` sets; `verdict_of` runs a case."""
 
-    def stepped(value: float) -> Case:
-        return with_step(case_at(value))  # a case with a tolerance has no step
+    def stepped(value: float) -> System:
+        return with_step(system_of(case_at(value)))  # a case with a tolerance has no step
 
     exact, bias = _by_eigenvalues(critical, stepped)
     if critical.method is Method.EIGENVALUE:
@@ -115,24 +117,24 @@ def search(critical: Critical, case_at: CaseAt, verdict_of: VerdictOf) -> Search
     return Search(found.outcome, found.value, found.low, found.high, error, bias, exact.value, *lasting)
 
 
-def _by_eigenvalues(critical: Critical, case_at: CaseAt) -> tuple[_Change, float | None]:
+def _by_eigenvalues(critical: Critical, system_at: SystemAt) -> tuple[_Change, float | None]:
     """Where the eigenvalues of steady sliding pass zero, and by how much the scheme at its step moves that."""
     if critical.parameter == "friction.coefficient":
-        return _friction_by_eigenvalues(critical, case_at(critical.lower))
+        return _friction_by_eigenvalues(critical, system_at(critical.lower))
 
     @cache
     def at(value: float) -> Sliding | None:
-        return _sliding(case_at, value)
+        return _sliding(system_at, value)
 
     def grows(found: Sliding) -> bool:
-        c, k = found.setup.coefficients, found.stiffness
+        c, k = found.system.coefficients, found.stiffness
         rate = eigenvalue_growth(c, k, found.grip)
         return rate > 1e-12 * math.sqrt((abs(c.c_xx) + abs(c.c_yy) + k) / c.m)
 
     def grows_in_steps(found: Sliding) -> bool:
-        setup = found.setup
-        c, belt = setup.coefficients, setup.belt_speed
-        return spectral_radius(c, setup.weights, setup.scheme, found.stiffness, belt) > 1.0 + MARGIN
+        system = found.system
+        c, belt = system.coefficients, system.belt_speed
+        return spectral_radius(c, system.weights, system.scheme, found.stiffness, belt) > 1.0 + MARGIN
 
     def first_change(unstable: Callable[[Sliding], bool], count: int) -> _Change:
         """The first change among `count` values, narrowed down."""
@@ -145,7 +147,7 @@ def _by_eigenvalues(critical: Critical, case_at: CaseAt) -> tuple[_Change, float
         return _Change(scanned.outcome, 0.5 * (low + high), low, high)
 
     first = at(critical.lower)
-    opens = first is not None and first.stiffness < 0.999 * first.setup.contact_stiffness
+    opens = first is not None and first.stiffness < 0.999 * first.system.contact_stiffness
     width = critical.tolerance * (1e-2 if opens else 1e-9)
     exact = first_change(grows, SCANNED_WHERE_OPEN if opens else SCANNED_BY_EIGENVALUES)
     own = first_change(grows_in_steps, SCANNED_WHERE_OPEN)
@@ -154,9 +156,9 @@ def _by_eigenvalues(critical: Critical, case_at: CaseAt) -> tuple[_Change, float
     return exact, own.value - exact.value
 
 
-def _friction_by_eigenvalues(critical: Critical, case: Case) -> tuple[_Change, float | None]:
+def _friction_by_eigenvalues(critical: Critical, system: System) -> tuple[_Change, float | None]:
     """The first loss of stability within the range of φ, otherwise the first regain."""
-    report = stability(set_up(case))
+    report = stability(system)
     within = [each for each in report.crossings if critical.lower <= each.friction <= critical.upper]
     if within:
         crossing = min(within, key=lambda each: not each.lost)
@@ -168,9 +170,9 @@ def _friction_by_eigenvalues(critical: Critical, case: Case) -> tuple[_Change, f
     return _Change(Outcome.STABLE if report.stable else Outcome.UNSTABLE), None
 
 
-def _sliding(case_at: CaseAt, value: float) -> Sliding | None:
+def _sliding(system_at: SystemAt, value: float) -> Sliding | None:
     try:
-        return sliding(case_at(value))
+        return sliding(system_at(value))
     except CaseError:  # a value that no case can have, between two that it can
         return None
 
@@ -200,13 +202,13 @@ def _scan(critical: Critical, unstable: Unstable, count: int) -> _Change:
     return _Change(Outcome.UNSTABLE if any(verdicts) else Outcome.STABLE)
 
 
-def _by_simulation(critical: Critical, case_at: CaseAt) -> _Change:
+def _by_simulation(critical: Critical, system_at: SystemAt) -> _Change:
     """Where the growth of small disturbances passes zero, by Brent's method, between two values on either side."""
     from scipy.optimize import brentq
 
     @cache
     def at(value: float) -> Growth | None:
-        steady = _sliding(case_at, value)
+        steady = _sliding(system_at, value)
         return None if steady is None else growth(steady)
 
     unstable = _if_known(at, lambda measured: measured.unstable)
@@ -234,10 +236,10 @@ def _by_simulation(critical: Critical, case_at: CaseAt) -> _Change:
     return _Change(scanned.outcome, value, low, high, min(spread, critical.upper - critical.lower))
 
 
-def _never_opens(case: Case) -> bool:
+def _never_opens(system: System) -> bool:
     """Whether surfaces that slide on each other touch everywhere: then their motion is linear."""
-    found = sliding(case)
-    return found is not None and found.stiffness >= 0.999 * found.setup.contact_stiffness
+    found = sliding(system)
+    return found is not None and found.stiffness >= 0.999 * found.system.contact_stiffness
 
 
 def _vibrates(verdict: Verdict | None, duration: float, unstable: bool | None, linear: bool) -> bool | None:
