@@ -92,12 +92,8 @@ def search(critical: Critical, case_at: CaseAt, verdict_of: VerdictOf) -> Search
         return with_step(system_of(case_at(value)))  # a case with a tolerance has no step
 
     exact, bias = _by_eigenvalues(critical, stepped)
-    if critical.method is Method.EIGENVALUE:
-        if exact.value is None:
-            return Search(exact.outcome, bias=bias)
-        error = 0.5 * (exact.high - exact.low)
-        return Search(exact.outcome, exact.value, exact.low, exact.high, error, bias, exact.value)
-    found = _by_simulation(critical, stepped)
+    by_simulation = critical.method is Method.SIMULATION
+    found = _by_simulation(critical, stepped) if by_simulation else exact
 
     def lasts(value: float) -> bool | None:
         known = None if found.outcome is not Outcome.FOUND else value >= found.high
@@ -110,10 +106,10 @@ def search(critical: Critical, case_at: CaseAt, verdict_of: VerdictOf) -> Search
             return verdict
         return _vibrates(verdict_of(longer), longer.solver.duration, known, linear)
 
-    lasting = _sustained(critical, lasts, found)
+    lasting = _sustained(critical, lasts, found) if by_simulation else (None, Outcome.NONE)
     if found.value is None:
         return Search(found.outcome, None, None, None, None, bias, exact.value, *lasting)
-    error = 0.5 * (found.high - found.low) + abs(bias or 0.0) + found.spread
+    error = 0.5 * (found.high - found.low) + (abs(bias or 0.0) if by_simulation else 0.0) + found.spread
     return Search(found.outcome, found.value, found.low, found.high, error, bias, exact.value, *lasting)
 
 

@@ -32,9 +32,9 @@ DEPARTED = 2.0
 PERIODS = 40
 """Smooth surfaces are watched for as many periods of the fastest motion: their disturbances are exactly linear."""
 ROUGH_PERIODS = 40
-"""Surfaces that open are watched for at least as many periods of the slowest motion."""
+"""Surfaces that open are watched for as many periods of the slowest motion, within the case's duration."""
 PASSES = 20
-"""Surfaces that open are watched for at least as many passes of the wheel's longest wave."""
+"""Surfaces that open are watched for as many passes of the wheel's longest wave, within the case's duration."""
 STEPS_PER_PERIOD = 200
 """Steps of the two-layer scheme where the case gives no step."""
 _PER_PERIOD = 20

@@ -38,8 +38,8 @@ class ClusterEngine(Engine):
     def __init__(self, compute: Compute, address: str | None, scheduler_file: str | None) -> None:
         """Connect to a scheduler and compare versions; raises UsageError or RefusedError."""
         self._compute = compute
-        self._option = "--scheduler" if scheduler_file is None else "--scheduler-file"
-        self._where = f"{self._option} {address if scheduler_file is None else scheduler_file}"
+        option, name = ("--scheduler", address) if scheduler_file is None else ("--scheduler-file", scheduler_file)
+        self._where = f"{option} {name}"
         address = str(address) if scheduler_file is None else self._address_in(scheduler_file)
         self._versions = fingerprint()
         self._client = self._connected(address)
@@ -52,10 +52,9 @@ class ClusterEngine(Engine):
             except BrakecliError:
                 raise
             except TimeoutError as error:
-                what = f"has no workers; start some with: dask worker {address}"
-                raise UsageError(f"{self._where}: {what}") from error
+                raise self._unusable(f"has no workers; start some with: dask worker {address}") from error
             except Exception as error:
-                raise UsageError(f"{self._where}: the scheduler does not answer ({first_line(error)})") from error
+                raise self._unusable(f"the scheduler does not answer ({first_line(error)})") from error
             failed.pop_all()
 
     def close(self) -> None:
@@ -122,15 +121,14 @@ class ClusterEngine(Engine):
             raise self._lost("the scheduler has gone")
         if future.status == "lost":  # with its worker; it is computed again
             raise TimeoutError
-        if future.status != "error":
-            finished: Finished = future.result(timeout=FETCH_SECONDS)
-            return finished
-        error = future.exception()
-        if isinstance(error, KilledWorker):
-            return None
-        if isinstance(error, OtherVersionError):
-            raise self._refused(str(error))
-        raise self._lost(f"a worker cannot compute ({first_line(error)})")
+        if future.status == "error":
+            if isinstance(error := future.exception(), KilledWorker):
+                return None
+            raise self._lost(f"a worker cannot compute ({first_line(error)})")
+        finished: Finished | str = future.result(timeout=FETCH_SECONDS)
+        if isinstance(finished, str):
+            raise self._refused(finished)
+        return finished
 
     def _gone(self) -> Iterator[Finished]:
         """The workers that are no longer there."""
@@ -151,6 +149,9 @@ class ClusterEngine(Engine):
     def _refused(self, difference: str) -> RefusedError:
         return RefusedError(f"{self._where}: {difference}; install the same version there")
 
+    def _unusable(self, what: str) -> UsageError:
+        return UsageError(f"{self._where}: {what}")
+
     def _address_in(self, scheduler_file: str) -> str:
         """The address in a scheduler's file; dask itself would wait for ever for the file to come."""
         try:
@@ -159,18 +160,15 @@ class ClusterEngine(Engine):
             reason = (error.strerror or str(error)).lower()
         except (ValueError, KeyError, TypeError, RecursionError):
             reason = "it holds no address"
-        raise UsageError(
-            f"{self._where}: cannot be read: {reason}; start a scheduler with: "
-            f"dask scheduler --scheduler-file {scheduler_file}"
-        )
+        remedy = f"start a scheduler with: dask scheduler --scheduler-file {scheduler_file}"
+        raise self._unusable(f"cannot be read: {reason}; {remedy}")
 
     def _connected(self, address: str) -> Any:
         try:
             from distributed import Client
         except ImportError as error:
-            raise UsageError(
-                f"{self._option}: needs dask.distributed, which is not installed; pip install 'brakecli[cluster]'"
-            ) from error
+            what = "needs dask.distributed, which is not installed; pip install 'brakecli[cluster]'"
+            raise self._unusable(what) from error
 
         _silence("distributed", "tornado", "asyncio")
 
@@ -182,19 +180,16 @@ class ClusterEngine(Engine):
         try:
             return quiet(address, timeout=CONNECT_SECONDS, set_as_default=False)
         except Exception as error:  # dask raises many kinds, of all its layers
-            raise UsageError(
-                f"{self._where}: no scheduler answers ({first_line(error)}); start one with: dask scheduler"
-            ) from error
+            what = f"no scheduler answers ({first_line(error)}); start one with: dask scheduler"
+            raise self._unusable(what) from error
 
     def _compare(self) -> None:
         """Refuse workers of another version: their results would not be the same."""
         try:
             found = self._client.run(_own_versions)
         except Exception as error:
-            raise UsageError(
-                f"{self._where}: a worker cannot load brakecli ({first_line(error)}); install the same version "
-                "there"
-            ) from error
+            what = f"a worker cannot load brakecli ({first_line(error)}); install the same version there"
+            raise self._unusable(what) from error
         for worker, theirs in sorted(found.items()):
             if difference := _difference(self._versions, theirs, f"the worker at {worker}"):
                 raise self._refused(difference)
@@ -207,15 +202,9 @@ def _silence(*packages: str) -> None:
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)
 
 
-class OtherVersionError(Exception):
-    """A worker that has come later is of another version."""
-
-
-def _attempt(compute: Compute, task: Task, versions: Mapping[str, str]) -> Finished:
-    """Compute a task in a worker of the cluster."""
-    if difference := _difference(versions, _own_versions(), "a worker that has come later"):
-        raise OtherVersionError(difference)
-    return attempt(compute, task)
+def _attempt(compute: Compute, task: Task, versions: Mapping[str, str]) -> Finished | str:
+    """Compute a task in a worker of the cluster; the difference where that is of another version."""
+    return _difference(versions, _own_versions(), "a worker that has come later") or attempt(compute, task)
 
 
 @cache
