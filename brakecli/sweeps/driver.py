@@ -45,22 +45,19 @@ class TaskQueue:
         """Queue what is not finished; `size` fixes that of the tasks, `order` = -1 begins at the end."""
         missing = np.flatnonzero(~finished)
         runs = np.split(missing, np.flatnonzero(np.diff(missing) != 1) + 1)
-        self._runs = deque([(int(run[0]), len(run)) for run in runs if len(run)][::order])
-        self._again: deque[Task] = deque()
+        self._tasks = deque([Task(int(run[0]), len(run)) for run in runs if len(run)][::order])
         self._size = size
         self._seconds, self._units = 0.0, 0
 
     def next_task(self) -> Task | None:
         """The next task, None where there is none now."""
-        if self._again:
-            return self._again.popleft()
-        if not self._runs:
+        if not self._tasks:
             return None
-        first, count = self._runs.popleft()
-        size = min(count, self._next_size())
-        if size < count:
-            self._runs.appendleft((first + size, count - size))
-        return Task(first, size)
+        task = self._tasks.popleft()
+        size = min(task.size, self._next_size())
+        if size < task.size:
+            self._tasks.appendleft(Task(task.first + size, task.size - size))
+        return task._replace(size=size)
 
     def note_time(self, task: Task, seconds: float) -> None:
         """Note how long a task has taken."""
@@ -70,7 +67,8 @@ class TaskQueue:
     def retry(self, task: Task) -> bool:
         """Queue the units of a task that has failed once more, one by one; False if that was their last try."""
         if not task.last_try:
-            self._again += [Task(unit, 1, True) for unit in range(task.first, task.first + task.size)]
+            units = range(task.first, task.first + task.size)
+            self._tasks.extendleft(Task(unit, 1, last_try=True) for unit in reversed(units))
         return not task.last_try
 
     def _next_size(self) -> int:
