@@ -221,7 +221,7 @@ def test_a_signal_ends_the_wait_for_a_scheduler(tmp_path: Path, number: signal.S
         (["--scheduler-file", "tiny.toml"], "--scheduler-file tiny.toml: cannot be read: it holds no address"),
     ],
 )
-def test_a_scheduler_that_does_not_exist_is_told(tmp_path: Path, options: list[str], reason: str) -> None:
+def test_a_scheduler_that_does_not_exist_is_reported(tmp_path: Path, options: list[str], reason: str) -> None:
     write_sweep(tmp_path, frictions(4))
     start = time.monotonic()
     done = run("sweep", "s.toml", *options, cwd=tmp_path, command=COMMAND)
@@ -230,7 +230,7 @@ def test_a_scheduler_that_does_not_exist_is_told(tmp_path: Path, options: list[s
     assert left_in(tmp_path) == {"tiny.toml", "s.toml"}
 
 
-def test_a_cluster_without_workers_or_with_those_of_another_version_is_told(here: Path) -> None:
+def test_a_cluster_without_workers_or_with_those_of_another_version_is_reported(here: Path) -> None:
     with cluster_of(here / "dask") as cluster:
         command = ["sweep", "s.toml", "-q", "--scheduler", cluster.address]
         none = run(*command, cwd=here, command=COMMAND)
