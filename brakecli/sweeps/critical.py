@@ -51,7 +51,7 @@ class Outcome(StrEnum):
 
 
 class Search(NamedTuple):
-    """The answer for one point, in the order of `CRITICAL_FIELDS`; None stands for what there is not.
+    """The answer for one point; None stands for what there is not.
 
     `error` is the half width of the bracket, plus the bias of the scheme at its step, plus what the growth
     measured in two halves of the time leaves open. `bias`: the scheme's own critical value less the exact one.

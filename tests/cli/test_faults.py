@@ -150,7 +150,7 @@ def test_closed_streams_and_a_full_standard_error_change_nothing(good: Path, her
         ("/proc/r.h5", "no such file or directory"),
         ("x" * 300, "file name too long"),
         ("x" * 254 + "/r.h5", "the directory"),
-        ("/dev/null", "no regular file"),
+        ("/dev/null", "not a regular file"),
     ],
 )
 def test_an_output_that_cannot_be_is_told_with_its_path(here: Path, output: str, reason: str) -> None:
@@ -187,7 +187,7 @@ def test_a_broken_result_is_no_case_to_run_again(good: Path, tmp_path: Path) -> 
     middle = len(whole) // 2
     files = {
         "empty.h5": (b"", 4, "the file is empty"),
-        "text.h5": (b"[shoe]\nmass = 1\n", 4, "this is no HDF5 file"),
+        "text.h5": (b"[shoe]\nmass = 1\n", 4, "this is not an HDF5 file"),
         "half.h5": (whole[:middle], 4, "truncated, damaged or was altered"),
         "cut.h5": (whole[:-1], 4, "truncated, damaged or was altered"),
         "flipped.h5": (whole[:middle] + bytes([whole[middle] ^ 1]) + whole[middle + 1 :], 4, "damaged"),
