@@ -97,18 +97,12 @@ def simulate(case: Case) -> Outcome:
 
 def blank(kind: np.dtype[Any], status: Status, reason: str) -> NDArray[Any]:
     """The record of a point without a result."""
-    record = np.zeros(1, kind)
-    for name in kind.names or ():
-        if kind[name].kind == "f":
-            record[name] = math.nan
-    for name, text in {"status": status, "reason": reason, "regime": "undecided", "excitation": "none"}.items():
-        record[name] = _clipped(text)
-    return record
+    return _filled(kind, {"status": status, "reason": reason, "regime": "undecided", "excitation": "none"})
 
 
 def compute(plan: Plan, first: int, count: int) -> NDArray[Any]:
     """The records of some neighbouring points, each computed for itself."""
-    return np.concatenate([_record(plan, point, {})[0] for point in range(first, first + count)])
+    return np.concatenate([_computed(plan, point, {})[0] for point in range(first, first + count)])
 
 
 def follow(plan: Plan, line: int) -> NDArray[Any]:
@@ -119,7 +113,7 @@ def follow(plan: Plan, line: int) -> NDArray[Any]:
     records: dict[int, NDArray[Any]] = {}
     start: Settings = {}
     for point in line_points(plan, line):
-        records[point], outcome = _record(plan, point, start)
+        records[point], outcome = _computed(plan, point, start)
         if outcome is not None and not outcome.motion.work.failed:
             start = next_start(outcome)
     return np.concatenate([records[point] for point in sorted(records)])
@@ -167,39 +161,37 @@ def verdict_of(case: Case) -> Verdict | None:
     return None if outcome.motion.work.failed else outcome.verdict
 
 
-def _record(plan: Plan, point: int, start: Settings) -> tuple[NDArray[Any], Outcome | None]:
+def _computed(plan: Plan, point: int, start: Settings) -> tuple[NDArray[Any], Outcome | None]:
     """The record of a point and its run, which is None where it was not possible."""
     settings = {**plan.settings(point), **start}
     try:
         outcome = simulate(plan.case(settings))
-        record = _filled(record_type(plan), outcome)
+        values = fields.values(fields.POINT, outcome)
         if (critical := plan.sweep.critical) is not None:
             path = key_path(critical.parameter)
             with within_range():
                 found = search(critical, lambda value: plan.case({**settings, path: value}), verdict_of)
-            _fill(record, fields.values(fields.CRITICAL, found))
+            values |= fields.values(fields.CRITICAL, found)
     except (BrakecliError, FloatingPointError, MemoryError) as error:
         return blank(record_type(plan), Status.FAILED, _sentence(error)), None
-    return record, outcome
+    return _filled(record_type(plan), values), outcome
 
 
-def _filled(kind: np.dtype[Any], outcome: Outcome) -> NDArray[Any]:
-    record = blank(kind, outcome.status, outcome.reason)
-    _fill(record, fields.values(fields.POINT, outcome))
+def _filled(kind: np.dtype[Any], values: Mapping[str, Any]) -> NDArray[Any]:
+    """A record of some values; missing numbers are NaN."""
+    record = np.zeros(1, kind)
+    for name in kind.names or ():
+        value = values.get(name)
+        if isinstance(value, str):
+            record[name] = (
+                value.encode()[: kind[name].itemsize].decode(errors="ignore").encode()
+            )  # whole characters
+        elif value is not None or kind[name].kind == "f":
+            record[name] = math.nan if value is None else value
     return record
-
-
-def _fill(record: NDArray[Any], values: Mapping[str, Any]) -> None:
-    for name, value in values.items():
-        record[name] = _clipped(value) if isinstance(value, str) else math.nan if value is None else value
 
 
 def _sentence(error: BaseException) -> str:
     if isinstance(error, MemoryError):
         return "out of memory; sample less often, or reduce contact.nodes"
     return "; ".join(str(error).splitlines())
-
-
-def _clipped(text: str) -> bytes:
-    """As much of a text as a record holds, in whole characters."""
-    return text.encode()[: int(fields.SENTENCE[1:])].decode(errors="ignore").encode()
