@@ -17,17 +17,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from brakecli.analysis.stability.discrete import natural_frequencies
 from brakecli.analysis.stability.modes import eigensystem
 from brakecli.analysis.stability.report import stability
 from brakecli.case.case import Case
-from brakecli.case.system import Setup, set_up
+from brakecli.case.system import system_of
 from brakecli.comparison.deviation import errors
 from brakecli.errors import RefusedError
 from brakecli.runs.limits import check, refuse, within_range
 from brakecli.runs.tolerance import certify
-from brakecli.solver.motion import Motion, Work
+from brakecli.solver.links import natural_frequencies
+from brakecli.solver.motion import Work, solve
 from brakecli.solver.quantities import HISTORY, Failure
+from brakecli.solver.system import System
 
 Rows = NDArray[np.float64]
 Tables = dict[str, dict[str, Any]]
@@ -117,11 +118,10 @@ def _case(tables: Tables, solver: dict[str, Any], interval: float) -> Case:
     return Case.model_validate({**tables, "solver": solver, "output": {"sample_interval": interval}})
 
 
-def motion(setup: Setup) -> tuple[Work, Rows]:
+def motion(system: System) -> tuple[Work, Rows]:
     """A run in memory."""
-    blocks: list[Rows] = []
-    work, _ = Motion(setup).run(lambda rows: blocks.append(rows.copy()))
-    return work, np.concatenate(blocks)
+    found = solve(system)
+    return found.work, found.rows
 
 
 @dataclass(frozen=True)
@@ -140,8 +140,8 @@ class Pace:
 
 def pace(tables: Tables, omega_h: float | None = None, *, dashpots: bool = True) -> Pace:
     """The common pace, or a given ωh and at least 20 steps; `dashpots`: whether the step follows their rate."""
-    setup = set_up(_case(tables, {"duration": 1.0, "step": 1.0}, 1.0))
-    c, k = setup.coefficients, setup.contact_stiffness
+    system = system_of(_case(tables, {"duration": 1.0, "step": 1.0}, 1.0))
+    c, k = system.coefficients, system.contact_stiffness
     omega = 2.0 * math.pi * natural_frequencies(c, k)[1]
     rate = max(omega, float(np.abs(eigensystem(c, k, c.phi)[0]).max()))
     step = (omega_h or 2.0 * math.pi / STEPS_PER_PERIOD) / (rate if dashpots else omega)
@@ -164,33 +164,33 @@ def truth(tables: Tables, at: Pace) -> Truth:
         solver = {"scheme": "event-driven", "tolerance": tolerance, "duration": at.duration}
         try:
             with within_range():
-                setup = set_up(_case(tables, solver, at.interval))
-                work, rows = motion(setup)
+                system = system_of(_case(tables, solver, at.interval))
+                work, rows = motion(system)
         except RefusedError as error:
             return Truth(None, math.nan, str(error))
         if work.failure is Failure.NONE:
-            exact = exponential(setup, rows)
+            exact = exponential(system, rows)
             return Truth(rows, errors(rows, exact, at.interval).error if exact is not None else math.nan, "")
     return Truth(None, math.nan, work.failure.sentence)
 
 
-def exponential(setup: Setup, rows: Rows) -> Rows | None:
+def exponential(system: System, rows: Rows) -> Rows | None:
     """The motion by the matrix exponential; None where it is not linear: it sticks, turns, opens or is rough."""
-    c, k, interval = setup.coefficients, setup.contact_stiffness, setup.timing.interval
+    c, k, interval = system.coefficients, system.contact_stiffness, system.interval
     states, force = rows[1:, list(HISTORY).index("state")], rows[1:, list(HISTORY).index("normal_force")]
-    sliding = rows[:, 2] - setup.belt_speed
+    sliding = rows[:, 2] - system.belt_speed
     clear = np.abs(sliding).min() > 0.02 * np.abs(sliding).max()
     one_way = abs(states[0]) == 1.0 and (states == states[0]).all() and clear
     omega = 2.0 * math.pi * natural_frequencies(c, k)[1]
     if (
-        not setup.smooth
+        not system.smooth
         or omega * interval > 0.3
         or not (one_way or c.phi == 0.0)
         or force.min() < 1e-4 * force.max()
     ):
         return None
     grip = -float(states[0]) * c.phi * k if c.phi else 0.0
-    load = float(setup.load.values[0])
+    load = float(system.load.values[0])
     a = np.zeros((5, 5))  # of (x, y, vx interval, vy interval, 1), the time in intervals
     a[0, 2] = a[1, 3] = 1.0
     a[2] = np.array([c.c_xx, c.c_xy + grip, c.b_xx / interval, c.b_xy / interval, load * c.sin_beta])
@@ -205,19 +205,19 @@ def exponential(setup: Setup, rows: Rows) -> Rows | None:
     return exact
 
 
-def jump(setup: Setup, reference: Rows, step: float) -> float:
+def jump(system: System, reference: Rows, step: float) -> float:
     """What the largest jump of friction changes the velocity by in one step, as a part of the largest velocity.
 
     No scheme of fixed steps knows when in a step friction turns over, or the shoe stops.
     """
     states, friction = (reference[1:, list(HISTORY).index(name)] for name in ("state", "friction_force"))
     jumps = np.abs(np.diff(friction))[np.diff(states) != 0.0]
-    change = float(jumps.max(initial=0.0)) * step / setup.coefficients.m
+    change = float(jumps.max(initial=0.0)) * step / system.coefficients.m
     return change / (float(np.abs(reference[:, 2]).max()) or 1.0)
 
 
 def bound(
-    scheme: Scheme, at: Pace, setup: Setup, reference: Rows | None, growth: float, nodes_per_wave: float | None
+    scheme: Scheme, at: Pace, system: System, reference: Rows | None, growth: float, nodes_per_wave: float | None
 ) -> float:
     """The error that a right answer may have, by order and step.
 
@@ -232,7 +232,7 @@ def bound(
         (at.omega * at.step) ** scheme.order * at.omega * at.duration + (at.rate * at.step) ** scheme.order
     )
     coarse = max(nodes_per_wave, COARSEST) ** -2 if nodes_per_wave else 0.0
-    turn = jump(setup, reference, at.step) if reference is not None else 0.0
+    turn = jump(system, reference, at.step) if reference is not None else 0.0
     return min((smooth + 2.0 * coarse + turn) * grown, MOST_ERROR)
 
 
@@ -240,24 +240,24 @@ def judge(tables: Tables, scheme: Scheme, at: Pace, reference: Truth, most: floa
     """Run a point with a scheme and tell what came of it; `most`: the error of a right answer, else `bound`."""
     try:
         with within_range():
-            setup = set_up(_case(tables, scheme.solver(at.step, at.duration), at.interval))
-            found = check(setup)
-            refuse(setup, found, math.inf)
+            system = system_of(_case(tables, scheme.solver(at.step, at.duration), at.interval))
+            found = check(system)
+            refuse(system, found, math.inf)
             warnings = [text for text in found.warnings if text.startswith(("solver", "contact", "friction"))]
             if scheme.order:
-                work, rows = motion(setup)
+                work, rows = motion(system)
             else:
-                answer = certify(setup.case)
-                work, rows = answer.work, answer.rows
+                answer = certify(system)
+                work, rows = answer.motion.work, answer.motion.rows
                 if not answer.certificate.certified:
                     warnings.append(f"solver.tolerance: {answer.certificate.sentence()}")
-            values, _ = eigensystem(setup.coefficients, setup.contact_stiffness, setup.coefficients.phi)
+            values, _ = eigensystem(system.coefficients, system.contact_stiffness, system.coefficients.phi)
     except RefusedError as error:
         return Outcome("refused", math.nan, math.nan, str(error))
     if work.failure is not Failure.NONE:
         return Outcome("failed by name", math.nan, math.nan, work.failure.name)
     growth = max(float(values.real.max()), 0.0)
-    limit = most or bound(scheme, at, setup, reference.rows, growth, found.nodes_per_wave)
+    limit = most or bound(scheme, at, system, reference.rows, growth, found.nodes_per_wave)
     if work.non_unique_steps:
         warnings.append(f"{work.non_unique_steps} steps met a point where their solution need not be unique")
     if reference.rows is None:
@@ -417,14 +417,14 @@ LIMIT_CASES: dict[str, Tables] = {
 LIMIT_STEPS, MOST_LIMIT = 20_000, 1e3
 
 
-def _still(tables: Tables, scheme: Scheme, step: float, steps: int, **initial: float) -> Setup:
+def _still(tables: Tables, scheme: Scheme, step: float, steps: int, **initial: float) -> System:
     """A frictionless shoe near its equilibrium."""
     tables = {**tables, "initial": {"at": "equilibrium", **initial}}
-    return set_up(_case(tables, scheme.solver(step, steps * step), step))
+    return system_of(_case(tables, scheme.solver(step, steps * step), step))
 
 
-def _compression(setup: Setup) -> float:
-    return setup.case.load.force / (setup.coefficients.c_yy + setup.contact_stiffness)  # type: ignore[operator]
+def _compression(system: System) -> float:
+    return system.load_at_start / (system.coefficients.c_yy + system.contact_stiffness)
 
 
 def grows(tables: Tables, scheme: Scheme, step: float) -> bool:
@@ -432,12 +432,12 @@ def grows(tables: Tables, scheme: Scheme, step: float) -> bool:
     at = pace(tables)
     small = 1e-3 * _compression(_still(tables, scheme, step, 1)) / (1.0 + (at.rate * step) ** 2)
     rest = motion(_still(tables, scheme, step, 1))[1][0, :2]
-    setup = _still(tables, scheme, step, LIMIT_STEPS, x=small, y=small)
-    work, rows = motion(setup)
+    system = _still(tables, scheme, step, LIMIT_STEPS, x=small, y=small)
+    work, rows = motion(system)
     away = np.abs(rows[:, :2] - rest).max(axis=1)
     half = len(away) // 2
     lost = work.failure not in (Failure.NONE, Failure.UNBALANCED)
-    return lost or away.max() > _compression(setup) or bool(away[half:].max() > 4.0 * away[:half].max())
+    return lost or away.max() > _compression(system) or bool(away[half:].max() > 4.0 * away[:half].max())
 
 
 def limits(tables: Tables, scheme: Scheme) -> tuple[float | None, float | None]:
@@ -473,10 +473,10 @@ def drift(scheme: Scheme, steps_per_period: int, steps: int = DRIFT_STEPS) -> fl
     step = 2.0 * math.pi / (steps_per_period * pace(tables).omega)
     rest = motion(_still(tables, scheme, step, 1))[1][0, :2]
     size = 0.5 * _compression(_still(tables, scheme, step, 1))
-    setup = _still(tables, scheme, step, steps, x=0.5 * size, y=size)
-    work, rows = motion(setup)
+    system = _still(tables, scheme, step, steps, x=0.5 * size, y=size)
+    work, rows = motion(system)
     assert work.failure is Failure.NONE
-    c, k = setup.coefficients, setup.contact_stiffness
+    c, k = system.coefficients, system.contact_stiffness
     x, y = (rows[:, :2] - rest).T
     kinetic = 0.5 * c.m * (rows[:, 2] ** 2 + rows[:, 3] ** 2)
     energy = kinetic + 0.5 * (c.c_xx * x * x + 2.0 * c.c_xy * x * y + (c.c_yy + k) * y * y)
@@ -515,7 +515,7 @@ def hours(scheme: Scheme, duration: float = HOURS) -> float:
     late = changed(SLOW, "roughness.wheel", {**wheel, "phases_deg": phases})
     ends = []
     for tables, length in ((SLOW, duration), (late, SETTLING)):
-        work, rows = motion(set_up(_case(tables, scheme.solver(0.01, length), 0.1)))
+        work, rows = motion(system_of(_case(tables, scheme.solver(0.01, length), 0.1)))
         assert work.failure is Failure.NONE
         ends.append(rows[-100:])
     apart = np.abs(ends[0] - ends[1])[:, :4].max(axis=0)

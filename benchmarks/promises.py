@@ -15,14 +15,14 @@ from typing import Any
 
 import numpy as np
 
-from brakecli.analysis.stability.discrete import natural_frequencies
 from brakecli.case.case import Case, changed
-from brakecli.case.system import set_up
+from brakecli.case.system import system_of
 from brakecli.comparison.deviation import errors
 from brakecli.errors import BrakecliError
 from brakecli.runs.tolerance import certify
-from brakecli.solver.motion import Motion
-from brakecli.solver.quantities import HISTORY, ContactState, Failure
+from brakecli.solver.links import natural_frequencies
+from brakecli.solver.motion import solve
+from brakecli.solver.quantities import HISTORY, ContactState
 
 KINDS = (
     "flat, sliding",
@@ -72,16 +72,15 @@ def random_case(rng: np.random.Generator, kind: str) -> Case:
     if kind == "rough, full contact":  # a start from rest passes through contact that is open in part
         tables["initial"] = {"at": "equilibrium", "x": 0.1 * compression}
     case = Case.model_validate(tables)
-    fast = natural_frequencies(set_up(case).coefficients, contact)[1]
+    fast = natural_frequencies(system_of(case).coefficients, contact)[1]
     periods = rng.uniform(3.0, 8.0) if "open" in kind else rng.uniform(20.0, 200.0)
     return changed(case, solver={"duration": periods / fast}, output={"sample_interval": 1.0 / (20.0 * fast)})
 
 
 def samples(case: Case, **solver: Any) -> np.ndarray[Any, Any] | None:
     """The samples of a motion; None where there is none to be had."""
-    blocks: list[np.ndarray[Any, Any]] = []
-    work, _ = Motion(set_up(changed(case, solver=solver))).run(lambda rows: blocks.append(rows.copy()))
-    return np.concatenate(blocks) if work.failure is Failure.NONE else None
+    motion = solve(system_of(changed(case, solver=solver)))
+    return None if motion.work.failed else motion.rows
 
 
 def fits(rows: np.ndarray[Any, Any], kind: str) -> bool:
@@ -117,10 +116,10 @@ def main() -> None:
                 break
         for tolerance in TOLERANCES:
             begin = time.perf_counter()
-            answer = certify(changed(case, solver={"tolerance": tolerance}))
+            answer = certify(system_of(changed(case, solver={"tolerance": tolerance})))
             seconds = time.perf_counter() - begin
             certificate = answer.certificate
-            error = errors(answer.rows, exact, answer.setup.timing.interval).error
+            error = errors(answer.motion.rows, exact, answer.motion.system.interval).error
             found.append((kind, tolerance, certificate.certified, certificate.estimated_error, error, seconds))
             if error > tolerance or not certificate.certified:
                 told = f"true error {error:.1e}, {certificate.sentence()}"

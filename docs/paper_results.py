@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from brakecli.analysis.stability.report import stability
 from brakecli.case.case import Case, changed
 from brakecli.case.read import parse_case
-from brakecli.case.system import set_up
+from brakecli.case.system import system_of
 
 ROOT = Path(__file__).parents[1]
 CASES, RESULTS = ROOT / "cases" / "paper", ROOT / "results" / "paper"
@@ -115,8 +115,8 @@ def base(name: str, **changes: dict[str, Any]) -> Case:
 
 def touching(name: str, **changes: dict[str, Any]) -> float:
     """K over 2ak in steady sliding: what a contact that opens in part keeps of its stiffness."""
-    setup = set_up(base(name, **changes))
-    return stability(setup).contact_stiffness / setup.contact_stiffness
+    system = system_of(base(name, **changes))
+    return stability(system).contact_stiffness / system.contact_stiffness
 
 
 def nonlinearity(angle: Array, friction: Array, reach: float, affine: bool) -> float:

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.case.case import Case
-from brakecli.case.system import set_up
+from brakecli.case.system import system_of
 from brakecli.solver.energy import EnergyAccount
-from brakecli.solver.motion import Motion, Work
+from brakecli.solver.motion import Work, solve
 from brakecli.solver.quantities import HISTORY
 
 SQUEAL: dict[str, Any] = {  # flat; linear critical friction coefficient 0.575 with these dashpots
@@ -98,8 +98,6 @@ class Result:
 
 def simulate(case: Case) -> Result:
     """Run a case in memory."""
-    blocks: list[NDArray[np.float64]] = []
-    motion = Motion(set_up(case))
-    work, energy = motion.run(lambda rows: blocks.append(rows.copy()))
-    rows = np.concatenate(blocks)
-    return Result(np.array(motion.setup.timing.interval * np.arange(len(rows))), rows, work, energy)
+    motion = solve(system_of(case))
+    time = np.array(motion.system.interval * np.arange(len(motion.rows)))
+    return Result(time, motion.rows, motion.work, motion.energy)

@@ -5,7 +5,7 @@ from pathlib import Path
 from brakecli.analysis.regime import rules
 from brakecli.analysis.stability.report import stability
 from brakecli.case.read import parse_case, starter_text
-from brakecli.case.system import set_up
+from brakecli.case.system import system_of
 from brakecli.comparison.compare import compare
 from brakecli.comparison.result import ComparisonReport, write
 from brakecli.files.read import open_result
@@ -45,7 +45,7 @@ def test_every_name_of_a_sweep_is_documented(tmp_path: Path) -> None:
 def test_every_name_of_a_comparison_is_documented(tmp_path: Path) -> None:
     page = "".join((ROOT / "docs" / page).read_text() for page in ("accuracy.md", "result-format.md"))
     loaded = parse_case(starter_text(), "starter", ["solver.duration=0.01"])
-    found = compare(loaded.case, schemes=["event-driven"], budget=1.0)
+    found = compare(system_of(loaded.case), schemes=["event-driven"], budget=1.0)
     report = ComparisonReport(tmp_path / "r.h5", loaded.case.title, found, 1e-3)
     write(report.output, loaded, report, force=False)
     numbers = report.numbers()
@@ -63,6 +63,6 @@ def test_every_threshold_stands_in_the_documentation_with_its_default() -> None:
 
 def test_every_name_of_stability_is_documented() -> None:
     page = (ROOT / "docs" / "stability.md").read_text()
-    numbers = stability(set_up(parse_case(starter_text(), "starter").case)).numbers()
+    numbers = stability(system_of(parse_case(starter_text(), "starter").case)).numbers()
     names = [*numbers, *numbers["discrete"]]
     assert [name for name in names if f"`{name}`" not in page] == []

@@ -15,7 +15,7 @@ from brakecli.analysis.stability.modes import Instability, crossings, growth, st
 from brakecli.analysis.stability.report import stability
 from brakecli.case.case import Case
 from brakecli.case.read import parse_case
-from brakecli.case.system import set_up
+from brakecli.case.system import system_of
 from brakecli.solver.roughness import TWO_PI
 from brakecli.sweeps.critical import Outcome, Search, search
 from brakecli.sweeps.file import is_sweep, read_sweep
@@ -39,11 +39,11 @@ def case(name: str, settings: dict[str, float]) -> Case:
 
 def critical(name: str, settings: dict[str, float]) -> float:
     """The critical friction coefficient by eigenvalues; on smooth surfaces without the scheme's own."""
-    setup = set_up(case(name, settings))
-    if not setup.smooth:
-        found = stability(setup).critical
+    system = system_of(case(name, settings))
+    if not system.smooth:
+        found = stability(system).critical
         return math.nan if found is None else found.friction
-    changes = crossings(setup.coefficients, setup.contact_stiffness, setup.belt_speed)
+    changes = crossings(system.coefficients, system.contact_stiffness, system.belt_speed)
     return next((change.friction for change in changes if change.lost), math.nan)
 
 
@@ -71,7 +71,7 @@ def test_every_file_beside_the_cases_reads() -> None:
         if is_sweep(str(path)):
             assert read_sweep(str(path)).plan.points > 1
         else:
-            set_up(parse_case(text, path.name).case)
+            system_of(parse_case(text, path.name).case)
     assert kinds[True] >= 10
     assert kinds[False] == 3
 
@@ -133,11 +133,11 @@ def test_roughness_in_full_contact_does_not_move_the_critical_friction(damping: 
 
     # The waves leave a slope of the force along x that changes as a sine: stiffness that is modulated by at most
     # `swing`, which moves a growth rate by no more than swing/(2mω), times the condition of the modes.
-    setup = set_up(case("rough", settings))
-    c, wheel, phi = setup.coefficients, setup.wheel, smooth.value
+    system = system_of(case("rough", settings))
+    c, wheel, phi = system.coefficients, system.wheel, smooth.value
     waves = TWO_PI * np.asarray(wheel.turns)
     slope = float(np.sum(np.abs(wheel.g * waves * np.sinc(waves * 0.05 / math.pi))))
-    k = setup.contact_stiffness
+    k = system.contact_stiffness
     swing = slope * k * math.hypot(1.0, phi)
     step = 1e-3
     rise = growth(c, k, phi + step) - growth(c, k, phi + 0.5 * step)
@@ -167,8 +167,8 @@ def test_equal_dashpots_at_right_angles_add_their_closed_form() -> None:
         angle, c2, b = draw.uniform(1.0, 30.0), draw.uniform(1.05e7, 3e7), draw.uniform(0.0, 1000.0)
         settings = {"link1.angle_deg": angle, "link2.angle_deg": angle, "link2.stiffness": c2}
         with_dashpots = {**settings, "link1.damping": b, "link2.damping": b}
-        setup = set_up(case("flat", with_dashpots))
-        c, k = setup.coefficients, setup.contact_stiffness
+        system = system_of(case("flat", with_dashpots))
+        c, k = system.coefficients, system.contact_stiffness
         added = b**2 / c.m * 0.5 * (c.c_xx + c.c_yy + k) / (k * abs(c.c_xy))
         expected = critical("flat", {**settings, **NO_DASHPOTS}) + added
         assert critical("flat", with_dashpots) == pytest.approx(expected, rel=1e-8)
@@ -211,8 +211,8 @@ def test_the_page_tells_the_eigenvalues_by_the_angle_of_link_1() -> None:
     locked = [row for row in tables("whatever the dashpots.") if row[3] != "–"]
     assert len(locked) > 4
     for row in locked:
-        setup = set_up(case("flat", {"link1.angle_deg": float(row[0])}))
-        first = crossings(setup.coefficients, setup.contact_stiffness, setup.belt_speed)[0]
+        system = system_of(case("flat", {"link1.angle_deg": float(row[0])}))
+        first = crossings(system.coefficients, system.contact_stiffness, system.belt_speed)[0]
         assert first.instability is Instability.DIVERGENCE
         assert float(row[3]) == pytest.approx(first.friction, abs=100.0 * PRINTED)
 

@@ -16,8 +16,8 @@ from brakecli.files.os_signals import Interrupted, unwinding
 
 if TYPE_CHECKING:
     from brakecli.case.read import LoadedCase
-    from brakecli.case.system import Setup
     from brakecli.runs.limits import Check
+    from brakecli.solver.system import System
 
 app = typer.Typer(
     name="brakecli",
@@ -128,21 +128,21 @@ def run_command(
             recall()
             bar.advance(steps)
 
-        def begin(setup: "Setup", found: "Check") -> None:
-            bar.begin("steps" if found.step is not None else "samples", setup.timing.steps)
+        def begin(system: "System", found: "Check") -> None:
+            bar.begin("steps" if found.step is not None else "samples", system.steps)
 
         report = run(loaded, target, force=force, begin=begin, progress=progress)
     for line in (*report.check.adjustments, *(f"warning: {warning}" for warning in report.warnings)):
         if not quiet or line.startswith("warning"):
             _tell(f"brakecli: {line}")
     if as_json:
-        seconds = {"solve_seconds": report.work.solve_seconds}
+        seconds = {"solve_seconds": report.motion.work.solve_seconds}
         _print_json({"command": "run", "output": str(report.output), **report.numbers(), **seconds})
     elif not quiet:
         _print(run_table(report))
     if report.failed:
         _tell(f"brakecli: {report.output}: the history up to the failure was written")
-        raise BrakecliError(str(report.failure_sentence))
+        raise BrakecliError(str(report.motion.work.failure_sentence))
     certificate = report.certificate
     if certificate is not None and not certificate.certified and loaded.case.solver.tolerance is not None:
         raise BrakecliError(f"{report.output}: was written, but solver.tolerance is not sure to be kept")
@@ -283,6 +283,7 @@ def compare_command(
     loaded = _load(case, overrides)
     target = output or Path(("case" if case == "-" else Path(case).stem) + "-schemes.h5")
     _announce_compilation(quiet)
+    from brakecli.case.system import system_of
     from brakecli.cli.tables import comparison_table
     from brakecli.comparison.compare import compare
     from brakecli.comparison.methods import parse_schemes, parse_steps
@@ -301,7 +302,7 @@ def compare_command(
             bar.begin(what, total)
             bar.advance(done)
 
-        found = compare(loaded.case, schemes=chosen, steps=ladder, budget=budget, progress=progress)
+        found = compare(system_of(loaded.case), schemes=chosen, steps=ladder, budget=budget, progress=progress)
         report = ComparisonReport(target, loaded.case.title, found, target_error)
         write(target, loaded, report, force=force)
     if as_json:
@@ -328,20 +329,20 @@ def check_command(
         return
     loaded = _load(case, overrides)
     _announce_compilation(quiet)
-    from brakecli.case.system import set_up
+    from brakecli.case.system import system_of
     from brakecli.cli.tables import check_numbers, check_table
     from brakecli.runs.limits import check, free_bytes, refuse, within_range
 
     with within_range():
-        setup = set_up(loaded.case)
-        found = check(setup)
+        system = system_of(loaded.case)
+        found = check(system)
     if as_json:
         _print_json({"command": "check", "valid": True, **check_numbers(found)})
     elif not quiet:
         _print(check_table(loaded.case.title, found))
     for warning in found.warnings:
         _tell(f"brakecli: warning: {warning}")
-    refuse(setup, found, free_bytes(Path()))
+    refuse(system, found, free_bytes(Path()))
 
 
 @app.command("new")
@@ -481,12 +482,12 @@ def stability_command(
     loaded = _load(case, overrides)
     _announce_compilation(quiet)
     from brakecli.analysis.stability.report import stability
-    from brakecli.case.system import set_up
+    from brakecli.case.system import system_of
     from brakecli.cli.tables import stability_table, vary_table
     from brakecli.runs.limits import within_range
 
     with within_range():
-        report = stability(set_up(loaded.case))
+        report = stability(system_of(loaded.case))
         entries = varied(loaded, chosen) if chosen else []
     if as_json:
         _print_json({"command": "stability", **report.numbers(), **({"vary": entries} if chosen else {})})

@@ -14,11 +14,13 @@ from rich.table import Table
 from brakecli.analysis.regime.of_run import braking_torque
 from brakecli.analysis.stability.modes import Crossing, Mode
 from brakecli.analysis.stability.report import Discrete, StabilityReport
-from brakecli.case.case import Solver
 from brakecli.comparison.compare import Entry
+from brakecli.comparison.methods import method_label
 from brakecli.comparison.result import ComparisonReport
 from brakecli.runs.limits import Check
+from brakecli.runs.modelled import modelled
 from brakecli.runs.run import RunReport
+from brakecli.solver.method import Method
 from brakecli.solver.quantities import COEFFICIENTS
 from brakecli.sweeps.cost import Estimate
 from brakecli.sweeps.plan import label
@@ -33,7 +35,8 @@ NARROWEST = 40
 
 def run_table(report: RunReport) -> str:
     """Summary of a run."""
-    verdict, work, energy, times = report.verdict, report.work, report.energy, report.setup.timing
+    verdict, system, work, energy = report.verdict, report.motion.system, report.motion.work, report.motion.energy
+    used, left = modelled(report.motion)
     shares = ", ".join(f"{kind} {count / max(work.steps, 1):.1%}" for kind, count in work.evaluators.items())
     rows: Rows = [
         (
@@ -45,21 +48,21 @@ def run_table(report: RunReport) -> str:
         ("amplitude of x", _unit(verdict.amplitude, "m")),
         ("peak of the spectrum of vx", _unit(report.spectrum_peak, "Hz")),
         ("mean friction force", _unit(verdict.mean_friction_force, "N")),
-        ("braking torque", _unit(braking_torque(verdict, report.setup), "N m")),
+        ("braking torque", _unit(braking_torque(verdict, system), "N m")),
         ("stick, lost contact", f"{verdict.stick_fraction:.2%}, {verdict.contact_loss_fraction:.2%} of the time"),
-        ("settled part", f"from {verdict.settled_from * times.interval:.4g} s on"),
-        ("scheme", _scheme(report.setup.case.solver)),
+        ("settled part", f"from {verdict.settled_from * system.interval:.4g} s on"),
+        ("scheme", _scheme(system.method)),
         *([("tolerance", report.certificate.sentence())] if report.certificate is not None else []),
-        ("contact", shares + (f", {report.setup.nodes} nodes" if "midpoint" in work.evaluators else "")),
-        ("modelled", "; ".join(report.scene[0])),
-        ("left out", "; ".join(report.scene[1]) or "nothing"),
+        ("contact", shares + (f", {system.nodes} nodes" if "midpoint" in work.evaluators else "")),
+        ("modelled", "; ".join(used)),
+        ("left out", "; ".join(left) or "nothing"),
         ("steps", f"{work.steps}{_step(report)}, {work.contact_evaluations} contact evaluations"),
         ("energy account", f"closes to {abs(energy.relative_closing_error):.1e} of its largest item"),
         ("time of the loop", f"{work.solve_seconds:.3g} s"),
         ("file", str(report.output)),
     ]
     if report.failed:
-        rows.insert(0, ("failed", str(report.failure_sentence)))
+        rows.insert(0, ("failed", str(work.failure_sentence)))
     return _table(report.title, rows)
 
 
@@ -221,7 +224,7 @@ def comparison_table(report: ComparisonReport) -> str:
     able = [entry for entry in found.entries if entry.errors is not None]
     failed = [entry for entry in found.entries if entry.work is not None and entry.errors is None]
     front = sorted((entry for entry in able if entry.on_front), key=lambda entry: entry.wall_seconds or 0.0)
-    finest = {entry.rung.method: entry for entry in able if not entry.on_front}
+    finest = {entry.rung.kind: entry for entry in able if not entry.on_front}
     headers = ("method", "step, s", "error", "order", "bias of φ", "evaluations", "time, ms")
     rows: Rows = [
         ("compared over", f"{found.duration:.6g} s of motion"),
@@ -251,7 +254,7 @@ def comparison_table(report: ComparisonReport) -> str:
 
 def _name(entry: Entry) -> str:
     rung = entry.rung
-    return f"{rung.method.label()}, " + (
+    return f"{method_label(rung.kind)}, " + (
         f"step {rung.step:.3g} s" if rung.step is not None else f"tolerance {rung.tolerance:g}"
     )
 
@@ -260,7 +263,7 @@ def _entry_row(entry: Entry) -> tuple[str, ...]:
     rung, work = entry.rung, entry.work
     bias = entry.critical_bias
     return (
-        rung.method.label(),
+        method_label(rung.kind),
         f"{rung.step:.3g}" if rung.step is not None else f"to {rung.tolerance:g}",
         f"{entry.errors.error:.2e}" if entry.errors is not None else "-",
         "-" if entry.order is None else f"{entry.order:.2f}",
@@ -329,11 +332,11 @@ def _infinite(value: object) -> bool:
     return isinstance(value, float) and math.isinf(value)
 
 
-def _scheme(solver: Solver) -> str:
-    if solver.tolerance is not None:
-        return f"{solver.scheme}, tolerance {solver.tolerance:.4g}"
-    weights = ", ".join(f"{weight:.4g}" for weight in solver.theta)
-    return f"{solver.scheme} ({weights}), {solver.iteration}"
+def _scheme(method: Method) -> str:
+    if method.own_steps:
+        return f"{method.scheme}, tolerance {method.tolerance:.4g}"
+    weights = ", ".join(f"{weight:.4g}" for weight in method.theta)
+    return f"{method.scheme} ({weights}), {method.iteration}"
 
 
 def _step(report: RunReport) -> str:

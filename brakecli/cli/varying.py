@@ -6,7 +6,7 @@ import numpy as np
 
 from brakecli.analysis.stability.report import stability
 from brakecli.case.read import LoadedCase, parse_case
-from brakecli.case.system import set_up
+from brakecli.case.system import system_of
 from brakecli.errors import UsageError
 
 MOST = 10_000
@@ -41,7 +41,7 @@ def varied(loaded: LoadedCase, vary: Vary) -> list[dict[str, Any]]:
     entries = []
     for value in vary.values:
         case = parse_case(loaded.resolved, "--vary", (f"{vary.key}={value!r}",)).case
-        report = stability(set_up(case))
+        report = stability(system_of(case))
         critical = report.critical
         entries.append(
             {

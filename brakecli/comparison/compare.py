@@ -3,7 +3,7 @@
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from statistics import median
 
 import numpy as np
@@ -16,17 +16,14 @@ from brakecli.analysis.stability.report import (
     stability,
     step_limit,
 )
-from brakecli.case.case import Case, Evaluator, Iteration, Scheme, Start
-from brakecli.case.system import Setup, set_up
 from brakecli.comparison.deviation import Errors, errors
-from brakecli.comparison.methods import Method, Rung, case_of, ladder, methods, rungs
+from brakecli.comparison.methods import Rung, kinds, ladder, rungs
 from brakecli.errors import BrakecliError, RefusedError
 from brakecli.runs.limits import check, refuse, within_range
-from brakecli.runs.run import failure_sentence
 from brakecli.solver import contact
-from brakecli.solver.motion import Motion, Work
-from brakecli.solver.quantities import Failure
-from brakecli.solver.schemes import load
+from brakecli.solver.method import Method
+from brakecli.solver.motion import Motion, Work, solve
+from brakecli.solver.system import System
 
 REFERENCE, CHECK = 1e-12, 1e-10
 """Tolerances of the reference, and of the run that tells how good it is."""
@@ -71,7 +68,7 @@ class Entry:
 class Comparison:
     """All entries on one case."""
 
-    setup: Setup
+    system: System
     duration: float  # s; less than the case's where the reference would take too long
     interval: float
     reference_error: float
@@ -91,8 +88,8 @@ class Comparison:
 
     def finer_error(self, entry: Entry) -> float:
         """The largest error of the same method at finer steps; above the entry's own, that is low by chance."""
-        method, step = entry.rung.method, entry.rung.step or 0.0
-        finer = (each for each in self.entries if each.rung.method == method and (each.rung.step or step) < step)
+        kind, step = entry.rung.kind, entry.rung.step or 0.0
+        finer = (each for each in self.entries if each.rung.kind == kind and (each.rung.step or step) < step)
         return max((each.errors.error for each in finer if each.errors is not None), default=0.0)
 
 
@@ -101,80 +98,75 @@ Progress = Callable[[str, int, int], None]
 
 
 def compare(
-    case: Case,
+    system: System,
     *,
     schemes: Sequence[str] = (),
     steps: Sequence[float] = (),
     budget: float = 60.0,
     progress: Progress = lambda what, done, total: None,
 ) -> Comparison:
-    """Compare the methods on a case within about `budget` s. Raises RefusedError where there is no reference."""
+    """Compare the methods on a system within about `budget` s. Raises RefusedError where there is no reference."""
     with within_range():
-        setup = set_up(case)
-        kinds = methods(setup, schemes)
-        for method in kinds:  # compilation is no part of the budget
-            _ = load(method.scheme), contact.load("exact" if method.evaluator == "auto" else method.evaluator)
+        tried = kinds(system, schemes)
+        for kind in tried:  # compilation is not part of the budget
+            _ = kind.module, contact.load("exact" if kind.evaluator == "auto" else kind.evaluator)
         begin = time.perf_counter()
-        found = ladder(setup, steps)
-        interval = found[0]
-        report = stability(setup)
+        found = ladder(system, steps)
+        report = stability(system)
         progress("reference", 0, 0)
-        duration, reference, reference_seconds = _reference(case, interval, REFERENCE_SHARE * budget)
-        reference_error = _reference_error(_reference_case(case, interval, duration, CHECK), reference, interval)
-        entries = [Entry(rung) for method in kinds for rung in rungs(method, found)]
-        left_out = _first_round(case, entries, reference, (interval, duration), begin + 0.8 * budget, progress)
-        _judge(setup, report, entries)
-        repeats = _repeat(case, entries, (interval, duration), begin + budget, progress)
+        sampled = replace(system, interval=found[0])
+        reference = _reference(sampled, REFERENCE_SHARE * budget)
+        sampled = replace(sampled, duration=(len(reference.rows) - 1) * sampled.interval)
+        reference_error = _reference_error(sampled, reference.rows)
+        entries = [Entry(rung) for kind in tried for rung in rungs(kind, found)]
+        left_out = _first_round(sampled, entries, reference.rows, begin + 0.8 * budget, progress)
+        _add_limits(system, report, entries)
+        repeats = _repeat(sampled, entries, begin + budget, progress)
     _fronts(entries)
     return Comparison(
-        setup, duration, interval, reference_error, reference_seconds, repeats, left_out, tuple(entries)
+        system,
+        sampled.duration,
+        sampled.interval,
+        reference_error,
+        reference.work.solve_seconds,
+        repeats,
+        left_out,
+        tuple(entries),
     )
 
 
-def _reference_case(case: Case, interval: float, duration: float, tolerance: float) -> Case:
-    method = Method(Scheme.EVENT_DRIVEN, (), Start.CONSISTENT, Iteration.NEWTON, Evaluator.AUTO, 0)
-    return case_of(case, Rung(method, None, tolerance), interval, duration)
+def _motion(system: System, method: Method, *, at_once: bool = False) -> Motion:
+    """The motion by a method, in one block if `at_once`; raises RefusedError."""
+    system = replace(system, method=method)
+    refuse(system, check(system), math.inf)
+    return solve(system, first_block=system.steps if at_once else 1)
 
 
-def _rows(case: Case, *, at_once: bool = False) -> tuple[NDArray[np.float64], Work]:
-    """Samples and work of a run, in one block if `at_once`; raises RefusedError."""
-    setup = set_up(case)
-    refuse(setup, check(setup), math.inf)
-    blocks: list[NDArray[np.float64]] = []
-    first = setup.timing.steps if at_once else 1
-    work, _ = Motion(setup).run(lambda rows: blocks.append(rows.copy()), first_block=first)
-    return np.concatenate(blocks), work
-
-
-def _reference(case: Case, interval: float, budget: float) -> tuple[float, NDArray[np.float64], float]:
-    """The longest part of the motion whose reference fits the budget (s), from the start on, and its samples."""
-    whole = max(case.solver.duration, FEWEST_SAMPLES * interval)
-    duration = FEWEST_SAMPLES * interval
+def _reference(system: System, budget: float) -> Motion:
+    """The longest part of the motion whose reference fits the budget (s), from the start on."""
+    whole = max(system.duration, FEWEST_SAMPLES * system.interval)
+    duration = FEWEST_SAMPLES * system.interval
     while True:
         duration = min(duration, whole)
-        rows, work = _rows(_reference_case(case, interval, duration, REFERENCE))
-        if work.failure is not Failure.NONE:
-            raise RefusedError(f"there is no reference to compare with: {failure_sentence(work)}")
-        if duration >= whole or 3.0 * work.solve_seconds > budget:
-            return (len(rows) - 1) * interval, rows, work.solve_seconds
-        duration *= min(4.0, 0.7 * budget / max(work.solve_seconds, 1e-3))
+        motion = _motion(replace(system, duration=duration), Method("event-driven", tolerance=REFERENCE))
+        if motion.work.failed:
+            raise RefusedError(f"there is no reference to compare with: {motion.work.failure_sentence}")
+        seconds = motion.work.solve_seconds
+        if duration >= whole or 3.0 * seconds > budget:
+            return motion
+        duration *= min(4.0, 0.7 * budget / max(seconds, 1e-3))
 
 
-def _reference_error(case: Case, reference: NDArray[np.float64], interval: float) -> float:
+def _reference_error(system: System, reference: NDArray[np.float64]) -> float:
     """By how much the reference differs from a run at a looser tolerance."""
-    rows, work = _rows(case)
-    if work.failure is not Failure.NONE:
-        raise RefusedError(f"it is not known how good the reference is: {failure_sentence(work)}")
-    return errors(rows, reference, interval).error
+    motion = _motion(system, Method("event-driven", tolerance=CHECK))
+    if motion.work.failed:
+        raise RefusedError(f"it is not known how good the reference is: {motion.work.failure_sentence}")
+    return errors(motion.rows, reference, system.interval).error
 
 
 def _first_round(
-    case: Case,
-    entries: list[Entry],
-    reference: NDArray[np.float64],
-    grid: tuple[float, float],
-    deadline: float,
-    progress: Progress,
+    system: System, entries: list[Entry], reference: NDArray[np.float64], deadline: float, progress: Progress
 ) -> int:
     """Run every rung once, the coarse ones first, and measure its error; how many there was no time for.
 
@@ -183,34 +175,31 @@ def _first_round(
     places: dict[Method, int] = {}
     order = []
     for entry in entries:
-        places[entry.rung.method] = place = places.get(entry.rung.method, -1) + 1
+        places[entry.rung.kind] = place = places.get(entry.rung.kind, -1) + 1
         order.append((place, entry))
     left_out = 0
     last: dict[Method, float] = {}
     for done, (place, entry) in enumerate(sorted(order, key=lambda pair: pair[0])):
         progress("errors", done, len(entries))
-        if place and time.perf_counter() + 2.0 * last.get(entry.rung.method, 0.0) > deadline:
+        if place and time.perf_counter() + 2.0 * last.get(entry.rung.kind, 0.0) > deadline:
             entry.failure = "left out: no time within the budget"
             left_out += 1
             continue
         try:
-            rows, work = _rows(case_of(case, entry.rung, *grid))
+            motion = _motion(system, entry.rung.method)
         except BrakecliError as error:
             entry.failure = " ".join(str(error).split())
             continue
-        last[entry.rung.method] = work.solve_seconds
-        entry.work, entry.samples = work, len(rows)
-        if work.failure is not Failure.NONE:
-            entry.failure = failure_sentence(work)
-        else:
+        work = entry.work = motion.work
+        last[entry.rung.kind] = work.solve_seconds
+        entry.samples, entry.failure = len(motion.rows), work.failure_sentence or ""
+        if not work.failed:
             entry.seconds.append(work.solve_seconds)
-            entry.errors = errors(rows, reference, grid[0])
+            entry.errors = errors(motion.rows, reference, system.interval)
     return left_out
 
 
-def _repeat(
-    case: Case, entries: list[Entry], grid: tuple[float, float], deadline: float, progress: Progress
-) -> int:
+def _repeat(system: System, entries: list[Entry], deadline: float, progress: Progress) -> int:
     """Time all that ran again, in turns, as often as the budget allows; how many times each.
 
     The times of the first round, which found memory and caches cold, count only where there are no others.
@@ -225,21 +214,21 @@ def _repeat(
         for done, entry in enumerate(timed):
             progress(f"times, turn {repeat + 1}", done, len(timed))
             at_once = entry.seconds[-1] < LONGEST_CALL
-            seconds = _rows(case_of(case, entry.rung, *grid), at_once=at_once)[1].solve_seconds
+            seconds = _motion(system, entry.rung.method, at_once=at_once).work.solve_seconds
             entry.seconds = [*entry.seconds, seconds] if repeat else [seconds]
     return MOST_REPEATS
 
 
-def _judge(setup: Setup, report: StabilityReport, entries: list[Entry]) -> None:
+def _add_limits(system: System, report: StabilityReport, entries: list[Entry]) -> None:
     """Add what the amplification matrices say, and the observed orders."""
-    stiffness_at = mean_stiffness(setup) if not setup.smooth else lambda phi: report.contact_stiffness
+    stiffness_at = mean_stiffness(system) if not system.smooth else lambda phi: report.contact_stiffness
     exact = report.critical
     limits: dict[tuple[str, tuple[float, ...]], float | None] = {}
     biases: dict[tuple[str, tuple[float, ...], float], float | None] = {}
     before: Entry | None = None
     for entry in entries:
-        method, step = entry.rung.method, entry.rung.step
-        if before is not None and before.rung.method == method:
+        kind, step = entry.rung.kind, entry.rung.step
+        if before is not None and before.rung.kind == kind:
             entry.order = _order(before, entry)
         before = entry
         if step is None:
@@ -247,9 +236,9 @@ def _judge(setup: Setup, report: StabilityReport, entries: list[Entry]) -> None:
             continue
         if report.discrete is None:  # no steady sliding that could lose its stability
             continue
-        scheme = str(method.scheme), method.theta
+        scheme = kind.scheme, kind.theta
         if (*scheme, step) not in biases:
-            at = set_up(case_of(setup.case, entry.rung, step, step))
+            at = replace(system, interval=step, duration=step, method=entry.rung.method)
             if scheme not in limits:
                 limit = step_limit(at, stiffness_at)
                 limits[scheme] = math.inf if limit is None else limit

@@ -11,6 +11,7 @@ from brakecli import __version__
 from brakecli.case.read import LoadedCase
 from brakecli.comparison.compare import Comparison, Entry
 from brakecli.comparison.deviation import FORCES, MOTION
+from brakecli.comparison.methods import method_label
 from brakecli.files.write import FILL, ResultFile, new_result
 from brakecli.runs.run import versions
 
@@ -81,16 +82,16 @@ class ComparisonReport:
 
 def entry_numbers(entry: Entry) -> dict[str, Any]:
     """Names and values of an entry; null where there is none."""
-    method, work, errors = entry.rung.method, entry.work, entry.errors
+    method, work, errors = entry.rung.kind, entry.work, entry.errors
     limit = entry.step_limit
     failed = errors is None
     return {
-        "method": method.label(),
-        "scheme": str(method.scheme),
+        "method": method_label(method),
+        "scheme": method.scheme,
         "theta": list(method.theta),
-        "start": str(method.start),
-        "iteration": str(method.iteration),
-        "evaluator": str(method.evaluator),
+        "start": method.start,
+        "iteration": method.iteration,
+        "evaluator": method.evaluator,
         "nodes": method.nodes,
         "step": entry.rung.step,
         "tolerance": entry.rung.tolerance,

@@ -16,15 +16,14 @@ from brakecli.analysis.regime.of_run import context, failed, verdict_numbers
 from brakecli.analysis.regime.rules import Verdict, classify
 from brakecli.analysis.regime.spectra import SPECTRAL, Spectrum, peak, spectrum
 from brakecli.case.read import LoadedCase
-from brakecli.case.system import Setup, set_up
+from brakecli.case.system import system_of
 from brakecli.files.write import ResultFile, new_result
 from brakecli.runs.limits import Check, check, free_bytes, refuse, within_range
-from brakecli.runs.modelled import scene
+from brakecli.runs.modelled import modelled
 from brakecli.runs.tolerance import Certificate, certify
-from brakecli.solver.energy import EnergyAccount
-from brakecli.solver.motion import Motion, Work
-from brakecli.solver.quantities import HISTORY, TIME, ContactState, Failure
-from brakecli.solver.schemes import has_own_steps
+from brakecli.solver.motion import Motion, solve
+from brakecli.solver.quantities import HISTORY, TIME, ContactState
+from brakecli.solver.system import System
 
 
 @dataclass(frozen=True)
@@ -33,10 +32,8 @@ class RunReport:
 
     output: Path
     title: str
-    setup: Setup
+    motion: Motion
     check: Check
-    work: Work
-    energy: EnergyAccount
     certificate: Certificate | None  # where the case gives no step
     verdict: Verdict
     spectrum_peak: float | None  # Hz, of vx
@@ -45,48 +42,39 @@ class RunReport:
     @property
     def failed(self) -> bool:
         """Whether the run ended before its time."""
-        return self.work.failure is not Failure.NONE
+        return self.motion.work.failed
 
     def numbers(self) -> dict[str, Any]:
         """Names and values as `--json` gives them and the file's attributes hold them."""
-        work, verdict, solver = self.work, self.verdict, self.setup.case.solver
+        system, work, energy = self.motion.system, self.motion.work, self.motion.energy
+        method, (used, left) = system.method, modelled(self.motion)
         return {
             "status": "failed" if self.failed else "done",
-            "failure": self.failure_sentence,
-            **verdict_numbers(verdict, self.setup),
+            "failure": work.failure_sentence,
+            **verdict_numbers(self.verdict, system),
             "spectrum_peak": self.spectrum_peak,
-            "scheme": str(solver.scheme),
-            "theta": list(solver.theta),
-            "iteration": None if has_own_steps(self.setup.scheme) else str(solver.iteration),
-            "step": None if has_own_steps(self.setup.scheme) else self.setup.timing.step,
+            "scheme": method.scheme,
+            "theta": list(method.theta),
+            "iteration": None if method.own_steps else method.iteration,
+            "step": None if method.own_steps else system.step,
             **certificate_numbers(self.certificate),
             "evaluators": work.evaluators,
-            "nodes": self.setup.nodes,
+            "nodes": system.nodes,
             "steps": work.steps,
             "contact_evaluations": work.contact_evaluations,
             "most_evaluations_in_a_step": work.most_evaluations,
             "unconverged_steps": work.unconverged_steps,
             "non_unique_steps": work.non_unique_steps,
             "energy": {
-                **asdict(self.energy),
-                "closing_error": self.energy.closing_error,
-                "relative_closing_error": self.energy.relative_closing_error,
+                **asdict(energy),
+                "closing_error": energy.closing_error,
+                "relative_closing_error": energy.relative_closing_error,
             },
-            "modelled": self.scene[0],
-            "left_out": self.scene[1],
+            "modelled": used,
+            "left_out": left,
             "adjustments": list(self.check.adjustments),
             "warnings": list(self.warnings),
         }
-
-    @property
-    def scene(self) -> tuple[list[str], list[str]]:
-        """What was modelled, and what was left out and why."""
-        return scene(self.setup, self.work)
-
-    @property
-    def failure_sentence(self) -> str | None:
-        """What ended the run before its time, or made it worthless."""
-        return failure_sentence(self.work) if self.failed else None
 
 
 def certificate_numbers(certificate: Certificate | None) -> dict[str, Any]:
@@ -102,17 +90,11 @@ def certificate_numbers(certificate: Certificate | None) -> dict[str, Any]:
     }
 
 
-def failure_sentence(work: Work) -> str:
-    """The sentence of a failure with its time, where it has one."""
-    when = f"t = {work.failure_time:.6g} s: " if work.failure_time is not None else ""
-    return when + work.failure.sentence
-
-
 def load_kernels(loaded: LoadedCase) -> None:
     """Compile what a run of a case needs, or load it: this takes seconds only once."""
     with within_range():
-        setup = set_up(loaded.case)
-    _ = setup.scheme, setup.evaluate
+        system = system_of(loaded.case)
+    _ = system.scheme, system.evaluate
 
 
 def run(
@@ -120,7 +102,7 @@ def run(
     output: Path,
     *,
     force: bool,
-    begin: Callable[[Setup, Check], None] = lambda setup, found: None,
+    begin: Callable[[System, Check], None] = lambda system, found: None,
     progress: Callable[[int], None] = lambda steps: None,
 ) -> RunReport:
     """Simulate a case and write its result file.
@@ -130,13 +112,13 @@ def run(
     numerically is written up to there and reported.
     """
     with within_range():
-        setup = set_up(loaded.case)
-        found = check(setup)
+        system = system_of(loaded.case)
+        found = check(system)
         with new_result(output, force=force) as result:
-            refuse(setup, found, free_bytes(output.resolve().parent))
-            begin(setup, found)
+            refuse(system, found, free_bytes(output.resolve().parent))
+            begin(system, found)
             _declare_history(result)
-            interval = setup.timing.interval
+            interval = system.interval
 
             def sink(rows: NDArray[np.float64]) -> None:
                 _require_finite("a force", rows)
@@ -145,14 +127,14 @@ def run(
                 result.append("history", {"time": interval * np.arange(first, first + len(rows)), **columns})
 
             certificate = None
-            if setup.case.solver.promise is None:
-                work, energy = Motion(setup).run(sink, progress)
+            if system.method.step is not None:
+                motion = solve(system, sink=sink, progress=progress)
             else:
-                motion = certify(setup.case, progress)
-                setup, work, energy, certificate = motion.setup, motion.work, motion.energy, motion.certificate
+                certified = certify(system, progress)
+                motion, certificate = certified.motion, certified.certificate
                 sink(motion.rows)
-            _require_finite("an energy", list(asdict(energy).values()))
-            report = _analyse(setup, found, work, energy, certificate, result, output)
+            _require_finite("an energy", list(asdict(motion.energy).values()))
+            report = _analyse(loaded.case.title, motion, found, certificate, result, output)
             _write(result, loaded, report)
             result.commit()
     return report
@@ -180,23 +162,18 @@ class _Written:
 
 
 def _analyse(
-    setup: Setup,
-    found: Check,
-    work: Work,
-    energy: EnergyAccount,
-    certificate: Certificate | None,
-    result: ResultFile,
-    output: Path,
+    title: str, motion: Motion, found: Check, certificate: Certificate | None, result: ResultFile, output: Path
 ) -> RunReport:
     """Regime, spectra and warnings of the finished history; the spectra go into the file at once."""
-    history = _Written(result, setup.timing.interval)
-    verdict = classify(history, context(setup))
-    if work.failure is not Failure.NONE:
-        verdict = failed(verdict, failure_sentence(work))
+    system, work = motion.system, motion.work
+    history = _Written(result, system.interval)
+    verdict = classify(history, context(system))
+    if work.failure_sentence is not None:
+        verdict = failed(verdict, work.failure_sentence)
     lines = spectrum(history, verdict.settled_from)
     _write_spectrum(result, lines)
     warnings = list(found.warnings)
-    if work.unconverged_steps and setup.case.solver.allow_unconverged:
+    if work.unconverged_steps and system.method.allow_unconverged:
         warnings.append(
             f"{work.unconverged_steps} of {work.steps} steps did not converge, as the case allows; their times "
             "and residuals are in the file, the history is not to be trusted there"
@@ -210,7 +187,7 @@ def _analyse(
         warnings.append(f"solver.tolerance: {certificate.sentence()}")
     top = peak(lines.frequency, lines.density["vx"])
     told = tuple(warnings)
-    return RunReport(output, setup.case.title, setup, found, work, energy, certificate, verdict, top, told)
+    return RunReport(output, title, motion, found, certificate, verdict, top, told)
 
 
 def _declare_history(result: ResultFile) -> None:
@@ -265,12 +242,11 @@ def _write(result: ResultFile, loaded: LoadedCase, report: RunReport) -> None:
     )
     for group, name in groups.items():
         result.set_attributes(_present(numbers[name]), group)
-    if len(report.work.unconverged):
-        result.axis(
-            "unconverged", "event", "1", "steps that did not converge", np.arange(len(report.work.unconverged))
-        )
+    unconverged = report.motion.work.unconverged
+    if len(unconverged):
+        result.axis("unconverged", "event", "1", "steps that did not converge", np.arange(len(unconverged)))
         for column, (name, units) in enumerate({"time": "s", "residual": "N"}.items()):
-            values = np.nan_to_num(report.work.unconverged[:, column], nan=np.finfo(float).max)
+            values = np.nan_to_num(unconverged[:, column], nan=np.finfo(float).max)
             result.variable("unconverged", name, ("event",), units, f"{name} of an unconverged step", values)
 
 

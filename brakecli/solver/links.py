@@ -1,6 +1,8 @@
-"""The coefficients of (6)-(7) from the two inclined links."""
+"""The coefficients of (6)-(7) from the two inclined links, and the frequencies that follow from them."""
 
 import math
+
+import numpy as np
 
 from brakecli.solver.compile import Coefficients
 
@@ -28,6 +30,13 @@ def coefficients(
         )
 
     return Coefficients(mass, *tensor(b_1, b_2), *tensor(c_1, c_2), sin_beta, cos_beta, phi)
+
+
+def natural_frequencies(c: Coefficients, contact_stiffness: float) -> tuple[float, float]:
+    """Undamped natural frequencies (Hz, rising) of the shoe on its links and a contact stiffness (N/m)."""
+    stiffness = np.array([[c.c_xx, c.c_xy], [c.c_xy, c.c_yy + contact_stiffness]])
+    low, high = np.sqrt(np.maximum(np.linalg.eigvalsh(stiffness / c.m), 0.0)) / (2.0 * math.pi)
+    return float(low), float(high)
 
 
 def _sin_cos(degrees: float) -> tuple[float, float]:

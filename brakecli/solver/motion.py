@@ -1,18 +1,14 @@
-"""A case's motion: the start, the loop in blocks, and what the loop has counted."""
+"""A motion: the start, the loop in blocks, and what the loop has counted."""
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.case.case import InitialState, Start
-from brakecli.case.system import Setup
-from brakecli.solver import implicit_step as iteration
-from brakecli.solver import loop as integrate
-from brakecli.solver import schemes
+from brakecli.solver import contact, implicit_step, loop
 from brakecli.solver.compile import (
     FORCE,
     FORCE_BEFORE,
@@ -23,18 +19,22 @@ from brakecli.solver.compile import (
     STORE_X_BEFORE,
     WORK_SIZE,
 )
-from brakecli.solver.contact import KINDS
 from brakecli.solver.contact.pad import build_contact
 from brakecli.solver.energy import OPEN_ACCOUNT, EnergyAccount, account
 from brakecli.solver.friction import minimise
+from brakecli.solver.method import Method
 from brakecli.solver.quantities import Failure
 from brakecli.solver.roughness import wheel_angles
-from brakecli.solver.schedules import integral_at, slope_at, value_at
-from brakecli.solver.steady_sliding import equilibrium, mean_contact
+from brakecli.solver.schedules import integral_at, slope_at
+from brakecli.solver.steady_sliding import steady_sliding
+from brakecli.solver.system import System
 
 BLOCK_SECONDS = 0.1
-"""Time that one call of the compiled loop should take: between calls Ctrl-C is heard and progress is told."""
+"""Time that one call of the compiled loop should take: between calls Ctrl-C is heard and progress is reported."""
 BLOCK_ROWS = 16384
+
+Sink = Callable[[NDArray[np.float64]], None]
+Progress = Callable[[int], None]
 
 
 @dataclass
@@ -53,74 +53,112 @@ class Work:
     solve_seconds: float = 0.0
     unconverged: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2)))  # time (s), residual (N)
 
+    @property
+    def failed(self) -> bool:
+        """Whether the run ended before its time, or is not worth having."""
+        return self.failure is not Failure.NONE
 
+    @property
+    def failure_sentence(self) -> str | None:
+        """The failure with its time, where it has one, and what to do."""
+        when = f"t = {self.failure_time:.6g} s: " if self.failure_time is not None else ""
+        return when + self.failure.sentence if self.failed else None
+
+
+@dataclass(frozen=True)
 class Motion:
-    """The motion of one case from its start on; `run` steps it to the end.
+    """A finished motion: its system with the method used, its samples (rows of `quantities.HISTORY`), its cost.
+
+    `rows` is empty where the samples went elsewhere.
+    """
+
+    system: System
+    rows: NDArray[np.float64]
+    work: Work
+    energy: EnergyAccount
+
+
+def solve(
+    system: System,
+    method: Method | None = None,
+    *,
+    sink: Sink | None = None,
+    progress: Progress = lambda steps: None,
+    first_block: int = 1,
+) -> Motion:
+    """Compute the motion of a system by a method, or by the system's own.
+
+    Every block of samples goes to `sink` where there is one. `progress` receives the steps done after each block.
+    `first_block` (steps) is 1 where it is not known what a step costs; each block adds some 0.1 ms of its own to
+    `solve_seconds`.
+    """
+    system = system if method is None else replace(system, method=method)
+    blocks: list[NDArray[np.float64]] = []
+    work, energy = Stepping(system).run(
+        sink or (lambda rows: blocks.append(rows.copy())), progress, first_block=first_block
+    )
+    rows = np.concatenate(blocks) if blocks else np.zeros((0, loop.COLUMNS))
+    return Motion(system, rows, work, energy)
+
+
+class Stepping:
+    """The motion of a system from its start on; `run` steps it to the end.
 
     It holds all that the loop changes, so that a run may be cut into blocks anywhere without changing a bit.
     """
 
-    def __init__(self, setup: Setup) -> None:
+    def __init__(self, system: System) -> None:
         """Put the shoe at its start."""
-        self.setup = setup
+        self.system, self.scheme = system, system.scheme
         self.work = Work()
-        self.angles = np.zeros(setup.wheel.g.size)
-        self.contact = build_contact(setup.pad)
+        self.angles = np.zeros(system.wheel.g.size)
+        self.contact = build_contact(system.pad)
         self.problem = np.zeros(PROBLEM_SIZE)
         self.works = np.zeros(WORK_SIZE)
-        self.counts = np.zeros(integrate.COUNTS_SIZE, dtype=np.int64)
-        self.events = np.zeros((integrate.EVENTS, 2))
-        self.counts[integrate.LEVEL] = setup.scheme.LAG
-        solve = iteration.newton if setup.case.solver.iteration == "newton" else iteration.fixed_point
-        self._advance, self._sample_into = schemes.loop(setup.scheme, setup.evaluate, solve)
+        self.counts = np.zeros(loop.COUNTS_SIZE, dtype=np.int64)
+        self.events = np.zeros((loop.EVENTS, 2))
+        self.counts[loop.LEVEL] = self.scheme.LAG
+        self._advance, self._sample_into = _plugged_in(system)
         self.state = self._begin()
         self._start_energy = self._energy()
 
     def run(
-        self,
-        sink: Callable[[NDArray[np.float64]], None],
-        progress: Callable[[int], None] = lambda steps: None,
-        *,
-        first_block: int = 1,
+        self, sink: Sink, progress: Progress = lambda steps: None, *, first_block: int = 1
     ) -> tuple[Work, EnergyAccount]:
-        """Step to the end or to a failure; give every block of samples (rows of `model.HISTORY`) to `sink`.
-
-        `progress` is told the steps done after each block. `first_block` (steps) is one where it is not known what
-        a step costs; each block adds some 0.1 ms of its own to `solve_seconds`.
-        """
-        lag, last = self.setup.scheme.LAG, self.setup.timing.steps
+        """Step to the end or to a failure; the arguments are those of `solve`."""
+        lag, last = self.scheme.LAG, self.system.steps
         size = min(first_block, self._most_steps())
-        while self.work.failure is Failure.NONE and self.counts[integrate.LEVEL] < last + lag:
+        while not self.work.failed and self.counts[loop.LEVEL] < last + lag:
             start = time.perf_counter()
-            rows = self._block(min(last + lag, int(self.counts[integrate.LEVEL]) + size))
+            rows = self.block(min(last + lag, int(self.counts[loop.LEVEL]) + size))
             seconds = time.perf_counter() - start
             self.work.solve_seconds += seconds
             size = min(int(size * min(10.0, BLOCK_SECONDS / max(seconds, 1e-9))) + 1, self._most_steps())
             sink(rows)
-            progress(int(self.counts[integrate.LEVEL]) - lag)
-        if self.work.failure is Failure.NONE:
+            progress(int(self.counts[loop.LEVEL]) - lag)
+        if not self.work.failed:
             sink(self._sample()[None, :])
         self._count()
         energy = account(self._start_energy, self._energy(), self.works)
-        if self.work.failure is Failure.NONE and not abs(energy.relative_closing_error) <= OPEN_ACCOUNT:
+        if not self.work.failed and not abs(energy.relative_closing_error) <= OPEN_ACCOUNT:
             self.work.failure = Failure.UNBALANCED
         return self.work, energy
 
     def _most_steps(self) -> int:
         """Steps whose samples fit into a block."""
-        return BLOCK_ROWS * self.setup.timing.per_sample
+        return BLOCK_ROWS * self.system.per_sample
 
-    def _block(self, stop: int) -> NDArray[np.float64]:
+    def block(self, stop: int) -> NDArray[np.float64]:
         """Step to level `stop`; the samples on the way."""
-        setup, lag, per_sample = self.setup, self.setup.scheme.LAG, self.setup.timing.per_sample
-        first = int(self.counts[integrate.LEVEL]) - lag
-        rows = np.zeros((-(-(stop - lag) // per_sample) + (-first // per_sample), integrate.COLUMNS))
+        system, lag, per_sample = self.system, self.scheme.LAG, self.system.per_sample
+        first = int(self.counts[loop.LEVEL]) - lag
+        rows = np.zeros((-(-(stop - lag) // per_sample) + (-first // per_sample), loop.COLUMNS))
         failure = self._advance(
-            setup.coefficients,
-            setup.weights,
-            setup.drive,
-            setup.grid,
-            setup.pad,
+            system.coefficients,
+            system.weights,
+            system.drive,
+            system.grid,
+            system.pad,
             self.angles,
             self.state,
             self.problem,
@@ -132,22 +170,22 @@ class Motion:
             stop,
         )
         self.work.failure = Failure(failure)
-        done = int(self.counts[integrate.LEVEL]) - lag
+        done = int(self.counts[loop.LEVEL]) - lag
         if failure:
-            self.work.failure_time = setup.timing.step * done
+            self.work.failure_time = system.step * done
             done += 1  # the sample of the failing step's own level has been taken
         return rows[: -(-done // per_sample) + (-first // per_sample)]
 
     def _sample(self) -> NDArray[np.float64]:
         """The sample at the level that has been reached."""
-        row = np.zeros(integrate.COLUMNS)
-        setup = self.setup
+        row = np.zeros(loop.COLUMNS)
+        system = self.system
         self._sample_into(
-            setup.coefficients,
-            setup.weights,
-            setup.drive,
-            setup.grid,
-            setup.pad,
+            system.coefficients,
+            system.weights,
+            system.drive,
+            system.grid,
+            system.pad,
             self.angles,
             self.state,
             self.contact,
@@ -158,19 +196,17 @@ class Motion:
 
     def _begin(self) -> NDArray[np.float64]:
         """The state at the scheme's first level, with the contact force there as the first guess."""
-        setup, initial = self.setup, self.setup.case.initial
+        system, initial = self.system, self.system.initial
         x, y = initial.x, initial.y
-        if initial.at is InitialState.EQUILIBRIUM:
-            load = float(value_at(setup.load, 0.0))
-            mean = partial(mean_contact, setup.evaluate, setup.pad, setup.wheel)
-            rest = equilibrium(setup.coefficients, mean, setup.pad, load, setup.belt_speed)
+        if initial.from_equilibrium:
+            rest = steady_sliding(system)
             x, y = x + rest.x, y + rest.y
         velocity, acceleration = (initial.vx, initial.vy), (0.0, 0.0)
         self._evaluate_at(x, y, 0.0)
         force = self.contact[NORMAL_FORCE]
-        if setup.case.solver.start is Start.CONSISTENT:
+        if system.method.start == "consistent":
             acceleration = self._acceleration((x, y), velocity, force)
-        state: NDArray[np.float64] = setup.scheme.begin(setup.weights, (x, y), velocity, acceleration)
+        state: NDArray[np.float64] = self.scheme.begin(system.weights, (x, y), velocity, acceleration)
         state[FORCE] = self.works[FORCE_BEFORE] = force
         self.works[STORE_X_BEFORE] = self.contact[STORE_X]
         return state
@@ -179,39 +215,52 @@ class Motion:
         self, position: tuple[float, float], velocity: tuple[float, float], force: float
     ) -> tuple[float, float]:
         """(ẍ, ÿ) of (6)-(7) at t = 0; where the shoe moves with the wheel, friction decides as in a step."""
-        c, (x, y), (v_x, v_y) = self.setup.coefficients, position, velocity
-        load = float(value_at(self.setup.load, 0.0))
+        c, (x, y), (v_x, v_y) = self.system.coefficients, position, velocity
+        load = self.system.load_at_start
         g_1 = -(c.b_xx * v_x + c.b_xy * v_y + c.c_xx * x + c.c_xy * y + load * c.sin_beta)
         g_2 = force - (c.b_xy * v_x + c.b_yy * v_y + c.c_xy * x + c.c_yy * y + load * c.cos_beta)
-        sliding = v_x - self.setup.belt_speed
+        sliding = v_x - self.system.belt_speed
         if sliding != 0.0:
             return (g_1 - np.sign(sliding) * c.phi * force) / c.m, g_2 / c.m
-        belt_acceleration = float(slope_at(self.setup.belt, 0.0))
+        belt_acceleration = float(slope_at(self.system.belt, 0.0))
         a_x, a_y, _ = minimise(c.m, 0.0, c.m, g_1, g_2, c.phi * force, belt_acceleration)
         return a_x, a_y
 
     def _evaluate_at(self, x: float, y: float, steps: float) -> None:
         """Evaluate the contact, `steps` steps after t = 0."""
-        t, part = divmod(steps, self.setup.timing.per_sample)
-        travel = integral_at(self.setup.belt, t * self.setup.timing.interval, part * self.setup.timing.step)
-        wheel_angles(self.setup.wheel, *travel, self.angles)
-        self.setup.evaluate(x, y, self.angles, self.setup.pad, self.contact)
+        t, part = divmod(steps, self.system.per_sample)
+        travel = integral_at(self.system.belt, t * self.system.interval, part * self.system.step)
+        wheel_angles(self.system.wheel, *travel, self.angles)
+        self.system.evaluate(x, y, self.angles, self.system.pad, self.contact)
 
     def _energy(self) -> tuple[float, float, float]:
         """Kinetic energy, energy of the links and of the contact (J), where the scheme places them."""
-        scheme, setup = self.setup.scheme, self.setup
-        kinetic, links, (x, y), back = scheme.mechanical_energy(setup.coefficients, setup.weights, self.state)
-        self._evaluate_at(x, y, int(self.counts[integrate.LEVEL]) - back)
+        system = self.system
+        kinetic, links, (x, y), back = self.scheme.mechanical_energy(
+            system.coefficients, system.weights, self.state
+        )
+        self._evaluate_at(x, y, int(self.counts[loop.LEVEL]) - back)
         return kinetic, links, float(self.contact[STORE])
 
     def _count(self) -> None:
         """Read the loop's counters."""
         counts, work = self.counts, self.work
-        work.steps = int(counts[integrate.KIND_0 :].sum())
-        work.contact_evaluations = int(counts[integrate.EVALUATIONS])
-        work.unconverged_steps = int(counts[integrate.UNCONVERGED])
-        work.non_unique_steps = int(counts[integrate.RISING])
-        work.most_evaluations = int(counts[integrate.MOST])
-        work.turns = int(counts[integrate.TURNS])
-        work.evaluators = {kind: int(n) for kind, n in zip(KINDS, counts[integrate.KIND_0 :], strict=True) if n}
-        work.unconverged = self.events[: min(work.unconverged_steps, integrate.EVENTS)].copy()
+        work.steps = int(counts[loop.KIND_0 :].sum())
+        work.contact_evaluations = int(counts[loop.EVALUATIONS])
+        work.unconverged_steps = int(counts[loop.UNCONVERGED])
+        work.non_unique_steps = int(counts[loop.RISING])
+        work.most_evaluations = int(counts[loop.MOST])
+        work.turns = int(counts[loop.TURNS])
+        work.evaluators = {
+            kind: int(n) for kind, n in zip(contact.kinds(), counts[loop.KIND_0 :], strict=True) if n
+        }
+        work.unconverged = self.events[: min(work.unconverged_steps, loop.EVENTS)].copy()
+
+
+def _plugged_in(system: System) -> tuple[Callable[..., int], Callable[..., None]]:
+    """The compiled loop and the sampling of the scheme, with everything plugged in that they call."""
+    scheme, evaluate = system.scheme, system.evaluate
+    if system.method.own_steps:
+        return partial(scheme.advance, evaluate), partial(scheme.sample, evaluate)
+    iterate = implicit_step.newton if system.method.iteration == "newton" else implicit_step.fixed_point
+    return partial(loop.advance, evaluate, scheme.prepare, scheme.finish, iterate), partial(loop.sample, evaluate)

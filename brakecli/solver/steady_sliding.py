@@ -2,26 +2,27 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
-from scipy.optimize import brentq
 
 from brakecli.errors import CaseError, Problem
-from brakecli.solver.compile import FRACTION, NORMAL_FORCE, STIFFNESS, Coefficients
+from brakecli.solver.compile import FRACTION, NORMAL_FORCE, STIFFNESS
 from brakecli.solver.contact.closed_form import CLEAR, FULL, coverage
 from brakecli.solver.contact.pad import HALF, SHOE_BOTTOM, SHOE_MEAN, SHOE_TOP, WHEEL_BOUND, K, build_contact
-from brakecli.solver.roughness import Surface, wheel_angles
+from brakecli.solver.roughness import wheel_angles
+from brakecli.solver.system import System
 
 PLACES = 1024
 """Positions of the wheel that an average takes, over 50 of its longest waves."""
 TABLE = 129
 
+Mean = Callable[[float], tuple[float, float, float]]
+"""Mean force (N), stiffness (N/m) and touching part of the contact at a height y (m)."""
+
 
 @dataclass(frozen=True)
-class Equilibrium:
+class SteadySliding:
     """Steady sliding: position (m), normal force (N), mean stiffness -∂F_y/∂y (N/m), part that touches."""
 
     x: float
@@ -31,12 +32,13 @@ class Equilibrium:
     contact_fraction: float
 
 
-def mean_contact(evaluate: Any, pad: NDArray[np.float64], wheel: Surface, y: float) -> tuple[float, float, float]:
+def mean_contact(system: System, y: float) -> tuple[float, float, float]:
     """Force (N), stiffness (N/m) and touching part at a height y (m), averaged over the travel of the wheel.
 
-    Full contact averages to its closed form; else places over many waves are averaged under a Hann window, so
+    Full contact averages to its closed form. Otherwise places over many waves are averaged under a Hann window, so
     that waves that do not close leave a trace of 1e-6 only.
     """
+    pad, wheel = system.pad, system.wheel
     covered = coverage(y, pad)
     length = 2.0 * pad[HALF]
     if covered == CLEAR:
@@ -48,22 +50,26 @@ def mean_contact(evaluate: Any, pad: NDArray[np.float64], wheel: Surface, y: flo
     found, angles, contact = np.zeros(3), np.zeros(wheel.g.size), build_contact(pad)
     for place, weight in zip(places, weights, strict=True):
         wheel_angles(wheel, float(place), 0.0, angles)
-        evaluate(0.0, y, angles, pad, contact)
+        system.evaluate(0.0, y, angles, pad, contact)
         found += weight * contact[[NORMAL_FORCE, STIFFNESS, FRACTION]]
     force, stiffness, fraction = found / len(places)
     return float(force), float(stiffness), float(fraction)
 
 
-Mean = Callable[[float], tuple[float, float, float]]
-"""Mean force (N), stiffness (N/m) and touching part of the contact at a height y (m)."""
+def _open_between(system: System) -> tuple[float, float]:
+    """The heights (m) between which the pad may touch in part."""
+    pad = system.pad
+    return -pad[WHEEL_BOUND] - pad[SHOE_TOP], pad[WHEEL_BOUND] + pad[SHOE_BOTTOM]
 
 
-def tabulated(mean: Mean, pad: NDArray[np.float64]) -> Mean:
-    """The same, interpolated between `TABLE` heights where the pad touches in part: for many calls.
+def tabulated(system: System) -> Mean:
+    """The mean contact, interpolated between `TABLE` heights where the pad touches in part: for many calls.
 
     The force is a cubic through its values and slopes; its error falls with the fourth power of the spacing.
     """
-    full, top = -pad[WHEEL_BOUND] - pad[SHOE_TOP], pad[WHEEL_BOUND] + pad[SHOE_BOTTOM]
+    from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
+
+    mean, (full, top) = partial(mean_contact, system), _open_between(system)
     if full == top:
         return mean
     heights = np.linspace(full, top, TABLE)
@@ -79,13 +85,17 @@ def tabulated(mean: Mean, pad: NDArray[np.float64]) -> Mean:
     return interpolated
 
 
-def equilibrium(c: Coefficients, mean: Mean, pad: NDArray[np.float64], load: float, belt: float) -> Equilibrium:
-    """Steady sliding under the load Q (N) on a wheel that moves with U (m/s); no friction acts where U = 0.
+def steady_sliding(
+    system: System, *, belt: float | None = None, phi: float | None = None, mean: Mean | None = None
+) -> SteadySliding:
+    """Steady sliding under the load of t = 0; no friction acts where U = 0.
 
-    With F_x = sign(U) phi F_y, (6) gives x for a height y and (7) remains: one equation in y. Raises CaseError
-    where it has no solution.
+    With F_x = sign(U) phi F_y, (6) gives x for a height y and (7) remains: one equation in y. U (m/s) and phi are
+    those of the system unless they are given. Raises CaseError where there is no solution.
     """
-    grip = float(np.sign(belt)) * c.phi
+    c, pad, load = system.coefficients, system.pad, system.load_at_start
+    mean = mean or partial(mean_contact, system)
+    grip = float(np.sign(system.belt_speed if belt is None else belt)) * (c.phi if phi is None else phi)
     q_x, q_y = load * c.sin_beta, load * c.cos_beta
     if c.c_xx > 0.0:
         lean = c.c_xy / c.c_xx
@@ -99,7 +109,7 @@ def equilibrium(c: Coefficients, mean: Mean, pad: NDArray[np.float64], load: flo
     def unbalanced(y: float) -> float:
         return spring * y + push - uplift * mean(y)[0]
 
-    full, top = -pad[WHEEL_BOUND] - pad[SHOE_TOP], pad[WHEEL_BOUND] + pad[SHOE_BOTTOM]
+    full, top = _open_between(system)
     stiffness = 2.0 * pad[HALF] * pad[K]
     whole = spring + uplift * stiffness
     y = -(push + uplift * stiffness * pad[SHOE_MEAN]) / whole if whole != 0.0 else np.inf
@@ -109,12 +119,14 @@ def equilibrium(c: Coefficients, mean: Mean, pad: NDArray[np.float64], load: flo
                 raise _none("the load lifts the shoe off the wheel and no link holds it")
             y = -push / spring
         elif unbalanced(full) < 0.0:
+            from scipy.optimize import brentq
+
             y = brentq(unbalanced, full, top, xtol=1e-15 * max(abs(full), abs(top), 1e-300), rtol=1e-14)
         else:
             raise _none("the friction force lifts more than the load presses (self-locking)")
-    force, mean_stiffness, fraction = mean(float(y))
+    force, stiffness, fraction = mean(float(y))
     x = (grip * force - q_x) / c.c_xx - lean * y if c.c_xx > 0.0 else 0.0
-    return Equilibrium(float(x), float(y), force, mean_stiffness, fraction)
+    return SteadySliding(float(x), float(y), force, stiffness, fraction)
 
 
 def _none(reason: str) -> CaseError:

@@ -4,9 +4,10 @@ import math
 import os
 from dataclasses import dataclass
 
-from brakecli.case.system import set_up
+from brakecli.case.system import system_of
 from brakecli.errors import CaseError, RefusedError
-from brakecli.runs.limits import MOST_BYTES, check, duration_text, refuse, within_range
+from brakecli.runs.cost import duration_text
+from brakecli.runs.limits import MOST_BYTES, check, refuse, within_range
 from brakecli.sweeps.plan import Plan
 from brakecli.sweeps.point import record_type
 from brakecli.sweeps.tables import Method
@@ -51,12 +52,12 @@ def estimate(plan: Plan, workers: int) -> Estimate:
     for point in sorted({0, plan.points - 1}):
         try:
             with within_range():
-                setup = set_up(plan.case(plan.settings(point)))
-                checked = check(setup)
-                refuse(setup, checked, math.inf)
+                system = system_of(plan.case(plan.settings(point)))
+                checked = check(system)
+                refuse(system, checked, math.inf)
         except (CaseError, RefusedError):  # the point is marked as failed when its turn comes
             continue
-        found.append((checked.seconds, setup.timing.samples))
+        found.append((checked.seconds, system.samples))
     seconds = sum(pair[0] for pair in found) / max(len(found), 1)
     samples = max((pair[1] for pair in found), default=0)
     run = seconds + _POINT_SECONDS + _SAMPLE_SECONDS * samples

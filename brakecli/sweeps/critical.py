@@ -15,8 +15,9 @@ from brakecli.analysis.stability.discrete import spectral_radius
 from brakecli.analysis.stability.modes import growth as eigenvalue_growth
 from brakecli.analysis.stability.report import MARGIN, stability
 from brakecli.case.case import Case, changed
-from brakecli.case.system import set_up
+from brakecli.case.system import system_of
 from brakecli.errors import CaseError
+from brakecli.solver.system import System
 from brakecli.sweeps.growth import Growth, Sliding, growth, sliding, with_step
 from brakecli.sweeps.tables import Critical, Method
 
@@ -64,6 +65,7 @@ class Search:
     sustained_outcome: Outcome = Outcome.NONE
 
 
+SystemAt = Callable[[float], System]
 CaseAt = Callable[[float], Case]
 Judge = Callable[[Case], Verdict | None]
 
@@ -71,8 +73,8 @@ Judge = Callable[[Case], Verdict | None]
 def search(critical: Critical, case_at: CaseAt, judge: Judge) -> Search:
     """Look for the critical value of the parameter that `case_at` sets; `judge` runs a case to its verdict."""
 
-    def stepped(value: float) -> Case:
-        return with_step(case_at(value))  # where a tolerance is promised, there is no step
+    def stepped(value: float) -> System:
+        return with_step(system_of(case_at(value)))  # where a tolerance is asked for, there is no step
 
     exact, bias = _by_eigenvalues(critical, stepped)
     if critical.method is Method.EIGENVALUE:
@@ -110,10 +112,10 @@ class _Change:
     spread: float = 0.0
 
 
-def _by_eigenvalues(critical: Critical, case_at: CaseAt) -> tuple[_Change, float | None]:
+def _by_eigenvalues(critical: Critical, system_at: SystemAt) -> tuple[_Change, float | None]:
     """Where the eigenvalues of steady sliding pass zero, and by how much the scheme at its step moves that."""
     if critical.parameter == "friction.coefficient":
-        report = stability(set_up(case_at(critical.lower)))
+        report = stability(system_at(critical.lower))
         within = [each for each in report.crossings if critical.lower <= each.friction <= critical.upper]
         for crossing in sorted(within, key=lambda each: not each.lost)[:1]:
             bias = report.discrete.bias if report.discrete and crossing is report.critical else None
@@ -125,13 +127,13 @@ def _by_eigenvalues(critical: Critical, case_at: CaseAt) -> tuple[_Change, float
 
     @cache
     def at(value: float) -> Sliding | None:
-        return _sliding(case_at, value)
+        return _sliding(system_at, value)
 
     def exactly(value: float) -> bool | None:
         found = at(value)
         if found is None:
             return None
-        c, k = found.setup.coefficients, found.stiffness
+        c, k = found.system.coefficients, found.stiffness
         rate = eigenvalue_growth(c, k, found.grip)
         return rate > 1e-12 * math.sqrt((abs(c.c_xx) + abs(c.c_yy) + k) / c.m)
 
@@ -139,12 +141,12 @@ def _by_eigenvalues(critical: Critical, case_at: CaseAt) -> tuple[_Change, float
         found = at(value)
         if found is None:
             return None
-        setup = found.setup
-        c, belt = setup.coefficients, setup.belt_speed
-        return spectral_radius(c, setup.weights, setup.scheme, found.stiffness, belt) > 1.0 + MARGIN
+        system = found.system
+        c, belt = system.coefficients, system.belt_speed
+        return spectral_radius(c, system.weights, system.scheme, found.stiffness, belt) > 1.0 + MARGIN
 
     first = at(critical.lower)
-    opens = first is not None and first.stiffness < 0.999 * first.setup.contact_stiffness
+    opens = first is not None and first.stiffness < 0.999 * first.system.contact_stiffness
     count, width = (SCANNED_WHERE_OPEN, 1e-2) if opens else (SCANNED_BY_EIGENVALUES, 1e-9)
     exact = _first_change(critical, exactly, count, width * critical.tolerance)
     own = _first_change(critical, discretely, SCANNED_WHERE_OPEN, width * critical.tolerance)
@@ -152,9 +154,9 @@ def _by_eigenvalues(critical: Critical, case_at: CaseAt) -> tuple[_Change, float
     return exact, own.value - exact.value if biased else None  # type: ignore[operator]
 
 
-def _sliding(case_at: CaseAt, value: float) -> Sliding | None:
+def _sliding(system_at: SystemAt, value: float) -> Sliding | None:
     try:
-        return sliding(case_at(value))
+        return sliding(system_at(value))
     except CaseError:  # a value that no case can have, between two that it can
         return None
 
@@ -189,13 +191,13 @@ def _interval(values: list[float], verdicts: list[bool | None]) -> tuple[float, 
     return Outcome.UNSTABLE if any(verdicts) else Outcome.STABLE
 
 
-def _by_simulation(critical: Critical, case_at: CaseAt) -> _Change:
+def _by_simulation(critical: Critical, system_at: SystemAt) -> _Change:
     """Where the growth of small disturbances passes zero, by Brent's method, between two values on either side."""
     found: dict[float, Growth | None] = {}
 
     def at(value: float) -> Growth | None:
         if value not in found:
-            steady = _sliding(case_at, value)
+            steady = _sliding(system_at, value)
             found[value] = growth(steady) if steady is not None else None
         return found[value]
 
@@ -230,10 +232,10 @@ def _by_simulation(critical: Critical, case_at: CaseAt) -> _Change:
     return _Change(outcome, value, low, high, min(spread, critical.upper - critical.lower))
 
 
-def _never_opens(case: Case) -> bool:
+def _never_opens(system: System) -> bool:
     """Whether surfaces that slide on each other touch everywhere: then their motion is linear."""
-    found = sliding(case)
-    return found is not None and found.stiffness >= 0.999 * found.setup.contact_stiffness
+    found = sliding(system)
+    return found is not None and found.stiffness >= 0.999 * found.system.contact_stiffness
 
 
 def _vibrates(verdict: Verdict | None, duration: float, unstable: bool | None, linear: bool) -> bool | None:

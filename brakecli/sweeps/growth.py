@@ -7,21 +7,19 @@ D(t₂) D(t₁)⁻¹ are those of the motion between, whatever the start put in.
 """
 
 import math
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.analysis.stability.discrete import natural_frequencies
 from brakecli.analysis.stability.modes import is_undamped
-from brakecli.case.case import Case, Scheme, changed
-from brakecli.case.system import Setup, set_up
 from brakecli.errors import CaseError
-from brakecli.solver.motion import Motion
+from brakecli.solver.links import natural_frequencies
+from brakecli.solver.motion import solve
 from brakecli.solver.quantities import HISTORY, Failure
-from brakecli.solver.schedules import value_at
-from brakecli.solver.steady_sliding import equilibrium, mean_contact
+from brakecli.solver.schedules import schedule
+from brakecli.solver.steady_sliding import steady_sliding
+from brakecli.solver.system import Initial, System
 
 DISTURBANCE = 1e-7
 """Of the static compression: the rounding of a run then is 1e-9 of a disturbance."""
@@ -62,9 +60,9 @@ class Growth:
 
 @dataclass(frozen=True)
 class Sliding:
-    """Steady sliding of a case at the speed and load of its start: what its growth is measured about."""
+    """Steady sliding of a system at the speed and load of its start: what its growth is measured about."""
 
-    setup: Setup
+    system: System
     x: float
     y: float
     stiffness: float  # of the contact, mean, N/m
@@ -73,36 +71,32 @@ class Sliding:
     @property
     def grip(self) -> float:
         """sign(U) φ."""
-        return math.copysign(self.setup.coefficients.phi, self.setup.belt_speed)
+        return math.copysign(self.system.coefficients.phi, self.system.belt_speed)
 
 
-def with_step(case: Case) -> Case:
-    """The case with the step that growth is measured with, where it promises an error instead."""
-    if case.solver.scheme not in (Scheme.AUTO, Scheme.EVENT_DRIVEN) and case.solver.step is not None:
-        return case
-    setup = set_up(case)
-    fast = natural_frequencies(setup.coefficients, setup.contact_stiffness)[1]
-    passing = abs(setup.belt_speed) * float(max(setup.wheel.turns, default=0.0))
-    interval = case.output.sample_interval
-    step = interval / math.ceil(interval * STEPS_PER_PERIOD * max(fast, passing))
-    solver = {"scheme": Scheme.TWO_LAYER, "theta": (0.5, 0.5), "step": step, "tolerance": None}
-    return changed(case, solver=solver)
+def with_step(system: System) -> System:
+    """The system with the step that growth is measured with, where its method keeps a tolerance instead."""
+    method = system.method
+    if not method.own_steps and method.step is not None:
+        return system
+    passing = abs(system.belt_speed) * float(max(system.wheel.turns, default=0.0))
+    fastest = max(system.natural_frequencies[1], passing)
+    step = system.interval / math.ceil(system.interval * STEPS_PER_PERIOD * fastest)
+    stepped = replace(method, scheme="two-layer", theta=(0.5, 0.5), start="consistent", step=step, automatic=False)
+    return replace(system, method=stepped)
 
 
-def sliding(case: Case) -> Sliding | None:
-    """Steady sliding of a case, None where there is none: it takes a wheel that turns, and a load that presses."""
-    setup = set_up(case)
-    if setup.belt_speed == 0.0:
+def sliding(system: System) -> Sliding | None:
+    """Steady sliding of a system; None where the wheel does not turn, or no load presses."""
+    if system.belt_speed == 0.0:
         return None
-    load = float(value_at(setup.load, 0.0))
-    mean = partial(mean_contact, setup.evaluate, setup.pad, setup.wheel)
     try:
-        rest = equilibrium(setup.coefficients, mean, setup.pad, load, setup.belt_speed)
+        rest = steady_sliding(system)
     except CaseError:
         return None
     if not rest.stiffness > 0.0:
         return None
-    return Sliding(setup, rest.x, rest.y, rest.stiffness, rest.normal_force / rest.stiffness)
+    return Sliding(system, rest.x, rest.y, rest.stiffness, rest.normal_force / rest.stiffness)
 
 
 def growth(found: Sliding) -> Growth | None:
@@ -110,21 +104,21 @@ def growth(found: Sliding) -> Growth | None:
 
     The runs have the scheme and step of the case, and the speed and load of its start throughout.
     """
-    setup = found.setup
-    slow, fast = natural_frequencies(setup.coefficients, found.stiffness)
-    per_sample = max(1, int(1.0 / (_PER_PERIOD * fast * setup.timing.step)))
-    interval = per_sample * setup.timing.step
-    duration = max(_watched(setup, slow, fast), 8.0 * interval)
+    system = found.system
+    slow, fast = natural_frequencies(system.coefficients, found.stiffness)
+    per_sample = max(1, int(1.0 / (_PER_PERIOD * fast * system.step)))
+    interval = per_sample * system.step
+    duration = max(_watched(system, slow, fast), 8.0 * interval)
     scales = found.compression * np.array([1.0, 1.0, *[2.0 * math.pi * fast] * 2])
     displacements = np.vstack([np.zeros(4), DISTURBANCE * np.diag(scales)])
-    runs = [_run(_displaced(found, interval, duration, displaced)) for displaced in displacements]
+    runs = [_run(found, interval, duration, displaced) for displaced in displacements]
     if any(run is None for run in runs):
         return None
     base, *others = [run for run in runs if run is not None]
     # D[t]: columns are the differences of the neighbours, rows x, y, ẋ, ẏ, each in its scale.
     maps = np.array([(other[:, :4] - base[:, :4]) / (DISTURBANCE * scales) for other in others]).transpose(1, 2, 0)
-    last = _last_linear(setup, [base, *others], np.abs(maps).max(axis=(1, 2)))
-    if not setup.smooth:
+    last = _last_linear(system, [base, *others], np.abs(maps).max(axis=(1, 2)))
+    if not system.smooth:
         last = min(last, _last_forced(found, base, interval, slow))
     first = max(1, last // 4)
     if last - first < 4:  # out of steady sliding at once
@@ -135,48 +129,48 @@ def growth(found: Sliding) -> Growth | None:
         _rate(maps[first], maps[middle], (middle - first) * interval),
         _rate(maps[middle], maps[last], (last - middle) * interval),
     )
-    noise = 1e-4 / ((last - first) * interval) if is_undamped(setup.coefficients) else 0.0
+    noise = 1e-4 / ((last - first) * interval) if is_undamped(system.coefficients) else 0.0
     return Growth(rate, 0.5 * abs(halves[1] - halves[0]), noise)
 
 
-def _watched(setup: Setup, slow: float, fast: float) -> float:
+def _watched(system: System, slow: float, fast: float) -> float:
     """The time (s) to watch disturbances for."""
     smooth = PERIODS / fast
-    if setup.wheel.g.size == 0:
+    if system.wheel.g.size == 0:
         return smooth
-    passing = PASSES / (abs(setup.belt_speed) * float(setup.wheel.turns.min()))
+    passing = PASSES / (abs(system.belt_speed) * float(system.wheel.turns.min()))
     rough = max(smooth, passing, ROUGH_PERIODS / slow if slow > 0.0 else 0.0)
-    return min(rough, max(setup.case.solver.duration, smooth))
+    return min(rough, max(system.duration, smooth))
 
 
-def _displaced(found: Sliding, interval: float, duration: float, by: NDArray[np.float64]) -> Case:
-    """The case from (x, y, ẋ, ẏ) beside steady sliding on, its speed and load held, sampled on whole steps."""
-    setup, (x, y, v_x, v_y) = found.setup, (float(value) for value in by)
-    load = float(value_at(setup.load, 0.0))
-    return changed(
-        setup.case,
-        wheel={"angular_speed": setup.belt_speed / setup.case.wheel.radius, "times": None, "angular_speeds": None},
-        load={"force": load, "times": None, "forces": None},
-        initial={"at": "rest", "x": found.x + x, "y": found.y + y, "vx": v_x, "vy": v_y},
-        solver={"step": setup.timing.step, "duration": duration, "start": "consistent"},
-        output={"sample_interval": interval},
+def _run(
+    found: Sliding, interval: float, duration: float, displaced: NDArray[np.float64]
+) -> NDArray[np.float64] | None:
+    """The samples of a run from (x, y, ẋ, ẏ) beside steady sliding on, None if it fails.
+
+    Its speed and load are held; it is sampled on whole steps.
+    """
+    system, (x, y, v_x, v_y) = found.system, (float(value) for value in displaced)
+    motion = solve(
+        replace(
+            system,
+            belt=schedule((0.0,), (system.belt_speed / system.radius,), system.radius),
+            load=schedule((0.0,), (system.load_at_start,)),
+            initial=Initial(found.x + x, found.y + y, v_x, v_y),
+            interval=interval,
+            duration=duration,
+            method=replace(system.method, step=system.step, start="consistent"),
+        )
     )
+    return None if motion.work.failure not in (Failure.NONE, Failure.UNBALANCED) else motion.rows
 
 
-def _run(case: Case) -> NDArray[np.float64] | None:
-    """The samples of a run, None if it fails."""
-    blocks: list[NDArray[np.float64]] = []
-    work, _ = Motion(set_up(case)).run(lambda rows: blocks.append(rows.copy()))
-    lost = work.failure not in (Failure.NONE, Failure.UNBALANCED)
-    return None if lost else np.concatenate(blocks)
-
-
-def _last_linear(setup: Setup, runs: list[NDArray[np.float64]], sizes: NDArray[np.float64]) -> int:
+def _last_linear(system: System, runs: list[NDArray[np.float64]], sizes: NDArray[np.float64]) -> int:
     """The last sample up to which the differences follow linear equations and are more than rounding."""
     ended = (sizes > SATURATED / DISTURBANCE) | (sizes < FADED)
-    if setup.smooth:  # a flat pad sticks or lifts off wholly: the motion has left steady sliding
+    if system.smooth:  # a flat pad sticks or lifts off wholly: the motion has left steady sliding
         for run in runs:  # by its own velocity: a three-layer scheme's slow sliding may pass for stick
-            ended |= (run[:, _VX] - setup.belt_speed) * setup.belt_speed >= 0.0
+            ended |= (run[:, _VX] - system.belt_speed) * system.belt_speed >= 0.0
             ended |= run[:, _NORMAL_FORCE] == 0.0
     ended[0] = False
     return int(np.argmax(ended)) - 1 if ended.any() else len(sizes) - 1
@@ -189,7 +183,7 @@ def _last_forced(found: Sliding, base: NDArray[np.float64], interval: float, slo
     `DEPARTED` times as far from steady sliding as in its first periods and its first passing wave.
     """
     away = np.abs(base[:, :2] - np.array([found.x, found.y])).max(axis=1)
-    passing = abs(found.setup.belt_speed) * float(found.setup.wheel.turns.min(initial=np.inf))
+    passing = abs(found.system.belt_speed) * float(found.system.wheel.turns.min(initial=np.inf))
     seconds = max(3.0 / slow if slow > 0.0 else 0.0, 1.0 / passing)
     opening = max(1, int(seconds / interval))
     gone = np.flatnonzero(away > DEPARTED * away[:opening].max())

@@ -12,14 +12,12 @@ from numpy.typing import NDArray
 from brakecli.analysis.regime.of_run import braking_torque, context, failed
 from brakecli.analysis.regime.rules import Verdict, classify
 from brakecli.case.case import Case
-from brakecli.case.system import Setup, set_up
+from brakecli.case.system import system_of
 from brakecli.errors import BrakecliError
 from brakecli.runs.limits import check, refuse, within_range
-from brakecli.runs.run import failure_sentence
 from brakecli.runs.tolerance import certify
 from brakecli.solver.history import ArrayHistory
-from brakecli.solver.motion import Motion, Work
-from brakecli.solver.quantities import Failure
+from brakecli.solver.motion import Motion, solve
 from brakecli.solver.roughness import TWO_PI, wheel_angles
 from brakecli.solver.schedules import integral_at
 from brakecli.sweeps.critical import Search, search
@@ -89,40 +87,37 @@ def record_type(plan: Plan) -> np.dtype[Any]:
 class Outcome:
     """A run in memory, as far as a sweep is interested in it."""
 
-    setup: Setup
-    work: Work
+    case: Case
+    motion: Motion
     verdict: Verdict
     warnings: tuple[str, ...]
-    end: NDArray[np.float64]  # x, y, ẋ, ẏ
     estimated_error: float  # of the histories, relative; NaN where the case gives a step
 
 
 def simulate(case: Case) -> Outcome:
     """Run a case in memory; raises RefusedError, and CaseError where it has no start."""
     with within_range():
-        setup = set_up(case)
-        found = check(setup)
-        refuse(setup, found, math.inf)
+        system = system_of(case)
+        found = check(system)
+        refuse(system, found, math.inf)
         certificate = None
-        if case.solver.promise is None:
-            blocks: list[NDArray[np.float64]] = []
-            work, _ = Motion(setup).run(lambda rows: blocks.append(rows.copy()))
-            rows = np.concatenate(blocks)
+        if system.method.step is not None:
+            motion = solve(system)
         else:
-            motion = certify(case)
-            setup, rows, work, certificate = motion.setup, motion.rows, motion.work, motion.certificate
-        if not np.isfinite(rows).all():
+            certified = certify(system)
+            motion, certificate = certified.motion, certified.certificate
+        if not np.isfinite(motion.rows).all():
             raise FloatingPointError("a force overflows")
-        verdict = classify(ArrayHistory(setup.timing.interval, rows), context(setup))
-    warnings = list(found.warnings)
-    if work.failure is not Failure.NONE:
-        verdict = failed(verdict, failure_sentence(work))
+        verdict = classify(ArrayHistory(system.interval, motion.rows), context(motion.system))
+    warnings, work = list(found.warnings), motion.work
+    if work.failure_sentence is not None:
+        verdict = failed(verdict, work.failure_sentence)
     elif work.unconverged_steps:
         warnings.append(f"{work.unconverged_steps} of {work.steps} steps did not converge, as the case allows")
     if certificate is not None and not certificate.certified:
         warnings.append(f"solver.tolerance: {certificate.sentence()}")
     error = math.nan if certificate is None else certificate.estimated_error
-    return Outcome(setup, work, verdict, tuple(warnings), rows[-1, :4], error)
+    return Outcome(case, motion, verdict, tuple(warnings), error)
 
 
 def blank(kind: np.dtype[Any], status: Status, reason: str) -> NDArray[Any]:
@@ -156,7 +151,7 @@ def follow(plan: Plan, line: int) -> NDArray[Any]:
             records.append((point, blank(kind, Status.FAILED, _sentence(error))))
             continue
         records.append((point, _filled(kind, outcome)))
-        if outcome.work.failure is Failure.NONE:
+        if not outcome.motion.work.failed:
             start = _continued(outcome)
     return np.concatenate([record for _, record in sorted(records, key=lambda pair: pair[0])])
 
@@ -181,14 +176,13 @@ def line_points(plan: Plan, line: int) -> list[int]:
 
 def _continued(outcome: Outcome) -> dict[tuple[str, ...], Any]:
     """The start of a case where another has ended."""
-    x, y, v_x, v_y = (float(value) for value in outcome.end)
+    x, y, v_x, v_y = (float(value) for value in outcome.motion.rows[-1, :4])
     start: dict[tuple[str, ...], Any] = {("initial",): {"x": x, "y": y, "vx": v_x, "vy": v_y}}
-    wheel = outcome.setup.case.roughness.wheel
+    wheel = outcome.case.roughness.wheel
     if wheel is not None:
-        setup = outcome.setup
-        angles = np.zeros(setup.wheel.g.size)
-        travel = integral_at(setup.belt, setup.timing.samples * setup.timing.interval, 0.0)
-        wheel_angles(setup.wheel, *travel, angles)
+        system = outcome.motion.system
+        angles = np.zeros(system.wheel.g.size)
+        wheel_angles(system.wheel, *integral_at(system.belt, system.sampled_duration, 0.0), angles)
         phases = iter(angles)  # a wave of no amplitude has none
         turned = [math.degrees(next(phases) % TWO_PI) if g else 0.0 for g in wheel.amplitudes]
         start["roughness", "wheel", "phases_deg"] = turned
@@ -218,13 +212,12 @@ def _verdict(case: Case) -> Verdict | None:
         outcome = simulate(case)
     except BrakecliError:
         return None
-    return outcome.verdict if outcome.work.failure is Failure.NONE else None
+    return None if outcome.motion.work.failed else outcome.verdict
 
 
 def _filled(kind: np.dtype[Any], outcome: Outcome) -> NDArray[Any]:
-    verdict, work = outcome.verdict, outcome.work
-    done = work.failure is Failure.NONE
-    record = blank(kind, Status.DONE if done else Status.FAILED, "; ".join(verdict.reasons))
+    verdict, system, work = outcome.verdict, outcome.motion.system, outcome.motion.work
+    record = blank(kind, Status.FAILED if work.failed else Status.DONE, "; ".join(verdict.reasons))
     values: dict[str, Any] = {
         "warning": _clipped(outcome.warnings[0]) if outcome.warnings else b"",
         "warning_count": len(outcome.warnings),
@@ -235,9 +228,9 @@ def _filled(kind: np.dtype[Any], outcome: Outcome) -> NDArray[Any]:
         "stick_fraction": verdict.stick_fraction,
         "contact_loss_fraction": verdict.contact_loss_fraction,
         "mean_friction_force": verdict.mean_friction_force,
-        "braking_torque": braking_torque(verdict, outcome.setup),
+        "braking_torque": braking_torque(verdict, system),
         "settled": int(verdict.settled),
-        "settled_from": verdict.settled_from * outcome.setup.timing.interval,
+        "settled_from": verdict.settled_from * system.interval,
         "steps": work.steps,
         "contact_evaluations": work.contact_evaluations,
         "unconverged_steps": work.unconverged_steps,

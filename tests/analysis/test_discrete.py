@@ -4,28 +4,29 @@ import numpy as np
 import pytest
 from scipy.linalg import eigvals
 
-from brakecli.analysis.stability.discrete import amplification, natural_frequencies, step_limits
-from brakecli.case.system import set_up
+from brakecli.analysis.stability.discrete import amplification, step_limits
+from brakecli.case.system import system_of
 from brakecli.errors import RefusedError
-from brakecli.runs.limits import check, refuse
+from brakecli.runs.limits import adjustments, check, refuse
 from brakecli.solver.compile import VX, VY, X, Y
+from brakecli.solver.links import natural_frequencies
 from tests.examples import MODE_COUPLING, ROUGH, SQUEAL, make, simulate
 
 
 def test_natural_frequencies_of_the_minimal_model() -> None:
-    setup = set_up(make(MODE_COUPLING))
+    system = system_of(make(MODE_COUPLING))
     # cxx = cyy + 2ak = 2, cxy = -1: ω² = 1 and 3.
-    assert np.array(natural_frequencies(setup.coefficients, setup.contact_stiffness)) * 2 * np.pi == pytest.approx(
-        [1.0, np.sqrt(3.0)], rel=1e-12
-    )
+    assert np.array(
+        natural_frequencies(system.coefficients, system.contact_stiffness)
+    ) * 2 * np.pi == pytest.approx([1.0, np.sqrt(3.0)], rel=1e-12)
 
 
 @pytest.mark.parametrize("scheme", ["two-layer", "three-layer"])
 def test_contraction_is_that_of_the_fixed_point_iteration(scheme: str) -> None:
     theta = (0.5, 0.5) if scheme == "two-layer" else (0.25, 0.5, 0.25)
     case = make(SQUEAL, solver__scheme=scheme, solver__theta=theta, friction__coefficient=0.0)
-    setup = set_up(case)
-    limits = step_limits(setup.coefficients, setup.weights, setup.scheme, setup.contact_stiffness, setup.wheel)
+    system = system_of(case)
+    limits = step_limits(system)
     # θ1 θ2 h² 2ak/m, or θ1 h² 2ak/m: both weights are 1/4 here; the links change a22 by 1e-4.
     assert limits.contraction == pytest.approx(0.25 * 1e-10 * 2e6 / 10.0, rel=1e-3)
     assert limits.unique
@@ -34,30 +35,30 @@ def test_contraction_is_that_of_the_fixed_point_iteration(scheme: str) -> None:
 def test_friction_that_can_wedge_the_shoe_within_a_step_is_told() -> None:
     changes = {"solver__step": 1e-3, "output__sample_interval": 1e-3, "contact__stiffness": 1e10}
     case = make(SQUEAL, link2__angle_deg=45.0, friction__coefficient=20.0, **changes)
-    setup = set_up(case)
-    found = check(setup)
+    system = system_of(case)
+    found = check(system)
     assert not found.limits.unique
     assert any("more than one solution" in warning for warning in found.warnings)
 
 
 @pytest.mark.parametrize("phi", [0.0, 0.5, 1.0])
 def test_amplification_of_the_half_weights_is_the_trapezoidal_rule(phi: float) -> None:
-    setup = set_up(make(MODE_COUPLING, friction__coefficient=phi, solver__step=0.1))
-    c, k = setup.coefficients, setup.contact_stiffness
+    system = system_of(make(MODE_COUPLING, friction__coefficient=phi, solver__step=0.1))
+    c, k = system.coefficients, system.contact_stiffness
     a = np.zeros((4, 4))
     a[:2, 2:] = np.eye(2)
     a[2:, :2] = -np.array([[c.c_xx, c.c_xy + phi * k], [c.c_xy, c.c_yy + k]]) / c.m
     exact = np.linalg.solve(np.eye(4) - 0.05 * a, np.eye(4) + 0.05 * a)
     scale = np.diag([1.0, 1.0, 0.1, 0.1])
-    found = amplification(c, setup.weights, setup.scheme, k)
+    found = amplification(c, system.weights, system.scheme, k)
     # Differences of 1e-3 of numbers of size one: rounding of 1e-13, and Newton's 1e-13 of the force.
     assert np.allclose(found, scale @ exact @ np.linalg.inv(scale), atol=1e-9)
 
 
 def test_amplification_predicts_the_growth_of_a_run() -> None:
     case = make(MODE_COUPLING, solver__step=0.05, solver__duration=60.0, initial__x=1e-6)
-    setup, result = set_up(case), simulate(case)
-    values = eigvals(amplification(setup.coefficients, setup.weights, setup.scheme, setup.contact_stiffness))
+    system, result = system_of(case), simulate(case)
+    values = eigvals(amplification(system.coefficients, system.weights, system.scheme, system.contact_stiffness))
     fastest = values[np.argmax(np.abs(values))]
     late = result.vx[-400:]  # only the growing pair is left: v(n+1) = 2 Re(λ) v(n) - |λ|² v(n-1)
     left = np.column_stack([late[1:-1], late[:-2]])
@@ -67,8 +68,10 @@ def test_amplification_predicts_the_growth_of_a_run() -> None:
 
 def test_weights_of_one_bias_the_critical_friction_as_published() -> None:
     def growth(phi: float) -> float:
-        setup = set_up(make(MODE_COUPLING, friction__coefficient=phi, solver__theta=(1.0, 1.0), solver__step=0.1))
-        matrix = amplification(setup.coefficients, setup.weights, setup.scheme, setup.contact_stiffness)
+        system = system_of(
+            make(MODE_COUPLING, friction__coefficient=phi, solver__theta=(1.0, 1.0), solver__step=0.1)
+        )
+        matrix = amplification(system.coefficients, system.weights, system.scheme, system.contact_stiffness)
         return float(np.abs(np.linalg.eigvals(matrix)).max())
 
     assert growth(0.8110) < 1.0 < growth(0.8120)  # 0.8115
@@ -79,7 +82,7 @@ def test_check_warns_of_everything_that_is_not_resolved() -> None:
         ROUGH, contact__nodes=32, solver__step=5e-4, output__sample_interval=5e-3, wheel__angular_speed=40.0,
         load__force=-1.0,
     )  # fmt: skip
-    warnings = " ".join(check(set_up(case)).warnings)
+    warnings = " ".join(check(system_of(case)).warnings)
     for words in (
         "steps per period",
         "steps per passing wave",
@@ -91,15 +94,15 @@ def test_check_warns_of_everything_that_is_not_resolved() -> None:
 
 
 def test_check_is_silent_about_a_case_that_is_resolved() -> None:
-    assert check(set_up(make(ROUGH, contact__nodes=None, output__sample_interval=2e-5))).warnings == ()
+    assert check(system_of(make(ROUGH, contact__nodes=None, output__sample_interval=2e-5))).warnings == ()
 
 
 def test_check_changes_the_step_and_the_duration_as_the_samples_need() -> None:
-    times = set_up(make(SQUEAL, solver__step=3e-5, solver__duration=0.10005)).timing
-    assert (times.per_sample, times.samples) == (4, 1001)
-    assert times.step == pytest.approx(2.5e-5, rel=1e-12)
-    assert len(times.adjustments) == 2
-    assert set_up(make(SQUEAL)).timing.adjustments == ()
+    system = system_of(make(SQUEAL, solver__step=3e-5, solver__duration=0.10005))
+    assert (system.per_sample, system.samples) == (4, 1001)
+    assert system.step == pytest.approx(2.5e-5, rel=1e-12)
+    assert len(adjustments(system)) == 2
+    assert adjustments(system_of(make(SQUEAL))) == []
 
 
 @pytest.mark.parametrize(
@@ -116,11 +119,11 @@ def test_check_changes_the_step_and_the_duration_as_the_samples_need() -> None:
 )
 def test_runs_beyond_a_limit_are_refused(changes: dict[str, object], words: str) -> None:
     case = make(SQUEAL, **{"output__sample_interval": 2e-3, **changes})
-    setup = set_up(case)
+    system = system_of(case)
     with pytest.raises(RefusedError, match=words):
-        refuse(setup, check(setup), 1e12)
+        refuse(system, check(system), 1e12)
 
 
 def test_memory_of_the_amplification_is_the_state() -> None:
-    setup = set_up(make(SQUEAL))
-    assert setup.scheme.MEMORY == (X, Y, VX, VY)
+    system = system_of(make(SQUEAL))
+    assert system.scheme.MEMORY == (X, Y, VX, VY)

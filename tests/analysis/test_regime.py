@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from brakecli.analysis.regime.of_run import context
 from brakecli.analysis.regime.rules import Context, Excitation, Regime, classify, forced_lines
-from brakecli.case.system import set_up
+from brakecli.case.system import system_of
 from brakecli.solver.history import ArrayHistory
 from brakecli.solver.quantities import HISTORY
 from tests.examples import COULOMB, ROUGH, SQUEAL, make, simulate
@@ -19,7 +19,7 @@ TIME = INTERVAL * np.arange(20000)
 
 def judged(case: Any) -> Any:
     result = simulate(case)
-    return classify(ArrayHistory(case.output.sample_interval, result.rows), context(set_up(case)))
+    return classify(ArrayHistory(case.output.sample_interval, result.rows), context(system_of(case)))
 
 
 def made(vx: NDArray[np.float64], state: float | NDArray[np.float64] = -1.0) -> ArrayHistory:

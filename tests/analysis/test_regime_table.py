@@ -10,7 +10,7 @@ from brakecli.analysis.regime.of_run import context
 from brakecli.analysis.regime.rules import Excitation, Regime, Verdict, classify
 from brakecli.analysis.stability.report import StabilityReport, stability
 from brakecli.case.case import Case
-from brakecli.case.system import set_up
+from brakecli.case.system import system_of
 from brakecli.solver.history import ArrayHistory
 from tests.campaign import counts
 from tests.examples import SQUEAL, make, simulate
@@ -52,7 +52,7 @@ def disturbed(report: StabilityReport, frequency: float, seconds: float) -> dict
 
 def judged(case: Case) -> Verdict:
     result = simulate(case)
-    return classify(ArrayHistory(case.output.sample_interval, result.rows), context(set_up(case)))
+    return classify(ArrayHistory(case.output.sample_interval, result.rows), context(system_of(case)))
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
@@ -61,7 +61,7 @@ def judged(case: Case) -> Verdict:
 def test_flat_shoes_ten_percent_off_their_critical_friction(
     kind: tuple[float, float, float], motion: str, mirrored: bool
 ) -> None:
-    flat = stability(set_up(shoe(kind)))
+    flat = stability(system_of(shoe(kind)))
     assert flat.critical is not None
     assert flat.equilibrium is not None
     # Growth is limited by stick where the velocity reaches U long before the amplitude reaches the compression
@@ -74,7 +74,7 @@ def test_flat_shoes_ten_percent_off_their_critical_friction(
         "wheel__angular_speed": sign * 2.0 * speed,
         "link2__angle_deg": sign * kind[0],
     }
-    report = stability(set_up(shoe(kind, **changes)))
+    report = stability(system_of(shoe(kind, **changes)))
     assert (report.modes[0].growth > 0.0) == (motion != "below")
     times = disturbed(report, flat.critical.frequency, 25.0 / abs(report.modes[0].growth))
     verdict = judged(shoe(kind, **changes, **times))
@@ -93,10 +93,10 @@ def test_roughness_below_the_critical_friction_forces_and_does_not_excite(
     kind: tuple[float, float, float], waves: dict[str, Any]
 ) -> None:
     changes: dict[str, Any] = {"roughness__wheel": waves, "wheel__angular_speed": 4.0}
-    report = stability(set_up(shoe(kind, **changes)))
+    report = stability(system_of(shoe(kind, **changes)))
     assert report.critical is not None
     changes["friction__coefficient"] = 0.85 * report.critical.friction
-    report = stability(set_up(shoe(kind, **changes)))
+    report = stability(system_of(shoe(kind, **changes)))
     times = disturbed(report, 180.0, 15.0 / abs(report.modes[0].growth))
     verdict = judged(shoe(kind, **changes, **times))
     assert (verdict.regime, verdict.excitation) == (Regime.DAMPED, Excitation.FORCED), verdict.reasons
@@ -105,7 +105,7 @@ def test_roughness_below_the_critical_friction_forces_and_does_not_excite(
 @pytest.mark.parametrize("kind", SHOES[:3])
 def test_without_friction_every_damped_shoe_is_damped(kind: tuple[float, float, float]) -> None:
     case = shoe(kind, friction__coefficient=0.0)
-    times = disturbed(stability(set_up(case)), 180.0, 2.0)
+    times = disturbed(stability(system_of(case)), 180.0, 2.0)
     assert judged(shoe(kind, friction__coefficient=0.0, **times)).regime is Regime.DAMPED
 
 
@@ -157,12 +157,12 @@ def test_random_shoes_are_never_judged_against_their_eigenvalues(shoes: int) -> 
     judgements: dict[tuple[bool, Regime], int] = {}
     while sum(judgements.values()) < shoes:
         tables = random_case(rng)
-        critical = stability(set_up(make(tables))).critical
+        critical = stability(system_of(make(tables))).critical
         if critical is not None and critical.friction < 3.0:
             tables["friction"] = {"coefficient": critical.friction * rng.uniform(0.6, 1.5)}
         elif rng.uniform() < 0.8:
             continue  # most random shoes never lose stability: a few of them are enough
-        report = stability(set_up(make(tables)))
+        report = stability(system_of(make(tables)))
         if report.equilibrium is None or report.equilibrium.normal_force <= 0.0:
             continue
         fast = max(mode.frequency for mode in report.modes)

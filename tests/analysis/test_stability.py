@@ -6,12 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brakecli.analysis.stability.discrete import natural_frequencies
 from brakecli.analysis.stability.modes import Instability, crossings, eigensystem, growth, modes
 from brakecli.analysis.stability.report import stability, step_limit, undamped_critical
-from brakecli.case.system import set_up
+from brakecli.case.system import system_of
 from brakecli.solver.compile import Coefficients
-from brakecli.solver.links import coefficients
+from brakecli.solver.links import coefficients, natural_frequencies
 from tests.campaign import counts
 from tests.examples import MODE_COUPLING, ROUGH, SQUEAL, make, simulate
 
@@ -41,7 +40,7 @@ def full_matrix(c: Coefficients, k: float, grip: float) -> Any:
 
 
 def test_minimal_model_loses_stability_at_three_quarters() -> None:
-    report = stability(set_up(make(MODE_COUPLING)))
+    report = stability(system_of(make(MODE_COUPLING)))
     assert report.critical is not None
     assert report.critical.friction == pytest.approx(0.75, abs=1e-12)
     assert report.critical.instability is Instability.FLUTTER
@@ -92,12 +91,12 @@ def test_every_crossing_of_random_damped_shoes_is_found(shoes: int) -> None:
 
 
 def test_growth_is_zero_at_a_crossing() -> None:
-    setup = set_up(make(SQUEAL))
-    crossing = crossings(setup.coefficients, setup.contact_stiffness, 1.0)[0]
+    system = system_of(make(SQUEAL))
+    crossing = crossings(system.coefficients, system.contact_stiffness, 1.0)[0]
     assert crossing.friction == pytest.approx(0.575, abs=5e-4)
-    rate = growth(setup.coefficients, setup.contact_stiffness, crossing.friction)
+    rate = growth(system.coefficients, system.contact_stiffness, crossing.friction)
     assert abs(rate) < 1e-8 * 2 * math.pi * crossing.frequency
-    values, _ = eigensystem(setup.coefficients, setup.contact_stiffness, crossing.friction)
+    values, _ = eigensystem(system.coefficients, system.contact_stiffness, crossing.friction)
     assert values[np.argmax(values.real)].imag / (2 * math.pi) == pytest.approx(
         math.copysign(crossing.frequency, values[np.argmax(values.real)].imag), rel=1e-9
     )
@@ -120,14 +119,14 @@ def test_least_critical_friction_lies_at_c2_equal_c1_plus_k(alpha: float, ratio:
 
 
 def test_decoupled_shoe_never_loses_stability() -> None:
-    report = stability(set_up(make(SQUEAL, link2__angle_deg=0.0)))
+    report = stability(system_of(make(SQUEAL, link2__angle_deg=0.0)))
     assert report.critical is None
     assert report.crossings == ()
     assert report.stable is True
 
 
 def test_positive_coupling_diverges_and_does_not_flutter() -> None:
-    report = stability(set_up(make(SQUEAL, link2__angle_deg=-5.0)))
+    report = stability(system_of(make(SQUEAL, link2__angle_deg=-5.0)))
     assert report.critical is not None
     assert report.critical.instability is Instability.DIVERGENCE
     assert report.undamped_flutter is None
@@ -136,9 +135,9 @@ def test_positive_coupling_diverges_and_does_not_flutter() -> None:
 
 @pytest.mark.parametrize("base", [SQUEAL, MODE_COUPLING])
 def test_wheel_turning_backwards_is_the_mirror_image(base: dict[str, Any]) -> None:
-    forwards = stability(set_up(make(base)))
+    forwards = stability(system_of(make(base)))
     angles = {f"{link}__angle_deg": -base[link].get("angle_deg", 0.0) for link in ("link1", "link2")}
-    backwards = stability(set_up(make(base, wheel__angular_speed=-base["wheel"]["angular_speed"], **angles)))
+    backwards = stability(system_of(make(base, wheel__angular_speed=-base["wheel"]["angular_speed"], **angles)))
     assert forwards.critical is not None
     assert backwards.critical is not None
     assert backwards.critical.friction == pytest.approx(forwards.critical.friction, rel=1e-12)
@@ -148,17 +147,17 @@ def test_wheel_turning_backwards_is_the_mirror_image(base: dict[str, Any]) -> No
 
 
 def test_a_standing_wheel_has_no_critical_friction() -> None:
-    report = stability(set_up(make(SQUEAL, wheel__angular_speed=0.0)))
+    report = stability(system_of(make(SQUEAL, wheel__angular_speed=0.0)))
     assert report.critical is None
     assert report.discrete is None
 
 
 def test_a_shoe_that_clears_the_wheel_says_so() -> None:
-    lifted = stability(set_up(make(SQUEAL, load__force=-1.0)))
+    lifted = stability(system_of(make(SQUEAL, load__force=-1.0)))
     assert lifted.equilibrium is not None
     assert lifted.equilibrium.contact_fraction == 0.0
     assert lifted.critical is None
-    free = stability(set_up(make(SQUEAL, load__force=-1.0, link1__stiffness=0.0, link2__angle_deg=0.0)))
+    free = stability(system_of(make(SQUEAL, load__force=-1.0, link1__stiffness=0.0, link2__angle_deg=0.0)))
     assert free.equilibrium is None
     assert "lifts the shoe" in str(free.no_equilibrium)
     assert free.stable is None
@@ -166,7 +165,7 @@ def test_a_shoe_that_clears_the_wheel_says_so() -> None:
 
 @pytest.mark.parametrize(("theta", "critical"), [((1.0, 1.0), 0.8115), ((0.5, 0.5), 0.75)])
 def test_weights_move_the_critical_friction_as_published(theta: tuple[float, float], critical: float) -> None:
-    report = stability(set_up(make(MODE_COUPLING, solver__theta=theta, solver__step=0.1)))
+    report = stability(system_of(make(MODE_COUPLING, solver__theta=theta, solver__step=0.1)))
     assert report.discrete is not None
     assert report.discrete.critical_friction == pytest.approx(critical, abs=5e-5)
     assert report.discrete.bias == pytest.approx(critical - 0.75, abs=5e-5)
@@ -186,7 +185,7 @@ def test_weights_move_the_critical_friction_as_published(theta: tuple[float, flo
 def test_limits_of_stability_are_those_of_theory(
     scheme: str, theta: tuple[float, ...], limit: float | None
 ) -> None:
-    report = stability(set_up(make(MODE_COUPLING, solver__scheme=scheme, solver__theta=theta)))
+    report = stability(system_of(make(MODE_COUPLING, solver__scheme=scheme, solver__theta=theta)))
     assert report.discrete is not None
     step = report.discrete.step_limit
     assert (step is None) == (limit is None)
@@ -205,9 +204,9 @@ def test_limits_of_stability_are_those_of_theory(
 def test_no_limit_is_seen_in_the_rounding_of_a_contact_that_is_all_but_rigid(
     scheme: str, theta: tuple[float, ...], limit: float | None
 ) -> None:
-    setup = set_up(make(SQUEAL, contact__stiffness=1e16, solver__scheme=scheme, solver__theta=list(theta)))
-    found = step_limit(setup, lambda friction: setup.contact_stiffness)
-    omega = 2.0 * math.pi * natural_frequencies(setup.coefficients, setup.contact_stiffness)[1]
+    system = system_of(make(SQUEAL, contact__stiffness=1e16, solver__scheme=scheme, solver__theta=list(theta)))
+    found = step_limit(system, lambda friction: system.contact_stiffness)
+    omega = 2.0 * math.pi * natural_frequencies(system.coefficients, system.contact_stiffness)[1]
     assert found == (limit if limit is None else pytest.approx(limit / omega, rel=1e-4))
 
 
@@ -217,7 +216,7 @@ def test_discrete_growth_is_that_of_a_run_with_the_same_step(scheme: str, theta:
         MODE_COUPLING, solver__scheme=scheme, solver__theta=theta, solver__step=0.02, solver__duration=80.0,
         initial__x=1e-7,
     )  # fmt: skip
-    report = stability(set_up(case))
+    report = stability(system_of(case))
     assert report.discrete is not None
     late = simulate(case).vx[-2000:]
     recurrence = np.linalg.lstsq(np.column_stack([late[1:-1], late[:-2]]), late[2:], rcond=None)[0]
@@ -226,17 +225,17 @@ def test_discrete_growth_is_that_of_a_run_with_the_same_step(scheme: str, theta:
 
 def test_roughness_in_full_contact_does_not_move_the_critical_friction() -> None:
     rough = {"roughness__wheel": {"amplitudes": [1e-5], "wavelengths": [0.03]}}
-    flat, touching = stability(set_up(make(SQUEAL))), stability(set_up(make(SQUEAL, **rough)))
+    flat, touching = stability(system_of(make(SQUEAL))), stability(system_of(make(SQUEAL, **rough)))
     assert flat.critical is not None
     assert touching.critical is not None
     assert touching.critical.friction == pytest.approx(flat.critical.friction, abs=1e-9)
 
 
 def test_roughness_that_opens_the_pad_softens_the_contact() -> None:
-    report = stability(set_up(make(ROUGH)))
+    report = stability(system_of(make(ROUGH)))
     assert report.equilibrium is not None
     assert 0.5 < report.equilibrium.contact_fraction < 0.95
-    full = set_up(make(ROUGH)).contact_stiffness
+    full = system_of(make(ROUGH)).contact_stiffness
     assert report.contact_stiffness == pytest.approx(report.equilibrium.contact_fraction * full, rel=1e-9)
 
 
@@ -245,9 +244,8 @@ def test_mean_stiffness_is_the_slope_of_the_mean_force() -> None:
 
     from brakecli.solver.steady_sliding import mean_contact, tabulated
 
-    setup = set_up(make(ROUGH))
-    mean = partial(mean_contact, setup.evaluate, setup.pad, setup.wheel)
-    table = tabulated(mean, setup.pad)
+    system = system_of(make(ROUGH))
+    mean, table = partial(mean_contact, system), tabulated(system)
     tried = 0
     for y in (-1e-4, -3e-5, 1e-5, 6e-5):
         # Over 1024 places of 256 nodes each, kinks in steps of 1e-8 m average out to a relative 1e-3.

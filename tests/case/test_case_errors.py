@@ -15,10 +15,11 @@ from hypothesis import strategies as st
 
 from brakecli.case.case import Case
 from brakecli.case.read import parse_case, read_case
-from brakecli.case.system import timing
+from brakecli.case.system import system_of
 from brakecli.case.toml_lines import LARGEST_TEXT, MOST_MARKS, MOST_PARTS, MOST_STATEMENTS, Located, split
 from brakecli.case.wording import tables
 from brakecli.errors import CaseError, Problem
+from brakecli.runs.limits import adjustments
 
 CONSTANT = """\
 title = "constant wheel and load"
@@ -355,12 +356,12 @@ def test_a_step_chooses_two_layer_and_none_leaves_the_choice() -> None:
 
 def test_nodes_are_chosen_by_the_tolerance() -> None:
     case = parse_case(CONSTANT, "case.toml", ["solver={duration=1.0, tolerance=1e-4}"]).case
-    assert "contact.nodes: not used, the tolerance chooses nodes itself" in timing(case).adjustments
+    assert "contact.nodes: not used, the tolerance chooses nodes itself" in adjustments(system_of(case))
 
 
 def test_event_driven_takes_the_step_of_a_case_for_its_samples_alone() -> None:
     case = parse_case(CONSTANT, "case.toml", ['solver.scheme="event-driven"', "solver.theta=[]"]).case
-    (told_,) = timing(case).adjustments
+    (told_,) = adjustments(system_of(case))
     assert "solver.step: not used, event-driven finds its steps itself, to a tolerance of 1e-10" in told_
 
 

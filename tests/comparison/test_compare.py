@@ -14,18 +14,17 @@ from numpy.typing import NDArray
 from brakecli.analysis.stability.report import stability
 from brakecli.case.case import Case
 from brakecli.case.read import read_case
-from brakecli.case.system import set_up
+from brakecli.case.system import system_of
 from brakecli.cli.tables import comparison_table
 from brakecli.comparison.compare import Comparison, Entry, compare
 from brakecli.comparison.deviation import errors
 from brakecli.comparison.methods import (
     COARSEST,
-    NUMEROV,
-    QUARTERS,
     RUNGS,
     TOLERANCES,
+    kinds,
     ladder,
-    methods,
+    method_label,
     parse_schemes,
     parse_steps,
     rungs,
@@ -33,7 +32,7 @@ from brakecli.comparison.methods import (
 from brakecli.comparison.result import ComparisonReport
 from brakecli.errors import UsageError
 from brakecli.solver.quantities import HISTORY
-from brakecli.solver.schemes import load
+from brakecli.solver.schemes import NUMEROV, QUARTERS, load
 from tests.commands import ROOT, TINY, attributes, brakecli, left_in
 from tests.examples import MODE_COUPLING, ROUGH, SQUEAL, make
 
@@ -52,13 +51,13 @@ def smooth(friction: float = 0.5, **changes: Any) -> Case:
 
 @cache
 def smooth_comparison() -> Comparison:
-    return compare(smooth(), steps=STEPS, budget=60.0)
+    return compare(system_of(smooth()), steps=STEPS, budget=60.0)
 
 
 @cache
 def rough_comparison() -> Comparison:
     case = make(ROUGH, solver__duration=0.004, contact__nodes=64)
-    return compare(case, schemes=["two-layer"], steps=[2e-5, 5e-6], budget=60.0)
+    return compare(system_of(case), schemes=["two-layer"], steps=[2e-5, 5e-6], budget=60.0)
 
 
 def entries_of(found: Comparison, scheme: str, theta: tuple[float, ...], **fields: str) -> list[Entry]:
@@ -66,8 +65,8 @@ def entries_of(found: Comparison, scheme: str, theta: tuple[float, ...], **field
     return [
         entry
         for entry in found.entries
-        if (entry.rung.method.scheme, entry.rung.method.theta) == (scheme, theta)
-        and all(getattr(entry.rung.method, name) == value for name, value in wanted.items())
+        if (entry.rung.kind.scheme, entry.rung.kind.theta) == (scheme, theta)
+        and all(getattr(entry.rung.kind, name) == value for name, value in wanted.items())
     ]
 
 
@@ -118,10 +117,10 @@ def test_a_motion_without_a_line_has_neither_amplitude_nor_phase() -> None:
 
 
 def test_every_method_of_a_case_is_told_apart_by_its_label() -> None:
-    for base, kinds in ((SQUEAL, 11), (ROUGH, 16)):
-        found = methods(set_up(make(base)))
-        assert len({method.label() for method in found}) == len(found) == kinds
-    labels = {method.label() for method in found}
+    for base, count in ((SQUEAL, 11), (ROUGH, 16)):
+        found = kinds(system_of(make(base)))
+        assert len({method_label(method) for method in found}) == len(found) == count
+    labels = {method_label(method) for method in found}
     assert {
         "two-layer (1/2, 1/2)",
         "three-layer (1/12, 10/12, 1/12), paper's start",
@@ -133,36 +132,36 @@ def test_every_method_of_a_case_is_told_apart_by_its_label() -> None:
 
 
 def test_a_start_that_moves_leaves_out_the_papers_start_which_is_one_from_rest() -> None:
-    moving = methods(set_up(make(SQUEAL, initial__vx=0.01)))
+    moving = kinds(system_of(make(SQUEAL, initial__vx=0.01)))
     assert len(moving) == 8
     assert {method.start for method in moving} == {"consistent"}
 
 
 def test_the_ladder_halves_from_a_step_that_resolves_the_fastest_motion() -> None:
     slow = make(SQUEAL)
-    steps = ladder(set_up(slow))
+    steps = ladder(system_of(slow))
     assert len(steps) == RUNGS
     assert [steps[0] / step for step in steps] == [2.0**rung for rung in range(RUNGS)]
     frequency = math.sqrt(max(np.linalg.eigvalsh(stiffness(slow)))) / (2.0 * math.pi)
     assert steps[0] == pytest.approx(1.0 / (COARSEST * frequency), rel=1e-9)
     turning = {"wheel__angular_speed": None, "wheel__times": [0.0, 1.0], "wheel__angular_speeds": [0.0, 100.0]}
-    waves = ladder(set_up(make(ROUGH, **turning)))  # 50 m/s at last, over waves of 4 mm
+    waves = ladder(system_of(make(ROUGH, **turning)))  # 50 m/s at last, over waves of 4 mm
     assert waves[0] == pytest.approx(0.004 / (COARSEST * 50.0), rel=1e-9)
-    assert ladder(set_up(slow), [1e-6, 4e-6, 2e-6]) == [4e-6, 2e-6, 1e-6]
+    assert ladder(system_of(slow), [1e-6, 4e-6, 2e-6]) == [4e-6, 2e-6, 1e-6]
 
 
 def stiffness(case: Case) -> NDArray[np.float64]:
     """Stiffness over mass of the shoe on links and contact, (6)-(7)."""
-    c = set_up(case).coefficients
+    c = system_of(case).coefficients
     contact = 2.0 * case.contact.half_length * case.contact.stiffness
     return np.array([[c.c_xx, c.c_xy], [c.c_xy, c.c_yy + contact]]) / c.m
 
 
 def test_a_scheme_with_steps_of_its_own_climbs_tolerances() -> None:
-    own = methods(set_up(make(SQUEAL)), ["event-driven"])
+    own = kinds(system_of(make(SQUEAL)), ["event-driven"])
     assert len(own) == 1
     assert [(rung.step, rung.tolerance) for rung in rungs(own[0], [1e-5])] == [(None, e) for e in TOLERANCES]
-    two = methods(set_up(make(SQUEAL)), ["two-layer"])[0]
+    two = kinds(system_of(make(SQUEAL)), ["two-layer"])[0]
     assert [(rung.step, rung.tolerance) for rung in rungs(two, [2e-5, 1e-5])] == [(2e-5, None), (1e-5, None)]
 
 
@@ -181,18 +180,18 @@ def test_steps_that_make_no_ladder_are_refused(text: str) -> None:
 
 def test_observed_orders_are_those_that_the_schemes_declare() -> None:
     found, checked = smooth_comparison(), 0
-    for method in dict.fromkeys(entry.rung.method for entry in found.entries):
+    for method in dict.fromkeys(entry.rung.kind for entry in found.entries):
         if method.scheme == "event-driven":
             continue
-        steps = [entry for entry in found.entries if entry.rung.method == method]
-        setup = set_up(smooth(solver__scheme=method.scheme, solver__theta=method.theta))
-        declared = load(method.scheme).order(setup.weights, method.start)
+        steps = [entry for entry in found.entries if entry.rung.kind == method]
+        system = system_of(smooth(solver__scheme=method.scheme, solver__theta=method.theta))
+        declared = load(method.scheme).order(system.weights, method.start)
         assert len(steps) == len(STEPS)
         assert steps[0].order is None
         for entry in steps[-2:]:
             assert entry.errors is not None, entry.failure
             assert entry.errors.error > 10.0 * found.reference_error
-            assert entry.order == pytest.approx(declared, abs=0.15), (method.label(), entry.rung.step)
+            assert entry.order == pytest.approx(declared, abs=0.15), (method_label(method), entry.rung.step)
             checked += 1
     assert checked == 20
 
@@ -221,7 +220,7 @@ def test_step_limits_and_biases_are_those_of_stability() -> None:
         for entry in entries_of(smooth_comparison(), scheme, theta):
             step = entry.rung.step
             case = smooth(solver__scheme=scheme, solver__theta=theta, solver__step=step)
-            known = stability(set_up(case)).discrete
+            known = stability(system_of(case)).discrete
             assert known is not None
             assert entry.critical_bias == pytest.approx(known.bias, abs=1e-11)
             assert entry.step_limit == (math.inf if known.step_limit is None else known.step_limit)
@@ -239,9 +238,9 @@ def test_the_bias_of_weights_of_one_is_as_published() -> None:
 def test_on_rough_surfaces_the_bias_is_that_of_stability_too() -> None:
     path, solver = str(ROOT / "cases" / "accuracy" / "C.toml"), ["solver.theta=[1.0, 1.0]", "solver.duration=1e-3"]
     case = read_case(path, [*solver, "solver.step=2e-5", "output.sample_interval=2e-5"]).case
-    found = compare(case, schemes=["two-layer"], steps=[2e-5], budget=1.0)
+    found = compare(system_of(case), schemes=["two-layer"], steps=[2e-5], budget=1.0)
     (entry,) = entries_of(found, "two-layer", (1.0, 1.0))
-    known = stability(set_up(case)).discrete
+    known = stability(system_of(case)).discrete
     assert known is not None
     assert known.bias is not None
     assert abs(known.bias) > 1e-3
@@ -250,7 +249,7 @@ def test_on_rough_surfaces_the_bias_is_that_of_stability_too() -> None:
 
 def test_a_step_above_the_limit_of_numerovs_weights_has_no_result() -> None:
     limit = math.sqrt(6.0 / 3.0)  # ωh < √6, and ω² = 3
-    found = compare(smooth(), schemes=["three-layer"], steps=[1.5, 0.5], budget=30.0)
+    found = compare(system_of(smooth()), schemes=["three-layer"], steps=[1.5, 0.5], budget=30.0)
     above, below = entries_of(found, "three-layer", NUMEROV)
     for entry in (above, below):
         assert entry.step_limit == pytest.approx(limit, rel=1e-5)
@@ -314,12 +313,12 @@ def test_nothing_is_recommended_where_nothing_meets_the_target() -> None:
 
 def test_every_evaluator_appears_on_rough_surfaces_and_nodes_lower_the_error() -> None:
     found = rough_comparison()
-    kinds = {entry.rung.method.evaluator for entry in found.entries}
-    assert {str(kind) for kind in kinds} == {"auto", "midpoint", "exact"}
+    evaluators = {entry.rung.kind.evaluator for entry in found.entries}
+    assert {str(kind) for kind in evaluators} == {"auto", "midpoint", "exact"}
     sizes = {
-        (str(entry.rung.method.evaluator), entry.rung.method.nodes): entry.errors.error
+        (str(entry.rung.kind.evaluator), entry.rung.kind.nodes): entry.errors.error
         for entry in found.entries
-        if entry.errors is not None and entry.rung.step == 5e-6 and entry.rung.method.theta == (0.5, 0.5)
+        if entry.errors is not None and entry.rung.step == 5e-6 and entry.rung.kind.theta == (0.5, 0.5)
     }
     nodes = [sizes["midpoint", count] for count in (16, 32, 128, 256)]
     assert nodes == sorted(nodes, reverse=True)
@@ -330,7 +329,7 @@ def test_every_evaluator_appears_on_rough_surfaces_and_nodes_lower_the_error() -
 
 def test_what_the_budget_does_not_allow_is_left_out_and_named() -> None:
     case = make(ROUGH, solver__duration=2.0)
-    found = compare(case, schemes=["two-layer"], steps=[1e-4, 5e-7], budget=1.0)
+    found = compare(system_of(case), schemes=["two-layer"], steps=[1e-4, 5e-7], budget=1.0)
     assert found.duration < 0.5 * case.solver.duration
     assert found.left_out > 0
     missing = [entry for entry in found.entries if "left out" in entry.failure]
@@ -387,7 +386,7 @@ def test_options_and_outputs_that_cannot_be_are_refused_before_anything_is_compu
 @pytest.mark.parametrize("path", sorted((ROOT / "cases" / "accuracy").glob("*.toml")), ids=lambda path: path.stem)
 def test_every_case_of_the_documentation_on_accuracy_is_valid(path: Path) -> None:
     case = read_case(str(path)).case
-    setup = set_up(case)
+    system = system_of(case)
     assert case.title.startswith(f"Accuracy, case {path.stem}")
-    assert setup.smooth == (path.stem == "S")
-    assert setup.nodes in (0, 256)
+    assert system.smooth == (path.stem == "S")
+    assert system.nodes in (0, 256)

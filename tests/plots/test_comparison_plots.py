@@ -11,8 +11,10 @@ from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from brakecli.case.read import parse_case
+from brakecli.case.system import system_of
 from brakecli.comparison import result as comparison_result
 from brakecli.comparison.compare import compare
+from brakecli.comparison.methods import method_label
 from brakecli.comparison.result import ComparisonReport
 from brakecli.errors import UnreadableResultError, UsageError
 from brakecli.files.write import FILL, new_result, open_result
@@ -200,13 +202,15 @@ def test_where_nothing_meets_the_target_the_picture_says_so(tmp_path: Path) -> N
 
 def test_a_computed_comparison_is_drawn_with_its_own_numbers(tmp_path: Path) -> None:
     loaded = parse_case(TINY, "tiny")
-    found = compare(loaded.case, schemes=["three-layer", "event-driven"], steps=[4e-5, 2e-5], budget=2.0)
+    found = compare(
+        system_of(loaded.case), schemes=["three-layer", "event-driven"], steps=[4e-5, 2e-5], budget=2.0
+    )
     report = ComparisonReport(tmp_path / "r.h5", "Tiny", found, 1e-2)
     comparison_result.write(report.output, loaded, report, force=False)
     figure = drawn(report.output)
     assert figure.texts[0].get_text() == "Tiny"
-    for label in {entry.rung.method.label() for entry in found.entries}:
-        sizes = [e.errors.error for e in found.entries if e.errors and e.rung.method.label() == label]
+    for label in {method_label(entry.rung.kind) for entry in found.entries}:
+        sizes = [e.errors.error for e in found.entries if e.errors and method_label(e.rung.kind) == label]
         assert len(sizes) >= 2
         np.testing.assert_allclose(line(figure.axes[1], label).get_ydata(), sizes, rtol=1e-12)
 

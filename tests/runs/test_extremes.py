@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from brakecli.case.system import set_up
+from brakecli.case.system import system_of
 from brakecli.runs.limits import check
 from tests.examples import SQUEAL, make
 
@@ -84,22 +84,22 @@ def test_hours_leave_the_phases_of_the_wheel_where_they_belong() -> None:
 def test_the_damping_of_a_scheme_itself_is_told() -> None:
     # Implicit Euler takes (1 + (ωh)²)^(-1/2) of a vibration in each step.
     case = make(SQUEAL, solver__theta=(1.0, 1.0), link2__angle_deg=0.0, contact__stiffness=4e7)
-    setup = set_up(case)
+    system = system_of(case)
     omega_h = (1.4e7 / 10.0) ** 0.5 * 1e-5
-    taken = 100.0 * (1.0 - (1.0 + omega_h**2) ** (-0.5 * setup.timing.steps))
-    (warning,) = check(setup).warnings
+    taken = 100.0 * (1.0 - (1.0 + omega_h**2) ** (-0.5 * system.steps))
+    (warning,) = check(system).warnings
     assert warning.startswith("solver.theta: with these weights the scheme itself damps")
     assert f"it takes {taken:.3g} % of" in warning
     for theta in ((0.5, 0.5), (1.0, 0.0)):
-        assert check(set_up(make(SQUEAL, solver__theta=theta))).warnings == ()
+        assert check(system_of(make(SQUEAL, solver__theta=theta))).warnings == ()
     event = make(SQUEAL, solver__scheme="event-driven", solver__step=None, solver__tolerance=1e-6)
-    assert check(set_up(event)).warnings == ()
+    assert check(system_of(event)).warnings == ()
 
 
 def test_dashpots_that_a_step_does_not_resolve_are_told() -> None:
     # b/m of the stronger dashpot is 1e6 1/s: in steps of 1e-5 s ten of its time constants pass.
-    found = check(set_up(make(SQUEAL, link1__damping=1e7)))
+    found = check(system_of(make(SQUEAL, link1__damping=1e7)))
     assert any(
         "the dashpots settle a motion at a rate of 1e+06 1/s: it is not resolved" in w for w in found.warnings
     )
-    assert check(set_up(make(SQUEAL, link1__damping=1e4))).warnings == ()
+    assert check(system_of(make(SQUEAL, link1__damping=1e4))).warnings == ()

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
-from brakecli.case.system import Setup
+from brakecli.solver.system import System
 
 Vector = NDArray[np.float64]
 
@@ -19,9 +19,9 @@ Vector = NDArray[np.float64]
 class PiecewiseExact:
     """Exact motion (x, y, vx, vy) of a flat case with constant speed and load."""
 
-    def __init__(self, setup: Setup, grid: float) -> None:
-        c, q = setup.coefficients, float(setup.load.values[0])
-        self.belt, self.phi, self.stiffness = setup.belt_speed, c.phi, setup.contact_stiffness
+    def __init__(self, system: System, grid: float) -> None:
+        c, q = system.coefficients, float(system.load.values[0])
+        self.belt, self.phi, self.stiffness = system.belt_speed, c.phi, system.contact_stiffness
         self.c = c
         self.q_x, self.q_y = q * c.sin_beta, q * c.cos_beta
         self.grid = grid

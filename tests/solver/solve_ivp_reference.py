@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from brakecli.case.system import Setup
 from brakecli.solver import contact
 from brakecli.solver.compile import NORMAL_FORCE
 from brakecli.solver.contact.pad import build_contact
+from brakecli.solver.system import System
 
 Vector = NDArray[np.float64]
 
@@ -23,17 +23,17 @@ Vector = NDArray[np.float64]
 class SolveIvp:
     """The motion (x, y, vx, vy) of a case, phase by phase: slip either way, or stick."""
 
-    def __init__(self, setup: Setup, relative: float, max_step: float) -> None:
-        self.setup, self.relative, self.max_step = setup, relative, max_step
-        self.c, self.belt, self.q = setup.coefficients, setup.belt_speed, float(setup.load.values[0])
-        self.evaluate, self.pad, self.filled = contact.load("exact"), setup.pad, build_contact(setup.pad)
+    def __init__(self, system: System, relative: float, max_step: float) -> None:
+        self.system, self.relative, self.max_step = system, relative, max_step
+        self.c, self.belt, self.q = system.coefficients, system.belt_speed, float(system.load.values[0])
+        self.evaluate, self.pad, self.filled = contact.load("exact"), system.pad, build_contact(system.pad)
         self.visited: list[int] = []
         self.evaluations = 0
 
     def normal(self, t: float, z: Vector) -> float:
         """F_y."""
         self.evaluations += 1
-        wheel = self.setup.wheel
+        wheel = self.system.wheel
         angles = wheel.phase - wheel.omega * (self.belt * t)
         self.evaluate(z[0], z[1], angles, self.pad, self.filled)
         return float(self.filled[NORMAL_FORCE])

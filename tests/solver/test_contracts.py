@@ -39,7 +39,7 @@ from brakecli.solver.roughness import surface
 
 EVALUATORS = sorted(module.name for module in pkgutil.iter_modules(contact.__path__) if module.name != "pad")
 SCHEMES = sorted(module.name for module in pkgutil.iter_modules(schemes.__path__))
-STEPPING = [name for name in SCHEMES if not schemes.has_own_steps(schemes.load(name.replace("_", "-")))]
+STEPPING = [name for name in SCHEMES if not schemes.SCHEMES[name.replace("_", "-")].own_steps]
 WEIGHTS: dict[int, list[tuple[float, ...]]] = {
     0: [(), (), ()],
     2: [(0.5, 0.5), (1.0, 1.0), (1.0, 0.5)],
@@ -81,7 +81,7 @@ def test_an_evaluator_fills_its_results_and_leaves_everything_else(name: str) ->
         assert filled[NORMAL_FORCE] >= 0.0
         assert filled[STIFFNESS] >= 0.0
         assert 0.0 <= filled[FRACTION] <= 1.0
-        assert contact.KINDS[int(filled[KIND])]
+        assert contact.kinds()[int(filled[KIND])]
         assert filled[VALID] in (0.0, 1.0)
         if filled[VALID] == 1.0:
             assert filled[NORMAL_FORCE] == 0.0 or filled[FRACTION] > 0.0
@@ -90,7 +90,7 @@ def test_an_evaluator_fills_its_results_and_leaves_everything_else(name: str) ->
         np.testing.assert_array_equal(pad, given[0])
         np.testing.assert_array_equal(angles, given[1])
         valid += filled[VALID] == 1.0
-        kinds.add(contact.KINDS[int(filled[KIND])])
+        kinds.add(contact.kinds()[int(filled[KIND])])
     assert valid > 50
     assert kinds <= {name.replace("_", "-")} if name != "auto" else kinds == {"closed-form", "midpoint"}
 

@@ -5,10 +5,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brakecli.case.system import set_up
+from brakecli.case.system import system_of
 from brakecli.solver import loop as integrate
 from brakecli.solver.compile import A_11, A_12, BELT, F_Y, G_1, D, E
-from brakecli.solver.motion import Motion
+from brakecli.solver.motion import Stepping
 from tests.examples import MODE_COUPLING, ROUGH, SQUEAL, make, simulate
 
 SCHEMES = [
@@ -95,10 +95,10 @@ def test_friction_never_feeds_energy_in_the_frame_of_the_wheel(
 ) -> None:
     base: dict[str, Any] = SQUEAL if flat else {**ROUGH, "wheel": {"radius": 0.5, "angular_speed": 0.1}}
     case = make(base, solver__scheme=scheme, solver__theta=theta, friction__coefficient=0.8, solver__step=2e-5)
-    motion = Motion(set_up(case))
+    motion = Stepping(system_of(case))
     slips, sticks = 0, 0
     for _ in range(1500):
-        motion._block(int(motion.counts[integrate.LEVEL]) + 1)
+        motion.block(int(motion.counts[integrate.LEVEL]) + 1)
         p = motion.problem
         friction = p[A_11] * p[D] + p[A_12] * p[E] - p[G_1]
         sliding = p[D] - p[BELT]

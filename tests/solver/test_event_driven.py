@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from brakecli.analysis.stability.report import stability
 from brakecli.case.case import Case
-from brakecli.case.system import set_up
+from brakecli.case.system import system_of
 from brakecli.runs.limits import check
 from brakecli.solver.compile import X
-from brakecli.solver.motion import Motion
+from brakecli.solver.motion import Stepping
 from brakecli.solver.quantities import ContactState, Failure
 from brakecli.solver.schemes.event_driven.dop853 import DENSE, END_STAGE, FIFTH, NODES, THIRD, A
 from brakecli.solver.schemes.event_driven.phases import EVENTS, EVENTS_TIME, SWITCHES
@@ -82,7 +82,7 @@ def test_flat_motions_are_exact_through_stick_and_lift_off() -> None:
         assert result.work.failure is Failure.NONE
         if amplification(case, result.rows) > 1e4:
             continue
-        reference = PiecewiseExact(set_up(Case.model_validate(case)), 0.05 / omega)
+        reference = PiecewiseExact(system_of(Case.model_validate(case)), 0.05 / omega)
         start = result.rows[0, :4]
         exact = reference.run(start, *reference.first_phase(start), samples=len(result.rows) - 1, per_sample=2)
         assert error(result.rows, exact) < 1e-10
@@ -103,7 +103,7 @@ def test_overcritical_dashpots_leave_the_tolerance_between_steps() -> None:
         for link in ("link1", "link2"):
             case[link]["damping"] = case["shoe"]["mass"] * omega * 10 ** rng.uniform(0.3, 1.7)
         result = simulate(Case.model_validate(case))
-        reference = PiecewiseExact(set_up(Case.model_validate(case)), 0.005 / omega)
+        reference = PiecewiseExact(system_of(Case.model_validate(case)), 0.005 / omega)
         start = result.rows[0, :4]
         exact = reference.run(start, *reference.first_phase(start), samples=len(result.rows) - 1, per_sample=20)
         assert error(result.rows, exact) < 1e-10
@@ -138,7 +138,7 @@ def test_rough_motions_agree_with_an_independent_solver() -> None:
         result = simulate(Case.model_validate(case))
         assert result.work.failure is Failure.NONE
         assert amplification(case, result.rows) < 1e4
-        reference = SolveIvp(set_up(Case.model_validate(case)), 1e-13, 0.003 / omega)
+        reference = SolveIvp(system_of(Case.model_validate(case)), 1e-13, 0.003 / omega)
         exact = reference.run(result.rows[0, :4], result.time)
         assert error(result.rows, exact) < 1e-9
         seen |= set(result.state)
@@ -160,7 +160,7 @@ def test_the_error_falls_with_the_tolerance() -> None:
             case["solver"]["tolerance"] = float(tolerance)
             result = simulate(Case.model_validate(case))
             if index == 0:
-                reference = PiecewiseExact(set_up(Case.model_validate(case)), 0.05 / omega)
+                reference = PiecewiseExact(system_of(Case.model_validate(case)), 0.05 / omega)
                 start = result.rows[0, :4]
                 phase = reference.first_phase(start)
                 exact = reference.run(start, *phase, samples=len(result.rows) - 1, per_sample=2)
@@ -289,8 +289,8 @@ def test_knots_of_the_schedules_end_a_step() -> None:
 
 def test_a_run_may_be_cut_into_blocks_anywhere() -> None:
     whole = simulate(event_driven(SQUEAL, solver__duration=0.02))
-    motion = Motion(set_up(event_driven(SQUEAL, solver__duration=0.02)))
-    rows = [motion._block(stop) for stop in range(1, motion.setup.timing.steps + 1)]
+    motion = Stepping(system_of(event_driven(SQUEAL, solver__duration=0.02)))
+    rows = [motion.block(stop) for stop in range(1, motion.system.steps + 1)]
     np.testing.assert_array_equal(np.concatenate(rows), whole.rows[:-1])
 
 
@@ -360,7 +360,7 @@ def test_rest_on_the_border_of_the_friction_cone_ends() -> None:
 
 
 def test_steps_that_shrink_to_nothing_are_a_failure_with_a_name() -> None:
-    motion = Motion(set_up(event_driven(SQUEAL)))
+    motion = Stepping(system_of(event_driven(SQUEAL)))
     motion.state[X] = math.nan  # no step from here has a known error
     work, _ = motion.run(lambda rows: None)
     assert work.failure is Failure.STALLED
@@ -368,7 +368,7 @@ def test_steps_that_shrink_to_nothing_are_a_failure_with_a_name() -> None:
 
 
 def test_events_without_progress_are_a_failure_with_a_name() -> None:
-    motion = Motion(set_up(event_driven(SQUEAL)))
+    motion = Stepping(system_of(event_driven(SQUEAL)))
     motion.state[[EVENTS, EVENTS_TIME]] = 1000.0, 1e9  # as if 1000 of them had come, and no time gone by
     work, _ = motion.run(lambda rows: None)
     assert work.failure is Failure.STALLED
@@ -379,7 +379,7 @@ def test_phases_that_end_at_once_are_a_failure_with_a_name() -> None:
     # At rest on a wheel at rest, as the load comes on: the coupling pulls harder than friction holds from 0 on.
     case = event_driven(SQUEAL, wheel__angular_speed=0.0, friction__coefficient=0.1)
     assert simulate(case).work.failure is Failure.NONE
-    motion = Motion(set_up(case))
+    motion = Stepping(system_of(case))
     motion.state[SWITCHES] = 60.0
     work, _ = motion.run(lambda rows: None)
     assert work.failure is Failure.STALLED
@@ -392,15 +392,15 @@ def test_closed_form_that_does_not_hold_is_a_failure() -> None:
 
 
 def test_no_step_limits_or_biases_the_scheme() -> None:
-    setup = set_up(event_driven(SQUEAL))
-    report = stability(setup)
+    system = system_of(event_driven(SQUEAL))
+    report = stability(system)
     assert report.critical is not None
     assert report.discrete is not None
     assert report.discrete.step_limit is None
     assert report.discrete.bias == 0.0
     assert report.discrete.critical_friction == report.critical.friction
     assert report.discrete.growth == max(value.real for value in report.eigenvalues)
-    found = check(setup)
+    found = check(system)
     assert found.step is None
     assert found.limits.growth == 1.0
     assert found.warnings == ()

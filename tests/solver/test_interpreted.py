@@ -53,15 +53,14 @@ def case(scheme: str, evaluator: str) -> dict[str, Any]:
 def histories() -> dict[str, NDArray[np.float64]]:
     """The samples of every scheme with every evaluator, and the evaluations that they took."""
     from brakecli.case.case import Case
-    from brakecli.case.system import set_up
-    from brakecli.solver.motion import Motion
+    from brakecli.case.system import system_of
+    from brakecli.solver.motion import solve
 
     found = {}
     for scheme, evaluator in PAIRS:
-        blocks: list[NDArray[np.float64]] = []
-        work, _ = Motion(set_up(Case.model_validate(case(scheme, evaluator)))).run(blocks.append)
-        name = f"{scheme} {evaluator}"
-        found[name] = np.concatenate(blocks)
+        motion = solve(system_of(Case.model_validate(case(scheme, evaluator))))
+        work, name = motion.work, f"{scheme} {evaluator}"
+        found[name] = motion.rows
         found[f"{name} work"] = np.array([float(work.failure), work.steps, work.contact_evaluations])
     return found
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from brakecli.analysis.stability.discrete import step_limits
-from brakecli.case.system import set_up
+from brakecli.case.system import system_of
 from brakecli.solver import motion as simulation
-from brakecli.solver.motion import Motion
+from brakecli.solver.motion import solve
 from brakecli.solver.quantities import Failure
 from tests.examples import COULOMB, MODE_COUPLING, ROUGH, SQUEAL, make, simulate
 
@@ -91,8 +91,8 @@ def test_a_run_that_the_fixed_point_cannot_solve_says_so() -> None:
 
 
 def _limits_of(case: Any) -> Any:
-    setup = set_up(case)
-    return setup.coefficients, setup.weights, setup.scheme, setup.contact_stiffness, setup.wheel
+    system = system_of(case)
+    return system.coefficients, system.weights, system.scheme, system.contact_stiffness, system.wheel
 
 
 @pytest.mark.parametrize("number", [2.0, 50.0, 5000.0])
@@ -135,7 +135,7 @@ def test_any_stiffness_and_friction_end_in_a_solution_or_a_named_failure(
 def test_links_at_right_angles_do_not_couple_the_directions(alpha: float, beta: float) -> None:
     case = make(SQUEAL, link1__angle_deg=beta, link2__angle_deg=alpha, friction__coefficient=0.0)
     result = simulate(case)
-    assert set_up(case).coefficients.c_xy == 0.0
+    assert system_of(case).coefficients.c_xy == 0.0
     assert np.all(np.isfinite(result.rows))
     if beta == 0.0:  # the load acts along y alone
         assert np.all(result.x == 0.0)
@@ -249,9 +249,9 @@ def test_auto_takes_the_closed_form_where_the_pad_touches_and_says_so() -> None:
 
 
 def test_a_run_keeps_no_more_than_a_block_in_memory() -> None:
-    motion = Motion(set_up(make(SQUEAL, solver__duration=10.0, output__sample_interval=1e-5)))
     sizes: list[int] = []
-    motion.run(lambda rows: sizes.append(len(rows)))
+    system = system_of(make(SQUEAL, solver__duration=10.0, output__sample_interval=1e-5))
+    solve(system, sink=lambda rows: sizes.append(len(rows)))
     assert sum(sizes) == 10**6 + 1
     assert max(sizes) <= simulation.BLOCK_ROWS
 

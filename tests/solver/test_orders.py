@@ -8,8 +8,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from brakecli.case.system import Setup, set_up
+from brakecli.case.system import system_of
 from brakecli.solver import schemes
+from brakecli.solver.system import System
 from tests.examples import SQUEAL, make, simulate
 from tests.solver.piecewise_exact import PiecewiseExact
 
@@ -41,9 +42,11 @@ def smooth_case(scheme: str, theta: Sequence[float], start: str, step: float) ->
     )
 
 
-def smooth_reference(setup: Setup, start: NDArray[np.float64], times: NDArray[np.float64]) -> NDArray[np.float64]:
+def smooth_reference(
+    system: System, start: NDArray[np.float64], times: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """The same motion by a Runge-Kutta method of order eight, with (2) of full contact and (6)-(7) written out."""
-    c, wheel, k = setup.coefficients, setup.wheel, setup.contact_stiffness
+    c, wheel, k = system.coefficients, system.wheel, system.contact_stiffness
     sinc = np.sinc(wheel.omega * 0.05 / np.pi)
 
     def slope(t: float, z: NDArray[np.float64]) -> list[float]:
@@ -79,14 +82,14 @@ def test_order_on_smooth_motion(scheme: str, theta: tuple[float, ...], start: st
         result = simulate(case)
         assert result.contact_fraction.min() == 1.0
         assert set(result.state) == {-1.0}
-        setup = set_up(case)
-        exact = smooth_reference(setup, result.rows[0, :4], result.time)
+        system = system_of(case)
+        exact = smooth_reference(system, result.rows[0, :4], result.time)
         errors.append(np.abs(result.rows[:, :2] - exact[:, :2]).max())
     assert len(errors) == 5
     slopes = np.diff(np.log(errors)) / np.diff(np.log(STEPS))
     assert np.polyfit(np.log(STEPS), np.log(errors), 1)[0] == pytest.approx(order, abs=0.15)
     assert slopes[-1] == pytest.approx(order, abs=0.15)
-    assert schemes.load(scheme).order(setup.weights, start) == order
+    assert schemes.load(scheme).order(system.weights, start) == order
 
 
 def test_velocities_and_forces_of_a_three_layer_scheme_belong_to_their_samples() -> None:
@@ -94,7 +97,7 @@ def test_velocities_and_forces_of_a_three_layer_scheme_belong_to_their_samples()
     for step in STEPS:
         case = smooth_case("three-layer", (0.25, 0.5, 0.25), "consistent", step)
         result = simulate(case)
-        exact = smooth_reference(set_up(case), result.rows[0, :4], result.time)
+        exact = smooth_reference(system_of(case), result.rows[0, :4], result.time)
         errors.append(np.abs(result.rows[:, 2:4] - exact[:, 2:4]).max())
     assert np.polyfit(np.log(STEPS), np.log(errors), 1)[0] == pytest.approx(2.0, abs=0.15)
 
@@ -118,7 +121,7 @@ def test_two_layer_scheme_keeps_second_order_through_stick_slip() -> None:
         )
         result = simulate(case)
         if exact is None:
-            reference = PiecewiseExact(set_up(case), 4e-5)
+            reference = PiecewiseExact(system_of(case), 4e-5)
             exact = reference.run(result.rows[0, :4], touching=True, side=-1, samples=500)
         errors.append(np.abs(result.rows[:, :2] - exact[:, :2]).max())
         stick += int(np.sum(result.state == 0))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from brakecli.case.system import set_up
+from brakecli.case.system import system_of
 from tests.examples import COULOMB, MODE_COUPLING, SQUEAL, make, simulate
 
 COULOMB_REST = 15.0 - np.sqrt(205.0)  # 0.6821789367236466
@@ -78,8 +78,8 @@ def test_without_friction_the_motion_is_the_matrix_exponential() -> None:
         initial__vy=0.01,
         solver__step=1e-6,
     )
-    setup, result = set_up(case), simulate(case)
-    c, k = setup.coefficients, setup.contact_stiffness
+    system, result = system_of(case), simulate(case)
+    c, k = system.coefficients, system.contact_stiffness
     a = np.zeros((4, 4))
     a[:2, 2:] = np.eye(2)
     a[2:] = -np.array([[c.c_xx, c.c_xy, c.b_xx, c.b_xy], [c.c_xy, c.c_yy + k, c.b_xy, c.b_yy]]) / c.m

@@ -192,7 +192,7 @@ def test_the_force_after_ten_thousand_kilometres_is_that_of_the_same_doubles(
     assert abs(mpf(float(found[NORMAL_FORCE])) - exact_force(numbers, x, y, way)) <= 1e-9 * scale
     # What is really reached: phases up to 2 pi a/3.7 mm = 51 rad, in a few roundings.
     assert abs(mpf(float(found[NORMAL_FORCE])) - exact_force(numbers, x, y, way)) <= 8 * 51 * EPS * scale
-    assert contact.KINDS[int(found[KIND])] == evaluator
+    assert contact.kinds()[int(found[KIND])] == evaluator
     if evaluator == "exact":
         assert 0.0 < found[NORMAL_FORCE] < 0.5 * scale
 

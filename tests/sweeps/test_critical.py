@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brakecli.analysis.stability.discrete import natural_frequencies
 from brakecli.analysis.stability.modes import growth as eigenvalue_growth
 from brakecli.analysis.stability.report import stability
 from brakecli.case.case import Case
-from brakecli.case.system import set_up
+from brakecli.case.system import system_of
+from brakecli.solver.links import natural_frequencies
 from brakecli.sweeps.critical import Outcome, Search, search
 from brakecli.sweeps.growth import growth, sliding
 from brakecli.sweeps.point import _verdict as judge
@@ -37,11 +37,11 @@ def found(
 
 def rates(case: Case) -> tuple[float, float]:
     """Growth rate by neighbouring runs and by eigenvalues, 1/s."""
-    steady = sliding(case)
+    steady = sliding(system_of(case))
     assert steady is not None
     measured = growth(steady)
     assert measured is not None
-    return measured.rate, eigenvalue_growth(steady.setup.coefficients, steady.stiffness, steady.grip)
+    return measured.rate, eigenvalue_growth(steady.system.coefficients, steady.stiffness, steady.grip)
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.3, 0.57, 0.58, 0.9])
@@ -113,8 +113,8 @@ def test_the_speed_and_the_load_of_the_start_are_held() -> None:
 
 
 def test_no_steady_sliding_has_no_growth() -> None:
-    assert sliding(make(SQUEAL, wheel__angular_speed=0.0)) is None
-    assert sliding(make(SQUEAL, load__force=-5000.0)) is None
+    assert sliding(system_of(make(SQUEAL, wheel__angular_speed=0.0))) is None
+    assert sliding(system_of(make(SQUEAL, load__force=-5000.0))) is None
 
 
 def test_the_critical_friction_of_20_random_flat_damped_shoes_is_bracketed() -> None:
@@ -122,11 +122,11 @@ def test_the_critical_friction_of_20_random_flat_damped_shoes_is_bracketed() -> 
     tried = 0
     while tried < 20:
         tables = random_case(rng)
-        exact = stability(set_up(make(tables))).critical
+        exact = stability(system_of(make(tables))).critical
         if exact is None or exact.friction > 3.0:
             continue
-        setup = set_up(make(tables))
-        fast = natural_frequencies(setup.coefficients, setup.contact_stiffness)[1]
+        system = system_of(make(tables))
+        fast = natural_frequencies(system.coefficients, system.contact_stiffness)[1]
         tables["solver"] = {"step": 1.0 / (100.0 * fast), "duration": 50.0 / fast}
         tolerance = 1e-3 * exact.friction
         answer = found(tables, 0.0, rng.uniform(1.3, 3.0) * exact.friction, tolerance=tolerance)
@@ -161,7 +161,7 @@ def test_the_error_bar_holds_the_bias_of_the_scheme() -> None:
 
 def test_divergence_is_found_where_steady_sliding_ends() -> None:
     tables = {**SQUEAL, "link2": {**SQUEAL["link2"], "angle_deg": -30.0}}
-    exact = stability(set_up(make(tables))).critical
+    exact = stability(system_of(make(tables))).critical
     assert exact is not None
     assert exact.instability == "divergence"
     answer = found(tables, 0.0, 1.5 * exact.friction, tolerance=1e-3)
@@ -185,7 +185,7 @@ def test_another_parameter_than_friction_is_searched_by_both_methods() -> None:
     assert answer.value == pytest.approx(answer.eigenvalue, abs=1e-3)
     alone = found(SQUEAL, 1.0, 10.0, "link2__angle_deg", method=Method.EIGENVALUE)
     assert alone.value == answer.eigenvalue
-    at = stability(set_up(make(SQUEAL, link2__angle_deg=alone.value))).critical
+    at = stability(system_of(make(SQUEAL, link2__angle_deg=alone.value))).critical
     assert at is not None
     assert at.friction == pytest.approx(SQUEAL["friction"]["coefficient"], abs=1e-7)
 
@@ -240,7 +240,7 @@ def test_slow_sliding_is_no_stick_to_a_three_layer_scheme(speed: float) -> None:
         "solver": {"scheme": "three-layer", "step": 1.7406422e-4, "duration": 0.05},
     }
     answer = found(tables, 2.9353636, 15.732434, tolerance=1e-3)
-    exact = stability(set_up(make(tables))).critical
+    exact = stability(system_of(make(tables))).critical
     assert exact is not None
     assert answer.outcome is Outcome.FOUND
     assert answer.value == pytest.approx(exact.friction, abs=1e-3)
@@ -294,8 +294,8 @@ def test_self_locking_on_rough_surfaces_in_full_contact_is_that_on_flat_ones() -
         "contact": {"half_length": 0.05, "stiffness": 2.2e7},
         "solver": {"step": 2e-5, "duration": 0.1},
     }
-    flat = stability(set_up(make(tables))).critical
-    rough = stability(set_up(make(tables, roughness__wheel=WAVES))).critical
+    flat = stability(system_of(make(tables))).critical
+    rough = stability(system_of(make(tables, roughness__wheel=WAVES))).critical
     assert flat is not None
     assert rough is not None
     assert flat.instability == rough.instability == "divergence"

@@ -64,8 +64,8 @@ def test_every_point_is_what_a_run_of_its_own_gives(tmp_path: Path) -> None:
             assert str(point.excitation.values) == verdict.excitation
             assert float(point.amplitude) == verdict.amplitude
             assert float(point.stick_fraction) == verdict.stick_fraction
-            assert int(point.steps) == outcome.work.steps
-            assert int(point.contact_evaluations) == outcome.work.contact_evaluations
+            assert int(point.steps) == outcome.motion.work.steps
+            assert int(point.contact_evaluations) == outcome.motion.work.contact_evaluations
             assert str(point.reason.values) == "; ".join(verdict.reasons)
             frequency = float(point.frequency)
             assert np.isnan(frequency) if verdict.frequency is None else frequency == verdict.frequency
@@ -148,7 +148,8 @@ def test_each_point_of_a_followed_axis_starts_where_the_one_before_has_ended(
             overrides = [f"wheel.angular_speed={speed}", f"friction.coefficient={friction}"]
             overrides += [f"initial.{key}={value!r}" for key, value in initial.items()]
             outcome = simulate(parse_case(CASE, "tiny", overrides).case)
-            initial = dict(zip(("x", "y", "vx", "vy"), (float(value) for value in outcome.end), strict=True))
+            end = outcome.motion.rows[-1, :4].tolist()
+            initial = dict(zip(("x", "y", "vx", "vy"), end, strict=True))
             place = list(found.friction_coefficient.values.round(6)).index(friction)
             point = found.sel(wheel_angular_speed=speed).isel(friction_coefficient=place)
             assert float(point.amplitude) == pytest.approx(outcome.verdict.amplitude, rel=1e-9)
@@ -165,7 +166,8 @@ def test_the_wheel_goes_on_turning_from_one_point_to_the_next(tmp_path: Path) ->
     first = simulate(loaded.base.case)
     second = simulate(loaded.plan.case(_continued(first)))
     # Phases pass through degrees, and the second run starts anew from four numbers: rounding, times its growth.
-    np.testing.assert_allclose(second.end, whole.end, rtol=1e-6, atol=1e-9 * np.abs(whole.end).max())
+    end, other = second.motion.rows[-1, :4], whole.motion.rows[-1, :4]
+    np.testing.assert_allclose(end, other, rtol=1e-6, atol=1e-9 * np.abs(other).max())
 
 
 def test_lines_go_up_and_down_through_every_point_once() -> None:

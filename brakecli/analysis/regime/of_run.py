@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.analysis.regime.rules import Context, Regime, Thresholds, Verdict, classify, forced_lines
-from brakecli.analysis.stability.discrete import natural_frequencies
 from brakecli.analysis.stability.modes import growth
 from brakecli.case.read import parse_case
-from brakecli.case.system import Setup, set_up
+from brakecli.case.system import system_of
 from brakecli.errors import CaseError, UnreadableResultError
 from brakecli.files.read import StoredResult, open_result
 from brakecli.solver.schedules import value_at
-from brakecli.solver.steady_sliding import equilibrium, mean_contact
+from brakecli.solver.steady_sliding import steady_sliding
+from brakecli.solver.system import System
 
 _ROUNDING = 1e-9
 """A velocity of this part of the static compression, per period of the fastest motion, is no motion."""
@@ -36,32 +36,28 @@ class StoredHistory:
         return self.stored.read("history", name, start, stop)
 
 
-def context(setup: Setup) -> Context:
-    """What the classifier is told of a case."""
-    steady = len(setup.belt.times) == 1 and len(setup.load.times) == 1
-    highest = 0.5 / setup.timing.interval
-    last_speed = float(value_at(setup.belt, setup.timing.samples * setup.timing.interval))
-    lines = forced_lines(last_speed, [float(turns) for turns in setup.wheel.turns], highest)
-    compression = float(np.abs(setup.load.values).max()) / (setup.coefficients.c_yy + setup.contact_stiffness)
-    fastest = natural_frequencies(setup.coefficients, setup.contact_stiffness)[1]
+def context(system: System) -> Context:
+    """What the classifier has to know of a system."""
+    last_speed = float(value_at(system.belt, system.sampled_duration))
+    compression = float(np.abs(system.load.values).max()) / (system.coefficients.c_yy + system.contact_stiffness)
     return Context(
         last_speed,
-        steady,
-        lines,
-        quiet=_ROUNDING * compression * fastest,
-        coefficients=setup.coefficients,
-        load=float(value_at(setup.load, 0.0)),
-        growth=partial(_growth, setup, last_speed),
+        steady=len(system.belt.times) == 1 and len(system.load.times) == 1,
+        forced=forced_lines(last_speed, [float(turns) for turns in system.wheel.turns], 0.5 / system.interval),
+        quiet=_ROUNDING * compression * system.natural_frequencies[1],
+        coefficients=system.coefficients,
+        load=system.load_at_start,
+        growth=partial(_growth, system, last_speed),
     )
 
 
-def _growth(setup: Setup, belt_speed: float) -> float:
+def _growth(system: System, belt_speed: float) -> float:
     """How fast a disturbance of steady sliding grows (1/s), by the mean stiffness of the contact; 0 if not."""
-    c, mean = setup.coefficients, partial(mean_contact, setup.evaluate, setup.pad, setup.wheel)
     try:
-        rest = equilibrium(c, mean, setup.pad, float(value_at(setup.load, 0.0)), belt_speed)
+        rest = steady_sliding(system, belt=belt_speed)
     except CaseError:
         return 0.0
+    c = system.coefficients
     return max(growth(c, rest.stiffness, math.copysign(c.phi, belt_speed)), 0.0)
 
 
@@ -69,19 +65,17 @@ def classify_result(path: Path, thresholds: Thresholds) -> dict[str, Any]:
     """Names and values of the verdict on a stored run; raises UnreadableResultError for anything else."""
     with open_result(path, kind="run") as stored:
         try:
-            setup = set_up(parse_case(str(stored.attributes["resolved_toml"]), str(path)).case)
+            system = system_of(parse_case(str(stored.attributes["resolved_toml"]), str(path)).case)
         except (CaseError, KeyError) as error:
             raise UnreadableResultError(f"{path}: holds no case of this version; run its case again") from error
         variable = stored.variables("history").get("time")
         if variable is None or variable.shape[0] < 1:
             raise UnreadableResultError(f"{path}: has no history; run its case again")
-        verdict = classify(
-            StoredHistory(stored, setup.timing.interval, variable.shape[0]), context(setup), thresholds
-        )
+        verdict = classify(StoredHistory(stored, system.interval, variable.shape[0]), context(system), thresholds)
         failure = stored.attributes.get("failure")
     if failure:
         verdict = failed(verdict, str(failure))
-    return {**verdict_numbers(verdict, setup), "failure": failure}
+    return {**verdict_numbers(verdict, system), "failure": failure}
 
 
 def failed(verdict: Verdict, failure: str) -> Verdict:
@@ -94,12 +88,12 @@ def failed(verdict: Verdict, failure: str) -> Verdict:
     return Verdict(**{**verdict.__dict__, **changes})
 
 
-def braking_torque(verdict: Verdict, setup: Setup) -> float:
+def braking_torque(verdict: Verdict, system: System) -> float:
     """Mean torque of the friction force on the wheel's axis, R F_x, N m."""
-    return setup.case.wheel.radius * verdict.mean_friction_force
+    return system.radius * verdict.mean_friction_force
 
 
-def verdict_numbers(verdict: Verdict, setup: Setup) -> dict[str, Any]:
+def verdict_numbers(verdict: Verdict, system: System) -> dict[str, Any]:
     """Names and values of a verdict as `--json` gives them and result files hold them."""
     return {
         "regime": str(verdict.regime),
@@ -107,9 +101,9 @@ def verdict_numbers(verdict: Verdict, setup: Setup) -> dict[str, Any]:
         "frequency": verdict.frequency,
         "amplitude": verdict.amplitude,
         "settled": int(verdict.settled),
-        "settled_from": verdict.settled_from * setup.timing.interval,
+        "settled_from": verdict.settled_from * system.interval,
         "mean_friction_force": verdict.mean_friction_force,
-        "braking_torque": braking_torque(verdict, setup),
+        "braking_torque": braking_torque(verdict, system),
         "stick_fraction": verdict.stick_fraction,
         "contact_loss_fraction": verdict.contact_loss_fraction,
         "reasons": list(verdict.reasons),

@@ -1,6 +1,5 @@
 """What a run will cost and which limits it meets, from the case alone: nothing is stepped but one linear step."""
 
-import math
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -25,18 +24,11 @@ from brakecli.solver.compile import (
 )
 from brakecli.solver.contact.closed_form import evaluate as closed_form
 from brakecli.solver.contact.pad import build_contact, build_pad
-from brakecli.solver.roughness import Surface, surface
-from brakecli.solver.schemes import has_own_steps
+from brakecli.solver.roughness import surface
+from brakecli.solver.system import System
 
 RESOLVED = 20
 """Steps per period (and per passing wave) below which a warning names the number."""
-
-
-def natural_frequencies(c: Coefficients, contact_stiffness: float) -> tuple[float, float]:
-    """Undamped natural frequencies (Hz, rising) of the shoe on its links and a contact stiffness (N/m)."""
-    stiffness = np.array([[c.c_xx, c.c_xy], [c.c_xy, c.c_yy + contact_stiffness]])
-    low, high = np.sqrt(np.maximum(np.linalg.eigvalsh(stiffness / c.m), 0.0)) / (2.0 * math.pi)
-    return float(low), float(high)
 
 
 @dataclass(frozen=True)
@@ -53,18 +45,20 @@ class StepLimits:
     growth: float
 
 
-def step_limits(c: Coefficients, s: Weights, scheme: Any, contact_stiffness: float, wheel: Surface) -> StepLimits:
-    """The limits of a scheme at its step, for a contact of stiffness 2ak (N/m) on this wheel.
+def step_limits(system: System, step: float | None = None) -> StepLimits:
+    """The limits of the system's scheme at its step, or at another one (s), in full contact.
 
     A scheme that finds its steps itself solves no equations in them and is as stable as the motion.
     """
-    if has_own_steps(scheme):
+    if system.method.own_steps:
         return StepLimits(contraction=0.0, unique=True, growth=1.0)
+    c, scheme, contact_stiffness = system.coefficients, system.scheme, system.contact_stiffness
+    s = system.weights if step is None else system.weights._replace(h=step)
     problem = np.zeros(PROBLEM_SIZE)
     scheme.prepare(c, s, np.zeros(STATE_SIZE), 0.0, 0.0, 0.0, problem)
     a_11, a_12, a_22, gain = (float(problem[i]) for i in (A_11, A_12, A_22, GAIN))
     a = a_11 * a_22 - a_12 * a_12
-    steepest = contact_stiffness * float(np.abs(wheel.g) @ wheel.omega)  # bound of |∂F_y/∂x|
+    steepest = contact_stiffness * float(np.abs(system.wheel.g) @ system.wheel.omega)  # bound of |∂F_y/∂x|
     lift, least = (a_11 + c.phi * abs(a_12)) / a, (a_11 - c.phi * abs(a_12)) / a  # ∂e/∂F on the slip branches
     rise = gain * (contact_stiffness * max(0.0, -least) + steepest * (abs(a_12) + c.phi * a_22) / a)
     matrix = amplification(c._replace(phi=0.0), s, scheme, contact_stiffness)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-from brakecli.analysis.stability.discrete import natural_frequencies, spectral_radius
+from brakecli.analysis.stability.discrete import spectral_radius
 from brakecli.analysis.stability.modes import (
     Crossing,
     Instability,
@@ -20,12 +20,11 @@ from brakecli.analysis.stability.modes import (
     is_undamped,
     modes,
 )
-from brakecli.case.system import Setup
 from brakecli.errors import CaseError
 from brakecli.solver.compile import Coefficients
-from brakecli.solver.schedules import value_at
-from brakecli.solver.schemes import has_own_steps
-from brakecli.solver.steady_sliding import Equilibrium, equilibrium, mean_contact, tabulated
+from brakecli.solver.links import natural_frequencies
+from brakecli.solver.steady_sliding import SteadySliding, steady_sliding, tabulated
+from brakecli.solver.system import System
 
 LARGEST_FRICTION = 10.0
 """Up to here a critical friction coefficient is looked for on rough surfaces, whose stiffness depends on it."""
@@ -59,7 +58,7 @@ class StabilityReport:
 
     belt_speed: float
     friction: float
-    equilibrium: Equilibrium | None
+    equilibrium: SteadySliding | None
     no_equilibrium: str | None
     contact_stiffness: float  # N/m, mean -∂F_y/∂y at the equilibrium
     stable: bool | None
@@ -99,25 +98,23 @@ class StabilityReport:
         }
 
 
-def stability(setup: Setup) -> StabilityReport:
+def stability(system: System) -> StabilityReport:
     """Linear stability of steady sliding at the speed and load of t = 0."""
-    c, belt = setup.coefficients, setup.belt_speed
+    c, belt = system.coefficients, system.belt_speed
     rest, reason = None, None
-    mean = partial(mean_contact, setup.evaluate, setup.pad, setup.wheel)
-    load = float(value_at(setup.load, 0.0))
     try:
-        rest = equilibrium(c, mean, setup.pad, load, belt)
+        rest = steady_sliding(system)
     except CaseError as error:
         reason = error.problems[0].what
-    k = rest.stiffness if rest else setup.contact_stiffness
+    k = rest.stiffness if rest else system.contact_stiffness
     grip = math.copysign(c.phi, belt) if belt else 0.0
     values, _ = eigensystem(c, k, grip)
     found: list[Crossing] = []
     stiffness_at: StiffnessAt = lambda phi: k  # noqa: E731
-    if belt != 0.0 and setup.smooth:
+    if belt != 0.0 and system.smooth:
         found = crossings(c, k, belt) if k > 0.0 else []
     elif belt != 0.0:
-        stiffness_at = mean_stiffness(setup)
+        stiffness_at = mean_stiffness(system)
         found = _rough_crossings(c, belt, stiffness_at)
     flutter, divergence = undamped_critical(c, k, belt)
     lost = next((crossing for crossing in found if crossing.lost), None)
@@ -135,7 +132,7 @@ def stability(setup: Setup) -> StabilityReport:
         crossings=tuple(found),
         undamped_flutter=flutter,
         undamped_divergence=divergence,
-        discrete=_discrete(setup, stiffness_at, lost, fastest) if rest else None,
+        discrete=_discrete(system, stiffness_at, lost, fastest) if rest else None,
     )
 
 
@@ -151,16 +148,14 @@ def undamped_critical(c: Coefficients, k: float, belt: float) -> tuple[float | N
     return None, (c.c_xx * (c.c_yy + k) - c.c_xy**2) / (k * abs(c.c_xy))
 
 
-def mean_stiffness(setup: Setup) -> StiffnessAt:
+def mean_stiffness(system: System) -> StiffnessAt:
     """Mean stiffness of a rough contact as it depends on φ through the mean force; NaN where there is none."""
-    mean = tabulated(partial(mean_contact, setup.evaluate, setup.pad, setup.wheel), setup.pad)
-    load = float(value_at(setup.load, 0.0))
+    mean = tabulated(system)
 
     @cache
     def at(phi: float) -> float:
-        c = setup.coefficients._replace(phi=phi)
         try:
-            return equilibrium(c, mean, setup.pad, load, setup.belt_speed).stiffness
+            return steady_sliding(system, phi=phi, mean=mean).stiffness
         except CaseError:
             return math.nan
 
@@ -198,43 +193,45 @@ def _rough_crossings(c: Coefficients, belt: float, stiffness_at: StiffnessAt) ->
     return found
 
 
-def _discrete(setup: Setup, stiffness_at: StiffnessAt, exact: Crossing | None, fastest: float) -> Discrete | None:
+def _discrete(
+    system: System, stiffness_at: StiffnessAt, exact: Crossing | None, fastest: float
+) -> Discrete | None:
     """What the scheme makes of steady sliding, which grows with `fastest` (1/s); None without contact."""
-    c = setup.coefficients
-    if setup.belt_speed == 0.0 or not stiffness_at(c.phi) > 0.0:
+    c = system.coefficients
+    if system.belt_speed == 0.0 or not stiffness_at(c.phi) > 0.0:
         return None
-    if has_own_steps(setup.scheme):  # it makes of it what it is
+    if system.method.own_steps:  # it makes of it what it is
         critical = exact.friction if exact else None
         bias = 0.0 if exact else None
-        return Discrete(math.exp(fastest * setup.weights.h), fastest, None, critical, bias)
-    at_case = _radius(setup, stiffness_at, c.phi, setup.weights.h)
-    critical = discrete_critical(setup, stiffness_at, exact)
+        return Discrete(math.exp(fastest * system.weights.h), fastest, None, critical, bias)
+    at_case = _radius(system, stiffness_at, c.phi, system.weights.h)
+    critical = discrete_critical(system, stiffness_at, exact)
     return Discrete(
         spectral_radius=at_case,
-        growth=math.log(at_case) / setup.weights.h if at_case > 0.0 else -math.inf,
-        step_limit=step_limit(setup, stiffness_at),
+        growth=math.log(at_case) / system.weights.h if at_case > 0.0 else -math.inf,
+        step_limit=step_limit(system, stiffness_at),
         critical_friction=critical,
         bias=critical - exact.friction if critical is not None and exact else None,
     )
 
 
-def _radius(setup: Setup, stiffness_at: StiffnessAt, phi: float, h: float) -> float:
+def _radius(system: System, stiffness_at: StiffnessAt, phi: float, h: float) -> float:
     """Spectral radius of the case's scheme at another φ and step (s)."""
     k = stiffness_at(phi)
     if not k > 0.0:
         return 0.0
-    c, weights = setup.coefficients._replace(phi=phi), setup.weights._replace(h=h)
-    return spectral_radius(c, weights, setup.scheme, k, setup.belt_speed)
+    c, weights = system.coefficients._replace(phi=phi), system.weights._replace(h=h)
+    return spectral_radius(c, weights, system.scheme, k, system.belt_speed)
 
 
-def discrete_critical(setup: Setup, stiffness_at: StiffnessAt, exact: Crossing | None) -> float | None:
+def discrete_critical(system: System, stiffness_at: StiffnessAt, exact: Crossing | None) -> float | None:
     """φ at which steady sliding loses stability in the case's scheme at its step, U ≠ 0; None where nowhere.
 
     The scheme is one that steps on the grid of the case. It is looked for up to twice the exact value.
     """
 
     def excess(phi: float) -> float:
-        return _radius(setup, stiffness_at, phi, setup.weights.h) - 1.0 - MARGIN
+        return _radius(system, stiffness_at, phi, system.weights.h) - 1.0 - MARGIN
 
     reach = 2.0 * exact.friction if exact else LARGEST_FRICTION
     frictions = [float(phi) for phi in np.linspace(0.0, reach, 41)]
@@ -246,13 +243,13 @@ def discrete_critical(setup: Setup, stiffness_at: StiffnessAt, exact: Crossing |
     return None
 
 
-def step_limit(setup: Setup, stiffness_at: StiffnessAt) -> float | None:
+def step_limit(system: System, stiffness_at: StiffnessAt) -> float | None:
     """The largest stable step (s), looked for between ωh = 0.01 and 10⁴ at the highest natural frequency.
 
     0 where the scheme is unstable at any step, None where it is stable at all of them.
     """
-    radius = partial(_radius, setup, stiffness_at, 0.0)
-    frequency = natural_frequencies(setup.coefficients, stiffness_at(0.0))[1]
+    radius = partial(_radius, system, stiffness_at, 0.0)
+    frequency = natural_frequencies(system.coefficients, stiffness_at(0.0))[1]
     ladder = 10.0 ** np.arange(-2.0, 4.1, 0.25) / (2.0 * math.pi * frequency)
 
     def is_stable(h: float) -> bool:

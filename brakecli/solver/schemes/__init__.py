@@ -1,4 +1,4 @@
-"""Difference schemes: one file each, loaded by the name that the case gives.
+"""Schemes: one file and one row of `SCHEMES` each. The rows are plain data; a file is imported when it is used.
 
 Contract of every scheme module:
 
@@ -20,28 +20,75 @@ or of one whose steps are its own, held to a tolerance, on the grid of samples a
   `prepare`, `finish` and `solve`.
 """
 
-from collections.abc import Callable
-from functools import partial
+from dataclasses import dataclass
 from importlib import import_module
 from types import ModuleType
-from typing import Any
 
-from brakecli.solver import loop as integrate
+HALF, QUARTERS, NUMEROV = (0.5, 0.5), (0.25, 0.5, 0.25), (1 / 12, 10 / 12, 1 / 12)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Weights, start and iteration with which compare-schemes tries a scheme; `contacts`: on other nodes, too."""
+
+    theta: tuple[float, ...] = ()
+    start: str = "consistent"
+    iteration: str = "newton"
+    contacts: bool = False
+
+
+@dataclass(frozen=True)
+class Scheme:
+    """What a scheme states of itself.
+
+    `theta`: its weights where a case gives none. `sum_is_one`: whether weights must add up to one. `own_steps`: it
+    finds its steps itself and keeps a tolerance, so that no step can be unstable, or bias anything. `unstable`:
+    what to do where it multiplies disturbances. `colour`: in pictures.
+    """
+
+    module: str
+    trials: tuple[Trial, ...]
+    colour: str
+    theta: tuple[float, ...] = ()
+    sum_is_one: bool = False
+    own_steps: bool = False
+    starts: tuple[str, ...] = ("consistent",)
+    unstable: str = ""
+
+
+SCHEMES: dict[str, Scheme] = {
+    "two-layer": Scheme(
+        "brakecli.solver.schemes.two_layer",
+        (
+            Trial(HALF, contacts=True),
+            Trial((1.0, 0.5)),
+            Trial((0.5, 1.0)),
+            Trial((1.0, 1.0)),
+            Trial(HALF, iteration="fixed-point"),
+        ),
+        colour="#0072B2",
+        theta=HALF,
+        unstable="or take weights that add up to 1 or more, such as [0.5, 0.5]",
+    ),
+    "three-layer": Scheme(
+        "brakecli.solver.schemes.three_layer",
+        (
+            Trial(QUARTERS),
+            Trial(NUMEROV),
+            Trial(QUARTERS, start="paper"),
+            Trial(NUMEROV, start="paper"),
+            Trial(QUARTERS, start="paper", iteration="fixed-point"),
+        ),
+        colour="#D55E00",
+        theta=QUARTERS,
+        sum_is_one=True,
+        starts=("consistent", "paper"),
+        unstable="or take theta = [0.25, 0.5, 0.25]",
+    ),
+    "event-driven": Scheme("brakecli.solver.schemes.event_driven", (Trial(),), colour="#222222", own_steps=True),
+}
 
 
 def load(name: str) -> ModuleType:
-    """The scheme module of this name; its kernels are compiled on the first call of a new version."""
-    return import_module(f"brakecli.solver.schemes.{name.replace('-', '_')}")
-
-
-def has_own_steps(scheme: Any) -> bool:
-    """Whether a scheme chooses its steps itself: no step of the case can then be unstable, or bias anything."""
-    return hasattr(scheme, "advance")
-
-
-def loop(scheme: Any, evaluate: Any, solve: Any) -> tuple[Callable[..., int], Callable[..., None]]:
-    """The compiled loop and the sampling of a scheme, with everything plugged in that it calls."""
-    if has_own_steps(scheme):
-        return partial(scheme.advance, evaluate), partial(scheme.sample, evaluate)
-    common = partial(integrate.advance, evaluate, scheme.prepare, scheme.finish, solve)
-    return common, partial(integrate.sample, evaluate)
+    """The module of a scheme; its kernels are compiled on the first call of a new version."""
+    return import_module(SCHEMES[name].module)

@@ -1,0 +1,41 @@
+"""How a system is solved: scheme, step, iteration, and the way of computing the contact."""
+
+from dataclasses import dataclass
+from types import ModuleType
+
+from brakecli.solver import schemes
+
+
+@dataclass(frozen=True)
+class Method:
+    """A scheme with everything that is chosen beside it, as it is asked for; a `System` says what comes of it.
+
+    `step` (s): a run shortens it until it divides the sample interval. None: the histories keep `tolerance`.
+    `nodes`: 0 leaves their number open. `automatic`: a tolerance may choose another scheme.
+    """
+
+    scheme: str
+    theta: tuple[float, ...] = ()
+    start: str = "consistent"
+    iteration: str = "newton"
+    evaluator: str = "auto"
+    nodes: int = 0
+    step: float | None = None
+    tolerance: float = 0.0
+    allow_unconverged: bool = False
+    automatic: bool = False
+
+    @property
+    def row(self) -> schemes.Scheme:
+        """What the scheme states of itself."""
+        return schemes.SCHEMES[self.scheme]
+
+    @property
+    def own_steps(self) -> bool:
+        """Whether the scheme finds its steps itself: no step can then be unstable, or bias anything."""
+        return self.row.own_steps
+
+    @property
+    def module(self) -> ModuleType:
+        """The scheme's module; its kernels are compiled on the first call of a new version."""
+        return schemes.load(self.scheme)

@@ -1,0 +1,186 @@
+"""A system: the numbers of a case that the solver works on, and the method that the case asks for."""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brakecli.solver import contact
+from brakecli.solver.compile import Coefficients, Weights
+from brakecli.solver.contact.pad import build_pad, default_nodes
+from brakecli.solver.implicit_step import MOST
+from brakecli.solver.links import natural_frequencies
+from brakecli.solver.loop import Drive, Grid
+from brakecli.solver.method import Method
+from brakecli.solver.roughness import Surface
+from brakecli.solver.schedules import Schedule, value_at
+
+WHOLE = 1e-9
+"""A ratio this close to a whole number is whole."""
+
+
+@dataclass(frozen=True)
+class Initial:
+    """The state at t = 0 (SI units), added to steady sliding where `from_equilibrium`."""
+
+    x: float = 0.0
+    y: float = 0.0
+    vx: float = 0.0
+    vy: float = 0.0
+    from_equilibrium: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """What moves, for how long, and how that is solved; tables and kernels follow when they are first asked for.
+
+    `half_length` a (m) and `layer_stiffness` k (N/m²) are the pad's. Samples are taken every `interval` (s) up to
+    the first one that is not before `duration` (s).
+    """
+
+    coefficients: Coefficients
+    belt: Schedule
+    load: Schedule
+    shoe: Surface
+    wheel: Surface
+    radius: float
+    half_length: float
+    layer_stiffness: float
+    initial: Initial
+    interval: float
+    duration: float
+    method: Method
+
+    @cached_property
+    def pad(self) -> NDArray[np.float64]:
+        """Constants and tables of the contact."""
+        return build_pad(self.layer_stiffness, self.half_length, self.shoe, self.wheel, self.nodes)
+
+    @property
+    def evaluator(self) -> str:
+        """The contact evaluator that runs: "auto" is "closed-form" on smooth surfaces."""
+        asked = self.method.evaluator
+        if asked != "auto":
+            return asked
+        if self.smooth:
+            return "closed-form"
+        return "exact" if self.method.own_steps else asked
+
+    @property
+    def nodes(self) -> int:
+        """Quadrature nodes; 0 where no quadrature can be needed."""
+        if not contact.EVALUATORS[self.evaluator].needs_nodes:
+            return 0
+        return self.method.nodes or default_nodes(self.half_length, self.shoe, self.wheel)
+
+    @cached_property
+    def evaluate(self) -> Any:
+        """The kernel of the contact evaluator."""
+        return contact.load(self.evaluator)
+
+    @property
+    def scheme(self) -> ModuleType:
+        """The scheme's module."""
+        return self.method.module
+
+    @property
+    def smooth(self) -> bool:
+        """Whether neither surface has any roughness."""
+        return self.shoe.g.size == 0 and self.wheel.g.size == 0
+
+    @property
+    def contact_stiffness(self) -> float:
+        """2ak, N/m: the contact that touches everywhere."""
+        return 2.0 * self.half_length * self.layer_stiffness
+
+    @property
+    def belt_speed(self) -> float:
+        """U at the start, m/s."""
+        return float(value_at(self.belt, 0.0))
+
+    @property
+    def fastest_belt(self) -> float:
+        """The largest |U|, m/s."""
+        return float(np.abs(self.belt.values).max())
+
+    @property
+    def load_at_start(self) -> float:
+        """Q at the start, N."""
+        return float(value_at(self.load, 0.0))
+
+    @property
+    def passing_frequency(self) -> float:
+        """Of the shortest wave of the wheel at its largest speed, Hz."""
+        return self.fastest_belt * float(max(self.wheel.turns, default=0.0))
+
+    @property
+    def most_turns(self) -> float:
+        """Waves per metre of the shortest wave of both surfaces, 1/m; 0 where they are smooth."""
+        return max([*self.shoe.turns, *self.wheel.turns], default=0.0)
+
+    @cached_property
+    def natural_frequencies(self) -> tuple[float, float]:
+        """Of the frictionless shoe on its links and a contact that touches everywhere, Hz, rising."""
+        return natural_frequencies(self.coefficients, self.contact_stiffness)
+
+    @property
+    def per_sample(self) -> int:
+        """Steps of a sample interval."""
+        asked = None if self.method.own_steps else self.method.step
+        return _at_least(self.interval / (asked or self.interval))
+
+    @property
+    def step(self) -> float:
+        """h, s; the sample interval where the scheme finds its steps itself."""
+        return self.interval / self.per_sample
+
+    @property
+    def samples(self) -> int:
+        """Samples after the one at t = 0."""
+        return _at_least(self.duration / self.interval)
+
+    @property
+    def steps(self) -> int:
+        """Steps from the first sample to the last."""
+        return self.samples * self.per_sample
+
+    @property
+    def sampled_duration(self) -> float:
+        """Time of the last sample, s."""
+        return self.samples * self.interval
+
+    @cached_property
+    def weights(self) -> Weights:
+        """Step and weights of the scheme."""
+        theta_1, theta_2, theta_3 = (*self.method.theta, 0.0, 0.0, 0.0)[:3]
+        return Weights(self.step, theta_1, theta_2, theta_3)
+
+    @property
+    def drive(self) -> Drive:
+        """What acts from outside."""
+        return Drive(self.belt, self.load, self.wheel)
+
+    @property
+    def grid(self) -> Grid:
+        """The grid of time as the loop sees it."""
+        method, scheme = self.method, self.scheme
+        return Grid(
+            self.interval,
+            self.per_sample,
+            scheme.weighted_time(self.weights),
+            scheme.LAG,
+            MOST[method.iteration],
+            int(method.allow_unconverged),
+            self.samples,
+            method.tolerance,
+        )
+
+
+def _at_least(ratio: float) -> int:
+    """The whole number that is not below a ratio, but for rounding."""
+    nearest = max(1, round(ratio))
+    return nearest if abs(ratio - nearest) <= WHOLE * nearest else max(1, math.ceil(ratio))
