@@ -96,7 +96,7 @@ class OutputFile(FileIO):
     def check(self) -> None:
         """Raise CannotWriteError if any write so far has failed."""
         if self.failure is not None:
-            raise _cannot_write(self.path, self.failure) from self.failure
+            raise cannot_write(self.path, self.failure) from self.failure
 
     def publish(self) -> None:
         """Put the finished file in the place of the target, on the disk and not only in its cache."""
@@ -109,7 +109,7 @@ class OutputFile(FileIO):
                 self._temporary.replace(self._target)
                 self._published = True
         except OSError as error:
-            raise _cannot_write(self.path, error) from error
+            raise cannot_write(self.path, error) from error
         with suppress(OSError):  # some network file systems refuse; the file is in its place already
             directory = os.open(self._target.parent, os.O_RDONLY)
             try:
@@ -164,7 +164,7 @@ def _checked_target(path: Path, *, force: bool) -> Path:
         except FileNotFoundError:
             return target
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-        raise _cannot_write(path, error) from error
+        raise cannot_write(path, error) from error
     if stat.S_ISDIR(mode):
         raise CannotWriteError(f"{path}: cannot write: this is a directory; name a file in it with -o")
     if not stat.S_ISREG(mode):  # replacing /dev/null would harm more than this command
@@ -178,7 +178,7 @@ def _opened(path: Path, target: Path, *, force: bool) -> OutputFile:
     try:
         return OutputFile(path, target, force=force)
     except OSError as error:
-        raise _cannot_write(path, error) from error
+        raise cannot_write(path, error) from error
 
 
 @contextmanager
@@ -202,7 +202,7 @@ def _acquire(path: Path, lock: Path) -> int:
         try:
             descriptor = _open_no_link(lock, os.O_RDWR | os.O_CREAT)
         except OSError as error:
-            raise _cannot_write(path, error) from error
+            raise cannot_write(path, error) from error
         holder = os.pread(descriptor, 1000, 0).decode(errors="replace").strip()
         if not _take(descriptor, holder):
             os.close(descriptor)
@@ -218,7 +218,7 @@ def _acquire(path: Path, lock: Path) -> int:
             os.pwrite(descriptor, f"process {os.getpid()} on {socket.gethostname()}\n".encode(), 0)
         except OSError as error:
             _release(descriptor, lock)
-            raise _cannot_write(path, error) from error
+            raise cannot_write(path, error) from error
         return descriptor
 
 
@@ -275,7 +275,8 @@ def _exists(path: Path) -> UsageError:
     return UsageError(f"{path}: exists already; replace it with --force, or choose another output with -o")
 
 
-def _cannot_write(path: Path, error: OSError | ValueError) -> CannotWriteError:
+def cannot_write(path: Path, error: OSError | ValueError) -> CannotWriteError:
+    """The failure to report where a file cannot be written, with its reason and a remedy."""
     reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
     full = isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
     remedy = "free some space there, or choose" if full else "choose"

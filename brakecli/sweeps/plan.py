@@ -33,6 +33,10 @@ class Plan:
     sweep_text: str
     case_text: str
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Travel as two texts: a worker meets the same plan again and again."""
+        return plan_of, (self.sweep_text, self.case_text)
+
     @cached_property
     def sweep(self) -> Sweep:
         """The axes and the critical parameter."""
@@ -129,7 +133,7 @@ def given_toml(table: Sweep | Case) -> str:
 
 @lru_cache(maxsize=4)
 def plan_of(sweep_text: str, case_text: str) -> Plan:
-    """The plan of two texts; a worker meets the same ones again and again."""
+    """The plan of two texts, parsed once."""
     return Plan(sweep_text, case_text)
 
 

@@ -1,7 +1,6 @@
 """One point of a sweep: its run, its verdict, its critical parameter, as a record of fixed size."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, NamedTuple
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from brakecli.analysis.regime.of_run import braking_torque, context, failed
 from brakecli.analysis.regime.rules import Verdict, classify
 from brakecli.case.case import Case
+from brakecli.case.read import key_path
 from brakecli.case.system import system_of
 from brakecli.errors import BrakecliError
 from brakecli.runs.limits import check, refuse, within_range
@@ -20,8 +20,8 @@ from brakecli.solver.history import ArrayHistory
 from brakecli.solver.motion import Motion, solve
 from brakecli.solver.roughness import TWO_PI, wheel_angles
 from brakecli.solver.schedules import integral_at
-from brakecli.sweeps.critical import Search, search
-from brakecli.sweeps.plan import Plan
+from brakecli.sweeps.critical import search
+from brakecli.sweeps.plan import Plan, Settings
 from brakecli.sweeps.tables import Direction
 
 
@@ -74,11 +74,9 @@ CRITICAL_FIELDS = {
     "sustained_status": Field("S24", "", "what the search for the least sustained value has come to"),
 }
 
-Recall = Callable[[], None]
-
 
 def record_type(plan: Plan) -> np.dtype[Any]:
-    """What a point of the sweep is stored as."""
+    """The record of a point of the sweep."""
     fields = FIELDS | (CRITICAL_FIELDS if plan.sweep.critical is not None else {})
     return np.dtype([(name, field.kind) for name, field in fields.items()])
 
@@ -126,14 +124,14 @@ def blank(kind: np.dtype[Any], status: Status, reason: str) -> NDArray[Any]:
     for name in kind.names or ():
         if kind[name].kind == "f":
             record[name] = math.nan
-    record["status"], record["reason"], record["regime"] = status.encode(), _clipped(reason), b"undecided"
-    record["excitation"] = b"none"
+    for name, text in {"status": status, "reason": reason, "regime": "undecided", "excitation": "none"}.items():
+        record[name] = _clipped(text)
     return record
 
 
 def compute(plan: Plan, first: int, count: int) -> NDArray[Any]:
     """The records of some neighbouring points, each computed for itself."""
-    return np.concatenate([_point(plan, index) for index in range(first, first + count)])
+    return np.concatenate([_record(plan, point, {})[0] for point in range(first, first + count)])
 
 
 def follow(plan: Plan, line: int) -> NDArray[Any]:
@@ -141,19 +139,13 @@ def follow(plan: Plan, line: int) -> NDArray[Any]:
 
     The wheel goes on turning from one point to the next: its waves keep the phases that they have come to.
     """
-    records = []
-    start: dict[tuple[str, ...], Any] = {}
+    records: dict[int, NDArray[Any]] = {}
+    start: Settings = {}
     for point in line_points(plan, line):
-        kind = record_type(plan)
-        try:
-            outcome = simulate(plan.case(plan.settings(point) | start))
-        except (BrakecliError, FloatingPointError, MemoryError) as error:
-            records.append((point, blank(kind, Status.FAILED, _sentence(error))))
-            continue
-        records.append((point, _filled(kind, outcome)))
-        if not outcome.motion.work.failed:
-            start = _continued(outcome)
-    return np.concatenate([record for _, record in sorted(records, key=lambda pair: pair[0])])
+        records[point], outcome = _record(plan, point, start)
+        if outcome is not None and not outcome.motion.work.failed:
+            start = next_start(outcome)
+    return np.concatenate([records[point] for point in sorted(records)])
 
 
 def line_points(plan: Plan, line: int) -> list[int]:
@@ -174,7 +166,7 @@ def line_points(plan: Plan, line: int) -> list[int]:
     return sorted(points, key=lambda point: value(plan.places(point)[axis]), reverse=down)
 
 
-def _continued(outcome: Outcome) -> dict[tuple[str, ...], Any]:
+def next_start(outcome: Outcome) -> Settings:
     """The start of a case where another has ended."""
     x, y, v_x, v_y = (float(value) for value in outcome.motion.rows[-1, :4])
     start: dict[tuple[str, ...], Any] = {("initial",): {"x": x, "y": y, "vx": v_x, "vy": v_y}}
@@ -183,31 +175,14 @@ def _continued(outcome: Outcome) -> dict[tuple[str, ...], Any]:
         system = outcome.motion.system
         angles = np.zeros(system.wheel.g.size)
         wheel_angles(system.wheel, *integral_at(system.belt, system.sampled_duration, 0.0), angles)
-        phases = iter(angles)  # a wave of no amplitude has none
+        phases = iter(angles)  # a wave without amplitude has no phase
         turned = [math.degrees(next(phases) % TWO_PI) if g else 0.0 for g in wheel.amplitudes]
         start["roughness", "wheel", "phases_deg"] = turned
     return start
 
 
-def _point(plan: Plan, point: int) -> NDArray[Any]:
-    kind = record_type(plan)
-    settings = plan.settings(point)
-    try:
-        record = _filled(kind, simulate(plan.case(settings)))
-        critical = plan.sweep.critical
-        if critical is not None:
-            from brakecli.case.read import key_path
-
-            path = key_path(critical.parameter)
-            with within_range():
-                found = search(critical, lambda value: plan.case({**settings, path: value}), _verdict)
-            _note(record, found)
-    except (BrakecliError, FloatingPointError, MemoryError) as error:
-        return blank(kind, Status.FAILED, _sentence(error))
-    return record
-
-
-def _verdict(case: Case) -> Verdict | None:
+def verdict_of(case: Case) -> Verdict | None:
+    """The verdict on a run in memory; None where it fails."""
     try:
         outcome = simulate(case)
     except BrakecliError:
@@ -215,47 +190,39 @@ def _verdict(case: Case) -> Verdict | None:
     return None if outcome.motion.work.failed else outcome.verdict
 
 
+def _record(plan: Plan, point: int, start: Settings) -> tuple[NDArray[Any], Outcome | None]:
+    """The record of a point and its run, which is None where it was not possible."""
+    settings = {**plan.settings(point), **start}
+    try:
+        outcome = simulate(plan.case(settings))
+        record = _filled(record_type(plan), outcome)
+        if (critical := plan.sweep.critical) is not None:
+            path = key_path(critical.parameter)
+            with within_range():
+                found = search(critical, lambda value: plan.case({**settings, path: value}), verdict_of)
+            for name, value in zip(CRITICAL_FIELDS, found, strict=True):
+                record[name] = math.nan if value is None else value
+    except (BrakecliError, FloatingPointError, MemoryError) as error:
+        return blank(record_type(plan), Status.FAILED, _sentence(error)), None
+    return record, outcome
+
+
 def _filled(kind: np.dtype[Any], outcome: Outcome) -> NDArray[Any]:
     verdict, system, work = outcome.verdict, outcome.motion.system, outcome.motion.work
     record = blank(kind, Status.FAILED if work.failed else Status.DONE, "; ".join(verdict.reasons))
     values: dict[str, Any] = {
+        **vars(verdict),
+        **vars(work),
+        "frequency": math.nan if verdict.frequency is None else verdict.frequency,
+        "braking_torque": braking_torque(verdict, system),
+        "settled_from": verdict.settled_from * system.interval,
         "warning": _clipped(outcome.warnings[0]) if outcome.warnings else b"",
         "warning_count": len(outcome.warnings),
-        "regime": verdict.regime.encode(),
-        "excitation": verdict.excitation.encode(),
-        "frequency": math.nan if verdict.frequency is None else verdict.frequency,
-        "amplitude": verdict.amplitude,
-        "stick_fraction": verdict.stick_fraction,
-        "contact_loss_fraction": verdict.contact_loss_fraction,
-        "mean_friction_force": verdict.mean_friction_force,
-        "braking_torque": braking_torque(verdict, system),
-        "settled": int(verdict.settled),
-        "settled_from": verdict.settled_from * system.interval,
-        "steps": work.steps,
-        "contact_evaluations": work.contact_evaluations,
-        "unconverged_steps": work.unconverged_steps,
         "estimated_error": outcome.estimated_error,
     }
-    for name, value in values.items():
-        record[name] = value
+    for name in FIELDS.keys() - {"status", "reason"}:
+        record[name] = values[name]
     return record
-
-
-def _note(record: NDArray[Any], found: Search) -> None:
-    """Put the critical values into a record."""
-    numbers = {
-        "critical": found.value,
-        "critical_lower": found.lower,
-        "critical_upper": found.upper,
-        "critical_error": found.error,
-        "critical_bias": found.bias,
-        "critical_eigenvalue": found.eigenvalue,
-        "critical_sustained": found.sustained,
-    }
-    for name, value in numbers.items():
-        record[name] = math.nan if value is None else value
-    record["critical_status"] = found.outcome.encode()
-    record["sustained_status"] = found.sustained_outcome.encode()
 
 
 def _sentence(error: BaseException) -> str:

@@ -14,9 +14,12 @@ from pathlib import Path
 
 import pytest
 
-from brakecli.sweeps.workers.task import work
-from tests.commands import LIMIT, ROOT, TINY, environment, left_in, warm_up
+from brakecli.sweeps.workers.task import compute_units
+from tests.commands import ROOT, left_in
 from tests.sweeps.helpers import (
+    ANGLES,
+    QUICK,
+    SLOWER,
     WICKED,
     alive,
     axis,
@@ -25,15 +28,13 @@ from tests.sweeps.helpers import (
     frictions,
     inline,
     journal_size,
+    program,
     run,
     started,
     wait_until,
     write_sweep,
 )
 
-QUICK = 2.0  # s, within which an interruption ends a command
-GRID = (frictions(20), axis("link2.angle_deg", "values = [1.0, 3.0, 5.0]"))
-SLOWER = TINY.replace("duration = 0.02", "duration = 0.6")  # 30 ms a point
 IMPATIENT = (
     "import brakecli.sweeps.workers.dask as c; c.CONNECT_SECONDS = 1; c.WAIT_SECONDS = 1.0; "
     "from brakecli.__main__ import main; main()"
@@ -61,19 +62,11 @@ class Cluster:
 
     def worker(self, *options: str, **changes: str) -> subprocess.Popen[bytes]:
         """One more worker; a moment passes until the scheduler knows it."""
-        known = [
-            "--host",
-            "127.0.0.1",
-            "--no-dashboard",
-            "--nthreads",
-            "1",
-            "--memory-limit",
-            "0",
-            "--death-timeout",
-            "30",
-        ]
-        known += ["--local-directory", str(self.folder), *options]
-        return self._start("distributed.cli.dask_worker", [self.address, *known], **changes)
+        known = {"host": "127.0.0.1", "nthreads": 1, "memory-limit": 0, "death-timeout": 30}
+        known["local-directory"] = str(self.folder)
+        words = [word for name, value in known.items() for word in (f"--{name}", str(value))]
+        words += ["--no-dashboard", *options]
+        return self._start("distributed.cli.dask_worker", [self.address, *words], **changes)
 
     def _start(self, module: str, options: list[str], **changes: str) -> subprocess.Popen[bytes]:
         # without -W error: their warnings are not ours
@@ -90,12 +83,6 @@ def cluster_of(folder: Path, allowed_failures: int = 3) -> Iterator[Cluster]:
 
 
 @pytest.fixture(scope="module")
-def compiled() -> None:
-    """Kernels."""
-    warm_up()
-
-
-@pytest.fixture(scope="module")
 def cluster(compiled: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
     """A scheduler with two workers, one of which is watched over by dask's nanny."""
     with cluster_of(tmp_path_factory.mktemp("cluster") / "dask") as cluster:
@@ -108,19 +95,11 @@ def cluster(compiled: None, tmp_path_factory: pytest.TempPathFactory) -> Iterato
 def good(compiled: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A directory with a sweep and its result, only to be read."""
     folder = tmp_path_factory.mktemp("good")
-    inline(write_sweep(folder, *GRID, case=SLOWER), folder / "s.h5", work)
+    inline(write_sweep(folder, frictions(20), ANGLES, case=SLOWER), folder / "s.h5", compute_units)
     return folder
 
 
-@pytest.fixture
-def here(good: Path, tmp_path: Path) -> Path:
-    """A directory with that sweep, without its result."""
-    for name in ("tiny.toml", "s.toml"):
-        shutil.copy(good / name, tmp_path)
-    return tmp_path
-
-
-# F24: the same bytes
+# the same bytes
 
 
 def test_a_cluster_gives_the_bytes_of_a_sweep_at_home(cluster: Cluster, good: Path, here: Path) -> None:
@@ -135,17 +114,17 @@ def test_a_scheduler_is_found_by_its_file_and_by_the_environment(cluster: Cluste
     both = frictions(4, 'direction = "both"'), axis("link2.angle_deg", "values = [1.0, 5.0]")
     search = '[critical]\nparameter = "friction.coefficient"\nlower = 0.0\nupper = 2.0\nmethod = "eigenvalue"\n'
     loaded = write_sweep(tmp_path, *both)
-    inline(loaded, tmp_path / "followed.h5", work)
+    inline(loaded, tmp_path / "followed.h5", compute_units)
     run("sweep", "s.toml", "-q", "--scheduler-file", cluster.file, "--task-size", "1", cwd=tmp_path).told(0)
     assert (tmp_path / "s.h5").read_bytes() == (tmp_path / "followed.h5").read_bytes()
     loaded = write_sweep(tmp_path, both[1], search)
-    inline(loaded, tmp_path / "critical.h5", work)
+    inline(loaded, tmp_path / "critical.h5", compute_units)
     command = ["sweep", "s.toml", "-q", "--force"]
     run(*command, cwd=tmp_path, DASK_SCHEDULER_ADDRESS=cluster.address).told(0)
     assert (tmp_path / "s.h5").read_bytes() == (tmp_path / "critical.h5").read_bytes()
 
 
-# F2, F3: workers that die
+# workers that die
 
 
 @pytest.mark.parametrize("nanny", ["--nanny", "--no-nanny"])
@@ -177,24 +156,16 @@ def test_a_point_that_ends_its_worker_is_marked_and_all_others_are_computed(tmp_
             ("deadly", "workers of the cluster have died of it"),
             ("hungry", "it ran out of memory"),
         ):
-            command = ["-m", "tests.sweeps.helpers", "on_cluster", str(tmp_path / "s.toml"), name, cluster.address]
-            done = subprocess.run(
-                [sys.executable, "-W", "error", *command],
-                cwd=ROOT,
-                capture_output=True,
-                env=environment(),
-                timeout=LIMIT,
-            )
-            assert done.returncode == 0, done.stderr
-            assert done.stderr == b""
-            found = json.loads(done.stdout)
+            done = program("on_cluster", tmp_path / "s.toml", name, cluster.address)
+            assert done.told(0) == ""
+            found = done.json
             assert [failure["point"] for failure in found["failures"]] == [WICKED]
             assert reason in found["failures"][0]["reason"]
             assert len(found["notes"]) == 1
             (tmp_path / "s.h5").unlink()
 
 
-# F12: interruptions
+# interruptions
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

@@ -13,7 +13,7 @@ from brakecli.case.system import system_of
 from brakecli.solver.links import natural_frequencies
 from brakecli.sweeps.critical import Outcome, Search, search
 from brakecli.sweeps.growth import growth, sliding
-from brakecli.sweeps.point import _verdict as judge
+from brakecli.sweeps.point import verdict_of
 from brakecli.sweeps.tables import Critical, Method
 from tests.analysis.test_regime_table import random_case
 from tests.examples import MODE_COUPLING, ROUGH, SQUEAL, make
@@ -32,7 +32,7 @@ def found(
     def case_at(value: float) -> Case:
         return make(tables, **{**case_keys, key: value})
 
-    return search(critical, case_at, judge)
+    return search(critical, case_at, verdict_of)
 
 
 def rates(case: Case) -> tuple[float, float]:
@@ -216,7 +216,7 @@ def test_vibration_that_lasts_below_the_critical_friction_is_hysteresis() -> Non
     assert answer.sustained is not None
     assert answer.sustained < 0.5 * answer.lower
     for friction, lasts in ((answer.sustained - 0.1, False), (answer.sustained + 0.1, True)):
-        verdict = judge(make(tables, friction__coefficient=friction, solver__duration=8.0))
+        verdict = verdict_of(make(tables, friction__coefficient=friction, solver__duration=8.0))
         assert verdict is not None
         assert (verdict.regime != "damped") is lasts
 
@@ -278,7 +278,7 @@ def test_a_start_that_takes_long_to_settle_is_given_the_time() -> None:
     answer = found(tables, 4.0, 20.0, tolerance=1e-2)
     assert answer.value == pytest.approx(5.683, abs=1e-2)
     assert (answer.sustained, answer.sustained_outcome) == (None, Outcome.SUSTAINED)
-    verdict = judge(make(tables, friction__coefficient=4.0, solver__duration=6.0))
+    verdict = verdict_of(make(tables, friction__coefficient=4.0, solver__duration=6.0))
     assert verdict is not None
     assert verdict.regime == "relaxation"
 
