@@ -267,8 +267,8 @@ def stuck(file: str) -> None:
     local(read_sweep(file), Path(file).with_suffix(".h5"), deaf)
 
 
-def memory(file: str) -> None:
-    """Sweep, and print the largest memory of this process and of its workers, in bytes."""
+def memory(file: str, name: str) -> None:
+    """Sweep, with `compute_units` or a function of this module, and print the largest memory of this process and of its workers, in bytes."""
     largest, looked = 0, 0.0
 
     def progress(_: object) -> None:
@@ -277,7 +277,8 @@ def memory(file: str) -> None:
             looked = time.monotonic()
             largest = max([largest, *map(peak, workers(os.getpid()))])
 
-    report = local(read_sweep(file), Path(file).with_suffix(".h5"), compute_units, progress=progress)
+    functions: dict[str, Compute] = {"compute_units": compute_units, "quick": quick}
+    report = local(read_sweep(file), Path(file).with_suffix(".h5"), functions[name], progress=progress)
     numbers = {"points": report.findings.points, "failed": report.findings.failed, "workers": largest}
     print(json.dumps({**numbers, "parent": peak("self"), "seconds": report.seconds}))  # noqa: T201
 
