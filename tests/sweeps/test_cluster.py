@@ -16,23 +16,18 @@ import pytest
 
 from brakecli.sweeps.workers.task import compute_units
 from tests.campaign import campaign
-from tests.commands import ROOT, brakecli, left_in
+from tests.commands import QUICK, ROOT, brakecli, ended, left_in, run, started, wait_until
 from tests.sweeps.helpers import (
     ANGLES,
-    QUICK,
     SLOWER,
     WICKED,
     alive,
     axis,
     children,
-    ended,
     frictions,
     inline,
     journal_size,
     program,
-    run,
-    started,
-    wait_until,
     write_sweep,
 )
 
@@ -72,7 +67,14 @@ class Cluster:
     def _start(self, module: str, options: list[str], **changes: str) -> subprocess.Popen[bytes]:
         # without -W error: their warnings are not ours
         return self._stack.enter_context(
-            started(*options, cwd=self.folder, command=[sys.executable, "-m", module], output=False, **changes)
+            started(
+                *options,
+                cwd=self.folder,
+                command=[sys.executable, "-m", module],
+                stdin=subprocess.DEVNULL,
+                output=False,
+                **changes,
+            )
         )
 
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from tests.campaign import campaign
-from tests.commands import left_in
-from tests.sweeps.helpers import QUICK, alive, ended, journal_size, run, started, wait_until, workers
+from tests.commands import QUICK, ended, left_in, run, started, wait_until
+from tests.sweeps.helpers import alive, journal_size, workers
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from brakecli.files.write import open_result
 from brakecli.sweeps.workers.local import LocalEngine
 from brakecli.sweeps.workers.task import Task
 from tests.campaign import campaign
-from tests.commands import LIMIT, ROOT, TINY, left_in
+from tests.commands import LIMIT, ROOT, TINY, ended, left_in, run, shell, started, wait_until
 from tests.sweeps.helpers import (
     PROGRAM,
     WICKED,
@@ -26,16 +26,11 @@ from tests.sweeps.helpers import (
     broken,
     children,
     deadly,
-    ended,
     frictions,
     hungry,
     journal_size,
     local,
-    run,
-    shell,
     slow,
-    started,
-    wait_until,
     workers,
     write_sweep,
 )

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from brakecli.sweeps.workers.task import compute_units
-from tests.commands import left_in
-from tests.sweeps.helpers import axis, frictions, inline, interrupted, local, run, write_sweep
+from tests.commands import left_in, run
+from tests.sweeps.helpers import axis, frictions, inline, interrupted, local, write_sweep
 
 pytestmark = pytest.mark.usefixtures("compiled")
 
