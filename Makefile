@@ -10,6 +10,8 @@ LOWEST := $(VENV)/lowest
 LOWEST_STAMP := $(LOWEST)/.installed
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 CASES := $(sort $(wildcard cases/*.toml))
+# Two processes: one test waits for what it has started while another computes. PYTEST_ARGS=-n0 takes one alone.
+PYTEST := -m pytest --numprocesses 2 --dist loadfile
 PYTEST_ARGS ?=
 
 .DEFAULT_GOAL := help
@@ -64,13 +66,13 @@ demo: $(RUN_STAMP) ## install into .venv and run one real case, cases/relaxation
 	@echo "Next: change a value, as in  $(BIN)/brakecli run cases/relaxation.toml --set friction.coefficient=0.5 -o results/mine.h5"
 
 test: $(DEV_STAMP) ## run the tests; PYTEST_ARGS='-k friction' narrows them down
-	$(BIN)/python -m pytest $(PYTEST_ARGS)
+	$(BIN)/python $(PYTEST) $(PYTEST_ARGS)
 
 campaign: $(DEV_STAMP) ## run the long statistics, of which make test has a smaller part (some minutes)
-	$(BIN)/python -m pytest -m campaign $(PYTEST_ARGS)
+	$(BIN)/python $(PYTEST) -m campaign $(PYTEST_ARGS)
 
 lowest: $(LOWEST_STAMP) ## run the tests with every dependency at the lowest version that pyproject.toml declares
-	$(LOWEST)/bin/python -m pytest $(PYTEST_ARGS)
+	$(LOWEST)/bin/python $(PYTEST) $(PYTEST_ARGS)
 
 lint: $(DEV_STAMP) ## check style and formatting, change nothing
 	$(BIN)/python -m ruff check .
