@@ -17,7 +17,7 @@ PYTEST_ARGS ?=
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .NOTPARALLEL: # two installations into one .venv at a time would collide
-.PHONY: help demo test campaign lowest lint format types imports derivations cases check \
+.PHONY: help demo test campaign lowest lint format types imports derivations tables cases check \
     accuracy promises picture paper extremes bench-sweep clean
 
 help: ## list the targets (this text)
@@ -90,6 +90,9 @@ imports: $(DEV_STAMP) ## check that imports point only down the list of layers
 
 derivations: $(DEV_STAMP) ## derive every formula of the documentation again, with sympy
 	$(BIN)/python docs/derivations.py
+
+tables: $(DEV_STAMP) ## write the tables of the documentation that list what a result holds
+	$(BIN)/python docs/tables.py
 
 cases: $(RUN_STAMP) ## run every sample case into results/; one that fails, fails all
 	@mkdir -p results

@@ -136,8 +136,7 @@ def run_command(
         if not quiet or line.startswith("warning"):
             _tell(f"brakecli: {line}")
     if as_json:
-        seconds = {"solve_seconds": report.motion.work.solve_seconds}
-        _print_json({"command": "run", "output": str(report.output), **report.numbers(), **seconds})
+        _print_json({"command": "run", "output": str(report.output), **report.numbers()})
     elif not quiet:
         _print(run_table(report))
     if report.failed:

@@ -11,14 +11,12 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from brakecli.analysis.regime.of_run import braking_torque
 from brakecli.analysis.stability.modes import Crossing, Mode
 from brakecli.analysis.stability.report import Discrete, StabilityReport
 from brakecli.comparison.compare import Entry
 from brakecli.comparison.methods import method_label
 from brakecli.comparison.result import ComparisonReport
 from brakecli.runs.limits import Check
-from brakecli.runs.modelled import modelled
 from brakecli.runs.run import RunReport
 from brakecli.solver.method import Method
 from brakecli.solver.quantities import COEFFICIENTS
@@ -36,7 +34,6 @@ NARROWEST = 40
 def run_table(report: RunReport) -> str:
     """Summary of a run."""
     verdict, system, work, energy = report.verdict, report.motion.system, report.motion.work, report.motion.energy
-    used, left = modelled(report.motion)
     shares = ", ".join(f"{kind} {count / max(work.steps, 1):.1%}" for kind, count in work.evaluators.items())
     rows: Rows = [
         (
@@ -48,14 +45,14 @@ def run_table(report: RunReport) -> str:
         ("amplitude of x", _unit(verdict.amplitude, "m")),
         ("peak of the spectrum of vx", _unit(report.spectrum_peak, "Hz")),
         ("mean friction force", _unit(verdict.mean_friction_force, "N")),
-        ("braking torque", _unit(braking_torque(verdict, system), "N m")),
+        ("braking torque", _unit(report.braking_torque, "N m")),
         ("stick, lost contact", f"{verdict.stick_fraction:.2%}, {verdict.contact_loss_fraction:.2%} of the time"),
-        ("settled part", f"from {verdict.settled_from * system.interval:.4g} s on"),
+        ("settled part", f"from {report.settled_from:.4g} s on"),
         ("scheme", _scheme(system.method)),
         *([("tolerance", report.certificate.sentence())] if report.certificate is not None else []),
         ("contact", shares + (f", {system.nodes} nodes" if "midpoint" in work.evaluators else "")),
-        ("modelled", "; ".join(used)),
-        ("left out", "; ".join(left) or "nothing"),
+        ("modelled", "; ".join(report.modelled)),
+        ("left out", "; ".join(report.left_out) or "nothing"),
         ("steps", f"{work.steps}{_step(report)}, {work.contact_evaluations} contact evaluations"),
         ("energy account", f"closes to {abs(energy.relative_closing_error):.1e} of its largest item"),
         ("time of the loop", f"{work.solve_seconds:.3g} s"),

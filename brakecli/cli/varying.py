@@ -8,6 +8,7 @@ from brakecli.analysis.stability.report import stability
 from brakecli.case.read import LoadedCase, parse_case
 from brakecli.case.system import system_of
 from brakecli.errors import UsageError
+from brakecli.files import fields
 
 MOST = 10_000
 
@@ -41,14 +42,5 @@ def varied(loaded: LoadedCase, vary: Vary) -> list[dict[str, Any]]:
     entries = []
     for value in vary.values:
         case = parse_case(loaded.resolved, "--vary", (f"{vary.key}={value!r}",)).case
-        report = stability(system_of(case))
-        critical = report.critical
-        entries.append(
-            {
-                "value": value,
-                "critical_friction": critical.friction if critical else None,
-                "instability": str(critical.instability) if critical else None,
-                "discrete_critical_friction": report.discrete.critical_friction if report.discrete else None,
-            }
-        )
+        entries.append({"value": value, **fields.values(fields.VARIED, stability(system_of(case)))})
     return entries

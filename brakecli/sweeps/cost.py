@@ -16,8 +16,8 @@ from brakecli.sweeps.tables import Method
 MOST_POINTS = 10_000_000
 MOST_SECONDS = 30 * 86400.0
 
-# Seconds and bytes, measured with `make bench-sweep`; they only serve to tell minutes from days.
-_POINT_SECONDS = 5e-3  # of setting up and judging a run
+# Seconds and bytes, measured with `make bench-sweep`; rough guesses that tell minutes from days.
+_POINT_SECONDS = 5e-3  # of a run, beside its steps
 _SAMPLE_SECONDS = 1e-7
 _SEARCH_RUNS = 12.0  # for the least sustained value
 _SEARCH_GROWTHS = 20.0
@@ -25,7 +25,7 @@ _GROWTH_SECONDS = 0.03
 _EIGENVALUE_SECONDS = 0.1
 _WORKER_BYTES = 1.8e8
 _SAMPLE_BYTES = 8.0 * 24
-_POINT_BYTES = 1000.0  # of the parent, which holds each variable whole while it writes it
+_POINT_BYTES = 1000.0  # in the parent, which holds each variable whole while it writes it
 
 
 @dataclass(frozen=True)

@@ -51,7 +51,7 @@ class Outcome(StrEnum):
 
 
 class Search(NamedTuple):
-    """The answer for one point, in the order of `CRITICAL_FIELDS`; None stands for what there is not.
+    """The answer for one point; None stands for what there is not.
 
     `error` is the half width of the bracket, plus the bias of the scheme at its step, plus what the growth
     measured in two halves of the time leaves open. `bias`: the scheme's own critical value less the exact one.
@@ -76,7 +76,7 @@ Unstable = Callable[[float], bool | None]
 
 
 class _Change(NamedTuple):
-    """Where stability changes: between `low` and `high`; or why there is no such place."""
+    """Where stability changes, between `low` and `high`; without a value, why it does not."""
 
     outcome: Outcome
     value: float | None = None
@@ -239,7 +239,7 @@ def _never_opens(system: System) -> bool:
 
 
 def _vibrates(verdict: Verdict | None, duration: float, unstable: bool | None, linear: bool) -> bool | None:
-    """Whether a run has ended in vibration that lasts by itself; None where that cannot be told.
+    """Whether a run has ended in vibration that lasts by itself; None where the run does not answer that.
 
     `unstable`: what is known of steady sliding. Where it is unstable no vibration can die out. A `linear` motion
     that neither sticks nor lifts off is on its way by the same equations: it lasts if sliding is unstable. One

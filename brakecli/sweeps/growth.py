@@ -47,7 +47,7 @@ class Growth:
 
     rate: float  # 1/s
     spread: float  # 1/s, by how much it differs between two halves of the time watched
-    noise: float  # 1/s, a rate up to here cannot be told from none
+    noise: float  # 1/s, a rate up to here may be none
 
     @property
     def unstable(self) -> bool:

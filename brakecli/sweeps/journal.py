@@ -10,7 +10,7 @@ import struct
 import tomllib
 import zlib
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Self
 
@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.errors import BrakecliError, CannotWriteError, RefusedError
-from brakecli.files.atomic import cannot_write
+from brakecli.files.atomic import explained
 from brakecli.sweeps.plan import Plan
 from brakecli.sweeps.point import record_type
 from brakecli.sweeps.workers.task import fingerprint
@@ -41,11 +41,11 @@ class Journal:
         self.finished = np.zeros(plan.units, dtype=bool)
         self._unit_bytes = plan.unit_length * self.kind.itemsize
         self._blocks: list[tuple[int, int, int]] = []  # first unit, units, where their records begin
-        with _writing(path):
+        with explained(path):
             descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666)
         self._file = open(descriptor, "r+b", buffering=0)  # noqa: SIM115, PTH123
         try:
-            with _writing(path):
+            with explained(path):
                 self._begin(force=force)
         except BaseException:
             self._file.close()
@@ -69,7 +69,7 @@ class Journal:
             raise ValueError(f"units {first} … hold {len(records)} bytes, or are there already")
         offset = self._file.seek(0, os.SEEK_END)
         try:
-            with _writing(self.path):
+            with explained(self.path):
                 self._write(_HEAD.pack(first, count, zlib.crc32(records)) + records)
                 os.fsync(self._file.fileno())
         except CannotWriteError:
@@ -135,14 +135,6 @@ class Journal:
         view = memoryview(data)
         while view:
             view = view[os.write(self._file.fileno(), view) :]
-
-
-@contextmanager
-def _writing(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise cannot_write(path, error) from error
 
 
 def identity(plan: Plan) -> dict[str, Any]:

@@ -2,22 +2,22 @@
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli import __version__
 from brakecli.case.case import json_schema
 from brakecli.case.read import key_path
-from brakecli.files.write import FILL, ResultFile
-from brakecli.runs.run import versions
+from brakecli.files import fields
+from brakecli.files.write import ResultFile
+from brakecli.runs.run import origin
 from brakecli.sweeps.file import LoadedSweep
 from brakecli.sweeps.journal import Journal
 from brakecli.sweeps.plan import Plan, label
-from brakecli.sweeps.point import CRITICAL_FIELDS, FIELDS, Status, line_points
+from brakecli.sweeps.point import Status, fields_of, line_points
 
 MOST_FAILURES = 100
 MOST_AS_JSON = 10_000
@@ -38,7 +38,11 @@ class Columns:
         axes = [axis.name for axis in self.plan.sweep.axis] or ["point"]
         self.dimensions = (*(["direction"] if both else []), *axes)
         self.shape = (*([2] if both else []), *(self.plan.shape or (1,)))
-        self.names = [*FIELDS, *(CRITICAL_FIELDS if self.plan.sweep.critical is not None else ())]
+
+    def decoded(self, name: str) -> NDArray[Any]:
+        """A variable, its texts as str."""
+        values = self[name]
+        return np.char.decode(values, "utf-8") if values.dtype.kind == "S" else values
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         """A variable; missing numbers are NaN."""
@@ -80,28 +84,18 @@ class SweepReport:
     resumed: int  # points that were there already
     notes: tuple[str, ...]
 
+    @property
+    def axes(self) -> dict[str, Any]:
+        """The parameters and the values of each axis; none where there are too many points."""
+        axes = self.loaded.sweep.axis if self.findings.variables is not None else ()
+        return {
+            axis.name: {"parameter": axis.parameter, "values": [axis.value(i) for i in range(axis.size)]}
+            for axis in axes
+        }
+
     def numbers(self) -> dict[str, Any]:
         """Names and values as `--json` gives them: the variables of the file, null where a number is missing."""
-        found = self.findings
-        axes = {
-            axis.name: {"parameter": list(axis.parameter), "values": [axis.value(i) for i in range(axis.size)]}
-            for axis in self.loaded.sweep.axis
-            if found.variables is not None
-        }
-        return {
-            "title": self.loaded.title,
-            "points": found.points,
-            "failed_points": found.failed,
-            "failures": list(found.failures),
-            "resumed_points": self.resumed,
-            "regimes": found.regimes,
-            "dimensions": list(found.dimensions),
-            "axes": axes,
-            **(found.variables or {}),
-            "seconds": self.seconds,
-            "findings": list(found.sentences),
-            "warnings": list(self.notes),
-        }
+        return {**fields.values(fields.SWEEP, self), **(self.findings.variables or {})}
 
 
 def findings(columns: Columns) -> Findings:
@@ -131,7 +125,9 @@ def findings(columns: Columns) -> Findings:
         hysteresis=hysteresis,
         sentences=(*_on_hysteresis(columns, hysteresis), *_on_lasting_vibration(columns)),
         variables=(
-            {name: _plain(columns[name]) for name in columns.names} if status.size <= MOST_AS_JSON else None
+            {field.name: fields.plain(columns[field.name]) for field in fields_of(plan)}
+            if status.size <= MOST_AS_JSON
+            else None
         ),
     )
 
@@ -139,52 +135,28 @@ def findings(columns: Columns) -> Findings:
 def write(result: ResultFile, report: SweepReport, columns: Columns) -> None:
     """Everything that the file holds."""
     loaded, found, plan = report.loaded, report.findings, columns.plan
-    result.set_attributes(
-        {
-            "kind": "sweep",
-            "title": loaded.title,
-            "sweep_toml": loaded.text,
-            "resolved_sweep_toml": loaded.resolved,
-            "case_toml": loaded.base.text,
-            "resolved_toml": loaded.base.resolved,
-            "brakecli_version": __version__,
-            **versions(),
-            "points": found.points,
-            "failed_points": found.failed,
-            **({"findings": list(found.sentences)} if found.sentences else {}),
-        }
-    )
+    sweep = {"sweep_toml": loaded.text, "resolved_sweep_toml": loaded.resolved}
+    result.set_attributes({**origin("sweep", loaded.title, loaded.base), **sweep})
+    result.set_fields(fields.SWEEP, report.numbers())
     if "direction" in found.dimensions:
-        result.axis("/", "direction", "", "direction in which the motion was followed", np.array(["up", "down"]))
+        result.axis("/", fields.DIRECTION, np.array(["up", "down"]))
     for axis in plan.sweep.axis:
         values = [axis.value(place) for place in range(axis.size)]
         data = np.array(values, dtype=np.float64) if axis.numeric else np.array([label(value) for value in values])
-        attributes = {"parameters": list(axis.parameter)}
-        units, long_name = unit(axis.parameter[0]), ", ".join(axis.parameter)
-        result.variable("/", axis.name, (axis.name,), units, long_name, data, attributes=attributes)
+        field = fields.Field(axis.name, unit(axis.parameter[0]), ", ".join(axis.parameter))
+        result.variable("/", field, (axis.name,), data, {"parameters": list(axis.parameter)})
     if not plan.sweep.axis:
-        result.axis("/", "point", "1", "the base case", np.zeros(1))
-    for name in columns.names:
-        _write_variable(result, name, columns)
+        result.axis("/", fields.BASE_POINT, np.zeros(1))
+    for field in fields.POINT:
+        result.column(field, columns.dimensions, columns.decoded(field.name))
+    if (critical := plan.sweep.critical) is not None:
+        for field in fields.CRITICAL:
+            numeric = field.kind == "f8"
+            of_parameter = replace(field, units=unit(critical.parameter)) if numeric else field
+            attributes = {"parameter": critical.parameter} if numeric else {}
+            result.column(of_parameter, columns.dimensions, columns.decoded(field.name), **attributes)
     if found.hysteresis is not None:
-        long_name = "whether the motions on the way up and down differ (0, 1)"
-        dims = found.dimensions[1:]
-        result.variable("/", "hysteresis", dims, "1", long_name, found.hysteresis, dtype=np.int64)
-
-
-def _write_variable(result: ResultFile, name: str, columns: Columns) -> None:
-    field, values, critical = (FIELDS | CRITICAL_FIELDS)[name], columns[name], columns.plan.sweep.critical
-    units = field.units
-    attributes: dict[str, Any] = {}
-    if field.kind == "f8":
-        values = np.where(np.isnan(values), FILL, values)
-        attributes["_FillValue"] = np.array([FILL])
-        if name in CRITICAL_FIELDS and critical is not None:
-            units, attributes["parameter"] = unit(critical.parameter), critical.parameter
-    elif field.kind != "i8":
-        values = np.char.decode(values, "utf-8")
-    dims, dtype = columns.dimensions, np.dtype(field.kind)
-    result.variable("/", name, dims, units, field.long_name, values, dtype=dtype, attributes=attributes)
+        result.column(*fields.DIFFERENCE, found.dimensions[1:], found.hysteresis)
 
 
 def unit(parameter: str) -> str:
@@ -246,14 +218,3 @@ def _on_lasting_vibration(columns: Columns) -> Iterator[str]:
 def _parameters(plan: Plan, index: int) -> dict[str, Any]:
     """What the axes set at a point, by its place in a variable of the result."""
     return {".".join(path): value for path, value in plan.settings(index % plan.points).items()}
-
-
-def _plain(values: NDArray[Any]) -> Any:
-    """Values as JSON holds them."""
-    if values.dtype.kind == "S":
-        return np.char.decode(values, "utf-8").tolist()
-    if values.dtype.kind != "f":
-        return values.tolist()
-    plain = values.astype(object)
-    plain[~np.isfinite(values)] = None
-    return plain.tolist()

@@ -19,7 +19,7 @@ from brakecli.case.system import system_of
 from brakecli.case.toml_lines import LARGEST_TEXT, MOST_MARKS, MOST_PARTS, MOST_STATEMENTS, Located, split
 from brakecli.case.wording import tables
 from brakecli.errors import CaseError, Problem
-from brakecli.runs.limits import adjustments
+from brakecli.runs.warnings import adjustments
 
 CONSTANT = """\
 title = "constant wheel and load"

@@ -17,7 +17,7 @@ def test_a_broken_result_is_no_case_to_run_again(good: Path, tmp_path: Path) -> 
     middle = len(whole) // 2
     files = {
         "empty.h5": (b"", 4, "the file is empty"),
-        "text.h5": (b"[shoe]\nmass = 1\n", 4, "this is no HDF5 file"),
+        "text.h5": (b"[shoe]\nmass = 1\n", 4, "this is not an HDF5 file"),
         "half.h5": (whole[:middle], 4, "truncated, damaged or was altered"),
         "cut.h5": (whole[:-1], 4, "truncated, damaged or was altered"),
         "flipped.h5": (whole[:middle] + bytes([whole[middle] ^ 1]) + whole[middle + 1 :], 4, "damaged"),

@@ -63,7 +63,7 @@ def test_closed_streams_and_a_full_standard_error_change_nothing(good: Path, her
         ("/proc/r.h5", "no such file or directory"),
         ("x" * 300, "file name too long"),
         ("x" * 254 + "/r.h5", "the directory"),
-        ("/dev/null", "no regular file"),
+        ("/dev/null", "not a regular file"),
     ],
 )
 def test_an_output_that_cannot_be_is_told_with_its_path(here: Path, output: str, reason: str) -> None:

@@ -21,21 +21,23 @@ import numpy as np
 import pytest
 
 from brakecli.errors import CannotWriteError, UnreadableResultError, UsageError
-from brakecli.files.write import ResultFile, new_result, open_result
+from brakecli.files.fields import Field
+from brakecli.files.read import open_result
+from brakecli.files.write import ResultFile, new_result
 
 ROWS = 40000
 
 
 def fill(result: ResultFile, rows: int = ROWS) -> None:
     result.set_attributes({"kind": "run", "case_toml": 'title = "Größe"\n' * 50})
-    result.axis("history", "time", "s", "time")
-    result.variable("history", "state", ["time"], "1", "state of the pad", dtype=np.int8)
+    result.axis("history", Field("time", "s", "time"))
+    result.variable("history", Field("state", "1", "state of the pad", "i1"), ["time"])
     for start in range(0, rows, 10000):
         time = np.arange(start, min(rows, start + 10000)) * 1e-5
         result.append("history", {"time": time, "state": np.full(time.shape, -1)})
         result.read("history", "time", 0, 5)
-    result.axis("spectrum", "frequency", "Hz", "frequency", np.arange(50.0))
-    result.variable("spectrum", "vx", ["frequency"], "m²/s", "density of vx", np.arange(50.0) ** 2)
+    result.axis("spectrum", Field("frequency", "Hz", "frequency"), np.arange(50.0))
+    result.variable("spectrum", Field("vx", "m²/s", "density of vx"), ["frequency"], np.arange(50.0) ** 2)
 
 
 def write(path: Path, rows: int = ROWS) -> None:
@@ -76,8 +78,8 @@ def in_a_process(action: str, path: Path) -> subprocess.CompletedProcess[str]:
         ("nul\0.h5", "null"),
         ("loop", "symbolic link"),
         ("/proc/r.h5", "no such file"),
-        ("/dev/null", "no regular file"),
-        ("/dev/full", "no regular file"),
+        ("/dev/null", "not a regular file"),
+        ("/dev/full", "not a regular file"),
     ],
 )
 def test_an_output_that_cannot_be_written_is_refused_at_once(tmp_path: Path, name: str, reason: str) -> None:
@@ -103,7 +105,7 @@ def test_a_deleted_working_directory_is_named(tmp_path: Path, monkeypatch: pytes
 
 def write_for_ever(path: Path, appended: list[int]) -> None:
     with new_result(path, force=True) as result:
-        result.axis("history", "time", "s", "time")
+        result.axis("history", Field("time", "s", "time"))
         while True:
             result.append("history", {"time": np.ones(10000)})
             appended.append(80000)
@@ -400,10 +402,10 @@ def foreign_of_our_kind(path: Path) -> None:
     ("make", "reason"),
     [
         (lambda path: None, "no such file"),
-        (lambda path: path.mkdir(), "no regular file"),
-        (os.mkfifo, "no regular file"),
+        (lambda path: path.mkdir(), "not a regular file"),
+        (os.mkfifo, "not a regular file"),
         (lambda path: path.touch(), "the file is empty"),
-        (lambda path: path.write_text("time,vx\n0,1\n"), "no HDF5 file"),
+        (lambda path: path.write_text("time,vx\n0,1\n"), "not an HDF5 file"),
         (foreign, "not written by this program"),
         (foreign_of_our_kind, "not written by this program"),
         (edit(lambda file: file.attrs.modify("format", "other")), "not written by this program"),
@@ -442,7 +444,7 @@ def memory(path: Path) -> None:
     peaks = []
     for rows in (200_000, 5_000_000):
         with new_result(path, force=True) as result:
-            result.axis("history", "time", "s", "time")
+            result.axis("history", Field("time", "s", "time"))
             for start in range(0, rows, 10_000):
                 result.append("history", {"time": np.arange(start, start + 10_000)})
             result.commit()

@@ -17,7 +17,9 @@ from brakecli.comparison.compare import compare
 from brakecli.comparison.methods import method_label
 from brakecli.comparison.result import ComparisonReport
 from brakecli.errors import UnreadableResultError, UsageError
-from brakecli.files.write import FILL, new_result, open_result
+from brakecli.files.fields import Field
+from brakecli.files.read import open_result
+from brakecli.files.write import FILL, new_result
 from brakecli.plots.comparison import LARGEST, draw_comparison, gather_comparison
 from brakecli.plots.result import plot_result
 from brakecli.plots.style import style
@@ -66,10 +68,10 @@ def write(path: Path, changed: Columns | None = None, **attributes: Any) -> Path
     known = {"title": "Größe $x_{", "target_error": 1e-2, "reference_error": 1e-6, "duration": 0.02, "left_out": 0}
     with new_result(path, force=True) as result:
         result.set_attributes({"kind": "comparison", **known, "recommended": 2} | attributes)
-        result.axis("/", "entry", "1", "entry", np.arange(len(values["method"])))
+        result.axis("/", Field("entry", "1", "entry"), np.arange(len(values["method"])))
         for name, array in values.items():
             data = np.where(np.isnan(array), FILL, array) if array.dtype.kind == "f" else array
-            result.variable("/", name, ("entry",), "1", name, data)
+            result.variable("/", Field(name, "1", name), ("entry",), data)
         result.commit()
     return path
 

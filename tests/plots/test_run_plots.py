@@ -18,7 +18,9 @@ from numpy.typing import NDArray
 from brakecli.case.read import parse_case
 from brakecli.cli import commands as cli
 from brakecli.errors import BrakecliError, UnreadableResultError, UsageError
-from brakecli.files.write import new_result, open_result
+from brakecli.files.fields import Field
+from brakecli.files.read import open_result
+from brakecli.files.write import new_result
 from brakecli.plots import run as picture
 from brakecli.plots.result import draw, plot_result
 from brakecli.plots.run import Picture, envelope, episodes, gather
@@ -54,14 +56,16 @@ def write(path: Path, moved: Samples, *overrides: str, **attributes: Any) -> Pat
         texts = {"kind": "run", "case_toml": CASE, "resolved_toml": loaded.resolved}
         numbers = {"status": "done", "regime": "relaxation", "excitation": "self-excited", "amplitude": 1.0}
         result.set_attributes(texts | numbers | attributes)
-        result.axis("history", "time", "s", "time", INTERVAL * np.arange(samples))
+        result.axis("history", Field("time", "s", "time"), INTERVAL * np.arange(samples))
         for name, quantity in HISTORY.items():
             values = moved.get(name, np.zeros(samples))
-            result.variable("history", name, ("time",), quantity.units, quantity.long_name, values)
-        result.axis("spectrum", "frequency", "Hz", "frequency", np.linspace(0.0, 50.0, 1 + samples // 2))
+            result.variable("history", Field(name, quantity.units, quantity.long_name), ("time",), values)
+        result.axis("spectrum", Field("frequency", "Hz", "frequency"), np.linspace(0.0, 50.0, 1 + samples // 2))
         density = np.zeros(1 + samples // 2)
         density[len(density) // 50 + 1 :: len(density) // 50 + 1] = 1.0
-        result.variable("spectrum", "vx", ("frequency",), "1", "density", density if samples > 3 else 0 * density)
+        result.variable(
+            "spectrum", Field("vx", "1", "density"), ("frequency",), density if samples > 3 else 0 * density
+        )
         result.set_attributes({"first_sample": 0, "segments": 1}, "spectrum")
         result.commit()
     return path

@@ -13,7 +13,10 @@ from matplotlib.image import imread
 from numpy.typing import NDArray
 
 from brakecli.errors import UnreadableResultError, UsageError
-from brakecli.files.write import FILL, new_result, open_result
+from brakecli.files.fields import CRITICAL as CRITICAL_FIELDS
+from brakecli.files.fields import POINT, Field
+from brakecli.files.read import open_result
+from brakecli.files.write import FILL, new_result
 from brakecli.plots.result import plot_result
 from brakecli.plots.style import style
 from brakecli.plots.sweep.curves import cell_edges, draw_critical, draw_difference, draw_motion
@@ -29,7 +32,6 @@ from brakecli.plots.sweep.picture import Axis, SweepPicture, gather_sweep, reada
 from brakecli.sweeps.driver import choose_engine, sweep
 from brakecli.sweeps.file import parse_sweep
 from brakecli.sweeps.plan import label
-from brakecli.sweeps.point import CRITICAL_FIELDS, FIELDS
 from brakecli.sweeps.tables import Sweep
 
 ANGLE = {"parameter": "link2.angle_deg", "start": 1.0, "stop": 8.0, "num": 8}
@@ -45,9 +47,9 @@ Columns = dict[str, NDArray[Any]]
 def columns(shape: tuple[int, ...], *, critical: bool) -> Columns:
     """Every variable of a sweep, its numbers all different; each regime in turn."""
     count = int(np.prod(shape))
-    fields = FIELDS | (CRITICAL_FIELDS if critical else {})
     values: Columns = {
-        name: (np.zeros(shape) if field.kind[0] in "fi" else np.full(shape, "x")) for name, field in fields.items()
+        field.name: (np.zeros(shape) if field.kind[0] in "fi" else np.full(shape, "x"))
+        for field in (*POINT, *(CRITICAL_FIELDS if critical else ()))
     }
     places = np.arange(count, dtype=float).reshape(shape)
     values["status"] = np.full(shape, "done", "U24")
@@ -80,19 +82,20 @@ def write(path: Path, table: dict[str, Any], changed: Columns | None = None, **a
         dims = [axis.name for axis in model.axis] or ["point"]
         if both:
             dims.insert(0, "direction")
-            result.axis("/", "direction", "", "direction", np.array(["up", "down"]))
+            result.axis("/", Field("direction", "", "direction"), np.array(["up", "down"]))
         for axis in model.axis:
             along = [axis.value(place) for place in range(axis.size)]
             data = np.array(along) if axis.numeric else np.array([label(each) for each in along])
             key = ", ".join(axis.parameter)
-            result.axis("/", axis.name, UNITS.get(axis.parameter[0], "1"), key, data)
+            result.axis("/", Field(axis.name, UNITS.get(axis.parameter[0], "1"), key), data)
         if not model.axis:
-            result.axis("/", "point", "1", "the base case", np.zeros(1))
+            result.axis("/", Field("point", "1", "the base case"), np.zeros(1))
+        known = {field.name: field for field in (*POINT, *CRITICAL_FIELDS)}
         for name, array in values.items():
-            field = (FIELDS | CRITICAL_FIELDS).get(name)
+            field = known.get(name) or Field(name, "1", name)
             data = np.where(np.isnan(array), FILL, array) if array.dtype.kind == "f" else array
-            units, long_name = (field.units or "1", field.long_name) if field else ("1", name)
-            result.variable("/", name, dims[array.ndim == len(dims) - 1 :], units, long_name, data)
+            shown = Field(name, field.units or "1", field.meaning)
+            result.variable("/", shown, dims[array.ndim == len(dims) - 1 :], data)
         result.commit()
     return path
 

@@ -81,18 +81,13 @@ def test_both_iterations_give_the_same_history(scheme: str, theta: tuple[float, 
 
 def test_a_run_that_the_fixed_point_cannot_solve_says_so() -> None:
     case = make(SQUEAL, contact__stiffness=1e14, solver__iteration="fixed-point")
-    limits = step_limits(*_limits_of(case))
+    limits = step_limits(system_of(case))
     assert limits.contraction > 1.0
     work = simulate(case).work
     assert work.failure is Failure.UNCONVERGED
     assert work.unconverged_steps == 1
     assert work.unconverged.shape == (1, 2)
     assert simulate(make(SQUEAL, contact__stiffness=1e14)).work.failure is Failure.NONE
-
-
-def _limits_of(case: Any) -> Any:
-    system = system_of(case)
-    return system.coefficients, system.weights, system.scheme, system.contact_stiffness, system.wheel
 
 
 @pytest.mark.parametrize("number", [2.0, 50.0, 5000.0])
@@ -219,13 +214,13 @@ def test_an_unstable_scheme_is_known_by_its_amplification() -> None:
             MODE_COUPLING, solver__scheme="three-layer", solver__theta=(0.0, 1.0, 0.0), friction__coefficient=0.0,
             solver__step=step / np.sqrt(3.0),
         )  # fmt: skip
-        assert (step_limits(*_limits_of(case)).growth < 1.0 + 1e-9) == stable
+        assert (step_limits(system_of(case)).growth < 1.0 + 1e-9) == stable
     for step, stable in ((2.4, True), (2.5, False)):  # weights of Numerov: ωh < √6
         case = make(
             MODE_COUPLING, solver__scheme="three-layer", solver__theta=(1 / 12, 10 / 12, 1 / 12),
             friction__coefficient=0.0, solver__step=step / np.sqrt(3.0),
         )  # fmt: skip
-        assert (step_limits(*_limits_of(case)).growth < 1.0 + 1e-9) == stable
+        assert (step_limits(system_of(case)).growth < 1.0 + 1e-9) == stable
 
 
 def test_motion_that_blows_up_is_named() -> None:

@@ -65,7 +65,7 @@ Compute = Callable[[Plan, int, int], bytes]
 
 
 def quick(plan: Plan, first: int, count: int) -> bytes:
-    """Records that tell their points, without any simulation."""
+    """Records that hold their points as frequencies, without any simulation."""
     record = blank(record_type(plan), Status.DONE, "made up")
     records = np.repeat(record, count * plan.unit_length)
     records["frequency"] = np.arange(first * plan.unit_length, (first + count) * plan.unit_length)
@@ -235,7 +235,7 @@ def refused(file: str) -> None:
 
 
 def on_cluster(file: str, name: str, address: str) -> None:
-    """Sweep on a cluster, with a function of this module; tell what has come of it."""
+    """Sweep on a cluster, with a function of this module; print what has come of it."""
     loaded = read_sweep(file)
     functions: dict[str, Compute] = {"deadly": deadly, "hungry": hungry}
     with ClusterEngine(partial(functions[name], loaded.plan), address, None) as engine:

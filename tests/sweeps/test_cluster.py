@@ -223,7 +223,7 @@ def test_a_signal_ends_the_wait_for_a_scheduler(tmp_path: Path, number: signal.S
         (["--scheduler-file", "tiny.toml"], "--scheduler-file tiny.toml: cannot be read: it holds no address"),
     ],
 )
-def test_a_scheduler_that_does_not_exist_is_told(tmp_path: Path, options: list[str], reason: str) -> None:
+def test_a_scheduler_that_does_not_exist_is_reported(tmp_path: Path, options: list[str], reason: str) -> None:
     write_sweep(tmp_path, frictions(4))
     assert brakecli("sweep", "s.toml", *options, cwd=tmp_path).told(2, reason).count("\n") == 1
     assert left_in(tmp_path) == {"tiny.toml", "s.toml"}
@@ -237,7 +237,7 @@ def test_a_scheduler_that_does_not_answer_is_not_waited_for_for_ever(tmp_path: P
     assert left_in(tmp_path) == {"tiny.toml", "s.toml"}
 
 
-def test_a_cluster_without_workers_or_with_those_of_another_version_is_told(here: Path) -> None:
+def test_a_cluster_without_workers_or_with_those_of_another_version_is_reported(here: Path) -> None:
     with cluster_of(here / "dask") as cluster:
         command = ["sweep", "s.toml", "-q", "--scheduler", cluster.address]
         none = run(*command, cwd=here, command=COMMAND)

@@ -36,6 +36,15 @@ def found(
     return search(critical, case_at, verdict_of)
 
 
+def bracket(answer: Search) -> tuple[float, float, float, float]:
+    """The value that was found, its lower and its upper end, and its error bar."""
+    assert answer.value is not None
+    assert answer.lower is not None
+    assert answer.upper is not None
+    assert answer.error is not None
+    return answer.value, answer.lower, answer.upper, answer.error
+
+
 def rates(case: Case) -> tuple[float, float]:
     """Growth rate by neighbouring runs and by eigenvalues, 1/s."""
     steady = sliding(system_of(case))
@@ -133,13 +142,10 @@ def test_the_critical_friction_of_random_flat_damped_shoes_is_bracketed(shoes: i
         tolerance = 1e-3 * exact.friction
         answer = found(tables, 0.0, rng.uniform(1.3, 3.0) * exact.friction, tolerance=tolerance)
         assert answer.outcome is Outcome.FOUND
-        assert answer.value is not None
-        assert answer.lower is not None
-        assert answer.upper is not None
-        assert answer.error is not None
-        assert answer.lower <= exact.friction <= answer.upper, tables
-        assert answer.upper - answer.lower <= tolerance
-        assert abs(answer.value - exact.friction) <= answer.error
+        value, lower, upper, error = bracket(answer)
+        assert lower <= exact.friction <= upper, tables
+        assert upper - lower <= tolerance
+        assert abs(value - exact.friction) <= error
         assert answer.eigenvalue == exact.friction
         tried += 1
 
@@ -156,9 +162,8 @@ def test_the_error_bar_holds_the_bias_of_the_scheme() -> None:
     )
     assert answer.value == pytest.approx(0.8115433, abs=1e-3)  # what the amplification matrix gives for this step
     assert answer.bias == pytest.approx(0.8115433 - 0.75, abs=1e-6)
-    assert answer.value is not None
-    assert answer.error is not None
-    assert abs(answer.value - 0.75) <= answer.error
+    value, _, _, error = bracket(answer)
+    assert abs(value - 0.75) <= error
 
 
 def test_divergence_is_found_where_steady_sliding_ends() -> None:
@@ -166,10 +171,8 @@ def test_divergence_is_found_where_steady_sliding_ends() -> None:
     exact = stability(system_of(make(tables))).critical
     assert exact is not None
     assert exact.instability == "divergence"
-    answer = found(tables, 0.0, 1.5 * exact.friction, tolerance=1e-3)
-    assert answer.lower is not None
-    assert answer.upper is not None
-    assert answer.lower <= exact.friction <= answer.upper
+    _, lower, upper, _ = bracket(found(tables, 0.0, 1.5 * exact.friction, tolerance=1e-3))
+    assert lower <= exact.friction <= upper
 
 
 def test_roughness_in_full_contact_does_not_move_the_critical_friction() -> None:

@@ -12,7 +12,7 @@ from typing import Any
 import h5py
 import pytest
 
-from brakecli.files.write import open_result
+from brakecli.files.read import open_result
 from brakecli.sweeps.workers.local import LocalEngine
 from brakecli.sweeps.workers.task import Task
 from tests.campaign import campaign

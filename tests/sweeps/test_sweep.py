@@ -187,7 +187,7 @@ def test_lines_go_up_and_down_through_every_point_once() -> None:
     assert [value(plan.places(point)[1]) for point in lines[8]] == [0.9, 0.5, 0.1]
 
 
-def test_hysteresis_between_up_and_down_is_found_and_told(tmp_path: Path) -> None:
+def test_hysteresis_between_up_and_down_is_found_and_reported(tmp_path: Path) -> None:
     """A shoe that vibrates on a stiff contact goes on doing so where one at rest on it stays at rest."""
     case = """\
 shoe.mass = 15.7
@@ -244,7 +244,7 @@ def test_a_sweep_comes_from_standard_input_as_well(tmp_path: Path) -> None:
     assert left_in(tmp_path) == {"tiny.toml", "sweep.h5"}
 
 
-def test_check_tells_what_a_sweep_would_cost(tmp_path: Path) -> None:
+def test_check_reports_what_a_sweep_would_cost(tmp_path: Path) -> None:
     (tmp_path / "tiny.toml").write_text(CASE)
     (tmp_path / "s.toml").write_text(GRID)
     found = brakecli("check", "s.toml", "--json", cwd=tmp_path)
@@ -257,7 +257,7 @@ def test_check_tells_what_a_sweep_would_cost(tmp_path: Path) -> None:
     brakecli("check", "s.toml", cwd=tmp_path).told(3, "the sweep is too large: 2000000000 points")
 
 
-def test_a_sweep_given_to_run_and_a_case_given_to_sweep_are_told_apart(tmp_path: Path) -> None:
+def test_a_sweep_given_to_run_and_a_case_given_to_sweep_are_distinguished(tmp_path: Path) -> None:
     (tmp_path / "tiny.toml").write_text(CASE)
     (tmp_path / "s.toml").write_text(GRID)
     brakecli("run", "s.toml", cwd=tmp_path).told(2, "brakecli sweep s.toml")

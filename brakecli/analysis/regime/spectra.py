@@ -25,6 +25,7 @@ class Spectrum:
     density: dict[str, NDArray[np.float64]]
     start: int
     segments: int
+    window: str = "hann"
 
 
 def spectrum(history: History, start: int) -> Spectrum:

@@ -22,6 +22,7 @@ from brakecli.analysis.stability.modes import (
 )
 from brakecli.analysis.stability.search import bisect
 from brakecli.errors import CaseError
+from brakecli.files import fields
 from brakecli.solver.compile import Coefficients
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.steady_sliding import SteadySliding, steady_sliding, tabulated
@@ -77,26 +78,7 @@ class StabilityReport:
 
     def numbers(self) -> dict[str, Any]:
         """Names and values as `--json` gives them."""
-        critical = self.critical
-        return {
-            "belt_speed": self.belt_speed,
-            "friction_coefficient": self.friction,
-            "critical_friction": critical.friction if critical else None,
-            "instability": str(critical.instability) if critical else None,
-            "critical_frequency": critical.frequency if critical else None,
-            "stable": self.stable,
-            "eigenvalues": [[value.real, value.imag] for value in self.eigenvalues],
-            "modes": [mode.__dict__ for mode in self.modes],
-            "crossings": [
-                {**crossing.__dict__, "instability": str(crossing.instability)} for crossing in self.crossings
-            ],
-            "undamped_flutter_friction": self.undamped_flutter,
-            "undamped_divergence_friction": self.undamped_divergence,
-            "contact_stiffness": self.contact_stiffness,
-            "equilibrium": self.equilibrium.__dict__ if self.equilibrium else None,
-            "no_equilibrium": self.no_equilibrium,
-            "discrete": self.discrete.__dict__ if self.discrete else None,
-        }
+        return fields.values(fields.STABILITY, self)
 
 
 def stability(system: System) -> StabilityReport:

@@ -12,7 +12,7 @@ from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 
 from brakecli.errors import BrakecliError
-from brakecli.files.atomic import signals_deferred
+from brakecli.files.os_signals import signals_deferred
 from brakecli.sweeps.workers.task import Compute, Engine, Finished, NextTask, Task, attempt
 
 _SIGNALS = (signal.SIGHUP, signal.SIGINT, signal.SIGTERM)

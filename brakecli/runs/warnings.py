@@ -1,0 +1,156 @@
+"""What a careful user would want to know of a case before it runs: one sentence each, with its key and number."""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from brakecli.analysis.stability.discrete import RESOLVED, StepLimits, amplification
+from brakecli.analysis.stability.modes import eigensystem
+from brakecli.solver.contact.pad import NODES_PER_WAVE
+from brakecli.solver.system import WHOLE, System
+
+UNSTABLE = 1e-5
+"""Growth per step that no rounding of the eigenvalues explains."""
+_COARSE_NODES = NODES_PER_WAVE / 2
+_TAKEN = 0.01  # part of the fastest motion that a scheme may take out of a run unsaid
+_ROUNDING = 1e-8  # of the factors of a step
+
+
+def adjustments(system: System) -> list[str]:
+    """Sentences on how a run differs from what the case asks for: the grid of time, and nodes."""
+    method, interval, asked, step = system.method, system.interval, system.method.step, system.step
+    found = []
+    if method.own_steps and asked is not None:
+        found.append(
+            f"solver.step: not used, event-driven finds its steps itself, to a tolerance of {method.tolerance:g}"
+        )
+    if asked is None and method.nodes:
+        found.append("contact.nodes: not used, the tolerance chooses nodes itself")
+    if asked and not method.own_steps and abs(interval / asked - system.per_sample) > WHOLE * system.per_sample:
+        found.append(
+            f"solver.step: reduced from {asked:g} s to {step:.9g} s, "
+            f"{system.per_sample} to the sample interval of {interval:g} s"
+        )
+    if abs(system.duration / interval - system.samples) > WHOLE * system.samples:
+        found.append(
+            f"solver.duration: extended from {system.duration:g} s to the next sample at "
+            f"{system.sampled_duration:.9g} s"
+        )
+    return found
+
+
+def steps_per_period(system: System) -> float:
+    """Steps per period of the fastest motion; infinite where the scheme finds its steps itself."""
+    fastest = system.natural_frequencies[1]
+    return math.inf if system.method.own_steps or not fastest > 0.0 else 1.0 / (fastest * system.step)
+
+
+def nodes_per_wave(system: System) -> float | None:
+    """Quadrature nodes per shortest wave on the pad; None where there is none of both."""
+    waves = 2.0 * system.half_length * system.most_turns
+    return system.nodes / waves if system.nodes and waves > 0.0 else None
+
+
+def warnings(system: System, limits: StepLimits, steps: int) -> Iterator[str]:
+    """All warnings, for a run of so many steps."""
+    if not system.method.own_steps:
+        yield from _unresolved(system)
+    yield from _undersampled(system)
+    per_wave = nodes_per_wave(system)
+    if per_wave is not None and per_wave < _COARSE_NODES:
+        yield (
+            f"contact.nodes: {per_wave:.3g} nodes per shortest wavelength; "
+            f"take at least {math.ceil(system.nodes * _COARSE_NODES / per_wave)}, or leave nodes out"
+        )
+    yield from _of_the_scheme(system, limits, steps)
+    if system.load.values.min() < 0.0:
+        yield "load: the force is negative at times, it lifts the shoe off the wheel"
+
+
+def _unresolved(system: System) -> Iterator[str]:
+    """What the step is too long for."""
+    step, (_, fastest), passing = system.step, system.natural_frequencies, system.passing_frequency
+    per_period = steps_per_period(system)
+    if per_period < RESOLVED:
+        yield (
+            f"solver.step: {per_period:.3g} steps per period of the fastest motion ({fastest:.4g} Hz): it is not "
+            f"resolved; take a step of at most {1.0 / (RESOLVED * fastest):.2g} s"
+        )
+    elif (rate := _settling_rate(system)) * step > 2.0 * math.pi / RESOLVED:
+        yield (
+            f"solver.step: the dashpots settle a motion at a rate of {rate:.4g} 1/s: it is not resolved; take a "
+            f"step of at most {2.0 * math.pi / (RESOLVED * rate):.2g} s, or event-driven"
+        )
+    if passing * step > 1.0 / RESOLVED:
+        yield (
+            f"solver.step: {1.0 / (passing * step):.3g} steps per passing wave of the wheel ({passing:.4g} Hz); "
+            f"take a step of at most {1.0 / (RESOLVED * passing):.2g} s"
+        )
+    speed = system.fastest_belt
+    grip = system.coefficients.phi * float(np.abs(system.load.values).max()) / system.coefficients.m
+    if 0.0 < speed < grip * step:
+        yield (
+            f"solver.step: friction changes the shoe's velocity by up to {grip * step:.3g} m/s in "
+            f"a step, more than the wheel's {speed:.3g} m/s: stick and slip are not resolved; take a step of at "
+            f"most {speed / grip:.2g} s, or event-driven"
+        )
+
+
+def _undersampled(system: System) -> Iterator[str]:
+    """What would appear at a wrong place in the spectra."""
+    nyquist = 0.5 / system.interval
+    for what, frequency in (
+        ("the contact resonance", system.natural_frequencies[1]),
+        ("the shortest wave of the wheel", system.passing_frequency),
+    ):
+        if frequency > nyquist:
+            yield (
+                f"output.sample_interval: {what} at {frequency:.4g} Hz lies above half the sampling rate "
+                f"({nyquist:.4g} Hz) and would appear at a wrong place in the spectra; sample every "
+                f"{0.4 / frequency:.2g} s or more often"
+            )
+
+
+def _of_the_scheme(system: System, limits: StepLimits, steps: int) -> Iterator[str]:
+    """What iteration and weights do to the motion."""
+    method = system.method
+    if method.iteration == "fixed-point" and limits.contraction >= 1.0:
+        yield (
+            f"solver.iteration: the fixed-point iteration may diverge (its bound of contraction is "
+            f'{limits.contraction:.3g}, above 1); take "newton", or a step of at most '
+            f"{system.step / math.sqrt(limits.contraction):.2g} s"
+        )
+    if not limits.unique:
+        yield (
+            "friction.coefficient: a step may have more than one solution, as friction can wedge the shoe into "
+            "the wheel within a step; reduce solver.step or the coefficient"
+        )
+    if 1.0 + 1e-3 / steps < limits.growth and limits.growth > 1.0 + UNSTABLE:
+        yield (
+            f"solver.theta: the scheme itself multiplies disturbances by {limits.growth:.6g} in each step; "
+            f"reduce solver.step, {method.row.unstable}"
+        )
+    taken = 0.0 if method.own_steps else _taken(system, steps)
+    if taken > _TAKEN:
+        yield (
+            f"solver.theta: with these weights the scheme itself damps, it takes {100.0 * taken:.3g} % of the "
+            "fastest motion away by the end of the run, and its errors are of first order; take theta = "
+            f"{list(method.row.theta)}"
+        )
+
+
+def _settling_rate(system: System) -> float:
+    """The fastest rate (1/s) of the frictionless shoe: that of its dashpots where they are overcritical."""
+    values, _ = eigensystem(system.coefficients, system.contact_stiffness, 0.0)
+    return float(np.abs(values).max())
+
+
+def _taken(system: System, steps: int) -> float:
+    """Part of the fastest motion, without dashpots and friction, that the scheme takes away in so many steps."""
+    c = system.coefficients._replace(b_xx=0.0, b_xy=0.0, b_yy=0.0, phi=0.0)
+    factors = np.linalg.eigvals(amplification(c, system.weights, system.scheme, system.contact_stiffness))
+    left = float(np.abs(factors[np.argmax(np.abs(np.angle(factors)))]))  # not a direction without a spring
+    if left > 1.0 - _ROUNDING:
+        return 0.0
+    return -math.expm1(steps * math.log(left)) if left > 0.0 else 1.0
