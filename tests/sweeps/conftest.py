@@ -5,14 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.commands import warm_up
-from tests.sweeps.helpers import ANGLES, SLOWER, frictions, run, write_sweep
-
-
-@pytest.fixture(scope="session")
-def compiled() -> None:
-    """Kernels."""
-    warm_up()
+from tests.commands import run
+from tests.sweeps.helpers import ANGLES, SLOWER, frictions, write_sweep
 
 
 @pytest.fixture(scope="session")

@@ -8,11 +8,9 @@ import os
 import re
 import resource
 import signal
-import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -28,11 +26,9 @@ from brakecli.sweeps.result import SweepReport
 from brakecli.sweeps.workers.dask import ClusterEngine
 from brakecli.sweeps.workers.local import LocalEngine
 from brakecli.sweeps.workers.task import Engine, Finished, NextTask, compute_units
-from tests.commands import COMMAND, LIMIT, ROOT, TINY, Done, environment
+from tests.commands import LIMIT, ROOT, TINY, Done, run
 
 PROGRAM = [sys.executable, "-W", "error", "-m", "tests.sweeps.helpers"]
-QUICK = 2.0
-"""Seconds within which an interruption ends a command."""
 ANGLES = """\
 [[axis]]
 parameter = "link2.angle_deg"
@@ -193,62 +189,9 @@ def peak(pid: int | str) -> int:
     return sum(int(line.split()[1]) * 1024 for line in _proc(pid, "status").splitlines() if "VmHWM:" in line)
 
 
-@contextmanager
-def started(
-    *arguments: str | Path, cwd: Path, command: Sequence[str] = COMMAND, output: bool = True, **changes: str | None
-) -> Iterator[subprocess.Popen[bytes]]:
-    """A command that is running, in a group of processes of its own; all of it is killed at the end."""
-    process = subprocess.Popen(
-        [*command, *map(str, arguments)],
-        cwd=cwd,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE if output else subprocess.DEVNULL,
-        stderr=subprocess.PIPE if output else subprocess.DEVNULL,
-        env=environment(**changes),
-        start_new_session=True,
-    )
-    try:
-        yield process
-    finally:
-        if process.poll() is None:
-            os.killpg(process.pid, signal.SIGKILL)
-        process.communicate()
-
-
-def ended(process: subprocess.Popen[bytes], limit: float = LIMIT) -> Done:
-    """A command that ends by itself."""
-    out, err = process.communicate(timeout=limit)
-    return Done(process.returncode, out.decode(), err.decode())
-
-
-def run(
-    *arguments: str | Path,
-    cwd: Path,
-    command: Sequence[str] = COMMAND,
-    limit: float = LIMIT,
-    **changes: str | None,
-) -> Done:
-    """Run a command to its end; a process of its own, as those of sweeps start others."""
-    with started(*arguments, cwd=cwd, command=command, output=True, **changes) as process:
-        return ended(process, limit)
-
-
-def shell(line: str, cwd: Path, **changes: str | None) -> Done:
-    """Run a line of bash, in which $B is the command."""
-    command = line.replace("$B", f"exec {' '.join(COMMAND)}")
-    return run("-c", command, cwd=cwd, command=["bash"], limit=LIMIT, **changes)
-
-
 def program(*arguments: str | Path, limit: float = LIMIT) -> Done:
     """Run this module as a program."""
     return run(*arguments, cwd=ROOT, command=PROGRAM, limit=limit)
-
-
-def wait_until(condition: Callable[[], object], seconds: float = LIMIT) -> None:
-    deadline = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
 
 
 def journal_size(folder: Path) -> int:
@@ -267,8 +210,8 @@ def stuck(file: str) -> None:
     local(read_sweep(file), Path(file).with_suffix(".h5"), deaf)
 
 
-def memory(file: str) -> None:
-    """Sweep, and print the largest memory of this process and of its workers, in bytes."""
+def memory(file: str, name: str) -> None:
+    """Sweep by a function, and print the largest memory of this process and of its workers, in bytes."""
     largest, looked = 0, 0.0
 
     def progress(_: object) -> None:
@@ -277,7 +220,8 @@ def memory(file: str) -> None:
             looked = time.monotonic()
             largest = max([largest, *map(peak, workers(os.getpid()))])
 
-    report = local(read_sweep(file), Path(file).with_suffix(".h5"), compute_units, progress=progress)
+    functions: dict[str, Compute] = {"compute_units": compute_units, "quick": quick}
+    report = local(read_sweep(file), Path(file).with_suffix(".h5"), functions[name], progress=progress)
     numbers = {"points": report.findings.points, "failed": report.findings.failed, "workers": largest}
     print(json.dumps({**numbers, "parent": peak("self"), "seconds": report.seconds}))  # noqa: T201
 

@@ -15,23 +15,19 @@ from pathlib import Path
 import pytest
 
 from brakecli.sweeps.workers.task import compute_units
-from tests.commands import ROOT, left_in
+from tests.campaign import campaign
+from tests.commands import QUICK, ROOT, brakecli, ended, left_in, run, started, wait_until
 from tests.sweeps.helpers import (
     ANGLES,
-    QUICK,
     SLOWER,
     WICKED,
     alive,
     axis,
     children,
-    ended,
     frictions,
     inline,
     journal_size,
     program,
-    run,
-    started,
-    wait_until,
     write_sweep,
 )
 
@@ -71,7 +67,14 @@ class Cluster:
     def _start(self, module: str, options: list[str], **changes: str) -> subprocess.Popen[bytes]:
         # without -W error: their warnings are not ours
         return self._stack.enter_context(
-            started(*options, cwd=self.folder, command=[sys.executable, "-m", module], output=False, **changes)
+            started(
+                *options,
+                cwd=self.folder,
+                command=[sys.executable, "-m", module],
+                stdin=subprocess.DEVNULL,
+                output=False,
+                **changes,
+            )
         )
 
 
@@ -127,7 +130,7 @@ def test_a_scheduler_is_found_by_its_file_and_by_the_environment(cluster: Cluste
 # workers that die
 
 
-@pytest.mark.parametrize("nanny", ["--nanny", "--no-nanny"])
+@pytest.mark.parametrize("nanny", ["--nanny", pytest.param("--no-nanny", marks=campaign)])
 def test_a_killed_worker_costs_a_warning_and_no_point(good: Path, here: Path, nanny: str) -> None:
     with cluster_of(here / "dask") as cluster:
         crew = [cluster.worker(nanny), cluster.worker("--no-nanny")]
@@ -188,7 +191,7 @@ def test_a_signal_ends_a_sweep_whose_points_are_kept(
     assert (here / "s.h5").read_bytes() == (good / "s.h5").read_bytes()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=campaign)])
 def test_a_signal_ends_the_wait_for_a_scheduler(tmp_path: Path, number: signal.Signals) -> None:
     write_sweep(tmp_path, frictions(4))
     with started("sweep", "s.toml", "--scheduler", "tcp://127.0.0.1:9", cwd=tmp_path) as process:
@@ -210,7 +213,6 @@ def test_a_signal_ends_the_wait_for_a_scheduler(tmp_path: Path, number: signal.S
 @pytest.mark.parametrize(
     ("options", "reason"),
     [
-        (["--scheduler", "tcp://127.0.0.1:9"], "--scheduler tcp://127.0.0.1:9: no scheduler answers (Timed out"),
         (["--scheduler", "nonsense"], "--scheduler nonsense: no scheduler answers (missing port number"),
         (["--scheduler", "localhost:x"], "--scheduler localhost:x: no scheduler answers ("),
         (
@@ -223,10 +225,15 @@ def test_a_signal_ends_the_wait_for_a_scheduler(tmp_path: Path, number: signal.S
 )
 def test_a_scheduler_that_does_not_exist_is_reported(tmp_path: Path, options: list[str], reason: str) -> None:
     write_sweep(tmp_path, frictions(4))
-    start = time.monotonic()
-    done = run("sweep", "s.toml", *options, cwd=tmp_path, command=COMMAND)
-    assert done.told(2, reason).count("\n") == 1
-    assert time.monotonic() - start < 10.0
+    assert brakecli("sweep", "s.toml", *options, cwd=tmp_path).told(2, reason).count("\n") == 1
+    assert left_in(tmp_path) == {"tiny.toml", "s.toml"}
+
+
+def test_a_scheduler_that_does_not_answer_is_not_waited_for_for_ever(tmp_path: Path) -> None:
+    write_sweep(tmp_path, frictions(4))
+    done = run("sweep", "s.toml", "--scheduler", "tcp://127.0.0.1:9", cwd=tmp_path, command=COMMAND)
+    told = done.told(2, "--scheduler tcp://127.0.0.1:9: no scheduler answers (Timed out")
+    assert told.count("\n") == 1
     assert left_in(tmp_path) == {"tiny.toml", "s.toml"}
 
 
@@ -275,7 +282,7 @@ def test_a_scheduler_that_dies_ends_the_sweep_with_a_sentence(here: Path) -> Non
     assert left_in(here) - {"dask"} == {"tiny.toml", "s.toml", "s.h5.partial"}
 
 
-@pytest.mark.parametrize("before", ["", LATE])
+@pytest.mark.parametrize("before", [LATE, pytest.param("", marks=campaign)])
 def test_a_cluster_without_workers_is_waited_for_and_then_given_up(here: Path, before: str) -> None:
     with cluster_of(here / "dask") as cluster:
         only = cluster.worker("--no-nanny")

@@ -16,6 +16,7 @@ from brakecli.sweeps.growth import growth, sliding
 from brakecli.sweeps.point import verdict_of
 from brakecli.sweeps.tables import Critical, Method
 from tests.analysis.test_regime_table import random_case
+from tests.campaign import counts
 from tests.examples import MODE_COUPLING, ROUGH, SQUEAL, make
 
 WAVES = {"amplitudes": [1e-6, 7e-7], "wavelengths": [0.02, 0.011]}
@@ -126,10 +127,11 @@ def test_no_steady_sliding_has_no_growth() -> None:
     assert sliding(system_of(make(SQUEAL, load__force=-5000.0))) is None
 
 
-def test_the_critical_friction_of_20_random_flat_damped_shoes_is_bracketed() -> None:
+@pytest.mark.parametrize("shoes", counts(4, 20))
+def test_the_critical_friction_of_random_flat_damped_shoes_is_bracketed(shoes: int) -> None:
     rng = np.random.default_rng(5)
     tried = 0
-    while tried < 20:
+    while tried < shoes:
         tables = random_case(rng)
         exact = stability(system_of(make(tables))).critical
         if exact is None or exact.friction > 3.0:

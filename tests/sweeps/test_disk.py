@@ -13,8 +13,8 @@ from brakecli.errors import CannotWriteError
 from brakecli.sweeps.file import read_sweep
 from brakecli.sweeps.journal import identity
 from brakecli.sweeps.point import record_type
-from tests.commands import left_in
-from tests.sweeps.helpers import frictions, inline, interrupted, journal_size, shell, write_sweep
+from tests.commands import left_in, shell
+from tests.sweeps.helpers import frictions, inline, interrupted, journal_size, write_sweep
 
 
 def journal_bytes(folder: Path) -> int:

@@ -4,42 +4,44 @@ import os
 import signal
 import socket
 import time
-from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 
-from tests.commands import left_in
-from tests.sweeps.helpers import QUICK, alive, ended, journal_size, run, started, wait_until, workers
+from tests.campaign import campaign
+from tests.commands import QUICK, ended, left_in, run, started, wait_until
+from tests.sweeps.helpers import alive, journal_size, workers
 
 
 @pytest.mark.parametrize(
-    ("number", "group", "delays"),
+    ("number", "group", "delay"),
     [
-        (signal.SIGINT, True, (0.05, 0.3, 1.0)),
-        (signal.SIGINT, False, (0.6,)),
-        (signal.SIGTERM, True, (0.6,)),
-        (signal.SIGTERM, False, (0.05, 1.0)),
+        (signal.SIGINT, True, 0.05),
+        (signal.SIGINT, False, 0.6),
+        (signal.SIGTERM, True, 0.6),
+        (signal.SIGTERM, False, 1.0),
+        pytest.param(signal.SIGINT, True, 0.3, marks=campaign),
+        pytest.param(signal.SIGINT, True, 1.0, marks=campaign),
+        pytest.param(signal.SIGTERM, False, 0.05, marks=campaign),
     ],
 )
 def test_a_signal_ends_a_sweep_soon_and_in_one_sentence(
-    here: Path, number: signal.Signals, group: bool, delays: Sequence[float]
+    here: Path, number: signal.Signals, group: bool, delay: float
 ) -> None:
     """A terminal sends Ctrl-C to all processes of a command, also while they are being started."""
     word = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}[number]
-    for delay in delays:
-        with started("sweep", "s.toml", "--quiet", "-j", "2", cwd=here) as process:
-            wait_until(lambda process=process: workers(process.pid))  # type: ignore[misc]
-            time.sleep(delay)
-            crew = workers(process.pid)
-            start = time.monotonic()
-            assert process.poll() is None
-            os.killpg(process.pid, number) if group else process.send_signal(number)
-            done = ended(process)
-            assert time.monotonic() - start < QUICK
-        assert done.told(128 + number, f"brakecli: {word}").count("\n") == 1
-        assert not any(map(alive, crew))
-        assert left_in(here) <= {"tiny.toml", "s.toml", "s.h5.partial"}
+    with started("sweep", "s.toml", "--quiet", "-j", "2", cwd=here) as process:
+        wait_until(lambda: workers(process.pid))
+        time.sleep(delay)
+        crew = workers(process.pid)
+        start = time.monotonic()
+        assert process.poll() is None
+        os.killpg(process.pid, number) if group else process.send_signal(number)
+        done = ended(process)
+        assert time.monotonic() - start < QUICK
+    assert done.told(128 + number, f"brakecli: {word}").count("\n") == 1
+    assert not any(map(alive, crew))
+    assert left_in(here) <= {"tiny.toml", "s.toml", "s.h5.partial"}
 
 
 def test_an_interrupted_sweep_is_resumed_by_the_same_command(good: Path, here: Path) -> None:

@@ -9,8 +9,8 @@ import pytest
 from brakecli.errors import RefusedError
 from brakecli.sweeps.file import read_sweep
 from brakecli.sweeps.workers.task import compute_units
-from tests.commands import left_in
-from tests.sweeps.helpers import frictions, inline, interrupted, run, write_sweep
+from tests.commands import left_in, run
+from tests.sweeps.helpers import frictions, inline, interrupted, write_sweep
 
 pytestmark = pytest.mark.usefixtures("compiled")
 

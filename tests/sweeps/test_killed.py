@@ -15,7 +15,8 @@ import pytest
 from brakecli.files.read import open_result
 from brakecli.sweeps.workers.local import LocalEngine
 from brakecli.sweeps.workers.task import Task
-from tests.commands import LIMIT, ROOT, TINY, left_in
+from tests.campaign import campaign
+from tests.commands import LIMIT, ROOT, TINY, ended, left_in, run, shell, started, wait_until
 from tests.sweeps.helpers import (
     PROGRAM,
     WICKED,
@@ -25,16 +26,11 @@ from tests.sweeps.helpers import (
     broken,
     children,
     deadly,
-    ended,
     frictions,
     hungry,
     journal_size,
     local,
-    run,
-    shell,
     slow,
-    started,
-    wait_until,
     workers,
     write_sweep,
 )
@@ -47,10 +43,16 @@ def variable(path: Path, name: str) -> Any:
         return file[name][:]
 
 
-def test_a_sweep_killed_five_times_ends_with_the_bytes_of_an_undisturbed_one(good: Path, here: Path) -> None:
+@pytest.mark.parametrize(
+    "kills", [(False, True), pytest.param((False, True, False, True, True), marks=campaign)], ids=len
+)
+def test_a_killed_sweep_ends_with_the_bytes_of_an_undisturbed_one(
+    good: Path, here: Path, kills: tuple[bool, ...]
+) -> None:
+    """Each kill comes while workers are started, or, where true, while they compute."""
     chance = random.Random(1)
     size = 0
-    for computing in (False, True, False, True, True):
+    for computing in kills:
         with started("sweep", "s.toml", "--quiet", "-j", "2", cwd=here) as process:
             wait_until(lambda process=process: workers(process.pid))  # type: ignore[misc]
             if computing:
@@ -92,7 +94,7 @@ def test_a_killed_worker_costs_a_warning_and_no_point(good: Path, here: Path) ->
 @pytest.mark.parametrize(
     ("wicked", "task_size", "reason"),
     [
-        (deadly, 1, "killed by SIGKILL, as when memory runs out"),
+        pytest.param(deadly, 1, "killed by SIGKILL, as when memory runs out", marks=campaign),
         (deadly, 5, "killed by SIGKILL, as when memory runs out"),
         (hungry, 5, "it ran out of memory"),
         (broken, 5, "ZeroDivisionError: division by zero"),
