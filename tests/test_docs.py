@@ -1,5 +1,7 @@
 """The documentation names what files and commands give."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 from brakecli.analysis.regime import rules
@@ -53,6 +55,12 @@ def test_every_name_of_a_comparison_is_documented(tmp_path: Path) -> None:
         names = [*stored.attributes, *stored.variables("/"), *numbers, *numbers["entries"][0]]
     assert len(set(names)) > 50
     assert [name for name in names if f"`{name}`" not in page] == []
+
+
+def test_the_tables_of_the_pages_are_those_of_the_declaration() -> None:
+    command = [sys.executable, "docs/tables.py", "--check"]
+    done = subprocess.run(command, cwd=ROOT, env={"PYTHONPATH": str(ROOT)}, capture_output=True, text=True)
+    assert (done.returncode, done.stdout + done.stderr) == (0, "")
 
 
 def test_every_threshold_stands_in_the_documentation_with_its_default() -> None:

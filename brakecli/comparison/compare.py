@@ -59,6 +59,11 @@ class Entry:
         return self.work.contact_evaluations - self.samples
 
     @property
+    def stable_step(self) -> float | None:
+        """The limit on the step, s; None where there is none, or where it is not known."""
+        return None if self.step_limit is None or math.isinf(self.step_limit) else self.step_limit
+
+    @property
     def wall_seconds(self) -> float | None:
         """Median time of the loop alone, s."""
         return median(self.seconds) if self.seconds else None

@@ -29,6 +29,11 @@ class Rung(NamedTuple):
         """The method with its step or tolerance."""
         return replace(self.kind, step=self.step, tolerance=self.tolerance or 0.0)
 
+    @property
+    def label(self) -> str:
+        """The method in a few words."""
+        return method_label(self.kind)
+
 
 def method_label(kind: Method) -> str:
     """A method in a few words, without step and tolerance."""

@@ -7,10 +7,8 @@ holds it, however that ends, and the next process takes over whatever was left b
 import errno
 import fcntl
 import os
-import signal
 import socket
 import stat
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from io import FileIO
@@ -18,34 +16,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from brakecli.errors import CannotWriteError, UsageError
+from brakecli.files.os_signals import signals_deferred
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer, WriteableBuffer
-
-_INTERRUPTIONS = (signal.SIGHUP, signal.SIGINT, signal.SIGTERM)
-
-
-@contextmanager
-def signals_deferred() -> Iterator[None]:
-    """Hold back the program's own handlers of Ctrl-C, SIGTERM and SIGHUP until the block has ended.
-
-    An exception out of a handler must not cut through HDF5, which calls back into Python, nor through a clean-up.
-    """
-    if threading.current_thread() is not threading.main_thread():  # where Python runs no handlers
-        yield
-        return
-    handlers = {number: signal.getsignal(number) for number in _INTERRUPTIONS}
-    own = {number: handler for number, handler in handlers.items() if callable(handler)}
-    waiting: list[int] = []
-    try:
-        for number in own:
-            signal.signal(number, lambda arrived, _frame: waiting.append(arrived))
-        yield
-    finally:
-        for number, handler in own.items():
-            signal.signal(number, handler)
-        for arrived in waiting:
-            signal.raise_signal(arrived)
 
 
 class OutputFile(FileIO):
@@ -96,20 +70,18 @@ class OutputFile(FileIO):
     def check(self) -> None:
         """Raise CannotWriteError if any write so far has failed."""
         if self.failure is not None:
-            raise _cannot_write(self.path, self.failure) from self.failure
+            raise cannot_write(self.path, self.failure) from self.failure
 
     def publish(self) -> None:
         """Put the finished file in the place of the target, on the disk and not only in its cache."""
         self.check()
-        try:
+        with explained(self.path):
             os.fsync(self.fileno())
             if not self._force and os.path.lexists(self._target):
                 raise _exists(self.path)
             with signals_deferred():
                 self._temporary.replace(self._target)
                 self._published = True
-        except OSError as error:
-            raise _cannot_write(self.path, error) from error
         with suppress(OSError):  # some network file systems refuse; the file is in its place already
             directory = os.open(self._target.parent, os.O_RDONLY)
             try:
@@ -137,8 +109,8 @@ def new_output(path: Path, *, force: bool) -> Iterator[OutputFile]:
     target = _checked_target(path, force=force)
     with _locked(path, target):
         try:
-            with signals_deferred():
-                output = _opened(path, target, force=force)
+            with signals_deferred(), explained(path):
+                output = OutputFile(path, target, force=force)
             yield output
         except Exception:
             if output is not None:
@@ -151,8 +123,8 @@ def new_output(path: Path, *, force: bool) -> Iterator[OutputFile]:
 
 
 def _checked_target(path: Path, *, force: bool) -> Path:
-    """The file that `path` stands for, once nothing speaks against writing it."""
-    try:
+    """The file that `path` stands for, unless something prevents writing it."""
+    with explained(path):
         target = Path(os.path.realpath(path))
         if not target.parent.is_dir():
             raise CannotWriteError(
@@ -163,22 +135,13 @@ def _checked_target(path: Path, *, force: bool) -> Path:
             mode = target.stat().st_mode
         except FileNotFoundError:
             return target
-    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-        raise _cannot_write(path, error) from error
     if stat.S_ISDIR(mode):
         raise CannotWriteError(f"{path}: cannot write: this is a directory; name a file in it with -o")
     if not stat.S_ISREG(mode):  # replacing /dev/null would harm more than this command
-        raise CannotWriteError(f"{path}: cannot write: this is no regular file; choose another output with -o")
+        raise CannotWriteError(f"{path}: cannot write: this is not a regular file; choose another output with -o")
     if not force:
         raise _exists(path)
     return target
-
-
-def _opened(path: Path, target: Path, *, force: bool) -> OutputFile:
-    try:
-        return OutputFile(path, target, force=force)
-    except OSError as error:
-        raise _cannot_write(path, error) from error
 
 
 @contextmanager
@@ -187,8 +150,9 @@ def _locked(path: Path, target: Path) -> Iterator[None]:
     lock = _beside(target, "lock")
     descriptor = None
     try:
-        with signals_deferred():
-            descriptor = _acquire(path, lock)
+        with signals_deferred(), explained(path):
+            while descriptor is None:
+                descriptor = _acquired(path, lock)
         yield
     finally:
         with signals_deferred():
@@ -196,34 +160,30 @@ def _locked(path: Path, target: Path) -> Iterator[None]:
                 _release(descriptor, lock)
 
 
-def _acquire(path: Path, lock: Path) -> int:
-    """Open and lock the lock file, and write into it who holds it."""
-    while True:
-        try:
-            descriptor = _open_no_link(lock, os.O_RDWR | os.O_CREAT)
-        except OSError as error:
-            raise _cannot_write(path, error) from error
-        holder = os.pread(descriptor, 1000, 0).decode(errors="replace").strip()
-        if not _take(descriptor, holder):
-            os.close(descriptor)
-            raise UsageError(
-                f"{path}: is being written by {holder or 'another process'}; "
-                "wait until it has ended, or choose another output with -o"
-            )
-        if not _is_at(descriptor, lock):  # its last holder removed it between our opening and our locking
-            os.close(descriptor)
-            continue
-        try:
-            os.ftruncate(descriptor, 0)
-            os.pwrite(descriptor, f"process {os.getpid()} on {socket.gethostname()}\n".encode(), 0)
-        except OSError as error:
-            _release(descriptor, lock)
-            raise _cannot_write(path, error) from error
-        return descriptor
+def _acquired(path: Path, lock: Path) -> int | None:
+    """Open and lock the lock file, and write into it who holds it; None where its last holder has removed it."""
+    descriptor = _open_no_link(lock, os.O_RDWR | os.O_CREAT)
+    holder = os.pread(descriptor, 1000, 0).decode(errors="replace").strip()
+    if not _take(descriptor, holder):
+        os.close(descriptor)
+        raise UsageError(
+            f"{path}: is being written by {holder or 'another process'}; "
+            "wait until it has ended, or choose another output with -o"
+        )
+    if not _is_at(descriptor, lock):
+        os.close(descriptor)
+        return None
+    try:
+        os.ftruncate(descriptor, 0)
+        os.pwrite(descriptor, f"process {os.getpid()} on {socket.gethostname()}\n".encode(), 0)
+    except OSError:
+        _release(descriptor, lock)
+        raise
+    return descriptor
 
 
 def _take(descriptor: int, holder: str) -> bool:
-    """Lock without waiting; on a file system without locks, go by whether the process named in the file lives."""
+    """Lock without waiting. A file system without locks: free unless the process named in the file may live."""
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -239,17 +199,18 @@ def _lives(holder: str) -> bool:
         case ["process", number, "on", host] if number.isdecimal():
             if host != socket.gethostname():
                 return True
-            with suppress(PermissionError):
-                try:
-                    os.kill(int(number), 0)
-                except (ProcessLookupError, OverflowError):
-                    return False
+            try:
+                os.kill(int(number), 0)
+            except (ProcessLookupError, OverflowError):
+                return False
+            except PermissionError:
+                pass  # it runs, and belongs to someone else
             return True
     return False
 
 
 def _release(descriptor: int, lock: Path) -> None:
-    """Remove the lock file while it is still locked, so that nobody is left holding a name that is gone."""
+    """Remove the lock file while it is still locked, so that nobody holds a file without a name."""
     with suppress(OSError):
         if _is_at(descriptor, lock):
             lock.unlink()
@@ -275,7 +236,17 @@ def _exists(path: Path) -> UsageError:
     return UsageError(f"{path}: exists already; replace it with --force, or choose another output with -o")
 
 
-def _cannot_write(path: Path, error: OSError | ValueError) -> CannotWriteError:
+@contextmanager
+def explained(path: Path) -> Iterator[None]:
+    """Turn what the operating system refuses into CannotWriteError with a remedy."""
+    try:
+        yield
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
+        raise cannot_write(path, error) from error
+
+
+def cannot_write(path: Path, error: OSError | ValueError) -> CannotWriteError:
+    """The sentence for an output that cannot be written, with its reason and a remedy."""
     reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
     full = isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
     remedy = "free some space there, or choose" if full else "choose"

@@ -1,9 +1,9 @@
 """The form of a result file, and reading one: exactly what was written, or UnreadableResultError.
 
-A result is HDF5 that opens as netCDF-4, followed by the 32 bytes of the SHA-256 of everything before them. HDF5
-ignores these; a reader knows by them, before the library sees a single byte, that the file is as it was written.
-The checksums inside do not do that: they leave out texts, and a hole of zeros passes them. A program that edits
-the file cuts the 32 bytes off: then the checksums inside have to do.
+A result is HDF5 that opens as netCDF-4, followed by 32 bytes: the SHA-256 of everything before them. HDF5 ignores
+these bytes. A reader compares them before the library sees the file, and so knows that it is as it was written.
+The checksums inside the file are weaker: they leave out texts, and a hole of zeros passes them. A program that
+edits the file cuts the 32 bytes off; then only the checksums inside remain.
 """
 
 import hashlib
@@ -30,7 +30,7 @@ _MACHINERY = {"CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_Encoding", 
 
 @dataclass(frozen=True)
 class Variable:
-    """What is known of a variable without reading it."""
+    """A variable, without its values."""
 
     name: str
     dims: tuple[str, ...]
@@ -42,7 +42,7 @@ class StoredResult:
     """An open result file; a group is named by its path, the root by ``/``."""
 
     def __init__(self, path: Path, file: h5py.File) -> None:
-        """Take over a file that `open_result` has verified."""
+        """Read from a file that `open_result` has verified."""
         self.path = path
         self._file = file
         self.attributes = _attributes(file)
@@ -93,8 +93,8 @@ def open_result(path: Path, kind: str | None = None) -> Iterator[StoredResult]:
     """
     with ExitStack() as stack:
         with _explained(path):
-            if not stat.S_ISREG(path.stat().st_mode):  # a pipe would wait for ever
-                raise ValueError("this is no regular file")
+            if not stat.S_ISREG(path.stat().st_mode):  # a pipe would block forever
+                raise ValueError("this is not a regular file")
             stream = stack.enter_context(path.open("rb", buffering=0))
             _verify(stream)
             # h5py gets the very file that was verified, and does without the file locks of HDF5
@@ -106,23 +106,14 @@ def open_result(path: Path, kind: str | None = None) -> Iterator[StoredResult]:
 def is_hdf5(path: Path) -> bool:
     """Whether this is a regular file with the signature of HDF5, behind a user block or not."""
     try:
-        if not stat.S_ISREG(path.stat().st_mode):  # looking into a pipe would use up what it holds
-            return False
-        size = path.stat().st_size
-        with path.open("rb") as file:
-            offset = 0
-            while offset < size:
-                file.seek(offset)
-                if file.read(len(_SIGNATURE)) == _SIGNATURE:
-                    return True
-                offset = max(512, 2 * offset)
+        # looking into a pipe would use up what it holds
+        return stat.S_ISREG(path.stat().st_mode) and bool(h5py.is_hdf5(path))
     except (OSError, ValueError):
-        pass
-    return False
+        return False
 
 
 def digest(file: RawIOBase, length: int) -> bytes:
-    """The SHA-256 of the first `length` bytes; `file` is left standing behind them."""
+    """The SHA-256 of the first `length` bytes; afterwards `file` stands behind them."""
     file.seek(0)
     total = hashlib.sha256()
     while length > 0 and (block := file.read(min(length, 1 << 20))):
@@ -132,12 +123,12 @@ def digest(file: RawIOBase, length: int) -> bytes:
 
 
 def _verify(file: RawIOBase) -> None:
-    """Compare the file with the digest behind its end, if there is anything behind its end."""
+    """Compare the file with the digest behind the end of its HDF5 part, if there is one."""
     file.seek(0)
     superblock = file.read(36) or b""
     if not superblock.startswith(_SIGNATURE):
-        raise ValueError("this is no HDF5 file" if superblock else "the file is empty")
-    if superblock[8:9] != b"\x02":  # versions 0 and 1 are laid out otherwise, and never written by this program
+        raise ValueError("this is not an HDF5 file" if superblock else "the file is empty")
+    if superblock[8:9] != b"\x02":  # versions 0 and 1 have another layout; this program does not write them
         raise ValueError(f'it was not written by this program, attribute format = "{FORMAT}" is missing')
     end = int.from_bytes(superblock[28:36], "little")
     behind = file.seek(0, 2) - end
@@ -161,7 +152,7 @@ def _check_header(attributes: dict[str, Any], kind: str | None) -> None:
 
 @contextmanager
 def _explained(path: Path) -> Iterator[None]:
-    """Turn whatever h5py raises on a damaged file into the one error that is promised."""
+    """Turn whatever h5py raises on a damaged file into UnreadableResultError."""
     try:
         yield
     except Exception as error:

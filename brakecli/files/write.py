@@ -1,10 +1,9 @@
 """Writing result files: HDF5 that opens as netCDF-4, and appears whole or not at all.
 
-The same calls give the same bytes, however the rows of a growing variable are cut into pieces. Which variables a
-result has is known to the callers alone.
+The same calls give the same bytes, however the rows of a growing variable are cut into pieces.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,41 +11,39 @@ from typing import Any
 
 import h5py
 import numpy as np
-from numpy.typing import ArrayLike, DTypeLike, NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from brakecli.files.atomic import OutputFile, new_output, signals_deferred
-from brakecli.files.read import FORMAT, FORMAT_VERSION, StoredResult, Variable, digest, is_hdf5, open_result
-
-__all__ = ["ResultFile", "StoredResult", "Variable", "is_hdf5", "new_result", "open_result"]
+from brakecli.files.atomic import OutputFile, new_output
+from brakecli.files.field import Field
+from brakecli.files.os_signals import signals_deferred
+from brakecli.files.read import FORMAT, FORMAT_VERSION, digest
 
 FILL = 9.969209968386869e36
-"""What netCDF puts where a number is missing; it stands in the attribute ``_FillValue`` then."""
+"""What netCDF puts where a number is missing; the attribute ``_FillValue`` names it."""
 _CHUNK = 16384
-"""Values in a chunk, at most: 128 KiB of float64."""
+"""Most values in a chunk: 128 KiB of float64."""
 
 
 @dataclass
-class _Column:
-    """A declared variable: where it stands, and what is written beside its values."""
+class _Variable:
+    """A declared variable, its axes, and rows that do not yet fill a chunk."""
 
-    name: str
+    field: Field
     dims: tuple[str, ...]
-    dtype: np.dtype[Any]
     attributes: dict[str, Any]
+    waiting: NDArray[Any]
 
 
 @dataclass
 class _Table:
-    """The growing variables of one group. Rows wait here until they fill a chunk, so nothing depends on pieces."""
+    """The growing variables of one group. Only whole chunks are written, so nothing depends on pieces."""
 
-    columns: dict[str, _Column] = field(default_factory=dict)
-    waiting: dict[str, NDArray[Any]] = field(default_factory=dict)
-    rows_waiting: int = 0
-    rows_stored: int = 0
+    variables: dict[str, _Variable] = field(default_factory=dict)
+    written: int = 0
 
-    def add(self, column: _Column) -> None:
-        self.columns[column.name] = column
-        self.waiting[column.name] = np.empty(_CHUNK, column.dtype)
+    @property
+    def waiting(self) -> int:
+        return next((len(variable.waiting) for variable in self.variables.values()), 0)
 
 
 class ResultFile:
@@ -73,83 +70,88 @@ class ResultFile:
         with self._hdf5():
             _set_attributes(self._file.require_group(group), attributes)
 
-    def axis(self, group: str, name: str, units: str, long_name: str, values: ArrayLike | None = None) -> None:
+    def set_fields(self, fields: Iterable[Field], values: Mapping[str, Any]) -> None:
+        """Set those of the fields that belong in a file, as attributes. What does not exist is left out."""
+        for each in fields:
+            if each.in_file and each.name in values:
+                found = values[each.name] if each.group else {each.name: values[each.name]}
+                present = {name: value for name, value in found.items() if value is not None and value != []}
+                self.set_attributes(present, each.group or "/")
+
+    def axis(self, group: str, field: Field, values: ArrayLike | None = None) -> None:
         """Make a dimension of this name in `group`, with numbers or texts along it; without `values` it grows."""
-        self.variable(group, name, (name,), units, long_name, values)
+        self.variable(group, field, (field.name,), values)
+
+    def column(self, field: Field, dims: Sequence[str], values: ArrayLike, **attributes: Any) -> None:
+        """Write a variable of the root whose numbers may be missing: None or NaN."""
+        if field.kind == "f8":
+            numbers = np.asarray(values, dtype=np.float64)
+            values = np.where(np.isnan(numbers), FILL, numbers)
+            attributes = {"_FillValue": np.array([FILL]), **attributes}
+        self.variable("/", field, dims, values, attributes)
 
     def variable(
         self,
         group: str,
-        name: str,
+        field: Field,
         dims: Sequence[str],
-        units: str,
-        long_name: str,
         values: ArrayLike | None = None,
-        *,
-        dtype: DTypeLike = np.float64,
         attributes: Mapping[str, Any] | None = None,
     ) -> None:
         """Write a variable over the axes `dims` of its group; without `values` it grows along its only axis.
 
         A scalar belongs in an attribute: HDF5 keeps no checksum of one.
         """
-        texts = {"units": units, "long_name": long_name}
-        column = _Column(name, tuple(dims), np.dtype(dtype), {**texts, **(attributes or {})})
-        table = self._tables.setdefault(group, _Table())
-        if not dims or name in table.columns:
+        name, table = field.name, self._tables.setdefault(group, _Table())
+        texts = {"units": field.units, "long_name": field.meaning}
+        variable = _Variable(field, tuple(dims), {**texts, **(attributes or {})}, np.empty(0, field.kind))
+        if not dims or name in table.variables:
             raise ValueError(f"{group}/{name}: has no dimension, or is declared twice")
         if values is None:
-            if len(dims) != 1 or (name != dims[0] and dims[0] not in table.columns):
+            if len(dims) != 1 or (name != dims[0] and dims[0] not in table.variables):
                 raise ValueError(f"{group}/{name}: only a variable over one growing axis can grow")
-            table.add(column)
+            table.variables[name] = variable
             return
-        checked = _checked(f"{group}/{name}", values, column.dtype)
+        checked = _checked(f"{group}/{name}", values, field.kind)
         if checked.dtype.kind == "S":
-            column.attributes["_Encoding"] = "utf-8"  # by which xarray knows text from bytes
+            variable.attributes["_Encoding"] = "utf-8"  # by which xarray knows text from bytes
         with self._hdf5():
             lengths = {axis: self._file[group][axis].shape[0] for axis in dims if axis != name}
             if checked.shape != tuple(lengths.get(axis, checked.size) for axis in dims):
                 raise ValueError(f"{group}/{name}: its shape {checked.shape} is not that of its axes {lengths}")
-            self._create(group, column, checked.shape, checked.dtype, _chunk(checked.shape))[...] = checked
+            self._create(group, variable, checked, _chunk(checked.shape))[...] = checked
 
     def append(self, group: str, rows: Mapping[str, ArrayLike]) -> None:
         """Append rows to all growing variables of `group`, the growing axis among them."""
         self.check()
         table = self._tables[group]
-        if rows.keys() != table.columns.keys():
-            raise ValueError(f"{group}: needs {sorted(table.columns)}, got {sorted(rows)}")
-        blocks = {
-            name: _checked(f"{group}/{name}", rows[name], column.dtype) for name, column in table.columns.items()
-        }
+        if rows.keys() != table.variables.keys():
+            raise ValueError(f"{group}: needs {sorted(table.variables)}, got {sorted(rows)}")
+        blocks = {name: _checked(f"{group}/{name}", rows[name], table.variables[name].field.kind) for name in rows}
         shapes = {block.shape for block in blocks.values()}
-        if len(shapes) != 1 or len(count := shapes.pop()) != 1:
+        if len(shapes) != 1 or len(shape := shapes.pop()) != 1:
             raise ValueError(f"{group}: every variable needs the same number of rows")
-        done = 0
-        while done < count[0]:
-            take = min(count[0] - done, _CHUNK - table.rows_waiting)
-            for name, block in blocks.items():
-                table.waiting[name][table.rows_waiting :][:take] = block[done : done + take]
-            table.rows_waiting += take
-            done += take
-            if table.rows_waiting == _CHUNK:
-                self._store(group, table)
+        for first in range(0, shape[0], _CHUNK):
+            for name, variable in table.variables.items():
+                variable.waiting = np.concatenate([variable.waiting, blocks[name][first : first + _CHUNK]])
+            if table.waiting >= _CHUNK:
+                self._write_rows(group, table, _CHUNK)
 
     def rows(self, group: str) -> int:
         """The number of rows appended to `group` so far."""
-        table = self._tables[group]
-        return table.rows_stored + table.rows_waiting
+        return self._tables[group].written + self._tables[group].waiting
 
     def read(self, group: str, name: str, start: int = 0, stop: int | None = None) -> NDArray[Any]:
         """The rows `start` to `stop` of a variable of numbers, of those appended so far; both are >= 0."""
         with self._hdf5():
             table = self._tables[group]
-            if name not in table.columns:
+            if name not in table.variables:
                 return np.asarray(self._file[group][name][start:stop])
-            stop = self.rows(group) if stop is None else stop
-            first = table.rows_stored
-            stored = self._file[group][name][start:stop] if first else np.empty(0, table.columns[name].dtype)
-            waiting = table.waiting[name][: table.rows_waiting]
-            return np.concatenate([stored, waiting[max(0, start - first) : max(0, stop - first)]])
+            first, waiting = table.written, table.variables[name].waiting
+            if not first:
+                return waiting[start:stop]
+            behind = None if stop is None else max(0, stop - first)
+            return np.concatenate([self._file[group][name][start:stop], waiting[max(0, start - first) : behind]])
 
     def check(self) -> None:
         """Raise CannotWriteError if any write so far has failed, so that a long run can end early."""
@@ -159,15 +161,15 @@ class ResultFile:
         """Finish the file and put it in its place; nothing can be written after that."""
         with self._hdf5():
             for group, table in self._tables.items():
-                if table.columns and (table.rows_waiting or not table.rows_stored):
-                    self._store(group, table)
+                if table.variables and (table.waiting or not table.written):
+                    self._write_rows(group, table, table.waiting)
             self._file.attrs["complete"] = 1
         self.close()
         self._output.write(digest(self._output, self._output.seek(0, 2)))
         self._output.publish()
 
     def close(self) -> None:
-        """Let go of the file, before its output is closed; without an earlier `commit` all is lost."""
+        """Close the HDF5 file, before its output is closed; without an earlier `commit` all is lost."""
         with signals_deferred():
             if self._file is not None:
                 self._file.close()
@@ -175,51 +177,44 @@ class ResultFile:
 
     @contextmanager
     def _hdf5(self) -> Iterator[None]:
-        """Around all calls of HDF5.
+        """Surround all calls of HDF5 with checks, and hold back signals.
 
-        Its objects have to die within, too: Python loses an exception that a handler raises while one dies.
+        Objects of HDF5 are to be freed within the block, too: Python loses an exception that a handler raises
+        while one is freed.
         """
         self.check()
         with signals_deferred():
             yield
         self.check()
 
-    def _store(self, group: str, table: _Table) -> None:
-        """Write the waiting rows behind the stored ones."""
-        end = table.rows_stored + table.rows_waiting
+    def _write_rows(self, group: str, table: _Table, count: int) -> None:
+        """Write the first of the waiting rows behind those that are written."""
+        end = table.written + count
         with self._hdf5():
-            for column in table.columns.values():
-                self._extend(group, column, table, end)
-        table.rows_stored, table.rows_waiting = end, 0
-
-    def _extend(self, group: str, column: _Column, table: _Table, end: int) -> None:
-        if not table.rows_stored:  # created only now, so that a short series gets a chunk of just its length
-            self._create(group, column, (0,), column.dtype, (max(1, end),))
-        dataset = self._file[group][column.name]
-        dataset.resize(end, axis=0)
-        dataset[table.rows_stored :] = table.waiting[column.name][: table.rows_waiting]
+            for variable in table.variables.values():
+                rows, variable.waiting = variable.waiting[:count], variable.waiting[count:]
+                if not table.written:  # created only now, so that a short series gets a chunk of just its length
+                    self._create(group, variable, rows[:0], (max(1, end),))
+                dataset = self._file[group][variable.field.name]
+                dataset.resize(end, axis=0)
+                dataset[table.written :] = rows
+        table.written = end
 
     def _create(
-        self,
-        group: str,
-        column: _Column,
-        shape: tuple[int, ...],
-        dtype: np.dtype[Any],
-        chunks: tuple[int, ...],
+        self, group: str, variable: _Variable, like: NDArray[Any], chunks: tuple[int, ...]
     ) -> h5py.Dataset:
-        """Create a dataset with checksums, its attributes and its axes."""
-        parent = self._file.require_group(group)
-        maxshape = None
-        if 0 in shape:  # HDF5 takes no chunk that is longer than its dataset can get
-            maxshape = (None,) * len(shape)
+        """Create a dataset with checksums, its attributes and its axes; `like` has its shape and type."""
+        parent, name = self._file.require_group(group), variable.field.name
+        # HDF5 takes no chunk that is longer than its dataset can get
+        maxshape = (None,) * like.ndim if 0 in like.shape else None
         dataset = parent.create_dataset(
-            column.name, shape, dtype, chunks=chunks, maxshape=maxshape, fletcher32=True
+            name, like.shape, like.dtype, chunks=chunks, maxshape=maxshape, fletcher32=True
         )
-        _set_attributes(dataset, column.attributes)
-        if column.dims == (column.name,):
-            dataset.make_scale(column.name)
+        _set_attributes(dataset, variable.attributes)
+        if variable.dims == (name,):
+            dataset.make_scale(name)
         else:
-            for dimension, axis in zip(dataset.dims, column.dims, strict=True):
+            for dimension, axis in zip(dataset.dims, variable.dims, strict=True):
                 dimension.attach_scale(parent[axis])
         return dataset
 
@@ -266,8 +261,8 @@ def _attribute(name: str, value: Any) -> Any:
     return array
 
 
-def _checked(name: str, values: ArrayLike, dtype: np.dtype[Any]) -> NDArray[Any]:
-    """The values in the type they are stored in; a number that would not come back as it was is refused."""
+def _checked(name: str, values: ArrayLike, kind: str) -> NDArray[Any]:
+    """The values in the type of the file; a number that would not come back as it was is refused."""
     array = np.asarray(values)
     if array.dtype.kind == "U":
         text = np.char.encode(array, "utf-8")
@@ -275,7 +270,7 @@ def _checked(name: str, values: ArrayLike, dtype: np.dtype[Any]) -> NDArray[Any]
     if array.dtype.kind not in "iuf" or not np.isfinite(array).all():
         raise ValueError(f"{name}: must be finite numbers")
     with np.errstate(all="ignore"):
-        converted = array.astype(dtype, copy=False)
+        converted = array.astype(kind, copy=False)
     if converted.dtype.kind not in "iuf" or not np.array_equal(converted, array):
-        raise ValueError(f"{name}: does not fit {dtype}")
+        raise ValueError(f"{name}: does not fit {np.dtype(kind)}")
     return converted

@@ -1,6 +1,6 @@
 """One run, from a case to a finished result file: what `brakecli run` does."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -12,30 +12,30 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from brakecli import __version__
-from brakecli.analysis.regime.of_run import context, failed, verdict_numbers
-from brakecli.analysis.regime.rules import Verdict, classify
-from brakecli.analysis.regime.spectra import SPECTRAL, Spectrum, peak, spectrum
+from brakecli.analysis.regime.of_run import RunVerdict, verdict_on
+from brakecli.analysis.regime.spectra import peak, spectrum
 from brakecli.case.read import LoadedCase
 from brakecli.case.system import system_of
+from brakecli.files import fields
+from brakecli.files.field import values_of
 from brakecli.files.write import ResultFile, new_result
 from brakecli.runs.limits import Check, check, free_bytes, refuse, within_range
 from brakecli.runs.modelled import modelled
 from brakecli.runs.tolerance import Certificate, certify
-from brakecli.solver.motion import Motion, solve
-from brakecli.solver.quantities import HISTORY, TIME, ContactState
+from brakecli.solver.motion import Motion, Progress, Sink, solve
+from brakecli.solver.quantities import HISTORY, ContactState
 from brakecli.solver.system import System
 
 
 @dataclass(frozen=True)
-class RunReport:
-    """Everything that a run has found out; numbers in SI units."""
+class RunReport(RunVerdict):
+    """Everything that a run has found out; numbers in SI units. `fields.RUN` says where each of them is."""
 
-    output: Path
     title: str
+    output: Path
     motion: Motion
     check: Check
     certificate: Certificate | None  # where the case gives no step
-    verdict: Verdict
     spectrum_peak: float | None  # Hz, of vx
     warnings: tuple[str, ...]
 
@@ -44,106 +44,38 @@ class RunReport:
         """Whether the run ended before its time."""
         return self.motion.work.failed
 
+    @property
+    def status(self) -> str:
+        """How the run has ended, in a word."""
+        return "failed" if self.failed else "done"
+
+    @property
+    def iteration(self) -> str | None:
+        """How the equations of a step are solved; None where the scheme finds its steps itself."""
+        method = self.system.method
+        return None if method.own_steps else method.iteration
+
+    @property
+    def step(self) -> float | None:
+        """The time step, s; None where the scheme finds its steps itself."""
+        return None if self.system.method.own_steps else self.system.step
+
+    @property
+    def modelled(self) -> list[str]:
+        """What of the model the run has used."""
+        return modelled(self.motion)[0]
+
+    @property
+    def left_out(self) -> list[str]:
+        """What of the model the run has left out, and why that was safe."""
+        return modelled(self.motion)[1]
+
     def numbers(self) -> dict[str, Any]:
-        """Names and values as `--json` gives them and the file's attributes hold them."""
-        system, work, energy = self.motion.system, self.motion.work, self.motion.energy
-        method, (used, left) = system.method, modelled(self.motion)
-        return {
-            "status": "failed" if self.failed else "done",
-            "failure": work.failure_sentence,
-            **verdict_numbers(self.verdict, system),
-            "spectrum_peak": self.spectrum_peak,
-            "scheme": method.scheme,
-            "theta": list(method.theta),
-            "iteration": None if method.own_steps else method.iteration,
-            "step": None if method.own_steps else system.step,
-            **certificate_numbers(self.certificate),
-            "evaluators": work.evaluators,
-            "nodes": system.nodes,
-            "steps": work.steps,
-            "contact_evaluations": work.contact_evaluations,
-            "most_evaluations_in_a_step": work.most_evaluations,
-            "unconverged_steps": work.unconverged_steps,
-            "non_unique_steps": work.non_unique_steps,
-            "energy": {
-                **asdict(energy),
-                "closing_error": energy.closing_error,
-                "relative_closing_error": energy.relative_closing_error,
-            },
-            "modelled": used,
-            "left_out": left,
-            "adjustments": list(self.check.adjustments),
-            "warnings": list(self.warnings),
-        }
-
-
-def certificate_numbers(certificate: Certificate | None) -> dict[str, Any]:
-    """Names and values of what a tolerance has come to; null where the case gives a step."""
-    if certificate is None:
-        return {"tolerance": None, "certified": None, "estimated_error": None, "certified_until": None}
-    return {
-        "tolerance": certificate.tolerance,
-        "certified": int(certificate.certified),
-        "estimated_error": certificate.estimated_error,
-        "certified_until": certificate.certified_until,
-        "certified_by": certificate.method,
-    }
-
-
-def load_kernels(loaded: LoadedCase) -> None:
-    """Compile what a run of a case needs, or load it: this takes seconds only once."""
-    with within_range():
-        system = system_of(loaded.case)
-    _ = system.scheme, system.evaluate
-
-
-def run(
-    loaded: LoadedCase,
-    output: Path,
-    *,
-    force: bool,
-    begin: Callable[[System, Check], None] = lambda system, found: None,
-    progress: Callable[[int], None] = lambda steps: None,
-) -> RunReport:
-    """Simulate a case and write its result file.
-
-    `begin` is told of the run before it starts, `progress` the steps done. Raises RefusedError,
-    CannotWriteError or UsageError before anything is computed, CannotWriteError also later; a run that fails
-    numerically is written up to there and reported.
-    """
-    with within_range():
-        system = system_of(loaded.case)
-        found = check(system)
-        with new_result(output, force=force) as result:
-            refuse(system, found, free_bytes(output.resolve().parent))
-            begin(system, found)
-            _declare_history(result)
-            interval = system.interval
-
-            def sink(rows: NDArray[np.float64]) -> None:
-                _require_finite("a force", rows)
-                first = result.rows("history")
-                columns = dict(zip(HISTORY, rows.T, strict=True))
-                result.append("history", {"time": interval * np.arange(first, first + len(rows)), **columns})
-
-            certificate = None
-            if system.method.step is not None:
-                motion = solve(system, sink=sink, progress=progress)
-            else:
-                certified = certify(system, progress)
-                motion, certificate = certified.motion, certified.certificate
-                sink(motion.rows)
-            _require_finite("an energy", list(asdict(motion.energy).values()))
-            report = _analyse(loaded.case.title, motion, found, certificate, result, output)
-            _write(result, loaded, report)
-            result.commit()
-    return report
-
-
-def _require_finite(what: str, values: ArrayLike) -> None:
-    """Compiled code overflows without a word; the motion itself is bounded by the loop."""
-    if not np.isfinite(values).all():
-        raise FloatingPointError(f"{what} overflows")
+        """Names and values as `--json` gives them."""
+        numbers = values_of(fields.RUN, self)
+        if self.certificate is None:
+            del numbers["certified_by"]
+        return numbers
 
 
 @dataclass(frozen=True)
@@ -160,20 +92,83 @@ class _Written:
     def read(self, name: str, start: int, stop: int) -> NDArray[np.float64]:
         return self.result.read("history", name, start, stop)
 
+    def append(self, rows: NDArray[np.float64]) -> None:
+        _require_finite("a force", rows)
+        time = self.interval * np.arange(self.samples, self.samples + len(rows))
+        self.result.append("history", {"time": time, **dict(zip(HISTORY, rows.T, strict=True))})
 
-def _analyse(
-    title: str, motion: Motion, found: Check, certificate: Certificate | None, result: ResultFile, output: Path
+
+def load_kernels(loaded: LoadedCase) -> None:
+    """Compile what a run of a case needs, or load it: this takes seconds only once."""
+    with within_range():
+        system = system_of(loaded.case)
+    _ = system.scheme, system.evaluate
+
+
+def run(
+    loaded: LoadedCase,
+    output: Path,
+    *,
+    force: bool,
+    progress: Callable[[str, int, int], None] = lambda what, done, total: None,
 ) -> RunReport:
-    """Regime, spectra and warnings of the finished history; the spectra go into the file at once."""
-    system, work = motion.system, motion.work
-    history = _Written(result, system.interval)
-    verdict = classify(history, context(system))
-    if work.failure_sentence is not None:
-        verdict = failed(verdict, work.failure_sentence)
-    lines = spectrum(history, verdict.settled_from)
-    _write_spectrum(result, lines)
-    warnings = list(found.warnings)
-    if work.unconverged_steps and system.method.allow_unconverged:
+    """Simulate a case and write its result file.
+
+    `progress` is called now and then with what is counted, how many are done, and how many there are. Raises
+    RefusedError, CannotWriteError or UsageError before anything is computed, CannotWriteError also later. A run
+    that fails numerically is written up to the failure and reported.
+    """
+    with within_range():
+        system = system_of(loaded.case)
+        found = check(system)
+        with new_result(output, force=force) as result:
+            refuse(system, found, free_bytes(output.resolve().parent))
+            _declare_history(result)
+
+            def advance(done: int) -> None:
+                progress("steps" if found.step else "samples", done, system.steps)
+
+            history = _Written(result, system.interval)
+            motion, certificate = motion_of(system, advance, history.append)
+            _require_finite("an energy", list(asdict(motion.energy).values()))
+            verdict = verdict_on(history, motion.system, motion.work.failure_sentence)
+            top = _write_spectrum(result, history, verdict.settled_from)
+            warnings = (*found.warnings, *_warnings(motion, certificate))
+            report = RunReport(
+                motion.system, verdict, loaded.case.title, output, motion, found, certificate, top, warnings
+            )
+            result.set_attributes(origin("run", report.title, loaded))
+            result.set_fields(fields.RUN, report.numbers())
+            _write_unconverged(result, motion.work.unconverged)
+            result.commit()
+    return report
+
+
+def motion_of(
+    system: System, progress: Progress = lambda steps: None, sink: Sink | None = None
+) -> tuple[Motion, Certificate | None]:
+    """The motion of a system: at the step of its method, or to its tolerance, with a certificate.
+
+    Samples go to `sink` where there is one.
+    """
+    if system.method.step is not None:
+        return solve(system, sink=sink, progress=progress), None
+    certified = certify(system, progress)
+    if sink is not None:
+        sink(certified.motion.rows)
+    return certified.motion, certified.certificate
+
+
+def _require_finite(what: str, values: ArrayLike) -> None:
+    """Compiled code overflows silently; the loop bounds only the motion itself."""
+    if not np.isfinite(values).all():
+        raise FloatingPointError(f"{what} overflows")
+
+
+def _warnings(motion: Motion, certificate: Certificate | None) -> list[str]:
+    """What a careful user should know of a finished motion."""
+    work, warnings = motion.work, []
+    if work.unconverged_steps and motion.system.method.allow_unconverged:
         warnings.append(
             f"{work.unconverged_steps} of {work.steps} steps did not converge, as the case allows; their times "
             "and residuals are in the file, the history is not to be trusted there"
@@ -185,69 +180,43 @@ def _analyse(
         )
     if certificate is not None and not certificate.certified:
         warnings.append(f"solver.tolerance: {certificate.sentence()}")
-    top = peak(lines.frequency, lines.density["vx"])
-    told = tuple(warnings)
-    return RunReport(output, title, motion, found, certificate, verdict, top, told)
+    return warnings
 
 
 def _declare_history(result: ResultFile) -> None:
-    result.axis("history", "time", TIME.units, TIME.long_name)
-    for name, quantity in HISTORY.items():
-        if name == "state":
-            flags = {
-                "flag_values": np.array([int(state) for state in ContactState], dtype=np.int8),
-                "flag_meanings": " ".join(state.name.lower() for state in ContactState),
-            }
-            result.variable(
-                "history", name, ("time",), quantity.units, quantity.long_name, dtype=np.int8, attributes=flags
-            )
-        else:
-            result.variable("history", name, ("time",), quantity.units, quantity.long_name)
-
-
-def _write_spectrum(result: ResultFile, lines: Spectrum) -> None:
-    result.axis("spectrum", "frequency", "Hz", "frequency", lines.frequency)
-    for name in SPECTRAL:
-        quantity = HISTORY[name]
-        result.variable(
-            "spectrum",
-            name,
-            ("frequency",),
-            f"({quantity.units})2 Hz-1",
-            f"power spectral density of: {quantity.long_name}",
-            lines.density[name],
-        )
-    result.set_attributes({"first_sample": lines.start, "segments": lines.segments, "window": "hann"}, "spectrum")
-
-
-def _write(result: ResultFile, loaded: LoadedCase, report: RunReport) -> None:
-    """Everything but the arrays: the case, the versions, the numbers."""
-    numbers = report.numbers()
-    groups = {
-        "regime/evidence": "evidence",
-        "regime/thresholds": "thresholds",
-        "energy": "energy",
-        "evaluators": "evaluators",
+    flags = {
+        "flag_values": np.array([int(state) for state in ContactState], dtype=np.int8),
+        "flag_meanings": " ".join(state.name.lower() for state in ContactState),
     }
-    result.set_attributes(
-        {
-            "kind": "run",
-            "title": report.title,
-            "case_toml": loaded.text,
-            "resolved_toml": loaded.resolved,
-            "brakecli_version": __version__,
-            **versions(),
-            **_present({name: value for name, value in numbers.items() if name not in groups.values()}),
-        }
-    )
-    for group, name in groups.items():
-        result.set_attributes(_present(numbers[name]), group)
-    unconverged = report.motion.work.unconverged
-    if len(unconverged):
-        result.axis("unconverged", "event", "1", "steps that did not converge", np.arange(len(unconverged)))
-        for column, (name, units) in enumerate({"time": "s", "residual": "N"}.items()):
-            values = np.nan_to_num(unconverged[:, column], nan=np.finfo(float).max)
-            result.variable("unconverged", name, ("event",), units, f"{name} of an unconverged step", values)
+    for field in fields.HISTORY:
+        result.variable("history", field, ("time",), attributes=flags if field.name == "state" else None)
+
+
+def _write_spectrum(result: ResultFile, history: _Written, start: int) -> float | None:
+    """Write the spectra of the samples from `start` on; the frequency (Hz) of the highest peak of vx."""
+    lines = spectrum(history, start)
+    result.axis("spectrum", fields.FREQUENCY, lines.frequency)
+    for name, density in lines.density.items():
+        result.variable("spectrum", fields.SPECTRUM[name], ("frequency",), density)
+    result.set_attributes(values_of(fields.WELCH, lines), "spectrum")
+    return peak(lines.frequency, lines.density["vx"])
+
+
+def _write_unconverged(result: ResultFile, events: NDArray[np.float64]) -> None:
+    """Write times and residuals of steps that did not converge, if there are any."""
+    if not len(events):
+        return
+    event, *columns = fields.UNCONVERGED
+    result.axis("unconverged", event, np.arange(len(events)))
+    for field, values in zip(columns, events.T, strict=True):
+        finite = np.nan_to_num(values, nan=np.finfo(float).max)
+        result.variable("unconverged", field, ("event",), finite)
+
+
+def origin(kind: str, title: str, loaded: LoadedCase) -> dict[str, Any]:
+    """The attributes that say where a result comes from: the case and the versions."""
+    case = {"case_toml": loaded.text, "resolved_toml": loaded.resolved}
+    return {"kind": kind, "title": title, **case, "brakecli_version": __version__, **versions()}
 
 
 def versions() -> dict[str, str]:
@@ -259,8 +228,3 @@ def versions() -> dict[str, str]:
         "h5py_version": h5py.__version__,
         "hdf5_version": h5py.version.hdf5_version,
     }
-
-
-def _present(values: Mapping[str, Any]) -> dict[str, Any]:
-    """The values that are there: an attribute cannot be nothing, nor an empty list."""
-    return {name: value for name, value in values.items() if value is not None and value != []}

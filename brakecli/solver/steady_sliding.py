@@ -124,6 +124,5 @@ def steady_sliding(
 
 
 def _none(reason: str) -> CaseError:
-    return CaseError(
-        [Problem("the case", "initial.at", f"there is no steady sliding: {reason}", 'start from at = "rest"')]
-    )
+    what = f"there is no steady sliding: {reason}"
+    return CaseError([Problem(("initial", "at"), what, 'start from at = "rest"', source="the case")])

@@ -1,27 +1,31 @@
 """One point of a sweep: its run, its verdict, its critical parameter, as a record of fixed size."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.analysis.regime.of_run import braking_torque, context, failed
-from brakecli.analysis.regime.rules import Verdict, classify
+from brakecli.analysis.regime.of_run import RunVerdict, verdict_on
+from brakecli.analysis.regime.rules import Verdict
 from brakecli.case.case import Case
+from brakecli.case.read import key_path
 from brakecli.case.system import system_of
 from brakecli.errors import BrakecliError
+from brakecli.files import fields
+from brakecli.files.field import Field, values_of
 from brakecli.runs.limits import check, refuse, within_range
-from brakecli.runs.tolerance import certify
+from brakecli.runs.run import motion_of
+from brakecli.runs.tolerance import Certificate
 from brakecli.solver.history import ArrayHistory
-from brakecli.solver.motion import Motion, solve
+from brakecli.solver.motion import Motion
 from brakecli.solver.roughness import TWO_PI, wheel_angles
 from brakecli.solver.schedules import integral_at
-from brakecli.sweeps.critical import Search, search
-from brakecli.sweeps.plan import Plan
+from brakecli.sweeps.critical import search
+from brakecli.sweeps.plan import Plan, Settings
 from brakecli.sweeps.tables import Direction
 
 
@@ -33,65 +37,44 @@ class Status(StrEnum):
     CRASHED = "crashed"
 
 
-class Field(NamedTuple):
-    """A variable of the result: its type in a record, its unit, and what it is. A float may be missing: NaN."""
-
-    kind: str
-    units: str
-    long_name: str
-
-
-TEXT = "S240"
-FIELDS = {
-    "status": Field("S8", "", "how the computation of the point has ended"),
-    "reason": Field(TEXT, "", "why the regime is as it is, or why the point failed"),
-    "warning": Field(TEXT, "", "first warning of the run, empty if there is none"),
-    "warning_count": Field("i8", "1", "number of warnings"),
-    "regime": Field("S16", "", "regime of the motion"),
-    "excitation": Field("S16", "", "where the energy of a sustained motion comes from"),
-    "frequency": Field("f8", "Hz", "fundamental frequency of vx of a sustained motion"),
-    "amplitude": Field("f8", "m", "half of peak to peak of x, settled part"),
-    "stick_fraction": Field("f8", "1", "part of the time in stick, settled part"),
-    "contact_loss_fraction": Field("f8", "1", "part of the time without contact, settled part"),
-    "mean_friction_force": Field("f8", "N", "mean friction force on the shoe, settled part"),
-    "braking_torque": Field("f8", "N m", "mean torque of the friction force, settled part"),
-    "settled": Field("i8", "1", "whether a settled part was found (0, 1)"),
-    "settled_from": Field("f8", "s", "begin of the settled part"),
-    "steps": Field("i8", "1", "time steps"),
-    "contact_evaluations": Field("i8", "1", "evaluations of the contact force"),
-    "unconverged_steps": Field("i8", "1", "steps that did not converge"),
-    "estimated_error": Field("f8", "1", "relative error of the histories, where a tolerance was given"),
-}
-CRITICAL_FIELDS = {
-    "critical_status": Field("S24", "", "what the search for the critical value has come to"),
-    "critical": Field("f8", "", "critical value: steady sliding loses its stability there"),
-    "critical_lower": Field("f8", "", "lower end of the bracket of the critical value"),
-    "critical_upper": Field("f8", "", "upper end of the bracket of the critical value"),
-    "critical_error": Field("f8", "", "error bar of the critical value, bias of the scheme included"),
-    "critical_bias": Field("f8", "", "critical value of the scheme at its step less the exact one"),
-    "critical_eigenvalue": Field("f8", "", "critical value by eigenvalues"),
-    "critical_sustained": Field("f8", "", "least value at which vibration lasts from the case's own start"),
-    "sustained_status": Field("S24", "", "what the search for the least sustained value has come to"),
-}
-
-Recall = Callable[[], None]
-
-
 def record_type(plan: Plan) -> np.dtype[Any]:
-    """What a point of the sweep is stored as."""
-    fields = FIELDS | (CRITICAL_FIELDS if plan.sweep.critical is not None else {})
-    return np.dtype([(name, field.kind) for name, field in fields.items()])
+    """The record of a point of the sweep."""
+    return np.dtype([(field.name, field.kind) for field in fields_of(plan)])
+
+
+def fields_of(plan: Plan) -> tuple[Field, ...]:
+    """What is known of each point of the sweep."""
+    return fields.POINT + (fields.CRITICAL if plan.sweep.critical is not None else ())
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """A run in memory, as far as a sweep is interested in it."""
+class Outcome(RunVerdict):
+    """A run in memory, as far as a sweep is interested in it. `fields.POINT` says where each number is."""
 
     case: Case
     motion: Motion
-    verdict: Verdict
+    certificate: Certificate | None  # where the case gives no step
     warnings: tuple[str, ...]
-    estimated_error: float  # of the histories, relative; NaN where the case gives a step
+
+    @property
+    def status(self) -> Status:
+        """How the computation of the point has ended."""
+        return Status.FAILED if self.motion.work.failed else Status.DONE
+
+    @property
+    def reason(self) -> str:
+        """Why the regime is as it is."""
+        return "; ".join(self.verdict.reasons)
+
+    @property
+    def warning(self) -> str:
+        """The first warning, empty if there is none."""
+        return self.warnings[0] if self.warnings else ""
+
+    @property
+    def warning_count(self) -> int:
+        """The number of warnings."""
+        return len(self.warnings)
 
 
 def simulate(case: Case) -> Outcome:
@@ -100,40 +83,27 @@ def simulate(case: Case) -> Outcome:
         system = system_of(case)
         found = check(system)
         refuse(system, found, math.inf)
-        certificate = None
-        if system.method.step is not None:
-            motion = solve(system)
-        else:
-            certified = certify(system)
-            motion, certificate = certified.motion, certified.certificate
+        motion, certificate = motion_of(system)
         if not np.isfinite(motion.rows).all():
             raise FloatingPointError("a force overflows")
-        verdict = classify(ArrayHistory(system.interval, motion.rows), context(motion.system))
+        history = ArrayHistory(system.interval, motion.rows)
+        verdict = verdict_on(history, motion.system, motion.work.failure_sentence)
     warnings, work = list(found.warnings), motion.work
-    if work.failure_sentence is not None:
-        verdict = failed(verdict, work.failure_sentence)
-    elif work.unconverged_steps:
+    if work.unconverged_steps and not work.failed:
         warnings.append(f"{work.unconverged_steps} of {work.steps} steps did not converge, as the case allows")
     if certificate is not None and not certificate.certified:
         warnings.append(f"solver.tolerance: {certificate.sentence()}")
-    error = math.nan if certificate is None else certificate.estimated_error
-    return Outcome(case, motion, verdict, tuple(warnings), error)
+    return Outcome(motion.system, verdict, case, motion, certificate, tuple(warnings))
 
 
 def blank(kind: np.dtype[Any], status: Status, reason: str) -> NDArray[Any]:
     """The record of a point without a result."""
-    record = np.zeros(1, kind)
-    for name in kind.names or ():
-        if kind[name].kind == "f":
-            record[name] = math.nan
-    record["status"], record["reason"], record["regime"] = status.encode(), _clipped(reason), b"undecided"
-    record["excitation"] = b"none"
-    return record
+    return _filled(kind, {"status": status, "reason": reason, "regime": "undecided", "excitation": "none"})
 
 
 def compute(plan: Plan, first: int, count: int) -> NDArray[Any]:
     """The records of some neighbouring points, each computed for itself."""
-    return np.concatenate([_point(plan, index) for index in range(first, first + count)])
+    return np.concatenate([_computed(plan, point, {})[0] for point in range(first, first + count)])
 
 
 def follow(plan: Plan, line: int) -> NDArray[Any]:
@@ -141,19 +111,13 @@ def follow(plan: Plan, line: int) -> NDArray[Any]:
 
     The wheel goes on turning from one point to the next: its waves keep the phases that they have come to.
     """
-    records = []
-    start: dict[tuple[str, ...], Any] = {}
+    records: dict[int, NDArray[Any]] = {}
+    start: Settings = {}
     for point in line_points(plan, line):
-        kind = record_type(plan)
-        try:
-            outcome = simulate(plan.case(plan.settings(point) | start))
-        except (BrakecliError, FloatingPointError, MemoryError) as error:
-            records.append((point, blank(kind, Status.FAILED, _sentence(error))))
-            continue
-        records.append((point, _filled(kind, outcome)))
-        if not outcome.motion.work.failed:
-            start = _continued(outcome)
-    return np.concatenate([record for _, record in sorted(records, key=lambda pair: pair[0])])
+        records[point], outcome = _computed(plan, point, start)
+        if outcome is not None and not outcome.motion.work.failed:
+            start = next_start(outcome)
+    return np.concatenate([records[point] for point in sorted(records)])
 
 
 def line_points(plan: Plan, line: int) -> list[int]:
@@ -174,7 +138,7 @@ def line_points(plan: Plan, line: int) -> list[int]:
     return sorted(points, key=lambda point: value(plan.places(point)[axis]), reverse=down)
 
 
-def _continued(outcome: Outcome) -> dict[tuple[str, ...], Any]:
+def next_start(outcome: Outcome) -> Settings:
     """The start of a case where another has ended."""
     x, y, v_x, v_y = (float(value) for value in outcome.motion.rows[-1, :4])
     start: dict[tuple[str, ...], Any] = {("initial",): {"x": x, "y": y, "vx": v_x, "vy": v_y}}
@@ -183,31 +147,14 @@ def _continued(outcome: Outcome) -> dict[tuple[str, ...], Any]:
         system = outcome.motion.system
         angles = np.zeros(system.wheel.g.size)
         wheel_angles(system.wheel.waves, *integral_at(system.belt, system.sampled_duration, 0.0), angles)
-        phases = iter(angles)  # a wave of no amplitude has none
+        phases = iter(angles)  # a wave without amplitude has no phase
         turned = [math.degrees(next(phases) % TWO_PI) if g else 0.0 for g in wheel.amplitudes]
         start["roughness", "wheel", "phases_deg"] = turned
     return start
 
 
-def _point(plan: Plan, point: int) -> NDArray[Any]:
-    kind = record_type(plan)
-    settings = plan.settings(point)
-    try:
-        record = _filled(kind, simulate(plan.case(settings)))
-        critical = plan.sweep.critical
-        if critical is not None:
-            from brakecli.case.read import key_path
-
-            path = key_path(critical.parameter)
-            with within_range():
-                found = search(critical, lambda value: plan.case({**settings, path: value}), _verdict)
-            _note(record, found)
-    except (BrakecliError, FloatingPointError, MemoryError) as error:
-        return blank(kind, Status.FAILED, _sentence(error))
-    return record
-
-
-def _verdict(case: Case) -> Verdict | None:
+def verdict_of(case: Case) -> Verdict | None:
+    """The verdict on a run in memory; None where it fails."""
     try:
         outcome = simulate(case)
     except BrakecliError:
@@ -215,55 +162,37 @@ def _verdict(case: Case) -> Verdict | None:
     return None if outcome.motion.work.failed else outcome.verdict
 
 
-def _filled(kind: np.dtype[Any], outcome: Outcome) -> NDArray[Any]:
-    verdict, system, work = outcome.verdict, outcome.motion.system, outcome.motion.work
-    record = blank(kind, Status.FAILED if work.failed else Status.DONE, "; ".join(verdict.reasons))
-    values: dict[str, Any] = {
-        "warning": _clipped(outcome.warnings[0]) if outcome.warnings else b"",
-        "warning_count": len(outcome.warnings),
-        "regime": verdict.regime.encode(),
-        "excitation": verdict.excitation.encode(),
-        "frequency": math.nan if verdict.frequency is None else verdict.frequency,
-        "amplitude": verdict.amplitude,
-        "stick_fraction": verdict.stick_fraction,
-        "contact_loss_fraction": verdict.contact_loss_fraction,
-        "mean_friction_force": verdict.mean_friction_force,
-        "braking_torque": braking_torque(verdict, system),
-        "settled": int(verdict.settled),
-        "settled_from": verdict.settled_from * system.interval,
-        "steps": work.steps,
-        "contact_evaluations": work.contact_evaluations,
-        "unconverged_steps": work.unconverged_steps,
-        "estimated_error": outcome.estimated_error,
-    }
-    for name, value in values.items():
-        record[name] = value
+def _computed(plan: Plan, point: int, start: Settings) -> tuple[NDArray[Any], Outcome | None]:
+    """The record of a point and its run, which is None where it was not possible."""
+    settings = {**plan.settings(point), **start}
+    try:
+        outcome = simulate(plan.case(settings))
+        values = values_of(fields.POINT, outcome)
+        if (critical := plan.sweep.critical) is not None:
+            path = key_path(critical.parameter)
+            with within_range():
+                found = search(critical, lambda value: plan.case({**settings, path: value}), verdict_of)
+            values |= values_of(fields.CRITICAL, found)
+    except (BrakecliError, FloatingPointError, MemoryError) as error:
+        return blank(record_type(plan), Status.FAILED, _sentence(error)), None
+    return _filled(record_type(plan), values), outcome
+
+
+def _filled(kind: np.dtype[Any], values: Mapping[str, Any]) -> NDArray[Any]:
+    """A record of some values; missing numbers are NaN."""
+    record = np.zeros(1, kind)
+    for name in kind.names or ():
+        value = values.get(name)
+        if isinstance(value, str):
+            record[name] = (
+                value.encode()[: kind[name].itemsize].decode(errors="ignore").encode()
+            )  # whole characters
+        elif value is not None or kind[name].kind == "f":
+            record[name] = math.nan if value is None else value
     return record
-
-
-def _note(record: NDArray[Any], found: Search) -> None:
-    """Put the critical values into a record."""
-    numbers = {
-        "critical": found.value,
-        "critical_lower": found.lower,
-        "critical_upper": found.upper,
-        "critical_error": found.error,
-        "critical_bias": found.bias,
-        "critical_eigenvalue": found.eigenvalue,
-        "critical_sustained": found.sustained,
-    }
-    for name, value in numbers.items():
-        record[name] = math.nan if value is None else value
-    record["critical_status"] = found.outcome.encode()
-    record["sustained_status"] = found.sustained_outcome.encode()
 
 
 def _sentence(error: BaseException) -> str:
     if isinstance(error, MemoryError):
         return "out of memory; sample less often, or reduce contact.nodes"
     return "; ".join(str(error).splitlines())
-
-
-def _clipped(text: str) -> bytes:
-    """As much of a text as a record holds, in whole characters."""
-    return text.encode()[: int(TEXT[1:])].decode(errors="ignore").encode()

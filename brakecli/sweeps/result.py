@@ -1,26 +1,29 @@
-"""The result of a sweep: what its file holds, and what the command tells of it."""
+"""The result of a sweep: what its file holds, and what the command reports of it."""
 
 from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli import __version__
-from brakecli.case.case import json_schema
+from brakecli.case.case import Case
 from brakecli.case.read import key_path
-from brakecli.files.write import FILL, ResultFile
-from brakecli.runs.run import versions
+from brakecli.case.tables import key_schema
+from brakecli.files import fields
+from brakecli.files.field import Field, plain, values_of
+from brakecli.files.write import ResultFile
+from brakecli.runs.run import origin
 from brakecli.sweeps.file import LoadedSweep
 from brakecli.sweeps.journal import Journal
 from brakecli.sweeps.plan import Plan, label
-from brakecli.sweeps.point import CRITICAL_FIELDS, FIELDS, Status, line_points
+from brakecli.sweeps.point import Status, fields_of, line_points
 
 MOST_FAILURES = 100
-MOST_TOLD = 10_000
-"""Points up to which every number is told as JSON; of more, the file holds them."""
+MOST_AS_JSON = 10_000
+"""Points up to which `--json` prints every number; the file holds those of more."""
 SAME_AMPLITUDE = 0.05
 """Motions whose amplitudes differ by less than this part, in the same regime, are the same."""
 
@@ -30,21 +33,18 @@ _DONE = Status.DONE.encode()
 class Columns:
     """The variables of a finished sweep in the shape of its grid, read one by one."""
 
-    def __init__(self, plan: Plan, journal: Journal) -> None:
+    def __init__(self, journal: Journal) -> None:
         """Read from a journal that holds every unit."""
-        self.plan = plan
-        self._journal = journal
+        self._journal, self.plan = journal, journal.plan
+        both = self.plan.passes == 2
+        axes = [axis.name for axis in self.plan.sweep.axis] or ["point"]
+        self.dimensions = (*(["direction"] if both else []), *axes)
+        self.shape = (*([2] if both else []), *(self.plan.shape or (1,)))
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The dimensions: those of the axes, in front of them the direction if both were followed."""
-        names = [axis.name for axis in self.plan.sweep.axis] or ["point"]
-        return (*(["direction"] if self.plan.passes == 2 else []), *names)
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """The length of each dimension."""
-        return (*([2] if self.plan.passes == 2 else []), *(self.plan.shape or (1,)))
+    def decoded(self, name: str) -> NDArray[Any]:
+        """A variable, its texts as str."""
+        values = self[name]
+        return np.char.decode(values, "utf-8") if values.dtype.kind == "S" else values
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         """A variable; missing numbers are NaN."""
@@ -57,14 +57,10 @@ class Columns:
             values[line // lines, sorted(line_points(self.plan, line))] = row
         return values.reshape(self.shape)
 
-    def variables(self) -> list[str]:
-        """The names of all variables."""
-        return [*FIELDS, *(CRITICAL_FIELDS if self.plan.sweep.critical is not None else ())]
-
 
 @dataclass(frozen=True)
 class Findings:
-    """What there is to tell of a sweep without looking at every point."""
+    """What the command reports of a sweep as a whole."""
 
     points: int
     dimensions: tuple[str, ...]
@@ -90,123 +86,84 @@ class SweepReport:
     resumed: int  # points that were there already
     notes: tuple[str, ...]
 
+    @property
+    def axes(self) -> dict[str, Any]:
+        """The parameters and the values of each axis; none where there are too many points."""
+        axes = self.loaded.sweep.axis if self.findings.variables is not None else ()
+        return {
+            axis.name: {"parameter": axis.parameter, "values": [axis.value(i) for i in range(axis.size)]}
+            for axis in axes
+        }
+
     def numbers(self) -> dict[str, Any]:
         """Names and values as `--json` gives them: the variables of the file, null where a number is missing."""
-        found = self.findings
-        axes = {
-            axis.name: {"parameter": list(axis.parameter), "values": [axis.value(i) for i in range(axis.size)]}
-            for axis in self.loaded.sweep.axis
-            if found.variables is not None
-        }
-        return {
-            "title": self.loaded.title,
-            "points": found.points,
-            "failed_points": found.failed,
-            "failures": list(found.failures),
-            "resumed_points": self.resumed,
-            "regimes": found.regimes,
-            "dimensions": list(found.dimensions),
-            "axes": axes,
-            **(found.variables or {}),
-            "seconds": self.seconds,
-            "findings": list(found.sentences),
-            "warnings": list(self.notes),
-        }
+        return {**values_of(fields.SWEEP, self), **(self.findings.variables or {})}
 
 
 def findings(columns: Columns) -> Findings:
     """Look through the variables of a sweep."""
-    plan = columns.plan
-    status, warnings = columns["status"], columns["warning_count"]
+    plan, status = columns.plan, columns["status"]
     failed = np.flatnonzero(status.ravel() != _DONE)
     reasons = columns["reason"].ravel()[failed[:MOST_FAILURES]]
-    failures = [
-        {"point": int(index), "parameters": _parameters(plan, int(index)), "reason": reason.decode()}
-        for index, reason in zip(failed, reasons, strict=False)
-    ]
-    warned = np.flatnonzero(warnings.ravel())
+    warned = np.flatnonzero(columns["warning_count"].ravel())
     critical = None
     if plan.sweep.critical is not None:
         known = columns["critical"]
         known = known[~np.isnan(known)]
         critical = (len(known), float(known.min()), float(known.max())) if len(known) else (0, 0.0, 0.0)
     hysteresis = _hysteresis(columns)
-    told = status.size <= MOST_TOLD
     return Findings(
         points=status.size,
-        dimensions=columns.names,
+        dimensions=columns.dimensions,
         failed=len(failed),
-        failures=tuple(failures),
+        failures=tuple(
+            {"point": point, "parameters": _parameters(plan, point), "reason": reason.decode()}
+            for point, reason in zip(failed[:MOST_FAILURES].tolist(), reasons, strict=True)
+        ),
         warned=len(warned),
         first_warning=columns["warning"].ravel()[warned[0]].decode() if len(warned) else "",
         regimes={name.decode(): count for name, count in sorted(Counter(columns["regime"].ravel()).items())},
         critical=critical,
         hysteresis=hysteresis,
-        sentences=tuple(_sentences(columns, hysteresis)),
-        variables={name: _plain(columns[name]) for name in columns.variables()} if told else None,
+        sentences=(*_on_hysteresis(columns, hysteresis), *_on_lasting_vibration(columns)),
+        variables=(
+            {field.name: plain(columns[field.name]) for field in fields_of(plan)}
+            if status.size <= MOST_AS_JSON
+            else None
+        ),
     )
 
 
 def write(result: ResultFile, report: SweepReport, columns: Columns) -> None:
     """Everything that the file holds."""
     loaded, found, plan = report.loaded, report.findings, columns.plan
-    result.set_attributes(
-        {
-            "kind": "sweep",
-            "title": loaded.title,
-            "sweep_toml": loaded.text,
-            "resolved_sweep_toml": loaded.resolved,
-            "case_toml": loaded.base.text,
-            "resolved_toml": loaded.base.resolved,
-            "brakecli_version": __version__,
-            **versions(),
-            "points": found.points,
-            "failed_points": found.failed,
-            **({"findings": list(found.sentences)} if found.sentences else {}),
-        }
-    )
+    sweep = {"sweep_toml": loaded.text, "resolved_sweep_toml": loaded.resolved}
+    result.set_attributes({**origin("sweep", loaded.title, loaded.base), **sweep})
+    result.set_fields(fields.SWEEP, report.numbers())
     if "direction" in found.dimensions:
-        result.axis("/", "direction", "", "direction in which the motion was followed", np.array(["up", "down"]))
+        result.axis("/", fields.DIRECTION, np.array(["up", "down"]))
     for axis in plan.sweep.axis:
         values = [axis.value(place) for place in range(axis.size)]
         data = np.array(values, dtype=np.float64) if axis.numeric else np.array([label(value) for value in values])
-        parameters = {"parameters": list(axis.parameter)}
-        long_name = ", ".join(axis.parameter)
-        units = unit(axis.parameter[0])
-        result.variable("/", axis.name, (axis.name,), units, long_name, data, attributes=parameters)
+        field = Field(axis.name, unit(axis.parameter[0]), ", ".join(axis.parameter))
+        result.variable("/", field, (axis.name,), data, {"parameters": list(axis.parameter)})
     if not plan.sweep.axis:
-        result.axis("/", "point", "1", "the base case", np.zeros(1))
-    for name in columns.variables():
-        _write_variable(result, name, columns)
+        result.axis("/", fields.BASE_POINT, np.zeros(1))
+    for field in fields.POINT:
+        result.column(field, columns.dimensions, columns.decoded(field.name))
+    if (critical := plan.sweep.critical) is not None:
+        for field in fields.CRITICAL:
+            numeric = field.kind == "f8"
+            of_parameter = replace(field, units=unit(critical.parameter)) if numeric else field
+            attributes = {"parameter": critical.parameter} if numeric else {}
+            result.column(of_parameter, columns.dimensions, columns.decoded(field.name), **attributes)
     if found.hysteresis is not None:
-        long_name = "whether the motions on the way up and down differ (0, 1)"
-        dims = found.dimensions[1:]
-        result.variable("/", "hysteresis", dims, "1", long_name, found.hysteresis, dtype=np.int64)
-
-
-def _write_variable(result: ResultFile, name: str, columns: Columns) -> None:
-    each = FIELDS.get(name) or CRITICAL_FIELDS[name]
-    values, units, dtype = columns[name], each.units, np.dtype(each.kind)
-    attributes: dict[str, Any] = {}
-    if each.kind == "f8":
-        values = np.where(np.isnan(values), FILL, values)
-        attributes["_FillValue"] = np.array([FILL])
-        critical = columns.plan.sweep.critical
-        if name in CRITICAL_FIELDS and critical is not None:
-            units, attributes["parameter"] = unit(critical.parameter), critical.parameter
-    elif each.kind != "i8":
-        values = np.char.decode(values, "utf-8")
-    result.variable("/", name, columns.names, units, each.long_name, values, dtype=dtype, attributes=attributes)
+        result.column(*fields.DIFFERENCE, found.dimensions[1:], found.hysteresis)
 
 
 def unit(parameter: str) -> str:
     """The unit of a key of the case, by the schema of its file; empty where it has none."""
-    schema = json_schema()
-    node: Any = schema
-    for part in key_path(parameter):
-        node = schema["$defs"][node["$ref"].rpartition("/")[2]] if "$ref" in node else node
-        node = node.get("properties", {}).get(part, {})
-    return str(node.get("unit", ""))
+    return str(key_schema(Case, key_path(parameter)).get("unit", ""))
 
 
 def _hysteresis(columns: Columns) -> NDArray[Any] | None:
@@ -221,51 +178,40 @@ def _hysteresis(columns: Columns) -> NDArray[Any] | None:
     return np.asarray(decided & ((regime[0] != regime[1]) | (apart & lasting)), dtype=np.int64)
 
 
-def _sentences(columns: Columns, hysteresis: NDArray[Any] | None) -> list[str]:
-    """What is to be said about motions that depend on where they come from."""
-    plan, sentences = columns.plan, []
-    if hysteresis is not None:
-        count = int(hysteresis.sum())
-        where = [_parameters(plan, int(index)) for index in np.flatnonzero(hysteresis.ravel())[:3]]
+def _on_hysteresis(columns: Columns, hysteresis: NDArray[Any] | None) -> Iterator[str]:
+    """What is to be said about motions that were followed up and down."""
+    if hysteresis is None:
+        return
+    if count := int(hysteresis.sum()):
+        where = [_parameters(columns.plan, int(index)) for index in np.flatnonzero(hysteresis.ravel())[:3]]
         places = "; ".join(", ".join(f"{key} = {label(value)}" for key, value in each.items()) for each in where)
-        sentences.append(
-            f"hysteresis at {count} of {hysteresis.size} points: {places}{' …' if count > 3 else ''}"
-            if count
-            else "no hysteresis: the motion is the same on the way up and on the way down"
+        yield f"hysteresis at {count} of {hysteresis.size} points: {places}{' …' if count > 3 else ''}"
+    else:
+        yield "no hysteresis: the motion is the same on the way up and on the way down"
+    if undecided := int((columns["regime"] == b"undecided").any(axis=0).sum()):
+        yield f"hysteresis is not known at {undecided} points, whose regime is undecided in a direction"
+
+
+def _on_lasting_vibration(columns: Columns) -> Iterator[str]:
+    """What is to be said where vibration from the case's own start does not begin at the critical value."""
+    critical = columns.plan.sweep.critical
+    if critical is None:
+        return
+    sustained = columns["critical_sustained"]
+    early = np.nan_to_num(columns["critical_lower"] - sustained, nan=0.0)
+    late = np.nan_to_num(sustained - columns["critical_upper"], nan=0.0)
+    if below := int((early > critical.tolerance).sum()):
+        yield (
+            f"hysteresis at {below} of {early.size} points: from the case's own start vibration lasts at "
+            f"values up to {early.max():.3g} below the one at which steady sliding loses its stability"
         )
-        if open_ := int(((columns["regime"] == b"undecided").any(axis=0)).sum()):
-            sentences.append(
-                f"hysteresis cannot be told at {open_} points, whose regime is undecided in a direction"
-            )
-    critical = plan.sweep.critical
-    if critical is not None:
-        sustained = columns["critical_sustained"]
-        early = np.nan_to_num(columns["critical_lower"] - sustained, nan=0.0)
-        late = np.nan_to_num(sustained - columns["critical_upper"], nan=0.0)
-        if beside := int((early > critical.tolerance).sum()):
-            sentences.append(
-                f"hysteresis at {beside} of {early.size} points: from the case's own start vibration lasts at "
-                f"values up to {early.max():.3g} below the one at which steady sliding loses its stability"
-            )
-        if after := int((late > critical.tolerance).sum()):
-            sentences.append(
-                f"at {after} of {late.size} points the case's own start leads into lasting vibration only at "
-                f"values up to {late.max():.3g} above the critical one; longer runs may tell another"
-            )
-    return sentences
+    if above := int((late > critical.tolerance).sum()):
+        yield (
+            f"at {above} of {late.size} points the case's own start leads into lasting vibration only at "
+            f"values up to {late.max():.3g} above the critical one; longer runs may give another answer"
+        )
 
 
 def _parameters(plan: Plan, index: int) -> dict[str, Any]:
     """What the axes set at a point, by its place in a variable of the result."""
     return {".".join(path): value for path, value in plan.settings(index % plan.points).items()}
-
-
-def _plain(values: NDArray[Any]) -> Any:
-    """Values as JSON holds them."""
-    if values.dtype.kind == "S":
-        return np.char.decode(values, "utf-8").tolist()
-    if values.dtype.kind != "f":
-        return values.tolist()
-    plain = values.astype(object)
-    plain[~np.isfinite(values)] = None
-    return plain.tolist()

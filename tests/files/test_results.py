@@ -14,7 +14,9 @@ import pytest
 import xarray as xr
 
 from brakecli.errors import UnreadableResultError, UsageError
-from brakecli.files.write import ResultFile, is_hdf5, new_result, open_result
+from brakecli.files.field import Field
+from brakecli.files.read import is_hdf5, open_result
+from brakecli.files.write import ResultFile, new_result
 
 STATES = {"flag_values": np.array([-1, 0, 1, 2], np.int8), "flag_meanings": "backward stick forward separated"}
 
@@ -30,24 +32,24 @@ def write(path: Path, rows: int = 100, piece: int = 1000) -> None:
         result.set_attributes(
             {"regime": "damped", "reasons": ["too short", "zu kurz"], "frequency": 12.5}, "/regime"
         )
-        result.axis("history", "time", "s", "time")
-        result.variable("history", "vx", ["time"], "m/s", "horizontal velocity")
-        result.variable("history", "state", ["time"], "1", "state of the pad", dtype=np.int8, attributes=STATES)
+        result.axis("history", Field("time", "s", "time"))
+        result.variable("history", Field("vx", "m/s", "horizontal velocity"), ["time"])
+        result.variable("history", Field("state", "1", "state of the pad", "i1"), ["time"], attributes=STATES)
         whole = history(rows)
         for start in range(0, rows, piece):
             result.append("history", {name: values[start : start + piece] for name, values in whole.items()})
-        result.axis("points", "solver_scheme", "1", "scheme", ["two-layer", "größer"])
-        result.axis("points", "phi", "1", "friction", [0.1, 0.2, 0.3])
-        result.variable("points", "amplitude", ["solver_scheme", "phi"], "m", "amplitude", np.ones((2, 3)))
-        result.axis("nothing", "frequency", "Hz", "frequency", [])
+        result.axis("points", Field("solver_scheme", "1", "scheme"), ["two-layer", "größer"])
+        result.axis("points", Field("phi", "1", "friction"), [0.1, 0.2, 0.3])
+        result.variable("points", Field("amplitude", "m", "amplitude"), ["solver_scheme", "phi"], np.ones((2, 3)))
+        result.axis("nothing", Field("frequency", "Hz", "frequency"), [])
         result.commit()
 
 
 @contextmanager
 def growing(path: Path) -> Iterator[ResultFile]:
     with new_result(path, force=False) as result:
-        result.axis("history", "time", "s", "time")
-        result.variable("history", "state", ["time"], "1", "state", dtype=np.int8)
+        result.axis("history", Field("time", "s", "time"))
+        result.variable("history", Field("state", "1", "state", "i1"), ["time"])
         yield result
 
 
@@ -120,8 +122,8 @@ def test_a_large_table_is_cut_into_chunks_of_bounded_size(tmp_path: Path) -> Non
     values = np.arange(300.0 * 400 * 2).reshape(300, 400, 2)
     with new_result(tmp_path / "r.h5", force=False) as result:
         for name, length in zip("abc", values.shape, strict=True):
-            result.axis("/", name, "1", name, np.arange(length))
-        result.variable("/", "all", "abc", "1", "all", values)
+            result.axis("/", Field(name, "1", name), np.arange(length))
+        result.variable("/", Field("all", "1", "all"), "abc", values)
         result.commit()
     with h5py.File(tmp_path / "r.h5") as file:
         assert file["all"].chunks == (20, 400, 2)
@@ -160,7 +162,7 @@ def test_only_finite_numbers_reach_a_file(tmp_path: Path, bad: Any) -> None:
         with pytest.raises(ValueError, match="history/time"):
             result.append("history", {"time": [bad], "state": [0]})
         with pytest.raises(ValueError, match="points/phi"):
-            result.axis("points", "phi", "1", "friction", [bad])
+            result.axis("points", Field("phi", "1", "friction"), [bad])
         with pytest.raises(ValueError, match="amplitude"):
             result.set_attributes({"amplitude": bad})
 
@@ -174,14 +176,14 @@ def test_a_mistake_of_the_caller_is_refused(tmp_path: Path) -> None:
         with pytest.raises(ValueError, match="same number of rows"):
             result.append("history", {"time": [0.0, 1.0], "state": [0]})
         with pytest.raises(ValueError, match="no dimension"):
-            result.variable("history", "x", [], "m", "scalar", 1.0)
+            result.variable("history", Field("x", "m", "scalar"), [], 1.0)
         with pytest.raises(ValueError, match="twice"):
-            result.axis("history", "time", "s", "time")
+            result.axis("history", Field("time", "s", "time"))
         with pytest.raises(ValueError, match="growing"):
-            result.variable("history", "x", ["place"], "m", "over an axis that is not there")
-        result.axis("points", "phi", "1", "friction", [0.1, 0.2])
+            result.variable("history", Field("x", "m", "over an axis that is not there"), ["place"])
+        result.axis("points", Field("phi", "1", "friction"), [0.1, 0.2])
         with pytest.raises(ValueError, match="its shape"):
-            result.variable("points", "x", ["phi"], "m", "too long", [1.0, 2.0, 3.0])
+            result.variable("points", Field("x", "m", "too long"), ["phi"], [1.0, 2.0, 3.0])
 
 
 def test_an_attribute_of_any_length_comes_back(tmp_path: Path) -> None:

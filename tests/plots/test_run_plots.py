@@ -16,12 +16,14 @@ from matplotlib.image import imread
 from numpy.typing import NDArray
 
 from brakecli.case.read import parse_case
-from brakecli.cli import commands as cli
+from brakecli.cli import app as cli
 from brakecli.errors import BrakecliError, UnreadableResultError, UsageError
-from brakecli.files.write import new_result, open_result
-from brakecli.plots import run as picture
-from brakecli.plots.result import draw, plot_result
-from brakecli.plots.run import Picture, envelope, episodes, gather
+from brakecli.files.field import Field
+from brakecli.files.read import open_result
+from brakecli.files.write import new_result
+from brakecli.plots import run
+from brakecli.plots.result import plot_result
+from brakecli.plots.run import RunPicture, draw, envelope, episodes, gather
 from brakecli.solver.quantities import HISTORY, ContactState
 
 CASE = """
@@ -54,20 +56,22 @@ def write(path: Path, moved: Samples, *overrides: str, **attributes: Any) -> Pat
         texts = {"kind": "run", "case_toml": CASE, "resolved_toml": loaded.resolved}
         numbers = {"status": "done", "regime": "relaxation", "excitation": "self-excited", "amplitude": 1.0}
         result.set_attributes(texts | numbers | attributes)
-        result.axis("history", "time", "s", "time", INTERVAL * np.arange(samples))
+        result.axis("history", Field("time", "s", "time"), INTERVAL * np.arange(samples))
         for name, quantity in HISTORY.items():
             values = moved.get(name, np.zeros(samples))
-            result.variable("history", name, ("time",), quantity.units, quantity.long_name, values)
-        result.axis("spectrum", "frequency", "Hz", "frequency", np.linspace(0.0, 50.0, 1 + samples // 2))
+            result.variable("history", Field(name, quantity.units, quantity.long_name), ("time",), values)
+        result.axis("spectrum", Field("frequency", "Hz", "frequency"), np.linspace(0.0, 50.0, 1 + samples // 2))
         density = np.zeros(1 + samples // 2)
         density[len(density) // 50 + 1 :: len(density) // 50 + 1] = 1.0
-        result.variable("spectrum", "vx", ("frequency",), "1", "density", density if samples > 3 else 0 * density)
+        result.variable(
+            "spectrum", Field("vx", "1", "density"), ("frequency",), density if samples > 3 else 0 * density
+        )
         result.set_attributes({"first_sample": 0, "segments": 1}, "spectrum")
         result.commit()
     return path
 
 
-def gathered(path: Path, moved: Samples, *overrides: str, **attributes: Any) -> Picture:
+def gathered(path: Path, moved: Samples, *overrides: str, **attributes: Any) -> RunPicture:
     with open_result(write(path, moved, *overrides, **attributes), kind="run") as result:
         return gather(result)
 
@@ -129,7 +133,7 @@ def test_stick_is_shaded_half_an_interval_around_each_of_its_samples(tmp_path: P
 def test_envelope_is_the_least_and_greatest_value_of_each_column(
     samples: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(picture, "BLOCK", 333)
+    monkeypatch.setattr(run, "BLOCK", 333)
     values = np.random.default_rng(1).normal(size=samples)
     asked: list[int] = []
 

@@ -1,7 +1,7 @@
 """The regime of a stored run, told anew from its history: what `brakecli classify RESULT.h5` does."""
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,13 +14,16 @@ from brakecli.analysis.stability.modes import growth
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError, UnreadableResultError
+from brakecli.files import fields
+from brakecli.files.field import values_of
 from brakecli.files.read import StoredResult, open_result
+from brakecli.solver.history import History
 from brakecli.solver.schedules import value_at
 from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import System
 
 _ROUNDING = 1e-9
-"""A velocity of this part of the static compression, per period of the fastest motion, is no motion."""
+"""A velocity up to this part of the static compression, times the highest frequency, may come from rounding."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +40,7 @@ class StoredHistory:
 
 
 def context(system: System) -> Context:
-    """What the classifier has to know of a system."""
+    """What the rules have to know of a system."""
     last_speed = float(value_at(system.belt, system.sampled_duration))
     compression = float(np.abs(system.load["value"]).max()) / (system.coefficients.c_yy + system.contact_stiffness)
     return Context(
@@ -52,7 +55,7 @@ def context(system: System) -> Context:
 
 
 def _growth(system: System, belt_speed: float) -> float:
-    """How fast a disturbance of steady sliding grows (1/s), by the mean stiffness of the contact; 0 if not."""
+    """Growth of a disturbance of steady sliding (1/s), by the mean stiffness of the contact; 0 if it decays."""
     try:
         rest = steady_sliding(system, belt=belt_speed)
     except CaseError:
@@ -71,42 +74,36 @@ def classify_result(path: Path, thresholds: Thresholds) -> dict[str, Any]:
         variable = stored.variables("history").get("time")
         if variable is None or variable.shape[0] < 1:
             raise UnreadableResultError(f"{path}: has no history; run its case again")
-        verdict = classify(StoredHistory(stored, system.interval, variable.shape[0]), context(system), thresholds)
+        history = StoredHistory(stored, system.interval, variable.shape[0])
         failure = stored.attributes.get("failure")
-    if failure:
-        verdict = failed(verdict, str(failure))
-    return {**verdict_numbers(verdict, system), "failure": failure}
+        verdict = verdict_on(history, system, failure, thresholds)
+    return {**values_of(fields.VERDICT, RunVerdict(system, verdict)), "failure": failure}
 
 
-def failed(verdict: Verdict, failure: str) -> Verdict:
-    """The verdict on a run that is not worth having: none, with what was measured."""
-    changes: dict[str, Any] = {
-        "regime": Regime.UNDECIDED,
-        "frequency": None,
-        "reasons": (f"the run failed: {failure}",),
-    }
-    return Verdict(**{**verdict.__dict__, **changes})
+def verdict_on(
+    history: History, system: System, failure: str | None, thresholds: Thresholds | None = None
+) -> Verdict:
+    """The verdict on the motion of a system; a run that has failed has no regime."""
+    verdict = classify(history, context(system), thresholds or Thresholds())
+    if not failure:
+        return verdict
+    reasons = (f"the run failed: {failure}",)
+    return replace(verdict, regime=Regime.UNDECIDED, frequency=None, reasons=reasons)
 
 
-def braking_torque(verdict: Verdict, system: System) -> float:
-    """Mean torque of the friction force on the wheel's axis, R F_x, N m."""
-    return system.radius * verdict.mean_friction_force
+@dataclass(frozen=True)
+class RunVerdict:
+    """The verdict on the motion of a system."""
 
+    system: System
+    verdict: Verdict
 
-def verdict_numbers(verdict: Verdict, system: System) -> dict[str, Any]:
-    """Names and values of a verdict as `--json` gives them and result files hold them."""
-    return {
-        "regime": str(verdict.regime),
-        "excitation": str(verdict.excitation),
-        "frequency": verdict.frequency,
-        "amplitude": verdict.amplitude,
-        "settled": int(verdict.settled),
-        "settled_from": verdict.settled_from * system.interval,
-        "mean_friction_force": verdict.mean_friction_force,
-        "braking_torque": braking_torque(verdict, system),
-        "stick_fraction": verdict.stick_fraction,
-        "contact_loss_fraction": verdict.contact_loss_fraction,
-        "reasons": list(verdict.reasons),
-        "evidence": verdict.evidence,
-        "thresholds": asdict(verdict.thresholds),
-    }
+    @property
+    def settled_from(self) -> float:
+        """Begin of the settled part, s."""
+        return self.verdict.settled_from * self.system.interval
+
+    @property
+    def braking_torque(self) -> float:
+        """Mean torque of the friction force on the wheel's axis, R F_x, N m."""
+        return self.system.radius * self.verdict.mean_friction_force

@@ -8,7 +8,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
 
 from brakecli.analysis.stability.discrete import spectral_radius
 from brakecli.analysis.stability.modes import (
@@ -20,7 +19,10 @@ from brakecli.analysis.stability.modes import (
     is_undamped,
     modes,
 )
+from brakecli.analysis.stability.search import bisect
 from brakecli.errors import CaseError
+from brakecli.files import fields
+from brakecli.files.field import values_of
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.records import Coefficients
 from brakecli.solver.steady_sliding import SteadySliding, steady_sliding, tabulated
@@ -76,26 +78,7 @@ class StabilityReport:
 
     def numbers(self) -> dict[str, Any]:
         """Names and values as `--json` gives them."""
-        critical = self.critical
-        return {
-            "belt_speed": self.belt_speed,
-            "friction_coefficient": self.friction,
-            "critical_friction": critical.friction if critical else None,
-            "instability": str(critical.instability) if critical else None,
-            "critical_frequency": critical.frequency if critical else None,
-            "stable": self.stable,
-            "eigenvalues": [[value.real, value.imag] for value in self.eigenvalues],
-            "modes": [mode.__dict__ for mode in self.modes],
-            "crossings": [
-                {**crossing.__dict__, "instability": str(crossing.instability)} for crossing in self.crossings
-            ],
-            "undamped_flutter_friction": self.undamped_flutter,
-            "undamped_divergence_friction": self.undamped_divergence,
-            "contact_stiffness": self.contact_stiffness,
-            "equilibrium": self.equilibrium.__dict__ if self.equilibrium else None,
-            "no_equilibrium": self.no_equilibrium,
-            "discrete": self.discrete.__dict__ if self.discrete else None,
-        }
+        return values_of(fields.STABILITY, self)
 
 
 def stability(system: System) -> StabilityReport:
@@ -182,9 +165,8 @@ def _rough_crossings(c: Coefficients, belt: float, stiffness_at: StiffnessAt) ->
     for (low, high), (before, after) in zip(pairwise(frictions), pairwise(verdicts), strict=True):
         if before is None or before == after or (before and after is None):
             continue
-        for _ in range(50):  # by halves: without dashpots the growth is zero on one side
-            middle = 0.5 * (low + high)
-            low, high = (middle, high) if unstable(middle) == before else (low, middle)
+        # By halves: without dashpots the growth is zero on one side.
+        low, high = bisect(lambda phi: unstable(phi) == before, low, high, halvings=50)  # noqa: B023 - used at once
         lost = unstable(high) is not False
         mode = first_mode(high if lost else low)
         oscillates = mode is not None and mode.frequency > 0.0
@@ -230,6 +212,8 @@ def discrete_critical(system: System, stiffness_at: StiffnessAt, exact: Crossing
     The scheme is one that steps on the grid of the case. It is looked for up to twice the exact value.
     """
 
+    from scipy.optimize import brentq  # only `brakecli stability` and sweeps wait for it
+
     def excess(phi: float) -> float:
         return _radius(system, stiffness_at, phi, system.weights.h) - 1.0 - MARGIN
 
@@ -263,8 +247,4 @@ def step_limit(system: System, stiffness_at: StiffnessAt) -> float | None:
     first = stable.index(False)
     if first == 0:
         return 0.0
-    low, high = float(ladder[first - 1]), float(ladder[first])
-    for _ in range(60):
-        middle = math.sqrt(low * high)
-        low, high = (middle, high) if is_stable(middle) else (low, middle)
-    return low
+    return bisect(is_stable, float(ladder[first - 1]), float(ladder[first]), halvings=60, geometric=True)[0]
