@@ -374,8 +374,8 @@ def schema_command(
     kind: Annotated[str, typer.Argument(metavar="[case|sweep]", help="Which kind of file.")] = "case",
 ) -> None:
     """Print the JSON Schema of case files, or of sweep files, for editors that know TOML."""
-    from brakecli.case.case import Case, json_schema
-    from brakecli.case.tables import Table
+    from brakecli.case.case import Case
+    from brakecli.case.tables import Table, json_schema
     from brakecli.sweeps.tables import Sweep
 
     tables: dict[str, type[Table]] = {"case": Case, "sweep": Sweep}

@@ -160,7 +160,7 @@ def _continued(outcome: Outcome) -> dict[tuple[str, ...], Any]:
     if wheel is not None:
         system = outcome.motion.system
         angles = np.zeros(system.wheel.g.size)
-        wheel_angles(system.wheel, *integral_at(system.belt, system.sampled_duration, 0.0), angles)
+        wheel_angles(system.wheel.waves, *integral_at(system.belt, system.sampled_duration, 0.0), angles)
         phases = iter(angles)  # a wave of no amplitude has none
         turned = [math.degrees(next(phases) % TWO_PI) if g else 0.0 for g in wheel.amplitudes]
         start["roughness", "wheel", "phases_deg"] = turned

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.case.case import json_schema
+from brakecli.case.case import Case
 from brakecli.case.read import key_path
+from brakecli.case.tables import key_schema
 from brakecli.files import fields
 from brakecli.files.field import Field, plain, values_of
 from brakecli.files.write import ResultFile
@@ -168,12 +169,7 @@ def write(result: ResultFile, report: SweepReport, columns: Columns) -> None:
 
 def unit(parameter: str) -> str:
     """The unit of a key of the case, by the schema of its file; empty where it has none."""
-    schema = json_schema()
-    node: Any = schema
-    for part in key_path(parameter):
-        node = schema["$defs"][node["$ref"].rpartition("/")[2]] if "$ref" in node else node
-        node = node.get("properties", {}).get(part, {})
-    return str(node.get("unit", ""))
+    return str(key_schema(Case, key_path(parameter)).get("unit", ""))
 
 
 def _hysteresis(columns: Columns) -> NDArray[Any] | None:

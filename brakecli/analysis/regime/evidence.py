@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.analysis.regime.spectra import upward_crossings
-from brakecli.solver.compile import Coefficients
 from brakecli.solver.history import History
 from brakecli.solver.quantities import ContactState
+from brakecli.solver.records import Coefficients
 
 Array = NDArray[np.float64]
 

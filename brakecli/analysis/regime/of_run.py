@@ -42,10 +42,10 @@ class StoredHistory:
 def context(system: System) -> Context:
     """What the classifier has to know of a system."""
     last_speed = float(value_at(system.belt, system.sampled_duration))
-    compression = float(np.abs(system.load.values).max()) / (system.coefficients.c_yy + system.contact_stiffness)
+    compression = float(np.abs(system.load["value"]).max()) / (system.coefficients.c_yy + system.contact_stiffness)
     return Context(
         last_speed,
-        steady=len(system.belt.times) == 1 and len(system.load.times) == 1,
+        steady=len(system.belt) == 1 and len(system.load) == 1,
         forced=forced_lines(last_speed, [float(turns) for turns in system.wheel.turns], 0.5 / system.interval),
         quiet=_ROUNDING * compression * system.natural_frequencies[1],
         coefficients=system.coefficients,

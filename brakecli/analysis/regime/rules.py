@@ -20,9 +20,9 @@ from brakecli.analysis.regime.evidence import (
     powers_of,
     share_of,
 )
-from brakecli.solver.compile import Coefficients
 from brakecli.solver.history import History
 from brakecli.solver.quantities import ContactState
+from brakecli.solver.records import Coefficients
 
 
 class Regime(StrEnum):

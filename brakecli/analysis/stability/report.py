@@ -23,8 +23,8 @@ from brakecli.analysis.stability.modes import (
 from brakecli.errors import CaseError
 from brakecli.files import fields
 from brakecli.files.field import values_of
-from brakecli.solver.compile import Coefficients
 from brakecli.solver.links import natural_frequencies
+from brakecli.solver.records import Coefficients
 from brakecli.solver.steady_sliding import SteadySliding, steady_sliding, tabulated
 from brakecli.solver.system import System
 
