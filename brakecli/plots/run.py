@@ -91,7 +91,7 @@ def gather(result: StoredResult) -> RunPicture:
     except CaseError as error:
         raise style.unreadable(result, f"the case in it is not valid: {error.problems[0]}") from error
     system = system_of(case)
-    steady, speed = np.ptp(system.belt.values) == 0.0, system.fastest_belt
+    steady, speed = np.ptp(system.belt["value"]) == 0.0, system.fastest_belt
     read = partial(result.read, "history")
     start, end = (float(read("time", i, i + 1)[0]) for i in (0, samples - 1))
     interval = (end - start) / (samples - 1) if samples > 1 else case.output.sample_interval
@@ -153,7 +153,7 @@ def _detail(read: Reader, samples: int, interval: float, belt: Schedule, result:
         stop, name = rest, "Last motion, then stick"
     first = max(0, stop - length)
     time, x, vx, state = (read(variable, first, stop) for variable in ("time", "x", "vx", "state"))
-    return Detail(name, time, x, vx, state, np.interp(time, belt.times, belt.values), interval)
+    return Detail(name, time, x, vx, state, np.interp(time, belt["time"], belt["value"]), interval)
 
 
 def _last_motion(read: Reader, samples: int) -> int:

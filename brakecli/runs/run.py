@@ -110,12 +110,11 @@ def run(
     output: Path,
     *,
     force: bool,
-    begin: Callable[[System, Check], None] = lambda system, found: None,
-    progress: Progress = lambda steps: None,
+    progress: Callable[[str, int, int], None] = lambda what, done, total: None,
 ) -> RunReport:
     """Simulate a case and write its result file.
 
-    `begin` receives the system and its limits before the run starts, `progress` the steps done. Raises
+    `progress` is called now and then with what is counted, how many are done, and how many there are. Raises
     RefusedError, CannotWriteError or UsageError before anything is computed, CannotWriteError also later. A run
     that fails numerically is written up to the failure and reported.
     """
@@ -124,10 +123,13 @@ def run(
         found = check(system)
         with new_result(output, force=force) as result:
             refuse(system, found, free_bytes(output.resolve().parent))
-            begin(system, found)
             _declare_history(result)
+
+            def advance(done: int) -> None:
+                progress("steps" if found.step else "samples", done, system.steps)
+
             history = _Written(result, system.interval)
-            motion, certificate = motion_of(system, progress, history.append)
+            motion, certificate = motion_of(system, advance, history.append)
             _require_finite("an energy", list(asdict(motion.energy).values()))
             verdict = verdict_on(history, motion.system, motion.work.failure_sentence)
             top = _write_spectrum(result, history, verdict.settled_from)

@@ -8,7 +8,6 @@ from functools import cache
 from itertools import pairwise
 
 import numpy as np
-from scipy.optimize import brentq
 
 from brakecli.analysis.regime.rules import Regime, Verdict
 from brakecli.analysis.stability.discrete import spectral_radius
@@ -193,6 +192,8 @@ def _interval(values: list[float], verdicts: list[bool | None]) -> tuple[float, 
 
 def _by_simulation(critical: Critical, system_at: SystemAt) -> _Change:
     """Where the growth of small disturbances passes zero, by Brent's method, between two values on either side."""
+    from scipy.optimize import brentq  # only searches wait for it
+
     found: dict[float, Growth | None] = {}
 
     def at(value: float) -> Growth | None:

@@ -9,8 +9,9 @@ import tomli_w
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from brakecli.files import fields
 from brakecli.files.field import Field
+from brakecli.files.fields import CRITICAL as CRITICAL_FIELDS
+from brakecli.files.fields import POINT
 from brakecli.files.read import open_result
 from brakecli.files.write import FILL, new_result
 from brakecli.plots.result import draw
@@ -34,7 +35,7 @@ def columns(shape: tuple[int, ...], *, critical: bool) -> Columns:
     count = int(np.prod(shape))
     values: Columns = {
         field.name: (np.zeros(shape) if field.kind[0] in "fi" else np.full(shape, "x"))
-        for field in (*fields.POINT, *(fields.CRITICAL if critical else ()))
+        for field in (*POINT, *(CRITICAL_FIELDS if critical else ()))
     }
     places = np.arange(count, dtype=float).reshape(shape)
     values["status"] = np.full(shape, "done", "U24")
@@ -67,15 +68,15 @@ def write(path: Path, table: dict[str, Any], changed: Columns | None = None, **a
         dims = [axis.name for axis in model.axis] or ["point"]
         if both:
             dims.insert(0, "direction")
-            result.axis("/", fields.DIRECTION, np.array(["up", "down"]))
+            result.axis("/", Field("direction", "", "direction"), np.array(["up", "down"]))
         for axis in model.axis:
             along = [axis.value(place) for place in range(axis.size)]
             data = np.array(along) if axis.numeric else np.array([label(each) for each in along])
             key = ", ".join(axis.parameter)
             result.axis("/", Field(axis.name, UNITS.get(axis.parameter[0], "1"), key), data)
         if not model.axis:
-            result.axis("/", fields.BASE_POINT, np.zeros(1))
-        known = {field.name: field for field in (*fields.POINT, *fields.CRITICAL)}
+            result.axis("/", Field("point", "1", "the base case"), np.zeros(1))
+        known = {field.name: field for field in (*POINT, *CRITICAL_FIELDS)}
         for name, array in values.items():
             field = known.get(name) or Field(name, "1", name)
             data = np.where(np.isnan(array), FILL, array) if array.dtype.kind == "f" else array

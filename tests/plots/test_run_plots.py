@@ -16,7 +16,7 @@ from matplotlib.image import imread
 from numpy.typing import NDArray
 
 from brakecli.case.read import parse_case
-from brakecli.cli import commands as cli
+from brakecli.cli import app as cli
 from brakecli.errors import BrakecliError, UnreadableResultError, UsageError
 from brakecli.files.field import Field
 from brakecli.files.read import open_result

@@ -23,7 +23,7 @@ from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import System
 
 _ROUNDING = 1e-9
-"""A velocity of this part of the static compression, per period of the fastest motion, is no motion."""
+"""A velocity up to this part of the static compression, times the highest frequency, may come from rounding."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class StoredHistory:
 
 
 def context(system: System) -> Context:
-    """What the classifier has to know of a system."""
+    """What the rules have to know of a system."""
     last_speed = float(value_at(system.belt, system.sampled_duration))
     compression = float(np.abs(system.load["value"]).max()) / (system.coefficients.c_yy + system.contact_stiffness)
     return Context(
@@ -55,7 +55,7 @@ def context(system: System) -> Context:
 
 
 def _growth(system: System, belt_speed: float) -> float:
-    """How fast a disturbance of steady sliding grows (1/s), by the mean stiffness of the contact; 0 if not."""
+    """Growth of a disturbance of steady sliding (1/s), by the mean stiffness of the contact; 0 if it decays."""
     try:
         rest = steady_sliding(system, belt=belt_speed)
     except CaseError:

@@ -8,7 +8,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
 
 from brakecli.analysis.stability.discrete import spectral_radius
 from brakecli.analysis.stability.modes import (
@@ -212,6 +211,8 @@ def discrete_critical(system: System, stiffness_at: StiffnessAt, exact: Crossing
 
     The scheme is one that steps on the grid of the case. It is looked for up to twice the exact value.
     """
+
+    from scipy.optimize import brentq  # only `brakecli stability` and sweeps wait for it
 
     def excess(phi: float) -> float:
         return _radius(system, stiffness_at, phi, system.weights.h) - 1.0 - MARGIN
