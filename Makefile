@@ -6,15 +6,19 @@ VENV := .venv
 BIN := $(VENV)/bin
 RUN_STAMP := $(VENV)/.installed-for-running
 DEV_STAMP := $(VENV)/.installed-for-development
+LOWEST := $(VENV)/lowest
+LOWEST_STAMP := $(LOWEST)/.installed
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 CASES := $(sort $(wildcard cases/*.toml))
+# Two processes: one test waits for what it has started while another computes. PYTEST_ARGS=-n0 takes one alone.
+PYTEST := -m pytest --numprocesses 2 --dist loadfile
 PYTEST_ARGS ?=
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .NOTPARALLEL: # two installations into one .venv at a time would collide
-.PHONY: help demo test lint format types imports derivations tables cases accuracy promises picture paper extremes \
-    bench-sweep check clean
+.PHONY: help demo test campaign lowest lint format types imports derivations tables cases check \
+    accuracy promises picture paper extremes bench-sweep clean
 
 help: ## list the targets (this text)
 	@echo "make TARGET, where TARGET is one of"
@@ -25,20 +29,31 @@ help: ## list the targets (this text)
 $(BIN)/python:
 	@"$(PYTHON)" -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
 	    || { echo "brakecli needs Python 3.11 or later; name one: make PYTHON=/path/to/python3" >&2; exit 1; }
-	@"$(PYTHON)" -m venv $(VENV) \
+	@"$(PYTHON)" -m venv --clear $(VENV) \
 	    || { rm -rf $(VENV); \
 	         echo "cannot create $(VENV); is Python's venv module installed (python3-venv on Debian)?" >&2; \
 	         exit 1; }
 
-$(RUN_STAMP): pyproject.toml | $(BIN)/python
+# The installation is editable: it always runs the code that is here. It is renewed when the dependencies, the version
+# or the Python have changed.
+INSTALLED_FROM := pyproject.toml brakecli/__init__.py $(BIN)/python
+
+$(RUN_STAMP): $(INSTALLED_FROM)
 	@echo "installing brakecli into $(VENV) ..."
-	@$(PIP) install --editable .
+	@$(PIP) install --editable '.[tour]'
 	@touch $@
 
-$(DEV_STAMP): pyproject.toml | $(BIN)/python
+$(DEV_STAMP): $(INSTALLED_FROM)
 	@echo "installing brakecli and its development tools into $(VENV) ..."
 	@$(PIP) install --editable '.[dev]'
 	@touch $@ $(RUN_STAMP)
+
+$(LOWEST_STAMP): $(INSTALLED_FROM)
+	@echo "installing brakecli with the lowest versions that it declares into $(LOWEST) ..."
+	@$(BIN)/python -m venv --clear $(LOWEST)
+	@$(LOWEST)/bin/python -m pip --disable-pip-version-check --quiet install uv
+	@$(LOWEST)/bin/uv pip install --quiet --python $(LOWEST)/bin/python --resolution lowest-direct --editable '.[dev]'
+	@touch $@
 
 demo: $(RUN_STAMP) ## install into .venv and run one real case, cases/relaxation.toml
 	@mkdir -p results
@@ -51,7 +66,13 @@ demo: $(RUN_STAMP) ## install into .venv and run one real case, cases/relaxation
 	@echo "Next: change a value, as in  $(BIN)/brakecli run cases/relaxation.toml --set friction.coefficient=0.5 -o results/mine.h5"
 
 test: $(DEV_STAMP) ## run the tests; PYTEST_ARGS='-k friction' narrows them down
-	$(BIN)/python -m pytest $(PYTEST_ARGS)
+	$(BIN)/python $(PYTEST) $(PYTEST_ARGS)
+
+campaign: $(DEV_STAMP) ## run the long statistics, of which make test has a smaller part (some minutes)
+	$(BIN)/python $(PYTEST) -m campaign $(PYTEST_ARGS)
+
+lowest: $(LOWEST_STAMP) ## run the tests with every dependency at the lowest version that pyproject.toml declares
+	$(LOWEST)/bin/python $(PYTEST) $(PYTEST_ARGS)
 
 lint: $(DEV_STAMP) ## check style and formatting, change nothing
 	$(BIN)/python -m ruff check .
@@ -109,7 +130,7 @@ bench-sweep: $(DEV_STAMP) ## what a sweep costs beside its points; needs two idl
 extremes: $(DEV_STAMP) ## go through the extremes of everything and write docs/extremes.md (a minute)
 	$(BIN)/python -m benchmarks.extremes
 
-check: lint types imports test cases ## all of lint, types, imports, test and cases
+check: lint types imports derivations cases test ## all that must hold before a change is handed in
 
 clean: ## remove .venv, results and caches
 	rm -rf $(VENV) results build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

@@ -6,12 +6,17 @@ program, imports once and forks for each command.
 
 import atexit
 import json
+import math
 import os
+import shlex
+import signal
 import subprocess
 import sys
+import time
 import traceback
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory, TemporaryFile
@@ -22,6 +27,8 @@ import h5py
 ROOT = Path(__file__).parents[1]
 COMMAND = [sys.executable, "-W", "error", "-m", "brakecli"]
 LIMIT = 100.0  # s; kernels may have to be compiled first
+LONG = ["--set", "solver.duration=1e4"]  # minutes
+QUICK = 2.0  # s, within which an interruption ends a command
 
 TINY = """\
 title = "Tiny"
@@ -51,6 +58,8 @@ class Done:
     code: int
     out: str
     err: str
+    seconds: float = field(default=math.nan, compare=False)
+    """Processor time of a fork, which has Python's start and the imports behind it."""
 
     @property
     def json(self) -> dict[str, Any]:
@@ -71,16 +80,21 @@ class Done:
         return self.err
 
 
-def brakecli(*arguments: str | Path, cwd: Path, stdin: str | None = None, **changes: str | None) -> Done:
-    """Run one command to its end: a fork, unless it needs another environment or standard input."""
+def brakecli(
+    *arguments: str | Path, cwd: Path, stdin: str | None = None, stdout: str | None = None, **changes: str | None
+) -> Done:
+    """Run one command to its end: a fork, unless it needs another environment or standard input.
+
+    `stdout`: where a fork writes to, instead of into the answer.
+    """
     words = [str(argument) for argument in arguments]
     if stdin is None and not changes:
         server = _server()
         assert server.stdin is not None
         assert server.stdout is not None
-        server.stdin.write(json.dumps([str(cwd), words]) + "\n")
+        server.stdin.write(json.dumps([str(cwd), words, stdout]) + "\n")
         server.stdin.flush()
-        return Done(*json.loads(server.stdout.readline()))
+        return Done(**json.loads(server.stdout.readline()))
     done = subprocess.run(
         [*COMMAND, *words],
         cwd=cwd,
@@ -90,6 +104,67 @@ def brakecli(*arguments: str | Path, cwd: Path, stdin: str | None = None, **chan
         env=environment(**changes),
     )
     return Done(done.returncode, done.stdout.decode(), done.stderr.decode())
+
+
+@contextmanager
+def started(
+    *arguments: str | Path,
+    cwd: Path,
+    command: Sequence[str] = COMMAND,
+    stdin: int = subprocess.DEVNULL,
+    output: bool = True,
+    **changes: str | None,
+) -> Iterator[subprocess.Popen[bytes]]:
+    """A command that is running, in a group of processes of its own; all of it is killed at the end."""
+    process = subprocess.Popen(
+        [*command, *map(str, arguments)],
+        cwd=cwd,
+        stdin=stdin,
+        stdout=subprocess.PIPE if output else subprocess.DEVNULL,
+        stderr=subprocess.PIPE if output else subprocess.DEVNULL,
+        env=environment(**changes),
+        start_new_session=True,
+    )
+    try:
+        yield process
+    finally:
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGKILL)
+        process.communicate()
+
+
+def ended(process: subprocess.Popen[bytes], limit: float = LIMIT) -> Done:
+    """A command that ends by itself."""
+    out, err = process.communicate(timeout=limit)
+    return Done(process.returncode, out.decode(), err.decode())
+
+
+def run(
+    *arguments: str | Path,
+    cwd: Path,
+    command: Sequence[str] = COMMAND,
+    limit: float = LIMIT,
+    **changes: str | None,
+) -> Done:
+    """Run a command to its end in a process of its own, which those of sweeps need, as they start others."""
+    with started(
+        *arguments, cwd=cwd, command=command, stdin=subprocess.DEVNULL, output=True, **changes
+    ) as process:
+        return ended(process, limit)
+
+
+def shell(line: str, cwd: Path, **changes: str | None) -> Done:
+    """Run a line of bash, in which $B is the command."""
+    command = line.replace("$B", f"exec {shlex.join(COMMAND)}")
+    return run("-c", command, cwd=cwd, command=["bash"], limit=LIMIT, **changes)
+
+
+def wait_until(condition: Callable[[], object], seconds: float = LIMIT) -> None:
+    """Wait for something that is to happen within so many seconds."""
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
 
 
 def warm_up() -> None:
@@ -124,20 +199,24 @@ def _serve() -> None:
     from brakecli.__main__ import main
 
     for line in sys.stdin:
-        cwd, words = json.loads(line)
+        cwd, words, place = json.loads(line)
         with TemporaryFile() as out, TemporaryFile() as err, Path(os.devnull).open("rb") as nothing:
             child = os.fork()
             if child == 0:
                 os.chdir(cwd)
-                for number, file in enumerate((nothing, out, err)):
-                    os.dup2(file.fileno(), number)
+                written = os.open(place, os.O_WRONLY) if place else out.fileno()
+                for number, opened in enumerate((nothing.fileno(), written, err.fileno())):
+                    os.dup2(opened, number)
                 os._exit(_code_of(main, ["brakecli", *words]))
-            code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-            texts = []
-            for file in (out, err):
+            _, status, usage = os.wait4(child, 0)
+            answer: dict[str, Any] = {
+                "code": os.waitstatus_to_exitcode(status),
+                "seconds": usage.ru_utime + usage.ru_stime,
+            }
+            for name, file in (("out", out), ("err", err)):
                 file.seek(0)
-                texts.append(file.read().decode())
-        print(json.dumps([code, *texts]), flush=True)  # noqa: T201
+                answer[name] = file.read().decode()
+        print(json.dumps(answer), flush=True)  # noqa: T201
 
 
 def _code_of(main: Callable[[], None], arguments: list[str]) -> int:

@@ -21,6 +21,7 @@ from brakecli.sweeps.critical import Outcome, Search, search
 from brakecli.sweeps.file import is_sweep, read_sweep
 from brakecli.sweeps.point import simulate
 from brakecli.sweeps.tables import Critical
+from tests.campaign import campaign, differences
 from tests.commands import ROOT
 
 FOLDER = ROOT / "cases" / "paper"
@@ -190,6 +191,14 @@ def test_the_prose_of_the_page_is_that_of_its_template() -> None:
     pieces = [piece.strip("\n") for piece in re.split(r"\{[a-z0-9_]+\}", template)]
     assert len(pieces) > 15
     assert [piece for piece in pieces if piece not in PAGE] == []
+
+
+@campaign
+def test_the_page_is_what_the_sweeps_of_the_paper_give(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(ROOT / "docs")  # where `make paper` finds these modules
+    results = importlib.import_module("paper_results").compute()
+    again = importlib.import_module("paper_page")
+    assert differences(again.page(results, again.touching_by_load(results)), PAGE) == []
 
 
 def test_the_page_tells_the_eigenvalues_by_the_angle_of_link_2() -> None:

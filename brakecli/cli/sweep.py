@@ -55,7 +55,7 @@ def command(
 
         def advance(points: Progress) -> None:
             what = f"points, {points.failed} failed" if points.failed else "points"
-            show_progress(what, points.done, points.points)
+            show_progress(what, points.done, loaded.plan.passes * loaded.plan.points)
 
         with choose_engine(loaded.plan, jobs, scheduler, scheduler_file) as engine:
             report = sweep(loaded, target, engine, force=force, task_size=task_size, begin=begin, progress=advance)

@@ -75,7 +75,7 @@ class OutputFile(FileIO):
     def publish(self) -> None:
         """Put the finished file in the place of the target, on the disk and not only in its cache."""
         self.check()
-        with _explained(self.path):
+        with explained(self.path):
             os.fsync(self.fileno())
             if not self._force and os.path.lexists(self._target):
                 raise _exists(self.path)
@@ -109,7 +109,7 @@ def new_output(path: Path, *, force: bool) -> Iterator[OutputFile]:
     target = _checked_target(path, force=force)
     with _locked(path, target):
         try:
-            with signals_deferred(), _explained(path):
+            with signals_deferred(), explained(path):
                 output = OutputFile(path, target, force=force)
             yield output
         except Exception:
@@ -124,7 +124,7 @@ def new_output(path: Path, *, force: bool) -> Iterator[OutputFile]:
 
 def _checked_target(path: Path, *, force: bool) -> Path:
     """The file that `path` stands for, unless something prevents writing it."""
-    with _explained(path):
+    with explained(path):
         target = Path(os.path.realpath(path))
         if not target.parent.is_dir():
             raise CannotWriteError(
@@ -150,7 +150,7 @@ def _locked(path: Path, target: Path) -> Iterator[None]:
     lock = _beside(target, "lock")
     descriptor = None
     try:
-        with signals_deferred(), _explained(path):
+        with signals_deferred(), explained(path):
             while descriptor is None:
                 descriptor = _acquired(path, lock)
         yield
@@ -237,7 +237,7 @@ def _exists(path: Path) -> UsageError:
 
 
 @contextmanager
-def _explained(path: Path) -> Iterator[None]:
+def explained(path: Path) -> Iterator[None]:
     """Turn what the operating system refuses into CannotWriteError with a remedy."""
     try:
         yield

@@ -59,5 +59,5 @@ def _check_target(result: Path, target: Path) -> None:
         import matplotlib.figure  # noqa: F401
     except ImportError as error:
         raise UsageError(
-            f"matplotlib cannot be imported ({error}); install it with: python -m pip install 'matplotlib>=3.9'"
+            f"matplotlib cannot be imported ({error}); install it with: python -m pip install matplotlib"
         ) from error

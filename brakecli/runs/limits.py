@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from brakecli.analysis.stability.discrete import StepLimits, step_limits
+from brakecli.analysis.stability.search import bisect
 from brakecli.errors import RefusedError
 from brakecli.runs.cost import duration_text, own_steps, seconds_per_step
 from brakecli.runs.warnings import UNSTABLE, adjustments, nodes_per_wave, steps_per_period, warnings
@@ -90,9 +91,7 @@ def _longest_stable_step(system: System) -> float | None:
     low, high = 1e-6 * system.step, system.step
     if not is_stable(low):
         return None
-    while high > 1.001 * low:
-        middle = math.sqrt(low * high)
-        low, high = (middle, high) if is_stable(middle) else (low, middle)
+    low, _ = bisect(is_stable, low, high, ratio=1.001, geometric=True)
     digit: float = 10.0 ** (math.floor(math.log10(low)) - 1)
     return math.floor(low / digit) * digit
 

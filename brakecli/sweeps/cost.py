@@ -2,6 +2,7 @@
 
 import math
 import os
+from contextlib import suppress
 from dataclasses import dataclass
 
 from brakecli.case.system import system_of
@@ -15,8 +16,8 @@ from brakecli.sweeps.tables import Method
 MOST_POINTS = 10_000_000
 MOST_SECONDS = 30 * 86400.0
 
-# Seconds and bytes, measured with `make bench-sweep`; they only serve to tell minutes from days.
-_POINT_SECONDS = 5e-3  # of setting up and judging a run
+# Seconds and bytes, measured with `make bench-sweep`; rough guesses that tell minutes from days.
+_POINT_SECONDS = 5e-3  # of a run, beside its steps
 _SAMPLE_SECONDS = 1e-7
 _SEARCH_RUNS = 12.0  # for the least sustained value
 _SEARCH_GROWTHS = 20.0
@@ -24,7 +25,7 @@ _GROWTH_SECONDS = 0.03
 _EIGENVALUE_SECONDS = 0.1
 _WORKER_BYTES = 1.8e8
 _SAMPLE_BYTES = 8.0 * 24
-_POINT_BYTES = 1000.0  # of the parent, which holds each variable whole while it writes it
+_POINT_BYTES = 1000.0  # in the parent, which holds each variable whole while it writes it
 
 
 @dataclass(frozen=True)
@@ -47,36 +48,28 @@ class Estimate:
 
 
 def estimate(plan: Plan, workers: int) -> Estimate:
-    """Estimate a sweep by the base case and by two corners of its grid; raises RefusedError where these are."""
-    found = []
+    """Estimate a sweep by two corners of its grid."""
+    times, samples = [], 0
     for point in sorted({0, plan.points - 1}):
-        try:
-            with within_range():
-                system = system_of(plan.case(plan.settings(point)))
-                checked = check(system)
-                refuse(system, checked, math.inf)
-        except (CaseError, RefusedError):  # the point is marked as failed when its turn comes
-            continue
-        found.append((checked.seconds, system.samples))
-    seconds = sum(pair[0] for pair in found) / max(len(found), 1)
-    samples = max((pair[1] for pair in found), default=0)
-    run = seconds + _POINT_SECONDS + _SAMPLE_SECONDS * samples
-    critical = plan.sweep.critical
+        with suppress(CaseError, RefusedError), within_range():  # the point fails when its turn comes
+            system = system_of(plan.case(plan.settings(point)))
+            checked = check(system)
+            refuse(system, checked, math.inf)
+            times.append(checked.seconds)
+            samples = max(samples, system.samples)
+    run = sum(times) / max(len(times), 1) + _POINT_SECONDS + _SAMPLE_SECONDS * samples
     each = run
-    if critical is not None:
+    if (critical := plan.sweep.critical) is not None:
         each += _EIGENVALUE_SECONDS
         if critical.method is Method.SIMULATION:
             each += _SEARCH_RUNS * run + _SEARCH_GROWTHS * _GROWTH_SECONDS
-    record = record_type(plan).itemsize
-    passes = plan.passes
+    records = plan.passes * plan.points
     return Estimate(
         points=plan.points,
         workers=workers,
-        seconds=2.0 + passes * plan.points * each / workers,
-        memory=_WORKER_BYTES * (workers + 1)
-        + _SAMPLE_BYTES * samples * workers
-        + _POINT_BYTES * passes * plan.points,
-        file_size=float(passes * plan.points * record) + 1e5,
+        seconds=2.0 + records * each / workers,
+        memory=_WORKER_BYTES * (workers + 1) + _SAMPLE_BYTES * samples * workers + _POINT_BYTES * records,
+        file_size=float(records * record_type(plan).itemsize) + 1e5,
     )
 
 
@@ -84,7 +77,7 @@ def refuse_sweep(found: Estimate, free_bytes: float) -> None:
     """Raise RefusedError where a sweep would be too large."""
     if found.points > MOST_POINTS or found.seconds > MOST_SECONDS:
         raise RefusedError(f"the sweep is too large: {found.sentence()}; take fewer points, or shorter runs")
-    if 2.0 * found.file_size > min(MOST_BYTES, free_bytes):  # finished points and the result, beside each other
+    if 2.0 * found.file_size > min(MOST_BYTES, free_bytes):  # finished points and the result, side by side
         raise RefusedError(
             f"the file would be too large, {free_bytes / 1e6:.3g} MB are free: {found.sentence()}; take fewer "
             "points"

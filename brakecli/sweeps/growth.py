@@ -22,35 +22,32 @@ from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import Initial, System
 
 DISTURBANCE = 1e-7
-"""Of the static compression: the rounding of a run then is 1e-9 of a disturbance."""
+"""Size of a disturbance, in static compressions: the rounding of a run is 1e-9 of it."""
 SATURATED = 1e-3
-"""Of the static compression: a difference as large as this no longer follows the linear equations to 1e-3."""
+"""Largest difference, in static compressions, that follows the linear equations to 1e-3."""
 FADED = 1e-5
-"""Of its first size: a difference as small as this holds no more than four digits."""
+"""Smallest difference, in parts of its first size, that holds four digits."""
 DEPARTED = 2.0
 """Times as far from steady sliding as roughness alone takes a run: it is on its way to a limit cycle."""
 PERIODS = 40
-"""Of the fastest motion, that smooth surfaces are watched for: their disturbances are exactly linear."""
+"""Smooth surfaces are watched for as many periods of the fastest motion: their disturbances are exactly linear."""
 ROUGH_PERIODS = 40
-"""Of the slowest motion, that surfaces which open are watched for, and …"""
+"""Surfaces that open are watched for as many periods of the slowest motion, within the case's duration."""
 PASSES = 20
-"""… passes of the wheel's longest wave."""
+"""Surfaces that open are watched for as many passes of the wheel's longest wave, within the case's duration."""
 STEPS_PER_PERIOD = 200
-"""Of the two-layer scheme, where the case gives no step."""
+"""Steps of the two-layer scheme where the case gives no step."""
 _PER_PERIOD = 20
 _VX, _NORMAL_FORCE = (list(HISTORY).index(name) for name in ("vx", "normal_force"))
 
 
 @dataclass(frozen=True)
 class Growth:
-    """Growth rate (1/s) of the fastest disturbance, and how far two halves of the time watched are apart in it.
+    """The growth rate of the fastest disturbance of steady sliding."""
 
-    `noise`: rates up to here cannot be told from none (1/s).
-    """
-
-    rate: float
-    spread: float
-    noise: float
+    rate: float  # 1/s
+    spread: float  # 1/s, by how much it differs between two halves of the time watched
+    noise: float  # 1/s, a rate up to here may be none
 
     @property
     def unstable(self) -> bool:
@@ -60,7 +57,7 @@ class Growth:
 
 @dataclass(frozen=True)
 class Sliding:
-    """Steady sliding of a system at the speed and load of its start: what its growth is measured about."""
+    """Steady sliding of a system at the speed and load of its start, whose disturbances are measured."""
 
     system: System
     x: float
@@ -123,14 +120,13 @@ def growth(found: Sliding) -> Growth | None:
     first = max(1, last // 4)
     if last - first < 4:  # out of steady sliding at once
         return Growth(fast, fast, 0.0)
+
+    def rate(start: int, end: int) -> float:
+        return _rate(maps[start], maps[end], (end - start) * interval)
+
     middle = (first + last) // 2
-    rate = _rate(maps[first], maps[last], (last - first) * interval)
-    halves = (
-        _rate(maps[first], maps[middle], (middle - first) * interval),
-        _rate(maps[middle], maps[last], (last - middle) * interval),
-    )
     noise = 1e-4 / ((last - first) * interval) if is_undamped(system.coefficients) else 0.0
-    return Growth(rate, 0.5 * abs(halves[1] - halves[0]), noise)
+    return Growth(rate(first, last), 0.5 * abs(rate(middle, last) - rate(first, middle)), noise)
 
 
 def _watched(system: System, slow: float, fast: float) -> float:

@@ -7,56 +7,55 @@ written at once with its checksum: whatever ends the process costs the block tha
 import json
 import os
 import struct
+import tomllib
 import zlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
-from types import TracebackType
-from typing import Any, BinaryIO, NamedTuple, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.errors import BrakecliError, CannotWriteError, RefusedError
-
-Identity = Mapping[str, Any]
-"""What makes a sweep that one: keys and values, none of them a mapping."""
+from brakecli.files.atomic import explained
+from brakecli.sweeps.plan import Plan
+from brakecli.sweeps.point import record_type
+from brakecli.sweeps.workers.task import fingerprint
 
 _HEAD = struct.Struct("<qqI")  # first unit, units, checksum of the records
 _LONGEST_HEADER = 5_000_000
 MOST_DIFFERENCES = 5
 
 
-class _Block(NamedTuple):
-    first: int
-    size: int
-    offset: int
-
-
 class Journal:
-    """The records of the units of a sweep: a point each, or a line of points that follow one another.
+    """The records of the units of a sweep: a point each, or a line of points that follow one another."""
 
-    Raises CannotWriteError where it cannot be written, and RefusedError where there is one of another sweep and
-    `force` is not set.
-    """
+    def __init__(self, path: Path, plan: Plan, *, force: bool) -> None:
+        """Open the journal beside an output, or begin it.
 
-    def __init__(
-        self, path: Path, identity: Identity, kind: np.dtype[Any], units: int, length: int, *, force: bool
-    ) -> None:
-        """Open the journal beside an output, or begin it. A unit has `length` records."""
-        self.path = path
-        self.finished = np.zeros(units, dtype=bool)
-        self._kind, self._length = kind, length
-        self._blocks: list[_Block] = []
-        self._file = self._opened(identity, force=force)
+        Raises CannotWriteError where it cannot be written, and RefusedError where there is one of another sweep
+        and `force` is not set.
+        """
+        self.path, self.plan, self.kind = path, plan, record_type(plan)
+        self.finished = np.zeros(plan.units, dtype=bool)
+        self._unit_bytes = plan.unit_length * self.kind.itemsize
+        self._blocks: list[tuple[int, int, int]] = []  # first unit, units, where their records begin
+        with explained(path):
+            descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666)
+        self._file = open(descriptor, "r+b", buffering=0)  # noqa: SIM115, PTH123
+        try:
+            with explained(path):
+                self._begin(force=force)
+        except BaseException:
+            self._file.close()
+            raise
 
     def __enter__(self) -> Self:
         """Nothing more to open."""
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         """Close it; one without any finished unit is removed."""
         with suppress(OSError):
             self._file.close()
@@ -65,29 +64,29 @@ class Journal:
 
     def add(self, first: int, records: bytes) -> None:
         """Append the records of finished units."""
-        count, rest = divmod(len(records), self._kind.itemsize * self._length)
+        count, rest = divmod(len(records), self._unit_bytes)
         if rest or self.finished[first : first + count].any():
             raise ValueError(f"units {first} … hold {len(records)} bytes, or are there already")
         offset = self._file.seek(0, os.SEEK_END)
         try:
-            _write(self._file, _HEAD.pack(first, count, zlib.crc32(records)) + records)
-            os.fsync(self._file.fileno())
-        except OSError as error:
+            with explained(self.path):
+                self._write(_HEAD.pack(first, count, zlib.crc32(records)) + records)
+                os.fsync(self._file.fileno())
+        except CannotWriteError:
             with suppress(OSError):
                 os.ftruncate(self._file.fileno(), offset)
-            raise _cannot_write(self.path, error) from error
-        self._note(_Block(first, count, offset + _HEAD.size))
+            raise
+        self._note(first, count, offset + _HEAD.size)
 
     def column(self, name: str) -> NDArray[Any]:
-        """A field of all records in the order of the units, which have to be finished."""
-        values = np.empty((len(self.finished), self._length), self._kind[name])
-        for block in self._blocks:
-            self._file.seek(block.offset)
-            data = self._file.read(size := block.size * self._length * self._kind.itemsize)
-            if len(data) < size:
+        """A field of all records in the order of the units, which have to be finished: a row for each unit."""
+        values = np.empty((len(self.finished), self.plan.unit_length), self.kind[name])
+        for first, count, offset in self._blocks:
+            self._file.seek(offset)
+            data = self._file.read(count * self._unit_bytes)
+            if len(data) < count * self._unit_bytes:
                 raise BrakecliError(f"{self.path}: was cut short while in use; run the same command again")
-            records = np.frombuffer(data, self._kind).reshape(block.size, self._length)
-            values[block.first : block.first + block.size] = records[name]
+            values[first : first + count] = np.frombuffer(data, self.kind)[name].reshape(count, -1)
         return values
 
     def discard(self) -> None:
@@ -95,86 +94,76 @@ class Journal:
         with suppress(OSError):
             self.path.unlink()
 
-    def _opened(self, identity: Identity, *, force: bool) -> BinaryIO:
-        header = json.dumps(dict(identity)).encode() + b"\n"
+    def _begin(self, *, force: bool) -> None:
+        own = identity(self.plan)
+        header = json.dumps(own).encode() + b"\n"
+        found = self._file.read(_LONGEST_HEADER)
+        found = found[: found.find(b"\n") + 1]
+        if found == header:
+            self._read_blocks(len(header))
+            return
+        if found and not force:
+            raise RefusedError(f"{self.path}: {_differences(found, own)}")
+        os.ftruncate(self._file.fileno(), 0)
+        self._file.seek(0)
         try:
-            file = open(os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666), "r+b", buffering=0)  # noqa: SIM115, PTH123
-        except OSError as error:
-            raise _cannot_write(self.path, error) from error
-        try:
-            found = file.read(_LONGEST_HEADER)
-            found = found[: found.find(b"\n") + 1]
-            if found and found != header and not force:
-                raise RefusedError(_differences(self.path, found, identity))
-            if found == header:
-                self._read(file, len(header))
-            else:
-                os.ftruncate(file.fileno(), 0)
-                file.seek(0)
-                self._begin(file, header)
-        except OSError as error:
-            file.close()
-            raise _cannot_write(self.path, error) from error
-        except BaseException:
-            file.close()
-            raise
-        return file
-
-    def _begin(self, file: BinaryIO, header: bytes) -> None:
-        try:
-            _write(file, header)
+            self._write(header)
         except OSError:
             self.discard()  # it holds nothing
             raise
 
-    def _read(self, file: BinaryIO, offset: int) -> None:
+    def _read_blocks(self, offset: int) -> None:
         """Note the blocks of a journal, and cut off one that was not finished."""
-        while True:
-            file.seek(offset)
-            head = file.read(_HEAD.size)
-            if len(head) < _HEAD.size:
-                break
+        self._file.seek(offset)
+        while len(head := self._file.read(_HEAD.size)) == _HEAD.size:
             first, count, checksum = _HEAD.unpack(head)
-            size = count * self._length * self._kind.itemsize
             if not 0 <= first < first + count <= len(self.finished):
                 break
-            records = file.read(size)
-            if len(records) < size or zlib.crc32(records) != checksum:
+            records = self._file.read(count * self._unit_bytes)
+            if len(records) < count * self._unit_bytes or zlib.crc32(records) != checksum:
                 break
-            self._note(_Block(first, count, offset + _HEAD.size))
-            offset += _HEAD.size + size
-        os.ftruncate(file.fileno(), offset)
+            self._note(first, count, offset + _HEAD.size)
+            offset = self._file.tell()
+        os.ftruncate(self._file.fileno(), offset)
 
-    def _note(self, block: _Block) -> None:
-        self._blocks.append(block)
-        self.finished[block.first : block.first + block.size] = True
+    def _note(self, first: int, count: int, offset: int) -> None:
+        self._blocks.append((first, count, offset))
+        self.finished[first : first + count] = True
+
+    def _write(self, data: bytes) -> None:
+        """Write all of it: a disk that is nearly full takes a part."""
+        view = memoryview(data)
+        while view:
+            view = view[os.write(self._file.fileno(), view) :]
 
 
-def _write(file: BinaryIO, data: bytes) -> None:
-    """Write all of it: a disk that is nearly full takes a part."""
-    view = memoryview(data)
-    while view:
-        view = view[os.write(file.fileno(), view) :]
+def identity(plan: Plan) -> dict[str, Any]:
+    """What makes a sweep this one: every key of the sweep and its case, and the versions it is computed with."""
+    case, sweep = tomllib.loads(plan.case_text), tomllib.loads(plan.sweep_text)
+    return {**fingerprint(), **dict(_flat(case, "", "")), **dict(_flat(sweep, "sweep ", ""))}
 
 
-def _differences(path: Path, found: bytes, identity: Identity) -> str:
+def _flat(value: Any, path: str, dot: str = ".") -> Iterator[tuple[str, Any]]:
+    if isinstance(value, dict):
+        for key, each in value.items():
+            yield from _flat(each, f"{path}{dot}{key}")
+    elif isinstance(value, list) and value and isinstance(value[0], dict):
+        for index, each in enumerate(value):
+            yield from _flat(each, f"{path}[{index}]")
+    else:
+        yield path, value
+
+
+def _differences(found: bytes, own: Mapping[str, Any]) -> str:
     """In which keys the journal that is there belongs to another sweep."""
-    remedy = "undo the change to go on, or start anew with --force, which drops the finished points"
     try:
         there = json.loads(found)
-        keys = [key for key in {**there, **identity} if there.get(key) != identity.get(key)]
+        keys = [key for key in {**there, **own} if there.get(key) != own.get(key)]
     except (ValueError, TypeError, AttributeError, RecursionError):
-        return f"{path}: holds no finished points; remove it, or start anew with --force"
-    told = [
-        f"{key} was {there.get(key, 'not set')!s:.60}, is {identity.get(key, 'not set')!s:.60}" for key in keys
-    ]
+        return "holds no finished points; remove it, or start anew with --force"
+    each = [f"{key} was {there.get(key, 'not set')!s:.60}, is {own.get(key, 'not set')!s:.60}" for key in keys]
     more = [f"and {len(keys) - MOST_DIFFERENCES} more"] if len(keys) > MOST_DIFFERENCES else []
-    differences = ", ".join(told[:MOST_DIFFERENCES] + more)
-    return f"{path}: holds finished points of another sweep: {differences}; {remedy}"
-
-
-def _cannot_write(path: Path, error: OSError) -> CannotWriteError:
-    reason = (error.strerror or str(error)).lower()
-    return CannotWriteError(
-        f"{path}: cannot write: {reason}; free some space there, or choose another output with -o"
+    return (
+        f"holds finished points of another sweep: {', '.join(each[:MOST_DIFFERENCES] + more)}; undo the change to "
+        "go on, or start anew with --force, which drops the finished points"
     )

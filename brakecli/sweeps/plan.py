@@ -34,6 +34,10 @@ class Plan:
     sweep_text: str
     case_text: str
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Travel as two texts: a worker meets the same plan again and again."""
+        return plan_of, (self.sweep_text, self.case_text)
+
     @cached_property
     def sweep(self) -> Sweep:
         """The axes and the critical parameter."""

@@ -1,7 +1,7 @@
 """One point of a sweep: its run, its verdict, its critical parameter, as a record of fixed size."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from brakecli.analysis.regime.of_run import RunVerdict, verdict_on
 from brakecli.analysis.regime.rules import Verdict
 from brakecli.case.case import Case
+from brakecli.case.read import key_path
 from brakecli.case.system import system_of
 from brakecli.errors import BrakecliError
 from brakecli.files import fields
@@ -24,7 +25,7 @@ from brakecli.solver.motion import Motion
 from brakecli.solver.roughness import TWO_PI, wheel_angles
 from brakecli.solver.schedules import integral_at
 from brakecli.sweeps.critical import search
-from brakecli.sweeps.plan import Plan
+from brakecli.sweeps.plan import Plan, Settings
 from brakecli.sweeps.tables import Direction
 
 
@@ -34,9 +35,6 @@ class Status(StrEnum):
     DONE = "done"
     FAILED = "failed"
     CRASHED = "crashed"
-
-
-Recall = Callable[[], None]
 
 
 def record_type(plan: Plan) -> np.dtype[Any]:
@@ -100,18 +98,12 @@ def simulate(case: Case) -> Outcome:
 
 def blank(kind: np.dtype[Any], status: Status, reason: str) -> NDArray[Any]:
     """The record of a point without a result."""
-    record = np.zeros(1, kind)
-    for name in kind.names or ():
-        if kind[name].kind == "f":
-            record[name] = math.nan
-    record["status"], record["reason"], record["regime"] = status.encode(), _clipped(reason), b"undecided"
-    record["excitation"] = b"none"
-    return record
+    return _filled(kind, {"status": status, "reason": reason, "regime": "undecided", "excitation": "none"})
 
 
 def compute(plan: Plan, first: int, count: int) -> NDArray[Any]:
     """The records of some neighbouring points, each computed for itself."""
-    return np.concatenate([_point(plan, index) for index in range(first, first + count)])
+    return np.concatenate([_computed(plan, point, {})[0] for point in range(first, first + count)])
 
 
 def follow(plan: Plan, line: int) -> NDArray[Any]:
@@ -119,19 +111,13 @@ def follow(plan: Plan, line: int) -> NDArray[Any]:
 
     The wheel goes on turning from one point to the next: its waves keep the phases that they have come to.
     """
-    records = []
-    start: dict[tuple[str, ...], Any] = {}
+    records: dict[int, NDArray[Any]] = {}
+    start: Settings = {}
     for point in line_points(plan, line):
-        kind = record_type(plan)
-        try:
-            outcome = simulate(plan.case(plan.settings(point) | start))
-        except (BrakecliError, FloatingPointError, MemoryError) as error:
-            records.append((point, blank(kind, Status.FAILED, _sentence(error))))
-            continue
-        records.append((point, _filled(kind, outcome)))
-        if not outcome.motion.work.failed:
-            start = _continued(outcome)
-    return np.concatenate([record for _, record in sorted(records, key=lambda pair: pair[0])])
+        records[point], outcome = _computed(plan, point, start)
+        if outcome is not None and not outcome.motion.work.failed:
+            start = next_start(outcome)
+    return np.concatenate([records[point] for point in sorted(records)])
 
 
 def line_points(plan: Plan, line: int) -> list[int]:
@@ -152,7 +138,7 @@ def line_points(plan: Plan, line: int) -> list[int]:
     return sorted(points, key=lambda point: value(plan.places(point)[axis]), reverse=down)
 
 
-def _continued(outcome: Outcome) -> dict[tuple[str, ...], Any]:
+def next_start(outcome: Outcome) -> Settings:
     """The start of a case where another has ended."""
     x, y, v_x, v_y = (float(value) for value in outcome.motion.rows[-1, :4])
     start: dict[tuple[str, ...], Any] = {("initial",): {"x": x, "y": y, "vx": v_x, "vy": v_y}}
@@ -161,31 +147,14 @@ def _continued(outcome: Outcome) -> dict[tuple[str, ...], Any]:
         system = outcome.motion.system
         angles = np.zeros(system.wheel.g.size)
         wheel_angles(system.wheel.waves, *integral_at(system.belt, system.sampled_duration, 0.0), angles)
-        phases = iter(angles)  # a wave of no amplitude has none
+        phases = iter(angles)  # a wave without amplitude has no phase
         turned = [math.degrees(next(phases) % TWO_PI) if g else 0.0 for g in wheel.amplitudes]
         start["roughness", "wheel", "phases_deg"] = turned
     return start
 
 
-def _point(plan: Plan, point: int) -> NDArray[Any]:
-    kind = record_type(plan)
-    settings = plan.settings(point)
-    try:
-        record = _filled(kind, simulate(plan.case(settings)))
-        critical = plan.sweep.critical
-        if critical is not None:
-            from brakecli.case.read import key_path
-
-            path = key_path(critical.parameter)
-            with within_range():
-                found = search(critical, lambda value: plan.case({**settings, path: value}), _verdict)
-            _fill(record, values_of(fields.CRITICAL, found))
-    except (BrakecliError, FloatingPointError, MemoryError) as error:
-        return blank(kind, Status.FAILED, _sentence(error))
-    return record
-
-
-def _verdict(case: Case) -> Verdict | None:
+def verdict_of(case: Case) -> Verdict | None:
+    """The verdict on a run in memory; None where it fails."""
     try:
         outcome = simulate(case)
     except BrakecliError:
@@ -193,23 +162,37 @@ def _verdict(case: Case) -> Verdict | None:
     return None if outcome.motion.work.failed else outcome.verdict
 
 
-def _filled(kind: np.dtype[Any], outcome: Outcome) -> NDArray[Any]:
-    record = blank(kind, outcome.status, outcome.reason)
-    _fill(record, values_of(fields.POINT, outcome))
+def _computed(plan: Plan, point: int, start: Settings) -> tuple[NDArray[Any], Outcome | None]:
+    """The record of a point and its run, which is None where it was not possible."""
+    settings = {**plan.settings(point), **start}
+    try:
+        outcome = simulate(plan.case(settings))
+        values = values_of(fields.POINT, outcome)
+        if (critical := plan.sweep.critical) is not None:
+            path = key_path(critical.parameter)
+            with within_range():
+                found = search(critical, lambda value: plan.case({**settings, path: value}), verdict_of)
+            values |= values_of(fields.CRITICAL, found)
+    except (BrakecliError, FloatingPointError, MemoryError) as error:
+        return blank(record_type(plan), Status.FAILED, _sentence(error)), None
+    return _filled(record_type(plan), values), outcome
+
+
+def _filled(kind: np.dtype[Any], values: Mapping[str, Any]) -> NDArray[Any]:
+    """A record of some values; missing numbers are NaN."""
+    record = np.zeros(1, kind)
+    for name in kind.names or ():
+        value = values.get(name)
+        if isinstance(value, str):
+            record[name] = (
+                value.encode()[: kind[name].itemsize].decode(errors="ignore").encode()
+            )  # whole characters
+        elif value is not None or kind[name].kind == "f":
+            record[name] = math.nan if value is None else value
     return record
-
-
-def _fill(record: NDArray[Any], values: Mapping[str, Any]) -> None:
-    for name, value in values.items():
-        record[name] = _clipped(value) if isinstance(value, str) else math.nan if value is None else value
 
 
 def _sentence(error: BaseException) -> str:
     if isinstance(error, MemoryError):
         return "out of memory; sample less often, or reduce contact.nodes"
     return "; ".join(str(error).splitlines())
-
-
-def _clipped(text: str) -> bytes:
-    """As much of a text as a record holds, in whole characters."""
-    return text.encode()[: int(fields.SENTENCE[1:])].decode(errors="ignore").encode()

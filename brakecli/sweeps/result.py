@@ -1,6 +1,7 @@
-"""The result of a sweep: what its file holds, and what the command tells of it."""
+"""The result of a sweep: what its file holds, and what the command reports of it."""
 
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -21,8 +22,8 @@ from brakecli.sweeps.plan import Plan, label
 from brakecli.sweeps.point import Status, fields_of, line_points
 
 MOST_FAILURES = 100
-MOST_TOLD = 10_000
-"""Points up to which every number is told as JSON; of more, the file holds them."""
+MOST_AS_JSON = 10_000
+"""Points up to which `--json` prints every number; the file holds those of more."""
 SAME_AMPLITUDE = 0.05
 """Motions whose amplitudes differ by less than this part, in the same regime, are the same."""
 
@@ -32,21 +33,13 @@ _DONE = Status.DONE.encode()
 class Columns:
     """The variables of a finished sweep in the shape of its grid, read one by one."""
 
-    def __init__(self, plan: Plan, journal: Journal) -> None:
+    def __init__(self, journal: Journal) -> None:
         """Read from a journal that holds every unit."""
-        self.plan = plan
-        self._journal = journal
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The dimensions: those of the axes, in front of them the direction if both were followed."""
-        names = [axis.name for axis in self.plan.sweep.axis] or ["point"]
-        return (*(["direction"] if self.plan.passes == 2 else []), *names)
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """The length of each dimension."""
-        return (*([2] if self.plan.passes == 2 else []), *(self.plan.shape or (1,)))
+        self._journal, self.plan = journal, journal.plan
+        both = self.plan.passes == 2
+        axes = [axis.name for axis in self.plan.sweep.axis] or ["point"]
+        self.dimensions = (*(["direction"] if both else []), *axes)
+        self.shape = (*([2] if both else []), *(self.plan.shape or (1,)))
 
     def decoded(self, name: str) -> NDArray[Any]:
         """A variable, its texts as str."""
@@ -67,7 +60,7 @@ class Columns:
 
 @dataclass(frozen=True)
 class Findings:
-    """What there is to tell of a sweep without looking at every point."""
+    """What the command reports of a sweep as a whole."""
 
     points: int
     dimensions: tuple[str, ...]
@@ -109,34 +102,35 @@ class SweepReport:
 
 def findings(columns: Columns) -> Findings:
     """Look through the variables of a sweep."""
-    plan = columns.plan
-    status, warnings = columns["status"], columns["warning_count"]
+    plan, status = columns.plan, columns["status"]
     failed = np.flatnonzero(status.ravel() != _DONE)
     reasons = columns["reason"].ravel()[failed[:MOST_FAILURES]]
-    failures = [
-        {"point": int(index), "parameters": _parameters(plan, int(index)), "reason": reason.decode()}
-        for index, reason in zip(failed, reasons, strict=False)
-    ]
-    warned = np.flatnonzero(warnings.ravel())
+    warned = np.flatnonzero(columns["warning_count"].ravel())
     critical = None
     if plan.sweep.critical is not None:
         known = columns["critical"]
         known = known[~np.isnan(known)]
         critical = (len(known), float(known.min()), float(known.max())) if len(known) else (0, 0.0, 0.0)
     hysteresis = _hysteresis(columns)
-    told = status.size <= MOST_TOLD
     return Findings(
         points=status.size,
-        dimensions=columns.names,
+        dimensions=columns.dimensions,
         failed=len(failed),
-        failures=tuple(failures),
+        failures=tuple(
+            {"point": point, "parameters": _parameters(plan, point), "reason": reason.decode()}
+            for point, reason in zip(failed[:MOST_FAILURES].tolist(), reasons, strict=True)
+        ),
         warned=len(warned),
         first_warning=columns["warning"].ravel()[warned[0]].decode() if len(warned) else "",
         regimes={name.decode(): count for name, count in sorted(Counter(columns["regime"].ravel()).items())},
         critical=critical,
         hysteresis=hysteresis,
-        sentences=tuple(_sentences(columns, hysteresis)),
-        variables={each.name: plain(columns[each.name]) for each in fields_of(plan)} if told else None,
+        sentences=(*_on_hysteresis(columns, hysteresis), *_on_lasting_vibration(columns)),
+        variables=(
+            {field.name: plain(columns[field.name]) for field in fields_of(plan)}
+            if status.size <= MOST_AS_JSON
+            else None
+        ),
     )
 
 
@@ -156,13 +150,13 @@ def write(result: ResultFile, report: SweepReport, columns: Columns) -> None:
     if not plan.sweep.axis:
         result.axis("/", fields.BASE_POINT, np.zeros(1))
     for field in fields.POINT:
-        result.column(field, columns.names, columns.decoded(field.name))
+        result.column(field, columns.dimensions, columns.decoded(field.name))
     if (critical := plan.sweep.critical) is not None:
         for field in fields.CRITICAL:
             numeric = field.kind == "f8"
             of_parameter = replace(field, units=unit(critical.parameter)) if numeric else field
             attributes = {"parameter": critical.parameter} if numeric else {}
-            result.column(of_parameter, columns.names, columns.decoded(field.name), **attributes)
+            result.column(of_parameter, columns.dimensions, columns.decoded(field.name), **attributes)
     if found.hysteresis is not None:
         result.column(*fields.DIFFERENCE, found.dimensions[1:], found.hysteresis)
 
@@ -184,38 +178,38 @@ def _hysteresis(columns: Columns) -> NDArray[Any] | None:
     return np.asarray(decided & ((regime[0] != regime[1]) | (apart & lasting)), dtype=np.int64)
 
 
-def _sentences(columns: Columns, hysteresis: NDArray[Any] | None) -> list[str]:
-    """What is to be said about motions that depend on where they come from."""
-    plan, sentences = columns.plan, []
-    if hysteresis is not None:
-        count = int(hysteresis.sum())
-        where = [_parameters(plan, int(index)) for index in np.flatnonzero(hysteresis.ravel())[:3]]
+def _on_hysteresis(columns: Columns, hysteresis: NDArray[Any] | None) -> Iterator[str]:
+    """What is to be said about motions that were followed up and down."""
+    if hysteresis is None:
+        return
+    if count := int(hysteresis.sum()):
+        where = [_parameters(columns.plan, int(index)) for index in np.flatnonzero(hysteresis.ravel())[:3]]
         places = "; ".join(", ".join(f"{key} = {label(value)}" for key, value in each.items()) for each in where)
-        sentences.append(
-            f"hysteresis at {count} of {hysteresis.size} points: {places}{' …' if count > 3 else ''}"
-            if count
-            else "no hysteresis: the motion is the same on the way up and on the way down"
+        yield f"hysteresis at {count} of {hysteresis.size} points: {places}{' …' if count > 3 else ''}"
+    else:
+        yield "no hysteresis: the motion is the same on the way up and on the way down"
+    if undecided := int((columns["regime"] == b"undecided").any(axis=0).sum()):
+        yield f"hysteresis is not known at {undecided} points, whose regime is undecided in a direction"
+
+
+def _on_lasting_vibration(columns: Columns) -> Iterator[str]:
+    """What is to be said where vibration from the case's own start does not begin at the critical value."""
+    critical = columns.plan.sweep.critical
+    if critical is None:
+        return
+    sustained = columns["critical_sustained"]
+    early = np.nan_to_num(columns["critical_lower"] - sustained, nan=0.0)
+    late = np.nan_to_num(sustained - columns["critical_upper"], nan=0.0)
+    if below := int((early > critical.tolerance).sum()):
+        yield (
+            f"hysteresis at {below} of {early.size} points: from the case's own start vibration lasts at "
+            f"values up to {early.max():.3g} below the one at which steady sliding loses its stability"
         )
-        if open_ := int(((columns["regime"] == b"undecided").any(axis=0)).sum()):
-            sentences.append(
-                f"hysteresis cannot be told at {open_} points, whose regime is undecided in a direction"
-            )
-    critical = plan.sweep.critical
-    if critical is not None:
-        sustained = columns["critical_sustained"]
-        early = np.nan_to_num(columns["critical_lower"] - sustained, nan=0.0)
-        late = np.nan_to_num(sustained - columns["critical_upper"], nan=0.0)
-        if beside := int((early > critical.tolerance).sum()):
-            sentences.append(
-                f"hysteresis at {beside} of {early.size} points: from the case's own start vibration lasts at "
-                f"values up to {early.max():.3g} below the one at which steady sliding loses its stability"
-            )
-        if after := int((late > critical.tolerance).sum()):
-            sentences.append(
-                f"at {after} of {late.size} points the case's own start leads into lasting vibration only at "
-                f"values up to {late.max():.3g} above the critical one; longer runs may tell another"
-            )
-    return sentences
+    if above := int((late > critical.tolerance).sum()):
+        yield (
+            f"at {above} of {late.size} points the case's own start leads into lasting vibration only at "
+            f"values up to {late.max():.3g} above the critical one; longer runs may give another answer"
+        )
 
 
 def _parameters(plan: Plan, index: int) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from brakecli.analysis.stability.report import StabilityReport, stability
 from brakecli.case.case import Case
 from brakecli.case.system import system_of
 from tests.analysis.histories import verdict_of
+from tests.campaign import counts
 from tests.examples import SQUEAL, make
 
 SHOES = [  # α in degrees, c2/c1, k in N/m²
@@ -144,10 +145,11 @@ def random_case(rng: np.random.Generator) -> dict[str, Any]:
     }
 
 
-def test_two_hundred_random_shoes_are_never_judged_against_their_eigenvalues() -> None:
+@pytest.mark.parametrize("shoes", counts(20, 200))
+def test_random_shoes_are_never_judged_against_their_eigenvalues(shoes: int) -> None:
     rng = np.random.default_rng(11)
     judgements: dict[tuple[bool, Regime], int] = {}
-    while sum(judgements.values()) < 200:
+    while sum(judgements.values()) < shoes:
         tables = random_case(rng)
         critical = stability(system_of(make(tables))).critical
         if critical is not None and critical.friction < 3.0:
@@ -167,10 +169,10 @@ def test_two_hundred_random_shoes_are_never_judged_against_their_eigenvalues() -
         wrong = {Regime.DAMPED} if rate > 0.0 else {Regime.RELAXATION, Regime.QUASI_HARMONIC}
         assert verdict.regime not in wrong, (tables, verdict)
     decided = sum(count for (_, regime), count in judgements.items() if regime is not Regime.UNDECIDED)
-    assert decided >= 170  # 190 of 200 when this was written; what is left grows, decays or wanders still
-    assert judgements[True, Regime.RELAXATION] > 10
-    assert judgements[True, Regime.QUASI_HARMONIC] > 10
-    assert judgements[False, Regime.DAMPED] > 50
+    assert decided >= 0.85 * shoes  # 190 of 200 when this was written; what is left grows, decays or wanders still
+    assert judgements[True, Regime.RELAXATION] > 0.05 * shoes
+    assert judgements[True, Regime.QUASI_HARMONIC] > 0.05 * shoes
+    assert judgements[False, Regime.DAMPED] > 0.25 * shoes
 
 
 CHANGES: list[dict[str, Any]] = [

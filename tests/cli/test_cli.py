@@ -31,7 +31,6 @@ from tests.commands import (
     each,
     environment,
     left_in,
-    warm_up,
 )
 
 xarray = import_module("xarray")  # imported so because h5netcdf has no type hints
@@ -41,12 +40,6 @@ COMMANDS = ["run", "check", "new", "schema", "plot"]
 
 
 pytestmark = pytest.mark.usefixtures("compiled")
-
-
-@pytest.fixture(scope="module")
-def compiled() -> None:
-    """Kernels."""
-    warm_up()
 
 
 @pytest.fixture(scope="module")

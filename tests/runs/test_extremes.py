@@ -1,35 +1,37 @@
-"""The extremes: the campaign of benchmarks/extremes.py, reduced."""
+"""The extremes of benchmarks/extremes: a few of them, and in the campaign all of them with their page."""
 
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from brakecli.case.system import system_of
 from brakecli.runs.limits import check
+from tests.campaign import campaign, counts, differences
 from tests.examples import SQUEAL, make
 
-extremes: Any = import_module("benchmarks.extremes")  # benchmarks are not type-checked
+# benchmarks are not type-checked
+judging: Any = import_module("benchmarks.extremes.judging")
+points: Any = import_module("benchmarks.extremes.points")
+long_runs: Any = import_module("benchmarks.extremes.long_runs")
+page: Any = import_module("benchmarks.extremes.__main__")
 
-SMOOTH = [family for family in extremes.FAMILIES if "rough" not in family.name and "wave" not in family.name]
-ROUGH = [family for family in extremes.FAMILIES if family not in SMOOTH]
-
-
-def _reduced(family: Any, every: int) -> list[tuple[float, Any, Any]]:
-    """The points at both ends of a family and some between, by every scheme."""
-    values = sorted({*family.values[::every], family.values[0], family.values[-1]})
-    return [(value, family.tables(value), family.pace(value)) for value in values]
+SMOOTH = [family for family in points.FAMILIES if "rough" not in family.name and "wave" not in family.name]
+QUICK_LIMITS = ("base", "contact 10¹⁶ N/m²")
+ROUGH = [family for family in points.FAMILIES if family not in SMOOTH]
 
 
 @pytest.mark.parametrize("family", SMOOTH, ids=lambda family: family.name)
 def test_nothing_on_smooth_surfaces_is_silently_wrong(family: Any) -> None:
     kinds = set()
-    for value, tables, at in _reduced(family, 3):
-        reference = extremes.truth(tables, at)
+    for value in sorted({*family.values[::3], family.values[0], family.values[-1]}):
+        tables, at = family.tables(value), family.pace(value)
+        reference = judging.truth(tables, at)
         assert reference.rows is not None, value
         assert not reference.apart > 1e-8, value
-        for scheme in extremes.SCHEMES:
-            outcome = extremes.judge(tables, scheme, at, reference)
+        for scheme in judging.SCHEMES:
+            outcome = judging.judge(tables, scheme, at, reference)
             kinds.add(outcome.kind)
             assert outcome.kind != "silently wrong", (value, scheme.text, outcome)
             assert outcome.kind in ("right", "failed by name") or outcome.words, (value, scheme.text)
@@ -40,45 +42,54 @@ def test_nothing_on_smooth_surfaces_is_silently_wrong(family: Any) -> None:
 def test_nothing_on_rough_surfaces_is_silently_wrong(family: Any) -> None:
     for value in (family.values[1], family.values[-1]):
         tables, at = family.tables(value), family.pace(value)
-        reference = extremes.truth(tables, at)
+        reference = judging.truth(tables, at)
         assert reference.rows is not None, value
-        for scheme in (extremes.MIDDLE, extremes.BACKWARD, extremes.THREE):
-            outcome = extremes.judge(tables, scheme, at, reference)
+        for scheme in (judging.MIDDLE, judging.BACKWARD, judging.THREE):
+            outcome = judging.judge(tables, scheme, at, reference)
             assert outcome.kind != "silently wrong", (value, scheme.text, outcome)
 
 
-def test_nothing_is_silently_wrong_where_several_extremes_meet() -> None:
-    points = list(extremes.together(20))
-    assert len(points) == 20
-    assert [outcome for point in points for outcome in point.values() if outcome.kind == "silently wrong"] == []
+@pytest.mark.parametrize("count", counts(20, 200))
+def test_nothing_is_silently_wrong_where_several_extremes_meet(count: int) -> None:
+    found = list(points.together(count))
+    assert len(found) == count
+    assert [outcome for point in found for outcome in point.values() if outcome.kind == "silently wrong"] == []
+
+
+@campaign
+def test_the_page_of_the_extremes_is_what_they_give(tmp_path: Path) -> None:
+    page.main(tmp_path / "extremes.md")
+    assert differences((tmp_path / "extremes.md").read_text(), page.PAGE.read_text()) == []
 
 
 def test_an_error_that_nothing_is_said_of_is_silently_wrong() -> None:
-    tables = extremes.FLAT
-    at = extremes.pace(tables)
-    reference = extremes.truth(tables, at)
+    tables = judging.FLAT
+    at = judging.pace(tables)
+    reference = judging.truth(tables, at)
     off = reference._replace(rows=1.01 * reference.rows)
-    assert extremes.judge(tables, extremes.MIDDLE, at, reference).kind == "right"
-    assert extremes.judge(tables, extremes.MIDDLE, at, off).kind == "silently wrong"
-    assert extremes.judge(tables, extremes.MIDDLE, at, extremes.Truth(None, 0.0, "")).kind == "silently wrong"
+    assert judging.judge(tables, judging.MIDDLE, at, reference).kind == "right"
+    assert judging.judge(tables, judging.MIDDLE, at, off).kind == "silently wrong"
+    assert judging.judge(tables, judging.MIDDLE, at, judging.Truth(None, 0.0, "")).kind == "silently wrong"
 
 
-@pytest.mark.parametrize("name", ["base", "contact 10¹⁶ N/m²", "mass 10⁻⁶ kg", "critical dashpots"])
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if name in QUICK_LIMITS else campaign) for name in long_runs.LIMIT_CASES]
+)
 def test_predicted_limits_of_stability_are_those_observed(name: str) -> None:
-    for scheme in extremes.LIMITED:
-        predicted, observed = extremes.limits(extremes.LIMIT_CASES[name], scheme)
+    for scheme in long_runs.LIMITED:
+        predicted, observed = long_runs.limits(long_runs.LIMIT_CASES[name], scheme)
         assert (predicted is None) == (observed is None), scheme.text
         if observed is not None:
             assert predicted == pytest.approx(observed, rel=0.02), scheme.text
 
 
 def test_weights_of_one_half_keep_the_energy() -> None:
-    assert abs(extremes.drift(extremes.MIDDLE, 10, 20_000)) < 1e-10
-    assert extremes.drift(extremes.BACKWARD, 10, 20_000) < -0.99
+    assert abs(long_runs.drift(judging.MIDDLE, 10, 20_000)) < 1e-10
+    assert long_runs.drift(judging.BACKWARD, 10, 20_000) < -0.99
 
 
 def test_hours_leave_the_phases_of_the_wheel_where_they_belong() -> None:
-    assert extremes.hours(extremes.MIDDLE, 5_000.0) < 1e-10
+    assert long_runs.hours(judging.MIDDLE, 5_000.0) < 1e-10
 
 
 def test_the_damping_of_a_scheme_itself_is_told() -> None:

@@ -8,28 +8,34 @@ import os
 import re
 import resource
 import signal
-import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
 from brakecli.errors import RefusedError
 from brakecli.sweeps.driver import sweep
 from brakecli.sweeps.file import LoadedSweep, read_sweep
-from brakecli.sweeps.plan import plan_of
+from brakecli.sweeps.plan import Plan
 from brakecli.sweeps.point import Status, blank, record_type
 from brakecli.sweeps.result import SweepReport
 from brakecli.sweeps.workers.dask import ClusterEngine
-from brakecli.sweeps.workers.local import Finished, Job, LocalEngine, Supply, Work
-from brakecli.sweeps.workers.task import work
-from tests.commands import COMMAND, LIMIT, TINY, Done, environment
+from brakecli.sweeps.workers.local import LocalEngine
+from brakecli.sweeps.workers.task import Engine, Finished, NextTask, compute_units
+from tests.commands import LIMIT, ROOT, TINY, Done, run
 
+PROGRAM = [sys.executable, "-W", "error", "-m", "tests.sweeps.helpers"]
+ANGLES = """\
+[[axis]]
+parameter = "link2.angle_deg"
+values = [1.0, 3.0, 5.0]
+"""
+SLOWER = TINY.replace("duration = 0.02", "duration = 0.6")
+"""30 ms a point."""
 WICKED = 7
 """The point that ends its worker."""
 MEMORY = 400_000_000
@@ -53,180 +59,139 @@ def write_sweep(folder: Path, *tables: str, case: str = TINY) -> LoadedSweep:
     return read_sweep(str(folder / "s.toml"))
 
 
-# work instead of that of the program: a function of a module, so that worker processes find it
+# functions in place of `compute_units`: those of a module, so that worker processes find them
+
+Compute = Callable[[Plan, int, int], bytes]
 
 
-def quick(job: Job, first: int, count: int) -> bytes:
-    """Records that tell their points, without any simulation."""
-    plan = plan_of(*job)
+def quick(plan: Plan, first: int, count: int) -> bytes:
+    """Records that hold their points as frequencies, without any simulation."""
     record = blank(record_type(plan), Status.DONE, "made up")
     records = np.repeat(record, count * plan.unit_length)
     records["frequency"] = np.arange(first * plan.unit_length, (first + count) * plan.unit_length)
     return records.tobytes()
 
 
-def slow(job: Job, first: int, count: int) -> bytes:
+def slow(plan: Plan, first: int, count: int) -> bytes:
     """The same, slowly."""
     time.sleep(0.1 * count)
-    return quick(job, first, count)
+    return quick(plan, first, count)
 
 
-def deadly(job: Job, first: int, count: int) -> bytes:
+def deadly(plan: Plan, first: int, count: int) -> bytes:
     """The same, but for the wicked point."""
     if first <= WICKED < first + count:
         os.kill(os.getpid(), signal.SIGKILL)
-    return quick(job, first, count)
+    return quick(plan, first, count)
 
 
-def hungry(job: Job, first: int, count: int) -> bytes:
+def hungry(plan: Plan, first: int, count: int) -> bytes:
     """The same in little memory, of which the wicked point wants more than there is."""
     pages = int(Path("/proc/self/statm").read_text().split()[0])
     limit = pages * resource.getpagesize() + MEMORY
     resource.setrlimit(resource.RLIMIT_AS, (limit, resource.RLIM_INFINITY))
     if first <= WICKED < first + count:
         np.ones(2 * MEMORY, dtype=np.int8)
-    return quick(job, first, count)
+    return quick(plan, first, count)
 
 
-def broken(job: Job, first: int, count: int) -> bytes:
+def broken(plan: Plan, first: int, count: int) -> bytes:
     """The same, but for the wicked point, for which nothing is prepared."""
     if first <= WICKED < first + count:
         raise ZeroDivisionError("division by zero\nin two lines")
-    return quick(job, first, count)
+    return quick(plan, first, count)
 
 
-def deaf(job: Job, first: int, count: int) -> bytes:
+def deaf(plan: Plan, first: int, count: int) -> bytes:
     """A computation of hours within one call of C, which lets no other thread run; a file tells that it runs."""
     Path(f"{os.getpid()}.computes").touch()
     re.fullmatch(r"(a+)+b", "a" * 60)
-    return quick(job, first, count)
+    return quick(plan, first, count)
 
 
 # engines and sweeps
 
 
-class Inline:
+class Inline(Engine):
     """An engine without workers, which takes `limit` tasks and is then interrupted."""
 
     workers = 1
 
-    def __init__(self, job: Job, work: Work = work, limit: int | None = None) -> None:
-        self._job, self._work, self._limit = job, work, limit
+    def __init__(self, plan: Plan, compute: Compute, limit: int | None = None) -> None:
+        self._plan, self._compute, self._limit = plan, compute, limit
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def close(self) -> None:
         pass
 
-    def run(self, supply: Supply) -> Iterator[Finished]:
+    def run(self, next_task: NextTask) -> Iterator[Finished]:
         done = 0
-        while (task := supply()) is not None:
+        while (task := next_task()) is not None:
             if done == self._limit:
                 raise KeyboardInterrupt
             done += 1
-            yield Finished(task, self._work(self._job, task.first, task.size), 0.1)
-
-
-def job_of(loaded: LoadedSweep) -> Job:
-    return Job(loaded.plan.sweep_text, loaded.plan.case_text)
+            yield Finished(task, self._compute(self._plan, task.first, task.size), 0.1)
 
 
 def inline(
-    loaded: LoadedSweep, output: Path, work: Work = quick, limit: int | None = None, **options: Any
+    loaded: LoadedSweep, output: Path, compute: Compute = quick, limit: int | None = None, **options: Any
 ) -> SweepReport:
     """Sweep in this process."""
-    return sweep(loaded, output, Inline(job_of(loaded), work, limit), **({"force": False} | options))
+    return sweep(loaded, output, Inline(loaded.plan, compute, limit), **({"force": False} | options))
 
 
-def local(loaded: LoadedSweep, output: Path, work: Work, workers: int = 2, **options: Any) -> SweepReport:
+def interrupted(loaded: LoadedSweep, output: Path, compute: Compute = quick, **options: Any) -> None:
+    """Begin a sweep in this process, and leave its journal."""
+    try:
+        inline(loaded, output, compute, **options)
+    except KeyboardInterrupt:
+        return
+    raise AssertionError("the sweep was not interrupted")
+
+
+def local(loaded: LoadedSweep, output: Path, compute: Compute, workers: int = 2, **options: Any) -> SweepReport:
     """Sweep in worker processes."""
-    with LocalEngine(job_of(loaded), work, workers) as engine:
+    with LocalEngine(partial(compute, loaded.plan), workers) as engine:
         return sweep(loaded, output, engine, **({"force": False} | options))
 
 
 # processes
 
 
+def _proc(pid: int | str, name: str) -> str:
+    """A file of the system on a process; empty once that has ended."""
+    try:
+        return Path(f"/proc/{pid}/{name}").read_text()
+    except OSError:
+        return ""
+
+
+def _state_and_parent(pid: int) -> list[str]:
+    return _proc(pid, "stat").rpartition(")")[2].split()[:2] or ["Z", "0"]
+
+
+def alive(pid: int) -> bool:
+    return _state_and_parent(pid)[0] != "Z"
+
+
 def children(pid: int) -> set[int]:
     """The processes that a process has started."""
-    found = set()
-    for stat in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            state, parent = stat.read_text().rpartition(")")[2].split()[:2]
-        except (OSError, ValueError):  # it has ended meanwhile
-            continue
-        if int(parent) == pid and state != "Z":
-            found.add(int(stat.parent.name))
-    return found
+    numbers = {int(folder.name) for folder in Path("/proc").glob("[0-9]*")}
+    return {each for each in numbers if _state_and_parent(each)[1] == str(pid) and alive(each)}
 
 
 def workers(pid: int) -> set[int]:
     """The worker processes among them."""
-    return {each for each in children(pid) if b"spawn_main" in _command(each)}
-
-
-def alive(pid: int) -> bool:
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except (OSError, IndexError):
-        return False
+    return {each for each in children(pid) if "spawn_main" in _proc(each, "cmdline")}
 
 
 def peak(pid: int | str) -> int:
-    """The most memory that a process has had, in bytes."""
-    text = Path(f"/proc/{pid}/status").read_text()
-    return next(int(line.split()[1]) * 1024 for line in text.splitlines() if line.startswith("VmHWM"))
+    """The most memory that a process has had, in bytes; 0 once it has ended."""
+    return sum(int(line.split()[1]) * 1024 for line in _proc(pid, "status").splitlines() if "VmHWM:" in line)
 
 
-def _command(pid: int) -> bytes:
-    try:
-        return Path(f"/proc/{pid}/cmdline").read_bytes()
-    except OSError:
-        return b""
-
-
-@contextmanager
-def started(
-    *arguments: str | Path, cwd: Path, command: Sequence[str] = COMMAND, output: bool = True, **changes: str | None
-) -> Iterator[subprocess.Popen[bytes]]:
-    """A command that is running, in a group of processes of its own; all of it is killed at the end."""
-    process = subprocess.Popen(
-        [*command, *map(str, arguments)],
-        cwd=cwd,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE if output else subprocess.DEVNULL,
-        stderr=subprocess.PIPE if output else subprocess.DEVNULL,
-        env=environment(**changes),
-        start_new_session=True,
-    )
-    try:
-        yield process
-    finally:
-        if process.poll() is None:
-            os.killpg(process.pid, signal.SIGKILL)
-        process.communicate()
-
-
-def ended(process: subprocess.Popen[bytes]) -> Done:
-    """A command that ends by itself."""
-    out, err = process.communicate(timeout=LIMIT)
-    return Done(process.returncode, out.decode(), err.decode())
-
-
-def run(*arguments: str | Path, cwd: Path, command: Sequence[str] = COMMAND, **changes: str | None) -> Done:
-    """Run a command to its end; a process of its own, as those of sweeps start others."""
-    with started(*arguments, cwd=cwd, command=command, output=True, **changes) as process:
-        return ended(process)
-
-
-def wait_until(condition: Callable[[], object], seconds: float = LIMIT) -> None:
-    deadline = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
+def program(*arguments: str | Path, limit: float = LIMIT) -> Done:
+    """Run this module as a program."""
+    return run(*arguments, cwd=ROOT, command=PROGRAM, limit=limit)
 
 
 def journal_size(folder: Path) -> int:
@@ -245,50 +210,39 @@ def stuck(file: str) -> None:
     local(read_sweep(file), Path(file).with_suffix(".h5"), deaf)
 
 
-def memory(file: str) -> None:
-    """Sweep, and tell the largest memory of this process and of its workers, in bytes."""
-    largest: list[int] = [0]
+def memory(file: str, name: str) -> None:
+    """Sweep by a function, and print the largest memory of this process and of its workers, in bytes."""
+    largest, looked = 0, 0.0
 
     def progress(_: object) -> None:
-        if time.monotonic() - told[0] > 0.2:
-            told[0] = time.monotonic()
-            largest[0] = max([largest[0], *map(_peak_or_nothing, workers(os.getpid()))])
+        nonlocal largest, looked
+        if time.monotonic() - looked > 0.2:
+            looked = time.monotonic()
+            largest = max([largest, *map(peak, workers(os.getpid()))])
 
-    told = [0.0]
-    report = local(read_sweep(file), Path(file).with_suffix(".h5"), work, progress=progress)
-    numbers = {"points": report.findings.points, "failed": report.findings.failed, "workers": largest[0]}
+    functions: dict[str, Compute] = {"compute_units": compute_units, "quick": quick}
+    report = local(read_sweep(file), Path(file).with_suffix(".h5"), functions[name], progress=progress)
+    numbers = {"points": report.findings.points, "failed": report.findings.failed, "workers": largest}
     print(json.dumps({**numbers, "parent": peak("self"), "seconds": report.seconds}))  # noqa: T201
 
 
 def refused(file: str) -> None:
-    """Try a sweep that is too large, and tell the largest memory of this process, in bytes."""
+    """Try a sweep that is too large, and print the largest memory of this process, in bytes."""
     try:
-        local(read_sweep(file), Path(file).with_suffix(".h5"), work)
+        local(read_sweep(file), Path(file).with_suffix(".h5"), compute_units)
     except RefusedError:
         print(peak("self"))  # noqa: T201
 
 
-def _peak_or_nothing(pid: int) -> int:
-    try:
-        return peak(pid)
-    except (OSError, StopIteration):
-        return 0
-
-
 def on_cluster(file: str, name: str, address: str) -> None:
-    """Sweep on a cluster, with a work of this module; tell what has come of it."""
+    """Sweep on a cluster, with a function of this module; print what has come of it."""
     loaded = read_sweep(file)
-    works: dict[str, Work] = {"deadly": deadly, "hungry": hungry, "broken": broken}
-    with ClusterEngine(job_of(loaded), works[name], address, None) as engine:
+    functions: dict[str, Compute] = {"deadly": deadly, "hungry": hungry}
+    with ClusterEngine(partial(functions[name], loaded.plan), address, None) as engine:
         report = sweep(loaded, Path(file).with_suffix(".h5"), engine, force=False, task_size=5)
     print(json.dumps({"failures": report.findings.failures, "notes": report.notes}))  # noqa: T201
 
 
 if __name__ == "__main__":
-    actions: dict[str, Callable[..., None]] = {
-        "stuck": stuck,
-        "memory": memory,
-        "refused": refused,
-        "on_cluster": on_cluster,
-    }
-    actions[sys.argv[1]](*sys.argv[2:])
+    choices: list[Callable[..., None]] = [stuck, memory, refused, on_cluster]
+    {each.__name__: each for each in choices}[sys.argv[1]](*sys.argv[2:])

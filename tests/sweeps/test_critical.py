@@ -13,9 +13,10 @@ from brakecli.case.system import system_of
 from brakecli.solver.links import natural_frequencies
 from brakecli.sweeps.critical import Outcome, Search, search
 from brakecli.sweeps.growth import growth, sliding
-from brakecli.sweeps.point import _verdict as judge
+from brakecli.sweeps.point import verdict_of
 from brakecli.sweeps.tables import Critical, Method
 from tests.analysis.test_regime_table import random_case
+from tests.campaign import counts
 from tests.examples import MODE_COUPLING, ROUGH, SQUEAL, make
 
 WAVES = {"amplitudes": [1e-6, 7e-7], "wavelengths": [0.02, 0.011]}
@@ -32,7 +33,16 @@ def found(
     def case_at(value: float) -> Case:
         return make(tables, **{**case_keys, key: value})
 
-    return search(critical, case_at, judge)
+    return search(critical, case_at, verdict_of)
+
+
+def bracket(answer: Search) -> tuple[float, float, float, float]:
+    """The value that was found, its lower and its upper end, and its error bar."""
+    assert answer.value is not None
+    assert answer.lower is not None
+    assert answer.upper is not None
+    assert answer.error is not None
+    return answer.value, answer.lower, answer.upper, answer.error
 
 
 def rates(case: Case) -> tuple[float, float]:
@@ -117,10 +127,11 @@ def test_no_steady_sliding_has_no_growth() -> None:
     assert sliding(system_of(make(SQUEAL, load__force=-5000.0))) is None
 
 
-def test_the_critical_friction_of_20_random_flat_damped_shoes_is_bracketed() -> None:
+@pytest.mark.parametrize("shoes", counts(4, 20))
+def test_the_critical_friction_of_random_flat_damped_shoes_is_bracketed(shoes: int) -> None:
     rng = np.random.default_rng(5)
     tried = 0
-    while tried < 20:
+    while tried < shoes:
         tables = random_case(rng)
         exact = stability(system_of(make(tables))).critical
         if exact is None or exact.friction > 3.0:
@@ -131,13 +142,10 @@ def test_the_critical_friction_of_20_random_flat_damped_shoes_is_bracketed() -> 
         tolerance = 1e-3 * exact.friction
         answer = found(tables, 0.0, rng.uniform(1.3, 3.0) * exact.friction, tolerance=tolerance)
         assert answer.outcome is Outcome.FOUND
-        assert answer.value is not None
-        assert answer.lower is not None
-        assert answer.upper is not None
-        assert answer.error is not None
-        assert answer.lower <= exact.friction <= answer.upper, tables
-        assert answer.upper - answer.lower <= tolerance
-        assert abs(answer.value - exact.friction) <= answer.error
+        value, lower, upper, error = bracket(answer)
+        assert lower <= exact.friction <= upper, tables
+        assert upper - lower <= tolerance
+        assert abs(value - exact.friction) <= error
         assert answer.eigenvalue == exact.friction
         tried += 1
 
@@ -154,9 +162,8 @@ def test_the_error_bar_holds_the_bias_of_the_scheme() -> None:
     )
     assert answer.value == pytest.approx(0.8115433, abs=1e-3)  # what the amplification matrix gives for this step
     assert answer.bias == pytest.approx(0.8115433 - 0.75, abs=1e-6)
-    assert answer.value is not None
-    assert answer.error is not None
-    assert abs(answer.value - 0.75) <= answer.error
+    value, _, _, error = bracket(answer)
+    assert abs(value - 0.75) <= error
 
 
 def test_divergence_is_found_where_steady_sliding_ends() -> None:
@@ -164,10 +171,8 @@ def test_divergence_is_found_where_steady_sliding_ends() -> None:
     exact = stability(system_of(make(tables))).critical
     assert exact is not None
     assert exact.instability == "divergence"
-    answer = found(tables, 0.0, 1.5 * exact.friction, tolerance=1e-3)
-    assert answer.lower is not None
-    assert answer.upper is not None
-    assert answer.lower <= exact.friction <= answer.upper
+    _, lower, upper, _ = bracket(found(tables, 0.0, 1.5 * exact.friction, tolerance=1e-3))
+    assert lower <= exact.friction <= upper
 
 
 def test_roughness_in_full_contact_does_not_move_the_critical_friction() -> None:
@@ -216,7 +221,7 @@ def test_vibration_that_lasts_below_the_critical_friction_is_hysteresis() -> Non
     assert answer.sustained is not None
     assert answer.sustained < 0.5 * answer.lower
     for friction, lasts in ((answer.sustained - 0.1, False), (answer.sustained + 0.1, True)):
-        verdict = judge(make(tables, friction__coefficient=friction, solver__duration=8.0))
+        verdict = verdict_of(make(tables, friction__coefficient=friction, solver__duration=8.0))
         assert verdict is not None
         assert (verdict.regime != "damped") is lasts
 
@@ -278,7 +283,7 @@ def test_a_start_that_takes_long_to_settle_is_given_the_time() -> None:
     answer = found(tables, 4.0, 20.0, tolerance=1e-2)
     assert answer.value == pytest.approx(5.683, abs=1e-2)
     assert (answer.sustained, answer.sustained_outcome) == (None, Outcome.SUSTAINED)
-    verdict = judge(make(tables, friction__coefficient=4.0, solver__duration=6.0))
+    verdict = verdict_of(make(tables, friction__coefficient=4.0, solver__duration=6.0))
     assert verdict is not None
     assert verdict.regime == "relaxation"
 

@@ -9,12 +9,12 @@ import xarray as xr
 
 from brakecli.case.case import resolved_toml
 from brakecli.case.read import parse_case
-from brakecli.sweeps.driver import Dealer, choose_engine, sweep
+from brakecli.sweeps.driver import TaskQueue, choose_engine, sweep
 from brakecli.sweeps.file import LoadedSweep, parse_sweep
 from brakecli.sweeps.plan import plan_of
-from brakecli.sweeps.point import Status, _continued, blank, line_points, record_type, simulate
+from brakecli.sweeps.point import Status, blank, line_points, next_start, record_type, simulate
 from brakecli.sweeps.result import SweepReport
-from brakecli.sweeps.workers.local import Task
+from brakecli.sweeps.workers.task import Task
 from tests.commands import TINY, attributes, brakecli, left_in
 
 CASE = TINY.replace("0.02", "0.4").replace("1e-5", "2e-5").replace("1e-4", "2e-4")
@@ -164,7 +164,7 @@ def test_the_wheel_goes_on_turning_from_one_point_to_the_next(tmp_path: Path) ->
     loaded = load(tmp_path, text, case)
     whole = simulate(parse_case(case, "tiny", ["solver.duration=0.8"]).case)
     first = simulate(loaded.base.case)
-    second = simulate(loaded.plan.case(_continued(first)))
+    second = simulate(loaded.plan.case(next_start(first)))
     # Phases pass through degrees, and the second run starts anew from four numbers: rounding, times its growth.
     end, other = second.motion.rows[-1, :4], whole.motion.rows[-1, :4]
     np.testing.assert_allclose(end, other, rtol=1e-6, atol=1e-9 * np.abs(other).max())
@@ -187,7 +187,7 @@ def test_lines_go_up_and_down_through_every_point_once() -> None:
     assert [value(plan.places(point)[1]) for point in lines[8]] == [0.9, 0.5, 0.1]
 
 
-def test_hysteresis_between_up_and_down_is_found_and_told(tmp_path: Path) -> None:
+def test_hysteresis_between_up_and_down_is_found_and_reported(tmp_path: Path) -> None:
     """A shoe that vibrates on a stiff contact goes on doing so where one at rest on it stays at rest."""
     case = """\
 shoe.mass = 15.7
@@ -244,7 +244,7 @@ def test_a_sweep_comes_from_standard_input_as_well(tmp_path: Path) -> None:
     assert left_in(tmp_path) == {"tiny.toml", "sweep.h5"}
 
 
-def test_check_tells_what_a_sweep_would_cost(tmp_path: Path) -> None:
+def test_check_reports_what_a_sweep_would_cost(tmp_path: Path) -> None:
     (tmp_path / "tiny.toml").write_text(CASE)
     (tmp_path / "s.toml").write_text(GRID)
     found = brakecli("check", "s.toml", "--json", cwd=tmp_path)
@@ -257,7 +257,7 @@ def test_check_tells_what_a_sweep_would_cost(tmp_path: Path) -> None:
     brakecli("check", "s.toml", cwd=tmp_path).told(3, "the sweep is too large: 2000000000 points")
 
 
-def test_a_sweep_given_to_run_and_a_case_given_to_sweep_are_told_apart(tmp_path: Path) -> None:
+def test_a_sweep_given_to_run_and_a_case_given_to_sweep_are_distinguished(tmp_path: Path) -> None:
     (tmp_path / "tiny.toml").write_text(CASE)
     (tmp_path / "s.toml").write_text(GRID)
     brakecli("run", "s.toml", cwd=tmp_path).told(2, "brakecli sweep s.toml")
@@ -265,25 +265,25 @@ def test_a_sweep_given_to_run_and_a_case_given_to_sweep_are_told_apart(tmp_path:
 
 
 def test_tasks_are_as_long_as_their_work_is_short() -> None:
-    dealer = Dealer(np.zeros(1000, dtype=bool), None)
-    first = dealer()
+    queue = TaskQueue(np.zeros(1000, dtype=bool), None)
+    first = queue.next_task()
     assert first == Task(0, 1)
-    dealer.learn(first, 0.004)
-    assert dealer() == Task(1, 50)  # 0.2 s of 4 ms each
-    dealer.learn(Task(1, 50), 49.0)
-    assert dealer() == Task(51, 1)
+    queue.note_time(first, 0.004)
+    assert queue.next_task() == Task(1, 50)  # 0.2 s of 4 ms each
+    queue.note_time(Task(1, 50), 49.0)
+    assert queue.next_task() == Task(51, 1)
 
 
-def test_only_what_is_missing_is_dealt_and_lost_units_come_again_one_by_one() -> None:
+def test_only_what_is_missing_is_queued_and_lost_units_come_again_one_by_one() -> None:
     finished = np.zeros(10, dtype=bool)
     finished[[0, 4, 5]] = True
-    dealer = Dealer(finished, 2)
-    assert [dealer() for _ in range(5)] == [Task(1, 2), Task(3, 1), Task(6, 2), Task(8, 2), None]
-    assert dealer.retry(Task(6, 2))
-    assert [dealer() for _ in range(3)] == [Task(6, 1, True), Task(7, 1, True), None]
-    assert not dealer.retry(Task(6, 1, True))
-    backwards = Dealer(finished, 2, -1)
-    assert [backwards() for _ in range(2)] == [Task(6, 2), Task(8, 2)]
+    queue = TaskQueue(finished, 2)
+    assert [queue.next_task() for _ in range(5)] == [Task(1, 2), Task(3, 1), Task(6, 2), Task(8, 2), None]
+    assert queue.retry(Task(6, 2))
+    assert [queue.next_task() for _ in range(3)] == [Task(6, 1, True), Task(7, 1, True), None]
+    assert not queue.retry(Task(6, 1, True))
+    backwards = TaskQueue(finished, 2, -1)
+    assert [backwards.next_task() for _ in range(2)] == [Task(6, 2), Task(8, 2)]
 
 
 def test_a_record_holds_text_whole_or_cut_between_characters() -> None:

@@ -19,6 +19,7 @@ from brakecli.analysis.stability.modes import (
     is_undamped,
     modes,
 )
+from brakecli.analysis.stability.search import bisect
 from brakecli.errors import CaseError
 from brakecli.files import fields
 from brakecli.files.field import values_of
@@ -164,9 +165,8 @@ def _rough_crossings(c: Coefficients, belt: float, stiffness_at: StiffnessAt) ->
     for (low, high), (before, after) in zip(pairwise(frictions), pairwise(verdicts), strict=True):
         if before is None or before == after or (before and after is None):
             continue
-        for _ in range(50):  # by halves: without dashpots the growth is zero on one side
-            middle = 0.5 * (low + high)
-            low, high = (middle, high) if unstable(middle) == before else (low, middle)
+        # By halves: without dashpots the growth is zero on one side.
+        low, high = bisect(lambda phi: unstable(phi) == before, low, high, halvings=50)  # noqa: B023 - used at once
         lost = unstable(high) is not False
         mode = first_mode(high if lost else low)
         oscillates = mode is not None and mode.frequency > 0.0
@@ -247,8 +247,4 @@ def step_limit(system: System, stiffness_at: StiffnessAt) -> float | None:
     first = stable.index(False)
     if first == 0:
         return 0.0
-    low, high = float(ladder[first - 1]), float(ladder[first])
-    for _ in range(60):
-        middle = math.sqrt(low * high)
-        low, high = (middle, high) if is_stable(middle) else (low, middle)
-    return low
+    return bisect(is_stable, float(ladder[first - 1]), float(ladder[first]), halvings=60, geometric=True)[0]

@@ -5,15 +5,22 @@ import logging
 import time
 from collections import deque
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from functools import cache
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from brakecli.errors import BrakecliError, RefusedError, UsageError
-from brakecli.sweeps.workers.local import Attempt, Finished, Job, Supply, Task, Work, attempt, first_line
-from brakecli.sweeps.workers.task import fingerprint
+from brakecli.sweeps.workers.task import (
+    Compute,
+    Engine,
+    Finished,
+    NextTask,
+    Task,
+    attempt,
+    fingerprint,
+    first_line,
+)
 
 CONNECT_SECONDS = 20
 WAIT_SECONDS = 60.0
@@ -25,55 +32,47 @@ LOOK_SECONDS = 1.0
 TASKS_PER_THREAD = 3
 
 
-class ClusterEngine:
-    """The workers of a dask scheduler. A worker that dies is replaced by others, which dask sees to."""
+class ClusterEngine(Engine):
+    """The workers of a dask scheduler. Dask gives the tasks of a worker that dies to others."""
 
-    def __init__(self, job: Job, work: Work, address: str | None, scheduler_file: str | None) -> None:
+    def __init__(self, compute: Compute, address: str | None, scheduler_file: str | None) -> None:
         """Connect to a scheduler and compare versions; raises UsageError or RefusedError."""
-        self._job, self._work = job, work
-        self._option = "--scheduler" if scheduler_file is None else "--scheduler-file"
-        self._name = str(address) if scheduler_file is None else scheduler_file
-        address = str(address) if scheduler_file is None else self._read(scheduler_file)
-        self._client = self._connected(address)
+        self._compute = compute
+        option, name = ("--scheduler", address) if scheduler_file is None else ("--scheduler-file", scheduler_file)
+        self._where = f"{option} {name}"
+        address = str(address) if scheduler_file is None else self._address_in(scheduler_file)
         self._versions = fingerprint()
-        try:
-            self._client.wait_for_workers(1, timeout=WAIT_SECONDS)
-            self._compare()
-            self.workers = max(1, sum(self._client.nthreads().values()))
-        except BrakecliError:
-            self._leave()
-            raise
-        except TimeoutError as error:
-            self._leave()
-            raise UsageError(f"{self._where}: has no workers; start some with: dask worker {address}") from error
-        except Exception as error:
-            self._leave()
-            raise UsageError(f"{self._where}: the scheduler does not answer ({first_line(error)})") from error
-        except BaseException:
-            self._leave()
-            raise
+        self._client = self._connected(address)
+        with ExitStack() as failed:
+            failed.callback(self.close)
+            try:
+                self._client.wait_for_workers(1, timeout=WAIT_SECONDS)
+                self._compare()
+                self.workers = max(1, sum(self._client.nthreads().values()))
+            except BrakecliError:
+                raise
+            except TimeoutError as error:
+                raise self._unusable(f"has no workers; start some with: dask worker {address}") from error
+            except Exception as error:
+                raise self._unusable(f"the scheduler does not answer ({first_line(error)})") from error
+            failed.pop_all()
 
-    def __enter__(self) -> Self:
-        """Nothing more to start."""
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def close(self) -> None:
         """Leave, which cancels what is still to be computed; scheduler and workers go on."""
-        self._leave()
+        with suppress(Exception):
+            self._client.close(timeout=1)
 
-    def run(self, supply: Supply) -> Iterator[Finished]:
+    def run(self, next_task: NextTask) -> Iterator[Finished]:
         """Compute until there are no more tasks."""
         try:
-            yield from self._run(supply)
-        except (BrakecliError, GeneratorExit):
+            yield from self._run(next_task)
+        except BrakecliError:
             raise
         except Exception as error:  # dask raises many kinds once its scheduler is gone
             raise self._lost(f"the scheduler has gone ({first_line(error)})") from error
 
-    def _run(self, supply: Supply) -> Iterator[Finished]:
-        from distributed import KilledWorker, wait
+    def _run(self, next_task: NextTask) -> Iterator[Finished]:
+        from distributed import wait
 
         running: dict[Any, Task] = {}
         suspects: deque[Task] = deque()  # last tries that died with a worker which had other tasks, too
@@ -81,7 +80,7 @@ class ClusterEngine:
         self._known = self._addresses()
         looked = seen = time.monotonic()
         while True:
-            while len(running) < TASKS_PER_THREAD * self.workers and (task := supply()) is not None:
+            while len(running) < TASKS_PER_THREAD * self.workers and (task := next_task()) is not None:
                 running[self._submit(task)] = task
             if suspects and not running:
                 alone = suspects.popleft()
@@ -92,20 +91,18 @@ class ClusterEngine:
             with self._client.as_current(), suppress(TimeoutError):
                 wait(list(running), timeout=0.5, return_when="FIRST_COMPLETED")
             for future in [each for each in running if each.done()]:
-                task = running[future]
-                died = future.status == "error" and isinstance(future.exception(), KilledWorker)
                 try:
-                    found = None if died else self._collected(future, task)
+                    finished = self._collect(future)
                 except TimeoutError:
                     continue
-                del running[future]
+                task = running.pop(future)
                 seen = time.monotonic()
-                if found is not None:
-                    yield found
+                if finished is not None:
+                    yield finished
                 elif task.last_try and task is not alone:
                     suspects.append(task)
                 else:
-                    yield Finished(task, None, 0.0, "several workers of the cluster have died of it")
+                    yield Finished(task, failure="several workers of the cluster have died of it")
             if time.monotonic() - looked > LOOK_SECONDS:
                 yield from self._gone()
                 looked = time.monotonic()
@@ -113,33 +110,38 @@ class ClusterEngine:
             if time.monotonic() - seen > WAIT_SECONDS + LOOK_SECONDS:
                 raise self._lost("has no workers any more")
 
-    def _gone(self) -> Iterator[Finished]:
-        """The workers that are no longer there."""
-        now = self._addresses()
-        gone, self._known = sorted(self._known - now), now
-        for address in gone:
-            yield Finished(None, None, 0.0, f"the worker at {address} has gone")
-
     def _submit(self, task: Task) -> Any:
-        arguments = (self._work, self._job, task.first, task.size, self._versions)
-        return self._client.submit(_attempt, *arguments, pure=False)
+        return self._client.submit(_attempt, self._compute, task, self._versions, pure=False)
 
-    def _collected(self, future: Any, task: Task) -> Finished:
+    def _collect(self, future: Any) -> Finished | None:
+        """The end of a task, None if its workers have died. Raises TimeoutError while dask computes it again."""
+        from distributed import KilledWorker
+
         if future.status == "cancelled":
             raise self._lost("the scheduler has gone")
         if future.status == "lost":  # with its worker; it is computed again
             raise TimeoutError
         if future.status == "error":
-            error = future.exception()
-            if isinstance(error, OtherVersionError):
-                raise self._refused(str(error))
+            if isinstance(error := future.exception(), KilledWorker):
+                return None
             raise self._lost(f"a worker cannot compute ({first_line(error)})")
-        found: Attempt = future.result(timeout=FETCH_SECONDS)
-        return Finished(task, found.records, found.seconds, found.failure)
+        finished: Finished | str = future.result(timeout=FETCH_SECONDS)
+        if isinstance(finished, str):
+            raise self._refused(finished)
+        return finished
 
-    @property
-    def _where(self) -> str:
-        return f"{self._option} {self._name}"
+    def _gone(self) -> Iterator[Finished]:
+        """The workers that are no longer there."""
+        now = self._addresses()
+        gone, self._known = sorted(self._known - now), now
+        for address in gone:
+            yield Finished(None, failure=f"the worker at {address} has gone")
+
+    def _addresses(self) -> set[str]:
+        try:
+            return set(self._client.scheduler_info(n_workers=-1)["workers"])
+        except TypeError:  # older versions report all workers anyway
+            return set(self._client.scheduler_info()["workers"])
 
     def _lost(self, how: str) -> BrakecliError:
         return BrakecliError(f"{self._where}: {how}; finished points are kept, run the same command again")
@@ -147,13 +149,10 @@ class ClusterEngine:
     def _refused(self, difference: str) -> RefusedError:
         return RefusedError(f"{self._where}: {difference}; install the same version there")
 
-    def _addresses(self) -> set[str]:
-        try:
-            return set(self._client.scheduler_info(n_workers=-1)["workers"])
-        except TypeError:  # older versions tell of all workers anyway
-            return set(self._client.scheduler_info()["workers"])
+    def _unusable(self, what: str) -> UsageError:
+        return UsageError(f"{self._where}: {what}")
 
-    def _read(self, scheduler_file: str) -> str:
+    def _address_in(self, scheduler_file: str) -> str:
         """The address in a scheduler's file; dask itself would wait for ever for the file to come."""
         try:
             return str(json.loads(Path(scheduler_file).read_text())["address"])
@@ -161,18 +160,15 @@ class ClusterEngine:
             reason = (error.strerror or str(error)).lower()
         except (ValueError, KeyError, TypeError, RecursionError):
             reason = "it holds no address"
-        raise UsageError(
-            f"{self._where}: cannot be read: {reason}; start a scheduler with: "
-            f"dask scheduler --scheduler-file {scheduler_file}"
-        )
+        remedy = f"start a scheduler with: dask scheduler --scheduler-file {scheduler_file}"
+        raise self._unusable(f"cannot be read: {reason}; {remedy}")
 
     def _connected(self, address: str) -> Any:
         try:
             from distributed import Client
         except ImportError as error:
-            raise UsageError(
-                f"{self._option}: needs dask.distributed, which is not installed; pip install 'brakecli[cluster]'"
-            ) from error
+            what = "needs dask.distributed, which is not installed; pip install 'brakecli[cluster]'"
+            raise self._unusable(what) from error
 
         _silence("distributed", "tornado", "asyncio")
 
@@ -184,23 +180,16 @@ class ClusterEngine:
         try:
             return quiet(address, timeout=CONNECT_SECONDS, set_as_default=False)
         except Exception as error:  # dask raises many kinds, of all its layers
-            raise UsageError(
-                f"{self._where}: no scheduler answers ({first_line(error)}); start one with: dask scheduler"
-            ) from error
-
-    def _leave(self) -> None:
-        with suppress(Exception):
-            self._client.close(timeout=1)
+            what = f"no scheduler answers ({first_line(error)}); start one with: dask scheduler"
+            raise self._unusable(what) from error
 
     def _compare(self) -> None:
         """Refuse workers of another version: their results would not be the same."""
         try:
             found = self._client.run(_own_versions)
         except Exception as error:
-            raise UsageError(
-                f"{self._where}: a worker cannot load brakecli ({first_line(error)}); install the same version "
-                "there"
-            ) from error
+            what = f"a worker cannot load brakecli ({first_line(error)}); install the same version there"
+            raise self._unusable(what) from error
         for worker, theirs in sorted(found.items()):
             if difference := _difference(self._versions, theirs, f"the worker at {worker}"):
                 raise self._refused(difference)
@@ -213,19 +202,14 @@ def _silence(*packages: str) -> None:
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)
 
 
-class OtherVersionError(Exception):
-    """A worker has come that is of another version."""
-
-
-def _attempt(work: Work, job: Job, first: int, size: int, versions: Mapping[str, str]) -> Attempt:
-    if difference := _difference(versions, _own_versions(), "a worker that has come later"):
-        raise OtherVersionError(difference)
-    return attempt(work, job, first, size)
+def _attempt(compute: Compute, task: Task, versions: Mapping[str, str]) -> Finished | str:
+    """Compute a task in a worker of the cluster; the difference where that is of another version."""
+    return _difference(versions, _own_versions(), "a worker that has come later") or attempt(compute, task)
 
 
 @cache
 def _own_versions() -> Mapping[str, str]:
-    """Of the sources that this process has loaded; a long-lived worker does not notice that they have changed."""
+    """Versions of the sources that this process has loaded; a long-lived worker does not notice changed files."""
     return fingerprint()
 
 

@@ -1,21 +1,90 @@
-"""What a worker process computes, on this machine or on another one."""
+"""What engines compute and how: tasks of a sweep, in worker processes on this machine or on others.
+
+An engine takes tasks and gives back their records in any order. It reports of which task a worker has died. The
+records do not depend on the engine, nor on how the units of a sweep were cut into tasks.
+"""
 
 import fcntl
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
+from typing import NamedTuple, Self
 
 from brakecli import __version__
-from brakecli.sweeps.workers.local import Job
+from brakecli.sweeps.plan import Plan
 
 
-def work(job: Job, first: int, count: int) -> bytes:
+class Task(NamedTuple):
+    """Some neighbouring units. `last_try`: a worker has died of one of them before."""
+
+    first: int
+    size: int
+    last_try: bool = False
+
+
+class Finished(NamedTuple):
+    """A task that has ended: its records and the seconds it took, or why there are no records.
+
+    Without a task: a worker has gone, and the engine has seen to its tasks.
+    """
+
+    task: Task | None
+    records: bytes | None = None
+    seconds: float = 0.0
+    failure: str = ""
+
+
+Compute = Callable[[int, int], bytes]
+"""compute(first, count): the records of some units. Workers get a pickled copy."""
+NextTask = Callable[[], Task | None]
+"""The next task, None where there is none now. It is asked again after each task that has ended."""
+
+
+class Engine(ABC):
+    """Computes tasks by `workers` processes; a context, which ends those that it has started."""
+
+    workers: int
+
+    @abstractmethod
+    def run(self, next_task: NextTask) -> Iterator[Finished]:
+        """Compute until there are no more tasks."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """End what was started, and drop what is still being computed."""
+
+    def __enter__(self) -> Self:
+        """Start nothing yet."""
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        """Close the engine."""
+        self.close()
+
+
+def attempt(compute: Compute, task: Task) -> Finished:
+    """Compute a task. An error within is the task's own fault, not that of the worker or the network."""
+    begin = time.perf_counter()
+    try:
+        return Finished(task, compute(task.first, task.size), time.perf_counter() - begin)
+    except MemoryError:
+        return Finished(task, failure="it ran out of memory")
+    except Exception as error:  # of one task, which must not cost the others
+        return Finished(task, failure=f"{type(error).__name__}: {first_line(error)}")
+
+
+def first_line(error: object) -> str:
+    """The first line of an error's text; its kind where it has none."""
+    return (str(error).splitlines() or [type(error).__name__])[0]
+
+
+def compute_units(plan: Plan, first: int, count: int) -> bytes:
     """The records of some units of a sweep: points, or lines along which the motion is followed."""
     with _one_compiles():
         from brakecli.sweeps.point import compute, follow
-    from brakecli.sweeps.plan import plan_of
 
-    plan = plan_of(*job)
     if plan.followed is None:
         return compute(plan, first, count).tobytes()
     return b"".join(follow(plan, line).tobytes() for line in range(first, first + count))
@@ -34,13 +103,9 @@ def _one_compiles() -> Iterator[None]:
     """Let one process at a time load kernels: several that fill one cold cache get into each other's way."""
     from brakecli.solver.compile import CACHE
 
-    file = None
-    if CACHE is not None:
-        with suppress(OSError):  # a disk without locks: do without
-            file = Path(f"{CACHE}.lock").open("w")  # noqa: SIM115 - closed below
-            fcntl.flock(file, fcntl.LOCK_EX)
-    try:
+    with ExitStack() as stack:
+        if CACHE is not None:
+            with suppress(OSError):  # a disk without locks: do without
+                file = stack.enter_context(Path(f"{CACHE}.lock").open("w"))
+                fcntl.flock(file, fcntl.LOCK_EX)
         yield
-    finally:
-        if file is not None:
-            file.close()

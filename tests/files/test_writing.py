@@ -1,4 +1,4 @@
-"""Result files that go wrong: full disks, failed writes, interruptions, rivals, damage; and never half a file."""
+"""Results that cannot be written, are interrupted or have a rival: the old file or the new one, never a half."""
 
 import errno
 import fcntl
@@ -16,54 +16,14 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-import h5py
 import numpy as np
 import pytest
 
-from brakecli.errors import CannotWriteError, UnreadableResultError, UsageError
+from brakecli.errors import CannotWriteError, UsageError
 from brakecli.files.field import Field
-from brakecli.files.read import open_result
-from brakecli.files.write import ResultFile, new_result
-
-ROWS = 40000
-
-
-def fill(result: ResultFile, rows: int = ROWS) -> None:
-    result.set_attributes({"kind": "run", "case_toml": 'title = "Größe"\n' * 50})
-    result.axis("history", Field("time", "s", "time"))
-    result.variable("history", Field("state", "1", "state of the pad", "i1"), ["time"])
-    for start in range(0, rows, 10000):
-        time = np.arange(start, min(rows, start + 10000)) * 1e-5
-        result.append("history", {"time": time, "state": np.full(time.shape, -1)})
-        result.read("history", "time", 0, 5)
-    result.axis("spectrum", Field("frequency", "Hz", "frequency"), np.arange(50.0))
-    result.variable("spectrum", Field("vx", "m²/s", "density of vx"), ["frequency"], np.arange(50.0) ** 2)
-
-
-def write(path: Path, rows: int = ROWS) -> None:
-    with new_result(path, force=True) as result:
-        fill(result, rows)
-        result.commit()
-
-
-def read_all(path: Path) -> dict[str, Any]:
-    with open_result(path, "run") as result:
-        everything: dict[str, Any] = {"": str(result.attributes)}
-        for group in result.groups():
-            for name, variable in result.variables(group).items():
-                everything[f"{group}/{name}"] = str(variable), result.read(group, name).tobytes()
-        return everything
-
-
-def in_a_process(action: str, path: Path) -> subprocess.CompletedProcess[str]:
-    """Run a function of this file where a crash or a hang is seen, and does not take the tests along."""
-    command = [sys.executable, "-W", "error", __file__, action, str(path)]
-    done = subprocess.run(command, cwd=Path(__file__).parents[2], capture_output=True, text=True, timeout=120)
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done
-
-
-# what cannot be written
+from brakecli.files.write import new_result
+from tests.commands import ROOT
+from tests.files.results import command_of, fill, in_a_process, read_all, write
 
 
 @pytest.mark.parametrize(
@@ -131,7 +91,7 @@ def full_disk(path: Path) -> None:
 
 
 def test_a_full_disk_ends_the_run_soon_and_leaves_the_old_file(tmp_path: Path) -> None:
-    in_a_process("full_disk", tmp_path / "r.h5")
+    in_a_process(full_disk, tmp_path / "r.h5")
 
 
 def call_after(number: int, action: Callable[[], None]) -> Callable[[], int]:
@@ -184,10 +144,10 @@ def failing_write(path: Path) -> None:
 
 
 def test_whichever_write_fails_there_is_the_old_file_or_the_new_one(tmp_path: Path) -> None:
-    in_a_process("failing_write", tmp_path / "r.h5")
+    in_a_process(failing_write, tmp_path / "r.h5")
 
 
-# interruptions
+# interruptions and rivals
 
 
 def terminate(_number: int, _frame: FrameType | None) -> None:
@@ -215,7 +175,7 @@ def interrupted(path: Path) -> None:
 
 
 def test_an_interruption_inside_hdf5_leaves_nothing_or_the_whole_file(tmp_path: Path) -> None:
-    in_a_process("interrupted", tmp_path / "r.h5")
+    in_a_process(interrupted, tmp_path / "r.h5")
 
 
 def interrupted_at_random(path: Path) -> None:
@@ -239,7 +199,7 @@ def interrupted_at_random(path: Path) -> None:
 
 
 def test_an_interruption_at_any_time_leaves_nothing_or_the_whole_file(tmp_path: Path) -> None:
-    in_a_process("interrupted_at_random", tmp_path / "r.h5")
+    in_a_process(interrupted_at_random, tmp_path / "r.h5")
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, SystemExit, RuntimeError, OSError])
@@ -254,9 +214,6 @@ def test_an_exception_of_the_caller_passes_and_leaves_nothing(tmp_path: Path, er
     assert list(tmp_path.iterdir()) == []
 
 
-# rivals
-
-
 def hold(path: Path) -> None:
     with new_result(path, force=True) as result:
         fill(result)
@@ -266,9 +223,9 @@ def hold(path: Path) -> None:
 
 def test_a_live_rival_is_named_and_a_killed_one_is_replaced(tmp_path: Path) -> None:
     path = tmp_path / "r.h5"
-    command = [sys.executable, __file__, "hold", str(path)]
+    command = command_of(hold, path)
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
-    with subprocess.Popen(command, cwd=Path(__file__).parents[2], text=True, **pipes) as rival:  # type: ignore[call-overload]
+    with subprocess.Popen(command, cwd=ROOT, text=True, **pipes) as rival:  # type: ignore[call-overload]
         assert rival.stdout.readline() == "ready\n"
         for force in (False, True):
             holder = re.escape(f"process {rival.pid} on {socket.gethostname()}")
@@ -300,7 +257,7 @@ def test_of_many_rivals_only_one_writes_at_a_time(tmp_path: Path) -> None:
 
     def run() -> None:
         try:
-            in_a_process("compete", tmp_path / "r.h5")
+            in_a_process(compete, tmp_path / "r.h5")
         except BaseException as error:
             threads_failed.append(error)
 
@@ -338,108 +295,6 @@ def test_without_file_locks_the_process_named_in_the_lock_decides(
         assert [entry.name for entry in tmp_path.iterdir()] == [".r.h5.lock"]
 
 
-# damage
-
-
-def mutate(data: bytes, chance: random.Random) -> bytes:
-    """One flipped bit, or up to 4 KiB of noise, zeros or nothing at all in the place of what was there."""
-    start = chance.randrange(len(data))
-    length = min(chance.choice([1, 4, 64, 512, 4096]), len(data) - start)
-    middle = chance.choice(
-        [
-            bytes([data[start] ^ 1 << chance.randrange(8)]) + data[start + 1 : start + length],
-            chance.randbytes(length),
-            bytes(length),
-            b"",
-        ]
-    )
-    return data[:start] + middle + data[start + length :]
-
-
-def damaged(path: Path) -> None:
-    refused = 0  # the rest were read, and exactly: zeros written over zeros do no damage
-    for rows in (100, ROWS):
-        write(path, rows)
-        good, expected = path.read_bytes(), read_all(path)
-        chance = random.Random(rows)
-        variants = [mutate(good, chance) for _ in range(600)]
-        variants += [good[: len(good) * part // 50] for part in range(50)]
-        variants += [good[:-length] for length in range(1, 32)]
-        variants += [good + b"\0", good + good]
-        for variant in variants:
-            path.write_bytes(variant)
-            try:
-                assert read_all(path) == expected
-            except UnreadableResultError:
-                refused += 1
-    assert refused > 1000
-
-
-def test_a_damaged_file_is_refused_or_read_exactly(tmp_path: Path) -> None:
-    in_a_process("damaged", tmp_path / "r.h5")
-
-
-def edit(change: Callable[[h5py.File], object]) -> Callable[[Path], object]:
-    def on_file(path: Path) -> None:
-        write(path, 100)
-        with h5py.File(path, "r+") as file:
-            change(file)
-
-    return on_file
-
-
-def foreign(path: Path) -> None:
-    with h5py.File(path, "w") as file:
-        file["x"] = [1.0, 2.0]
-
-
-def foreign_of_our_kind(path: Path) -> None:
-    with h5py.File(path, "w", libver=("v108", "v108")) as file:
-        file["x"] = [1.0, 2.0]
-
-
-@pytest.mark.parametrize(
-    ("make", "reason"),
-    [
-        (lambda path: None, "no such file"),
-        (lambda path: path.mkdir(), "not a regular file"),
-        (os.mkfifo, "not a regular file"),
-        (lambda path: path.touch(), "the file is empty"),
-        (lambda path: path.write_text("time,vx\n0,1\n"), "not an HDF5 file"),
-        (foreign, "not written by this program"),
-        (foreign_of_our_kind, "not written by this program"),
-        (edit(lambda file: file.attrs.modify("format", "other")), "not written by this program"),
-        (edit(lambda file: file.attrs.modify("format_version", 2)), "format version is 2, and only version 1"),
-        (edit(lambda file: file.attrs.modify("complete", 0)), "incomplete"),
-        (edit(lambda file: file.attrs.pop("complete")), "incomplete"),
-        (edit(lambda file: file.attrs.modify("kind", "sweep")), "kind 'sweep', and 'run' is needed"),
-        (edit(lambda file: file["history/time"].write_direct(np.full(100, np.nan))), "not finite"),
-        (edit(lambda file: file["history"].__delitem__("time")), "no variable time"),
-        (edit(lambda file: file.__delitem__("history")), "no group history"),
-    ],
-)
-def test_a_file_that_is_no_result_is_refused_with_the_reason(
-    tmp_path: Path, make: Callable[[Path], object], reason: str
-) -> None:
-    path = tmp_path / "r.h5"
-    make(path)
-    with pytest.raises(UnreadableResultError, match=f"(?i){reason}") as caught, open_result(path, "run") as result:
-        result.read("history", "time")
-    assert str(caught.value).startswith(f"{path}: ")
-
-
-@pytest.mark.parametrize("name", ["nul\0", "x" * 300])
-def test_a_name_that_cannot_exist_is_an_unreadable_result(tmp_path: Path, name: str) -> None:
-    with pytest.raises(UnreadableResultError), open_result(tmp_path / name):
-        raise AssertionError
-
-
-def test_an_exception_while_reading_is_the_callers_own(tmp_path: Path) -> None:
-    write(tmp_path / "r.h5", 10)
-    with pytest.raises(ZeroDivisionError), open_result(tmp_path / "r.h5"):
-        raise ZeroDivisionError
-
-
 def memory(path: Path) -> None:
     peaks = []
     for rows in (200_000, 5_000_000):
@@ -453,7 +308,7 @@ def memory(path: Path) -> None:
 
 
 def test_memory_does_not_grow_with_the_number_of_rows(tmp_path: Path) -> None:
-    in_a_process("memory", tmp_path / "r.h5")
+    in_a_process(memory, tmp_path / "r.h5")
 
 
 if __name__ == "__main__":

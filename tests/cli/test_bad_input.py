@@ -1,0 +1,177 @@
+"""Bad cases, results and command lines: a sentence with the place and a remedy, and an exit code."""
+
+import random
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from tests.commands import LONG, TINY, brakecli, each, left_in, variants
+
+pytestmark = pytest.mark.usefixtures("compiled")
+
+
+def test_a_broken_result_is_no_case_to_run_again(good: Path, tmp_path: Path) -> None:
+    whole = (good / "tiny.h5").read_bytes()
+    middle = len(whole) // 2
+    files = {
+        "empty.h5": (b"", 4, "the file is empty"),
+        "text.h5": (b"[shoe]\nmass = 1\n", 4, "this is not an HDF5 file"),
+        "half.h5": (whole[:middle], 4, "truncated, damaged or was altered"),
+        "cut.h5": (whole[:-1], 4, "truncated, damaged or was altered"),
+        "flipped.h5": (whole[:middle] + bytes([whole[middle] ^ 1]) + whole[middle + 1 :], 4, "damaged"),
+        "flipped": (whole[:middle] + bytes([whole[middle] ^ 1]) + whole[middle + 1 :], 4, "damaged"),
+        "empty": (b"", 2, "shoe: is missing"),
+    }
+    for name, (data, _, _) in files.items():
+        (tmp_path / name).write_bytes(data)
+    with h5py.File(tmp_path / "foreign.h5", "w") as foreign:
+        foreign["x"] = np.arange(5.0)
+    (tmp_path / "sweep.h5").write_bytes(whole[:-32])
+    with h5py.File(tmp_path / "sweep.h5", "r+") as other:
+        other.attrs["kind"] = "sweep"
+    (tmp_path / "edited.h5").write_bytes(whole[:-32])
+    with h5py.File(tmp_path / "edited.h5", "r+") as edited:
+        edited.attrs["resolved_toml"] = edited.attrs["resolved_toml"].replace("mass = 10.0", "mass = -1.0")
+    expected = {name: (code, reason) for name, (_, code, reason) in files.items()} | {
+        "foreign.h5": (4, "was not written by this program"),
+        "sweep.h5": (4, "holds a result of kind 'sweep'"),
+        "edited.h5": (2, "shoe.mass"),
+        "missing.h5": (2, "missing.h5: cannot be read"),
+    }
+    done = each(tmp_path, [["run", name, "-o", "out.h5"] for name in expected])
+    for (name, (code, reason)), result in zip(expected.items(), done, strict=True):
+        result.told(code, name, reason)
+    assert not (tmp_path / "out.h5").exists()
+
+
+def test_wrong_values_are_told_all_at_once_with_their_lines(tmp_path: Path) -> None:
+    bad = TINY.replace("mass = 10.0", "mass = nan").replace("radius = 0.5", 'radius = "0.5"')
+    bad = bad.replace("load.force = 5000.0", "load.force = true\nload.forse = 1").replace("1e-5,", "1e-320,")
+    (tmp_path / "bad.toml").write_text(bad)
+    for command in ("run", "check"):
+        told = brakecli(command, "bad.toml", "--set", "contact.stiffness=0", cwd=tmp_path).told(2)
+        starts = ["bad.toml:2: shoe.mass: ", "bad.toml:3: wheel.radius: ", "bad.toml:6: load.force: "]
+        starts += ["bad.toml:7: load.forse: ", "bad.toml:10: solver.step: "]
+        starts += ["--set contact.stiffness=0: contact.stiffness: "]
+        lines = told.splitlines()
+        assert [
+            line.removeprefix("brakecli: ").startswith(start) for line, start in zip(lines, starts, strict=True)
+        ]
+        assert all("(found " in line and "; " in line for line in lines)
+        assert "force" in lines[3].split(";")[1]  # the nearest valid key
+    assert left_in(tmp_path) == {"bad.toml"}
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[a" * 5000,
+        f"{'a.' * 20000}b = 1",
+        TINY + "\0",
+        "\ufeff" * 3 + TINY,
+        TINY.encode("utf-16"),
+        b"title = '\xe9'",
+    ],
+    ids=["nested", "deep", "nul", "marks", "utf-16", "latin-1"],
+)
+def test_hostile_texts_are_refused_as_fast_as_any_case(tmp_path: Path, text: str | bytes) -> None:
+    (tmp_path / "bad.toml").write_bytes(text if isinstance(text, bytes) else text.encode())
+    done = brakecli("check", "bad.toml", cwd=tmp_path)
+    done.told(2, "bad.toml")
+    assert done.seconds < 0.5
+
+
+def test_a_run_that_is_too_large_is_refused_with_its_size(here: Path) -> None:
+    steps = [["solver.duration=1e7"], ["solver.step=1e-100", "solver.duration=1e100"]]
+    for done in variants(here, *steps):
+        told = done.told(
+            3, "the run is too long: about 1e+", "steps, ", "MB of memory, a file of ", "reduce solver"
+        )
+        assert done.out == ""
+        assert told.count("\n") == 1
+    check = brakecli("check", "tiny.toml", "--set", "solver.duration=1e7", cwd=here)
+    check.told(3, "about 1e+12 steps", "41.7 hours", "6.5e+06 MB")
+    nodes = ["--set", "contact.nodes=10000000", "--set", "contact.evaluator='midpoint'"]
+    waves = ["--set", "roughness.wheel={amplitudes=[1e-6], wavelengths=[1e-2]}"]
+    several = f"roughness.wheel={{amplitudes={[1e-6] * 30}, wavelengths={[0.01] * 30}}}"
+    brakecli("run", "tiny.toml", *nodes, "--set", several, cwd=here).told(3, "contact.nodes")
+    brakecli("run", "tiny.toml", *nodes, *waves, *LONG, cwd=here).told(3, "the run is too long")
+    assert left_in(here) == {"tiny.toml"}
+
+
+def test_no_command_line_ends_in_a_traceback(good: Path, here: Path) -> None:
+    result = (good / "tiny.h5").read_bytes()
+    (here / "r.h5").write_bytes(result)
+    generator = random.Random(11)
+    words = [
+        *(
+            "run",
+            "check",
+            "new",
+            "schema",
+            "plot",
+            "tiny.toml",
+            "r.h5",
+            "-",
+            "--",
+            "--json",
+            "--quiet",
+            "-q",
+            "-h",
+        ),
+        *(
+            "--force",
+            "-o",
+            "--output",
+            "--set",
+            "--version",
+            "--help",
+            "--no-such",
+            "",
+            " ",
+            ".",
+            "..",
+            "/",
+            "=",
+            "é",
+        ),
+        *(
+            "solver.duration=0.01",
+            "solver.duration=",
+            "a.b.c=1",
+            "shoe=1",
+            "shoe.mass=-1",
+            "\udcff",
+            "\x1b[31m",
+            "%s",
+        ),
+        *(
+            "title='x'",
+            "out.h5",
+            "missing.toml",
+            "x" * 300,
+            "-5",
+            "~",
+            "*",
+            "${HOME}",
+            "--set=",
+            "-o=",
+            "-oq",
+            "\n",
+        ),
+    ]
+    lines = [
+        [generator.choice(words[:5]), *generator.choices(words, k=generator.randrange(5))] for _ in range(24)
+    ] + [generator.choices(words, k=generator.randrange(4)) for _ in range(8)]
+    codes = []
+    for line, done in zip(lines, each(here, lines), strict=True):
+        assert "Traceback" not in done.err, line
+        assert done.code in (0, 1, 2, 3, 4, 74), line
+        assert done.code == 0 or done.err, line
+        codes.append(done.code)
+    assert 0 in codes
+    assert 2 in codes
+    assert (here / "tiny.toml").read_text() == TINY
+    assert not any(name.endswith((".part", ".lock")) for name in left_in(here))

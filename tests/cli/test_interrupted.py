@@ -1,0 +1,144 @@
+"""Runs that are interrupted, or started twice."""
+
+import random
+import signal
+import socket
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.campaign import campaign, counts
+from tests.commands import (
+    COMMAND,
+    LIMIT,
+    LONG,
+    QUICK,
+    Done,
+    brakecli,
+    environment,
+    left_in,
+    started,
+    wait_until,
+)
+
+pytestmark = pytest.mark.usefixtures("compiled")
+
+
+def interrupt(process: subprocess.Popen[bytes], number: signal.Signals) -> None:
+    """Send a signal; the command ends soon, with its code and one sentence."""
+    assert process.poll() is None
+    start = time.monotonic()
+    process.send_signal(number)
+    out, err = process.communicate(timeout=LIMIT)
+    word = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated", signal.SIGHUP: "hung up"}[number]
+    done = Done(process.returncode, out.decode(), err.decode())
+    assert done.told(128 + number, f"brakecli: {word}").count("\n") == 1
+    assert time.monotonic() - start < QUICK
+    assert done.out == ""
+
+
+@pytest.mark.parametrize(
+    ("number", "delay"),
+    [
+        (signal.SIGINT, 0.5),
+        (signal.SIGTERM, 0.0),
+        (signal.SIGHUP, 0.2),
+        pytest.param(signal.SIGINT, 0.0, marks=campaign),
+        pytest.param(signal.SIGTERM, 0.5, marks=campaign),
+    ],
+)
+def test_a_signal_ends_a_run_in_the_loop_and_leaves_nothing(
+    here: Path, number: signal.Signals, delay: float
+) -> None:
+    with started("run", "tiny.toml", *LONG, cwd=here) as process:
+        wait_until((here / ".tiny.h5.part").exists)
+        time.sleep(delay)
+        interrupt(process, number)
+    assert left_in(here) == {"tiny.toml"}
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_the_reading_of_a_case(here: Path, number: signal.Signals) -> None:
+    with started("run", "-", cwd=here, stdin=subprocess.PIPE) as process:
+        time.sleep(0.7)  # it waits for its case
+        interrupt(process, number)
+    assert left_in(here) == {"tiny.toml"}
+
+
+def test_a_signal_ends_the_imports_without_a_traceback(here: Path) -> None:
+    command = [COMMAND[0], "-X", "importtime", *COMMAND[1:], "run", "tiny.toml"]
+    for module in (b"typer.main", b"pydantic.types", b"numba.core.types", b"numpy.fft"):
+        with subprocess.Popen(command, cwd=here, stderr=subprocess.PIPE, env=environment()) as process:
+            assert process.stderr is not None
+            for line in process.stderr:
+                if line.rstrip().endswith(module):
+                    break
+            else:
+                pytest.fail(f"{module.decode()} was not imported")
+            process.send_signal(signal.SIGINT)
+            rest = process.stderr.read()
+        assert b"Traceback" not in rest, rest
+        assert process.returncode == 130
+        assert b"brakecli: interrupted\n" in rest
+    assert left_in(here) == {"tiny.toml"}
+
+
+def test_a_signal_ends_a_run_of_slow_steps(here: Path) -> None:
+    waves = "roughness.wheel={amplitudes=[1e-6, 1e-6], wavelengths=[0.02, 0.01]}"
+    slow = ["--set", "contact.nodes=2000000", "--set", "contact.evaluator='midpoint'", "--set", waves]
+    with started("run", "tiny.toml", *slow, cwd=here) as process:
+        wait_until((here / ".tiny.h5.part").exists)
+        time.sleep(1.0)  # for the tables of the contact
+        interrupt(process, signal.SIGINT)
+    assert left_in(here) == {"tiny.toml"}
+
+
+def test_many_signals_at_once_leave_nothing_either(here: Path) -> None:
+    with started("run", "tiny.toml", *LONG, cwd=here) as process:
+        wait_until((here / ".tiny.h5.part").exists)
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGINT):
+            process.send_signal(number)
+        _, err = process.communicate(timeout=LIMIT)
+    assert b"Traceback" not in err
+    assert process.returncode in (130, 143)
+    assert left_in(here) == {"tiny.toml"}
+
+
+@pytest.mark.parametrize("times", counts(2, 4))
+def test_an_interruption_at_any_time_of_a_short_run_leaves_nothing_or_the_result(
+    good: Path, here: Path, times: int
+) -> None:
+    generator = random.Random(5)
+    outcomes = set()
+    for _ in range(times):
+        (here / "tiny.h5").unlink(missing_ok=True)
+        with started("run", "tiny.toml", "-q", cwd=here) as process:
+            wait_until(lambda: (here / ".tiny.h5.part").exists() or (here / "tiny.h5").exists())
+            time.sleep(generator.uniform(0.0, 0.12))
+            process.send_signal(signal.SIGINT)
+            _, err = process.communicate(timeout=LIMIT)
+        assert b"Traceback" not in err
+        outcomes.add(process.returncode)
+        assert left_in(here) <= {"tiny.toml", "tiny.h5"}
+        if (here / "tiny.h5").exists():
+            assert (here / "tiny.h5").read_bytes() == (good / "tiny.h5").read_bytes()
+        else:
+            assert process.returncode == 130
+    assert outcomes <= {0, 130, -signal.SIGINT}  # the last: Python itself, on its way out
+    assert 130 in outcomes
+
+
+def test_a_second_writer_is_refused_and_names_the_first_whose_lock_ends_with_it(good: Path, here: Path) -> None:
+    with started("run", "tiny.toml", *LONG, cwd=here) as first:
+        wait_until((here / ".tiny.h5.part").exists)
+        second = brakecli("run", "tiny.toml", "--force", cwd=here)
+        second.told(2, f"tiny.h5: is being written by process {first.pid} on {socket.gethostname()}; wait until")
+        assert first.poll() is None
+        first.kill()
+        first.wait()
+    assert {".tiny.h5.part", ".tiny.h5.lock"} <= left_in(here)  # nobody was left to remove them
+    brakecli("run", "tiny.toml", "--quiet", cwd=here).told(0)
+    assert left_in(here) == {"tiny.toml", "tiny.h5"}
+    assert (here / "tiny.h5").read_bytes() == (good / "tiny.h5").read_bytes()

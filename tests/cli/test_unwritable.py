@@ -1,0 +1,92 @@
+"""Outputs that cannot be written: the path and the reason are told, and nothing is left behind."""
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from tests.commands import TINY, Done, brakecli, left_in, shell
+
+pytestmark = pytest.mark.usefixtures("compiled")
+
+
+def shells(cwd: Path, lines: Sequence[str]) -> list[Done]:
+    """Run lines of the shell, two at a time."""
+    with ThreadPoolExecutor(2) as pool:
+        return list(pool.map(lambda line: shell(line, cwd), lines))
+
+
+def test_a_full_disk_is_told_with_the_path_and_leaves_nothing(here: Path) -> None:
+    limits = (0, 10, 60)  # KiB that a file may have
+    run = "$B run tiny.toml --set solver.duration=0.1 -o"
+    for limit, done in zip(limits, shells(here, [f"ulimit -f {n}; {run} {n}.h5" for n in limits]), strict=True):
+        assert done.told(74, f"{limit}.h5: cannot write: ").count("\n") == 1
+    assert shell("ulimit -f 0; $B new other", here).told(74, "other.toml: cannot write: ").count("\n") == 1
+    assert left_in(here) == {"tiny.toml"}
+    brakecli("run", "tiny.toml", "-o", "10.h5", "--quiet", cwd=here).told(0)  # once there is room again
+
+
+def test_a_full_standard_output_is_told(here: Path) -> None:
+    commands = [
+        "run tiny.toml -o 1.h5 --json",
+        "run tiny.toml -o 2.h5",
+        "check tiny.toml",
+        "check tiny.toml --json",
+    ]
+    commands += ["new x", "schema", "--help", "run --help", "--version"]
+    forks = [brakecli(*command.split(), cwd=here, stdout="/dev/full") for command in commands]
+    for done in (*forks, shell("$B check tiny.toml > /dev/full", here)):
+        assert done.told(74, "standard output: cannot write: no space left on device").count("\n") == 1
+
+
+def test_closed_streams_and_a_full_standard_error_change_nothing(good: Path, here: Path) -> None:
+    redirections = [">&-", "<&- >&- 2>&-", "2>/dev/full", "| true"]
+    lines = [f"set -o pipefail; $B run tiny.toml -o {n}.h5 {to}" for n, to in enumerate(redirections)]
+    for n, done in enumerate(shells(here, lines)):
+        done.told(0)
+        assert (here / f"{n}.h5").read_bytes() == (good / "tiny.h5").read_bytes()
+    wrong = zip(("run missing.toml", "no-such-command", "run missing.toml"), redirections, strict=False)
+    for done in shells(here, [f"$B {command} {to}" for command, to in wrong]):
+        done.told(2)
+    shell("set -o pipefail; $B --help | true", here).told(0)
+    shell("$B run - <&-", here).told(2, "standard input: cannot be read")
+
+
+@pytest.mark.parametrize(
+    ("output", "reason"),
+    [
+        ("missing/r.h5", "the directory"),
+        ("tiny.toml/r.h5", "the directory"),
+        (".", "this is a directory"),
+        ("folder", "this is a directory"),
+        ("/proc/r.h5", "no such file or directory"),
+        ("x" * 300, "file name too long"),
+        ("x" * 254 + "/r.h5", "the directory"),
+        ("/dev/null", "not a regular file"),
+    ],
+)
+def test_an_output_that_cannot_be_is_told_with_its_path(here: Path, output: str, reason: str) -> None:
+    (here / "folder").mkdir()
+    brakecli("run", "tiny.toml", "-o", output, "--force", cwd=here).told(74, f"{output}: cannot write: ", reason)
+    assert left_in(here) == {"tiny.toml", "folder"}
+
+
+def test_outputs_elsewhere_are_written_and_the_case_is_never_replaced(here: Path) -> None:
+    (here / "inner").mkdir()
+    brakecli("run", "../tiny.toml", "-o", "../r.h5", "-q", cwd=here / "inner").told(0)
+    assert left_in(here) == {"tiny.toml", "inner", "r.h5"}
+    for name in ("tiny.toml", "./tiny.toml", "inner/../tiny.toml"):
+        told = brakecli("run", "tiny.toml", "--force", "-o", name, cwd=here)
+        told.told(2, "this is the case itself; choose another output with -o")
+    assert (here / "tiny.toml").read_text() == TINY
+    before = (here / "r.h5").read_bytes()
+    brakecli("run", "tiny.toml", "-o", "r.h5", cwd=here).told(2, "r.h5: exists already; replace it with --force")
+    assert (here / "r.h5").read_bytes() == before
+
+
+def test_a_deleted_working_directory_is_told(here: Path) -> None:
+    gone = 'mkdir gone; cd gone; rmdir "$PWD"; $B '
+    shell(f"{gone} run {here}/tiny.toml", here).told(74, "tiny.h5: cannot write: no such file or directory")
+    shell(f"{gone} new", here).told(74, "case.toml: cannot write: no such file or directory")
+    shell(f"{gone} check {here}/tiny.toml", here).told(0)

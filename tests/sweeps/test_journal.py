@@ -1,0 +1,110 @@
+"""Finished points are taken up by the same sweep alone, as far as they are whole."""
+
+import random
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from brakecli.errors import RefusedError
+from brakecli.sweeps.file import read_sweep
+from brakecli.sweeps.workers.task import compute_units
+from tests.commands import left_in, run
+from tests.sweeps.helpers import frictions, inline, interrupted, write_sweep
+
+pytestmark = pytest.mark.usefixtures("compiled")
+
+
+def edited(path: Path, old: str, new: str) -> Callable[[Path], None]:
+    def edit(folder: Path) -> None:
+        text = (folder / path).read_bytes()
+        assert text.count(old.encode()) == 1
+        (folder / path).write_bytes(text.replace(old.encode(), new.encode()))
+
+    return edit
+
+
+@pytest.mark.parametrize(
+    ("edit", "difference"),
+    [
+        (edited(Path("tiny.toml"), "mass = 10.0", "mass = 11.0"), "shoe.mass was 10.0, is 11.0"),
+        (edited(Path("tiny.toml"), "damping = 300.0, ", ""), "link2.damping was 300.0, is not set"),
+        (edited(Path("s.toml"), "num = 20", "num = 21"), "sweep axis[0].num was 20, is 21"),
+        (
+            edited(Path("s.h5.partial"), '"brakecli_version": "', '"brakecli_version": "7'),
+            "brakecli_version was 7",
+        ),
+        (edited(Path("s.h5.partial"), '"numpy_version": "', '"numpy_version": "7'), "numpy_version was 7"),
+        (
+            edited(Path("s.h5.partial"), '{"brakecli_version', '[{"brakecli_version'),
+            "holds no finished points",
+        ),
+    ],
+    ids=["case", "default", "sweep", "version", "library", "foreign"],
+)
+def test_finished_points_of_another_sweep_are_refused_and_the_key_named(
+    tmp_path: Path, edit: Callable[[Path], None], difference: str
+) -> None:
+    loaded = write_sweep(tmp_path, frictions(20))
+    interrupted(loaded, tmp_path / "s.h5", compute_units, limit=4, task_size=3)
+    assert left_in(tmp_path) == {"tiny.toml", "s.toml", "s.h5.partial"}
+    edit(tmp_path)
+    before = (tmp_path / "s.h5.partial").read_bytes()
+    with pytest.raises(RefusedError, match=r"s\.h5\.partial: holds .* start anew with --force") as refused:
+        inline(read_sweep(str(tmp_path / "s.toml")), tmp_path / "s.h5", compute_units)
+    assert refused.value.exit_code == 3
+    assert difference in str(refused.value)
+    assert (tmp_path / "s.h5.partial").read_bytes() == before
+    assert left_in(tmp_path) == {"tiny.toml", "s.toml", "s.h5.partial"}
+    assert inline(read_sweep(str(tmp_path / "s.toml")), tmp_path / "s.h5", compute_units, force=True).resumed == 0
+    assert left_in(tmp_path) == {"tiny.toml", "s.toml", "s.h5"}
+
+
+def test_the_command_names_the_key_that_has_changed_and_starts_anew_with_force(tmp_path: Path) -> None:
+    loaded = write_sweep(tmp_path, frictions(20))
+    interrupted(loaded, tmp_path / "s.h5", compute_units, limit=4, task_size=3)
+    command = ["sweep", "s.toml", "--set", "friction.coefficient=0.5", "--set", "shoe.mass=11.0", "-j", "1"]
+    refused = run(*command, cwd=tmp_path).told(3, "s.h5.partial: holds finished points of another sweep: ")
+    assert "friction.coefficient was 0.6, is 0.5" in refused
+    assert "shoe.mass was 10.0, is 11.0" in refused
+    assert refused.count("\n") == 1
+    anew = run(*command, "--force", "--json", cwd=tmp_path)
+    anew.told(0)
+    assert anew.json["resumed_points"] == 0
+    assert left_in(tmp_path) == {"tiny.toml", "s.toml", "s.h5"}
+
+
+def test_a_journal_of_the_same_sweep_is_taken_up(tmp_path: Path) -> None:
+    """The control of the refusals above: without a change the very same journal is used."""
+    loaded = write_sweep(tmp_path, frictions(20))
+    interrupted(loaded, tmp_path / "s.h5", compute_units, limit=4, task_size=3)
+    done = run("sweep", "s.toml", "--json", "-j", "1", cwd=tmp_path)
+    assert done.told(0).endswith("; 12 of them are there already\n")
+    assert done.json["resumed_points"] == 12
+
+
+@pytest.mark.parametrize("cut", [1, 5, 400])
+def test_a_journal_that_ends_within_a_block_loses_that_block_alone(tmp_path: Path, cut: int) -> None:
+    loaded = write_sweep(tmp_path, frictions(20))
+    interrupted(loaded, tmp_path / "s.h5", limit=4, task_size=1)
+    path = tmp_path / "s.h5.partial"
+    path.write_bytes(path.read_bytes()[:-cut])
+    assert inline(loaded, tmp_path / "s.h5").resumed == 3
+
+
+def test_damaged_records_of_a_journal_are_computed_again(tmp_path: Path) -> None:
+    loaded = write_sweep(tmp_path, frictions(20))
+    inline(loaded, tmp_path / "expected.h5")
+    chance = random.Random(3)
+    resumed = []
+    for _ in range(20):
+        interrupted(loaded, tmp_path / "s.h5", limit=4, task_size=1)
+        path = tmp_path / "s.h5.partial"
+        data = bytearray(path.read_bytes())
+        begin = data.index(b"\n") + 1
+        data[chance.randrange(begin, len(data))] ^= 1 << chance.randrange(8)
+        path.write_bytes(data)
+        resumed.append(inline(loaded, tmp_path / "s.h5").resumed)
+        assert (tmp_path / "s.h5").read_bytes() == (tmp_path / "expected.h5").read_bytes()
+        (tmp_path / "s.h5").unlink()
+    assert set(resumed) == {0, 1, 2, 3}

@@ -1,0 +1,146 @@
+"""Sweeps whose processes are killed or run out of memory lose no point but the one that is to blame."""
+
+import os
+import random
+import re
+import signal
+import time
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import h5py
+import pytest
+
+from brakecli.files.read import open_result
+from brakecli.sweeps.workers.local import LocalEngine
+from brakecli.sweeps.workers.task import Task
+from tests.campaign import campaign
+from tests.commands import LIMIT, ROOT, TINY, ended, left_in, run, shell, started, wait_until
+from tests.sweeps.helpers import (
+    PROGRAM,
+    WICKED,
+    Compute,
+    alive,
+    axis,
+    broken,
+    children,
+    deadly,
+    frictions,
+    hungry,
+    journal_size,
+    local,
+    slow,
+    workers,
+    write_sweep,
+)
+
+pytestmark = pytest.mark.usefixtures("compiled")
+
+
+def variable(path: Path, name: str) -> Any:
+    with open_result(path, "sweep"), h5py.File(path) as file:
+        return file[name][:]
+
+
+@pytest.mark.parametrize(
+    "kills", [(False, True), pytest.param((False, True, False, True, True), marks=campaign)], ids=len
+)
+def test_a_killed_sweep_ends_with_the_bytes_of_an_undisturbed_one(
+    good: Path, here: Path, kills: tuple[bool, ...]
+) -> None:
+    """Each kill comes while workers are started, or, where true, while they compute."""
+    chance = random.Random(1)
+    size = 0
+    for computing in kills:
+        with started("sweep", "s.toml", "--quiet", "-j", "2", cwd=here) as process:
+            wait_until(lambda process=process: workers(process.pid))  # type: ignore[misc]
+            if computing:
+                wait_until(lambda size=size: journal_size(here) > max(size, 1500))  # type: ignore[misc]
+            time.sleep(chance.uniform(0.0, 0.25))
+            crew = children(process.pid)
+            assert process.poll() is None
+            process.kill()
+            # a worker that is being started notices once it has started
+            wait_until(lambda crew=crew: not any(map(alive, crew)), seconds=1.0 if computing else LIMIT)  # type: ignore[misc]
+        assert journal_size(here) >= size
+        size = journal_size(here)
+    last = run("sweep", "s.toml", cwd=here)
+    assert re.search(r"120 points on . workers?: .*; [1-9]\d* of them are there already", last.told(0))
+    assert left_in(here) == {"tiny.toml", "s.toml", "s.h5"}
+    assert (here / "s.h5").read_bytes() == (good / "s.h5").read_bytes()
+
+
+def test_workers_die_with_their_parent_whatever_they_are_in(tmp_path: Path) -> None:
+    write_sweep(tmp_path, frictions(4))
+    with started("stuck", tmp_path / "s.toml", cwd=ROOT, command=PROGRAM) as process:
+        wait_until(lambda: len([*tmp_path.glob("*.computes")]) == 2)
+        crew = children(process.pid)
+        process.kill()
+        wait_until(lambda: not any(map(alive, crew)), seconds=1.0)
+
+
+def test_a_killed_worker_costs_a_warning_and_no_point(good: Path, here: Path) -> None:
+    with started("sweep", "s.toml", "--quiet", "-j", "2", cwd=here) as process:
+        wait_until(lambda: journal_size(here) > 2000)
+        os.kill(min(workers(process.pid)), signal.SIGKILL)
+        done = ended(process)
+    told = done.told(0, "brakecli: warning: a worker process has ended before its time (its process was killed by")
+    assert told.count("\n") == 1
+    assert (here / "s.h5").read_bytes() == (good / "s.h5").read_bytes()
+    assert left_in(here) == {"tiny.toml", "s.toml", "s.h5"}
+
+
+@pytest.mark.parametrize(
+    ("wicked", "task_size", "reason"),
+    [
+        pytest.param(deadly, 1, "killed by SIGKILL, as when memory runs out", marks=campaign),
+        (deadly, 5, "killed by SIGKILL, as when memory runs out"),
+        (hungry, 5, "it ran out of memory"),
+        (broken, 5, "ZeroDivisionError: division by zero"),
+    ],
+)
+def test_a_point_that_ends_its_worker_is_marked_and_all_others_are_computed(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], wicked: Compute, task_size: int, reason: str
+) -> None:
+    loaded = write_sweep(tmp_path, frictions(20))
+    report = local(loaded, tmp_path / "s.h5", wicked, task_size=task_size)
+    assert report.findings.failed == 1
+    (failure,) = report.findings.failures
+    assert failure["point"] == WICKED
+    assert reason in failure["reason"]
+    assert len(report.notes) == 1
+    assert variable(tmp_path / "s.h5", "status").tolist() == [
+        b"crashed" if point == WICKED else b"done" for point in range(20)
+    ]
+    frequency = variable(tmp_path / "s.h5", "frequency").tolist()
+    assert frequency[:WICKED] + frequency[WICKED + 1 :] == [n for n in range(20) if n != WICKED]
+    assert capfd.readouterr().err == ""
+
+
+def test_workers_that_die_idle_cost_no_point(tmp_path: Path) -> None:
+    loaded = write_sweep(tmp_path, frictions(12))
+    with LocalEngine(partial(slow, loaded.plan), 2) as engine:
+        tasks = iter([Task(0, 1, True), Task(1, 9, True), None, Task(10, 1, True), Task(11, 1, True), *[None] * 9])
+        killed: list[int] = []
+
+        def next_task() -> Task | None:
+            if (task := next(tasks)) is None and not killed:
+                (idle,) = (each.process for each in engine.pool if each.task is None)
+                idle.kill()
+                wait_until(lambda: not idle.is_alive())  # all of its threads
+                killed.append(idle.pid or 0)
+            return task
+
+        found = list(engine.run(next_task))
+    assert killed
+    assert sorted(each.task.first for each in found if each.task and each.records) == [0, 1, 10, 11]
+    assert len(found) == 4
+
+
+def test_a_point_without_memory_fails_with_the_reason_and_exit_code_1(tmp_path: Path) -> None:
+    durations = axis("solver.duration", "values = [0.02, 100.0, 0.03]")
+    write_sweep(tmp_path, durations, case=TINY.replace("sample_interval = 1e-4", "sample_interval = 1e-5"))
+    done = shell("ulimit -v 1200000; $B sweep s.toml --json -q -j 1", tmp_path, OPENBLAS_NUM_THREADS="1")
+    done.told(1, "point 1 (solver.duration = 100.0): out of memory", "1 of 3 points failed")
+    assert done.json["status"] == ["done", "failed", "done"]

@@ -1,0 +1,65 @@
+"""Sweeps of any size take little memory, or are refused at once."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.campaign import campaign
+from tests.commands import TINY, brakecli, left_in
+from tests.sweeps.helpers import axis, frictions, program, write_sweep
+
+pytestmark = pytest.mark.usefixtures("compiled")
+
+
+@pytest.mark.parametrize(
+    "tables",
+    [
+        [frictions(1_000_000_000)],
+        [frictions(1_000_000_000, 'direction = "both"')],
+        [
+            axis(name, "start = 0.1", "stop = 1.0", "num = 1000")
+            for name in ("friction.coefficient", "link2.angle_deg", "shoe.mass")
+        ],
+    ],
+    ids=["one axis", "followed", "three axes"],
+)
+def test_a_sweep_of_a_billion_points_is_refused_at_once_with_its_size(tmp_path: Path, tables: list[str]) -> None:
+    write_sweep(tmp_path, *tables)
+    told = brakecli("sweep", "s.toml", "-j", "2", cwd=tmp_path).told(
+        3, "brakecli: the sweep is too large: 1000000000 points on 2 workers: about ", " MB of memory, a file of "
+    )
+    assert told.count("\n") == 1
+    done = program("refused", tmp_path / "s.toml")
+    assert int(done.out) < 400_000_000  # bytes; one for each point would be more
+    assert left_in(tmp_path) == {"tiny.toml", "s.toml"}
+
+
+def memory_of(folder: Path, points: int, compute: str) -> dict[str, Any]:
+    """The largest memory of a sweep of the shortest runs, in bytes, of its parent and of its workers."""
+    shortest = TINY.replace("step = 1e-5, duration = 0.02", "step = 1e-4, duration = 1e-4")
+    write_sweep(folder, frictions(points), case=shortest)
+    (folder / "s.h5").unlink(missing_ok=True)
+    done = program("memory", folder / "s.toml", compute, limit=900.0)
+    assert done.code == 0, done
+    found = done.json
+    assert found["failed"] == 0
+    assert found["points"] == points
+    return found
+
+
+POINT_BYTES = 1000
+"""What a point may cost the parent, which holds all values of one variable at a time. The widest are texts of
+240 bytes, once as bytes and once as characters of four bytes each; 660 bytes were measured."""
+
+WORKER_MARGIN = 10_000_000
+"""Bytes; a worker knows of one task at a time, and what it needs besides depends on how memory was handed out."""
+
+
+@pytest.mark.parametrize(
+    ("points", "compute"), [(20_000, "quick"), pytest.param(100_000, "compute_units", marks=campaign)]
+)
+def test_many_points_need_no_more_memory_than_a_thousand(tmp_path: Path, points: int, compute: str) -> None:
+    few, many = memory_of(tmp_path, 1000, compute), memory_of(tmp_path, points, compute)
+    assert many["parent"] < few["parent"] + POINT_BYTES * (points - 1000)
+    assert many["workers"] < few["workers"] + WORKER_MARGIN
