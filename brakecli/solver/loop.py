@@ -2,11 +2,9 @@
 
 import math
 
-import numpy as np
 from numba import float64, int64, void
-from numpy.typing import NDArray
 
-from brakecli.solver.compile import at_address, borrowed, kernel, vector
+from brakecli.solver.compile import Floats, at_address, borrowed, kernel, vector
 from brakecli.solver.implicit_step import SOLVED
 from brakecli.solver.quantities import BOUND, ContactState, Failure
 from brakecli.solver.records import EVALUATE, FINISH, PLANT, PREPARE, SOLVE, Plant
@@ -23,7 +21,7 @@ _evaluate_at, _prepare_at, _finish_at, _solve_at = (
 
 
 @kernel(void(PLANT, vector))
-def sample(p: Plant, row: NDArray[np.float64]) -> None:
+def sample(p: Plant, row: Floats) -> None:
     """Write the sample that is due at this level: the motion, and the forces at its own time.
 
     F_y is evaluated at the sample; F_x follows from the slip law, or in stick from (6) with the wheel's
@@ -67,7 +65,7 @@ def sample(p: Plant, row: NDArray[np.float64]) -> None:
 
 
 @kernel(int64(PLANT, float64[:, ::1], float64[:, ::1], int64))
-def advance(p: Plant, rows: NDArray[np.float64], events: NDArray[np.float64], stop: int) -> int:
+def advance(p: Plant, rows: Floats, events: Floats, stop: int) -> int:
     """Step from the level reached to `stop`, filling `rows` with the samples before each step; a `Failure`.
 
     A failure leaves the state at the last good level. `events` gets time and residual of unconverged steps.

@@ -5,10 +5,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brakecli.solver import contact
-from brakecli.solver.compile import address
+from brakecli.solver.compile import Floats, address
 from brakecli.solver.contact.pad import build_layer
 from brakecli.solver.energy import OPEN_ACCOUNT, EnergyAccount, account
 from brakecli.solver.friction import minimise
@@ -26,7 +25,7 @@ BLOCK_SECONDS = 0.1
 """Time that one call of the compiled loop should take: between calls Ctrl-C is heard and progress is reported."""
 BLOCK_ROWS = 16384
 
-Sink = Callable[[NDArray[np.float64]], None]
+Sink = Callable[[Floats], None]
 Progress = Callable[[int], None]
 
 
@@ -44,7 +43,7 @@ class Work:
     turns: int = 0  # steps after which friction points the other way, or holds
     evaluators: dict[str, int] = field(default_factory=dict)  # steps that each evaluator took
     solve_seconds: float = 0.0
-    unconverged: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2)))  # time (s), residual (N)
+    unconverged: Floats = field(default_factory=lambda: np.zeros((0, 2)))  # time (s), residual (N)
 
     @property
     def failed(self) -> bool:
@@ -66,7 +65,7 @@ class Motion:
     """
 
     system: System
-    rows: NDArray[np.float64]
+    rows: Floats
     work: Work
     energy: EnergyAccount
 
@@ -86,7 +85,7 @@ def solve(
     `solve_seconds`.
     """
     system = system if method is None else replace(system, method=method)
-    blocks: list[NDArray[np.float64]] = []
+    blocks: list[Floats] = []
     work, energy = Stepping(system).run(
         sink or (lambda rows: blocks.append(rows.copy())), progress, first_block=first_block
     )
@@ -148,7 +147,7 @@ class Stepping:
         """Steps whose samples fit into a block."""
         return BLOCK_ROWS * self.system.per_sample
 
-    def block(self, stop: int) -> NDArray[np.float64]:
+    def block(self, stop: int) -> Floats:
         """Step to level `stop`; the samples on the way."""
         system, lag, per_sample = self.system, self.scheme.LAG, self.system.per_sample
         first = int(self.counts.level) - lag
@@ -161,7 +160,7 @@ class Stepping:
             done += 1  # the sample of the failing step's own level has been taken
         return rows[: -(-done // per_sample) + (-first // per_sample)]
 
-    def _sample(self) -> NDArray[np.float64]:
+    def _sample(self) -> Floats:
         """The sample at the level that has been reached."""
         row = np.zeros(len(HISTORY))
         self.scheme.sample(self.plant, row)
@@ -228,7 +227,7 @@ class Stepping:
 def _plugged_in(system: System) -> Plug:
     """What the common loop calls: the kernels of the scheme and the iteration of a step."""
     if system.method.own_steps:
-        return Plug(0, 0, 0)
+        return Plug(0, 0, address(system.scheme.step))
     from brakecli.solver import implicit_step  # its kernels are compiled only where they are needed
 
     scheme = system.scheme

@@ -3,7 +3,7 @@
 Contract of every scheme module:
 
 - `STATE`: the type of the record that its motion is kept in, with the fields x, y, v_x, v_y and force;
-- `WEIGHTS`: how many weights it takes; `LAG`: how many levels the known velocity lies behind the position;
+- `LAG`: how many levels the known velocity lies behind the position;
 - `MEMORY`: the fields of the state that decide the next ones, `VELOCITIES`: which of them are velocities;
 - `weighted_time(weights)`: the time at which a step evaluates the load, the travel of the wheel and the contact,
   in steps after the current level;

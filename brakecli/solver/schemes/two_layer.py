@@ -9,7 +9,6 @@ from brakecli.solver.records import Coefficients, Pair, Weights
 
 STATE = records.STATE
 advance, sample = loop.advance, loop.sample
-WEIGHTS = 2
 LAG = 0
 MEMORY = ("x", "y", "v_x", "v_y")
 VELOCITIES = ("v_x", "v_y")

@@ -6,11 +6,9 @@ slip, lift-off and touch-down end a step: nothing is smoothed, nothing stepped o
 
 from typing import Any
 
-import numpy as np
 from numba import float64, int64, void
-from numpy.typing import NDArray
 
-from brakecli.solver.compile import borrowed, kernel, vector
+from brakecli.solver.compile import Floats, at_address, borrowed, kernel, vector
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.energy import Mechanical, energy_at_level
 from brakecli.solver.quantities import ContactState, Failure
@@ -32,15 +30,15 @@ from brakecli.solver.records import (
 from brakecli.solver.schedules import integral_at, slope_at, value_at
 from brakecli.solver.schemes.event_driven.dop853 import interpolated
 from brakecli.solver.schemes.event_driven.phases import SHOE, Shoe, press, resistance
-from brakecli.solver.schemes.event_driven.step import first_step, step
+from brakecli.solver.schemes.event_driven.step import STEP, first_step, step
 
 STATE = MOTION
-WEIGHTS = 0
 LAG = 0
 MEMORY = ("x", "y", "v_x", "v_y")
 VELOCITIES = ("v_x", "v_y")
 
 _PLANT = plant_type(MOTION)
+_step_at = at_address(STEP)  # compiled in its own place: otherwise `advance` would compile it again
 
 _BUDGET, _EXACT = 4096, 64
 """Steps of one call, and as how many one counts that finds patches: an interruption need not wait for a sample."""
@@ -71,7 +69,7 @@ def mechanical_energy(c: Coefficients, s: Weights, state: Any) -> Mechanical:
 
 
 @kernel(void(MOTION_TYPE, vector))
-def _write(m: Any, row: NDArray[np.float64]) -> None:
+def _write(m: Any, row: Floats) -> None:
     for column in range(row.size):  # a slice would take seconds to compile
         row[column] = m.row[column]
 
@@ -109,14 +107,13 @@ def _sample(p: Shoe, drive: Drive, interval: float, level: int) -> None:
     m.row[4], m.row[5], m.row[6], m.row[7] = friction, normal, p.layer.contact.fraction, state
 
 
-@kernel(void(_PLANT, vector))
-def sample(p: Plant, row: NDArray[np.float64]) -> None:
+def sample(p: Plant, row: Floats) -> None:
     """Write the sample at the level that has been reached."""
-    _write(p.state, row)
+    row[:] = p.state.row
 
 
 @kernel(int64(_PLANT, float64[:, ::1], float64[:, ::1], int64))
-def advance(p: Plant, rows: NDArray[np.float64], events: NDArray[np.float64], stop: int) -> int:
+def advance(p: Plant, rows: Floats, events: Floats, stop: int) -> int:
     """Step until the sample `stop` is reached, or until the budget of a call is spent; a `Failure`.
 
     `rows` gets the samples before that of counts.level, which waits in the state; a failure adds it.
@@ -136,7 +133,7 @@ def advance(p: Plant, rows: NDArray[np.float64], events: NDArray[np.float64], st
             _sample(shoe, drive, grid.interval, counts.level)
         if counts.level == stop or steps >= _BUDGET:
             return _NONE
-        failure = step(shoe, drive, grid)
+        failure = _step_at(p.plug.solve)(shoe, drive, grid)
         steps += 1 if p.layer.contact.kind == CLOSED_FORM else _EXACT
         if failure != _NONE:
             _write(m, rows[row])

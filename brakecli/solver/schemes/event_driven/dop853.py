@@ -10,19 +10,18 @@ from typing import Any
 
 import numpy as np
 from numba import float64, int64, types, void
-from numpy.typing import NDArray
 
-from brakecli.solver.compile import kernel
+from brakecli.solver.compile import Floats, kernel
 from brakecli.solver.records import MOTION_TYPE, POWERS, STAGES
 
 END_STAGE = 12
 
 
-def _numbers(text: str) -> NDArray[np.float64]:
+def _numbers(text: str) -> Floats:
     return np.array([float(word) for word in text.split()])
 
 
-def _below_diagonal(numbers: NDArray[np.float64]) -> NDArray[np.float64]:
+def _below_diagonal(numbers: Floats) -> Floats:
     """The square matrix whose entries below the diagonal are these, row by row."""
     a = np.zeros((STAGES, STAGES))
     a[np.tril_indices(STAGES, -1)] = numbers

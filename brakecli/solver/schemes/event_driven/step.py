@@ -54,6 +54,8 @@ _MOST_SWITCHES, _MOST_EVENTS, _NO_PROGRESS = 60, 1000, 1e-6
 """A run ends after so many phases that end at once, or so many events within a part of the longest step."""
 _TINY = 1e-300  # no division by zero where nothing moves
 
+STEP = int64(SHOE, DRIVE, GRID)
+
 _NONE, _NOT_CLOSED, _DIVERGED = int(Failure.NONE), int(Failure.NOT_CLOSED), int(Failure.DIVERGED)
 _STALLED = int(Failure.STALLED)
 
@@ -232,7 +234,7 @@ def _enter(p: Shoe, which: int, longest: float) -> int:
     return _STALLED if m.events > _MOST_EVENTS else _NONE
 
 
-@kernel(int64(SHOE, DRIVE, GRID), inlined=False)
+@kernel(STEP, inlined=False)
 def step(p: Shoe, drive: Drive, grid: Grid) -> int:
     """Take one step, up to an event at most; a `Failure`."""
     m, evaluations = p.motion, p.counts.evaluations
