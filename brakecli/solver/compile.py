@@ -51,11 +51,12 @@ def cache_is_cold() -> bool:
     return not config.DISABLE_JIT and (CACHE is None or not any(CACHE.iterdir()))
 
 
-class _ForKernels(CPUDispatcher):  # type: ignore[misc]
+class _ForKernels(CPUDispatcher):
     """A kernel without a wrapper for calls from Python, which would otherwise end the process."""
 
     def __call__(self, *arguments: Any) -> None:
-        raise TypeError(f"{self.__name__} has no wrapper for calls from Python; only other kernels can call it")
+        name = vars(self)["__name__"]
+        raise TypeError(f"{name} has no wrapper for calls from Python: only other kernels can call it")
 
 
 def kernel(signature: Any, *, fastmath: frozenset[str] = frozenset(), inlined: bool = True) -> Callable[[F], F]:
@@ -70,12 +71,11 @@ def kernel(signature: Any, *, fastmath: frozenset[str] = frozenset(), inlined: b
         before, config.CACHE_DIR = config.CACHE_DIR, str(CACHE or config.CACHE_DIR)
         private = not inlined or function.__name__.startswith("_")
         options: dict[str, Any] = {"fastmath": set(fastmath), "forceinline": inlined, "no_cfunc_wrapper": True}
+        options["no_cpython_wrapper"] = private
         try:
-            compiled: Any = njit(signature, cache=CACHE is not None, no_cpython_wrapper=private, **options)(
-                function
-            )
+            compiled: Any = njit(signature, cache=CACHE is not None, **options)(function)
         except OSError:  # a cache that cannot be written or read, on a full disk: do without
-            compiled = njit(signature, no_cpython_wrapper=private, **options)(function)
+            compiled = njit(signature, **options)(function)
         finally:
             config.CACHE_DIR = before
         if private and not config.DISABLE_JIT:

@@ -83,7 +83,7 @@ PAD = record(
     shoe_terms=int,  # harmonics
     wheel_terms=int,
     nodes=int,  # of the midpoint rule; 0 without its tables
-    shoe_at=int,  # where in the tables begin: amplitudes, wavenumbers, phases of the shoe
+    gap_at=int,  # where in the tables begin: amplitudes, wavenumbers, phases of f2 - f1
     wheel_at=int,  # amplitudes and wavenumbers of the wheel
     full_at=int,  # ∂(k ∫ f2 dξ)/∂(sin) of each of its harmonics, N
     ss_at=int,  # integrals of products, see `contact.pad`
@@ -95,8 +95,8 @@ PAD = record(
 )
 
 KNOT = record("time value value_low slope slope_low integral integral_low")
-"""A piecewise linear function of time at one of its knots (s): value, slope after it, and integral from t = 0, each
-the sum of two doubles, to 32 digits."""
+"""A piecewise linear function of time, at one of its knots (s). Value, slope after it and integral from t = 0 are
+sums of two doubles, to 32 digits."""
 
 WAVE = record("phase turns turns_low")
 """A harmonic of the wheel: its phase (rad) and its exact number of waves per metre, a sum of two doubles."""

@@ -43,7 +43,5 @@ def kinds() -> tuple[str, ...]:
 def load(name: str) -> Any:
     """The kernel `evaluate` of an evaluator; it is compiled on the first call of a new version."""
     if len(kinds()) > MOST_KINDS:
-        raise ValueError(
-            f"EVALUATORS: {len(kinds())} kinds, a run counts {MOST_KINDS} at most; increase MOST_KINDS"
-        )
+        raise ValueError(f"EVALUATORS has {len(kinds())} kinds, a run can count {MOST_KINDS}; increase MOST_KINDS")
     return import_module(EVALUATORS[name].module).evaluate

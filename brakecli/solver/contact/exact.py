@@ -96,22 +96,16 @@ def _add_interval(
     contact.store_x += work - y * rise
 
 
-@kernel(types.UniTuple(float64, 2)(float64, float64, int64, vector))
-def _bounds(y: float, end: float, n: int, waves: Floats) -> tuple[float, float]:
-    """Bounds of the gap's fourth derivative, and of the rounding in the gap (m)."""
-    fourth, rounding = 0.0, abs(y)
-    for i in range(n):
-        g, omega = abs(waves[i]), waves[n + i]
-        fourth += g * (omega * omega) * (omega * omega)
-        rounding += g * (1.0 + omega * end + abs(waves[2 * n + i]))
-    return fourth, _EPSILON * rounding
-
-
 @kernel(void(float64, int64, int64, PAD_TYPE, vector, CONTACT_TYPE))
 def _add_touching(y: float, wheel_terms: int, n: int, pad: Any, waves: Floats, contact: Any) -> None:
     """Walk over the pad and add every interval on which the gap is positive."""
     end, widest = pad.half_length, pad.cell
-    fourth, rounding = _bounds(y, end, n, waves)
+    fourth, rounding = 0.0, abs(y)  # bounds of the gap's fourth derivative, and of the rounding in the gap (m)
+    for i in range(n):
+        g, omega = abs(waves[i]), waves[n + i]
+        fourth += g * (omega * omega) * (omega * omega)
+        rounding += g * (1.0 + omega * end + abs(waves[2 * n + i]))
+    rounding *= _EPSILON
     left, width = -end, widest
     touching, start = False, left
     while left < end:
@@ -155,17 +149,12 @@ def evaluate(x: float, y: float, layer: Layer) -> None:
     covered = coverage(y, pad)
     if covered == CLEAR:
         return
-    wheel_terms, shoe_terms, wheel_at, shoe_at = pad.wheel_terms, pad.shoe_terms, pad.wheel_at, pad.shoe_at
-    n = wheel_terms + shoe_terms
+    wheel_terms, n = pad.wheel_terms, pad.wheel_terms + pad.shoe_terms
     waves = layer.scratch[: 6 * n]
+    for i in range(3 * n):
+        waves[i] = tables[pad.gap_at + i]
     for i in range(wheel_terms):
-        waves[i] = tables[wheel_at + i]
-        waves[n + i] = tables[wheel_at + wheel_terms + i]
-        waves[2 * n + i] = tables[wheel_at + wheel_terms + i] * x + angles[i]
-    for i in range(shoe_terms):
-        waves[wheel_terms + i] = -tables[shoe_at + i]
-        waves[n + wheel_terms + i] = tables[shoe_at + shoe_terms + i]
-        waves[2 * n + wheel_terms + i] = tables[shoe_at + 2 * shoe_terms + i]
+        waves[2 * n + i] = waves[n + i] * x + angles[i]
     if covered == FULL:
         _add_interval(-pad.half_length, pad.half_length, y, wheel_terms, n, waves, contact)
     else:

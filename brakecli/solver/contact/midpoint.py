@@ -34,13 +34,7 @@ def _sums(y: float, f1: Floats, f2: Floats) -> tuple[float, float, float, float,
 
 
 @kernel(void(float64, float64, vector, vector, vector))
-def _add_wave(
-    sine: float,
-    cosine: float,
-    sines: Floats,
-    cosines: Floats,
-    f2: Floats,
-) -> None:
+def _add_wave(sine: float, cosine: float, sines: Floats, cosines: Floats, f2: Floats) -> None:
     """Add g sin(ωξ + ψ) at the nodes, by addition from the tables of g sin(ωξ) and g cos(ωξ)."""
     for j in range(f2.size):
         f2[j] += cosine * sines[j] + sine * cosines[j]
@@ -69,5 +63,4 @@ def evaluate(x: float, y: float, layer: Layer) -> None:
     contact.fraction = touching / n
     contact.store = 0.5 * k * spacing * square
     contact.store_x = k * work
-    contact.kind = MIDPOINT
-    contact.valid = 1
+    contact.kind, contact.valid = MIDPOINT, 1

@@ -47,7 +47,9 @@ def build_pad(k: float, half_length: float, shoe: Surface, wheel: Surface, nodes
     ss, cc, pr, pad.shoe_mean, pad.shoe_square = _products(half_length, shoe, wheel)
     f1, sines, cosines = _node_tables(half_length, shoe, wheel, nodes)
     tables = {
-        "shoe_at": np.concatenate([shoe.g, shoe.omega, shoe.phase]),
+        "gap_at": np.concatenate(
+            [wheel.g, -shoe.g, wheel.omega, shoe.omega, np.zeros(wheel.g.size), shoe.phase],
+        ),
         "wheel_at": np.concatenate([wheel.g, wheel.omega]),
         "full_at": 2.0 * half_length * k * wheel.g * np.sinc(wheel.omega * half_length / np.pi),
         "ss_at": ss,
