@@ -1,5 +1,8 @@
 """`python -m brakecli` and the installed command."""
 
+import atexit
+import gc
+
 from brakecli.files.os_signals import guard_streams, handle_signals
 
 
@@ -7,7 +10,9 @@ def main() -> None:
     """Run the command line; signals are heard before anything large is imported."""
     handle_signals()
     guard_streams()
-    from brakecli.cli.commands import main as run
+    # Otherwise the interpreter searches every imported module for garbage as it ends, which takes 0.2 s.
+    atexit.register(gc.freeze)
+    from brakecli.cli.app import main as run
 
     run()
 

@@ -1,35 +1,52 @@
 """What can go wrong, and the exit code that each kind of failure ends the command with.
 
-Every message reads *where: what is wrong, what was found; what to do*.
+Every message reads *where: what is wrong (what was found); what to do*.
 """
 
+import json
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+KeyPath = tuple[str | int, ...]
+"""The names of the tables and of the key, from the top of a file on; a number is a place in a list."""
 
-class BrakecliError(Exception):
-    """A failure that is told to the user in one or more plain sentences, never as a traceback."""
-
-    exit_code = 1
+_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing that is wrong with an input file.
+    """One thing that is wrong with what a user gave.
 
-    `where` is ``FILE:LINE`` (or ``FILE`` where no line can be named, ``--set key.path=VALUE`` for an
-    override), `key` the
-    dotted key path or "" for the file as a whole.
+    `path` leads to the key; it is empty for the text as a whole. `source` names the file, or the override as
+    ``--set key.path=VALUE``. `line` is 0 where no line can be named.
     """
 
-    where: str
-    key: str
+    path: KeyPath
     what: str
     remedy: str
+    source: str = ""
+    line: int = 0
+
+    @property
+    def where(self) -> str:
+        """``FILE:LINE``, or the source alone."""
+        return f"{self.source}:{self.line}" if self.line else self.source
+
+    @property
+    def key(self) -> str:
+        """The key path as TOML writes it."""
+        return key_text(self.path)
 
     def __str__(self) -> str:
         """`FILE:LINE: key.path: what is wrong (found VALUE); remedy`."""
         return ": ".join(part for part in (self.where, self.key, f"{self.what}; {self.remedy}") if part)
+
+
+class BrakecliError(Exception):
+    """A failure that is reported to the user in one or more plain sentences, never as a traceback."""
+
+    exit_code = 1
 
 
 class UsageError(BrakecliError):
@@ -44,8 +61,8 @@ class CaseError(BrakecliError):
     exit_code = 2
 
     def __init__(self, problems: Sequence[Problem]) -> None:
-        """Tell every problem, a line each."""
-        super().__init__("\n".join(str(problem) for problem in problems))
+        """Report every problem in a line of its own."""
+        super().__init__("\n".join(map(str, problems)))
         self.problems = tuple(problems)
 
 
@@ -65,3 +82,44 @@ class CannotWriteError(BrakecliError):
     """An output cannot be written: exit code 74 (EX_IOERR of sysexits.h)."""
 
     exit_code = 74
+
+
+def key_text(path: KeyPath) -> str:
+    """A key path as TOML writes it, with places in a list in brackets: `roughness.wheel.amplitudes[2]`."""
+    parts = (
+        f"[{part}]"
+        if isinstance(part, int)
+        else "." + (part if _BARE_KEY.fullmatch(part) else json.dumps(part, ensure_ascii=False))
+        for part in path
+    )
+    return printable("".join(parts).removeprefix("."))
+
+
+def found(value: object) -> str:
+    """The part of a message that shows the value which was found."""
+    return f" (found {value_text(value)})"
+
+
+def value_text(value: object) -> str:
+    """A value as TOML writes it, shortened to fit into a message."""
+    match value:
+        case bool():
+            text = str(value).lower()
+        case str():
+            text = json.dumps(value[:80], ensure_ascii=False)
+        case int() if value.bit_length() > 250:
+            text = "an integer of more than 75 digits"
+        case dict():
+            text = "a table"
+        case list() | tuple():
+            shown = ["[…]" if isinstance(each, list) else value_text(each) for each in value[:5]]
+            text = f"[{', '.join([*shown, '…'] if len(value) > 5 else shown)}]"
+        case _:
+            text = str(value)
+    return printable(text)
+
+
+def printable(text: str) -> str:
+    """A text in one line of at most 80 characters that a terminal shows as they are."""
+    text = text if len(text) <= 80 else text[:79] + "…"
+    return "".join(char if char.isprintable() else f"\\u{ord(char):04x}" for char in text)

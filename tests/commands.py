@@ -193,7 +193,9 @@ def _server() -> subprocess.Popen[str]:
 
 
 def _serve() -> None:
-    import brakecli.cli.tables  # noqa: F401 - all that a run needs
+    import brakecli.cli.tables
+    import brakecli.comparison.result
+    import brakecli.sweeps.result  # noqa: F401 - these load all that a command needs
     from brakecli.__main__ import main
 
     for line in sys.stdin:

@@ -5,32 +5,18 @@ import re
 import shlex
 import sys
 from collections.abc import Container, Sequence
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import dataclass, replace
 from importlib import resources
-from operator import itemgetter
 from pathlib import Path
 from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
+from brakecli.case import wording
 from brakecli.case.case import Case, resolved_toml
-from brakecli.case.tables import Table
-from brakecli.case.toml_lines import (
-    LARGEST_TEXT,
-    WRITING,
-    Finding,
-    KeyPath,
-    Located,
-    UnfitTextError,
-    key_text,
-    parse,
-    printable,
-    split,
-    too_large,
-)
-from brakecli.case.wording import MISSING, sentences, tables
-from brakecli.errors import CaseError, Problem
+from brakecli.case.tables import MISSING, Table, tables_within
+from brakecli.case.toml_lines import LARGEST_TEXT, MOST_PARTS, WRITING, Located, parse, split, too_large, unfit
+from brakecli.errors import CaseError, KeyPath, Problem, key_text, printable
 
 _Table = TypeVar("_Table", bound=Table)
 
@@ -54,12 +40,12 @@ def read_case(source: str, overrides: Sequence[str] = ()) -> LoadedCase:
 
     Overrides are those of `parse_case`.
     """
-    label = "standard input" if source == "-" else source
-    return parse_case(read_text(source, label), label, overrides)
+    return parse_case(*read_text(source), overrides)
 
 
-def read_text(source: str, label: str) -> str:
-    """The text of a file, or of standard input where the path is "-"; line ends stay as they are."""
+def read_text(source: str) -> tuple[str, str]:
+    """The text of a file, or of standard input where the path is "-", and its name; line ends stay as they are."""
+    name = "standard input" if source == "-" else source
     try:
         if source == "-":
             data = sys.stdin.buffer.read(LARGEST_TEXT + 1)
@@ -71,16 +57,16 @@ def read_text(source: str, label: str) -> str:
         closed = isinstance(error, AttributeError)
         reason = "it is closed" if closed else getattr(error, "strerror", None) or str(error)
         what = f"cannot be read: {reason[0].lower()}{reason[1:]}"
-        raise CaseError([Problem(label, "", what, 'name a TOML file, or "-" for standard input')]) from error
+        raise unfit(what, 'name a TOML file, or "-" for standard input', name) from error
     if len(data) > LARGEST_TEXT:
-        raise CaseError([_problem(too_large(), label)])
+        raise too_large(name)
     try:
-        return data.decode("utf-8")
+        return data.decode("utf-8"), name
     except UnicodeDecodeError as error:
         utf_16 = data.startswith((b"\xff\xfe", b"\xfe\xff"))
-        line = data.count(b"\n", 0, error.start) + 1
         what = "is UTF-16, not UTF-8" if utf_16 else f"is not UTF-8 (found byte 0x{data[error.start]:02x})"
-        raise CaseError([Problem(f"{label}:{line}", "", what, "save the file as UTF-8")]) from error
+        line = data.count(b"\n", 0, error.start) + 1
+        raise unfit(what, "save the file as UTF-8", name, line) from error
 
 
 def parse_case(text: str, label: str, overrides: Sequence[str] = ()) -> LoadedCase:
@@ -96,92 +82,47 @@ def parse_case(text: str, label: str, overrides: Sequence[str] = ()) -> LoadedCa
 
 def parse_table(kind: type[_Table], text: str, label: str, overrides: Sequence[str] = ()) -> _Table:
     """Make a table of some kind, such as a case, of a whole TOML text; see `parse_case`."""
+    located = Located(text, label)
+    problems: list[Problem] = []
     try:
-        statements = split(text)
-    except UnfitTextError as error:
-        raise CaseError([_problem(error.finding, label)]) from error
-    data = parse(text)
-    located = None
-    findings = []
-    if isinstance(data, Finding):
-        located = Located(statements)
-        findings = located.findings or [data]
-        data = located.data
-    is_readable = not any(finding.key == () for finding in findings)
-    problems = [(finding.line, _problem(finding, label)) for finding in findings]
-    set_by, refused = _override(data, overrides, kind)
-    problems += refused
+        data = parse(text, label)
+    except CaseError as error:
+        data, problems = located.data, located.problems or [*error.problems]
+    all_is_readable = all(problem.path for problem in problems)
+    options = [f"--set {printable(override)}" for override in overrides]
+    set_by: dict[KeyPath, str] = {}
+    for option, override in zip(options, overrides, strict=True):
+        try:
+            path, value = parse_override(override)
+            created = put(data, path, value, kind, kept=set_by)
+        except CaseError as error:
+            problems += [replace(problem, source=option, line=0) for problem in error.problems]
+        else:
+            set_by |= dict.fromkeys((*created, path), option)
     try:
         table = kind.model_validate(data)
     except ValidationError as error:
-        located = located or Located(statements)
-        for key, what, remedy in sentences(error, kind):
-            if is_readable or what != MISSING:  # what seems to be missing may be in the part that cannot be read
-                order, where = _place(key, located, label, set_by, overrides)
-                problems.append((order, Problem(where, key_text(key), what, remedy)))
+        for problem in wording.problems(error, kind):
+            if problem.what == MISSING and not all_is_readable:
+                continue  # it may stand in the part that cannot be read
+            prefixes = (problem.path[:end] for end in range(len(problem.path), 0, -1))
+            if by := next((set_by[prefix] for prefix in prefixes if prefix in set_by), ""):
+                problems.append(replace(problem, source=by))
+            else:
+                problems.append(replace(problem, source=label, line=located.line_of(problem.path)))
     if problems:
-        raise CaseError([problem for _, problem in sorted(problems, key=itemgetter(0))])
+        order = [label, *options]
+        raise CaseError(sorted(problems, key=lambda problem: (order.index(problem.source), problem.line)))
     return table
-
-
-def _problem(finding: Finding, label: str) -> Problem:
-    where = f"{label}:{finding.line}" if finding.line else label
-    return Problem(where, key_text(finding.key), finding.what, finding.remedy)
-
-
-def _place(
-    key: KeyPath, located: Located, label: str, set_by: dict[KeyPath, int], overrides: Sequence[str]
-) -> tuple[int, str]:
-    """Where a key is, or else the table that it belongs to, and the order of such places."""
-    prefixes = [key[:end] for end in range(len(key), 0, -1)]
-    for prefix in prefixes:
-        if prefix in set_by:
-            return _order(set_by[prefix]), _option(overrides[set_by[prefix]])
-    for prefix in prefixes:
-        if prefix in located.lines:
-            return located.lines[prefix], f"{label}:{located.lines[prefix]}"
-    return 0, label
-
-
-def _order(index: int) -> int:
-    return LARGEST_TEXT + 1 + index  # after every line
-
-
-def _option(override: str) -> str:
-    return f"--set {printable(override)}"
-
-
-def _override(
-    data: dict[str, Any], overrides: Sequence[str], kind: type[Table]
-) -> tuple[dict[KeyPath, int], list[tuple[int, Problem]]]:
-    """Apply overrides to the data; tell which key was set by which of them, and what is wrong with the rest."""
-    set_by: dict[KeyPath, int] = {}
-    problems = []
-    for index, override in enumerate(overrides):
-        parsed = parse_override(override)
-        if isinstance(parsed, Finding):
-            problem = Problem(_option(override), "", parsed.what, parsed.remedy)
-            problems.append((_order(index), problem))
-            continue
-        path, value = parsed
-        try:
-            created = put(data, path, value, kind, kept=set_by)
-        except TypeError:
-            what = f"{key_text(path[:-1])} is not a table"
-            problem = Problem(_option(override), key_text(path), what, "set a key of a table")
-            problems.append((_order(index), problem))
-            continue
-        set_by |= dict.fromkeys((*created, path), index)
-    return set_by, problems
 
 
 def put(
     data: dict[str, Any], path: tuple[str, ...], value: object, kind: type[Table], kept: Container[KeyPath] = ()
 ) -> list[tuple[str, ...]]:
-    """Set a key in the data of a table of some kind; the paths of the tables that it took to create.
+    """Set a key in the data of a table of some kind; the paths of the tables that were created for it.
 
-    Of keys that exclude each other the ones given before are removed, unless they are to be kept. Raises TypeError
-    where something on the path is no table.
+    Of keys that exclude each other the ones given before are removed, unless they are to be kept. Raises
+    `CaseError` where something on the path is not a table.
     """
     *parents, key = path
     table: Any = data
@@ -193,9 +134,10 @@ def put(
                 created.append(path[:end])
             table = table[parent]
     if not isinstance(table, dict):
-        raise TypeError(path)
+        raise CaseError([Problem(path, f"{key_text(path[:-1])} is not a table", "set a key of a table")])
     table[key] = value
-    groups = _alternatives(kind).get(tuple(parents), ())
+    owner = tables_within(kind).get(tuple(parents))
+    groups = owner.alternatives if owner else ()
     if any(key in group for group in groups):
         for other in (other for group in groups if key not in group for other in group):
             if (*parents, other) not in kept:
@@ -203,36 +145,37 @@ def put(
     return created
 
 
-@cache
-def _alternatives(kind: type[Table]) -> dict[KeyPath, tuple[tuple[str, ...], ...]]:
-    return {path: table.alternatives for path, table in tables(kind)}
-
-
-def parse_override(override: str) -> tuple[tuple[str, ...], object] | Finding:
-    """The key path and the value of an override, or what is wrong with it."""
+def parse_override(override: str) -> tuple[tuple[str, ...], object]:
+    """The key path and the value of an override; raises `CaseError`."""
     try:
         override.encode()
-        split(override)
     except UnicodeEncodeError:
-        return Finding(0, (), "is not UTF-8", "write it in UTF-8")
-    except UnfitTextError as error:
-        return error.finding
+        raise unfit("is not UTF-8", "write it in UTF-8") from None
+    split(override)  # refuses what would take long
     key, _, value = override.partition("=")
     path = key_path(key)
     if "=" not in override or not path:
-        return Finding(0, (), f"does not begin with a key (found {printable(key)})", "write --set key.path=VALUE")
-    parsed = parse(f"value={value}")
-    if isinstance(parsed, dict) and parsed.keys() == {"value"}:
+        raise unfit(f"does not begin with a key (found {printable(key)})", "write --set key.path=VALUE")
+    try:
+        parsed = parse(f"value={value}")
+    except CaseError:
+        parsed = {}
+    if parsed.keys() == {"value"}:
         return path, parsed["value"]
     remedy = WRITING
     if re.fullmatch(r"[^\W\d][\w .-]*", value):
         remedy = f"texts need quotes: --set {key}={shlex.quote(json.dumps(value, ensure_ascii=False))}"
-    return Finding(0, (), f"the value is not valid TOML (found {printable(value)})", remedy)
+    raise unfit(f"the value is not valid TOML (found {printable(value)})", remedy)
 
 
 def key_path(text: str) -> tuple[str, ...]:
     """The parts of a key path as TOML writes it; none if it is not one."""
-    rest: Any = parse(f"{text}=0") if "\n" not in text else None
+    if "\n" in text or text.count(".") >= MOST_PARTS:  # the time that tomllib takes grows with their square
+        return ()
+    try:
+        rest: Any = parse(f"{text}=0")
+    except CaseError:
+        return ()
     path: tuple[str, ...] = ()
     while isinstance(rest, dict) and len(rest) == 1:
         ((part, rest),) = rest.items()

@@ -50,7 +50,7 @@ def method_of(case: Case) -> Method:
         evaluator=str(case.contact.evaluator),
         nodes=case.contact.nodes or 0,
         step=solver.step,
-        tolerance=solver.promise or EVENT_TOLERANCE,
+        tolerance=solver.effective_tolerance or EVENT_TOLERANCE,
         allow_unconverged=solver.allow_unconverged,
         automatic=automatic,
     )

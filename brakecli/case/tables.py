@@ -1,27 +1,34 @@
-"""What the tables of a case file have in common: kinds of numbers, rules between keys, every problem at once."""
+"""What all tables of case and sweep files share: kinds of numbers, rules between keys, and their JSON Schema."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import nullcontext, suppress
-from typing import Annotated, Any, ClassVar, NamedTuple, Self, cast
+from enum import StrEnum
+from functools import cache
+from typing import Annotated, Any, ClassVar, Self, cast, get_args
 
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    ConfigDict,
-    Field,
-    ModelWrapValidatorHandler,
-    ValidationError,
-    ValidatorFunctionWrapHandler,
-    WrapValidator,
-    model_validator,
-)
-from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, WrapValidator, model_validator
+from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
+from pydantic_core import InitErrorDetails, PydanticCustomError, core_schema
+
+from brakecli.errors import KeyPath, Problem, found
 
 SMALLEST, LARGEST = 1e-100, 1e100
 """Magnitudes between which every number other than zero must lie, so that products neither vanish nor overflow."""
 
 MOST_WRONG_ENTRIES = 20
-"""Most wrong entries that are told of one list."""
+"""Most wrong entries of one list that are reported."""
+
+MISSING = "is missing"
+
+
+def quantity(unit: str, description: str, default: Any = ..., **options: Any) -> Any:
+    """A key that holds a number or numbers; it is required if it has no default."""
+    return Field(default, description=description, json_schema_extra={"unit": unit}, **options)
+
+
+def choice(description: str, default: StrEnum | None) -> Any:
+    """A key that holds a member of an enum, which TOML gives as a text."""
+    return Field(default, description=description, strict=False)
 
 
 def _within_scale(value: float) -> float:
@@ -30,85 +37,84 @@ def _within_scale(value: float) -> float:
     return value
 
 
-def quantity(unit: str, description: str) -> Any:  # pydantic's Field is typed so, too
-    """Field metadata: the unit and what the number is."""
-    return Field(description=description, json_schema_extra={"unit": unit})
-
-
-def _few_errors(values: Any, handler: ValidatorFunctionWrapHandler) -> Any:
-    """Report the first wrong entries of a list alone: thousands of them help nobody, and take seconds."""
+def _few_errors(values: Any, handler: Callable[[Any], Any]) -> Any:
+    """Report only the first wrong entries of a list: thousands of them help nobody, and take seconds."""
     try:
         return handler(values)
     except ValidationError as error:
-        if error.error_count() <= MOST_WRONG_ENTRIES:
+        count = error.error_count()
+        if count <= MOST_WRONG_ENTRIES:
             raise
-        errors = [_repeated(each) for each in error.errors(include_url=False)[:MOST_WRONG_ENTRIES]]
-        what = f"has {error.error_count()} wrong entries, of which the first {len(errors)} are told"
-        errors.append(_rule(Broken((), what, "correct these first")))
+        what = f"has {count} wrong entries, of which the first {MOST_WRONG_ENTRIES} are reported"
+        errors = [*_again(error, MOST_WRONG_ENTRIES), _as_error(Problem((), what, "correct these first"))]
         raise ValidationError.from_exception_data("list", errors) from None
 
 
-# TOML has lists, a frozen case holds tuples.
-from_list = (Field(strict=False), WrapValidator(_few_errors))
-Number = Annotated[float, AfterValidator(_within_scale)]
-Positive = Annotated[float, Field(gt=0), AfterValidator(_within_scale)]
-NonNegative = Annotated[float, Field(ge=0), AfterValidator(_within_scale)]
-Angle = Annotated[float, Field(ge=-90, le=90), AfterValidator(_within_scale)]
+from_list = (Field(strict=False), WrapValidator(_few_errors))  # TOML has lists, a frozen case holds tuples
+_scaled = AfterValidator(_within_scale)
+Number = Annotated[float, _scaled]
+Positive = Annotated[float, Field(gt=0), _scaled]
+NonNegative = Annotated[float, Field(ge=0), _scaled]
+Angle = Annotated[float, Field(ge=-90, le=90), _scaled]
 Tolerance = Annotated[float, Field(ge=1e-13, le=1e-2)]
-Weight = Annotated[float, Field(ge=0, le=1), AfterValidator(_within_scale)]
+Weight = Annotated[float, Field(ge=0, le=1), _scaled]
+Weights = Annotated[tuple[Weight, ...], *from_list]
 Series = Annotated[tuple[Number, ...], *from_list]
 Lengths = Annotated[tuple[Positive, ...], *from_list]
 Schedule = Annotated[tuple[Number, ...], Field(min_length=1), *from_list]
-from_text = Field(strict=False)  # TOML has texts, a case holds members of an enum
-
-
-class Broken(NamedTuple):
-    """A rule between several keys that a table breaks: where, and what is wrong with the value found there."""
-
-    key: tuple[str | int, ...]
-    what: str
-    remedy: str
-    found: object = None
+Title = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f-\x9f]*$", description="one line for people to read")]
 
 
 class Table(BaseModel):
-    """A table of the case file: frozen, without unknown keys, and with rules between its keys."""
+    """A table of a file: frozen, without unknown keys, and with rules between its keys."""
 
     model_config = ConfigDict(
         strict=True,
         frozen=True,
         extra="forbid",
         allow_inf_nan=False,
-        json_schema_extra=lambda schema, model: _tell_alternatives(schema, model),
+        json_schema_extra=lambda schema, model: _describe_alternatives(schema, model),
     )
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = ()
-    """Groups of keys of which exactly one is given …"""
+    """Groups of keys that exclude each other."""
     one_is_needed: ClassVar[bool] = True
-    """… or, if this is not set, at most one."""
+    """Whether one of these groups must be given."""
 
-    def _broken_rules(self) -> Iterator[Broken]:
-        """Yield every rule between keys that does not hold."""
+    def _broken_rules(self) -> Iterator[Problem]:
+        """Yield a problem for every rule between keys that does not hold."""
         given = [group for group in self.alternatives if any(getattr(self, key) is not None for key in group)]
-        if not given:
-            choices = ", or ".join(" and ".join(group) for group in self.alternatives)
-            if choices and self.one_is_needed:
-                yield Broken((self.alternatives[0][0],), "is missing", f"give {choices}")
-        elif len(given) > 1:
+        if len(given) > 1:
             key = next(key for key in given[1] if getattr(self, key) is not None)
-            other = " and ".join(given[0])
-            yield Broken((key,), f"is given together with {other}", "keep one of the two", getattr(self, key))
-        else:
+            yield self.wrong(key, f"is given together with {' and '.join(given[0])}", "keep one of the two")
+        elif given:
             for key in given[0]:
                 if getattr(self, key) is None:
-                    yield Broken((key,), "is missing", f"give {' and '.join(given[0])} together")
+                    yield Problem((key,), MISSING, f"give {' and '.join(given[0])} together")
+        elif self.alternatives and self.one_is_needed:
+            choices = ", or ".join(" and ".join(group) for group in self.alternatives)
+            yield Problem((self.alternatives[0][0],), MISSING, f"give {choices}")
+
+    def different_lengths(self, key: str, other: str) -> Iterator[Problem]:
+        """Yield a problem if a list is not as long as another one; either may be absent."""
+        values, others = getattr(self, key), getattr(self, other)
+        if None not in (values, others) and len(values) != len(others):
+            what = f"has {entries(values)} where {other} has {len(others)}"
+            yield self.wrong(key, what, f"give one value for each {other.removesuffix('s')}")
+
+    def wrong(self, key: str, what: str, remedy: str) -> Problem:
+        """The problem with the value of a key, which may be one of an inner table: `output.sample_interval`."""
+        value: Any = self
+        for part in key.split("."):
+            value = getattr(value, part)
+        return Problem(tuple(key.split(".")), what + found(value), remedy)
 
     def _fill(self) -> None:
         """Give the keys that were left out their values, where these depend on other keys."""
 
     @model_validator(mode="wrap")
     @classmethod
-    def _tell_everything(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
+    def _find_every_problem(cls, data: Any, handler: Callable[[Any], Self]) -> Self:
         """Check the rules between keys even where some keys are wrong by themselves, and report all at once."""
         errors: list[InitErrorDetails] = []
         try:
@@ -116,14 +122,13 @@ class Table(BaseModel):
         except ValidationError as error:
             if not isinstance(data, dict):
                 raise
-            found = error.errors(include_url=False)
-            errors = [_repeated(each) for each in found]
-            table = cls._without({str(each["loc"][0]) for each in found}, data)
+            errors = _again(error)
+            table = cls._without({str(each["loc"][0]) for each in errors}, data)
         # A rule that needs a wrong key meets no attribute: it waits until that key is right.
         with suppress(AttributeError) if errors else nullcontext():
             table._fill()
-            for broken in table._broken_rules():
-                errors.append(_rule(broken))
+            for problem in table._broken_rules():
+                errors.append(_as_error(problem))
         if errors:
             raise ValidationError.from_exception_data(cls.__name__, errors)
         return table
@@ -142,19 +147,73 @@ class Table(BaseModel):
         return table
 
 
-def _rule(broken: Broken) -> InitErrorDetails:
-    error = PydanticCustomError("rule", "rule", {"what": broken.what, "remedy": broken.remedy})
-    return InitErrorDetails(type=error, loc=broken.key, input=broken.found)
+def entries(values: tuple[Any, ...]) -> str:
+    """How many entries a list has, in words."""
+    return "1 entry" if len(values) == 1 else f"{len(values)} entries"
 
 
-def _repeated(error: ErrorDetails) -> InitErrorDetails:
-    kind = PydanticCustomError(error["type"], error["type"], error.get("ctx"))
-    return InitErrorDetails(type=kind, loc=error["loc"], input=error["input"])
+def _as_error(problem: Problem) -> InitErrorDetails:
+    kind = PydanticCustomError("rule", "{problem}", {"problem": problem})
+    return InitErrorDetails(type=kind, loc=problem.path, input=None)
 
 
-def _tell_alternatives(schema: dict[str, Any], model: type[Table]) -> None:
+def _again(error: ValidationError, most: int | None = None) -> list[InitErrorDetails]:
+    """The errors of a validation, or the first of them, in a form that can be raised again."""
+    return [
+        InitErrorDetails(
+            type=PydanticCustomError(each["type"], each["type"], each.get("ctx")),
+            loc=each["loc"],
+            input=each["input"],
+        )
+        for each in error.errors(include_url=False)[:most]
+    ]
+
+
+@cache
+def tables_within(kind: type[Table]) -> dict[KeyPath, type[Table]]:
+    """Every table of a kind of table, itself included, by its key path."""
+    tables: dict[KeyPath, type[Table]] = {(): kind}
+    for key, field in kind.model_fields.items():
+        for inner in (field.annotation, *get_args(field.annotation)):
+            if isinstance(inner, type) and issubclass(inner, Table):
+                tables |= {(key, *path): table for path, table in tables_within(inner).items()}
+    return tables
+
+
+class _TomlSchema(GenerateJsonSchema):
+    """TOML has no null: a key without a value is left out."""
+
+    def nullable_schema(self, schema: core_schema.NullableSchema) -> JsonSchemaValue:
+        return self.generate_inner(schema["schema"])
+
+    def default_schema(self, schema: core_schema.WithDefaultSchema) -> JsonSchemaValue:
+        described = super().default_schema(schema)
+        if described.get("default", 0) is None:
+            del described["default"]
+        return described
+
+
+def _describe_alternatives(schema: dict[str, Any], model: type[Table]) -> None:
     groups = [{"required": list(group)} for group in model.alternatives]
     if groups and model.one_is_needed:
         schema["oneOf"] = groups
     elif groups:
         schema["not"] = {"allOf": groups}
+
+
+@cache
+def json_schema(kind: type[Table]) -> dict[str, Any]:
+    """The JSON Schema (draft 2020-12) of a kind of table, such as a whole case file.
+
+    It accepts everything that is valid; most rules between keys are beyond it.
+    """
+    return {"$schema": _TomlSchema.schema_dialect, **kind.model_json_schema(schema_generator=_TomlSchema)}
+
+
+def key_schema(kind: type[Table], path: KeyPath) -> dict[str, Any]:
+    """The JSON Schema of one key of a table, of an inner table, or of an entry of a list; its unit is included."""
+    schema = node = json_schema(kind)
+    for part in path:
+        node = {"unit": node.get("unit"), **node["items"]} if isinstance(part, int) else node["properties"][part]
+        node = schema["$defs"][node["$ref"].rpartition("/")[2]] if "$ref" in node else node
+    return node

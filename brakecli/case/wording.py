@@ -1,18 +1,16 @@
 """What pydantic found wrong with a table, in plain sentences that name the remedy."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from difflib import get_close_matches
-from typing import Any, NamedTuple, get_args
+from typing import Any
 
 from pydantic import ValidationError
 
-from brakecli.case.case import json_schema
-from brakecli.case.tables import LARGEST, SMALLEST, Table
-from brakecli.case.toml_lines import KeyPath, key_text, value_text
+from brakecli.case.tables import LARGEST, MISSING, SMALLEST, Table, key_schema, tables_within
+from brakecli.errors import KeyPath, Problem, found, key_text
 
-MISSING = "is missing"
 _WHAT = {
-    "missing": MISSING,
     "float_type": "is not a number",
     "int_type": "is not a whole number",
     "bool_type": "is neither true nor false",
@@ -28,127 +26,93 @@ _WHAT = {
     "less_than_equal": "is out of range",
     "magnitude": f"is not between {SMALLEST:g} and {LARGEST:g} in magnitude",
 }
-"""The kinds of error that pydantic reports for the types of a case, and our own; a rule brings its own words."""
+"""The kinds of error that pydantic reports for one value of a case."""
+
+_KINDS = {
+    "number": "a number",
+    "integer": "a whole number",
+    "boolean": "true or false",
+    "string": "one line of text in quotes",
+}
 
 
-Tables = dict[KeyPath, type[Table]]
-
-
-class Sentence(NamedTuple):
-    """One problem: the key path, what is wrong with what was found there, and what to do."""
-
-    key: KeyPath
-    what: str
-    remedy: str
-
-
-def tables(model: type[Table], path: KeyPath = ()) -> Iterator[tuple[KeyPath, type[Table]]]:
-    """Every table of a model, itself included, by its key path."""
-    yield path, model
-    for key, field in model.model_fields.items():
-        for kind in (field.annotation, *get_args(field.annotation)):
-            if isinstance(kind, type) and issubclass(kind, Table):
-                yield from tables(kind, (*path, key))
-
-
-def sentences(error: ValidationError, model: type[Table]) -> Iterator[Sentence]:
-    """Tell everything that is wrong with a table in plain words."""
-    known = dict(tables(model))
-    schema = json_schema(model)
+def problems(error: ValidationError, kind: type[Table]) -> Iterator[Problem]:
+    """Everything that is wrong with a table, in plain words."""
+    tables = tables_within(kind)
     errors = error.errors(include_url=False)
-    meant = {each["loc"]: _nearest(each["loc"], known) for each in errors if each["type"] == "extra_forbidden"}
+    meant = {each["loc"]: _meant(each["loc"], tables) for each in errors if each["type"] == "extra_forbidden"}
+    misspelt = {paths[0] for paths in meant.values() if paths}
     for each in errors:
-        path, kind, found = each["loc"], each["type"], each["input"]
-        if kind == "extra_forbidden":
-            yield Sentence(path, "is unknown" + _found(found), _suggestion(path, meant[path], known))
-            if meant[path] and (table := known.get(meant[path])) and isinstance(found, dict):
-                yield from _inside(path, table, found)
-        elif kind == "rule":
-            words = each["ctx"]
-            yield Sentence(path, words["what"] + ("" if found is None else _found(found)), words["remedy"])
-        elif kind == "missing":
-            if path not in meant.values():  # else it is misspelt
-                yield Sentence(path, MISSING, f"give {_expected(path, schema)}")
-        else:
-            too_large = kind == "float_type" and type(found) is int
-            what = _WHAT["magnitude" if too_large else kind]
-            yield Sentence(path, what + _found(found), f"give {_expected(path, schema)}")
+        path, value = each["loc"], each["input"]
+        match each["type"]:
+            case "rule":
+                yield replace(each["ctx"]["problem"], path=path)
+            case "extra_forbidden":
+                remedy = f"did you mean {' or '.join(_name(near, tables) for near in meant[path])}?"
+                if not meant[path]:
+                    parent = _without_places(path[:-1])
+                    keys = ", ".join(tables[parent].model_fields)
+                    remedy = f"the keys {f'of {_name(parent, tables)}' if parent else 'at the top'} are {keys}"
+                yield Problem(path, "is unknown" + found(value), remedy)
+                if meant[path] and meant[path][0] in tables and isinstance(value, dict):
+                    yield from _within(path, tables[meant[path][0]], value)
+            case "missing":
+                if path not in misspelt:
+                    yield Problem(path, MISSING, f"give {_expected(path, kind)}")
+            case reason:
+                too_large = reason == "float_type" and type(value) is int
+                what = _WHAT["magnitude" if too_large else reason]
+                yield Problem(path, what + found(value), f"give {_expected(path, kind)}")
 
 
-def _inside(path: KeyPath, table: type[Table], found: dict[str, Any]) -> Iterator[Sentence]:
+def _within(path: KeyPath, kind: type[Table], data: dict[str, Any]) -> Iterator[Problem]:
     """What is wrong with the keys of a table whose own name is misspelt."""
     try:
-        table.model_validate(found)
+        kind.model_validate(data)
     except ValidationError as error:
-        for sentence in sentences(error, table):
-            yield sentence._replace(key=path + sentence.key)
+        for problem in problems(error, kind):
+            yield replace(problem, path=path + problem.path)
 
 
-def _nearest(path: KeyPath, known: Tables) -> KeyPath:
-    """The key path that an unknown one was probably meant to be, () if none comes near."""
-    parent, key = _names(path[:-1]), str(path[-1])
-    elsewhere = [table for table, model in known.items() if key in model.model_fields]
-    if elsewhere:
-        return (*elsewhere[0], key)
-    for table in (parent, *known):
-        if near := get_close_matches(key, known[table].model_fields, n=1, cutoff=0.7):
-            return (*table, near[0])
-    return ()
+def _meant(path: KeyPath, tables: dict[KeyPath, type[Table]]) -> list[KeyPath]:
+    """The key paths that an unknown one was probably meant to be; empty if none comes near."""
+    parent, key = _without_places(path[:-1]), str(path[-1])
+    known = dict.fromkeys(name for kind in tables.values() for name in kind.model_fields)
+    if key not in known:
+        if near := get_close_matches(key, tables[parent].model_fields, n=1, cutoff=0.7):
+            return [(*parent, near[0])]
+        key = next(iter(get_close_matches(key, known, n=1, cutoff=0.7)), "")
+    return [(*table, key) for table, kind in tables.items() if key in kind.model_fields]
 
 
-def _suggestion(path: KeyPath, meant: KeyPath, known: Tables) -> str:
-    parent, key = _names(path[:-1]), path[-1]
-    if not meant:
-        keys = ", ".join(known[parent].model_fields)
-        return f"the keys {f'of [{key_text(parent)}]' if parent else 'at the top'} are {keys}"
-    if meant in known:
-        return f"did you mean [{key_text(meant)}]?"
-    if meant[-1] != key and meant[:-1] == parent:
-        return f'did you mean "{meant[-1]}"?'
-    owners = [f"[{key_text(table)}]" for table, model in known.items() if meant[-1] in model.model_fields]
-    return f"did you mean {meant[-1]} of {' or '.join(owners)}?"
+def _name(path: KeyPath, tables: dict[KeyPath, type[Table]]) -> str:
+    return f"[{key_text(path)}]" if path in tables else key_text(path)
 
 
-def _names(path: KeyPath) -> KeyPath:
+def _without_places(path: KeyPath) -> KeyPath:
     """A key path without the places in lists."""
     return tuple(part for part in path if isinstance(part, str))
 
 
-def _expected(path: KeyPath, schema: dict[str, Any]) -> str:
-    """What belongs at a key path, from the JSON Schema: "a number above 0, in kg"."""
-    node = schema
-    unit = ""
-    for part in path:
-        node = node["items"] if isinstance(part, int) else node["properties"][part]
-        unit = node.get("unit", unit)
-        node = schema["$defs"][node["$ref"].rpartition("/")[2]] if "$ref" in node else node
+def _expected(path: KeyPath, kind: type[Table]) -> str:
+    """What belongs at a key path, by its JSON Schema: "a number above 0, in kg"."""
+    node = key_schema(kind, path)
     if "enum" in node:
         return "one of " + ", ".join(f'"{choice}"' for choice in node["enum"])
     if node["type"] == "object":
         required = node.get("required", []) + node.get("oneOf", [{}])[0].get("required", [])
         return f"the table [{key_text(path)}]" + (f" with {' and '.join(required)}" if required else "")
-    measured = f", in {unit}" if unit not in ("", "1") else ""
     if "array" in node["type"]:
-        at_least = " of at least one entry" if "minItems" in node else ""
-        return f"a list{at_least}, each {_kind(node['items'])}{measured}"
-    return _kind(node) + measured
+        text = f"a list{' of at least one entry' if 'minItems' in node else ''}, each {_value(node['items'])}"
+    else:
+        text = _value(node)
+    return text if node.get("unit") in (None, "1") else f"{text}, in {node['unit']}"
 
 
-def _kind(node: dict[str, Any]) -> str:
-    if "type" not in node:
-        return "a value"
-    kind = {
-        "number": "a number",
-        "integer": "a whole number",
-        "boolean": "true or false",
-        "string": "one line of text in quotes",
-    }[node["type"]]
+def _value(node: dict[str, Any]) -> str:
+    text = _KINDS.get(node.get("type", ""), "a value")
     if "exclusiveMinimum" in node:
-        return f"{kind} above {node['exclusiveMinimum']:g}"
+        return f"{text} above {node['exclusiveMinimum']:.9g}"
     if "maximum" in node:
-        return f"{kind} from {node['minimum']} to {node['maximum']}"
-    return f"{kind} of at least {node['minimum']:g}" if "minimum" in node else kind
-
-
-def _found(value: object) -> str:
-    return f" (found {value_text(value)})"
+        return f"{text} from {node['minimum']:.9g} to {node['maximum']:.9g}"
+    return f"{text} of at least {node['minimum']:.9g}" if "minimum" in node else text

@@ -9,6 +9,7 @@ import numpy as np
 from brakecli.case.read import LoadedCase
 from brakecli.comparison.compare import Comparison, Entry
 from brakecli.files import fields
+from brakecli.files.field import values_of
 from brakecli.files.write import ResultFile, new_result
 from brakecli.runs.run import origin
 
@@ -37,12 +38,12 @@ class ComparisonReport:
 
     def numbers(self) -> dict[str, Any]:
         """Names and values as `--json` gives them."""
-        return fields.values(fields.COMPARISON, self)
+        return values_of(fields.COMPARISON, self)
 
 
 def entry_numbers(entry: Entry) -> dict[str, Any]:
     """Names and values of an entry; null where there is none."""
-    return fields.values(fields.ENTRY, entry)
+    return values_of(fields.ENTRY, entry)
 
 
 def write(path: Path, loaded: LoadedCase, report: ComparisonReport, *, force: bool) -> None:

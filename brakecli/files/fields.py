@@ -1,95 +1,14 @@
 """Every number and text of a result, declared once: its name, unit, meaning, type, and where a report holds it.
 
-JSON, the attributes and variables of result files, labels in the terminal and the tables of the documentation
+JSON, the attributes and variables of result files, the records of a sweep and the tables of the documentation
 (`make tables`) are all made from these rows.
 """
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, is_dataclass, replace
-from typing import Any
-
-import numpy as np
-
+from brakecli.files.field import Field, json_only, named, within
 from brakecli.solver.quantities import HISTORY as QUANTITIES
 from brakecli.solver.quantities import TIME
 
 TEXT, OBJECT, SENTENCE = "S", "O", "S240"
-
-
-@dataclass(frozen=True)
-class Field:
-    """A number or text of a result, or an object that holds several."""
-
-    name: str
-    units: str
-    """In SI; `1` for pure numbers, empty for texts."""
-    meaning: str
-    kind: str = "f8"
-    """The NumPy type of many of them. A float may be missing: null in JSON, `_FillValue` in a file."""
-    source: str = ""
-    """Path of attributes, keys and methods that leads from a report to the value; the name if empty."""
-    missing: Any = None
-    """What stands for a value that does not exist."""
-    in_file: bool = True
-    """Whether a file holds it too. What changes from one run of the same case to the next stays outside."""
-    group: str = ""
-    """Group of the file whose attributes hold the items of an object."""
-    rows: "tuple[Field, ...]" = ()
-    """The items of an object, or of each object in a list."""
-
-    def read(self, report: object) -> Any:
-        """The value that a report holds, as JSON writes it."""
-        value: Any = report
-        for part in (self.source or self.name).split("."):
-            if value is not None:
-                value = value[part] if isinstance(value, Mapping) else getattr(value, part)
-                value = value() if callable(value) else value
-        if value is None:
-            return self.missing
-        if self.rows:
-            many = isinstance(value, list | tuple)
-            return [values(self.rows, each) for each in value] if many else values(self.rows, value)
-        return int(value) if self.kind == "i8" else plain(value)
-
-
-def values(fields: Iterable[Field], report: object) -> dict[str, Any]:
-    """Names and values as `--json` gives them; None stands for what does not exist."""
-    return {field.name: field.read(report) for field in fields}
-
-
-def named(fields: Iterable[Field], *names: str) -> tuple[Field, ...]:
-    """The fields of these names, in this order."""
-    known = {field.name: field for field in fields}
-    return tuple(known[name] for name in names)
-
-
-def plain(value: Any) -> Any:
-    """A value as JSON holds it: enumerations are texts, complex numbers pairs, NaN in an array is None."""
-    if isinstance(value, str):
-        return str(value)
-    if isinstance(value, complex):
-        return [value.real, value.imag]
-    if isinstance(value, np.ndarray):
-        if value.dtype.kind == "S":
-            return np.char.decode(value, "utf-8").tolist()
-        if value.dtype.kind == "f":
-            value = np.where(np.isfinite(value), value.astype(object), np.array(None))
-        return value.tolist()
-    if is_dataclass(value):
-        value = vars(value)
-    if isinstance(value, Mapping):
-        return {name: plain(each) for name, each in value.items()}
-    return [plain(each) for each in value] if isinstance(value, list | tuple) else value
-
-
-def _within(part: str, *fields: Field) -> tuple[Field, ...]:
-    """Fields that are found in a part of the report."""
-    return tuple(replace(field, source=f"{part}.{field.source or field.name}") for field in fields)
-
-
-def _json_only(*fields: Field) -> tuple[Field, ...]:
-    return tuple(replace(field, in_file=False) for field in fields)
-
 
 # All result files
 
@@ -110,7 +29,7 @@ ORIGIN = (
 # A run
 
 VERDICT = (
-    *_within(
+    *within(
         "verdict",
         Field("regime", "", "regime of the motion", "S16"),
         Field("excitation", "", "where the energy of a sustained motion comes from", "S16"),
@@ -118,16 +37,16 @@ VERDICT = (
         Field("amplitude", "m", "half of peak to peak of x, settled part"),
         Field("settled", "1", "whether a settled part was found (0, 1); otherwise it is the second half", "i8"),
     ),
-    Field("settled_from", "s", "begin of the settled part"),
-    *_within("verdict", Field("mean_friction_force", "N", "mean friction force on the shoe, settled part")),
+    Field("settled_from", "s", "start of the settled part"),
+    *within("verdict", Field("mean_friction_force", "N", "mean friction force on the shoe, settled part")),
     Field("braking_torque", "N m", "mean torque of the friction force, settled part"),
-    *_within(
+    *within(
         "verdict",
         Field("stick_fraction", "1", "part of the time in stick, settled part"),
         Field("contact_loss_fraction", "1", "part of the time off the wheel, settled part"),
         Field("reasons", "", "why the regime is as it is", OBJECT),
-        Field("evidence", "", "what the rules went by", OBJECT, group="regime/evidence"),
-        Field("thresholds", "", "where the rules drew their lines", OBJECT, group="regime/thresholds"),
+        Field("evidence", "", "numbers by which the rules decided", OBJECT, group="regime/evidence"),
+        Field("thresholds", "", "limits of the rules", OBJECT, group="regime/thresholds"),
     ),
 )
 ENERGY = (
@@ -141,22 +60,22 @@ ENERGY = (
     Field("roughness", "J", "work of the passing roughness"),
     Field("scheme", "J", "what the difference scheme itself takes out; 0 for weights of one half"),
     Field("stored", "J", "the larger of the stored energies, all three together, at the start and at the end"),
-    Field("closing_error", "J", "what is left"),
+    Field("closing_error", "J", "what the other items leave open"),
     Field("relative_closing_error", "1", "closing error over the largest item, `stored` included"),
 )
 RUN = (
     Field("status", "", "how the run has ended: done or failed", TEXT),
-    *_within("motion.work", Field("failure", "", "time and reason of a failure", TEXT, source="failure_sentence")),
+    *within("motion.work", Field("failure", "", "time and reason of a failure", TEXT, source="failure_sentence")),
     *VERDICT,
     Field("spectrum_peak", "Hz", "place of the highest peak of the spectrum of vx above 0 Hz"),
-    *_within(
+    *within(
         "system.method",
         Field("scheme", "", "time-stepping scheme", TEXT),
         Field("theta", "1", "weights of the layers", OBJECT),
     ),
     Field("iteration", "", "how the equations of a step are solved", TEXT),
     Field("step", "s", "time step, after it was fitted to the sample interval"),
-    *_within(
+    *within(
         "certificate",
         Field("tolerance", "1", "largest relative error of the histories that is asked for"),
         Field("certified", "1", "whether the error is sure to stay below the tolerance (0, 1)", "i8"),
@@ -164,9 +83,9 @@ RUN = (
         Field("certified_until", "s", "up to here the error stays below the tolerance"),
         Field("certified_by", "", "how the error is known", TEXT, source="method"),
     ),
-    *_within("motion.work", Field("evaluators", "", "steps that each evaluator took", OBJECT, group="evaluators")),
+    *within("motion.work", Field("evaluators", "", "steps that each evaluator took", OBJECT, group="evaluators")),
     Field("nodes", "1", "cells of the midpoint sum, 0 where it could not be needed", "i8", source="system.nodes"),
-    *_within(
+    *within(
         "motion.work",
         Field("steps", "1", "time steps", "i8"),
         Field("contact_evaluations", "1", "evaluations of the contact force", "i8"),
@@ -174,7 +93,7 @@ RUN = (
         Field("unconverged_steps", "1", "steps that did not converge", "i8"),
         Field("non_unique_steps", "1", "steps that met a point where their solution need not be unique", "i8"),
     ),
-    *_within("motion", Field("energy", "", "the account of energies", OBJECT, group="energy", rows=ENERGY)),
+    *within("motion", Field("energy", "", "the account of energies", OBJECT, group="energy", rows=ENERGY)),
     Field("modelled", "", "what of the model the run has used", OBJECT),
     Field("left_out", "", "what of the model the run has left out, and why that was safe", OBJECT),
     Field("adjustments", "", "how step and duration were made to fit", OBJECT, source="check.adjustments"),
@@ -261,7 +180,7 @@ SWEEP = (
     Field("title", "", "title of the sweep, or of its case", TEXT, source="loaded.title"),
     Field("points", "1", "number of points", "i8", source="findings.points"),
     Field("failed_points", "1", "number of points that failed", "i8", source="findings.failed"),
-    *_json_only(
+    *json_only(
         Field("failures", "", "the first 100 failures, with parameters and reason", OBJECT, "findings.failures"),
         Field("resumed_points", "1", "number of points that an earlier run had finished", "i8", source="resumed"),
         Field("regimes", "", "number of points of each regime", OBJECT, source="findings.regimes"),
@@ -270,7 +189,7 @@ SWEEP = (
         Field("seconds", "s", "time of the command"),
     ),
     Field("findings", "", "sentences on hysteresis", OBJECT, source="findings.sentences"),
-    *_json_only(Field("warnings", "", "what a careful user should know", OBJECT, source="notes")),
+    *json_only(Field("warnings", "", "what a careful user should know", OBJECT, source="notes")),
 )
 
 # A comparison of schemes
@@ -279,7 +198,7 @@ _COMPARED = ("x", "y", "vx", "vy", "friction_force", "normal_force")
 ENTRY_PLACE = Field("entry", "1", "a method at one step or tolerance")
 ENTRY = (
     Field("method", "", "the method in a few words", TEXT, source="rung.label"),
-    *_within(
+    *within(
         "rung.kind",
         Field("scheme", "", "time-stepping scheme", TEXT),
         Field("theta", "", "weights of the layers; in the file one text", TEXT),
@@ -288,12 +207,12 @@ ENTRY = (
         Field("evaluator", "", "how the contact force is computed", TEXT),
         Field("nodes", "1", "quadrature nodes, 0 where none are needed", "i8"),
     ),
-    *_within(
+    *within(
         "rung",
         Field("step", "s", "time step; missing where the scheme finds its steps itself"),
         Field("tolerance", "1", "tolerance of a scheme that finds its steps itself"),
     ),
-    *_within(
+    *within(
         "errors",
         Field("error", "1", "largest relative error of x, y, vx and vy"),
         *(Field(f"error_{x}", "1", f"largest relative error of {x}", source=f"largest.{x}") for x in _COMPARED),
@@ -307,7 +226,7 @@ ENTRY = (
     Field("critical_bias", "1", "critical friction of the scheme at its step less the exact one"),
     Field("observed_order", "1", "order by which the error falls from the step before", source="order"),
     Field("step_limit", "s", "largest stable step; missing where any is stable, or unknown", source="stable_step"),
-    *_within(
+    *within(
         "work",
         Field("steps", "1", "time steps", "i8", missing=0),
         Field("contact_evaluations", "1", "evaluations of the contact force", "i8", missing=0),
@@ -320,7 +239,7 @@ ENTRY = (
 )
 COMPARISON = (
     Field("title", "", "title of the case", TEXT),
-    *_within(
+    *within(
         "comparison",
         Field("duration", "s", "how much of the motion was compared"),
         Field("sample_interval", "s", "where it was compared: the largest step", source="interval"),
@@ -332,7 +251,7 @@ COMPARISON = (
     Field("target_error", "1", "the error to be met", source="target"),
     Field("recommended", "", "cheapest entry that meets the target; in the file its place", OBJECT, rows=ENTRY),
     Field("margin", "1", "`target_error` over the error of the recommended entry"),
-    *_json_only(Field("entries", "", "all entries", OBJECT, source="comparison.entries", rows=ENTRY)),
+    *json_only(Field("entries", "", "all entries", OBJECT, source="comparison.entries", rows=ENTRY)),
 )
 
 # Linear stability, in JSON alone
@@ -364,7 +283,7 @@ DISCRETE = (
     Field("critical_friction", "1", "friction coefficient at which the factor passes one"),
     Field("bias", "1", "its distance from the exact one"),
 )
-_CRITICAL_FRICTION = _within(
+_CRITICAL_FRICTION = within(
     "critical",
     Field("critical_friction", "1", "least friction coefficient at which stability is lost", source="friction"),
     Field("instability", "", "how it is lost: flutter or divergence", TEXT),

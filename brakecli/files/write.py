@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from brakecli.files.atomic import OutputFile, new_output
-from brakecli.files.fields import Field
+from brakecli.files.field import Field
 from brakecli.files.os_signals import signals_deferred
 from brakecli.files.read import FORMAT, FORMAT_VERSION, digest
 

@@ -1,29 +1,25 @@
-"""The picture of a comparison: error against time, and against work that no machine changes."""
+"""The picture of a comparison: error against time, and against work that is the same on every machine."""
 
 import math
 from collections import Counter
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import NDArray
 
-from brakecli.case.case import Evaluator, Iteration, Scheme, Start
-from brakecli.errors import UnreadableResultError, UsageError
+from brakecli.case.case import Evaluator, Iteration, Start
+from brakecli.errors import UsageError
 from brakecli.files.read import StoredResult
 from brakecli.files.write import FILL
-from brakecli.plots.style import BLUE, DASHES, GREEN, GREY, VERMILION, headed, layout
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-Array = NDArray[np.float64]
+from brakecli.plots import style
+from brakecli.solver.schemes import SCHEMES
 
 _TEXTS = ("method", "scheme", "theta", "start", "iteration", "evaluator", "failure")
 _NUMBERS = ("step", "tolerance", "error", "wall_seconds", "contact_evaluations", "nodes", "on_front")
-DARK, SKY, PURPLE = "#222222", "#56B4E9", "#CC79A7"
-_COLOURS = {Scheme.TWO_LAYER: BLUE, Scheme.THREE_LAYER: VERMILION, Scheme.EVENT_DRIVEN: DARK}
 _MARKERS = {
     "0.5, 0.5": "o",
     "1, 0.5": "^",
@@ -33,22 +29,13 @@ _MARKERS = {
     "0.0833333, 0.833333, 0.0833333": "D",
     "": "*",
 }
+"""Markers by weights."""
+_EXACT, _OTHER_NODES = "#CC79A7", "#56B4E9"
+"""Colours of the exact contact force, and of less usual numbers of nodes."""
 _NODE_MARKERS = "<>ph"
-"""For the same weights with other numbers of nodes."""
+"""Markers of the same weights with other numbers of nodes."""
 LARGEST = 3.0
-"""Errors above are no results any more; they are not drawn."""
-
-FEW_DECADES = 300.0
-"""Ratio of the ends of an axis below which more than powers of ten have a number."""
-
-
-@dataclass(frozen=True)
-class Curve:
-    """A method over its steps or tolerances: places of its entries in the columns, and how it looks."""
-
-    label: str
-    places: NDArray[np.intp]
-    look: dict[str, Any]
+"""Entries with larger errors are useless as results; they are not drawn."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +45,6 @@ class ComparisonPicture:
     title: str
     lines: tuple[str, ...]
     columns: dict[str, NDArray[Any]]
-    curves: tuple[Curve, ...]
     target: float
     reference_error: float
     recommended: int | None
@@ -68,12 +54,12 @@ class ComparisonPicture:
         return self.columns[name]
 
     @property
-    def timed(self) -> bool:
-        """Whether it has times at all."""
-        return bool(np.isfinite(self["wall_seconds"]).any())
+    def drawn(self) -> NDArray[np.bool_]:
+        """The entries whose error can be drawn."""
+        return np.asarray((self["error"] > 0.0) & (self["error"] <= LARGEST))
 
 
-def gather_comparison(result: StoredResult) -> ComparisonPicture:
+def gather(result: StoredResult) -> ComparisonPicture:
     """Read what is drawn; raises UsageError where there is nothing to draw, UnreadableResultError."""
     columns: dict[str, NDArray[Any]] = {name: result.read("/", name) for name in _TEXTS}
     for name in _NUMBERS:
@@ -81,87 +67,51 @@ def gather_comparison(result: StoredResult) -> ComparisonPicture:
         columns[name] = np.where(values == FILL, np.nan, values)
     if not np.isfinite(columns["error"]).any():
         raise UsageError(f"{result.path}: none of its entries has an error, so there is nothing to draw")
-    target, reference = (float(result.attributes.get(name, 0.0)) for name in ("target_error", "reference_error"))
     best = result.attributes.get("recommended")
     if best is not None and not (isinstance(best, int) and 0 <= best < len(columns["error"])):
-        raise UnreadableResultError(f"{result.path}: recommends an entry that it does not hold; compute it again")
+        raise style.unreadable(result, "it recommends an entry that it does not hold")
     return ComparisonPicture(
         title=str(result.attributes.get("title", "")),
         lines=_lines(result.attributes, columns, best),
         columns=columns,
-        curves=_curves(columns),
-        target=target,
-        reference_error=reference,
+        target=float(result.attributes.get("target_error", 0.0)),
+        reference_error=float(result.attributes.get("reference_error", 0.0)),
         recommended=best,
     )
 
 
 def _lines(attributes: dict[str, Any], columns: dict[str, NDArray[Any]], best: int | None) -> tuple[str, ...]:
-    """What stands below the title."""
+    """The lines below the title."""
     target = f"{attributes.get('target_error', 0.0):g}"
     if best is None:
         first = f"no entry has an error of at most {target}"
     else:
-        step, tolerance = columns["step"][best], columns["tolerance"][best]
+        method, step, tolerance, error, seconds = (
+            columns[name][best] for name in ("method", "step", "tolerance", "error", "wall_seconds")
+        )
         at = f"step {step:.3g} s" if math.isfinite(step) else f"tolerance {tolerance:g}"
-        found = f"error {columns['error'][best]:.2g}"
-        seconds = columns["wall_seconds"][best]
         cost = f" in {1e3 * seconds:.3g} ms" if math.isfinite(seconds) else ""
-        first = f"cheapest of error ≤ {target}: {columns['method'][best]}, {at}: {found}{cost}"
-    parts = [f"{attributes.get('duration', 0.0):.4g} s of motion"]
-    parts.append(f"reference good to {attributes.get('reference_error', 0.0):.1e}")
+        first = f"cheapest of error ≤ {target}: {method}, {at}: error {error:.2g}{cost}"
     left_out = int(attributes.get("left_out", 0))
     failed = int(np.count_nonzero(columns["failure"] != "")) - left_out
+    parts = [f"{attributes.get('duration', 0.0):.4g} s of motion"]
+    parts.append(f"reference good to {attributes.get('reference_error', 0.0):.1e}")
     parts += [f"failed {failed}"] if failed else []
     parts += [f"left out for want of time {left_out}"] if left_out else []
     return first, "   ·   ".join(parts)
 
 
-def _curves(columns: dict[str, NDArray[Any]]) -> tuple[Curve, ...]:
-    """The methods in the order of the file."""
-    labels = list(dict.fromkeys(columns["method"].tolist()))
-    usual = Counter(columns["nodes"].tolist()).most_common(1)[0][0]
-    counts = sorted({n for n in columns["nodes"].tolist() if n not in (0.0, usual)})
-    curves = []
-    for label in labels:
-        places = np.flatnonzero(columns["method"] == label)
-        first = {name: columns[name][places[0]] for name in (*_TEXTS, "nodes")}
-        curves.append(Curve(label, places, _look(first, counts)))
-    return tuple(curves)
-
-
-def _look(method: dict[str, Any], counts: list[float]) -> dict[str, Any]:
-    """Colour by the kind of scheme, marker by weights; hollow: the paper's start, dashes: the fixed point."""
-    colour, marker = _COLOURS.get(method["scheme"], GREEN), _MARKERS.get(method["theta"], "P")
-    if method["evaluator"] == Evaluator.EXACT and method["scheme"] != Scheme.EVENT_DRIVEN:
-        colour = PURPLE
-    elif method["evaluator"] == Evaluator.MIDPOINT and method["nodes"] in counts:
-        colour, marker = SKY, _NODE_MARKERS[counts.index(method["nodes"]) % len(_NODE_MARKERS)]
-    hollow = method["start"] == Start.PAPER
-    fixed = method["iteration"] == Iteration.FIXED_POINT
-    own = method["scheme"] == Scheme.EVENT_DRIVEN
-    return {
-        "color": colour,
-        "marker": marker,
-        "markersize": 9.0 if own else 5.0,
-        "markerfacecolor": "white" if hollow else colour,
-        "linestyle": (0, (2, 1.5)) if fixed else "-",
-        "linewidth": 2.0 if own else 1.1,
-        "zorder": 3.0 if own else 2.0,
-    }
-
-
-def draw_comparison(picture: ComparisonPicture) -> "Figure":
-    """The figure: error against time, if it was measured, and error against evaluations of the contact."""
-    figure = headed(12.4, 6.6, picture.title, *picture.lines)
-    layout(figure).set(wspace=0.04)
-    count = 2 if picture.timed else 1
-    panels = figure.subplots(1, count, sharey=True, squeeze=False)[0]
-    if picture.timed:
-        _draw(panels[0], picture, "wall_seconds", 1e3)
+def draw(picture: ComparisonPicture) -> Figure:
+    """The figure: error against time, if it was measured, and error against evaluations of the contact force."""
+    figure = style.headed(12.4, 6.6, picture.title, *picture.lines, wspace=0.04)
+    timed = bool(np.isfinite(picture["wall_seconds"]).any())
+    panels = figure.subplots(1, 1 + timed, sharey=True, squeeze=False)[0]
+    looks = _looks(picture)
+    if timed:
+        _draw_errors(panels[0], picture, looks, 1e3 * picture["wall_seconds"])
         _draw_front(panels[0], picture)
         panels[0].set(title="Work–precision", xlabel="median time of the loop (ms)")
-    _draw(panels[-1], picture, "contact_evaluations", 1.0)
+    _draw_errors(panels[-1], picture, looks, picture["contact_evaluations"])
     _draw_slopes(panels[-1], picture)
     panels[-1].set(title="Work counted, the same on every machine", xlabel="evaluations of the contact force")
     for axes in panels:
@@ -169,99 +119,105 @@ def draw_comparison(picture: ComparisonPicture) -> "Figure":
         _set_ticks(axes)
     panels[0].set_ylabel("largest relative error of x, y, ẋ, ẏ")
     _set_errors(panels[0], picture)
-    handles: dict[str, Any] = {}
-    for axes in panels:
-        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-            handles.setdefault(label, handle)
-    figure.legend(
-        handles.values(),
-        handles.keys(),
-        loc="outside right center",
-        frameon=False,
-        handlelength=2.6,
-        labelspacing=0.6,
-    )
+    found = style.labels(figure)
+    look: dict[str, Any] = {"frameon": False, "handlelength": 2.6, "labelspacing": 0.6}
+    figure.legend(found.values(), found.keys(), loc="outside right center", **look)
     return figure
 
 
-def _draw(axes: "Axes", picture: ComparisonPicture, along: str, factor: float) -> None:
-    """Every method, the target, and what the reference cannot tell."""
-    axes.set(xscale="log", yscale="log")
-    for curve in picture.curves:
-        x, y = factor * picture[along][curve.places], picture["error"][curve.places]
-        drawn = np.isfinite(x) & (x > 0.0) & (y > 0.0) & (y <= LARGEST)
-        if drawn.any():
-            axes.plot(np.where(drawn, x, np.nan), np.where(drawn, y, np.nan), label=curve.label, **curve.look)
-    if picture.target > 0.0:
-        axes.axhline(
-            picture.target, color=GREEN, ls=DASHES, lw=1.3, zorder=1.0, label=f"target {picture.target:g}"
-        )
-    best = picture.recommended
-    if best is not None and math.isfinite(picture[along][best]):
-        at = factor * picture[along][best], picture["error"][best]
-        ring: dict[str, Any] = {
-            "marker": "o",
-            "markersize": 16.0,
-            "markerfacecolor": "none",
-            "markeredgecolor": GREEN,
+def _looks(picture: ComparisonPicture) -> dict[str, dict[str, Any]]:
+    """The look of each method, in the order of the file.
+
+    The colour shows the scheme, the marker its weights, a hollow marker the paper's start, and dashes the fixed
+    point iteration. Colour and marker also tell methods apart that differ in the contact force only.
+    """
+    nodes = picture["nodes"].tolist()
+    usual = Counter(nodes).most_common(1)[0][0]
+    others = sorted({number for number in nodes if number not in (0.0, usual)})
+    looks = {}
+    for label in dict.fromkeys(picture["method"].tolist()):
+        entry = {name: values[picture["method"] == label][0] for name, values in picture.columns.items()}
+        scheme = SCHEMES.get(entry["scheme"])
+        colour, own = (scheme.colour, scheme.own_steps) if scheme else (style.GREEN, False)
+        marker = _MARKERS.get(entry["theta"], "P")
+        if entry["evaluator"] == Evaluator.EXACT and not own:
+            colour = _EXACT
+        elif entry["evaluator"] == Evaluator.MIDPOINT and entry["nodes"] in others:
+            colour, marker = _OTHER_NODES, _NODE_MARKERS[others.index(entry["nodes"]) % len(_NODE_MARKERS)]
+        looks[label] = {
+            "color": colour,
+            "marker": marker,
+            "markersize": 9.0 if own else 5.0,
+            "markerfacecolor": "white" if entry["start"] == Start.PAPER else colour,
+            "linestyle": (0, (2, 1.5)) if entry["iteration"] == Iteration.FIXED_POINT else "-",
+            "linewidth": 2.0 if own else 1.1,
+            "zorder": 3.0 if own else 2.0,
         }
-        axes.plot(*at, ls="none", markeredgewidth=2.2, zorder=4.0, label="recommended", **ring)
+    return looks
 
 
-def _draw_front(axes: "Axes", picture: ComparisonPicture) -> None:
+def _draw_errors(
+    axes: Axes, picture: ComparisonPicture, looks: dict[str, dict[str, Any]], work: NDArray[np.float64]
+) -> None:
+    """The error of every method over its work, the target, and the recommended entry."""
+    axes.set(xscale="log", yscale="log")
+    for label, look in looks.items():
+        places = picture["method"] == label
+        drawn = (picture.drawn & (work > 0.0))[places]
+        if drawn.any():
+            x, y = (np.where(drawn, values[places], np.nan) for values in (work, picture["error"]))
+            axes.plot(x, y, label=label, **look)
+    if picture.target > 0.0:
+        label = f"target {picture.target:g}"
+        axes.axhline(picture.target, color=style.GREEN, ls=style.DASHES, lw=1.3, zorder=1.0, label=label)
+    best = picture.recommended
+    if best is not None and math.isfinite(work[best]):
+        ring: dict[str, Any] = {"ms": 16.0, "mfc": "none", "mec": style.GREEN, "mew": 2.2, "zorder": 4.0}
+        axes.plot(work[best], picture["error"][best], "o", label="recommended", **ring)
+
+
+def _draw_front(axes: Axes, picture: ComparisonPicture) -> None:
     """The entries that no other beats in both error and time."""
-    on = np.flatnonzero((picture["on_front"] == 1) & (picture["error"] <= LARGEST) & (picture["error"] > 0.0))
+    on = np.flatnonzero((picture["on_front"] == 1) & picture.drawn)
     on = on[np.argsort(picture["wall_seconds"][on], kind="stable")]
     x, y = 1e3 * picture["wall_seconds"][on], picture["error"][on]
-    look: dict[str, Any] = {"color": GREY, "alpha": 0.45, "lw": 8.0, "solid_capstyle": "round", "zorder": 0.9}
-    axes.plot(x, y, label="no other is better in both", **look)
+    look: dict[str, Any] = {"color": style.GREY, "alpha": 0.45, "lw": 8.0, "solid_capstyle": "round"}
+    axes.plot(x, y, zorder=0.9, label="no other is better in both", **look)
 
 
-def _draw_slopes(axes: "Axes", picture: ComparisonPicture) -> None:
+def _draw_slopes(axes: Axes, picture: ComparisonPicture) -> None:
     """How errors fall with the work at orders one and two, from the coarsest steps on."""
-    x, y = picture["contact_evaluations"], picture["error"]
-    stepped = np.isfinite(picture["step"]) & (x > 0.0) & (y > 0.0) & (y <= LARGEST)
+    work = picture["contact_evaluations"]
+    stepped = np.isfinite(picture["step"]) & (work > 0.0) & picture.drawn
     if not stepped.any():
         return
-    low, high = float(x[stepped].min()), float(x[stepped].max())
-    top = 1.5 * float(y[stepped].max())
+    ends = np.array([work[stepped].min(), work[stepped].max()])
+    top = 1.5 * float(picture["error"][stepped].max())
     note: dict[str, Any] = {"xytext": (4, 0), "textcoords": "offset points", "va": "center", "size": 8.5}
     for order in (1, 2):
-        ends = np.array([low, high])
-        axes.plot(ends, top * (ends / low) ** -order, color="#777777", lw=0.9, ls=(0, (1, 2)), zorder=0.8)
-        axes.annotate(f"order {order}", (high, top * (high / low) ** -order), color="#555555", **note)
+        errors = top * (ends / ends[0]) ** -order
+        axes.plot(ends, errors, color="#777777", lw=0.9, ls=(0, (1, 2)), zorder=0.8)
+        axes.annotate(f"order {order}", (ends[1], errors[1]), color="#555555", **note)
 
 
-def _set_ticks(axes: "Axes") -> None:
-    """Ticks along the work that read as numbers: at 1, 2 and 5 where there are few decades."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
+def _set_ticks(axes: Axes) -> None:
+    """Ticks along the work that read as numbers where there are few decades."""
     low, high = axes.get_xlim()
-    few = high / low < FEW_DECADES
-    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if few else (1.0,)))
+    axes.xaxis.set_major_locator(style.log_locator(high / low))
     axes.xaxis.set_minor_formatter(NullFormatter())
-    if few:
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    if high / low < style.WIDE:
+        axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
 
 
-def _set_errors(axes: "Axes", picture: ComparisonPicture) -> None:
-    """Errors from the smallest to the largest that are drawn; below its own error the reference tells nothing."""
-    from matplotlib.ticker import LogLocator
-
-    drawn = picture["error"][(picture["error"] > 0.0) & (picture["error"] <= LARGEST)]
+def _set_errors(axes: Axes, picture: ComparisonPicture) -> None:
+    """Errors from the smallest to the largest drawn; those within the reference's error are shaded."""
+    drawn = picture["error"][picture.drawn]
     if not drawn.size:
         return
     low, high = 0.4 * min(float(drawn.min()), picture.target or LARGEST), 2.5 * float(drawn.max())
     axes.set_ylim(low, high)
     axes.yaxis.set_major_locator(LogLocator(numticks=20))
     if picture.reference_error > low:
+        band: dict[str, Any] = {"color": style.GREY, "alpha": 0.2, "lw": 0, "zorder": 0.5}
         for panel in axes.figure.axes:
-            panel.axhspan(
-                low,
-                picture.reference_error,
-                color=GREY,
-                alpha=0.2,
-                lw=0,
-                zorder=0.5,
-                label="within the reference's error",
-            )
+            panel.axhspan(low, picture.reference_error, label="within the reference's error", **band)

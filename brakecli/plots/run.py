@@ -1,34 +1,42 @@
-"""What a picture of a run shows, in SI units, gathered from its result.
+"""The picture of a run: motion in detail, whole history, phase portrait and spectrum.
 
-It is read in pieces: a run of 10^8 samples takes no more memory than a short one.
+The history is read in pieces: a run of 10^8 samples takes no more memory than a short one.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from brakecli.case.case import Case
 from brakecli.case.read import parse_case
-from brakecli.errors import CaseError, UnreadableResultError
+from brakecli.case.system import system_of
+from brakecli.errors import CaseError
 from brakecli.files.read import StoredResult
+from brakecli.plots import style
+from brakecli.plots.style import Array
 from brakecli.solver.quantities import ContactState
+from brakecli.solver.schedules import Schedule
 
-Array = NDArray[np.float64]
 Reader = Callable[[str, int, int], NDArray[Any]]
-"""The samples start … stop - 1 of a variable of the history."""
+"""Reads the samples start … stop - 1 of a variable of the history."""
 
 CYCLES = 12
+"""Number of cycles drawn in detail."""
 MOST_DETAIL = 100_000
-"""Samples drawn one by one, at most."""
+"""Largest number of samples drawn one by one."""
 FEW = 4000
-"""Samples of the detail where no frequency tells how long a cycle is."""
+"""Number of samples of the detail where no frequency says how long a cycle is."""
 COLUMNS = 1200
-"""Columns of the envelope: about the width of its panel in pixels."""
+"""Number of columns of the envelope: about the width of its panel in pixels."""
 BLOCK = 1 << 20
-"""Samples read at a time."""
+"""Number of samples read at a time."""
+_SHADES = ((ContactState.STICK, style.ORANGE, "stick"), (ContactState.SEPARATED, style.GREY, "no contact"))
 
 
 @dataclass(frozen=True)
@@ -43,57 +51,63 @@ class Detail:
     belt: Array
     interval: float
 
+    @property
+    def near(self) -> bool:
+        """Whether the wheel's surface speed fits beside the motion without flattening it."""
+        moving = style.largest(self.vx)
+        return moving == 0.0 or style.largest(self.belt) <= 4.0 * moving
+
+    @property
+    def velocity_unit(self) -> tuple[float, str]:
+        """Factor and unit for the velocities that are drawn."""
+        return style.prefixed(max(style.largest(self.vx), style.largest(self.belt) if self.near else 0.0), "m/s")
+
 
 @dataclass(frozen=True)
-class Picture:
-    """Everything that is drawn, in SI units."""
+class RunPicture:
+    """Everything that is drawn of a run, in SI units."""
 
     title: str
     summary: str
     detail: Detail
     span: tuple[float, float]  # s, of the whole run
-    time: Array  # of the envelope's columns
-    lowest: Array
-    highest: Array
-    frequency: Array
-    density: Array
+    envelope: tuple[Array, Array, Array]  # time, least and greatest x of its columns
+    spectrum: tuple[Array, Array]  # frequency, density
     spectrum_from: float  # s
     fundamental: float | None  # Hz
     peak: float | None  # Hz
-    passing: tuple[float, ...]  # Hz
+    passing: tuple[float, ...]  # Hz, of the waves of a wheel that turns steadily
 
 
-def gather(result: StoredResult) -> Picture:
+def gather(result: StoredResult) -> RunPicture:
     """Read from a result what its picture shows; raises UnreadableResultError where it is not there."""
     variables = result.variables("history")
     needed = ("time", "x", "vx", "state")
     shapes = {variables[name].shape for name in needed if name in variables}
     if not variables.keys() >= set(needed) or len(shapes) != 1 or not (samples := max(shapes)[0]):
-        raise _unreadable(result, f"its history has no {', '.join(needed)} of equal length above 0")
-
-    def read(name: str, start: int, stop: int) -> NDArray[Any]:
-        return result.read("history", name, start, stop)
-
-    case = _case(result)
+        raise style.unreadable(result, f"its history has no {', '.join(needed)} of equal length above 0")
+    try:
+        case = parse_case(str(result.attributes.get("resolved_toml", "")), "its resolved case").case
+    except CaseError as error:
+        raise style.unreadable(result, f"the case in it is not valid: {error.problems[0]}") from error
+    system = system_of(case)
+    steady, speed = np.ptp(system.belt["value"]) == 0.0, system.fastest_belt
+    read = partial(result.read, "history")
     start, end = (float(read("time", i, i + 1)[0]) for i in (0, samples - 1))
     interval = (end - start) / (samples - 1) if samples > 1 else case.output.sample_interval
-    fundamental, peak = _number(result, "frequency"), _number(result, "spectrum_peak")
-    places, lowest, highest = envelope(lambda first, last: read("x", first, last), samples)
+    places, lowest, highest = envelope(partial(read, "x"), samples)
     first_sample = result.group_attributes("spectrum").get("first_sample", 0)
-    return Picture(
+    return RunPicture(
         title=case.title or "Case without a title",
         summary=_summary(result),
-        detail=_detail(read, samples, interval, case, result),
+        detail=_detail(read, samples, interval, system.belt, result),
         span=(start, end),
-        time=start + interval * places,
-        lowest=lowest,
-        highest=highest,
-        frequency=result.read("spectrum", "frequency"),
-        density=result.read("spectrum", "vx"),
+        envelope=(start + interval * places, lowest, highest),
+        spectrum=(result.read("spectrum", "frequency"), result.read("spectrum", "vx")),
         spectrum_from=start + interval * float(first_sample),
-        fundamental=fundamental,
-        peak=peak,
-        passing=_passing(case),
+        fundamental=_number(result, "frequency"),
+        peak=_number(result, "spectrum_peak"),
+        passing=tuple(sorted(speed * system.wheel.turns)) if steady and speed else (),
     )
 
 
@@ -124,7 +138,7 @@ def episodes(state: NDArray[Any], wanted: ContactState) -> list[tuple[int, int]]
     return [(int(first), int(behind) - 1) for first, behind in edges.reshape(-1, 2)]
 
 
-def _detail(read: Reader, samples: int, interval: float, case: Case, result: StoredResult) -> Detail:
+def _detail(read: Reader, samples: int, interval: float, belt: Schedule, result: StoredResult) -> Detail:
     """The last cycles of the run, or of the motion where it has come to rest."""
     fundamental = _number(result, "frequency")
     frequency = fundamental or _number(result, "spectrum_peak")
@@ -139,7 +153,7 @@ def _detail(read: Reader, samples: int, interval: float, case: Case, result: Sto
         stop, name = rest, "Last motion, then stick"
     first = max(0, stop - length)
     time, x, vx, state = (read(variable, first, stop) for variable in ("time", "x", "vx", "state"))
-    return Detail(name, time, x, vx, state, _belt(case, time), interval)
+    return Detail(name, time, x, vx, state, np.interp(time, belt["time"], belt["value"]), interval)
 
 
 def _last_motion(read: Reader, samples: int) -> int:
@@ -150,25 +164,6 @@ def _last_motion(read: Reader, samples: int) -> int:
         if moving.size:
             return begin + int(moving[-1]) + 1
     return 0
-
-
-def _belt(case: Case, time: Array) -> Array:
-    """U (m/s) at some times."""
-    wheel = case.wheel
-    speeds: Any = wheel.angular_speeds or (wheel.angular_speed or 0.0,)
-    speed: Array = wheel.radius * np.interp(time, wheel.times or (0.0,), speeds)
-    return speed
-
-
-def _passing(case: Case) -> tuple[float, ...]:
-    """Frequencies (Hz) at which the waves of the wheel pass; none where its speed changes."""
-    wheel, profile = case.wheel, case.roughness.wheel
-    if profile is None or (wheel.angular_speeds and len(set(wheel.angular_speeds)) > 1):
-        return ()
-    speed = abs(float(_belt(case, np.zeros(1))[0]))
-    waves = [1.0 / length for length in profile.wavelengths or ()]
-    waves += [number / (2.0 * np.pi) for number in profile.wavenumbers or ()]
-    return tuple(sorted(speed * wave for wave in waves if speed > 0.0))
 
 
 def _summary(result: StoredResult) -> str:
@@ -183,7 +178,7 @@ def _summary(result: StoredResult) -> str:
     if frequency := _number(result, "frequency"):
         parts.append(f"{frequency:.4g} Hz")
     if (amplitude := _number(result, "amplitude")) and excitation != "none":
-        factor, unit = prefixed(amplitude, "m")
+        factor, unit = style.prefixed(amplitude, "m")
         parts.append(f"amplitude of x {amplitude * factor:.3g} {unit}")
     for name, words in (("stick_fraction", "stick"), ("contact_loss_fraction", "contact lost")):
         if share := _number(result, name):
@@ -196,21 +191,121 @@ def _number(result: StoredResult, name: str) -> float | None:
     return float(value) if isinstance(value, int | float) else None
 
 
-def _case(result: StoredResult) -> Case:
-    try:
-        return parse_case(str(result.attributes.get("resolved_toml", "")), "its resolved case").case
-    except CaseError as error:
-        raise _unreadable(result, f"the case it holds is none: {error.problems[0]}") from error
+def draw(picture: RunPicture) -> Figure:
+    """The figure with its four panels."""
+    figure = style.headed(10.4, 7.2, picture.title, picture.summary, wspace=0.05, hspace=0.06)
+    panels = figure.subplots(2, 2, width_ratios=(1.55, 1.0))
+    _draw_detail(panels[0, 0], picture.detail)
+    _draw_portrait(panels[0, 1], picture.detail)
+    _draw_history(panels[1, 0], picture)
+    _draw_spectrum(panels[1, 1], picture)
+    return figure
 
 
-def _unreadable(result: StoredResult, reason: str) -> UnreadableResultError:
-    return UnreadableResultError(f"{result.path}: cannot be drawn: {reason}; compute it again")
+def _draw_detail(axes: Axes, detail: Detail) -> None:
+    factor, unit = detail.velocity_unit
+    axes.plot(detail.time, factor * detail.vx, color=style.BLUE, marker=_marker(detail.time))
+    look: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "alpha": 0.3, "lw": 0, "zorder": 0.5}
+    for state, colour, label in _SHADES:
+        spans = [
+            (detail.time[first] - 0.5 * detail.interval, (last - first + 1) * detail.interval)
+            for first, last in episodes(detail.state, state)
+        ]
+        if spans:
+            axes.broken_barh(spans, (0, 1), color=colour, label=label, **look)
+    if detail.near:
+        label = f"U = {factor * detail.belt[-1]:.4g} {unit}" if np.ptp(detail.belt) == 0.0 else "U"
+        axes.plot(detail.time, factor * detail.belt, color=style.VERMILION, ls=style.DASHES, lw=1.1, label=label)
+    if len(detail.time) > 1:
+        axes.set_xlim(detail.time[0], detail.time[-1])
+    axes.set(title=f"{detail.name}: tangential velocity", xlabel="time (s)", ylabel=f"velocity ẋ ({unit})")
+    _note_far(axes, detail)
+    _add_legend(axes)
 
 
-def prefixed(largest: float, unit: str) -> tuple[float, str]:
-    """By what to multiply values up to `largest` for a unit that makes them easy to read, and its name."""
-    if 0.0 < largest < 1e6:
-        for exponent, prefix in ((3, "k"), (0, ""), (-3, "m"), (-6, "µ"), (-9, "n"), (-12, "p")):
-            if largest >= 10.0**exponent:
-                return 10.0**-exponent, prefix + unit
-    return 1.0, unit
+def _draw_portrait(axes: Axes, detail: Detail) -> None:
+    centre = _centre(detail.x)
+    x_factor, x_unit = style.prefixed(style.largest(detail.x - centre), "m")
+    factor, unit = detail.velocity_unit
+    x, vx = x_factor * (detail.x - centre), factor * detail.vx
+    axes.plot(x, vx, color=style.BLUE, lw=0.9, marker=_marker(x))
+    stick = detail.state == ContactState.STICK
+    axes.plot(x[stick], vx[stick], color=style.ORANGE, ls="none", marker="o", ms=3.0)
+    for speed in np.unique([detail.belt.min(), detail.belt.max()]) if detail.near else ():
+        axes.axhline(factor * speed, color=style.VERMILION, ls=style.DASHES, lw=1.1)
+    axes.locator_params(axis="x", nbins=6)
+    about = f" − ({centre:.12g} m)".replace("-", "−") if centre else ""
+    axes.set(title="Phase portrait", xlabel=f"displacement x{about} ({x_unit})", ylabel=f"velocity ẋ ({unit})")
+    _note_far(axes, detail)
+
+
+def _note_far(axes: Axes, detail: Detail) -> None:
+    if not detail.near:
+        note = f"U = {detail.belt[-1]:.4g} m/s, off the scale"
+        axes.set_title(note, loc="right", size=8.5, color=style.VERMILION)
+
+
+def _draw_history(axes: Axes, picture: RunPicture) -> None:
+    time, lowest, highest = picture.envelope
+    factor, unit = style.prefixed(max(style.largest(lowest), style.largest(highest)), "m")
+    axes.fill_between(time, factor * lowest, factor * highest, color=style.BLUE, lw=0.9)
+    if len(time) < 3:
+        axes.plot(time, factor * lowest, color=style.BLUE, marker="o", ms=4.0)
+    detail = picture.detail.time
+    if len(detail) > 1 and detail[-1] - detail[0] < 0.9 * (picture.span[1] - picture.span[0]):
+        axes.axvspan(detail[0], detail[-1], color=style.GREEN, alpha=0.25, lw=0, zorder=0.5, label="drawn above")
+    if picture.span[1] > picture.span[0]:
+        axes.set_xlim(*picture.span)
+    axes.set(title="Whole run: tangential displacement", xlabel="time (s)", ylabel=f"displacement x ({unit})")
+    _add_legend(axes)
+
+
+def _draw_spectrum(axes: Axes, picture: RunPicture) -> None:
+    axes.set(title=f"Spectrum of ẋ from {picture.spectrum_from:.4g} s on")
+    axes.set(xlabel="frequency (Hz)", ylabel="power spectral density ((m/s)²/Hz)")
+    frequency, density = picture.spectrum
+    shown = density > 0.0
+    shown[:1] = False  # the mean was removed
+    if not shown.any():
+        axes.set(xticks=[], yticks=[])
+        style.write_inside(axes, "no motion")
+        return
+    line = picture.fundamental or picture.peak
+    highest = min(frequency[-1], max([6.5 * (line or np.inf), *(1.3 * f for f in picture.passing)]))
+    near = shown & (frequency <= highest)
+    near = near if near.any() else shown
+    frequency, density = frequency[near], density[near]
+    lowest = max(0.3 * float(density.min()), 1e-10 * float(density.max()))
+    axes.semilogy(frequency, density, color=style.BLUE, lw=1.0, marker=_marker(frequency))
+    axes.set_ylim(lowest, 30.0 * float(density.max()))
+    axes.set_xlim(0.0, min(highest, max(1.3 * float(frequency[density > lowest][-1]), 2.0 * (line or 0.0))))
+    for number, wave in enumerate(picture.passing):
+        label = None if number else "waves of the wheel pass"
+        axes.axvline(wave, color=style.VERMILION, ls=style.DASHES, lw=0.9, zorder=0.8, label=label)
+    if line:
+        label = f"{'fundamental' if picture.fundamental else 'highest peak'} {line:.4g} Hz"
+        axes.axvline(line, color=style.GREEN, ls=(0, (1, 1.5)), lw=1.4, zorder=0.9, label=label)
+    if axes.get_legend_handles_labels()[1]:
+        axes.legend(loc="upper right")
+
+
+def _add_legend(axes: Axes) -> None:
+    """A legend, if there is anything to explain, with room for it above the data."""
+    if axes.get_legend_handles_labels()[1]:
+        low, high = axes.get_ylim()
+        axes.set_ylim(low, high + 0.14 * (high - low))
+        axes.legend(loc="upper right", ncols=3)
+
+
+def _marker(values: Array) -> str:
+    """Dots where samples are so few that a line would not show them."""
+    return "." if len(values) < 40 else ""
+
+
+def _centre(values: Array) -> float:
+    """What to subtract from values that differ too little for readable ticks, in round numbers; otherwise 0."""
+    middle, width = 0.5 * float(values.min() + values.max()), float(np.ptp(values))
+    if not 0.0 < width < 0.1 * abs(middle):
+        return 0.0
+    digits = math.ceil(math.log10(abs(middle) / width))
+    return float(f"{middle:.{digits}e}")

@@ -43,7 +43,7 @@ def _open_part(system: System) -> float:
     """Part of the time in which rough surfaces may be open in part: little if the load presses them together."""
     heights = float(np.abs(system.shoe.g).sum() + np.abs(system.wheel.g).sum())
     spring = system.coefficients.c_yy + system.contact_stiffness
-    return 0.04 if heights * spring < float(np.abs(system.load.values).min()) else 0.12
+    return 0.04 if heights * spring < float(np.abs(system.load["value"]).min()) else 0.12
 
 
 def evaluation_seconds(system: System) -> float:

@@ -16,7 +16,7 @@ from brakecli.runs.cost import duration_text, own_steps, seconds_per_step
 from brakecli.runs.warnings import UNSTABLE, adjustments, nodes_per_wave, steps_per_period, warnings
 from brakecli.solver.history import ROW_BYTES
 from brakecli.solver.links import natural_frequencies
-from brakecli.solver.loop import COLUMNS
+from brakecli.solver.quantities import HISTORY
 from brakecli.solver.system import System
 
 MOST_STEPS = 1e11
@@ -110,7 +110,7 @@ def refuse(system: System, found: Check, free_bytes: float) -> None:
         raise RefusedError(f"the file would be too large, {free_bytes / 1e6:.3g} MB are free: {size}; {remedy}")
     if found.memory > MOST_TABLE_BYTES:
         raise RefusedError(f"the contact's tables would be too large: {size}; reduce contact.nodes")
-    compared = 2.0 * 8.0 * COLUMNS * system.samples
+    compared = 2.0 * 8.0 * len(HISTORY) * system.samples
     if system.method.step is None and compared > MOST_TABLE_BYTES:
         raise RefusedError(
             f"two histories of {system.samples:.3g} samples are compared to keep the tolerance, which takes "

@@ -34,7 +34,7 @@ def modelled(motion: Motion) -> tuple[list[str], list[str]]:
         used.append("stick and slip as a set-valued law, solved for in every step")
     if system.wheel.g.size == 0:
         left.append("the wheel's phase: its surface is the same everywhere")
-    if not system.load.values.any():
+    if not system.load["value"].any():
         left.append("the load: it is zero")
     if c.b_xx == 0.0 == c.b_yy:
         left.append("dashpots: they are zero")

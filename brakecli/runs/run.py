@@ -17,6 +17,7 @@ from brakecli.analysis.regime.spectra import peak, spectrum
 from brakecli.case.read import LoadedCase
 from brakecli.case.system import system_of
 from brakecli.files import fields
+from brakecli.files.field import values_of
 from brakecli.files.write import ResultFile, new_result
 from brakecli.runs.limits import Check, check, free_bytes, refuse, within_range
 from brakecli.runs.modelled import modelled
@@ -71,7 +72,7 @@ class RunReport(RunVerdict):
 
     def numbers(self) -> dict[str, Any]:
         """Names and values as `--json` gives them."""
-        numbers = fields.values(fields.RUN, self)
+        numbers = values_of(fields.RUN, self)
         if self.certificate is None:
             del numbers["certified_by"]
         return numbers
@@ -109,12 +110,11 @@ def run(
     output: Path,
     *,
     force: bool,
-    begin: Callable[[System, Check], None] = lambda system, found: None,
-    progress: Progress = lambda steps: None,
+    progress: Callable[[str, int, int], None] = lambda what, done, total: None,
 ) -> RunReport:
     """Simulate a case and write its result file.
 
-    `begin` receives the system and its limits before the run starts, `progress` the steps done. Raises
+    `progress` is called now and then with what is counted, how many are done, and how many there are. Raises
     RefusedError, CannotWriteError or UsageError before anything is computed, CannotWriteError also later. A run
     that fails numerically is written up to the failure and reported.
     """
@@ -123,10 +123,13 @@ def run(
         found = check(system)
         with new_result(output, force=force) as result:
             refuse(system, found, free_bytes(output.resolve().parent))
-            begin(system, found)
             _declare_history(result)
+
+            def advance(done: int) -> None:
+                progress("steps" if found.step else "samples", done, system.steps)
+
             history = _Written(result, system.interval)
-            motion, certificate = motion_of(system, progress, history.append)
+            motion, certificate = motion_of(system, advance, history.append)
             _require_finite("an energy", list(asdict(motion.energy).values()))
             verdict = verdict_on(history, motion.system, motion.work.failure_sentence)
             top = _write_spectrum(result, history, verdict.settled_from)
@@ -195,7 +198,7 @@ def _write_spectrum(result: ResultFile, history: _Written, start: int) -> float 
     result.axis("spectrum", fields.FREQUENCY, lines.frequency)
     for name, density in lines.density.items():
         result.variable("spectrum", fields.SPECTRUM[name], ("frequency",), density)
-    result.set_attributes(fields.values(fields.WELCH, lines), "spectrum")
+    result.set_attributes(values_of(fields.WELCH, lines), "spectrum")
     return peak(lines.frequency, lines.density["vx"])
 
 

@@ -120,7 +120,7 @@ def _opens_and_slides(system: System, progress: Progress) -> bool:
 
     Not where speed or load change with time, as steps would have to be short beside what they do.
     """
-    if system.smooth or len(system.belt.times) > 1 or len(system.load.times) > 1:
+    if system.smooth or len(system.belt) > 1 or len(system.load) > 1:
         return False
     coarse = replace(_two_layer(system.method), step=_coarsest(system), nodes=0)
     work = _run(system, coarse, lambda samples: progress(0)).work
@@ -220,7 +220,7 @@ def _by_steps(
 
 def _shortest_span(system: System) -> float:
     """Between two knots of speed or load, s; infinite where there are none."""
-    return min(float(np.diff(each.times).min(initial=math.inf)) for each in (system.belt, system.load))
+    return min(float(np.diff(each["time"]).min(initial=math.inf)) for each in (system.belt, system.load))
 
 
 def _jump_error(run: Motion) -> float:

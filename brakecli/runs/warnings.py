@@ -64,7 +64,7 @@ def warnings(system: System, limits: StepLimits, steps: int) -> Iterator[str]:
             f"take at least {math.ceil(system.nodes * _COARSE_NODES / per_wave)}, or leave nodes out"
         )
     yield from _of_the_scheme(system, limits, steps)
-    if system.load.values.min() < 0.0:
+    if system.load["value"].min() < 0.0:
         yield "load: the force is negative at times, it lifts the shoe off the wheel"
 
 
@@ -88,7 +88,7 @@ def _unresolved(system: System) -> Iterator[str]:
             f"take a step of at most {1.0 / (RESOLVED * passing):.2g} s"
         )
     speed = system.fastest_belt
-    grip = system.coefficients.phi * float(np.abs(system.load.values).max()) / system.coefficients.m
+    grip = system.coefficients.phi * float(np.abs(system.load["value"]).max()) / system.coefficients.m
     if 0.0 < speed < grip * step:
         yield (
             f"solver.step: friction changes the shoe's velocity by up to {grip * step:.3g} m/s in "

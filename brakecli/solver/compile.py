@@ -1,6 +1,6 @@
-"""How kernels are compiled: one decorator, one cache on disk, and the signatures that plug-ins share.
+"""How kernels are compiled: one decorator, one cache on disk, and calls by address.
 
-A scheme or a contact evaluator is handed to the time loop as a compiled function pointer, so that one compiled
+A scheme or a contact evaluator is handed to the time loop as the address of its machine code, so that one compiled
 loop serves them all and stays in the cache. Kernels neither allocate, raise nor print: they return a status.
 """
 
@@ -8,41 +8,15 @@ import hashlib
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
-import numpy as np
-from numba import float64, njit, types, void
+from numba import float64, njit, types
 from numba.core import cgutils
 from numba.core import config as numba_config
 from numba.extending import intrinsic
-from numpy.typing import NDArray
 
 config: Any = numba_config  # its settings come from the environment, so type checkers know none of them
 F = TypeVar("F", bound=Callable[..., Any])
-
-
-class Coefficients(NamedTuple):
-    """The constants of (6)-(7) and of the friction law, in the paper's symbols (SI units)."""
-
-    m: float
-    b_xx: float
-    b_xy: float
-    b_yy: float
-    c_xx: float
-    c_xy: float
-    c_yy: float
-    sin_beta: float  # Q_x = Q sin(beta)
-    cos_beta: float  # Q_y = Q cos(beta)
-    phi: float
-
-
-class Weights(NamedTuple):
-    """Step h (s) and weights of a difference scheme; theta_3 is unused by a two-layer scheme."""
-
-    h: float
-    theta_1: float
-    theta_2: float
-    theta_3: float
 
 
 def source_hash() -> str:
@@ -75,13 +49,16 @@ def cache_is_cold() -> bool:
 def kernel(signature: Any, *, fastmath: frozenset[str] = frozenset(), inlined: bool = True) -> Callable[[F], F]:
     """Compile a function ahead of its first call for one signature, strictly (no fastmath unless named).
 
-    A large one that is called in many places is better not `inlined`: compiling takes ten times as long else.
+    A large one that is called in many places is better not `inlined`: otherwise compilation takes ten times
+    longer. Such a one, and one whose name begins with an underscore, cannot be called from Python: to wrap their
+    arguments would take longer than to compile them.
     """
 
     def compile_(function: F) -> F:
         before, config.CACHE_DIR = config.CACHE_DIR, str(CACHE or config.CACHE_DIR)
         try:
-            options: dict[str, Any] = {"fastmath": set(fastmath), "forceinline": inlined}
+            options: dict[str, Any] = {"fastmath": set(fastmath), "forceinline": inlined, "no_cfunc_wrapper": True}
+            options["no_cpython_wrapper"] = not inlined or function.__name__.startswith("_")
             try:
                 return njit(signature, cache=CACHE is not None, **options)(function)  # type: ignore[no-any-return]
             except OSError:  # a cache that cannot be written or read, on a full disk: do without
@@ -95,48 +72,68 @@ def kernel(signature: Any, *, fastmath: frozenset[str] = frozenset(), inlined: b
 vector = float64[::1]
 """A contiguous array of doubles."""
 
-COEFFICIENTS = types.NamedUniTuple(float64, len(Coefficients._fields), Coefficients)
-WEIGHTS = types.NamedUniTuple(float64, len(Weights._fields), Weights)
 
-EVALUATE = void(float64, float64, vector, vector, vector)
-"""evaluate(x, y, angles, pad, contact): fills `contact` (see `solver.contact`) for a position of the shoe."""
+vector = float64[::1]
+"""A contiguous array of doubles."""
 
-PREPARE = void(COEFFICIENTS, WEIGHTS, vector, float64, float64, float64, vector)
-"""prepare(coefficients, weights, state, Q, U_now, U_next, problem): sets up the minimisation of one step."""
+_functions: list[Any] = []
 
-FINISH = void(COEFFICIENTS, WEIGHTS, vector, float64, float64, float64, vector, vector, vector)
-"""finish(coefficients, weights, state, Q, U_now, U_next, problem, contact, work): the new state, works added."""
 
-# `state`: the motion at the current time level. The names ending in _OLD belong to the level before.
-X, Y, VX, VY, X_OLD, Y_OLD, FORCE = range(7)
-STATE_SIZE = 7
+def address(function: Any) -> int:
+    """Where the machine code of a kernel is. An interpreted one gets a number instead."""
+    if config.DISABLE_JIT:
+        if function not in _functions:
+            _functions.append(function)
+        return _functions.index(function)
+    (compiled,) = function.overloads.values()
+    return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))
 
-# `problem`: J(d, e) = a11 d^2/2 + a12 d e + a22 e^2/2 - g1 d - (g2 + F) e + phi F |d - U|, (14) and (25); the
-# contact sees the shoe at (x0 + gain d, y0 + gain e). Then its solution.
-(A_11, A_12, A_22, G_1, G_2, X_0, Y_0, GAIN, BELT, D, E, F_Y, SIDE, D_SLOPE, E_SLOPE, RESIDUAL) = range(16)
-PROBLEM_SIZE = 16
 
-# `contact`: what an evaluator returns (see `brakecli.solver.contact` for each entry), then its scratch.
-NORMAL_FORCE, STIFFNESS, TANGENTIAL, FRACTION, STORE, STORE_X, KIND, VALID, SCRATCH = range(9)
+def at_address(signature: Any) -> Any:
+    """What turns the address of a kernel of this signature into a function that compiled code can call.
 
-# `work`: energies that have passed since the start, J; see `brakecli.solver.energy`.
-W_BELT, W_FRICTION, W_DASHPOTS, W_LOAD, W_ROUGHNESS, W_SCHEME, STORE_X_BEFORE, FORCE_BEFORE = range(8)
-WORK_SIZE = 8
+    The conversion costs nothing, whereas a function that is handed to compiled code costs 0.2 ms in each call.
+    """
+    function = types.FunctionType(signature)
+
+    @intrinsic
+    def callable_at(typing: Any, address: Any) -> Any:
+        def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            pointers = cgutils.create_struct_proxy(function)(context, builder)
+            pointers.c_addr = pointers.py_addr = cgutils.get_null_value(cgutils.voidptr_t)
+            pointers.jit_addr = builder.inttoptr(arguments[0], cgutils.voidptr_t)
+            return pointers._getvalue()
+
+        return function(types.int64), codegen
+
+    return _functions.__getitem__ if config.DISABLE_JIT else callable_at
+
+
+def _without_counts(context: Any, builder: Any, type_: Any, value: Any) -> Any:
+    """The value with the reference count of every array in it removed."""
+    if isinstance(type_, types.Array):
+        array = context.make_array(type_)(context, builder, value)
+        array.meminfo = cgutils.get_null_value(array.meminfo.type)
+        return array._getvalue()
+    if isinstance(type_, types.BaseTuple):
+        members: Any = type_
+        for index, member in enumerate(members):
+            item = _without_counts(context, builder, member, builder.extract_value(value, index))
+            value = builder.insert_value(value, item, index)
+    return value
 
 
 @intrinsic
-def _without_count(typing: Any, array: Any) -> Any:
+def _borrowed(typing: Any, value: Any) -> Any:
     def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        struct = context.make_array(signature.args[0])(context, builder, arguments[0])
-        struct.meminfo = cgutils.get_null_value(struct.meminfo.type)
-        return struct._getvalue()
+        return _without_counts(context, builder, signature.args[0], arguments[0])
 
-    return array(array), codegen
+    return value(value), codegen
 
 
-def _same(array: NDArray[np.float64]) -> NDArray[np.float64]:
-    return array
+def _same(value: Any) -> Any:
+    return value
 
 
-borrowed: Any = _same if config.DISABLE_JIT else _without_count
-"""The array without its reference count, which costs a kernel 10 ns for each array that it passes on."""
+borrowed: Any = _same if config.DISABLE_JIT else _borrowed
+"""A tuple whose arrays have no reference counts, which cost a kernel 10 ns for each array that it passes on."""

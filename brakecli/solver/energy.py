@@ -1,14 +1,15 @@
 """The energy account of a run: what came in, what went out, what is stored, and what does not add up."""
 
 from dataclasses import dataclass
+from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from brakecli.solver.compile import W_BELT, W_DASHPOTS, W_FRICTION, W_LOAD, W_ROUGHNESS, W_SCHEME
+from brakecli.solver.records import Coefficients
 
 OPEN_ACCOUNT = 0.1
 """Relative closing error from which on a motion is not worth having: the step does not resolve it."""
+
+Mechanical = tuple[float, float, tuple[float, float], float]
+"""Kinetic energy and energy of the links (J), the position they belong to (m), and how many steps back that is."""
 
 
 @dataclass(frozen=True)
@@ -50,11 +51,20 @@ class EnergyAccount:
         return self.closing_error / largest if largest > 0.0 else 0.0
 
 
-def account(
-    start: tuple[float, float, float], end: tuple[float, float, float], works: NDArray[np.float64]
-) -> EnergyAccount:
+def links_energy(c: Coefficients, x: float, y: float) -> float:
+    """Energy of the stretched links, J."""
+    return float(0.5 * (c.c_xx * x * x + 2.0 * c.c_xy * x * y + c.c_yy * y * y))
+
+
+def energy_at_level(c: Coefficients, state: Any) -> Mechanical:
+    """The energies of a motion whose position and velocity belong to one level."""
+    kinetic = 0.5 * c.m * float(state.v_x**2 + state.v_y**2)
+    return kinetic, links_energy(c, state.x, state.y), (state.x, state.y), 0.0
+
+
+def account(start: tuple[float, float, float], end: tuple[float, float, float], work: Any) -> EnergyAccount:
     """The account between two states, each as energies (kinetic, links, contact), from the works in between."""
     changes = [after - before for before, after in zip(start, end, strict=True)]
-    passed = [float(works[item]) for item in (W_BELT, W_FRICTION, W_DASHPOTS, W_LOAD, W_ROUGHNESS, W_SCHEME)]
+    passed = [float(work[name]) for name in ("belt", "friction", "dashpots", "load", "roughness", "scheme")]
     items = [*changes, *passed, max(sum(start), sum(end))]
     return EnergyAccount(*items)

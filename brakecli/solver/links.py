@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from brakecli.solver.compile import Coefficients
+from brakecli.solver.records import Coefficients
 
 
 def coefficients(

@@ -5,6 +5,9 @@ from types import ModuleType
 
 from brakecli.solver import schemes
 
+MOST = {"newton": 100, "fixed-point": 500}
+"""Evaluations of the contact that a step of each iteration may take before it counts as not converged."""
+
 
 @dataclass(frozen=True)
 class Method:

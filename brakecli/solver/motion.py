@@ -3,32 +3,25 @@
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.solver import contact, implicit_step, loop
-from brakecli.solver.compile import (
-    FORCE,
-    FORCE_BEFORE,
-    NORMAL_FORCE,
-    PROBLEM_SIZE,
-    STORE,
-    STORE_X,
-    STORE_X_BEFORE,
-    WORK_SIZE,
-)
-from brakecli.solver.contact.pad import build_contact
+from brakecli.solver import contact
+from brakecli.solver.compile import address
+from brakecli.solver.contact.pad import build_layer
 from brakecli.solver.energy import OPEN_ACCOUNT, EnergyAccount, account
 from brakecli.solver.friction import minimise
 from brakecli.solver.method import Method
-from brakecli.solver.quantities import Failure
+from brakecli.solver.quantities import HISTORY, Failure
+from brakecli.solver.records import COUNTS, PROBLEM, WORK, Plant, Plug, new
 from brakecli.solver.roughness import wheel_angles
 from brakecli.solver.schedules import integral_at, slope_at
 from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import System
 
+EVENTS = 1000
+"""How many unconverged steps are kept with their time and residual; all are counted."""
 BLOCK_SECONDS = 0.1
 """Time that one call of the compiled loop should take: between calls Ctrl-C is heard and progress is reported."""
 BLOCK_ROWS = 16384
@@ -97,7 +90,7 @@ def solve(
     work, energy = Stepping(system).run(
         sink or (lambda rows: blocks.append(rows.copy())), progress, first_block=first_block
     )
-    rows = np.concatenate(blocks) if blocks else np.zeros((0, loop.COLUMNS))
+    rows = np.concatenate(blocks) if blocks else np.zeros((0, len(HISTORY)))
     return Motion(system, rows, work, energy)
 
 
@@ -111,15 +104,22 @@ class Stepping:
         """Put the shoe at its start."""
         self.system, self.scheme = system, system.scheme
         self.work = Work()
-        self.angles = np.zeros(system.wheel.g.size)
-        self.contact = build_contact(system.pad)
-        self.problem = np.zeros(PROBLEM_SIZE)
-        self.works = np.zeros(WORK_SIZE)
-        self.counts = np.zeros(loop.COUNTS_SIZE, dtype=np.int64)
-        self.events = np.zeros((loop.EVENTS, 2))
-        self.counts[loop.LEVEL] = self.scheme.LAG
-        self._advance, self._sample_into = _plugged_in(system)
-        self.state = self._begin()
+        self.events = np.zeros((EVENTS, 2))
+        self.counts = new(COUNTS)
+        self.counts.level = self.scheme.LAG
+        self.plant = Plant(
+            c=system.coefficients,
+            s=system.weights,
+            grid=system.grid,
+            drive=system.drive,
+            layer=build_layer(system.evaluate, system.pad),
+            plug=_plugged_in(system),
+            state=new(self.scheme.STATE),
+            problem=new(PROBLEM),
+            work=new(WORK),
+            counts=self.counts,
+        )
+        self._begin()
         self._start_energy = self._energy()
 
     def run(
@@ -128,18 +128,18 @@ class Stepping:
         """Step to the end or to a failure; the arguments are those of `solve`."""
         lag, last = self.scheme.LAG, self.system.steps
         size = min(first_block, self._most_steps())
-        while not self.work.failed and self.counts[loop.LEVEL] < last + lag:
+        while not self.work.failed and self.counts.level < last + lag:
             start = time.perf_counter()
-            rows = self.block(min(last + lag, int(self.counts[loop.LEVEL]) + size))
+            rows = self.block(min(last + lag, int(self.counts.level) + size))
             seconds = time.perf_counter() - start
             self.work.solve_seconds += seconds
             size = min(int(size * min(10.0, BLOCK_SECONDS / max(seconds, 1e-9))) + 1, self._most_steps())
             sink(rows)
-            progress(int(self.counts[loop.LEVEL]) - lag)
+            progress(int(self.counts.level) - lag)
         if not self.work.failed:
             sink(self._sample()[None, :])
         self._count()
-        energy = account(self._start_energy, self._energy(), self.works)
+        energy = account(self._start_energy, self._energy(), self.plant.work)
         if not self.work.failed and not abs(energy.relative_closing_error) <= OPEN_ACCOUNT:
             self.work.failure = Failure.UNBALANCED
         return self.work, energy
@@ -151,26 +151,11 @@ class Stepping:
     def block(self, stop: int) -> NDArray[np.float64]:
         """Step to level `stop`; the samples on the way."""
         system, lag, per_sample = self.system, self.scheme.LAG, self.system.per_sample
-        first = int(self.counts[loop.LEVEL]) - lag
-        rows = np.zeros((-(-(stop - lag) // per_sample) + (-first // per_sample), loop.COLUMNS))
-        failure = self._advance(
-            system.coefficients,
-            system.weights,
-            system.drive,
-            system.grid,
-            system.pad,
-            self.angles,
-            self.state,
-            self.problem,
-            self.contact,
-            self.works,
-            self.counts,
-            rows,
-            self.events,
-            stop,
-        )
+        first = int(self.counts.level) - lag
+        rows = np.zeros((-(-(stop - lag) // per_sample) + (-first // per_sample), len(HISTORY)))
+        failure = self.scheme.advance(self.plant, rows, self.events, stop)
         self.work.failure = Failure(failure)
-        done = int(self.counts[loop.LEVEL]) - lag
+        done = int(self.counts.level) - lag
         if failure:
             self.work.failure_time = system.step * done
             done += 1  # the sample of the failing step's own level has been taken
@@ -178,24 +163,12 @@ class Stepping:
 
     def _sample(self) -> NDArray[np.float64]:
         """The sample at the level that has been reached."""
-        row = np.zeros(loop.COLUMNS)
-        system = self.system
-        self._sample_into(
-            system.coefficients,
-            system.weights,
-            system.drive,
-            system.grid,
-            system.pad,
-            self.angles,
-            self.state,
-            self.contact,
-            self.counts,
-            row,
-        )
+        row = np.zeros(len(HISTORY))
+        self.scheme.sample(self.plant, row)
         return row
 
-    def _begin(self) -> NDArray[np.float64]:
-        """The state at the scheme's first level, with the contact force there as the first guess."""
+    def _begin(self) -> None:
+        """Fill the state at the scheme's first level, with the contact force there as the first guess."""
         system, initial = self.system, self.system.initial
         x, y = initial.x, initial.y
         if initial.from_equilibrium:
@@ -203,13 +176,12 @@ class Stepping:
             x, y = x + rest.x, y + rest.y
         velocity, acceleration = (initial.vx, initial.vy), (0.0, 0.0)
         self._evaluate_at(x, y, 0.0)
-        force = self.contact[NORMAL_FORCE]
+        plant, found = self.plant, self.plant.layer.contact
         if system.method.start == "consistent":
-            acceleration = self._acceleration((x, y), velocity, force)
-        state: NDArray[np.float64] = self.scheme.begin(system.weights, (x, y), velocity, acceleration)
-        state[FORCE] = self.works[FORCE_BEFORE] = force
-        self.works[STORE_X_BEFORE] = self.contact[STORE_X]
-        return state
+            acceleration = self._acceleration((x, y), velocity, found.normal_force)
+        self.scheme.begin(plant.s, plant.state, (x, y), velocity, acceleration)
+        plant.state.force = plant.work.force_before = found.normal_force
+        plant.work.store_x_before = found.store_x
 
     def _acceleration(
         self, position: tuple[float, float], velocity: tuple[float, float], force: float
@@ -230,37 +202,35 @@ class Stepping:
         """Evaluate the contact, `steps` steps after t = 0."""
         t, part = divmod(steps, self.system.per_sample)
         travel = integral_at(self.system.belt, t * self.system.interval, part * self.system.step)
-        wheel_angles(self.system.wheel, *travel, self.angles)
-        self.system.evaluate(x, y, self.angles, self.system.pad, self.contact)
+        wheel_angles(self.plant.drive.wheel, *travel, self.plant.layer.angles)
+        self.system.evaluate(x, y, self.plant.layer)
 
     def _energy(self) -> tuple[float, float, float]:
         """Kinetic energy, energy of the links and of the contact (J), where the scheme places them."""
-        system = self.system
-        kinetic, links, (x, y), back = self.scheme.mechanical_energy(
-            system.coefficients, system.weights, self.state
-        )
-        self._evaluate_at(x, y, int(self.counts[loop.LEVEL]) - back)
-        return kinetic, links, float(self.contact[STORE])
+        plant = self.plant
+        kinetic, links, (x, y), back = self.scheme.mechanical_energy(plant.c, plant.s, plant.state)
+        self._evaluate_at(x, y, int(self.counts.level) - back)
+        return kinetic, links, float(plant.layer.contact.store)
 
     def _count(self) -> None:
         """Read the loop's counters."""
         counts, work = self.counts, self.work
-        work.steps = int(counts[loop.KIND_0 :].sum())
-        work.contact_evaluations = int(counts[loop.EVALUATIONS])
-        work.unconverged_steps = int(counts[loop.UNCONVERGED])
-        work.non_unique_steps = int(counts[loop.RISING])
-        work.most_evaluations = int(counts[loop.MOST])
-        work.turns = int(counts[loop.TURNS])
-        work.evaluators = {
-            kind: int(n) for kind, n in zip(contact.kinds(), counts[loop.KIND_0 :], strict=True) if n
-        }
-        work.unconverged = self.events[: min(work.unconverged_steps, loop.EVENTS)].copy()
+        work.steps = int(counts.kinds.sum())
+        work.contact_evaluations = int(counts.evaluations)
+        work.unconverged_steps = int(counts.unconverged)
+        work.non_unique_steps = int(counts.rising)
+        work.most_evaluations = int(counts.most)
+        work.turns = int(counts.turns)
+        work.evaluators = {kind: int(n) for kind, n in zip(contact.kinds(), counts.kinds, strict=True) if n}
+        work.unconverged = self.events[: min(work.unconverged_steps, EVENTS)].copy()
 
 
-def _plugged_in(system: System) -> tuple[Callable[..., int], Callable[..., None]]:
-    """The compiled loop and the sampling of the scheme, with everything plugged in that they call."""
-    scheme, evaluate = system.scheme, system.evaluate
+def _plugged_in(system: System) -> Plug:
+    """What the common loop calls: the kernels of the scheme and the iteration of a step."""
     if system.method.own_steps:
-        return partial(scheme.advance, evaluate), partial(scheme.sample, evaluate)
-    iterate = implicit_step.newton if system.method.iteration == "newton" else implicit_step.fixed_point
-    return partial(loop.advance, evaluate, scheme.prepare, scheme.finish, iterate), partial(loop.sample, evaluate)
+        return Plug(0, 0, 0)
+    from brakecli.solver import implicit_step  # its kernels are compiled only where they are needed
+
+    scheme = system.scheme
+    solve = implicit_step.newton if system.method.iteration == "newton" else implicit_step.fixed_point
+    return Plug(address(scheme.prepare), address(scheme.finish), address(solve))

@@ -54,6 +54,10 @@ class ContactState(IntEnum):
     SEPARATED = 2
 
 
+BOUND = 1e15
+"""Position (m) and velocity (m/s) beyond which a motion is not one of a brake, `Failure.DIVERGED`."""
+
+
 class Failure(IntEnum):
     """Why a run is not worth having; each has a sentence with its remedy."""
 

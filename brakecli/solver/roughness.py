@@ -3,14 +3,15 @@
 import math
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numba import float64, types, void
+from numba import float64, void
 from numpy.typing import NDArray
 
 from brakecli.solver.compile import kernel, vector
 from brakecli.solver.double_double import multiply, split
+from brakecli.solver.records import WAVE, WAVES
 
 PI = Fraction(314159265358979323846264338327950288419716939937511, 10**50)
 TWO_PI = 2.0 * math.pi
@@ -28,8 +29,10 @@ class Surface(NamedTuple):
     turns: NDArray[np.float64]
     turns_low: NDArray[np.float64]
 
-
-SURFACE = types.NamedUniTuple(vector, len(Surface._fields), Surface)
+    @property
+    def waves(self) -> NDArray[Any]:
+        """What `wheel_angles` needs, as records of `WAVE`."""
+        return np.array(list(zip(self.phase, self.turns, self.turns_low, strict=True)), WAVE)
 
 
 def surface(
@@ -57,21 +60,22 @@ def surface(
 
 
 def height(f: Surface, xi: NDArray[np.float64]) -> NDArray[np.float64]:
-    """f(xi) in m at places xi (m), (1)."""
+    """f(xi) in m at places xi (m)."""
     f_xi = np.zeros(xi.size)
     for g, omega, phase in zip(f.g, f.omega, f.phase, strict=True):  # no table of all waves at all places
-        f_xi += g * np.sin(omega * xi + phase)
+        f_xi += g * np.sin(omega * xi + phase)  # Eq. (1)
     return f_xi
 
 
-@kernel(void(SURFACE, float64, float64, vector))
-def wheel_angles(wheel: Surface, travel: float, travel_low: float, angles: NDArray[np.float64]) -> None:
+@kernel(void(WAVES, float64, float64, vector))
+def wheel_angles(waves: NDArray[Any], travel: float, travel_low: float, angles: NDArray[np.float64]) -> None:
     """Phase in rad of each harmonic at xi = 0 after the wheel has travelled: phase - omega travel, reduced.
 
     The waves are counted in turns with 32 digits and only their fraction is kept, so that the phase is as exact
     after 10^7 m as at the start.
     """
-    for i in range(wheel.g.size):
-        waves, waves_low = multiply(travel, travel_low, wheel.turns[i], wheel.turns_low[i])
-        fraction = (waves - math.floor(waves)) + waves_low
-        angles[i] = wheel.phase[i] - TWO_PI * fraction
+    for i in range(waves.size):
+        wave = waves[i]
+        number, number_low = multiply(travel, travel_low, wave.turns, wave.turns_low)
+        fraction = (number - math.floor(number)) + number_low
+        angles[i] = wave.phase - TWO_PI * fraction

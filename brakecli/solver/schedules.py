@@ -5,33 +5,18 @@ Before the first knot and after the last a schedule holds its value.
 
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from numba import float64, int64, types
 from numpy.typing import NDArray
 
-from brakecli.solver.compile import kernel, vector
+from brakecli.solver.compile import kernel
 from brakecli.solver.double_double import add, multiply, split, two_sum
+from brakecli.solver.records import KNOT, KNOTS
 
-
-class Schedule(NamedTuple):
-    """A piecewise linear function of time: knots, values, slopes and the integral from t = 0 up to each knot.
-
-    Values, slopes and integrals are sums of two doubles (`..._low` the smaller), to 32 digits of what follows
-    from the given doubles exactly.
-    """
-
-    times: NDArray[np.float64]
-    values: NDArray[np.float64]
-    values_low: NDArray[np.float64]
-    slopes: NDArray[np.float64]
-    slopes_low: NDArray[np.float64]
-    integrals: NDArray[np.float64]
-    integrals_low: NDArray[np.float64]
-
-
-SCHEDULE = types.NamedUniTuple(vector, len(Schedule._fields), Schedule)
+Schedule = NDArray[Any]
+"""A piecewise linear function of time: its knots, records of `KNOT`."""
 
 
 def schedule(times: Sequence[float], values: Sequence[float], scale: float = 1.0) -> Schedule:
@@ -44,8 +29,9 @@ def schedule(times: Sequence[float], values: Sequence[float], scale: float = 1.0
         integrals.append(integrals[-1] + (v[i] + v[i + 1]) / 2 * (t[i + 1] - t[i]))
     at_zero = _integral_to(Fraction(0), t, v, slopes, integrals)
     columns = [v, slopes, [integral - at_zero for integral in integrals]]
-    pairs = [np.array([split(value) for value in column]).T.copy() for column in columns]
-    return Schedule(np.array([float(time) for time in t]), *(row.copy() for pair in pairs for row in pair))
+    pairs = [[split(value) for value in column] for column in columns]
+    knots = [(float(time), *first, *second, *third) for time, first, second, third in zip(t, *pairs, strict=True)]
+    return np.array(knots, KNOT)
 
 
 def _integral_to(
@@ -58,46 +44,46 @@ def _integral_to(
     return integrals[k] + (v[k] + slopes[k] * (time - t[k]) / 2) * (time - t[k])
 
 
-@kernel(int64(float64, vector))
-def segment(t: float, times: NDArray[np.float64]) -> int:
+@kernel(int64(KNOTS, float64))
+def segment(s: Schedule, t: float) -> int:
     """Index of the last knot at or before t, -1 before the first."""
-    low, high = -1, times.size
+    low, high = -1, s.size
     while high - low > 1:
         middle = (low + high) // 2
-        if times[middle] <= t:
+        if s[middle].time <= t:
             low = middle
         else:
             high = middle
     return low
 
 
-@kernel(float64(SCHEDULE, float64))
+@kernel(float64(KNOTS, float64))
 def value_at(s: Schedule, t: float) -> float:
     """Value at time t (s)."""
-    k = segment(t, s.times)
+    k = segment(s, t)
     if k < 0:
-        return s.values[0]  # type: ignore[no-any-return]
-    return s.values[k] + s.slopes[k] * (t - s.times[k])  # type: ignore[no-any-return]
+        return s[0].value  # type: ignore[no-any-return]
+    return s[k].value + s[k].slope * (t - s[k].time)  # type: ignore[no-any-return]
 
 
-@kernel(float64(SCHEDULE, float64))
+@kernel(float64(KNOTS, float64))
 def slope_at(s: Schedule, t: float) -> float:
     """Time derivative just after time t."""
-    k = segment(t, s.times)
-    return s.slopes[k] if k >= 0 else 0.0
+    k = segment(s, t)
+    return s[k].slope if k >= 0 else 0.0
 
 
-@kernel(types.UniTuple(float64, 2)(SCHEDULE, float64, float64))
+@kernel(types.UniTuple(float64, 2)(KNOTS, float64, float64))
 def integral_at(s: Schedule, t: float, t_low: float) -> tuple[float, float]:
     """Integral from 0 to t + t_low, as a sum of two doubles; t_low may be of any size, beyond a knot as well."""
     t, t_low = two_sum(t, t_low)
-    k = max(segment(t, s.times), 0)
-    slope, slope_low = s.slopes[k], s.slopes_low[k]
-    if t < s.times[0]:
+    k = max(segment(s, t), 0)
+    slope, slope_low = s[k].slope, s[k].slope_low
+    if t < s[0].time:
         slope, slope_low = 0.0, 0.0
-    after, after_low = two_sum(t, -s.times[k])
+    after, after_low = two_sum(t, -s[k].time)
     after, after_low = add(after, after_low, t_low, 0.0)
     mean, mean_low = multiply(after, after_low, 0.5 * slope, 0.5 * slope_low)
-    mean, mean_low = add(mean, mean_low, s.values[k], s.values_low[k])
+    mean, mean_low = add(mean, mean_low, s[k].value, s[k].value_low)
     part, part_low = multiply(after, after_low, mean, mean_low)
-    return add(part, part_low, s.integrals[k], s.integrals_low[k])
+    return add(part, part_low, s[k].integral, s[k].integral_low)

@@ -7,9 +7,8 @@ from functools import partial
 import numpy as np
 
 from brakecli.errors import CaseError, Problem
-from brakecli.solver.compile import FRACTION, NORMAL_FORCE, STIFFNESS
 from brakecli.solver.contact.closed_form import CLEAR, FULL, coverage
-from brakecli.solver.contact.pad import HALF, SHOE_BOTTOM, SHOE_MEAN, SHOE_TOP, WHEEL_BOUND, K, build_contact
+from brakecli.solver.contact.pad import build_layer
 from brakecli.solver.roughness import wheel_angles
 from brakecli.solver.system import System
 
@@ -38,28 +37,23 @@ def mean_contact(system: System, y: float) -> tuple[float, float, float]:
     Full contact averages to its closed form. Otherwise places over many waves are averaged under a Hann window, so
     that waves that do not close leave a trace of 1e-6 only.
     """
-    pad, wheel = system.pad, system.wheel
+    pad, wheel = system.pad.constants, system.wheel
     covered = coverage(y, pad)
-    length = 2.0 * pad[HALF]
+    length = 2.0 * pad.half_length
     if covered == CLEAR:
         return 0.0, 0.0, 0.0
     if covered == FULL:
-        return -pad[K] * length * (y + pad[SHOE_MEAN]), pad[K] * length, 1.0
+        return -pad.k * length * (y + pad.shoe_mean), pad.k * length, 1.0
     places = np.zeros(1) if wheel.g.size == 0 else 50.0 / wheel.turns.min() * (np.arange(PLACES) + 0.5) / PLACES
     weights = np.ones(1) if wheel.g.size == 0 else 2.0 * np.sin(np.pi * (np.arange(PLACES) + 0.5) / PLACES) ** 2
-    found, angles, contact = np.zeros(3), np.zeros(wheel.g.size), build_contact(pad)
+    found, layer, waves = np.zeros(3), build_layer(system.evaluate, system.pad), wheel.waves
+    contact = layer.contact
     for place, weight in zip(places, weights, strict=True):
-        wheel_angles(wheel, float(place), 0.0, angles)
-        system.evaluate(0.0, y, angles, pad, contact)
-        found += weight * contact[[NORMAL_FORCE, STIFFNESS, FRACTION]]
+        wheel_angles(waves, float(place), 0.0, layer.angles)
+        system.evaluate(0.0, y, layer)
+        found += weight * np.array([contact.normal_force, contact.stiffness, contact.fraction])
     force, stiffness, fraction = found / len(places)
     return float(force), float(stiffness), float(fraction)
-
-
-def _open_between(system: System) -> tuple[float, float]:
-    """The heights (m) between which the pad may touch in part."""
-    pad = system.pad
-    return -pad[WHEEL_BOUND] - pad[SHOE_TOP], pad[WHEEL_BOUND] + pad[SHOE_BOTTOM]
 
 
 def tabulated(system: System) -> Mean:
@@ -69,7 +63,7 @@ def tabulated(system: System) -> Mean:
     """
     from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
-    mean, (full, top) = partial(mean_contact, system), _open_between(system)
+    mean, (full, top) = partial(mean_contact, system), system.pad.edges
     if full == top:
         return mean
     heights = np.linspace(full, top, TABLE)
@@ -93,7 +87,7 @@ def steady_sliding(
     With F_x = sign(U) phi F_y, (6) gives x for a height y and (7) remains: one equation in y. U (m/s) and phi are
     those of the system unless they are given. Raises CaseError where there is no solution.
     """
-    c, pad, load = system.coefficients, system.pad, system.load_at_start
+    c, pad, load = system.coefficients, system.pad.constants, system.load_at_start
     mean = mean or partial(mean_contact, system)
     grip = float(np.sign(system.belt_speed if belt is None else belt)) * (c.phi if phi is None else phi)
     q_x, q_y = load * c.sin_beta, load * c.cos_beta
@@ -109,10 +103,10 @@ def steady_sliding(
     def unbalanced(y: float) -> float:
         return spring * y + push - uplift * mean(y)[0]
 
-    full, top = _open_between(system)
-    stiffness = 2.0 * pad[HALF] * pad[K]
+    full, top = system.pad.edges
+    stiffness = 2.0 * pad.half_length * pad.k
     whole = spring + uplift * stiffness
-    y = -(push + uplift * stiffness * pad[SHOE_MEAN]) / whole if whole != 0.0 else np.inf
+    y = -(push + uplift * stiffness * pad.shoe_mean) / whole if whole != 0.0 else np.inf
     if not y <= full:
         if unbalanced(top) < 0.0:
             if spring == 0.0:
@@ -130,6 +124,5 @@ def steady_sliding(
 
 
 def _none(reason: str) -> CaseError:
-    return CaseError(
-        [Problem("the case", "initial.at", f"there is no steady sliding: {reason}", 'start from at = "rest"')]
-    )
+    what = f"there is no steady sliding: {reason}"
+    return CaseError([Problem(("initial", "at"), what, 'start from at = "rest"', source="the case")])

@@ -7,15 +7,12 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brakecli.solver import contact
-from brakecli.solver.compile import Coefficients, Weights
-from brakecli.solver.contact.pad import build_pad, default_nodes
-from brakecli.solver.implicit_step import MOST
+from brakecli.solver.contact.pad import Pad, build_pad, default_nodes
 from brakecli.solver.links import natural_frequencies
-from brakecli.solver.loop import Drive, Grid
-from brakecli.solver.method import Method
+from brakecli.solver.method import MOST, Method
+from brakecli.solver.records import Coefficients, Drive, Grid, Weights
 from brakecli.solver.roughness import Surface
 from brakecli.solver.schedules import Schedule, value_at
 
@@ -56,7 +53,7 @@ class System:
     method: Method
 
     @cached_property
-    def pad(self) -> NDArray[np.float64]:
+    def pad(self) -> Pad:
         """Constants and tables of the contact."""
         return build_pad(self.layer_stiffness, self.half_length, self.shoe, self.wheel, self.nodes)
 
@@ -105,7 +102,7 @@ class System:
     @property
     def fastest_belt(self) -> float:
         """The largest |U|, m/s."""
-        return float(np.abs(self.belt.values).max())
+        return float(np.abs(self.belt["value"]).max())
 
     @property
     def load_at_start(self) -> float:
@@ -162,7 +159,7 @@ class System:
     @property
     def drive(self) -> Drive:
         """What acts from outside."""
-        return Drive(self.belt, self.load, self.wheel)
+        return Drive(self.belt, self.load, self.wheel.waves)
 
     @property
     def grid(self) -> Grid:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.errors import CannotWriteError
+from brakecli.files.os_signals import Interrupted
 from brakecli.files.write import new_result
 from brakecli.runs.limits import free_bytes
 from brakecli.sweeps.cost import Estimate, estimate, refuse_sweep
@@ -140,10 +141,12 @@ def _keeping(journal: Path) -> Iterator[None]:
     """Add to the message on what could not be written that the finished points are kept, if they are."""
     try:
         yield
-    except CannotWriteError as error:
+    except (CannotWriteError, Interrupted) as error:
         if os.path.lexists(journal):
-            sentence = f"{error}; finished points are kept, and the same command goes on with them"
-            raise CannotWriteError(sentence) from error
+            kept = "finished points are kept, and the same command goes on with them"
+            if isinstance(error, CannotWriteError):
+                raise CannotWriteError(f"{error}; {kept}") from error
+            error.left = kept
         raise
 
 

@@ -2,19 +2,20 @@
 
 import copy
 import json
+import math
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any
 
+import numpy as np
 import tomli_w
 from pydantic import ValidationError
 
+from brakecli.case import wording
 from brakecli.case.case import Case
 from brakecli.case.read import key_path, parse_table, put
-from brakecli.case.toml_lines import key_text
-from brakecli.case.wording import sentences
 from brakecli.errors import CaseError, Problem
 from brakecli.sweeps.tables import Direction, Sweep
 
@@ -24,7 +25,7 @@ Settings = Mapping[tuple[str, ...], Any]
 
 @dataclass(frozen=True)
 class Plan:
-    """A sweep with its base case, both as TOML that stands for itself: all that a worker needs.
+    """A sweep with its base case, both as complete TOML texts: all that a worker needs.
 
     `case_text` holds the keys that were given, overrides applied, so that a default which follows from another key
     follows it at every point.
@@ -54,7 +55,7 @@ class Plan:
     @property
     def points(self) -> int:
         """Points of the grid."""
-        return self.sweep.points
+        return math.prod(self.shape)
 
     @cached_property
     def followed(self) -> int | None:
@@ -63,13 +64,13 @@ class Plan:
 
     @property
     def passes(self) -> int:
-        """How many times the grid is gone through: twice where the motion is followed both up and down."""
+        """How often the grid is computed: twice where the motion is followed both up and down."""
         axis = self.followed
         return 2 if axis is not None and self.sweep.axis[axis].direction is Direction.BOTH else 1
 
     @property
     def unit_length(self) -> int:
-        """Points of a unit, which is computed in one go: one, or a line along the followed axis."""
+        """Points of a unit, which one task computes: a single point, or a line along the followed axis."""
         return 1 if self.followed is None else self.shape[self.followed]
 
     @property
@@ -79,11 +80,7 @@ class Plan:
 
     def places(self, point: int) -> tuple[int, ...]:
         """Where a point lies along each axis; points are counted with the last axis fastest."""
-        found = []
-        for size in reversed(self.shape):
-            point, place = divmod(point, size)
-            found.append(place)
-        return tuple(reversed(found))
+        return tuple(map(int, np.unravel_index(point, self.shape)))
 
     def settings(self, point: int) -> dict[tuple[str, ...], Any]:
         """What the axes set at a point."""
@@ -94,36 +91,30 @@ class Plan:
 
     def case(self, settings: Settings) -> Case:
         """The base case with some values put into it; raises CaseError."""
-        return case_with(self._base, settings)
-
-
-def case_with(base: dict[str, Any], settings: Settings, where: str = "the point") -> Case:
-    """A case of its data with values put into it; raises CaseError, its problems at `where`."""
-    data = copy.deepcopy(base)
-    for path, value in settings.items():
-        try:
+        data = copy.deepcopy(self._base)
+        for path, value in settings.items():
             put(data, path, value, Case, kept=settings)
-        except TypeError:
-            what = f"{key_text(path[:-1])} is not a table"
-            raise CaseError([Problem(where, key_text(path), what, "name a key of a table")]) from None
-    try:
-        return Case.model_validate(data)
-    except ValidationError as error:
-        if settings and (whole := _whole(error, settings)):
-            return case_with(base, whole, where)
-        raise CaseError(
-            [Problem(where, key_text(key), what, remedy) for key, what, remedy in sentences(error, Case)]
-        ) from None
+        try:
+            return Case.model_validate(data)
+        except ValidationError as error:
+            wanted = {each["loc"] for each in error.errors(include_url=False) if each["type"] == "int_type"}
+            whole = {
+                path: int(value)  # a range holds floats, also where the key takes whole numbers
+                for path, value in settings.items()
+                if path in wanted and isinstance(value, float) and value.is_integer()
+            }
+            if whole:
+                return self.case({**settings, **whole})
+            problems = [replace(each, source="the point") for each in wording.problems(error, Case)]
+            raise CaseError(problems) from None
 
-
-def _whole(error: ValidationError, settings: Settings) -> Settings | None:
-    """The settings as whole numbers where whole numbers are wanted: a range of nodes is one of floats."""
-    wanted = {each["loc"] for each in error.errors(include_url=False) if each["type"] == "int_type"}
-    found = {
-        path: int(value) if path in wanted and isinstance(value, float) and value.is_integer() else value
-        for path, value in settings.items()
-    }
-    return found if any(type(found[path]) is not type(settings[path]) for path in found) else None
+    def problems(self, settings: Settings) -> tuple[Problem, ...]:
+        """What is wrong with these values."""
+        try:
+            self.case(settings)
+        except CaseError as error:
+            return error.problems
+        return ()
 
 
 def given_toml(table: Sweep | Case) -> str:
@@ -131,14 +122,12 @@ def given_toml(table: Sweep | Case) -> str:
     return tomli_w.dumps(table.model_dump(mode="json", exclude_unset=True, exclude_none=True))
 
 
-@lru_cache(maxsize=4)
-def plan_of(sweep_text: str, case_text: str) -> Plan:
-    """The plan of two texts, parsed once."""
-    return Plan(sweep_text, case_text)
+plan_of = lru_cache(maxsize=4)(Plan)
+"""The plan of the texts of a sweep and of its case; a worker meets the same ones again and again."""
 
 
 def label(value: Any) -> str:
-    """A value of an axis as text: as TOML writes it, but for the quotes of texts."""
+    """A value of an axis as TOML writes it, but a text without its quotes."""
     if isinstance(value, str):
         return value
     return f"{value:.9g}" if isinstance(value, float) else json.dumps(value)

@@ -16,6 +16,7 @@ from brakecli.case.read import key_path
 from brakecli.case.system import system_of
 from brakecli.errors import BrakecliError
 from brakecli.files import fields
+from brakecli.files.field import Field, values_of
 from brakecli.runs.limits import check, refuse, within_range
 from brakecli.runs.run import motion_of
 from brakecli.runs.tolerance import Certificate
@@ -41,7 +42,7 @@ def record_type(plan: Plan) -> np.dtype[Any]:
     return np.dtype([(field.name, field.kind) for field in fields_of(plan)])
 
 
-def fields_of(plan: Plan) -> tuple[fields.Field, ...]:
+def fields_of(plan: Plan) -> tuple[Field, ...]:
     """What is known of each point of the sweep."""
     return fields.POINT + (fields.CRITICAL if plan.sweep.critical is not None else ())
 
@@ -145,7 +146,7 @@ def next_start(outcome: Outcome) -> Settings:
     if wheel is not None:
         system = outcome.motion.system
         angles = np.zeros(system.wheel.g.size)
-        wheel_angles(system.wheel, *integral_at(system.belt, system.sampled_duration, 0.0), angles)
+        wheel_angles(system.wheel.waves, *integral_at(system.belt, system.sampled_duration, 0.0), angles)
         phases = iter(angles)  # a wave without amplitude has no phase
         turned = [math.degrees(next(phases) % TWO_PI) if g else 0.0 for g in wheel.amplitudes]
         start["roughness", "wheel", "phases_deg"] = turned
@@ -166,12 +167,12 @@ def _computed(plan: Plan, point: int, start: Settings) -> tuple[NDArray[Any], Ou
     settings = {**plan.settings(point), **start}
     try:
         outcome = simulate(plan.case(settings))
-        values = fields.values(fields.POINT, outcome)
+        values = values_of(fields.POINT, outcome)
         if (critical := plan.sweep.critical) is not None:
             path = key_path(critical.parameter)
             with within_range():
                 found = search(critical, lambda value: plan.case({**settings, path: value}), verdict_of)
-            values |= fields.values(fields.CRITICAL, found)
+            values |= values_of(fields.CRITICAL, found)
     except (BrakecliError, FloatingPointError, MemoryError) as error:
         return blank(record_type(plan), Status.FAILED, _sentence(error)), None
     return _filled(record_type(plan), values), outcome

@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.case.case import json_schema
+from brakecli.case.case import Case
 from brakecli.case.read import key_path
+from brakecli.case.tables import key_schema
 from brakecli.files import fields
+from brakecli.files.field import Field, plain, values_of
 from brakecli.files.write import ResultFile
 from brakecli.runs.run import origin
 from brakecli.sweeps.file import LoadedSweep
@@ -95,7 +97,7 @@ class SweepReport:
 
     def numbers(self) -> dict[str, Any]:
         """Names and values as `--json` gives them: the variables of the file, null where a number is missing."""
-        return {**fields.values(fields.SWEEP, self), **(self.findings.variables or {})}
+        return {**values_of(fields.SWEEP, self), **(self.findings.variables or {})}
 
 
 def findings(columns: Columns) -> Findings:
@@ -125,7 +127,7 @@ def findings(columns: Columns) -> Findings:
         hysteresis=hysteresis,
         sentences=(*_on_hysteresis(columns, hysteresis), *_on_lasting_vibration(columns)),
         variables=(
-            {field.name: fields.plain(columns[field.name]) for field in fields_of(plan)}
+            {field.name: plain(columns[field.name]) for field in fields_of(plan)}
             if status.size <= MOST_AS_JSON
             else None
         ),
@@ -143,7 +145,7 @@ def write(result: ResultFile, report: SweepReport, columns: Columns) -> None:
     for axis in plan.sweep.axis:
         values = [axis.value(place) for place in range(axis.size)]
         data = np.array(values, dtype=np.float64) if axis.numeric else np.array([label(value) for value in values])
-        field = fields.Field(axis.name, unit(axis.parameter[0]), ", ".join(axis.parameter))
+        field = Field(axis.name, unit(axis.parameter[0]), ", ".join(axis.parameter))
         result.variable("/", field, (axis.name,), data, {"parameters": list(axis.parameter)})
     if not plan.sweep.axis:
         result.axis("/", fields.BASE_POINT, np.zeros(1))
@@ -161,12 +163,7 @@ def write(result: ResultFile, report: SweepReport, columns: Columns) -> None:
 
 def unit(parameter: str) -> str:
     """The unit of a key of the case, by the schema of its file; empty where it has none."""
-    schema = json_schema()
-    node: Any = schema
-    for part in key_path(parameter):
-        node = schema["$defs"][node["$ref"].rpartition("/")[2]] if "$ref" in node else node
-        node = node.get("properties", {}).get(part, {})
-    return str(node.get("unit", ""))
+    return str(key_schema(Case, key_path(parameter)).get("unit", ""))
 
 
 def _hysteresis(columns: Columns) -> NDArray[Any] | None:

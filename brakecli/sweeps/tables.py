@@ -1,4 +1,4 @@
-"""A sweep file's tables: the axes of the grid, and the critical parameter that is looked for at each point."""
+"""A sweep file's tables: the axes of the grid, and the critical parameter that is sought at each point."""
 
 import math
 from collections.abc import Iterator
@@ -8,7 +8,8 @@ from typing import Annotated, Any, ClassVar
 from pydantic import BeforeValidator, Field
 
 from brakecli.case.read import key_path
-from brakecli.case.tables import Broken, Number, Positive, Table, from_list, from_text
+from brakecli.case.tables import MISSING, Number, Positive, Table, Title, choice, from_list
+from brakecli.errors import Problem, found
 
 
 class Spacing(StrEnum):
@@ -19,7 +20,7 @@ class Spacing(StrEnum):
 
 
 class Direction(StrEnum):
-    """Whether each point of an axis starts from the end of the one before it, and which way that goes."""
+    """How the motion is followed along an axis, where each point starts from the end of the one before it."""
 
     UP = "up"
     DOWN = "down"
@@ -31,13 +32,6 @@ class Method(StrEnum):
 
     SIMULATION = "simulation"
     EIGENVALUE = "eigenvalue"
-
-
-Values = Annotated[tuple[Any, ...], Field(min_length=1), *from_list]
-
-
-def _one_is_a_list(value: Any) -> Any:
-    return (value,) if isinstance(value, str) else value
 
 
 class Axis(Table):
@@ -53,20 +47,18 @@ class Axis(Table):
             json_schema_extra={"type": ["string", "array"]},
         ),
         *from_list,
-        BeforeValidator(_one_is_a_list),
+        BeforeValidator(lambda value: (value,) if isinstance(value, str) else value),
     ]
-    start: Annotated[Number | None, Field(description="first value")] = None
-    stop: Annotated[Number | None, Field(description="last value")] = None
-    num: Annotated[int | None, Field(ge=1, description="number of values")] = None
-    spacing: Annotated[Spacing, from_text, Field(description="how the values lie between the first and last")] = (
-        Spacing.LINEAR
+    start: Number | None = Field(None, description="first value")
+    stop: Number | None = Field(None, description="last value")
+    num: int | None = Field(None, ge=1, description="number of values")
+    spacing: Spacing = choice("how the values lie between the first and last", Spacing.LINEAR)
+    values: Annotated[tuple[Any, ...], Field(min_length=1), *from_list] | None = Field(
+        None, description="the values themselves"
     )
-    values: Annotated[Values | None, Field(description="the values themselves")] = None
-    direction: Annotated[
-        Direction | None,
-        from_text,
-        Field(description="follow the motion along this axis: each point starts from the end of the one before"),
-    ] = None
+    direction: Direction | None = choice(
+        "follow the motion along this axis: each point starts from the end of the one before", None
+    )
 
     @property
     def name(self) -> str:
@@ -96,71 +88,68 @@ class Axis(Table):
             return self.start * (self.stop / self.start) ** (place / last)
         return self.start + place * (self.stop - self.start) / last
 
-    def _broken_rules(self) -> Iterator[Broken]:
+    def _broken_rules(self) -> Iterator[Problem]:
         yield from super()._broken_rules()
         for text in self.parameter:
-            if not key_path(text):
-                yield Broken(("parameter",), "is no key path", 'write it as in "link2.angle_deg"', text)
-        if self.values is not None and self.spacing is Spacing.LOG:
-            yield Broken(("spacing",), "is for start and stop", "leave spacing out", str(self.spacing))
-        for key in ("start", "stop"):
-            value = getattr(self, key)
-            if self.spacing is Spacing.LOG and value is not None and value <= 0.0:
-                yield Broken((key,), "is not above 0", "a logarithmic axis needs values above 0", value)
+            yield from _not_a_key_path(text)
+        if self.spacing is Spacing.LOG:
+            if self.values is not None:
+                yield self.wrong("spacing", "is only for start and stop", "leave spacing out")
+            for key in ("start", "stop"):
+                value = getattr(self, key)
+                if value is not None and value <= 0.0:
+                    yield self.wrong(key, "is not above 0", "a logarithmic axis needs values above 0")
         if self.direction is not None and not self.numeric:
-            yield Broken(("direction",), "needs numbers to follow", "leave it out", str(self.direction))
+            yield self.wrong("direction", "needs numbers to follow", "leave it out")
+
+
+def _not_a_key_path(text: str) -> Iterator[Problem]:
+    if not key_path(text):
+        yield Problem(("parameter",), "is not a key path" + found(text), 'write it as in "link2.angle_deg"')
 
 
 class Critical(Table):
-    """The parameter whose critical value is looked for: the least at which steady sliding loses its stability."""
+    """The parameter whose critical value is sought: the least at which steady sliding loses its stability."""
 
-    parameter: Annotated[str, Field(description="key path of the case, such as friction.coefficient")]
-    lower: Annotated[Number, Field(description="the search begins here …")]
-    upper: Annotated[Number, Field(description="… and ends here")]
-    tolerance: Annotated[Positive, Field(description="widest bracket to be content with")] = 1e-3
-    method: Annotated[Method, from_text, Field(description="runs, or eigenvalues alone")] = Method.SIMULATION
+    parameter: str = Field(description="key path of the case, such as friction.coefficient")
+    lower: Number = Field(description="where the search begins")
+    upper: Number = Field(description="where the search ends")
+    tolerance: Positive = Field(1e-3, description="largest width of the bracket at the end of the search")
+    method: Method = choice("by runs, or only by eigenvalues", Method.SIMULATION)
 
-    def _broken_rules(self) -> Iterator[Broken]:
+    def _broken_rules(self) -> Iterator[Problem]:
         if self.upper <= self.lower:
-            yield Broken(("upper",), "is not above lower", "give a range to search in", self.upper)
+            yield self.wrong("upper", "is not above lower", "give a range to search in")
         elif self.tolerance < 1e-12 * max(abs(self.lower), abs(self.upper)):
-            yield Broken(("tolerance",), "is below the rounding of the parameter", "widen it", self.tolerance)
-        if not key_path(self.parameter):
-            yield Broken(("parameter",), "is no key path", 'write it as in "link2.angle_deg"', self.parameter)
+            yield self.wrong("tolerance", "is below the rounding of the parameter", "widen it")
+        yield from _not_a_key_path(self.parameter)
 
 
 class Sweep(Table):
     """A grid of cases around a base case, and what to find at each of them."""
 
-    title: Annotated[
-        str, Field(pattern=r"^[^\x00-\x1f\x7f-\x9f]*$", description="one line for people to read")
-    ] = ""
-    case: Annotated[str, Field(min_length=1, description="the base case's file, seen from the sweep's own")]
+    title: Title = ""
+    case: str = Field(min_length=1, description="the base case's file, seen from the sweep's own")
     axis: Annotated[
         tuple[Axis, ...], *from_list, Field(description="the axes of the grid, the last one fastest")
     ] = ()
-    critical: Annotated[Critical | None, Field(description="the critical parameter to find at each point")] = None
+    critical: Critical | None = Field(None, description="the critical parameter to find at each point")
 
-    @property
-    def points(self) -> int:
-        """How many points the grid has."""
-        return math.prod(axis.size for axis in self.axis)
-
-    def _broken_rules(self) -> Iterator[Broken]:
+    def _broken_rules(self) -> Iterator[Problem]:
         if not self.axis and self.critical is None:
-            yield Broken(("axis",), "is missing", "give at least one [[axis]], or [critical]")
+            yield Problem(("axis",), MISSING, "give at least one [[axis]], or [critical]")
         taken: set[tuple[str, ...]] = set()
         for index, axis in enumerate(self.axis):
             for text in axis.parameter:
                 if key_path(text) in taken:
-                    yield Broken(("axis", index, "parameter"), "is set twice", "set each key path once", text)
+                    path = ("axis", index, "parameter")
+                    yield Problem(path, "is set twice" + found(text), "set each key path once")
                 taken.add(key_path(text))
         if self.critical is not None and key_path(self.critical.parameter) in taken:
-            what, remedy = "is set by an axis", "look for another parameter, or leave that axis out"
-            yield Broken(("critical", "parameter"), what, remedy, self.critical.parameter)
-        followed = [index for index, axis in enumerate(self.axis) if axis.direction is not None]
-        for index in followed[1:]:
-            yield Broken(("axis", index, "direction"), "is given twice", "follow the motion along one axis alone")
+            remedy = "look for another parameter, or leave that axis out"
+            yield self.wrong("critical.parameter", "is set by an axis", remedy)
+        followed = [("axis", index, "direction") for index, axis in enumerate(self.axis) if axis.direction]
+        for path in followed[1:]:
+            yield Problem(path, "is given twice", "follow the motion along one axis alone")
         if followed and self.critical is not None:
-            what, remedy = "is given together with [critical]", "keep one of the two"
-            yield Broken(("axis", followed[0], "direction"), what, remedy)
+            yield Problem(followed[0], "is given together with [critical]", "keep one of the two")

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.analysis.regime.of_signal import MeasuredVerdict, Quantity, Signal, classify_signal
+from brakecli.analysis.regime.of_signal import Measurand, Signal, SignalVerdict, classify_signal
 from brakecli.analysis.regime.rules import Regime
 
 Array = NDArray[np.float64]
@@ -65,10 +65,10 @@ def motions(per_cycle: int, cycles: int) -> Iterator[Motion]:
     yield Motion("noise", Regime.UNDECIDED, np.random.default_rng(1).normal(0.0, 1.0, len(time)))
 
 
-def measured(displacement: Array, per_cycle: int, quantity: Quantity, decibels: float, seed: int = 1) -> Array:
+def measured(displacement: Array, per_cycle: int, quantity: Measurand, decibels: float, seed: int = 1) -> Array:
     """What a sensor of this quantity gives: a velocity is the mean of each sample; white noise so far below."""
     values = displacement
-    if quantity == Quantity.VELOCITY:
+    if quantity == Measurand.VELOCITY:
         values = per_cycle * np.diff(displacement, prepend=2.0 * displacement[0] - displacement[1])
     noise = np.random.default_rng(seed).normal(0.0, 1.0, len(values))
     noisy: Array = values + 10.0 ** (-decibels / 20.0) * values.std() * noise
@@ -99,9 +99,9 @@ def disturbed(values: Array, per_cycle: int, kind: str, seed: int = 9) -> Array:
     return values
 
 
-def verdict(values: Array, per_cycle: int, quantity: Quantity) -> MeasuredVerdict:
+def verdict(values: Array, per_cycle: int, quantity: Measurand) -> SignalVerdict:
     """The verdict, without any knowledge of the belt."""
-    return classify_signal(Signal(values, 1.0 / per_cycle, "synthetic"), quantity=quantity)
+    return classify_signal(Signal(values, 1.0 / per_cycle), quantity=quantity)
 
 
 def outcome(found: Regime, true: Regime) -> str:
@@ -115,7 +115,7 @@ def tally(per_cycle: int, cycles: int, decibels: float, kind: str = "") -> Count
     """Outcomes over all motions, as displacement and as velocity."""
     outcomes: Counter[str] = Counter()
     for motion in motions(per_cycle, cycles):
-        for quantity in (Quantity.DISPLACEMENT, Quantity.VELOCITY):
+        for quantity in (Measurand.DISPLACEMENT, Measurand.VELOCITY):
             values = disturbed(measured(motion.displacement, per_cycle, quantity, decibels), per_cycle, kind)
             outcomes[outcome(verdict(values, per_cycle, quantity).regime, motion.regime)] += 1
     return outcomes
@@ -135,8 +135,8 @@ def clipped(stick: float, samples: int = 20000, per_cycle: float = 99.7) -> Arra
 def _short_stick(stick: float, decibels: float, belt_speed: float | None) -> str:
     velocity = clipped(stick)
     noise = 10.0 ** (-decibels / 20.0) * velocity.std() * np.random.default_rng(1).normal(0.0, 1.0, len(velocity))
-    signal = Signal(velocity + noise, 1e-3, "synthetic")
-    return str(classify_signal(signal, quantity=Quantity.VELOCITY, belt_speed=belt_speed).regime)
+    signal = Signal(velocity + noise, 1e-3)
+    return str(classify_signal(signal, quantity=Measurand.VELOCITY, belt_speed=belt_speed).regime)
 
 
 def main() -> None:

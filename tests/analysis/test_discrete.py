@@ -9,7 +9,6 @@ from brakecli.case.system import system_of
 from brakecli.errors import RefusedError
 from brakecli.runs.limits import check, refuse
 from brakecli.runs.warnings import adjustments
-from brakecli.solver.compile import VX, VY, X, Y
 from brakecli.solver.links import natural_frequencies
 from tests.examples import MODE_COUPLING, ROUGH, SQUEAL, make, simulate
 
@@ -127,4 +126,4 @@ def test_runs_beyond_a_limit_are_refused(changes: dict[str, object], words: str)
 
 def test_memory_of_the_amplification_is_the_state() -> None:
     system = system_of(make(SQUEAL))
-    assert system.scheme.MEMORY == (X, Y, VX, VY)
+    assert system.scheme.MEMORY == ("x", "y", "v_x", "v_y")

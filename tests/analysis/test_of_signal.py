@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from brakecli.analysis.regime.of_signal import MeasuredVerdict, Quantity, Signal, Thresholds, classify_signal
+from brakecli.analysis.regime.of_signal import Measurand, Signal, SignalThresholds, SignalVerdict, classify_signal
 from brakecli.analysis.regime.rules import Excitation, Regime
 from tests.analysis.measured_signals import (
     Array,
@@ -24,9 +24,9 @@ IN_DOUBT = {
 
 
 @pytest.mark.parametrize("per_cycle", [10, 50, *(pytest.param(n, marks=campaign) for n in (20, 200, 1000))])
-@pytest.mark.parametrize("quantity", list(Quantity))
-def test_no_motion_is_mistaken_for_another(per_cycle: int, quantity: Quantity) -> None:
-    told = 0
+@pytest.mark.parametrize("quantity", list(Measurand))
+def test_no_motion_is_mistaken_for_another(per_cycle: int, quantity: Measurand) -> None:
+    checked = 0
     for motion in motions(per_cycle, 100):
         for decibels in (40, 20, 10):
             values = measured(motion.displacement, per_cycle, quantity, decibels)
@@ -34,26 +34,26 @@ def test_no_motion_is_mistaken_for_another(per_cycle: int, quantity: Quantity) -
             result = outcome(found.regime, motion.regime)
             doubtful = motion.name in IN_DOUBT and decibels == 10 and per_cycle <= 20
             assert result == "right" or (doubtful and result == "undecided"), (motion.name, decibels, found)
-            told += 1
-    assert told == 69
+            checked += 1
+    assert checked == 69
 
 
 @pytest.mark.parametrize("kind", ["spikes", "drift", "offset", "turned round", "short gaps", "long gap"])
-@pytest.mark.parametrize("quantity", [Quantity.DISPLACEMENT, Quantity.VELOCITY])
-def test_disturbances_do_not_change_the_regime(kind: str, quantity: Quantity) -> None:
-    told = 0
+@pytest.mark.parametrize("quantity", [Measurand.DISPLACEMENT, Measurand.VELOCITY])
+def test_disturbances_do_not_change_the_regime(kind: str, quantity: Measurand) -> None:
+    checked = 0
     for motion in motions(50, 100):
         values = disturbed(measured(motion.displacement, 50, quantity, 20), 50, kind)
-        told += 1
+        checked += 1
         if motion.name == "noise" and kind == "spikes":
             continue  # spikes in nothing but noise are events, for all that a signal can show
         found = verdict(values, 50, quantity).regime
         assert outcome(found, motion.regime) != "wrong", motion.name
-    assert told == 23
+    assert checked == 23
 
 
-def test_what_was_mended_is_told() -> None:
-    values = measured(np.sin(2.0 * np.pi * np.arange(5000) / 50), 50, Quantity.DISPLACEMENT, 40)
+def test_what_was_changed_is_reported() -> None:
+    values = measured(np.sin(2.0 * np.pi * np.arange(5000) / 50), 50, Measurand.DISPLACEMENT, 40)
     for kind, words in {
         "spikes": "spikes removed",
         "drift": "drift removed",
@@ -63,49 +63,53 @@ def test_what_was_mended_is_told() -> None:
         slow = disturbed(values, 50, kind)
         if kind == "drift":
             slow = slow + 50.0 * np.sin(2.0 * np.pi * np.arange(5000) / 2500)
-        found = verdict(slow, 50, Quantity.DISPLACEMENT)
+        found = verdict(slow, 50, Measurand.DISPLACEMENT)
         assert any(words in warning for warning in found.warnings), (kind, found.warnings)
-    assert verdict(values, 50, Quantity.DISPLACEMENT).warnings == ()
+    assert verdict(values, 50, Measurand.DISPLACEMENT).warnings == ()
 
 
 def test_frequency_and_amplitude_of_a_sine_are_those_of_its_displacement() -> None:
     time = np.arange(20000) / 1000.0
     frequency, size, stiffness = 20.0, 3e-5, 4e6
     x, v = size * np.sin(40.0 * np.pi * time), 40.0 * np.pi * size * np.cos(40.0 * np.pi * time)
-    for values, quantity in ((x, Quantity.DISPLACEMENT), (v, Quantity.VELOCITY), (stiffness * x, Quantity.FORCE)):
-        known = classify_signal(Signal(values, 1e-3, "s"), quantity=quantity, stiffness=stiffness)
+    for values, quantity in (
+        (x, Measurand.DISPLACEMENT),
+        (v, Measurand.VELOCITY),
+        (stiffness * x, Measurand.FORCE),
+    ):
+        known = classify_signal(Signal(values, 1e-3), quantity=quantity, stiffness=stiffness)
         assert known.frequency == pytest.approx(frequency, rel=1.0 / 400)  # a bin of 400 cycles
         # smoothed over a cycle's 1/25 at most, and the largest sample up to 1/100 of a cycle from the peak
         assert known.amplitude == pytest.approx(size, rel=0.01)
-    assert classify_signal(Signal(stiffness * x, 1e-3, "s"), quantity=Quantity.FORCE).amplitude is None
+    assert classify_signal(Signal(stiffness * x, 1e-3), quantity=Measurand.FORCE).amplitude is None
 
 
 def test_events_and_time_of_stick_are_counted() -> None:
     for slip in (0.05, 0.1, 0.3):
         found = verdict(
-            measured(stick_slip(100, 60, slip), 100, Quantity.DISPLACEMENT, 40), 100, Quantity.DISPLACEMENT
+            measured(stick_slip(100, 60, slip), 100, Measurand.DISPLACEMENT, 40), 100, Measurand.DISPLACEMENT
         )
         assert found.frequency == pytest.approx(1.0, abs=1.5 / 60)  # an event at either end
         assert found.stick_fraction == pytest.approx(1.0 - slip, abs=0.06)
 
 
 @pytest.mark.parametrize("stick", [0.08, 0.1, 0.2])
-def test_short_stick_is_told_by_the_speed_of_the_belt(stick: float) -> None:
-    signal = Signal(clipped(stick), 1e-3, "s")
-    known = classify_signal(signal, quantity=Quantity.VELOCITY, belt_speed=1.0)
+def test_short_stick_shows_by_the_speed_of_the_belt(stick: float) -> None:
+    signal = Signal(clipped(stick), 1e-3)
+    known = classify_signal(signal, quantity=Measurand.VELOCITY, belt_speed=1.0)
     assert known.regime == Regime.RELAXATION
     assert known.stick_fraction == pytest.approx(stick, abs=0.03)
-    assert classify_signal(signal, quantity=Quantity.VELOCITY).regime != Regime.QUASI_HARMONIC
+    assert classify_signal(signal, quantity=Measurand.VELOCITY).regime != Regime.QUASI_HARMONIC
 
 
 @pytest.mark.parametrize("size", [0.5, 0.9, 2.0])
 def test_a_sine_that_passes_the_belts_speed_or_keeps_below_does_not_stick(size: float) -> None:
-    signal = Signal(size * np.cos(0.0631 * np.arange(20000)), 1e-3, "s")
-    assert classify_signal(signal, quantity=Quantity.VELOCITY, belt_speed=1.0).regime == Regime.QUASI_HARMONIC
+    signal = Signal(size * np.cos(0.0631 * np.arange(20000)), 1e-3)
+    assert classify_signal(signal, quantity=Measurand.VELOCITY, belt_speed=1.0).regime == Regime.QUASI_HARMONIC
 
 
-def _undecided(values: Array, reason: str) -> MeasuredVerdict:
-    found = classify_signal(Signal(values, 1.0, "s"), quantity=Quantity.DISPLACEMENT)
+def _undecided(values: Array, reason: str) -> SignalVerdict:
+    found = classify_signal(Signal(values, 1.0), quantity=Measurand.DISPLACEMENT)
     assert found.regime == Regime.UNDECIDED
     assert reason in found.reasons[0]
     assert found.frequency is None
@@ -134,17 +138,17 @@ def test_short_and_hostile_signals_are_undecided_at_worst() -> None:
         1e-200 * random.normal(size=300),
     ]
     for values in hostile:
-        for quantity in Quantity:
-            found = classify_signal(Signal(values, 1.0, "s"), quantity=quantity, belt_speed=1.0, stiffness=1.0)
+        for quantity in Measurand:
+            found = classify_signal(Signal(values, 1.0), quantity=quantity, belt_speed=1.0, stiffness=1.0)
             assert found.regime in (Regime.UNDECIDED, Regime.DAMPED), values[:5]
             assert all(np.isfinite(list(found.evidence.values()))), found.evidence
 
 
-def test_a_measurement_does_not_tell_what_drives_it_and_keeps_its_thresholds() -> None:
+def test_a_measurement_does_not_show_what_drives_it_and_keeps_its_thresholds() -> None:
     found = classify_signal(
-        Signal(np.sin(0.1 * np.arange(5000)), 1.0, "s"),
-        quantity=Quantity.DISPLACEMENT,
-        thresholds=Thresholds(fewest_cycles=1000.0),
+        Signal(np.sin(0.1 * np.arange(5000)), 1.0),
+        quantity=Measurand.DISPLACEMENT,
+        thresholds=SignalThresholds(fewest_cycles=1000.0),
     )
     assert (found.regime, found.excitation) == (Regime.UNDECIDED, Excitation.NONE)
     assert found.contact_loss_fraction is None

@@ -6,29 +6,16 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from brakecli.analysis.regime.of_run import context
 from brakecli.analysis.regime.rules import Context, Excitation, Regime, classify, forced_lines
-from brakecli.case.system import system_of
 from brakecli.solver.history import ArrayHistory
-from brakecli.solver.quantities import HISTORY
-from tests.examples import COULOMB, ROUGH, SQUEAL, make, simulate
+from tests.analysis.histories import INTERVAL, history_of, verdict_of
+from tests.examples import COULOMB, ROUGH, SQUEAL, make
 
-INTERVAL = 1e-4
 TIME = INTERVAL * np.arange(20000)
 
 
-def judged(case: Any) -> Any:
-    result = simulate(case)
-    return classify(ArrayHistory(case.output.sample_interval, result.rows), context(system_of(case)))
-
-
 def made(vx: NDArray[np.float64], state: float | NDArray[np.float64] = -1.0) -> ArrayHistory:
-    rows = np.zeros((len(vx), len(HISTORY)))
-    names = list(HISTORY)
-    rows[:, names.index("vx")] = vx
-    rows[:, names.index("x")] = np.cumsum(vx) * INTERVAL
-    rows[:, names.index("state")] = state
-    return ArrayHistory(INTERVAL, rows)
+    return history_of(len(vx), vx=vx, x=np.cumsum(vx) * INTERVAL, state=state)
 
 
 @pytest.mark.parametrize(
@@ -42,7 +29,7 @@ def made(vx: NDArray[np.float64], state: float | NDArray[np.float64] = -1.0) -> 
 )
 def test_the_three_regimes_of_the_paper(phi: float, omega: float, regime: Regime) -> None:
     case = make(SQUEAL, friction__coefficient=phi, wheel__angular_speed=omega, solver__duration=2.0)
-    verdict = judged(case)
+    verdict = verdict_of(case)
     assert verdict.regime is regime
     sustained = regime is not Regime.DAMPED
     assert verdict.excitation is (Excitation.SELF_EXCITED if sustained else Excitation.NONE)
@@ -52,13 +39,13 @@ def test_the_three_regimes_of_the_paper(phi: float, omega: float, regime: Regime
 
 
 def test_a_shoe_shaken_by_roughness_below_its_critical_friction_is_damped_and_forced() -> None:
-    verdict = judged(make(ROUGH, solver__duration=1.0, solver__step=2e-5))
+    verdict = verdict_of(make(ROUGH, solver__duration=1.0, solver__step=2e-5))
     assert (verdict.regime, verdict.excitation) == (Regime.DAMPED, Excitation.FORCED)
     assert verdict.frequency is None
 
 
 def test_a_shoe_at_rest_on_a_standing_wheel_is_damped() -> None:
-    verdict = judged(make(COULOMB))
+    verdict = verdict_of(make(COULOMB))
     assert verdict.regime is Regime.DAMPED
     assert "rest" in verdict.reasons[0]
     assert verdict.stick_fraction == 1.0
@@ -66,14 +53,14 @@ def test_a_shoe_at_rest_on_a_standing_wheel_is_damped() -> None:
 
 def test_a_shoe_that_is_carried_along_is_not_called_damped() -> None:
     changes: dict[str, Any] = {"link2__stiffness": 0.0, "link2__damping": 0.0, "solver__duration": 0.5}
-    verdict = judged(make(SQUEAL, **changes))
+    verdict = verdict_of(make(SQUEAL, **changes))
     assert verdict.regime is Regime.UNDECIDED
     assert "carried along" in verdict.reasons[0]
 
 
 def test_a_shoe_that_lost_contact_is_not_called_damped() -> None:
     load = {"load__force": None, "load__times": [0.0, 0.1], "load__forces": [5000.0, -5000.0]}
-    verdict = judged(make(SQUEAL, solver__duration=1.0, **load))
+    verdict = verdict_of(make(SQUEAL, solver__duration=1.0, **load))
     assert verdict.regime is Regime.UNDECIDED
     assert "lost contact for good" in verdict.reasons[0]
     assert verdict.contact_loss_fraction == 1.0
@@ -81,7 +68,7 @@ def test_a_shoe_that_lost_contact_is_not_called_damped() -> None:
 
 @pytest.mark.parametrize("force", [-5000.0, 0.0])
 def test_a_shoe_that_never_touched_is_not_called_damped(force: float) -> None:
-    verdict = judged(make(SQUEAL, load__force=force))
+    verdict = verdict_of(make(SQUEAL, load__force=force))
     assert verdict.regime is Regime.UNDECIDED
     assert "never touched" in verdict.reasons[0]
 
@@ -147,7 +134,7 @@ def test_squeal_on_a_wheel_of_many_waves_is_not_called_forced(duration: float) -
     }
     changes: dict[str, Any] = {"wheel__angular_speed": 4.0, "load__force": 5000.0, "output__sample_interval": 2e-4}
     case = make(SQUEAL | {"roughness": roughness}, friction__coefficient=0.7, solver__duration=duration, **changes)
-    verdict = judged(case)
+    verdict = verdict_of(case)
     assert (verdict.evidence["forced_share"] > 0.8) == (duration == 0.5)
     assert verdict.regime is (Regime.UNDECIDED if duration == 0.5 else Regime.QUASI_HARMONIC)
 
@@ -176,14 +163,14 @@ def test_a_changing_wheel_speed_is_undecided() -> None:
 def test_verdict_does_not_depend_on_length_or_sampling() -> None:
     base: dict[str, Any] = {"friction__coefficient": 0.7, "solver__duration": 1.0}
     changes: list[dict[str, Any]] = [{}, {"solver__duration": 2.0}, {"output__sample_interval": 5e-5}]
-    verdicts = [judged(make(SQUEAL, **{**base, **change})) for change in changes]
+    verdicts = [verdict_of(make(SQUEAL, **{**base, **change})) for change in changes]
     assert {verdict.regime for verdict in verdicts} == {Regime.RELAXATION}
-    frequencies = [verdict.frequency for verdict in verdicts]
+    frequencies = [verdict.frequency or 0.0 for verdict in verdicts]
     assert np.ptp(frequencies) < 0.1
 
 
 def test_evidence_names_lines_harmonics_and_powers() -> None:
-    verdict = judged(make(SQUEAL, friction__coefficient=0.7, solver__duration=2.0))
+    verdict = verdict_of(make(SQUEAL, friction__coefficient=0.7, solver__duration=2.0))
     evidence = verdict.evidence
     assert evidence["line_frequencies"][0] == pytest.approx(verdict.frequency, abs=1.0)
     assert evidence["line_shares"][0] > 0.99
@@ -200,7 +187,7 @@ def test_evidence_names_lines_harmonics_and_powers() -> None:
     assert evidence["power_friction"] > 0.0
 
 
-def test_lines_of_the_roughness_are_told_from_others() -> None:
+def test_lines_of_the_roughness_are_distinguished_from_others() -> None:
     lines = forced_lines(2.0, [1.0 / 0.02], 5000.0)
     both = np.sin(2 * np.pi * 100.0 * TIME) + np.sin(2 * np.pi * 151.0 * TIME + 1.0)
     evidence = classify(made(both), Context(2.0, True, lines)).evidence

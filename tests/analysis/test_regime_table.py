@@ -6,14 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brakecli.analysis.regime.of_run import context
-from brakecli.analysis.regime.rules import Excitation, Regime, Verdict, classify
+from brakecli.analysis.regime.rules import Excitation, Regime
 from brakecli.analysis.stability.report import StabilityReport, stability
 from brakecli.case.case import Case
 from brakecli.case.system import system_of
-from brakecli.solver.history import ArrayHistory
+from tests.analysis.histories import verdict_of
 from tests.campaign import counts
-from tests.examples import SQUEAL, make, simulate
+from tests.examples import SQUEAL, make
 
 SHOES = [  # α in degrees, c2/c1, k in N/m²
     (3.0, 1.2, 2e7),
@@ -50,11 +49,6 @@ def disturbed(report: StabilityReport, frequency: float, seconds: float) -> dict
     }
 
 
-def judged(case: Case) -> Verdict:
-    result = simulate(case)
-    return classify(ArrayHistory(case.output.sample_interval, result.rows), context(system_of(case)))
-
-
 @pytest.mark.parametrize("mirrored", [False, True])
 @pytest.mark.parametrize("motion", ["below", "slow wheel", "fast wheel"])
 @pytest.mark.parametrize("kind", SHOES)
@@ -77,7 +71,7 @@ def test_flat_shoes_ten_percent_off_their_critical_friction(
     report = stability(system_of(shoe(kind, **changes)))
     assert (report.modes[0].growth > 0.0) == (motion != "below")
     times = disturbed(report, flat.critical.frequency, 25.0 / abs(report.modes[0].growth))
-    verdict = judged(shoe(kind, **changes, **times))
+    verdict = verdict_of(shoe(kind, **changes, **times))
     expected = {"below": Regime.DAMPED, "slow wheel": Regime.RELAXATION, "fast wheel": Regime.QUASI_HARMONIC}
     assert verdict.regime is expected[motion], verdict.reasons
     if motion != "below":
@@ -98,7 +92,7 @@ def test_roughness_below_the_critical_friction_forces_and_does_not_excite(
     changes["friction__coefficient"] = 0.85 * report.critical.friction
     report = stability(system_of(shoe(kind, **changes)))
     times = disturbed(report, 180.0, 15.0 / abs(report.modes[0].growth))
-    verdict = judged(shoe(kind, **changes, **times))
+    verdict = verdict_of(shoe(kind, **changes, **times))
     assert (verdict.regime, verdict.excitation) == (Regime.DAMPED, Excitation.FORCED), verdict.reasons
 
 
@@ -106,26 +100,26 @@ def test_roughness_below_the_critical_friction_forces_and_does_not_excite(
 def test_without_friction_every_damped_shoe_is_damped(kind: tuple[float, float, float]) -> None:
     case = shoe(kind, friction__coefficient=0.0)
     times = disturbed(stability(system_of(case)), 180.0, 2.0)
-    assert judged(shoe(kind, friction__coefficient=0.0, **times)).regime is Regime.DAMPED
+    assert verdict_of(shoe(kind, friction__coefficient=0.0, **times)).regime is Regime.DAMPED
 
 
 @pytest.mark.parametrize("kind", SHOES[:3])
 def test_on_a_standing_wheel_a_shoe_comes_to_rest(kind: tuple[float, float, float]) -> None:
     changes: dict[str, Any] = {"wheel__angular_speed": 0.0, "initial__vx": 0.05, "solver__duration": 1.0}
-    verdict = judged(shoe(kind, **changes))
+    verdict = verdict_of(shoe(kind, **changes))
     assert verdict.regime is Regime.DAMPED
     assert verdict.excitation is Excitation.NONE
 
 
 @pytest.mark.parametrize("kind", SHOES[:2])
 def test_a_shoe_that_is_pulled_off_has_no_regime(kind: tuple[float, float, float]) -> None:
-    verdict = judged(shoe(kind, load__force=-2000.0, solver__duration=1.0))
+    verdict = verdict_of(shoe(kind, load__force=-2000.0, solver__duration=1.0))
     assert verdict.regime is Regime.UNDECIDED
     assert "never touched" in verdict.reasons[0]
 
 
 def test_steady_sliding_left_alone_is_damped_and_not_rounding_that_vibrates() -> None:
-    verdict = judged(make(SQUEAL, initial__at="equilibrium", friction__coefficient=0.3, solver__duration=0.5))
+    verdict = verdict_of(make(SQUEAL, initial__at="equilibrium", friction__coefficient=0.3, solver__duration=0.5))
     assert verdict.regime is Regime.DAMPED
     assert "slides steadily" in verdict.reasons[0]
 
@@ -169,7 +163,7 @@ def test_random_shoes_are_never_judged_against_their_eigenvalues(shoes: int) -> 
         slow = min((mode.frequency for mode in report.modes if mode.frequency > 0.0), default=fast)
         rate = report.modes[0].growth
         seconds = max(min(max(300.0 / fast, 14.0 / abs(rate)), 10000.0 / fast), 100.0 / slow)
-        verdict = judged(make(tables, **disturbed(report, fast, seconds)))
+        verdict = verdict_of(make(tables, **disturbed(report, fast, seconds)))
         key = (rate > 0.0, verdict.regime)
         judgements[key] = judgements.get(key, 0) + 1
         wrong = {Regime.DAMPED} if rate > 0.0 else {Regime.RELAXATION, Regime.QUASI_HARMONIC}
@@ -199,7 +193,7 @@ def test_verdict_does_not_change_with_what_does_not_matter(phi: float, speed: fl
     base: dict[str, Any] = {
         "friction__coefficient": phi, "wheel__angular_speed": speed, "solver__duration": 1.5, "solver__step": 1e-5,
     }  # fmt: skip
-    verdicts = [judged(make(SQUEAL, **{**base, **change})) for change in CHANGES]
+    verdicts = [verdict_of(make(SQUEAL, **{**base, **change})) for change in CHANGES]
     assert {verdict.regime for verdict in verdicts} == {regime}, [verdict.reasons for verdict in verdicts]
     if regime is not Regime.DAMPED:
         frequencies = [verdict.frequency for verdict in verdicts if verdict.frequency]

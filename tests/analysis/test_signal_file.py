@@ -60,7 +60,7 @@ def test_missing_values_and_jumps_of_time_are_gaps(tmp_path: Path) -> None:
     assert "1 jumps of time" in jump.notes[0]
 
 
-def test_irregular_sampling_is_resampled_and_told(tmp_path: Path) -> None:
+def test_irregular_sampling_is_resampled_and_reported(tmp_path: Path) -> None:
     times = np.arange(50) + 0.2 * np.sin(np.arange(50))
     content = "\n".join(f"{t},{3.0 * t}" for t in times)
     signal = read(written(tmp_path, content), time="1")
@@ -92,12 +92,12 @@ def test_a_broken_file_is_unreadable_and_never_a_number(kind: str, tmp_path: Pat
         read(written(tmp_path, BROKEN[kind]), "2", "1")
 
 
-def test_a_missing_column_is_told_with_those_there_are(tmp_path: Path) -> None:
+def test_a_missing_column_is_reported_with_those_there_are(tmp_path: Path) -> None:
     with pytest.raises(UnreadableResultError, match="no column force; there are t, x"):
         read(written(tmp_path, "t,x\n0,1\n1,2\n"), "force", "t")
 
 
-def test_wrong_options_are_told_apart_from_a_wrong_file(tmp_path: Path) -> None:
+def test_wrong_options_differ_from_a_wrong_file(tmp_path: Path) -> None:
     path = written(tmp_path, "a,b,c\n0,1,2\n1,2,4\n")
     with pytest.raises(UsageError, match="--sample-rate HZ, or --time-column"):
         read(path, "a")

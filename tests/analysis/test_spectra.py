@@ -3,19 +3,16 @@
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.signal import welch
 
 from brakecli.analysis.regime import spectra
 from brakecli.analysis.regime.spectra import SPECTRAL, peak, spectrum, upward_crossings
 from brakecli.solver.history import ArrayHistory
-from brakecli.solver.quantities import HISTORY
-
-INTERVAL = 1e-4
+from tests.analysis.histories import INTERVAL, history_of
 
 
 def history(vx: NDArray[np.float64]) -> ArrayHistory:
-    rows = np.zeros((len(vx), len(HISTORY)))
-    rows[:, list(HISTORY).index("vx")] = vx
-    return ArrayHistory(INTERVAL, rows)
+    return history_of(len(vx), vx=vx)
 
 
 def sine(frequency: float, samples: int = 20000, amplitude: float = 0.03) -> NDArray[np.float64]:
@@ -89,3 +86,13 @@ def test_crossings_of_a_sine_are_interpolated() -> None:
     # Linear interpolation between samples x apart errs by (ωx)³/60 of a sample at most here.
     period = (crossings[-1] - crossings[0]) / (len(crossings) - 1)
     assert 1.0 / (period * INTERVAL) == pytest.approx(100.37, rel=1e-6)
+
+
+@pytest.mark.parametrize("samples", [2, 17, 100, 1001, 20000])
+def test_density_is_that_of_scipy(samples: int) -> None:
+    noise = np.random.default_rng(3).normal(1.0, 2.0, samples)
+    lines = spectrum(history(noise), 0)
+    size = round(1.0 / (lines.frequency[1] * INTERVAL))
+    _, density = welch(noise, 1.0 / INTERVAL, nperseg=size, noverlap=size // 2)
+    # Both sum the same numbers, but for the scale that is taken out here and put back.
+    np.testing.assert_allclose(lines.density["vx"], density, rtol=1e-12, atol=1e-15 * density.max())

@@ -9,8 +9,8 @@ import pytest
 from brakecli.analysis.stability.modes import Instability, crossings, eigensystem, growth, modes
 from brakecli.analysis.stability.report import stability, step_limit, undamped_critical
 from brakecli.case.system import system_of
-from brakecli.solver.compile import Coefficients
 from brakecli.solver.links import coefficients, natural_frequencies
+from brakecli.solver.records import Coefficients
 from tests.campaign import counts
 from tests.examples import MODE_COUPLING, ROUGH, SQUEAL, make, simulate
 

@@ -14,23 +14,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from brakecli.case.case import Case, InitialState, Iteration, Scheme, Start, json_schema, resolved_toml
+from brakecli.case.case import Case, InitialState, Iteration, Scheme, Start, resolved_toml
 from brakecli.case.read import parse_case, read_case, starter_text
-from brakecli.case.wording import tables
+from brakecli.case.tables import json_schema, tables_within
+from tests.case.examples import SMALL
 
 jsonschema = import_module("jsonschema")  # imported so because it has no type hints
-VALIDATOR = jsonschema.Draft202012Validator(json_schema())
-
-SMALL = """
-shoe.mass = 10
-wheel = { radius = 0.5, angular_speed = -4 }
-link1.stiffness = 1e7
-link2.stiffness = 0
-load.force = -5000
-friction.coefficient = 0
-contact = { half_length = 0.05, stiffness = 2e7 }
-solver = { step = 1e-5, duration = 1 }
-"""
+VALIDATOR = jsonschema.Draft202012Validator(json_schema(Case))
 
 numbers = st.floats(-1e100, 1e100).filter(lambda value: value == 0 or abs(value) >= 1e-100)
 positives = st.floats(1e-100, 1e100)
@@ -214,9 +204,9 @@ def test_a_case_built_in_python_obeys_the_same_rules() -> None:
 
 
 def test_every_key_has_a_description_and_every_float_a_unit() -> None:
-    schema = json_schema()
+    schema = json_schema(Case)
     seen = 0
-    for path, table in tables(Case):
+    for path, table in tables_within(Case).items():
         properties = schema["$defs"][table.__name__]["properties"] if path else schema["properties"]
         for key, node in properties.items():
             kind = node.get("items", node).get("type")
@@ -228,11 +218,11 @@ def test_every_key_has_a_description_and_every_float_a_unit() -> None:
 
 def test_the_shipped_schema_is_the_one_the_models_give() -> None:
     shipped = resources.files("brakecli.case").joinpath("case.schema.json").read_text(encoding="utf-8")
-    assert json.loads(shipped) == json_schema()
+    assert json.loads(shipped) == json_schema(Case)
 
 
 def test_the_schema_is_valid_and_accepts_the_starter_case() -> None:
-    jsonschema.Draft202012Validator.check_schema(json_schema())
+    jsonschema.Draft202012Validator.check_schema(json_schema(Case))
     VALIDATOR.validate(tomllib.loads(starter_text()))
 
 
@@ -264,9 +254,9 @@ def test_the_schema_refuses_two_alternatives_at_once() -> None:
 def test_the_starter_mentions_every_key() -> None:
     text = starter_text()
     seen = 0
-    for path, table in tables(Case):
+    for path, table in tables_within(Case).items():
         for key in table.model_fields:
-            if (*path, key) not in dict(tables(Case)):
+            if (*path, key) not in tables_within(Case):
                 assert f"\n{key} = " in text or f"\n# {key} = " in text, (path, key)
                 seen += 1
     assert seen > 30
@@ -298,41 +288,6 @@ def test_the_text_is_kept_as_it_was_with_its_line_ends(tmp_path: Path) -> None:
 def test_a_case_is_read_from_standard_input(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(SMALL.encode())))
     assert read_case("-").case == parse_case(SMALL, "small").case
-
-
-def test_overrides_show_in_the_resolved_case_and_not_in_the_text() -> None:
-    loaded = parse_case(SMALL, "small", ["shoe.mass=3", "shoe.mass=4", 'title="a=b"'])
-    assert loaded.text == SMALL
-    assert loaded.case.shoe.mass == 4.0  # the last one counts
-    assert loaded.case.title == "a=b"
-    assert parse_case(loaded.resolved, "resolved").case == loaded.case
-
-
-def test_overrides_create_the_tables_they_need() -> None:
-    overrides = ["roughness.wheel.amplitudes=[1e-6]", "roughness.wheel.wavenumbers=[300]", "initial={x=1e-6}"]
-    case = parse_case(SMALL, "small", overrides).case
-    assert case.roughness.wheel is not None
-    assert case.roughness.wheel.wavenumbers == (300.0,)
-    assert case.initial.x == 1e-6
-
-
-@pytest.mark.parametrize(
-    ("overrides", "there", "gone"),
-    [
-        (["load.times=[0, 1]", "load.forces=[0, 9]"], "forces", "force"),
-        (["load.forces=[0, 9]", "load.times=[0, 1]"], "times", "force"),
-    ],
-)
-def test_an_override_takes_the_place_of_its_alternative(overrides: list[str], there: str, gone: str) -> None:
-    load = parse_case(SMALL, "small", overrides).case.load
-    assert getattr(load, there) is not None
-    assert getattr(load, gone) is None
-
-
-def test_an_override_takes_the_place_of_a_schedule() -> None:
-    text = SMALL.replace("angular_speed = -4", "times = [0, 1], angular_speeds = [4, 0]")
-    wheel = parse_case(text, "small", ["wheel.angular_speed=7"]).case.wheel
-    assert (wheel.angular_speed, wheel.times, wheel.angular_speeds) == (7.0, None, None)
 
 
 def test_reading_a_case_imports_no_numerical_library() -> None:

@@ -175,7 +175,7 @@ def test_titles_and_file_names_are_shown_as_they_are(folder: Path) -> None:
     assert "[red]r.h5\n" in done.out
 
 
-def test_adjusted_steps_and_durations_are_told(tmp_path: Path) -> None:
+def test_adjusted_steps_and_durations_are_reported(tmp_path: Path) -> None:
     (tmp_path / "tiny.toml").write_text(TINY)
     changes = ["--set", "solver.step=1.3e-5", "--set", "solver.duration=0.01234"]
     run, quiet, check = each(
@@ -220,6 +220,22 @@ def test_new_takes_its_place_from_a_name_or_an_output(tmp_path: Path) -> None:
     empty.told(2, "the name is empty")
 
 
+def test_no_command_replaces_the_file_that_it_reads(tmp_path: Path) -> None:
+    axis = '[[axis]]\nparameter = "load.force"\nvalues = [1.0]\n'
+    texts = {"tiny.toml": TINY, "sweep.toml": 'case = "tiny.toml"\n' + axis}
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text)
+    commands = [["run", "tiny.toml"], ["compare-schemes", "tiny.toml"], ["sweep", "sweep.toml"]]
+    done = each(tmp_path, [[*command, "-o", command[1], "--force"] for command in commands])
+    for result, kind in zip(done, ("case", "case", "sweep"), strict=True):
+        result.told(2, f"this is the {kind} itself; choose another output with -o")
+    assert {name: (tmp_path / name).read_text() for name in texts} == texts
+
+
+def test_a_directory_is_not_a_result_to_draw(tmp_path: Path) -> None:
+    brakecli("plot", ".", cwd=tmp_path).told(2, "name a file that ends in .pdf, .png or .svg")
+
+
 def test_the_schema_is_the_shipped_file(tmp_path: Path) -> None:
     done, ascii_only = (brakecli("schema", cwd=tmp_path, PYTHONIOENCODING=code) for code in ("utf-8", "ascii"))
     shipped = resources.files("brakecli.case").joinpath("case.schema.json").read_text(encoding="utf-8")
@@ -227,7 +243,7 @@ def test_the_schema_is_the_shipped_file(tmp_path: Path) -> None:
     assert done.json == ascii_only.json == json.loads(shipped)
 
 
-def test_check_tells_cost_and_limits_and_writes_nothing(tmp_path: Path) -> None:
+def test_check_reports_cost_and_limits_and_writes_nothing(tmp_path: Path) -> None:
     (tmp_path / "tiny.toml").write_text(TINY)
     table, numbers, quiet = each(tmp_path, [["check", "tiny.toml", *flag] for flag in ([], ["--json"], ["-q"])])
     assert table.told(0) == numbers.told(0) == quiet.told(0) == quiet.out == ""
@@ -246,7 +262,7 @@ def test_check_tells_cost_and_limits_and_writes_nothing(tmp_path: Path) -> None:
     assert left_in(tmp_path) == {"tiny.toml"}
 
 
-def test_the_version_is_told() -> None:
+def test_the_version_is_printed() -> None:
     assert brakecli("--version", cwd=ROOT) == Done(0, f"brakecli {__version__}\n", "")
 
 
@@ -263,22 +279,44 @@ def test_every_command_has_help_and_a_place_in_the_documentation() -> None:
         assert f"brakecli {command}" in documentation, command
 
 
-# how it is told
+# how it is shown
+
+
+def loaded_by(arguments: list[str], cwd: Path | None = None) -> set[str]:
+    """The names of the modules that a command has loaded by its end."""
+    code = (
+        f"import sys; sys.argv = {['brakecli', *arguments]}\n"
+        "from brakecli.__main__ import main\n"
+        "try: main()\n"
+        "except SystemExit: pass\n"
+        "print('loaded:', *sys.modules, file=sys.stderr)\n"
+    )
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(
+        command, capture_output=True, text=True, cwd=cwd, env=environment(), timeout=LIMIT, check=True
+    )
+    return set(done.stderr.split("loaded:")[1].split())
 
 
 def test_help_imports_no_numerical_library() -> None:
-    code = (
-        "import sys; sys.argv = ['brakecli', '--help']\n"
-        "from brakecli.__main__ import main\n"
-        "try: main()\n"
-        "except SystemExit: print('loaded:', *sys.modules, file=sys.stderr)\n"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, env=environment(), timeout=LIMIT, check=True
-    )
-    loaded = {name.split(".")[0] for name in done.stderr.split("loaded:")[1].split()}
+    loaded = loaded_by(["--help"])
     assert "typer" in loaded
     assert loaded.isdisjoint({"numpy", "numba", "h5py", "scipy", "pydantic", "matplotlib", "rich"})
+
+
+def test_a_run_waits_for_no_library_that_it_does_not_need(tmp_path: Path) -> None:
+    (tmp_path / "tiny.toml").write_text(TINY)
+    loaded = loaded_by(["run", "tiny.toml"], tmp_path)
+    assert {"numba", "h5py", "brakecli.solver.loop"} <= loaded
+    unused = {"scipy.signal", "scipy.stats", "scipy.interpolate", "scipy.optimize", "scipy.ndimage"}
+    assert loaded.isdisjoint({*unused, "matplotlib", "pint", "brakecli.sweeps", "brakecli.comparison"})
+
+
+def test_a_measured_signal_waits_for_no_compiled_code(tmp_path: Path) -> None:
+    np.savetxt(tmp_path / "signal.csv", np.sin(0.1 * np.arange(2000.0)))
+    loaded = loaded_by(["classify", "signal.csv", "--sample-rate", "1e3", "--quantity", "displacement"], tmp_path)
+    assert "brakecli.analysis.regime.of_signal" in loaded
+    assert loaded.isdisjoint({"numba", "h5py", "scipy.signal", "scipy.stats", "scipy.optimize", "matplotlib"})
 
 
 def on_a_terminal(arguments: list[str], cwd: Path, **changes: str) -> tuple[int, str, str]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from brakecli.files.fields import Field
+from brakecli.files.field import Field
 from brakecli.files.read import open_result
 from brakecli.files.write import ResultFile, new_result
 from tests.commands import LIMIT, ROOT

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from brakecli.files import fields
-from brakecli.files.fields import Field
+from brakecli.files.field import Field, plain
 
 TABLES = {name: rows for name, rows in vars(fields).items() if isinstance(rows, tuple) and name[0].isupper()}
 
@@ -60,7 +60,7 @@ def test_objects_and_lists_of_objects_are_read_by_their_own_rows() -> None:
 
 
 def test_values_are_as_json_holds_them() -> None:
-    assert fields.plain((1.0, 2 + 3j, {"x": ("y",)})) == [1.0, [2.0, 3.0], {"x": ["y"]}]
-    assert fields.plain(np.array([[1.0, np.nan]])) == [[1.0, None]]
-    assert fields.plain(np.array(["größer".encode()])) == ["größer"]
-    assert fields.plain(np.array([1, 2])) == [1, 2]
+    assert plain((1.0, 2 + 3j, {"x": ("y",)})) == [1.0, [2.0, 3.0], {"x": ["y"]}]
+    assert plain(np.array([[1.0, np.nan]])) == [[1.0, None]]
+    assert plain(np.array(["größer".encode()])) == ["größer"]
+    assert plain(np.array([1, 2])) == [1, 2]

@@ -14,7 +14,7 @@ import pytest
 import xarray as xr
 
 from brakecli.errors import UnreadableResultError, UsageError
-from brakecli.files.fields import Field
+from brakecli.files.field import Field
 from brakecli.files.read import is_hdf5, open_result
 from brakecli.files.write import ResultFile, new_result
 

@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 
 from brakecli.errors import CannotWriteError, UsageError
-from brakecli.files.fields import Field
+from brakecli.files.field import Field
 from brakecli.files.write import new_result
 from tests.commands import ROOT
 from tests.files.results import command_of, fill, in_a_process, read_all, write

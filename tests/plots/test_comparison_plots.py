@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 from matplotlib.image import imread
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
@@ -17,13 +16,14 @@ from brakecli.comparison.compare import compare
 from brakecli.comparison.methods import method_label
 from brakecli.comparison.result import ComparisonReport
 from brakecli.errors import UnreadableResultError, UsageError
-from brakecli.files.fields import Field
+from brakecli.files.field import Field
 from brakecli.files.read import open_result
 from brakecli.files.write import FILL, new_result
-from brakecli.plots.comparison import LARGEST, draw_comparison, gather_comparison
-from brakecli.plots.result import plot_result
-from brakecli.plots.style import style
+from brakecli.plots.comparison import LARGEST
+from brakecli.plots.result import draw, plot_result
+from brakecli.plots.style import applied
 from tests.commands import TINY
+from tests.plots.helpers import drawn, legend, line
 
 METHODS = {
     "two-layer (1/2, 1/2)": ("two-layer", "0.5, 0.5", "consistent", "newton", "auto", 256),
@@ -74,21 +74,6 @@ def write(path: Path, changed: Columns | None = None, **attributes: Any) -> Path
             result.variable("/", Field(name, "1", name), ("entry",), data)
         result.commit()
     return path
-
-
-def drawn(path: Path) -> Figure:
-    with open_result(path) as stored, style():
-        return draw_comparison(gather_comparison(stored))
-
-
-def line(axes: Any, label: str) -> Any:
-    found = [each for each in axes.get_lines() if each.get_label() == label]
-    assert len(found) == 1, label
-    return found[0]
-
-
-def legend(figure: Figure) -> list[str]:
-    return [text.get_text() for each in figure.legends for text in each.get_texts()]
 
 
 @pytest.mark.parametrize("suffix", ["png", "pdf", "svg"])
@@ -145,7 +130,7 @@ def test_front_target_and_recommendation_are_marked(tmp_path: Path) -> None:
 
 
 def test_the_legend_covers_no_panel(tmp_path: Path) -> None:
-    with style():
+    with applied():
         figure = drawn(write(tmp_path / "r.h5"))
         figure.draw_without_rendering()
     (found,) = figure.legends
@@ -196,8 +181,8 @@ def test_without_times_the_work_is_drawn_alone(tmp_path: Path) -> None:
 def test_where_nothing_meets_the_target_the_picture_says_so(tmp_path: Path) -> None:
     with open_result(write(tmp_path / "r.h5")) as stored:
         stored.attributes = {name: value for name, value in stored.attributes.items() if name != "recommended"}
-        with style():
-            figure = draw_comparison(gather_comparison(stored))
+        with applied():
+            figure = draw(stored)
     assert figure.texts[1].get_text() == "no entry has an error of at most 0.01"
     assert "recommended" not in legend(figure)
 

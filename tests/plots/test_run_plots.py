@@ -16,14 +16,14 @@ from matplotlib.image import imread
 from numpy.typing import NDArray
 
 from brakecli.case.read import parse_case
-from brakecli.cli import commands as cli
+from brakecli.cli import app as cli
 from brakecli.errors import BrakecliError, UnreadableResultError, UsageError
-from brakecli.files.fields import Field
+from brakecli.files.field import Field
 from brakecli.files.read import open_result
 from brakecli.files.write import new_result
-from brakecli.plots import run as picture
-from brakecli.plots.result import draw, plot_result
-from brakecli.plots.run import Picture, envelope, episodes, gather
+from brakecli.plots import run
+from brakecli.plots.result import plot_result
+from brakecli.plots.run import RunPicture, draw, envelope, episodes, gather
 from brakecli.solver.quantities import HISTORY, ContactState
 
 CASE = """
@@ -71,7 +71,7 @@ def write(path: Path, moved: Samples, *overrides: str, **attributes: Any) -> Pat
     return path
 
 
-def gathered(path: Path, moved: Samples, *overrides: str, **attributes: Any) -> Picture:
+def gathered(path: Path, moved: Samples, *overrides: str, **attributes: Any) -> RunPicture:
     with open_result(write(path, moved, *overrides, **attributes), kind="run") as result:
         return gather(result)
 
@@ -133,7 +133,7 @@ def test_stick_is_shaded_half_an_interval_around_each_of_its_samples(tmp_path: P
 def test_envelope_is_the_least_and_greatest_value_of_each_column(
     samples: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(picture, "BLOCK", 333)
+    monkeypatch.setattr(run, "BLOCK", 333)
     values = np.random.default_rng(1).normal(size=samples)
     asked: list[int] = []
 

@@ -20,7 +20,7 @@ class PiecewiseExact:
     """Exact motion (x, y, vx, vy) of a flat case with constant speed and load."""
 
     def __init__(self, system: System, grid: float) -> None:
-        c, q = system.coefficients, float(system.load.values[0])
+        c, q = system.coefficients, float(system.load["value"][0])
         self.belt, self.phi, self.stiffness = system.belt_speed, c.phi, system.contact_stiffness
         self.c = c
         self.q_x, self.q_y = q * c.sin_beta, q * c.cos_beta

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from hypothesis import strategies as st
@@ -15,8 +15,8 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from brakecli.solver import contact
-from brakecli.solver.compile import SCRATCH
-from brakecli.solver.contact.pad import build_contact, build_pad
+from brakecli.solver.contact.pad import Pad, build_layer, build_pad
+from brakecli.solver.records import Layer
 from brakecli.solver.roughness import Surface, surface, wheel_angles
 
 EPS = 2.0**-52
@@ -148,22 +148,35 @@ class Gap:
     def angles(self) -> NDArray[np.float64]:
         """The package's phases of the wheel."""
         angles = np.zeros(len(self.wheel))
-        wheel_angles(self.surfaces[1], self.travel, 0.0, angles)
+        wheel_angles(self.surfaces[1].waves, self.travel, 0.0, angles)
         return angles
 
-    def pad(self, nodes: int = 64) -> NDArray[np.float64]:
+    def pad(self, nodes: int = 64) -> Pad:
         """The package's pad."""
         return build_pad(self.k, self.a, *self.surfaces, nodes)
 
     def evaluate(
-        self, evaluator: str, *, nodes: int = 64, dx: float = 0.0, dy: float = 0.0, pad: object = None
-    ) -> NDArray[np.float64]:
-        """What the package computes with the shoe moved by (dx, dy)."""
-        pad = self.pad(nodes) if pad is None else pad
-        filled = build_contact(pad)  # type: ignore[arg-type]
-        filled[:] = np.nan
-        contact.load(evaluator)(self.x + dx, self.y + dy, self.angles, pad, filled)
-        return filled[:SCRATCH]
+        self, evaluator: str, *, nodes: int = 64, dx: float = 0.0, dy: float = 0.0, pad: Pad | None = None
+    ) -> Any:
+        """What the package computes with the shoe moved by (dx, dy): a record of CONTACT."""
+        layer = unfilled(evaluator, self.pad(nodes) if pad is None else pad)
+        layer.angles[:] = self.angles
+        contact.load(evaluator)(self.x + dx, self.y + dy, layer)
+        return layer.contact
+
+
+def unfilled(evaluator: str, pad: Pad) -> Layer:
+    """The package's layer with nothing in it that an evaluator might take for a result."""
+    layer = build_layer(contact.load(evaluator), pad)
+    layer.scratch[:] = np.nan
+    for name in layer.contact.dtype.names:
+        layer.contact[name] = -1 if name in ("kind", "valid") else np.nan
+    return layer
+
+
+def outputs(found: Any) -> NDArray[np.float64]:
+    """The quantities of a record of CONTACT, in their order, without kind and valid."""
+    return np.array(found.tolist()[:-2])
 
 
 def _surface(waves: tuple[Wave, ...]) -> Surface:

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from brakecli.solver import contact
-from brakecli.solver.compile import NORMAL_FORCE
-from brakecli.solver.contact.pad import build_contact
+from brakecli.solver.contact.pad import build_layer
 from brakecli.solver.system import System
 
 Vector = NDArray[np.float64]
@@ -25,8 +24,9 @@ class SolveIvp:
 
     def __init__(self, system: System, relative: float, max_step: float) -> None:
         self.system, self.relative, self.max_step = system, relative, max_step
-        self.c, self.belt, self.q = system.coefficients, system.belt_speed, float(system.load.values[0])
-        self.evaluate, self.pad, self.filled = contact.load("exact"), system.pad, build_contact(system.pad)
+        self.c, self.belt, self.q = system.coefficients, system.belt_speed, float(system.load["value"][0])
+        self.evaluate = contact.load("exact")
+        self.layer = build_layer(self.evaluate, system.pad)
         self.visited: list[int] = []
         self.evaluations = 0
 
@@ -34,9 +34,9 @@ class SolveIvp:
         """F_y."""
         self.evaluations += 1
         wheel = self.system.wheel
-        angles = wheel.phase - wheel.omega * (self.belt * t)
-        self.evaluate(z[0], z[1], angles, self.pad, self.filled)
-        return float(self.filled[NORMAL_FORCE])
+        self.layer.angles[:] = wheel.phase - wheel.omega * (self.belt * t)
+        self.evaluate(z[0], z[1], self.layer)
+        return float(self.layer.contact.normal_force)
 
     def against(self, z: Vector) -> tuple[float, float]:
         """Forces of links and load."""

@@ -9,22 +9,10 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from brakecli.solver import contact
-from brakecli.solver.compile import (
-    FRACTION,
-    KIND,
-    NORMAL_FORCE,
-    STIFFNESS,
-    STORE,
-    STORE_X,
-    TANGENTIAL,
-    VALID,
-)
 from brakecli.solver.contact.closed_form import CLEAR, FULL, coverage
-from brakecli.solver.contact.pad import NODES_PER_WAVE, build_contact, build_pad, default_nodes
+from brakecli.solver.contact.pad import NODES_PER_WAVE, build_layer, build_pad, default_nodes
 from brakecli.solver.roughness import Surface, surface
-from tests.solver.rough_gap import EPS, EVALUATORS, Gap, Wave, gaps
-
-OUTPUTS = slice(NORMAL_FORCE, KIND)
+from tests.solver.rough_gap import EPS, EVALUATORS, Gap, Wave, gaps, outputs
 
 # Case B of the roughness: five waves on each surface.
 CASE_B_SHOE = (Wave(30e-6, 0.020), Wave(21e-6, 0.011), Wave(15e-6, 0.007), Wave(9e-6, 0.005), Wave(6e-6, 0.003))
@@ -46,20 +34,20 @@ def test_exact_agrees_with_quadrature_between_the_roots(gap: Gap) -> None:
     # Sums of n terms round n times, and quadrature adds once its accuracy, that of the integrand.
     n = 2 + gap.sines[0].size
     force = k * gap.integral(gap.value, delta)
-    assert found[NORMAL_FORCE] == pytest.approx(force, rel=0, abs=k * length * delta * n)
+    assert found.normal_force == pytest.approx(force, rel=0, abs=k * length * delta * n)
     store = 0.5 * k * gap.integral(lambda xi: gap.value(xi) ** 2, height * delta)
-    assert found[STORE] == pytest.approx(store, rel=0, abs=k * length * height * delta * n)
+    assert found.store == pytest.approx(store, rel=0, abs=k * length * height * delta * n)
     store_x = k * gap.integral(lambda xi: gap.value(xi) * gap.wheel_slope(xi), steep * delta)
-    assert found[STORE_X] == pytest.approx(store_x, rel=0, abs=k * length * steep * delta * n)
+    assert found.store_x == pytest.approx(store_x, rel=0, abs=k * length * steep * delta * n)
     # Rounding moves the gap by at most delta, so the touching set lies between those where it exceeds +-delta.
     least, most = gap.length(delta) - 8 * EPS * length, gap.length(-delta) + 8 * EPS * length
-    assert k * least <= found[STIFFNESS] <= k * most
-    assert found[FRACTION] == pytest.approx(found[STIFFNESS] / (k * length), rel=4 * EPS)
+    assert k * least <= found.stiffness <= k * most
+    assert found.fraction == pytest.approx(found.stiffness / (k * length), rel=4 * EPS)
     rise = k * gap.integral(gap.wheel_slope, steep * 1e4 * EPS)  # phases up to 2000 rad
-    assert found[TANGENTIAL] == pytest.approx(
+    assert found.tangential == pytest.approx(
         rise, rel=0, abs=k * (steep * (most - least) + (height + steep * length) * n * 1e4 * EPS)
     )
-    assert (found[KIND], found[VALID]) == (2, 1)
+    assert (found.kind, found.valid) == (2, 1)
 
 
 @given(gaps(-3.0, -1.001, most=4))
@@ -67,13 +55,13 @@ def test_the_evaluators_agree_where_the_pad_touches_everywhere(gap: Gap) -> None
     closed, exact, auto = (gap.evaluate(name) for name in ("closed-form", "exact", "auto"))
     height, steep = abs(gap.y) + gap.crest, gap.steepest(wheel_only=True)
     scale = 2 * gap.a * gap.k * np.array([height, 1, steep, 0, height**2, height * steep])
-    scale[FRACTION] = 1
+    scale[3] = 1  # fraction
     # The phases, up to 2 pi (x + travel)/wavelength = 1600, round to 1600 EPS = 4e-13 rad; four times that.
-    assert np.all(np.abs(closed - exact)[OUTPUTS] <= 2e-12 * scale)
+    assert np.all(np.abs(outputs(closed) - outputs(exact)) <= 2e-12 * scale)
     np.testing.assert_array_equal(auto, closed)
-    assert closed[VALID] == 1
-    assert gap.evaluate("midpoint")[NORMAL_FORCE] == pytest.approx(
-        exact[NORMAL_FORCE], rel=0, abs=2e-12 * gap.force_scale
+    assert closed.valid == 1
+    assert gap.evaluate("midpoint").normal_force == pytest.approx(
+        exact.normal_force, rel=0, abs=2e-12 * gap.force_scale
     )
 
 
@@ -89,15 +77,15 @@ def test_a_fully_touching_pad_obeys_the_closed_form(gap: Gap, evaluator: str) ->
 
     expected = 2 * gap.a * gap.k * (mean(gap.wheel, gap.x - gap.travel) - mean(gap.shoe, 0.0) - gap.y)
     # 1e-12: phases of up to 1600 rad are known to 4e-13 rad, here and there.
-    found = gap.evaluate(evaluator)[NORMAL_FORCE]
+    found = gap.evaluate(evaluator).normal_force
     assert found == pytest.approx(expected, rel=0, abs=1e-12 * gap.force_scale)
 
 
 @given(gaps(1.0, 3.0), st.sampled_from(EVALUATORS))
 def test_an_open_pad_gives_nothing_at_all(gap: Gap, evaluator: str) -> None:
     found = gap.evaluate(evaluator)
-    np.testing.assert_array_equal(found[OUTPUTS], 0.0)
-    assert found[VALID] == 1
+    np.testing.assert_array_equal(outputs(found), 0.0)
+    assert found.valid == 1
 
 
 @given(gaps(-3.0, -1.0), st.floats(-0.01, 0.01), st.sampled_from(EVALUATORS))
@@ -106,8 +94,8 @@ def test_the_shoe_s_own_roughness_drops_out_of_full_contact_but_for_a_constant(
 ) -> None:
     smooth = Gap((), gap.wheel, gap.a, gap.x, gap.y, gap.travel, gap.k)
     assume(smooth.crest > 0)
-    rough = [gap.evaluate(evaluator, dx=each)[NORMAL_FORCE] for each in (0.0, dx)]
-    bare = [smooth.evaluate(evaluator, dx=each)[NORMAL_FORCE] for each in (0.0, dx)]
+    rough = [gap.evaluate(evaluator, dx=each).normal_force for each in (0.0, dx)]
+    bare = [smooth.evaluate(evaluator, dx=each).normal_force for each in (0.0, dx)]
     # Rounding of the same phases cancels; the tables' and the sums' remain: a few EPS per wave.
     tolerance = 1e-13 * gap.force_scale
     assert rough[1] - bare[1] == pytest.approx(rough[0] - bare[0], rel=0, abs=2 * tolerance)
@@ -126,12 +114,12 @@ def test_the_midpoint_rule_errs_downwards_and_by_no_more_than_its_kinks_explain(
     exact, found = gap.evaluate("exact"), gap.evaluate("midpoint", nodes=nodes)
     spacing, roots = 2 * gap.a / nodes, 2 * len(gap.extremes)
     # Rounding of the gap, and of the sum over the nodes: half a unit in the last place for each addition.
-    rounding = 2 * gap.a * gap.k * gap.rounding * (1 + gap.sines[0].size) + nodes * EPS / 2 * exact[NORMAL_FORCE]
-    error = exact[NORMAL_FORCE] - found[NORMAL_FORCE]
+    rounding = 2 * gap.a * gap.k * gap.rounding * (1 + gap.sines[0].size) + nodes * EPS / 2 * exact.normal_force
+    error = exact.normal_force - found.normal_force
     assert -rounding <= error <= gap.k * gap.steepest() * spacing**2 / 8 * roots + rounding
     # A cell counts as touching as a whole: wrong by less than a cell at each root.
-    assert found[STIFFNESS] == pytest.approx(exact[STIFFNESS], rel=0, abs=gap.k * spacing * (roots + 1e-9))
-    assert found[FRACTION] == pytest.approx(found[STIFFNESS] / (2 * gap.a * gap.k), rel=4 * EPS)
+    assert found.stiffness == pytest.approx(exact.stiffness, rel=0, abs=gap.k * spacing * (roots + 1e-9))
+    assert found.fraction == pytest.approx(found.stiffness / (2 * gap.a * gap.k), rel=4 * EPS)
 
 
 def test_the_midpoint_error_falls_with_the_square_of_the_spacing() -> None:
@@ -145,8 +133,8 @@ def test_the_midpoint_error_falls_with_the_square_of_the_spacing() -> None:
     xi = np.linspace(-0.05, 0.05, 5001)
     for i in range(positions):
         at = case_b(rng.uniform(-1e-3, 1e-3), rng.uniform(-60e-6, 0.0), rng.uniform(0.0, 1.0))
-        forces[i] = at.evaluate("exact", pad=pads[0])[NORMAL_FORCE]
-        errors[i] = [forces[i] - at.evaluate("midpoint", pad=pad)[NORMAL_FORCE] for pad in pads]
+        forces[i] = at.evaluate("exact", pad=pads[0]).normal_force
+        errors[i] = [forces[i] - at.evaluate("midpoint", pad=pad).normal_force for pad in pads]
         slopes[i] = np.sum(np.abs(at.values(xi, 1)[:-1])[np.diff(at.values(xi) > 0)])
     rms = np.sqrt(np.mean(errors**2, axis=0))
     order = -np.polyfit(np.log2(nodes), np.log2(rms), 1)[0]
@@ -178,8 +166,8 @@ def test_default_nodes_keep_the_force_to_a_few_parts_in_ten_thousand() -> None:
         pad = gap.pad(default_nodes(a, *gap.surfaces))
         for _ in range(10):
             at = Gap(shoe, wheel, a, rng.uniform(-1e-3, 1e-3), rng.uniform(-1, 1) * gap.crest, rng.uniform(0, 1))
-            difference = at.evaluate("midpoint", pad=pad) - at.evaluate("exact", pad=pad)
-            errors.append(difference[NORMAL_FORCE] / (2 * a * gap.k * (gap.crest or 1.0)))
+            forces = [at.evaluate(name, pad=pad).normal_force for name in ("midpoint", "exact")]
+            errors.append((forces[0] - forces[1]) / (2 * a * gap.k * (gap.crest or 1.0)))
     assert len(errors) == 2000
     assert 1e-4 < np.sqrt(np.mean(np.square(errors))) < 4e-4  # measured 2.6e-4
     assert max(map(abs, errors)) < 2 * math.pi / (4 * NODES_PER_WAVE**2)
@@ -199,10 +187,10 @@ def test_stiffness_is_the_force_s_derivative(gap: Gap, evaluator: str, part: flo
     """F_y is convex in y, so that a difference quotient lies between the stiffnesses at its two ends."""
     eta, pad = part * gap.crest, gap.pad()
     near, far = (gap.evaluate(evaluator, dy=dy, pad=pad) for dy in (-eta, eta))
-    assume(near[VALID] == far[VALID] == 1)
-    quotient = (near[NORMAL_FORCE] - far[NORMAL_FORCE]) / (2 * eta)
+    assume(near.valid == far.valid == 1)
+    quotient = (near.normal_force - far.normal_force) / (2 * eta)
     rounding = 2 * gap.a * gap.k * gap.rounding * (1 + gap.sines[0].size) / eta
-    assert far[STIFFNESS] - rounding <= quotient <= near[STIFFNESS] + rounding
+    assert far.stiffness - rounding <= quotient <= near.stiffness + rounding
 
 
 @given(gaps(least=1), st.sampled_from(EVALUATORS))
@@ -215,15 +203,15 @@ def test_tangential_is_the_force_s_derivative_along_the_wheel(gap: Gap, evaluato
     assume(steep > 0)
     pad = gap.pad(nodes)
     before, at, after = (gap.evaluate(evaluator, dx=dx, pad=pad) for dx in (-eta, 0.0, eta))
-    wide, narrow = (gap.evaluate(evaluator, dy=dy * eta * steep, pad=pad)[STIFFNESS] for dy in (-1.001, 1.001))
-    assume(before[VALID] == at[VALID] == after[VALID] == 1)
-    quotient = (after[NORMAL_FORCE] - before[NORMAL_FORCE]) / (2 * eta)
+    wide, narrow = (gap.evaluate(evaluator, dy=dy * eta * steep, pad=pad).stiffness for dy in (-1.001, 1.001))
+    assume(before.valid == at.valid == after.valid == 1)
+    quotient = (after.normal_force - before.normal_force) / (2 * eta)
     rounding = 2 * gap.a * gap.k * gap.rounding * (1 + gap.sines[0].size)
     tolerance = 2 * gap.a * gap.k * eta * curved + steep * (wide - narrow) + rounding / eta
-    if at[KIND] == 1:  # f2' from neighbouring nodes: omega spacing replaced by its sine, 1 - sinc z <= z²/6
+    if at.kind == 1:  # f2' from neighbouring nodes: omega spacing replaced by its sine, 1 - sinc z <= z²/6
         g, omega, _ = (column[: len(gap.wheel)] for column in gap.sines)
         tolerance += 2 * gap.a * gap.k * float(np.sum(np.abs(g) * omega * (omega * 2 * gap.a / nodes) ** 2 / 6))
-    assert at[TANGENTIAL] == pytest.approx(quotient, rel=0, abs=tolerance)
+    assert at.tangential == pytest.approx(quotient, rel=0, abs=tolerance)
 
 
 @given(gaps(least=1), st.sampled_from(EVALUATORS))
@@ -235,17 +223,17 @@ def test_the_store_s_derivatives_are_the_forces(gap: Gap, evaluator: str) -> Non
     rounding = stiffness * height * gap.rounding * (1 + gap.sines[0].size)
     eta = 1e-4 * height
     ends = [gap.evaluate(evaluator, dy=dy, pad=pad) for dy in (-eta, eta)]
-    assume(all(end[VALID] == 1 and end[KIND] == at[KIND] for end in (*ends, at)))
-    quotient = (ends[0][STORE] - ends[1][STORE]) / (2 * eta)
-    assert at[NORMAL_FORCE] == pytest.approx(quotient, rel=0, abs=stiffness * eta / 2 + rounding / eta)
+    assume(all(end.valid == 1 and end.kind == at.kind for end in (*ends, at)))
+    quotient = (ends[0].store - ends[1].store) / (2 * eta)
+    assert at.normal_force == pytest.approx(quotient, rel=0, abs=stiffness * eta / 2 + rounding / eta)
     eta, bend = 1e-6, stiffness * (steep**2 + height * gap.steepest(2, wheel_only=True))
     ends = [gap.evaluate(evaluator, dx=dx, pad=pad) for dx in (-eta, eta)]
-    quotient = (ends[1][STORE] - ends[0][STORE]) / (2 * eta)
+    quotient = (ends[1].store - ends[0].store) / (2 * eta)
     tolerance = bend * eta / 2 + rounding / eta
-    if at[KIND] == 1:  # as above
+    if at.kind == 1:  # as above
         g, omega, _ = (column[: len(gap.wheel)] for column in gap.sines)
         tolerance += stiffness * height * float(np.sum(np.abs(g) * omega * (omega * 2 * gap.a / nodes) ** 2 / 6))
-    assert at[STORE_X] == pytest.approx(quotient, rel=0, abs=tolerance)
+    assert at.store_x == pytest.approx(quotient, rel=0, abs=tolerance)
 
 
 # --- auto ----------------------------------------------------------------------------------------------------
@@ -258,15 +246,15 @@ def test_auto_changes_over_without_a_jump_in_the_force(gap: Gap) -> None:
     low, high = -4 * gap.crest, 4 * gap.crest  # the last height at which the bound proves full contact
     while math.nextafter(low, high) < high:
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if coverage(middle, pad) == FULL else (low, middle)
+        low, high = (middle, high) if coverage(middle, pad.constants) == FULL else (low, middle)
     ys.append(low)
     kinds = []
     for y in ys:
         at = Gap(gap.shoe, gap.wheel, gap.a, gap.x, 0.0, gap.travel, gap.k)
         forces = [at.evaluate("auto", dy=each, pad=pad) for each in (y, math.nextafter(y, math.inf))]
-        kinds.append((forces[0][KIND], forces[1][KIND]))
+        kinds.append((forces[0].kind, forces[1].kind))
         tolerance = 2 * gap.a * gap.k * gap.rounding * (1 + gap.sines[0].size)
-        assert forces[0][NORMAL_FORCE] == pytest.approx(forces[1][NORMAL_FORCE], rel=0, abs=tolerance)
+        assert forces[0].normal_force == pytest.approx(forces[1].normal_force, rel=0, abs=tolerance)
     assert kinds[2] == (0, 1)
 
 
@@ -275,7 +263,7 @@ def test_auto_changes_over_without_a_jump_in_the_force(gap: Gap) -> None:
 def test_auto_on_smooth_surfaces_is_the_closed_form_bit_for_bit(gap: Gap, dy: float) -> None:
     assert gap.evaluate("auto", dy=dy).tobytes() == gap.evaluate("closed-form", dy=dy).tobytes()
     y = gap.y + dy
-    assert gap.evaluate("auto", dy=dy)[NORMAL_FORCE] == gap.k * 2.0 * gap.a * max(-y, 0.0)
+    assert gap.evaluate("auto", dy=dy).normal_force == gap.k * 2.0 * gap.a * max(-y, 0.0)
 
 
 # --- bounds --------------------------------------------------------------------------------------------------
@@ -290,17 +278,17 @@ def test_a_pad_is_never_taken_for_full_or_clear_where_a_place_contradicts(gap: G
     claims = 0
     for edge, covered in ((-highest - f1.max(), FULL), (highest - f1.min(), CLEAR)):
         for y in (edge * part, edge, edge / part):
-            if coverage(y, pad) == covered:
+            if coverage(y, pad.constants) == covered:
                 claims += 1
                 gap_at_worst = -highest - f1.max() - y if covered == FULL else y - highest + f1.min()
                 assert gap_at_worst >= -gap.rounding
     beyond = 1.05 * (highest + bare.crest)  # nothing is left undecided far away
-    assert (coverage(-beyond, pad), coverage(beyond, pad)) == (FULL, CLEAR)
+    assert (coverage(-beyond, pad.constants), coverage(beyond, pad.constants)) == (FULL, CLEAR)
 
 
 @given(gaps(-1.3, -0.3, least=1))
 def test_full_contact_has_no_open_place_in_a_dense_scan(gap: Gap) -> None:
-    if coverage(gap.y, gap.pad(0)) == FULL:
+    if coverage(gap.y, gap.pad(0).constants) == FULL:
         assert gap.values(np.linspace(-gap.a, gap.a, 5001)).min() >= -gap.rounding
 
 
@@ -337,8 +325,8 @@ def test_exact_finds_a_patch_however_narrow(depth: float) -> None:
         result = gap.evaluate("exact", dy=top - d, pad=gap.pad(0))
         following = d * (third**2 / curvature**3 + abs(fourth) / curvature**2)
         tolerance = following + 4 * gap.rounding / d
-        assert result[STIFFNESS] == pytest.approx(2 * half * gap.k, rel=tolerance)
-        assert result[NORMAL_FORCE] == pytest.approx(4 / 3 * d * half * gap.k, rel=tolerance)
+        assert result.stiffness == pytest.approx(2 * half * gap.k, rel=tolerance)
+        assert result.normal_force == pytest.approx(4 / 3 * d * half * gap.k, rel=tolerance)
 
 
 @pytest.mark.parametrize("depth", [1e-3, 1e-6, 1e-9, 1e-12])
@@ -355,7 +343,7 @@ def test_exact_finds_every_patch_and_hole_at_grazing_extremes(depth: float) -> N
                 y = gap.value(xi) + side * depth * gap.crest
                 at = Gap(gap.shoe, gap.wheel, gap.a, gap.x, y, gap.travel, gap.k)
                 delta = 4 * EPS * (abs(y) + gap.crest) * 100  # phases up to 100 rad
-                touching = at.evaluate("exact", pad=pad)[STIFFNESS] / gap.k
+                touching = at.evaluate("exact", pad=pad).stiffness / gap.k
                 assert at.length(delta) - 1e-16 <= touching <= at.length(-delta) + 1e-16
                 checked += 1
     assert checked > 80
@@ -369,7 +357,7 @@ def test_the_force_is_never_below_zero_by_rounding() -> None:
         gap = random_gap(rng)
         pad, top = gap.pad(0), max(gap.value(xi) for xi in gap.extremes)
         for ulps in range(-40, 41, 4):
-            force = gap.evaluate("exact", dy=top + ulps * math.ulp(gap.crest), pad=pad)[NORMAL_FORCE]
+            force = gap.evaluate("exact", dy=top + ulps * math.ulp(gap.crest), pad=pad).normal_force
             assert force >= 0.0
             positive += force > 0.0
     assert positive > 100
@@ -388,7 +376,7 @@ def test_exact_finds_the_edges_of_a_hole_with_a_flat_bottom(depth: float) -> Non
         wheel = (Wave(g, length, -90.0), Wave(g / 4, length / 2, 90.0))
         gap = Gap((), wheel, 0.02, shift, -g * (0.75 - depth))
         found = gap.evaluate("exact")
-        hole = 2 * gap.a - found[STIFFNESS] / gap.k
+        hole = 2 * gap.a - found.stiffness / gap.k
         # The next term makes the hole wider by (w half)²/24 of itself; rounding of the bottom, to the fourth root.
         assert hole == pytest.approx(2 * half, rel=(omega * half) ** 2 / 12 + 0.25 * gap.rounding / (depth * g))
 
@@ -405,9 +393,9 @@ def test_exact_agrees_with_a_brute_force_scan() -> None:
         values = gap.values(xi) - y
         roots = int(np.count_nonzero(np.diff(values > 0)))
         found = gap.evaluate("exact", dy=y)
-        assert found[STIFFNESS] / gap.k == pytest.approx(np.sum(values > 0) * spacing, rel=0, abs=spacing * roots)
+        assert found.stiffness / gap.k == pytest.approx(np.sum(values > 0) * spacing, rel=0, abs=spacing * roots)
         curved = gap.steepest(2) * spacing**2 / 24 * 2 * gap.a  # the midpoint rule on smooth pieces
-        assert found[NORMAL_FORCE] / gap.k == pytest.approx(
+        assert found.normal_force / gap.k == pytest.approx(
             np.sum(np.maximum(values, 0)) * spacing, rel=0, abs=gap.steepest() * spacing**2 / 8 * roots + curved
         )
 
@@ -419,15 +407,15 @@ def test_exact_ends_where_two_equal_profiles_meet(shift: float) -> None:
     gap = Gap(profile, profile, 0.05, shift, 0.0)
     found = gap.evaluate("exact")
     highest = gap.steepest() * shift + gap.rounding
-    assert np.isfinite(found).all()
-    assert 0.0 <= found[NORMAL_FORCE] <= 2 * gap.a * gap.k * highest
-    assert 0.0 <= found[FRACTION] <= 1.0
+    assert np.isfinite(found.tolist()).all()
+    assert 0.0 <= found.normal_force <= 2 * gap.a * gap.k * highest
+    assert 0.0 <= found.fraction <= 1.0
 
 
 def test_exact_ends_where_profiles_of_almost_equal_length_meet() -> None:
     """A gap that is small everywhere but not zero: waves that differ in the 12th digit."""
     gap = Gap((Wave(30e-6, 0.02),), (Wave(30e-6, 0.02 * (1 + 1e-12)),), 0.05, 0.0, 0.0)
-    assert 0.0 <= gap.evaluate("exact")[NORMAL_FORCE] <= 2 * gap.a * gap.k * 30e-6 * 2e-11
+    assert 0.0 <= gap.evaluate("exact").normal_force <= 2 * gap.a * gap.k * 30e-6 * 2e-11
 
 
 # --- extremes ------------------------------------------------------------------------------------------------
@@ -453,8 +441,8 @@ def test_heights_and_stiffness_scale_exactly(gap: Gap, evaluator: str, height: i
     )
     force, energy = height + stiffness, 2 * height + stiffness
     powers = [force, stiffness, force, 0, energy, energy]
-    expected = np.ldexp(gap.evaluate(evaluator)[OUTPUTS], powers)
-    np.testing.assert_array_equal(other.evaluate(evaluator)[OUTPUTS], expected)
+    expected = np.ldexp(outputs(gap.evaluate(evaluator)), powers)
+    np.testing.assert_array_equal(outputs(other.evaluate(evaluator)), expected)
 
 
 def many_waves(seed: int, count: int) -> Surface:
@@ -473,15 +461,17 @@ def test_hundreds_of_waves_are_summed_as_well_as_one(level: float) -> None:
     shoe, wheel = many_waves(1, 60), many_waves(2, 140)
     pad, angles = build_pad(k, a, shoe, wheel, 0), np.random.default_rng(3).uniform(-6, 0, 140)
     crest = float(shoe.g.sum() + wheel.g.sum())
-    found = build_contact(pad)
-    contact.load("exact")(1e-4, level * crest, angles, pad, found)
+    layer = build_layer(contact.load("exact"), pad)
+    layer.angles[:] = angles
+    contact.load("exact")(1e-4, level * crest, layer)
+    found = layer.contact
     if level == -1.0:
-        other = build_contact(pad)
-        contact.load("closed-form")(1e-4, level * crest, angles, pad, other)
+        other = layer._replace(contact=found.copy())
+        contact.load("closed-form")(1e-4, level * crest, other)
         steep = float(wheel.g @ wheel.omega)
         scale = 2 * a * k * np.array([crest, 1, steep, 1, crest**2, crest * steep])
         # Phases of up to 2 pi a/1 mm = 126 rad; sums over 200 waves and their pairs.
-        assert np.all(np.abs(found - other)[OUTPUTS] <= 126 * 20 * EPS * scale)
+        assert np.all(np.abs(outputs(found) - outputs(other.contact)) <= 126 * 20 * EPS * scale)
         return
     places = 200_000
     spacing = 2 * a / places
@@ -493,8 +483,8 @@ def test_hundreds_of_waves_are_summed_as_well_as_one(level: float) -> None:
     roots = int(np.count_nonzero(np.diff(values > 0)))
     steep, curved = (sum(float(f.g @ f.omega**n) for f in (shoe, wheel)) for n in (1, 2))
     tolerance = k * spacing**2 * (steep / 8 * roots + curved / 24 * 2 * a)
-    assert found[NORMAL_FORCE] == pytest.approx(k * spacing * np.maximum(values, 0).sum(), rel=0, abs=tolerance)
-    assert found[STIFFNESS] == pytest.approx(k * spacing * np.sum(values > 0), rel=0, abs=k * spacing * roots)
+    assert found.normal_force == pytest.approx(k * spacing * np.maximum(values, 0).sum(), rel=0, abs=tolerance)
+    assert found.stiffness == pytest.approx(k * spacing * np.sum(values > 0), rel=0, abs=k * spacing * roots)
 
 
 @pytest.mark.parametrize("apart", [0.0, 1e-15, 1e-12, 1e-9, 1e-6, 1e-3, 1e-2])
@@ -503,9 +493,9 @@ def test_waves_of_almost_equal_length_lose_no_digits(apart: float) -> None:
     gap = Gap((Wave(2e-5, 0.02, 40.0),), (Wave(3e-5, 0.02 * (1 + apart), 10.0),), 0.03, 1e-3, -5e-6)
     found, height = gap.evaluate("exact"), abs(gap.y) + gap.crest
     store = 0.5 * gap.k * gap.integral(lambda xi: gap.value(xi) ** 2, height * gap.rounding)
-    assert found[STORE] == pytest.approx(store, rel=0, abs=2 * gap.a * gap.k * height * gap.rounding)
+    assert found.store == pytest.approx(store, rel=0, abs=2 * gap.a * gap.k * height * gap.rounding)
     full = Gap(gap.shoe, gap.wheel, gap.a, gap.x, -6e-5, 0.0, gap.k)
     expected = 0.5 * full.k * full.integral(lambda xi: full.value(xi) ** 2, height * full.rounding)
     for evaluator in ("closed-form", "exact"):
         found = full.evaluate(evaluator)
-        assert found[STORE] == pytest.approx(expected, rel=0, abs=2 * full.a * full.k * 1.2e-4 * full.rounding)
+        assert found.store == pytest.approx(expected, rel=0, abs=2 * full.a * full.k * 1.2e-4 * full.rounding)

@@ -8,34 +8,12 @@ import pytest
 
 from brakecli.case.case import Evaluator, Scheme
 from brakecli.solver import contact, schemes
-from brakecli.solver.compile import (
-    A_11,
-    A_12,
-    A_22,
-    FRACTION,
-    GAIN,
-    KIND,
-    NORMAL_FORCE,
-    PROBLEM_SIZE,
-    SCRATCH,
-    STATE_SIZE,
-    STIFFNESS,
-    STORE,
-    VALID,
-    VX,
-    VY,
-    WORK_SIZE,
-    X_OLD,
-    Y_OLD,
-    Coefficients,
-    Weights,
-    X,
-    Y,
-)
-from brakecli.solver.contact.pad import HALF, K, build_contact, build_pad
+from brakecli.solver.contact.pad import build_layer, build_pad
 from brakecli.solver.implicit_step import SOLVED, newton
 from brakecli.solver.loop import advance
+from brakecli.solver.records import PROBLEM, WORK, Coefficients, Weights, new
 from brakecli.solver.roughness import surface
+from tests.solver.rough_gap import unfilled
 
 EVALUATORS = sorted(module.name for module in pkgutil.iter_modules(contact.__path__) if module.name != "pad")
 SCHEMES = sorted(module.name for module in pkgutil.iter_modules(schemes.__path__))
@@ -71,26 +49,25 @@ def test_an_evaluator_fills_its_results_and_leaves_everything_else(name: str) ->
         )
         height = float(shoe.g.sum() + wheel.g.sum()) or 1e-5
         pad = build_pad(10 ** rng.uniform(0, 16), 0.05, shoe, wheel, 64)
-        angles = rng.uniform(-6, 0, wheel.g.size)
-        given = pad.copy(), angles.copy()
-        filled = build_contact(pad)
-        filled[:] = np.nan
+        layer = unfilled(name.replace("_", "-"), pad)
+        layer.angles[:] = rng.uniform(-6, 0, wheel.g.size)
+        given = layer.pad.tobytes(), layer.tables.tobytes(), layer.angles.tobytes()
         y = rng.uniform(-1.5, 1.5) * height
-        evaluate(rng.uniform(-1e-2, 1e-2), y, angles, pad, filled)
-        assert np.isfinite(filled[:SCRATCH]).all()
-        assert filled[NORMAL_FORCE] >= 0.0
-        assert filled[STIFFNESS] >= 0.0
-        assert 0.0 <= filled[FRACTION] <= 1.0
-        assert contact.kinds()[int(filled[KIND])]
-        assert filled[VALID] in (0.0, 1.0)
-        if filled[VALID] == 1.0:
-            assert filled[NORMAL_FORCE] == 0.0 or filled[FRACTION] > 0.0
+        evaluate(rng.uniform(-1e-2, 1e-2), y, layer)
+        filled = layer.contact
+        assert np.isfinite(filled.tolist()).all()
+        assert filled.normal_force >= 0.0
+        assert filled.stiffness >= 0.0
+        assert 0.0 <= filled.fraction <= 1.0
+        assert contact.kinds()[filled.kind]
+        assert filled.valid in (0, 1)
+        if filled.valid == 1:
+            assert filled.normal_force == 0.0 or filled.fraction > 0.0
             # A difference of terms of 2ak height²/2: not negative but for their rounding.
-            assert filled[STORE] >= -1e-14 * pad[K] * 2 * pad[HALF] * (height + abs(y)) ** 2
-        np.testing.assert_array_equal(pad, given[0])
-        np.testing.assert_array_equal(angles, given[1])
-        valid += filled[VALID] == 1.0
-        kinds.add(contact.kinds()[int(filled[KIND])])
+            assert filled.store >= -1e-14 * layer.pad.k * 2 * layer.pad.half_length * (height + abs(y)) ** 2
+        assert (layer.pad.tobytes(), layer.tables.tobytes(), layer.angles.tobytes()) == given
+        valid += filled.valid == 1
+        kinds.add(contact.kinds()[filled.kind])
     assert valid > 50
     assert kinds <= {name.replace("_", "-")} if name != "auto" else kinds == {"closed-form", "midpoint"}
 
@@ -98,10 +75,9 @@ def test_an_evaluator_fills_its_results_and_leaves_everything_else(name: str) ->
 @pytest.mark.parametrize("name", EVALUATORS)
 def test_an_evaluator_is_accepted_by_the_step(name: str) -> None:
     pad = build_pad(1e8, 0.05, surface(), surface(), 64)
-    problem = np.zeros(PROBLEM_SIZE)
-    problem[[A_11, A_22, GAIN]] = 1e6, 1e6, 0.1
-    evaluate = contact.load(name.replace("_", "-"))
-    assert newton(evaluate, 100, 0.3, np.zeros(0), pad, problem, build_contact(pad))[0] == SOLVED
+    problem = new(PROBLEM)
+    problem.a_11, problem.a_22, problem.gain, problem.phi = 1e6, 1e6, 0.1, 0.3
+    assert newton(build_layer(contact.load(name.replace("_", "-")), pad), problem, 100)[0] == SOLVED
 
 
 # --- schemes -------------------------------------------------------------------------------------------------
@@ -114,7 +90,7 @@ def test_a_scheme_states_what_the_loop_needs_of_it(name: str) -> None:
     scheme: Any = schemes.load(name.replace("_", "-"))
     assert scheme.WEIGHTS in WEIGHTS
     assert scheme.LAG in (0, 1)
-    assert set(scheme.VELOCITIES) <= set(scheme.MEMORY) <= set(range(STATE_SIZE))
+    assert set(scheme.VELOCITIES) <= set(scheme.MEMORY) <= set(scheme.STATE.names)
     checked = 0
     for theta in WEIGHTS[scheme.WEIGHTS]:
         weights = Weights(1e-5, *(*theta, 0.0, 0.0, 0.0)[:3])
@@ -129,15 +105,14 @@ def test_a_scheme_states_what_the_loop_needs_of_it(name: str) -> None:
 def test_a_scheme_starts_at_the_given_state(name: str) -> None:
     scheme: Any = schemes.load(name.replace("_", "-"))
     weights = Weights(1e-5, *(*WEIGHTS[scheme.WEIGHTS][0], 0.0, 0.0, 0.0)[:3])
-    state = scheme.begin(weights, *START)
-    assert state.size == STATE_SIZE if name in STEPPING else state.size > STATE_SIZE
-    known = [X, Y] if scheme.LAG == 0 else [X_OLD, Y_OLD]
-    assert tuple(state[known]) == START[0]
-    assert tuple(state[[VX, VY]]) == START[1]
+    state = new(scheme.STATE)
+    scheme.begin(weights, state, *START)
+    assert ((state.x, state.y) if scheme.LAG == 0 else (state.x_old, state.y_old)) == START[0]
+    assert (state.v_x, state.v_y) == START[1]
     if scheme.LAG == 1:
         h = weights.h
         next_ = [r + h * v + 0.5 * h * h * a for r, v, a in zip(*START, strict=True)]
-        np.testing.assert_allclose(state[[X, Y]], next_, rtol=1e-15)
+        np.testing.assert_allclose((state.x, state.y), next_, rtol=1e-15)
     kinetic, links, position, back = scheme.mechanical_energy(COEFFICIENTS, weights, state)
     # At most half a step off the start: 1/2 m v² to h a/v, the links' energy to h v/r.
     c, (x, y), (v_x, v_y) = COEFFICIENTS, START[0], START[1]
@@ -153,22 +128,25 @@ def test_a_scheme_s_kernels_pose_a_definite_problem_and_take_its_solution(name: 
     checked = 0
     for theta in WEIGHTS[scheme.WEIGHTS]:
         weights = Weights(1e-5, *(*theta, 0.0)[:3])
-        state, problem, work = scheme.begin(weights, *START), np.full(PROBLEM_SIZE, np.nan), np.zeros(WORK_SIZE)
-        scheme.prepare(COEFFICIENTS, weights, state, 5e3, 1.0, 1.0, problem)
-        assert problem[A_11] > 0
-        assert problem[A_11] * problem[A_22] > problem[A_12] ** 2
-        assert problem[GAIN] > 0
+        state, problem, work = new(scheme.STATE), new(PROBLEM), new(WORK)
+        scheme.begin(weights, state, *START)
+        for field in PROBLEM.names or ():
+            problem[field] = np.nan
+        problem.load, problem.belt_now, problem.belt_next = 5e3, 1.0, 1.0
+        scheme.prepare(COEFFICIENTS, weights, state, problem)
+        assert problem.a_11 > 0
+        assert problem.a_11 * problem.a_22 > problem.a_12**2
+        assert problem.gain > 0
         pad = build_pad(1e8, 0.05, surface(), surface(), 0)
-        filled = build_contact(pad)
-        evaluate = contact.load("closed-form")
-        assert newton(evaluate, 100, COEFFICIENTS.phi, np.zeros(0), pad, problem, filled)[0] == SOLVED
-        assert np.isfinite(problem).all()
+        layer = build_layer(contact.load("closed-form"), pad)
+        assert newton(layer, problem, 100)[0] == SOLVED
+        assert np.isfinite(problem.tolist()).all()
         before = state.copy()
-        scheme.finish(COEFFICIENTS, weights, state, 5e3, 1.0, 1.0, problem, filled, work)
-        assert np.isfinite(state).all()
-        assert np.isfinite(work).all()
-        np.testing.assert_array_equal(state[[X_OLD, Y_OLD]], before[[X, Y]])
-        assert state[X] != before[X]
+        scheme.finish(COEFFICIENTS, weights, state, problem, layer.contact, work)
+        assert np.isfinite(state.tolist()).all()
+        assert np.isfinite(work.tolist()).all()
+        assert (state.x_old, state.y_old) == (before.x, before.y)
+        assert state.x != before.x
         checked += 1
     assert checked == 3
 

@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 
 from brakecli.case.system import system_of
-from brakecli.solver import loop as integrate
-from brakecli.solver.compile import A_11, A_12, BELT, F_Y, G_1, D, E
 from brakecli.solver.motion import Stepping
 from tests.examples import MODE_COUPLING, ROUGH, SQUEAL, make, simulate
 
@@ -98,13 +96,13 @@ def test_friction_never_feeds_energy_in_the_frame_of_the_wheel(
     motion = Stepping(system_of(case))
     slips, sticks = 0, 0
     for _ in range(1500):
-        motion.block(int(motion.counts[integrate.LEVEL]) + 1)
-        p = motion.problem
-        friction = p[A_11] * p[D] + p[A_12] * p[E] - p[G_1]
-        sliding = p[D] - p[BELT]
-        rounding = 1e-15 * (abs(p[A_11] * p[D]) + abs(p[A_12] * p[E]) + abs(p[G_1]))
+        motion.block(int(motion.counts.level) + 1)
+        p = motion.plant.problem
+        friction = p.a_11 * p.d + p.a_12 * p.e - p.g_1
+        sliding = p.d - p.belt
+        rounding = 1e-15 * (abs(p.a_11 * p.d) + abs(p.a_12 * p.e) + abs(p.g_1))
         assert friction * sliding <= rounding * abs(sliding)
-        assert abs(friction) <= 0.8 * p[F_Y] + 4.0 * rounding
+        assert abs(friction) <= 0.8 * p.normal_force + 4.0 * rounding
         slips, sticks = slips + (sliding != 0.0), sticks + (sliding == 0.0)
     assert slips > 100
     assert sticks > 10 or not flat

@@ -11,11 +11,9 @@ from brakecli.analysis.stability.report import stability
 from brakecli.case.case import Case
 from brakecli.case.system import system_of
 from brakecli.runs.limits import check
-from brakecli.solver.compile import X
 from brakecli.solver.motion import Stepping
 from brakecli.solver.quantities import ContactState, Failure
 from brakecli.solver.schemes.event_driven.dop853 import DENSE, END_STAGE, FIFTH, NODES, THIRD, A
-from brakecli.solver.schemes.event_driven.phases import EVENTS, EVENTS_TIME, SWITCHES
 from tests.examples import COULOMB, MODE_COUPLING, ROUGH, SQUEAL, Result, make, simulate
 from tests.solver.piecewise_exact import PiecewiseExact
 from tests.solver.solve_ivp_reference import SolveIvp
@@ -361,7 +359,7 @@ def test_rest_on_the_border_of_the_friction_cone_ends() -> None:
 
 def test_steps_that_shrink_to_nothing_are_a_failure_with_a_name() -> None:
     motion = Stepping(system_of(event_driven(SQUEAL)))
-    motion.state[X] = math.nan  # no step from here has a known error
+    motion.plant.state.x = math.nan  # no step from here has a known error
     work, _ = motion.run(lambda rows: None)
     assert work.failure is Failure.STALLED
     assert "solver.tolerance" in work.failure.sentence
@@ -369,7 +367,8 @@ def test_steps_that_shrink_to_nothing_are_a_failure_with_a_name() -> None:
 
 def test_events_without_progress_are_a_failure_with_a_name() -> None:
     motion = Stepping(system_of(event_driven(SQUEAL)))
-    motion.state[[EVENTS, EVENTS_TIME]] = 1000.0, 1e9  # as if 1000 of them had come, and no time gone by
+    state = motion.plant.state
+    state.events, state.events_time = 1000, 1e9  # as if 1000 of them had come, and no time gone by
     work, _ = motion.run(lambda rows: None)
     assert work.failure is Failure.STALLED
     assert work.steps > 0
@@ -380,7 +379,7 @@ def test_phases_that_end_at_once_are_a_failure_with_a_name() -> None:
     case = event_driven(SQUEAL, wheel__angular_speed=0.0, friction__coefficient=0.1)
     assert simulate(case).work.failure is Failure.NONE
     motion = Stepping(system_of(case))
-    motion.state[SWITCHES] = 60.0
+    motion.plant.state.switches = 60
     work, _ = motion.run(lambda rows: None)
     assert work.failure is Failure.STALLED
     assert work.steps == 0

@@ -9,32 +9,11 @@ import pytest
 from numpy.typing import NDArray
 
 from brakecli.solver import contact
-from brakecli.solver.compile import (
-    A_11,
-    A_12,
-    A_22,
-    BELT,
-    D_SLOPE,
-    E_SLOPE,
-    F_Y,
-    G_1,
-    G_2,
-    GAIN,
-    NORMAL_FORCE,
-    PROBLEM_SIZE,
-    RESIDUAL,
-    SIDE,
-    STIFFNESS,
-    TANGENTIAL,
-    VALID,
-    X_0,
-    Y_0,
-    D,
-    E,
-)
-from brakecli.solver.contact.pad import SHOE_TERMS, build_contact, build_pad
+from brakecli.solver.contact.pad import build_layer, build_pad
 from brakecli.solver.friction import minimise
-from brakecli.solver.implicit_step import MOST, SOLVED, UNCONVERGED, fixed_point, newton
+from brakecli.solver.implicit_step import SOLVED, UNCONVERGED, fixed_point, newton
+from brakecli.solver.method import MOST
+from brakecli.solver.records import CONTACT, PROBLEM, new
 from brakecli.solver.roughness import Surface, surface
 
 EPS = 2.0**-52
@@ -54,19 +33,20 @@ class Step:
         angles: NDArray[np.float64] | None = None,
         evaluator: str = "exact",
         phi: float = 0.3,
+        guess: float = 0.0,
         **entries: float,
     ) -> None:
         self.shoe, self.wheel, self.phi, self.k = shoe, wheel, phi, k
         self.evaluate: Any = contact.load(evaluator)
-        self.pad = build_pad(k, A, shoe, wheel, 128)
-        self.contact = build_contact(self.pad)
-        self.angles = np.zeros(wheel.g.size) if angles is None else angles
-        self.problem = np.zeros(PROBLEM_SIZE)
-        places = {"a_11": A_11, "a_12": A_12, "a_22": A_22, "g_1": G_1, "g_2": G_2, "x_0": X_0, "y_0": Y_0}
-        places |= {"gain": GAIN, "belt": BELT, "guess": F_Y, "d": D, "e": E}
+        self.layer = build_layer(self.evaluate, build_pad(k, A, shoe, wheel, 128))
+        self.contact = self.layer.contact
+        if angles is not None:
+            self.layer.angles[:] = angles
+        self.given = new(PROBLEM)
+        self.given.phi, self.given.normal_force = phi, guess
         for name, value in entries.items():
-            self.problem[places[name]] = value
-        self.given = self.problem.copy()
+            self.given[name] = value
+        self.problem = self.given.copy()
 
     @property
     def crest(self) -> float:
@@ -75,32 +55,30 @@ class Step:
     def force_at(self, force: float) -> float:
         """F_y where the minimiser puts the shoe under the normal force `force`."""
         p = self.given
-        d, e, _ = minimise(p[A_11], p[A_12], p[A_22], p[G_1], p[G_2] + force, self.phi * force, p[BELT])
-        filled = build_contact(self.pad)
-        self.evaluate(p[X_0] + p[GAIN] * d, p[Y_0] + p[GAIN] * e, self.angles, self.pad, filled)
-        return float(filled[NORMAL_FORCE])
+        d, e, _ = minimise(p.a_11, p.a_12, p.a_22, p.g_1, p.g_2 + force, self.phi * force, p.belt)
+        layer = self.layer._replace(contact=new(CONTACT))
+        self.evaluate(p.x_0 + p.gain * d, p.y_0 + p.gain * e, layer)
+        return float(layer.contact.normal_force)
 
     def run(self, solve: Any = newton, most: int = MOST["newton"]) -> tuple[int, int, int]:
-        self.problem[:] = self.given
-        outcome: tuple[int, int, int] = solve(
-            self.evaluate, most, self.phi, self.angles, self.pad, self.problem, self.contact
-        )
+        self.problem = self.given.copy()
+        outcome: tuple[int, int, int] = solve(self.layer, self.problem, most)
         return outcome
 
     @property
     def force(self) -> float:
-        return float(self.problem[F_Y])
+        return float(self.problem.normal_force)
 
     def lipschitz(self) -> float:
         """A bound of |dF_y/dF| on any branch: 2ak and the whole rise of the wheel under the pad."""
         p = self.given
-        a = p[A_11] * p[A_22] - p[A_12] ** 2
-        d_slope = (abs(p[A_12]) + self.phi * p[A_22]) / a
-        e_slope = max((p[A_11] + self.phi * abs(p[A_12])) / a, 1 / p[A_22])
+        a = p.a_11 * p.a_22 - p.a_12**2
+        d_slope = (abs(p.a_12) + self.phi * p.a_22) / a
+        e_slope = max((p.a_11 + self.phi * abs(p.a_12)) / a, 1 / p.a_22)
         steep = min(
             2 * float(np.abs(self.wheel.g).sum()) * 20, 2 * A * float(np.abs(self.wheel.g) @ self.wheel.omega)
         )
-        return float(p[GAIN] * self.k * (2 * A * e_slope + steep * d_slope))
+        return float(p.gain * self.k * (2 * A * e_slope + steep * d_slope))
 
     def noise(self) -> float:
         """What rounding of the position and of the phases does to F_y: 2ak times that of the gap.
@@ -108,15 +86,15 @@ class Step:
         The phases are below 2 pi (a + |x|)/lambda + 2 pi: some 100 rad.
         """
         p = self.problem
-        y = abs(p[Y_0]) + abs(p[GAIN] * p[E])
-        x = abs(p[X_0]) + abs(p[GAIN] * p[D])
+        y = abs(p.y_0) + abs(p.gain * p.e)
+        x = abs(p.x_0) + abs(p.gain * p.d)
         # d and e round with a11 a22 - a12², which loses less than two digits here.
         steep = float(np.abs(self.wheel.g) @ self.wheel.omega)
         return float(2 * A * self.k * EPS * (4 * y + 100 * self.crest + 4 * steep * x) * 4)
 
     def tolerance(self) -> float:
         """A solved step knows F to 1e-13: as a Newton correction, or as the width of the bracket."""
-        force = max(self.force, float(self.contact[NORMAL_FORCE]))
+        force = max(self.force, float(self.contact.normal_force))
         return 2e-13 * (1 + self.lipschitz()) * force + self.noise()
 
 
@@ -175,7 +153,7 @@ def test_both_iterations_agree_where_both_converge(evaluator: str) -> None:
         if contraction > 0.8:
             continue
         outcome, _, rising = step.run(newton)
-        by_newton, valid = step.force, step.contact[VALID]
+        by_newton, valid = step.force, step.contact.valid
         paper, evaluations, _ = step.run(fixed_point, MOST["fixed-point"])
         assert (outcome, rising, paper) == (SOLVED, 0, SOLVED)
         assert evaluations <= 2 + math.log(1e-16) / math.log(max(contraction, 1e-16)) + 1 or step.noise() > 0
@@ -195,14 +173,14 @@ def test_newton_solves_every_step_from_any_guess(seed: int) -> None:
     rng, touching = np.random.default_rng(seed), 0
     for _, step in random_steps(seed, 700, (-4.0, 4.0), coupling=0.95):
         guess = 0.0 if rng.random() < 0.2 else 2 * A * step.k * step.crest * 10 ** rng.uniform(-3, 1)
-        step.given[F_Y] = guess
+        step.given.normal_force = guess
         outcome, evaluations, _ = step.run()
         assert outcome == SOLVED
         assert evaluations < MOST["newton"]
         assert step.force >= 0.0
         residual = step.force_at(step.force) - step.force
         assert abs(residual) <= step.tolerance()
-        assert step.problem[RESIDUAL] == residual
+        assert step.problem.residual == residual
         touching += step.force > 0.0
     assert touching > 300
 
@@ -217,7 +195,7 @@ def test_newton_takes_few_evaluations_from_a_force_nearby(off: float, mean: floa
         assert step.run()[0] == SOLVED
         if step.force == 0.0:
             continue
-        step.given[F_Y] = step.force * (1.0 + off * rng.uniform(-1, 1))
+        step.given.normal_force = step.force * (1.0 + off * rng.uniform(-1, 1))
         outcome, evaluations, _ = step.run()
         assert outcome == SOLVED
         taken.append(evaluations)
@@ -242,7 +220,7 @@ def test_newton_converges_where_the_fixed_point_cannot(ratio: float, phi: float)
     assert abs(step.force_at(step.force) - step.force) <= step.tolerance()
     outcome, evaluations, _ = step.run(fixed_point, MOST["fixed-point"])
     assert (outcome, evaluations) == (UNCONVERGED, MOST["fixed-point"])
-    assert abs(step.problem[RESIDUAL]) > 0.1 * step.force  # and the residual tells how far off
+    assert abs(step.problem.residual) > 0.1 * step.force  # and the residual tells how far off
 
 
 def test_a_fixed_point_that_fails_is_never_taken_for_solved() -> None:
@@ -256,7 +234,7 @@ def test_a_fixed_point_that_fails_is_never_taken_for_solved() -> None:
         else:
             assert outcome == UNCONVERGED
             assert evaluations == MOST["fixed-point"]
-            assert abs(step.problem[RESIDUAL]) == residual > 0.0
+            assert abs(step.problem.residual) == residual > 0.0
     assert 50 < outcomes.count(SOLVED) < 450
 
 
@@ -268,9 +246,9 @@ def test_an_open_contact_carries_nothing(evaluator: str, guess: float) -> None:
         k=1e8, wheel=wheel, evaluator=evaluator, a_11=1e6, a_22=1e6, gain=1e-3, y_0=1.1e-5, guess=guess, g_1=3.0
     )
     outcome, evaluations, rising = step.run()
-    assert (outcome, rising, step.force, step.contact[NORMAL_FORCE]) == (SOLVED, 0, 0.0, 0.0)
+    assert (outcome, rising, step.force, step.contact.normal_force) == (SOLVED, 0, 0.0, 0.0)
     assert evaluations <= 60
-    assert step.problem[D] == 3.0 / 1e6
+    assert step.problem.d == 3.0 / 1e6
 
 
 @pytest.mark.parametrize("evaluator", ["closed-form", "midpoint", "exact", "auto"])
@@ -290,22 +268,22 @@ def test_a_stuck_shoe_moves_with_the_wheel_exactly() -> None:
     stuck = 0
     for _, step in random_steps(37, 300, (-2.0, 3.0)):
         for solve, most in ((newton, 100), (fixed_point, 500)):
-            if step.run(solve, most)[0] == SOLVED and step.problem[SIDE] == 0.0:
+            if step.run(solve, most)[0] == SOLVED and step.problem.side == 0.0:
                 stuck += 1
-                assert step.problem[D] == step.given[BELT]
+                assert step.problem.d == step.given.belt
     assert stuck > 30
 
 
 def test_an_explicit_scheme_evaluates_the_contact_once() -> None:
     checked = 0
     for _, step in random_steps(38, 50, (-2.0, 3.0)):
-        step.given[GAIN] = 0.0
-        step.given[F_Y] = 123.0
+        step.given.gain = 0.0
+        step.given.normal_force = 123.0
         assert step.run() == (SOLVED, 1, 0)
-        by_newton = step.problem[[D, E, F_Y, SIDE]].copy()
-        assert step.force == step.contact[NORMAL_FORCE] == step.force_at(0.0)
+        by_newton = [step.problem[name] for name in ("d", "e", "normal_force", "side")]
+        assert step.force == step.contact.normal_force == step.force_at(0.0)
         assert step.run(fixed_point, 500)[0] == SOLVED
-        np.testing.assert_array_equal(step.problem[[D, E, F_Y, SIDE]], by_newton)
+        assert [step.problem[name] for name in ("d", "e", "normal_force", "side")] == by_newton
         checked += 1
     assert checked == 50
 
@@ -336,12 +314,12 @@ def wedge(guess: float, y_0: float) -> Step:
 def test_a_wedge_is_told_and_does_not_hang(guess: float) -> None:
     step = wedge(guess, y_0=-1.5e-4)  # touching at F = 0 already: only stick holds
     p = step.given
-    a = p[A_11] * p[A_22] - p[A_12] ** 2
-    assert p[GAIN] * 2 * A * step.k * (step.phi * abs(p[A_12]) - p[A_11]) / a > 1.0
+    a = p.a_11 * p.a_22 - p.a_12**2
+    assert p.gain * 2 * A * step.k * (step.phi * abs(p.a_12) - p.a_11) / a > 1.0
     outcome, evaluations, rising = step.run()
     assert outcome == SOLVED
     assert evaluations <= 60
-    assert step.problem[SIDE] == 0.0
+    assert step.problem.side == 0.0
     assert step.force == pytest.approx(1e7 * 1.5e-4 / (1 + 1e7 * 3e-6), rel=1e-12)
     if guess < 9.0909:
         assert rising > 0
@@ -356,7 +334,7 @@ def test_a_wedge_has_three_solutions_of_which_one_is_found() -> None:
     assert (residuals[0], roots) == (0.0, 3)
     found, risen = set(), 0
     for guess in (0.0, 1.0, 1.75, 3.0, 50.0, 1e3, 1e6):
-        step.given[F_Y] = guess
+        step.given.normal_force = guess
         outcome, _, rising = step.run()
         assert outcome == SOLVED
         assert abs(step.force_at(step.force) - step.force) <= step.tolerance()
@@ -367,13 +345,13 @@ def test_a_wedge_has_three_solutions_of_which_one_is_found() -> None:
 
 
 def test_the_reported_slope_is_the_residual_s_derivative() -> None:
-    """Newton's slope from D_SLOPE, E_SLOPE and the contact's derivatives, against differences along F."""
+    """Newton's slope from d_slope, e_slope and the contact's derivatives, against differences along F."""
     compared = 0
     for _, step in random_steps(39, 200, (-2.0, 1.0), evaluator="exact"):
         if step.run()[0] != SOLVED or step.force == 0.0:
             continue
         p, c = step.problem, step.contact
-        slope = p[GAIN] * (c[TANGENTIAL] * p[D_SLOPE] - c[STIFFNESS] * p[E_SLOPE])
+        slope = p.gain * (c.tangential * p.d_slope - c.stiffness * p.e_slope)
         eta = 1e-5 * step.force
         sides = [step.force_at(step.force + s * eta) for s in (-1.0, 0.0, 1.0)]
         backward, forward = (sides[1] - sides[0]) / eta, (sides[2] - sides[1]) / eta
@@ -387,4 +365,4 @@ def test_the_reported_slope_is_the_residual_s_derivative() -> None:
 
 
 def test_pads_count_their_waves() -> None:
-    assert build_pad(1.0, A, surface([1e-6], wavelengths=[0.1]), FLAT, 0)[SHOE_TERMS] == 1
+    assert build_pad(1.0, A, surface([1e-6], wavelengths=[0.1]), FLAT, 0).constants.shoe_terms == 1

@@ -12,8 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from brakecli.solver import contact
-from brakecli.solver.compile import KIND, NORMAL_FORCE
-from brakecli.solver.contact.pad import build_contact, build_pad
+from brakecli.solver.contact.pad import build_layer, build_pad
 from brakecli.solver.roughness import PI, height, surface, wheel_angles
 from brakecli.solver.schedules import integral_at, schedule
 from tests.solver.rough_gap import EPS, Gap, Wave
@@ -91,7 +90,7 @@ def test_the_wheel_s_phases_stay_exact_over_ten_thousand_kilometres(
     g, length, phase = (list(column) for column in zip(*terms, strict=True))
     wheel = surface(g, wavelengths=length, phases_deg=phase)
     angles = np.full(wheel.g.size, np.nan)
-    wheel_angles(wheel, travel, travel_low, angles)
+    wheel_angles(wheel.waves, travel, travel_low, angles)
     way = mpf(travel) + mpf(travel_low)
     for i, each in enumerate(length):
         assert abs(angles[i] - wheel.phase[i]) <= 2 * math.pi * (1 + 4 * EPS)  # reduced
@@ -172,10 +171,11 @@ def test_the_force_after_ten_thousand_kilometres_is_that_of_the_same_doubles(
     shoe = surface(
         [each[0] for each in SHOE], wavelengths=[each[1] for each in SHOE], phases_deg=[each[2] for each in SHOE]
     )
-    angles, pad = np.zeros(len(WHEEL)), build_pad(K, A, shoe, wheel, 0)
-    wheel_angles(wheel, *integral_at(schedule(times, speeds, radius), t, t_low), angles)
-    found = build_contact(pad)
-    contact.load(evaluator)(x, y, angles, pad, found)
+    evaluate = contact.load(evaluator)
+    layer = build_layer(evaluate, build_pad(K, A, shoe, wheel, 0))
+    wheel_angles(wheel.waves, *integral_at(schedule(times, speeds, radius), t, t_low), layer.angles)
+    evaluate(x, y, layer)
+    found = layer.contact
 
     time = Fraction(t) + Fraction(t_low)
     if time > Fraction(times[-1]):
@@ -189,12 +189,12 @@ def test_the_force_after_ten_thousand_kilometres_is_that_of_the_same_doubles(
         way += (v + slope * (time - start) / 2) * (time - start)
     assert abs(way) > 9e6
     scale = 2 * A * K * (abs(y) + 53e-6)
-    assert abs(mpf(float(found[NORMAL_FORCE])) - exact_force(numbers, x, y, way)) <= 1e-9 * scale
+    assert abs(mpf(float(found.normal_force)) - exact_force(numbers, x, y, way)) <= 1e-9 * scale
     # What is really reached: phases up to 2 pi a/3.7 mm = 51 rad, in a few roundings.
-    assert abs(mpf(float(found[NORMAL_FORCE])) - exact_force(numbers, x, y, way)) <= 8 * 51 * EPS * scale
-    assert contact.kinds()[int(found[KIND])] == evaluator
+    assert abs(mpf(float(found.normal_force)) - exact_force(numbers, x, y, way)) <= 8 * 51 * EPS * scale
+    assert contact.kinds()[found.kind] == evaluator
     if evaluator == "exact":
-        assert 0.0 < found[NORMAL_FORCE] < 0.5 * scale
+        assert 0.0 < found.normal_force < 0.5 * scale
 
 
 @given(st.integers(1, 10**9))
@@ -203,6 +203,6 @@ def test_whole_waves_bring_the_phases_back(turns: int) -> None:
     """A travel of whole wavelengths, 1/64 m each, is a double: the angles return to the bit."""
     wheel = surface([1e-6, 1e-6], wavelengths=[1 / 64, 1 / 32], phases_deg=[10.0, 20.0])
     start, later = np.zeros(2), np.zeros(2)
-    wheel_angles(wheel, 0.0, 0.0, start)
-    wheel_angles(wheel, 2 * turns / 64, 0.0, later)
+    wheel_angles(wheel.waves, 0.0, 0.0, start)
+    wheel_angles(wheel.waves, 2 * turns / 64, 0.0, later)
     np.testing.assert_array_equal(later, start)

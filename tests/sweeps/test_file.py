@@ -1,4 +1,4 @@
-"""Sweep files: what they may say, and how every problem of one is told."""
+"""Sweep files: what they may say, and how every problem of one is reported."""
 
 import tomllib
 from importlib import import_module
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brakecli.case.case import json_schema
+from brakecli.case.tables import json_schema
 from brakecli.errors import CaseError
 from brakecli.sweeps.file import LoadedSweep, is_case, is_sweep, parse_sweep
 from brakecli.sweeps.plan import Plan
@@ -121,18 +121,18 @@ def test_the_texts_of_a_plan_stand_for_it(tmp_path: Path) -> None:
     assert again.case(again.settings(17)) == plan.case(plan.settings(17))
 
 
-def test_every_problem_of_a_sweep_is_told_at_once_with_its_line(tmp_path: Path) -> None:
+def test_every_problem_of_a_sweep_is_reported_at_once_with_its_line(tmp_path: Path) -> None:
     text = (
         'case = "tiny.toml"\n[[axis]]\nparamter = "link2.angle_deg"\nstart = 1\nstop = 2\n[critical]\nlower = 1\n'
     )
-    told = "\n".join(problems(tmp_path, text))
+    reported = "\n".join(problems(tmp_path, text))
     for words in (
-        'sweep.toml:3: axis[0].paramter: is unknown (found "link2.angle_deg"); did you mean "parameter"?',
+        'sweep.toml:3: axis[0].paramter: is unknown (found "link2.angle_deg"); did you mean axis.parameter?',
         "axis[0].num: is missing",
         "critical.parameter: is missing",
         "critical.upper: is missing",
     ):
-        assert words in told
+        assert words in reported
 
 
 AXIS = '[[axis]]\nparameter = "link2.angle_deg"\n'
@@ -151,10 +151,11 @@ AXIS = '[[axis]]\nparameter = "link2.angle_deg"\n'
         (AXIS + "values = [1.0]\nstart = 1.0", "is given together with"),
         (AXIS + "start = 1.0\nstop = 2.0\nnum = 0", "axis[0].num: is out of range (found 0)"),
         (AXIS + "start = 0.0\nstop = 2.0\nnum = 3\nspacing = 'log'", "axis[0].start: is not above 0"),
-        (AXIS + "values = [1.0]\nspacing = 'log'", "axis[0].spacing: is for start and stop"),
+        (AXIS + "values = [1.0]\nspacing = 'log'", "axis[0].spacing: is only for start and stop"),
         (AXIS + "start = nan\nstop = 2.0\nnum = 3", "axis[0].start"),
         ('[[axis]]\nparameter = []\nvalues = [1.0]', "axis[0].parameter: is too short"),
-        ('[[axis]]\nparameter = "a b"\nvalues = [1.0]', "axis[0].parameter: is no key path"),
+        ('[[axis]]\nparameter = "a b"\nvalues = [1.0]', "axis[0].parameter: is not a key path"),
+        ('[[axis]]\nparameter = "' + "a." * 40 + 'a"\nvalues = [1.0]', "axis[0].parameter: is not a key path"),
         (AXIS + "values = [1.0]\n" + AXIS + "values = [2.0]", "axis[1].parameter: is set twice"),
         (AXIS + "values = [1.0]\n" + CRITICAL.replace("friction.coefficient", "link2.angle_deg"),
          "is set by an axis"),

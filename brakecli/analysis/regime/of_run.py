@@ -1,4 +1,4 @@
-"""The regime of a stored run, told anew from its history: what `brakecli classify RESULT.h5` does."""
+"""The regime of the run in a result file, found from its history: what `brakecli classify RESULT.h5` does."""
 
 import math
 from dataclasses import dataclass, replace
@@ -15,6 +15,7 @@ from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError, UnreadableResultError
 from brakecli.files import fields
+from brakecli.files.field import values_of
 from brakecli.files.read import StoredResult, open_result
 from brakecli.solver.history import History
 from brakecli.solver.schedules import value_at
@@ -22,7 +23,7 @@ from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import System
 
 _ROUNDING = 1e-9
-"""A velocity of this part of the static compression, per period of the fastest motion, is no motion."""
+"""A velocity up to this part of the static compression, times the highest frequency, may come from rounding."""
 
 
 @dataclass(frozen=True)
@@ -39,12 +40,12 @@ class StoredHistory:
 
 
 def context(system: System) -> Context:
-    """What the classifier has to know of a system."""
+    """What the rules have to know of a system."""
     last_speed = float(value_at(system.belt, system.sampled_duration))
-    compression = float(np.abs(system.load.values).max()) / (system.coefficients.c_yy + system.contact_stiffness)
+    compression = float(np.abs(system.load["value"]).max()) / (system.coefficients.c_yy + system.contact_stiffness)
     return Context(
         last_speed,
-        steady=len(system.belt.times) == 1 and len(system.load.times) == 1,
+        steady=len(system.belt) == 1 and len(system.load) == 1,
         forced=forced_lines(last_speed, [float(turns) for turns in system.wheel.turns], 0.5 / system.interval),
         quiet=_ROUNDING * compression * system.natural_frequencies[1],
         coefficients=system.coefficients,
@@ -54,7 +55,7 @@ def context(system: System) -> Context:
 
 
 def _growth(system: System, belt_speed: float) -> float:
-    """How fast a disturbance of steady sliding grows (1/s), by the mean stiffness of the contact; 0 if not."""
+    """Growth of a disturbance of steady sliding (1/s), by the mean stiffness of the contact; 0 if it decays."""
     try:
         rest = steady_sliding(system, belt=belt_speed)
     except CaseError:
@@ -76,7 +77,7 @@ def classify_result(path: Path, thresholds: Thresholds) -> dict[str, Any]:
         history = StoredHistory(stored, system.interval, variable.shape[0])
         failure = stored.attributes.get("failure")
         verdict = verdict_on(history, system, failure, thresholds)
-    return {**fields.values(fields.VERDICT, RunVerdict(system, verdict)), "failure": failure}
+    return {**values_of(fields.VERDICT, RunVerdict(system, verdict)), "failure": failure}
 
 
 def verdict_on(

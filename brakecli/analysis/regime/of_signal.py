@@ -1,41 +1,32 @@
 """The regime of a measured signal, which carries no flags: see docs/measured-signals.md.
 
-Stick shows in the distribution of the velocity: long at one value, the belt's, then short and fast in the other
-direction. So its skewness is large. The velocity is smoothed over m samples; of m = 1, 2,
-4 … that one is taken which shows the skewness best, so that one procedure serves any sampling rate and noise.
+Stick shows in the distribution of the velocity: it stays long at one value, the belt's, and is then short and fast
+in the other direction. So its skewness is large. The velocity is smoothed over m = 1, 2, 4 … samples, and the m
+that shows the skewness best is used, so that one procedure serves any sampling rate and noise.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.analysis.regime.cleaning import (
-    CERTAIN,
-    Motion,
-    condition,
-    count_turns,
-    denoised,
-    line_share,
-    stride_of,
-    trend,
-)
+from brakecli.analysis.regime.cleaning import CERTAIN, Velocity, cleaned, count_falls, line_share
 from brakecli.analysis.regime.rules import Excitation, Regime
 
 Array = NDArray[np.float64]
 
 _FINE = 1000.0
-"""Samples of a cycle, after interpolation, among which a plateau is sought …"""
+"""Samples of a cycle, after interpolation, among which a plateau is sought."""
 _PLATEAU_SAMPLES = 1 << 20
-"""… in so many samples at most."""
+"""A plateau is sought in at most so many samples."""
+_SHORTEST_PLATEAU = 0.03  # of the time
 _PARTS = 7
 _FEWEST_SAMPLES = 64
-_SHORTEST_PLATEAU = 0.03
-"""Of the time."""
 
 
-class Quantity(StrEnum):
+class Measurand(StrEnum):
     """What was measured; a force is that of a spring between the belt's friction and the frame."""
 
     DISPLACEMENT = "displacement"
@@ -45,33 +36,32 @@ class Quantity(StrEnum):
 
 @dataclass(frozen=True)
 class Signal:
-    """Equally spaced values, NaN where there are none, in SI units; `notes` tell what reading has changed."""
+    """Equally spaced values in SI units, NaN where there are none; `notes` report what reading has changed."""
 
     values: Array
     interval: float  # s
-    source: str
     notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
-class Thresholds:
-    """Where the rules draw their lines; kept with every verdict."""
+class SignalThresholds:
+    """Where the rules draw their lines; every verdict carries them."""
 
     fewest_cycles: float = 10.0
     samples_per_cycle: float = 8.0
     decayed_to: float = 0.05
     """A motion has died out when its velocity has fallen to this part of its largest."""
     trend_order: float = 0.85
-    """Rank correlation of the envelope with time beyond which it may grow or decay …"""
+    """Rank correlation of the envelope with time from which it may grow or decay."""
     trend_ratio: float = 1.25
-    """… if its last third is so many times its first third, or the reverse."""
+    """The envelope grows or decays if also its last third is so many times its first third, or the reverse."""
     trend_order_large: float = 0.6
+    """The rank correlation that suffices for a change by `trend_ratio_large`."""
     trend_ratio_large: float = 4.0
-    """The same for a change that is large."""
     skewness_unlikely: float = 0.3
-    """Skewness of the velocity up to which there is no stick, except for a short one at the belt's speed …"""
+    """Skewness of the velocity up to which there is no stick, except for a short one at the belt's speed."""
     skewness_certain: float = 0.9
-    """… and from which there is. Two lines in step reach 0.816 and no more."""
+    """Skewness of the velocity from which there is stick. Two lines in step reach 0.816 and no more."""
     overtones: float = 0.03
     """Between these two it is stick if the third to eighth multiple hold this part of the energy."""
     plateau: float = 2.6
@@ -81,11 +71,11 @@ class Thresholds:
 
 
 @dataclass(frozen=True)
-class MeasuredVerdict:
+class SignalVerdict:
     """The regime of a measured signal, its numbers (SI units), and the reasons in plain words.
 
-    What a measurement cannot tell: where the energy comes from, so `excitation` is always none, and whether
-    contact was lost.
+    A measurement does not show where the energy comes from, so `excitation` is always none, nor whether contact
+    was lost.
     """
 
     regime: Regime
@@ -97,11 +87,10 @@ class MeasuredVerdict:
     contact_loss_fraction: float | None = None
     evidence: dict[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
-    thresholds: Thresholds = field(default_factory=Thresholds)
+    thresholds: SignalThresholds = field(default_factory=SignalThresholds)
 
 
-@dataclass(frozen=True)
-class Stick:
+class Stick(NamedTuple):
     """What speaks for stick: skewness of the velocity, events, part of the time."""
 
     skewness: float
@@ -112,205 +101,185 @@ class Stick:
 def classify_signal(
     signal: Signal,
     *,
-    quantity: Quantity,
+    quantity: Measurand,
     belt_speed: float | None = None,
     stiffness: float | None = None,
-    thresholds: Thresholds = Thresholds(),
-) -> MeasuredVerdict:
+    thresholds: SignalThresholds = SignalThresholds(),
+) -> SignalVerdict:
     """The regime of a measured signal; `belt_speed` in m/s, `stiffness` in N/m (of a force) where known."""
     size = float(np.nanmax(np.abs(signal.values), initial=0.0))  # squares of the smallest numbers must not vanish
-    motion = condition(signal.values / (size or 1.0), quantity == Quantity.VELOCITY)
-    scale, level = size, None if belt_speed is None else abs(belt_speed)
-    if quantity == Quantity.FORCE:
-        scale = np.nan if stiffness is None else size / stiffness
-        level = None if belt_speed is None or stiffness is None else abs(belt_speed) * stiffness
-    if quantity == Quantity.VELOCITY:
-        scale *= signal.interval
-    elif level is not None:
-        level *= signal.interval
-    judge = _Judge(motion, signal.interval, None if level is None else level / (size or 1.0), thresholds)
-    regime, reason, frequency, stick = judge.verdict()
-    amplitude = scale * motion.amplitude(judge.start, judge.windows) if judge.above_noise else np.nan
-    return MeasuredVerdict(
-        regime,
-        (reason,),
-        frequency=frequency,
+    velocity = cleaned(signal.values / (size or 1.0), quantity == Measurand.VELOCITY)
+    metres, belt = size, np.nan if belt_speed is None else abs(belt_speed)
+    if quantity == Measurand.FORCE:
+        known = np.nan if stiffness is None else stiffness
+        metres, belt = size / known, belt * known
+    if quantity == Measurand.VELOCITY:
+        metres *= signal.interval
+    else:
+        belt *= signal.interval
+    rules = _Rules(velocity, signal.interval, belt / (size or 1.0), thresholds)
+    verdict = rules.verdict()
+    amplitude = metres * velocity.amplitude(rules.start, rules.windows) if rules.above_noise else np.nan
+    return replace(
+        verdict,
         amplitude=amplitude if np.isfinite(amplitude) else None,
-        stick_fraction=stick,
-        evidence={**judge.evidence, "noise": size * motion.noise},
-        warnings=(*signal.notes, *motion.notes, *judge.notes),
-        thresholds=thresholds,
+        evidence={**rules.evidence, "noise": size * velocity.noise},
+        warnings=(*signal.notes, *velocity.notes),
     )
 
 
-class _Judge:
-    """One motion under judgement: gathers evidence until a rule applies."""
+class _Rules:
+    """The rules on one velocity: they gather evidence until one of them applies."""
 
-    def __init__(self, motion: Motion, interval: float, level: float | None, limits: Thresholds) -> None:
-        self.motion, self.interval, self.level, self.limits = motion, interval, level, limits
+    def __init__(self, velocity: Velocity, interval: float, belt: float, limits: SignalThresholds) -> None:
+        self.velocity, self.interval, self.limits = velocity, interval, limits
+        self.belt = belt  # the belt's speed, as the velocity would show it; NaN where it is not known
+        self.duration = len(velocity.values) * interval
         self.scale, self.start, self.windows, self.above_noise = 1, 0, 1, True
         self.evidence: dict[str, float] = {}
-        self.notes: list[str] = []
 
-    def verdict(self) -> tuple[Regime, str, float | None, float | None]:
-        """Regime, reason, frequency (Hz), part of the time in stick."""
-        motion, limits = self.motion, self.limits
-        count = len(motion.velocity)
+    def verdict(self) -> SignalVerdict:
+        """Apply the rules in their order; the first that applies decides. Only the amplitude is left out."""
+        velocity, limits = self.velocity, self.limits
+        count = len(velocity.values)
         if count < _FEWEST_SAMPLES:
             self.above_noise = False
             return self._undecided(f"only {count} samples in one piece; measure longer")
-        self.scale = motion.quiet_scale()
-        stick = self._stick()
-        clean, power = denoised(motion)
+        self.scale = velocity.quiet_scale()
+        stick = self.stick = self._stick()
+        self.clean, self.power = velocity.denoised()
         self.evidence |= {"samples": float(count), "skewness": stick.skewness}
-        self.evidence |= {
-            "smoothed_over": float(self.scale),
-            "events": float(stick.events),
-        }
-        if not motion.variances:
+        self.evidence |= {"smoothed_over": float(self.scale), "events": float(stick.events)}
+        if not velocity.variances:
             self.above_noise = False
             return self._undecided("nothing stands out of the noise; measure closer, or with less noise")
-        cycles, frequency = self._cycles(stick, power, len(clean) * self.interval)
+        cycles, self.frequency = self._cycles()
         self.windows = int(np.clip(cycles / 3.0, 1, 40))
-        period = 1.0 / (frequency * self.interval)
+        period = 1.0 / (self.frequency * self.interval)
         self.evidence |= {"cycles": cycles, "samples_per_cycle": period}
         if cycles < limits.fewest_cycles:
             return self._undecided(f"only {cycles:.0f} cycles; measure longer")
         if period < limits.samples_per_cycle:
             return self._undecided(f"only {period:.1f} samples a cycle; measure at a higher rate")
-        if reason := self._unsettled(cycles):
-            return reason
-        return self._sustained(stick, clean, power, frequency)
+        return self._unsettled(cycles) or self._sticking() or self._without_stick()
 
-    def _sustained(
-        self, stick: Stick, clean: Array, power: Array, frequency: float
-    ) -> tuple[Regime, str, float | None, float | None]:
-        """The regime of a motion that neither grows nor dies out."""
-        limits, rate = self.limits, stick.events / (len(self.motion.velocity) * self.interval)
-        sticks = self._sticks(stick, power, frequency)
-        if sticks is None:
-            what = "the velocity is skewed, by stick or by two lines in step, and noise hides which"
-            return self._undecided(f"{what}; measure with less noise, or for longer")
-        if sticks:
-            reason = f"{stick.events} events of stick and slip: skewness of the velocity {stick.skewness:.2g}"
-            return Regime.RELAXATION, reason, rate, stick.fraction
-        top, beside = self._plateau(clean)
-        self.evidence |= {"plateau": top / max(beside, 1e-9), "plateau_time": top}
-        flat = top > limits.plateau * beside
-        if flat and self.level is not None:
-            fraction = max(0.0, top - 0.5 * beside)
-            reason = (
-                f"the velocity stays at the belt's speed for {fraction:.0%} of the time, in every cycle or nearly"
-            )
-            return Regime.RELAXATION, reason, frequency, fraction
-        share = line_share(power, 3)
-        self.evidence |= {"line_share": share}
-        if flat:
-            return self._undecided(
-                "the velocity is cut off flat on one side, as by short stick; give the belt speed"
-            )
-        if self._reaches_belt(clean):
-            return self._undecided(
-                "the velocity just reaches the belt's; with less noise it would show if it stays"
-            )
-        if share < limits.line_share:
-            return self._undecided(
-                f"irregular without stick: {share:.0%} of the energy in three lines; measure longer"
-            )
-        reason = f"sustained without stick: {share:.0%} of the energy of the velocity in at most three lines"
-        return Regime.QUASI_HARMONIC, reason, frequency, 0.0
+    def _verdict(
+        self, regime: Regime, reason: str, frequency: float | None = None, stick: float | None = None
+    ) -> SignalVerdict:
+        return SignalVerdict(regime, (reason,), frequency=frequency, stick_fraction=stick, thresholds=self.limits)
 
-    def _undecided(self, reason: str) -> tuple[Regime, str, float | None, float | None]:
-        return Regime.UNDECIDED, reason, None, None
+    def _undecided(self, reason: str) -> SignalVerdict:
+        return self._verdict(Regime.UNDECIDED, reason)
 
     def _stick(self) -> Stick:
-        """Skewness at the smoothing that shows it best, and what goes with it."""
-        motion, best, sign = self.motion, 0.0, 1.0
-        scale = self.scale
-        for m, _ in motion.variances:
-            skewness = _skewness(motion.smoothed(m, stride_of(m)))
-            if abs(skewness) > max(best, 4.0 * np.sqrt(6.0 * m / len(motion.velocity))):
+        """Skewness at the smoothing that shows it best, and the events of slip that go with it."""
+        velocity, best, sign, scale = self.velocity, 0.0, 1.0, self.scale
+        for m, _ in velocity.variances:
+            skewness = _skewness(velocity.thinned(m))
+            if abs(skewness) > max(best, 4.0 * np.sqrt(6.0 * m / len(velocity.values))):
                 best, sign, scale = abs(skewness), -np.sign(skewness), m
         if best < self.limits.skewness_certain:
             scale = self.scale
-        velocity = sign * motion.smoothed(scale)
-        velocity = velocity - velocity.mean()
-        bulk = velocity[velocity > 0.0]
+        values = sign * velocity.smoothed(scale)
+        values = values - values.mean()
+        bulk = values[values > 0.0]
         if not len(bulk):
             return Stick(best, 0, 0.0)
-        middle, noise = float(np.median(bulk)), float(np.sqrt(motion.noise_at(scale)))
-        events = count_turns(velocity, -max(0.5 * middle, 4.0 * noise), 0.25 * middle)
-        return Stick(best, events, float(np.mean(velocity > -0.5 * middle)))
+        middle, noise = float(np.median(bulk)), float(np.sqrt(velocity.noise_at(scale)))
+        events = count_falls(values, -max(0.5 * middle, 4.0 * noise), 0.25 * middle)
+        return Stick(best, events, float(np.mean(values > -0.5 * middle)))
 
-    def _cycles(self, stick: Stick, power: Array, length: float) -> tuple[float, float]:
-        """How many, and how many a second; `length` of what the power was taken from, in seconds."""
-        duration = len(self.motion.velocity) * self.interval
-        strongest = int(np.argmax(power))
+    def _cycles(self) -> tuple[float, float]:
+        """How many cycles there are, and how many a second."""
+        stick, strongest, length = self.stick, int(np.argmax(self.power)), len(self.clean) * self.interval
         certain = stick.skewness >= self.limits.skewness_certain and stick.events >= self.limits.fewest_cycles
-        if certain or power[strongest] == 0.0:
-            return float(stick.events), max(stick.events, 1) / duration
-        return strongest * duration / length, max(strongest, 1) / length
+        if certain or self.power[strongest] == 0.0:
+            return float(stick.events), max(stick.events, 1) / self.duration
+        return strongest * self.duration / length, max(strongest, 1) / length
 
-    def _unsettled(self, cycles: float) -> tuple[Regime, str, float | None, float | None] | None:
-        """Why the motion is not sustained; moves the start behind a transient."""
-        limits, motion = self.limits, self.motion
+    def _unsettled(self, cycles: float) -> SignalVerdict | None:
+        """Decides where the motion has died out, still grows or decays; moves the start behind a transient."""
+        limits, velocity = self.limits, self.velocity
         windows = int(np.clip(cycles / 3.0, 4, 40))
-        whole = trend(motion, self.scale, 0, windows)
+        whole = velocity.trend(self.scale, 0, windows)
         last, largest = float(whole.envelope[-max(1, windows // 4) :].mean()), float(np.sort(whole.envelope)[-3])
-        floor = np.sqrt(motion.noise_at(self.scale))
-        self.evidence |= {
-            "envelope_ratio": whole.ratio,
-            "envelope_order": whole.order,
-            "died_to": last / max(largest, 1e-300),
-        }
+        floor = np.sqrt(velocity.noise_at(self.scale))
+        died_to = last / max(largest, 1e-300)
+        self.evidence |= {"envelope_ratio": whole.ratio, "envelope_order": whole.order, "died_to": died_to}
         early = bool(whole.envelope[: windows // 2].max() >= largest)
         if early and last <= max(limits.decayed_to * largest, min(0.2 * largest, 0.5 * floor)):
-            share = last / max(largest, 1e-300)
-            return Regime.DAMPED, f"the vibration has died out: down to {share:.2g} of its largest", None, None
+            return self._verdict(
+                Regime.DAMPED, f"the vibration has died out: down to {died_to:.2g} of its largest"
+            )
         found = whole
-        for start in (0, len(motion.velocity) // 4, len(motion.velocity) // 2):
-            found = trend(motion, self.scale, start, windows)
-            change = max(found.ratio, 1.0 / max(found.ratio, 1e-9))
-            slow = change > limits.trend_ratio and abs(found.order) > limits.trend_order
-            if not slow and not (
-                change > limits.trend_ratio_large and abs(found.order) > limits.trend_order_large
-            ):
+        for start in (0, len(velocity.values) // 4, len(velocity.values) // 2):
+            found = velocity.trend(self.scale, start, windows)
+            change, order = max(found.ratio, 1.0 / max(found.ratio, 1e-9)), abs(found.order)
+            slow = change > limits.trend_ratio and order > limits.trend_order
+            fast = change > limits.trend_ratio_large and order > limits.trend_order_large
+            if not slow and not fast:
                 self.start = start
                 return None
         word, end = ("growing", "settled") if found.ratio > 1.0 else ("decaying", "died out")
         return self._undecided(f"still {word}; measure longer, until it has {end}")
 
-    def _sticks(self, stick: Stick, power: Array, frequency: float) -> bool | None:
-        """Whether the velocity is skewed by stick, and not by two lines in step; None if noise hides which."""
-        limits, motion = self.limits, self.motion
+    def _sticking(self) -> SignalVerdict | None:
+        """Decides where stick has skewed the velocity; undecided if noise hides whether two lines in step did."""
+        limits, stick, velocity, total = self.limits, self.stick, self.velocity, float(self.power.sum())
         if stick.events < limits.fewest_cycles or stick.skewness < limits.skewness_unlikely:
-            return False
-        if stick.skewness >= limits.skewness_certain:
-            return True
-        strongest = int(np.argmax(power))
-        bands = [slice(int(0.97 * n * strongest), int(1.03 * n * strongest) + 2) for n in range(3, 9)]
-        overtones = sum(float(power[band].sum()) for band in bands) / float(power.sum())
-        self.evidence |= {"overtones": overtones}
-        if overtones > limits.overtones:
-            return True
-        turn = 2.0 * np.pi * min(4.0 * frequency * self.interval, 0.5)
-        gain = 1.0 if motion.measured_velocity else 2.0 - 2.0 * np.cos(turn)
-        hidden = CERTAIN * len(motion.velocity) * motion.noise**2 * gain
-        return None if hidden > limits.overtones / 3.0 * float(power.sum()) else False
+            return None
+        if stick.skewness < limits.skewness_certain:
+            strongest = int(np.argmax(self.power))
+            bands = [slice(int(0.97 * n * strongest), int(1.03 * n * strongest) + 2) for n in range(3, 9)]
+            overtones = sum(float(self.power[band].sum()) for band in bands) / total
+            self.evidence |= {"overtones": overtones}
+            if overtones <= limits.overtones:
+                turn = 2.0 * np.pi * min(4.0 * self.frequency * self.interval, 0.5)
+                gain = 1.0 if velocity.measured else 2.0 - 2.0 * np.cos(turn)
+                if CERTAIN * len(velocity.values) * velocity.noise**2 * gain <= limits.overtones / 3.0 * total:
+                    return None
+                what = "the velocity is skewed, by stick or by two lines in step, and noise hides which"
+                return self._undecided(f"{what}; measure with less noise, or for longer")
+        reason = f"{stick.events} events of stick and slip: skewness of the velocity {stick.skewness:.2g}"
+        return self._verdict(Regime.RELAXATION, reason, stick.events / self.duration, stick.fraction)
 
-    def _reaches_belt(self, clean: Array) -> bool:
-        """Whether the velocity's largest values, in either direction, are about the belt's."""
-        least, most = np.quantile(clean + self.motion.raw.mean(), [0.01, 0.99])
-        return self.level is not None and any(0.95 * self.level <= v <= 1.2 * self.level for v in (-least, most))
+    def _without_stick(self) -> SignalVerdict:
+        """Decides on a motion that neither grows nor dies out, nor sticks for long."""
+        top, beside = self._plateau()
+        self.evidence |= {"plateau": top / max(beside, 1e-9), "plateau_time": top}
+        flat = top > self.limits.plateau * beside
+        if flat and np.isfinite(self.belt):
+            fraction = max(0.0, top - 0.5 * beside)
+            reason = (
+                f"the velocity stays at the belt's speed for {fraction:.0%} of the time, in most cycles or all"
+            )
+            return self._verdict(Regime.RELAXATION, reason, self.frequency, fraction)
+        share = line_share(self.power, 3)
+        self.evidence |= {"line_share": share}
+        if flat:
+            return self._undecided(
+                "the velocity is cut off flat on one side, as by short stick; give the belt speed"
+            )
+        least, most = np.quantile(self.clean + self.velocity.raw.mean(), [0.01, 0.99])
+        if any(0.95 * self.belt <= v <= 1.2 * self.belt for v in (-least, most)):
+            return self._undecided(
+                "the velocity just reaches the belt's; with less noise it would show if it stays"
+            )
+        if share < self.limits.line_share:
+            return self._undecided(
+                f"irregular without stick: {share:.0%} of the energy in three lines; measure longer"
+            )
+        reason = f"sustained without stick: {share:.0%} of the energy of the velocity in at most three lines"
+        return self._verdict(Regime.QUASI_HARMONIC, reason, self.frequency, 0.0)
 
-    def _plateau(self, clean: Array) -> tuple[float, float]:
-        """Part of the time at the belt's speed (or at the velocity's extreme value) and next to it."""
+    def _plateau(self) -> tuple[float, float]:
+        """Part of the time at the belt's speed (or an extreme velocity), and part of the time next to it."""
         finer = int(np.ceil(_FINE / self.evidence["samples_per_cycle"]))
-        clean = clean[: _PLATEAU_SAMPLES // finer]
+        clean = self.clean[: _PLATEAU_SAMPLES // finer]
         clean = finer * np.fft.irfft(np.fft.rfft(clean), finer * len(clean))
-        absolute = clean + self.motion.raw.mean()
+        absolute = clean + self.velocity.raw.mean()
         reach = 0.5 * float(np.ptp(np.quantile(clean, [0.01, 0.99])))
-        levels = (self.level, -self.level) if self.level is not None else _extreme_modes(absolute, reach)
+        levels = (self.belt, -self.belt) if np.isfinite(self.belt) else _extreme_modes(absolute, reach)
         results = [(0.0, 1.0)]
         for level in levels:
             away = np.abs(absolute - level) / reach
@@ -322,7 +291,7 @@ class _Judge:
 
 
 def _skewness(values: Array) -> float:
-    """The median of equal parts', which a single jump does not change."""
+    """Median of the skewness of equal parts, which a single jump does not change."""
     parts = [part - part.mean() for part in np.array_split(values, _PARTS)]
     return float(np.median([np.mean(p * p * p) / max(float(np.mean(p * p)), 1e-100) ** 1.5 for p in parts]))
 

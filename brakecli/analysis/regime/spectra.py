@@ -1,11 +1,14 @@
-"""Power spectral densities and the fundamental frequency of a history."""
+"""Power spectral densities, their peak, and the rises of a signal through zero."""
 
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from brakecli.solver.history import History
+
+Array = NDArray[np.float64]
 
 LONGEST_SEGMENT = 1 << 16
 """Samples of one Welch segment: the memory that a spectrum takes does not grow with the run."""
@@ -19,10 +22,10 @@ SPECTRAL = ("x", "y", "vx", "vy", "friction_force", "normal_force", "contact_fra
 
 @dataclass(frozen=True)
 class Spectrum:
-    """One-sided power spectral densities (unit² per Hz) over frequencies (Hz), of samples start … stop - 1."""
+    """One-sided power spectral densities (unit² per Hz) over frequencies (Hz), from sample `start` on."""
 
-    frequency: NDArray[np.float64]
-    density: dict[str, NDArray[np.float64]]
+    frequency: Array
+    density: dict[str, Array]
     start: int
     segments: int
     window: str = "hann"
@@ -31,41 +34,44 @@ class Spectrum:
 def spectrum(history: History, start: int) -> Spectrum:
     """Welch's estimate (Hann window, half overlap, mean removed) of the samples from `start` on.
 
-    Segments are as long as leaves about `SEGMENTS_WANTED` of them, within `LONGEST_SEGMENT`.
+    The length of the segments, at most `LONGEST_SEGMENT`, leaves about `SEGMENTS_WANTED` of them.
     """
     length = history.samples - start
     size = min(LONGEST_SEGMENT, max(min(SHORTEST_SEGMENT, length), 2 * length // (SEGMENTS_WANTED + 1)))
     hop = max(1, size - size // 2)
     segments = 1 + (length - size) // hop
-    frequency: NDArray[np.float64] = np.fft.rfftfreq(size, history.interval).astype(np.float64)
-    return Spectrum(
-        frequency,
-        {name: _density(history, name, start, size, hop, segments) for name in SPECTRAL},
-        start,
-        segments,
-    )
-
-
-def _density(history: History, name: str, start: int, size: int, hop: int, segments: int) -> NDArray[np.float64]:
-    """Mean periodogram of the segments, some of them at a time."""
-    from scipy import signal  # half a second, which a command without spectra need not wait for
-
-    total = np.zeros(size // 2 + 1)
+    window = _window(size, history.interval)
+    densities = {name: np.zeros(size // 2 + 1) for name in SPECTRAL}
     for first in range(0, segments, SEGMENTS_AT_ONCE):
         count = min(SEGMENTS_AT_ONCE, segments - first)
         begin = start + first * hop
-        block = history.read(name, begin, begin + (count - 1) * hop + size)
-        # Brought to a scale of one, so that squares of the smallest numbers do not vanish.
-        scale = float(np.max(np.abs(block), initial=0.0)) or 1.0
-        _, density = signal.welch(
-            block / scale, 1.0 / history.interval, nperseg=size, noverlap=size - hop, detrend="constant"
-        )
-        total += count * density * scale**2
-    mean: NDArray[np.float64] = total / segments
-    return mean
+        for name, total in densities.items():
+            block = history.read(name, begin, begin + (count - 1) * hop + size)
+            total += _summed_periodograms(sliding_window_view(block, size)[::hop], window)
+    frequency: Array = np.fft.rfftfreq(size, history.interval).astype(np.float64)
+    return Spectrum(frequency, {name: total / segments for name, total in densities.items()}, start, segments)
 
 
-def peak(frequency: NDArray[np.float64], density: NDArray[np.float64]) -> float | None:
+def _window(size: int, interval: float) -> Array:
+    """Periodic Hann window, scaled so that the squared transform is a density."""
+    window = 0.5 + 0.5 * np.cos(np.linspace(-np.pi, np.pi, size + 1)[:size]) if size > 1 else np.ones(1)
+    # The sum and the interval are rounded as in `scipy.signal.welch`, whose import takes half a second.
+    return np.asarray(window * (1.0 / np.sqrt(np.cumsum(window**2)[-1] / (1.0 / (1.0 / interval)))))
+
+
+def _summed_periodograms(segments: Array, window: Array) -> Array:
+    """Sum of the one-sided power spectral densities of segments, one in a row."""
+    # Squares of the smallest numbers would vanish, so the segments are brought to a scale of one.
+    scale = float(np.max(np.abs(segments), initial=0.0)) or 1.0
+    power = np.empty((len(window) // 2 + 1, len(segments)))
+    for column, segment in zip(power.T, segments / scale, strict=True):
+        line = np.fft.rfft((segment - segment.mean()) * window)
+        column[:] = line.real**2 + line.imag**2
+    power[1 : (len(window) + 1) // 2] *= 2.0
+    return np.asarray(len(segments) * power.mean(axis=1) * scale**2)
+
+
+def peak(frequency: Array, density: Array) -> float | None:
     """Frequency (Hz) of the highest peak above zero, from a parabola through its logarithm; None without one."""
     if density.size < 3 or not density[1:].max() > 0.0:
         return None
@@ -78,16 +84,21 @@ def peak(frequency: NDArray[np.float64], density: NDArray[np.float64]) -> float 
     return float(frequency[i] + np.clip(shift, -0.5, 0.5) * (frequency[1] - frequency[0]))
 
 
-def upward_crossings(values: NDArray[np.float64], band: float) -> NDArray[np.float64]:
+def rises(values: Array, low: float, high: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """The last samples below `low` and the first ones above `high`, of every rise from one to the other."""
+    side = np.where(values > high, 1, np.where(values < low, -1, 0)).astype(np.int8)
+    marked = np.flatnonzero(side)
+    found = np.flatnonzero((side[marked[:-1]] < 0) & (side[marked[1:]] > 0))
+    return marked[found], marked[found + 1]
+
+
+def upward_crossings(values: Array, band: float) -> Array:
     """Places (in samples) where a signal rises through zero between leaving -band and reaching +band.
 
     The band keeps ripple on a slow cycle from counting as cycles. The places are interpolated linearly.
     """
-    side = np.where(values > band, 1, np.where(values < -band, -1, 0))
-    marked = np.flatnonzero(side)
-    rises = np.flatnonzero((side[marked[:-1]] < 0) & (side[marked[1:]] > 0))
     places = []
-    for low, high in zip(marked[rises], marked[rises + 1], strict=True):
+    for low, high in zip(*rises(values, -band, band), strict=True):
         i = low + int(np.argmax(values[low : high + 1] >= 0.0)) - 1
         places.append(i + values[i] / (values[i] - values[i + 1]))
     return np.array(places)

@@ -7,23 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.solver import implicit_step as iteration
-from brakecli.solver.compile import (
-    A_11,
-    A_12,
-    A_22,
-    FORCE,
-    GAIN,
-    PROBLEM_SIZE,
-    STATE_SIZE,
-    WORK_SIZE,
-    Y_OLD,
-    Coefficients,
-    Weights,
-    Y,
-)
 from brakecli.solver.contact.closed_form import evaluate as closed_form
-from brakecli.solver.contact.pad import build_contact, build_pad
+from brakecli.solver.contact.pad import build_layer, build_pad
+from brakecli.solver.implicit_step import newton
+from brakecli.solver.method import MOST
+from brakecli.solver.records import PROBLEM, WORK, Coefficients, Weights, new
 from brakecli.solver.roughness import surface
 from brakecli.solver.system import System
 
@@ -53,10 +41,9 @@ def step_limits(system: System, step: float | None = None) -> StepLimits:
     if system.method.own_steps:
         return StepLimits(contraction=0.0, unique=True, growth=1.0)
     c, scheme, contact_stiffness = system.coefficients, system.scheme, system.contact_stiffness
-    s = system.weights if step is None else system.weights._replace(h=step)
-    problem = np.zeros(PROBLEM_SIZE)
-    scheme.prepare(c, s, np.zeros(STATE_SIZE), 0.0, 0.0, 0.0, problem)
-    a_11, a_12, a_22, gain = (float(problem[i]) for i in (A_11, A_12, A_22, GAIN))
+    s, problem = system.weights if step is None else system.weights._replace(h=step), new(PROBLEM)
+    scheme.prepare(c, s, new(scheme.STATE), problem)
+    a_11, a_12, a_22, gain = (float(each) for each in (problem.a_11, problem.a_12, problem.a_22, problem.gain))
     a = a_11 * a_22 - a_12 * a_12
     steepest = contact_stiffness * float(np.abs(system.wheel.g) @ system.wheel.omega)  # bound of |∂F_y/∂x|
     lift, least = (a_11 + c.phi * abs(a_12)) / a, (a_11 - c.phi * abs(a_12)) / a  # ∂e/∂F on the slip branches
@@ -78,29 +65,26 @@ def amplification(c: Coefficients, s: Weights, scheme: Any, contact_stiffness: f
     from a deep, loaded equilibrium and from neighbours of it: while nothing opens or sticks, the step is affine
     and differences are exact.
     """
-    pad = build_pad(contact_stiffness, 0.5, surface(), surface(), 0)
-    small, no_waves = 1e-3, np.zeros(0)
-    far = 1e3 / s.h  # a belt so fast that nothing sticks
+    layer = build_layer(closed_form, build_pad(contact_stiffness, 0.5, surface(), surface(), 0))
+    small = 1e-3
     # y = -1, x = 0 is the equilibrium under a load of the size of the contact stiffness.
     loaded = c._replace(sin_beta=c.c_xy / contact_stiffness + c.phi, cos_beta=1.0 + c.c_yy / contact_stiffness)
-    memory = list(scheme.MEMORY)
-    scales = np.array([1.0 / s.h if index in scheme.VELOCITIES else 1.0 for index in memory])
+    scales = [1.0 / s.h if name in scheme.VELOCITIES else 1.0 for name in scheme.MEMORY]
 
-    def step(state: NDArray[np.float64]) -> NDArray[np.float64]:
-        problem, contact = np.zeros(PROBLEM_SIZE), build_contact(pad)
-        scheme.prepare(loaded, s, state, contact_stiffness, far, far, problem)
-        iteration.newton(closed_form, iteration.MOST["newton"], c.phi, no_waves, pad, problem, contact)
-        scheme.finish(loaded, s, state, contact_stiffness, far, far, problem, contact, np.zeros(WORK_SIZE))
-        return state[memory] / scales  # type: ignore[no-any-return]
+    def step(moved: str | None = None, by: float = 0.0) -> NDArray[np.float64]:
+        state, problem = new(scheme.STATE), new(PROBLEM)
+        state.y = state.y_old = -1.0
+        state.force = problem.load = contact_stiffness
+        problem.belt_now = problem.belt_next = 1e3 / s.h  # a belt so fast that nothing sticks
+        if moved is not None:
+            state[moved] += by
+        scheme.prepare(loaded, s, state, problem)
+        newton(layer, problem, MOST["newton"])
+        scheme.finish(loaded, s, state, problem, layer.contact, new(WORK))
+        return np.array([state[name] for name in scheme.MEMORY]) / scales
 
-    base = np.zeros(STATE_SIZE)
-    base[[Y, Y_OLD]], base[FORCE] = -1.0, contact_stiffness
-    neighbours = []
-    for index, scale in zip(memory, scales, strict=True):
-        state = base.copy()
-        state[index] += small * scale
-        neighbours.append(step(state))
-    matrix: NDArray[np.float64] = (np.array(neighbours) - step(base.copy())).T / small
+    neighbours = [step(name, small * scale) for name, scale in zip(scheme.MEMORY, scales, strict=True)]
+    matrix: NDArray[np.float64] = (np.array(neighbours) - step()).T / small
     matrix.flags.writeable = False
     return matrix
 

@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.solver.compile import Coefficients
+from brakecli.solver.records import Coefficients
 
 Complex = NDArray[np.complex128]
 

@@ -8,7 +8,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
 
 from brakecli.analysis.stability.discrete import spectral_radius
 from brakecli.analysis.stability.modes import (
@@ -23,8 +22,9 @@ from brakecli.analysis.stability.modes import (
 from brakecli.analysis.stability.search import bisect
 from brakecli.errors import CaseError
 from brakecli.files import fields
-from brakecli.solver.compile import Coefficients
+from brakecli.files.field import values_of
 from brakecli.solver.links import natural_frequencies
+from brakecli.solver.records import Coefficients
 from brakecli.solver.steady_sliding import SteadySliding, steady_sliding, tabulated
 from brakecli.solver.system import System
 
@@ -78,7 +78,7 @@ class StabilityReport:
 
     def numbers(self) -> dict[str, Any]:
         """Names and values as `--json` gives them."""
-        return fields.values(fields.STABILITY, self)
+        return values_of(fields.STABILITY, self)
 
 
 def stability(system: System) -> StabilityReport:
@@ -211,6 +211,8 @@ def discrete_critical(system: System, stiffness_at: StiffnessAt, exact: Crossing
 
     The scheme is one that steps on the grid of the case. It is looked for up to twice the exact value.
     """
+
+    from scipy.optimize import brentq  # only `brakecli stability` and sweeps wait for it
 
     def excess(phi: float) -> float:
         return _radius(system, stiffness_at, phi, system.weights.h) - 1.0 - MARGIN

@@ -2,16 +2,10 @@
 
 The rows are plain data; a file is imported when it is used.
 
-Contract of an evaluator module: `evaluate(x, y, angles, pad, contact)`, a kernel of the signature `EVALUATE`,
-fills `contact` for the shoe at (x, y), with `angles` the phases of the wheel's harmonics
-(`roughness.wheel_angles`) and `pad` the constants and tables of `brakecli.solver.contact.pad`:
-
-- NORMAL_FORCE, N: F_y = k ∫ max(gap, 0) dξ over the pad, gap = f2(ξ + x - travel) - f1(ξ) - y;
-- STIFFNESS, N/m: -∂F_y/∂y = k (length that touches) >= 0;
-- TANGENTIAL, N/m: ∂F_y/∂x = k Σ [f2] over the touching intervals;
-- FRACTION: the part of the pad that touches, 0 to 1;
-- STORE, J: V = k/2 ∫ max(gap, 0)² dξ, and STORE_X, N: ∂V/∂x;
-- KIND: the evaluator that did the work (its place in `kinds()`), VALID: 0 where its assumptions do not hold.
+Contract of an evaluator module: `evaluate(x, y, layer)`, a kernel of the signature `records.EVALUATE`, fills
+`layer.contact`, a record of `records.CONTACT`, for the shoe at (x, y) and the phases `layer.angles` of the wheel's
+harmonics (`roughness.wheel_angles`). It takes constants and tables from `layer.pad` and `layer.tables`, changes
+nothing but the contact and `layer.scratch`, and notes its place in `kinds()`.
 """
 
 from dataclasses import dataclass
@@ -34,6 +28,10 @@ EVALUATORS: dict[str, Evaluator] = {
     "exact": Evaluator("brakecli.solver.contact.exact"),
 }
 """`auto` hands over to the others."""
+
+
+CLOSED_FORM, MIDPOINT, EXACT = range(3)
+"""Places in `kinds()`."""
 
 
 def kinds() -> tuple[str, ...]:

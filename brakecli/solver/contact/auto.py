@@ -1,22 +1,18 @@
 """The cheapest evaluator that is good enough, chosen anew at each evaluation."""
 
-import numpy as np
-from numpy.typing import NDArray
-
-from brakecli.solver.compile import EVALUATE, kernel
+from brakecli.solver.compile import kernel
 from brakecli.solver.contact.closed_form import CLEAR, FULL, clear, coverage, full_contact
 from brakecli.solver.contact.midpoint import evaluate as midpoint
+from brakecli.solver.records import EVALUATE, Layer
 
 
 @kernel(EVALUATE)
-def evaluate(
-    x: float, y: float, angles: NDArray[np.float64], pad: NDArray[np.float64], contact: NDArray[np.float64]
-) -> None:
-    """Closed form where a bound proves the pad to touch everywhere or nowhere, else the midpoint rule."""
-    covered = coverage(y, pad)
+def evaluate(x: float, y: float, layer: Layer) -> None:
+    """Closed form where a bound proves the pad to touch everywhere or nowhere, otherwise the midpoint rule."""
+    covered = coverage(y, layer.pad)
     if covered == FULL:
-        full_contact(x, y, angles, pad, contact)
+        full_contact(x, y, layer)
     elif covered == CLEAR:
-        clear(x, y, angles, pad, contact)
+        clear(layer.contact)
     else:
-        midpoint(x, y, angles, pad, contact)
+        midpoint(x, y, layer)

@@ -6,26 +6,16 @@ counts as touching or not by its sign in the middle, so that the walk ends also 
 """
 
 import math
+from typing import Any
 
 import numpy as np
 from numba import float64, int64, types, void
 from numpy.typing import NDArray
 
-from brakecli.solver.compile import (
-    EVALUATE,
-    FRACTION,
-    KIND,
-    NORMAL_FORCE,
-    SCRATCH,
-    STIFFNESS,
-    STORE,
-    STORE_X,
-    TANGENTIAL,
-    kernel,
-    vector,
-)
+from brakecli.solver.compile import kernel, vector
+from brakecli.solver.contact import EXACT
 from brakecli.solver.contact.closed_form import CLEAR, FULL, clear, coverage
-from brakecli.solver.contact.pad import AT_SHOE, AT_WHEEL, CELL, HALF, SHOE_TERMS, WHEEL_TERMS, K
+from brakecli.solver.records import CONTACT_TYPE, EVALUATE, PAD_TYPE, Layer
 
 # `waves` holds, for every harmonic of the gap (the wheel's first, the shoe's with minus): amplitude,
 # wavenumber, phase, and for one interval the phase in its middle (sine, cosine) and the half width times omega.
@@ -74,15 +64,9 @@ def _sinc_of(sine: float, z: float) -> float:
     return sine / z if z != 0.0 else 1.0
 
 
-@kernel(void(float64, float64, float64, int64, int64, vector, vector))
+@kernel(void(float64, float64, float64, int64, int64, vector, CONTACT_TYPE))
 def _add_interval(
-    left: float,
-    right: float,
-    y: float,
-    wheel_terms: int,
-    n: int,
-    waves: NDArray[np.float64],
-    contact: NDArray[np.float64],
+    left: float, right: float, y: float, wheel_terms: int, n: int, waves: NDArray[np.float64], contact: Any
 ) -> None:
     """Add the closed integrals of a touching interval, without the factor k."""
     length, middle = right - left, 0.5 * (left + right)
@@ -107,11 +91,11 @@ def _add_interval(
             square += g * (minus * (c_i * c_j + s_i * s_j) - plus * (c_i * c_j - s_i * s_j))
             if j < wheel_terms:
                 work += g * waves[n + j] * (plus * (s_i * c_j + c_i * s_j) + minus * (s_i * c_j - c_i * s_j))
-    contact[NORMAL_FORCE] += heights - y * length
-    contact[STIFFNESS] += length
-    contact[TANGENTIAL] += rise
-    contact[STORE] += 0.5 * (square + y * y * length) - y * heights
-    contact[STORE_X] += work - y * rise
+    contact.normal_force += heights - y * length
+    contact.stiffness += length
+    contact.tangential += rise
+    contact.store += 0.5 * (square + y * y * length) - y * heights
+    contact.store_x += work - y * rise
 
 
 @kernel(types.UniTuple(float64, 2)(float64, float64, int64, vector))
@@ -125,17 +109,10 @@ def _bounds(y: float, end: float, n: int, waves: NDArray[np.float64]) -> tuple[f
     return fourth, _EPSILON * rounding
 
 
-@kernel(void(float64, int64, int64, vector, vector, vector))
-def _add_touching(
-    y: float,
-    wheel_terms: int,
-    n: int,
-    pad: NDArray[np.float64],
-    waves: NDArray[np.float64],
-    contact: NDArray[np.float64],
-) -> None:
+@kernel(void(float64, int64, int64, PAD_TYPE, vector, CONTACT_TYPE))
+def _add_touching(y: float, wheel_terms: int, n: int, pad: Any, waves: NDArray[np.float64], contact: Any) -> None:
     """Walk over the pad and add every interval on which the gap is positive."""
-    end, widest = pad[HALF], pad[CELL]
+    end, widest = pad.half_length, pad.cell
     fourth, rounding = _bounds(y, end, n, waves)
     left, width = -end, widest
     touching, start = False, left
@@ -172,35 +149,33 @@ def _add_touching(
 
 
 @kernel(EVALUATE)
-def evaluate(
-    x: float, y: float, angles: NDArray[np.float64], pad: NDArray[np.float64], contact: NDArray[np.float64]
-) -> None:
+def evaluate(x: float, y: float, layer: Layer) -> None:
     """See the package; exact to rounding."""
-    clear(x, y, angles, pad, contact)
-    contact[KIND] = 2.0
+    pad, tables, contact, angles = layer.pad, layer.tables, layer.contact, layer.angles
+    clear(contact)
+    contact.kind = EXACT
     covered = coverage(y, pad)
     if covered == CLEAR:
         return
-    wheel_terms, shoe_terms = int(pad[WHEEL_TERMS]), int(pad[SHOE_TERMS])
+    wheel_terms, shoe_terms, wheel_at, shoe_at = pad.wheel_terms, pad.shoe_terms, pad.wheel_at, pad.shoe_at
     n = wheel_terms + shoe_terms
-    waves = contact[SCRATCH : SCRATCH + 6 * n]
-    at_wheel, at_shoe = int(pad[AT_WHEEL]), int(pad[AT_SHOE])
+    waves = layer.scratch[: 6 * n]
     for i in range(wheel_terms):
-        waves[i] = pad[at_wheel + i]
-        waves[n + i] = pad[at_wheel + wheel_terms + i]
-        waves[2 * n + i] = pad[at_wheel + wheel_terms + i] * x + angles[i]
+        waves[i] = tables[wheel_at + i]
+        waves[n + i] = tables[wheel_at + wheel_terms + i]
+        waves[2 * n + i] = tables[wheel_at + wheel_terms + i] * x + angles[i]
     for i in range(shoe_terms):
-        waves[wheel_terms + i] = -pad[at_shoe + i]
-        waves[n + wheel_terms + i] = pad[at_shoe + shoe_terms + i]
-        waves[2 * n + wheel_terms + i] = pad[at_shoe + 2 * shoe_terms + i]
+        waves[wheel_terms + i] = -tables[shoe_at + i]
+        waves[n + wheel_terms + i] = tables[shoe_at + shoe_terms + i]
+        waves[2 * n + wheel_terms + i] = tables[shoe_at + 2 * shoe_terms + i]
     if covered == FULL:
-        _add_interval(-pad[HALF], pad[HALF], y, wheel_terms, n, waves, contact)
+        _add_interval(-pad.half_length, pad.half_length, y, wheel_terms, n, waves, contact)
     else:
         _add_touching(y, wheel_terms, n, pad, waves, contact)
-    contact[FRACTION] = contact[STIFFNESS] / (2.0 * pad[HALF])
-    k = pad[K]
-    contact[NORMAL_FORCE] = max(k * contact[NORMAL_FORCE], 0.0)  # not below zero by rounding
-    contact[STIFFNESS] *= k
-    contact[TANGENTIAL] *= k
-    contact[STORE] *= k
-    contact[STORE_X] *= k
+    contact.fraction = contact.stiffness / (2.0 * pad.half_length)
+    k = pad.k
+    contact.normal_force = max(k * contact.normal_force, 0.0)  # Eq. (2), not below zero by rounding
+    contact.stiffness *= k
+    contact.tangential *= k
+    contact.store *= k
+    contact.store_x *= k

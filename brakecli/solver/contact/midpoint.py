@@ -6,21 +6,9 @@ import numpy as np
 from numba import float64, types, void
 from numpy.typing import NDArray
 
-from brakecli.solver.compile import (
-    EVALUATE,
-    FRACTION,
-    KIND,
-    NORMAL_FORCE,
-    SCRATCH,
-    STIFFNESS,
-    STORE,
-    STORE_X,
-    TANGENTIAL,
-    VALID,
-    kernel,
-    vector,
-)
-from brakecli.solver.contact.pad import AT_COS, AT_NODES, AT_SIN, AT_WHEEL, HALF, NODES, WHEEL_TERMS, K
+from brakecli.solver.compile import kernel, vector
+from brakecli.solver.contact import MIDPOINT
+from brakecli.solver.records import EVALUATE, Layer
 
 _SUMS = types.UniTuple(float64, 5)(float64, vector, vector)
 _FAST = frozenset({"reassoc", "contract", "nsz"})
@@ -61,29 +49,27 @@ def _add_wave(
 
 
 @kernel(EVALUATE)
-def evaluate(
-    x: float, y: float, angles: NDArray[np.float64], pad: NDArray[np.float64], contact: NDArray[np.float64]
-) -> None:
+def evaluate(x: float, y: float, layer: Layer) -> None:
     """See the package. The error falls with the square of the spacing, by its kinks at the edges of patches;
     ∂F_y/∂x and ∂V/∂x take the rise of f2 from the neighbouring nodes.
     """
-    n, terms = int(pad[NODES]), int(pad[WHEEL_TERMS])
-    at_omega, at_sin, at_cos = int(pad[AT_WHEEL]) + terms, int(pad[AT_SIN]), int(pad[AT_COS])
-    at_f1, columns = int(pad[AT_NODES]), n + 2
-    f2 = contact[SCRATCH : SCRATCH + columns]
+    pad, tables, contact, angles = layer.pad, layer.tables, layer.contact, layer.angles
+    n, columns, omega_at = pad.nodes, pad.nodes + 2, pad.wheel_at + pad.wheel_terms
+    f2 = layer.scratch[:columns]
     f2[:] = 0.0
-    for i in range(terms):
-        psi = pad[at_omega + i] * x + angles[i]
-        sines = pad[at_sin + i * columns : at_sin + (i + 1) * columns]
-        cosines = pad[at_cos + i * columns : at_cos + (i + 1) * columns]
+    for i in range(pad.wheel_terms):
+        psi = tables[omega_at + i] * x + angles[i]
+        sines = tables[pad.sin_at + i * columns : pad.sin_at + (i + 1) * columns]
+        cosines = tables[pad.cos_at + i * columns : pad.cos_at + (i + 1) * columns]
         _add_wave(math.sin(psi), math.cos(psi), sines, cosines, f2)
-    force, touching, rise, square, work = _sums(y, pad[at_f1 : at_f1 + columns], f2)
-    k, spacing = pad[K], 2.0 * pad[HALF] / n
-    contact[NORMAL_FORCE] = k * spacing * force
-    contact[STIFFNESS] = k * spacing * touching
-    contact[TANGENTIAL] = k * rise
-    contact[FRACTION] = touching / n
-    contact[STORE] = 0.5 * k * spacing * square
-    contact[STORE_X] = k * work
-    contact[KIND] = 1.0
-    contact[VALID] = 1.0
+    f1 = tables[pad.nodes_at : pad.nodes_at + columns]
+    force, touching, rise, square, work = _sums(y, f1, f2)
+    k, spacing = pad.k, 2.0 * pad.half_length / n
+    contact.normal_force = k * spacing * force  # Eq. (2)
+    contact.stiffness = k * spacing * touching
+    contact.tangential = k * rise
+    contact.fraction = touching / n
+    contact.store = 0.5 * k * spacing * square
+    contact.store_x = k * work
+    contact.kind = MIDPOINT
+    contact.valid = 1

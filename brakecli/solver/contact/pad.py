@@ -1,20 +1,18 @@
-"""The pad: constants and tables of the contact in one flat buffer of doubles.
+"""The pad: constants in a record, tables in one flat buffer of doubles, and the layer that an evaluator works on.
 
-One buffer because every array that a compiled function pointer receives costs time on each of its calls. The
-first entries are the constants below; those named AT_... hold where a block begins.
+One buffer because every array that an evaluator receives costs time on each of its calls. The constants named
+..._at are where a table begins in it.
 """
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.solver.compile import SCRATCH
+from brakecli.solver.compile import address
+from brakecli.solver.records import CONTACT, PAD, Layer, new
 from brakecli.solver.roughness import Surface, height
-
-(K, HALF, SHOE_TERMS, WHEEL_TERMS, NODES, SHOE_TOP, SHOE_BOTTOM, WHEEL_BOUND, SHOE_MEAN, SHOE_SQUARE) = range(10)
-(CELL, AT_SHOE, AT_WHEEL, AT_FULL, AT_SS, AT_CC, AT_PR, AT_NODES, AT_SIN, AT_COS) = range(10, 20)
-HEADER = 20
 
 NODES_PER_WAVE = 16
 """Nodes per shortest wavelength that `nodes` is chosen for; measured in tests/solver/test_contact.py."""
@@ -26,38 +24,53 @@ def default_nodes(half_length: float, shoe: Surface, wheel: Surface) -> int:
     return 64 * max(1, math.ceil(NODES_PER_WAVE * waves / 64 - 1e-9))
 
 
-def build_pad(k: float, half_length: float, shoe: Surface, wheel: Surface, nodes: int) -> NDArray[np.float64]:
-    """The buffer for stiffness k (N/m²), half length (m) and surfaces; `nodes` = 0 without quadrature tables."""
-    top, bottom = _shoe_bounds(half_length, shoe)
-    sinc = np.sinc(wheel.omega * half_length / np.pi)
-    ss, cc, pr, shoe_mean, shoe_square = _products(half_length, shoe, wheel)
+class Pad(NamedTuple):
+    """Constants, a record of `PAD`, and tables of a pad on its wheel."""
+
+    constants: Any
+    tables: NDArray[np.float64]
+
+    @property
+    def edges(self) -> tuple[float, float]:
+        """Heights (m) up to which it is sure to touch everywhere, and from which on it is sure to be clear."""
+        pad = self.constants
+        return -pad.wheel_bound - pad.shoe_top, pad.wheel_bound + pad.shoe_bottom
+
+
+def build_pad(k: float, half_length: float, shoe: Surface, wheel: Surface, nodes: int) -> Pad:
+    """The pad for stiffness k (N/m²), half length (m) and surfaces; `nodes` = 0 without quadrature tables."""
+    pad = new(PAD)
+    pad.k, pad.half_length, pad.nodes = k, half_length, nodes
+    pad.shoe_terms, pad.wheel_terms = shoe.g.size, wheel.g.size
+    pad.shoe_top, pad.shoe_bottom = _shoe_bounds(half_length, shoe)
+    pad.wheel_bound = np.abs(wheel.g).sum()
+    pad.cell = 2.0 * half_length / max(8.0, 8.0 * half_length * max([*shoe.turns, *wheel.turns], default=0.0))
+    ss, cc, pr, pad.shoe_mean, pad.shoe_square = _products(half_length, shoe, wheel)
     f1, sines, cosines = _node_tables(half_length, shoe, wheel, nodes)
-    blocks = {
-        AT_SHOE: np.concatenate([shoe.g, shoe.omega, shoe.phase]),
-        AT_WHEEL: np.concatenate([wheel.g, wheel.omega]),
-        AT_FULL: 2.0 * half_length * k * wheel.g * sinc,
-        AT_SS: ss,
-        AT_CC: cc,
-        AT_PR: pr,
-        AT_NODES: f1,
-        AT_SIN: sines,
-        AT_COS: cosines,
+    tables = {
+        "shoe_at": np.concatenate([shoe.g, shoe.omega, shoe.phase]),
+        "wheel_at": np.concatenate([wheel.g, wheel.omega]),
+        "full_at": 2.0 * half_length * k * wheel.g * np.sinc(wheel.omega * half_length / np.pi),
+        "ss_at": ss,
+        "cc_at": cc,
+        "pr_at": pr,
+        "nodes_at": f1,
+        "sin_at": sines,
+        "cos_at": cosines,
     }
-    header = np.zeros(HEADER)
-    header[[K, HALF, SHOE_TERMS, WHEEL_TERMS, NODES]] = k, half_length, shoe.g.size, wheel.g.size, nodes
-    header[[SHOE_TOP, SHOE_BOTTOM, WHEEL_BOUND]] = top, bottom, np.abs(wheel.g).sum()
-    header[[SHOE_MEAN, SHOE_SQUARE]] = shoe_mean, shoe_square
-    header[CELL] = 2.0 * half_length / max(8.0, 8.0 * half_length * max([*shoe.turns, *wheel.turns], default=0.0))
-    place = HEADER
-    for index, block in blocks.items():
-        header[index] = place
-        place += block.size
-    return np.concatenate([header, *(block.ravel() for block in blocks.values())])
+    place = 0
+    for name, table in tables.items():
+        pad[name] = place
+        place += table.size
+    return Pad(pad, np.concatenate([table.ravel() for table in tables.values()]))
 
 
-def build_contact(pad: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The vector that an evaluator fills for this pad, its scratch included."""
-    return np.zeros(SCRATCH + int(max(pad[NODES] + 2, 6 * (pad[SHOE_TERMS] + pad[WHEEL_TERMS]))))
+def build_layer(evaluate: Any, pad: Pad) -> Layer:
+    """What the kernel `evaluate` works on and fills for this pad."""
+    constants, tables = pad
+    waves = constants.shoe_terms + constants.wheel_terms
+    scratch = np.zeros(max(constants.nodes + 2, 6 * waves))
+    return Layer(address(evaluate), constants, tables, np.zeros(constants.wheel_terms), scratch, new(CONTACT))
 
 
 def _shoe_bounds(a: float, shoe: Surface) -> tuple[float, float]:

@@ -2,22 +2,18 @@
 
 Contract of every scheme module:
 
+- `STATE`: the type of the record that its motion is kept in, with the fields x, y, v_x, v_y and force;
 - `WEIGHTS`: how many weights it takes; `LAG`: how many levels the known velocity lies behind the position;
-- `MEMORY`: the entries of the state that decide the next ones, `VELOCITIES`: which of them are velocities;
+- `MEMORY`: the fields of the state that decide the next ones, `VELOCITIES`: which of them are velocities;
 - `weighted_time(weights)`: the time at which a step evaluates the load, the travel of the wheel and the contact,
   in steps after the current level;
 - `order(weights, start)`: its order of accuracy on smooth motion;
-- `begin(...)`: the state from which the loop starts, at level `LAG`;
+- `begin(...)`: fills the state from which the loop starts, at level `LAG`;
 - `mechanical_energy(...)`: kinetic energy and energy of the links that the scheme keeps;
-and of one that steps on the grid of the case, in the common loop `brakecli.solver.loop`:
-
-- kernels `prepare` and `finish`, of the signatures in `solver.compile`: the minimisation that a step comes
-  down to, and the new state with the works of the step;
-
-or of one whose steps are its own, held to a tolerance, on the grid of samples alone:
-
-- kernels `advance` and `sample`, which do what those of `brakecli.solver.loop` do, with their arguments less
-  `prepare`, `finish` and `solve`.
+- kernels `advance` and `sample`: those of `brakecli.solver.loop`, or its own, with the same arguments, where its
+  steps are its own, held to a tolerance, on the grid of samples alone;
+- in the first case kernels `prepare` and `finish`, of the signatures in `solver.records`: the minimisation that a
+  step comes down to, and the new state with the works of the step.
 """
 
 from dataclasses import dataclass

@@ -1,50 +1,18 @@
 """The three-layer scheme with weights, (11)-(17): unknowns d, e, the central velocities at the middle level."""
 
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any
 
-from brakecli.solver.compile import (
-    A_11,
-    A_12,
-    A_22,
-    BELT,
-    F_Y,
-    FINISH,
-    FORCE,
-    FORCE_BEFORE,
-    G_1,
-    G_2,
-    GAIN,
-    NORMAL_FORCE,
-    PREPARE,
-    STATE_SIZE,
-    STORE_X,
-    STORE_X_BEFORE,
-    VX,
-    VY,
-    W_BELT,
-    W_DASHPOTS,
-    W_FRICTION,
-    W_LOAD,
-    W_ROUGHNESS,
-    W_SCHEME,
-    X_0,
-    X_OLD,
-    Y_0,
-    Y_OLD,
-    Coefficients,
-    D,
-    E,
-    Weights,
-    X,
-    Y,
-    kernel,
-)
+from brakecli.solver import loop, records
+from brakecli.solver.compile import kernel
+from brakecli.solver.energy import Mechanical, links_energy
+from brakecli.solver.records import Coefficients, Pair, Weights
 
+STATE = records.STATE
+advance, sample = loop.advance, loop.sample
 WEIGHTS = 3
 LAG = 1
-MEMORY = (X, Y, X_OLD, Y_OLD)
-VELOCITIES: tuple[int, ...] = ()
+MEMORY = ("x", "y", "x_old", "y_old")
+VELOCITIES: tuple[str, ...] = ()
 
 
 def weighted_time(s: Weights) -> float:
@@ -53,95 +21,71 @@ def weighted_time(s: Weights) -> float:
 
 
 def order(s: Weights, start: str) -> int:
-    """Second order with symmetric weights and the consistent start, else first."""
+    """Second order with symmetric weights and the consistent start, otherwise first."""
     return 2 if s.theta_1 == s.theta_3 and start == "consistent" else 1
 
 
-def begin(
-    s: Weights, position: tuple[float, float], velocity: tuple[float, float], acceleration: tuple[float, float]
-) -> NDArray[np.float64]:
+def begin(s: Weights, state: Any, position: Pair, velocity: Pair, acceleration: Pair) -> None:
     """Two levels: x¹ = x⁰ + h v⁰ + h² a⁰/2. The paper's start x¹ = x⁰ is v⁰ = a⁰ = 0."""
-    state = np.zeros(STATE_SIZE)
     h = s.h
-    state[[X_OLD, Y_OLD]] = position
-    state[[X, Y]] = [r + h * v + 0.5 * h * h * a for r, v, a in zip(position, velocity, acceleration, strict=True)]
-    state[[VX, VY]] = velocity
-    return state
+    state.x_old, state.y_old = position
+    state.x, state.y = (
+        r + h * v + 0.5 * h * h * a for r, v, a in zip(position, velocity, acceleration, strict=True)
+    )
+    state.v_x, state.v_y = velocity
 
 
-def mechanical_energy(
-    c: Coefficients, s: Weights, state: NDArray[np.float64]
-) -> tuple[float, float, tuple[float, float], float]:
-    """Kinetic energy and energy of the links (J), the position and how many steps back they belong: half a step.
+def mechanical_energy(c: Coefficients, s: Weights, state: Any) -> Mechanical:
+    """What the scheme keeps belongs to half a step before the level reached.
 
-    With symmetric weights the scheme without friction and dashpots keeps their sum (and the store's) exactly.
+    With symmetric weights the scheme without friction and dashpots keeps the sum (with the store's) exactly.
     """
-    dx, dy = state[X] - state[X_OLD], state[Y] - state[Y_OLD]
-    x, y = 0.5 * (state[X] + state[X_OLD]), 0.5 * (state[Y] + state[Y_OLD])
-
-    def links(x: float, y: float) -> float:
-        return float(0.5 * (c.c_xx * x * x + 2.0 * c.c_xy * x * y + c.c_yy * y * y))
-
+    dx, dy = state.x - state.x_old, state.y - state.y_old
+    x, y = 0.5 * (state.x + state.x_old), 0.5 * (state.y + state.y_old)
     kinetic = 0.5 * c.m * float(dx**2 + dy**2) / s.h**2
-    return kinetic, links(x, y) + (0.5 * (s.theta_1 + s.theta_3) - 0.25) * links(dx, dy), (x, y), 0.5
+    links = links_energy(c, x, y) + (0.5 * (s.theta_1 + s.theta_3) - 0.25) * links_energy(c, dx, dy)
+    return kinetic, links, (x, y), 0.5
 
 
-@kernel(PREPARE)
-def prepare(
-    c: Coefficients,
-    s: Weights,
-    state: NDArray[np.float64],
-    load: float,
-    belt_now: float,
-    belt_next: float,
-    problem: NDArray[np.float64],
-) -> None:
-    """Eq. (14), misprints corrected, see docs/errata.md; the normal force is left out of g2."""
-    h, inertia = s.h, 2.0 * c.m / s.h
-    problem[A_11] = inertia + c.b_xx + 2.0 * c.c_xx * h * s.theta_1
-    problem[A_12] = c.b_xy + 2.0 * c.c_xy * h * s.theta_1
-    problem[A_22] = inertia + c.b_yy + 2.0 * c.c_yy * h * s.theta_1
-    x = s.theta_2 * state[X] + (s.theta_3 + s.theta_1) * state[X_OLD]
-    y = s.theta_2 * state[Y] + (s.theta_3 + s.theta_1) * state[Y_OLD]
-    delta, gamma = (state[X] - state[X_OLD]) / h, (state[Y] - state[Y_OLD]) / h
-    problem[G_1] = inertia * delta - c.c_xx * x - c.c_xy * y - load * c.sin_beta
-    problem[G_2] = inertia * gamma - c.c_yy * y - c.c_xy * x - load * c.cos_beta
-    problem[X_0], problem[Y_0] = x, y
-    problem[GAIN] = 2.0 * s.theta_1 * h
-    problem[BELT] = belt_now
-    problem[D], problem[E], problem[F_Y] = state[VX], state[VY], state[FORCE]
+@kernel(records.PREPARE)
+def prepare(c: Coefficients, s: Weights, state: Any, problem: Any) -> None:
+    """(14), misprints corrected, see docs/errata.md; the normal force is left out of g2."""
+    h, inertia, load = s.h, 2.0 * c.m / s.h, problem.load
+    problem.a_11 = inertia + c.b_xx + 2.0 * c.c_xx * h * s.theta_1  # Eq. (14)
+    problem.a_12 = c.b_xy + 2.0 * c.c_xy * h * s.theta_1  # Eq. (14)
+    problem.a_22 = inertia + c.b_yy + 2.0 * c.c_yy * h * s.theta_1  # Eq. (14)
+    x = s.theta_2 * state.x + (s.theta_3 + s.theta_1) * state.x_old
+    y = s.theta_2 * state.y + (s.theta_3 + s.theta_1) * state.y_old
+    delta, gamma = (state.x - state.x_old) / h, (state.y - state.y_old) / h
+    problem.g_1 = inertia * delta - c.c_xx * x - c.c_xy * y - load * c.sin_beta  # Eq. (14)
+    problem.g_2 = inertia * gamma - c.c_yy * y - c.c_xy * x - load * c.cos_beta  # Eq. (14)
+    problem.x_0, problem.y_0 = x, y  # arguments of F_y in (13), less gain d and gain e
+    problem.gain = 2.0 * s.theta_1 * h
+    problem.belt = problem.belt_now
+    problem.phi = c.phi
+    problem.d, problem.e, problem.normal_force = state.v_x, state.v_y, state.force
 
 
-@kernel(FINISH)
-def finish(
-    c: Coefficients,
-    s: Weights,
-    state: NDArray[np.float64],
-    load: float,
-    belt_now: float,
-    belt_next: float,
-    problem: NDArray[np.float64],
-    contact: NDArray[np.float64],
-    work: NDArray[np.float64],
-) -> None:
+@kernel(records.FINISH)
+def finish(c: Coefficients, s: Weights, state: Any, problem: Any, contact: Any, work: Any) -> None:
     """x at the new level is x two levels back plus 2hd; and the works: the scheme times half that displacement.
 
     For symmetric weights inertia and links then change an energy of the pair of levels, exactly; with
     theta_1 != theta_3 the scheme takes (theta_1 - theta_3) |half displacement|² (links and layer) out itself.
     """
-    h, d, e = s.h, problem[D], problem[E]
-    friction = problem[A_11] * d + problem[A_12] * e - problem[G_1]
-    dx, dy, slid = h * d, h * e, h * (d - belt_now)
-    work[W_BELT] += h * friction * belt_now
-    work[W_FRICTION] -= friction * slid
-    work[W_DASHPOTS] += h * (c.b_xx * d * d + 2.0 * c.b_xy * d * e + c.b_yy * e * e)
-    work[W_LOAD] += load * (c.sin_beta * dx + c.cos_beta * dy)
-    work[W_ROUGHNESS] += contact[STORE_X] * slid
+    h, d, e, belt = s.h, problem.d, problem.e, problem.belt_now
+    friction = problem.a_11 * d + problem.a_12 * e - problem.g_1
+    dx, dy, slid = h * d, h * e, h * (d - belt)
+    work.belt += h * friction * belt
+    work.friction -= friction * slid
+    work.dashpots += h * (c.b_xx * d * d + 2.0 * c.b_xy * d * e + c.b_yy * e * e)
+    work.load += problem.load * (c.sin_beta * dx + c.cos_beta * dy)
+    work.roughness += contact.store_x * slid
     links = c.c_xx * dx * dx + 2.0 * c.c_xy * dx * dy + c.c_yy * dy * dy
-    layer = slid * (contact[STORE_X] - work[STORE_X_BEFORE]) - dy * (contact[NORMAL_FORCE] - work[FORCE_BEFORE])
-    work[W_SCHEME] += (s.theta_1 - s.theta_3) * (links + layer)
-    work[STORE_X_BEFORE], work[FORCE_BEFORE] = contact[STORE_X], contact[NORMAL_FORCE]
-    x_new, y_new = state[X_OLD] + 2.0 * dx, state[Y_OLD] + 2.0 * dy
-    state[X_OLD], state[Y_OLD] = state[X], state[Y]
-    state[X], state[Y] = x_new, y_new
-    state[VX], state[VY], state[FORCE] = d, e, problem[F_Y]
+    layer = slid * (contact.store_x - work.store_x_before) - dy * (contact.normal_force - work.force_before)
+    work.scheme += (s.theta_1 - s.theta_3) * (links + layer)
+    work.store_x_before, work.force_before = contact.store_x, contact.normal_force
+    x_new, y_new = state.x_old + 2.0 * dx, state.y_old + 2.0 * dy  # d and e of (12)
+    state.x_old, state.y_old = state.x, state.y
+    state.x, state.y = x_new, y_new
+    state.v_x, state.v_y, state.force = d, e, problem.normal_force

@@ -4,60 +4,43 @@ Its steps are its own. Each component keeps the tolerance, relative to the large
 slip, lift-off and touch-down end a step: nothing is smoothed, nothing stepped over.
 """
 
+from typing import Any
+
 import numpy as np
-from numba import float64, int64, types, void
+from numba import float64, int64, void
 from numpy.typing import NDArray
 
-from brakecli.solver.compile import (
-    COEFFICIENTS,
-    EVALUATE,
-    FRACTION,
-    KIND,
-    VX,
-    VY,
+from brakecli.solver.compile import borrowed, kernel, vector
+from brakecli.solver.contact import CLOSED_FORM
+from brakecli.solver.energy import Mechanical, energy_at_level
+from brakecli.solver.quantities import ContactState, Failure
+from brakecli.solver.records import (
+    DRIVE,
+    MOTION,
+    MOTION_TYPE,
+    V_X,
+    V_Y,
     Coefficients,
+    Drive,
+    Pair,
+    Plant,
     Weights,
     X,
     Y,
-    borrowed,
-    kernel,
-    vector,
+    plant_type,
 )
-from brakecli.solver.compile import WEIGHTS as WEIGHTS_TYPE
-from brakecli.solver.loop import COLUMNS, DRIVE, GRID, LEVEL, Drive, Grid
-from brakecli.solver.quantities import ContactState, Failure
 from brakecli.solver.schedules import integral_at, slope_at, value_at
 from brakecli.solver.schemes.event_driven.dop853 import interpolated
-from brakecli.solver.schemes.event_driven.phases import (
-    ANCHOR,
-    ANCHOR_LOW,
-    BEGIN,
-    LEVEL_AT,
-    MEMORY_SIZE,
-    PLANT,
-    POWER,
-    ROW,
-    SIDE,
-    SIDE_DONE,
-    STARTED,
-    STEP_DONE,
-    TAU,
-    TAU_DONE,
-    TIME_DONE,
-    TOUCHING,
-    TOUCHING_DONE,
-    TRAVEL,
-    TRAVEL_LOW,
-    Plant,
-    press,
-    resistance,
-)
+from brakecli.solver.schemes.event_driven.phases import SHOE, Shoe, press, resistance
 from brakecli.solver.schemes.event_driven.step import first_step, step
 
+STATE = MOTION
 WEIGHTS = 0
 LAG = 0
-MEMORY = (X, Y, VX, VY)
-VELOCITIES = (VX, VY)
+MEMORY = ("x", "y", "v_x", "v_y")
+VELOCITIES = ("v_x", "v_y")
+
+_PLANT = plant_type(MOTION)
 
 _BUDGET, _EXACT = 4096, 64
 """Steps of one call, and as how many one counts that finds patches: an interruption need not wait for a sample."""
@@ -72,152 +55,89 @@ def weighted_time(s: Weights) -> float:
 
 
 def order(s: Weights, start: str) -> int:
-    """Of the steps, through all events, on smooth surfaces."""
+    """The order of the steps, through all events, on smooth surfaces."""
     return 8
 
 
-def begin(
-    s: Weights, position: tuple[float, float], velocity: tuple[float, float], acceleration: tuple[float, float]
-) -> NDArray[np.float64]:
+def begin(s: Weights, state: Any, position: Pair, velocity: Pair, acceleration: Pair) -> None:
     """The initial state; the phase is found with the first step."""
-    memory = np.zeros(MEMORY_SIZE)
-    memory[[X, Y]], memory[[VX, VY]] = position, velocity
-    return memory
+    state.x, state.y = position
+    state.v_x, state.v_y = velocity
 
 
-def mechanical_energy(
-    c: Coefficients, s: Weights, state: NDArray[np.float64]
-) -> tuple[float, float, tuple[float, float], float]:
-    """Kinetic energy and energy of the links (J), the position and how many sample intervals back they belong."""
-    x, y = state[X], state[Y]
-    links = 0.5 * (c.c_xx * x * x + 2.0 * c.c_xy * x * y + c.c_yy * y * y)
-    return 0.5 * c.m * float(state[VX] ** 2 + state[VY] ** 2), float(links), (x, y), 0.0
+def mechanical_energy(c: Coefficients, s: Weights, state: Any) -> Mechanical:
+    """The energies belong to the time reached."""
+    return energy_at_level(c, state)
 
 
-@kernel(void(PLANT, DRIVE, float64, int64), inlined=False)
-def _sample(p: Plant, drive: Drive, interval: float, level: int) -> None:
+@kernel(void(MOTION_TYPE, vector))
+def _write(m: Any, row: NDArray[np.float64]) -> None:
+    for column in range(row.size):  # a slice would take seconds to compile
+        row[column] = m.row[column]
+
+
+@kernel(void(SHOE, DRIVE, float64, int64), inlined=False)
+def _sample(p: Shoe, drive: Drive, interval: float, level: int) -> None:
     """Put the sample of a level that the motion has reached into the state, with the forces at its time."""
-    c, m = p.c, p.memory
+    c, m = p.c, p.motion
     t = interval * level
     travel, travel_low = integral_at(drive.belt, t, 0.0)
     belt, belt_slope = value_at(drive.belt, t), slope_at(drive.belt, t)
-    side, touching = m[SIDE], m[TOUCHING]
-    x, y, v_x, v_y = m[X], m[Y], m[VX], m[VY]
-    if m[LEVEL_AT] > level or m[TAU] > 0.0:
-        side, touching = m[SIDE_DONE], m[TOUCHING_DONE]
-        theta = ((t - m[TIME_DONE]) - m[TAU_DONE]) / m[STEP_DONE]
-        x, y = interpolated(m, BEGIN, POWER, X, theta), interpolated(m, BEGIN, POWER, Y, theta)
-        v_x, v_y = interpolated(m, BEGIN, POWER, VX, theta), interpolated(m, BEGIN, POWER, VY, theta)
+    side, touching = m.side, m.touching
+    x, y, v_x, v_y = m.x, m.y, m.v_x, m.v_y
+    if m.level > level or m.tau > 0.0:
+        side, touching = m.side_done, m.touching_done
+        theta = ((t - m.time_done) - m.tau_done) / m.step_done
+        x, y = interpolated(m, X, theta), interpolated(m, Y, theta)
+        v_x, v_y = interpolated(m, V_X, theta), interpolated(m, V_Y, theta)
         if side == 0.0:
-            x, v_x = (m[ANCHOR] + travel) + (m[ANCHOR_LOW] + travel_low), belt
-    passed = (travel - m[TRAVEL]) + (travel_low - m[TRAVEL_LOW])
+            x, v_x = (m.anchor + travel) + (m.anchor_low + travel_low), belt
+    passed = (travel - m.travel) + (travel_low - m.travel_low)
     normal = max(press(p, x - passed, y, touching), 0.0)
     bound = c.phi * normal
     against_x, _ = resistance(c, value_at(drive.load, t), x, y, v_x, v_y)
-    needed = c.m * belt_slope + against_x
+    needed = c.m * belt_slope + against_x  # Eq. (6) in stick
     if normal == 0.0:
         state, friction = _SEPARATED, 0.0
     elif side == 0.0 and abs(needed) <= bound * (1.0 + 1e-12):  # by the rounding of the cone it still sticks
-        state, friction = _STICK, needed
+        state, friction = _STICK, needed  # Eq. (4)
     elif side > 0.0 or (side == 0.0 and needed < 0.0):
-        state, friction = _FORWARD, -bound
+        state, friction = _FORWARD, -bound  # Eq. (5)
     else:
-        state, friction = _BACKWARD, bound
-    m[ROW], m[ROW + 1], m[ROW + 2], m[ROW + 3] = x, y, v_x, v_y
-    m[ROW + 4], m[ROW + 5], m[ROW + 6], m[ROW + 7] = friction, normal, p.contact[FRACTION], state
+        state, friction = _BACKWARD, bound  # Eq. (5)
+    m.row[0], m.row[1], m.row[2], m.row[3] = x, y, v_x, v_y
+    m.row[4], m.row[5], m.row[6], m.row[7] = friction, normal, p.layer.contact.fraction, state
 
 
-@kernel(
-    void(
-        types.FunctionType(EVALUATE),
-        COEFFICIENTS,
-        WEIGHTS_TYPE,
-        DRIVE,
-        GRID,
-        vector,
-        vector,
-        vector,
-        vector,
-        int64[::1],
-        vector,
-    )
-)
-def sample(
-    evaluate: object,
-    c: Coefficients,
-    s: Weights,
-    drive: Drive,
-    grid: Grid,
-    pad: NDArray[np.float64],
-    angles: NDArray[np.float64],
-    state: NDArray[np.float64],
-    contact: NDArray[np.float64],
-    counts: NDArray[np.int64],
-    row: NDArray[np.float64],
-) -> None:
+@kernel(void(_PLANT, vector))
+def sample(p: Plant, row: NDArray[np.float64]) -> None:
     """Write the sample at the level that has been reached."""
-    for column in range(COLUMNS):  # a slice would take seconds to compile
-        row[column] = state[ROW + column]
+    _write(p.state, row)
 
 
-@kernel(
-    int64(
-        types.FunctionType(EVALUATE),
-        COEFFICIENTS,
-        WEIGHTS_TYPE,
-        DRIVE,
-        GRID,
-        vector,
-        vector,
-        vector,
-        vector,
-        vector,
-        vector,
-        int64[::1],
-        float64[:, ::1],
-        float64[:, ::1],
-        int64,
-    )
-)
-def advance(
-    evaluate: object,
-    c: Coefficients,
-    s: Weights,
-    drive: Drive,
-    grid: Grid,
-    pad: NDArray[np.float64],
-    angles: NDArray[np.float64],
-    state: NDArray[np.float64],
-    problem: NDArray[np.float64],
-    contact: NDArray[np.float64],
-    work: NDArray[np.float64],
-    counts: NDArray[np.int64],
-    rows: NDArray[np.float64],
-    events: NDArray[np.float64],
-    stop: int,
-) -> int:
+@kernel(int64(_PLANT, float64[:, ::1], float64[:, ::1], int64))
+def advance(p: Plant, rows: NDArray[np.float64], events: NDArray[np.float64], stop: int) -> int:
     """Step until the sample `stop` is reached, or until the budget of a call is spent; a `Failure`.
 
-    `rows` gets the samples before that of counts[LEVEL], which waits in the state; a failure adds it.
+    `rows` gets the samples before that of counts.level, which waits in the state; a failure adds it.
     """
-    m, row, steps = borrowed(state), 0, 0
-    p = Plant(evaluate, c, borrowed(pad), borrowed(angles), m, borrowed(contact), borrowed(counts))
-    if m[STARTED] == 0.0:
-        first_step(p, drive, grid)
-        _sample(p, drive, grid.interval, 0)
-        m[STARTED] = 1.0
+    p = borrowed(p)
+    m, counts, drive, grid, row, steps = p.state, p.counts, p.drive, p.grid, 0, 0
+    shoe = Shoe(p.c, p.layer, m, p.work, counts)
+    if m.started == 0:
+        first_step(shoe, drive, grid)
+        _sample(shoe, drive, grid.interval, 0)
+        m.started = 1
     while True:
-        while counts[LEVEL] < stop and counts[LEVEL] < m[LEVEL_AT]:
-            for column in range(COLUMNS):
-                rows[row, column] = m[ROW + column]
+        while counts.level < stop and counts.level < m.level:
+            _write(m, rows[row])
             row += 1
-            counts[LEVEL] += 1
-            _sample(p, drive, grid.interval, counts[LEVEL])
-        if counts[LEVEL] == stop or steps >= _BUDGET:
+            counts.level += 1
+            _sample(shoe, drive, grid.interval, counts.level)
+        if counts.level == stop or steps >= _BUDGET:
             return _NONE
-        failure = step(p, drive, grid, borrowed(work))
-        steps += 1 if p.contact[KIND] == 0.0 else _EXACT
+        failure = step(shoe, drive, grid)
+        steps += 1 if p.layer.contact.kind == CLOSED_FORM else _EXACT
         if failure != _NONE:
-            for column in range(COLUMNS):
-                rows[row, column] = m[ROW + column]
+            _write(m, rows[row])
             return failure

@@ -6,17 +6,16 @@ first of the next; the last three serve the continuous solution alone.
 """
 
 import math
+from typing import Any
 
 import numpy as np
-from numba import float64, int64, types
+from numba import float64, int64, types, void
 from numpy.typing import NDArray
 
-from brakecli.solver.compile import kernel, vector
+from brakecli.solver.compile import kernel
+from brakecli.solver.records import MOTION_TYPE, POWERS, STAGES
 
-STAGES, END_STAGE = 16, 12
-POWERS = 7
-SIZE = 4
-"""Components of the motion: x, y and their velocities."""
+END_STAGE = 12
 
 
 def _numbers(text: str) -> NDArray[np.float64]:
@@ -92,65 +91,61 @@ DENSE = _numbers("""
 """The upper coefficients of the continuous solution."""
 
 
-@kernel(types.UniTuple(float64, 4)(vector, int64, int64))
-def combined(memory: NDArray[np.float64], at_slopes: int, stage: int) -> tuple[float, float, float, float]:
+@kernel(types.UniTuple(float64, 4)(MOTION_TYPE, int64))
+def combined(m: Any, stage: int) -> tuple[float, float, float, float]:
     """Σ A[stage, j] k_j of every component: what the step so far advances by, over the step."""
     x, y, v_x, v_y = 0.0, 0.0, 0.0, 0.0
     for j in range(stage):
-        weight, at = A[stage, j], at_slopes + SIZE * j
-        x += weight * memory[at]
-        y += weight * memory[at + 1]
-        v_x += weight * memory[at + 2]
-        v_y += weight * memory[at + 3]
+        weight = A[stage, j]
+        x += weight * m.slopes[j, 0]
+        y += weight * m.slopes[j, 1]
+        v_x += weight * m.slopes[j, 2]
+        v_y += weight * m.slopes[j, 3]
     return x, y, v_x, v_y
 
 
-@kernel(float64(vector, int64, int64))
-def local_error(memory: NDArray[np.float64], at_slopes: int, component: int) -> float:
+@kernel(float64(MOTION_TYPE, int64))
+def local_error(m: Any, component: int) -> float:
     """The error of one component in a step, over the step: of order seven, from those of order three and five."""
     third, fifth = 0.0, 0.0
     for j in range(END_STAGE):
-        third += THIRD[j] * memory[at_slopes + SIZE * j + component]
-        fifth += FIFTH[j] * memory[at_slopes + SIZE * j + component]
+        third += THIRD[j] * m.slopes[j, component]
+        fifth += FIFTH[j] * m.slopes[j, component]
     size = math.sqrt(fifth * fifth + 0.01 * third * third)
     return fifth * fifth / size if size > 0.0 else 0.0
 
 
-@kernel(types.void(vector, int64, int64, int64, int64, float64))
-def make_continuous(
-    memory: NDArray[np.float64], at_slopes: int, at_begin: int, at_end: int, at_powers: int, h: float
-) -> None:
+@kernel(void(MOTION_TYPE, float64))
+def make_continuous(m: Any, h: float) -> None:
     """Coefficients of the continuous solution, from the slopes and both ends of a step h."""
-    for i in range(SIZE):
-        first, last = h * memory[at_slopes + i], h * memory[at_slopes + SIZE * END_STAGE + i]
-        change = memory[at_end + i] - memory[at_begin + i]
-        memory[at_powers + i] = change
-        memory[at_powers + SIZE + i] = first - change
-        memory[at_powers + 2 * SIZE + i] = 2.0 * change - (first + last)
+    for i in range(4):
+        first, last = h * m.slopes[0, i], h * m.slopes[END_STAGE, i]
+        change = m.end[i] - m.begin[i]
+        m.powers[0, i] = change
+        m.powers[1, i] = first - change
+        m.powers[2, i] = 2.0 * change - (first + last)
         for p in range(POWERS - 3):
             total = 0.0
             for j in range(STAGES):
-                total += DENSE[p, j] * memory[at_slopes + SIZE * j + i]
-            memory[at_powers + SIZE * (p + 3) + i] = h * total
+                total += DENSE[p, j] * m.slopes[j, i]
+            m.powers[p + 3, i] = h * total
 
 
-@kernel(float64(vector, int64, int64, int64, float64))
-def interpolated(
-    memory: NDArray[np.float64], at_begin: int, at_powers: int, component: int, theta: float
-) -> float:
+@kernel(float64(MOTION_TYPE, int64, float64))
+def interpolated(m: Any, component: int, theta: float) -> float:
     """One component at the part theta of the step that the continuous solution belongs to."""
     total, rest = 0.0, 1.0 - theta
     for p in range(POWERS - 1, -1, -1):
-        total = (total + memory[at_powers + SIZE * p + component]) * (theta if p % 2 == 0 else rest)
-    return memory[at_begin + component] + total  # type: ignore[no-any-return]
+        total = (total + m.powers[p, component]) * (theta if p % 2 == 0 else rest)
+    return m.begin[component] + total  # type: ignore[no-any-return]
 
 
-@kernel(float64(vector, int64, int64, float64))
-def interpolated_slope(memory: NDArray[np.float64], at_powers: int, component: int, theta: float) -> float:
+@kernel(float64(MOTION_TYPE, int64, float64))
+def interpolated_slope(m: Any, component: int, theta: float) -> float:
     """Derivative of `interpolated` by theta."""
     total, slope, rest = 0.0, 0.0, 1.0 - theta
     for p in range(POWERS - 1, -1, -1):
-        total += memory[at_powers + SIZE * p + component]
+        total += m.powers[p, component]
         if p % 2 == 0:
             total, slope = total * theta, slope * theta + total
         else:

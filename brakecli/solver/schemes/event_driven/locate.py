@@ -4,20 +4,8 @@ import math
 
 from numba import float64, int64, types
 
-from brakecli.solver.compile import VX, Y, kernel
-from brakecli.solver.schemes.event_driven.phases import (
-    BELT,
-    BELT_SLOPE,
-    EPSILON,
-    PLANT,
-    SIDE,
-    TAU,
-    TIME,
-    Plant,
-    clear_height,
-    margins,
-    rounding,
-)
+from brakecli.solver.compile import kernel
+from brakecli.solver.schemes.event_driven.phases import EPSILON, SHOE, Shoe, clear_height, margins, rounding
 
 NONE = -1
 LOOKS = 8
@@ -27,20 +15,20 @@ _NEAR = 1e-12
 _GOLDEN = 0.3819660112501051
 
 
-@kernel(types.UniTuple(float64, 3)(PLANT))
-def _allowances(p: Plant) -> tuple[float, float, float]:
+@kernel(types.UniTuple(float64, 3)(SHOE))
+def _allowances(p: Shoe) -> tuple[float, float, float]:
     """How far each margin may be below zero by rounding alone."""
-    m = p.memory
-    height = 4.0 * EPSILON * (abs(m[Y]) + clear_height(p.pad))
-    if m[SIDE] != 0.0:
-        late = abs(m[BELT_SLOPE]) * (m[TIME] + m[TAU])  # the wheel's velocity at a time that is rounded
-        return 4.0 * EPSILON * (abs(m[VX]) + abs(m[BELT]) + late), 0.0, height
+    m = p.motion
+    height = 4.0 * EPSILON * (abs(m.y) + clear_height(p.layer.pad))
+    if m.side != 0.0:
+        late = abs(m.belt_slope) * (m.time + m.tau)  # the wheel's velocity at a time that is rounded
+        return 4.0 * EPSILON * (abs(m.v_x) + abs(m.belt) + late), 0.0, height
     along, _ = rounding(p)
     return 2.0 * along, 2.0 * along, height
 
 
-@kernel(float64(PLANT, int64, float64, float64, float64), inlined=False)
-def _root(p: Plant, which: int, h: float, left: float, right: float) -> float:
+@kernel(float64(SHOE, int64, float64, float64, float64), inlined=False)
+def _root(p: Shoe, which: int, h: float, left: float, right: float) -> float:
     """Where a margin passes zero between left and right: the secant inside the bracket, halved if it lags.
 
     Near enough for Newton's iteration on the true motion to make it exact.
@@ -70,8 +58,8 @@ def _root(p: Plant, which: int, h: float, left: float, right: float) -> float:
     return right
 
 
-@kernel(types.UniTuple(float64, 2)(PLANT, int64, float64, float64, float64), inlined=False)
-def _lowest(p: Plant, which: int, h: float, left: float, right: float) -> tuple[float, float]:
+@kernel(types.UniTuple(float64, 2)(SHOE, int64, float64, float64, float64), inlined=False)
+def _lowest(p: Shoe, which: int, h: float, left: float, right: float) -> tuple[float, float]:
     """Where a margin is lowest between left and right, and its value; by the golden section, until below zero."""
     a, b = left + _GOLDEN * (right - left), right - _GOLDEN * (right - left)
     at_a, at_b = margins(p, h, a)[which], margins(p, h, b)[which]
@@ -89,8 +77,8 @@ def _lowest(p: Plant, which: int, h: float, left: float, right: float) -> tuple[
     return (a, at_a) if at_a < at_b else (b, at_b)
 
 
-@kernel(float64(PLANT, int64, float64, float64, float64), inlined=False)
-def _first_positive(p: Plant, which: int, h: float, theta: float, allowed: float) -> float:
+@kernel(float64(SHOE, int64, float64, float64, float64), inlined=False)
+def _first_positive(p: Shoe, which: int, h: float, theta: float, allowed: float) -> float:
     """A place before theta at which a margin that begins at zero is positive; 0 if there is none."""
     for _ in range(8):
         theta *= 0.125
@@ -99,8 +87,8 @@ def _first_positive(p: Plant, which: int, h: float, theta: float, allowed: float
     return 0.0
 
 
-@kernel(types.Tuple((int64, float64))(PLANT, float64), inlined=False)
-def first_event(p: Plant, h: float) -> tuple[int, float]:
+@kernel(types.Tuple((int64, float64))(SHOE, float64), inlined=False)
+def first_event(p: Shoe, h: float) -> tuple[int, float]:
     """The margin that runs out first and the part of the step at which it does; 0 where it never was positive.
 
     Between three places a margin may also dip below zero: it is followed down where a parabola says that it may.

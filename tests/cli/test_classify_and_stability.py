@@ -1,4 +1,4 @@
-"""The commands that judge: `classify` and `stability`, as their users meet them."""
+"""`classify` and `stability`, as their users meet them."""
 
 import math
 from pathlib import Path
@@ -15,7 +15,7 @@ MODE_COUPLING = ROOT / "cases" / "mode-coupling.toml"
 @pytest.fixture(scope="module")
 def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the result of a short run and a measured signal."""
-    folder: Path = tmp_path_factory.mktemp("judging")
+    folder: Path = tmp_path_factory.mktemp("classify")
     run = brakecli("run", RELAXATION, "-o", "run.h5", "--set", "solver.duration=1.0", "--quiet", cwd=folder)
     assert run.code == 0, run
     time = np.arange(4000) / 1000.0
@@ -45,7 +45,7 @@ def test_classify_repeats_the_verdict_of_the_run(here: Path) -> None:
     assert again.json["regime"] == "relaxation"
 
 
-def test_thresholds_are_options_and_are_told(here: Path) -> None:
+def test_thresholds_are_options_and_are_reported(here: Path) -> None:
     strict, wrong, bad = each(
         here,
         [
@@ -83,13 +83,13 @@ def test_options_that_do_not_fit_are_bad_usage(here: Path) -> None:
             ["stability", RELAXATION, "--vary", "link2.angle=1:2:2"],
         ],
     )
-    words = ["--quantity", "displacement", "positive", "START:STOP:NUM", "from -90 to 90", "angle_deg"]
+    words = ["--quantity", "displacement", "above 0 Hz", "START:STOP:NUM", "from -90 to 90", "angle_deg"]
     assert len(done) == len(words)
     for result, word in zip(done, words, strict=True):
         result.told(2, word)
 
 
-def test_files_that_are_no_results_end_in_four_and_never_in_a_number(here: Path) -> None:
+def test_files_that_are_not_results_end_in_four_and_never_in_a_number(here: Path) -> None:
     (here / "empty.h5").write_bytes(b"")
     (here / "text.csv").write_text("no numbers here\n")
     whole = (here / "run.h5").read_bytes()
@@ -106,7 +106,7 @@ def test_files_that_are_no_results_end_in_four_and_never_in_a_number(here: Path)
         assert result.out == ""
 
 
-def test_stability_tells_the_minimal_model_and_what_a_scheme_makes_of_it(here: Path) -> None:
+def test_stability_reports_the_minimal_model_and_what_a_scheme_makes_of_it(here: Path) -> None:
     changes = [
         "--set",
         "solver.step=0.1",

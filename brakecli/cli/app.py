@@ -1,0 +1,63 @@
+"""The program: its commands, and the end of every failure in one sentence and an exit code.
+
+A new command is one file and one entry of `COMMANDS`. Heavy imports stand inside the functions of the commands, so
+that `--help` is quick.
+"""
+
+import sys
+from typing import Annotated
+
+import typer
+
+from brakecli import __version__
+from brakecli.cli import check, classify, compare_schemes, new, plot, run, schema, stability, sweep
+from brakecli.cli.output import say, show
+from brakecli.errors import BrakecliError
+from brakecli.files.os_signals import Interrupted
+
+COMMANDS = (run, sweep, classify, compare_schemes, stability, check, new, schema, plot)
+"""The files of the commands, in the order in which `--help` lists them."""
+
+app = typer.Typer(
+    name="brakecli",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    help="Vibration of a brake shoe on a rough wheel: will it vibrate, how, from which friction coefficient on.",
+)
+for module in COMMANDS:
+    app.command(module.__name__.rpartition(".")[2].replace("_", "-"))(module.command)
+
+
+def main() -> None:
+    """Run the command line; every failure ends in a sentence on standard error and its exit code."""
+    try:
+        app()
+    except BrakecliError as error:
+        message, code = str(error), error.exit_code
+    except Interrupted as error:
+        message, code = f"{error}; {error.left}", error.exit_code
+    except MemoryError:
+        message, code = "out of memory; reduce contact.nodes, or sample less often", 3
+    except OSError as error:  # not of an input or output, but of a file such as the cache of compiled code
+        message = f"{error.filename or 'a file'}: cannot be read or written: {error.strerror or error}"
+        code = 74
+    say(*message.splitlines())
+    sys.exit(code)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        show(f"brakecli {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _common(
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit."),
+    ] = False,
+) -> None:
+    pass

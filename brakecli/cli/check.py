@@ -1,0 +1,54 @@
+"""`brakecli check`."""
+
+import math
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+from brakecli.cli.inputs import is_sweep, load_case, load_sweep
+from brakecli.cli.options import AsJson, Overrides, Quiet, source_argument
+from brakecli.cli.output import show_result, warn
+from brakecli.cli.progress import announce_compilation
+
+
+def command(
+    file: Annotated[str, source_argument("FILE.toml", 'Case or sweep file, or "-" for standard input.')],
+    overrides: Overrides = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+) -> None:
+    """Validate a case or a sweep; report what it would cost and which limits it meets, without computing it."""
+    (_check_sweep if is_sweep(file) else _check_case)(file, overrides, as_json, quiet)
+
+
+def _check_case(file: str, overrides: list[str] | None, as_json: bool, quiet: bool) -> None:
+    loaded = load_case(file, overrides)
+    announce_compilation(quiet)
+    from brakecli.case.system import system_of
+    from brakecli.cli.tables import check_table
+    from brakecli.runs.limits import check, free_bytes, refuse, within_range
+
+    with within_range():
+        system = system_of(loaded.case)
+        found = check(system)
+    values = {"valid": True, **asdict(found), **asdict(found.limits)}
+    del values["limits"]
+    numbers = {name: value for name, value in values.items() if value not in (math.inf, -math.inf)}
+    title = loaded.case.title
+    show_result("check", numbers, check_table, title, found, as_json=as_json, quiet=quiet)
+    warn(*found.warnings)
+    refuse(system, found, free_bytes(Path()))
+
+
+def _check_sweep(file: str, overrides: list[str] | None, as_json: bool, quiet: bool) -> None:
+    loaded = load_sweep(file, overrides)
+    announce_compilation(quiet)
+    from brakecli.cli.tables import estimate_table
+    from brakecli.runs.limits import free_bytes
+    from brakecli.sweeps.cost import estimate, refuse_sweep
+    from brakecli.sweeps.driver import cores
+
+    found = estimate(loaded.plan, cores())
+    numbers = {"valid": True, **asdict(found)}
+    show_result("check", numbers, estimate_table, loaded.title, found, as_json=as_json, quiet=quiet)
+    refuse_sweep(found, free_bytes(Path()))

@@ -1,0 +1,46 @@
+"""`brakecli compare-schemes`."""
+
+from pathlib import Path
+from typing import Annotated
+
+from brakecli.cli.inputs import load_case, result_path
+from brakecli.cli.options import AsJson, CaseArgument, Force, Overrides, Quiet, option, output_option
+from brakecli.cli.output import show_result
+from brakecli.cli.progress import announce_compilation, progress
+
+
+def command(
+    case: CaseArgument,
+    output: Annotated[Path | None, output_option("Result file", "the case's name with -schemes.h5, here")] = None,
+    overrides: Overrides = None,
+    schemes: Annotated[str | None, option("Only these: two-layer, three-layer, event-driven.", "NAME,…")] = None,
+    steps: Annotated[str | None, option("Time steps in s, whole parts of the largest.", "H,…")] = None,
+    budget: Annotated[float, option("Time to spend, about.", "SECONDS", min=1.0, max=86400.0)] = 60.0,
+    target_error: Annotated[float, option("Name the cheapest that meets it.", "E", min=1e-12, max=1.0)] = 1e-3,
+    force: Force = False,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+) -> None:
+    """Compare every scheme, its weights, starts and iterations by error and cost; recommend one."""
+    loaded = load_case(case, overrides)
+    target = result_path(output, case, ending="-schemes.h5")
+    announce_compilation(quiet)
+    from brakecli.case.system import system_of
+    from brakecli.cli.tables import comparison_table
+    from brakecli.comparison.compare import compare
+    from brakecli.comparison.methods import parse_schemes, parse_steps
+    from brakecli.comparison.result import ComparisonReport, write
+    from brakecli.files.atomic import new_output
+    from brakecli.runs.run import load_kernels
+
+    chosen, ladder = parse_schemes(schemes), parse_steps(steps)
+    load_kernels(loaded)
+    system = system_of(loaded.case)
+    with progress(quiet) as show_progress:
+        with new_output(target, force=force):  # whether it can be written is known before anything is computed
+            pass
+        found = compare(system, schemes=chosen, steps=ladder, budget=budget, progress=show_progress)
+        report = ComparisonReport(target, loaded.case.title, found, target_error)
+        write(target, loaded, report, force=force)
+    numbers = {"output": str(target), **report.numbers()}
+    show_result("compare-schemes", numbers, comparison_table, report, as_json=as_json, quiet=quiet)

@@ -1,0 +1,32 @@
+"""Arguments and options, and those that several commands share."""
+
+from typing import Annotated, Any
+
+import typer
+
+
+def source_argument(metavar: str, content: str) -> Any:
+    """The file that a command reads."""
+    return typer.Argument(metavar=metavar, help=content, show_default=False)
+
+
+def option(description: str, metavar: str | None = None, *names: str, **more: Any) -> Any:
+    """An option, named like its parameter if no names are given."""
+    return typer.Option(*names, metavar=metavar, help=description, **more)
+
+
+def output_option(content: str, default: str) -> Any:
+    """The file that a command writes."""
+    return option(f"{content}  [default: {default}]", "PATH", "--output", "-o")
+
+
+def set_option(target: str) -> Any:
+    """Changes to a case or a sweep."""
+    return option(f"Set a key of {target}; repeatable.", "KEY.PATH=VALUE", "--set")
+
+
+CaseArgument = Annotated[str, source_argument("CASE.toml", 'Case file, or "-" for standard input.')]
+Overrides = Annotated[list[str] | None, set_option("the case, the value in TOML")]
+AsJson = Annotated[bool, option("Print one JSON object on standard output, nothing else.", None, "--json")]
+Quiet = Annotated[bool, option("Print nothing but warnings and errors.", None, "--quiet", "-q")]
+Force = Annotated[bool, option("Replace an existing output.", None, "--force")]

@@ -1,0 +1,27 @@
+"""`brakecli plot`."""
+
+from pathlib import Path
+from typing import Annotated
+
+from brakecli.cli.options import Force, Quiet, option, output_option, source_argument
+from brakecli.cli.output import show
+from brakecli.files.os_signals import unwinding
+
+
+def command(
+    result: Annotated[Path, source_argument("FILE.h5", "Result of a run, a sweep or a comparison.")],
+    output: Annotated[Path | None, output_option("Picture", "FILE.png, here")] = None,
+    select: Annotated[
+        list[str] | None, option("Draw one value of a sweep's axis; repeatable.", "KEY=VALUE")
+    ] = None,
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Draw the motion of a run, values of a sweep, or errors of a comparison (needs matplotlib)."""
+    from brakecli.plots.result import plot_result
+
+    target = output or Path(f"{result.stem}.png")
+    with unwinding():
+        plot_result(result, target, force=force, select=select or ())
+    if not quiet:
+        show(f"{target}: written")

@@ -1,0 +1,43 @@
+"""`brakecli run`."""
+
+from pathlib import Path
+from typing import Annotated
+
+from brakecli.cli.inputs import load_case, result_path
+from brakecli.cli.options import AsJson, Force, Overrides, Quiet, output_option, source_argument
+from brakecli.cli.output import say, show_result, warn
+from brakecli.cli.progress import announce_compilation, progress
+from brakecli.errors import BrakecliError
+
+SOURCE = 'Case file, "-" for standard input, or a result file, whose case is run again.'
+
+
+def command(
+    case: Annotated[str, source_argument("CASE.toml", SOURCE)],
+    output: Annotated[Path | None, output_option("Result file", "the case's name with .h5, here")] = None,
+    overrides: Overrides = None,
+    force: Force = False,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+) -> None:
+    """Simulate one case; write time histories, spectra, regime and energy account to an HDF5 file."""
+    loaded = load_case(case, overrides)
+    target = result_path(output, case)
+    announce_compilation(quiet)
+    from brakecli.cli.tables import run_table
+    from brakecli.runs.run import load_kernels, run
+
+    load_kernels(loaded)
+    with progress(quiet) as show_progress:
+        report = run(loaded, target, force=force, progress=show_progress)
+    if not quiet:
+        say(*report.check.adjustments)
+    warn(*report.warnings)
+    numbers = {"output": str(report.output), **report.numbers()}
+    show_result("run", numbers, run_table, report, as_json=as_json, quiet=quiet)
+    if report.failed:
+        say(f"{report.output}: the history up to the failure was written")
+        raise BrakecliError(str(report.motion.work.failure_sentence))
+    certificate = report.certificate
+    if certificate is not None and not certificate.certified and loaded.case.solver.tolerance is not None:
+        raise BrakecliError(f"{report.output}: was written, but solver.tolerance is not sure to be kept")

@@ -1,0 +1,74 @@
+"""`brakecli sweep`."""
+
+from pathlib import Path
+from typing import Annotated
+
+from brakecli.cli.inputs import load_sweep, result_path
+from brakecli.cli.options import AsJson, Quiet, option, output_option, set_option, source_argument
+from brakecli.cli.output import say, show_result, warn
+from brakecli.cli.progress import announce_compilation, progress
+from brakecli.errors import BrakecliError
+
+
+def command(
+    file: Annotated[str, source_argument("SWEEP.toml", 'Sweep file, or "-" for standard input.')],
+    output: Annotated[Path | None, output_option("Result file", "the sweep's name with .h5, here")] = None,
+    overrides: Annotated[list[str] | None, set_option("the base case or of [critical]")] = None,
+    jobs: Annotated[
+        int | None,
+        option("Worker processes  [default: one for each core]", None, "--jobs", "-j", min=1, max=4096),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        option(
+            "Compute on a dask cluster: the scheduler's address, as tcp://host:8786.",
+            "ADDRESS",
+            envvar="DASK_SCHEDULER_ADDRESS",
+        ),
+    ] = None,
+    scheduler_file: Annotated[str | None, option("The same, by the scheduler's file.", "FILE")] = None,
+    task_size: Annotated[int | None, option("Points of a task  [default: as many as take 0.2 s]", min=1)] = None,
+    force: Annotated[
+        bool, option("Replace an existing output, and drop finished points of another sweep.", None, "--force")
+    ] = False,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+) -> None:
+    """Simulate a grid of cases, or search for a critical parameter at each.
+
+    The same command continues an interrupted sweep.
+    """
+    loaded = load_sweep(file, overrides)
+    target = result_path(output, file, kind="sweep")
+    announce_compilation(quiet)
+    from brakecli.cli.tables import sweep_table
+    from brakecli.runs.run import load_kernels
+    from brakecli.sweeps.cost import Estimate
+    from brakecli.sweeps.driver import Progress, choose_engine, sweep
+
+    load_kernels(loaded.base)
+    with progress(quiet) as show_progress:
+
+        def begin(found: Estimate, resumed: int) -> None:
+            if not quiet:
+                say(found.sentence() + (f"; {resumed} of them are there already" if resumed else ""))
+
+        def advance(points: Progress) -> None:
+            what = f"points, {points.failed} failed" if points.failed else "points"
+            show_progress(what, points.done, loaded.plan.passes * loaded.plan.points)
+
+        with choose_engine(loaded.plan, jobs, scheduler, scheduler_file) as engine:
+            report = sweep(loaded, target, engine, force=force, task_size=task_size, begin=begin, progress=advance)
+    found = report.findings
+    warn(*report.notes)
+    if found.warned:
+        warn(f"{found.warned} points ran with warnings, the first: {found.first_warning}")
+    numbers = {"output": str(report.output), **report.numbers()}
+    show_result("sweep", numbers, sweep_table, report, as_json=as_json, quiet=quiet)
+    for failure in found.failures:
+        where = ", ".join(f"{key} = {value}" for key, value in failure["parameters"].items())
+        say(f"point {failure['point']}{f' ({where})' if where else ''}: {failure['reason']}")
+    if found.failed:
+        raise BrakecliError(
+            f"{report.output}: {found.failed} of {found.points} points failed; all others were written"
+        )

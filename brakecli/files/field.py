@@ -1,0 +1,83 @@
+"""How a number or text of a result is declared and read; `brakecli.files.fields` declares them all."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, is_dataclass, replace
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Field:
+    """A number or text of a result, or an object that holds several."""
+
+    name: str
+    units: str
+    """In SI; `1` for pure numbers, empty for texts."""
+    meaning: str
+    kind: str = "f8"
+    """The NumPy type of many of them. A float may be missing: null in JSON, `_FillValue` in a file."""
+    source: str = ""
+    """Path of attributes, keys and methods that leads from a report to the value; the name if empty."""
+    missing: Any = None
+    """What stands for a value that does not exist."""
+    in_file: bool = True
+    """Whether a file holds it too. What changes from one run of the same case to the next stays outside."""
+    group: str = ""
+    """Group of the file whose attributes hold the items of an object."""
+    rows: "tuple[Field, ...]" = ()
+    """The items of an object, or of each object in a list."""
+
+    def read(self, report: object) -> Any:
+        """The value that a report holds, as JSON writes it."""
+        value: Any = report
+        for part in (self.source or self.name).split("."):
+            if value is not None:
+                value = value[part] if isinstance(value, Mapping) else getattr(value, part)
+                value = value() if callable(value) else value
+        if value is None:
+            return self.missing
+        if self.rows:
+            many = isinstance(value, list | tuple)
+            return [values_of(self.rows, each) for each in value] if many else values_of(self.rows, value)
+        return int(value) if self.kind == "i8" else plain(value)
+
+
+def values_of(fields: Iterable[Field], report: object) -> dict[str, Any]:
+    """Names and values as `--json` gives them; None stands for what does not exist."""
+    return {field.name: field.read(report) for field in fields}
+
+
+def named(fields: Iterable[Field], *names: str) -> tuple[Field, ...]:
+    """The fields of these names, in this order."""
+    known = {field.name: field for field in fields}
+    return tuple(known[name] for name in names)
+
+
+def plain(value: Any) -> Any:
+    """A value as JSON holds it: enumerations are texts, complex numbers pairs, NaN in an array is None."""
+    if isinstance(value, str):
+        return str(value)
+    if isinstance(value, complex):
+        return [value.real, value.imag]
+    if isinstance(value, np.ndarray):
+        if value.dtype.kind == "S":
+            return np.char.decode(value, "utf-8").tolist()
+        if value.dtype.kind == "f":
+            value = np.where(np.isfinite(value), value.astype(object), np.array(None))
+        return value.tolist()
+    if is_dataclass(value):
+        value = vars(value)
+    if isinstance(value, Mapping):
+        return {name: plain(each) for name, each in value.items()}
+    return [plain(each) for each in value] if isinstance(value, list | tuple) else value
+
+
+def within(part: str, *fields: Field) -> tuple[Field, ...]:
+    """Fields that are found in a part of the report."""
+    return tuple(replace(field, source=f"{part}.{field.source or field.name}") for field in fields)
+
+
+def json_only(*fields: Field) -> tuple[Field, ...]:
+    """Fields that no file holds."""
+    return tuple(replace(field, in_file=False) for field in fields)

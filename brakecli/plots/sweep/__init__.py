@@ -1,1 +1,0 @@
-"""Pictures of sweeps: curves over one axis, maps over two, rows of maps over three."""

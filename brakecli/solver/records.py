@@ -1,0 +1,288 @@
+"""What compiled code works on: records with named fields, what is given to a step, signatures of the plug-ins."""
+
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+from numba import float64, int64, types, void
+from numpy.typing import NDArray
+
+from brakecli.solver.compile import vector
+
+Pair = tuple[float, float]
+
+
+def record(**fields: Any) -> np.dtype[Any]:
+    """A type of record: fields of 8 bytes, or arrays of them given as (type, shape)."""
+    return np.dtype((np.record, np.dtype(list(fields.items()), align=True)))
+
+
+def new(type_: np.dtype[Any]) -> Any:
+    """A record of zeros, with its fields as attributes. Compiled code that gets it writes into it."""
+    return np.zeros(1, type_)[0]
+
+
+STATE = record(
+    x=float,  # position at the level reached, m
+    y=float,
+    v_x=float,  # velocity that belongs to it or, in a scheme that lags, to the level before, m/s
+    v_y=float,
+    x_old=float,  # position at the level before, m
+    y_old=float,
+    force=float,  # normal force in the last step, the first guess for the next, N
+)
+"""The motion at the level of time that has been reached."""
+
+PROBLEM = record(
+    load=float,  # Q at the weighted time, N
+    belt_now=float,  # U at the level reached and at the next, m/s
+    belt_next=float,
+    phi=float,  # coefficient of friction
+    a_11=float,  # kg/s
+    a_12=float,
+    a_22=float,
+    g_1=float,  # N
+    g_2=float,  # N, without the normal force
+    belt=float,  # U of the friction law, m/s
+    x_0=float,  # the contact sees the shoe at (x_0 + gain d, y_0 + gain e), m
+    y_0=float,
+    gain=float,  # s
+    d=float,  # solution: the velocities, m/s
+    e=float,
+    normal_force=float,  # F, N; before the solution the guess
+    side=float,  # sign of d - U, 0 in stick
+    d_slope=float,  # derivatives of d and e by F
+    e_slope=float,
+    residual=float,  # F_y - F, N
+)
+"""One step: minimise a11 d²/2 + a12 d e + a22 e²/2 - g1 d - (g2 + F) e + phi F |d - U|, (14) and (25)."""
+
+CONTACT = record(
+    normal_force=float,  # F_y = k ∫ max(gap, 0) dξ over the pad, N; gap = f2(ξ + x - travel) - f1(ξ) - y
+    stiffness=float,  # -∂F_y/∂y = k (length that touches) >= 0, N/m
+    tangential=float,  # ∂F_y/∂x = k Σ [f2] over the touching intervals, N/m
+    fraction=float,  # part of the pad that touches, 0 to 1
+    store=float,  # V = k/2 ∫ max(gap, 0)² dξ, J
+    store_x=float,  # ∂V/∂x, N
+    kind=int,  # the evaluator that did the work, place in `contact.kinds()`
+    valid=int,  # 0 where its assumptions do not hold
+)
+"""What an evaluator finds."""
+
+WORK = record(
+    belt=float,  # energies that have passed since the start, J; see `solver.energy`
+    friction=float,
+    dashpots=float,
+    load=float,
+    roughness=float,
+    scheme=float,
+    store_x_before=float,  # of the contact in the last step, N
+    force_before=float,
+)
+
+COUNTS = record(
+    level=int,  # level of time that has been reached; of a scheme with steps of its own the sample
+    evaluations=int,  # of the contact
+    unconverged=int,  # steps whose iteration did not converge
+    rising=int,  # steps whose solution need not be unique
+    most=int,  # evaluations in one step
+    turns=int,  # steps after which a touching shoe slides the other way, or sticks; not of a scheme's own steps
+    kinds=(int, 3),  # steps that each of `contact.kinds()` took
+)
+
+PAD = record(
+    k=float,  # stiffness per length, N/m²
+    half_length=float,  # a, m
+    shoe_terms=int,  # harmonics
+    wheel_terms=int,
+    nodes=int,  # of the midpoint rule; 0 without its tables
+    shoe_top=float,  # upper bounds of f1, of -f1 and of |f2|, m
+    shoe_bottom=float,
+    wheel_bound=float,
+    shoe_mean=float,  # means of f1 (m) and ∫ f1² dξ (m³) over the pad
+    shoe_square=float,
+    cell=float,  # widest interval in which roots are sought, m
+    shoe_at=int,  # where in the tables begin: amplitudes, wavenumbers, phases of the shoe
+    wheel_at=int,  # amplitudes and wavenumbers of the wheel
+    full_at=int,  # ∂(k ∫ f2 dξ)/∂(sin) of each of its harmonics, N
+    ss_at=int,  # integrals of products, see `contact.pad`
+    cc_at=int,
+    pr_at=int,
+    nodes_at=int,  # f1 at the nodes
+    sin_at=int,  # g sin(ωξ) and g cos(ωξ) of the wheel at the nodes
+    cos_at=int,
+)
+
+KNOT = record(
+    time=float,  # s
+    value=float,  # value, slope and integral from t = 0 are sums of two doubles, to 32 digits
+    value_low=float,
+    slope=float,
+    slope_low=float,
+    integral=float,
+    integral_low=float,
+)
+"""A piecewise linear function of time, at one of its knots; the slope is that after it."""
+
+WAVE = record(phase=float, turns=float, turns_low=float)
+"""A harmonic of the wheel: its phase (rad) and its exact number of waves per metre, a sum of two doubles."""
+
+
+X, Y, V_X, V_Y = range(4)
+"""Components of an event-driven motion, the last index of its arrays."""
+
+STAGES, POWERS, POWERED = 16, 7, 5
+"""Stages of its steps, coefficients of its continuous solution, works that it adds up."""
+
+MOTION = record(
+    x=float,  # motion reached, at which the next step begins, m and m/s
+    y=float,
+    v_x=float,
+    v_y=float,
+    force=float,  # normal force at the start, N
+    side=float,  # sign of the sliding velocity, 0 in stick
+    touching=int,  # 0 where the pad is clear of the wheel for sure
+    started=int,  # 0 before the phase of the start is known
+    level=int,  # number of the sample interval that has been reached
+    time=float,  # when it began, s
+    tau=float,  # time since then, s
+    belt=float,  # U, m/s, and its slope, m/s²
+    belt_slope=float,
+    travel=float,  # of the wheel, a sum of two doubles, m
+    travel_low=float,
+    load=float,  # Q, N, and its slope, N/s
+    load_slope=float,
+    anchor=float,  # x - travel in stick, a sum of two doubles, m
+    anchor_low=float,
+    tolerance=float,  # of a step
+    step=float,  # to try next, s
+    switches=int,  # changes of phase without a step in between
+    events=int,  # events without progress
+    events_time=float,  # since then, s
+    step_done=float,  # the step that the continuous solution belongs to, s, when it began, and its phase
+    time_done=float,
+    tau_done=float,
+    side_done=float,
+    touching_done=int,
+    row=(float, 8),  # the sample at the level that counts
+    largest=(float, 4),  # of each component so far
+    begin=(float, 4),  # both ends of the step
+    end=(float, 4),
+    slopes=(float, (STAGES, 4)),  # derivatives of the components by time, at each stage
+    powers=(float, (POWERS, 4)),  # coefficients of the continuous solution
+    work_rates=(float, (STAGES, POWERED)),  # powers of the energy account, W
+)
+"""An event-driven motion and its last step."""
+
+
+class Coefficients(NamedTuple):
+    """The constants of (6)-(7) and of the friction law, in the paper's symbols (SI units)."""
+
+    m: float
+    b_xx: float
+    b_xy: float
+    b_yy: float
+    c_xx: float
+    c_xy: float
+    c_yy: float
+    sin_beta: float  # Q_x = Q sin(beta)
+    cos_beta: float  # Q_y = Q cos(beta)
+    phi: float
+
+
+class Weights(NamedTuple):
+    """Step h (s) and weights of a difference scheme; theta_3 is unused by a two-layer scheme."""
+
+    h: float
+    theta_1: float
+    theta_2: float
+    theta_3: float
+
+
+class Grid(NamedTuple):
+    """The grid of time, and what bounds the work of a step."""
+
+    interval: float  # between samples, s
+    per_sample: int  # steps from one to the next
+    weighted: float  # time at which a scheme takes its forces, see `solver.schemes`
+    lag: int  # levels that its velocity lies behind
+    most: int  # evaluations of one step
+    go_on: int  # 1 where steps that did not converge are counted and do not end the run
+    samples: int  # number of the last sample
+    tolerance: float  # error that a scheme with steps of its own keeps
+
+
+class Drive(NamedTuple):
+    """What acts from outside: the speed U of the wheel's surface (m/s), the load Q (N), the wheel's profile."""
+
+    belt: NDArray[Any]
+    load: NDArray[Any]
+    wheel: NDArray[Any]
+
+
+class Layer(NamedTuple):
+    """The springs between shoe and wheel: how their force is computed, and the force found last."""
+
+    evaluate: int  # address of the evaluator
+    pad: Any
+    tables: NDArray[np.float64]
+    angles: NDArray[np.float64]  # phases of the wheel's harmonics, rad
+    scratch: NDArray[np.float64]
+    contact: Any
+
+
+class Plug(NamedTuple):
+    """Addresses of what a scheme and an iteration plug into the common loop."""
+
+    prepare: int
+    finish: int
+    solve: int
+
+
+class Plant(NamedTuple):
+    """Everything that the common loop works with: what is given, then the records that it changes."""
+
+    c: Coefficients
+    s: Weights
+    grid: Grid
+    drive: Drive
+    layer: Layer
+    plug: Plug
+    state: Any
+    problem: Any
+    work: Any
+    counts: Any
+
+
+STATE_TYPE, MOTION_TYPE, PROBLEM_TYPE, CONTACT_TYPE, WORK_TYPE, COUNTS_TYPE, PAD_TYPE = (
+    numba.from_dtype(each) for each in (STATE, MOTION, PROBLEM, CONTACT, WORK, COUNTS, PAD)
+)
+KNOTS = types.Array(numba.from_dtype(KNOT), 1, "C")
+WAVES = types.Array(numba.from_dtype(WAVE), 1, "C")
+COEFFICIENTS = types.NamedUniTuple(float64, len(Coefficients._fields), Coefficients)
+WEIGHTS = types.NamedUniTuple(float64, len(Weights._fields), Weights)
+GRID = types.NamedTuple([float64, int64, float64, int64, int64, int64, int64, float64], Grid)
+DRIVE = types.NamedTuple([KNOTS, KNOTS, WAVES], Drive)
+LAYER = types.NamedTuple([int64, PAD_TYPE, vector, vector, vector, CONTACT_TYPE], Layer)
+PLUG = types.NamedUniTuple(int64, 3, Plug)
+
+
+def plant_type(state: np.dtype[Any]) -> Any:
+    """The type of a `Plant` whose scheme keeps its motion in this record."""
+    members = [COEFFICIENTS, WEIGHTS, GRID, DRIVE, LAYER, PLUG, numba.from_dtype(state)]
+    return types.NamedTuple([*members, PROBLEM_TYPE, WORK_TYPE, COUNTS_TYPE], Plant)
+
+
+PLANT = plant_type(STATE)
+
+EVALUATE = void(float64, float64, LAYER)
+"""evaluate(x, y, layer): fills `layer.contact` for a position of the shoe and the layer's angles of the wheel."""
+
+PREPARE = void(COEFFICIENTS, WEIGHTS, STATE_TYPE, PROBLEM_TYPE)
+"""prepare(c, s, state, problem): sets up the minimisation of one step."""
+
+FINISH = void(COEFFICIENTS, WEIGHTS, STATE_TYPE, PROBLEM_TYPE, CONTACT_TYPE, WORK_TYPE)
+"""finish(c, s, state, problem, contact, work): the new state, and the works added."""
+
+SOLVE = types.UniTuple(int64, 3)(LAYER, PROBLEM_TYPE, int64)
+"""solve(layer, problem, most): solves the step with so many evaluations; (outcome, evaluations, rising points)."""

@@ -1,0 +1,52 @@
+"""Pictures of sweeps over two and three axes: the colours of cells are the numbers of the file."""
+
+from pathlib import Path
+
+import numpy as np
+
+from tests.plots.helpers import (
+    ANGLE,
+    CRITICAL,
+    REGIMES,
+    SCHEME,
+    SPEED,
+    columns,
+    drawn,
+    gathered,
+    panels,
+    points,
+    write,
+)
+
+
+def test_maps_hold_the_values_of_their_cells(tmp_path: Path) -> None:
+    values = columns((8, 7), critical=True)
+    values["critical"][3, 4] = np.nan
+    values["critical_status"][3, 4] = "stable throughout"
+    values["status"][1, 2] = "failed"
+    axes = panels(write(tmp_path / "c.h5", {"axis": [ANGLE, SPEED], "critical": CRITICAL}, values))[0]
+    mesh = axes.collections[0]
+    shown = np.ma.filled(mesh.get_array().reshape(7, 8).T.astype(float), np.nan)
+    np.testing.assert_array_equal(shown, values["critical"])
+    assert axes.get_yscale() == "log"
+    assert axes.get_xscale() == "linear"
+    np.testing.assert_allclose(points(axes, "stable up to 2"), [[4.0, 1.0]], rtol=1e-12)
+    regime, amplitude, _ = panels(write(tmp_path / "m.h5", {"axis": [ANGLE, SPEED]}, values))
+    codes = np.ma.filled(regime.collections[0].get_array().reshape(7, 8).T.astype(float), np.nan)
+    for (x, y), code in np.ndenumerate(codes):
+        assert np.isnan(code) if (x, y) == (1, 2) else REGIMES[int(code)] == values["regime"][x, y]
+    np.testing.assert_allclose(
+        amplitude.collections[0].get_array().reshape(7, 8).T, 1e6 * values["amplitude"], rtol=1e-12
+    )
+
+
+def test_a_short_third_axis_stands_side_by_side(tmp_path: Path) -> None:
+    for critical in ({}, {"critical": CRITICAL}):
+        figure = drawn(write(tmp_path / "r.h5", {"axis": [SPEED, SCHEME, ANGLE], **critical}))
+        titles = [axes.get_title(loc="left") for axes in figure.axes]
+        assert titles[:2] == ["solver.scheme = two-layer", "solver.scheme = three-layer"]
+        shown = figure.axes[:2] if critical else figure.axes[2:4]
+        assert [axes.get_xlabel() for axes in shown] == ["wheel.angular_speed (rad/s)"] * 2
+    picture = gathered(tmp_path / "r.h5", ["solver.scheme=three-layer", "link2.angle_deg=3"])
+    np.testing.assert_array_equal(picture["critical"][0], columns((7, 2, 8), critical=True)["critical"][:, 1, 2])
+    assert picture.chosen == ("solver.scheme = three-layer", "link2.angle_deg = 3 deg")
