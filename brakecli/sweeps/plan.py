@@ -125,7 +125,7 @@ def given_toml(table: Sweep | Case) -> str:
 @lru_cache(maxsize=4)
 def plan_of(sweep_text: str, case_text: str) -> Plan:
     """The plan of the texts of a sweep and of its case; a worker meets the same ones again and again."""
-    return Plan(sweep_text, case_text)
+    return Plan(sweep_text, case_text)  # `lru_cache(Plan)` would inherit `__reduce__`, and could not be sent
 
 
 def label(value: Any) -> str:
