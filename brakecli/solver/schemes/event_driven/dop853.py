@@ -21,21 +21,15 @@ def _numbers(text: str) -> Floats:
     return np.array([float(word) for word in text.split()])
 
 
-def _below_diagonal(numbers: Floats) -> Floats:
-    """The square matrix whose entries below the diagonal are these, row by row."""
-    a = np.zeros((STAGES, STAGES))
-    a[np.tril_indices(STAGES, -1)] = numbers
-    return a
-
-
 NODES = _numbers("""
     0 0.05260015195876773 0.0789002279381516 0.1183503419072274 0.2816496580927726 0.3333333333333333 0.25
     0.3076923076923077 0.6512820512820513 0.6 0.8571428571428571 1 1 0.1 0.2 0.7777777777777778
 """)
 """When each stage is, in steps."""
 
-A = _below_diagonal(
-    _numbers("""
+A = np.zeros((STAGES, STAGES))
+"""Weights of the slopes so far; the thirteenth row is the step itself."""
+A[np.tril_indices(STAGES, -1)] = _numbers("""
     0.05260015195876773 0.0197250569845379 0.0591751709536137 0.02958758547680685 0 0.08876275643042054
     0.2413651341592667 0 -0.8845494793282861 0.924834003261792 0.037037037037037035 0 0 0.17082860872947386
     0.12546768756682242 0.037109375 0 0 0.17025221101954405 0.06021653898045596 -0.017578125 0.03709200011850479 0
@@ -54,8 +48,6 @@ A = _below_diagonal(
     -4.697621415361164 7.683421196062599 4.06898981839711 0.3567271874552811 0 0 0 -0.0013990241651590145
     2.9475147891527724 -9.15095847217987
 """)
-)
-"""Weights of the slopes so far; the thirteenth row is the step itself."""
 
 THIRD = _numbers("""
     -0.18980075407240762 0 0 0 0 4.450312892752409 1.8915178993145003 -5.801203960010585 -0.4226823213237919

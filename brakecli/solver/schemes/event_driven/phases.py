@@ -15,19 +15,7 @@ from brakecli.solver.compile import at_address, kernel
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.contact.closed_form import FULL, clear, coverage, full_contact
 from brakecli.solver.double_double import two_sum
-from brakecli.solver.records import (
-    COEFFICIENTS,
-    DRIVE,
-    EVALUATE,
-    LAYER,
-    MOTION_TYPE,
-    V_X,
-    V_Y,
-    Coefficients,
-    Drive,
-    Layer,
-    Y,
-)
+from brakecli.solver.records import COEFFICIENTS, V_X, V_Y, Coefficients, Drive, Layer, Y
 from brakecli.solver.roughness import wheel_angles
 from brakecli.solver.schedules import integral_at, slope_at, value_at
 from brakecli.solver.schemes.event_driven.dop853 import END_STAGE, interpolated
@@ -45,8 +33,10 @@ class Shoe(NamedTuple):
     counts: Any
 
 
-SHOE = types.NamedTuple([COEFFICIENTS, LAYER, MOTION_TYPE, records.WORK_TYPE, records.COUNTS_TYPE], Shoe)
-_evaluate_at = at_address(EVALUATE)
+SHOE = types.NamedTuple(
+    [COEFFICIENTS, records.LAYER, records.MOTION_TYPE, records.WORK_TYPE, records.COUNTS_TYPE], Shoe
+)
+_evaluate_at = at_address(records.EVALUATE)
 _PAIR = types.UniTuple(float64, 2)
 _TRIPLE = types.UniTuple(float64, 3)
 
@@ -80,7 +70,7 @@ def rounding(p: Shoe) -> tuple[float, float]:
     return 4.0 * EPSILON * along, 4.0 * EPSILON * (across + normal)
 
 
-@kernel(void(SHOE, DRIVE), inlined=False)
+@kernel(void(SHOE, records.DRIVE), inlined=False)
 def arrive(p: Shoe, drive: Drive) -> None:
     """What acts from outside at the time reached and, as no knot lies inside a step, all through the next step."""
     m, t, tau = p.motion, p.motion.time, p.motion.tau
