@@ -4,8 +4,8 @@ The tables and keys are those of the case file, version 1. `brakecli.case.read` 
 """
 
 from collections.abc import Iterator, Mapping
-from enum import StrEnum
 from itertools import pairwise
+from typing import Annotated, Literal
 
 import tomli_w
 from pydantic import Field
@@ -17,6 +17,7 @@ from brakecli.case.tables import (
     Lengths,
     NonNegative,
     Number,
+    OneOf,
     Positive,
     Schedule,
     Series,
@@ -24,65 +25,19 @@ from brakecli.case.tables import (
     Title,
     Tolerance,
     Weights,
-    choice,
     entries,
     quantity,
 )
 from brakecli.errors import Problem, found
-
-
-class Evaluator(StrEnum):
-    """How the contact force F_y is computed."""
-
-    AUTO = "auto"
-    CLOSED_FORM = "closed-form"
-    MIDPOINT = "midpoint"
-    EXACT = "exact"
-
-
-class Scheme(StrEnum):
-    """How time is stepped."""
-
-    TWO_LAYER = "two-layer"
-    THREE_LAYER = "three-layer"
-    EVENT_DRIVEN = "event-driven"
-    AUTO = "auto"
-
-
-_THETA: dict[Scheme, tuple[float, ...]] = {
-    Scheme.AUTO: (),
-    Scheme.TWO_LAYER: (0.5, 0.5),
-    Scheme.THREE_LAYER: (0.25, 0.5, 0.25),
-    Scheme.EVENT_DRIVEN: (),
-}
-
+from brakecli.solver.contact import EVALUATORS
+from brakecli.solver.method import MOST
+from brakecli.solver.schemes import SCHEMES, Scheme
 
 DEFAULT_TOLERANCE = 1e-3
 """Relative error of the histories where a case gives neither step nor tolerance."""
 
 EVENT_TOLERANCE = 1e-10
 """Tolerance of event-driven where a case gives it a step."""
-
-
-class Iteration(StrEnum):
-    """How the equations of one step are solved; "fixed-point" is the paper's way."""
-
-    NEWTON = "newton"
-    FIXED_POINT = "fixed-point"
-
-
-class Start(StrEnum):
-    """How a three-layer scheme gets its second layer; "paper" sets it equal to the first."""
-
-    CONSISTENT = "consistent"
-    PAPER = "paper"
-
-
-class InitialState(StrEnum):
-    """The state that the initial values are added to: the origin, or the steady sliding of the case."""
-
-    REST = "rest"
-    EQUILIBRIUM = "equilibrium"
 
 
 class Shoe(Table):
@@ -147,7 +102,9 @@ class Contact(Table):
 
     half_length: Positive = quantity("m", "half length a of the contact")
     stiffness: Positive = quantity("N/m²", "stiffness k of the contact per unit of its length")
-    evaluator: Evaluator = choice('how the contact force is computed; "auto" takes the cheapest', Evaluator.AUTO)
+    evaluator: Annotated[str, OneOf(lambda: EVALUATORS)] = Field(
+        "auto", description='how the contact force is computed; "auto" takes the cheapest'
+    )
     nodes: int | None = Field(
         None,
         ge=2,
@@ -186,7 +143,10 @@ class Roughness(Table):
 class Initial(Table):
     """The state at t = 0."""
 
-    at: InitialState = choice("the state that x, y, vx and vy are added to", InitialState.REST)
+    at: Literal["rest", "equilibrium"] = Field(
+        "rest",
+        description="the state that x, y, vx and vy are added to: the origin, or the steady sliding of the case",
+    )
     x: Number = quantity("m", "tangential displacement", 0.0)
     y: Number = quantity("m", "normal displacement", 0.0)
     vx: Number = quantity("m/s", "tangential velocity", 0.0)
@@ -199,8 +159,9 @@ class Solver(Table):
     alternatives = (("step",), ("tolerance",))
     one_is_needed = False
 
-    scheme: Scheme = choice(
-        'the time-stepping scheme; "two-layer" with a step, otherwise "auto", which chooses one', Scheme.AUTO
+    scheme: Annotated[str, OneOf(lambda: (*SCHEMES, "auto"))] = Field(
+        "auto",
+        description='the time-stepping scheme; "two-layer" with a step, otherwise "auto", which chooses one',
     )
     theta: Weights = quantity(
         "1",
@@ -208,8 +169,13 @@ class Solver(Table):
         "three that add up to 1 for three-layer, 0.25, 0.5 and 0.25 if left out; none for event-driven",
         default_factory=tuple,
     )
-    iteration: Iteration = choice("how the equations of a step are solved", Iteration.NEWTON)
-    start: Start = choice("how the second layer of three-layer is found", Start.CONSISTENT)
+    iteration: Annotated[str, OneOf(lambda: MOST)] = Field(
+        "newton", description='how the equations of a step are solved; "fixed-point" is the paper\'s way'
+    )
+    start: Annotated[str, OneOf(lambda: [start for row in SCHEMES.values() for start in row.starts])] = Field(
+        "consistent",
+        description='how the second layer of three-layer is found; "paper" sets it equal to the first',
+    )
     step: Positive | None = quantity("s", "time step h; or tolerance instead", None)
     tolerance: Tolerance | None = quantity(
         "1", "largest relative error of the histories, 0.001 if there is no step either", None
@@ -219,9 +185,14 @@ class Solver(Table):
 
     def _fill(self) -> None:
         if "scheme" not in self.model_fields_set and self.step is not None:
-            self.__dict__["scheme"] = Scheme.TWO_LAYER
+            self.__dict__["scheme"] = "two-layer"
         if "theta" not in self.model_fields_set:
-            self.__dict__["theta"] = _THETA[self.scheme]
+            self.__dict__["theta"] = self.row.theta
+
+    @property
+    def row(self) -> Scheme:
+        """What the scheme states of itself; one that is still to be chosen is event-driven until then."""
+        return SCHEMES["event-driven" if self.scheme == "auto" else self.scheme]
 
     @property
     def effective_tolerance(self) -> float | None:
@@ -230,23 +201,25 @@ class Solver(Table):
 
     def _broken_rules(self) -> Iterator[Problem]:
         yield from super()._broken_rules()
-        if self.step is not None and self.scheme == Scheme.AUTO:
+        if self.step is not None and self.scheme == "auto":
             what = 'is given, but "auto" chooses the step'
             yield self.wrong("step", what, "leave scheme out, or give tolerance instead of step")
-        count = len(_THETA[self.scheme])
-        if self.scheme in (Scheme.EVENT_DRIVEN, Scheme.AUTO):
-            neutral = {"theta": (), "iteration": Iteration.NEWTON, "allow_unconverged": False}
+        row, count = self.row, len(self.row.theta)
+        if row.own_steps:
+            neutral = {"theta": (), "iteration": "newton", "allow_unconverged": False}
             for key, value in neutral.items():
                 if getattr(self, key) != value:
                     yield self.wrong(key, f"is not for {self.scheme}", f"leave {key} out")
         elif len(self.theta) != count:
             what = f"has {entries(self.theta)} where {self.scheme} has {count} weights"
             yield self.wrong("theta", what, f"give {count} weights, or leave theta out")
-        elif count == 3 and abs(sum(self.theta) - 1) > 1e-9:
+        elif row.sum_is_one and abs(sum(self.theta) - 1) > 1e-9:
             yield self.wrong("theta", f"adds up to {sum(self.theta):.12g}", "let the weights add up to 1")
-        if self.start == Start.PAPER and self.scheme != Scheme.THREE_LAYER:
-            what = "is only for the three-layer scheme"
-            yield self.wrong("start", what, 'leave start out, or set scheme to "three-layer"')
+        if self.start not in row.starts:
+            names = [name for name, each in SCHEMES.items() if self.start in each.starts]
+            what = f"is only for the {' and '.join(names)} scheme"
+            remedy = " or ".join(f'"{name}"' for name in names)
+            yield self.wrong("start", what, f"leave start out, or set scheme to {remedy}")
 
 
 class Output(Table):
@@ -289,11 +262,11 @@ class Case(Table):
         if step is not None and self.output.sample_interval < step * (1 - 1e-9):
             what = f"is below the time step of {step!r} s"
             yield self.wrong("output.sample_interval", what, "make it at least one time step")
-        exact = self.solver.scheme == Scheme.EVENT_DRIVEN or step is None
-        if exact and self.contact.evaluator == Evaluator.MIDPOINT:
+        exact = self.solver.row.own_steps or step is None
+        if exact and self.contact.evaluator == "midpoint":
             what = "is given, but event-driven is exact, and a tolerance chooses nodes itself"
             yield self.wrong("contact.evaluator", what, "leave evaluator out")
-        if self.solver.start == Start.PAPER and (self.initial.vx or self.initial.vy):
+        if self.solver.start == "paper" and (self.initial.vx or self.initial.vy):
             what = "takes the second layer for equal to the first, but the initial velocity is not zero"
             remedy = 'set start to "consistent", or initial.vx and initial.vy to 0'
             yield self.wrong("solver.start", what, remedy)

@@ -43,11 +43,11 @@ def method_of(case: Case) -> Method:
     solver = case.solver
     automatic = solver.scheme == "auto"
     return Method(
-        scheme="event-driven" if automatic else str(solver.scheme),
+        scheme="event-driven" if automatic else solver.scheme,
         theta=solver.theta,
-        start=str(solver.start),
-        iteration=str(solver.iteration),
-        evaluator=str(case.contact.evaluator),
+        start=solver.start,
+        iteration=solver.iteration,
+        evaluator=case.contact.evaluator,
         nodes=case.contact.nodes or 0,
         step=solver.step,
         tolerance=solver.effective_tolerance or EVENT_TOLERANCE,

@@ -1,16 +1,28 @@
 """What all tables of case and sweep files share: kinds of numbers, rules between keys, and their JSON Schema."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import nullcontext, suppress
-from enum import StrEnum
+from dataclasses import dataclass
 from functools import cache
 from typing import Annotated, Any, ClassVar, Self, cast, get_args
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, WrapValidator, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    ValidationError,
+    WrapValidator,
+    model_validator,
+)
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import InitErrorDetails, PydanticCustomError, core_schema
 
 from brakecli.errors import KeyPath, Problem, found
+from brakecli.solver.contact import EVALUATORS
+from brakecli.solver.schemes import SCHEMES
 
 SMALLEST, LARGEST = 1e-100, 1e100
 """Magnitudes between which every number other than zero must lie, so that products neither vanish nor overflow."""
@@ -26,9 +38,24 @@ def quantity(unit: str, description: str, default: Any = ..., **options: Any) ->
     return Field(default, description=description, json_schema_extra={"unit": unit}, **options)
 
 
-def choice(description: str, default: StrEnum | None) -> Any:
-    """A key that holds a member of an enum, which TOML gives as a text."""
-    return Field(default, description=description, strict=False)
+@dataclass(frozen=True)
+class OneOf:
+    """A text that is one of some names. They are asked for at every check, so that a row may join a registry."""
+
+    names: Callable[[], Iterable[str]]
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
+        """Accept the names alone."""
+        return core_schema.no_info_plain_validator_function(self._checked)
+
+    def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        """List the names."""
+        return {"enum": list(dict.fromkeys(self.names())), "type": "string"}
+
+    def _checked(self, value: Any) -> Any:
+        if value not in tuple(self.names()):
+            raise PydanticCustomError("enum", "is not one of the choices")
+        return value
 
 
 def _within_scale(value: float) -> float:
@@ -201,12 +228,17 @@ def _describe_alternatives(schema: dict[str, Any], model: type[Table]) -> None:
         schema["not"] = {"allOf": groups}
 
 
-@cache
 def json_schema(kind: type[Table]) -> dict[str, Any]:
     """The JSON Schema (draft 2020-12) of a kind of table, such as a whole case file.
 
     It accepts everything that is valid; most rules between keys are beyond it.
     """
+    return _schema_with(kind, (*SCHEMES, *EVALUATORS))
+
+
+@cache
+def _schema_with(kind: type[Table], names: tuple[str, ...]) -> dict[str, Any]:
+    """The schema as it is while the registries hold these names."""
     return {"$schema": _TomlSchema.schema_dialect, **kind.model_json_schema(schema_generator=_TomlSchema)}
 
 

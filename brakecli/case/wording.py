@@ -17,6 +17,7 @@ _WHAT = {
     "string_type": "is not a text",
     "string_pattern_mismatch": "holds a line break or a control character",
     "enum": "is not one of the choices",
+    "literal_error": "is not one of the choices",
     "tuple_type": "is not a list",
     "model_type": "is not a table",
     "too_short": "is too short",

@@ -20,7 +20,7 @@ from brakecli.case.system import system_of
 from brakecli.errors import CaseError
 from brakecli.solver.system import System
 from brakecli.sweeps.growth import Growth, Sliding, growth, sliding, with_step
-from brakecli.sweeps.tables import Critical, Method
+from brakecli.sweeps.tables import Critical
 
 Found = TypeVar("Found")
 
@@ -92,7 +92,7 @@ def search(critical: Critical, case_at: CaseAt, verdict_of: VerdictOf) -> Search
         return with_step(system_of(case_at(value)))  # a case with a tolerance has no step
 
     exact, bias = _by_eigenvalues(critical, stepped)
-    by_simulation = critical.method is Method.SIMULATION
+    by_simulation = critical.method == "simulation"
     found = _by_simulation(critical, stepped) if by_simulation else exact
 
     def lasts(value: float) -> bool | None:

@@ -17,7 +17,7 @@ from brakecli.case import wording
 from brakecli.case.case import Case
 from brakecli.case.read import key_path, parse_table, put
 from brakecli.errors import CaseError, Problem
-from brakecli.sweeps.tables import Direction, Sweep
+from brakecli.sweeps.tables import Sweep
 
 Settings = Mapping[tuple[str, ...], Any]
 """Values by key path, to be put into the base case."""
@@ -66,7 +66,7 @@ class Plan:
     def passes(self) -> int:
         """How often the grid is computed: twice where the motion is followed both up and down."""
         axis = self.followed
-        return 2 if axis is not None and self.sweep.axis[axis].direction is Direction.BOTH else 1
+        return 2 if axis is not None and self.sweep.axis[axis].direction == "both" else 1
 
     @property
     def unit_length(self) -> int:

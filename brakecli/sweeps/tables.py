@@ -2,36 +2,16 @@
 
 import math
 from collections.abc import Iterator
-from enum import StrEnum
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field
 
 from brakecli.case.read import key_path
-from brakecli.case.tables import MISSING, Number, Positive, Table, Title, choice, from_list
+from brakecli.case.tables import MISSING, Number, Positive, Table, Title, from_list
 from brakecli.errors import Problem, found
 
-
-class Spacing(StrEnum):
-    """How the values of an axis lie between its ends."""
-
-    LINEAR = "linear"
-    LOG = "log"
-
-
-class Direction(StrEnum):
-    """How the motion is followed along an axis, where each point starts from the end of the one before it."""
-
-    UP = "up"
-    DOWN = "down"
-    BOTH = "both"
-
-
-class Method(StrEnum):
-    """How a critical parameter is found: by the growth of small disturbances in runs, or by eigenvalues."""
-
-    SIMULATION = "simulation"
-    EIGENVALUE = "eigenvalue"
+Direction = Literal["up", "down", "both"]
+"""How the motion is followed along an axis, where each point starts from the end of the one before it."""
 
 
 class Axis(Table):
@@ -52,12 +32,14 @@ class Axis(Table):
     start: Number | None = Field(None, description="first value")
     stop: Number | None = Field(None, description="last value")
     num: int | None = Field(None, ge=1, description="number of values")
-    spacing: Spacing = choice("how the values lie between the first and last", Spacing.LINEAR)
+    spacing: Literal["linear", "log"] = Field(
+        "linear", description="how the values lie between the first and last"
+    )
     values: Annotated[tuple[Any, ...], Field(min_length=1), *from_list] | None = Field(
         None, description="the values themselves"
     )
-    direction: Direction | None = choice(
-        "follow the motion along this axis: each point starts from the end of the one before", None
+    direction: Direction | None = Field(
+        None, description="follow the motion along this axis: each point starts from the end of the one before"
     )
 
     @property
@@ -84,7 +66,7 @@ class Axis(Table):
         last = max(self.size - 1, 1)
         if place == last:
             return self.stop
-        if self.spacing is Spacing.LOG:
+        if self.spacing == "log":
             return self.start * (self.stop / self.start) ** (place / last)
         return self.start + place * (self.stop - self.start) / last
 
@@ -92,7 +74,7 @@ class Axis(Table):
         yield from super()._broken_rules()
         for text in self.parameter:
             yield from _not_a_key_path(text)
-        if self.spacing is Spacing.LOG:
+        if self.spacing == "log":
             if self.values is not None:
                 yield self.wrong("spacing", "is only for start and stop", "leave spacing out")
             for key in ("start", "stop"):
@@ -115,7 +97,9 @@ class Critical(Table):
     lower: Number = Field(description="where the search begins")
     upper: Number = Field(description="where the search ends")
     tolerance: Positive = Field(1e-3, description="largest width of the bracket at the end of the search")
-    method: Method = choice("by runs, or only by eigenvalues", Method.SIMULATION)
+    method: Literal["simulation", "eigenvalue"] = Field(
+        "simulation", description="by the growth of small disturbances in runs, or only by eigenvalues"
+    )
 
     def _broken_rules(self) -> Iterator[Problem]:
         if self.upper <= self.lower:
