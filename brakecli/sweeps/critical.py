@@ -128,9 +128,8 @@ def _by_eigenvalues(critical: Critical, system_at: SystemAt) -> tuple[_Change, f
         return rate > 1e-12 * math.sqrt((abs(c.c_xx) + abs(c.c_yy) + k) / c.m)
 
     def grows_in_steps(found: Sliding) -> bool:
-        system = found.system
-        c, belt = system.coefficients, system.belt_speed
-        return spectral_radius(c, system.weights, system.scheme, found.stiffness, belt) > 1.0 + MARGIN
+        phi = found.system.coefficients.phi
+        return spectral_radius(found.system, found.stiffness, phi) > 1.0 + MARGIN
 
     def first_change(unstable: Callable[[Sliding], bool], count: int) -> _Change:
         """The first change among `count` values, narrowed down."""
