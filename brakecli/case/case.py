@@ -10,24 +10,8 @@ from typing import Annotated, Literal
 import tomli_w
 from pydantic import Field
 
-from brakecli.case.tables import (
-    MISSING,
-    MOST_WRONG_ENTRIES,
-    Angle,
-    Lengths,
-    NonNegative,
-    Number,
-    OneOf,
-    Positive,
-    Schedule,
-    Series,
-    Table,
-    Title,
-    Tolerance,
-    Weights,
-    entries,
-    quantity,
-)
+from brakecli.case import tables
+from brakecli.case.tables import NonNegative, Number, OneOf, Positive, Schedule, Series, Table, entries, quantity
 from brakecli.errors import Problem, found
 from brakecli.solver.contact import EVALUATORS
 from brakecli.solver.method import MOST
@@ -35,9 +19,6 @@ from brakecli.solver.schemes import SCHEMES, Scheme
 
 DEFAULT_TOLERANCE = 1e-3
 """Relative error of the histories where a case gives neither step nor tolerance."""
-
-EVENT_TOLERANCE = 1e-10
-"""Tolerance of event-driven where a case gives it a step."""
 
 
 class Shoe(Table):
@@ -55,7 +36,7 @@ class Varying(Table):
         yield from self.different_lengths(values_key, times_key)
         times: Series = getattr(self, times_key) or ()
         late = [index for index, (before, time) in enumerate(pairwise(times), start=1) if time <= before]
-        for index in late[:MOST_WRONG_ENTRIES]:
+        for index in late[: tables.MOST_WRONG_ENTRIES]:
             what = f"is not later than the time before it{found(times[index])}"
             yield Problem((times_key, index), what, "let the times increase")
 
@@ -76,7 +57,7 @@ class Link(Table):
 
     stiffness: NonNegative = quantity("N/m", "stiffness c of the spring")
     damping: NonNegative = quantity("N·s/m", "damping b of the dashpot", 0.0)
-    angle_deg: Angle = quantity(
+    angle_deg: tables.Angle = quantity(
         "deg", "inclination: β of link 1 to the vertical, α of link 2 to the friction plane", 0.0
     )
 
@@ -119,8 +100,8 @@ class Profile(Table):
     alternatives = (("wavelengths",), ("wavenumbers",))
 
     amplitudes: Series = quantity("m", "amplitude of each sine")
-    wavelengths: Lengths | None = quantity("m", "wavelength of each sine", None)
-    wavenumbers: Lengths | None = quantity("rad/m", "wavenumber of each sine", None)
+    wavelengths: tables.Lengths | None = quantity("m", "wavelength of each sine", None)
+    wavenumbers: tables.Lengths | None = quantity("rad/m", "wavenumber of each sine", None)
     phases_deg: Series = quantity("deg", "phase of each sine, 0 if left out", default_factory=tuple)
 
     def _fill(self) -> None:
@@ -163,7 +144,7 @@ class Solver(Table):
         "auto",
         description='the time-stepping scheme; "two-layer" with a step, otherwise "auto", which chooses one',
     )
-    theta: Weights = quantity(
+    theta: tables.Weights = quantity(
         "1",
         "weights of the layers: two for two-layer, 0.5 and 0.5 if left out; "
         "three that add up to 1 for three-layer, 0.25, 0.5 and 0.25 if left out; none for event-driven",
@@ -177,7 +158,7 @@ class Solver(Table):
         description='how the second layer of three-layer is found; "paper" sets it equal to the first',
     )
     step: Positive | None = quantity("s", "time step h; or tolerance instead", None)
-    tolerance: Tolerance | None = quantity(
+    tolerance: tables.Tolerance | None = quantity(
         "1", "largest relative error of the histories, 0.001 if there is no step either", None
     )
     duration: Positive = quantity("s", "time to simulate")
@@ -237,7 +218,7 @@ class Case(Table):
     of the roughness hold their values also where the file left them out.
     """
 
-    title: Title = ""
+    title: tables.Title = ""
     shoe: Shoe
     wheel: Wheel
     link1: Link = Field(description="the link that is inclined by β to the vertical")
@@ -257,7 +238,7 @@ class Case(Table):
     def _broken_rules(self) -> Iterator[Problem]:
         step = self.solver.step
         if step is None and "sample_interval" not in self.output.model_fields_set:
-            what = f"{MISSING}, and there is no time step to take its place"
+            what = f"{tables.MISSING}, and there is no time step to take its place"
             yield Problem(("output", "sample_interval"), what, "give a number above 0, in s")
         if step is not None and self.output.sample_interval < step * (1 - 1e-9):
             what = f"is below the time step of {step!r} s"
@@ -274,10 +255,8 @@ class Case(Table):
 
 def changed(case: Case, **tables: Mapping[str, object]) -> Case:
     """The case with some keys of some tables changed, valid again; raises pydantic's ValidationError."""
-    parts = {name: getattr(case, name) for name in Case.model_fields}
-    for name, keys in tables.items():
-        parts[name] = {**{key: getattr(parts[name], key) for key in type(parts[name]).model_fields}, **keys}
-    return Case.model_validate(parts)
+    new = {name: {**dict(getattr(case, name)), **keys} for name, keys in tables.items()}
+    return Case.model_validate({**dict(case), **new})
 
 
 def resolved_toml(case: Case) -> str:

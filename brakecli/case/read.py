@@ -5,6 +5,7 @@ import re
 import shlex
 import sys
 from collections.abc import Container, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
@@ -15,7 +16,17 @@ from pydantic import ValidationError
 from brakecli.case import wording
 from brakecli.case.case import Case, resolved_toml
 from brakecli.case.tables import MISSING, Table, tables_within
-from brakecli.case.toml_lines import LARGEST_TEXT, MOST_PARTS, WRITING, Located, parse, split, too_large, unfit
+from brakecli.case.toml_lines import (
+    LARGEST_TEXT,
+    MOST_PARTS,
+    WRITING,
+    Located,
+    check_size,
+    innermost,
+    parse,
+    split,
+    unfit,
+)
 from brakecli.errors import CaseError, KeyPath, Problem, key_text, printable
 
 _Table = TypeVar("_Table", bound=Table)
@@ -36,10 +47,7 @@ def starter_text() -> str:
 
 
 def read_case(source: str, overrides: Sequence[str] = ()) -> LoadedCase:
-    """Read the case from a path, or from standard input where the path is "-". Raises `CaseError`.
-
-    Overrides are those of `parse_case`.
-    """
+    """Read the case from a path, or from standard input where the path is "-"; see `parse_case`."""
     return parse_case(*read_text(source), overrides)
 
 
@@ -47,19 +55,15 @@ def read_text(source: str) -> tuple[str, str]:
     """The text of a file, or of standard input where the path is "-", and its name; line ends stay as they are."""
     name = "standard input" if source == "-" else source
     try:
-        if source == "-":
-            data = sys.stdin.buffer.read(LARGEST_TEXT + 1)
-        else:
-            with Path(source).open("rb") as file:
-                data = file.read(LARGEST_TEXT + 1)
+        with nullcontext(sys.stdin.buffer) if source == "-" else Path(source).open("rb") as file:
+            data = file.read(LARGEST_TEXT + 1)
     except (OSError, ValueError, AttributeError) as error:
         # ValueError: a NUL in the path, or standard input is closed; AttributeError: there is no standard input.
-        closed = isinstance(error, AttributeError)
-        reason = "it is closed" if closed else getattr(error, "strerror", None) or str(error)
+        reason = getattr(error, "strerror", None) or str(error)
+        reason = "it is closed" if isinstance(error, AttributeError) else reason
         what = f"cannot be read: {reason[0].lower()}{reason[1:]}"
         raise unfit(what, 'name a TOML file, or "-" for standard input', name) from error
-    if len(data) > LARGEST_TEXT:
-        raise too_large(name)
+    check_size(data, name)
     try:
         return data.decode("utf-8"), name
     except UnicodeDecodeError as error:
@@ -82,8 +86,7 @@ def parse_case(text: str, label: str, overrides: Sequence[str] = ()) -> LoadedCa
 
 def parse_table(kind: type[_Table], text: str, label: str, overrides: Sequence[str] = ()) -> _Table:
     """Make a table of some kind, such as a case, of a whole TOML text; see `parse_case`."""
-    located = Located(text, label)
-    problems: list[Problem] = []
+    located, problems = Located(text, label), list[Problem]()
     try:
         data = parse(text, label)
     except CaseError as error:
@@ -105,11 +108,9 @@ def parse_table(kind: type[_Table], text: str, label: str, overrides: Sequence[s
         for problem in wording.problems(error, kind):
             if problem.what == MISSING and not all_is_readable:
                 continue  # it may stand in the part that cannot be read
-            prefixes = (problem.path[:end] for end in range(len(problem.path), 0, -1))
-            if by := next((set_by[prefix] for prefix in prefixes if prefix in set_by), ""):
-                problems.append(replace(problem, source=by))
-            else:
-                problems.append(replace(problem, source=label, line=located.line_of(problem.path)))
+            by = innermost(set_by, problem.path, "")
+            line = 0 if by else innermost(located.lines, problem.path, 0)
+            problems.append(replace(problem, source=by or label, line=line))
     if problems:
         order = [label, *options]
         raise CaseError(sorted(problems, key=lambda problem: (order.index(problem.source), problem.line)))
@@ -136,10 +137,10 @@ def put(
     if not isinstance(table, dict):
         raise CaseError([Problem(path, f"{key_text(path[:-1])} is not a table", "set a key of a table")])
     table[key] = value
-    owner = tables_within(kind).get(tuple(parents))
-    groups = owner.alternatives if owner else ()
-    if any(key in group for group in groups):
-        for other in (other for group in groups if key not in group for other in group):
+    owner = tables_within(kind).get(tuple(parents), Table)
+    others = {other for group in owner.alternatives if key not in group for other in group}
+    if any(key in group for group in owner.alternatives):
+        for other in others:
             if (*parents, other) not in kept:
                 table.pop(other, None)
     return created

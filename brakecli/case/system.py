@@ -1,11 +1,14 @@
 """From a case to the numbers that the solver works on."""
 
-from brakecli.case.case import EVENT_TOLERANCE, Case, Profile
+from brakecli.case.case import Case, Profile
 from brakecli.solver.links import coefficients
 from brakecli.solver.method import Method
 from brakecli.solver.roughness import Surface, surface
 from brakecli.solver.schedules import schedule
 from brakecli.solver.system import Initial, System
+
+EVENT_TOLERANCE = 1e-10
+"""Tolerance of event-driven where a case gives it a step."""
 
 
 def system_of(case: Case) -> System:

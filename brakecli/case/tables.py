@@ -4,19 +4,10 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass
 from functools import cache
+from operator import attrgetter
 from typing import Annotated, Any, ClassVar, Self, cast, get_args
 
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    ConfigDict,
-    Field,
-    GetCoreSchemaHandler,
-    GetJsonSchemaHandler,
-    ValidationError,
-    WrapValidator,
-    model_validator,
-)
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, WrapValidator, model_validator
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import InitErrorDetails, PydanticCustomError, core_schema
 
@@ -44,18 +35,19 @@ class OneOf:
 
     names: Callable[[], Iterable[str]]
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
-        """Accept the names alone."""
-        return core_schema.no_info_plain_validator_function(self._checked)
+    def __get_pydantic_core_schema__(self, *_: Any) -> core_schema.CoreSchema:
+        """Accept these names."""
 
-    def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        """List the names."""
+        def checked(value: Any) -> Any:
+            if value not in tuple(self.names()):
+                raise PydanticCustomError("enum", "is not one of the choices")
+            return value
+
+        return core_schema.no_info_plain_validator_function(checked)
+
+    def __get_pydantic_json_schema__(self, *_: Any) -> JsonSchemaValue:
+        """List these names."""
         return {"enum": list(dict.fromkeys(self.names())), "type": "string"}
-
-    def _checked(self, value: Any) -> Any:
-        if value not in tuple(self.names()):
-            raise PydanticCustomError("enum", "is not one of the choices")
-        return value
 
 
 def _within_scale(value: float) -> float:
@@ -100,7 +92,7 @@ class Table(BaseModel):
         frozen=True,
         extra="forbid",
         allow_inf_nan=False,
-        json_schema_extra=lambda schema, model: _describe_alternatives(schema, model),
+        json_schema_extra=lambda schema, model: schema.update(model._alternatives_schema()),
     )
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = ()
@@ -131,13 +123,17 @@ class Table(BaseModel):
 
     def wrong(self, key: str, what: str, remedy: str) -> Problem:
         """The problem with the value of a key, which may be one of an inner table: `output.sample_interval`."""
-        value: Any = self
-        for part in key.split("."):
-            value = getattr(value, part)
-        return Problem(tuple(key.split(".")), what + found(value), remedy)
+        return Problem(tuple(key.split(".")), what + found(attrgetter(key)(self)), remedy)
 
     def _fill(self) -> None:
         """Give the keys that were left out their values, where these depend on other keys."""
+
+    @classmethod
+    def _alternatives_schema(cls) -> dict[str, Any]:
+        groups = [{"required": list(group)} for group in cls.alternatives]
+        if not groups:
+            return {}
+        return {"oneOf": groups} if cls.one_is_needed else {"not": {"allOf": groups}}
 
     @model_validator(mode="wrap")
     @classmethod
@@ -149,7 +145,7 @@ class Table(BaseModel):
         except ValidationError as error:
             if not isinstance(data, dict):
                 raise
-            errors = _again(error)
+            errors = [*_again(error)]
             table = cls._without({str(each["loc"][0]) for each in errors}, data)
         # A rule that needs a wrong key meets no attribute: it waits until that key is right.
         with suppress(AttributeError) if errors else nullcontext():
@@ -184,16 +180,11 @@ def _as_error(problem: Problem) -> InitErrorDetails:
     return InitErrorDetails(type=kind, loc=problem.path, input=None)
 
 
-def _again(error: ValidationError, most: int | None = None) -> list[InitErrorDetails]:
+def _again(error: ValidationError, most: int | None = None) -> Iterator[InitErrorDetails]:
     """The errors of a validation, or the first of them, in a form that can be raised again."""
-    return [
-        InitErrorDetails(
-            type=PydanticCustomError(each["type"], each["type"], each.get("ctx")),
-            loc=each["loc"],
-            input=each["input"],
-        )
-        for each in error.errors(include_url=False)[:most]
-    ]
+    for each in error.errors(include_url=False)[:most]:
+        kind = PydanticCustomError(each["type"], each["type"], each.get("ctx"))
+        yield InitErrorDetails(type=kind, loc=each["loc"], input=each["input"])
 
 
 @cache
@@ -218,14 +209,6 @@ class _TomlSchema(GenerateJsonSchema):
         if described.get("default", 0) is None:
             del described["default"]
         return described
-
-
-def _describe_alternatives(schema: dict[str, Any], model: type[Table]) -> None:
-    groups = [{"required": list(group)} for group in model.alternatives]
-    if groups and model.one_is_needed:
-        schema["oneOf"] = groups
-    elif groups:
-        schema["not"] = {"allOf": groups}
 
 
 def json_schema(kind: type[Table]) -> dict[str, Any]:

@@ -6,7 +6,8 @@ into its statements, and each of them is parsed by itself.
 
 import re
 import tomllib
-from typing import Any, NamedTuple
+from collections.abc import Mapping
+from typing import Any, TypeVar
 
 from brakecli.errors import CaseError, KeyPath, Problem, printable
 
@@ -29,6 +30,7 @@ _TOKEN = re.compile(
     r"|[\[\]{}.,=]",
     re.DOTALL,
 )
+_Value = TypeVar("_Value")
 _HEADER = re.compile(r"[ \t]*\[")
 _NOTHING = re.compile(r"[ \t\n]*(#.*)?", re.DOTALL)
 _POSITION = re.compile(r" \(at (?:line (\d+), column \d+|end of document)\)$")
@@ -37,27 +39,29 @@ WRITING = "numbers are written 1.5 or 2e-3, texts in quotes, lists as [1, 2], ta
 """The remedy for what is not TOML."""
 
 
-class Statement(NamedTuple):
-    """A table header or a key with its value, and the line where it begins."""
-
-    line: int
-    text: str
-
-
 def unfit(what: str, remedy: str, source: str = "", line: int = 0) -> CaseError:
     """The error for a text of which no key can be named."""
     return CaseError([Problem((), what, remedy, source, line)])
 
 
-def too_large(source: str) -> CaseError:
-    """The error for a text of more than `LARGEST_TEXT` bytes."""
-    return unfit(f"is larger than {LARGEST_TEXT} bytes", "give a shorter file", source)
-
-
-def split(text: str, source: str = "") -> list[Statement]:
-    """The statements of a text, valid or not; raises `CaseError` for a text that tomllib must not get."""
+def check_size(text: str | bytes, source: str = "") -> None:
+    """Raise `CaseError` for more than `LARGEST_TEXT` bytes."""
     if len(text) > LARGEST_TEXT:
-        raise too_large(source)
+        raise unfit(f"is larger than {LARGEST_TEXT} bytes", "give a shorter file", source)
+
+
+def innermost(values: Mapping[KeyPath, _Value], path: KeyPath, default: _Value) -> _Value:
+    """The value of a key path, otherwise that of the innermost table around it."""
+    prefixes = (path[:end] for end in range(len(path), 0, -1))
+    return next((values[prefix] for prefix in prefixes if prefix in values), default)
+
+
+def split(text: str, source: str = "") -> list[tuple[int, str]]:
+    """Headers and keys with their values, valid or not, each with the line where it begins.
+
+    Raises `CaseError` for a text that tomllib must not get.
+    """
+    check_size(text, source)
     if text.startswith("\ufeff"):
         raise unfit("begins with a byte order mark", "save the file as UTF-8 without one", source, 1)
     if "\0" in text:
@@ -83,14 +87,15 @@ def split(text: str, source: str = "") -> list[Statement]:
                 raise unfit(what, "give shorter lists", source, line)
         line += mark.count("\n")
         if mark[0] == "\n" and (depth <= 0 or in_header):
-            statements.append(Statement(first, text[start : token.start()]))
+            statements.append((first, text[start : token.start()]))
             start, first, depth = token.end(), line, 0
             in_header = _HEADER.match(text, start)
-    statements.append(Statement(first, text[start:]))
-    statements = [statement for statement in statements if not _NOTHING.fullmatch(statement.text)]
+    statements = [
+        (line, part) for line, part in (*statements, (first, text[start:])) if not _NOTHING.fullmatch(part)
+    ]
     if len(statements) > MOST_STATEMENTS:
-        line = statements[MOST_STATEMENTS].line
-        raise unfit(f"there are more than {MOST_STATEMENTS} keys", "give a shorter file", source, line)
+        what = f"there are more than {MOST_STATEMENTS} keys"
+        raise unfit(what, "give a shorter file", source, statements[MOST_STATEMENTS][0])
     return statements
 
 
@@ -100,9 +105,9 @@ class Located:
     def __init__(self, text: str, source: str = "") -> None:
         """Parse statement after statement. Raises `CaseError` where the text cannot be split into statements."""
         self.data: dict[str, Any] = {}
+        self.lines: dict[KeyPath, int] = {}
         self.problems: list[Problem] = []
         self._source = source
-        self.lines: dict[KeyPath, int] = {}
         table: dict[str, Any] | None = self.data
         path: KeyPath = ()
         for line, statement in split(text, source):
@@ -118,11 +123,6 @@ class Located:
                 table, path = self._enter(parsed, line)
             elif table is not None:
                 self._add(table, path, parsed, line)
-
-    def line_of(self, path: KeyPath) -> int:
-        """The line of a key, otherwise that of the innermost table around it; 0 if there is none."""
-        prefixes = (path[:end] for end in range(len(path), 0, -1))
-        return next((self.lines[prefix] for prefix in prefixes if prefix in self.lines), 0)
 
     def _enter(self, parsed: dict[str, Any], line: int) -> tuple[dict[str, Any] | None, KeyPath]:
         """The table of a header, given as what tomllib makes of it; the keys that follow belong to this table."""
@@ -161,7 +161,7 @@ class Located:
                 self.lines.setdefault(here, line)
 
     def _report_twice(self, path: KeyPath, line: int) -> None:
-        first = self.line_of(path)
+        first = innermost(self.lines, path, 0)
         what = "is given twice" + (f", first in line {first}" if first else "")
         self.problems.append(Problem(path, what, "keep one of the two", self._source, line))
 

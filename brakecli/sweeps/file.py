@@ -7,7 +7,7 @@ from pathlib import Path
 import tomli_w
 
 from brakecli.case.read import LoadedCase, key_path, parse_case, parse_table, read_text
-from brakecli.case.toml_lines import Located
+from brakecli.case.toml_lines import Located, innermost
 from brakecli.errors import CaseError, KeyPath, Problem
 from brakecli.sweeps.plan import Plan, given_toml
 from brakecli.sweeps.tables import Sweep
@@ -88,11 +88,11 @@ def _wrong_values(plan: Plan, text: str, label: str) -> list[Problem]:
         tries.append((("axis", index, "parameter"), axis.parameter, ends))
     if (critical := plan.sweep.critical) is not None:
         tries.append((("critical", "parameter"), (critical.parameter,), (critical.lower, critical.upper)))
-    located = Located(text, label)
+    lines = Located(text, label).lines
     corners = [{}, plan.settings(0), plan.settings(plan.points - 1)]
     problems: dict[tuple[int, str], Problem] = {}
     for place, parameters, values in tries:
-        line = located.line_of(place)
+        line = innermost(lines, place, 0)
         for value in values:
             settings = {key_path(parameter): value for parameter in parameters}
             found = [plan.problems(corner | settings) for corner in corners]
