@@ -18,7 +18,7 @@ from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
 from brakecli.solver.roughness import TWO_PI
 from brakecli.sweeps.critical import Outcome, Search, search
-from brakecli.sweeps.file import is_sweep, read_sweep
+from brakecli.sweeps.file import kind_of, read_sweep
 from brakecli.sweeps.point import simulate
 from brakecli.sweeps.tables import Critical
 from tests.campaign import campaign, differences
@@ -68,8 +68,8 @@ def test_every_file_beside_the_cases_reads() -> None:
     kinds = {True: 0, False: 0}
     for path in sorted(FOLDER.glob("*.toml")):
         text = path.read_text()
-        kinds[is_sweep(str(path))] += 1
-        if is_sweep(str(path)):
+        kinds[(kind_of(str(path)) == "sweep")] += 1
+        if kind_of(str(path)) == "sweep":
             assert read_sweep(str(path)).plan.points > 1
         else:
             system_of(parse_case(text, path.name).case)

@@ -11,7 +11,7 @@ import tomli_w
 from pydantic import Field
 
 from brakecli.case import tables
-from brakecli.case.tables import NonNegative, Number, OneOf, Positive, Schedule, Series, Table, entries, quantity
+from brakecli.case.tables import NonNegative, Number, OneOf, Positive, Schedule, Series, Table, described, quantity
 from brakecli.errors import Problem, found
 from brakecli.solver.contact import EVALUATORS
 from brakecli.solver.method import MOST
@@ -83,14 +83,11 @@ class Contact(Table):
 
     half_length: Positive = quantity("m", "half length a of the contact")
     stiffness: Positive = quantity("N/m²", "stiffness k of the contact per unit of its length")
-    evaluator: Annotated[str, OneOf(lambda: EVALUATORS)] = Field(
-        "auto", description='how the contact force is computed; "auto" takes the cheapest'
+    evaluator: Annotated[str, OneOf(lambda: EVALUATORS)] = described(
+        'how the contact force is computed; "auto" takes the cheapest', "auto"
     )
-    nodes: int | None = Field(
-        None,
-        ge=2,
-        le=10_000_000,
-        description='quadrature nodes of "midpoint", chosen from the shortest wavelength if left out',
+    nodes: Annotated[int, Field(ge=2, le=10_000_000)] | None = described(
+        'quadrature nodes of "midpoint", chosen from the shortest wavelength if left out', None
     )
 
 
@@ -117,16 +114,15 @@ class Profile(Table):
 class Roughness(Table):
     """The profiles of both surfaces; a surface without one is smooth."""
 
-    shoe: Profile | None = Field(None, description="profile f1 of the shoe")
-    wheel: Profile | None = Field(None, description="profile f2 of the wheel")
+    shoe: Profile | None = described("profile f1 of the shoe", None)
+    wheel: Profile | None = described("profile f2 of the wheel", None)
 
 
 class Initial(Table):
     """The state at t = 0."""
 
-    at: Literal["rest", "equilibrium"] = Field(
-        "rest",
-        description="the state that x, y, vx and vy are added to: the origin, or the steady sliding of the case",
+    at: Literal["rest", "equilibrium"] = described(
+        "the state that x, y, vx and vy are added to: the origin, or the steady sliding of the case", "rest"
     )
     x: Number = quantity("m", "tangential displacement", 0.0)
     y: Number = quantity("m", "normal displacement", 0.0)
@@ -140,9 +136,8 @@ class Solver(Table):
     alternatives = (("step",), ("tolerance",))
     one_is_needed = False
 
-    scheme: Annotated[str, OneOf(lambda: (*SCHEMES, "auto"))] = Field(
-        "auto",
-        description='the time-stepping scheme; "two-layer" with a step, otherwise "auto", which chooses one',
+    scheme: Annotated[str, OneOf(lambda: (*SCHEMES, "auto"))] = described(
+        'the time-stepping scheme; "two-layer" with a step, otherwise "auto", which chooses one', "auto"
     )
     theta: tables.Weights = quantity(
         "1",
@@ -150,19 +145,18 @@ class Solver(Table):
         "three that add up to 1 for three-layer, 0.25, 0.5 and 0.25 if left out; none for event-driven",
         default_factory=tuple,
     )
-    iteration: Annotated[str, OneOf(lambda: MOST)] = Field(
-        "newton", description='how the equations of a step are solved; "fixed-point" is the paper\'s way'
+    iteration: Annotated[str, OneOf(lambda: MOST)] = described(
+        'how the equations of a step are solved; "fixed-point" is the paper\'s way', "newton"
     )
-    start: Annotated[str, OneOf(lambda: [start for row in SCHEMES.values() for start in row.starts])] = Field(
-        "consistent",
-        description='how the second layer of three-layer is found; "paper" sets it equal to the first',
+    start: Annotated[str, OneOf(lambda: [start for row in SCHEMES.values() for start in row.starts])] = described(
+        'how the second layer of three-layer is found; "paper" sets it equal to the first', "consistent"
     )
     step: Positive | None = quantity("s", "time step h; or tolerance instead", None)
     tolerance: tables.Tolerance | None = quantity(
         "1", "largest relative error of the histories, 0.001 if there is no step either", None
     )
     duration: Positive = quantity("s", "time to simulate")
-    allow_unconverged: bool = Field(False, description="whether a run goes on after a step that did not converge")
+    allow_unconverged: bool = described("whether a run goes on after a step that did not converge", False)
 
     def _fill(self) -> None:
         if "scheme" not in self.model_fields_set and self.step is not None:
@@ -192,7 +186,7 @@ class Solver(Table):
                 if getattr(self, key) != value:
                     yield self.wrong(key, f"is not for {self.scheme}", f"leave {key} out")
         elif len(self.theta) != count:
-            what = f"has {entries(self.theta)} where {self.scheme} has {count} weights"
+            what = f"has {tables.entries(self.theta)} where {self.scheme} has {count} weights"
             yield self.wrong("theta", what, f"give {count} weights, or leave theta out")
         elif row.sum_is_one and abs(sum(self.theta) - 1) > 1e-9:
             yield self.wrong("theta", f"adds up to {sum(self.theta):.12g}", "let the weights add up to 1")
@@ -221,8 +215,8 @@ class Case(Table):
     title: tables.Title = ""
     shoe: Shoe
     wheel: Wheel
-    link1: Link = Field(description="the link that is inclined by β to the vertical")
-    link2: Link = Field(description="the link that is inclined by α to the friction plane")
+    link1: Link = described("the link that is inclined by β to the vertical")
+    link2: Link = described("the link that is inclined by α to the friction plane")
     load: Load
     friction: Friction
     contact: Contact

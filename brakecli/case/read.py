@@ -74,11 +74,11 @@ def read_text(source: str) -> tuple[str, str]:
 
 
 def parse_case(text: str, label: str, overrides: Sequence[str] = ()) -> LoadedCase:
-    """Make a case of a TOML text; messages call it `label`. Raises `CaseError`, which holds every problem.
+    """Make a case of a TOML text, which messages call `label`. Raises `CaseError`, which holds every problem.
 
     An override reads `key.path=VALUE`, the value in TOML. It replaces what the text says, creates the tables
     that it needs, and takes effect before anything is checked. Of two keys that exclude each other (a constant
-    load or a schedule, wavelengths or wavenumbers), an override of one removes the other from the text.
+    load or a schedule), an override of one removes the other from the text.
     """
     case = parse_table(Case, text, label, overrides)
     return LoadedCase(case, text, resolved_toml(case))
@@ -92,9 +92,9 @@ def parse_table(kind: type[_Table], text: str, label: str, overrides: Sequence[s
     except CaseError as error:
         data, problems = located.data, located.problems or [*error.problems]
     all_is_readable = all(problem.path for problem in problems)
-    options = [f"--set {printable(override)}" for override in overrides]
-    set_by: dict[KeyPath, str] = {}
-    for option, override in zip(options, overrides, strict=True):
+    sources, set_by = [label], dict[KeyPath, str]()
+    for override in overrides:
+        sources.append(option := f"--set {printable(override)}")
         try:
             path, value = parse_override(override)
             created = put(data, path, value, kind, kept=set_by)
@@ -112,13 +112,12 @@ def parse_table(kind: type[_Table], text: str, label: str, overrides: Sequence[s
             line = 0 if by else innermost(located.lines, problem.path, 0)
             problems.append(replace(problem, source=by or label, line=line))
     if problems:
-        order = [label, *options]
-        raise CaseError(sorted(problems, key=lambda problem: (order.index(problem.source), problem.line)))
+        raise CaseError(sorted(problems, key=lambda problem: (sources.index(problem.source), problem.line)))
     return table
 
 
 def put(
-    data: dict[str, Any], path: tuple[str, ...], value: object, kind: type[Table], kept: Container[KeyPath] = ()
+    data: dict[str, Any], path: tuple[str, ...], value: object, kind: type[Table], kept: Container[KeyPath]
 ) -> list[tuple[str, ...]]:
     """Set a key in the data of a table of some kind; the paths of the tables that were created for it.
 

@@ -24,9 +24,14 @@ MOST_WRONG_ENTRIES = 20
 MISSING = "is missing"
 
 
+def described(description: str, default: Any = ..., **options: Any) -> Any:
+    """A key, which is required if it has no default."""
+    return Field(default, description=description, **options)
+
+
 def quantity(unit: str, description: str, default: Any = ..., **options: Any) -> Any:
-    """A key that holds a number or numbers; it is required if it has no default."""
-    return Field(default, description=description, json_schema_extra={"unit": unit}, **options)
+    """A key that holds a number or numbers."""
+    return described(description, default, json_schema_extra={"unit": unit}, **options)
 
 
 @dataclass(frozen=True)

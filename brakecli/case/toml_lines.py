@@ -90,9 +90,8 @@ def split(text: str, source: str = "") -> list[tuple[int, str]]:
             statements.append((first, text[start : token.start()]))
             start, first, depth = token.end(), line, 0
             in_header = _HEADER.match(text, start)
-    statements = [
-        (line, part) for line, part in (*statements, (first, text[start:])) if not _NOTHING.fullmatch(part)
-    ]
+    statements.append((first, text[start:]))
+    statements = [statement for statement in statements if not _NOTHING.fullmatch(statement[1])]
     if len(statements) > MOST_STATEMENTS:
         what = f"there are more than {MOST_STATEMENTS} keys"
         raise unfit(what, "give a shorter file", source, statements[MOST_STATEMENTS][0])

@@ -57,24 +57,15 @@ def parse_sweep(text: str, label: str, folder: Path, overrides: Sequence[str] = 
     return LoadedSweep(sweep, text, resolved, base, plan)
 
 
-def is_sweep(path: str) -> bool:
-    """Whether a file is meant to be a sweep: it has keys that no case has."""
-    keys = _keys(path)
-    return bool(keys & {"case", "axis", "critical"}) and "shoe" not in keys
-
-
-def is_case(path: str) -> bool:
-    """Whether a file is meant to be a case: it has keys that no sweep has."""
-    keys = _keys(path)
-    return "shoe" in keys and not keys & {"axis", "critical"}
-
-
-def _keys(path: str) -> set[str]:
-    """The keys at the top of a file, as far as they can be read."""
+def kind_of(path: str) -> str:
+    """What a file is meant to be, by its keys at the top: "case", "sweep", or neither."""
     try:
-        return set(Located(*read_text(path)).data)
+        keys = set(Located(*read_text(path)).data)
     except CaseError:
-        return set()
+        return ""
+    if "shoe" in keys:
+        return "" if keys & {"axis", "critical"} else "case"
+    return "sweep" if keys & {"case", "axis", "critical"} else ""
 
 
 def _wrong_values(plan: Plan, text: str, label: str) -> list[Problem]:

@@ -97,12 +97,11 @@ class Plan:
         try:
             return Case.model_validate(data)
         except ValidationError as error:
-            wanted = {each["loc"] for each in error.errors(include_url=False) if each["type"] == "int_type"}
-            whole = {
-                path: int(value)  # a range holds floats, also where the key takes whole numbers
-                for path, value in settings.items()
-                if path in wanted and isinstance(value, float) and value.is_integer()
+            # A range holds floats, also where the key takes whole numbers.
+            wanted = {
+                each["loc"]: settings.get(each["loc"]) for each in error.errors() if each["type"] == "int_type"
             }
+            whole = {k: int(v) for k, v in wanted.items() if isinstance(v, float) and v.is_integer()}
             if whole:
                 return self.case({**settings, **whole})
             problems = [replace(each, source="the point") for each in wording.problems(error, Case)]

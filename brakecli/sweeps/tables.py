@@ -2,44 +2,38 @@
 
 import math
 from collections.abc import Iterator
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
 from brakecli.case.read import key_path
-from brakecli.case.tables import MISSING, Number, Positive, Table, Title, from_list
+from brakecli.case.tables import MISSING, Number, Positive, Table, Title, described, from_list
 from brakecli.errors import Problem, found
-
-Direction = Literal["up", "down", "both"]
-"""How the motion is followed along an axis, where each point starts from the end of the one before it."""
 
 
 class Axis(Table):
     """One axis of the grid: the key paths that it sets, together, and the values that they take."""
 
-    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("start", "stop", "num"), ("values",))
+    alternatives = (("start", "stop", "num"), ("values",))
 
     parameter: Annotated[
         tuple[str, ...],
-        Field(
-            min_length=1,
-            description="key path of the case, or a list of key paths that take the same values",
-            json_schema_extra={"type": ["string", "array"]},
-        ),
         *from_list,
         BeforeValidator(lambda value: (value,) if isinstance(value, str) else value),
-    ]
-    start: Number | None = Field(None, description="first value")
-    stop: Number | None = Field(None, description="last value")
-    num: int | None = Field(None, ge=1, description="number of values")
-    spacing: Literal["linear", "log"] = Field(
-        "linear", description="how the values lie between the first and last"
+    ] = described(
+        "key path of the case, or a list of key paths that take the same values",
+        min_length=1,
+        json_schema_extra={"type": ["string", "array"]},
     )
-    values: Annotated[tuple[Any, ...], Field(min_length=1), *from_list] | None = Field(
-        None, description="the values themselves"
+    start: Number | None = described("first value", None)
+    stop: Number | None = described("last value", None)
+    num: Annotated[int, Field(ge=1)] | None = described("number of values", None)
+    spacing: Literal["linear", "log"] = described("how the values lie between the first and last", "linear")
+    values: Annotated[tuple[Any, ...], Field(min_length=1), *from_list] | None = described(
+        "the values themselves", None
     )
-    direction: Direction | None = Field(
-        None, description="follow the motion along this axis: each point starts from the end of the one before"
+    direction: Literal["up", "down", "both"] | None = described(
+        "follow the motion along this axis: each point starts from the end of the one before", None
     )
 
     @property
@@ -61,8 +55,7 @@ class Axis(Table):
         """The value at a place along the axis; both ends of a range are exact."""
         if self.values is not None:
             return self.values[place]
-        assert self.start is not None
-        assert self.stop is not None
+        assert self.start is not None and self.stop is not None  # noqa: PT018 - the rules below
         last = max(self.size - 1, 1)
         if place == last:
             return self.stop
@@ -93,12 +86,12 @@ def _not_a_key_path(text: str) -> Iterator[Problem]:
 class Critical(Table):
     """The parameter whose critical value is sought: the least at which steady sliding loses its stability."""
 
-    parameter: str = Field(description="key path of the case, such as friction.coefficient")
-    lower: Number = Field(description="where the search begins")
-    upper: Number = Field(description="where the search ends")
-    tolerance: Positive = Field(1e-3, description="largest width of the bracket at the end of the search")
-    method: Literal["simulation", "eigenvalue"] = Field(
-        "simulation", description="by the growth of small disturbances in runs, or only by eigenvalues"
+    parameter: str = described("key path of the case, such as friction.coefficient")
+    lower: Number = described("where the search begins")
+    upper: Number = described("where the search ends")
+    tolerance: Positive = described("largest width of the bracket at the end of the search", 1e-3)
+    method: Literal["simulation", "eigenvalue"] = described(
+        "by the growth of small disturbances in runs, or only by eigenvalues", "simulation"
     )
 
     def _broken_rules(self) -> Iterator[Problem]:
@@ -113,22 +106,19 @@ class Sweep(Table):
     """A grid of cases around a base case, and what to find at each of them."""
 
     title: Title = ""
-    case: str = Field(min_length=1, description="the base case's file, seen from the sweep's own")
-    axis: Annotated[
-        tuple[Axis, ...], *from_list, Field(description="the axes of the grid, the last one fastest")
-    ] = ()
-    critical: Critical | None = Field(None, description="the critical parameter to find at each point")
+    case: str = described("the base case's file, seen from the sweep's own", min_length=1)
+    axis: Annotated[tuple[Axis, ...], *from_list] = described("the axes of the grid, the last one fastest", ())
+    critical: Critical | None = described("the critical parameter to find at each point", None)
 
     def _broken_rules(self) -> Iterator[Problem]:
         if not self.axis and self.critical is None:
             yield Problem(("axis",), MISSING, "give at least one [[axis]], or [critical]")
         taken: set[tuple[str, ...]] = set()
-        for index, axis in enumerate(self.axis):
-            for text in axis.parameter:
-                if key_path(text) in taken:
-                    path = ("axis", index, "parameter")
-                    yield Problem(path, "is set twice" + found(text), "set each key path once")
-                taken.add(key_path(text))
+        for index, text in ((index, text) for index, axis in enumerate(self.axis) for text in axis.parameter):
+            if key_path(text) in taken:
+                path = ("axis", index, "parameter")
+                yield Problem(path, "is set twice" + found(text), "set each key path once")
+            taken.add(key_path(text))
         if self.critical is not None and key_path(self.critical.parameter) in taken:
             remedy = "look for another parameter, or leave that axis out"
             yield self.wrong("critical.parameter", "is set by an axis", remedy)
