@@ -136,10 +136,9 @@ def put(
     if not isinstance(table, dict):
         raise CaseError([Problem(path, f"{key_text(path[:-1])} is not a table", "set a key of a table")])
     table[key] = value
-    owner = tables_within(kind).get(tuple(parents), Table)
-    others = {other for group in owner.alternatives if key not in group for other in group}
-    if any(key in group for group in owner.alternatives):
-        for other in others:
+    groups = tables_within(kind).get(tuple(parents), Table).alternatives
+    if any(key in group for group in groups):
+        for other in (other for group in groups if key not in group for other in group):
             if (*parents, other) not in kept:
                 table.pop(other, None)
     return created

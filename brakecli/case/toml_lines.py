@@ -11,14 +11,11 @@ from typing import Any, TypeVar
 
 from brakecli.errors import CaseError, KeyPath, Problem, printable
 
-LARGEST_TEXT = 500_000
-"""Most bytes of a file. Within this limit and those below, every problem is reported within half a second."""
-MOST_PARTS = 32
-"""Most parts of a dotted key: the time that tomllib takes grows with their square."""
-MOST_STATEMENTS = 1000
-"""Most keys and table headers of a file: the time to find what is wrong grows with them."""
-MOST_MARKS = 50_000
-"""Most commas, brackets and signs of equality outside texts, and so most entries of all lists together."""
+# Within these limits every problem of a file is reported within half a second.
+LARGEST_TEXT = 500_000  # bytes
+MOST_PARTS = 32  # of a dotted key: the time that tomllib takes grows with their square
+MOST_STATEMENTS = 1000  # keys and table headers
+MOST_MARKS = 50_000  # commas, brackets and signs of equality outside texts; so many entries may all lists have
 
 _TOKEN = re.compile(
     r'"""(?:\\.|[^\\])*?(?:"{3,5}|\\?\Z)'
@@ -115,8 +112,7 @@ class Located:
                 parsed = parse(statement, source, line)
             except CaseError as error:
                 self.problems += error.problems
-                if is_header:
-                    table = None  # nobody knows to which table the next keys belong
+                table = None if is_header else table  # nobody knows to which table the next keys belong
                 continue
             if is_header:
                 table, path = self._enter(parsed, line)

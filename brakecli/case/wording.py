@@ -29,9 +29,8 @@ _WHAT = {
 }
 """The kinds of error that pydantic reports for one value of a case."""
 
-_KINDS = dict(
-    number="a number", integer="a whole number", boolean="true or false", string="one line of text in quotes"
-)
+_TEXT = "one line of text in quotes"
+_KINDS = {"number": "a number", "integer": "a whole number", "boolean": "true or false", "string": _TEXT}
 
 
 def problems(error: ValidationError, kind: type[Table]) -> Iterator[Problem]:

@@ -15,8 +15,6 @@ from brakecli.sweeps.tables import Sweep
 MOST_TRIED = 1000
 """Most listed values of an axis that are tried before the sweep starts. Both ends of a range are always tried."""
 
-_OWN_KEYS = {("case",), ("critical",)}
-
 
 @dataclass(frozen=True)
 class LoadedSweep:
@@ -35,23 +33,21 @@ class LoadedSweep:
 
 
 def read_sweep(source: str, overrides: Sequence[str] = ()) -> LoadedSweep:
-    """Read a sweep from a path, or from standard input where the path is "-". Raises `CaseError`.
-
-    Overrides of `critical` and `case` belong to the sweep, all others to its base case.
-    """
-    folder = Path() if source == "-" else Path(source).parent
-    return parse_sweep(*read_text(source), folder, overrides)
+    """Read a sweep from a path, or from standard input where the path is "-"; see `parse_sweep`."""
+    return parse_sweep(*read_text(source), Path() if source == "-" else Path(source).parent, overrides)
 
 
 def parse_sweep(text: str, label: str, folder: Path, overrides: Sequence[str] = ()) -> LoadedSweep:
-    """Make a sweep of its text; the path of its base case begins at `folder`. Raises `CaseError`."""
-    own = [override for override in overrides if key_path(override.partition("=")[0])[:1] in _OWN_KEYS]
+    """Make a sweep of its text; the path of its base case begins at `folder`. Raises `CaseError`.
+
+    Overrides of `critical` and `case` belong to the sweep, all others to its base case.
+    """
+    own = [each for each in overrides if key_path(each.partition("=")[0])[:1] in (("case",), ("critical",))]
     sweep = parse_table(Sweep, text, label, own)
     others = [override for override in overrides if override not in own]
     base = parse_case(*read_text(str(folder / sweep.case)), others)
     plan = Plan(given_toml(sweep), given_toml(base.case))
-    problems = _wrong_values(plan, text, label)
-    if problems:
+    if problems := _wrong_values(plan, text, label):
         raise CaseError(problems)
     resolved = tomli_w.dumps(sweep.model_dump(mode="json", exclude_none=True))
     return LoadedSweep(sweep, text, resolved, base, plan)

@@ -11,6 +11,12 @@ from brakecli.case.tables import MISSING, Number, Positive, Table, Title, descri
 from brakecli.errors import Problem, found
 
 
+def _not_key_paths(*texts: str) -> Iterator[Problem]:
+    for text in texts:
+        if not key_path(text):
+            yield Problem(("parameter",), "is not a key path" + found(text), 'write it as in "link2.angle_deg"')
+
+
 class Axis(Table):
     """One axis of the grid: the key paths that it sets, together, and the values that they take."""
 
@@ -55,7 +61,8 @@ class Axis(Table):
         """The value at a place along the axis; both ends of a range are exact."""
         if self.values is not None:
             return self.values[place]
-        assert self.start is not None and self.stop is not None  # noqa: PT018 - the rules below
+        assert self.start is not None
+        assert self.stop is not None
         last = max(self.size - 1, 1)
         if place == last:
             return self.stop
@@ -65,8 +72,7 @@ class Axis(Table):
 
     def _broken_rules(self) -> Iterator[Problem]:
         yield from super()._broken_rules()
-        for text in self.parameter:
-            yield from _not_a_key_path(text)
+        yield from _not_key_paths(*self.parameter)
         if self.spacing == "log":
             if self.values is not None:
                 yield self.wrong("spacing", "is only for start and stop", "leave spacing out")
@@ -76,11 +82,6 @@ class Axis(Table):
                     yield self.wrong(key, "is not above 0", "a logarithmic axis needs values above 0")
         if self.direction is not None and not self.numeric:
             yield self.wrong("direction", "needs numbers to follow", "leave it out")
-
-
-def _not_a_key_path(text: str) -> Iterator[Problem]:
-    if not key_path(text):
-        yield Problem(("parameter",), "is not a key path" + found(text), 'write it as in "link2.angle_deg"')
 
 
 class Critical(Table):
@@ -99,7 +100,7 @@ class Critical(Table):
             yield self.wrong("upper", "is not above lower", "give a range to search in")
         elif self.tolerance < 1e-12 * max(abs(self.lower), abs(self.upper)):
             yield self.wrong("tolerance", "is below the rounding of the parameter", "widen it")
-        yield from _not_a_key_path(self.parameter)
+        yield from _not_key_paths(self.parameter)
 
 
 class Sweep(Table):
