@@ -17,8 +17,7 @@ from brakecli.solver.contact import EVALUATORS
 from brakecli.solver.method import MOST
 from brakecli.solver.schemes import SCHEMES, Scheme
 
-DEFAULT_TOLERANCE = 1e-3
-"""Relative error of the histories where a case gives neither step nor tolerance."""
+DEFAULT_TOLERANCE = 1e-3  # relative error of the histories where a case gives neither step nor tolerance
 
 
 class Shoe(Table):

@@ -13,20 +13,10 @@ from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
-from brakecli.case import wording
+from brakecli.case import toml_lines, wording
 from brakecli.case.case import Case, resolved_toml
 from brakecli.case.tables import MISSING, Table, tables_within
-from brakecli.case.toml_lines import (
-    LARGEST_TEXT,
-    MOST_PARTS,
-    WRITING,
-    Located,
-    check_size,
-    innermost,
-    parse,
-    split,
-    unfit,
-)
+from brakecli.case.toml_lines import WRITING, Located, check_size, innermost, parse, split, unfit
 from brakecli.errors import CaseError, KeyPath, Problem, key_text, printable
 
 _Table = TypeVar("_Table", bound=Table)
@@ -56,7 +46,7 @@ def read_text(source: str) -> tuple[str, str]:
     name = "standard input" if source == "-" else source
     try:
         with nullcontext(sys.stdin.buffer) if source == "-" else Path(source).open("rb") as file:
-            data = file.read(LARGEST_TEXT + 1)
+            data = file.read(toml_lines.LARGEST_TEXT + 1)
     except (OSError, ValueError, AttributeError) as error:
         # ValueError: a NUL in the path, or standard input is closed; AttributeError: there is no standard input.
         reason = getattr(error, "strerror", None) or str(error)
@@ -169,7 +159,9 @@ def parse_override(override: str) -> tuple[tuple[str, ...], object]:
 
 def key_path(text: str) -> tuple[str, ...]:
     """The parts of a key path as TOML writes it; none if it is not one."""
-    if "\n" in text or text.count(".") >= MOST_PARTS:  # the time that tomllib takes grows with their square
+    if (
+        "\n" in text or text.count(".") >= toml_lines.MOST_PARTS
+    ):  # the time that tomllib takes grows with their square
         return ()
     try:
         rest: Any = parse(f"{text}=0")

@@ -15,22 +15,16 @@ from brakecli.solver.records import PROBLEM, WORK, Coefficients, Weights, new
 from brakecli.solver.roughness import surface
 from brakecli.solver.system import System
 
-RESOLVED = 20
-"""Steps per period (and per passing wave) below which a warning names the number."""
+RESOLVED = 20  # steps per period, and per passing wave, below which a warning names the number
 
 
 @dataclass(frozen=True)
 class StepLimits:
-    """How one step of the scheme takes the contact.
+    """How one step of the scheme takes the contact."""
 
-    `contraction`: bound of the factor by which the paper's fixed-point iteration changes its error, above one it
-    may diverge. `unique`: whether a step is sure to have one solution. `growth`: by how much the scheme itself
-    multiplies a disturbance of the frictionless, fully touching shoe in a step: above one it is unstable.
-    """
-
-    contraction: float
-    unique: bool
-    growth: float
+    contraction: float  # bound of the factor of the error in a fixed-point iteration: above 1 it may diverge
+    unique: bool  # whether a step is sure to have one solution
+    growth: float  # factor of a disturbance of the frictionless, fully touching shoe: above 1 it is unstable
 
 
 def step_limits(system: System, step: float | None = None) -> StepLimits:

@@ -19,15 +19,13 @@ Complex = NDArray[np.complex128]
 
 @dataclass(frozen=True)
 class Mode:
-    """One mode of the linearised motion: growth rate (1/s), frequency (Hz), damping ratio (negative: it grows),
-    and the shape as y/x: its size and its phase (deg), None where x does not move.
-    """
+    """One mode of the linearised motion."""
 
-    growth: float
-    frequency: float
-    damping_ratio: float
-    shape: float | None
-    shape_phase: float | None
+    growth: float  # rate, 1/s
+    frequency: float  # Hz
+    damping_ratio: float  # negative where it grows
+    shape: float | None  # y/x, None where x does not move
+    shape_phase: float | None  # of y/x, deg
 
 
 @dataclass(frozen=True)
@@ -65,11 +63,8 @@ def eigensystem(c: Coefficients, contact_stiffness: float, grip: float) -> tuple
         vectors = np.array([_null_vector(s, square) for square in squares]).T
         roots = np.sqrt(-squares)
         return np.concatenate([roots, -roots]), np.concatenate([vectors, vectors], axis=1)
-    matrix = np.zeros((4, 4))
-    matrix[:2, 2:] = np.eye(2)
-    matrix[2:, :2] = -s
-    matrix[2:, 2:] = -np.array([[c.b_xx, c.b_xy], [c.b_xy, c.b_yy]]) / c.m
-    values, vectors = np.linalg.eig(matrix)
+    damping = np.array([[c.b_xx, c.b_xy], [c.b_xy, c.b_yy]]) / c.m
+    values, vectors = np.linalg.eig(np.block([[np.zeros((2, 2)), np.eye(2)], [-s, -damping]]))
     return values.astype(complex), vectors[:2].astype(complex)
 
 

@@ -20,8 +20,7 @@ from brakecli.solver.records import Coefficients
 from brakecli.solver.steady_sliding import SteadySliding, steady_sliding, tabulated
 from brakecli.solver.system import System
 
-LARGEST_FRICTION = 10.0
-"""Up to here a critical friction coefficient is looked for on rough surfaces, whose stiffness depends on it."""
+LARGEST_FRICTION = 10.0  # to which rough surfaces are searched, whose stiffness depends on friction
 FRICTIONS = 401
 MARGIN = 1e-9  # growth per step that counts as growth: above the rounding of simple eigenvalues
 _CLEAR_MARGIN = 1e-6  # above that of double ones, where a direction has no spring
@@ -31,19 +30,13 @@ StiffnessAt = Callable[[float], float]
 
 @dataclass(frozen=True)
 class Discrete:
-    """What the case's scheme makes of the same motion at its step.
+    """What the case's scheme makes of the same motion at its step."""
 
-    `spectral_radius`: factor of the fastest disturbance in a step at the case's φ (in a sample interval, where the
-    scheme finds its steps itself); `growth` (1/s) is its logarithm over that time. `step_limit` (s): the
-    frictionless shoe is stable below; None where any step is. `critical_friction`: where the radius passes one,
-    `bias` its distance from the exact one.
-    """
-
-    spectral_radius: float
-    growth: float
-    step_limit: float | None
-    critical_friction: float | None
-    bias: float | None
+    spectral_radius: float  # factor of the fastest disturbance in a step, or sample interval if steps are its own
+    growth: float  # 1/s, its logarithm over that time
+    step_limit: float | None  # s, below which the frictionless shoe is stable; None where any step is
+    critical_friction: float | None  # where the radius passes one
+    bias: float | None  # its distance from the exact one
 
 
 @dataclass(frozen=True)
@@ -164,17 +157,14 @@ def _rough_crossings(c: Coefficients, belt: float, stiffness_at: StiffnessAt) ->
     return found
 
 
-def _discrete(
-    system: System, stiffness_at: StiffnessAt, exact: Crossing | None, fastest: float
-) -> Discrete | None:
-    """What the scheme makes of steady sliding, which grows with `fastest` (1/s); None without contact."""
+def _discrete(system: System, stiffness_at: StiffnessAt, exact: Crossing | None, rate: float) -> Discrete | None:
+    """What the scheme makes of steady sliding, which grows at a rate (1/s); None without contact."""
     phi, h = system.coefficients.phi, system.weights.h
     if system.belt_speed == 0.0 or not stiffness_at(phi) > 0.0:
         return None
     if system.method.own_steps:  # the motion itself
-        return Discrete(
-            math.exp(fastest * h), fastest, None, exact.friction if exact else None, 0.0 if exact else None
-        )
+        critical, bias = (exact.friction, 0.0) if exact else (None, None)
+        return Discrete(math.exp(rate * h), rate, None, critical, bias)
     radius = spectral_radius(system, stiffness_at(phi), phi)
     critical = discrete_critical(system, stiffness_at, exact)
     return Discrete(
