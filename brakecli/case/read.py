@@ -159,9 +159,7 @@ def parse_override(override: str) -> tuple[tuple[str, ...], object]:
 
 def key_path(text: str) -> tuple[str, ...]:
     """The parts of a key path as TOML writes it; none if it is not one."""
-    if (
-        "\n" in text or text.count(".") >= toml_lines.MOST_PARTS
-    ):  # the time that tomllib takes grows with their square
+    if "\n" in text or text.count(".") >= toml_lines.MOST_PARTS:
         return ()
     try:
         rest: Any = parse(f"{text}=0")

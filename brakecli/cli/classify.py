@@ -71,7 +71,7 @@ def _classify_signal(
 
     if quantity not in set(Measurand):
         raise UsageError(f"--quantity {quantity}: is not known; give one of {', '.join(Measurand)}")
-    for name, value in {**machine, "sample_rate": reading["sample_rate"]}.items():
+    for name, value in machine.items():
         if value is not None and not (math.isfinite(value) and (value > 0.0 or name == "belt_speed")):
             raise UsageError(f"--{name.replace('_', '-')} {value}: is not a positive number; give one in SI units")
     signal = read_signal(source, **reading)

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from brakecli.files import fields
+from brakecli.files.field import Field, named
 from brakecli.solver.quantities import COEFFICIENTS
 
 if TYPE_CHECKING:  # what one command prints need not wait for the modules of the others
@@ -46,23 +48,34 @@ class Column(NamedTuple):
     form: str = ".6g"
 
 
+def _rows(known: Iterable[Field], numbers: Mapping[str, Any], *names: str) -> list[Row]:
+    """A row for each of these fields, with the label and the unit that are declared."""
+    return [
+        Row(field.title, numbers[field.name], "of the time", ".2%")
+        if field.units == "1"
+        else Row(field.title, numbers[field.name], field.units)
+        for field in named(known, *names)
+    ]
+
+
+def _columns(known: Iterable[Field], *names: str) -> tuple[Column, ...]:
+    """A column for each of these fields, with the label and the unit that are declared."""
+    return tuple(
+        Column(field.name, f"{field.title}, {field.units}" if field.units not in ("", "1") else field.title, ".5g")
+        for field in named(known, *names)
+    )
+
+
 ALONG_A_KEY = (
     Column("critical_friction", "critical friction"),
     Column("instability", "instability"),
     Column("discrete_critical_friction", "as the scheme has it"),
 )
-POINTS = (
-    Column("regime", "regime"),
-    Column("frequency", "frequency, Hz", ".5g"),
-    Column("amplitude", "amplitude, m", ".5g"),
-)
+POINTS = _columns(fields.POINT, "regime", "frequency", "amplitude")
 CRITICAL_POINTS = (
-    Column("regime", "regime"),
-    Column("critical", "critical", ".5g"),
-    Column("critical_error", "±", ".5g"),
-    Column("critical_eigenvalue", "by eigenvalues", ".5g"),
-    Column("critical_sustained", "vibrates from", ".5g"),
-    Column("critical_status", "search"),
+    *_columns(fields.POINT, "regime"),
+    *_columns(fields.CRITICAL, "critical", "critical_error", "critical_eigenvalue", "critical_sustained"),
+    *_columns(fields.CRITICAL, "critical_status"),
 )
 ENTRIES = (
     Column("method", "method"),
@@ -85,9 +98,7 @@ def run_table(report: RunReport) -> str:
     rows = [
         Row("failed", [numbers["failure"]] if report.failed else []),
         *_verdict_rows(numbers),
-        Row("peak of the spectrum of vx", numbers["spectrum_peak"], "Hz"),
-        Row("mean friction force", numbers["mean_friction_force"], "N"),
-        Row("braking torque", numbers["braking_torque"], "N m"),
+        *_rows(fields.RUN, numbers, "spectrum_peak", "mean_friction_force", "braking_torque"),
         Row("settled part", f"from {numbers['settled_from']:.4g} s on"),
         Row("scheme", _scheme(system.method)),
         Row("tolerance", [report.certificate.sentence()] if report.certificate else []),
@@ -122,10 +133,7 @@ def _verdict_rows(numbers: Mapping[str, Any]) -> list[Row]:
     return [
         Row("regime", regime if excitation == "none" else f"{regime} ({excitation})"),
         Row("because", "; ".join(numbers["reasons"])),
-        Row("frequency", numbers["frequency"], "Hz"),
-        Row("amplitude of x", numbers["amplitude"], "m"),
-        Row("stick", numbers["stick_fraction"], "of the time", ".2%"),
-        Row("lost contact", numbers["contact_loss_fraction"], "of the time", ".2%"),
+        *_rows(fields.VERDICT, numbers, "frequency", "amplitude", "stick_fraction", "contact_loss_fraction"),
     ]
 
 

@@ -1,4 +1,4 @@
-"""The regime of a stored run, told anew from its history: what `brakecli classify RESULT.h5` does."""
+"""The regime of the run in a result file, found from its history: what `brakecli classify RESULT.h5` does."""
 
 import math
 from dataclasses import dataclass, replace
