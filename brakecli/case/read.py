@@ -162,11 +162,7 @@ def key_path(text: str) -> tuple[str, ...]:
     if "\n" in text or text.count(".") >= toml_lines.MOST_PARTS:
         return ()
     try:
-        rest: Any = parse(f"{text}=0")
+        path, value = toml_lines.only_path(parse(f"{text}=0"))
     except CaseError:
         return ()
-    path: tuple[str, ...] = ()
-    while isinstance(rest, dict) and len(rest) == 1:
-        ((part, rest),) = rest.items()
-        path = (*path, part)
-    return path if rest == 0 else ()
+    return path if value == 0 else ()

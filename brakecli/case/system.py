@@ -12,7 +12,8 @@ EVENT_TOLERANCE = 1e-10  # of event-driven where a case gives it a step
 
 def system_of(case: Case) -> System:
     """The system of a case, with the method that the case asks for."""
-    wheel, load, initial = case.wheel, case.load, case.initial
+    wheel, load, initial, solver = case.wheel, case.load, case.initial, case.solver
+    automatic = solver.scheme == "auto"
     return System(
         coefficients=coefficients(
             mass=case.shoe.mass,
@@ -33,24 +34,17 @@ def system_of(case: Case) -> System:
         layer_stiffness=case.contact.stiffness,
         initial=Initial(initial.x, initial.y, initial.vx, initial.vy, initial.at == "equilibrium"),
         interval=case.output.sample_interval,
-        duration=case.solver.duration,
-        method=method_of(case),
-    )
-
-
-def method_of(case: Case) -> Method:
-    """The method that a case asks for; a scheme that is still to be chosen is event-driven until then."""
-    solver = case.solver
-    automatic = solver.scheme == "auto"
-    return Method(
-        scheme="event-driven" if automatic else solver.scheme,
-        theta=solver.theta,
-        start=solver.start,
-        iteration=solver.iteration,
-        evaluator=case.contact.evaluator,
-        nodes=case.contact.nodes or 0,
-        step=solver.step,
-        tolerance=solver.effective_tolerance or EVENT_TOLERANCE,
-        allow_unconverged=solver.allow_unconverged,
-        automatic=automatic,
+        duration=solver.duration,
+        method=Method(
+            scheme="event-driven" if automatic else solver.scheme,  # until a tolerance chooses one
+            theta=solver.theta,
+            start=solver.start,
+            iteration=solver.iteration,
+            evaluator=case.contact.evaluator,
+            nodes=case.contact.nodes or 0,
+            step=solver.step,
+            tolerance=solver.effective_tolerance or EVENT_TOLERANCE,
+            allow_unconverged=solver.allow_unconverged,
+            automatic=automatic,
+        ),
     )

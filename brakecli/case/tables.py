@@ -18,9 +18,7 @@ from brakecli.solver.schemes import SCHEMES
 SMALLEST, LARGEST = 1e-100, 1e100
 """Magnitudes between which every number other than zero must lie, so that products neither vanish nor overflow."""
 
-MOST_WRONG_ENTRIES = 20
-"""Most wrong entries of one list that are reported."""
-
+MOST_WRONG_ENTRIES = 20  # of one list that are reported
 MISSING = "is missing"
 
 
@@ -66,10 +64,9 @@ def _few_errors(values: Any, handler: Callable[[Any], Any]) -> Any:
     try:
         return handler(values)
     except ValidationError as error:
-        count = error.error_count()
-        if count <= MOST_WRONG_ENTRIES:
+        if error.error_count() <= MOST_WRONG_ENTRIES:
             raise
-        what = f"has {count} wrong entries, of which the first {MOST_WRONG_ENTRIES} are reported"
+        what = f"has {error.error_count()} wrong entries, of which the first {MOST_WRONG_ENTRIES} are reported"
         errors = [*_again(error, MOST_WRONG_ENTRIES), _as_error(Problem((), what, "correct these first"))]
         raise ValidationError.from_exception_data("list", errors) from None
 
@@ -100,10 +97,8 @@ class Table(BaseModel):
         json_schema_extra=lambda schema, model: schema.update(model._alternatives_schema()),
     )
 
-    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = ()
-    """Groups of keys that exclude each other."""
-    one_is_needed: ClassVar[bool] = True
-    """Whether one of these groups must be given."""
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = ()  # groups of keys that exclude each other
+    one_is_needed: ClassVar[bool] = True  # of these groups
 
     def _broken_rules(self) -> Iterator[Problem]:
         """Yield a problem for every rule between keys that does not hold."""

@@ -53,6 +53,15 @@ def innermost(values: Mapping[KeyPath, _Value], path: KeyPath, default: _Value) 
     return next((values[prefix] for prefix in prefixes if prefix in values), default)
 
 
+def only_path(data: Any) -> tuple[tuple[str, ...], Any]:
+    """The path through tables of a single key, and what stands at its end."""
+    path: tuple[str, ...] = ()
+    while isinstance(data, dict) and len(data) == 1:
+        ((key, data),) = data.items()
+        path = (*path, key)
+    return path, data
+
+
 def split(text: str, source: str = "") -> list[tuple[int, str]]:
     """Headers and keys with their values, valid or not, each with the line where it begins.
 
@@ -121,23 +130,22 @@ class Located:
 
     def _enter(self, parsed: dict[str, Any], line: int) -> tuple[dict[str, Any] | None, KeyPath]:
         """The table of a header, given as what tomllib makes of it; the keys that follow belong to this table."""
-        table, rest = self.data, parsed
+        keys, leaf = only_path(parsed)
+        table: Any = self.data
         path: KeyPath = ()
-        while rest:
-            ((key, rest),) = rest.items()
+        for count, key in enumerate(keys, start=1):
+            is_entry = count == len(keys) and isinstance(leaf, list)
             path = (*path, key)
-            inner = table.setdefault(key, [] if isinstance(rest, list) else {})
-            if isinstance(rest, list) and isinstance(inner, list):
+            table = table.setdefault(key, [] if is_entry else {})
+            if is_entry and isinstance(table, list):
                 self.lines.setdefault(path, line)
-                inner.append({})
-                rest = {}
-            if isinstance(inner, list) and inner:
-                path = (*path, len(inner) - 1)
-                inner = inner[-1]
-            if not isinstance(inner, dict):
+                table.append({})
+            if isinstance(table, list) and table:
+                path = (*path, len(table) - 1)
+                table = table[-1]
+            if not isinstance(table, dict):
                 self._report_twice(path, line)
                 return None, path
-            table = inner
         if path in self.lines:
             self._report_twice(path, line)
         self.lines.setdefault(path, line)

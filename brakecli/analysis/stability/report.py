@@ -5,7 +5,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
@@ -13,8 +12,6 @@ from brakecli.analysis.stability.discrete import spectral_radius
 from brakecli.analysis.stability.modes import Crossing, Mode, crossings, eigensystem, is_undamped, modes
 from brakecli.analysis.stability.search import bisect
 from brakecli.errors import CaseError
-from brakecli.files import fields
-from brakecli.files.field import values_of
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.records import Coefficients
 from brakecli.solver.steady_sliding import SteadySliding, steady_sliding, tabulated
@@ -56,10 +53,6 @@ class StabilityReport:
     undamped_flutter: float | None  # φ, closed forms for the contact stiffness above
     undamped_divergence: float | None
     discrete: Discrete | None
-
-    def numbers(self) -> dict[str, Any]:
-        """Names and values as `--json` gives them."""
-        return values_of(fields.STABILITY, self)
 
 
 def stability(system: System) -> StabilityReport:
