@@ -11,8 +11,6 @@ from dataclasses import dataclass
 KeyPath = tuple[str | int, ...]
 """The names of the tables and of the key, from the top of a file on; a number is a place in a list."""
 
-_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
-
 
 @dataclass(frozen=True)
 class Problem:
@@ -84,10 +82,11 @@ def key_text(path: KeyPath) -> str:
     """A key path as TOML writes it, with places in a list in brackets: `roughness.wheel.amplitudes[2]`."""
     text = ""
     for part in path:
-        if isinstance(part, int):
-            text += f"[{part}]"
+        if isinstance(part, str):
+            is_bare = re.fullmatch(r"[\w-]+", part, re.ASCII)
+            text += "." + (part if is_bare else json.dumps(part, ensure_ascii=False))
         else:
-            text += "." + (part if _BARE_KEY.fullmatch(part) else json.dumps(part, ensure_ascii=False))
+            text += f"[{part}]"
     return printable(text.removeprefix("."))
 
 

@@ -180,9 +180,8 @@ class Solver(Table):
             yield self.wrong("step", what, "leave scheme out, or give tolerance instead of step")
         row, count = self.row, len(self.row.theta)
         if row.own_steps:
-            neutral = {"theta": (), "iteration": "newton", "allow_unconverged": False}
-            for key, value in neutral.items():
-                if getattr(self, key) != value:
+            for key, neutral in (("theta", ()), ("iteration", "newton"), ("allow_unconverged", False)):
+                if getattr(self, key) != neutral:
                     yield self.wrong(key, f"is not for {self.scheme}", f"leave {key} out")
         elif len(self.theta) != count:
             what = f"has {tables.entries(self.theta)} where {self.scheme} has {count} weights"

@@ -12,8 +12,7 @@ from brakecli.errors import CaseError, KeyPath, Problem
 from brakecli.sweeps.plan import Plan, given_toml
 from brakecli.sweeps.tables import Sweep
 
-MOST_TRIED = 1000
-"""Most listed values of an axis that are tried before the sweep starts. Both ends of a range are always tried."""
+MOST_TRIED = 1000  # listed values of an axis that are tried before the sweep starts; of a range it is both ends
 
 
 @dataclass(frozen=True)
