@@ -13,7 +13,8 @@ Contract of every scheme module:
 - kernels `advance` and `sample`: those of `brakecli.solver.loop`, or its own, with the same arguments, where its
   steps are its own, held to a tolerance, on the grid of samples alone;
 - in the first case kernels `prepare` and `finish`, of the signatures in `solver.records`: the minimisation that a
-  step comes down to, and the new state with the works of the step.
+  step comes down to, and the new state with the works of the step; otherwise `solve`, the kernel of one step,
+  which `advance` calls at the address in `plug.solve`.
 """
 
 from dataclasses import dataclass
