@@ -20,7 +20,7 @@ from brakecli.files.field import Field, values_of
 from brakecli.runs.limits import check, refuse, within_range
 from brakecli.runs.run import motion_of
 from brakecli.runs.tolerance import Certificate
-from brakecli.solver.history import ArrayHistory
+from brakecli.solver.history import array_history
 from brakecli.solver.motion import Motion
 from brakecli.solver.roughness import TWO_PI, wheel_angles
 from brakecli.solver.schedules import integral_at
@@ -86,7 +86,7 @@ def simulate(case: Case) -> Outcome:
         motion, certificate = motion_of(system)
         if not np.isfinite(motion.rows).all():
             raise FloatingPointError("a force overflows")
-        history = ArrayHistory(system.interval, motion.rows)
+        history = array_history(system.interval, motion.rows)
         verdict = verdict_on(history, motion.system, motion.work.failure_sentence)
     warnings, work = list(found.warnings), motion.work
     if work.unconverged_steps and not work.failed:

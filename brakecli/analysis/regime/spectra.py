@@ -10,14 +10,11 @@ from brakecli.solver.history import History
 
 Array = NDArray[np.float64]
 
-LONGEST_SEGMENT = 1 << 16
-"""Samples of one Welch segment: the memory that a spectrum takes does not grow with the run."""
+LONGEST_SEGMENT = 1 << 16  # samples, so that the memory that a spectrum takes does not grow with the run
 SEGMENTS_AT_ONCE = 16
 SEGMENTS_WANTED = 8
 SHORTEST_SEGMENT = 16
-
 SPECTRAL = ("x", "y", "vx", "vy", "friction_force", "normal_force", "contact_fraction")
-"""The variables that have a spectrum; the state has no size."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +37,9 @@ def spectrum(history: History, start: int) -> Spectrum:
     size = min(LONGEST_SEGMENT, max(min(SHORTEST_SEGMENT, length), 2 * length // (SEGMENTS_WANTED + 1)))
     hop = max(1, size - size // 2)
     segments = 1 + (length - size) // hop
-    window = _window(size, history.interval)
+    window = 0.5 + 0.5 * np.cos(np.linspace(-np.pi, np.pi, size + 1)[:size]) if size > 1 else np.ones(1)
+    # The sum and the interval are rounded as in `scipy.signal.welch`, whose import takes half a second.
+    window *= 1.0 / np.sqrt(np.cumsum(window**2)[-1] / (1.0 / (1.0 / history.interval)))
     densities = {name: np.zeros(size // 2 + 1) for name in SPECTRAL}
     for first in range(0, segments, SEGMENTS_AT_ONCE):
         count = min(SEGMENTS_AT_ONCE, segments - first)
@@ -50,13 +49,6 @@ def spectrum(history: History, start: int) -> Spectrum:
             total += _summed_periodograms(sliding_window_view(block, size)[::hop], window)
     frequency: Array = np.fft.rfftfreq(size, history.interval).astype(np.float64)
     return Spectrum(frequency, {name: total / segments for name, total in densities.items()}, start, segments)
-
-
-def _window(size: int, interval: float) -> Array:
-    """Periodic Hann window, scaled so that the squared transform is a density."""
-    window = 0.5 + 0.5 * np.cos(np.linspace(-np.pi, np.pi, size + 1)[:size]) if size > 1 else np.ones(1)
-    # The sum and the interval are rounded as in `scipy.signal.welch`, whose import takes half a second.
-    return np.asarray(window * (1.0 / np.sqrt(np.cumsum(window**2)[-1] / (1.0 / (1.0 / interval)))))
 
 
 def _summed_periodograms(segments: Array, window: Array) -> Array:
