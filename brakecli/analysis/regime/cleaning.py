@@ -153,12 +153,7 @@ def _cycle(velocity: Velocity) -> float:
     velocity = replace(velocity, values=_without_slow(velocity.values))
     values = velocity.smoothed(velocity.quiet)
     band = _RIPPLE * float(np.abs(values).mean())
-    return len(values) / max(1, count_falls(values, -band, band))
-
-
-def count_falls(values: Array, low: float, high: float) -> int:
-    """How often a signal goes from above `high` to below `low`."""
-    return len(rises(-values, -high, -low)[0])
+    return len(values) / max(1, len(rises(-values, -band, band)))
 
 
 def line_share(power: Array) -> float:
@@ -192,17 +187,17 @@ def _bridged(values: Array) -> Array:
 def _longest_piece(values: Array, longest_gap: float, notes: list[str]) -> Array:
     """The longest part without a gap of more samples than `longest_gap`."""
     bad = np.concatenate([[False], ~np.isfinite(values), [False]])
-    starts, stops = np.flatnonzero(bad[1:] != bad[:-1]).reshape(-1, 2).T
-    cuts = stops - starts > longest_gap
-    if not cuts.all():
-        notes.append(f"{np.sum(~cuts)} short gaps bridged")
-    if not cuts.any():
+    gaps = np.flatnonzero(bad[1:] != bad[:-1]).reshape(-1, 2)
+    cuts = gaps[np.diff(gaps)[:, 0] > longest_gap]
+    if len(cuts) < len(gaps):
+        notes.append(f"{len(gaps) - len(cuts)} short gaps bridged")
+    if not len(cuts):
         return values
-    begins, ends = np.concatenate([[0], stops[cuts]]), np.concatenate([starts[cuts], [len(values)]])
-    i = int(np.argmax(ends - begins))
-    used = f"{ends[i] - begins[i]} of {len(values)} samples"
-    notes.append(f"{np.sum(cuts)} long gaps: only the longest piece is used, {used}")
-    return values[begins[i] : ends[i]]
+    pieces = np.array([0, *cuts.flat, len(values)]).reshape(-1, 2)
+    begin, end = pieces[np.argmax(np.diff(pieces))]
+    used = f"{end - begin} of {len(values)} samples"
+    notes.append(f"{len(cuts)} long gaps: only the longest piece is used, {used}")
+    return values[begin:end]
 
 
 def _without_spikes(values: Array, is_velocity: bool, notes: list[str]) -> Array:

@@ -191,11 +191,7 @@ def powers_of(part: Part, c: "Coefficients", belt: float, load: float) -> dict[s
             float(c.b_xx * v_x @ v_x + 2.0 * c.b_xy * v_x @ v_y + c.b_yy * v_y @ v_y),
             load * (c.sin_beta * v_x.sum() + c.cos_beta * v_y.sum()),
         )
-    taken, heat, dashpots, lifted = (float(value) for value in sums / (part.stop - part.start))
-    return {
-        "power_belt": taken,
-        "power_friction": heat,
-        "power_dashpots": dashpots,
-        "power_load": lifted,
-        "power_rest": taken - heat - dashpots - lifted,
-    }
+    means = sums / (part.stop - part.start)
+    rest = np.subtract.reduce(means)
+    names = ("power_belt", "power_friction", "power_dashpots", "power_load", "power_rest")
+    return dict(zip(names, [*means.tolist(), float(rest)], strict=True))

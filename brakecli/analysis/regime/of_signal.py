@@ -5,14 +5,14 @@ in the other direction. So its skewness is large. The velocity is smoothed over 
 that shows the skewness best is used, so that one procedure serves any sampling rate and noise.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
 
-from brakecli.analysis.regime.cleaning import CERTAIN, Velocity, cleaned, count_falls, line_share
-from brakecli.analysis.regime.rules import Excitation, Regime
-from brakecli.analysis.regime.spectra import Array
+from brakecli.analysis.regime.cleaning import CERTAIN, Velocity, cleaned, line_share
+from brakecli.analysis.regime.rules import Decision, Excitation, Regime
+from brakecli.analysis.regime.spectra import Array, rises
 
 _FINE = 1000.0  # samples of a cycle, after interpolation, among which a plateau is sought
 _PLATEAU_SAMPLES = 1 << 20  # most samples in which a plateau is sought
@@ -66,14 +66,14 @@ class SignalVerdict:
 
     regime: Regime
     reasons: tuple[str, ...]
+    frequency: float | None  # Hz: strongest line, or events of stick per second
+    amplitude: float | None  # m, half of peak to peak of x
+    stick_fraction: float | None
+    evidence: dict[str, float]
+    warnings: tuple[str, ...]
+    thresholds: SignalThresholds
     excitation: Excitation = Excitation.NONE
-    frequency: float | None = None  # Hz: strongest line, or events of stick per second
-    amplitude: float | None = None  # m, half of peak to peak of x
-    stick_fraction: float | None = None
     contact_loss_fraction: float | None = None
-    evidence: dict[str, float] = field(default_factory=dict)
-    warnings: tuple[str, ...] = ()
-    thresholds: SignalThresholds = field(default_factory=SignalThresholds)
 
 
 def classify_signal(
@@ -96,13 +96,17 @@ def classify_signal(
     else:
         belt *= signal.interval
     rules = _Rules(velocity, signal.interval, belt / (size or 1.0), thresholds)
-    verdict = rules.short() or rules.unsettled() or rules.sticking() or rules.without_stick()
+    decision = rules.short() or rules.unsettled() or rules.sticking() or rules.without_stick()
     amplitude = metres * velocity.amplitude(rules.start, rules.windows) if rules.above_noise else np.nan
-    return replace(
-        verdict,
+    return SignalVerdict(
+        regime=decision.regime,
+        reasons=(decision.reason,),
+        frequency=decision.frequency,
         amplitude=amplitude if np.isfinite(amplitude) else None,
+        stick_fraction=decision.stick_fraction,
         evidence={**rules.evidence, "noise": size * velocity.noise},
         warnings=(*signal.notes, *velocity.notes),
+        thresholds=thresholds,
     )
 
 
@@ -116,17 +120,17 @@ class _Rules:
         self.above_noise = self.count >= _FEWEST_SAMPLES and bool(velocity.variances)
         self.evidence: dict[str, float] = {}
 
-    def short(self) -> SignalVerdict | None:
+    def short(self) -> Decision | None:
         """Decides where there are too few samples or cycles, or nothing but noise."""
         velocity, limits = self.velocity, self.limits
         if self.count < _FEWEST_SAMPLES:
-            return self._verdict(f"only {self.count} samples in one piece; measure longer")
+            return Decision(f"only {self.count} samples in one piece; measure longer")
         self._seek_stick()
         self.clean, self.power = velocity.denoised()
         self.evidence |= {"samples": float(self.count), "skewness": self.skewness}
         self.evidence |= {"smoothed_over": float(velocity.quiet), "events": float(self.events)}
         if not self.above_noise:
-            return self._verdict("nothing stands out of the noise; measure closer, or with less noise")
+            return Decision("nothing stands out of the noise; measure closer, or with less noise")
         strongest, length = int(np.argmax(self.power)), len(self.clean) * self.interval
         certain = self.skewness >= limits.skewness_certain and self.events >= limits.fewest_cycles
         if certain or self.power[strongest] == 0.0:
@@ -137,12 +141,12 @@ class _Rules:
         period = 1.0 / (self.frequency * self.interval)
         self.evidence |= {"cycles": cycles, "samples_per_cycle": period}
         if cycles < limits.fewest_cycles:
-            return self._verdict(f"only {cycles:.0f} cycles; measure longer")
+            return Decision(f"only {cycles:.0f} cycles; measure longer")
         if period < limits.samples_per_cycle:
-            return self._verdict(f"only {period:.1f} samples a cycle; measure at a higher rate")
+            return Decision(f"only {period:.1f} samples a cycle; measure at a higher rate")
         return None
 
-    def unsettled(self) -> SignalVerdict | None:
+    def unsettled(self) -> Decision | None:
         """Decides where the motion has died out, still grows or decays; moves the start behind a transient."""
         limits, velocity, windows = self.limits, self.velocity, max(self.windows, 4)
         whole = velocity.trend(0, windows)
@@ -151,9 +155,7 @@ class _Rules:
         self.evidence |= {"envelope_ratio": whole.ratio, "envelope_order": whole.order, "died_to": died_to}
         early = bool(whole.envelope[: windows // 2].max() >= largest)
         if early and last <= max(limits.decayed_to * largest, min(0.2 * largest, 0.5 * floor)):
-            return self._verdict(
-                f"the vibration has died out: down to {died_to:.2g} of its largest", Regime.DAMPED
-            )
+            return Decision(f"the vibration has died out: down to {died_to:.2g} of its largest", Regime.DAMPED)
         for start in (0, self.count // 4, self.count // 2):
             found = velocity.trend(start, windows)
             change, order = max(found.ratio, 1.0 / max(found.ratio, 1e-9)), abs(found.order)
@@ -163,9 +165,9 @@ class _Rules:
                 self.start = start
                 return None
         word, end = ("growing", "settled") if found.ratio > 1.0 else ("decaying", "died out")
-        return self._verdict(f"still {word}; measure longer, until it has {end}")
+        return Decision(f"still {word}; measure longer, until it has {end}")
 
-    def sticking(self) -> SignalVerdict | None:
+    def sticking(self) -> Decision | None:
         """Decides where stick has skewed the velocity; undecided if noise hides whether two lines in step did."""
         limits, velocity, total = self.limits, self.velocity, float(self.power.sum())
         if self.events < limits.fewest_cycles or self.skewness < limits.skewness_unlikely:
@@ -181,11 +183,13 @@ class _Rules:
                 if CERTAIN * self.count * velocity.noise**2 * gain <= limits.overtones / 3.0 * total:
                     return None
                 what = "the velocity is skewed, by stick or by two lines in step, and noise hides which"
-                return self._verdict(f"{what}; measure with less noise, or for longer")
+                return Decision(f"{what}; measure with less noise, or for longer")
         reason = f"{self.events} events of stick and slip: skewness of the velocity {self.skewness:.2g}"
-        return self._verdict(reason, Regime.RELAXATION, self.events / self.duration, self.stick)
+        return Decision(
+            reason, Regime.RELAXATION, frequency=self.events / self.duration, stick_fraction=self.stick
+        )
 
-    def without_stick(self) -> SignalVerdict:
+    def without_stick(self) -> Decision:
         """Decides on a motion that neither grows nor dies out, nor sticks for long."""
         top, beside = self._plateau()
         self.evidence |= {"plateau": top / max(beside, 1e-9), "plateau_time": top}
@@ -193,29 +197,18 @@ class _Rules:
         if flat and np.isfinite(self.belt):
             stick = max(0.0, top - 0.5 * beside)
             reason = f"the velocity is the belt's for {stick:.0%} of the time, in most cycles or all"
-            return self._verdict(reason, Regime.RELAXATION, self.frequency, stick)
+            return Decision(reason, Regime.RELAXATION, frequency=self.frequency, stick_fraction=stick)
         share = line_share(self.power)
         self.evidence |= {"line_share": share}
         if flat:
-            return self._verdict("the velocity is flat on one side, as by short stick; give the belt speed")
+            return Decision("the velocity is flat on one side, as by short stick; give the belt speed")
         least, most = np.quantile(self.clean + self.velocity.raw.mean(), [0.01, 0.99])
         if any(0.95 * self.belt <= v <= 1.2 * self.belt for v in (-least, most)):
-            return self._verdict("the velocity just reaches the belt's; less noise would show if it stays")
+            return Decision("the velocity just reaches the belt's; less noise would show if it stays")
         if share < self.limits.line_share:
-            return self._verdict(
-                f"irregular without stick: {share:.0%} of the energy in three lines; measure longer"
-            )
+            return Decision(f"irregular without stick: {share:.0%} of the energy in three lines; measure longer")
         reason = f"sustained without stick: {share:.0%} of the energy of the velocity in at most three lines"
-        return self._verdict(reason, Regime.QUASI_HARMONIC, self.frequency, 0.0)
-
-    def _verdict(
-        self,
-        reason: str,
-        regime: Regime = Regime.UNDECIDED,
-        frequency: float | None = None,
-        stick: float | None = None,
-    ) -> SignalVerdict:
-        return SignalVerdict(regime, (reason,), frequency=frequency, stick_fraction=stick, thresholds=self.limits)
+        return Decision(reason, Regime.QUASI_HARMONIC, frequency=self.frequency, stick_fraction=0.0)
 
     def _seek_stick(self) -> None:
         """Find the skewness, at the smoothing that shows it best, the events of slip, and the part of stick."""
@@ -232,7 +225,7 @@ class _Rules:
         bulk = values[values > 0.0]
         if len(bulk):
             middle, noise = float(np.median(bulk)), float(np.sqrt(velocity.noise_at(scale)))
-            self.events = count_falls(values, -max(0.5 * middle, 4.0 * noise), 0.25 * middle)
+            self.events = len(rises(-values, -0.25 * middle, max(0.5 * middle, 4.0 * noise)))
             self.stick = float(np.mean(values > -0.5 * middle))
 
     def _plateau(self) -> tuple[float, float]:
@@ -242,7 +235,14 @@ class _Rules:
         clean = finer * np.fft.irfft(np.fft.rfft(clean), finer * len(clean))
         absolute = clean + self.velocity.raw.mean()
         reach = 0.5 * float(np.ptp(np.quantile(clean, [0.01, 0.99])))
-        levels = (self.belt, -self.belt) if np.isfinite(self.belt) else _extreme_modes(absolute, reach)
+        levels = [self.belt, -self.belt]
+        if not np.isfinite(
+            self.belt
+        ):  # the most frequent values of the lower and of the upper quarter of the range
+            edges = np.arange(absolute.min(), absolute.max() + 0.01 * reach, 0.01 * reach)
+            counts, quarter = np.histogram(absolute, edges)[0], max(1, len(edges) // 4)
+            places = np.argmax(counts[:quarter]), len(counts) - quarter + np.argmax(counts[-quarter:])
+            levels = [float(0.5 * (edges[i] + edges[i + 1])) for i in places]
         results = [(0.0, 1.0)]
         for level in levels:
             away = np.abs(absolute - level) / reach
@@ -257,11 +257,3 @@ def _skewness(values: Array) -> float:
     """Median of the skewness of equal parts, which a single jump does not change."""
     parts = [part - part.mean() for part in np.array_split(values, _PARTS)]
     return float(np.median([np.mean(p * p * p) / max(float(np.mean(p * p)), 1e-100) ** 1.5 for p in parts]))
-
-
-def _extreme_modes(values: Array, reach: float) -> list[float]:
-    """The most frequent values of the upper and of the lower quarter of the range."""
-    edges = np.arange(values.min(), values.max() + 0.01 * reach, 0.01 * reach)
-    counts, quarter = np.histogram(values, edges)[0], max(1, len(edges) // 4)
-    places = int(np.argmax(counts[:quarter])), len(counts) - quarter + int(np.argmax(counts[-quarter:]))
-    return [float(0.5 * (edges[i] + edges[i + 1])) for i in places]

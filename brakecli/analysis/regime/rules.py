@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, WINDOWS, Envelope, Part, cycles_of, powers_of
 from brakecli.solver.history import History
@@ -64,6 +64,16 @@ class Context:
     growth: Callable[[], float] = lambda: 0.0  # 1/s, of a small disturbance of steady sliding; 0 where it decays
 
 
+class Decision(NamedTuple):
+    """What a rule decides, and why."""
+
+    reason: str
+    regime: Regime = Regime.UNDECIDED
+    excitation: Excitation = Excitation.NONE
+    frequency: float | None = None  # Hz
+    stick_fraction: float | None = None
+
+
 @dataclass(frozen=True)
 class Verdict:
     """The regime of a history, its numbers (SI units) over the settled part, and the reasons in plain words."""
@@ -101,34 +111,34 @@ class _Rules:
         self.settled_part, self.settled = self._part(history.samples // 2), False
         self.evidence: dict[str, Any] = {}
 
-    def contact(self) -> Verdict | None:
+    def contact(self) -> Decision | None:
         """Decides where the second half is without contact, or stick throughout."""
         if self.settled_part.fraction(ContactState.SEPARATED) == 1.0:
             never = self._part(0).fraction(ContactState.SEPARATED) == 1.0
             text = "never touched the wheel" if never else "lost contact for good"
-            return self._verdict(f"the shoe has {text}; check the sign and size of load.force")
+            return Decision(f"the shoe has {text}; check the sign and size of load.force")
         if self.settled_part.fraction(ContactState.STICK) < 1.0:
             return None
         if self.context.belt_speed == 0.0:
-            return self._verdict("the shoe has come to rest, sticking to the standing wheel", Regime.DAMPED)
-        return self._verdict("the shoe sticks throughout and is carried along by the wheel; run longer")
+            return Decision("the shoe has come to rest, sticking to the standing wheel", Regime.DAMPED)
+        return Decision("the shoe sticks throughout and is carried along by the wheel; run longer")
 
-    def unmoved(self) -> Verdict | None:
+    def unmoved(self) -> Decision | None:
         """Decides where the run is too short or not steady, and where nothing has moved or all has died out."""
         if self.history.samples < FEWEST_SAMPLES:
-            return self._verdict(f"fewer than {FEWEST_SAMPLES} samples; run longer")
+            return Decision(f"fewer than {FEWEST_SAMPLES} samples; run longer")
         envelope = self.envelope = Envelope(self.history)
         self.evidence |= envelope.evidence()
         if not self.context.steady:
-            return self._verdict("the wheel's speed or the load changes with time, so the motion cannot settle")
+            return Decision("the wheel's speed or the load changes with time, so the motion cannot settle")
         if envelope.largest <= self.context.quiet:
-            return self._verdict("nothing moves beyond rounding: the shoe slides steadily or rests", Regime.DAMPED)
+            return Decision("nothing moves beyond rounding: the shoe slides steadily or rests", Regime.DAMPED)
         if envelope.final <= max(self.limits.decayed_to * envelope.largest, self.context.quiet):
             text = f"vx has fallen to {envelope.final / envelope.largest:.2g} of its largest amplitude"
-            return self._verdict(f"the vibration has died out: {text}", Regime.DAMPED)
+            return Decision(f"the vibration has died out: {text}", Regime.DAMPED)
         return None
 
-    def forced(self) -> Verdict | None:
+    def forced(self) -> Decision | None:
         """Decides where only the roughness shakes the shoe."""
         if not self.context.forced:
             return None
@@ -140,14 +150,14 @@ class _Rules:
         if powers_of_e > _GROWN:  # the shoe's own vibration falls on the same lines
             return None
         if powers_of_e > _NOTHING:
-            return self._verdict(
+            return Decision(
                 f"{share:.0%} of the energy of vx lies on the lines of the roughness, but sliding is unstable: "
                 f"the shoe's own vibration grows at {growth:.3g} 1/s; run at least {_GROWN / growth:.2g} s"
             )
         text = f"only the roughness shakes the shoe: {share:.0%} of the energy of vx lies on its lines"
-        return self._verdict(text, Regime.DAMPED, Excitation.FORCED)
+        return Decision(text, Regime.DAMPED, Excitation.FORCED)
 
-    def trend(self) -> Verdict | None:
+    def trend(self) -> Decision | None:
         """Decides where the motion still grows or decays; otherwise it finds the settled part."""
         first = self.envelope.settled_window(self.limits.settled_within, self.limits.reach_within)
         if first is not None:
@@ -155,67 +165,58 @@ class _Rules:
             return None
         slope = self.evidence.get("envelope_slope")
         if slope is None:
-            return self._verdict("the motion comes and goes; run longer")
+            return Decision("the motion comes and goes; run longer")
         if abs(slope) <= self.limits.trend_errors * self.evidence["envelope_slope_error"]:
             return None  # an amplitude that beats or wanders, without a trend
         text = f"still {'growing' if slope > 0.0 else 'decaying'} at {abs(slope):.3g} 1/s"
-        return self._verdict(f"{text}; run at least {3.0 / abs(slope):.2g} s longer")
+        return Decision(f"{text}; run at least {3.0 / abs(slope):.2g} s longer")
 
-    def sustained(self) -> Verdict:
+    def sustained(self) -> Decision:
         """Decides on a motion whose amplitude has settled, by its cycles, stick and lines."""
         found = cycles_of(self.settled_part)
         self.evidence |= found
         cycles = found.get("cycles", 0.0)
         if cycles < self.limits.fewest_cycles:
-            return self._verdict(f"only {cycles:.0f} cycles in the settled part; run longer")
+            return Decision(f"only {cycles:.0f} cycles in the settled part; run longer")
         period, stick, harmonic = found["samples_per_cycle"], found["stick_cycles"], found["harmonic_share"]
         if period < self.limits.samples_per_cycle:
-            return self._verdict(f"only {period:.1f} samples a cycle; reduce output.sample_interval")
+            return Decision(f"only {period:.1f} samples a cycle; reduce output.sample_interval")
         own = Excitation.SELF_EXCITED, 1.0 / (period * self.history.interval)
         if stick >= self.limits.stick_cycles:
             text = f"sustained, with stick in {stick:.0%} of {cycles:.0f} cycles"
-            return self._verdict(text, Regime.RELAXATION, *own)
+            return Decision(text, Regime.RELAXATION, *own)
         lines = f"{harmonic:.0%} of the energy of vx in one line and its harmonics"
         if stick == 0.0 and harmonic >= self.limits.harmonic_share:
-            return self._verdict(f"sustained without stick: {lines}", Regime.QUASI_HARMONIC, *own)
+            return Decision(f"sustained without stick: {lines}", Regime.QUASI_HARMONIC, *own)
         irregular = f"irregular: stick in {stick:.0%} of the cycles, {lines}"
-        return self._verdict(f"{irregular}; run longer, or look at the spectrum")
+        return Decision(f"{irregular}; run longer, or look at the spectrum")
 
     def _part(self, start: int) -> Part:
         return Part(self.history, start, self.history.samples)
-
-    def _verdict(
-        self,
-        reason: str,
-        regime: Regime = Regime.UNDECIDED,
-        excitation: Excitation = Excitation.NONE,
-        frequency: float | None = None,
-    ) -> Verdict:
-        """The verdict, with the means and fractions of the settled part."""
-        part, belt, c = self.settled_part, self.context.belt_speed, self.context.coefficients
-        self.evidence |= {f"amplitude_{name}": part.amplitude(name) for name in ("y", "vx", "vy")}
-        if belt != 0.0:
-            self.evidence["largest_vx_over_belt_speed"] = part.extremes("vx")[int(belt > 0.0)] / belt
-        self.evidence |= part.lines(self.context.forced)
-        if c is not None and self.context.steady:
-            self.evidence |= powers_of(part, c, belt, self.context.load)
-        return Verdict(
-            regime=regime,
-            excitation=excitation,
-            frequency=frequency,
-            amplitude=part.amplitude("x"),
-            settled_from=part.start,
-            settled=self.settled,
-            stick_fraction=part.fraction(ContactState.STICK),
-            contact_loss_fraction=part.fraction(ContactState.SEPARATED),
-            mean_friction_force=part.mean("friction_force"),
-            reasons=(reason,),
-            evidence=self.evidence,
-            thresholds=self.limits,
-        )
 
 
 def classify(history: History, context: Context, thresholds: Thresholds = Thresholds()) -> Verdict:
     """The regime of a run's history, by the rules of docs/regimes.md; the first that applies decides."""
     rules = _Rules(history, context, thresholds)
-    return rules.contact() or rules.unmoved() or rules.forced() or rules.trend() or rules.sustained()
+    decision = rules.contact() or rules.unmoved() or rules.forced() or rules.trend() or rules.sustained()
+    part, belt, c = rules.settled_part, context.belt_speed, context.coefficients
+    evidence = rules.evidence | {f"amplitude_{name}": part.amplitude(name) for name in ("y", "vx", "vy")}
+    if belt != 0.0:
+        evidence["largest_vx_over_belt_speed"] = part.extremes("vx")[int(belt > 0.0)] / belt
+    evidence |= part.lines(context.forced)
+    if c is not None and context.steady:
+        evidence |= powers_of(part, c, belt, context.load)
+    return Verdict(
+        regime=decision.regime,
+        excitation=decision.excitation,
+        frequency=decision.frequency,
+        amplitude=part.amplitude("x"),
+        settled_from=part.start,
+        settled=rules.settled,
+        stick_fraction=part.fraction(ContactState.STICK),
+        contact_loss_fraction=part.fraction(ContactState.SEPARATED),
+        mean_friction_force=part.mean("friction_force"),
+        reasons=(decision.reason,),
+        evidence=evidence,
+        thresholds=thresholds,
+    )

@@ -76,12 +76,11 @@ def peak(frequency: Array, density: Array) -> float | None:
     return float(frequency[i] + np.clip(shift, -0.5, 0.5) * (frequency[1] - frequency[0]))
 
 
-def rises(values: Array, low: float, high: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """The last samples below `low` and the first ones above `high`, of every rise from one to the other."""
+def rises(values: Array, low: float, high: float) -> NDArray[np.intp]:
+    """The last samples below `low` before every rise above `high`."""
     side = np.where(values > high, 1, np.where(values < low, -1, 0)).astype(np.int8)
     marked = np.flatnonzero(side)
-    found = np.flatnonzero((side[marked[:-1]] < 0) & (side[marked[1:]] > 0))
-    return marked[found], marked[found + 1]
+    return marked[np.flatnonzero((side[marked[:-1]] < 0) & (side[marked[1:]] > 0))]
 
 
 def upward_crossings(values: Array, band: float) -> Array:
@@ -89,8 +88,6 @@ def upward_crossings(values: Array, band: float) -> Array:
 
     The band keeps ripple on a slow cycle from counting as cycles. The places are interpolated linearly.
     """
-    places = []
-    for low, high in zip(*rises(values, -band, band), strict=True):
-        i = low + int(np.argmax(values[low : high + 1] >= 0.0)) - 1
-        places.append(i + values[i] / (values[i] - values[i + 1]))
-    return np.array(places)
+    crossings = np.flatnonzero((values[:-1] < 0.0) & (values[1:] >= 0.0))
+    i = crossings[np.searchsorted(crossings, rises(values, -band, band))]
+    return i + values[i] / (values[i] - values[i + 1])
