@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import median_filter, uniform_filter1d
@@ -21,14 +20,6 @@ _DRIFT_CYCLES = 8.0
 _COARSE = 24  # whatever is slower than this part of the record is left out where cycles are estimated
 _SHORTEST = 8
 _LINES_LEFT = 0.5
-
-
-class Trend(NamedTuple):
-    """The envelope of the velocity in equal windows, its noise taken off, and how it changes."""
-
-    envelope: Array
-    ratio: float  # last third over first third
-    order: float  # rank correlation with time
 
 
 @dataclass(frozen=True)
@@ -64,14 +55,11 @@ class Velocity:
 
     @cached_property
     def variances(self) -> list[tuple[int, float]]:
-        """Smoothings m = 1, 2, 4 … with the variance of the velocity there.
-
-        Those that show little but noise are left out. The list ends where the motion itself is smoothed away.
-        """
+        """Smoothings m = 1, 2, 4 … with the variance there, up to where the motion itself is smoothed away."""
         found, most = [], 0.0
         for m in (1 << k for k in range(max(1, len(self.values) // 100).bit_length())):
             variance = float(self.thinned(m).var())
-            if self.noise_at(m) >= _NOISE_SHARE * variance:
+            if self.noise_at(m) >= _NOISE_SHARE * variance:  # little but noise
                 continue
             most = max(most, variance - self.noise_at(m))
             if variance - self.noise_at(m) < _SMOOTHED_AWAY * most:
@@ -91,15 +79,15 @@ class Velocity:
         x = c if self.measured else (c[m:] - c[:-m]) / m
         return 0.5 * float(np.median([np.ptp(part) for part in np.array_split(x[start:], windows)]))
 
-    def trend(self, start: int, windows: int) -> Trend:
-        """How the size of the quiet velocity changes from a sample on."""
+    def trend(self, start: int, windows: int) -> tuple[Array, float, float]:
+        """Envelope from a sample on, without noise, last third over first, and rank correlation with time."""
         parts = np.array_split(self.smoothed(self.quiet)[start:], windows)
         envelope = np.sqrt(np.maximum([float(p.var()) - self.noise_at(self.quiet) for p in parts], 0.0))
         if float(np.ptp(envelope)) == 0.0:
-            return Trend(envelope, 1.0, 0.0)
+            return envelope, 1.0, 0.0
         third, ranks = max(1, windows // 3), np.argsort(np.argsort(envelope)).astype(float)
         ratio = float(envelope[-third:].mean()) / max(float(envelope[:third].mean()), 1e-300)
-        return Trend(envelope, ratio, float(np.corrcoef(ranks, np.arange(windows))[0, 1]))
+        return envelope, ratio, float(np.corrcoef(ranks, np.arange(windows))[0, 1])
 
     def denoised(self) -> tuple[Array, Array]:
         """The velocity made of those lines only that stand out of the noise, and their power over rfft's bins."""
@@ -133,19 +121,15 @@ def cleaned(values: Array, is_velocity: bool) -> Velocity:
 
 
 def _velocity(values: Array, is_velocity: bool) -> Velocity:
-    raw = values if is_velocity else np.diff(values)
-    noise = _noise(values) if len(values) >= _SHORTEST else 0.0
+    """Its noise is the lesser of what third differences and the spectrum's floor allow."""
+    raw, noise = values if is_velocity else np.diff(values), 0.0
+    if len(values) >= _SHORTEST:
+        rough, some = np.diff(values, 3), _handy(values)
+        local = float(np.median(np.abs(rough - np.median(rough)))) / 0.6745 / np.sqrt(20.0)
+        line = np.linspace(some[0], some[-1], len(some))
+        floor = np.median(np.abs(np.fft.rfft(some - line)) ** 2) / np.log(2.0) / len(some)
+        noise = float(min(local, np.sqrt(floor)))
     return Velocity(raw - raw.mean() if len(raw) else raw, raw, noise, is_velocity)
-
-
-def _noise(values: Array) -> float:
-    """Standard deviation of white noise: the lesser of what third differences and the spectrum's floor allow."""
-    rough = np.diff(values, 3)
-    local = float(np.median(np.abs(rough - np.median(rough)))) / 0.6745 / np.sqrt(20.0)
-    values = _handy(values)
-    line = np.linspace(values[0], values[-1], len(values))
-    floor = np.median(np.abs(np.fft.rfft(values - line)) ** 2) / np.log(2.0) / len(values)
-    return float(min(local, np.sqrt(floor)))
 
 
 def _cycle(velocity: Velocity) -> float:

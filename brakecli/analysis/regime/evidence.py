@@ -141,17 +141,18 @@ class Envelope:
 
 
 def cycles_of(part: Part) -> dict[str, Any]:
-    """What the cycles of vx show; they are counted by its rises through the mean. Empty if there are none.
-
-    A motion that repeats only after two to four rises has that long a period.
-    """
+    """What the cycles of vx show, which are counted by its rises through the mean; empty if there are none."""
     velocity = part.last("vx")
     crossings = upward_crossings(velocity, 0.3 * float(velocity.std()))
     if len(crossings) < 2:
         return {}
-    period = float(crossings[-1] - crossings[0]) / (len(crossings) - 1)
-    numbers = range(1, _MOST_RISES_PER_CYCLE + 1)
-    rises = next((n for n in numbers if _repeats_after(round(n * period), velocity)), 1)
+    period, close = float(crossings[-1] - crossings[0]) / (len(crossings) - 1), 2.0 * _SAME * float(velocity.var())
+    for rises in range(1, _MOST_RISES_PER_CYCLE + 1):  # after which the motion repeats
+        shift = round(rises * period)
+        if 0 < shift < len(velocity) // 2 and np.mean((velocity[shift:] - velocity[:-shift]) ** 2) <= close:
+            break
+    else:
+        rises = 1
     crossings, period = crossings[::rises], period * rises
     state = part.history.read("state", part.stop - len(velocity), part.stop)
     sticks = np.flatnonzero((state[1:] == ContactState.STICK) & (state[:-1] != ContactState.STICK)) + 1
@@ -170,19 +171,8 @@ def cycles_of(part: Part) -> dict[str, Any]:
     }
 
 
-def _repeats_after(shift: int, velocity: Array) -> bool:
-    """Whether a motion repeats after so many samples."""
-    if not 0 < shift < len(velocity) // 2:
-        return False
-    return bool(np.mean((velocity[shift:] - velocity[:-shift]) ** 2) <= 2.0 * _SAME * float(velocity.var()))
-
-
 def powers_of(part: Part, c: "Coefficients", belt: float, load: float) -> dict[str, float]:
-    """Mean powers (W) at constant U (m/s) and Q (N): the belt's, and what becomes of it.
-
-    What is left, `power_rest`, is the work of the roughness and the change of the energy in the links and the
-    contact; on flat surfaces it falls with the length of the settled part.
-    """
+    """Mean powers (W) at constant U (m/s) and Q (N): the belt's, what becomes of it, and what is left."""
     sums = np.zeros(4)
     for v_x, v_y, friction in zip(*map(part.pieces, ("vx", "vy", "friction_force")), strict=True):
         sums += (

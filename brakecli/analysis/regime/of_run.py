@@ -21,8 +21,6 @@ from brakecli.solver.schedules import value_at
 from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import System
 
-_ROUNDING = 1e-9  # part of the static compression times the highest frequency that may come from rounding
-
 
 @dataclass(frozen=True)
 class RunVerdict:
@@ -85,7 +83,7 @@ def context(system: System) -> Context:
         belt,
         steady=len(system.belt) == 1 and len(system.load) == 1,
         forced=forced_lines(belt, [float(turns) for turns in system.wheel.turns], 0.5 / system.interval),
-        quiet=_ROUNDING * compression * system.natural_frequencies[1],
+        quiet=1e-9 * compression * system.natural_frequencies[1],
         coefficients=c,
         load=system.load_at_start,
         growth=growth_rate,

@@ -1,8 +1,7 @@
 """The regime of a measured signal, which carries no flags: see docs/measured-signals.md.
 
-Stick shows in the distribution of the velocity: it stays long at one value, the belt's, and is then short and fast
-in the other direction. So its skewness is large. The velocity is smoothed over m = 1, 2, 4 … samples, and the m
-that shows the skewness best is used, so that one procedure serves any sampling rate and noise.
+Stick skews the distribution of the velocity: it stays long at the belt's, and is then short and fast in the other
+direction. Smoothing over the m = 1, 2, 4 … samples that show this best serves any sampling rate and noise.
 """
 
 from dataclasses import dataclass
@@ -58,11 +57,7 @@ class SignalThresholds:
 
 @dataclass(frozen=True)
 class SignalVerdict:
-    """The regime of a measured signal, its numbers (SI units), and the reasons in plain words.
-
-    A measurement does not show where the energy comes from, so `excitation` is always none, nor whether contact
-    was lost.
-    """
+    """The regime of a measured signal, its numbers (SI units), and the reasons in plain words."""
 
     regime: Regime
     reasons: tuple[str, ...]
@@ -72,8 +67,8 @@ class SignalVerdict:
     evidence: dict[str, float]
     warnings: tuple[str, ...]
     thresholds: SignalThresholds
-    excitation: Excitation = Excitation.NONE
-    contact_loss_fraction: float | None = None
+    excitation: Excitation = Excitation.NONE  # a measurement does not show where the energy comes from,
+    contact_loss_fraction: None = None  # nor whether contact was lost
 
 
 def classify_signal(
@@ -87,10 +82,8 @@ def classify_signal(
     """The regime of a measured signal; `belt_speed` in m/s, `stiffness` in N/m (of a force) where known."""
     size = float(np.nanmax(np.abs(signal.values), initial=0.0))  # squares of the smallest numbers must not vanish
     velocity = cleaned(signal.values / (size or 1.0), quantity == Measurand.VELOCITY)
-    metres, belt = size, np.nan if belt_speed is None else abs(belt_speed)
-    if quantity == Measurand.FORCE:
-        known = np.nan if stiffness is None else stiffness
-        metres, belt = size / known, belt * known
+    spring = 1.0 if quantity != Measurand.FORCE else np.nan if stiffness is None else stiffness
+    metres, belt = size / spring, np.nan if belt_speed is None else abs(belt_speed) * spring
     if quantity == Measurand.VELOCITY:
         metres *= signal.interval
     else:
@@ -121,7 +114,6 @@ class _Rules:
         self.evidence: dict[str, float] = {}
 
     def short(self) -> Decision | None:
-        """Decides where there are too few samples or cycles, or nothing but noise."""
         velocity, limits = self.velocity, self.limits
         if self.count < _FEWEST_SAMPLES:
             return Decision(f"only {self.count} samples in one piece; measure longer")
@@ -149,22 +141,23 @@ class _Rules:
     def unsettled(self) -> Decision | None:
         """Decides where the motion has died out, still grows or decays; moves the start behind a transient."""
         limits, velocity, windows = self.limits, self.velocity, max(self.windows, 4)
-        whole = velocity.trend(0, windows)
-        last, largest = float(whole.envelope[-max(1, windows // 4) :].mean()), float(np.sort(whole.envelope)[-3])
+        envelope, ratio, order = velocity.trend(0, windows)
+        last, largest = float(envelope[-max(1, windows // 4) :].mean()), float(np.sort(envelope)[-3])
         died_to, floor = last / max(largest, 1e-300), np.sqrt(velocity.noise_at(velocity.quiet))
-        self.evidence |= {"envelope_ratio": whole.ratio, "envelope_order": whole.order, "died_to": died_to}
-        early = bool(whole.envelope[: windows // 2].max() >= largest)
-        if early and last <= max(limits.decayed_to * largest, min(0.2 * largest, 0.5 * floor)):
+        self.evidence |= {"envelope_ratio": ratio, "envelope_order": order, "died_to": died_to}
+        if envelope[: windows // 2].max() >= largest and last <= max(
+            limits.decayed_to * largest, min(0.2 * largest, 0.5 * floor)
+        ):
             return Decision(f"the vibration has died out: down to {died_to:.2g} of its largest", Regime.DAMPED)
         for start in (0, self.count // 4, self.count // 2):
-            found = velocity.trend(start, windows)
-            change, order = max(found.ratio, 1.0 / max(found.ratio, 1e-9)), abs(found.order)
-            slow = change > limits.trend_ratio and order > limits.trend_order
-            fast = change > limits.trend_ratio_large and order > limits.trend_order_large
+            _, ratio, order = velocity.trend(start, windows)
+            change = max(ratio, 1.0 / max(ratio, 1e-9))
+            slow = change > limits.trend_ratio and abs(order) > limits.trend_order
+            fast = change > limits.trend_ratio_large and abs(order) > limits.trend_order_large
             if not slow and not fast:
                 self.start = start
                 return None
-        word, end = ("growing", "settled") if found.ratio > 1.0 else ("decaying", "died out")
+        word, end = ("growing", "settled") if ratio > 1.0 else ("decaying", "died out")
         return Decision(f"still {word}; measure longer, until it has {end}")
 
     def sticking(self) -> Decision | None:
@@ -190,7 +183,6 @@ class _Rules:
         )
 
     def without_stick(self) -> Decision:
-        """Decides on a motion that neither grows nor dies out, nor sticks for long."""
         top, beside = self._plateau()
         self.evidence |= {"plateau": top / max(beside, 1e-9), "plateau_time": top}
         flat = top > self.limits.plateau * beside

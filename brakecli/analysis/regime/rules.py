@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -93,10 +93,7 @@ class Verdict:
 
 
 def forced_lines(belt_speed: float, waves_per_metre: Sequence[float], highest: float) -> tuple[float, ...]:
-    """Frequencies (Hz, up to `highest`) at which the passing roughness acts.
-
-    Each wave has its own and their multiples. A contact that opens adds the sums and differences of two waves.
-    """
+    """Frequencies (Hz, up to `highest`) of the passing waves, their multiples, and sums and differences of two."""
     base = [abs(belt_speed) * waves for waves in waves_per_metre]
     multiples = {n * f for f in base for n in range(1, 11)}
     pairs = {abs(f + sign * g) for f in base for g in base for sign in (1, -1)}
@@ -108,13 +105,12 @@ class _Rules:
 
     def __init__(self, history: History, context: Context, limits: Thresholds) -> None:
         self.history, self.context, self.limits = history, context, limits
-        self.settled_part, self.settled = self._part(history.samples // 2), False
+        self.settled_part, self.settled = Part(history, history.samples // 2, history.samples), False
         self.evidence: dict[str, Any] = {}
 
     def contact(self) -> Decision | None:
-        """Decides where the second half is without contact, or stick throughout."""
         if self.settled_part.fraction(ContactState.SEPARATED) == 1.0:
-            never = self._part(0).fraction(ContactState.SEPARATED) == 1.0
+            never = replace(self.settled_part, start=0).fraction(ContactState.SEPARATED) == 1.0
             text = "never touched the wheel" if never else "lost contact for good"
             return Decision(f"the shoe has {text}; check the sign and size of load.force")
         if self.settled_part.fraction(ContactState.STICK) < 1.0:
@@ -124,7 +120,6 @@ class _Rules:
         return Decision("the shoe sticks throughout and is carried along by the wheel; run longer")
 
     def unmoved(self) -> Decision | None:
-        """Decides where the run is too short or not steady, and where nothing has moved or all has died out."""
         if self.history.samples < FEWEST_SAMPLES:
             return Decision(f"fewer than {FEWEST_SAMPLES} samples; run longer")
         envelope = self.envelope = Envelope(self.history)
@@ -139,7 +134,6 @@ class _Rules:
         return None
 
     def forced(self) -> Decision | None:
-        """Decides where only the roughness shakes the shoe."""
         if not self.context.forced:
             return None
         share = self.evidence["forced_share"] = self.settled_part.share(self.context.forced)
@@ -147,8 +141,8 @@ class _Rules:
             return None
         growth = self.context.growth()
         powers_of_e = growth * self.history.samples * self.history.interval
-        if powers_of_e > _GROWN:  # the shoe's own vibration falls on the same lines
-            return None
+        if powers_of_e > _GROWN:
+            return None  # the shoe's own vibration falls on the same lines
         if powers_of_e > _NOTHING:
             return Decision(
                 f"{share:.0%} of the energy of vx lies on the lines of the roughness, but sliding is unstable: "
@@ -161,7 +155,8 @@ class _Rules:
         """Decides where the motion still grows or decays; otherwise it finds the settled part."""
         first = self.envelope.settled_window(self.limits.settled_within, self.limits.reach_within)
         if first is not None:
-            self.settled_part, self.settled = self._part(first * self.history.samples // WINDOWS), True
+            start = first * self.history.samples // WINDOWS
+            self.settled_part, self.settled = replace(self.settled_part, start=start), True
             return None
         slope = self.evidence.get("envelope_slope")
         if slope is None:
@@ -172,7 +167,6 @@ class _Rules:
         return Decision(f"{text}; run at least {3.0 / abs(slope):.2g} s longer")
 
     def sustained(self) -> Decision:
-        """Decides on a motion whose amplitude has settled, by its cycles, stick and lines."""
         found = cycles_of(self.settled_part)
         self.evidence |= found
         cycles = found.get("cycles", 0.0)
@@ -190,9 +184,6 @@ class _Rules:
             return Decision(f"sustained without stick: {lines}", Regime.QUASI_HARMONIC, *own)
         irregular = f"irregular: stick in {stick:.0%} of the cycles, {lines}"
         return Decision(f"{irregular}; run longer, or look at the spectrum")
-
-    def _part(self, start: int) -> Part:
-        return Part(self.history, start, self.history.samples)
 
 
 def classify(history: History, context: Context, thresholds: Thresholds = Thresholds()) -> Verdict:

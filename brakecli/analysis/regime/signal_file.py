@@ -7,7 +7,6 @@ import re
 import stat
 import warnings
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -39,7 +38,7 @@ def read_signal(source: str, *, column: str | None, time_column: str | None, sam
         _require(stat.S_ISREG(path.stat().st_mode), "this is not a regular file; name a file")
         if inside is not None and (column is not None or time_column is not None):
             raise UsageError("a dataset has no columns; leave out --column, and give --sample-rate HZ")
-        values, *times = _columns(path, column, time_column) if inside is None else [_dataset(path, inside)]
+        values, *times = [_dataset(path, inside)] if inside else _TextFile(path).columns_of(column, time_column)
         values = _numbers(values)
         return Signal(values, 1.0 / sample_rate) if sample_rate is not None else _evenly(values, *times)
     except (UsageError, UnreadableResultError) as error:
@@ -75,46 +74,57 @@ def _dataset(path: Path, inside: str) -> Array:
         raise UnreadableResultError(f"{what}; name an intact HDF5 file and a dataset in it") from error
 
 
-def _columns(path: Path, column: str | None, time_column: str | None) -> list[Array]:
-    """The chosen column of a text file, and its times where they are in a column."""
-    text = _text_file(path)
-    times = [] if time_column is None else [text.index(time_column, "--time-column")]
-    others = [i for i in range(text.columns) if i not in times]
-    values = others if column is None else [text.index(column, "--column")]
-    if len(values) != 1:
-        raise UsageError(f"which column is the signal? give --column; there are {text.listed}")
-    chosen, last = [*values, *times], text.columns - 1
-    table = text.read(chosen if last in chosen else [*chosen, last])  # the last shows that rows are whole
-    return list(table.T[: len(chosen)])
-
-
-@dataclass(frozen=True)
 class _TextFile:
-    """A text file of columns, and how it is laid out."""
+    """A text file of columns. Its first lines show separator, decimal sign and header."""
 
-    path: Path
-    separator: str | None  # None: white space
-    decimal_comma: bool
-    names: tuple[str, ...]
-    columns: int
-    skip: int  # lines before the first number
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        with path.open("rb") as file:
+            head = file.read(_HEAD)
+        _require(head.strip() != b"", "the file is empty; name a file with numbers")
+        _require(b"\0" not in head, "this is not text; name a CSV file, or FILE.h5:/path of an HDF5 file")
+        lines = head.decode("utf-8-sig", errors="replace").splitlines()
+        lines = lines[:-1] if len(head) == _HEAD and len(lines) > 1 else lines
+        self.names: list[str] = []
+        for self.skip, line in enumerate(lines):
+            if not line.strip() or line.lstrip().startswith(_COMMENTS):
+                continue
+            self.separator = next((s for s in (";", "\t", ",") if s in line), None)  # None: white space
+            self.decimal_comma = self.separator != "," and "," in line
+            cells = [cell.strip().strip('"') for cell in line.split(self.separator)]
+            numbers = [_is_number(cell, self.decimal_comma) for cell in cells]
+            self.columns, names_fit = len(cells), len(self.names) == len(cells)
+            if any(numbers) and all(good or not cell for good, cell in zip(numbers, cells, strict=True)):
+                near = lines[self.skip : self.skip + 100]
+                self.decimal_comma |= self.separator != "," and any("," in text for text in near)
+                self.names = self.names if names_fit else []
+                return
+            self.names = self.names if names_fit else cells  # a second line of names is that of the units
+        raise UnreadableResultError("no line of numbers was found at its start; name a file of columns of numbers")
 
-    @property
-    def listed(self) -> str:
-        """The columns, in words."""
-        return ", ".join(self.names) or f"columns 1 to {self.columns}, without names"
+    def columns_of(self, column: str | None, time_column: str | None) -> list[Array]:
+        """The chosen column, and the times where they are in a column."""
+        there = ", ".join(self.names) or f"columns 1 to {self.columns}, without names"
+        times = [] if time_column is None else [self._index(time_column, "--time-column", there)]
+        others = [i for i in range(self.columns) if i not in times]
+        values = others if column is None else [self._index(column, "--column", there)]
+        if len(values) != 1:
+            raise UsageError(f"which column is the signal? give --column; there are {there}")
+        chosen, last = [*values, *times], self.columns - 1
+        table = self._read(chosen if last in chosen else [*chosen, last])  # the last shows that rows are whole
+        return list(table.T[: len(chosen)])
 
-    def index(self, wanted: str, option: str) -> int:
+    def _index(self, wanted: str, option: str, there: str) -> int:
         """Place of a column; a name comes before a number."""
         if self.names.count(wanted) > 1:
             raise UsageError(f"{option}: several columns are named {wanted}; give its number, from 1")
         if wanted in self.names:
             return self.names.index(wanted)
         number = int(wanted) if wanted.isascii() and wanted.isdigit() else 0
-        _require(1 <= number <= self.columns, f"{option}: there is no column {wanted}; there are {self.listed}")
+        _require(1 <= number <= self.columns, f"{option}: there is no column {wanted}; there are {there}")
         return number - 1
 
-    def read(self, columns: list[int]) -> Array:
+    def _read(self, columns: list[int]) -> Array:
         """Some columns, by numpy's own reader; empty cells and decimal commas take it longer."""
         load = partial(
             np.loadtxt,
@@ -137,30 +147,6 @@ class _TextFile:
                 what = f"from line {self.skip + 1} on: {' '.join(str(error).split())}"
                 remedy = "give every row the same columns, and every cell a number, nothing or nan"
                 raise UnreadableResultError(f"{what}; {remedy}") from error
-
-
-def _text_file(path: Path) -> _TextFile:
-    """Find separator, decimal sign and header from the first lines."""
-    with path.open("rb") as file:
-        head = file.read(_HEAD)
-    _require(head.strip() != b"", "the file is empty; name a file with numbers")
-    _require(b"\0" not in head, "this is not text; name a CSV file, or FILE.h5:/path of an HDF5 file")
-    lines = head.decode("utf-8-sig", errors="replace").splitlines()
-    lines = lines[:-1] if len(head) == _HEAD and len(lines) > 1 else lines
-    names: list[str] = []
-    for number, line in enumerate(lines):
-        if not line.strip() or line.lstrip().startswith(_COMMENTS):
-            continue
-        separator = next((s for s in (";", "\t", ",") if s in line), None)
-        comma = separator != "," and "," in line
-        cells = [cell.strip().strip('"') for cell in line.split(separator)]
-        numbers = [_is_number(cell, comma) for cell in cells]
-        names_fit = len(names) == len(cells)
-        if any(numbers) and all(good or not cell for good, cell in zip(numbers, cells, strict=True)):
-            comma = comma or (separator != "," and any("," in text for text in lines[number : number + 100]))
-            return _TextFile(path, separator, comma, tuple(names) if names_fit else (), len(cells), number)
-        names = names if names_fit else cells  # a second line of names is that of the units
-    raise UnreadableResultError("no line of numbers was found at its start; name a file of columns of numbers")
 
 
 def _is_number(cell: str, decimal_comma: bool) -> bool:

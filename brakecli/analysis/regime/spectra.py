@@ -29,10 +29,7 @@ class Spectrum:
 
 
 def spectrum(history: History, start: int) -> Spectrum:
-    """Welch's estimate (Hann window, half overlap, mean removed) of the samples from `start` on.
-
-    The length of the segments, at most `LONGEST_SEGMENT`, leaves about `SEGMENTS_WANTED` of them.
-    """
+    """Welch's estimate (Hann window, half overlap, mean removed) of the samples from `start` on."""
     length = history.samples - start
     size = min(LONGEST_SEGMENT, max(min(SHORTEST_SEGMENT, length), 2 * length // (SEGMENTS_WANTED + 1)))
     hop = max(1, size - size // 2)
@@ -46,21 +43,16 @@ def spectrum(history: History, start: int) -> Spectrum:
         begin = start + first * hop
         for name, total in densities.items():
             block = history.read(name, begin, begin + (count - 1) * hop + size)
-            total += _summed_periodograms(sliding_window_view(block, size)[::hop], window)
+            # Squares of the smallest numbers would vanish, so the block is brought to a scale of one.
+            scale = float(np.max(np.abs(block))) or 1.0
+            power = np.empty((size // 2 + 1, count))
+            for column, segment in zip(power.T, sliding_window_view(block / scale, size)[::hop], strict=True):
+                line = np.fft.rfft((segment - segment.mean()) * window)
+                column[:] = line.real**2 + line.imag**2
+            power[1 : (size + 1) // 2] *= 2.0
+            total += count * power.mean(axis=1) * scale**2
     frequency: Array = np.fft.rfftfreq(size, history.interval).astype(np.float64)
     return Spectrum(frequency, {name: total / segments for name, total in densities.items()}, start, segments)
-
-
-def _summed_periodograms(segments: Array, window: Array) -> Array:
-    """Sum of the one-sided power spectral densities of segments, one in a row."""
-    # Squares of the smallest numbers would vanish, so the segments are brought to a scale of one.
-    scale = float(np.max(np.abs(segments), initial=0.0)) or 1.0
-    power = np.empty((len(window) // 2 + 1, len(segments)))
-    for column, segment in zip(power.T, segments / scale, strict=True):
-        line = np.fft.rfft((segment - segment.mean()) * window)
-        column[:] = line.real**2 + line.imag**2
-    power[1 : (len(window) + 1) // 2] *= 2.0
-    return np.asarray(len(segments) * power.mean(axis=1) * scale**2)
 
 
 def peak(frequency: Array, density: Array) -> float | None:
@@ -84,10 +76,7 @@ def rises(values: Array, low: float, high: float) -> NDArray[np.intp]:
 
 
 def upward_crossings(values: Array, band: float) -> Array:
-    """Places (in samples) where a signal rises through zero between leaving -band and reaching +band.
-
-    The band keeps ripple on a slow cycle from counting as cycles. The places are interpolated linearly.
-    """
+    """Where a signal rises through zero from below -band to above band, in samples, interpolated linearly."""
     crossings = np.flatnonzero((values[:-1] < 0.0) & (values[1:] >= 0.0))
     i = crossings[np.searchsorted(crossings, rises(values, -band, band))]
     return i + values[i] / (values[i] - values[i + 1])
