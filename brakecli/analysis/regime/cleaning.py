@@ -121,7 +121,7 @@ def cleaned(values: Array, is_velocity: bool) -> Velocity:
 
 
 def _velocity(values: Array, is_velocity: bool) -> Velocity:
-    """Its noise is the lesser of what third differences and the spectrum's floor allow."""
+    """Velocity with its noise, the lesser of what third differences and the spectrum's floor allow."""
     raw, noise = values if is_velocity else np.diff(values), 0.0
     if len(values) >= _SHORTEST:
         rough, some = np.diff(values, 3), _handy(values)

@@ -4,16 +4,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from brakecli.analysis.regime.spectra import Array, upward_crossings
 from brakecli.solver.history import History
 from brakecli.solver.quantities import ContactState
-
-if TYPE_CHECKING:  # measured signals need not wait for compiled code
-    from brakecli.solver.records import Coefficients
 
 FEWEST_SAMPLES = 160  # of a history that has an envelope
 WINDOWS = 40
@@ -169,19 +166,3 @@ def cycles_of(part: Part) -> dict[str, Any]:
         "stick_cycles": float(np.mean(per_cycle > 0)),
         "stick_episodes_per_cycle": float(np.mean(per_cycle)),
     }
-
-
-def powers_of(part: Part, c: "Coefficients", belt: float, load: float) -> dict[str, float]:
-    """Mean powers (W) at constant U (m/s) and Q (N): the belt's, what becomes of it, and what is left."""
-    sums = np.zeros(4)
-    for v_x, v_y, friction in zip(*map(part.pieces, ("vx", "vy", "friction_force")), strict=True):
-        sums += (
-            belt * friction.sum(),
-            -float(friction @ (v_x - belt)),
-            float(c.b_xx * v_x @ v_x + 2.0 * c.b_xy * v_x @ v_y + c.b_yy * v_y @ v_y),
-            load * (c.sin_beta * v_x.sum() + c.cos_beta * v_y.sum()),
-        )
-    means = sums / (part.stop - part.start)
-    rest = np.subtract.reduce(means)
-    names = ("power_belt", "power_friction", "power_dashpots", "power_load", "power_rest")
-    return dict(zip(names, [*means.tolist(), float(rest)], strict=True))

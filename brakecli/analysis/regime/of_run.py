@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from brakecli.analysis.regime.evidence import Part
 from brakecli.analysis.regime.rules import Context, Regime, Thresholds, Verdict, classify, forced_lines
 from brakecli.analysis.stability.modes import growth
 from brakecli.case.read import parse_case
@@ -56,11 +57,9 @@ def classify_result(path: Path, thresholds: Thresholds) -> dict[str, Any]:
     return {**values_of(fields.VERDICT, RunVerdict(system, verdict)), "failure": failure}
 
 
-def verdict_on(
-    history: History, system: System, failure: str | None, thresholds: Thresholds | None = None
-) -> Verdict:
+def verdict_on(history: History, system: System, failure: str | None, limits: Thresholds | None = None) -> Verdict:
     """The verdict on the motion of a system; a run that has failed has no regime."""
-    verdict = classify(history, context(system), thresholds or Thresholds())
+    verdict = classify(history, context(system), limits or Thresholds())
     if not failure:
         return verdict
     return replace(verdict, regime=Regime.UNDECIDED, frequency=None, reasons=(f"the run failed: {failure}",))
@@ -84,7 +83,21 @@ def context(system: System) -> Context:
         steady=len(system.belt) == 1 and len(system.load) == 1,
         forced=forced_lines(belt, [float(turns) for turns in system.wheel.turns], 0.5 / system.interval),
         quiet=1e-9 * compression * system.natural_frequencies[1],
-        coefficients=c,
-        load=system.load_at_start,
         growth=growth_rate,
+        powers=partial(_powers, system, belt),
     )
+
+
+def _powers(system: System, belt: float, part: Part) -> dict[str, float]:
+    """Mean powers (W) at constant U (m/s) and Q (N): the belt's, what becomes of it, and what is left."""
+    c, sums = system.coefficients, np.zeros(4)
+    for v_x, v_y, friction in zip(*map(part.pieces, ("vx", "vy", "friction_force")), strict=True):
+        sums += (
+            belt * friction.sum(),
+            -float(friction @ (v_x - belt)),
+            float(c.b_xx * v_x @ v_x + 2.0 * c.b_xy * v_x @ v_y + c.b_yy * v_y @ v_y),
+            system.load_at_start * (c.sin_beta * v_x.sum() + c.cos_beta * v_y.sum()),
+        )
+    means = sums / (part.stop - part.start)
+    names = ("power_belt", "power_friction", "power_dashpots", "power_load", "power_rest")
+    return dict(zip(names, [*means.tolist(), float(np.subtract.reduce(means))], strict=True))

@@ -207,7 +207,9 @@ class _Rules:
         velocity, sign, scale = self.velocity, 1.0, self.velocity.quiet
         self.skewness, self.events, self.stick = 0.0, 0, 0.0
         for m, _ in velocity.variances:
-            skewness = _skewness(velocity.thinned(m))
+            parts = [part - part.mean() for part in np.array_split(velocity.thinned(m), _PARTS)]
+            each = [np.mean(p * p * p) / max(float(np.mean(p * p)), 1e-100) ** 1.5 for p in parts]
+            skewness = float(np.median(each))  # a single jump does not change it
             if abs(skewness) > max(self.skewness, 4.0 * np.sqrt(6.0 * m / self.count)):
                 self.skewness, sign, scale = abs(skewness), -np.sign(skewness), m
         if self.skewness < self.limits.skewness_certain:
@@ -243,9 +245,3 @@ class _Rules:
                 if at >= _SHORTEST_PLATEAU:
                     results.append((at, float(np.mean((away > width) & (away <= 3.0 * width)))))
         return max(results, key=lambda r: r[0] / max(r[1], 1e-9))
-
-
-def _skewness(values: Array) -> float:
-    """Median of the skewness of equal parts, which a single jump does not change."""
-    parts = [part - part.mean() for part in np.array_split(values, _PARTS)]
-    return float(np.median([np.mean(p * p * p) / max(float(np.mean(p * p)), 1e-100) ** 1.5 for p in parts]))

@@ -4,14 +4,11 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
-from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, WINDOWS, Envelope, Part, cycles_of, powers_of
+from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, WINDOWS, Envelope, Part, cycles_of
 from brakecli.solver.history import History
 from brakecli.solver.quantities import ContactState
-
-if TYPE_CHECKING:
-    from brakecli.solver.records import Coefficients
 
 
 class Regime(StrEnum):
@@ -59,9 +56,10 @@ class Context:
     steady: bool = True  # whether U and Q are constant
     forced: tuple[float, ...] = ()  # Hz, lines of the roughness
     quiet: float = 0.0  # m/s, size of vx that may come from rounding
-    coefficients: "Coefficients | None" = None  # with `load` Q (N) for the balance of powers
-    load: float = 0.0
     growth: Callable[[], float] = lambda: 0.0  # 1/s, of a small disturbance of steady sliding; 0 where it decays
+    powers: Callable[[Part], dict[str, float]] = (
+        lambda part: {}
+    )  # W, the balance of powers where U and Q are constant
 
 
 class Decision(NamedTuple):
@@ -190,13 +188,11 @@ def classify(history: History, context: Context, thresholds: Thresholds = Thresh
     """The regime of a run's history, by the rules of docs/regimes.md; the first that applies decides."""
     rules = _Rules(history, context, thresholds)
     decision = rules.contact() or rules.unmoved() or rules.forced() or rules.trend() or rules.sustained()
-    part, belt, c = rules.settled_part, context.belt_speed, context.coefficients
+    part, belt = rules.settled_part, context.belt_speed
     evidence = rules.evidence | {f"amplitude_{name}": part.amplitude(name) for name in ("y", "vx", "vy")}
     if belt != 0.0:
         evidence["largest_vx_over_belt_speed"] = part.extremes("vx")[int(belt > 0.0)] / belt
-    evidence |= part.lines(context.forced)
-    if c is not None and context.steady:
-        evidence |= powers_of(part, c, belt, context.load)
+    evidence |= part.lines(context.forced) | (context.powers(part) if context.steady else {})
     return Verdict(
         regime=decision.regime,
         excitation=decision.excitation,

@@ -27,14 +27,12 @@ def read_signal(source: str, *, column: str | None, time_column: str | None, sam
     """The signal of a text file, or of ``FILE.h5:/path``; raises UnreadableResultError and UsageError."""
     if sample_rate is not None and not (np.isfinite(sample_rate) and sample_rate > 0.0):
         raise UsageError(f"--sample-rate: must be above 0 Hz, found {sample_rate}; give samples per second")
-    if sample_rate is not None and time_column is not None:
-        raise UsageError("--sample-rate and --time-column: only one of them can hold; leave one out")
     path, inside = Path(source), None
     if not path.exists() and (found := re.fullmatch(r"(.+?):(/.*)", source)):
         path, inside = Path(found[1]), found[2]
     try:
-        if sample_rate is None and time_column is None:
-            raise UsageError("no times are known; give --sample-rate HZ, or --time-column")
+        if (sample_rate is None) == (time_column is None):
+            raise UsageError("the times come from --sample-rate HZ, or --time-column; give one, leave one out")
         _require(stat.S_ISREG(path.stat().st_mode), "this is not a regular file; name a file")
         if inside is not None and (column is not None or time_column is not None):
             raise UsageError("a dataset has no columns; leave out --column, and give --sample-rate HZ")
