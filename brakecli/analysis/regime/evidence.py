@@ -143,7 +143,8 @@ def cycles_of(part: Part) -> dict[str, Any]:
     crossings = upward_crossings(velocity, 0.3 * float(velocity.std()))
     if len(crossings) < 2:
         return {}
-    period, close = float(crossings[-1] - crossings[0]) / (len(crossings) - 1), 2.0 * _SAME * float(velocity.var())
+    period = float(crossings[-1] - crossings[0]) / (len(crossings) - 1)
+    close = 2.0 * _SAME * float(velocity.var())
     for rises in range(1, _MOST_RISES_PER_CYCLE + 1):  # after which the motion repeats
         shift = round(rises * period)
         if 0 < shift < len(velocity) // 2 and np.mean((velocity[shift:] - velocity[:-shift]) ** 2) <= close:

@@ -6,6 +6,7 @@ direction. Smoothing over the m = 1, 2, 4 … samples that show this best serves
 
 from dataclasses import dataclass
 from enum import StrEnum
+from itertools import product
 
 import numpy as np
 
@@ -123,11 +124,12 @@ class _Rules:
         self.evidence |= {"smoothed_over": float(velocity.quiet), "events": float(self.events)}
         if not self.above_noise:
             return Decision("nothing stands out of the noise; measure closer, or with less noise")
-        strongest, length = int(np.argmax(self.power)), len(self.clean) * self.interval
+        self.strongest = strongest = int(np.argmax(self.power))
         certain = self.skewness >= limits.skewness_certain and self.events >= limits.fewest_cycles
         if certain or self.power[strongest] == 0.0:
             cycles, self.frequency = float(self.events), max(self.events, 1) / self.duration
         else:
+            length = len(self.clean) * self.interval
             cycles, self.frequency = strongest * self.duration / length, max(strongest, 1) / length
         self.windows = int(np.clip(cycles / 3.0, 1, 40))
         period = 1.0 / (self.frequency * self.interval)
@@ -145,9 +147,8 @@ class _Rules:
         last, largest = float(envelope[-max(1, windows // 4) :].mean()), float(np.sort(envelope)[-3])
         died_to, floor = last / max(largest, 1e-300), np.sqrt(velocity.noise_at(velocity.quiet))
         self.evidence |= {"envelope_ratio": ratio, "envelope_order": order, "died_to": died_to}
-        if envelope[: windows // 2].max() >= largest and last <= max(
-            limits.decayed_to * largest, min(0.2 * largest, 0.5 * floor)
-        ):
+        faded = last <= max(limits.decayed_to * largest, min(0.2 * largest, 0.5 * floor))
+        if faded and envelope[: windows // 2].max() >= largest:
             return Decision(f"the vibration has died out: down to {died_to:.2g} of its largest", Regime.DAMPED)
         for start in (0, self.count // 4, self.count // 2):
             _, ratio, order = velocity.trend(start, windows)
@@ -166,8 +167,9 @@ class _Rules:
         if self.events < limits.fewest_cycles or self.skewness < limits.skewness_unlikely:
             return None
         if self.skewness < limits.skewness_certain:
-            strongest = int(np.argmax(self.power))
-            bands = [slice(int(0.97 * n * strongest), int(1.03 * n * strongest) + 2) for n in range(3, 9)]
+            bands = [
+                slice(int(0.97 * n * self.strongest), int(1.03 * n * self.strongest) + 2) for n in range(3, 9)
+            ]
             overtones = sum(float(self.power[band].sum()) for band in bands) / total
             self.evidence |= {"overtones": overtones}
             if overtones <= limits.overtones:
@@ -178,9 +180,8 @@ class _Rules:
                 what = "the velocity is skewed, by stick or by two lines in step, and noise hides which"
                 return Decision(f"{what}; measure with less noise, or for longer")
         reason = f"{self.events} events of stick and slip: skewness of the velocity {self.skewness:.2g}"
-        return Decision(
-            reason, Regime.RELAXATION, frequency=self.events / self.duration, stick_fraction=self.stick
-        )
+        often = self.events / self.duration
+        return Decision(reason, Regime.RELAXATION, frequency=often, stick_fraction=self.stick)
 
     def without_stick(self) -> Decision:
         top, beside = self._plateau()
@@ -230,18 +231,15 @@ class _Rules:
         absolute = clean + self.velocity.raw.mean()
         reach = 0.5 * float(np.ptp(np.quantile(clean, [0.01, 0.99])))
         levels = [self.belt, -self.belt]
-        if not np.isfinite(
-            self.belt
-        ):  # the most frequent values of the lower and of the upper quarter of the range
+        if not np.isfinite(self.belt):
+            # the most frequent values of the lower and of the upper quarter of the range
             edges = np.arange(absolute.min(), absolute.max() + 0.01 * reach, 0.01 * reach)
             counts, quarter = np.histogram(absolute, edges)[0], max(1, len(edges) // 4)
             places = np.argmax(counts[:quarter]), len(counts) - quarter + np.argmax(counts[-quarter:])
             levels = [float(0.5 * (edges[i] + edges[i + 1])) for i in places]
         results = [(0.0, 1.0)]
-        for level in levels:
+        for level, width in product(levels, (0.02, 0.01, 0.005)):
             away = np.abs(absolute - level) / reach
-            for width in (0.02, 0.01, 0.005):
-                at = float(np.mean(away <= width))
-                if at >= _SHORTEST_PLATEAU:
-                    results.append((at, float(np.mean((away > width) & (away <= 3.0 * width)))))
+            if (at := float(np.mean(away <= width))) >= _SHORTEST_PLATEAU:
+                results.append((at, float(np.mean((away > width) & (away <= 3.0 * width)))))
         return max(results, key=lambda r: r[0] / max(r[1], 1e-9))
