@@ -57,9 +57,7 @@ class Context:
     forced: tuple[float, ...] = ()  # Hz, lines of the roughness
     quiet: float = 0.0  # m/s, size of vx that may come from rounding
     growth: Callable[[], float] = lambda: 0.0  # 1/s, of a small disturbance of steady sliding; 0 where it decays
-    powers: Callable[[Part], dict[str, float]] = (
-        lambda part: {}
-    )  # W, the balance of powers where U and Q are constant
+    powers: Callable[[Part], dict[str, float]] = lambda part: {}  # W, what becomes of the power of the belt
 
 
 class Decision(NamedTuple):
