@@ -23,9 +23,6 @@ from brakecli.plots.style import Array
 from brakecli.solver.quantities import ContactState
 from brakecli.solver.schedules import Schedule
 
-Reader = Callable[[str, int, int], NDArray[Any]]
-"""Reads the samples start … stop - 1 of a variable of the history."""
-
 CYCLES = 12
 """Number of cycles drawn in detail."""
 MOST_DETAIL = 100_000
@@ -37,6 +34,7 @@ COLUMNS = 1200
 BLOCK = 1 << 20
 """Number of samples read at a time."""
 _SHADES = ((ContactState.STICK, style.ORANGE, "stick"), (ContactState.SEPARATED, style.GREY, "no contact"))
+_BELT: dict[str, Any] = {"color": style.VERMILION, "ls": style.DASHES}
 
 
 @dataclass(frozen=True)
@@ -49,7 +47,6 @@ class Detail:
     vx: Array
     state: NDArray[Any]
     belt: Array
-    interval: float
 
     @property
     def near(self) -> bool:
@@ -70,21 +67,20 @@ class RunPicture:
     title: str
     summary: str
     detail: Detail
+    interval: float
     span: tuple[float, float]  # s, of the whole run
     envelope: tuple[Array, Array, Array]  # time, least and greatest x of its columns
     spectrum: tuple[Array, Array]  # frequency, density
     spectrum_from: float  # s
-    fundamental: float | None  # Hz
-    peak: float | None  # Hz
+    line: tuple[str, float | None]  # name and frequency (Hz) of what the spectrum is drawn around
     passing: tuple[float, ...]  # Hz, of the waves of a wheel that turns steadily
 
 
 def gather(result: StoredResult) -> RunPicture:
     """Read from a result what its picture shows; raises UnreadableResultError where it is not there."""
-    variables = result.variables("history")
-    needed = ("time", "x", "vx", "state")
-    shapes = {variables[name].shape for name in needed if name in variables}
-    if not variables.keys() >= set(needed) or len(shapes) != 1 or not (samples := max(shapes)[0]):
+    variables, needed = result.variables("history"), ("time", "x", "vx", "state")
+    shapes = {variables[name].shape if name in variables else (0,) for name in needed}
+    if len(shapes) != 1 or not (samples := max(shapes)[0]):
         raise style.unreadable(result, f"its history has no {', '.join(needed)} of equal length above 0")
     try:
         case = parse_case(str(result.attributes.get("resolved_toml", "")), "its resolved case").case
@@ -97,16 +93,17 @@ def gather(result: StoredResult) -> RunPicture:
     interval = (end - start) / (samples - 1) if samples > 1 else case.output.sample_interval
     places, lowest, highest = envelope(partial(read, "x"), samples)
     first_sample = result.group_attributes("spectrum").get("first_sample", 0)
+    fundamental = _number(result, "frequency")
     return RunPicture(
         title=case.title or "Case without a title",
         summary=_summary(result),
-        detail=_detail(read, samples, interval, system.belt, result),
+        detail=_detail(result, samples, interval, system.belt),
+        interval=interval,
         span=(start, end),
         envelope=(start + interval * places, lowest, highest),
         spectrum=(result.read("spectrum", "frequency"), result.read("spectrum", "vx")),
         spectrum_from=start + interval * float(first_sample),
-        fundamental=_number(result, "frequency"),
-        peak=_number(result, "spectrum_peak"),
+        line=("fundamental", fundamental) if fundamental else ("highest peak", _number(result, "spectrum_peak")),
         passing=tuple(sorted(speed * system.wheel.turns)) if steady and speed else (),
     )
 
@@ -138,32 +135,27 @@ def episodes(state: NDArray[Any], wanted: ContactState) -> list[tuple[int, int]]
     return [(int(first), int(behind) - 1) for first, behind in edges.reshape(-1, 2)]
 
 
-def _detail(read: Reader, samples: int, interval: float, belt: Schedule, result: StoredResult) -> Detail:
+def _detail(result: StoredResult, samples: int, interval: float, belt: Schedule) -> Detail:
     """The last cycles of the run, or of the motion where it has come to rest."""
-    fundamental = _number(result, "frequency")
+    read, fundamental = partial(result.read, "history"), _number(result, "frequency")
     frequency = fundamental or _number(result, "spectrum_peak")
     wanted = CYCLES / (frequency * interval) if frequency else FEW
-    length = min(samples, MOST_DETAIL, max(2, round(min(wanted, MOST_DETAIL))))
+    length = min(samples, max(2, round(min(wanted, MOST_DETAIL))))
     stop, name = samples, "End of the run" if length < samples else "Whole run"
     if fundamental:
         name = "Settled motion"
     elif result.attributes.get("status") == "failed":
         name = "Motion up to the failure"
-    elif (rest := _last_motion(read, samples) + length // 8 + 1) < samples:
-        stop, name = rest, "Last motion, then stick"
-    first = max(0, stop - length)
-    time, x, vx, state = (read(variable, first, stop) for variable in ("time", "x", "vx", "state"))
-    return Detail(name, time, x, vx, state, np.interp(time, belt["time"], belt["value"]), interval)
-
-
-def _last_motion(read: Reader, samples: int) -> int:
-    """Samples up to the last one that does not stick, searched from the end."""
-    for stop in range(samples, 0, -BLOCK):
-        begin = max(0, stop - BLOCK)
-        moving = np.flatnonzero(read("state", begin, stop) != ContactState.STICK)
-        if moving.size:
-            return begin + int(moving[-1]) + 1
-    return 0
+    else:
+        starts = range((samples - 1) // BLOCK * BLOCK, -1, -BLOCK)
+        moving = (
+            begin + np.flatnonzero(read("state", begin, begin + BLOCK) != ContactState.STICK) for begin in starts
+        )
+        rest = next((int(found[-1]) for found in moving if found.size), -1) + length // 8 + 2
+        if rest < samples:
+            stop, name = rest, "Last motion, then stick"
+    time, x, vx, state = (read(variable, max(0, stop - length), stop) for variable in ("time", "x", "vx", "state"))
+    return Detail(name, time, x, vx, state, np.interp(time, belt["time"], belt["value"]))
 
 
 def _summary(result: StoredResult) -> str:
@@ -172,9 +164,9 @@ def _summary(result: StoredResult) -> str:
     if attributes.get("status") == "failed":
         return f"failed at {str(attributes.get('failure', '')).partition(';')[0]}"
     regime, excitation = str(attributes.get("regime")), str(attributes.get("excitation"))
-    parts = [regime if excitation == "none" else f"{regime}, {excitation}"]
-    if regime == "undecided":
-        parts = [f"{parts[0]}: {'; '.join(str(reason) for reason in attributes.get('reasons', ()))}"]
+    first = regime if excitation == "none" else f"{regime}, {excitation}"
+    reasons = f": {'; '.join(map(str, attributes.get('reasons', ())))}" if regime == "undecided" else ""
+    parts = [first + reasons]
     if frequency := _number(result, "frequency"):
         parts.append(f"{frequency:.4g} Hz")
     if (amplitude := _number(result, "amplitude")) and excitation != "none":
@@ -194,37 +186,35 @@ def _number(result: StoredResult, name: str) -> float | None:
 def draw(picture: RunPicture) -> Figure:
     """The figure with its four panels."""
     figure = style.headed(10.4, 7.2, picture.title, picture.summary, wspace=0.05, hspace=0.06)
-    panels = figure.subplots(2, 2, width_ratios=(1.55, 1.0))
-    _draw_detail(panels[0, 0], picture.detail)
-    _draw_portrait(panels[0, 1], picture.detail)
-    _draw_history(panels[1, 0], picture)
-    _draw_spectrum(panels[1, 1], picture)
+    panels = figure.subplots(2, 2, width_ratios=(1.55, 1.0)).flat
+    for axes, draw_panel in zip(
+        panels, (_draw_detail, _draw_portrait, _draw_history, _draw_spectrum), strict=True
+    ):
+        draw_panel(axes, picture)
     return figure
 
 
-def _draw_detail(axes: Axes, detail: Detail) -> None:
+def _draw_detail(axes: Axes, picture: RunPicture) -> None:
+    detail, interval = picture.detail, picture.interval
     factor, unit = detail.velocity_unit
     axes.plot(detail.time, factor * detail.vx, color=style.BLUE, marker=_marker(detail.time))
     look: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "alpha": 0.3, "lw": 0, "zorder": 0.5}
     for state, colour, label in _SHADES:
-        spans = [
-            (detail.time[first] - 0.5 * detail.interval, (last - first + 1) * detail.interval)
-            for first, last in episodes(detail.state, state)
-        ]
+        found = episodes(detail.state, state)
+        spans = [(detail.time[first] - 0.5 * interval, (last - first + 1) * interval) for first, last in found]
         if spans:
             axes.broken_barh(spans, (0, 1), color=colour, label=label, **look)
     if detail.near:
         label = f"U = {factor * detail.belt[-1]:.4g} {unit}" if np.ptp(detail.belt) == 0.0 else "U"
-        axes.plot(detail.time, factor * detail.belt, color=style.VERMILION, ls=style.DASHES, lw=1.1, label=label)
-    if len(detail.time) > 1:
-        axes.set_xlim(detail.time[0], detail.time[-1])
+        axes.plot(detail.time, factor * detail.belt, lw=1.1, label=label, **_BELT)
+    _set_span(axes, detail.time)
     axes.set(title=f"{detail.name}: tangential velocity", xlabel="time (s)", ylabel=f"velocity ẋ ({unit})")
     _note_far(axes, detail)
     _add_legend(axes)
 
 
-def _draw_portrait(axes: Axes, detail: Detail) -> None:
-    centre = _centre(detail.x)
+def _draw_portrait(axes: Axes, picture: RunPicture) -> None:
+    detail, centre = picture.detail, _centre(picture.detail.x)
     x_factor, x_unit = style.prefixed(style.largest(detail.x - centre), "m")
     factor, unit = detail.velocity_unit
     x, vx = x_factor * (detail.x - centre), factor * detail.vx
@@ -232,17 +222,11 @@ def _draw_portrait(axes: Axes, detail: Detail) -> None:
     stick = detail.state == ContactState.STICK
     axes.plot(x[stick], vx[stick], color=style.ORANGE, ls="none", marker="o", ms=3.0)
     for speed in np.unique([detail.belt.min(), detail.belt.max()]) if detail.near else ():
-        axes.axhline(factor * speed, color=style.VERMILION, ls=style.DASHES, lw=1.1)
+        axes.axhline(factor * speed, lw=1.1, **_BELT)
     axes.locator_params(axis="x", nbins=6)
     about = f" − ({centre:.12g} m)".replace("-", "−") if centre else ""
     axes.set(title="Phase portrait", xlabel=f"displacement x{about} ({x_unit})", ylabel=f"velocity ẋ ({unit})")
     _note_far(axes, detail)
-
-
-def _note_far(axes: Axes, detail: Detail) -> None:
-    if not detail.near:
-        note = f"U = {detail.belt[-1]:.4g} m/s, off the scale"
-        axes.set_title(note, loc="right", size=8.5, color=style.VERMILION)
 
 
 def _draw_history(axes: Axes, picture: RunPicture) -> None:
@@ -251,11 +235,10 @@ def _draw_history(axes: Axes, picture: RunPicture) -> None:
     axes.fill_between(time, factor * lowest, factor * highest, color=style.BLUE, lw=0.9)
     if len(time) < 3:
         axes.plot(time, factor * lowest, color=style.BLUE, marker="o", ms=4.0)
-    detail = picture.detail.time
-    if len(detail) > 1 and detail[-1] - detail[0] < 0.9 * (picture.span[1] - picture.span[0]):
-        axes.axvspan(detail[0], detail[-1], color=style.GREEN, alpha=0.25, lw=0, zorder=0.5, label="drawn above")
-    if picture.span[1] > picture.span[0]:
-        axes.set_xlim(*picture.span)
+    first, last = picture.detail.time[[0, -1]]
+    if first < last < first + 0.9 * (picture.span[1] - picture.span[0]):
+        axes.axvspan(first, last, color=style.GREEN, alpha=0.25, lw=0, zorder=0.5, label="drawn above")
+    _set_span(axes, picture.span)
     axes.set(title="Whole run: tangential displacement", xlabel="time (s)", ylabel=f"displacement x ({unit})")
     _add_legend(axes)
 
@@ -270,7 +253,7 @@ def _draw_spectrum(axes: Axes, picture: RunPicture) -> None:
         axes.set(xticks=[], yticks=[])
         style.write_inside(axes, "no motion")
         return
-    line = picture.fundamental or picture.peak
+    name, line = picture.line
     highest = min(frequency[-1], max([6.5 * (line or np.inf), *(1.3 * f for f in picture.passing)]))
     near = shown & (frequency <= highest)
     near = near if near.any() else shown
@@ -280,13 +263,22 @@ def _draw_spectrum(axes: Axes, picture: RunPicture) -> None:
     axes.set_ylim(lowest, 30.0 * float(density.max()))
     axes.set_xlim(0.0, min(highest, max(1.3 * float(frequency[density > lowest][-1]), 2.0 * (line or 0.0))))
     for number, wave in enumerate(picture.passing):
-        label = None if number else "waves of the wheel pass"
-        axes.axvline(wave, color=style.VERMILION, ls=style.DASHES, lw=0.9, zorder=0.8, label=label)
+        axes.axvline(wave, lw=0.9, zorder=0.8, label="" if number else "waves of the wheel pass", **_BELT)
     if line:
-        label = f"{'fundamental' if picture.fundamental else 'highest peak'} {line:.4g} Hz"
-        axes.axvline(line, color=style.GREEN, ls=(0, (1, 1.5)), lw=1.4, zorder=0.9, label=label)
-    if axes.get_legend_handles_labels()[1]:
+        axes.axvline(line, color=style.GREEN, ls=style.DOTS, lw=1.4, zorder=0.9, label=f"{name} {line:.4g} Hz")
+    if picture.passing or line:
         axes.legend(loc="upper right")
+
+
+def _note_far(axes: Axes, detail: Detail) -> None:
+    if not detail.near:
+        note = f"U = {detail.belt[-1]:.4g} m/s, off the scale"
+        axes.set_title(note, loc="right", size=8.5, color=style.VERMILION)
+
+
+def _set_span(axes: Axes, time: Any) -> None:
+    if time[-1] > time[0]:
+        axes.set_xlim(time[0], time[-1])
 
 
 def _add_legend(axes: Axes) -> None:
