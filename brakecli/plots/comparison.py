@@ -8,7 +8,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
-from numpy.typing import NDArray
 
 from brakecli.case.case import Evaluator, Iteration, Start
 from brakecli.errors import UsageError
@@ -16,18 +15,16 @@ from brakecli.files.read import StoredResult
 from brakecli.plots import style
 from brakecli.solver.schemes import SCHEMES
 
-Columns = dict[str, NDArray[Any]]
+Columns = dict[str, style.Array]
 """Columns over the entries, and in `drawn` whether the error of an entry can be drawn."""
-LARGEST = 3.0
-"""Entries with larger errors are useless as results; they are not drawn."""
+LARGEST = 3.0  # entries with larger errors are useless as results; they are not drawn
 _TEXTS = ("method", "scheme", "theta", "start", "iteration", "evaluator", "failure")
 _NUMBERS = ("step", "tolerance", "error", "wall_seconds", "contact_evaluations", "nodes", "on_front")
-_PANELS = (
+_PANELS = (  # column, factor, title and label of the work
     ("wall_seconds", 1e3, "Work–precision", "median time of the loop (ms)"),
     ("contact_evaluations", 1.0, "Work counted, the same on every machine", "evaluations of the contact force"),
 )
-"""Column, factor, title and label of the work."""
-_MARKERS = {
+_MARKERS = {  # by weights
     "0.5, 0.5": "o",
     "1, 0.5": "^",
     "0.5, 1": "v",
@@ -36,11 +33,8 @@ _MARKERS = {
     "0.0833333, 0.833333, 0.0833333": "D",
     "": "*",
 }
-"""Markers by weights."""
-_EXACT, _OTHER_NODES = "#CC79A7", "#56B4E9"
-"""Colours of the exact contact force, and of less usual numbers of nodes."""
-_NODE_MARKERS = "<>ph"
-"""Markers of the same weights with other numbers of nodes."""
+_EXACT, _OTHER_NODES = "#CC79A7", "#56B4E9"  # colours of the exact contact force, of less usual numbers of nodes
+_NODE_MARKERS = "<>ph"  # markers of the same weights with other numbers of nodes
 
 
 def draw(result: StoredResult) -> Figure:
@@ -72,7 +66,11 @@ def draw(result: StoredResult) -> Figure:
         (_draw_front if name == "wall_seconds" else _draw_slopes)(axes, columns, work)
         axes.set(title=title, xlabel=label)
         axes.label_outer()
-        _set_ticks(axes)
+        left, right = axes.get_xlim()
+        axes.xaxis.set_major_locator(style.log_locator(right / left))
+        axes.xaxis.set_minor_formatter(NullFormatter())
+        if right / left < style.WIDE:
+            axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
     panels[0].set_ylabel("largest relative error of x, y, ẋ, ẏ")
     if (errors := columns["error"][columns["drawn"]]).size:
         low = 0.4 * min(float(errors.min()), target or LARGEST)
@@ -88,7 +86,6 @@ def draw(result: StoredResult) -> Figure:
 
 
 def _lines(attributes: dict[str, Any], columns: Columns, best: int | None) -> tuple[str, str]:
-    """The lines below the title."""
     target = f"{attributes.get('target_error', 0.0):g}"
     first = f"no entry has an error of at most {target}"
     if best is not None:
@@ -101,9 +98,8 @@ def _lines(attributes: dict[str, Any], columns: Columns, best: int | None) -> tu
     failed = int(np.count_nonzero(columns["failure"] != "")) - left_out
     parts = [f"{attributes.get('duration', 0.0):.4g} s of motion"]
     parts.append(f"reference good to {attributes.get('reference_error', 0.0):.1e}")
-    parts += [f"failed {failed}"] if failed else []
-    parts += [f"left out for want of time {left_out}"] if left_out else []
-    return first, "   ·   ".join(parts)
+    counts = (("failed", failed), ("left out for want of time", left_out))
+    return first, "   ·   ".join(parts + [f"{words} {count}" for words, count in counts if count])
 
 
 def _draw_errors(axes: Axes, columns: Columns, work: style.Array) -> None:
@@ -161,12 +157,3 @@ def _draw_slopes(axes: Axes, columns: Columns, work: style.Array) -> None:
         errors = top * (ends / ends[0]) ** -order
         axes.plot(ends, errors, color="#777777", lw=0.9, ls=(0, (1, 2)), zorder=0.8)
         axes.annotate(f"order {order}", (ends[1], errors[1]), color="#555555", **note)
-
-
-def _set_ticks(axes: Axes) -> None:
-    """Ticks along the work that read as numbers where there are few decades."""
-    low, high = axes.get_xlim()
-    axes.xaxis.set_major_locator(style.log_locator(high / low))
-    axes.xaxis.set_minor_formatter(NullFormatter())
-    if high / low < style.WIDE:
-        axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")

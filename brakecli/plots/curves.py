@@ -8,34 +8,29 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from brakecli.analysis.regime.rules import Excitation
 from brakecli.plots import marks, style
-from brakecli.plots.style import Array
 from brakecli.plots.sweep import SweepPicture
 from brakecli.sweeps.critical import Outcome
 from brakecli.sweeps.tables import Method
 
-_FEW = 60
-"""Number of points up to which each has a marker of full size."""
-_DIRECTIONS = {"": ("", "-"), "up": (">", "-"), "down": ("<", style.DASHES)}
-"""Marker and dashes of the curve of each direction."""
-_ALIKE = 0.02
-"""Values whose relative difference is smaller do not fill the axis from bottom to top."""
+_FEW = 60  # points up to which each has a marker of full size
+_DIRECTIONS = {"": ("", "-"), "up": (">", "-"), "down": ("<", style.DASHES)}  # marker and dashes of curves
+_ALIKE = 0.02  # values whose relative difference is smaller do not fill the axis from bottom to top
 
 
 def draw(picture: SweepPicture) -> Figure:
     """The figure of a sweep over one axis: one panel, or two above each other."""
-    panels: list[tuple[float, Callable[[Axes, SweepPicture], None]]]
-    if picture.critical is None:
-        panels = [(1.5, partial(_draw_motion, name="amplitude")), (1.0, partial(_draw_motion, name="frequency"))]
-    else:
-        panels = [(3.2, _draw_critical)]
+    panels: list[Callable[[Axes, SweepPicture], None]]
+    panels = [partial(_draw_motion, name="amplitude"), partial(_draw_motion, name="frequency")]
+    if picture.critical is not None:
         compared = np.isfinite(picture["critical"] - picture["critical_eigenvalue"]).any()
-        if picture.critical.method is Method.SIMULATION and compared:
-            panels.append((1.0, _draw_difference))
+        both = compared and picture.critical.method is Method.SIMULATION
+        panels = [_draw_critical, _draw_difference] if both else [_draw_critical]
     figure = marks.sweep_figure(picture, marks.WIDTH, 5.2 if len(panels) == 1 else 6.4)
-    heights = [height for height, _ in panels]
+    heights = (1.5 if picture.critical is None else 3.2, 1.0)[: len(panels)]
     rows = figure.subplots(len(panels), 1, sharex=True, height_ratios=heights, squeeze=False)[:, 0]
-    for axes, (_, draw_panel) in zip(rows, panels, strict=True):
+    for axes, draw_panel in zip(rows, panels, strict=True):
         draw_panel(axes, picture)
         axes.label_outer()
     figure.align_ylabels()
@@ -44,10 +39,7 @@ def draw(picture: SweepPicture) -> Figure:
 
 
 def _draw_critical(axes: Axes, picture: SweepPicture) -> None:
-    """The critical value along the axis of a sweep, and the least sustained one where it differs.
-
-    Values found by simulation have error bars, and those by eigenvalues stand beside them.
-    """
+    """The critical value along the axis of a sweep, and the least sustained one where it differs."""
     critical, axis = picture.critical, picture.axes[0]
     assert critical is not None
     x, value, sustained = axis.values, picture["critical"][0], picture["critical_sustained"][0]
@@ -67,7 +59,7 @@ def _draw_critical(axes: Axes, picture: SweepPicture) -> None:
         label = "vibration lasts from here on, from the case's own start"
         axes.plot(x[apart], sustained[apart], "v", ms=size, color=style.VERMILION, label=label)
     marks.set_scale(axes.xaxis, axis)
-    axes.set_ylabel(picture.critical_label, parse_math=False)
+    axes.set_ylabel(style.labelled(picture.long_names["critical"], picture.units["critical"]), parse_math=False)
     drawn = np.concatenate([value, eigenvalue, sustained])
     style.set_ticks(axes.yaxis, 0.0, style.largest(drawn) or max(abs(critical.lower), abs(critical.upper)))
     if np.isfinite(drawn).any():
@@ -91,14 +83,14 @@ def _draw_difference(axes: Axes, picture: SweepPicture) -> None:
 
 
 def _draw_motion(axes: Axes, picture: SweepPicture, name: str) -> None:
-    """`name`, the amplitude or the frequency, along the axis of a sweep; each point in the colour of its regime.
-
-    Where the motion was followed, the points are arrows that show the direction.
-    """
+    """Amplitude or frequency; points have the colour of their regime, and are arrows if it was followed."""
     axis, values, unit = picture.axes[0], picture[name], picture.units[name]
     factor, unit = style.prefixed(style.largest(values), unit) if unit == "m" else (1.0, unit)
-    least = _least(picture) if name == "amplitude" else 0.0
-    x, size, small, shaken = axis.values, _size(axis.values), values < least, marks.forced(picture)
+    lasting, _, wide = marks.lasting_amplitudes(picture)
+    wide = wide and name == "amplitude"  # drawn on a logarithmic axis
+    least = max(lasting / 30.0, float(np.nanmin(values[values > 0.0]))) if wide else 0.0
+    x, size, small = axis.values, _size(axis.values), values < least
+    shaken = picture["excitation"] == Excitation.FORCED
     for number, direction in enumerate(picture.directions):
         y = factor * np.where(small[number], np.nan, values[number])
         arrow, dashes = _DIRECTIONS[direction]
@@ -118,40 +110,27 @@ def _draw_motion(axes: Axes, picture: SweepPicture, name: str) -> None:
     if shaken.any():
         axes.plot([], [], "o", ms=3, color=style.DARK, label=marks.FORCED)
     edges, label = axis.edges, marks.DIFFERENT
-    for place in np.flatnonzero(picture.hysteresis[0]):
+    for place in np.flatnonzero(picture["hysteresis"][0]):
         axes.axvspan(edges[place], edges[place + 1], color=style.GREEN, alpha=0.16, lw=0, zorder=0.5, label=label)
         label = "_"
     marks.set_scale(axes.xaxis, axis)
     words = picture.long_names[name]
     axes.set(ylabel=style.labelled(name, unit), title=words[:1].upper() + words[1:])
-    if np.isfinite(values).any():
-        _set_height(axes, name, factor * values, factor * least)
-    else:
+    floor, highest = factor * least, factor * float(np.nanmax(values, initial=0.0))
+    if not np.isfinite(values).any():
         axes.set_yticks([])
-        style.write_inside(axes, "no sustained vibration")
-    _mark(axes, x, [marks.sign(small, "smaller than drawn", "v", style.DARK, "white"), marks.failed(picture)])
-
-
-def _least(picture: SweepPicture) -> float:
-    """The least amplitude that is drawn on a logarithmic axis; 0 where the axis is linear."""
-    least, _, wide = marks.lasting_amplitudes(picture)
-    values = picture["amplitude"]
-    return max(least / 30.0, float(np.nanmin(values[values > 0.0]))) if wide else 0.0
-
-
-def _set_height(axes: Axes, name: str, values: Array, floor: float) -> None:
-    """Show amplitudes from 0 on, or on a logarithmic axis from the floor on; frequencies around their middle."""
-    highest = float(np.nanmax(values))
-    if name != "amplitude":
-        _widen(axes, values)
-    elif floor:
+        axes.text(0.5, 0.5, "no sustained vibration", transform=axes.transAxes, ha="center", color="#666666")
+    elif name == "frequency":
+        _widen(axes, factor * values)
+    elif wide:
         axes.set(yscale="log", ylim=(0.5 * floor, 2.0 * highest))
         style.set_ticks(axes.yaxis, 0.5 * floor, 2.0 * highest)
     else:
         axes.set_ylim(-0.03 * (highest or 1.0), 1.08 * (highest or 1.0))
+    _mark(axes, x, [marks.sign(small, "smaller than drawn", "v", style.DARK, "white"), marks.failed(picture)])
 
 
-def _widen(axes: Axes, values: Array) -> None:
+def _widen(axes: Axes, values: style.Array) -> None:
     """Keep values that differ too little in the middle of the axis."""
     low, high = np.nanmin(values), np.nanmax(values)
     if high - low < _ALIKE * abs(high + low) / 2.0:
@@ -161,7 +140,7 @@ def _widen(axes: Axes, values: Array) -> None:
         axes.margins(y=0.08)
 
 
-def _mark(axes: Axes, x: Array, signs: Iterable[marks.Sign]) -> None:
+def _mark(axes: Axes, x: style.Array, signs: Iterable[marks.Sign]) -> None:
     """Signs at the edge of the axes, in room of their own: at the top for triangles that point up."""
     there = [(where.any(axis=0), look) for where, look in signs if where.any()]
     up = [look["marker"] == "^" for _, look in there]
@@ -175,11 +154,9 @@ def _mark(axes: Axes, x: Array, signs: Iterable[marks.Sign]) -> None:
         axes.plot(x[chosen], height, clip_on=False, zorder=3, ms=_size(x), transform=transform, **look)
 
 
-def _size(points: Array) -> float:
-    """The size of markers, smaller where there are many points."""
-    return 6.5 if len(points) <= _FEW else max(2.0, 6.5 * (_FEW / len(points)) ** 0.5)
+def _size(points: style.Array) -> float:
+    return float(max(2.0, 6.5 * min(1.0, _FEW / len(points)) ** 0.5))
 
 
 def _bars(size: float) -> dict[str, Any]:
-    """The look of points with error bars."""
     return {"fmt": "o", "color": style.BLUE, "ms": size, "capsize": 0.6 * size, "elinewidth": 1.0}

@@ -12,17 +12,14 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
+from brakecli.analysis.regime.rules import Excitation
 from brakecli.plots import marks, style
-from brakecli.plots.style import Array
 from brakecli.plots.sweep import MOST_PANELS, SweepPicture
 
-_LONG_TITLE = 34
-"""Number of characters of a panel's title from which on it takes two lines."""
-_MAP_WIDTH, _PANEL_WIDTH = 10.4, 3.0
-"""Widths (inches): of a figure with two columns of maps, and of each map where maps stand side by side."""
+_LONG_TITLE = 34  # characters of a panel's title from which on it takes two lines
+_MAP_WIDTH, _PANEL_WIDTH = 10.4, 3.0  # inches, of a figure with two columns of maps, and of each of more maps
 _MOST_NUMBERS = 80
-_MOST_DRAWN = 4096
-"""Number of cells up to which each cell of a map is a shape of its own in a PDF or SVG file."""
+_MOST_DRAWN = 4096  # cells up to which each cell of a map is a shape of its own in a PDF or SVG file
 
 
 class Scale(NamedTuple):
@@ -54,10 +51,9 @@ def draw(picture: SweepPicture) -> Figure:
     for row, (name, piece) in zip(panels.T if sliced else panels, pieces, strict=True):
         for axes, (layer, draw_layer) in zip(row, layers.items(), strict=True):
             mesh = draw_layer(axes, piece, scale)
-            axes.set_title("" if sliced else layer + name)
             axes.label_outer()
-        if sliced:
-            row[0].set_title(name, parse_math=False)
+            if not sliced or axes is row[0]:
+                axes.set_title(name if sliced else layer + name, parse_math=False)
     bar = figure.colorbar(mesh, ax=panels[-1] if sliced else panels, extend=scale.extend, aspect=30, pad=0.015)
     style.set_ticks(bar.ax.yaxis, *(value or 0.0 for value in mesh.get_clim()))
     bar.minorticks_off()
@@ -85,9 +81,10 @@ def _draw_regimes(axes: Axes, picture: SweepPicture, _: Scale) -> ScalarMappable
         axes.plot([], [], ls="none", marker="s", ms=9, mfc=colour, mec="none", label=str(regime))
     colours = ListedColormap([colour for colour, _ in marks.REGIMES.values()])
     mesh = _mesh(axes, picture, codes[0], cmap=colours, vmin=-0.5, vmax=len(marks.REGIMES) - 0.5)
+    forced = picture["excitation"] == Excitation.FORCED
     shaken = {"marker": "o", "color": style.DARK, "mec": "white", "label": marks.FORCED}
     different = {"marker": "$≠$", "color": style.DARK, "label": marks.DIFFERENT}
-    _sign(axes, picture, (marks.forced(picture), shaken), (picture.hysteresis, different), marks.failed(picture))
+    _sign(axes, picture, (forced, shaken), (picture["hysteresis"], different), marks.failed(picture))
     return mesh
 
 
@@ -138,10 +135,10 @@ def _critical_scale(picture: SweepPicture) -> Scale:
         least = 0.01 * max(abs(low), abs(high))
         if high - low <= least:
             low, high = low - (least or 1.0), high + (least or 1.0)
-    return Scale(picture.critical_label, Normalize(low, high))
+    return Scale(style.labelled(picture.long_names["critical"], picture.units["critical"]), Normalize(low, high))
 
 
-def _mesh(axes: Axes, picture: SweepPicture, values: Array, **look: Any) -> QuadMesh:
+def _mesh(axes: Axes, picture: SweepPicture, values: style.Array, **look: Any) -> QuadMesh:
     """A cell around each point, in the colour of its value; none where it is missing."""
     x, y = picture.axes
     marks.set_scale(axes.xaxis, x)
@@ -155,7 +152,7 @@ def _mesh(axes: Axes, picture: SweepPicture, values: Array, **look: Any) -> Quad
     return mesh
 
 
-def _draw_contours(axes: Axes, picture: SweepPicture, values: Array, norm: Normalize) -> None:
+def _draw_contours(axes: Axes, picture: SweepPicture, values: style.Array, norm: Normalize) -> None:
     x, y = (axis.values for axis in picture.axes)
     levels = MaxNLocator(6).tick_values(float(norm.vmin or 0.0), float(norm.vmax or 0.0))
     if not (levels := [level for level in levels if np.nanmin(values) < level < np.nanmax(values)]):

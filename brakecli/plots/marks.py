@@ -9,39 +9,29 @@ import numpy as np
 from matplotlib.axis import XAxis, YAxis
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
-from numpy.typing import NDArray
 
-from brakecli.analysis.regime.rules import Excitation, Regime
+from brakecli.analysis.regime.rules import Regime
 from brakecli.plots import style
 from brakecli.plots.sweep import Axis, SweepPicture
 from brakecli.sweeps.critical import Outcome
 from brakecli.sweeps.point import Status
 
-Places = NDArray[np.bool_]
-"""Which points, in the shape of the picture's variables."""
-Sign = tuple[Places, dict[str, Any]]
-"""Points without a value that could be drawn, and the look of their marker."""
-
-REGIMES = {
+Sign = tuple[style.Array, dict[str, Any]]  # points without a value that could be drawn, the look of their marker
+REGIMES = {  # colour and marker
     Regime.DAMPED: ("#BFDDF0", "o"),
     Regime.RELAXATION: (style.ORANGE, "s"),
     Regime.QUASI_HARMONIC: (style.BLUE, "D"),
     Regime.UNDECIDED: (style.GREY, "X"),
 }
-"""Colour and marker of each regime."""
 FORCED, DIFFERENT = "forced by the wheel's waves", "up and down differ"
-WIDTH = 8.8
-"""Width (inches) of a figure with one column of panels."""
+WIDTH = 8.8  # inches, of a figure with one column of panels
 _FIRST = (*map(str, REGIMES), "by simulation", "by eigenvalues")
-_MOST_TEXTS = 30
-_MOST_CHARACTERS = 70
-_FEW = 6
-"""Number of values of an axis up to which each has its tick."""
-_WIDE = 20.0
-"""Ratio of lasting amplitudes from which on their scale is logarithmic."""
+_LONGEST_KEY, _MOST_TEXTS, _MOST_CHARACTERS = 45, 30, 70
+_FEW = 6  # values of an axis up to which each has its tick
+_WIDE = 20.0  # ratio of lasting amplitudes from which on their scale is logarithmic
 
 
-def sign(where: Places, label: str, marker: str, colour: str, face: str) -> Sign:
+def sign(where: style.Array, label: str, marker: str, colour: str, face: str) -> Sign:
     """A sign for points without a value; a triangle that points up stands at the top of curves."""
     look = {"marker": marker, "markeredgecolor": colour, "markerfacecolor": face, "markeredgewidth": 1.2}
     return where, {"ls": "none", "label": label, **look}
@@ -68,26 +58,19 @@ def missing(picture: SweepPicture) -> Iterator[Sign]:
     yield failed(picture)
 
 
-def differs(picture: SweepPicture) -> Places:
+def differs(picture: SweepPicture) -> style.Array:
     """Where the least sustained value lies outside the bracket of the critical one, or where there is none."""
     assert picture.critical is not None
     sustained, tolerance = picture["critical_sustained"], picture.critical.tolerance
     early = picture["critical_lower"] - sustained > tolerance  # false where one of the two is missing
     late = sustained - picture["critical_upper"] > tolerance
-    return np.asarray(np.isfinite(sustained) & (early | late | np.isnan(picture["critical"])))
+    differ: style.Array = np.isfinite(sustained) & (early | late | np.isnan(picture["critical"]))
+    return differ
 
 
-def forced(picture: SweepPicture) -> Places:
-    """Where the waves of a rough wheel shake the shoe."""
-    return np.asarray((picture["excitation"] == Excitation.FORCED) & (picture["status"] == Status.DONE))
-
-
-def regimes(picture: SweepPicture) -> Iterator[tuple[Regime, Places]]:
+def regimes(picture: SweepPicture) -> list[tuple[Regime, style.Array]]:
     """Every regime that occurs, and where."""
-    for regime in REGIMES:
-        where = np.asarray((picture["regime"] == regime) & (picture["status"] == Status.DONE))
-        if where.any():
-            yield regime, where
+    return [(regime, where) for regime in REGIMES if (where := picture["regime"] == regime).any()]
 
 
 def lasting_amplitudes(picture: SweepPicture) -> tuple[float, float, bool]:
@@ -130,7 +113,8 @@ def add_legend(figure: Figure) -> None:
 def set_scale(axis: XAxis | YAxis, along: Axis) -> None:
     """Set the scale, the ticks and the label of an axis of the sweep."""
     side, values, texts = axis.axis_name, along.values, along.texts
-    axis.set_label_text(along.label, parse_math=False)
+    key = textwrap.shorten(along.key, _LONGEST_KEY, placeholder=" …")
+    axis.set_label_text(style.labelled(key, along.units), parse_math=False)
     if texts is not None:
         step = -(-len(texts) // _MOST_TEXTS)
         slanted = side == "x" and sum(map(len, texts)) > _MOST_CHARACTERS

@@ -9,7 +9,6 @@ from typing import Any
 
 import matplotlib.style
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
@@ -19,14 +18,13 @@ from brakecli.errors import UnreadableResultError
 from brakecli.files.read import StoredResult
 from brakecli.files.write import FILL
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]
 
 # The colours of Okabe and Ito, which people who do not see red or green can tell apart.
 BLUE, ORANGE, VERMILION, GREEN, GREY = "#0072B2", "#E69F00", "#D55E00", "#009E73", "#9A9A9A"
 DARK = "#333333"
 DASHES, DOTS = (0, (5, 3)), (0, (1, 1.5))
-WIDE = 300.0
-"""Ratio of the ends of a logarithmic axis from which on only powers of ten have a number."""
+WIDE = 300.0  # ratio of the ends of a logarithmic axis from which on only powers of ten have a number
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _LOOK: tuple[tuple[str, dict[str, Any]], ...] = (
     ("font", {"size": 9.5}),
@@ -87,7 +85,7 @@ def labels(figure: Figure) -> dict[str, Any]:
     return found
 
 
-def read_column(result: StoredResult, name: str) -> NDArray[Any]:
+def read_column(result: StoredResult, name: str) -> Array:
     """A variable of the root; missing numbers are NaN."""
     values = result.read("/", name)
     return np.where(values == FILL, np.nan, values) if values.dtype.kind == "f" else values
@@ -98,11 +96,6 @@ def unreadable(result: StoredResult, reason: str) -> UnreadableResultError:
     return UnreadableResultError(f"{result.path}: cannot be drawn: {reason}; compute it again")
 
 
-def write_inside(axes: Axes, words: str) -> None:
-    """Write in the middle of a panel why it is empty."""
-    axes.text(0.5, 0.5, words, transform=axes.transAxes, ha="center", color="#666666")
-
-
 def largest(values: Array) -> float:
     """The largest magnitude of the finite values, 0 if there are none."""
     return float(np.max(np.abs(values), where=np.isfinite(values), initial=0.0))
@@ -110,10 +103,9 @@ def largest(values: Array) -> float:
 
 def prefixed(magnitude: float, unit: str) -> tuple[float, str]:
     """The factor for values up to this magnitude that makes them easy to read, and the unit with its SI prefix."""
-    if 0.0 < magnitude < 1e6:
-        for exponent, prefix in ((3, "k"), (0, ""), (-3, "m"), (-6, "µ"), (-9, "n"), (-12, "p")):
-            if magnitude >= 10.0**exponent:
-                return 10.0**-exponent, prefix + unit
+    for exponent, prefix in ((3, "k"), (0, ""), (-3, "m"), (-6, "µ"), (-9, "n"), (-12, "p")):
+        if 10.0**exponent <= magnitude < 1e6:
+            return 10.0**-exponent, prefix + unit
     return 1.0, unit
 
 

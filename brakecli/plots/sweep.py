@@ -2,34 +2,26 @@
 
 import math
 import textwrap
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brakecli.case.read import parse_table
 from brakecli.errors import CaseError, UsageError
 from brakecli.files.read import StoredResult
 from brakecli.plots import style
-from brakecli.plots.style import Array
 from brakecli.sweeps.plan import label
 from brakecli.sweeps.tables import Critical, Sweep
 
-MOST_PANELS = 5
-"""Largest number of values of a third axis: its maps stand side by side."""
+MOST_PANELS = 5  # values of a third axis: its maps stand side by side
 _NEEDED = ("status", "regime", "excitation", "amplitude", "frequency")
 _CRITICAL = (
     *("critical_status", "critical", "critical_lower", "critical_upper", "critical_error"),
     *("critical_eigenvalue", "critical_sustained", "sustained_status"),
 )
-_LEAST_LOG = 5.0
-"""Ratio of the ends from which on an axis may be logarithmic; below it, linear ticks are easier to read."""
-_LONGEST_KEY = 45
-_MOST_LISTED = 12
+_LEAST_LOG = 5.0  # ratio of the ends of a logarithmic axis; below it, linear ticks are easier to read
 
 
 @dataclass(frozen=True)
@@ -39,13 +31,8 @@ class Axis:
     dimension: str
     key: str
     units: str
-    values: Array
+    values: style.Array
     texts: tuple[str, ...] | None = None
-
-    @property
-    def label(self) -> str:
-        """Key path and unit."""
-        return style.labelled(textwrap.shorten(self.key, _LONGEST_KEY, placeholder=" …"), self.units)
 
     @property
     def logarithmic(self) -> bool:
@@ -57,7 +44,7 @@ class Axis:
         return bool(np.std(ratios) / np.mean(ratios) < 0.999 * np.std(steps) / np.mean(steps))
 
     @property
-    def edges(self) -> Array:
+    def edges(self) -> style.Array:
         """The limits of the cells around the values: half way between neighbours."""
         places = np.log(self.values) if self.logarithmic else self.values
         middles = 0.5 * (places[1:] + places[:-1])
@@ -94,24 +81,14 @@ class SweepPicture:
     chosen: tuple[str, ...]  # what was selected, and axes of a single value
     directions: tuple[str, ...]
     axes: tuple[Axis, ...]
-    variables: Mapping[str, NDArray[Any]]
+    variables: Mapping[str, style.Array]
     units: Mapping[str, str]
     long_names: Mapping[str, str]
     critical: Critical | None
 
-    def __getitem__(self, name: str) -> NDArray[Any]:
+    def __getitem__(self, name: str) -> style.Array:
         """A variable."""
         return self.variables[name]
-
-    @property
-    def hysteresis(self) -> NDArray[np.bool_]:
-        """Where the ways up and down differ."""
-        return np.asarray(self.variables.get("hysteresis", np.zeros(self["status"].shape)) == 1)
-
-    @property
-    def critical_label(self) -> str:
-        """The searched parameter and its unit."""
-        return style.labelled(self.long_names["critical"], self.units["critical"])
 
     @property
     def summary(self) -> str:
@@ -119,8 +96,8 @@ class SweepPicture:
         done = self["status"] == "done"
         parts = [f"{done.size} point{'s' if done.size != 1 else ''}"]
         if self.critical is None:
-            counts = Counter(self["regime"][done].tolist())
-            parts += [f"{name} {counts[name]}" for name in sorted(counts)]
+            regimes = zip(*np.unique(self["regime"][done], return_counts=True), strict=True)
+            parts += [f"{name} {count}" for name, count in regimes]
         else:
             known = self["critical"][np.isfinite(self["critical"])]
             ends = [style.readable(float(f"{end(known):.4g}")) for end in (np.min, np.max) if known.size]
@@ -163,8 +140,11 @@ def gather(result: StoredResult, select: Sequence[str] = ()) -> SweepPicture:
     dims = known["status"].dims
     both = dims[:1] == ("direction",)
     variables = {name: style.read_column(result, name)[... if both else np.newaxis] for name in names}
-    if both and "hysteresis" in known and known["hysteresis"].dims == dims[1:]:
-        variables["hysteresis"] = np.stack(2 * [result.read("/", "hysteresis")])
+    for name in ("regime", "excitation"):  # those of points that failed mean nothing
+        variables[name] = np.where(variables["status"] == "done", variables[name], "")
+    followed = both and "hysteresis" in known and known["hysteresis"].dims == dims[1:]
+    differ = result.read("/", "hysteresis") == 1 if followed else False
+    variables["hysteresis"] = np.broadcast_to(differ, variables["status"].shape)
     units = {name: str(each.attributes.get("units", "")) for name, each in known.items()}
     units = {name: unit if unit != "1" else "" for name, unit in units.items()}
     long_names = {name: str(each.attributes.get("long_name", "")) for name, each in known.items()}
@@ -199,7 +179,6 @@ def gather(result: StoredResult, select: Sequence[str] = ()) -> SweepPicture:
 
 
 def _selected(picture: SweepPicture, wanted: str, result: StoredResult) -> SweepPicture:
-    """The picture at the value of one `KEY=VALUE`."""
     key, _, value = (part.strip() for part in wanted.partition("="))
     value, both = value.strip("\"'"), len(picture.directions) > 1
     problem, choices = "no axis has this key or value", [axis.key for axis in picture.axes] + both * ["direction"]
@@ -212,8 +191,8 @@ def _selected(picture: SweepPicture, wanted: str, result: StoredResult) -> Sweep
             if (place := axis.place(value)) is not None:
                 return picture.at(number, place)
             problem, choices = "no point has this value", [*(axis.texts or map(label, axis.values.tolist()))]
-    more = " …" if len(choices) > _MOST_LISTED else ""
-    remedy = f"give one of {', '.join(choices[:_MOST_LISTED])}{more}, as KEY=VALUE" if choices else "leave it out"
+    some = textwrap.shorten(", ".join(choices), 120, placeholder=" …")
+    remedy = f"give one of {some}, as KEY=VALUE" if choices else "leave it out"
     raise UsageError(f"{result.path}: --select {wanted}: {problem}; {remedy}")
 
 
