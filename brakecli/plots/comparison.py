@@ -15,8 +15,7 @@ from brakecli.files.read import StoredResult
 from brakecli.plots import style
 from brakecli.solver.schemes import SCHEMES
 
-Columns = dict[str, style.Array]
-"""Columns over the entries, and in `drawn` whether the error of an entry can be drawn."""
+Columns = dict[str, style.Array]  # over the entries; `drawn` says whether the error of an entry can be drawn
 LARGEST = 3.0  # entries with larger errors are useless as results; they are not drawn
 _TEXTS = ("method", "scheme", "theta", "start", "iteration", "evaluator", "failure")
 _NUMBERS = ("step", "tolerance", "error", "wall_seconds", "contact_evaluations", "nodes", "on_front")

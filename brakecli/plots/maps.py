@@ -77,8 +77,7 @@ def _draw_regimes(axes: Axes, picture: SweepPicture, _: Scale) -> ScalarMappable
     codes = np.full(picture["regime"].shape, np.nan)
     for regime, where in marks.regimes(picture):
         codes[where] = list(marks.REGIMES).index(regime)
-        colour, _marker = marks.REGIMES[regime]
-        axes.plot([], [], ls="none", marker="s", ms=9, mfc=colour, mec="none", label=str(regime))
+        axes.plot([], [], "s", ms=9, mfc=marks.REGIMES[regime][0], mec="none", label=str(regime))
     colours = ListedColormap([colour for colour, _ in marks.REGIMES.values()])
     mesh = _mesh(axes, picture, codes[0], cmap=colours, vmin=-0.5, vmax=len(marks.REGIMES) - 0.5)
     forced = picture["excitation"] == Excitation.FORCED

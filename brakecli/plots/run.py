@@ -38,18 +38,13 @@ class RunPicture:
     part: str  # what `detail` shows: time, x, vx, state and belt (U) of the samples that are drawn one by one
     detail: dict[str, style.Array]
     near: bool  # whether the wheel's surface speed fits beside the motion without flattening it
+    velocity_unit: tuple[float, str]  # factor and unit for the velocities that are drawn
     interval: float
     span: tuple[float, float]  # s, of the whole run
     envelope: tuple[style.Array, style.Array, style.Array]  # time, least and greatest x of its columns
     spectrum: tuple[float, style.Array, style.Array]  # start of its samples (s), frequency, density
     line: tuple[str, float | None]  # name and frequency (Hz) of what the spectrum is drawn around
     passing: tuple[float, ...]  # Hz, of the waves of a wheel that turns steadily
-
-    @property
-    def velocity_unit(self) -> tuple[float, str]:
-        """Factor and unit for the velocities that are drawn."""
-        drawn = ("vx", "belt") if self.near else ("vx",)
-        return style.prefixed(max(style.largest(self.detail[name]) for name in drawn), "m/s")
 
 
 def gather(result: StoredResult) -> RunPicture:
@@ -74,12 +69,14 @@ def gather(result: StoredResult) -> RunPicture:
     detail = {name: read(name, first, stop) for name in needed}
     detail["belt"] = np.interp(detail["time"], system.belt["time"], system.belt["value"])
     fastest, moving = style.largest(detail["belt"]), style.largest(detail["vx"])
+    near = moving == 0.0 or fastest <= 4.0 * moving
     return RunPicture(
         title=case.title or "Case without a title",
         summary=_summary(result),
         part=part,
         detail=detail,
-        near=moving == 0.0 or fastest <= 4.0 * moving,
+        near=near,
+        velocity_unit=style.prefixed(max(moving, fastest if near else 0.0), "m/s"),
         interval=interval,
         span=(start, end),
         envelope=(start + interval * places, lowest, highest),
@@ -89,24 +86,20 @@ def gather(result: StoredResult) -> RunPicture:
     )
 
 
-def envelope(
-    read: Callable[[int, int], style.Array], samples: int, columns: int = COLUMNS
-) -> tuple[style.Array, style.Array, style.Array]:
+def envelope(read: Callable[[int, int], style.Array], samples: int, columns: int = COLUMNS) -> list[style.Array]:
     """Middle (in samples) of each column, least and greatest value of the samples that fall into it.
 
     Columns are equally wide; there are never more of them than samples. At most `BLOCK` samples are read at once.
     """
     columns = min(columns, samples)
-    lowest: style.Array = np.full(columns, np.inf)
-    highest: style.Array = np.full(columns, -np.inf)
+    lowest, highest = np.full(columns, np.inf), np.full(columns, -np.inf)
     for begin in range(0, samples, BLOCK):
         values = read(begin, min(begin + BLOCK, samples))
         column = np.arange(begin, begin + len(values)) * columns // samples
         np.minimum.at(lowest, column, values)
         np.maximum.at(highest, column, values)
     firsts = -(-np.arange(columns + 1) * samples // columns)
-    middles: style.Array = 0.5 * (firsts[:-1] + firsts[1:] - 1).astype(np.float64)
-    return middles, lowest, highest
+    return [0.5 * (firsts[:-1] + firsts[1:] - 1), lowest, highest]
 
 
 def episodes(state: style.Array, wanted: ContactState) -> list[tuple[int, int]]:
