@@ -9,7 +9,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from brakecli.case.case import Evaluator, Iteration, Start
 from brakecli.errors import UsageError
 from brakecli.files.read import StoredResult
 from brakecli.plots import style
@@ -119,9 +118,9 @@ def _draw_errors(axes: Axes, columns: Columns, work: style.Array) -> None:
         scheme = SCHEMES.get(entry["scheme"])
         colour, own = (scheme.colour, scheme.own_steps) if scheme else (style.GREEN, False)
         marker = _MARKERS.get(entry["theta"], "P")
-        if entry["evaluator"] == Evaluator.EXACT and not own:
+        if entry["evaluator"] == "exact" and not own:
             colour = _EXACT
-        elif entry["evaluator"] == Evaluator.MIDPOINT and entry["nodes"] in others:
+        elif entry["evaluator"] == "midpoint" and entry["nodes"] in others:
             colour, marker = _OTHER_NODES, _NODE_MARKERS[others.index(entry["nodes"]) % len(_NODE_MARKERS)]
         axes.plot(
             *(np.where(drawn, values[places], np.nan) for values in (work, columns["error"])),
@@ -129,8 +128,8 @@ def _draw_errors(axes: Axes, columns: Columns, work: style.Array) -> None:
             color=colour,
             marker=marker,
             markersize=9.0 if own else 5.0,
-            markerfacecolor="white" if entry["start"] == Start.PAPER else colour,
-            linestyle=(0, (2, 1.5)) if entry["iteration"] == Iteration.FIXED_POINT else "-",
+            markerfacecolor="white" if entry["start"] == "paper" else colour,
+            linestyle=(0, (2, 1.5)) if entry["iteration"] == "fixed-point" else "-",
             linewidth=2.0 if own else 1.1,
             zorder=3.0 if own else 2.0,
         )

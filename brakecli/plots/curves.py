@@ -12,7 +12,6 @@ from brakecli.analysis.regime.rules import Excitation
 from brakecli.plots import marks, style
 from brakecli.plots.sweep import SweepPicture
 from brakecli.sweeps.critical import Outcome
-from brakecli.sweeps.tables import Method
 
 _FEW = 60  # points up to which each has a marker of full size
 _DIRECTIONS = {"": ("", "-"), "up": (">", "-"), "down": ("<", style.DASHES)}  # marker and dashes of curves
@@ -25,7 +24,7 @@ def draw(picture: SweepPicture) -> Figure:
     panels = [partial(_draw_motion, name="amplitude"), partial(_draw_motion, name="frequency")]
     if picture.critical is not None:
         compared = np.isfinite(picture["critical"] - picture["critical_eigenvalue"]).any()
-        both = compared and picture.critical.method is Method.SIMULATION
+        both = compared and picture.critical.method == "simulation"
         panels = [_draw_critical, _draw_difference] if both else [_draw_critical]
     figure = marks.sweep_figure(picture, marks.WIDTH, 5.2 if len(panels) == 1 else 6.4)
     heights = (1.5 if picture.critical is None else 3.2, 1.0)[: len(panels)]
@@ -47,7 +46,7 @@ def _draw_critical(axes: Axes, picture: SweepPicture) -> None:
     marker, ms, ls = (".", 0.6 * size, "-") if axis.texts is None else ("_", 16.0, "none")
     axes.plot(x, eigenvalue, color=style.DARK, lw=1.1, label="by eigenvalues", marker=marker, ms=ms, ls=ls)
     regained = picture["critical_status"][0] == Outcome.REGAINED
-    if critical.method is Method.SIMULATION:
+    if critical.method == "simulation":
         for chosen, face, label in ((~regained, style.BLUE, "by simulation"), (regained, "white", "stable above")):
             if (there := chosen & np.isfinite(value)).any():
                 error = picture["critical_error"][0][there]

@@ -26,7 +26,6 @@ from brakecli.solver.roughness import TWO_PI, wheel_angles
 from brakecli.solver.schedules import integral_at
 from brakecli.sweeps.critical import search
 from brakecli.sweeps.plan import Plan, Settings
-from brakecli.sweeps.tables import Direction
 
 
 class Status(StrEnum):
@@ -133,7 +132,7 @@ def line_points(plan: Plan, line: int) -> list[int]:
     outer, rest = divmod(line % lines, inner)
     points = [(outer * shape[axis] + place) * inner + rest for place in range(shape[axis])]
     direction = plan.sweep.axis[axis].direction
-    down = direction is Direction.DOWN or (direction is Direction.BOTH and line >= lines)
+    down = direction == "down" or (direction == "both" and line >= lines)
     value = plan.sweep.axis[axis].value
     return sorted(points, key=lambda point: value(plan.places(point)[axis]), reverse=down)
 
