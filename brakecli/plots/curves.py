@@ -58,7 +58,7 @@ def _draw_critical(axes: Axes, picture: SweepPicture) -> None:
         label = "vibration lasts from here on, from the case's own start"
         axes.plot(x[apart], sustained[apart], "v", ms=size, color=style.VERMILION, label=label)
     marks.set_scale(axes.xaxis, axis)
-    axes.set_ylabel(style.labelled(picture.long_names["critical"], picture.units["critical"]), parse_math=False)
+    axes.set_ylabel(style.labelled(f"critical {critical.parameter}", picture.units["critical"]), parse_math=False)
     drawn = np.concatenate([value, eigenvalue, sustained])
     style.set_ticks(axes.yaxis, 0.0, style.largest(drawn) or max(abs(critical.lower), abs(critical.upper)))
     if np.isfinite(drawn).any():

@@ -126,15 +126,15 @@ def _draw_critical(axes: Axes, picture: SweepPicture, scale: Scale) -> ScalarMap
 
 
 def _critical_scale(picture: SweepPicture) -> Scale:
-    assert picture.critical is not None
-    values = picture["critical"][np.isfinite(picture["critical"])]
-    low, high = picture.critical.lower, picture.critical.upper
+    critical, values = picture.critical, picture["critical"][np.isfinite(picture["critical"])]
+    assert critical is not None
+    low, high = critical.lower, critical.upper
     if values.size:
         low, high = float(values.min()), float(values.max())
         least = 0.01 * max(abs(low), abs(high))
         if high - low <= least:
             low, high = low - (least or 1.0), high + (least or 1.0)
-    return Scale(style.labelled(picture.long_names["critical"], picture.units["critical"]), Normalize(low, high))
+    return Scale(style.labelled(f"critical {critical.parameter}", picture.units["critical"]), Normalize(low, high))
 
 
 def _mesh(axes: Axes, picture: SweepPicture, values: style.Array, **look: Any) -> QuadMesh:

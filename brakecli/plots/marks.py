@@ -64,8 +64,7 @@ def differs(picture: SweepPicture) -> style.Array:
     sustained, tolerance = picture["critical_sustained"], picture.critical.tolerance
     early = picture["critical_lower"] - sustained > tolerance  # false where one of the two is missing
     late = sustained - picture["critical_upper"] > tolerance
-    differ: style.Array = np.isfinite(sustained) & (early | late | np.isnan(picture["critical"]))
-    return differ
+    return np.asarray(np.isfinite(sustained) & (early | late | np.isnan(picture["critical"])))
 
 
 def regimes(picture: SweepPicture) -> list[tuple[Regime, style.Array]]:

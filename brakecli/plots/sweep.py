@@ -127,8 +127,7 @@ def gather(result: StoredResult, select: Sequence[str] = ()) -> SweepPicture:
     something is missing, UsageError where there is no such key or value.
     """
     try:
-        text = str(result.attributes.get("resolved_sweep_toml", ""))
-        sweep = parse_table(Sweep, text, "its resolved sweep")
+        sweep = parse_table(Sweep, str(result.attributes.get("resolved_sweep_toml", "")), "its resolved sweep")
     except CaseError as error:
         raise style.unreadable(result, f"the sweep in it is not valid: {error.problems[0]}") from error
     known = result.variables("/")
@@ -148,8 +147,6 @@ def gather(result: StoredResult, select: Sequence[str] = ()) -> SweepPicture:
     units = {name: str(each.attributes.get("units", "")) for name, each in known.items()}
     units = {name: unit if unit != "1" else "" for name, unit in units.items()}
     long_names = {name: str(each.attributes.get("long_name", "")) for name, each in known.items()}
-    if sweep.critical is not None:
-        long_names["critical"] = f"critical {sweep.critical.parameter}"
     axes = []
     for number, dimension in enumerate(dims[both:], start=1):
         values = result.read("/", dimension)
