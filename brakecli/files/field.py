@@ -18,7 +18,7 @@ class Field:
     kind: str = "f8"
     """The NumPy type of many of them. A float may be missing: null in JSON, `_FillValue` in a file."""
     at: str = ""
-    """Path of attributes, keys and methods from a report to the value; the name ends it after a dot, or is it."""
+    """Path of attributes, keys and methods to the value; the name is added if it is empty or ends in a dot."""
     label: str = ""
     """Words for the terminal; the name if empty."""
     missing: Any = None

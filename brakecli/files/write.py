@@ -88,15 +88,10 @@ class ResultFile:
             numbers = np.asarray(values, dtype=np.float64)
             values = np.where(np.isnan(numbers), FILL, numbers)
             attributes = {"_FillValue": np.array([FILL]), **attributes}
-        self.variable("/", field, dims, values, attributes)
+        self.variable("/", field, dims, values, **attributes)
 
     def variable(
-        self,
-        group: str,
-        field: Field,
-        dims: Sequence[str],
-        values: ArrayLike | None = None,
-        attributes: Mapping[str, Any] | None = None,
+        self, group: str, field: Field, dims: Sequence[str], values: ArrayLike | None = None, **attributes: Any
     ) -> None:
         """Write a variable over the axes `dims` of its group; without `values` it grows along its only axis.
 
@@ -104,7 +99,7 @@ class ResultFile:
         """
         name, table = field.name, self._tables.setdefault(group, _Table())
         texts = {"units": field.units, "long_name": field.meaning}
-        variable = _Variable(field, tuple(dims), {**texts, **(attributes or {})}, np.empty(0, field.kind))
+        variable = _Variable(field, tuple(dims), {**texts, **attributes}, np.empty(0, field.kind))
         if not dims or name in table.variables:
             raise ValueError(f"{group}/{name}: has no dimension, or is declared twice")
         if values is None:
@@ -119,17 +114,17 @@ class ResultFile:
             lengths = {axis: self._file[group][axis].shape[0] for axis in dims if axis != name}
             if checked.shape != tuple(lengths.get(axis, checked.size) for axis in dims):
                 raise ValueError(f"{group}/{name}: its shape {checked.shape} is not that of its axes {lengths}")
-            self._create(group, variable, checked, _chunk(checked.shape))[...] = checked
+            self._create(group, variable, checked, grows=0 in checked.shape)
 
     def append(self, group: str, rows: Mapping[str, ArrayLike]) -> None:
         """Append rows to all growing variables of `group`, the growing axis among them."""
-        self.check()
+        self._output.check()
         table = self._tables[group]
         if rows.keys() != table.variables.keys():
             raise ValueError(f"{group}: needs {sorted(table.variables)}, got {sorted(rows)}")
         blocks = {name: _checked(f"{group}/{name}", rows[name], table.variables[name].field.kind) for name in rows}
-        shapes = {block.shape for block in blocks.values()}
-        if len(shapes) != 1 or len(shape := shapes.pop()) != 1:
+        shape, *others = {block.shape for block in blocks.values()}
+        if others or len(shape) != 1:
             raise ValueError(f"{group}: every variable needs the same number of rows")
         for first in range(0, shape[0], _CHUNK):
             for name, variable in table.variables.items():
@@ -141,21 +136,14 @@ class ResultFile:
         """The number of rows appended to `group` so far."""
         return self._tables[group].written + self._tables[group].waiting
 
-    def read(self, group: str, name: str, start: int = 0, stop: int | None = None) -> NDArray[Any]:
-        """The rows `start` to `stop` of a variable of numbers, of those appended so far; both are >= 0."""
+    def read(self, group: str, name: str, start: int, stop: int) -> NDArray[Any]:
+        """The rows `start` to `stop` of a growing variable, of those appended so far; both are >= 0."""
+        written, waiting = self._tables[group].written, self._tables[group].variables[name].waiting
+        if not written:
+            return waiting[start:stop]
         with self._hdf5():
-            table = self._tables[group]
-            if name not in table.variables:
-                return np.asarray(self._file[group][name][start:stop])
-            first, waiting = table.written, table.variables[name].waiting
-            if not first:
-                return waiting[start:stop]
-            behind = None if stop is None else max(0, stop - first)
-            return np.concatenate([self._file[group][name][start:stop], waiting[max(0, start - first) : behind]])
-
-    def check(self) -> None:
-        """Raise CannotWriteError if any write so far has failed, so that a long run can end early."""
-        self._output.check()
+            before = self._file[group][name][start:stop]
+        return np.concatenate([before, waiting[max(0, start - written) : max(0, stop - written)]])
 
     def commit(self) -> None:
         """Finish the file and put it in its place; nothing can be written after that."""
@@ -182,33 +170,30 @@ class ResultFile:
         Objects of HDF5 are to be freed within the block, too: Python loses an exception that a handler raises
         while one is freed.
         """
-        self.check()
+        self._output.check()
         with signals_deferred():
             yield
-        self.check()
+        self._output.check()
 
     def _write_rows(self, group: str, table: _Table, count: int) -> None:
         """Write the first of the waiting rows behind those that are written."""
-        end = table.written + count
         with self._hdf5():
             for variable in table.variables.values():
                 rows, variable.waiting = variable.waiting[:count], variable.waiting[count:]
                 if not table.written:  # created only now, so that a short series gets a chunk of just its length
-                    self._create(group, variable, rows[:0], (max(1, end),))
+                    self._create(group, variable, rows, grows=True)
+                    continue
                 dataset = self._file[group][variable.field.name]
-                dataset.resize(end, axis=0)
+                dataset.resize(table.written + count, axis=0)
                 dataset[table.written :] = rows
-        table.written = end
+        table.written += count
 
-    def _create(
-        self, group: str, variable: _Variable, like: NDArray[Any], chunks: tuple[int, ...]
-    ) -> h5py.Dataset:
-        """Create a dataset with checksums, its attributes and its axes; `like` has its shape and type."""
+    def _create(self, group: str, variable: _Variable, values: NDArray[Any], *, grows: bool) -> None:
+        """Create a dataset with checksums, its attributes, axes and values."""
         parent, name = self._file.require_group(group), variable.field.name
-        # HDF5 takes no chunk that is longer than its dataset can get
-        maxshape = (None,) * like.ndim if 0 in like.shape else None
+        maxshape = (None,) * values.ndim if grows else None  # HDF5 takes no chunk longer than its dataset can get
         dataset = parent.create_dataset(
-            name, like.shape, like.dtype, chunks=chunks, maxshape=maxshape, fletcher32=True
+            name, values.shape, values.dtype, chunks=_chunk(values.shape), maxshape=maxshape, fletcher32=True
         )
         _set_attributes(dataset, variable.attributes)
         if variable.dims == (name,):
@@ -216,7 +201,7 @@ class ResultFile:
         else:
             for dimension, axis in zip(dataset.dims, variable.dims, strict=True):
                 dimension.attach_scale(parent[axis])
-        return dataset
+        dataset[...] = values
 
 
 @contextmanager
@@ -247,17 +232,18 @@ def _chunk(shape: tuple[int, ...]) -> tuple[int, ...]:
 
 def _set_attributes(node: h5py.HLObject, attributes: Mapping[str, Any]) -> None:
     for name, value in attributes.items():
-        node.attrs[name] = _attribute(name, value)
+        if isinstance(value, str):
+            node.attrs[name] = value
+        elif isinstance(value, list | tuple) and all(isinstance(item, str) for item in value):
+            node.attrs[name] = np.array(value, dtype=h5py.string_dtype())
+        else:
+            node.attrs[name] = _finite(f"attribute {name}", value)
 
 
-def _attribute(name: str, value: Any) -> Any:
-    if isinstance(value, str):
-        return value
-    if isinstance(value, list | tuple) and all(isinstance(item, str) for item in value):
-        return np.array(value, dtype=h5py.string_dtype())
-    array = np.asarray(value)
+def _finite(name: str, values: ArrayLike) -> NDArray[Any]:
+    array = np.asarray(values)
     if array.dtype.kind not in "iuf" or not np.isfinite(array).all():
-        raise ValueError(f"attribute {name}: must be text or finite numbers (found {value!r})")
+        raise ValueError(f"{name}: must be finite numbers, or text (found {values!r})")
     return array
 
 
@@ -267,10 +253,9 @@ def _checked(name: str, values: ArrayLike, kind: str) -> NDArray[Any]:
     if array.dtype.kind == "U":
         text = np.char.encode(array, "utf-8")
         return text.astype(h5py.string_dtype("utf-8", max(1, text.dtype.itemsize)))
-    if array.dtype.kind not in "iuf" or not np.isfinite(array).all():
-        raise ValueError(f"{name}: must be finite numbers")
+    _finite(name, array)
     with np.errstate(all="ignore"):
         converted = array.astype(kind, copy=False)
-    if converted.dtype.kind not in "iuf" or not np.array_equal(converted, array):
+    if not np.array_equal(converted, array):
         raise ValueError(f"{name}: does not fit {np.dtype(kind)}")
     return converted
