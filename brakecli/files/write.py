@@ -130,7 +130,8 @@ class ResultFile:
             for name, variable in table.variables.items():
                 variable.waiting = np.concatenate([variable.waiting, blocks[name][first : first + _CHUNK]])
             if table.waiting >= _CHUNK:
-                self._write_rows(group, table, _CHUNK)
+                with self._hdf5():
+                    self._write_rows(group, table, _CHUNK)
 
     def rows(self, group: str) -> int:
         """The number of rows appended to `group` so far."""
@@ -167,8 +168,8 @@ class ResultFile:
     def _hdf5(self) -> Iterator[None]:
         """Surround all calls of HDF5 with checks, and hold back signals.
 
-        Objects of HDF5 are to be freed within the block, too: Python loses an exception that a handler raises
-        while one is freed.
+        Objects of HDF5 are to be freed within the block, too, so no variable beside it holds one: Python loses an
+        exception that a handler raises while one is freed.
         """
         self._output.check()
         with signals_deferred():
@@ -177,15 +178,14 @@ class ResultFile:
 
     def _write_rows(self, group: str, table: _Table, count: int) -> None:
         """Write the first of the waiting rows behind those that are written."""
-        with self._hdf5():
-            for variable in table.variables.values():
-                rows, variable.waiting = variable.waiting[:count], variable.waiting[count:]
-                if not table.written:  # created only now, so that a short series gets a chunk of just its length
-                    self._create(group, variable, rows, grows=True)
-                    continue
-                dataset = self._file[group][variable.field.name]
-                dataset.resize(table.written + count, axis=0)
-                dataset[table.written :] = rows
+        for variable in table.variables.values():
+            rows, variable.waiting = variable.waiting[:count], variable.waiting[count:]
+            if not table.written:  # created only now, so that a short series gets a chunk of just its length
+                self._create(group, variable, rows, grows=True)
+                continue
+            dataset = self._file[group][variable.field.name]
+            dataset.resize(table.written + count, axis=0)
+            dataset[table.written :] = rows
         table.written += count
 
     def _create(self, group: str, variable: _Variable, values: NDArray[Any], *, grows: bool) -> None:
