@@ -33,7 +33,8 @@ class OutputFile(FileIO):
         """Begin with an empty file, in the place of one that a killed process left."""
         self.path = path
         self.failure: OSError | None = None
-        self._target, self._temporary, self._force = target, _beside(target, "part"), force
+        self._target, self._force = target, force
+        self._temporary = target.with_name(f".{target.name}.part")
         super().__init__(self._temporary, "w+", opener=_open_no_link)
 
     def write(self, data: "ReadableBuffer") -> int:
@@ -100,7 +101,7 @@ def new_output(path: Path, *, force: bool) -> Iterator[OutputFile]:
     `force` is not set or where another process is writing it. A symbolic link is followed.
     """
     target = _checked_target(path, force=force)
-    lock, clean_up = _beside(target, "lock"), ExitStack()
+    lock, clean_up = target.with_name(f".{target.name}.lock"), ExitStack()
     try:
         with signals_deferred(), explained(path):
             descriptor = _acquired(path, lock)
@@ -159,11 +160,11 @@ def _take(descriptor: int, holder: str) -> bool:
     """Lock without waiting. A file system without locks: free unless the process named in the file may live."""
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        return True
     except BlockingIOError:
         return False
     except OSError:
         return not _lives(holder)
-    return True
 
 
 def _lives(holder: str) -> bool:
@@ -187,10 +188,6 @@ def _release(descriptor: int, lock: Path) -> None:
         if os.path.samestat(os.fstat(descriptor), lock.lstat()):
             lock.unlink()
     os.close(descriptor)
-
-
-def _beside(target: Path, suffix: str) -> Path:
-    return target.with_name(f".{target.name}.{suffix}")
 
 
 def _open_no_link(path: str | Path, flags: int) -> int:

@@ -1,7 +1,8 @@
-"""Every number and text of a result, declared once: its name, unit, meaning, type, and where a report holds it.
+"""Every number and text of a report, declared once: its name, unit, meaning, type, and where the report holds it.
 
 JSON, the attributes and variables of result files, the records of a sweep, labels in the terminal and the tables
-of the documentation (`make tables`) are all made from these rows.
+of the documentation (`make tables`) are all made from these rows. `docs/result-format.md` describes the attributes
+that all files have in common, and `docs/regimes.md` the evidence.
 """
 
 from brakecli.files.field import Field, integer, named
@@ -9,22 +10,6 @@ from brakecli.solver.quantities import HISTORY as QUANTITIES
 from brakecli.solver.quantities import TIME
 
 TEXT, OBJECT, SENTENCE = "S", "O", "S240"
-
-# All result files
-
-ORIGIN = (
-    Field("format", "", "always brakecli", TEXT),
-    integer("format_version", "version of the form of the file"),
-    Field("kind", "", "what the file holds: run, sweep or comparison", TEXT),
-    integer("complete", "1 once the whole result is in the file"),
-    Field("title", "", "title of the case or of the sweep", TEXT),
-    Field("case_toml", "", "the case as it was read, to the letter", TEXT),
-    Field("resolved_toml", "", "the case that was run: overrides applied, every default filled in", TEXT),
-    *(
-        Field(f"{library}_version", "", f"version of {library}", TEXT)
-        for library in ("brakecli", "numpy", "scipy", "numba", "h5py", "hdf5")
-    ),
-)
 
 # A run
 
@@ -112,33 +97,6 @@ UNCONVERGED = (
     Field("event", "1", "steps that did not converge"),
     Field("time", "s", "time of an unconverged step"),
     Field("residual", "N", "residual of an unconverged step"),
-)
-EVIDENCE = (
-    Field("envelope_final", "m/s", "rule 6: last value of the envelope of vx"),
-    Field("envelope_largest", "m/s", "rule 6: largest value of the envelope of vx"),
-    Field("envelope_slope", "1/s", "slope of the logarithm of the envelope's second half"),
-    Field("envelope_slope_error", "1/s", "standard error of that slope"),
-    Field("forced_share", "1", "rule 7, on a rough wheel: part of the energy on the lines of the roughness"),
-    Field("cycles", "1", "rule 9: cycles in the settled part"),
-    Field("samples_per_cycle", "1", "rule 10"),
-    Field("rises_per_cycle", "1", "rule 9"),
-    Field("stick_cycles", "1", "part of the cycles in which a stick begins"),
-    Field("stick_episodes_per_cycle", "1", "sticks that begin in a cycle, in the mean"),
-    Field("fundamental_share", "1", "part of the energy of vx on `frequency`"),
-    Field("harmonic_share", "1", "part of the energy of vx on `frequency` and its multiples"),
-    Field("amplitude_y", "m", "half of peak to peak of y, settled part"),
-    Field("amplitude_vx", "m/s", "half of peak to peak of vx, settled part"),
-    Field("amplitude_vy", "m/s", "half of peak to peak of vy, settled part"),
-    Field("largest_vx_over_belt_speed", "1", "1 where stick limits the growth"),
-    Field("harmonics", "1", "amplitudes of vx at 2 to 5 times `frequency`, over that at `frequency`", OBJECT),
-    Field("line_frequencies", "Hz", "strongest lines of vx: at most 8, each above 0.001 of its energy", OBJECT),
-    Field("line_shares", "1", "their parts of the energy", OBJECT),
-    Field("line_forced", "1", "1 where a line sits on a forced one, 0 where the shoe adds it by itself", OBJECT),
-    Field("power_belt", "W", "constant speed and load only: mean power that the wheel gives"),
-    Field("power_friction", "W", "mean power of the heat of sliding"),
-    Field("power_dashpots", "W", "mean power lost in the dashpots"),
-    Field("power_load", "W", "mean power against the pressing force"),
-    Field("power_rest", "W", "what is left: work of the roughness, and change of what is stored"),
 )
 
 # A sweep

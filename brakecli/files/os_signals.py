@@ -129,7 +129,7 @@ def guard_streams() -> None:
     for number, name in ((1, "stdout"), (2, "stderr")):
         old = getattr(sys, name)  # None where it was closed before Python started
         raw = io.BufferedWriter(_Stream(number, "w", closefd=False))
-        encoding = old.encoding if old is not None else "utf-8"
+        encoding = getattr(old, "encoding", "utf-8")
         setattr(sys, name, io.TextIOWrapper(raw, encoding, "backslashreplace", line_buffering=True))
 
 
@@ -146,7 +146,6 @@ class _Stream(io.FileIO):
             self._failed = self.fileno() == 1
             # a broken pipe is not a failure: whoever read the output has gone
             if self._failed and not isinstance(error, BrokenPipeError):
-                reason = (error.strerror or str(error)).lower()
-                sentence = f"standard output: cannot write: {reason}; redirect it elsewhere"
-                raise CannotWriteError(sentence) from error
+                what = f"cannot write: {(error.strerror or str(error)).lower()}"
+                raise CannotWriteError(f"standard output: {what}; redirect it elsewhere") from error
         return memoryview(data).nbytes

@@ -5,7 +5,7 @@ The same calls give the same bytes, however the rows of a growing variable are c
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -26,24 +26,16 @@ _CHUNK = 16384
 
 @dataclass
 class _Variable:
-    """A declared variable, its axes, and rows that do not yet fill a chunk."""
+    """A declared variable, its axes, and rows that do not yet fill a chunk.
+
+    Only whole chunks are written, so that nothing depends on how rows are cut into pieces.
+    """
 
     field: Field
     dims: tuple[str, ...]
     attributes: dict[str, Any]
     waiting: NDArray[Any]
-
-
-@dataclass
-class _Table:
-    """The growing variables of one group. Only whole chunks are written, so nothing depends on pieces."""
-
-    variables: dict[str, _Variable] = field(default_factory=dict)
     written: int = 0
-
-    @property
-    def waiting(self) -> int:
-        return next((len(variable.waiting) for variable in self.variables.values()), 0)
 
 
 class ResultFile:
@@ -55,7 +47,7 @@ class ResultFile:
     def __init__(self, output: OutputFile) -> None:
         """Prepare a result in the file that `new_result` has opened."""
         self._output = output
-        self._tables: dict[str, _Table] = {}
+        self._growing: dict[str, dict[str, _Variable]] = {}
         self._file: Any = None
 
     def open(self) -> None:
@@ -97,19 +89,19 @@ class ResultFile:
 
         A scalar belongs in an attribute: HDF5 keeps no checksum of one.
         """
-        name, table = field.name, self._tables.setdefault(group, _Table())
-        texts = {"units": field.units, "long_name": field.meaning}
-        variable = _Variable(field, tuple(dims), {**texts, **attributes}, np.empty(0, field.kind))
-        if not dims or name in table.variables:
+        name, growing = field.name, self._growing.setdefault(group, {})
+        attributes = {"units": field.units, "long_name": field.meaning, **attributes}
+        variable = _Variable(field, tuple(dims), attributes, np.empty(0, field.kind))
+        if not dims or name in growing:
             raise ValueError(f"{group}/{name}: has no dimension, or is declared twice")
         if values is None:
-            if len(dims) != 1 or (name != dims[0] and dims[0] not in table.variables):
+            if len(dims) != 1 or (name != dims[0] and dims[0] not in growing):
                 raise ValueError(f"{group}/{name}: only a variable over one growing axis can grow")
-            table.variables[name] = variable
+            growing[name] = variable
             return
         checked = _checked(f"{group}/{name}", values, field.kind)
         if checked.dtype.kind == "S":
-            variable.attributes["_Encoding"] = "utf-8"  # by which xarray knows text from bytes
+            attributes["_Encoding"] = "utf-8"  # by which xarray knows text from bytes
         with self._hdf5():
             lengths = {axis: self._file[group][axis].shape[0] for axis in dims if axis != name}
             if checked.shape != tuple(lengths.get(axis, checked.size) for axis in dims):
@@ -119,27 +111,28 @@ class ResultFile:
     def append(self, group: str, rows: Mapping[str, ArrayLike]) -> None:
         """Append rows to all growing variables of `group`, the growing axis among them."""
         self._output.check()
-        table = self._tables[group]
-        if rows.keys() != table.variables.keys():
-            raise ValueError(f"{group}: needs {sorted(table.variables)}, got {sorted(rows)}")
-        blocks = {name: _checked(f"{group}/{name}", rows[name], table.variables[name].field.kind) for name in rows}
+        growing = self._growing[group]
+        if rows.keys() != growing.keys():
+            raise ValueError(f"{group}: needs {sorted(growing)}, got {sorted(rows)}")
+        blocks = {name: _checked(f"{group}/{name}", rows[name], growing[name].field.kind) for name in rows}
         shape, *others = {block.shape for block in blocks.values()}
         if others or len(shape) != 1:
             raise ValueError(f"{group}: every variable needs the same number of rows")
         for first in range(0, shape[0], _CHUNK):
-            for name, variable in table.variables.items():
+            for name, variable in growing.items():
                 variable.waiting = np.concatenate([variable.waiting, blocks[name][first : first + _CHUNK]])
-            if table.waiting >= _CHUNK:
-                with self._hdf5():
-                    self._write_rows(group, table, _CHUNK)
+                if len(variable.waiting) >= _CHUNK:
+                    with self._hdf5():
+                        self._write_rows(group, variable, _CHUNK)
 
     def rows(self, group: str) -> int:
         """The number of rows appended to `group` so far."""
-        return self._tables[group].written + self._tables[group].waiting
+        variable = next(iter(self._growing[group].values()))
+        return variable.written + len(variable.waiting)
 
     def read(self, group: str, name: str, start: int, stop: int) -> NDArray[Any]:
         """The rows `start` to `stop` of a growing variable, of those appended so far; both are >= 0."""
-        written, waiting = self._tables[group].written, self._tables[group].variables[name].waiting
+        written, waiting = self._growing[group][name].written, self._growing[group][name].waiting
         if not written:
             return waiting[start:stop]
         with self._hdf5():
@@ -149,9 +142,10 @@ class ResultFile:
     def commit(self) -> None:
         """Finish the file and put it in its place; nothing can be written after that."""
         with self._hdf5():
-            for group, table in self._tables.items():
-                if table.variables and (table.waiting or not table.written):
-                    self._write_rows(group, table, table.waiting)
+            for group, growing in self._growing.items():
+                for variable in growing.values():
+                    if len(variable.waiting) or not variable.written:
+                        self._write_rows(group, variable, len(variable.waiting))
             self._file.attrs["complete"] = 1
         self.close()
         self._output.write(digest(self._output, self._output.seek(0, 2)))
@@ -176,24 +170,27 @@ class ResultFile:
             yield
         self._output.check()
 
-    def _write_rows(self, group: str, table: _Table, count: int) -> None:
+    def _write_rows(self, group: str, variable: _Variable, count: int) -> None:
         """Write the first of the waiting rows behind those that are written."""
-        for variable in table.variables.values():
-            rows, variable.waiting = variable.waiting[:count], variable.waiting[count:]
-            if not table.written:  # created only now, so that a short series gets a chunk of just its length
-                self._create(group, variable, rows, grows=True)
-                continue
+        rows, variable.waiting = variable.waiting[:count], variable.waiting[count:]
+        if not variable.written:  # created only now, so that a short series gets a chunk of just its length
+            self._create(group, variable, rows, grows=True)
+        else:
             dataset = self._file[group][variable.field.name]
-            dataset.resize(table.written + count, axis=0)
-            dataset[table.written :] = rows
-        table.written += count
+            dataset.resize(variable.written + count, axis=0)
+            dataset[variable.written :] = rows
+        variable.written += count
 
     def _create(self, group: str, variable: _Variable, values: NDArray[Any], *, grows: bool) -> None:
         """Create a dataset with checksums, its attributes, axes and values."""
         parent, name = self._file.require_group(group), variable.field.name
         maxshape = (None,) * values.ndim if grows else None  # HDF5 takes no chunk longer than its dataset can get
+        room, chunks = _CHUNK, list[int]()  # the longest last dimensions that fit
+        for length in reversed(values.shape):
+            chunks.insert(0, max(1, min(length, room)))
+            room //= chunks[0]
         dataset = parent.create_dataset(
-            name, values.shape, values.dtype, chunks=_chunk(values.shape), maxshape=maxshape, fletcher32=True
+            name, values.shape, values.dtype, chunks=tuple(chunks), maxshape=maxshape, fletcher32=True
         )
         _set_attributes(dataset, variable.attributes)
         if variable.dims == (name,):
@@ -218,16 +215,6 @@ def new_result(path: Path, *, force: bool) -> Iterator[ResultFile]:
             yield result
         finally:
             result.close()
-
-
-def _chunk(shape: tuple[int, ...]) -> tuple[int, ...]:
-    """The longest last dimensions that fit a chunk."""
-    room = _CHUNK
-    chunk: list[int] = []
-    for length in reversed(shape):
-        chunk.insert(0, max(1, min(length, room)))
-        room //= chunk[0]
-    return tuple(chunk)
 
 
 def _set_attributes(node: h5py.HLObject, attributes: Mapping[str, Any]) -> None:
