@@ -2,7 +2,8 @@
 
 JSON, the attributes and variables of result files, the records of a sweep, labels in the terminal and the tables
 of the documentation (`make tables`) are all made from these rows. `docs/result-format.md` describes the attributes
-that all files have in common, and `docs/regimes.md` the evidence.
+that all files have in common, `docs/regimes.md` the evidence, and `docs/stability.md` the objects of a report on
+stability, which have the attributes of their classes.
 """
 
 from brakecli.files.field import Field, integer, named
@@ -188,33 +189,6 @@ COMPARISON = (
 
 # Linear stability, in JSON alone
 
-EQUILIBRIUM = (
-    Field("x", "m", "tangential displacement of the shoe"),
-    Field("y", "m", "normal displacement of the shoe"),
-    Field("normal_force", "N", "normal contact force on the shoe"),
-    Field("stiffness", "N/m", "mean stiffness of the contact"),
-    Field("contact_fraction", "1", "part of the pad that touches"),
-)
-MODE = (
-    Field("growth", "1/s", "growth rate, negative where the mode decays"),
-    Field("frequency", "Hz", "frequency"),
-    Field("damping_ratio", "1", "damping ratio, negative where the mode grows"),
-    Field("shape", "1", "size of y/x; null where x does not move"),
-    Field("shape_phase", "deg", "phase of y/x"),
-)
-CROSSING = (
-    Field("friction", "1", "friction coefficient at which stability changes"),
-    Field("instability", "", "flutter or divergence", TEXT),
-    Field("frequency", "Hz", "frequency of the mode"),
-    Field("lost", "", "whether stability is lost or regained there", "?"),
-)
-DISCRETE = (
-    Field("spectral_radius", "1", "factor of the fastest disturbance in a step"),
-    Field("growth", "1/s", "its logarithm over the step"),
-    Field("step_limit", "s", "largest stable step of the frictionless shoe; null where any step is stable"),
-    Field("critical_friction", "1", "friction coefficient at which the factor passes one"),
-    Field("bias", "1", "its distance from the exact one"),
-)
 STABILITY = (
     Field("belt_speed", "m/s", "speed U of the wheel's surface"),
     Field("friction_coefficient", "1", "friction coefficient φ of the case", at="friction"),
@@ -223,14 +197,14 @@ STABILITY = (
     Field("critical_frequency", "Hz", "frequency of the mode that is lost", at="critical.frequency"),
     Field("stable", "", "whether steady sliding is stable at φ", "?"),
     Field("eigenvalues", "1/s", "eigenvalues at φ: real and imaginary parts", OBJECT),
-    Field("modes", "", "modes at φ, the one that grows fastest first", OBJECT, rows=MODE),
-    Field("crossings", "", "all changes of stability along φ", OBJECT, rows=CROSSING),
+    Field("modes", "", "modes at φ, the one that grows fastest first", OBJECT),
+    Field("crossings", "", "all changes of stability along φ", OBJECT),
     Field("undamped_flutter_friction", "1", "φ of flutter without dashpots", at="undamped_flutter"),
     Field("undamped_divergence_friction", "1", "φ of divergence without dashpots", at="undamped_divergence"),
     Field("contact_stiffness", "N/m", "mean stiffness of the contact in steady sliding"),
-    Field("equilibrium", "", "steady sliding; null where there is none", OBJECT, rows=EQUILIBRIUM),
+    Field("equilibrium", "", "steady sliding; null where there is none", OBJECT),
     Field("no_equilibrium", "", "why there is no steady sliding", TEXT),
-    Field("discrete", "", "what the scheme makes of the same motion at its step", OBJECT, rows=DISCRETE),
+    Field("discrete", "", "what the scheme makes of the same motion at its step", OBJECT),
 )
 VARIED = (
     *named(STABILITY, "critical_friction", "instability"),

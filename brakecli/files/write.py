@@ -205,8 +205,7 @@ class ResultFile:
 def new_result(path: Path, *, force: bool) -> Iterator[ResultFile]:
     """Begin a result file; unless `commit` is called within the block, nothing of it remains.
 
-    Raises CannotWriteError where nothing can be written, and UsageError where the file exists and `force` is not
-    set or where another process is writing it: both at once, before anything is computed.
+    Raises what `new_output` raises, before anything is computed.
     """
     with new_output(path, force=force) as output:
         result = ResultFile(output)
