@@ -166,12 +166,12 @@ def _warnings(motion: Motion, certificate: Certificate | None) -> list[str]:
 
 
 def _declare_history(result: ResultFile) -> None:
-    flags = {
+    flags: dict[str, Any] = {
         "flag_values": np.array([int(state) for state in ContactState], dtype=np.int8),
         "flag_meanings": " ".join(state.name.lower() for state in ContactState),
     }
     for field in fields.HISTORY:
-        result.variable("history", field, ("time",), attributes=flags if field.name == "state" else None)
+        result.variable("history", field, ("time",), **(flags if field.name == "state" else {}))
 
 
 def _append(result: ResultFile, interval: float, rows: NDArray[np.float64]) -> None:
