@@ -7,8 +7,7 @@ from typing import Annotated
 
 from brakecli.cli.inputs import is_sweep, load_case, load_sweep
 from brakecli.cli.options import AsJson, Overrides, Quiet, source_argument
-from brakecli.cli.output import show_result, warn
-from brakecli.cli.progress import announce_compilation
+from brakecli.cli.output import announce_compilation, show_result, warn
 
 
 def command(
@@ -31,11 +30,10 @@ def _check_case(file: str, overrides: list[str] | None, as_json: bool, quiet: bo
     with within_range():
         system = system_of(loaded.case)
         found = check(system)
-    values = {"valid": True, **asdict(found), **asdict(found.limits)}
-    del values["limits"]
+    values = {"valid": True, **asdict(found)}
+    values |= values.pop("limits")
     numbers = {name: value for name, value in values.items() if value not in (math.inf, -math.inf)}
-    title = loaded.case.title
-    show_result("check", numbers, check_table, title, found, as_json=as_json, quiet=quiet)
+    show_result("check", numbers, check_table, loaded.case.title, found, as_json=as_json, quiet=quiet)
     warn(*found.warnings)
     refuse(system, found, free_bytes(Path()))
 

@@ -34,6 +34,12 @@ class Rung(NamedTuple):
         """The method in a few words."""
         return method_label(self.kind)
 
+    def __str__(self) -> str:
+        """The method with its step or tolerance."""
+        return f"{self.label}, " + (
+            f"tolerance {self.tolerance:g}" if self.step is None else f"step {self.step:.3g} s"
+        )
+
 
 def method_label(kind: Method) -> str:
     """A method in a few words, without step and tolerance."""

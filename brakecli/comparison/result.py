@@ -41,11 +41,6 @@ class ComparisonReport:
         return values_of(fields.COMPARISON, self)
 
 
-def entry_numbers(entry: Entry) -> dict[str, Any]:
-    """Names and values of an entry; null where there is none."""
-    return values_of(fields.ENTRY, entry)
-
-
 def write(path: Path, loaded: LoadedCase, report: ComparisonReport, *, force: bool) -> None:
     """Write the result file; raises UsageError or CannotWriteError."""
     with new_result(path, force=force) as result:

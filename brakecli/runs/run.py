@@ -98,11 +98,12 @@ class _Written:
         self.result.append("history", {"time": time, **dict(zip(HISTORY, rows.T, strict=True))})
 
 
-def load_kernels(loaded: LoadedCase) -> None:
-    """Compile what a run of a case needs, or load it: this takes seconds only once."""
+def load_kernels(loaded: LoadedCase) -> System:
+    """The system of a case, whose kernels are compiled or loaded: this takes seconds only once."""
     with within_range():
         system = system_of(loaded.case)
     _ = system.scheme, system.evaluate
+    return system
 
 
 def run(
