@@ -65,8 +65,10 @@ def _check(quantity: str | None, given: Mapping[str, Any]) -> None:
         where = "--" + name.replace("_", "-")
         if value is not None and quantity is None:
             raise UsageError(f"{where}: is for a measured signal; say with --quantity what was measured")
-        if isinstance(value, float) and not (math.isfinite(value) and (value > 0.0 or name == "belt_speed")):
+        if name == "stiffness" and value is not None and not 0.0 < value < math.inf:
             raise UsageError(f"{where} {value}: is not a positive number; give one in SI units")
+        if name == "belt_speed" and value is not None and not math.isfinite(value):
+            raise UsageError(f"{where} {value}: is not a number; give one in SI units")
 
 
 def _changed(thresholds: type[Any], changes: list[str] | None) -> Any:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import io
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from brakecli.files import fields
+from brakecli.files.field import Field, named
 from brakecli.solver.quantities import COEFFICIENTS
 
 if TYPE_CHECKING:  # what one command prints need not wait for the modules of the others
@@ -20,6 +22,12 @@ if TYPE_CHECKING:  # what one command prints need not wait for the modules of th
     from brakecli.sweeps.cost import Estimate
     from brakecli.sweeps.result import SweepReport
 
+POINTS = named(fields.POINT, "regime", "frequency", "amplitude")
+CRITICAL_POINTS = (
+    *named(fields.POINT, "regime"),
+    *named(fields.CRITICAL, "critical", "critical_error", "critical_eigenvalue", "critical_sustained"),
+    *named(fields.CRITICAL, "critical_status"),
+)
 MOST_LISTED_POINTS = 30
 NARROWEST = 40
 """Columns of a table, whatever the terminal says: nothing can be read in fewer."""
@@ -28,25 +36,6 @@ NARROWEST = 40
 Row = tuple[str, str | Sequence[str]]
 """A label with its text; a list gives a row for each of its texts, and none if it is empty."""
 
-# Columns: the name of the values, their header, their format.
-ALONG_A_KEY = (
-    ("critical_friction", "critical friction", ".6g"),
-    ("instability", "instability", ""),
-    ("discrete_critical_friction", "as the scheme has it", ".6g"),
-)
-POINTS = (
-    ("regime", "regime", ""),
-    ("frequency", "frequency, Hz", ".5g"),
-    ("amplitude", "amplitude, m", ".5g"),
-)
-CRITICAL_POINTS = (
-    ("regime", "regime", ""),
-    ("critical", "critical", ".5g"),
-    ("critical_error", "±", ".5g"),
-    ("critical_eigenvalue", "by eigenvalues", ".5g"),
-    ("critical_sustained", "vibrates from", ".5g"),
-    ("critical_status", "search", ""),
-)
 ENTRIES = (
     ("method", "method", ""),
     ("step", "step, s", ".3g"),
@@ -56,6 +45,7 @@ ENTRIES = (
     ("contact_evaluations", "evaluations", "d"),
     ("milliseconds", "time, ms", ".3g"),
 )
+"""Of the methods that are compared: name of the numbers, header, format."""
 
 
 def run_table(report: RunReport) -> str:
@@ -70,9 +60,7 @@ def run_table(report: RunReport) -> str:
     rows = [
         ("failed", [numbers["failure"]] if report.failed else []),
         *_verdict_rows(numbers),
-        ("peak of the spectrum of vx", _text(numbers["spectrum_peak"], "Hz")),
-        ("mean friction force", _text(numbers["mean_friction_force"], "N")),
-        ("braking torque", _text(numbers["braking_torque"], "N m")),
+        *_rows(fields.RUN, numbers, "spectrum_peak", "mean_friction_force", "braking_torque"),
         ("settled part", f"from {numbers['settled_from']:.4g} s on"),
         ("scheme", method.scheme + how),
         ("tolerance", [report.certificate.sentence()] if report.certificate else []),
@@ -101,10 +89,7 @@ def _verdict_rows(numbers: Mapping[str, Any]) -> list[Row]:
     return [
         ("regime", regime if excitation == "none" else f"{regime} ({excitation})"),
         ("because", "; ".join(numbers["reasons"])),
-        ("frequency", _text(numbers["frequency"], "Hz")),
-        ("amplitude of x", _text(numbers["amplitude"], "m")),
-        ("stick", _text(numbers["stick_fraction"], "of the time", ".2%")),
-        ("lost contact", _text(numbers["contact_loss_fraction"], "of the time", ".2%")),
+        *_rows(fields.VERDICT, numbers, "frequency", "amplitude", "stick_fraction", "contact_loss_fraction"),
     ]
 
 
@@ -184,8 +169,12 @@ def stability_table(title: str, report: StabilityReport, key: str, entries: Sequ
             ("its critical friction", "none" if friction is None else f"{friction:.7g}{bias}"),
             ("its stable steps", "any" if limit is None else f"up to {limit:.4g} s" if limit else "none"),
         ]
-    along = "\n\n" + _grid(_columns([("value", key, ".6g"), *ALONG_A_KEY], entries)) if key else ""
-    return _table(title, rows) + along
+    if not key:
+        return _table(title, rows)
+    columns = {key: [_text(each["value"]) for each in entries]}
+    for field in fields.VARIED:
+        columns[field.title] = [_text(each[field.name]) for each in entries]
+    return _table(title, rows) + "\n\n" + _grid(columns)
 
 
 def _crossing(crossing: Crossing) -> str:
@@ -227,9 +216,10 @@ def _points_table(report: SweepReport) -> str:
         columns["way"] = [("up", "down")[point // plan.points] for point in range(found.points)]
     for number, axis in enumerate(plan.sweep.axis):
         columns[axis.parameter[0]] = [label(axis.value(place[number])) for place in places]
-    for name, header, form in POINTS if found.critical is None else CRITICAL_POINTS:
-        values = np.ravel(np.array((found.variables or {})[name], object))
-        columns[header] = [_text(value, form=form) for value in values]
+    for field in POINTS if found.critical is None else CRITICAL_POINTS:
+        values = np.ravel(np.array((found.variables or {})[field.name], object))
+        header = f"{field.title}, {field.units}" if field.units else field.title
+        columns[header] = [_text(value, form=".5g") for value in values]
     return _grid(columns)
 
 
@@ -262,17 +252,24 @@ def comparison_table(report: ComparisonReport) -> str:
         ("file", str(report.output)),
     ]
     parts = [
-        "No other is better in both error and time:\n" + _grid(_columns(ENTRIES, front)),
-        "The finest of the others:\n" + _grid(_columns(ENTRIES, list(finest.values()))),
+        "No other is better in both error and time:\n" + _entries(front),
+        "The finest of the others:\n" + _entries(finest.values()),
         _table(report.title, rows),
     ]
     return "\n\n".join(parts)
 
 
-def _columns(
-    columns: Sequence[tuple[str, str, str]], records: Sequence[Mapping[str, Any]]
-) -> dict[str, list[str]]:
-    return {header: [_text(each[name], form=form) for each in records] for name, header, form in columns}
+def _rows(known: Iterable[Field], numbers: Mapping[str, Any], *names: str) -> list[Row]:
+    """A row for each of these fields, with its declared label and unit; parts of one are percentages."""
+    return [
+        (each.title, _text(numbers[each.name], *(("of the time", ".2%") if each.units == "1" else (each.units,))))
+        for each in named(known, *names)
+    ]
+
+
+def _entries(records: Iterable[Mapping[str, Any]]) -> str:
+    shown = list(records)
+    return _grid({header: [_text(each[name], form=form) for each in shown] for name, header, form in ENTRIES})
 
 
 def _text(value: str | float | None, unit: str = "", form: str = ".6g") -> str:

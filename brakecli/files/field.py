@@ -19,6 +19,8 @@ class Field:
     """The NumPy type of many of them. A float may be missing: null in JSON, `_FillValue` in a file."""
     source: str = ""
     """Path of attributes, keys and methods that leads from a report to the value; the name if empty."""
+    label: str = ""
+    """Words for the terminal; the name if empty."""
     missing: Any = None
     """What stands for a value that does not exist."""
     in_file: bool = True
@@ -27,6 +29,11 @@ class Field:
     """Group of the file whose attributes hold the items of an object."""
     rows: "tuple[Field, ...]" = ()
     """The items of an object, or of each object in a list."""
+
+    @property
+    def title(self) -> str:
+        """The words for the terminal."""
+        return self.label or self.name.replace("_", " ")
 
     def read(self, report: object) -> Any:
         """The value that a report holds, as JSON writes it."""

@@ -1,7 +1,7 @@
 """Every number and text of a result, declared once: its name, unit, meaning, type, and where a report holds it.
 
-JSON, the attributes and variables of result files, the records of a sweep and the tables of the documentation
-(`make tables`) are all made from these rows.
+JSON, the attributes and variables of result files, the records of a sweep, labels in the terminal and the tables
+of the documentation (`make tables`) are all made from these rows.
 """
 
 from brakecli.files.field import Field, json_only, named, within
@@ -34,7 +34,7 @@ VERDICT = (
         Field("regime", "", "regime of the motion", "S16"),
         Field("excitation", "", "where the energy of a sustained motion comes from", "S16"),
         Field("frequency", "Hz", "fundamental frequency of vx of a sustained motion"),
-        Field("amplitude", "m", "half of peak to peak of x, settled part"),
+        Field("amplitude", "m", "half of peak to peak of x, settled part", label="amplitude of x"),
         Field("settled", "1", "whether a settled part was found (0, 1); otherwise it is the second half", "i8"),
     ),
     Field("settled_from", "s", "start of the settled part"),
@@ -42,8 +42,8 @@ VERDICT = (
     Field("braking_torque", "N m", "mean torque of the friction force, settled part"),
     *within(
         "verdict",
-        Field("stick_fraction", "1", "part of the time in stick, settled part"),
-        Field("contact_loss_fraction", "1", "part of the time off the wheel, settled part"),
+        Field("stick_fraction", "1", "part of the time in stick, settled part", label="stick"),
+        Field("contact_loss_fraction", "1", "part of the time off the wheel, settled part", label="lost contact"),
         Field("reasons", "", "why the regime is as it is", OBJECT),
         Field("evidence", "", "numbers by which the rules decided", OBJECT, group="regime/evidence"),
         Field("thresholds", "", "limits of the rules", OBJECT, group="regime/thresholds"),
@@ -67,7 +67,7 @@ RUN = (
     Field("status", "", "how the run has ended: done or failed", TEXT),
     *within("motion.work", Field("failure", "", "time and reason of a failure", TEXT, source="failure_sentence")),
     *VERDICT,
-    Field("spectrum_peak", "Hz", "place of the highest peak of the spectrum of vx above 0 Hz"),
+    Field("spectrum_peak", "Hz", "highest peak of the spectrum above 0 Hz", label="peak of the spectrum of vx"),
     *within(
         "system.method",
         Field("scheme", "", "time-stepping scheme", TEXT),
@@ -164,7 +164,7 @@ CRITICAL = (
     Field("critical", "", "critical value: steady sliding loses its stability there", source="value"),
     Field("critical_lower", "", "lower end of the bracket of the critical value", source="lower"),
     Field("critical_upper", "", "upper end of the bracket of the critical value", source="upper"),
-    Field("critical_error", "", "error bar of the critical value, with the bias of the scheme", source="error"),
+    Field("critical_error", "", "error bar of the critical value, bias included", source="error", label="±"),
     Field("critical_bias", "", "critical value of the scheme at its step less the exact one", source="bias"),
     Field("critical_eigenvalue", "", "critical value by eigenvalues", source="eigenvalue"),
     Field(
@@ -306,6 +306,12 @@ STABILITY = (
 )
 VARIED = (
     *named(_CRITICAL_FRICTION, "critical_friction", "instability"),
-    Field("discrete_critical_friction", "1", "the same in the scheme", source="discrete.critical_friction"),
+    Field(
+        "discrete_critical_friction",
+        "1",
+        "the same in the scheme",
+        source="discrete.critical_friction",
+        label="as the scheme has it",
+    ),
 )
 """Along a key of the case, beside its `value`."""

@@ -122,8 +122,10 @@ def given_toml(table: Sweep | Case) -> str:
     return tomli_w.dumps(table.model_dump(mode="json", exclude_unset=True, exclude_none=True))
 
 
-plan_of = lru_cache(maxsize=4)(Plan)
-"""The plan of the texts of a sweep and of its case; a worker meets the same ones again and again."""
+@lru_cache(maxsize=4)
+def plan_of(sweep_text: str, case_text: str) -> Plan:
+    """The plan of the texts of a sweep and of its case; a worker meets the same ones again and again."""
+    return Plan(sweep_text, case_text)  # `lru_cache(Plan)` would inherit `__reduce__`, and could not be sent
 
 
 def label(value: Any) -> str:
