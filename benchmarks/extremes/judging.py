@@ -238,7 +238,7 @@ def judge(tables: Tables, scheme: Scheme, at: Pace, reference: Truth, most: floa
         with within_range():
             system = system_of(case_of(tables, scheme.solver(at.step, at.duration), at.interval))
             found = check(system)
-            refuse(system, found, math.inf)
+            refuse(found)
             warnings = [text for text in found.warnings if text.startswith(("solver", "contact", "friction"))]
             if scheme.order:
                 work, rows = motion(system)

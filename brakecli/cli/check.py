@@ -9,6 +9,8 @@ from brakecli.cli.inputs import is_sweep, load_case, load_sweep
 from brakecli.cli.options import AsJson, Overrides, Quiet, source_argument
 from brakecli.cli.output import announce_compilation, show_result, warn
 
+OF_SYSTEM = ("belt_speed", "contact_stiffness", "natural_frequencies", "passing_frequency", "evaluator", "nodes")
+
 
 def command(
     file: Annotated[str, source_argument("FILE.toml", 'Case or sweep file, or "-" for standard input.')],
@@ -28,14 +30,15 @@ def _check_case(file: str, overrides: list[str] | None, as_json: bool, quiet: bo
     from brakecli.runs.limits import check, free_bytes, refuse, within_range
 
     with within_range():
-        system = system_of(loaded.case)
-        found = check(system)
-    values = {"valid": True, **asdict(found)}
-    values |= values.pop("limits")
+        found = check(system_of(loaded.case))
+    of_system = {name: getattr(found.system, name) for name in OF_SYSTEM}
+    values = {"valid": True, "coefficients": found.system.coefficients._asdict(), **of_system, **vars(found)}
+    values |= vars(values.pop("limits"))
+    del values["system"]
     numbers = {name: value for name, value in values.items() if value not in (math.inf, -math.inf)}
     show_result("check", numbers, check_table, loaded.case.title, found, as_json=as_json, quiet=quiet)
     warn(*found.warnings)
-    refuse(system, found, free_bytes(Path()))
+    refuse(found, free_bytes(Path()))
 
 
 def _check_sweep(file: str, overrides: list[str] | None, as_json: bool, quiet: bool) -> None:

@@ -34,7 +34,7 @@ def command(
     warn(*report.warnings)
     numbers = {"output": str(report.output), **report.numbers()}
     show_result("run", numbers, run_table, report, as_json=as_json, quiet=quiet)
-    if report.failed:
+    if report.motion.work.failed:
         say(f"{report.output}: the history up to the failure was written")
         raise BrakecliError(str(report.motion.work.failure_sentence))
     certificate = report.certificate

@@ -58,7 +58,7 @@ def run_table(report: RunReport) -> str:
     step = "" if report.check.step is None else f" of {report.check.step:.4g} s"
     error = abs(numbers["energy"]["relative_closing_error"])
     rows = [
-        ("failed", [numbers["failure"]] if report.failed else []),
+        ("failed", [numbers["failure"]] if work.failed else []),
         *_verdict_rows(numbers),
         *_rows(fields.RUN, numbers, "spectrum_peak", "mean_friction_force", "braking_torque"),
         ("settled part", f"from {numbers['settled_from']:.4g} s on"),
@@ -95,26 +95,28 @@ def _verdict_rows(numbers: Mapping[str, Any]) -> list[Row]:
 
 def check_table(title: str, found: Check) -> str:
     """What a run would cost and which limits it meets."""
-    low, high = found.natural_frequencies
-    link_low, link_high = found.link_frequencies
-    limits, has_step = found.limits, found.step is not None
+    system, limits, has_step = found.system, found.limits, found.step is not None
+    (low, high), (link_low, link_high) = system.natural_frequencies, found.link_frequencies
     growth = f"multiplies a frictionless disturbance by at most {limits.growth:.8g} a step"
     rows = [
         *(
-            (f"{each.symbol}, {each.long_name}", _text(found.coefficients[name], each.units.removeprefix("1")))
+            (
+                f"{each.symbol}, {each.long_name}",
+                _text(getattr(system.coefficients, name), each.units.removeprefix("1")),
+            )
             for name, each in COEFFICIENTS.items()
         ),
-        ("surface speed U", _text(found.belt_speed, "m/s")),
-        ("contact stiffness 2ak", _text(found.contact_stiffness, "N/m")),
+        ("surface speed U", _text(system.belt_speed, "m/s")),
+        ("contact stiffness 2ak", _text(system.contact_stiffness, "N/m")),
         ("natural frequencies", f"{low:.5g} and {high:.5g} Hz in full contact"),
         ("without contact", f"{link_low:.5g} and {link_high:.5g} Hz"),
-        ("shortest wave passes at", _text(found.passing_frequency, "Hz")),
+        ("shortest wave passes at", _text(system.passing_frequency, "Hz")),
         ("step", (f"{found.step:.6g} s, " if has_step else "its own, about ") + f"{found.steps} steps"),
         ("steps per period", [f"{found.steps_per_period:.4g} of the fastest motion"] * has_step),
         ("fixed-point contraction", [f"{limits.contraction:.3g} (it may diverge from 1 on)"] * has_step),
         ("solution of a step", [f"{'' if limits.unique else 'not '}sure to be unique"] * has_step),
         ("scheme", [growth] * has_step),
-        ("contact", found.evaluator + (f", {found.nodes} nodes" if found.nodes else "")),
+        ("contact", system.evaluator + (f", {system.nodes} nodes" if system.nodes else "")),
         ("nodes per shortest wave", _text(found.nodes_per_wave)),
         *_cost_rows(found),
         ("adjusted", found.adjustments),
@@ -261,10 +263,11 @@ def comparison_table(report: ComparisonReport) -> str:
 
 def _rows(known: Iterable[Field], numbers: Mapping[str, Any], *names: str) -> list[Row]:
     """A row for each of these fields, with its declared label and unit; parts of one are percentages."""
-    return [
-        (each.title, _text(numbers[each.name], *(("of the time", ".2%") if each.units == "1" else (each.units,))))
-        for each in named(known, *names)
-    ]
+    rows: list[Row] = []
+    for each in named(known, *names):
+        shown = ("of the time", ".2%") if each.units == "1" else (each.units,)
+        rows.append((each.title, _text(numbers[each.name], *shown)))
+    return rows
 
 
 def _entries(records: Iterable[Mapping[str, Any]]) -> str:

@@ -143,7 +143,7 @@ def compare(
 def _motion(system: System, method: Method, *, at_once: bool = False) -> Motion:
     """The motion by a method, in one block if `at_once`; raises RefusedError."""
     system = replace(system, method=method)
-    refuse(system, check(system), math.inf)
+    refuse(check(system))
     return solve(system, first_block=system.steps if at_once else 1)
 
 

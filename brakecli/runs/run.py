@@ -26,6 +26,11 @@ from brakecli.solver.motion import Motion, Progress, Sink, solve
 from brakecli.solver.quantities import HISTORY, ContactState
 from brakecli.solver.system import System
 
+STATES = {
+    "flag_values": np.array(list(ContactState), dtype=np.int8),
+    "flag_meanings": " ".join(state.name.lower() for state in ContactState),
+}
+
 
 @dataclass(frozen=True)
 class RunReport(RunVerdict):
@@ -38,16 +43,13 @@ class RunReport(RunVerdict):
     certificate: Certificate | None  # where the case gives no step
     spectrum_peak: float | None  # Hz, of vx
     warnings: tuple[str, ...]
-
-    @property
-    def failed(self) -> bool:
-        """Whether the run ended before its time."""
-        return self.motion.work.failed
+    modelled: list[str]
+    left_out: list[str]
 
     @property
     def status(self) -> str:
         """How the run has ended, in a word."""
-        return "failed" if self.failed else "done"
+        return "failed" if self.motion.work.failed else "done"
 
     @property
     def iteration(self) -> str | None:
@@ -60,16 +62,6 @@ class RunReport(RunVerdict):
         """The time step, s; None where the scheme finds its steps itself."""
         return None if self.system.method.own_steps else self.system.step
 
-    @property
-    def modelled(self) -> list[str]:
-        """What of the model the run has used."""
-        return modelled(self.motion)[0]
-
-    @property
-    def left_out(self) -> list[str]:
-        """What of the model the run has left out, and why that was safe."""
-        return modelled(self.motion)[1]
-
     def numbers(self) -> dict[str, Any]:
         """Names and values as `--json` gives them."""
         numbers = values_of(fields.RUN, self)
@@ -78,12 +70,14 @@ class RunReport(RunVerdict):
         return numbers
 
 
-@dataclass(frozen=True)
 class _Written:
     """The history of a file that is being written, as the analysis reads it."""
 
-    result: ResultFile
-    interval: float
+    def __init__(self, result: ResultFile, interval: float) -> None:
+        self.result, self.interval = result, interval
+        for field in fields.HISTORY:
+            flags = STATES if field.name == "state" else None
+            result.variable("history", field, ("time",), attributes=flags)
 
     @property
     def samples(self) -> int:
@@ -123,22 +117,20 @@ def run(
         system = system_of(loaded.case)
         found = check(system)
         with new_result(output, force=force) as result:
-            refuse(system, found, free_bytes(output.resolve().parent))
-            _declare_history(result)
-
-            def advance(done: int) -> None:
-                progress("steps" if found.step else "samples", done, system.steps)
-
-            history = _Written(result, system.interval)
-            motion, certificate = motion_of(system, advance, history.append)
+            refuse(found, free_bytes(output.resolve().parent))
+            history, counted = _Written(result, system.interval), "steps" if found.step else "samples"
+            motion, certificate = motion_of(
+                system, lambda done: progress(counted, done, system.steps), history.append
+            )
             _require_finite("an energy", list(asdict(motion.energy).values()))
             verdict = verdict_on(history, motion.system, motion.work.failure_sentence)
             top = _write_spectrum(result, history, verdict.settled_from)
             warnings = (*found.warnings, *_warnings(motion, certificate))
+            title, told = loaded.case.title, modelled(motion)
             report = RunReport(
-                motion.system, verdict, loaded.case.title, output, motion, found, certificate, top, warnings
+                motion.system, verdict, title, output, motion, found, certificate, top, warnings, *told
             )
-            result.set_attributes(origin("run", report.title, loaded))
+            result.set_attributes(origin("run", title, loaded))
             result.set_fields(fields.RUN, report.numbers())
             _write_unconverged(result, motion.work.unconverged)
             result.commit()
@@ -157,7 +149,7 @@ def motion_of(
     certified = certify(system, progress)
     if sink is not None:
         sink(certified.motion.rows)
-    return certified.motion, certified.certificate
+    return certified
 
 
 def _require_finite(what: str, values: ArrayLike) -> None:
@@ -182,15 +174,6 @@ def _warnings(motion: Motion, certificate: Certificate | None) -> list[str]:
     if certificate is not None and not certificate.certified:
         warnings.append(f"solver.tolerance: {certificate.sentence()}")
     return warnings
-
-
-def _declare_history(result: ResultFile) -> None:
-    flags = {
-        "flag_values": np.array([int(state) for state in ContactState], dtype=np.int8),
-        "flag_meanings": " ".join(state.name.lower() for state in ContactState),
-    }
-    for field in fields.HISTORY:
-        result.variable("history", field, ("time",), attributes=flags if field.name == "state" else None)
 
 
 def _write_spectrum(result: ResultFile, history: _Written, start: int) -> float | None:
@@ -222,10 +205,5 @@ def origin(kind: str, title: str, loaded: LoadedCase) -> dict[str, Any]:
 
 def versions() -> dict[str, str]:
     """The versions of the numerical libraries."""
-    return {
-        "numpy_version": np.__version__,
-        "scipy_version": scipy.__version__,
-        "numba_version": numba.__version__,
-        "h5py_version": h5py.__version__,
-        "hdf5_version": h5py.version.hdf5_version,
-    }
+    found = {f"{library.__name__}_version": str(library.__version__) for library in (np, scipy, numba, h5py)}
+    return {**found, "hdf5_version": h5py.version.hdf5_version}
