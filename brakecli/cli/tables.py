@@ -237,9 +237,9 @@ def comparison_table(report: ComparisonReport) -> str:
     finest = {entry.rung.kind: numbers for entry, numbers in able if not entry.on_front}
     failed = [entry for entry in found.entries if entry.work is not None and entry.errors is None]
     recommended = [f"none meets {report.target:g}"]
-    if best is not None and best.errors is not None:
-        error, finer = best.errors.error, found.finer_error(best)
-        margin = f"error {error:.2g}, {report.target / error:.3g} times below {report.target:g}"
+    if best is not None:
+        finer = found.finer_error(best)
+        margin = f"error {best.error:.2g}, {report.margin:.3g} times below {report.target:g}"
         recommended = [f"{best.rung}: {margin}"]
         if finer > report.target:
             recommended.append(f"by chance: at a finer step its error is {finer:.2g}; choose one with more margin")

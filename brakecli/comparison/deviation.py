@@ -11,7 +11,6 @@ from brakecli.solver.quantities import HISTORY
 MOTION = ("x", "y", "vx", "vy")
 FORCES = ("friction_force", "normal_force")
 _COLUMNS = {name: index for index, name in enumerate(HISTORY)}
-_QUARTER = 4
 
 
 @dataclass(frozen=True)
@@ -32,7 +31,7 @@ class Errors:
 
 
 def errors(rows: NDArray[np.float64], reference: NDArray[np.float64], interval: float) -> Errors:
-    """Compare rows of `model.HISTORY`, sampled at the same times."""
+    """Compare rows of `quantities.HISTORY`, sampled at the same times."""
     largest, mean = {}, {}
     for name in (*MOTION, *FORCES):
         exact = reference[:, _COLUMNS[name]]
@@ -47,7 +46,7 @@ def _line(
     values: NDArray[np.float64], reference: NDArray[np.float64], interval: float
 ) -> tuple[float | None, float | None]:
     """Relative error of the amplitude, and error of the phase, of the reference's strongest line."""
-    count = len(reference) // _QUARTER
+    count = len(reference) // 4
     if count < 64:
         return None, None
     window = np.hanning(count + 2)[1:-1]

@@ -36,39 +36,39 @@ class Rung(NamedTuple):
 
     def __str__(self) -> str:
         """The method with its step or tolerance."""
-        return f"{self.label}, " + (
-            f"tolerance {self.tolerance:g}" if self.step is None else f"step {self.step:.3g} s"
-        )
+        rung = f"tolerance {self.tolerance:g}" if self.step is None else f"step {self.step:.3g} s"
+        return f"{self.label}, {rung}"
 
 
 def method_label(kind: Method) -> str:
     """A method in a few words, without step and tolerance."""
-    weights = f" ({', '.join(_fraction(weight) for weight in kind.theta)})" if kind.theta else ""
-    start = ", paper's start" if kind.start == "paper" else ""
-    iteration = ", fixed point" if kind.iteration == "fixed-point" else ""
-    nodes = f", {kind.nodes} nodes" if kind.evaluator == "midpoint" else ""
-    exact = ", exact contact" if kind.evaluator == "exact" else ""
-    return f"{kind.scheme}{weights}{start}{iteration}{nodes}{exact}"
+    words = [
+        kind.scheme + (f" ({', '.join(_fraction(weight) for weight in kind.theta)})" if kind.theta else ""),
+        "paper's start" if kind.start == "paper" else "",
+        "fixed point" if kind.iteration == "fixed-point" else "",
+        {"midpoint": f"{kind.nodes} nodes", "exact": "exact contact"}.get(kind.evaluator, ""),
+    ]
+    return ", ".join(filter(None, words))
 
 
 def kinds(system: System, wanted: Sequence[str] = ()) -> list[Method]:
     """The methods that are compared on a system, the cheapest of a scheme first; `wanted` names schemes."""
     moving = system.initial.vx != 0.0 or system.initial.vy != 0.0
+    usual = "closed-form" if system.smooth else "auto"
     layered, contacts, own = [], [], []
     for name, scheme in SCHEMES.items():
         for trial in scheme.trials:
+            kind = Method(name, trial.theta, trial.start, trial.iteration)
             if (wanted and name not in wanted) or (moving and trial.start == "paper"):
                 continue
-            kind = Method(name, trial.theta, trial.start, trial.iteration)
             if scheme.own_steps:
                 own.append(kind)
                 continue
-            kind = replace(kind, evaluator="closed-form" if system.smooth else "auto", nodes=system.nodes)
-            layered.append(kind)
+            layered.append(replace(kind, evaluator=usual, nodes=system.nodes))
             if trial.contacts and not system.smooth:
                 counts = [max(2, round(system.nodes * factor)) for factor in NODE_FACTORS]
                 contacts += [replace(kind, evaluator="midpoint", nodes=count) for count in counts]
-                contacts.append(replace(kind, evaluator="exact", nodes=0))
+                contacts.append(replace(kind, evaluator="exact"))
     return layered + contacts + own
 
 
@@ -116,7 +116,7 @@ def parse_steps(text: str | None) -> list[float]:
 
 def _fraction(weight: float) -> str:
     for denominator in (1, 2, 3, 4, 12):
-        if math.isclose(weight * denominator, round(weight * denominator), abs_tol=1e-12):
-            numerator = round(weight * denominator)
+        numerator = round(weight * denominator)
+        if math.isclose(weight * denominator, numerator, abs_tol=1e-12):
             return str(numerator) if denominator == 1 else f"{numerator}/{denominator}"
     return f"{weight:.4g}"
