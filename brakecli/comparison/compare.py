@@ -234,19 +234,9 @@ def _add_limits(system: System, report: linear.StabilityReport, entries: list[En
             scheme = Method(kind.scheme, kind.theta)
             entry.step_limit, entry.critical_bias = limit(scheme), bias(scheme, step)
     for coarse, fine in pairwise(entries):
-        if fine.place:
-            fine.order = _order(coarse, fine)
-
-
-def _order(coarse: Entry, fine: Entry) -> float | None:
-    """Observed order between two rungs: how the error falls with the step."""
-    if (
-        coarse.rung.step is None
-        or fine.rung.step is None
-        or not all(0.0 < e.error < math.inf for e in (coarse, fine))
-    ):
-        return None
-    return math.log(coarse.error / fine.error) / math.log(coarse.rung.step / fine.rung.step)
+        long, short = coarse.rung.step, fine.rung.step
+        if fine.place and long and short and 0.0 < fine.error < math.inf and 0.0 < coarse.error < math.inf:
+            fine.order = math.log(coarse.error / fine.error) / math.log(long / short)
 
 
 def _mark_front(entries: list[Entry]) -> None:
