@@ -98,14 +98,10 @@ def check_table(title: str, found: Check) -> str:
     system, limits, has_step = found.system, found.limits, found.step is not None
     (low, high), (link_low, link_high) = system.natural_frequencies, found.link_frequencies
     growth = f"multiplies a frictionless disturbance by at most {limits.growth:.8g} a step"
-    rows = [
-        *(
-            (
-                f"{each.symbol}, {each.long_name}",
-                _text(getattr(system.coefficients, name), each.units.removeprefix("1")),
-            )
-            for name, each in COEFFICIENTS.items()
-        ),
+    rows: list[Row] = []
+    for each, value in zip(COEFFICIENTS.values(), system.coefficients, strict=True):
+        rows.append((f"{each.symbol}, {each.long_name}", _text(value, each.units.removeprefix("1"))))
+    rows += [
         ("surface speed U", _text(system.belt_speed, "m/s")),
         ("contact stiffness 2ak", _text(system.contact_stiffness, "N/m")),
         ("natural frequencies", f"{low:.5g} and {high:.5g} Hz in full contact"),

@@ -12,7 +12,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from brakecli import __version__
-from brakecli.analysis.regime.of_run import RunVerdict, verdict_on
+from brakecli.analysis.regime.of_run import RunVerdict, StoredHistory, verdict_on
 from brakecli.analysis.regime.spectra import peak, spectrum
 from brakecli.case.read import LoadedCase
 from brakecli.case.system import system_of
@@ -22,6 +22,7 @@ from brakecli.files.write import ResultFile, new_result
 from brakecli.runs.limits import Check, check, free_bytes, refuse, within_range
 from brakecli.runs.modelled import modelled
 from brakecli.runs.tolerance import Certificate, certify
+from brakecli.solver.history import History
 from brakecli.solver.motion import Motion, Progress, Sink, solve
 from brakecli.solver.quantities import HISTORY, ContactState
 from brakecli.solver.system import System
@@ -70,28 +71,6 @@ class RunReport(RunVerdict):
         return numbers
 
 
-class _Written:
-    """The history of a file that is being written, as the analysis reads it."""
-
-    def __init__(self, result: ResultFile, interval: float) -> None:
-        self.result, self.interval = result, interval
-        for field in fields.HISTORY:
-            flags = STATES if field.name == "state" else None
-            result.variable("history", field, ("time",), attributes=flags)
-
-    @property
-    def samples(self) -> int:
-        return self.result.rows("history")
-
-    def read(self, name: str, start: int, stop: int) -> NDArray[np.float64]:
-        return self.result.read("history", name, start, stop)
-
-    def append(self, rows: NDArray[np.float64]) -> None:
-        _require_finite("a force", rows)
-        time = self.interval * np.arange(self.samples, self.samples + len(rows))
-        self.result.append("history", {"time": time, **dict(zip(HISTORY, rows.T, strict=True))})
-
-
 def load_kernels(loaded: LoadedCase) -> System:
     """The system of a case, whose kernels are compiled or loaded: this takes seconds only once."""
     with within_range():
@@ -118,11 +97,10 @@ def run(
         found = check(system)
         with new_result(output, force=force) as result:
             refuse(found, free_bytes(output.resolve().parent))
-            history, counted = _Written(result, system.interval), "steps" if found.step else "samples"
-            motion, certificate = motion_of(
-                system, lambda done: progress(counted, done, system.steps), history.append
-            )
+            counted, sink = "steps" if found.step else "samples", _history_sink(result, system.interval)
+            motion, certificate = motion_of(system, lambda done: progress(counted, done, system.steps), sink)
             _require_finite("an energy", list(asdict(motion.energy).values()))
+            history = StoredHistory(result, system.interval, result.rows("history"))
             verdict = verdict_on(history, motion.system, motion.work.failure_sentence)
             top = _write_spectrum(result, history, verdict.settled_from)
             warnings = (*found.warnings, *_warnings(motion, certificate))
@@ -152,6 +130,20 @@ def motion_of(
     return certified
 
 
+def _history_sink(result: ResultFile, interval: float) -> Sink:
+    """Declare the history of a file; what is returned writes samples to it."""
+    for field in fields.HISTORY:
+        result.variable("history", field, ("time",), attributes=STATES if field.name == "state" else None)
+
+    def append(rows: NDArray[np.float64]) -> None:
+        _require_finite("a force", rows)
+        done = result.rows("history")
+        time = interval * np.arange(done, done + len(rows))
+        result.append("history", {"time": time, **dict(zip(HISTORY, rows.T, strict=True))})
+
+    return append
+
+
 def _require_finite(what: str, values: ArrayLike) -> None:
     """Compiled code overflows silently; the loop bounds only the motion itself."""
     if not np.isfinite(values).all():
@@ -176,7 +168,7 @@ def _warnings(motion: Motion, certificate: Certificate | None) -> list[str]:
     return warnings
 
 
-def _write_spectrum(result: ResultFile, history: _Written, start: int) -> float | None:
+def _write_spectrum(result: ResultFile, history: History, start: int) -> float | None:
     """Write the spectra of the samples from `start` on; the frequency (Hz) of the highest peak of vx."""
     lines = spectrum(history, start)
     result.axis("spectrum", fields.FREQUENCY, lines.frequency)

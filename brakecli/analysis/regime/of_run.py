@@ -17,6 +17,7 @@ from brakecli.errors import CaseError, UnreadableResultError
 from brakecli.files import fields
 from brakecli.files.field import values_of
 from brakecli.files.read import StoredResult, open_result
+from brakecli.files.write import ResultFile
 from brakecli.solver.history import History
 from brakecli.solver.schedules import value_at
 from brakecli.solver.steady_sliding import steady_sliding
@@ -28,9 +29,9 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class StoredHistory:
-    """The history of a result file, read in pieces."""
+    """The history of a result file that is read, or still written, in pieces."""
 
-    stored: StoredResult
+    stored: StoredResult | ResultFile
     interval: float
     samples: int
 
