@@ -19,10 +19,19 @@ def command(
     quiet: Quiet = False,
 ) -> None:
     """Validate a case or a sweep; report what it would cost and which limits it meets, without computing it."""
-    (_check_sweep if is_sweep(file) else _check_case)(file, overrides, as_json, quiet)
+    if is_sweep(file):
+        sweep = load_sweep(file, overrides)
+        announce_compilation(quiet)
+        from brakecli.cli.tables import estimate_table
+        from brakecli.runs.limits import free_bytes
+        from brakecli.sweeps.cost import estimate, refuse_sweep
+        from brakecli.sweeps.driver import cores
 
-
-def _check_case(file: str, overrides: list[str] | None, as_json: bool, quiet: bool) -> None:
+        cost = estimate(sweep.plan, cores())
+        numbers = {"valid": True, **asdict(cost)}
+        show_result("check", numbers, estimate_table, sweep.title, cost, as_json=as_json, quiet=quiet)
+        refuse_sweep(cost, free_bytes(Path()))
+        return
     loaded = load_case(file, overrides)
     announce_compilation(quiet)
     from brakecli.case.system import system_of
@@ -39,17 +48,3 @@ def _check_case(file: str, overrides: list[str] | None, as_json: bool, quiet: bo
     show_result("check", numbers, check_table, loaded.case.title, found, as_json=as_json, quiet=quiet)
     warn(*found.warnings)
     refuse(found, free_bytes(Path()))
-
-
-def _check_sweep(file: str, overrides: list[str] | None, as_json: bool, quiet: bool) -> None:
-    loaded = load_sweep(file, overrides)
-    announce_compilation(quiet)
-    from brakecli.cli.tables import estimate_table
-    from brakecli.runs.limits import free_bytes
-    from brakecli.sweeps.cost import estimate, refuse_sweep
-    from brakecli.sweeps.driver import cores
-
-    found = estimate(loaded.plan, cores())
-    numbers = {"valid": True, **asdict(found)}
-    show_result("check", numbers, estimate_table, loaded.title, found, as_json=as_json, quiet=quiet)
-    refuse_sweep(found, free_bytes(Path()))

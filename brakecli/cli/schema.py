@@ -13,10 +13,10 @@ def command(
 ) -> None:
     """Print the JSON Schema of case files, or of sweep files, for editors that know TOML."""
     from brakecli.case.case import Case
-    from brakecli.case.tables import Table, json_schema
+    from brakecli.case.tables import json_schema
     from brakecli.sweeps.tables import Sweep
 
-    tables: dict[str, type[Table]] = {"case": Case, "sweep": Sweep}
+    tables = {"case": Case, "sweep": Sweep}
     if kind not in tables:
         raise UsageError(f"schema {kind}: there is none; give {' or '.join(tables)}")
     show_json(json_schema(tables[kind]), indent=2)

@@ -230,13 +230,13 @@ def comparison_table(report: ComparisonReport) -> str:
         numbers["step"] = numbers["step"] or f"to {numbers['tolerance']:g}"
     able = [(entry, numbers) for entry, numbers in entries if entry.errors is not None]
     front = sorted((numbers for entry, numbers in able if entry.on_front), key=lambda each: each["milliseconds"])
-    finest = {entry.rung.kind: numbers for entry, numbers in able if not entry.on_front}
+    finest = {entry.kind: numbers for entry, numbers in able if not entry.on_front}
     failed = [entry for entry in found.entries if entry.work is not None and entry.errors is None]
     recommended = [f"none meets {report.target:g}"]
     if best is not None:
         finer = found.finer_error(best)
         margin = f"error {best.error:.2g}, {report.margin:.3g} times below {report.target:g}"
-        recommended = [f"{best.rung}: {margin}"]
+        recommended = [f"{best}: {margin}"]
         if finer > report.target:
             recommended.append(f"by chance: at a finer step its error is {finer:.2g}; choose one with more margin")
     left_out = f"{found.left_out} entries, for want of time: give a larger --budget"
@@ -245,7 +245,7 @@ def comparison_table(report: ComparisonReport) -> str:
         ("reference", f"event-driven, good to {found.reference_error:.1e}, {found.reference_seconds:.3g} s"),
         ("times", f"median of {found.repeats} turns, of the loop alone"),
         ("left out", [left_out] if found.left_out else []),
-        ("failed", [f"{len(failed)} entries, such as {each.rung}: {each.failure}" for each in failed[:1]]),
+        ("failed", [f"{len(failed)} entries, such as {each}: {each.failure}" for each in failed[:1]]),
         ("recommended", recommended),
         ("file", str(report.output)),
     ]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from brakecli.analysis.stability import report as linear
 from brakecli.comparison.deviation import Errors, errors
-from brakecli.comparison.methods import Rung, kinds, ladder, rungs
+from brakecli.comparison.methods import kinds, ladder, method_label, rungs
 from brakecli.errors import BrakecliError, RefusedError
 from brakecli.runs.limits import check, refuse, within_range
 from brakecli.solver import contact
@@ -34,10 +34,11 @@ LONGEST_CALL = 1.0
 
 @dataclass
 class Entry:
-    """A rung with what came of it; None where it does not exist."""
+    """A method at one step or tolerance, with what came of it; None where it does not exist."""
 
-    rung: Rung
-    place: int  # on the ladder of its method, from the coarsest on
+    kind: Method  # without step and tolerance
+    method: Method
+    place: int  # on the ladder of steps or tolerances, from the coarsest on
     errors: Errors | None = None
     work: Work | None = None
     failure: str = ""
@@ -48,6 +49,21 @@ class Entry:
     step_limit: float | None = None  # s; infinite where any step is stable
     on_front: bool = False
 
+    def __str__(self) -> str:
+        """The method with its step or tolerance."""
+        rung = f"tolerance {self.tolerance:g}" if self.method.step is None else f"step {self.method.step:.3g} s"
+        return f"{self.label}, {rung}"
+
+    @property
+    def label(self) -> str:
+        """The method in a few words."""
+        return method_label(self.kind)
+
+    @property
+    def tolerance(self) -> float | None:
+        """The tolerance; None where there is a step."""
+        return self.method.tolerance or None
+
     @property
     def error(self) -> float:
         """The largest error of the motion; infinite where it is not known."""
@@ -56,7 +72,7 @@ class Entry:
     @property
     def iterations(self) -> int:
         """Evaluations of the contact in the steps, one for each iteration; none where steps are explicit."""
-        if self.work is None or self.rung.step is None:
+        if self.work is None or self.method.step is None:
             return 0
         return self.work.contact_evaluations - self.samples
 
@@ -91,8 +107,8 @@ class Comparison:
 
     def finer_error(self, entry: Entry) -> float:
         """The largest error of the same method at finer steps; above the entry's own, that is low by chance."""
-        kind, step = entry.rung.kind, entry.rung.step or 0.0
-        finer = (each for each in self.entries if each.rung.kind == kind and (each.rung.step or step) < step)
+        kind, step = entry.kind, entry.method.step or 0.0
+        finer = (each for each in self.entries if each.kind == kind and (each.method.step or step) < step)
         return max((each.error for each in finer if each.errors), default=0.0)
 
 
@@ -121,8 +137,8 @@ def compare(
         reference = _reference(sampled, REFERENCE_SHARE * budget)
         sampled = replace(sampled, duration=(len(reference.rows) - 1) * sampled.interval)
         checked = _event_driven(sampled, CHECK, "it is not known how good the reference is")
-        reference_error = errors(checked.rows, reference.rows, sampled.interval).error
-        entries = [Entry(rung, place) for kind in tried for place, rung in enumerate(rungs(kind, found))]
+        reference_error = errors(checked.rows, reference.rows).error
+        entries = [Entry(kind, each, place) for kind in tried for place, each in enumerate(rungs(kind, found))]
         left_out = _first_round(sampled, entries, reference.rows, begin + 0.8 * budget, progress)
         _add_limits(system, report, entries)
         repeats = _repeat(sampled, entries, begin + budget, progress)
@@ -172,21 +188,21 @@ def _first_round(
     last: dict[Method, float] = {}
     for done, entry in enumerate(sorted(entries, key=lambda each: each.place)):
         progress("errors", done, len(entries))
-        if entry.place and time.perf_counter() + 2.0 * last.get(entry.rung.kind, 0.0) > deadline:
+        if entry.place and time.perf_counter() + 2.0 * last.get(entry.kind, 0.0) > deadline:
             entry.failure = "left out: no time within the budget"
             left_out += 1
             continue
         try:
-            motion = _motion(system, entry.rung.method)
+            motion = _motion(system, entry.method)
         except BrakecliError as error:
             entry.failure = " ".join(str(error).split())
             continue
         work = entry.work = motion.work
-        last[entry.rung.kind] = work.solve_seconds
+        last[entry.kind] = work.solve_seconds
         entry.samples, entry.failure = len(motion.rows), work.failure_sentence or ""
         if not work.failed:
             entry.seconds.append(work.solve_seconds)
-            entry.errors = errors(motion.rows, reference, system.interval)
+            entry.errors = errors(motion.rows, reference)
     return left_out
 
 
@@ -205,7 +221,7 @@ def _repeat(system: System, entries: list[Entry], deadline: float, progress: Pro
         for done, entry in enumerate(timed):
             progress(f"times, turn {repeat + 1}", done, len(timed))
             at_once = entry.seconds[-1] < LONGEST_CALL
-            seconds = _motion(system, entry.rung.method, at_once=at_once).work.solve_seconds
+            seconds = _motion(system, entry.method, at_once=at_once).work.solve_seconds
             entry.seconds = [*entry.seconds, seconds] if repeat else [seconds]
     return MOST_REPEATS
 
@@ -227,14 +243,14 @@ def _add_limits(system: System, report: linear.StabilityReport, entries: list[En
         return found - exact.friction if found is not None and exact else None
 
     for entry in entries:
-        kind, step = entry.rung.kind, entry.rung.step
+        kind, step = entry.kind, entry.method.step
         if step is None:
             entry.step_limit, entry.critical_bias = math.inf, 0.0 if exact else None
         elif report.discrete is not None:  # otherwise no steady sliding could lose its stability
             scheme = Method(kind.scheme, kind.theta)
             entry.step_limit, entry.critical_bias = limit(scheme), bias(scheme, step)
     for coarse, fine in pairwise(entries):
-        long, short = coarse.rung.step, fine.rung.step
+        long, short = coarse.method.step, fine.method.step
         if fine.place and long and short and 0.0 < fine.error < math.inf and 0.0 < coarse.error < math.inf:
             fine.order = math.log(coarse.error / fine.error) / math.log(long / short)
 

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 from brakecli.errors import UsageError
 from brakecli.solver.method import Method
@@ -15,29 +14,6 @@ COARSEST = 16
 RUNGS = 7
 TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 NODE_FACTORS = (0.25, 0.5, 2.0, 4.0)
-
-
-class Rung(NamedTuple):
-    """A method at one step (s), or at one tolerance."""
-
-    kind: Method
-    step: float | None
-    tolerance: float | None
-
-    @property
-    def method(self) -> Method:
-        """The method with its step or tolerance."""
-        return replace(self.kind, step=self.step, tolerance=self.tolerance or 0.0)
-
-    @property
-    def label(self) -> str:
-        """The method in a few words."""
-        return method_label(self.kind)
-
-    def __str__(self) -> str:
-        """The method with its step or tolerance."""
-        rung = f"tolerance {self.tolerance:g}" if self.step is None else f"step {self.step:.3g} s"
-        return f"{self.label}, {rung}"
 
 
 def method_label(kind: Method) -> str:
@@ -80,11 +56,11 @@ def ladder(system: System, steps: Sequence[float] = ()) -> list[float]:
     return [coarsest / 2**rung for rung in range(RUNGS)]
 
 
-def rungs(kind: Method, steps: Sequence[float]) -> list[Rung]:
+def rungs(kind: Method, steps: Sequence[float]) -> list[Method]:
     """A method over the ladder: over steps, or over tolerances if its steps are its own."""
     if kind.own_steps:
-        return [Rung(kind, None, tolerance) for tolerance in TOLERANCES]
-    return [Rung(kind, step, None) for step in steps]
+        return [replace(kind, tolerance=tolerance) for tolerance in TOLERANCES]
+    return [replace(kind, step=step) for step in steps]
 
 
 def parse_schemes(text: str | None) -> list[str]:

@@ -197,9 +197,9 @@ SWEEP = (
 _COMPARED = ("x", "y", "vx", "vy", "friction_force", "normal_force")
 ENTRY_PLACE = Field("entry", "1", "a method at one step or tolerance")
 ENTRY = (
-    Field("method", "", "the method in a few words", TEXT, source="rung.label"),
+    Field("method", "", "the method in a few words", TEXT, source="label"),
     *within(
-        "rung.kind",
+        "kind",
         Field("scheme", "", "time-stepping scheme", TEXT),
         Field("theta", "", "weights of the layers; in the file one text", TEXT),
         Field("start", "", "how the second layer is found", TEXT),
@@ -207,11 +207,8 @@ ENTRY = (
         Field("evaluator", "", "how the contact force is computed", TEXT),
         Field("nodes", "1", "quadrature nodes, 0 where none are needed", "i8"),
     ),
-    *within(
-        "rung",
-        Field("step", "s", "time step; missing where the scheme finds its steps itself"),
-        Field("tolerance", "1", "tolerance of a scheme that finds its steps itself"),
-    ),
+    Field("step", "s", "time step; missing where the scheme finds its steps itself", source="method.step"),
+    Field("tolerance", "1", "tolerance of a scheme that finds its steps itself"),
     *within(
         "errors",
         Field("error", "1", "largest relative error of x, y, vx and vy"),

@@ -196,8 +196,8 @@ def test_a_computed_comparison_is_drawn_with_its_own_numbers(tmp_path: Path) -> 
     comparison_result.write(report.output, loaded, report, force=False)
     figure = drawn(report.output)
     assert figure.texts[0].get_text() == "Tiny"
-    for label in {method_label(entry.rung.kind) for entry in found.entries}:
-        sizes = [e.errors.error for e in found.entries if e.errors and method_label(e.rung.kind) == label]
+    for label in {method_label(entry.kind) for entry in found.entries}:
+        sizes = [e.errors.error for e in found.entries if e.errors and method_label(e.kind) == label]
         assert len(sizes) >= 2
         np.testing.assert_allclose(line(figure.axes[1], label).get_ydata(), sizes, rtol=1e-12)
 
