@@ -1,6 +1,6 @@
 """One run, from a case to a finished result file: what `brakecli run` does."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -104,10 +104,8 @@ def run(
             verdict = verdict_on(history, motion.system, motion.work.failure_sentence)
             top = _write_spectrum(result, history, verdict.settled_from)
             warnings = (*found.warnings, *_warnings(motion, certificate))
-            title, told = loaded.case.title, modelled(motion)
-            report = RunReport(
-                motion.system, verdict, title, output, motion, found, certificate, top, warnings, *told
-            )
+            title, shown = loaded.case.title, (top, warnings, *modelled(motion))
+            report = RunReport(motion.system, verdict, title, output, motion, found, certificate, *shown)
             result.set_attributes(origin("run", title, loaded))
             result.set_fields(fields.RUN, report.numbers())
             _write_unconverged(result, motion.work.unconverged)
@@ -150,22 +148,21 @@ def _require_finite(what: str, values: ArrayLike) -> None:
         raise FloatingPointError(f"{what} overflows")
 
 
-def _warnings(motion: Motion, certificate: Certificate | None) -> list[str]:
+def _warnings(motion: Motion, certificate: Certificate | None) -> Iterator[str]:
     """What a careful user should know of a finished motion."""
-    work, warnings = motion.work, []
+    work = motion.work
     if work.unconverged_steps and motion.system.method.allow_unconverged:
-        warnings.append(
+        yield (
             f"{work.unconverged_steps} of {work.steps} steps did not converge, as the case allows; their times "
             "and residuals are in the file, the history is not to be trusted there"
         )
     if work.non_unique_steps:
-        warnings.append(
+        yield (
             f"{work.non_unique_steps} steps met a point where their solution need not be unique (the contact "
             "force rises with itself); reduce solver.step or friction.coefficient"
         )
     if certificate is not None and not certificate.certified:
-        warnings.append(f"solver.tolerance: {certificate.sentence()}")
-    return warnings
+        yield f"solver.tolerance: {certificate.sentence()}"
 
 
 def _write_spectrum(result: ResultFile, history: History, start: int) -> float | None:
