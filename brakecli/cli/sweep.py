@@ -5,32 +5,23 @@ from typing import Annotated
 
 from brakecli.cli.inputs import load_sweep, result_path
 from brakecli.cli.options import AsJson, Quiet, option, output_option, set_option, source_argument
-from brakecli.cli.output import say, show_result, warn
-from brakecli.cli.progress import announce_compilation, progress
+from brakecli.cli.output import announce_compilation, progress, say, show_result, warn
 from brakecli.errors import BrakecliError
+
+JOBS = "Worker processes  [default: one for each core]"
+SCHEDULER = "Compute on a dask cluster: the scheduler's address, as tcp://host:8786."
+REPLACE = "Replace an existing output, and drop finished points of another sweep."
 
 
 def command(
     file: Annotated[str, source_argument("SWEEP.toml", 'Sweep file, or "-" for standard input.')],
     output: Annotated[Path | None, output_option("Result file", "the sweep's name with .h5, here")] = None,
     overrides: Annotated[list[str] | None, set_option("the base case or of [critical]")] = None,
-    jobs: Annotated[
-        int | None,
-        option("Worker processes  [default: one for each core]", None, "--jobs", "-j", min=1, max=4096),
-    ] = None,
-    scheduler: Annotated[
-        str | None,
-        option(
-            "Compute on a dask cluster: the scheduler's address, as tcp://host:8786.",
-            "ADDRESS",
-            envvar="DASK_SCHEDULER_ADDRESS",
-        ),
-    ] = None,
+    jobs: Annotated[int | None, option(JOBS, None, "--jobs", "-j", min=1, max=4096)] = None,
+    scheduler: Annotated[str | None, option(SCHEDULER, "ADDRESS", envvar="DASK_SCHEDULER_ADDRESS")] = None,
     scheduler_file: Annotated[str | None, option("The same, by the scheduler's file.", "FILE")] = None,
     task_size: Annotated[int | None, option("Points of a task  [default: as many as take 0.2 s]", min=1)] = None,
-    force: Annotated[
-        bool, option("Replace an existing output, and drop finished points of another sweep.", None, "--force")
-    ] = False,
+    force: Annotated[bool, option(REPLACE, None, "--force")] = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:

@@ -145,15 +145,15 @@ SWEEP = (
 _COMPARED = ("x", "y", "vx", "vy", "friction_force", "normal_force")
 ENTRY_PLACE = Field("entry", "1", "a method at one step or tolerance")
 ENTRY = (
-    Field("method", "", "the method in a few words", TEXT, at="rung.label"),
-    Field("scheme", "", "time-stepping scheme", TEXT, "rung.kind."),
-    Field("theta", "", "weights of the layers; in the file one text", TEXT, "rung.kind."),
-    Field("start", "", "how the second layer is found", TEXT, "rung.kind."),
-    Field("iteration", "", "how the equations of a step are solved", TEXT, "rung.kind."),
-    Field("evaluator", "", "how the contact force is computed", TEXT, "rung.kind."),
-    integer("nodes", "quadrature nodes, 0 where none are needed", "rung.kind."),
-    Field("step", "s", "time step; missing where the scheme finds its steps itself", at="rung."),
-    Field("tolerance", "1", "tolerance of a scheme that finds its steps itself", at="rung."),
+    Field("method", "", "the method in a few words", TEXT, at="label"),
+    Field("scheme", "", "time-stepping scheme", TEXT, "kind."),
+    Field("theta", "", "weights of the layers; in the file one text", TEXT, "kind."),
+    Field("start", "", "how the second layer is found", TEXT, "kind."),
+    Field("iteration", "", "how the equations of a step are solved", TEXT, "kind."),
+    Field("evaluator", "", "how the contact force is computed", TEXT, "kind."),
+    integer("nodes", "quadrature nodes, 0 where none are needed", "kind."),
+    Field("step", "s", "time step; missing where the scheme finds its steps itself", at="method."),
+    Field("tolerance", "1", "tolerance of a scheme that finds its steps itself"),
     Field("error", "1", "largest relative error of x, y, vx and vy", at="errors."),
     *(Field(f"error_{x}", "1", f"largest relative error of {x}", at=f"errors.largest.{x}") for x in _COMPARED),
     *(

@@ -53,7 +53,7 @@ def estimate(plan: Plan, workers: int) -> Estimate:
         with suppress(CaseError, RefusedError), within_range():  # the point fails when its turn comes
             system = system_of(plan.case(plan.settings(point)))
             checked = check(system)
-            refuse(system, checked, math.inf)
+            refuse(checked)
             times.append(checked.seconds)
             samples = max(samples, system.samples)
     run = sum(times) / max(len(times), 1) + _POINT_SECONDS + _SAMPLE_SECONDS * samples

@@ -81,7 +81,7 @@ def simulate(case: Case) -> Outcome:
     with within_range():
         system = system_of(case)
         found = check(system)
-        refuse(system, found, math.inf)
+        refuse(found)
         motion, certificate = motion_of(system)
         if not np.isfinite(motion.rows).all():
             raise FloatingPointError("a force overflows")
