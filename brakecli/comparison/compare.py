@@ -19,6 +19,7 @@ from brakecli.runs.limits import check, refuse, within_range
 from brakecli.solver import contact
 from brakecli.solver.method import Method
 from brakecli.solver.motion import Motion, Work, solve
+from brakecli.solver.schemes import load
 from brakecli.solver.system import System
 
 REFERENCE, CHECK = 1e-12, 1e-10
@@ -128,7 +129,7 @@ def compare(
     with within_range():
         tried = kinds(system, schemes)
         for kind in tried:  # compilation is not part of the budget
-            _ = kind.module, contact.load("exact" if kind.evaluator == "auto" else kind.evaluator)
+            _ = load(kind.scheme), contact.load("exact" if kind.evaluator == "auto" else kind.evaluator)
         begin = time.perf_counter()
         found = ladder(system, steps)
         report = linear.stability(system)

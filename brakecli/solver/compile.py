@@ -10,10 +10,17 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
 from numba import float64, njit, types
 from numba.core import cgutils
 from numba.core import config as numba_config
+from numba.core.registry import CPUDispatcher
 from numba.extending import intrinsic
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+vector = float64[::1]
+"""A contiguous array of doubles, for the compiler."""
 
 config: Any = numba_config  # its settings come from the environment, so type checkers know none of them
 F = TypeVar("F", bound=Callable[..., Any])
@@ -21,10 +28,8 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 def source_hash() -> str:
     """Hash of the sources of the solver: otherwise a cached caller would keep the old code of an edited helper."""
-    digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.rglob("*.py")):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
+    sources = b"".join(path.read_bytes() for path in sorted(Path(__file__).parent.rglob("*.py")))
+    return hashlib.sha256(sources).hexdigest()[:16]
 
 
 def _cache_directory() -> Path | None:
@@ -46,31 +51,39 @@ def cache_is_cold() -> bool:
     return not config.DISABLE_JIT and (CACHE is None or not any(CACHE.iterdir()))
 
 
+class _ForKernels(CPUDispatcher):
+    """A kernel without a wrapper for calls from Python, which would otherwise end the process."""
+
+    def __call__(self, *arguments: Any) -> None:
+        name = vars(self)["__name__"]
+        raise TypeError(f"{name} has no wrapper for calls from Python: only other kernels can call it")
+
+
 def kernel(signature: Any, *, fastmath: frozenset[str] = frozenset(), inlined: bool = True) -> Callable[[F], F]:
     """Compile a function ahead of its first call for one signature, strictly (no fastmath unless named).
 
     A large one that is called in many places is better not `inlined`: otherwise compilation takes ten times
     longer. Such a one, and one whose name begins with an underscore, is for other kernels alone: it has no wrapper
-    for calls from Python, whose compilation takes as long as its own. Python must not call it.
+    for calls from Python, whose compilation takes as long as its own.
     """
 
     def compile_(function: F) -> F:
         before, config.CACHE_DIR = config.CACHE_DIR, str(CACHE or config.CACHE_DIR)
+        private = not inlined or function.__name__.startswith("_")
+        options: dict[str, Any] = {"fastmath": set(fastmath), "forceinline": inlined, "no_cfunc_wrapper": True}
+        options["no_cpython_wrapper"] = private
         try:
-            options: dict[str, Any] = {"fastmath": set(fastmath), "forceinline": inlined, "no_cfunc_wrapper": True}
-            options["no_cpython_wrapper"] = not inlined or function.__name__.startswith("_")
-            try:
-                return njit(signature, cache=CACHE is not None, **options)(function)  # type: ignore[no-any-return]
-            except OSError:  # a cache that cannot be written or read, on a full disk: do without
-                return njit(signature, **options)(function)  # type: ignore[no-any-return]
+            compiled: Any = njit(signature, cache=CACHE is not None, **options)(function)
+        except OSError:  # a cache that cannot be written or read, on a full disk: do without
+            compiled = njit(signature, **options)(function)
         finally:
             config.CACHE_DIR = before
+        if private and not config.DISABLE_JIT:
+            compiled.__class__ = _ForKernels
+        return compiled  # type: ignore[no-any-return]
 
     return compile_
 
-
-vector = float64[::1]
-"""A contiguous array of doubles."""
 
 _functions: list[Any] = []  # interpreted kernels, found by their number
 
@@ -127,9 +140,5 @@ def _borrowed(typing: Any, value: Any) -> Any:
     return value(value), codegen
 
 
-def _same(value: Any) -> Any:
-    return value
-
-
-borrowed: Any = _same if config.DISABLE_JIT else _borrowed
+borrowed: Any = (lambda value: value) if config.DISABLE_JIT else _borrowed
 """A tuple whose arrays have no reference counts, which cost a kernel 10 ns for each array that it passes on."""

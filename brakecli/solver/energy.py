@@ -1,9 +1,9 @@
 """The energy account of a run: what came in, what went out, what is stored, and what does not add up."""
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import Any
 
-from brakecli.solver.records import Coefficients
+from brakecli.solver.records import Coefficients, Weights
 
 OPEN_ACCOUNT = 0.1
 """Relative closing error from which on a motion is not worth having: the step does not resolve it."""
@@ -46,8 +46,7 @@ class EnergyAccount:
     @property
     def relative_closing_error(self) -> float:
         """Closing error over the largest item of the account, the store included; 0 where all are zero."""
-        items = (self.kinetic, self.links, self.contact, self.belt, self.friction, self.dashpots, self.load)
-        largest = max(abs(item) for item in (*items, self.roughness, self.scheme, self.stored))
+        largest = max(abs(item) for item in astuple(self))
         return self.closing_error / largest if largest > 0.0 else 0.0
 
 
@@ -56,7 +55,7 @@ def links_energy(c: Coefficients, x: float, y: float) -> float:
     return float(0.5 * (c.c_xx * x * x + 2.0 * c.c_xy * x * y + c.c_yy * y * y))
 
 
-def energy_at_level(c: Coefficients, state: Any) -> Mechanical:
+def energy_at_level(c: Coefficients, s: Weights, state: Any) -> Mechanical:
     """The energies of a motion whose position and velocity belong to one level."""
     kinetic = 0.5 * c.m * float(state.v_x**2 + state.v_y**2)
     return kinetic, links_energy(c, state.x, state.y), (state.x, state.y), 0.0

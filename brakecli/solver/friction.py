@@ -1,8 +1,11 @@
 """Amontons friction, set-valued: the minimisation that every step of every scheme comes down to, (14)-(17)."""
 
-from numba import float64, types
+from numba import boolean, float64, types
 
 from brakecli.solver.compile import kernel
+from brakecli.solver.quantities import ContactState
+
+_BACKWARD, _STICK, _FORWARD, _SEPARATED = (float(state) for state in ContactState)  # compiled code knows no enums
 
 
 @kernel(types.UniTuple(float64, 3)(float64, float64, float64, float64, float64, float64, float64))
@@ -30,3 +33,15 @@ def slopes(a_11: float, a_12: float, a_22: float, phi: float, side: float) -> tu
         return 0.0, 1.0 / a_22
     a = a_11 * a_22 - a_12 * a_12
     return (-a_12 - side * phi * a_22) / a, (a_11 + side * phi * a_12) / a
+
+
+@kernel(types.UniTuple(float64, 2)(float64, boolean, float64, float64, float64))
+def observed(sliding: float, holds: bool, needed: float, normal: float, bound: float) -> tuple[float, float]:
+    """State of the contact and friction force (N); `needed` keeps the shoe in stick, if friction `holds` it."""
+    if normal == 0.0:
+        return _SEPARATED, 0.0
+    if holds:
+        return _STICK, needed  # Eq. (4)
+    if sliding > 0.0 or (sliding == 0.0 and needed < 0.0):
+        return _FORWARD, -bound  # Eq. (5)
+    return _BACKWARD, bound  # Eq. (5)

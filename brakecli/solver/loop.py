@@ -2,19 +2,16 @@
 
 import math
 
-import numpy as np
 from numba import float64, int64, void
-from numpy.typing import NDArray
 
-from brakecli.solver.compile import at_address, borrowed, kernel, vector
+from brakecli.solver.compile import Floats, at_address, borrowed, kernel, vector
+from brakecli.solver.friction import observed
 from brakecli.solver.implicit_step import SOLVED
-from brakecli.solver.quantities import BOUND, ContactState, Failure
+from brakecli.solver.quantities import BOUND, Failure
 from brakecli.solver.records import EVALUATE, FINISH, PLANT, PREPARE, SOLVE, Plant
 from brakecli.solver.roughness import wheel_angles
 from brakecli.solver.schedules import integral_at, slope_at, value_at
 
-# IntEnum members are not known to compiled code, their numbers are.
-_BACKWARD, _STICK, _FORWARD, _SEPARATED = (int(state) for state in ContactState)
 _NONE, _UNCONVERGED, _DIVERGED, _NOT_CLOSED = (int(failure) for failure in tuple(Failure)[:4])
 
 _evaluate_at, _prepare_at, _finish_at, _solve_at = (
@@ -23,7 +20,7 @@ _evaluate_at, _prepare_at, _finish_at, _solve_at = (
 
 
 @kernel(void(PLANT, vector))
-def sample(p: Plant, row: NDArray[np.float64]) -> None:
+def sample(p: Plant, row: Floats) -> None:
     """Write the sample that is due at this level: the motion, and the forces at its own time.
 
     F_y is evaluated at the sample; F_x follows from the slip law, or in stick from (6) with the wheel's
@@ -42,32 +39,20 @@ def sample(p: Plant, row: NDArray[np.float64]) -> None:
     p.counts.evaluations += 1
     normal = contact.normal_force
     bound = c.phi * normal
-    belt_slope = slope_at(drive.belt, t)
+    belt_slope, load = slope_at(drive.belt, t), value_at(drive.load, t)
     sliding = v_x - belt
     if abs(sliding) <= 1e-15 * (abs(belt) + abs(belt_slope * t)):  # the step took U at its own rounding of t
         sliding = 0.0
-    needed = (  # Eq. (6) with the velocity and the acceleration of the wheel
-        c.m * belt_slope
-        + c.b_xx * belt
-        + c.b_xy * v_y
-        + c.c_xx * x
-        + c.c_xy * y
-        + value_at(drive.load, t) * c.sin_beta
-    )
-    if normal == 0.0:
-        side, friction = _SEPARATED, 0.0
-    elif abs(sliding) <= grid.lag * p.s.h * bound / c.m and abs(needed) <= bound:
-        side, friction = _STICK, needed  # Eq. (4)
-    elif sliding > 0.0 or (sliding == 0.0 and needed < 0.0):
-        side, friction = _FORWARD, -bound  # Eq. (5)
-    else:
-        side, friction = _BACKWARD, bound  # Eq. (5)
+    # Eq. (6) with the velocity and the acceleration of the wheel
+    needed = c.m * belt_slope + c.b_xx * belt + c.b_xy * v_y + c.c_xx * x + c.c_xy * y + load * c.sin_beta
+    holds = abs(sliding) <= grid.lag * p.s.h * bound / c.m and abs(needed) <= bound
+    side, friction = observed(sliding, holds, needed, normal, bound)
     row[0], row[1], row[2], row[3] = x, y, v_x, v_y
     row[4], row[5], row[6], row[7] = friction, normal, contact.fraction, side
 
 
 @kernel(int64(PLANT, float64[:, ::1], float64[:, ::1], int64))
-def advance(p: Plant, rows: NDArray[np.float64], events: NDArray[np.float64], stop: int) -> int:
+def advance(p: Plant, rows: Floats, events: Floats, stop: int) -> int:
     """Step from the level reached to `stop`, filling `rows` with the samples before each step; a `Failure`.
 
     A failure leaves the state at the last good level. `events` gets time and residual of unconverged steps.

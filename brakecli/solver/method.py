@@ -1,7 +1,6 @@
 """How a system is solved: scheme, step, iteration, and the way of computing the contact."""
 
 from dataclasses import dataclass
-from types import ModuleType
 
 from brakecli.solver import schemes
 
@@ -37,8 +36,3 @@ class Method:
     def own_steps(self) -> bool:
         """Whether the scheme finds its steps itself: no step can then be unstable, or bias anything."""
         return self.row.own_steps
-
-    @property
-    def module(self) -> ModuleType:
-        """The scheme's module; its kernels are compiled on the first call of a new version."""
-        return schemes.load(self.scheme)

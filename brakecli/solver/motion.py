@@ -5,16 +5,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brakecli.solver import contact
-from brakecli.solver.compile import address
+from brakecli.solver.compile import Floats, address
 from brakecli.solver.contact.pad import build_layer
 from brakecli.solver.energy import OPEN_ACCOUNT, EnergyAccount, account
 from brakecli.solver.friction import minimise
 from brakecli.solver.method import Method
 from brakecli.solver.quantities import HISTORY, Failure
-from brakecli.solver.records import COUNTS, PROBLEM, WORK, Plant, Plug, new
+from brakecli.solver.records import COUNTS, PROBLEM, WORK, Drive, Pair, Plant, Plug, new
 from brakecli.solver.roughness import wheel_angles
 from brakecli.solver.schedules import integral_at, slope_at
 from brakecli.solver.steady_sliding import steady_sliding
@@ -26,7 +25,7 @@ BLOCK_SECONDS = 0.1
 """Time that one call of the compiled loop should take: between calls Ctrl-C is heard and progress is reported."""
 BLOCK_ROWS = 16384
 
-Sink = Callable[[NDArray[np.float64]], None]
+Sink = Callable[[Floats], None]
 Progress = Callable[[int], None]
 
 
@@ -44,7 +43,7 @@ class Work:
     turns: int = 0  # steps after which friction points the other way, or holds
     evaluators: dict[str, int] = field(default_factory=dict)  # steps that each evaluator took
     solve_seconds: float = 0.0
-    unconverged: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2)))  # time (s), residual (N)
+    unconverged: Floats = field(default_factory=lambda: np.zeros((0, 2)))  # time (s), residual (N)
 
     @property
     def failed(self) -> bool:
@@ -66,7 +65,7 @@ class Motion:
     """
 
     system: System
-    rows: NDArray[np.float64]
+    rows: Floats
     work: Work
     energy: EnergyAccount
 
@@ -85,13 +84,7 @@ def solve(
     `first_block` (steps) is 1 where it is not known what a step costs; each block adds some 0.1 ms of its own to
     `solve_seconds`.
     """
-    system = system if method is None else replace(system, method=method)
-    blocks: list[NDArray[np.float64]] = []
-    work, energy = Stepping(system).run(
-        sink or (lambda rows: blocks.append(rows.copy())), progress, first_block=first_block
-    )
-    rows = np.concatenate(blocks) if blocks else np.zeros((0, len(HISTORY)))
-    return Motion(system, rows, work, energy)
+    return Stepping(replace(system, method=method or system.method)).run(sink, progress, first_block)
 
 
 class Stepping:
@@ -111,7 +104,7 @@ class Stepping:
             c=system.coefficients,
             s=system.weights,
             grid=system.grid,
-            drive=system.drive,
+            drive=Drive(system.belt, system.load, system.wheel.waves),
             layer=build_layer(system.evaluate, system.pad),
             plug=_plugged_in(system),
             state=new(self.scheme.STATE),
@@ -123,80 +116,57 @@ class Stepping:
         self._start_energy = self._energy()
 
     def run(
-        self, sink: Sink, progress: Progress = lambda steps: None, *, first_block: int = 1
-    ) -> tuple[Work, EnergyAccount]:
+        self, sink: Sink | None = None, progress: Progress = lambda steps: None, first_block: int = 1
+    ) -> Motion:
         """Step to the end or to a failure; the arguments are those of `solve`."""
-        lag, last = self.scheme.LAG, self.system.steps
-        size = min(first_block, self._most_steps())
-        while not self.work.failed and self.counts.level < last + lag:
+        lag, work, kept = self.scheme.LAG, self.work, [np.zeros((0, len(HISTORY)))]
+        sink = sink or (lambda rows: kept.append(rows.copy()))
+        last, most = self.system.steps + lag, BLOCK_ROWS * self.system.per_sample
+        size = min(first_block, most)
+        while not work.failed and self.counts.level < last:
             start = time.perf_counter()
-            rows = self.block(min(last + lag, int(self.counts.level) + size))
+            rows = self.block(min(last, int(self.counts.level) + size))
             seconds = time.perf_counter() - start
-            self.work.solve_seconds += seconds
-            size = min(int(size * min(10.0, BLOCK_SECONDS / max(seconds, 1e-9))) + 1, self._most_steps())
+            work.solve_seconds += seconds
+            size = min(int(size * min(10.0, BLOCK_SECONDS / max(seconds, 1e-9))) + 1, most)
             sink(rows)
             progress(int(self.counts.level) - lag)
-        if not self.work.failed:
-            sink(self._sample()[None, :])
+        if not work.failed:
+            row = np.zeros(len(HISTORY))
+            self.scheme.sample(self.plant, row)
+            sink(row[None, :])
         self._count()
         energy = account(self._start_energy, self._energy(), self.plant.work)
-        if not self.work.failed and not abs(energy.relative_closing_error) <= OPEN_ACCOUNT:
-            self.work.failure = Failure.UNBALANCED
-        return self.work, energy
+        if not work.failed and not abs(energy.relative_closing_error) <= OPEN_ACCOUNT:
+            work.failure = Failure.UNBALANCED
+        return Motion(self.system, np.concatenate(kept), work, energy)
 
-    def _most_steps(self) -> int:
-        """Steps whose samples fit into a block."""
-        return BLOCK_ROWS * self.system.per_sample
-
-    def block(self, stop: int) -> NDArray[np.float64]:
+    def block(self, stop: int) -> Floats:
         """Step to level `stop`; the samples on the way."""
         system, lag, per_sample = self.system, self.scheme.LAG, self.system.per_sample
         first = int(self.counts.level) - lag
         rows = np.zeros((-(-(stop - lag) // per_sample) + (-first // per_sample), len(HISTORY)))
-        failure = self.scheme.advance(self.plant, rows, self.events, stop)
-        self.work.failure = Failure(failure)
+        self.work.failure = Failure(self.scheme.advance(self.plant, rows, self.events, stop))
         done = int(self.counts.level) - lag
-        if failure:
+        if self.work.failed:
             self.work.failure_time = system.step * done
             done += 1  # the sample of the failing step's own level has been taken
         return rows[: -(-done // per_sample) + (-first // per_sample)]
 
-    def _sample(self) -> NDArray[np.float64]:
-        """The sample at the level that has been reached."""
-        row = np.zeros(len(HISTORY))
-        self.scheme.sample(self.plant, row)
-        return row
-
     def _begin(self) -> None:
         """Fill the state at the scheme's first level, with the contact force there as the first guess."""
-        system, initial = self.system, self.system.initial
+        system, initial, plant = self.system, self.system.initial, self.plant
         x, y = initial.x, initial.y
         if initial.from_equilibrium:
             rest = steady_sliding(system)
             x, y = x + rest.x, y + rest.y
-        velocity, acceleration = (initial.vx, initial.vy), (0.0, 0.0)
         self._evaluate_at(x, y, 0.0)
-        plant, found = self.plant, self.plant.layer.contact
+        velocity, acceleration, found = (initial.vx, initial.vy), (0.0, 0.0), plant.layer.contact
         if system.method.start == "consistent":
-            acceleration = self._acceleration((x, y), velocity, found.normal_force)
+            acceleration = _acceleration(system, (x, y), velocity, found.normal_force)
         self.scheme.begin(plant.s, plant.state, (x, y), velocity, acceleration)
         plant.state.force = plant.work.force_before = found.normal_force
         plant.work.store_x_before = found.store_x
-
-    def _acceleration(
-        self, position: tuple[float, float], velocity: tuple[float, float], force: float
-    ) -> tuple[float, float]:
-        """(ẍ, ÿ) of (6)-(7) at t = 0; where the shoe moves with the wheel, friction decides as in a step."""
-        c, (x, y), (v_x, v_y) = self.system.coefficients, position, velocity
-        load = self.system.load_at_start
-        g_1 = -(c.b_xx * v_x + c.b_xy * v_y + c.c_xx * x + c.c_xy * y + load * c.sin_beta)  # Eq. (6)
-        g_2 = force - (c.b_xy * v_x + c.b_yy * v_y + c.c_xy * x + c.c_yy * y + load * c.cos_beta)  # Eq. (7)
-        sliding = v_x - self.system.belt_speed
-        if sliding != 0.0:
-            return (g_1 - np.sign(sliding) * c.phi * force) / c.m, g_2 / c.m
-        belt_acceleration = float(slope_at(self.system.belt, 0.0))
-        a_x, a_y, _ = minimise(c.m, 0.0, c.m, g_1, g_2, c.phi * force, belt_acceleration)
-        return a_x, a_y
 
     def _evaluate_at(self, x: float, y: float, steps: float) -> None:
         """Evaluate the contact, `steps` steps after t = 0."""
@@ -213,7 +183,6 @@ class Stepping:
         return kinetic, links, float(plant.layer.contact.store)
 
     def _count(self) -> None:
-        """Read the loop's counters."""
         counts, work = self.counts, self.work
         work.steps = int(counts.kinds.sum())
         work.contact_evaluations = int(counts.evaluations)
@@ -221,16 +190,27 @@ class Stepping:
         work.non_unique_steps = int(counts.rising)
         work.most_evaluations = int(counts.most)
         work.turns = int(counts.turns)
-        work.evaluators = {kind: int(n) for kind, n in zip(contact.kinds(), counts.kinds, strict=True) if n}
+        work.evaluators = {kind: int(n) for kind, n in zip(contact.kinds(), counts.kinds, strict=False) if n}
         work.unconverged = self.events[: min(work.unconverged_steps, EVENTS)].copy()
 
 
+def _acceleration(system: System, position: Pair, velocity: Pair, force: float) -> Pair:
+    """(ẍ, ÿ) of (6)-(7) at t = 0; where the shoe moves with the wheel, friction decides as in a step."""
+    c, load, (x, y), (v_x, v_y) = system.coefficients, system.load_at_start, position, velocity
+    g_1 = -(c.b_xx * v_x + c.b_xy * v_y + c.c_xx * x + c.c_xy * y + load * c.sin_beta)  # Eq. (6)
+    g_2 = force - (c.b_xy * v_x + c.b_yy * v_y + c.c_xy * x + c.c_yy * y + load * c.cos_beta)  # Eq. (7)
+    sliding = v_x - system.belt_speed
+    if sliding != 0.0:
+        return (g_1 - np.sign(sliding) * c.phi * force) / c.m, g_2 / c.m
+    return minimise(c.m, 0.0, c.m, g_1, g_2, c.phi * force, float(slope_at(system.belt, 0.0)))[:2]
+
+
 def _plugged_in(system: System) -> Plug:
-    """What the common loop calls: the kernels of the scheme and the iteration of a step."""
+    """What the loop calls: the kernels of the scheme and the iteration of a step."""
+    scheme = system.scheme
     if system.method.own_steps:
-        return Plug(0, 0, 0)
+        return Plug(0, 0, address(scheme.solve))
     from brakecli.solver import implicit_step  # its kernels are compiled only where they are needed
 
-    scheme = system.scheme
     solve = implicit_step.newton if system.method.iteration == "newton" else implicit_step.fixed_point
     return Plug(address(scheme.prepare), address(scheme.finish), address(solve))

@@ -6,6 +6,7 @@ off the wheel; the wheel's surface moves with U (either sign).
 
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Self
 
 
 @dataclass(frozen=True)
@@ -61,35 +62,33 @@ BOUND = 1e15
 class Failure(IntEnum):
     """Why a run is not worth having; each has a sentence with its remedy."""
 
-    NONE = 0
-    UNCONVERGED = 1
-    DIVERGED = 2
-    NOT_CLOSED = 3
-    UNBALANCED = 4
-    STALLED = 5
+    sentence: str  # what happened and what to do
 
-    @property
-    def sentence(self) -> str:
-        """What happened and what to do."""
-        return _SENTENCES[self]
+    def __new__(cls, number: int, sentence: str = "") -> Self:
+        """The number that a loop returns, with its sentence."""
+        failure = int.__new__(cls, number)
+        failure._value_, failure.sentence = number, sentence
+        return failure
 
-
-_SENTENCES = {
-    Failure.NONE: "the run reached its end",
-    Failure.UNCONVERGED: (
+    NONE = 0, "the run reached its end"
+    UNCONVERGED = (
+        1,
         'the iteration of a step did not converge; reduce solver.step, take solver.iteration = "newton", '
-        "or set solver.allow_unconverged = true to go on and count such steps"
-    ),
-    Failure.DIVERGED: "the motion grew beyond all bounds; reduce solver.step",
-    Failure.NOT_CLOSED: (
-        'the pad may no longer touch everywhere, so the closed form does not hold; take contact.evaluator = "auto"'
-    ),
-    Failure.UNBALANCED: (
+        "or set solver.allow_unconverged = true to go on and count such steps",
+    )
+    DIVERGED = 2, "the motion grew beyond all bounds; reduce solver.step"
+    NOT_CLOSED = (
+        3,
+        "the pad may no longer touch everywhere, so the closed form does not hold; "
+        'take contact.evaluator = "auto"',
+    )
+    UNBALANCED = (
+        4,
         "the energy account does not close, so the step does not resolve the motion and the history is not to be "
-        "trusted; reduce solver.step"
-    ),
-    Failure.STALLED: (
+        "trusted; reduce solver.step",
+    )
+    STALLED = (
+        5,
         "the steps shrink to nothing: stick, slip, lift-off and touch-down follow each other without progress, or "
-        "the tolerance is below what the forces are known to; increase solver.tolerance"
-    ),
-}
+        "the tolerance is below what the forces are known to; increase solver.tolerance",
+    )

@@ -7,14 +7,16 @@ import numpy as np
 from numba import float64, int64, types, void
 from numpy.typing import NDArray
 
-from brakecli.solver.compile import vector
+from brakecli.solver.compile import Floats, vector
+from brakecli.solver.contact import MOST_KINDS
 
 Pair = tuple[float, float]
 
 
-def record(**fields: Any) -> np.dtype[Any]:
-    """A type of record: fields of 8 bytes, or arrays of them given as (type, shape)."""
-    return np.dtype((np.record, np.dtype(list(fields.items()), align=True)))
+def record(*floats: str, **others: Any) -> np.dtype[Any]:
+    """A type of record: the names of its doubles, several in a text, then its other fields of 8 bytes each."""
+    fields = [(name, float) for names in floats for name in names.split()]
+    return np.dtype((np.record, np.dtype([*fields, *others.items()], align=True)))
 
 
 def new(type_: np.dtype[Any]) -> Any:
@@ -23,61 +25,43 @@ def new(type_: np.dtype[Any]) -> Any:
 
 
 STATE = record(
-    x=float,  # position at the level reached, m
-    y=float,
-    v_x=float,  # velocity that belongs to it or, in a scheme that lags, to the level before, m/s
-    v_y=float,
-    x_old=float,  # position at the level before, m
-    y_old=float,
-    force=float,  # normal force in the last step, the first guess for the next, N
+    "x y",  # position at the level reached, m
+    "v_x v_y",  # velocity that belongs to it or, in a scheme that lags, to the level before, m/s
+    "x_old y_old",  # position at the level before, m
+    "force",  # normal force in the last step, the first guess for the next, N
 )
 """The motion at the level of time that has been reached."""
 
 PROBLEM = record(
-    load=float,  # Q at the weighted time, N
-    belt_now=float,  # U at the level reached and at the next, m/s
-    belt_next=float,
-    phi=float,  # coefficient of friction
-    a_11=float,  # kg/s
-    a_12=float,
-    a_22=float,
-    g_1=float,  # N
-    g_2=float,  # N, without the normal force
-    belt=float,  # U of the friction law, m/s
-    x_0=float,  # the contact sees the shoe at (x_0 + gain d, y_0 + gain e), m
-    y_0=float,
-    gain=float,  # s
-    d=float,  # solution: the velocities, m/s
-    e=float,
-    normal_force=float,  # F, N; before the solution the guess
-    side=float,  # sign of d - U, 0 in stick
-    d_slope=float,  # derivatives of d and e by F
-    e_slope=float,
-    residual=float,  # F_y - F, N
+    "load",  # Q at the weighted time, N
+    "belt_now belt_next",  # U at the level reached and at the next, m/s
+    "phi",  # coefficient of friction
+    "a_11 a_12 a_22",  # kg/s
+    "g_1 g_2",  # N, without the normal force
+    "belt",  # U of the friction law, m/s
+    "x_0 y_0 gain",  # the contact sees the shoe at (x_0 + gain d, y_0 + gain e), m; gain in s
+    "d e",  # solution: the velocities, m/s
+    "normal_force",  # F, N; before the solution the guess
+    "side",  # sign of d - U, 0 in stick
+    "d_slope e_slope",  # derivatives of d and e by F
+    "residual",  # F_y - F, N
 )
 """One step: minimise a11 d²/2 + a12 d e + a22 e²/2 - g1 d - (g2 + F) e + phi F |d - U|, (14) and (25)."""
 
 CONTACT = record(
-    normal_force=float,  # F_y = k ∫ max(gap, 0) dξ over the pad, N; gap = f2(ξ + x - travel) - f1(ξ) - y
-    stiffness=float,  # -∂F_y/∂y = k (length that touches) >= 0, N/m
-    tangential=float,  # ∂F_y/∂x = k Σ [f2] over the touching intervals, N/m
-    fraction=float,  # part of the pad that touches, 0 to 1
-    store=float,  # V = k/2 ∫ max(gap, 0)² dξ, J
-    store_x=float,  # ∂V/∂x, N
+    "normal_force",  # F_y = k ∫ max(gap, 0) dξ over the pad, N; gap = f2(ξ + x - travel) - f1(ξ) - y
+    "stiffness",  # -∂F_y/∂y = k (length that touches) >= 0, N/m
+    "tangential",  # ∂F_y/∂x = k Σ [f2] over the touching intervals, N/m
+    "fraction",  # part of the pad that touches, 0 to 1
+    "store store_x",  # V = k/2 ∫ max(gap, 0)² dξ, J, and ∂V/∂x, N
     kind=int,  # the evaluator that did the work, place in `contact.kinds()`
     valid=int,  # 0 where its assumptions do not hold
 )
 """What an evaluator finds."""
 
 WORK = record(
-    belt=float,  # energies that have passed since the start, J; see `solver.energy`
-    friction=float,
-    dashpots=float,
-    load=float,
-    roughness=float,
-    scheme=float,
-    store_x_before=float,  # of the contact in the last step, N
-    force_before=float,
+    "belt friction dashpots load roughness scheme",  # passed since the start, J; see `solver.energy`
+    "store_x_before force_before",  # of the contact in the last step, N
 )
 
 COUNTS = record(
@@ -87,22 +71,19 @@ COUNTS = record(
     rising=int,  # steps whose solution need not be unique
     most=int,  # evaluations in one step
     turns=int,  # steps after which a touching shoe slides the other way, or sticks; not of a scheme's own steps
-    kinds=(int, 3),  # steps that each of `contact.kinds()` took
+    kinds=(int, MOST_KINDS),  # steps that each of `contact.kinds()` took
 )
 
 PAD = record(
-    k=float,  # stiffness per length, N/m²
-    half_length=float,  # a, m
+    "k",  # stiffness per length, N/m²
+    "half_length",  # a, m
+    "shoe_top shoe_bottom wheel_bound",  # upper bounds of f1, of -f1 and of |f2|, m
+    "shoe_mean shoe_square",  # means of f1 (m) and ∫ f1² dξ (m³) over the pad
+    "cell",  # widest interval in which roots are sought, m
     shoe_terms=int,  # harmonics
     wheel_terms=int,
     nodes=int,  # of the midpoint rule; 0 without its tables
-    shoe_top=float,  # upper bounds of f1, of -f1 and of |f2|, m
-    shoe_bottom=float,
-    wheel_bound=float,
-    shoe_mean=float,  # means of f1 (m) and ∫ f1² dξ (m³) over the pad
-    shoe_square=float,
-    cell=float,  # widest interval in which roots are sought, m
-    shoe_at=int,  # where in the tables begin: amplitudes, wavenumbers, phases of the shoe
+    gap_at=int,  # where in the tables begin: amplitudes, wavenumbers, phases of f2 - f1
     wheel_at=int,  # amplitudes and wavenumbers of the wheel
     full_at=int,  # ∂(k ∫ f2 dξ)/∂(sin) of each of its harmonics, N
     ss_at=int,  # integrals of products, see `contact.pad`
@@ -113,18 +94,11 @@ PAD = record(
     cos_at=int,
 )
 
-KNOT = record(
-    time=float,  # s
-    value=float,  # value, slope and integral from t = 0 are sums of two doubles, to 32 digits
-    value_low=float,
-    slope=float,
-    slope_low=float,
-    integral=float,
-    integral_low=float,
-)
-"""A piecewise linear function of time, at one of its knots; the slope is that after it."""
+KNOT = record("time value value_low slope slope_low integral integral_low")
+"""A piecewise linear function of time, at one of its knots (s). Value, slope after it and integral from t = 0 are
+sums of two doubles, to 32 digits."""
 
-WAVE = record(phase=float, turns=float, turns_low=float)
+WAVE = record("phase turns turns_low")
 """A harmonic of the wheel: its phase (rad) and its exact number of waves per metre, a sum of two doubles."""
 
 
@@ -135,35 +109,24 @@ STAGES, POWERS, POWERED = 16, 7, 5
 """Stages of its steps, coefficients of its continuous solution, works that it adds up."""
 
 MOTION = record(
-    x=float,  # motion reached, at which the next step begins, m and m/s
-    y=float,
-    v_x=float,
-    v_y=float,
-    force=float,  # normal force at the start, N
-    side=float,  # sign of the sliding velocity, 0 in stick
+    "x y v_x v_y",  # motion reached, at which the next step begins, m and m/s
+    "force",  # normal force at the start, N
+    "side",  # sign of the sliding velocity, 0 in stick
+    "time tau",  # when the sample interval that has been reached began, and time since then, s
+    "belt belt_slope",  # U, m/s, and its slope, m/s²
+    "travel travel_low",  # of the wheel, a sum of two doubles, m
+    "load load_slope",  # Q, N, and its slope, N/s
+    "anchor anchor_low",  # x - travel in stick, a sum of two doubles, m
+    "tolerance",  # of a step
+    "step",  # to try next, s
+    "events_time",  # since which `events` are counted, s
+    "step_done time_done tau_done side_done",  # the step of the continuous solution, its begin and its phase
+    touching_done=int,
     touching=int,  # 0 where the pad is clear of the wheel for sure
     started=int,  # 0 before the phase of the start is known
     level=int,  # number of the sample interval that has been reached
-    time=float,  # when it began, s
-    tau=float,  # time since then, s
-    belt=float,  # U, m/s, and its slope, m/s²
-    belt_slope=float,
-    travel=float,  # of the wheel, a sum of two doubles, m
-    travel_low=float,
-    load=float,  # Q, N, and its slope, N/s
-    load_slope=float,
-    anchor=float,  # x - travel in stick, a sum of two doubles, m
-    anchor_low=float,
-    tolerance=float,  # of a step
-    step=float,  # to try next, s
     switches=int,  # changes of phase without a step in between
     events=int,  # events without progress
-    events_time=float,  # since then, s
-    step_done=float,  # the step that the continuous solution belongs to, s, when it began, and its phase
-    time_done=float,
-    tau_done=float,
-    side_done=float,
-    touching_done=int,
     row=(float, 8),  # the sample at the level that counts
     largest=(float, 4),  # of each component so far
     begin=(float, 4),  # both ends of the step
@@ -225,14 +188,14 @@ class Layer(NamedTuple):
 
     evaluate: int  # address of the evaluator
     pad: Any
-    tables: NDArray[np.float64]
-    angles: NDArray[np.float64]  # phases of the wheel's harmonics, rad
-    scratch: NDArray[np.float64]
+    tables: Floats
+    angles: Floats  # phases of the wheel's harmonics, rad
+    scratch: Floats
     contact: Any
 
 
 class Plug(NamedTuple):
-    """Addresses of what a scheme and an iteration plug into the common loop."""
+    """Addresses of what is plugged into the time loop; of a scheme with its own steps `solve` takes a step."""
 
     prepare: int
     finish: int

@@ -9,7 +9,7 @@ import numpy as np
 from numba import float64, void
 from numpy.typing import NDArray
 
-from brakecli.solver.compile import kernel, vector
+from brakecli.solver.compile import Floats, kernel, vector
 from brakecli.solver.double_double import multiply, split
 from brakecli.solver.records import WAVE, WAVES
 
@@ -23,11 +23,11 @@ class Surface(NamedTuple):
     `turns` + `turns_low` is the exact number of waves per metre, 1/wavelength.
     """
 
-    g: NDArray[np.float64]
-    omega: NDArray[np.float64]
-    phase: NDArray[np.float64]
-    turns: NDArray[np.float64]
-    turns_low: NDArray[np.float64]
+    g: Floats
+    omega: Floats
+    phase: Floats
+    turns: Floats
+    turns_low: Floats
 
     @property
     def waves(self) -> NDArray[Any]:
@@ -59,7 +59,7 @@ def surface(
     )
 
 
-def height(f: Surface, xi: NDArray[np.float64]) -> NDArray[np.float64]:
+def height(f: Surface, xi: Floats) -> Floats:
     """f(xi) in m at places xi (m)."""
     f_xi = np.zeros(xi.size)
     for g, omega, phase in zip(f.g, f.omega, f.phase, strict=True):  # no table of all waves at all places
@@ -68,7 +68,7 @@ def height(f: Surface, xi: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 @kernel(void(WAVES, float64, float64, vector))
-def wheel_angles(waves: NDArray[Any], travel: float, travel_low: float, angles: NDArray[np.float64]) -> None:
+def wheel_angles(waves: NDArray[Any], travel: float, travel_low: float, angles: Floats) -> None:
     """Phase in rad of each harmonic at xi = 0 after the wheel has travelled: phase - omega travel, reduced.
 
     The waves are counted in turns with 32 digits and only their fraction is kept, so that the phase is as exact

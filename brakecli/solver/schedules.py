@@ -5,6 +5,7 @@ Before the first knot and after the last a schedule holds its value.
 
 from collections.abc import Sequence
 from fractions import Fraction
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -27,21 +28,11 @@ def schedule(times: Sequence[float], values: Sequence[float], scale: float = 1.0
     integrals = [Fraction(0)]
     for i in range(len(t) - 1):
         integrals.append(integrals[-1] + (v[i] + v[i + 1]) / 2 * (t[i + 1] - t[i]))
-    at_zero = _integral_to(Fraction(0), t, v, slopes, integrals)
+    k = max((i for i, time in enumerate(t) if time <= 0), default=0)
+    at_zero = integrals[k] - (v[k] - (slopes[k] if t[k] <= 0 else 0) * t[k] / 2) * t[k]
     columns = [v, slopes, [integral - at_zero for integral in integrals]]
     pairs = [[split(value) for value in column] for column in columns]
-    knots = [(float(time), *first, *second, *third) for time, first, second, third in zip(t, *pairs, strict=True)]
-    return np.array(knots, KNOT)
-
-
-def _integral_to(
-    time: Fraction, t: list[Fraction], v: list[Fraction], slopes: list[Fraction], integrals: list[Fraction]
-) -> Fraction:
-    """Exact integral from the first knot to `time`."""
-    if time < t[0]:
-        return v[0] * (time - t[0])
-    k = max(i for i, knot in enumerate(t) if knot <= time)
-    return integrals[k] + (v[k] + slopes[k] * (time - t[k]) / 2) * (time - t[k])
+    return np.array([(float(time), *chain(*rest)) for time, *rest in zip(t, *pairs, strict=True)], KNOT)
 
 
 @kernel(int64(KNOTS, float64))

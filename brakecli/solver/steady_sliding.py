@@ -103,8 +103,7 @@ def steady_sliding(
     def unbalanced(y: float) -> float:
         return spring * y + push - uplift * mean(y)[0]
 
-    full, top = system.pad.edges
-    stiffness = 2.0 * pad.half_length * pad.k
+    (full, top), stiffness = system.pad.edges, system.contact_stiffness
     whole = spring + uplift * stiffness
     y = -(push + uplift * stiffness * pad.shoe_mean) / whole if whole != 0.0 else np.inf
     if not y <= full:

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from brakecli.solver import contact
+from brakecli.solver import contact, schemes
 from brakecli.solver.contact.pad import Pad, build_pad, default_nodes
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.method import MOST, Method
-from brakecli.solver.records import Coefficients, Drive, Grid, Weights
+from brakecli.solver.records import Coefficients, Grid, Weights
 from brakecli.solver.roughness import Surface
 from brakecli.solver.schedules import Schedule, value_at
 
@@ -60,12 +60,9 @@ class System:
     @property
     def evaluator(self) -> str:
         """The contact evaluator that runs: "auto" is "closed-form" on smooth surfaces."""
-        asked = self.method.evaluator
-        if asked != "auto":
-            return asked
-        if self.smooth:
-            return "closed-form"
-        return "exact" if self.method.own_steps else asked
+        if self.method.evaluator != "auto":
+            return self.method.evaluator
+        return "closed-form" if self.smooth else "exact" if self.method.own_steps else "auto"
 
     @property
     def nodes(self) -> int:
@@ -81,8 +78,8 @@ class System:
 
     @property
     def scheme(self) -> ModuleType:
-        """The scheme's module."""
-        return self.method.module
+        """The scheme's module; its kernels are compiled on the first call of a new version."""
+        return schemes.load(self.method.scheme)
 
     @property
     def smooth(self) -> bool:
@@ -155,11 +152,6 @@ class System:
         """Step and weights of the scheme."""
         theta_1, theta_2, theta_3 = (*self.method.theta, 0.0, 0.0, 0.0)[:3]
         return Weights(self.step, theta_1, theta_2, theta_3)
-
-    @property
-    def drive(self) -> Drive:
-        """What acts from outside."""
-        return Drive(self.belt, self.load, self.wheel.waves)
 
     @property
     def grid(self) -> Grid:

@@ -4,13 +4,14 @@ from typing import Any
 
 from brakecli.solver import loop, records
 from brakecli.solver.compile import kernel
-from brakecli.solver.energy import Mechanical, energy_at_level
+from brakecli.solver.energy import energy_at_level
 from brakecli.solver.records import Coefficients, Pair, Weights
 
 STATE = records.STATE
 advance, sample = loop.advance, loop.sample
-WEIGHTS, LAG = 0, 0
+LAG = 0
 MEMORY, VELOCITIES = ("x", "y", "v_x", "v_y"), ("v_x", "v_y")
+mechanical_energy = energy_at_level
 
 
 def weighted_time(s: Weights) -> float:
@@ -24,10 +25,6 @@ def order(s: Weights, start: str) -> int:
 def begin(s: Weights, state: Any, position: Pair, velocity: Pair, acceleration: Pair) -> None:
     state.x, state.y = position
     state.v_x, state.v_y = velocity
-
-
-def mechanical_energy(c: Coefficients, s: Weights, state: Any) -> Mechanical:
-    return energy_at_level(c, state)
 
 
 @kernel(records.PREPARE)

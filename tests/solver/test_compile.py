@@ -40,6 +40,17 @@ def test_kernels_compile_without_a_cache_where_the_disk_is_full(limit: str, tmp_
     assert out.splitlines()[0] == "(2.0, 0.0, 1.0)"
 
 
+def test_a_kernel_for_kernels_alone_cannot_be_called_from_python(tmp_path: Path) -> None:
+    program = """
+from brakecli.solver import implicit_step
+try:
+    implicit_step._try_force(None, None, 0.0)
+except TypeError as error:
+    print(error)
+"""
+    assert "has no wrapper for calls from Python" in python(program, tmp_path)
+
+
 def test_kernels_compile_where_no_cache_can_be_made(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way")
     out = python(COUNT.format(limit=""), tmp_path / "file")

@@ -28,6 +28,12 @@ WEIGHTS: dict[int, list[tuple[float, ...]]] = {
     2: [(0.5, 0.5), (1.0, 1.0), (1.0, 0.5)],
     3: [(0.25, 0.5, 0.25), (0.5, 0.0, 0.5), (0.4, 0.5, 0.1)],
 }
+
+
+def weights_of(name: str) -> list[tuple[float, ...]]:
+    return WEIGHTS[len(schemes.SCHEMES[name.replace("_", "-")].theta)]
+
+
 START = ((1e-5, -2e-5), (0.1, -0.2), (3.0, 4.0))
 
 
@@ -116,11 +122,10 @@ COEFFICIENTS = Coefficients(10.0, 300.0, -20.0, 200.0, 2e7, -1e6, 1e7, 0.0, 1.0,
 @pytest.mark.parametrize("name", SCHEMES)
 def test_a_scheme_states_what_the_loop_needs_of_it(name: str) -> None:
     scheme: Any = schemes.load(name.replace("_", "-"))
-    assert scheme.WEIGHTS in WEIGHTS
     assert scheme.LAG in (0, 1)
     assert set(scheme.VELOCITIES) <= set(scheme.MEMORY) <= set(scheme.STATE.names)
     checked = 0
-    for theta in WEIGHTS[scheme.WEIGHTS]:
+    for theta in weights_of(name):
         weights = Weights(1e-5, *(*theta, 0.0, 0.0, 0.0)[:3])
         assert 0.0 <= scheme.weighted_time(weights) <= 1.0
         for start in ("consistent", "paper"):
@@ -132,7 +137,7 @@ def test_a_scheme_states_what_the_loop_needs_of_it(name: str) -> None:
 @pytest.mark.parametrize("name", SCHEMES)
 def test_a_scheme_starts_at_the_given_state(name: str) -> None:
     scheme: Any = schemes.load(name.replace("_", "-"))
-    weights = Weights(1e-5, *(*WEIGHTS[scheme.WEIGHTS][0], 0.0, 0.0, 0.0)[:3])
+    weights = Weights(1e-5, *(*weights_of(name)[0], 0.0, 0.0, 0.0)[:3])
     state = new(scheme.STATE)
     scheme.begin(weights, state, *START)
     assert ((state.x, state.y) if scheme.LAG == 0 else (state.x_old, state.y_old)) == START[0]
@@ -154,7 +159,7 @@ def test_a_scheme_starts_at_the_given_state(name: str) -> None:
 def test_a_scheme_s_kernels_pose_a_definite_problem_and_take_its_solution(name: str) -> None:
     scheme: Any = schemes.load(name.replace("_", "-"))
     checked = 0
-    for theta in WEIGHTS[scheme.WEIGHTS]:
+    for theta in weights_of(name):
         weights = Weights(1e-5, *(*theta, 0.0)[:3])
         state, problem, work = new(scheme.STATE), new(PROBLEM), new(WORK)
         scheme.begin(weights, state, *START)
@@ -177,6 +182,15 @@ def test_a_scheme_s_kernels_pose_a_definite_problem_and_take_its_solution(name: 
         assert state.x != before.x
         checked += 1
     assert checked == 3
+
+
+def test_more_evaluators_than_a_run_can_count_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    more = {f"of-a-user-{n}": contact.EVALUATORS["exact"] for n in range(contact.MOST_KINDS - 3)}
+    monkeypatch.setattr(contact, "EVALUATORS", contact.EVALUATORS | more)
+    contact.load("of-a-user-0")
+    monkeypatch.setitem(contact.EVALUATORS, "one-more", contact.EVALUATORS["exact"])
+    with pytest.raises(ValueError, match="EVALUATORS has 9 kinds, a run can count 8"):
+        contact.load("of-a-user-0")
 
 
 def test_the_loop_is_compiled_for_every_scheme_at_once() -> None:

@@ -361,7 +361,7 @@ def test_rest_on_the_border_of_the_friction_cone_ends() -> None:
 def test_steps_that_shrink_to_nothing_are_a_failure_with_a_name() -> None:
     motion = Stepping(system_of(event_driven(SQUEAL)))
     motion.plant.state.x = math.nan  # no step from here has a known error
-    work, _ = motion.run(lambda rows: None)
+    work = motion.run().work
     assert work.failure is Failure.STALLED
     assert "solver.tolerance" in work.failure.sentence
 
@@ -370,7 +370,7 @@ def test_events_without_progress_are_a_failure_with_a_name() -> None:
     motion = Stepping(system_of(event_driven(SQUEAL)))
     state = motion.plant.state
     state.events, state.events_time = 1000, 1e9  # as if 1000 of them had come, and no time gone by
-    work, _ = motion.run(lambda rows: None)
+    work = motion.run().work
     assert work.failure is Failure.STALLED
     assert work.steps > 0
 
@@ -381,7 +381,7 @@ def test_phases_that_end_at_once_are_a_failure_with_a_name() -> None:
     assert simulate(case).work.failure is Failure.NONE
     motion = Stepping(system_of(case))
     motion.plant.state.switches = 60
-    work, _ = motion.run(lambda rows: None)
+    work = motion.run().work
     assert work.failure is Failure.STALLED
     assert work.steps == 0
 

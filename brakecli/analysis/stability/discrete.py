@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from brakecli.solver.contact.closed_form import evaluate as closed_form
 from brakecli.solver.contact.pad import build_layer, build_pad
-from brakecli.solver.implicit_step import newton
 from brakecli.solver.method import MOST
 from brakecli.solver.records import PROBLEM, WORK, Coefficients, Weights, new
 from brakecli.solver.roughness import surface
@@ -57,6 +56,8 @@ def amplification(c: Coefficients, s: Weights, scheme: Any, contact_stiffness: f
     It acts on the scheme's memory of the motion, with velocities times h. The step is taken from a deep, loaded
     equilibrium and from its neighbours: while nothing opens or sticks, it is affine and differences are exact.
     """
+    from brakecli.solver.implicit_step import newton  # its kernels are compiled only where they are needed
+
     layer = build_layer(closed_form, build_pad(contact_stiffness, 0.5, surface(), surface(), 0))
     small = 1e-3
     # y = -1, x = 0 is the equilibrium under a load of the size of the contact stiffness.

@@ -29,9 +29,10 @@ EVALUATORS: dict[str, Evaluator] = {
 }
 """`auto` hands over to the others."""
 
-
 CLOSED_FORM, MIDPOINT, EXACT = range(3)
 """Places in `kinds()`."""
+MOST_KINDS = 8
+"""How many of `kinds()` a run has counters for."""
 
 
 def kinds() -> tuple[str, ...]:
@@ -41,4 +42,6 @@ def kinds() -> tuple[str, ...]:
 
 def load(name: str) -> Any:
     """The kernel `evaluate` of an evaluator; it is compiled on the first call of a new version."""
+    if len(kinds()) > MOST_KINDS:
+        raise ValueError(f"EVALUATORS has {len(kinds())} kinds, a run can count {MOST_KINDS}; increase MOST_KINDS")
     return import_module(EVALUATORS[name].module).evaluate

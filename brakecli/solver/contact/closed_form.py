@@ -52,8 +52,7 @@ def full_contact(x: float, y: float, layer: Layer) -> None:
     contact.fraction = 1.0
     contact.store = 0.5 * k * (square + length * y * y) - y * mean_force
     contact.store_x = 0.5 * k * square_x - y * tangential
-    contact.kind = CLOSED_FORM
-    contact.valid = 1
+    contact.kind, contact.valid = CLOSED_FORM, 1
 
 
 @kernel(void(CONTACT_TYPE))
@@ -61,8 +60,7 @@ def clear(contact: Any) -> None:
     """The pad touches nowhere: no force, nothing stored."""
     contact.normal_force = contact.stiffness = contact.tangential = contact.fraction = 0.0
     contact.store = contact.store_x = 0.0
-    contact.kind = CLOSED_FORM
-    contact.valid = 1
+    contact.kind, contact.valid = CLOSED_FORM, 1
 
 
 @kernel(EVALUATE)

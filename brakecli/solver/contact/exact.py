@@ -8,11 +8,9 @@ counts as touching or not by its sign in the middle, so that the walk ends also 
 import math
 from typing import Any
 
-import numpy as np
 from numba import float64, int64, types, void
-from numpy.typing import NDArray
 
-from brakecli.solver.compile import kernel, vector
+from brakecli.solver.compile import Floats, kernel, vector
 from brakecli.solver.contact import EXACT
 from brakecli.solver.contact.closed_form import CLEAR, FULL, clear, coverage
 from brakecli.solver.records import CONTACT_TYPE, EVALUATE, PAD_TYPE, Layer
@@ -25,7 +23,7 @@ _EPSILON = 2.220446049250313e-16
 
 
 @kernel(types.UniTuple(float64, 4)(float64, float64, int64, vector))
-def _gap(xi: float, y: float, n: int, waves: NDArray[np.float64]) -> tuple[float, float, float, float]:
+def _gap(xi: float, y: float, n: int, waves: Floats) -> tuple[float, float, float, float]:
     """The gap f2 - f1 - y at xi, m, and its first three derivatives."""
     gap, slope, second, third = -y, 0.0, 0.0, 0.0
     for i in range(n):
@@ -40,7 +38,7 @@ def _gap(xi: float, y: float, n: int, waves: NDArray[np.float64]) -> tuple[float
 
 
 @kernel(float64(float64, float64, float64, float64, int64, vector))
-def _root(left: float, right: float, at_left: float, y: float, n: int, waves: NDArray[np.float64]) -> float:
+def _root(left: float, right: float, at_left: float, y: float, n: int, waves: Floats) -> float:
     """The root of a gap that is monotone on [left, right] and changes sign: Newton inside the bracket."""
     xi = 0.5 * (left + right)
     for _ in range(100):
@@ -66,7 +64,7 @@ def _sinc_of(sine: float, z: float) -> float:
 
 @kernel(void(float64, float64, float64, int64, int64, vector, CONTACT_TYPE))
 def _add_interval(
-    left: float, right: float, y: float, wheel_terms: int, n: int, waves: NDArray[np.float64], contact: Any
+    left: float, right: float, y: float, wheel_terms: int, n: int, waves: Floats, contact: Any
 ) -> None:
     """Add the closed integrals of a touching interval, without the factor k."""
     length, middle = right - left, 0.5 * (left + right)
@@ -98,22 +96,16 @@ def _add_interval(
     contact.store_x += work - y * rise
 
 
-@kernel(types.UniTuple(float64, 2)(float64, float64, int64, vector))
-def _bounds(y: float, end: float, n: int, waves: NDArray[np.float64]) -> tuple[float, float]:
-    """Bounds of the gap's fourth derivative, and of the rounding in the gap (m)."""
-    fourth, rounding = 0.0, abs(y)
+@kernel(void(float64, int64, int64, PAD_TYPE, vector, CONTACT_TYPE))
+def _add_touching(y: float, wheel_terms: int, n: int, pad: Any, waves: Floats, contact: Any) -> None:
+    """Walk over the pad and add every interval on which the gap is positive."""
+    end, widest = pad.half_length, pad.cell
+    fourth, rounding = 0.0, abs(y)  # bounds of the gap's fourth derivative, and of the rounding in the gap (m)
     for i in range(n):
         g, omega = abs(waves[i]), waves[n + i]
         fourth += g * (omega * omega) * (omega * omega)
         rounding += g * (1.0 + omega * end + abs(waves[2 * n + i]))
-    return fourth, _EPSILON * rounding
-
-
-@kernel(void(float64, int64, int64, PAD_TYPE, vector, CONTACT_TYPE))
-def _add_touching(y: float, wheel_terms: int, n: int, pad: Any, waves: NDArray[np.float64], contact: Any) -> None:
-    """Walk over the pad and add every interval on which the gap is positive."""
-    end, widest = pad.half_length, pad.cell
-    fourth, rounding = _bounds(y, end, n, waves)
+    rounding *= _EPSILON
     left, width = -end, widest
     touching, start = False, left
     while left < end:
@@ -157,17 +149,12 @@ def evaluate(x: float, y: float, layer: Layer) -> None:
     covered = coverage(y, pad)
     if covered == CLEAR:
         return
-    wheel_terms, shoe_terms, wheel_at, shoe_at = pad.wheel_terms, pad.shoe_terms, pad.wheel_at, pad.shoe_at
-    n = wheel_terms + shoe_terms
+    wheel_terms, n = pad.wheel_terms, pad.wheel_terms + pad.shoe_terms
     waves = layer.scratch[: 6 * n]
+    for i in range(3 * n):
+        waves[i] = tables[pad.gap_at + i]
     for i in range(wheel_terms):
-        waves[i] = tables[wheel_at + i]
-        waves[n + i] = tables[wheel_at + wheel_terms + i]
-        waves[2 * n + i] = tables[wheel_at + wheel_terms + i] * x + angles[i]
-    for i in range(shoe_terms):
-        waves[wheel_terms + i] = -tables[shoe_at + i]
-        waves[n + wheel_terms + i] = tables[shoe_at + shoe_terms + i]
-        waves[2 * n + wheel_terms + i] = tables[shoe_at + 2 * shoe_terms + i]
+        waves[2 * n + i] = waves[n + i] * x + angles[i]
     if covered == FULL:
         _add_interval(-pad.half_length, pad.half_length, y, wheel_terms, n, waves, contact)
     else:

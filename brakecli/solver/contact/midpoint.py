@@ -2,11 +2,9 @@
 
 import math
 
-import numpy as np
 from numba import float64, types, void
-from numpy.typing import NDArray
 
-from brakecli.solver.compile import kernel, vector
+from brakecli.solver.compile import Floats, kernel, vector
 from brakecli.solver.contact import MIDPOINT
 from brakecli.solver.records import EVALUATE, Layer
 
@@ -15,7 +13,7 @@ _FAST = frozenset({"reassoc", "contract", "nsz"})
 
 
 @kernel(_SUMS, fastmath=_FAST)
-def _sums(y: float, f1: NDArray[np.float64], f2: NDArray[np.float64]) -> tuple[float, float, float, float, float]:
+def _sums(y: float, f1: Floats, f2: Floats) -> tuple[float, float, float, float, float]:
     """Sums over the touching nodes of: gap, 1, rise of f2 across the cell, gap², gap times rise.
 
     Reassociation lets the compiler keep several partial sums side by side; no test in here depends on signed
@@ -36,13 +34,7 @@ def _sums(y: float, f1: NDArray[np.float64], f2: NDArray[np.float64]) -> tuple[f
 
 
 @kernel(void(float64, float64, vector, vector, vector))
-def _add_wave(
-    sine: float,
-    cosine: float,
-    sines: NDArray[np.float64],
-    cosines: NDArray[np.float64],
-    f2: NDArray[np.float64],
-) -> None:
+def _add_wave(sine: float, cosine: float, sines: Floats, cosines: Floats, f2: Floats) -> None:
     """Add g sin(ωξ + ψ) at the nodes, by addition from the tables of g sin(ωξ) and g cos(ωξ)."""
     for j in range(f2.size):
         f2[j] += cosine * sines[j] + sine * cosines[j]
@@ -71,5 +63,4 @@ def evaluate(x: float, y: float, layer: Layer) -> None:
     contact.fraction = touching / n
     contact.store = 0.5 * k * spacing * square
     contact.store_x = k * work
-    contact.kind = MIDPOINT
-    contact.valid = 1
+    contact.kind, contact.valid = MIDPOINT, 1

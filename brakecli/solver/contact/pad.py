@@ -8,9 +8,8 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from brakecli.solver.compile import address
+from brakecli.solver.compile import Floats, address
 from brakecli.solver.records import CONTACT, PAD, Layer, new
 from brakecli.solver.roughness import Surface, height
 
@@ -28,7 +27,7 @@ class Pad(NamedTuple):
     """Constants, a record of `PAD`, and tables of a pad on its wheel."""
 
     constants: Any
-    tables: NDArray[np.float64]
+    tables: Floats
 
     @property
     def edges(self) -> tuple[float, float]:
@@ -48,7 +47,9 @@ def build_pad(k: float, half_length: float, shoe: Surface, wheel: Surface, nodes
     ss, cc, pr, pad.shoe_mean, pad.shoe_square = _products(half_length, shoe, wheel)
     f1, sines, cosines = _node_tables(half_length, shoe, wheel, nodes)
     tables = {
-        "shoe_at": np.concatenate([shoe.g, shoe.omega, shoe.phase]),
+        "gap_at": np.concatenate(
+            [wheel.g, -shoe.g, wheel.omega, shoe.omega, np.zeros(wheel.g.size), shoe.phase],
+        ),
         "wheel_at": np.concatenate([wheel.g, wheel.omega]),
         "full_at": 2.0 * half_length * k * wheel.g * np.sinc(wheel.omega * half_length / np.pi),
         "ss_at": ss,
@@ -84,9 +85,7 @@ def _shoe_bounds(a: float, shoe: Surface) -> tuple[float, float]:
     return min(float(f.max()) + between, crest), min(float(-f.min()) + between, crest)
 
 
-def _node_tables(
-    a: float, shoe: Surface, wheel: Surface, nodes: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def _node_tables(a: float, shoe: Surface, wheel: Surface, nodes: int) -> tuple[Floats, Floats, Floats]:
     """Cell means of f1, and of g sin(omega xi), g cos(omega xi) for the wheel, with one cell beyond each end.
 
     The mean of a sine over a cell is its value in the middle times sinc(omega spacing/2). With means instead of
@@ -97,7 +96,7 @@ def _node_tables(
     spacing = 2.0 * a / nodes
     xi = -a + spacing * (np.arange(nodes + 2) - 0.5)
 
-    def mean(f: Surface) -> NDArray[np.float64]:
+    def mean(f: Surface) -> Floats:
         return (f.g * np.sinc(f.omega * spacing / (2.0 * np.pi)))[:, None]
 
     waves = np.outer(wheel.omega, xi)
@@ -105,16 +104,14 @@ def _node_tables(
     return f1, mean(wheel) * np.sin(waves), mean(wheel) * np.cos(waves)
 
 
-def _products(
-    a: float, shoe: Surface, wheel: Surface
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], float, float]:
+def _products(a: float, shoe: Surface, wheel: Surface) -> tuple[Floats, Floats, Floats, float, float]:
     """Integrals over the pad of products of harmonics (m³), for the store of a fully touching pad.
 
     With S = g sin(omega xi), C = g cos(omega xi) of the wheel: ∫ S S, ∫ C C, (∫ S f1, ∫ C f1), ∫ f1 (per pad
     length), ∫ f1². ∫ S C and ∫ S are zero by symmetry.
     """
 
-    def pair(f: Surface, h: Surface) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def pair(f: Surface, h: Surface) -> tuple[Floats, Floats]:
         minus = np.sinc(np.subtract.outer(f.omega, h.omega) * a / np.pi)
         plus = np.sinc(np.add.outer(f.omega, h.omega) * a / np.pi)
         g = a * np.outer(f.g, h.g)

@@ -3,7 +3,7 @@
 Contract of every scheme module:
 
 - `STATE`: the type of the record that its motion is kept in, with the fields x, y, v_x, v_y and force;
-- `WEIGHTS`: how many weights it takes; `LAG`: how many levels the known velocity lies behind the position;
+- `LAG`: how many levels the known velocity lies behind the position;
 - `MEMORY`: the fields of the state that decide the next ones, `VELOCITIES`: which of them are velocities;
 - `weighted_time(weights)`: the time at which a step evaluates the load, the travel of the wheel and the contact,
   in steps after the current level;
@@ -13,7 +13,8 @@ Contract of every scheme module:
 - kernels `advance` and `sample`: those of `brakecli.solver.loop`, or its own, with the same arguments, where its
   steps are its own, held to a tolerance, on the grid of samples alone;
 - in the first case kernels `prepare` and `finish`, of the signatures in `solver.records`: the minimisation that a
-  step comes down to, and the new state with the works of the step.
+  step comes down to, and the new state with the works of the step; otherwise `solve`, the kernel of one step,
+  which `advance` calls at the address in `plug.solve`.
 """
 
 from dataclasses import dataclass

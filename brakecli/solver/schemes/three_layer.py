@@ -9,7 +9,6 @@ from brakecli.solver.records import Coefficients, Pair, Weights
 
 STATE = records.STATE
 advance, sample = loop.advance, loop.sample
-WEIGHTS = 3
 LAG = 1
 MEMORY = ("x", "y", "x_old", "y_old")
 VELOCITIES: tuple[str, ...] = ()

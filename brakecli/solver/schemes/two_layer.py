@@ -4,15 +4,15 @@ from typing import Any
 
 from brakecli.solver import loop, records
 from brakecli.solver.compile import kernel
-from brakecli.solver.energy import Mechanical, energy_at_level
+from brakecli.solver.energy import energy_at_level
 from brakecli.solver.records import Coefficients, Pair, Weights
 
 STATE = records.STATE
 advance, sample = loop.advance, loop.sample
-WEIGHTS = 2
 LAG = 0
 MEMORY = ("x", "y", "v_x", "v_y")
 VELOCITIES = ("v_x", "v_y")
+mechanical_energy = energy_at_level  # what the scheme keeps belongs to the level reached
 
 
 def weighted_time(s: Weights) -> float:
@@ -31,36 +31,18 @@ def begin(s: Weights, state: Any, position: Pair, velocity: Pair, acceleration: 
     state.v_x, state.v_y = velocity
 
 
-def mechanical_energy(c: Coefficients, s: Weights, state: Any) -> Mechanical:
-    """What the scheme keeps belongs to the level reached."""
-    return energy_at_level(c, state)
-
-
 @kernel(records.PREPARE)
 def prepare(c: Coefficients, s: Weights, state: Any, problem: Any) -> None:
     """(25), misprints corrected, see docs/errata.md; the normal force is left out of g2."""
-    h, theta_1, theta_2, load = s.h, s.theta_1, s.theta_2, problem.load
+    h, theta_1, theta_2, inertia, load = s.h, s.theta_1, s.theta_2, c.m / s.h, problem.load
     x, y, p, q = state.x, state.y, state.v_x, state.v_y
-    problem.a_11 = c.m / h + theta_1 * (c.b_xx + theta_2 * c.c_xx * h)  # Eq. (25)
+    problem.a_11 = inertia + theta_1 * (c.b_xx + theta_2 * c.c_xx * h)  # Eq. (25)
     problem.a_12 = theta_1 * (c.b_xy + theta_2 * c.c_xy * h)  # Eq. (25)
-    problem.a_22 = c.m / h + theta_1 * (c.b_yy + theta_2 * c.c_yy * h)  # Eq. (25)
+    problem.a_22 = inertia + theta_1 * (c.b_yy + theta_2 * c.c_yy * h)  # Eq. (25)
     b, k = 1.0 - theta_1, theta_1 * (1.0 - theta_2) * h
-    problem.g_1 = (  # Eq. (25)
-        c.m / h * p
-        - (b * c.b_xx + k * c.c_xx) * p
-        - (b * c.b_xy + k * c.c_xy) * q
-        - c.c_xx * x
-        - c.c_xy * y
-        - load * c.sin_beta
-    )
-    problem.g_2 = (  # Eq. (25)
-        c.m / h * q
-        - (b * c.b_yy + k * c.c_yy) * q
-        - (b * c.b_xy + k * c.c_xy) * p
-        - c.c_yy * y
-        - c.c_xy * x
-        - load * c.cos_beta
-    )
+    xx, xy, yy = b * c.b_xx + k * c.c_xx, b * c.b_xy + k * c.c_xy, b * c.b_yy + k * c.c_yy
+    problem.g_1 = inertia * p - xx * p - xy * q - c.c_xx * x - c.c_xy * y - load * c.sin_beta  # Eq. (25)
+    problem.g_2 = inertia * q - yy * q - xy * p - c.c_yy * y - c.c_xy * x - load * c.cos_beta  # Eq. (25)
     problem.x_0, problem.y_0 = x + k * p, y + k * q  # arguments of F_y in (23), less gain p and gain q
     problem.gain = theta_1 * theta_2 * h
     problem.belt = problem.belt_next

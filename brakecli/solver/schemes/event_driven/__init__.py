@@ -6,47 +6,32 @@ slip, lift-off and touch-down end a step: nothing is smoothed, nothing stepped o
 
 from typing import Any
 
-import numpy as np
 from numba import float64, int64, void
-from numpy.typing import NDArray
 
-from brakecli.solver.compile import borrowed, kernel, vector
+from brakecli.solver.compile import Floats, at_address, borrowed, kernel
 from brakecli.solver.contact import CLOSED_FORM
-from brakecli.solver.energy import Mechanical, energy_at_level
-from brakecli.solver.quantities import ContactState, Failure
-from brakecli.solver.records import (
-    DRIVE,
-    MOTION,
-    MOTION_TYPE,
-    V_X,
-    V_Y,
-    Coefficients,
-    Drive,
-    Pair,
-    Plant,
-    Weights,
-    X,
-    Y,
-    plant_type,
-)
+from brakecli.solver.energy import energy_at_level
+from brakecli.solver.friction import observed
+from brakecli.solver.quantities import Failure
+from brakecli.solver.records import DRIVE, MOTION, V_X, V_Y, Drive, Pair, Plant, Weights, X, Y, plant_type
 from brakecli.solver.schedules import integral_at, slope_at, value_at
 from brakecli.solver.schemes.event_driven.dop853 import interpolated
 from brakecli.solver.schemes.event_driven.phases import SHOE, Shoe, press, resistance
-from brakecli.solver.schemes.event_driven.step import first_step, step
+from brakecli.solver.schemes.event_driven.step import STEP, first_step, step
 
-STATE = MOTION
-WEIGHTS = 0
+STATE, solve = MOTION, step
 LAG = 0
 MEMORY = ("x", "y", "v_x", "v_y")
 VELOCITIES = ("v_x", "v_y")
+mechanical_energy = energy_at_level
 
 _PLANT = plant_type(MOTION)
+_step_at = at_address(STEP)  # compiled in its own place: otherwise `advance` would compile it again
 
 _BUDGET, _EXACT = 4096, 64
 """Steps of one call, and as how many one counts that finds patches: an interruption need not wait for a sample."""
 
 _NONE = int(Failure.NONE)
-_BACKWARD, _STICK, _FORWARD, _SEPARATED = (int(state) for state in ContactState)
 
 
 def weighted_time(s: Weights) -> float:
@@ -63,17 +48,6 @@ def begin(s: Weights, state: Any, position: Pair, velocity: Pair, acceleration: 
     """The initial state; the phase is found with the first step."""
     state.x, state.y = position
     state.v_x, state.v_y = velocity
-
-
-def mechanical_energy(c: Coefficients, s: Weights, state: Any) -> Mechanical:
-    """The energies belong to the time reached."""
-    return energy_at_level(c, state)
-
-
-@kernel(void(MOTION_TYPE, vector))
-def _write(m: Any, row: NDArray[np.float64]) -> None:
-    for column in range(row.size):  # a slice would take seconds to compile
-        row[column] = m.row[column]
 
 
 @kernel(void(SHOE, DRIVE, float64, int64), inlined=False)
@@ -97,26 +71,19 @@ def _sample(p: Shoe, drive: Drive, interval: float, level: int) -> None:
     bound = c.phi * normal
     against_x, _ = resistance(c, value_at(drive.load, t), x, y, v_x, v_y)
     needed = c.m * belt_slope + against_x  # Eq. (6) in stick
-    if normal == 0.0:
-        state, friction = _SEPARATED, 0.0
-    elif side == 0.0 and abs(needed) <= bound * (1.0 + 1e-12):  # by the rounding of the cone it still sticks
-        state, friction = _STICK, needed  # Eq. (4)
-    elif side > 0.0 or (side == 0.0 and needed < 0.0):
-        state, friction = _FORWARD, -bound  # Eq. (5)
-    else:
-        state, friction = _BACKWARD, bound  # Eq. (5)
+    holds = side == 0.0 and abs(needed) <= bound * (1.0 + 1e-12)  # by the rounding of the cone it still sticks
+    state, friction = observed(side, holds, needed, normal, bound)
     m.row[0], m.row[1], m.row[2], m.row[3] = x, y, v_x, v_y
     m.row[4], m.row[5], m.row[6], m.row[7] = friction, normal, p.layer.contact.fraction, state
 
 
-@kernel(void(_PLANT, vector))
-def sample(p: Plant, row: NDArray[np.float64]) -> None:
+def sample(p: Plant, row: Floats) -> None:
     """Write the sample at the level that has been reached."""
-    _write(p.state, row)
+    row[:] = p.state.row
 
 
 @kernel(int64(_PLANT, float64[:, ::1], float64[:, ::1], int64))
-def advance(p: Plant, rows: NDArray[np.float64], events: NDArray[np.float64], stop: int) -> int:
+def advance(p: Plant, rows: Floats, events: Floats, stop: int) -> int:
     """Step until the sample `stop` is reached, or until the budget of a call is spent; a `Failure`.
 
     `rows` gets the samples before that of counts.level, which waits in the state; a failure adds it.
@@ -130,14 +97,16 @@ def advance(p: Plant, rows: NDArray[np.float64], events: NDArray[np.float64], st
         m.started = 1
     while True:
         while counts.level < stop and counts.level < m.level:
-            _write(m, rows[row])
+            for column in range(rows.shape[1]):  # a slice would take seconds to compile
+                rows[row, column] = m.row[column]
             row += 1
             counts.level += 1
             _sample(shoe, drive, grid.interval, counts.level)
         if counts.level == stop or steps >= _BUDGET:
             return _NONE
-        failure = step(shoe, drive, grid)
+        failure: int = _step_at(p.plug.solve)(shoe, drive, grid)
         steps += 1 if p.layer.contact.kind == CLOSED_FORM else _EXACT
         if failure != _NONE:
-            _write(m, rows[row])
+            for column in range(rows.shape[1]):
+                rows[row, column] = m.row[column]
             return failure

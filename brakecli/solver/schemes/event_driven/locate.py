@@ -77,16 +77,6 @@ def _lowest(p: Shoe, which: int, h: float, left: float, right: float) -> tuple[f
     return (a, at_a) if at_a < at_b else (b, at_b)
 
 
-@kernel(float64(SHOE, int64, float64, float64, float64), inlined=False)
-def _first_positive(p: Shoe, which: int, h: float, theta: float, allowed: float) -> float:
-    """A place before theta at which a margin that begins at zero is positive; 0 if there is none."""
-    for _ in range(8):
-        theta *= 0.125
-        if margins(p, h, theta)[which] > allowed:
-            return theta
-    return 0.0
-
-
 @kernel(types.Tuple((int64, float64))(SHOE, float64), inlined=False)
 def first_event(p: Shoe, h: float) -> tuple[int, float]:
     """The margin that runs out first and the part of the step at which it does; 0 where it never was positive.
@@ -103,9 +93,13 @@ def first_event(p: Shoe, h: float) -> tuple[int, float]:
             bend, rise = before_last[which] - 2.0 * last[which] + now[which], now[which] - before_last[which]
             if now[which] < -allowed[which]:
                 right = theta
-                if look == 1 and last[which] <= allowed[which]:
-                    left = _first_positive(p, which, h, theta, allowed[which])
-                    if left == 0.0:
+                if look == 1 and last[which] <= allowed[which]:  # it begins at zero: where is it positive?
+                    left = theta
+                    for _ in range(8):
+                        left *= 0.125
+                        if margins(p, h, left)[which] > allowed[which]:
+                            break
+                    else:
                         return which, 0.0
             elif (
                 look > 1

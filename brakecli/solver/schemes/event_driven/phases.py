@@ -10,26 +10,12 @@ from typing import Any, NamedTuple
 
 from numba import float64, int64, types, void
 
+from brakecli.solver import records
 from brakecli.solver.compile import at_address, kernel
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.contact.closed_form import FULL, clear, coverage, full_contact
 from brakecli.solver.double_double import two_sum
-from brakecli.solver.records import (
-    COEFFICIENTS,
-    COUNTS_TYPE,
-    DRIVE,
-    EVALUATE,
-    LAYER,
-    MOTION_TYPE,
-    PAD_TYPE,
-    V_X,
-    V_Y,
-    WORK_TYPE,
-    Coefficients,
-    Drive,
-    Layer,
-    Y,
-)
+from brakecli.solver.records import COEFFICIENTS, V_X, V_Y, Coefficients, Drive, Layer, Y
 from brakecli.solver.roughness import wheel_angles
 from brakecli.solver.schedules import integral_at, slope_at, value_at
 from brakecli.solver.schemes.event_driven.dop853 import END_STAGE, interpolated
@@ -47,19 +33,15 @@ class Shoe(NamedTuple):
     counts: Any
 
 
-SHOE = types.NamedTuple([COEFFICIENTS, LAYER, MOTION_TYPE, WORK_TYPE, COUNTS_TYPE], Shoe)
-_evaluate_at = at_address(EVALUATE)
+SHOE = types.NamedTuple(
+    [COEFFICIENTS, records.LAYER, records.MOTION_TYPE, records.WORK_TYPE, records.COUNTS_TYPE], Shoe
+)
+_evaluate_at = at_address(records.EVALUATE)
 _PAIR = types.UniTuple(float64, 2)
 _TRIPLE = types.UniTuple(float64, 3)
 
 
-@kernel(float64(PAD_TYPE))
-def full_stiffness(pad: Any) -> float:
-    """2ak, N/m."""
-    return 2.0 * pad.half_length * pad.k  # type: ignore[no-any-return]
-
-
-@kernel(float64(PAD_TYPE))
+@kernel(float64(records.PAD_TYPE))
 def clear_height(pad: Any) -> float:
     """The height (m) from which on the pad is sure to touch nowhere: 0 on smooth surfaces, as it must be."""
     return pad.wheel_bound + pad.shoe_bottom  # type: ignore[no-any-return]
@@ -81,14 +63,14 @@ def rounding(p: Shoe) -> tuple[float, float]:
     x, y, v_x, v_y = abs(m.x), abs(m.y), abs(m.v_x), abs(m.v_y)
     load, normal = abs(m.load), 0.0
     if m.touching != 0:
-        normal = full_stiffness(pad) * (y + pad.wheel_bound + max(pad.shoe_top, pad.shoe_bottom))
+        normal = 2.0 * pad.half_length * pad.k * (y + pad.wheel_bound + max(pad.shoe_top, pad.shoe_bottom))
     along = c.b_xx * v_x + abs(c.b_xy) * v_y + c.c_xx * x + abs(c.c_xy) * y + load * abs(c.sin_beta)
     across = abs(c.b_xy) * v_x + c.b_yy * v_y + abs(c.c_xy) * x + c.c_yy * y + load * c.cos_beta
     along += c.m * abs(m.belt_slope) + c.phi * normal
     return 4.0 * EPSILON * along, 4.0 * EPSILON * (across + normal)
 
 
-@kernel(void(SHOE, DRIVE), inlined=False)
+@kernel(void(SHOE, records.DRIVE), inlined=False)
 def arrive(p: Shoe, drive: Drive) -> None:
     """What acts from outside at the time reached and, as no knot lies inside a step, all through the next step."""
     m, t, tau = p.motion, p.motion.time, p.motion.tau
@@ -114,7 +96,7 @@ def press(p: Shoe, x: float, y: float, touching: int) -> float:
         return 0.0
     p.counts.evaluations += 1
     if pad.shoe_terms + pad.wheel_terms == 0:
-        contact.stiffness = full_stiffness(pad)
+        contact.stiffness = 2.0 * pad.half_length * pad.k
         contact.normal_force = -contact.stiffness * y  # Eq. (2), continued: an event ends the phase at y = 0
         contact.fraction = 1.0 if y < 0.0 else 0.0
         contact.store_x, contact.kind, contact.valid = 0.0, CLOSED_FORM, 1

@@ -10,31 +10,10 @@ from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.quantities import BOUND, Failure
 from brakecli.solver.records import DRIVE, GRID, KNOTS, MOTION_TYPE, POWERED, STAGES, V_X, V_Y, Drive, Grid, X, Y
 from brakecli.solver.schedules import Schedule, segment
-from brakecli.solver.schemes.event_driven.dop853 import (
-    END_STAGE,
-    NODES,
-    A,
-    combined,
-    interpolated,
-    interpolated_slope,
-    local_error,
-    make_continuous,
-)
+from brakecli.solver.schemes.event_driven import dop853, phases
+from brakecli.solver.schemes.event_driven.dop853 import END_STAGE, NODES, A
 from brakecli.solver.schemes.event_driven.locate import NONE, first_event
-from brakecli.solver.schemes.event_driven.phases import (
-    EPSILON,
-    SHOE,
-    Shoe,
-    arrive,
-    clear_height,
-    find_slopes,
-    full_stiffness,
-    margin_slope,
-    margins,
-    rounding,
-    switch,
-    take_hold,
-)
+from brakecli.solver.schemes.event_driven.phases import EPSILON, SHOE, Shoe
 
 _LOCAL = 0.05
 """Error of a step over the tolerance of the histories, to which the errors of all steps add up."""
@@ -54,8 +33,9 @@ _MOST_SWITCHES, _MOST_EVENTS, _NO_PROGRESS = 60, 1000, 1e-6
 """A run ends after so many phases that end at once, or so many events within a part of the longest step."""
 _TINY = 1e-300  # no division by zero where nothing moves
 
-_NONE, _NOT_CLOSED, _DIVERGED = int(Failure.NONE), int(Failure.NOT_CLOSED), int(Failure.DIVERGED)
-_STALLED = int(Failure.STALLED)
+STEP = int64(SHOE, DRIVE, GRID)
+
+_NONE, _, _DIVERGED, _NOT_CLOSED, _, _STALLED = (int(failure) for failure in Failure)
 
 
 @kernel(float64(KNOTS, float64))
@@ -68,8 +48,8 @@ def _to_knot(s: Schedule, t: float) -> float:
 @kernel(float64(SHOE, float64), inlined=False)
 def _longest(p: Shoe, duration: float) -> float:
     """The longest step (s), by the fastest motion and the passing waves; `duration` where nothing limits it."""
-    c, m = p.c, p.motion
-    stiffness = (1.0 + c.phi) * full_stiffness(p.layer.pad) if m.touching != 0 else 0.0
+    c, m, pad = p.c, p.motion, p.layer.pad
+    stiffness = (1.0 + c.phi) * (2.0 * pad.half_length * pad.k) if m.touching != 0 else 0.0
     bound = c.c_xx + c.c_yy + 2.0 * abs(c.c_xy) + stiffness  # of the largest eigenvalue of the stiffness
     longest = duration
     if bound * longest * longest > _RADIANS * _RADIANS * c.m:
@@ -77,11 +57,11 @@ def _longest(p: Shoe, duration: float) -> float:
     rate = (c.b_xx + c.b_yy) / c.m  # at least that of the fastest decay
     if rate * longest > _DECAY:
         longest = _DECAY / rate
-    if p.layer.pad.wheel_terms > 0 and m.touching != 0 and m.side != 0.0:
+    if pad.wheel_terms > 0 and m.touching != 0 and m.side != 0.0:
         # A fourth of the shortest wave, so that no patch comes and goes unseen.
         slide = abs(m.v_x - m.belt) + abs(m.slopes[0, V_X] - m.belt_slope) * m.step
-        if slide * longest > p.layer.pad.cell:
-            longest = p.layer.pad.cell / slide
+        if slide * longest > pad.cell:
+            longest = pad.cell / slide
     return longest
 
 
@@ -90,15 +70,15 @@ def first_step(p: Shoe, drive: Drive, grid: Grid) -> None:
     """Find the phase of the initial state, and a step to begin with."""
     m = p.motion
     m.tolerance = _LOCAL * grid.tolerance
-    arrive(p, drive)
+    phases.arrive(p, drive)
     m.largest[X], m.largest[Y], m.largest[V_X], m.largest[V_Y] = abs(m.x), abs(m.y), abs(m.v_x), abs(m.v_y)
-    height = m.y - clear_height(p.layer.pad)
+    height = m.y - phases.clear_height(p.layer.pad)
     m.touching = 0 if height > 0.0 or (height == 0.0 and m.v_y > 0.0) else 1
     if m.v_x == m.belt:
-        take_hold(p)
+        phases.take_hold(p)
     else:
         m.side = 1.0 if m.v_x > m.belt else -1.0
-    find_slopes(p, 0, 0.0, m.x, m.y, m.v_x, m.v_y)
+    phases.find_slopes(p, 0, 0.0, m.x, m.y, m.v_x, m.v_y)
     m.step = _FIRST * _longest(p, grid.samples * grid.interval)
 
 
@@ -109,15 +89,15 @@ def _defect(p: Shoe, h: float) -> float:
     The error estimate is a linear functional of the slopes, which vanishes for a kink at certain places of a step.
     """
     m, worst = p.motion, 0.0
-    along, across = rounding(p)
+    along, across = phases.rounding(p)
     for theta in (_EARLY, _LATE):
-        x, y = interpolated(m, X, theta), interpolated(m, Y, theta)
-        v_x, v_y = interpolated(m, V_X, theta), interpolated(m, V_Y, theta)
-        find_slopes(p, STAGES - 1, theta * h, x, y, v_x, v_y)
+        x, y = dop853.interpolated(m, X, theta), dop853.interpolated(m, Y, theta)
+        v_x, v_y = dop853.interpolated(m, V_X, theta), dop853.interpolated(m, V_Y, theta)
+        phases.find_slopes(p, STAGES - 1, theta * h, x, y, v_x, v_y)
         for i in (V_X, V_Y):
             if m.side == 0.0 and i == V_X:
                 continue
-            defect = abs(interpolated_slope(m, i, theta) - h * m.slopes[STAGES - 1, i])
+            defect = abs(dop853.interpolated_slope(m, i, theta) - h * m.slopes[STAGES - 1, i])
             noise = _DENSE_ROUNDING * h * (along if i == V_X else across) / p.c.m
             largest = max(m.largest[i], abs(m.end[i]))
             worst = max(worst, defect / (_DEFECT * m.tolerance * largest + noise + _TINY))
@@ -135,7 +115,7 @@ def _try(p: Shoe, h: float, allowed: float) -> float:
     m.begin[X], m.begin[Y], m.begin[V_X], m.begin[V_Y] = m.x, m.y, m.v_x, m.v_y
     for stage in range(1, STAGES):
         if stage == END_STAGE + 1:
-            along, across = rounding(p)
+            along, across = phases.rounding(p)
             for i in range(4):
                 tangential = i in (X, V_X)
                 if m.side == 0.0 and tangential:
@@ -144,21 +124,21 @@ def _try(p: Shoe, h: float, allowed: float) -> float:
                 floor = noise if i >= V_X else h * noise
                 floor += 4.0 * EPSILON * max(abs(m.begin[i]), abs(m.end[i]))
                 largest = max(m.largest[i], abs(m.end[i]))
-                error = h * local_error(m, i) / (m.tolerance * largest + floor + _TINY)
+                error = h * dop853.local_error(m, i) / (m.tolerance * largest + floor + _TINY)
                 if not error < math.inf:
                     return math.inf
                 worst = max(worst, error)
             if worst > allowed:
                 return worst
-        x, y, v_x, v_y = combined(m, stage)
+        x, y, v_x, v_y = dop853.combined(m, stage)
         x, y = m.begin[X] + h * x, m.begin[Y] + h * y
         v_x, v_y = m.begin[V_X] + h * v_x, m.begin[V_Y] + h * v_y
-        find_slopes(p, stage, NODES[stage] * h, x, y, v_x, v_y)
+        phases.find_slopes(p, stage, NODES[stage] * h, x, y, v_x, v_y)
         if stage == END_STAGE:
             m.end[X], m.end[Y], m.end[V_X], m.end[V_Y] = x, y, v_x, v_y
             if p.layer.contact.valid == 0:
                 return math.inf
-    make_continuous(m, h)
+    dop853.make_continuous(m, h)
     m.step_done = h
     return worst if p.layer.contact.kind == CLOSED_FORM else max(worst, _defect(p, h))
 
@@ -172,8 +152,8 @@ def _to_event(p: Shoe, which: int, h: float) -> float:
     m = p.motion
     if _try(p, h, math.inf) == math.inf:
         return 0.0
-    margin = margins(p, h, 1.0)[which]
-    slope = margin_slope(p, which)
+    margin = phases.margins(p, h, 1.0)[which]
+    slope = phases.margin_slope(p, which)
     rest = -margin / slope if slope != 0.0 else 0.0
     if not abs(rest) <= 1e-3 * h:
         return h
@@ -195,8 +175,7 @@ def _passed(m: Any, item: int) -> float:
 def _take(p: Shoe, drive: Drive, grid: Grid, h: float, last: int) -> None:
     """Take the step that has been made; `last` is 1 where it reaches the end of the run."""
     m, work, interval = p.motion, p.work, grid.interval
-    m.time_done, m.tau_done = m.time, m.tau
-    m.side_done, m.touching_done = m.side, m.touching
+    m.time_done, m.tau_done, m.side_done, m.touching_done = m.time, m.tau, m.side, m.touching
     work.belt += h * _passed(m, 0)
     work.friction += h * _passed(m, 1)
     work.dashpots += h * _passed(m, 2)
@@ -215,7 +194,7 @@ def _take(p: Shoe, drive: Drive, grid: Grid, h: float, last: int) -> None:
     if last == 1:
         m.level, m.tau = grid.samples, 0.0
     m.time = interval * m.level
-    arrive(p, drive)
+    phases.arrive(p, drive)
     m.switches = 0
     p.counts.kinds[p.layer.contact.kind] += 1
 
@@ -225,14 +204,14 @@ def _enter(p: Shoe, which: int, longest: float) -> int:
     """Enter the phase after an event, and see that events do not pile up without progress; a `Failure`."""
     m = p.motion
     t = m.time + m.tau
-    switch(p, which)
+    phases.switch(p, which)
     if t - m.events_time > _NO_PROGRESS * longest:
         m.events_time, m.events = t, 0
     m.events += 1
     return _STALLED if m.events > _MOST_EVENTS else _NONE
 
 
-@kernel(int64(SHOE, DRIVE, GRID), inlined=False)
+@kernel(STEP, inlined=False)
 def step(p: Shoe, drive: Drive, grid: Grid) -> int:
     """Take one step, up to an event at most; a `Failure`."""
     m, evaluations = p.motion, p.counts.evaluations
