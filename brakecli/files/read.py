@@ -39,7 +39,7 @@ class Variable:
     attributes: dict[str, Any]
 
 
-@dataclass(frozen=True)
+@dataclass
 class StoredResult:
     """A result file that `open_result` has verified; a group is named by its path, the root by ``/``."""
 
