@@ -17,6 +17,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from brakecli import SAME_NUMBERS_AS
 from brakecli.errors import BrakecliError, CannotWriteError, RefusedError
 from brakecli.files.atomic import explained
 from brakecli.sweeps.plan import Plan
@@ -96,18 +97,18 @@ class Journal:
 
     def _begin(self, *, force: bool) -> None:
         own = identity(self.plan)
-        header = json.dumps(own).encode() + b"\n"
         found = self._file.read(_LONGEST_HEADER)
         found = found[: found.find(b"\n") + 1]
-        if found == header:
-            self._read_blocks(len(header))
+        refusal = _refusal(found, own)
+        if not refusal:
+            self._read_blocks(len(found))
             return
         if found and not force:
-            raise RefusedError(f"{self.path}: {_differences(found, own)}")
+            raise RefusedError(f"{self.path}: {refusal}")
         os.ftruncate(self._file.fileno(), 0)
         self._file.seek(0)
         try:
-            self._write(header)
+            self._write(json.dumps(own).encode() + b"\n")
         except OSError:
             self.discard()  # it holds nothing
             raise
@@ -154,13 +155,17 @@ def _flat(value: Any, path: str, dot: str = ".") -> Iterator[tuple[str, Any]]:
         yield path, value
 
 
-def _differences(found: bytes, own: Mapping[str, Any]) -> str:
-    """In which keys the journal that is there belongs to another sweep."""
+def _refusal(found: bytes, own: Mapping[str, Any]) -> str:
+    """Why a journal that begins with a line belongs to another sweep; empty where it belongs to this one."""
     try:
         there = json.loads(found)
+        if there.get("brakecli_version") in SAME_NUMBERS_AS:
+            there |= {key: own[key] for key in ("brakecli_version", "brakecli_sources")}
         keys = [key for key in {**there, **own} if there.get(key) != own.get(key)]
     except (ValueError, TypeError, AttributeError, RecursionError):
         return "holds no finished points; remove it, or start anew with --force"
+    if not keys:
+        return ""
     each = [f"{key} was {there.get(key, 'not set')!s:.60}, is {own.get(key, 'not set')!s:.60}" for key in keys]
     more = [f"and {len(keys) - MOST_DIFFERENCES} more"] if len(keys) > MOST_DIFFERENCES else []
     return (
