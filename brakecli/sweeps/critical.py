@@ -63,7 +63,7 @@ class Search(NamedTuple):
 
 
 class _Change(NamedTuple):
-    """Where stability changes, between `low` and `high`; without a value, why it does not. `bias` as in `Search`."""
+    """Where stability changes, between `low` and `high`; without a value, why it does not."""
 
     outcome: Outcome
     value: float | None = None
@@ -135,11 +135,8 @@ def _by_eigenvalues(critical: Critical, sliding_at: SlidingAt) -> _Change:
         return rate > 1e-12 * math.sqrt((abs(c.c_xx) + abs(c.c_yy) + k) / c.m)
 
     def grows_in_steps(found: Sliding) -> bool:
-        system, k = found.system, found.stiffness
-        return (
-            spectral_radius(system.coefficients, system.weights, system.scheme, k, system.belt_speed)
-            > 1.0 + MARGIN
-        )
+        system, k, belt = found.system, found.stiffness, found.system.belt_speed
+        return spectral_radius(system.coefficients, system.weights, system.scheme, k, belt) > 1.0 + MARGIN
 
     first = sliding_at(critical.lower)
     opens = first is not None and first.opens
