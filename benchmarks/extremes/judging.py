@@ -186,7 +186,7 @@ def exponential(system: System, rows: Rows) -> Rows | None:
     ):
         return None
     grip = -float(states[0]) * c.phi * k if c.phi else 0.0
-    load = float(system.load.values[0])
+    load = float(system.load["value"][0])
     a = np.zeros((5, 5))  # of (x, y, vx interval, vy interval, 1), the time in intervals
     a[0, 2] = a[1, 3] = 1.0
     a[2] = np.array([c.c_xx, c.c_xy + grip, c.b_xx / interval, c.b_xy / interval, load * c.sin_beta])

@@ -50,8 +50,8 @@ def kernel(signature: Any, *, fastmath: frozenset[str] = frozenset(), inlined: b
     """Compile a function ahead of its first call for one signature, strictly (no fastmath unless named).
 
     A large one that is called in many places is better not `inlined`: otherwise compilation takes ten times
-    longer. Such a one, and one whose name begins with an underscore, cannot be called from Python: to wrap their
-    arguments would take longer than to compile them.
+    longer. Such a one, and one whose name begins with an underscore, is for other kernels alone: it has no wrapper
+    for calls from Python, whose compilation takes as long as its own. Python must not call it.
     """
 
     def compile_(function: F) -> F:
@@ -72,11 +72,7 @@ def kernel(signature: Any, *, fastmath: frozenset[str] = frozenset(), inlined: b
 vector = float64[::1]
 """A contiguous array of doubles."""
 
-
-vector = float64[::1]
-"""A contiguous array of doubles."""
-
-_functions: list[Any] = []
+_functions: list[Any] = []  # interpreted kernels, found by their number
 
 
 def address(function: Any) -> int:

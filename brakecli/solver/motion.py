@@ -189,8 +189,8 @@ class Stepping:
         """(ẍ, ÿ) of (6)-(7) at t = 0; where the shoe moves with the wheel, friction decides as in a step."""
         c, (x, y), (v_x, v_y) = self.system.coefficients, position, velocity
         load = self.system.load_at_start
-        g_1 = -(c.b_xx * v_x + c.b_xy * v_y + c.c_xx * x + c.c_xy * y + load * c.sin_beta)
-        g_2 = force - (c.b_xy * v_x + c.b_yy * v_y + c.c_xy * x + c.c_yy * y + load * c.cos_beta)
+        g_1 = -(c.b_xx * v_x + c.b_xy * v_y + c.c_xx * x + c.c_xy * y + load * c.sin_beta)  # Eq. (6)
+        g_2 = force - (c.b_xy * v_x + c.b_yy * v_y + c.c_xy * x + c.c_yy * y + load * c.cos_beta)  # Eq. (7)
         sliding = v_x - self.system.belt_speed
         if sliding != 0.0:
             return (g_1 - np.sign(sliding) * c.phi * force) / c.m, g_2 / c.m

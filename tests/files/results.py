@@ -53,5 +53,5 @@ def command_of(action: Action, path: Path) -> list[str]:
 
 def in_a_process(action: Action, path: Path) -> None:
     """Call a function where a crash or a hang is seen, and does not take the tests along."""
-    done = subprocess.run(command_of(action, path), cwd=ROOT, capture_output=True, text=True, timeout=LIMIT)
+    done = subprocess.run(command_of(action, path), cwd=ROOT, capture_output=True, text=True, timeout=3 * LIMIT)
     assert done.returncode == 0, done.stdout + done.stderr

@@ -424,8 +424,9 @@ def test_exact_ends_where_profiles_of_almost_equal_length_meet() -> None:
 @given(gaps(), st.sampled_from(EVALUATORS), st.integers(-20, 20), st.integers(-20, 30))
 def test_heights_and_stiffness_scale_exactly(gap: Gap, evaluator: str, height: int, stiffness: int) -> None:
     """Amplitudes and y times 2^p, k times 2^q: no threshold in metres or newtons, so not a bit changes but the
-    exponent.
+    exponent, where nothing is so small that it loses bits itself.
     """
+    assume(gap.y == 0.0 or abs(gap.y) > 1e-200)
 
     def scaled(waves: tuple[Wave, ...]) -> tuple[Wave, ...]:
         return tuple(Wave(math.ldexp(wave.g, height), wave.length, wave.phase) for wave in waves)

@@ -5,7 +5,7 @@ from fractions import Fraction
 from itertools import pairwise
 
 import pytest
-from hypothesis import example, given
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from brakecli.solver.double_double import add, multiply, split, two_product, two_sum
@@ -128,6 +128,7 @@ def test_the_integral_is_exact_to_30_digits_wherever_the_time_lies(given_: Given
 
 @given(values, st.floats(-10, 10), st.floats(-1e7, 1e7))
 def test_a_single_knot_is_a_constant(height: float, knot: float, t: float) -> None:
+    assume(all(time == 0.0 or abs(time) > 1e-200 for time in (knot, t)))  # or the integral loses bits itself
     s = schedule([knot], [height])
     assert (value_at(s, t), slope_at(s, t)) == (height, 0.0)
     error = exact(integral_at(s, t, 0.0)) - Fraction(height) * Fraction(t)

@@ -14,7 +14,7 @@ CLEAR, PARTLY, FULL = 0, 1, 2
 
 @kernel(int64(float64, PAD_TYPE))
 def coverage(y: float, pad: Any) -> int:
-    """FULL or CLEAR where bounds on the surfaces prove that the pad touches everywhere or nowhere, else PARTLY."""
+    """FULL or CLEAR where bounds on the surfaces prove that the pad touches everywhere or nowhere, or PARTLY."""
     if y >= pad.wheel_bound + pad.shoe_bottom:
         return CLEAR
     if -y >= pad.wheel_bound + pad.shoe_top:

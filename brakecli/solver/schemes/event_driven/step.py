@@ -39,19 +39,19 @@ from brakecli.solver.schemes.event_driven.phases import (
 _LOCAL = 0.05
 """Error of a step over the tolerance of the histories, to which the errors of all steps add up."""
 _DEFECT, _EARLY, _LATE = 20.0, 0.47, 0.93
-"""Defect of a step over the error that it is allowed, and where it is taken: between the stages."""
+"""Allowed defect of a step over its allowed error, and the parts of the step where it is taken, between stages."""
 _DENSE_ROUNDING = 63.0
-"""Rounding of the continuous solution's slope there over that of the slopes of the stages."""
+"""The continuous solution's slope there is rounded so many times more than the slopes of the stages."""
 _SAFETY, _LEAST, _MOST = 0.9, 0.2, 6.0
-"""Of the step that the error asks for: what is taken, and the bounds of its change."""
+"""The part that is taken of the step that the error asks for, and the bounds of a step's change."""
 _RADIANS = 2.0
-"""Of the fastest motion, in a step: the looks at the margins are to follow it."""
+"""Largest angle that the fastest motion turns by in a step, so that the looks at the margins follow it."""
 _DECAY = 4.0
-"""Powers of e by which the fastest decay goes on in a step; steps are stable up to six, but wrong in between."""
+"""Largest step times decay rate: steps are stable up to 6, but inaccurate beyond 4."""
 _FIRST = 0.05
 """The first step over the longest."""
 _MOST_SWITCHES, _MOST_EVENTS, _NO_PROGRESS = 60, 1000, 1e-6
-"""Phases that end at once, and events within a part of the longest step, before a run ends."""
+"""A run ends after so many phases that end at once, or so many events within a part of the longest step."""
 _TINY = 1e-300  # no division by zero where nothing moves
 
 _NONE, _NOT_CLOSED, _DIVERGED = int(Failure.NONE), int(Failure.NOT_CLOSED), int(Failure.DIVERGED)
