@@ -118,8 +118,14 @@ def growth(found: Sliding) -> Growth | None:
     if last - first < 4:  # out of steady sliding at once
         return Growth(fast, fast, 0.0)
 
-    def rate(start: int, end: int) -> float:
-        return _rate(maps[start], maps[end], (end - start) * interval)
+    def rate(
+        start: int, end: int
+    ) -> float:  # of the fastest of the disturbances that are still there at the start
+        u, sizes, vh = np.linalg.svd(maps[start])
+        kept = sizes > 1e-6 * sizes[0]
+        step = u.T[kept] @ maps[end] @ vh.T[:, kept] / sizes[kept]
+        radius = float(np.abs(np.linalg.eigvals(step)).max())
+        return math.log(max(radius, 1e-300)) / ((end - start) * interval)
 
     middle = (first + last) // 2
     noise = 1e-4 / ((last - first) * interval) if is_undamped(system.coefficients) else 0.0
@@ -157,12 +163,3 @@ def _last_linear(
         ended |= away > DEPARTED * away[:opening].max()
     ended[0] = False
     return int(np.argmax(ended)) - 1 if ended.any() else len(sizes) - 1
-
-
-def _rate(start: NDArray[np.float64], end: NDArray[np.float64], time: float) -> float:
-    """The growth rate (1/s) of the fastest of the disturbances that are still there at the start."""
-    u, sizes, vh = np.linalg.svd(start)
-    kept = sizes > 1e-6 * sizes[0]
-    step = u.T[kept] @ end @ vh.T[:, kept] / sizes[kept]
-    radius = float(np.abs(np.linalg.eigvals(step)).max())
-    return math.log(max(radius, 1e-300)) / time

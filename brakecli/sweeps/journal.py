@@ -76,11 +76,9 @@ class Journal:
 
     def begin(self, *, force: bool) -> None:
         """Take up what an earlier run has left, or write the header of a new journal."""
-        own = identity(self.plan)
-        found = self._file.read(_LONGEST_HEADER)
+        own, found = identity(self.plan), self._file.read(_LONGEST_HEADER)
         found = found[: found.find(b"\n") + 1]
-        refusal = _refusal(found, own)
-        if not refusal:
+        if not (refusal := _refusal(found, own)):
             self._read_blocks(len(found))
             return
         if found and not force:

@@ -96,12 +96,10 @@ def findings(columns: Columns) -> Findings:
     failed = np.flatnonzero(status.ravel() != _DONE)
     reasons = columns["reason"].ravel()[failed[:MOST_FAILURES]]
     warned = np.flatnonzero(columns["warning_count"].ravel())
-    critical = None
+    critical, hysteresis = None, _hysteresis(columns)
     if plan.sweep.critical is not None:
-        known = columns["critical"]
-        known = known[~np.isnan(known)]
+        known = columns["critical"][~np.isnan(columns["critical"])]
         critical = (len(known), float(known.min()), float(known.max())) if len(known) else (0, 0.0, 0.0)
-    hysteresis = _hysteresis(columns)
     few = status.size <= MOST_AS_JSON
     return Findings(
         points=status.size,
@@ -136,10 +134,9 @@ def write(result: ResultFile, report: SweepReport, columns: Columns) -> None:
     if not plan.sweep.axis:
         result.axis("/", fields.BASE_POINT, np.zeros(1))
     for field in fields_of(plan):
-        attributes = {}
-        if plan.sweep.critical is not None and field in fields.CRITICAL and field.kind == "f8":
-            attributes = {"parameter": plan.sweep.critical.parameter}
-            field = replace(field, units=unit(plan.sweep.critical.parameter))
+        attributes, critical = {}, plan.sweep.critical
+        if critical is not None and field in fields.CRITICAL and field.kind == "f8":
+            attributes, field = {"parameter": critical.parameter}, replace(field, units=unit(critical.parameter))
         data = columns[field.name]
         data = np.char.decode(data, "utf-8") if data.dtype.kind == "S" else data
         result.column(field, columns.dimensions, data, **attributes)
@@ -191,15 +188,13 @@ def _on_lasting_vibration(columns: Columns) -> Iterator[str]:
     early = np.nan_to_num(columns["critical_lower"] - sustained, nan=0.0)
     late = np.nan_to_num(sustained - columns["critical_upper"], nan=0.0)
     if below := int((early > critical.tolerance).sum()):
-        yield (
-            f"hysteresis at {below} of {early.size} points: from the case's own start vibration lasts at "
-            f"values up to {early.max():.3g} below the one at which steady sliding loses its stability"
-        )
+        start = "from the case's own start vibration lasts at values up to"
+        least = "below the one at which steady sliding loses its stability"
+        yield f"hysteresis at {below} of {early.size} points: {start} {early.max():.3g} {least}"
     if above := int((late > critical.tolerance).sum()):
-        yield (
-            f"at {above} of {late.size} points the case's own start leads into lasting vibration only at "
-            f"values up to {late.max():.3g} above the critical one; longer runs may give another answer"
-        )
+        start = "the case's own start leads into lasting vibration only at values up to"
+        longer = "above the critical one; longer runs may give another answer"
+        yield f"at {above} of {late.size} points {start} {late.max():.3g} {longer}"
 
 
 def _parameters(plan: Plan, index: int) -> dict[str, Any]:
