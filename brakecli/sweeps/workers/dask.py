@@ -194,7 +194,5 @@ def _attempt(compute: Compute, task: Task, versions: Mapping[str, str]) -> Finis
 
 
 def _difference(ours: Mapping[str, str], theirs: Mapping[str, str], who: str) -> str:
-    each = (
-        f"{key} is {theirs.get(key)} on {who} and {ours[key]} here" for key in ours if theirs.get(key) != ours[key]
-    )
-    return next(each, "")
+    different = [key for key in ours if theirs.get(key) != ours[key]]
+    return "".join(f"{key} is {theirs.get(key)} on {who} and {ours[key]} here" for key in different[:1])
