@@ -10,6 +10,8 @@ from brakecli.case.read import parse_case, starter_text
 from brakecli.case.system import system_of
 from brakecli.comparison.compare import compare
 from brakecli.comparison.result import ComparisonReport, write
+from brakecli.files import fields
+from brakecli.files.field import values_of
 from brakecli.files.read import open_result
 from brakecli.runs.run import run
 from brakecli.sweeps.driver import choose_engine, sweep
@@ -71,6 +73,7 @@ def test_every_threshold_stands_in_the_documentation_with_its_default() -> None:
 
 def test_every_name_of_stability_is_documented() -> None:
     page = (ROOT / "docs" / "stability.md").read_text()
-    numbers = stability(system_of(parse_case(starter_text(), "starter").case)).numbers()
+    report = stability(system_of(parse_case(starter_text(), "starter").case))
+    numbers = values_of(fields.STABILITY, report)
     names = [*numbers, *numbers["discrete"]]
     assert [name for name in names if f"`{name}`" not in page] == []

@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import NDArray
 
-from brakecli.case.case import Evaluator, Iteration, Start
 from brakecli.errors import UsageError
 from brakecli.files.read import StoredResult
 from brakecli.files.write import FILL
@@ -140,16 +139,16 @@ def _looks(picture: ComparisonPicture) -> dict[str, dict[str, Any]]:
         scheme = SCHEMES.get(entry["scheme"])
         colour, own = (scheme.colour, scheme.own_steps) if scheme else (style.GREEN, False)
         marker = _MARKERS.get(entry["theta"], "P")
-        if entry["evaluator"] == Evaluator.EXACT and not own:
+        if entry["evaluator"] == "exact" and not own:
             colour = _EXACT
-        elif entry["evaluator"] == Evaluator.MIDPOINT and entry["nodes"] in others:
+        elif entry["evaluator"] == "midpoint" and entry["nodes"] in others:
             colour, marker = _OTHER_NODES, _NODE_MARKERS[others.index(entry["nodes"]) % len(_NODE_MARKERS)]
         looks[label] = {
             "color": colour,
             "marker": marker,
             "markersize": 9.0 if own else 5.0,
-            "markerfacecolor": "white" if entry["start"] == Start.PAPER else colour,
-            "linestyle": (0, (2, 1.5)) if entry["iteration"] == Iteration.FIXED_POINT else "-",
+            "markerfacecolor": "white" if entry["start"] == "paper" else colour,
+            "linestyle": (0, (2, 1.5)) if entry["iteration"] == "fixed-point" else "-",
             "linewidth": 2.0 if own else 1.1,
             "zorder": 3.0 if own else 2.0,
         }

@@ -13,7 +13,6 @@ from brakecli.plots.marks import DIFFERENT, FORCED, REGIMES, Mark
 from brakecli.plots.style import Array
 from brakecli.plots.sweep import SweepPicture
 from brakecli.sweeps.critical import Outcome
-from brakecli.sweeps.tables import Method
 
 _FEW = 60
 """Number of points up to which each has a marker of full size."""
@@ -31,7 +30,7 @@ def draw(picture: SweepPicture) -> Figure:
     else:
         panels = [(3.2, _draw_critical)]
         compared = np.isfinite(picture["critical"] - picture["critical_eigenvalue"]).any()
-        if picture.critical.method is Method.SIMULATION and compared:
+        if picture.critical.method == "simulation" and compared:
             panels.append((1.0, _draw_difference))
     figure = marks.sweep_figure(picture, marks.WIDTH, 5.2 if len(panels) == 1 else 6.4)
     heights = [height for height, _ in panels]
@@ -59,7 +58,7 @@ def _draw_critical(axes: Axes, picture: SweepPicture) -> None:
         line = {"ls": "none", "marker": "_", "ms": 16}
     axes.plot(x, eigenvalue, color=style.DARK, lw=1.1, label="by eigenvalues", **line)
     regained = picture["critical_status"][0] == Outcome.REGAINED
-    if critical.method is Method.SIMULATION:
+    if critical.method == "simulation":
         for chosen, face, label in ((~regained, style.BLUE, "by simulation"), (regained, "white", "stable above")):
             if (there := chosen & np.isfinite(value)).any():
                 error = picture["critical_error"][0][there]

@@ -19,7 +19,7 @@ from brakecli.case.system import system_of
 from brakecli.errors import CaseError
 from brakecli.solver.system import System
 from brakecli.sweeps.growth import Growth, Sliding, growth, sliding, with_step
-from brakecli.sweeps.tables import Critical, Method
+from brakecli.sweeps.tables import Critical
 
 Found = TypeVar("Found")
 
@@ -97,7 +97,7 @@ def search(
         exact = _friction_by_eigenvalues(critical, system_at(critical.lower))
     else:
         exact = _by_eigenvalues(critical, sliding_at)
-    if critical.method is Method.EIGENVALUE:
+    if critical.method == "eigenvalue":
         return _answer(exact, exact, 0.0)
     found = _by_simulation(critical, sliding_at)
 
@@ -135,8 +135,8 @@ def _by_eigenvalues(critical: Critical, sliding_at: SlidingAt) -> _Change:
         return rate > 1e-12 * math.sqrt((abs(c.c_xx) + abs(c.c_yy) + k) / c.m)
 
     def grows_in_steps(found: Sliding) -> bool:
-        system, k, belt = found.system, found.stiffness, found.system.belt_speed
-        return spectral_radius(system.coefficients, system.weights, system.scheme, k, belt) > 1.0 + MARGIN
+        phi = found.system.coefficients.phi
+        return spectral_radius(found.system, found.stiffness, phi) > 1.0 + MARGIN
 
     first = sliding_at(critical.lower)
     opens = first is not None and first.opens

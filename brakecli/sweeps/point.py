@@ -27,7 +27,6 @@ from brakecli.solver.roughness import TWO_PI, wheel_angles
 from brakecli.solver.schedules import integral_at
 from brakecli.sweeps.critical import search
 from brakecli.sweeps.plan import Plan, Settings
-from brakecli.sweeps.tables import Direction
 
 OUT_OF_MEMORY = "out of memory; sample less often, or reduce contact.nodes"
 
@@ -117,7 +116,7 @@ def line_points(plan: Plan, line: int) -> list[int]:
     followed, inner = plan.sweep.axis[plan.followed], math.prod(plan.shape[plan.followed + 1 :])
     lines = plan.points // followed.size
     outer, rest = divmod(line % lines, inner)
-    down = followed.direction is Direction.DOWN or (followed.direction is Direction.BOTH and line >= lines)
+    down = followed.direction == "down" or (followed.direction == "both" and line >= lines)
     places = sorted(range(followed.size), key=followed.value, reverse=down)
     return [(outer * followed.size + place) * inner + rest for place in places]
 
