@@ -35,7 +35,7 @@ def command(
     from brakecli.cli.tables import sweep_table
     from brakecli.runs.run import load_kernels
     from brakecli.sweeps.cost import Estimate
-    from brakecli.sweeps.driver import Progress, choose_engine, sweep
+    from brakecli.sweeps.driver import choose_engine, sweep
 
     load_kernels(loaded.base)
     with progress(quiet) as show_progress:
@@ -44,9 +44,9 @@ def command(
             if not quiet:
                 say(found.sentence() + (f"; {resumed} of them are there already" if resumed else ""))
 
-        def advance(points: Progress) -> None:
-            what = f"points, {points.failed} failed" if points.failed else "points"
-            show_progress(what, points.done, loaded.plan.passes * loaded.plan.points)
+        def advance(done: int, failed: int) -> None:
+            what = f"points, {failed} failed" if failed else "points"
+            show_progress(what, done, loaded.plan.passes * loaded.plan.points)
 
         with choose_engine(loaded.plan, jobs, scheduler, scheduler_file) as engine:
             report = sweep(loaded, target, engine, force=force, task_size=task_size, begin=begin, progress=advance)

@@ -77,19 +77,9 @@ def refuse_sweep(found: Estimate, free_bytes: float) -> None:
     if found.points > MOST_POINTS or found.seconds > MOST_SECONDS:
         raise RefusedError(f"the sweep is too large: {found.sentence()}; take fewer points, or shorter runs")
     if 2.0 * found.file_size > min(MOST_BYTES, free_bytes):  # finished points and the result, side by side
-        raise RefusedError(
-            f"the file would be too large, {free_bytes / 1e6:.3g} MB are free: {found.sentence()}; take fewer "
-            "points"
-        )
-    if found.memory > _physical_bytes():
-        raise RefusedError(
-            f"the sweep needs more memory than there is: {found.sentence()}; take fewer "
-            "--jobs, or sample less often"
-        )
-
-
-def _physical_bytes() -> float:
-    try:
-        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
-    except (ValueError, OSError):
-        return math.inf
+        free = f"{free_bytes / 1e6:.3g} MB are free"
+        raise RefusedError(f"the file would be too large, {free}: {found.sentence()}; take fewer points")
+    with suppress(ValueError, OSError):  # systems that do not say how much memory they have
+        if found.memory > os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"):
+            remedy = "take fewer --jobs, or sample less often"
+            raise RefusedError(f"the sweep needs more memory than there is: {found.sentence()}; {remedy}")
