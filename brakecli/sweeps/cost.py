@@ -1,6 +1,5 @@
 """What a sweep will cost, before anything is computed."""
 
-import math
 import os
 from contextlib import suppress
 from dataclasses import dataclass
