@@ -11,22 +11,16 @@ from dataclasses import dataclass
 KeyPath = tuple[str | int, ...]
 """The names of the tables and of the key, from the top of a file on; a number is a place in a list."""
 
-_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
-
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing that is wrong with what a user gave.
+    """One thing that is wrong with what a user gave."""
 
-    `path` leads to the key; it is empty for the text as a whole. `source` names the file, or the override as
-    ``--set key.path=VALUE``. `line` is 0 where no line can be named.
-    """
-
-    path: KeyPath
+    path: KeyPath  # of the key; empty for the text as a whole
     what: str
     remedy: str
-    source: str = ""
-    line: int = 0
+    source: str = ""  # the file, or the override as ``--set key.path=VALUE``
+    line: int = 0  # 0 where no line can be named
 
     @property
     def where(self) -> str:
@@ -86,13 +80,14 @@ class CannotWriteError(BrakecliError):
 
 def key_text(path: KeyPath) -> str:
     """A key path as TOML writes it, with places in a list in brackets: `roughness.wheel.amplitudes[2]`."""
-    parts = (
-        f"[{part}]"
-        if isinstance(part, int)
-        else "." + (part if _BARE_KEY.fullmatch(part) else json.dumps(part, ensure_ascii=False))
-        for part in path
-    )
-    return printable("".join(parts).removeprefix("."))
+    text = ""
+    for part in path:
+        if isinstance(part, str):
+            is_bare = re.fullmatch(r"[\w-]+", part, re.ASCII)
+            text += "." + (part if is_bare else json.dumps(part, ensure_ascii=False))
+        else:
+            text += f"[{part}]"
+    return printable(text.removeprefix("."))
 
 
 def found(value: object) -> str:

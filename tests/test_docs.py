@@ -10,6 +10,8 @@ from brakecli.case.read import parse_case, starter_text
 from brakecli.case.system import system_of
 from brakecli.comparison.compare import compare
 from brakecli.comparison.result import ComparisonReport, write
+from brakecli.files import fields
+from brakecli.files.field import values_of
 from brakecli.files.read import open_result
 from brakecli.runs.run import run
 from brakecli.sweeps.driver import choose_engine, sweep
@@ -71,6 +73,9 @@ def test_every_threshold_stands_in_the_documentation_with_its_default() -> None:
 
 def test_every_name_of_stability_is_documented() -> None:
     page = (ROOT / "docs" / "stability.md").read_text()
-    numbers = stability(system_of(parse_case(starter_text(), "starter").case)).numbers()
-    names = [*numbers, *numbers["discrete"]]
+    report = stability(system_of(parse_case(starter_text(), "starter").case))
+    numbers = values_of(fields.STABILITY, report)
+    objects = (numbers["discrete"], numbers["equilibrium"], numbers["modes"][0], numbers["crossings"][0])
+    names = [*numbers, *(name for each in objects for name in each)]
+    assert len(names) > 30
     assert [name for name in names if f"`{name}`" not in page] == []

@@ -4,85 +4,20 @@ The tables and keys are those of the case file, version 1. `brakecli.case.read` 
 """
 
 from collections.abc import Iterator, Mapping
-from enum import StrEnum
 from itertools import pairwise
+from typing import Annotated, Literal
 
 import tomli_w
 from pydantic import Field
 
-from brakecli.case.tables import (
-    MISSING,
-    MOST_WRONG_ENTRIES,
-    Angle,
-    Lengths,
-    NonNegative,
-    Number,
-    Positive,
-    Schedule,
-    Series,
-    Table,
-    Title,
-    Tolerance,
-    Weights,
-    choice,
-    entries,
-    quantity,
-)
+from brakecli.case import tables
+from brakecli.case.tables import NonNegative, Number, OneOf, Positive, Schedule, Series, Table, described, quantity
 from brakecli.errors import Problem, found
+from brakecli.solver.contact import EVALUATORS
+from brakecli.solver.method import MOST
+from brakecli.solver.schemes import SCHEMES, Scheme
 
-
-class Evaluator(StrEnum):
-    """How the contact force F_y is computed."""
-
-    AUTO = "auto"
-    CLOSED_FORM = "closed-form"
-    MIDPOINT = "midpoint"
-    EXACT = "exact"
-
-
-class Scheme(StrEnum):
-    """How time is stepped."""
-
-    TWO_LAYER = "two-layer"
-    THREE_LAYER = "three-layer"
-    EVENT_DRIVEN = "event-driven"
-    AUTO = "auto"
-
-
-_THETA: dict[Scheme, tuple[float, ...]] = {
-    Scheme.AUTO: (),
-    Scheme.TWO_LAYER: (0.5, 0.5),
-    Scheme.THREE_LAYER: (0.25, 0.5, 0.25),
-    Scheme.EVENT_DRIVEN: (),
-}
-
-
-DEFAULT_TOLERANCE = 1e-3
-"""Relative error of the histories where a case gives neither step nor tolerance."""
-
-EVENT_TOLERANCE = 1e-10
-"""Tolerance of event-driven where a case gives it a step."""
-
-
-class Iteration(StrEnum):
-    """How the equations of one step are solved; "fixed-point" is the paper's way."""
-
-    NEWTON = "newton"
-    FIXED_POINT = "fixed-point"
-
-
-class Start(StrEnum):
-    """How a three-layer scheme gets its second layer; "paper" sets it equal to the first."""
-
-    CONSISTENT = "consistent"
-    PAPER = "paper"
-
-
-class InitialState(StrEnum):
-    """The state that the initial values are added to: the origin, or the steady sliding of the case."""
-
-    REST = "rest"
-    EQUILIBRIUM = "equilibrium"
+DEFAULT_TOLERANCE = 1e-3  # relative error of the histories where a case gives neither step nor tolerance
 
 
 class Shoe(Table):
@@ -100,7 +35,7 @@ class Varying(Table):
         yield from self.different_lengths(values_key, times_key)
         times: Series = getattr(self, times_key) or ()
         late = [index for index, (before, time) in enumerate(pairwise(times), start=1) if time <= before]
-        for index in late[:MOST_WRONG_ENTRIES]:
+        for index in late[: tables.MOST_WRONG_ENTRIES]:
             what = f"is not later than the time before it{found(times[index])}"
             yield Problem((times_key, index), what, "let the times increase")
 
@@ -121,7 +56,7 @@ class Link(Table):
 
     stiffness: NonNegative = quantity("N/m", "stiffness c of the spring")
     damping: NonNegative = quantity("N·s/m", "damping b of the dashpot", 0.0)
-    angle_deg: Angle = quantity(
+    angle_deg: tables.Angle = quantity(
         "deg", "inclination: β of link 1 to the vertical, α of link 2 to the friction plane", 0.0
     )
 
@@ -147,12 +82,11 @@ class Contact(Table):
 
     half_length: Positive = quantity("m", "half length a of the contact")
     stiffness: Positive = quantity("N/m²", "stiffness k of the contact per unit of its length")
-    evaluator: Evaluator = choice('how the contact force is computed; "auto" takes the cheapest', Evaluator.AUTO)
-    nodes: int | None = Field(
-        None,
-        ge=2,
-        le=10_000_000,
-        description='quadrature nodes of "midpoint", chosen from the shortest wavelength if left out',
+    evaluator: Annotated[str, OneOf(lambda: EVALUATORS)] = described(
+        'how the contact force is computed; "auto" takes the cheapest', "auto"
+    )
+    nodes: Annotated[int, Field(ge=2, le=10_000_000)] | None = described(
+        'quadrature nodes of "midpoint", chosen from the shortest wavelength if left out', None
     )
 
 
@@ -162,8 +96,8 @@ class Profile(Table):
     alternatives = (("wavelengths",), ("wavenumbers",))
 
     amplitudes: Series = quantity("m", "amplitude of each sine")
-    wavelengths: Lengths | None = quantity("m", "wavelength of each sine", None)
-    wavenumbers: Lengths | None = quantity("rad/m", "wavenumber of each sine", None)
+    wavelengths: tables.Lengths | None = quantity("m", "wavelength of each sine", None)
+    wavenumbers: tables.Lengths | None = quantity("rad/m", "wavenumber of each sine", None)
     phases_deg: Series = quantity("deg", "phase of each sine, 0 if left out", default_factory=tuple)
 
     def _fill(self) -> None:
@@ -179,14 +113,16 @@ class Profile(Table):
 class Roughness(Table):
     """The profiles of both surfaces; a surface without one is smooth."""
 
-    shoe: Profile | None = Field(None, description="profile f1 of the shoe")
-    wheel: Profile | None = Field(None, description="profile f2 of the wheel")
+    shoe: Profile | None = described("profile f1 of the shoe", None)
+    wheel: Profile | None = described("profile f2 of the wheel", None)
 
 
 class Initial(Table):
     """The state at t = 0."""
 
-    at: InitialState = choice("the state that x, y, vx and vy are added to", InitialState.REST)
+    at: Literal["rest", "equilibrium"] = described(
+        "the state that x, y, vx and vy are added to: the origin, or the steady sliding of the case", "rest"
+    )
     x: Number = quantity("m", "tangential displacement", 0.0)
     y: Number = quantity("m", "normal displacement", 0.0)
     vx: Number = quantity("m/s", "tangential velocity", 0.0)
@@ -199,29 +135,38 @@ class Solver(Table):
     alternatives = (("step",), ("tolerance",))
     one_is_needed = False
 
-    scheme: Scheme = choice(
-        'the time-stepping scheme; "two-layer" with a step, otherwise "auto", which chooses one', Scheme.AUTO
+    scheme: Annotated[str, OneOf(lambda: (*SCHEMES, "auto"))] = described(
+        'the time-stepping scheme; "two-layer" with a step, otherwise "auto", which chooses one', "auto"
     )
-    theta: Weights = quantity(
+    theta: tables.Weights = quantity(
         "1",
         "weights of the layers: two for two-layer, 0.5 and 0.5 if left out; "
         "three that add up to 1 for three-layer, 0.25, 0.5 and 0.25 if left out; none for event-driven",
         default_factory=tuple,
     )
-    iteration: Iteration = choice("how the equations of a step are solved", Iteration.NEWTON)
-    start: Start = choice("how the second layer of three-layer is found", Start.CONSISTENT)
+    iteration: Annotated[str, OneOf(lambda: MOST)] = described(
+        'how the equations of a step are solved; "fixed-point" is the paper\'s way', "newton"
+    )
+    start: Annotated[str, OneOf(lambda: [start for row in SCHEMES.values() for start in row.starts])] = described(
+        'how the second layer of three-layer is found; "paper" sets it equal to the first', "consistent"
+    )
     step: Positive | None = quantity("s", "time step h; or tolerance instead", None)
-    tolerance: Tolerance | None = quantity(
+    tolerance: tables.Tolerance | None = quantity(
         "1", "largest relative error of the histories, 0.001 if there is no step either", None
     )
     duration: Positive = quantity("s", "time to simulate")
-    allow_unconverged: bool = Field(False, description="whether a run goes on after a step that did not converge")
+    allow_unconverged: bool = described("whether a run goes on after a step that did not converge", False)
 
     def _fill(self) -> None:
         if "scheme" not in self.model_fields_set and self.step is not None:
-            self.__dict__["scheme"] = Scheme.TWO_LAYER
+            self.__dict__["scheme"] = "two-layer"
         if "theta" not in self.model_fields_set:
-            self.__dict__["theta"] = _THETA[self.scheme]
+            self.__dict__["theta"] = self.row.theta
+
+    @property
+    def row(self) -> Scheme:
+        """What the scheme states of itself; one that is still to be chosen is event-driven until then."""
+        return SCHEMES["event-driven" if self.scheme == "auto" else self.scheme]
 
     @property
     def effective_tolerance(self) -> float | None:
@@ -230,23 +175,24 @@ class Solver(Table):
 
     def _broken_rules(self) -> Iterator[Problem]:
         yield from super()._broken_rules()
-        if self.step is not None and self.scheme == Scheme.AUTO:
+        if self.step is not None and self.scheme == "auto":
             what = 'is given, but "auto" chooses the step'
             yield self.wrong("step", what, "leave scheme out, or give tolerance instead of step")
-        count = len(_THETA[self.scheme])
-        if self.scheme in (Scheme.EVENT_DRIVEN, Scheme.AUTO):
-            neutral = {"theta": (), "iteration": Iteration.NEWTON, "allow_unconverged": False}
-            for key, value in neutral.items():
-                if getattr(self, key) != value:
+        row, count = self.row, len(self.row.theta)
+        if row.own_steps:
+            for key, neutral in (("theta", ()), ("iteration", "newton"), ("allow_unconverged", False)):
+                if getattr(self, key) != neutral:
                     yield self.wrong(key, f"is not for {self.scheme}", f"leave {key} out")
         elif len(self.theta) != count:
-            what = f"has {entries(self.theta)} where {self.scheme} has {count} weights"
+            what = f"has {tables.entries(self.theta)} where {self.scheme} has {count} weights"
             yield self.wrong("theta", what, f"give {count} weights, or leave theta out")
-        elif count == 3 and abs(sum(self.theta) - 1) > 1e-9:
+        elif row.sum_is_one and abs(sum(self.theta) - 1) > 1e-9:
             yield self.wrong("theta", f"adds up to {sum(self.theta):.12g}", "let the weights add up to 1")
-        if self.start == Start.PAPER and self.scheme != Scheme.THREE_LAYER:
-            what = "is only for the three-layer scheme"
-            yield self.wrong("start", what, 'leave start out, or set scheme to "three-layer"')
+        if self.start not in row.starts:
+            names = [name for name, each in SCHEMES.items() if self.start in each.starts]
+            what = f"is only for the {' and '.join(names)} scheme"
+            remedy = " or ".join(f'"{name}"' for name in names)
+            yield self.wrong("start", what, f"leave start out, or set scheme to {remedy}")
 
 
 class Output(Table):
@@ -264,11 +210,11 @@ class Case(Table):
     of the roughness hold their values also where the file left them out.
     """
 
-    title: Title = ""
+    title: tables.Title = ""
     shoe: Shoe
     wheel: Wheel
-    link1: Link = Field(description="the link that is inclined by β to the vertical")
-    link2: Link = Field(description="the link that is inclined by α to the friction plane")
+    link1: Link = described("the link that is inclined by β to the vertical")
+    link2: Link = described("the link that is inclined by α to the friction plane")
     load: Load
     friction: Friction
     contact: Contact
@@ -284,16 +230,16 @@ class Case(Table):
     def _broken_rules(self) -> Iterator[Problem]:
         step = self.solver.step
         if step is None and "sample_interval" not in self.output.model_fields_set:
-            what = f"{MISSING}, and there is no time step to take its place"
+            what = f"{tables.MISSING}, and there is no time step to take its place"
             yield Problem(("output", "sample_interval"), what, "give a number above 0, in s")
         if step is not None and self.output.sample_interval < step * (1 - 1e-9):
             what = f"is below the time step of {step!r} s"
             yield self.wrong("output.sample_interval", what, "make it at least one time step")
-        exact = self.solver.scheme == Scheme.EVENT_DRIVEN or step is None
-        if exact and self.contact.evaluator == Evaluator.MIDPOINT:
+        exact = self.solver.row.own_steps or step is None
+        if exact and self.contact.evaluator == "midpoint":
             what = "is given, but event-driven is exact, and a tolerance chooses nodes itself"
             yield self.wrong("contact.evaluator", what, "leave evaluator out")
-        if self.solver.start == Start.PAPER and (self.initial.vx or self.initial.vy):
+        if self.solver.start == "paper" and (self.initial.vx or self.initial.vy):
             what = "takes the second layer for equal to the first, but the initial velocity is not zero"
             remedy = 'set start to "consistent", or initial.vx and initial.vy to 0'
             yield self.wrong("solver.start", what, remedy)
@@ -301,10 +247,8 @@ class Case(Table):
 
 def changed(case: Case, **tables: Mapping[str, object]) -> Case:
     """The case with some keys of some tables changed, valid again; raises pydantic's ValidationError."""
-    parts = {name: getattr(case, name) for name in Case.model_fields}
-    for name, keys in tables.items():
-        parts[name] = {**{key: getattr(parts[name], key) for key in type(parts[name]).model_fields}, **keys}
-    return Case.model_validate(parts)
+    new = {name: {**dict(getattr(case, name)), **keys} for name, keys in tables.items()}
+    return Case.model_validate({**dict(case), **new})
 
 
 def resolved_toml(case: Case) -> str:

@@ -5,6 +5,7 @@ import re
 import shlex
 import sys
 from collections.abc import Container, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
@@ -12,10 +13,10 @@ from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
-from brakecli.case import wording
+from brakecli.case import toml_lines, wording
 from brakecli.case.case import Case, resolved_toml
 from brakecli.case.tables import MISSING, Table, tables_within
-from brakecli.case.toml_lines import LARGEST_TEXT, MOST_PARTS, WRITING, Located, parse, split, too_large, unfit
+from brakecli.case.toml_lines import WRITING, Located, check_size, innermost, parse, split, unfit
 from brakecli.errors import CaseError, KeyPath, Problem, key_text, printable
 
 _Table = TypeVar("_Table", bound=Table)
@@ -36,10 +37,7 @@ def starter_text() -> str:
 
 
 def read_case(source: str, overrides: Sequence[str] = ()) -> LoadedCase:
-    """Read the case from a path, or from standard input where the path is "-". Raises `CaseError`.
-
-    Overrides are those of `parse_case`.
-    """
+    """Read the case from a path, or from standard input where the path is "-"; see `parse_case`."""
     return parse_case(*read_text(source), overrides)
 
 
@@ -47,19 +45,15 @@ def read_text(source: str) -> tuple[str, str]:
     """The text of a file, or of standard input where the path is "-", and its name; line ends stay as they are."""
     name = "standard input" if source == "-" else source
     try:
-        if source == "-":
-            data = sys.stdin.buffer.read(LARGEST_TEXT + 1)
-        else:
-            with Path(source).open("rb") as file:
-                data = file.read(LARGEST_TEXT + 1)
+        with nullcontext(sys.stdin.buffer) if source == "-" else Path(source).open("rb") as file:
+            data = file.read(toml_lines.LARGEST_TEXT + 1)
     except (OSError, ValueError, AttributeError) as error:
         # ValueError: a NUL in the path, or standard input is closed; AttributeError: there is no standard input.
-        closed = isinstance(error, AttributeError)
-        reason = "it is closed" if closed else getattr(error, "strerror", None) or str(error)
+        reason = getattr(error, "strerror", None) or str(error)
+        reason = "it is closed" if isinstance(error, AttributeError) else reason
         what = f"cannot be read: {reason[0].lower()}{reason[1:]}"
         raise unfit(what, 'name a TOML file, or "-" for standard input', name) from error
-    if len(data) > LARGEST_TEXT:
-        raise too_large(name)
+    check_size(data, name)
     try:
         return data.decode("utf-8"), name
     except UnicodeDecodeError as error:
@@ -70,11 +64,11 @@ def read_text(source: str) -> tuple[str, str]:
 
 
 def parse_case(text: str, label: str, overrides: Sequence[str] = ()) -> LoadedCase:
-    """Make a case of a TOML text; messages call it `label`. Raises `CaseError`, which holds every problem.
+    """Make a case of a TOML text, which messages call `label`. Raises `CaseError`, which holds every problem.
 
     An override reads `key.path=VALUE`, the value in TOML. It replaces what the text says, creates the tables
     that it needs, and takes effect before anything is checked. Of two keys that exclude each other (a constant
-    load or a schedule, wavelengths or wavenumbers), an override of one removes the other from the text.
+    load or a schedule), an override of one removes the other from the text.
     """
     case = parse_table(Case, text, label, overrides)
     return LoadedCase(case, text, resolved_toml(case))
@@ -82,16 +76,15 @@ def parse_case(text: str, label: str, overrides: Sequence[str] = ()) -> LoadedCa
 
 def parse_table(kind: type[_Table], text: str, label: str, overrides: Sequence[str] = ()) -> _Table:
     """Make a table of some kind, such as a case, of a whole TOML text; see `parse_case`."""
-    located = Located(text, label)
-    problems: list[Problem] = []
+    located, problems = Located(text, label), list[Problem]()
     try:
         data = parse(text, label)
     except CaseError as error:
         data, problems = located.data, located.problems or [*error.problems]
     all_is_readable = all(problem.path for problem in problems)
-    options = [f"--set {printable(override)}" for override in overrides]
-    set_by: dict[KeyPath, str] = {}
-    for option, override in zip(options, overrides, strict=True):
+    sources, set_by = [label], dict[KeyPath, str]()
+    for override in overrides:
+        sources.append(option := f"--set {printable(override)}")
         try:
             path, value = parse_override(override)
             created = put(data, path, value, kind, kept=set_by)
@@ -105,19 +98,16 @@ def parse_table(kind: type[_Table], text: str, label: str, overrides: Sequence[s
         for problem in wording.problems(error, kind):
             if problem.what == MISSING and not all_is_readable:
                 continue  # it may stand in the part that cannot be read
-            prefixes = (problem.path[:end] for end in range(len(problem.path), 0, -1))
-            if by := next((set_by[prefix] for prefix in prefixes if prefix in set_by), ""):
-                problems.append(replace(problem, source=by))
-            else:
-                problems.append(replace(problem, source=label, line=located.line_of(problem.path)))
+            by = innermost(set_by, problem.path, "")
+            line = 0 if by else innermost(located.lines, problem.path, 0)
+            problems.append(replace(problem, source=by or label, line=line))
     if problems:
-        order = [label, *options]
-        raise CaseError(sorted(problems, key=lambda problem: (order.index(problem.source), problem.line)))
+        raise CaseError(sorted(problems, key=lambda problem: (sources.index(problem.source), problem.line)))
     return table
 
 
 def put(
-    data: dict[str, Any], path: tuple[str, ...], value: object, kind: type[Table], kept: Container[KeyPath] = ()
+    data: dict[str, Any], path: tuple[str, ...], value: object, kind: type[Table], kept: Container[KeyPath]
 ) -> list[tuple[str, ...]]:
     """Set a key in the data of a table of some kind; the paths of the tables that were created for it.
 
@@ -136,8 +126,7 @@ def put(
     if not isinstance(table, dict):
         raise CaseError([Problem(path, f"{key_text(path[:-1])} is not a table", "set a key of a table")])
     table[key] = value
-    owner = tables_within(kind).get(tuple(parents))
-    groups = owner.alternatives if owner else ()
+    groups = tables_within(kind).get(tuple(parents), Table).alternatives
     if any(key in group for group in groups):
         for other in (other for group in groups if key not in group for other in group):
             if (*parents, other) not in kept:
@@ -170,14 +159,10 @@ def parse_override(override: str) -> tuple[tuple[str, ...], object]:
 
 def key_path(text: str) -> tuple[str, ...]:
     """The parts of a key path as TOML writes it; none if it is not one."""
-    if "\n" in text or text.count(".") >= MOST_PARTS:  # the time that tomllib takes grows with their square
+    if "\n" in text or text.count(".") >= toml_lines.MOST_PARTS:
         return ()
     try:
-        rest: Any = parse(f"{text}=0")
+        path, value = toml_lines.only_path(parse(f"{text}=0"))
     except CaseError:
         return ()
-    path: tuple[str, ...] = ()
-    while isinstance(rest, dict) and len(rest) == 1:
-        ((part, rest),) = rest.items()
-        path = (*path, part)
-    return path if rest == 0 else ()
+    return path if value == 0 else ()

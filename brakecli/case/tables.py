@@ -1,9 +1,10 @@
 """What all tables of case and sweep files share: kinds of numbers, rules between keys, and their JSON Schema."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import nullcontext, suppress
-from enum import StrEnum
+from dataclasses import dataclass
 from functools import cache
+from operator import attrgetter
 from typing import Annotated, Any, ClassVar, Self, cast, get_args
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, WrapValidator, model_validator
@@ -11,24 +12,45 @@ from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import InitErrorDetails, PydanticCustomError, core_schema
 
 from brakecli.errors import KeyPath, Problem, found
+from brakecli.solver.contact import EVALUATORS
+from brakecli.solver.schemes import SCHEMES
 
 SMALLEST, LARGEST = 1e-100, 1e100
 """Magnitudes between which every number other than zero must lie, so that products neither vanish nor overflow."""
 
-MOST_WRONG_ENTRIES = 20
-"""Most wrong entries of one list that are reported."""
-
+MOST_WRONG_ENTRIES = 20  # of one list that are reported
 MISSING = "is missing"
 
 
+def described(description: str, default: Any = ..., **options: Any) -> Any:
+    """A key, which is required if it has no default."""
+    return Field(default, description=description, **options)
+
+
 def quantity(unit: str, description: str, default: Any = ..., **options: Any) -> Any:
-    """A key that holds a number or numbers; it is required if it has no default."""
-    return Field(default, description=description, json_schema_extra={"unit": unit}, **options)
+    """A key that holds a number or numbers."""
+    return described(description, default, json_schema_extra={"unit": unit}, **options)
 
 
-def choice(description: str, default: StrEnum | None) -> Any:
-    """A key that holds a member of an enum, which TOML gives as a text."""
-    return Field(default, description=description, strict=False)
+@dataclass(frozen=True)
+class OneOf:
+    """A text that is one of some names. They are asked for at every check, so that a row may join a registry."""
+
+    names: Callable[[], Iterable[str]]
+
+    def __get_pydantic_core_schema__(self, *_: Any) -> core_schema.CoreSchema:
+        """Accept these names."""
+
+        def checked(value: Any) -> Any:
+            if value not in tuple(self.names()):
+                raise PydanticCustomError("enum", "is not one of the choices")
+            return value
+
+        return core_schema.no_info_plain_validator_function(checked)
+
+    def __get_pydantic_json_schema__(self, *_: Any) -> JsonSchemaValue:
+        """List these names."""
+        return {"enum": list(dict.fromkeys(self.names())), "type": "string"}
 
 
 def _within_scale(value: float) -> float:
@@ -42,10 +64,9 @@ def _few_errors(values: Any, handler: Callable[[Any], Any]) -> Any:
     try:
         return handler(values)
     except ValidationError as error:
-        count = error.error_count()
-        if count <= MOST_WRONG_ENTRIES:
+        if error.error_count() <= MOST_WRONG_ENTRIES:
             raise
-        what = f"has {count} wrong entries, of which the first {MOST_WRONG_ENTRIES} are reported"
+        what = f"has {error.error_count()} wrong entries, of which the first {MOST_WRONG_ENTRIES} are reported"
         errors = [*_again(error, MOST_WRONG_ENTRIES), _as_error(Problem((), what, "correct these first"))]
         raise ValidationError.from_exception_data("list", errors) from None
 
@@ -73,13 +94,11 @@ class Table(BaseModel):
         frozen=True,
         extra="forbid",
         allow_inf_nan=False,
-        json_schema_extra=lambda schema, model: _describe_alternatives(schema, model),
+        json_schema_extra=lambda schema, model: schema.update(model._alternatives_schema()),
     )
 
-    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = ()
-    """Groups of keys that exclude each other."""
-    one_is_needed: ClassVar[bool] = True
-    """Whether one of these groups must be given."""
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = ()  # groups of keys that exclude each other
+    one_is_needed: ClassVar[bool] = True  # of these groups
 
     def _broken_rules(self) -> Iterator[Problem]:
         """Yield a problem for every rule between keys that does not hold."""
@@ -104,13 +123,17 @@ class Table(BaseModel):
 
     def wrong(self, key: str, what: str, remedy: str) -> Problem:
         """The problem with the value of a key, which may be one of an inner table: `output.sample_interval`."""
-        value: Any = self
-        for part in key.split("."):
-            value = getattr(value, part)
-        return Problem(tuple(key.split(".")), what + found(value), remedy)
+        return Problem(tuple(key.split(".")), what + found(attrgetter(key)(self)), remedy)
 
     def _fill(self) -> None:
         """Give the keys that were left out their values, where these depend on other keys."""
+
+    @classmethod
+    def _alternatives_schema(cls) -> dict[str, Any]:
+        groups = [{"required": list(group)} for group in cls.alternatives]
+        if not groups:
+            return {}
+        return {"oneOf": groups} if cls.one_is_needed else {"not": {"allOf": groups}}
 
     @model_validator(mode="wrap")
     @classmethod
@@ -122,7 +145,7 @@ class Table(BaseModel):
         except ValidationError as error:
             if not isinstance(data, dict):
                 raise
-            errors = _again(error)
+            errors = [*_again(error)]
             table = cls._without({str(each["loc"][0]) for each in errors}, data)
         # A rule that needs a wrong key meets no attribute: it waits until that key is right.
         with suppress(AttributeError) if errors else nullcontext():
@@ -157,16 +180,11 @@ def _as_error(problem: Problem) -> InitErrorDetails:
     return InitErrorDetails(type=kind, loc=problem.path, input=None)
 
 
-def _again(error: ValidationError, most: int | None = None) -> list[InitErrorDetails]:
+def _again(error: ValidationError, most: int | None = None) -> Iterator[InitErrorDetails]:
     """The errors of a validation, or the first of them, in a form that can be raised again."""
-    return [
-        InitErrorDetails(
-            type=PydanticCustomError(each["type"], each["type"], each.get("ctx")),
-            loc=each["loc"],
-            input=each["input"],
-        )
-        for each in error.errors(include_url=False)[:most]
-    ]
+    for each in error.errors(include_url=False)[:most]:
+        kind = PydanticCustomError(each["type"], each["type"], each.get("ctx"))
+        yield InitErrorDetails(type=kind, loc=each["loc"], input=each["input"])
 
 
 @cache
@@ -193,20 +211,17 @@ class _TomlSchema(GenerateJsonSchema):
         return described
 
 
-def _describe_alternatives(schema: dict[str, Any], model: type[Table]) -> None:
-    groups = [{"required": list(group)} for group in model.alternatives]
-    if groups and model.one_is_needed:
-        schema["oneOf"] = groups
-    elif groups:
-        schema["not"] = {"allOf": groups}
-
-
-@cache
 def json_schema(kind: type[Table]) -> dict[str, Any]:
     """The JSON Schema (draft 2020-12) of a kind of table, such as a whole case file.
 
     It accepts everything that is valid; most rules between keys are beyond it.
     """
+    return _schema_with(kind, (*SCHEMES, *EVALUATORS))
+
+
+@cache
+def _schema_with(kind: type[Table], names: tuple[str, ...]) -> dict[str, Any]:
+    """The schema as it is while the registries hold these names."""
     return {"$schema": _TomlSchema.schema_dialect, **kind.model_json_schema(schema_generator=_TomlSchema)}
 
 

@@ -6,18 +6,16 @@ into its statements, and each of them is parsed by itself.
 
 import re
 import tomllib
-from typing import Any, NamedTuple
+from collections.abc import Mapping
+from typing import Any, TypeVar
 
 from brakecli.errors import CaseError, KeyPath, Problem, printable
 
-LARGEST_TEXT = 500_000
-"""Most bytes of a file. Within this limit and those below, every problem is reported within half a second."""
-MOST_PARTS = 32
-"""Most parts of a dotted key: the time that tomllib takes grows with their square."""
-MOST_STATEMENTS = 1000
-"""Most keys and table headers of a file: the time to find what is wrong grows with them."""
-MOST_MARKS = 50_000
-"""Most commas, brackets and signs of equality outside texts, and so most entries of all lists together."""
+# Within these limits every problem of a file is reported within half a second.
+LARGEST_TEXT = 500_000  # bytes
+MOST_PARTS = 32  # of a dotted key: the time that tomllib takes grows with their square
+MOST_STATEMENTS = 1000  # keys and table headers
+MOST_MARKS = 50_000  # commas, brackets and signs of equality outside texts; so many entries may all lists have
 
 _TOKEN = re.compile(
     r'"""(?:\\.|[^\\])*?(?:"{3,5}|\\?\Z)'
@@ -29,6 +27,7 @@ _TOKEN = re.compile(
     r"|[\[\]{}.,=]",
     re.DOTALL,
 )
+_Value = TypeVar("_Value")
 _HEADER = re.compile(r"[ \t]*\[")
 _NOTHING = re.compile(r"[ \t\n]*(#.*)?", re.DOTALL)
 _POSITION = re.compile(r" \(at (?:line (\d+), column \d+|end of document)\)$")
@@ -37,27 +36,38 @@ WRITING = "numbers are written 1.5 or 2e-3, texts in quotes, lists as [1, 2], ta
 """The remedy for what is not TOML."""
 
 
-class Statement(NamedTuple):
-    """A table header or a key with its value, and the line where it begins."""
-
-    line: int
-    text: str
-
-
 def unfit(what: str, remedy: str, source: str = "", line: int = 0) -> CaseError:
     """The error for a text of which no key can be named."""
     return CaseError([Problem((), what, remedy, source, line)])
 
 
-def too_large(source: str) -> CaseError:
-    """The error for a text of more than `LARGEST_TEXT` bytes."""
-    return unfit(f"is larger than {LARGEST_TEXT} bytes", "give a shorter file", source)
-
-
-def split(text: str, source: str = "") -> list[Statement]:
-    """The statements of a text, valid or not; raises `CaseError` for a text that tomllib must not get."""
+def check_size(text: str | bytes, source: str = "") -> None:
+    """Raise `CaseError` for more than `LARGEST_TEXT` bytes."""
     if len(text) > LARGEST_TEXT:
-        raise too_large(source)
+        raise unfit(f"is larger than {LARGEST_TEXT} bytes", "give a shorter file", source)
+
+
+def innermost(values: Mapping[KeyPath, _Value], path: KeyPath, default: _Value) -> _Value:
+    """The value of a key path, otherwise that of the innermost table around it."""
+    prefixes = (path[:end] for end in range(len(path), 0, -1))
+    return next((values[prefix] for prefix in prefixes if prefix in values), default)
+
+
+def only_path(data: Any) -> tuple[tuple[str, ...], Any]:
+    """The path through tables of a single key, and what stands at its end."""
+    path: tuple[str, ...] = ()
+    while isinstance(data, dict) and len(data) == 1:
+        ((key, data),) = data.items()
+        path = (*path, key)
+    return path, data
+
+
+def split(text: str, source: str = "") -> list[tuple[int, str]]:
+    """Headers and keys with their values, valid or not, each with the line where it begins.
+
+    Raises `CaseError` for a text that tomllib must not get.
+    """
+    check_size(text, source)
     if text.startswith("\ufeff"):
         raise unfit("begins with a byte order mark", "save the file as UTF-8 without one", source, 1)
     if "\0" in text:
@@ -83,14 +93,14 @@ def split(text: str, source: str = "") -> list[Statement]:
                 raise unfit(what, "give shorter lists", source, line)
         line += mark.count("\n")
         if mark[0] == "\n" and (depth <= 0 or in_header):
-            statements.append(Statement(first, text[start : token.start()]))
+            statements.append((first, text[start : token.start()]))
             start, first, depth = token.end(), line, 0
             in_header = _HEADER.match(text, start)
-    statements.append(Statement(first, text[start:]))
-    statements = [statement for statement in statements if not _NOTHING.fullmatch(statement.text)]
+    statements.append((first, text[start:]))
+    statements = [statement for statement in statements if not _NOTHING.fullmatch(statement[1])]
     if len(statements) > MOST_STATEMENTS:
-        line = statements[MOST_STATEMENTS].line
-        raise unfit(f"there are more than {MOST_STATEMENTS} keys", "give a shorter file", source, line)
+        what = f"there are more than {MOST_STATEMENTS} keys"
+        raise unfit(what, "give a shorter file", source, statements[MOST_STATEMENTS][0])
     return statements
 
 
@@ -100,9 +110,9 @@ class Located:
     def __init__(self, text: str, source: str = "") -> None:
         """Parse statement after statement. Raises `CaseError` where the text cannot be split into statements."""
         self.data: dict[str, Any] = {}
+        self.lines: dict[KeyPath, int] = {}
         self.problems: list[Problem] = []
         self._source = source
-        self.lines: dict[KeyPath, int] = {}
         table: dict[str, Any] | None = self.data
         path: KeyPath = ()
         for line, statement in split(text, source):
@@ -111,38 +121,31 @@ class Located:
                 parsed = parse(statement, source, line)
             except CaseError as error:
                 self.problems += error.problems
-                if is_header:
-                    table = None  # nobody knows to which table the next keys belong
+                table = None if is_header else table  # nobody knows to which table the next keys belong
                 continue
             if is_header:
                 table, path = self._enter(parsed, line)
             elif table is not None:
                 self._add(table, path, parsed, line)
 
-    def line_of(self, path: KeyPath) -> int:
-        """The line of a key, otherwise that of the innermost table around it; 0 if there is none."""
-        prefixes = (path[:end] for end in range(len(path), 0, -1))
-        return next((self.lines[prefix] for prefix in prefixes if prefix in self.lines), 0)
-
     def _enter(self, parsed: dict[str, Any], line: int) -> tuple[dict[str, Any] | None, KeyPath]:
         """The table of a header, given as what tomllib makes of it; the keys that follow belong to this table."""
-        table, rest = self.data, parsed
+        keys, leaf = only_path(parsed)
+        table: Any = self.data
         path: KeyPath = ()
-        while rest:
-            ((key, rest),) = rest.items()
+        for count, key in enumerate(keys, start=1):
+            is_entry = count == len(keys) and isinstance(leaf, list)
             path = (*path, key)
-            inner = table.setdefault(key, [] if isinstance(rest, list) else {})
-            if isinstance(rest, list) and isinstance(inner, list):
+            table = table.setdefault(key, [] if is_entry else {})
+            if is_entry and isinstance(table, list):
                 self.lines.setdefault(path, line)
-                inner.append({})
-                rest = {}
-            if isinstance(inner, list) and inner:
-                path = (*path, len(inner) - 1)
-                inner = inner[-1]
-            if not isinstance(inner, dict):
+                table.append({})
+            if isinstance(table, list) and table:
+                path = (*path, len(table) - 1)
+                table = table[-1]
+            if not isinstance(table, dict):
                 self._report_twice(path, line)
                 return None, path
-            table = inner
         if path in self.lines:
             self._report_twice(path, line)
         self.lines.setdefault(path, line)
@@ -161,7 +164,7 @@ class Located:
                 self.lines.setdefault(here, line)
 
     def _report_twice(self, path: KeyPath, line: int) -> None:
-        first = self.line_of(path)
+        first = innermost(self.lines, path, 0)
         what = "is given twice" + (f", first in line {first}" if first else "")
         self.problems.append(Problem(path, what, "keep one of the two", self._source, line))
 

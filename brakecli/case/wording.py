@@ -17,6 +17,7 @@ _WHAT = {
     "string_type": "is not a text",
     "string_pattern_mismatch": "holds a line break or a control character",
     "enum": "is not one of the choices",
+    "literal_error": "is not one of the choices",
     "tuple_type": "is not a list",
     "model_type": "is not a table",
     "too_short": "is too short",
@@ -28,12 +29,8 @@ _WHAT = {
 }
 """The kinds of error that pydantic reports for one value of a case."""
 
-_KINDS = {
-    "number": "a number",
-    "integer": "a whole number",
-    "boolean": "true or false",
-    "string": "one line of text in quotes",
-}
+_TEXT = "one line of text in quotes"
+_KINDS = {"number": "a number", "integer": "a whole number", "boolean": "true or false", "string": _TEXT}
 
 
 def problems(error: ValidationError, kind: type[Table]) -> Iterator[Problem]:
@@ -43,40 +40,35 @@ def problems(error: ValidationError, kind: type[Table]) -> Iterator[Problem]:
     meant = {each["loc"]: _meant(each["loc"], tables) for each in errors if each["type"] == "extra_forbidden"}
     misspelt = {paths[0] for paths in meant.values() if paths}
     for each in errors:
-        path, value = each["loc"], each["input"]
-        match each["type"]:
-            case "rule":
-                yield replace(each["ctx"]["problem"], path=path)
-            case "extra_forbidden":
-                remedy = f"did you mean {' or '.join(_name(near, tables) for near in meant[path])}?"
-                if not meant[path]:
-                    parent = _without_places(path[:-1])
-                    keys = ", ".join(tables[parent].model_fields)
-                    remedy = f"the keys {f'of {_name(parent, tables)}' if parent else 'at the top'} are {keys}"
-                yield Problem(path, "is unknown" + found(value), remedy)
-                if meant[path] and meant[path][0] in tables and isinstance(value, dict):
-                    yield from _within(path, tables[meant[path][0]], value)
-            case "missing":
-                if path not in misspelt:
-                    yield Problem(path, MISSING, f"give {_expected(path, kind)}")
-            case reason:
-                too_large = reason == "float_type" and type(value) is int
-                what = _WHAT["magnitude" if too_large else reason]
-                yield Problem(path, what + found(value), f"give {_expected(path, kind)}")
-
-
-def _within(path: KeyPath, kind: type[Table], data: dict[str, Any]) -> Iterator[Problem]:
-    """What is wrong with the keys of a table whose own name is misspelt."""
-    try:
-        kind.model_validate(data)
-    except ValidationError as error:
-        for problem in problems(error, kind):
-            yield replace(problem, path=path + problem.path)
+        path, value, reason = each["loc"], each["input"], each["type"]
+        if reason == "rule":
+            yield replace(each["ctx"]["problem"], path=path)
+        elif reason == "missing":
+            if path not in misspelt:
+                yield Problem(path, MISSING, f"give {_expected(path, kind)}")
+        elif reason != "extra_forbidden":
+            too_large = reason == "float_type" and type(value) is int
+            what = _WHAT["magnitude" if too_large else reason]
+            yield Problem(path, what + found(value), f"give {_expected(path, kind)}")
+        elif not meant[path]:
+            parent = _table(path)
+            keys = ", ".join(tables[parent].model_fields)
+            remedy = f"the keys {f'of {_name(parent, tables)}' if parent else 'at the top'} are {keys}"
+            yield Problem(path, "is unknown" + found(value), remedy)
+        else:
+            near = " or ".join(_name(near, tables) for near in meant[path])
+            yield Problem(path, "is unknown" + found(value), f"did you mean {near}?")
+            inner = tables.get(meant[path][0])
+            if inner and isinstance(value, dict):  # a table whose name is misspelt has keys, too
+                try:
+                    inner.model_validate(value)
+                except ValidationError as wrong:
+                    yield from (replace(problem, path=path + problem.path) for problem in problems(wrong, inner))
 
 
 def _meant(path: KeyPath, tables: dict[KeyPath, type[Table]]) -> list[KeyPath]:
     """The key paths that an unknown one was probably meant to be; empty if none comes near."""
-    parent, key = _without_places(path[:-1]), str(path[-1])
+    parent, key = _table(path), str(path[-1])
     known = dict.fromkeys(name for kind in tables.values() for name in kind.model_fields)
     if key not in known:
         if near := get_close_matches(key, tables[parent].model_fields, n=1, cutoff=0.7):
@@ -89,9 +81,9 @@ def _name(path: KeyPath, tables: dict[KeyPath, type[Table]]) -> str:
     return f"[{key_text(path)}]" if path in tables else key_text(path)
 
 
-def _without_places(path: KeyPath) -> KeyPath:
-    """A key path without the places in lists."""
-    return tuple(part for part in path if isinstance(part, str))
+def _table(path: KeyPath) -> KeyPath:
+    """The table around a key, without the places in lists."""
+    return tuple(part for part in path[:-1] if isinstance(part, str))
 
 
 def _expected(path: KeyPath, kind: type[Table]) -> str:

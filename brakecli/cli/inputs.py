@@ -33,12 +33,12 @@ def load_case(source: str, overrides: list[str] | None) -> "LoadedCase":
 
 def load_sweep(source: str, overrides: list[str] | None) -> "LoadedSweep":
     """The sweep of a sweep file."""
-    from brakecli.sweeps.file import is_case, read_sweep
+    from brakecli.sweeps.file import kind_of, read_sweep
 
     try:
         return read_sweep(source, overrides or ())
     except CaseError as error:
-        if source != "-" and is_case(source):
+        if source != "-" and kind_of(source) == "case":
             raise UsageError(f"{source}: this is a case; simulate it with: brakecli run {source}") from error
         raise
 
@@ -47,7 +47,7 @@ def is_sweep(source: str) -> bool:
     """Whether a file is meant to be a sweep; standard input can be read only once, and holds a case."""
     from brakecli.sweeps import file
 
-    return source != "-" and not _is_result(source) and file.is_sweep(source)
+    return source != "-" and not _is_result(source) and file.kind_of(source) == "sweep"
 
 
 def result_path(output: Path | None, source: str, kind: str = "case", ending: str = ".h5") -> Path:

@@ -30,12 +30,14 @@ def command(
     from brakecli.analysis.stability.report import stability
     from brakecli.case.system import system_of
     from brakecli.cli.tables import stability_table
+    from brakecli.files import fields
+    from brakecli.files.field import values_of
     from brakecli.runs.limits import within_range
 
     with within_range():
         report = stability(system_of(loaded.case))
         entries = _critical_friction_along(loaded, key, values)
-    numbers, found = report.numbers(), (loaded.case.title, report, key, entries)
+    numbers, found = values_of(fields.STABILITY, report), (loaded.case.title, report, key, entries)
     if key:
         numbers["vary"] = entries
     show_result("stability", numbers, stability_table, *found, as_json=as_json, quiet=quiet)

@@ -226,7 +226,7 @@ def _repeat(system: System, entries: list[Entry], deadline: float, progress: Pro
 
 def _add_limits(system: System, report: StabilityReport, entries: list[Entry]) -> None:
     """Add what the amplification matrices say, and the observed orders."""
-    stiffness_at = mean_stiffness(system) if not system.smooth else lambda phi: report.contact_stiffness
+    stiffness_at = mean_stiffness(system, report.contact_stiffness)
     exact = report.critical
     limits: dict[tuple[str, tuple[float, ...]], float | None] = {}
     biases: dict[tuple[str, tuple[float, ...], float], float | None] = {}

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from brakecli.files.write import ResultFile, new_result
 from brakecli.runs.limits import Check, check, free_bytes, refuse, within_range
 from brakecli.runs.modelled import modelled
 from brakecli.runs.tolerance import Certificate, certify
+from brakecli.solver.history import History
 from brakecli.solver.motion import Motion, Progress, Sink, solve
 from brakecli.solver.quantities import HISTORY, ContactState
 from brakecli.solver.system import System
@@ -78,26 +80,6 @@ class RunReport(RunVerdict):
         return numbers
 
 
-@dataclass(frozen=True)
-class _Written:
-    """The history of a file that is being written, as the analysis reads it."""
-
-    result: ResultFile
-    interval: float
-
-    @property
-    def samples(self) -> int:
-        return self.result.rows("history")
-
-    def read(self, name: str, start: int, stop: int) -> NDArray[np.float64]:
-        return self.result.read("history", name, start, stop)
-
-    def append(self, rows: NDArray[np.float64]) -> None:
-        _require_finite("a force", rows)
-        time = self.interval * np.arange(self.samples, self.samples + len(rows))
-        self.result.append("history", {"time": time, **dict(zip(HISTORY, rows.T, strict=True))})
-
-
 def load_kernels(loaded: LoadedCase) -> None:
     """Compile what a run of a case needs, or load it: this takes seconds only once."""
     with within_range():
@@ -128,8 +110,8 @@ def run(
             def advance(done: int) -> None:
                 progress("steps" if found.step else "samples", done, system.steps)
 
-            history = _Written(result, system.interval)
-            motion, certificate = motion_of(system, advance, history.append)
+            motion, certificate = motion_of(system, advance, partial(_append, result, system.interval))
+            history = History(system.interval, result.rows("history"), partial(result.read, "history"))
             _require_finite("an energy", list(asdict(motion.energy).values()))
             verdict = verdict_on(history, motion.system, motion.work.failure_sentence)
             top = _write_spectrum(result, history, verdict.settled_from)
@@ -184,15 +166,23 @@ def _warnings(motion: Motion, certificate: Certificate | None) -> list[str]:
 
 
 def _declare_history(result: ResultFile) -> None:
-    flags = {
+    flags: dict[str, Any] = {
         "flag_values": np.array([int(state) for state in ContactState], dtype=np.int8),
         "flag_meanings": " ".join(state.name.lower() for state in ContactState),
     }
     for field in fields.HISTORY:
-        result.variable("history", field, ("time",), attributes=flags if field.name == "state" else None)
+        result.variable("history", field, ("time",), **(flags if field.name == "state" else {}))
 
 
-def _write_spectrum(result: ResultFile, history: _Written, start: int) -> float | None:
+def _append(result: ResultFile, interval: float, rows: NDArray[np.float64]) -> None:
+    """Append samples to the history."""
+    _require_finite("a force", rows)
+    first = result.rows("history")
+    time = interval * np.arange(first, first + len(rows))
+    result.append("history", {"time": time, **dict(zip(HISTORY, rows.T, strict=True))})
+
+
+def _write_spectrum(result: ResultFile, history: History, start: int) -> float | None:
     """Write the spectra of the samples from `start` on; the frequency (Hz) of the highest peak of vx."""
     lines = spectrum(history, start)
     result.axis("spectrum", fields.FREQUENCY, lines.frequency)

@@ -11,7 +11,6 @@ from brakecli.runs.cost import duration_text
 from brakecli.runs.limits import MOST_BYTES, check, refuse, within_range
 from brakecli.sweeps.plan import Plan
 from brakecli.sweeps.point import record_type
-from brakecli.sweeps.tables import Method
 
 MOST_POINTS = 10_000_000
 MOST_SECONDS = 30 * 86400.0
@@ -61,7 +60,7 @@ def estimate(plan: Plan, workers: int) -> Estimate:
     each = run
     if (critical := plan.sweep.critical) is not None:
         each += _EIGENVALUE_SECONDS
-        if critical.method is Method.SIMULATION:
+        if critical.method == "simulation":
             each += _SEARCH_RUNS * run + _SEARCH_GROWTHS * _GROWTH_SECONDS
     records = plan.passes * plan.points
     return Estimate(

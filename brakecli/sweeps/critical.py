@@ -20,7 +20,7 @@ from brakecli.case.system import system_of
 from brakecli.errors import CaseError
 from brakecli.solver.system import System
 from brakecli.sweeps.growth import Growth, Sliding, growth, sliding, with_step
-from brakecli.sweeps.tables import Critical, Method
+from brakecli.sweeps.tables import Critical
 
 Found = TypeVar("Found")
 
@@ -92,7 +92,7 @@ def search(critical: Critical, case_at: CaseAt, verdict_of: VerdictOf) -> Search
         return with_step(system_of(case_at(value)))  # a case with a tolerance has no step
 
     exact, bias = _by_eigenvalues(critical, stepped)
-    by_simulation = critical.method is Method.SIMULATION
+    by_simulation = critical.method == "simulation"
     found = _by_simulation(critical, stepped) if by_simulation else exact
 
     def lasts(value: float) -> bool | None:
@@ -128,9 +128,8 @@ def _by_eigenvalues(critical: Critical, system_at: SystemAt) -> tuple[_Change, f
         return rate > 1e-12 * math.sqrt((abs(c.c_xx) + abs(c.c_yy) + k) / c.m)
 
     def grows_in_steps(found: Sliding) -> bool:
-        system = found.system
-        c, belt = system.coefficients, system.belt_speed
-        return spectral_radius(c, system.weights, system.scheme, found.stiffness, belt) > 1.0 + MARGIN
+        phi = found.system.coefficients.phi
+        return spectral_radius(found.system, found.stiffness, phi) > 1.0 + MARGIN
 
     def first_change(unstable: Callable[[Sliding], bool], count: int) -> _Change:
         """The first change among `count` values, narrowed down."""

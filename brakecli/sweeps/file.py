@@ -7,15 +7,12 @@ from pathlib import Path
 import tomli_w
 
 from brakecli.case.read import LoadedCase, key_path, parse_case, parse_table, read_text
-from brakecli.case.toml_lines import Located
+from brakecli.case.toml_lines import Located, innermost
 from brakecli.errors import CaseError, KeyPath, Problem
 from brakecli.sweeps.plan import Plan, given_toml
 from brakecli.sweeps.tables import Sweep
 
-MOST_TRIED = 1000
-"""Most listed values of an axis that are tried before the sweep starts. Both ends of a range are always tried."""
-
-_OWN_KEYS = {("case",), ("critical",)}
+MOST_TRIED = 1000  # listed values of an axis that are tried before the sweep starts; of a range it is both ends
 
 
 @dataclass(frozen=True)
@@ -35,46 +32,35 @@ class LoadedSweep:
 
 
 def read_sweep(source: str, overrides: Sequence[str] = ()) -> LoadedSweep:
-    """Read a sweep from a path, or from standard input where the path is "-". Raises `CaseError`.
-
-    Overrides of `critical` and `case` belong to the sweep, all others to its base case.
-    """
-    folder = Path() if source == "-" else Path(source).parent
-    return parse_sweep(*read_text(source), folder, overrides)
+    """Read a sweep from a path, or from standard input where the path is "-"; see `parse_sweep`."""
+    return parse_sweep(*read_text(source), Path() if source == "-" else Path(source).parent, overrides)
 
 
 def parse_sweep(text: str, label: str, folder: Path, overrides: Sequence[str] = ()) -> LoadedSweep:
-    """Make a sweep of its text; the path of its base case begins at `folder`. Raises `CaseError`."""
-    own = [override for override in overrides if key_path(override.partition("=")[0])[:1] in _OWN_KEYS]
+    """Make a sweep of its text; the path of its base case begins at `folder`. Raises `CaseError`.
+
+    Overrides of `critical` and `case` belong to the sweep, all others to its base case.
+    """
+    own = [each for each in overrides if key_path(each.partition("=")[0])[:1] in (("case",), ("critical",))]
     sweep = parse_table(Sweep, text, label, own)
     others = [override for override in overrides if override not in own]
     base = parse_case(*read_text(str(folder / sweep.case)), others)
     plan = Plan(given_toml(sweep), given_toml(base.case))
-    problems = _wrong_values(plan, text, label)
-    if problems:
+    if problems := _wrong_values(plan, text, label):
         raise CaseError(problems)
     resolved = tomli_w.dumps(sweep.model_dump(mode="json", exclude_none=True))
     return LoadedSweep(sweep, text, resolved, base, plan)
 
 
-def is_sweep(path: str) -> bool:
-    """Whether a file is meant to be a sweep: it has keys that no case has."""
-    keys = _keys(path)
-    return bool(keys & {"case", "axis", "critical"}) and "shoe" not in keys
-
-
-def is_case(path: str) -> bool:
-    """Whether a file is meant to be a case: it has keys that no sweep has."""
-    keys = _keys(path)
-    return "shoe" in keys and not keys & {"axis", "critical"}
-
-
-def _keys(path: str) -> set[str]:
-    """The keys at the top of a file, as far as they can be read."""
+def kind_of(path: str) -> str:
+    """What a file is meant to be, by its keys at the top: "case", "sweep", or neither."""
     try:
-        return set(Located(*read_text(path)).data)
+        keys = set(Located(*read_text(path)).data)
     except CaseError:
-        return set()
+        return ""
+    if "shoe" in keys:
+        return "" if keys & {"axis", "critical"} else "case"
+    return "sweep" if keys & {"case", "axis", "critical"} else ""
 
 
 def _wrong_values(plan: Plan, text: str, label: str) -> list[Problem]:
@@ -88,11 +74,11 @@ def _wrong_values(plan: Plan, text: str, label: str) -> list[Problem]:
         tries.append((("axis", index, "parameter"), axis.parameter, ends))
     if (critical := plan.sweep.critical) is not None:
         tries.append((("critical", "parameter"), (critical.parameter,), (critical.lower, critical.upper)))
-    located = Located(text, label)
+    lines = Located(text, label).lines
     corners = [{}, plan.settings(0), plan.settings(plan.points - 1)]
     problems: dict[tuple[int, str], Problem] = {}
     for place, parameters, values in tries:
-        line = located.line_of(place)
+        line = innermost(lines, place, 0)
         for value in values:
             settings = {key_path(parameter): value for parameter in parameters}
             found = [plan.problems(corner | settings) for corner in corners]

@@ -17,7 +17,7 @@ from brakecli.case import wording
 from brakecli.case.case import Case
 from brakecli.case.read import key_path, parse_table, put
 from brakecli.errors import CaseError, Problem
-from brakecli.sweeps.tables import Direction, Sweep
+from brakecli.sweeps.tables import Sweep
 
 Settings = Mapping[tuple[str, ...], Any]
 """Values by key path, to be put into the base case."""
@@ -25,17 +25,17 @@ Settings = Mapping[tuple[str, ...], Any]
 
 @dataclass(frozen=True)
 class Plan:
-    """A sweep with its base case, both as complete TOML texts: all that a worker needs.
+    """A sweep with its base case: all that a worker needs.
 
-    `case_text` holds the keys that were given, overrides applied, so that a default which follows from another key
-    follows it at every point.
+    Both texts hold the keys that were given, overrides applied: a default that follows from another key follows it
+    at every point.
     """
 
     sweep_text: str
     case_text: str
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Travel as two texts: a worker meets the same plan again and again."""
+        """Travel as two texts."""
         return plan_of, (self.sweep_text, self.case_text)
 
     @cached_property
@@ -60,13 +60,12 @@ class Plan:
     @cached_property
     def followed(self) -> int | None:
         """The axis along which the motion is followed."""
-        return next((index for index, axis in enumerate(self.sweep.axis) if axis.direction is not None), None)
+        return next((index for index, axis in enumerate(self.sweep.axis) if axis.direction), None)
 
     @property
     def passes(self) -> int:
         """How often the grid is computed: twice where the motion is followed both up and down."""
-        axis = self.followed
-        return 2 if axis is not None and self.sweep.axis[axis].direction is Direction.BOTH else 1
+        return 2 if any(axis.direction == "both" for axis in self.sweep.axis) else 1
 
     @property
     def unit_length(self) -> int:
@@ -97,14 +96,11 @@ class Plan:
         try:
             return Case.model_validate(data)
         except ValidationError as error:
-            wanted = {each["loc"] for each in error.errors(include_url=False) if each["type"] == "int_type"}
-            whole = {
-                path: int(value)  # a range holds floats, also where the key takes whole numbers
-                for path, value in settings.items()
-                if path in wanted and isinstance(value, float) and value.is_integer()
-            }
-            if whole:
-                return self.case({**settings, **whole})
+            for each in error.errors(include_url=False):
+                path = tuple(map(str, each["loc"]))
+                value = settings.get(path)
+                if each["type"] == "int_type" and isinstance(value, float) and value.is_integer():
+                    return self.case({**settings, path: int(value)})  # a range holds floats
             problems = [replace(each, source="the point") for each in wording.problems(error, Case)]
             raise CaseError(problems) from None
 

@@ -20,13 +20,12 @@ from brakecli.files.field import Field, values_of
 from brakecli.runs.limits import check, refuse, within_range
 from brakecli.runs.run import motion_of
 from brakecli.runs.tolerance import Certificate
-from brakecli.solver.history import ArrayHistory
+from brakecli.solver.history import array_history
 from brakecli.solver.motion import Motion
 from brakecli.solver.roughness import TWO_PI, wheel_angles
 from brakecli.solver.schedules import integral_at
 from brakecli.sweeps.critical import search
 from brakecli.sweeps.plan import Plan, Settings
-from brakecli.sweeps.tables import Direction
 
 
 class Status(StrEnum):
@@ -86,7 +85,7 @@ def simulate(case: Case) -> Outcome:
         motion, certificate = motion_of(system)
         if not np.isfinite(motion.rows).all():
             raise FloatingPointError("a force overflows")
-        history = ArrayHistory(system.interval, motion.rows)
+        history = array_history(system.interval, motion.rows)
         verdict = verdict_on(history, motion.system, motion.work.failure_sentence)
     warnings, work = list(found.warnings), motion.work
     if work.unconverged_steps and not work.failed:
@@ -133,7 +132,7 @@ def line_points(plan: Plan, line: int) -> list[int]:
     outer, rest = divmod(line % lines, inner)
     points = [(outer * shape[axis] + place) * inner + rest for place in range(shape[axis])]
     direction = plan.sweep.axis[axis].direction
-    down = direction is Direction.DOWN or (direction is Direction.BOTH and line >= lines)
+    down = direction == "down" or (direction == "both" and line >= lines)
     value = plan.sweep.axis[axis].value
     return sorted(points, key=lambda point: value(plan.places(point)[axis]), reverse=down)
 

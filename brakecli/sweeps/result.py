@@ -146,7 +146,7 @@ def write(result: ResultFile, report: SweepReport, columns: Columns) -> None:
         values = [axis.value(place) for place in range(axis.size)]
         data = np.array(values, dtype=np.float64) if axis.numeric else np.array([label(value) for value in values])
         field = Field(axis.name, unit(axis.parameter[0]), ", ".join(axis.parameter))
-        result.variable("/", field, (axis.name,), data, {"parameters": list(axis.parameter)})
+        result.variable("/", field, (axis.name,), data, parameters=list(axis.parameter))
     if not plan.sweep.axis:
         result.axis("/", fields.BASE_POINT, np.zeros(1))
     for field in fields.POINT:

@@ -2,61 +2,43 @@
 
 import math
 from collections.abc import Iterator
-from enum import StrEnum
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
 from brakecli.case.read import key_path
-from brakecli.case.tables import MISSING, Number, Positive, Table, Title, choice, from_list
+from brakecli.case.tables import MISSING, Number, Positive, Table, Title, described, from_list
 from brakecli.errors import Problem, found
 
 
-class Spacing(StrEnum):
-    """How the values of an axis lie between its ends."""
-
-    LINEAR = "linear"
-    LOG = "log"
-
-
-class Direction(StrEnum):
-    """How the motion is followed along an axis, where each point starts from the end of the one before it."""
-
-    UP = "up"
-    DOWN = "down"
-    BOTH = "both"
-
-
-class Method(StrEnum):
-    """How a critical parameter is found: by the growth of small disturbances in runs, or by eigenvalues."""
-
-    SIMULATION = "simulation"
-    EIGENVALUE = "eigenvalue"
+def _not_key_paths(*texts: str) -> Iterator[Problem]:
+    for text in texts:
+        if not key_path(text):
+            yield Problem(("parameter",), "is not a key path" + found(text), 'write it as in "link2.angle_deg"')
 
 
 class Axis(Table):
     """One axis of the grid: the key paths that it sets, together, and the values that they take."""
 
-    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("start", "stop", "num"), ("values",))
+    alternatives = (("start", "stop", "num"), ("values",))
 
     parameter: Annotated[
         tuple[str, ...],
-        Field(
-            min_length=1,
-            description="key path of the case, or a list of key paths that take the same values",
-            json_schema_extra={"type": ["string", "array"]},
-        ),
         *from_list,
         BeforeValidator(lambda value: (value,) if isinstance(value, str) else value),
-    ]
-    start: Number | None = Field(None, description="first value")
-    stop: Number | None = Field(None, description="last value")
-    num: int | None = Field(None, ge=1, description="number of values")
-    spacing: Spacing = choice("how the values lie between the first and last", Spacing.LINEAR)
-    values: Annotated[tuple[Any, ...], Field(min_length=1), *from_list] | None = Field(
-        None, description="the values themselves"
+    ] = described(
+        "key path of the case, or a list of key paths that take the same values",
+        min_length=1,
+        json_schema_extra={"type": ["string", "array"]},
     )
-    direction: Direction | None = choice(
+    start: Number | None = described("first value", None)
+    stop: Number | None = described("last value", None)
+    num: Annotated[int, Field(ge=1)] | None = described("number of values", None)
+    spacing: Literal["linear", "log"] = described("how the values lie between the first and last", "linear")
+    values: Annotated[tuple[Any, ...], Field(min_length=1), *from_list] | None = described(
+        "the values themselves", None
+    )
+    direction: Literal["up", "down", "both"] | None = described(
         "follow the motion along this axis: each point starts from the end of the one before", None
     )
 
@@ -84,15 +66,14 @@ class Axis(Table):
         last = max(self.size - 1, 1)
         if place == last:
             return self.stop
-        if self.spacing is Spacing.LOG:
+        if self.spacing == "log":
             return self.start * (self.stop / self.start) ** (place / last)
         return self.start + place * (self.stop - self.start) / last
 
     def _broken_rules(self) -> Iterator[Problem]:
         yield from super()._broken_rules()
-        for text in self.parameter:
-            yield from _not_a_key_path(text)
-        if self.spacing is Spacing.LOG:
+        yield from _not_key_paths(*self.parameter)
+        if self.spacing == "log":
             if self.values is not None:
                 yield self.wrong("spacing", "is only for start and stop", "leave spacing out")
             for key in ("start", "stop"):
@@ -103,48 +84,42 @@ class Axis(Table):
             yield self.wrong("direction", "needs numbers to follow", "leave it out")
 
 
-def _not_a_key_path(text: str) -> Iterator[Problem]:
-    if not key_path(text):
-        yield Problem(("parameter",), "is not a key path" + found(text), 'write it as in "link2.angle_deg"')
-
-
 class Critical(Table):
     """The parameter whose critical value is sought: the least at which steady sliding loses its stability."""
 
-    parameter: str = Field(description="key path of the case, such as friction.coefficient")
-    lower: Number = Field(description="where the search begins")
-    upper: Number = Field(description="where the search ends")
-    tolerance: Positive = Field(1e-3, description="largest width of the bracket at the end of the search")
-    method: Method = choice("by runs, or only by eigenvalues", Method.SIMULATION)
+    parameter: str = described("key path of the case, such as friction.coefficient")
+    lower: Number = described("where the search begins")
+    upper: Number = described("where the search ends")
+    tolerance: Positive = described("largest width of the bracket at the end of the search", 1e-3)
+    method: Literal["simulation", "eigenvalue"] = described(
+        "by the growth of small disturbances in runs, or only by eigenvalues", "simulation"
+    )
 
     def _broken_rules(self) -> Iterator[Problem]:
         if self.upper <= self.lower:
             yield self.wrong("upper", "is not above lower", "give a range to search in")
         elif self.tolerance < 1e-12 * max(abs(self.lower), abs(self.upper)):
             yield self.wrong("tolerance", "is below the rounding of the parameter", "widen it")
-        yield from _not_a_key_path(self.parameter)
+        yield from _not_key_paths(self.parameter)
 
 
 class Sweep(Table):
     """A grid of cases around a base case, and what to find at each of them."""
 
     title: Title = ""
-    case: str = Field(min_length=1, description="the base case's file, seen from the sweep's own")
-    axis: Annotated[
-        tuple[Axis, ...], *from_list, Field(description="the axes of the grid, the last one fastest")
-    ] = ()
-    critical: Critical | None = Field(None, description="the critical parameter to find at each point")
+    case: str = described("the base case's file, seen from the sweep's own", min_length=1)
+    axis: Annotated[tuple[Axis, ...], *from_list] = described("the axes of the grid, the last one fastest", ())
+    critical: Critical | None = described("the critical parameter to find at each point", None)
 
     def _broken_rules(self) -> Iterator[Problem]:
         if not self.axis and self.critical is None:
             yield Problem(("axis",), MISSING, "give at least one [[axis]], or [critical]")
         taken: set[tuple[str, ...]] = set()
-        for index, axis in enumerate(self.axis):
-            for text in axis.parameter:
-                if key_path(text) in taken:
-                    path = ("axis", index, "parameter")
-                    yield Problem(path, "is set twice" + found(text), "set each key path once")
-                taken.add(key_path(text))
+        for index, text in ((index, text) for index, axis in enumerate(self.axis) for text in axis.parameter):
+            if key_path(text) in taken:
+                path = ("axis", index, "parameter")
+                yield Problem(path, "is set twice" + found(text), "set each key path once")
+            taken.add(key_path(text))
         if self.critical is not None and key_path(self.critical.parameter) in taken:
             remedy = "look for another parameter, or leave that axis out"
             yield self.wrong("critical.parameter", "is set by an axis", remedy)

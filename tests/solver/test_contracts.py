@@ -1,12 +1,17 @@
 """Every evaluator and every scheme, found by its file, keeps the contract that its package states."""
 
 import pkgutil
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from brakecli.case.case import Evaluator, Scheme
+from brakecli.case.case import Case
+from brakecli.case.read import parse_case, starter_text
+from brakecli.case.system import system_of
+from brakecli.case.tables import key_schema
+from brakecli.errors import CaseError
 from brakecli.solver import contact, schemes
 from brakecli.solver.contact.pad import build_layer, build_pad
 from brakecli.solver.implicit_step import SOLVED, newton
@@ -27,8 +32,31 @@ START = ((1e-5, -2e-5), (0.1, -0.2), (3.0, 4.0))
 
 
 def test_every_file_can_be_named_in_a_case_and_every_name_has_a_file() -> None:
-    assert [name.replace("_", "-") for name in EVALUATORS] == sorted(Evaluator)
-    assert [name.replace("_", "-") for name in SCHEMES] == sorted(set(Scheme) - {Scheme.AUTO})  # which chooses one
+    assert [name.replace("_", "-") for name in EVALUATORS] == sorted(
+        key_schema(Case, ("contact", "evaluator"))["enum"]
+    )
+    names = key_schema(Case, ("solver", "scheme"))["enum"]
+    assert [name.replace("_", "-") for name in SCHEMES] == sorted(set(names) - {"auto"})  # which chooses one
+
+
+def test_a_row_added_to_a_registry_can_be_named_in_a_case_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    chosen = ['contact.evaluator="other"', 'solver.scheme="three-equal"']
+    with pytest.raises(CaseError) as caught:
+        parse_case(starter_text(), "starter", chosen)
+    assert [str(problem) for problem in caught.value.problems] == [
+        '--set contact.evaluator="other": contact.evaluator: is not one of the choices (found "other");'
+        ' give one of "auto", "closed-form", "midpoint", "exact"',
+        '--set solver.scheme="three-equal": solver.scheme: is not one of the choices (found "three-equal");'
+        ' give one of "two-layer", "three-layer", "event-driven", "auto"',
+    ]
+    row = replace(schemes.SCHEMES["three-layer"], theta=(0.3, 0.4, 0.3), starts=("consistent",))
+    monkeypatch.setitem(schemes.SCHEMES, "three-equal", row)
+    monkeypatch.setitem(contact.EVALUATORS, "other", contact.EVALUATORS["exact"])
+    method = system_of(parse_case(starter_text(), "starter", chosen).case).method
+    assert (method.row, method.theta, method.evaluator) == (row, row.theta, "other")
+    assert "three-equal" in key_schema(Case, ("solver", "scheme"))["enum"]
+    with pytest.raises(CaseError, match="is only for the three-layer scheme"):
+        parse_case(starter_text(), "starter", [*chosen, 'solver.start="paper"'])
 
 
 # --- evaluators ----------------------------------------------------------------------------------------------

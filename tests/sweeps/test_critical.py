@@ -14,7 +14,7 @@ from brakecli.solver.links import natural_frequencies
 from brakecli.sweeps.critical import Outcome, Search, search
 from brakecli.sweeps.growth import growth, sliding
 from brakecli.sweeps.point import verdict_of
-from brakecli.sweeps.tables import Critical, Method
+from brakecli.sweeps.tables import Critical
 from tests.analysis.test_regime_table import random_case
 from tests.campaign import counts
 from tests.examples import MODE_COUPLING, ROUGH, SQUEAL, make
@@ -188,15 +188,15 @@ def test_another_parameter_than_friction_is_searched_by_both_methods() -> None:
     answer = found(SQUEAL, 1.0, 10.0, "link2__angle_deg", tolerance=1e-3)
     assert answer.outcome is Outcome.REGAINED  # the steeper the link, the more friction it takes
     assert answer.value == pytest.approx(answer.eigenvalue, abs=1e-3)
-    alone = found(SQUEAL, 1.0, 10.0, "link2__angle_deg", method=Method.EIGENVALUE)
+    alone = found(SQUEAL, 1.0, 10.0, "link2__angle_deg", method="eigenvalue")
     assert alone.value == answer.eigenvalue
     at = stability(system_of(make(SQUEAL, link2__angle_deg=alone.value))).critical
     assert at is not None
     assert at.friction == pytest.approx(SQUEAL["friction"]["coefficient"], abs=1e-7)
 
 
-@pytest.mark.parametrize("method", list(Method))
-def test_a_range_without_a_change_says_so(method: Method) -> None:
+@pytest.mark.parametrize("method", ["simulation", "eigenvalue"])
+def test_a_range_without_a_change_says_so(method: str) -> None:
     assert found(SQUEAL, 0.0, 0.3, method=method).outcome is Outcome.STABLE
     assert found(SQUEAL, 0.8, 1.2, method=method).outcome is Outcome.UNSTABLE
     assert found(SQUEAL, 0.0, 1.0, method=method, wheel__angular_speed=0.0).outcome is Outcome.NO_SLIDING
@@ -309,8 +309,8 @@ def test_self_locking_on_rough_surfaces_in_full_contact_is_that_on_flat_ones() -
 
 def test_roughness_that_opens_the_contact_moves_the_critical_friction() -> None:
     tables = {**ROUGH, "link2": {"stiffness": 2.2e7, "angle_deg": 10.0}, "link1": {"stiffness": 2e7}}
-    flat = found({**tables, "roughness": {}}, 0.0, 4.0, method=Method.EIGENVALUE)
-    rough = found(tables, 0.0, 4.0, method=Method.EIGENVALUE)
+    flat = found({**tables, "roughness": {}}, 0.0, 4.0, method="eigenvalue")
+    rough = found(tables, 0.0, 4.0, method="eigenvalue")
     assert flat.value is not None
     assert rough.value is not None
     assert abs(rough.value - flat.value) > 0.05 * flat.value

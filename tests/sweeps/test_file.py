@@ -3,14 +3,13 @@
 import tomllib
 from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from brakecli.case.tables import json_schema
 from brakecli.errors import CaseError
-from brakecli.sweeps.file import LoadedSweep, is_case, is_sweep, parse_sweep
+from brakecli.sweeps.file import LoadedSweep, kind_of, parse_sweep
 from brakecli.sweeps.plan import Plan
 from brakecli.sweeps.tables import Sweep
 from tests.commands import TINY
@@ -187,13 +186,12 @@ def test_values_that_fit_only_together_are_no_problem(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "expected"), [(GRID, True), (CRITICAL, True), (TINY, False), ("", False), ("=", False)]
+    ("text", "expected"), [(GRID, "sweep"), (CRITICAL, "sweep"), (TINY, "case"), ("", ""), ("=", "")]
 )
-def test_a_sweep_is_told_from_a_case_by_its_keys(tmp_path: Path, text: str, expected: Any) -> None:
+def test_a_sweep_is_told_from_a_case_by_its_keys(tmp_path: Path, text: str, expected: str) -> None:
     path = tmp_path / "file.toml"
     path.write_text(text)
-    assert is_sweep(str(path)) is expected
-    assert is_case(str(path)) is (text == TINY)
+    assert kind_of(str(path)) == expected
 
 
 def test_the_schema_of_sweep_files_accepts_what_is_accepted_here() -> None:

@@ -1,4 +1,4 @@
-"""What a run will cost and which limits it meets, from the case alone: nothing is stepped but one linear step."""
+"""What a scheme makes of the linear motion in one step: the limits of the step, and its amplification."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -15,22 +15,16 @@ from brakecli.solver.records import PROBLEM, WORK, Coefficients, Weights, new
 from brakecli.solver.roughness import surface
 from brakecli.solver.system import System
 
-RESOLVED = 20
-"""Steps per period (and per passing wave) below which a warning names the number."""
+RESOLVED = 20  # steps per period, and per passing wave, below which a warning names the number
 
 
 @dataclass(frozen=True)
 class StepLimits:
-    """How one step of the scheme takes the contact.
+    """How one step of the scheme takes the contact."""
 
-    `contraction`: bound of the factor by which the paper's fixed-point iteration changes its error, above one it
-    may diverge. `unique`: whether a step is sure to have one solution. `growth`: by how much the scheme itself
-    multiplies a disturbance of the frictionless, fully touching shoe in a step: above one it is unstable.
-    """
-
-    contraction: float
-    unique: bool
-    growth: float
+    contraction: float  # bound of the factor of the error in a fixed-point iteration: above 1 it may diverge
+    unique: bool  # whether a step is sure to have one solution
+    growth: float  # factor of a disturbance of the frictionless, fully touching shoe: above 1 it is unstable
 
 
 def step_limits(system: System, step: float | None = None) -> StepLimits:
@@ -58,12 +52,10 @@ def step_limits(system: System, step: float | None = None) -> StepLimits:
 
 @lru_cache(maxsize=16)  # a sweep over friction asks for the same two at every point
 def amplification(c: Coefficients, s: Weights, scheme: Any, contact_stiffness: float) -> NDArray[np.float64]:
-    """Amplification matrix of a scheme for steady sliding in full, smooth contact (stiffness 2ak, N/m), U > 0.
+    """Amplification matrix of a scheme on the case's grid for steady sliding in full, smooth contact, U > 0.
 
-    The scheme is one that steps on the grid of the case.
-    It acts on the scheme's own memory of the motion, with velocities times h. The scheme's own step is taken
-    from a deep, loaded equilibrium and from neighbours of it: while nothing opens or sticks, the step is affine
-    and differences are exact.
+    It acts on the scheme's memory of the motion, with velocities times h. The step is taken from a deep, loaded
+    equilibrium and from its neighbours: while nothing opens or sticks, it is affine and differences are exact.
     """
     layer = build_layer(closed_form, build_pad(contact_stiffness, 0.5, surface(), surface(), 0))
     small = 1e-3
@@ -89,8 +81,15 @@ def amplification(c: Coefficients, s: Weights, scheme: Any, contact_stiffness: f
     return matrix
 
 
-def spectral_radius(c: Coefficients, s: Weights, scheme: Any, contact_stiffness: float, belt: float) -> float:
-    """Factor by which the scheme multiplies the fastest disturbance of steady sliding in a step, U (m/s) ≠ 0."""
-    if belt < 0.0:  # the same shoe seen from behind: x and U change sign, and so do the couplings
+def spectral_radius(system: System, contact_stiffness: float, phi: float, step: float | None = None) -> float:
+    """Factor by which the scheme multiplies the fastest disturbance of steady sliding in a step, U ≠ 0.
+
+    The step (s) is that of the case unless it is given. 0 where nothing touches.
+    """
+    if not contact_stiffness > 0.0:
+        return 0.0
+    c = system.coefficients._replace(phi=phi)
+    s = system.weights if step is None else system.weights._replace(h=step)
+    if system.belt_speed < 0.0:  # the same shoe seen from behind: x and U change sign, and so do the couplings
         c = c._replace(b_xy=-c.b_xy, c_xy=-c.c_xy, sin_beta=-c.sin_beta)
-    return float(np.abs(np.linalg.eigvals(amplification(c, s, scheme, contact_stiffness))).max())
+    return float(np.abs(np.linalg.eigvals(amplification(c, s, system.scheme, contact_stiffness))).max())

@@ -6,9 +6,7 @@ the wedge that friction and links form can lock (divergence).
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
-from enum import StrEnum
 from itertools import pairwise
 
 import numpy as np
@@ -19,34 +17,25 @@ from brakecli.solver.records import Coefficients
 Complex = NDArray[np.complex128]
 
 
-class Instability(StrEnum):
-    """How steady sliding is lost."""
-
-    FLUTTER = "flutter"
-    DIVERGENCE = "divergence"
-
-
 @dataclass(frozen=True)
 class Mode:
-    """One mode of the linearised motion: growth rate (1/s), frequency (Hz), damping ratio (negative: it grows),
-    and the shape as y/x: its size and its phase (deg), None where x does not move.
-    """
+    """One mode of the linearised motion."""
 
-    growth: float
-    frequency: float
-    damping_ratio: float
-    shape: float | None
-    shape_phase: float | None
+    growth: float  # rate, 1/s
+    frequency: float  # Hz
+    damping_ratio: float  # negative where it grows
+    shape: float | None  # y/x, None where x does not move
+    shape_phase: float | None  # of y/x, deg
 
 
 @dataclass(frozen=True)
 class Crossing:
-    """A friction coefficient at which stability changes, how, at which frequency (Hz), and whether it is lost."""
+    """A friction coefficient at which stability changes, by flutter or divergence, at which frequency (Hz)."""
 
     friction: float
-    instability: Instability
+    instability: str
     frequency: float
-    lost: bool
+    lost: bool  # or regained
 
 
 def stiffness_matrix(c: Coefficients, contact_stiffness: float, grip: float) -> NDArray[np.float64]:
@@ -74,16 +63,13 @@ def eigensystem(c: Coefficients, contact_stiffness: float, grip: float) -> tuple
         vectors = np.array([_null_vector(s, square) for square in squares]).T
         roots = np.sqrt(-squares)
         return np.concatenate([roots, -roots]), np.concatenate([vectors, vectors], axis=1)
-    matrix = np.zeros((4, 4))
-    matrix[:2, 2:] = np.eye(2)
-    matrix[2:, :2] = -s
-    matrix[2:, 2:] = -np.array([[c.b_xx, c.b_xy], [c.b_xy, c.b_yy]]) / c.m
-    values, vectors = np.linalg.eig(matrix)
+    damping = np.array([[c.b_xx, c.b_xy], [c.b_xy, c.b_yy]]) / c.m
+    values, vectors = np.linalg.eig(np.block([[np.zeros((2, 2)), np.eye(2)], [-s, -damping]]))
     return values.astype(complex), vectors[:2].astype(complex)
 
 
 def _null_vector(s: NDArray[np.float64], square: complex) -> Complex:
-    """The vector with (S/m - square) v = 0, from the row that tells more."""
+    """The vector with (S/m - square) v = 0, from the larger row."""
     rows = s - square * np.eye(2)
     row = rows[np.argmax(np.abs(rows).sum(axis=1))]
     vector = np.array([-row[1], row[0]], dtype=complex)
@@ -118,13 +104,13 @@ def growth(c: Coefficients, contact_stiffness: float, grip: float) -> float:
 
 
 def crossings(c: Coefficients, contact_stiffness: float, belt: float) -> list[Crossing]:
-    """Every φ > 0 at which stability changes for a contact stiffness K that does not depend on φ; none if U = 0.
+    """Every φ > 0 at which stability changes, for a contact stiffness K (N/m) that does not depend on φ.
 
     det(m s² + B s + S) = a4 s⁴ + a3 s³ + a2 s² + a1 s + a0, of which only a1 and a0 contain φ, linearly. A real
     eigenvalue passes zero where a0 = 0; a pair passes the imaginary axis where Hurwitz' a1 a2 a3 - a1² a4 -
     a0 a3² = 0 with a1/a3 > 0. Without dashpots two imaginary pairs meet where a2² = 4 a4 a0.
     """
-    if belt == 0.0:
+    if belt == 0.0 or not contact_stiffness > 0.0:
         return []
     pull = math.copysign(contact_stiffness, belt)
     s = stiffness_matrix(c, contact_stiffness, 0.0)
@@ -132,19 +118,24 @@ def crossings(c: Coefficients, contact_stiffness: float, belt: float) -> list[Cr
     a2 = c.m * (s[0, 0] + s[1, 1]) + c.b_xx * c.b_yy - c.b_xy**2
     a1 = np.array([c.b_xx * s[1, 1] + c.b_yy * s[0, 0] - 2.0 * c.b_xy * c.c_xy, -c.b_xy * pull])  # + φ ...
     a0 = np.array([s[0, 0] * s[1, 1] - c.c_xy**2, -c.c_xy * pull])
-    found = [(phi, Instability.DIVERGENCE, 0.0) for phi in _positive_roots(a0)]
+    divergence = [(phi, 0.0) for phi in _positive_roots(a0)]
     if is_undamped(c):
         gap = 0.5 * (s[0, 0] - s[1, 1])  # a2² - 4 a4 a0 without the cancellation
         meeting = c.m**2 * 4.0 * np.array([gap**2 + c.c_xy**2, c.c_xy * pull])
-        speed = math.sqrt(0.5 * a2 / a4) / (2.0 * math.pi)
-        found += [(phi, Instability.FLUTTER, speed) for phi in _positive_roots(meeting)]
+        flutter = [(phi, 0.5 * a2 / a4) for phi in _positive_roots(meeting)]
     else:
         hurwitz = np.append(a2 * a3 * a1 - a3**2 * a0, 0.0) - a4 * np.convolve(a1, a1)
-        for phi in _positive_roots(hurwitz):
-            turning = (a1[0] + a1[1] * phi) / a3
-            if turning > 0.0:
-                found.append((phi, Instability.FLUTTER, math.sqrt(turning) / (2.0 * math.pi)))
-    return _changes(sorted(found), lambda phi: growth(c, contact_stiffness, math.copysign(phi, belt)))
+        turning = [(phi, (a1[0] + a1[1] * phi) / a3) for phi in _positive_roots(hurwitz)]
+        flutter = [(phi, square) for phi, square in turning if square > 0.0]
+    candidates = sorted((*divergence, *flutter))  # φ and ω², which is 0 for divergence
+    edges = [0.0, *(phi for phi, _ in candidates), 2.0 * candidates[-1][0] if candidates else 0.0]
+    middles = [0.5 * (low + high) for low, high in pairwise(edges)]
+    unstable = [growth(c, contact_stiffness, math.copysign(phi, belt)) > 0.0 for phi in middles]
+    return [
+        Crossing(phi, "flutter" if square > 0.0 else "divergence", math.sqrt(square) / (2.0 * math.pi), after)
+        for (phi, square), (before, after) in zip(candidates, pairwise(unstable), strict=True)
+        if before != after  # between the candidate and its neighbours the sign of the growth really changes
+    ]
 
 
 def _positive_roots(coefficients: NDArray[np.float64]) -> list[float]:
@@ -154,15 +145,3 @@ def _positive_roots(coefficients: NDArray[np.float64]) -> list[float]:
         return []
     roots = np.polynomial.polynomial.polyroots(np.trim_zeros(coefficients / scale, "b"))
     return [float(root.real) for root in roots if abs(root.imag) <= 1e-9 * abs(root) and root.real > 0.0]
-
-
-def _changes(found: list[tuple[float, Instability, float]], growth_at: Callable[[float], float]) -> list[Crossing]:
-    """Those candidates at which the sign of the growth really changes, seen half way to their neighbours."""
-    friction = [phi for phi, _, _ in found]
-    edges = [0.0, *friction, 2.0 * friction[-1]] if friction else []
-    unstable = [growth_at(0.5 * (low + high)) > 0.0 for low, high in pairwise(edges)]
-    return [
-        Crossing(phi, kind, frequency, after)
-        for (phi, kind, frequency), before, after in zip(found, unstable[:-1], unstable[1:], strict=True)
-        if before != after
-    ]

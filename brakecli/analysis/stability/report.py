@@ -3,33 +3,21 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
 from brakecli.analysis.stability.discrete import spectral_radius
-from brakecli.analysis.stability.modes import (
-    Crossing,
-    Instability,
-    Mode,
-    crossings,
-    eigensystem,
-    is_undamped,
-    modes,
-)
+from brakecli.analysis.stability.modes import Crossing, Mode, crossings, eigensystem, is_undamped, modes
 from brakecli.analysis.stability.search import bisect
 from brakecli.errors import CaseError
-from brakecli.files import fields
-from brakecli.files.field import values_of
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.records import Coefficients
 from brakecli.solver.steady_sliding import SteadySliding, steady_sliding, tabulated
 from brakecli.solver.system import System
 
-LARGEST_FRICTION = 10.0
-"""Up to here a critical friction coefficient is looked for on rough surfaces, whose stiffness depends on it."""
+LARGEST_FRICTION = 10.0  # to which rough surfaces are searched, whose stiffness depends on friction
 FRICTIONS = 401
 MARGIN = 1e-9  # growth per step that counts as growth: above the rounding of simple eigenvalues
 _CLEAR_MARGIN = 1e-6  # above that of double ones, where a direction has no spring
@@ -39,19 +27,13 @@ StiffnessAt = Callable[[float], float]
 
 @dataclass(frozen=True)
 class Discrete:
-    """What the case's scheme makes of the same motion at its step.
+    """What the case's scheme makes of the same motion at its step."""
 
-    `spectral_radius`: factor of the fastest disturbance in a step at the case's φ (in a sample interval, where the
-    scheme finds its steps itself); `growth` (1/s) is its logarithm over that time. `step_limit` (s): the
-    frictionless shoe is stable below; None where any step is. `critical_friction`: where the radius passes one,
-    `bias` its distance from the exact one.
-    """
-
-    spectral_radius: float
-    growth: float
-    step_limit: float | None
-    critical_friction: float | None
-    bias: float | None
+    spectral_radius: float  # factor of the fastest disturbance in a step, or sample interval if steps are its own
+    growth: float  # 1/s, its logarithm over that time
+    step_limit: float | None  # s, below which the frictionless shoe is stable; None where any step is
+    critical_friction: float | None  # where the radius passes one
+    bias: float | None  # its distance from the exact one
 
 
 @dataclass(frozen=True)
@@ -67,18 +49,10 @@ class StabilityReport:
     eigenvalues: tuple[complex, ...]
     modes: tuple[Mode, ...]
     crossings: tuple[Crossing, ...]
+    critical: Crossing | None  # the smallest friction coefficient at which stability is lost
     undamped_flutter: float | None  # φ, closed forms for the contact stiffness above
     undamped_divergence: float | None
     discrete: Discrete | None
-
-    @property
-    def critical(self) -> Crossing | None:
-        """The smallest friction coefficient at which stability is lost."""
-        return next((crossing for crossing in self.crossings if crossing.lost), None)
-
-    def numbers(self) -> dict[str, Any]:
-        """Names and values as `--json` gives them."""
-        return values_of(fields.STABILITY, self)
 
 
 def stability(system: System) -> StabilityReport:
@@ -90,17 +64,13 @@ def stability(system: System) -> StabilityReport:
     except CaseError as error:
         reason = error.problems[0].what
     k = rest.stiffness if rest else system.contact_stiffness
+    stiffness_at = mean_stiffness(system, k)
+    rough = belt != 0.0 and not system.smooth
+    found = _rough_crossings(c, belt, stiffness_at) if rough else crossings(c, k, belt)
+    critical = next((crossing for crossing in found if crossing.lost), None)
+    flutter, divergence = undamped_critical(c, k, belt)
     grip = math.copysign(c.phi, belt) if belt else 0.0
     values, _ = eigensystem(c, k, grip)
-    found: list[Crossing] = []
-    stiffness_at: StiffnessAt = lambda phi: k  # noqa: E731
-    if belt != 0.0 and system.smooth:
-        found = crossings(c, k, belt) if k > 0.0 else []
-    elif belt != 0.0:
-        stiffness_at = mean_stiffness(system)
-        found = _rough_crossings(c, belt, stiffness_at)
-    flutter, divergence = undamped_critical(c, k, belt)
-    lost = next((crossing for crossing in found if crossing.lost), None)
     fastest = float(values.real.max())
     tolerance = 0.0 if is_undamped(c) else 1e-12 * float(np.abs(values).max())
     return StabilityReport(
@@ -113,9 +83,10 @@ def stability(system: System) -> StabilityReport:
         eigenvalues=tuple(complex(value) for value in values),
         modes=tuple(modes(c, k, grip)),
         crossings=tuple(found),
+        critical=critical,
         undamped_flutter=flutter,
         undamped_divergence=divergence,
-        discrete=_discrete(system, stiffness_at, lost, fastest) if rest else None,
+        discrete=_discrete(system, stiffness_at, critical, fastest) if rest else None,
     )
 
 
@@ -131,8 +102,13 @@ def undamped_critical(c: Coefficients, k: float, belt: float) -> tuple[float | N
     return None, (c.c_xx * (c.c_yy + k) - c.c_xy**2) / (k * abs(c.c_xy))
 
 
-def mean_stiffness(system: System) -> StiffnessAt:
-    """Mean stiffness of a rough contact as it depends on φ through the mean force; NaN where there is none."""
+def mean_stiffness(system: System, smooth: float) -> StiffnessAt:
+    """Mean stiffness of a rough contact as it depends on φ through the mean force; NaN where there is none.
+
+    That of smooth surfaces (N/m) is known, and of a wheel at rest it is not needed.
+    """
+    if system.smooth or system.belt_speed == 0.0:
+        return lambda phi: smooth
     mean = tabulated(system)
 
     @cache
@@ -157,71 +133,55 @@ def _rough_crossings(c: Coefficients, belt: float, stiffness_at: StiffnessAt) ->
 
     def unstable(phi: float) -> bool | None:
         mode = first_mode(phi)
-        return None if mode is None else mode.growth > 0.0
+        return mode.growth > 0.0 if mode else None
 
-    frictions = [float(phi) for phi in np.linspace(0.0, LARGEST_FRICTION, FRICTIONS)]
-    verdicts = [unstable(phi) for phi in frictions]
+    frictions = np.linspace(0.0, LARGEST_FRICTION, FRICTIONS).tolist()
     found = []
-    for (low, high), (before, after) in zip(pairwise(frictions), pairwise(verdicts), strict=True):
+    for (low, high), (before, after) in zip(pairwise(frictions), pairwise(map(unstable, frictions)), strict=True):
         if before is None or before == after or (before and after is None):
             continue
         # By halves: without dashpots the growth is zero on one side.
         low, high = bisect(lambda phi: unstable(phi) == before, low, high, halvings=50)  # noqa: B023 - used at once
         lost = unstable(high) is not False
         mode = first_mode(high if lost else low)
-        oscillates = mode is not None and mode.frequency > 0.0
-        kind = Instability.FLUTTER if oscillates else Instability.DIVERGENCE
-        found.append(Crossing(0.5 * (low + high), kind, mode.frequency if mode else 0.0, lost))
+        frequency = mode.frequency if mode else 0.0
+        kind = "flutter" if frequency > 0.0 else "divergence"
+        found.append(Crossing(0.5 * (low + high), kind, frequency, lost))
     return found
 
 
-def _discrete(
-    system: System, stiffness_at: StiffnessAt, exact: Crossing | None, fastest: float
-) -> Discrete | None:
-    """What the scheme makes of steady sliding, which grows with `fastest` (1/s); None without contact."""
-    c = system.coefficients
-    if system.belt_speed == 0.0 or not stiffness_at(c.phi) > 0.0:
+def _discrete(system: System, stiffness_at: StiffnessAt, exact: Crossing | None, rate: float) -> Discrete | None:
+    """What the scheme makes of steady sliding, which grows at a rate (1/s); None without contact."""
+    phi, h = system.coefficients.phi, system.weights.h
+    if system.belt_speed == 0.0 or not stiffness_at(phi) > 0.0:
         return None
-    if system.method.own_steps:  # it makes of it what it is
-        critical = exact.friction if exact else None
-        bias = 0.0 if exact else None
-        return Discrete(math.exp(fastest * system.weights.h), fastest, None, critical, bias)
-    at_case = _radius(system, stiffness_at, c.phi, system.weights.h)
+    if system.method.own_steps:  # the motion itself
+        critical, bias = (exact.friction, 0.0) if exact else (None, None)
+        return Discrete(math.exp(rate * h), rate, None, critical, bias)
+    radius = spectral_radius(system, stiffness_at(phi), phi)
     critical = discrete_critical(system, stiffness_at, exact)
     return Discrete(
-        spectral_radius=at_case,
-        growth=math.log(at_case) / system.weights.h if at_case > 0.0 else -math.inf,
+        spectral_radius=radius,
+        growth=math.log(radius) / h if radius > 0.0 else -math.inf,
         step_limit=step_limit(system, stiffness_at),
         critical_friction=critical,
         bias=critical - exact.friction if critical is not None and exact else None,
     )
 
 
-def _radius(system: System, stiffness_at: StiffnessAt, phi: float, h: float) -> float:
-    """Spectral radius of the case's scheme at another φ and step (s)."""
-    k = stiffness_at(phi)
-    if not k > 0.0:
-        return 0.0
-    c, weights = system.coefficients._replace(phi=phi), system.weights._replace(h=h)
-    return spectral_radius(c, weights, system.scheme, k, system.belt_speed)
-
-
 def discrete_critical(system: System, stiffness_at: StiffnessAt, exact: Crossing | None) -> float | None:
-    """φ at which steady sliding loses stability in the case's scheme at its step, U ≠ 0; None where nowhere.
+    """φ at which steady sliding, U ≠ 0, loses stability in a scheme on the case's grid; None where nowhere.
 
-    The scheme is one that steps on the grid of the case. It is looked for up to twice the exact value.
+    It is looked for up to twice the exact value.
     """
-
     from scipy.optimize import brentq  # only `brakecli stability` and sweeps wait for it
 
     def excess(phi: float) -> float:
-        return _radius(system, stiffness_at, phi, system.weights.h) - 1.0 - MARGIN
+        return spectral_radius(system, stiffness_at(phi), phi) - 1.0 - MARGIN
 
-    reach = 2.0 * exact.friction if exact else LARGEST_FRICTION
-    frictions = [float(phi) for phi in np.linspace(0.0, reach, 41)]
     if excess(0.0) > 0.0:
         return 0.0
-    for low, high in pairwise(frictions):
+    for low, high in pairwise(np.linspace(0.0, 2.0 * exact.friction if exact else LARGEST_FRICTION, 41).tolist()):
         if excess(high) > 0.0:
             return float(brentq(excess, low, high, xtol=1e-12))
     return None
@@ -232,19 +192,18 @@ def step_limit(system: System, stiffness_at: StiffnessAt) -> float | None:
 
     0 where the scheme is unstable at any step, None where it is stable at all of them.
     """
-    radius = partial(_radius, system, stiffness_at, 0.0)
-    frequency = natural_frequencies(system.coefficients, stiffness_at(0.0))[1]
-    ladder = 10.0 ** np.arange(-2.0, 4.1, 0.25) / (2.0 * math.pi * frequency)
+    k = stiffness_at(0.0)
+    omega = 2.0 * math.pi * natural_frequencies(system.coefficients, k)[1]
 
     def is_stable(h: float) -> bool:
         # Entries of the matrix are rounded to ε (ωh)² / 10⁻³; double eigenvalues are known to the root of that.
-        rounding = math.sqrt(np.finfo(float).eps / 1e-3) * 2.0 * math.pi * frequency * h
-        return bool(radius(h) <= 1.0 + max(_CLEAR_MARGIN, rounding))
+        rounding = math.sqrt(np.finfo(float).eps / 1e-3) * omega * h
+        return spectral_radius(system, k, 0.0, h) <= 1.0 + max(_CLEAR_MARGIN, rounding)
 
-    stable = [is_stable(float(h)) for h in ladder]
-    if all(stable):
+    ladder = (10.0 ** np.arange(-2.0, 4.1, 0.25) / omega).tolist()
+    first = next((place for place, h in enumerate(ladder) if not is_stable(h)), None)
+    if first is None:
         return None
-    first = stable.index(False)
     if first == 0:
         return 0.0
-    return bisect(is_stable, float(ladder[first - 1]), float(ladder[first]), halvings=60, geometric=True)[0]
+    return bisect(is_stable, ladder[first - 1], ladder[first], halvings=60, geometric=True)[0]

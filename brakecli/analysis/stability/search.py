@@ -14,11 +14,10 @@ def bisect(
     halvings: int = 5000,
     geometric: bool = False,
 ) -> tuple[float, float]:
-    """Narrow the bracket of a change: `as_below` is true at `low`, and where the answer is still that at `low`.
+    """Narrow the bracket of a change: `as_below` is true where the answer is still that at `low`.
 
     It ends where the bracket is no wider than `width` or high / low no larger than `ratio`, after so many
-    `halvings`, at neighbouring numbers, and where `as_below` answers None. With `geometric` midpoints both ends
-    are positive.
+    `halvings`, at neighbouring numbers, and where `as_below` answers None. `geometric`: both ends are positive.
     """
     for _ in range(halvings):
         middle = math.sqrt(low * high) if geometric else 0.5 * (low + high)

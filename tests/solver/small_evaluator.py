@@ -1,0 +1,20 @@
+"""A small evaluator for the test of the registry: smooth surfaces, the layer as one spring."""
+
+from brakecli.solver.compile import kernel
+from brakecli.solver.contact import kinds
+from brakecli.solver.records import EVALUATE, Layer
+
+KIND = len(kinds())  # the place that it takes in the registry
+
+
+@kernel(EVALUATE)
+def evaluate(x: float, y: float, layer: Layer) -> None:
+    pad, contact = layer.pad, layer.contact
+    touching = 1.0 if y < 0.0 else 0.0
+    contact.stiffness = touching * 2.0 * pad.half_length * pad.k
+    contact.normal_force = -contact.stiffness * y
+    contact.fraction = touching
+    contact.store = -0.5 * contact.normal_force * y
+    contact.tangential = contact.store_x = 0.0
+    contact.kind = KIND
+    contact.valid = 1 if pad.shoe_terms + pad.wheel_terms == 0 else 0

@@ -1,0 +1,59 @@
+"""A small scheme for the test of the registry: backward Euler, of first order, for any step."""
+
+from typing import Any
+
+from brakecli.solver import loop, records
+from brakecli.solver.compile import kernel
+from brakecli.solver.energy import Mechanical, energy_at_level
+from brakecli.solver.records import Coefficients, Pair, Weights
+
+STATE = records.STATE
+advance, sample = loop.advance, loop.sample
+WEIGHTS, LAG = 0, 0
+MEMORY, VELOCITIES = ("x", "y", "v_x", "v_y"), ("v_x", "v_y")
+
+
+def weighted_time(s: Weights) -> float:
+    return 1.0
+
+
+def order(s: Weights, start: str) -> int:
+    return 1
+
+
+def begin(s: Weights, state: Any, position: Pair, velocity: Pair, acceleration: Pair) -> None:
+    state.x, state.y = position
+    state.v_x, state.v_y = velocity
+
+
+def mechanical_energy(c: Coefficients, s: Weights, state: Any) -> Mechanical:
+    return energy_at_level(c, state)
+
+
+@kernel(records.PREPARE)
+def prepare(c: Coefficients, s: Weights, state: Any, problem: Any) -> None:
+    h, inertia = s.h, c.m / s.h
+    problem.a_11, problem.a_12 = inertia + c.b_xx + c.c_xx * h, c.b_xy + c.c_xy * h
+    problem.a_22 = inertia + c.b_yy + c.c_yy * h
+    problem.g_1 = inertia * state.v_x - c.c_xx * state.x - c.c_xy * state.y - problem.load * c.sin_beta
+    problem.g_2 = inertia * state.v_y - c.c_yy * state.y - c.c_xy * state.x - problem.load * c.cos_beta
+    problem.x_0, problem.y_0, problem.gain = state.x, state.y, h
+    problem.belt, problem.phi = problem.belt_next, c.phi
+    problem.d, problem.e, problem.normal_force = state.v_x, state.v_y, state.force
+
+
+@kernel(records.FINISH)
+def finish(c: Coefficients, s: Weights, state: Any, problem: Any, contact: Any, work: Any) -> None:
+    p, q, dx, dy = problem.d, problem.e, s.h * problem.d, s.h * problem.e
+    friction = problem.a_11 * p + problem.a_12 * q - problem.g_1
+    work.belt += s.h * friction * problem.belt
+    work.friction -= friction * (dx - s.h * problem.belt)
+    work.dashpots += dx * (c.b_xx * p + c.b_xy * q) + dy * (c.b_xy * p + c.b_yy * q)
+    work.load += problem.load * (c.sin_beta * dx + c.cos_beta * dy)
+    inertia = c.m * ((p - state.v_x) ** 2 + (q - state.v_y) ** 2)
+    links = c.c_xx * dx * dx + 2.0 * c.c_xy * dx * dy + c.c_yy * dy * dy
+    work.scheme += 0.5 * (inertia + links - dy * (contact.normal_force - work.force_before))
+    work.force_before = contact.normal_force
+    state.x += dx
+    state.y += dy
+    state.v_x, state.v_y, state.force = p, q, problem.normal_force
