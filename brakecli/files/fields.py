@@ -208,6 +208,12 @@ STABILITY = (
 )
 VARIED = (
     *named(STABILITY, "critical_friction", "instability"),
-    Field("discrete_critical_friction", "1", "the same in the scheme", at="discrete.critical_friction"),
+    Field(
+        "discrete_critical_friction",
+        "1",
+        "the same in the scheme",
+        at="discrete.critical_friction",
+        label="as the scheme has it",
+    ),
 )
 """Along a key of the case, beside its `value`."""

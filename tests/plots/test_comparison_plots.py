@@ -190,7 +190,7 @@ def test_where_nothing_meets_the_target_the_picture_says_so(tmp_path: Path) -> N
 def test_a_computed_comparison_is_drawn_with_its_own_numbers(tmp_path: Path) -> None:
     loaded = parse_case(TINY, "tiny")
     found = compare(
-        system_of(loaded.case), schemes=["three-layer", "event-driven"], steps=[4e-5, 2e-5], budget=2.0
+        system_of(loaded.case), schemes=["three-layer", "event-driven"], steps=[4e-5, 2e-5], budget=30.0
     )
     report = ComparisonReport(tmp_path / "r.h5", "Tiny", found, 1e-2)
     comparison_result.write(report.output, loaded, report, force=False)
