@@ -119,7 +119,7 @@ def main() -> None:
             answer = certify(system_of(changed(case, solver={"tolerance": tolerance})))
             seconds = time.perf_counter() - begin
             certificate = answer.certificate
-            error = errors(answer.motion.rows, exact, answer.motion.system.interval).error
+            error = errors(answer.motion.rows, exact).error
             found.append((kind, tolerance, certificate.certified, certificate.estimated_error, error, seconds))
             if error > tolerance or not certificate.certified:
                 told = f"true error {error:.1e}, {certificate.sentence()}"

@@ -75,5 +75,7 @@ def test_every_name_of_stability_is_documented() -> None:
     page = (ROOT / "docs" / "stability.md").read_text()
     report = stability(system_of(parse_case(starter_text(), "starter").case))
     numbers = values_of(fields.STABILITY, report)
-    names = [*numbers, *numbers["discrete"]]
+    objects = (numbers["discrete"], numbers["equilibrium"], numbers["modes"][0], numbers["crossings"][0])
+    names = [*numbers, *(name for each in objects for name in each)]
+    assert len(names) > 30
     assert [name for name in names if f"`{name}`" not in page] == []

@@ -166,7 +166,7 @@ def truth(tables: Tables, at: Pace) -> Truth:
             return Truth(None, math.nan, str(error))
         if work.failure is Failure.NONE:
             exact = exponential(system, rows)
-            return Truth(rows, errors(rows, exact, at.interval).error if exact is not None else math.nan, "")
+            return Truth(rows, errors(rows, exact).error if exact is not None else math.nan, "")
     return Truth(None, math.nan, work.failure.sentence)
 
 
@@ -238,7 +238,7 @@ def judge(tables: Tables, scheme: Scheme, at: Pace, reference: Truth, most: floa
         with within_range():
             system = system_of(case_of(tables, scheme.solver(at.step, at.duration), at.interval))
             found = check(system)
-            refuse(system, found, math.inf)
+            refuse(found)
             warnings = [text for text in found.warnings if text.startswith(("solver", "contact", "friction"))]
             if scheme.order:
                 work, rows = motion(system)
@@ -259,6 +259,6 @@ def judge(tables: Tables, scheme: Scheme, at: Pace, reference: Truth, most: floa
     if reference.rows is None:
         kind = "warned" if warnings else "silently wrong"
         return Outcome(kind, math.nan, limit, "; ".join(warnings) or "no reference: " + reference.words)
-    error = errors(rows, reference.rows, at.interval).error
+    error = errors(rows, reference.rows).error
     kind = "right" if error <= limit else "warned" if warnings else "silently wrong"
     return Outcome(kind, error, limit, "; ".join(warnings))

@@ -11,6 +11,7 @@ import typer
 
 from brakecli import __version__
 from brakecli.cli import check, classify, compare_schemes, new, plot, run, schema, stability, sweep
+from brakecli.cli.options import option
 from brakecli.cli.output import say, show
 from brakecli.errors import BrakecliError
 from brakecli.files.os_signals import Interrupted
@@ -53,11 +54,9 @@ def _print_version(wanted: bool) -> None:
         raise typer.Exit
 
 
+VERSION = option("Print the version and exit.", None, "--version", callback=_print_version, is_eager=True)
+
+
 @app.callback()
-def _common(
-    version: Annotated[
-        bool,
-        typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit."),
-    ] = False,
-) -> None:
+def _common(version: Annotated[bool, VERSION] = False) -> None:
     pass

@@ -7,8 +7,9 @@ from typing import Annotated
 
 from brakecli.cli.inputs import is_sweep, load_case, load_sweep
 from brakecli.cli.options import AsJson, Overrides, Quiet, source_argument
-from brakecli.cli.output import show_result, warn
-from brakecli.cli.progress import announce_compilation
+from brakecli.cli.output import announce_compilation, show_result, warn
+
+OF_SYSTEM = ("belt_speed", "contact_stiffness", "natural_frequencies", "passing_frequency", "evaluator", "nodes")
 
 
 def command(
@@ -18,10 +19,19 @@ def command(
     quiet: Quiet = False,
 ) -> None:
     """Validate a case or a sweep; report what it would cost and which limits it meets, without computing it."""
-    (_check_sweep if is_sweep(file) else _check_case)(file, overrides, as_json, quiet)
+    if is_sweep(file):
+        sweep = load_sweep(file, overrides)
+        announce_compilation(quiet)
+        from brakecli.cli.tables import estimate_table
+        from brakecli.runs.limits import free_bytes
+        from brakecli.sweeps.cost import estimate, refuse_sweep
+        from brakecli.sweeps.driver import cores
 
-
-def _check_case(file: str, overrides: list[str] | None, as_json: bool, quiet: bool) -> None:
+        cost = estimate(sweep.plan, cores())
+        numbers = {"valid": True, **asdict(cost)}
+        show_result("check", numbers, estimate_table, sweep.title, cost, as_json=as_json, quiet=quiet)
+        refuse_sweep(cost, free_bytes(Path()))
+        return
     loaded = load_case(file, overrides)
     announce_compilation(quiet)
     from brakecli.case.system import system_of
@@ -29,26 +39,12 @@ def _check_case(file: str, overrides: list[str] | None, as_json: bool, quiet: bo
     from brakecli.runs.limits import check, free_bytes, refuse, within_range
 
     with within_range():
-        system = system_of(loaded.case)
-        found = check(system)
-    values = {"valid": True, **asdict(found), **asdict(found.limits)}
-    del values["limits"]
+        found = check(system_of(loaded.case))
+    of_system = {name: getattr(found.system, name) for name in OF_SYSTEM}
+    values = {"valid": True, "coefficients": found.system.coefficients._asdict(), **of_system, **vars(found)}
+    values |= vars(values.pop("limits"))
+    del values["system"]
     numbers = {name: value for name, value in values.items() if value not in (math.inf, -math.inf)}
-    title = loaded.case.title
-    show_result("check", numbers, check_table, title, found, as_json=as_json, quiet=quiet)
+    show_result("check", numbers, check_table, loaded.case.title, found, as_json=as_json, quiet=quiet)
     warn(*found.warnings)
-    refuse(system, found, free_bytes(Path()))
-
-
-def _check_sweep(file: str, overrides: list[str] | None, as_json: bool, quiet: bool) -> None:
-    loaded = load_sweep(file, overrides)
-    announce_compilation(quiet)
-    from brakecli.cli.tables import estimate_table
-    from brakecli.runs.limits import free_bytes
-    from brakecli.sweeps.cost import estimate, refuse_sweep
-    from brakecli.sweeps.driver import cores
-
-    found = estimate(loaded.plan, cores())
-    numbers = {"valid": True, **asdict(found)}
-    show_result("check", numbers, estimate_table, loaded.title, found, as_json=as_json, quiet=quiet)
-    refuse_sweep(found, free_bytes(Path()))
+    refuse(found, free_bytes(Path()))

@@ -5,8 +5,7 @@ from typing import Annotated
 
 from brakecli.cli.inputs import load_case, result_path
 from brakecli.cli.options import AsJson, CaseArgument, Force, Overrides, Quiet, option, output_option
-from brakecli.cli.output import show_result
-from brakecli.cli.progress import announce_compilation, progress
+from brakecli.cli.output import announce_compilation, progress, show_result
 
 
 def command(
@@ -25,7 +24,6 @@ def command(
     loaded = load_case(case, overrides)
     target = result_path(output, case, ending="-schemes.h5")
     announce_compilation(quiet)
-    from brakecli.case.system import system_of
     from brakecli.cli.tables import comparison_table
     from brakecli.comparison.compare import compare
     from brakecli.comparison.methods import parse_schemes, parse_steps
@@ -34,8 +32,7 @@ def command(
     from brakecli.runs.run import load_kernels
 
     chosen, ladder = parse_schemes(schemes), parse_steps(steps)
-    load_kernels(loaded)
-    system = system_of(loaded.case)
+    system = load_kernels(loaded)
     with progress(quiet) as show_progress:
         with new_output(target, force=force):  # whether it can be written is known before anything is computed
             pass

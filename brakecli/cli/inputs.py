@@ -2,6 +2,7 @@
 
 import os
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,9 +15,9 @@ if TYPE_CHECKING:
 
 def load_case(source: str, overrides: list[str] | None) -> "LoadedCase":
     """The case of a case file, or the one that a result file holds."""
-    from brakecli.case.read import LoadedCase, parse_case, read_case
+    from brakecli.case.read import parse_case, read_case
 
-    if source == "-" or Path(source).suffix == ".toml" or not _is_result(source):
+    if not _is_result(source):
         try:
             return read_case(source, overrides or ())
         except CaseError as error:
@@ -27,8 +28,7 @@ def load_case(source: str, overrides: list[str] | None) -> "LoadedCase":
 
     with open_result(Path(source), kind="run") as result:
         text, resolved = result.attributes["case_toml"], result.attributes["resolved_toml"]
-    again = parse_case(resolved, f"{source} (its resolved case)", overrides or ())
-    return LoadedCase(again.case, text, again.resolved)
+    return replace(parse_case(resolved, f"{source} (its resolved case)", overrides or ()), text=text)
 
 
 def load_sweep(source: str, overrides: list[str] | None) -> "LoadedSweep":
@@ -65,8 +65,9 @@ def result_path(output: Path | None, source: str, kind: str = "case", ending: st
 
 def _is_result(source: str) -> bool:
     """Whether this is a result file, or was one: by its name, or by its content."""
-    if Path(source).suffix == ".h5" and os.path.isfile(source):  # noqa: PTH113 - pathlib's may raise
-        return True
+    if source == "-" or Path(source).suffix == ".toml":
+        return False
     from brakecli.files.read import is_hdf5
 
-    return is_hdf5(Path(source))
+    named = Path(source).suffix == ".h5" and os.path.isfile(source)  # noqa: PTH113 - pathlib's may raise
+    return named or is_hdf5(Path(source))

@@ -1,9 +1,12 @@
-"""Results go to standard output, everything else to standard error."""
+"""What a command prints: results on standard output; warnings, progress and failures on standard error."""
 
 import json
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
+
+from brakecli.files.os_signals import unwinding
 
 
 def show(text: str) -> None:
@@ -13,8 +16,8 @@ def show(text: str) -> None:
 
 def show_json(value: Mapping[str, Any], indent: int | None = None) -> None:
     """Print a result as JSON, in ASCII if standard output is not UTF-8."""
-    ascii_only = (sys.stdout.encoding or "").lower().replace("-", "") != "utf8"
-    show(json.dumps(value, allow_nan=False, ensure_ascii=ascii_only, indent=indent))
+    utf8 = (sys.stdout.encoding or "").lower() in ("utf-8", "utf8")
+    show(json.dumps(value, allow_nan=False, ensure_ascii=not utf8, indent=indent))
 
 
 def show_result(
@@ -36,3 +39,40 @@ def say(*lines: str) -> None:
 def warn(*warnings: str) -> None:
     """Print warnings on standard error."""
     say(*(f"warning: {warning}" for warning in warnings))
+
+
+def announce_compilation(quiet: bool) -> None:
+    """Report that kernels will be compiled, which takes seconds once for each version.
+
+    They are compiled as they are imported: a command calls this before it imports them.
+    """
+    if quiet:
+        return
+    from brakecli.solver.compile import cache_is_cold
+
+    if cache_is_cold():
+        say("compiling kernels, once for this version …")
+
+
+@contextmanager
+def progress(quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
+    """Yield a function that shows on a terminal what is counted, how many are done, and how many there are.
+
+    Within, a signal raises `Interrupted`: at once, or when that function is called next.
+    """
+    with unwinding() as recall:
+        if quiet or sys.stderr is None or not sys.stderr.isatty():
+            yield lambda what, done, total: recall()
+            return
+        from rich import progress as rich_progress
+        from rich.console import Console
+
+        columns = (*rich_progress.Progress.get_default_columns(), rich_progress.MofNCompleteColumn())
+        with rich_progress.Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+            task = bar.add_task("", visible=False)
+
+            def show(what: str, done: int, total: int) -> None:
+                recall()
+                bar.update(task, description=what, completed=done, total=total, visible=True)
+
+            yield show

@@ -5,8 +5,7 @@ from typing import Annotated
 
 from brakecli.cli.inputs import load_case, result_path
 from brakecli.cli.options import AsJson, Force, Overrides, Quiet, output_option, source_argument
-from brakecli.cli.output import say, show_result, warn
-from brakecli.cli.progress import announce_compilation, progress
+from brakecli.cli.output import announce_compilation, progress, say, show_result, warn
 from brakecli.errors import BrakecliError
 
 SOURCE = 'Case file, "-" for standard input, or a result file, whose case is run again.'
@@ -35,7 +34,7 @@ def command(
     warn(*report.warnings)
     numbers = {"output": str(report.output), **report.numbers()}
     show_result("run", numbers, run_table, report, as_json=as_json, quiet=quiet)
-    if report.failed:
+    if report.motion.work.failed:
         say(f"{report.output}: the history up to the failure was written")
         raise BrakecliError(str(report.motion.work.failure_sentence))
     certificate = report.certificate

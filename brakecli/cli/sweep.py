@@ -5,32 +5,23 @@ from typing import Annotated
 
 from brakecli.cli.inputs import load_sweep, result_path
 from brakecli.cli.options import AsJson, Quiet, option, output_option, set_option, source_argument
-from brakecli.cli.output import say, show_result, warn
-from brakecli.cli.progress import announce_compilation, progress
+from brakecli.cli.output import announce_compilation, progress, say, show_result, warn
 from brakecli.errors import BrakecliError
+
+JOBS = "Worker processes  [default: one for each core]"
+SCHEDULER = "Compute on a dask cluster: the scheduler's address, as tcp://host:8786."
+REPLACE = "Replace an existing output, and drop finished points of another sweep."
 
 
 def command(
     file: Annotated[str, source_argument("SWEEP.toml", 'Sweep file, or "-" for standard input.')],
     output: Annotated[Path | None, output_option("Result file", "the sweep's name with .h5, here")] = None,
     overrides: Annotated[list[str] | None, set_option("the base case or of [critical]")] = None,
-    jobs: Annotated[
-        int | None,
-        option("Worker processes  [default: one for each core]", None, "--jobs", "-j", min=1, max=4096),
-    ] = None,
-    scheduler: Annotated[
-        str | None,
-        option(
-            "Compute on a dask cluster: the scheduler's address, as tcp://host:8786.",
-            "ADDRESS",
-            envvar="DASK_SCHEDULER_ADDRESS",
-        ),
-    ] = None,
+    jobs: Annotated[int | None, option(JOBS, None, "--jobs", "-j", min=1, max=4096)] = None,
+    scheduler: Annotated[str | None, option(SCHEDULER, "ADDRESS", envvar="DASK_SCHEDULER_ADDRESS")] = None,
     scheduler_file: Annotated[str | None, option("The same, by the scheduler's file.", "FILE")] = None,
     task_size: Annotated[int | None, option("Points of a task  [default: as many as take 0.2 s]", min=1)] = None,
-    force: Annotated[
-        bool, option("Replace an existing output, and drop finished points of another sweep.", None, "--force")
-    ] = False,
+    force: Annotated[bool, option(REPLACE, None, "--force")] = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
@@ -44,7 +35,7 @@ def command(
     from brakecli.cli.tables import sweep_table
     from brakecli.runs.run import load_kernels
     from brakecli.sweeps.cost import Estimate
-    from brakecli.sweeps.driver import Progress, choose_engine, sweep
+    from brakecli.sweeps.driver import choose_engine, sweep
 
     load_kernels(loaded.base)
     with progress(quiet) as show_progress:
@@ -53,9 +44,9 @@ def command(
             if not quiet:
                 say(found.sentence() + (f"; {resumed} of them are there already" if resumed else ""))
 
-        def advance(points: Progress) -> None:
-            what = f"points, {points.failed} failed" if points.failed else "points"
-            show_progress(what, points.done, loaded.plan.passes * loaded.plan.points)
+        def advance(done: int, failed: int) -> None:
+            what = f"points, {failed} failed" if failed else "points"
+            show_progress(what, done, loaded.plan.passes * loaded.plan.points)
 
         with choose_engine(loaded.plan, jobs, scheduler, scheduler_file) as engine:
             report = sweep(loaded, target, engine, force=force, task_size=task_size, begin=begin, progress=advance)

@@ -4,20 +4,16 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
+from itertools import pairwise
 from statistics import median
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.analysis.stability.report import (
-    StabilityReport,
-    discrete_critical,
-    mean_stiffness,
-    stability,
-    step_limit,
-)
+from brakecli.analysis.stability import report as linear
 from brakecli.comparison.deviation import Errors, errors
-from brakecli.comparison.methods import Rung, kinds, ladder, rungs
+from brakecli.comparison.methods import kinds, ladder, method_label, rungs
 from brakecli.errors import BrakecliError, RefusedError
 from brakecli.runs.limits import check, refuse, within_range
 from brakecli.solver import contact
@@ -39,9 +35,11 @@ LONGEST_CALL = 1.0
 
 @dataclass
 class Entry:
-    """A rung with what came of it; None where it does not exist."""
+    """A method at one step or tolerance, with what came of it; None where it does not exist."""
 
-    rung: Rung
+    kind: Method  # without step and tolerance
+    method: Method
+    place: int  # on the ladder of steps or tolerances, from the coarsest on
     errors: Errors | None = None
     work: Work | None = None
     failure: str = ""
@@ -52,10 +50,30 @@ class Entry:
     step_limit: float | None = None  # s; infinite where any step is stable
     on_front: bool = False
 
+    def __str__(self) -> str:
+        """The method with its step or tolerance."""
+        rung = f"tolerance {self.tolerance:g}" if self.method.step is None else f"step {self.method.step:.3g} s"
+        return f"{self.label}, {rung}"
+
+    @property
+    def label(self) -> str:
+        """The method in a few words."""
+        return method_label(self.kind)
+
+    @property
+    def tolerance(self) -> float | None:
+        """The tolerance; None where there is a step."""
+        return self.method.tolerance or None
+
+    @property
+    def error(self) -> float:
+        """The largest error of the motion; infinite where it is not known."""
+        return math.inf if self.errors is None else self.errors.error
+
     @property
     def iterations(self) -> int:
         """Evaluations of the contact in the steps, one for each iteration; none where steps are explicit."""
-        if self.work is None or self.rung.step is None:
+        if self.work is None or self.method.step is None:
             return 0
         return self.work.contact_evaluations - self.samples
 
@@ -85,22 +103,18 @@ class Comparison:
 
     def cheapest(self, target: float) -> Entry | None:
         """The entry that takes the least time of those whose error is at most `target`."""
-        able = [
-            entry
-            for entry in self.entries
-            if entry.errors is not None and entry.errors.error + self.reference_error <= target and entry.seconds
-        ]
+        able = [each for each in self.entries if each.seconds and each.error + self.reference_error <= target]
         return min(able, key=lambda entry: entry.wall_seconds or math.inf, default=None)
 
     def finer_error(self, entry: Entry) -> float:
         """The largest error of the same method at finer steps; above the entry's own, that is low by chance."""
-        kind, step = entry.rung.kind, entry.rung.step or 0.0
-        finer = (each for each in self.entries if each.rung.kind == kind and (each.rung.step or step) < step)
-        return max((each.errors.error for each in finer if each.errors is not None), default=0.0)
+        kind, step = entry.kind, entry.method.step or 0.0
+        finer = (each for each in self.entries if each.kind == kind and (each.method.step or step) < step)
+        return max((each.error for each in finer if each.errors), default=0.0)
 
 
 Progress = Callable[[str, int, int], None]
-"""Told what is done, how many rungs are done, and of how many."""
+"""Called with what is done, how many rungs are done, and of how many."""
 
 
 def compare(
@@ -118,57 +132,50 @@ def compare(
             _ = load(kind.scheme), contact.load("exact" if kind.evaluator == "auto" else kind.evaluator)
         begin = time.perf_counter()
         found = ladder(system, steps)
-        report = stability(system)
+        report = linear.stability(system)
         progress("reference", 0, 0)
         sampled = replace(system, interval=found[0])
         reference = _reference(sampled, REFERENCE_SHARE * budget)
         sampled = replace(sampled, duration=(len(reference.rows) - 1) * sampled.interval)
-        reference_error = _reference_error(sampled, reference.rows)
-        entries = [Entry(rung) for kind in tried for rung in rungs(kind, found)]
+        checked = _event_driven(sampled, CHECK, "it is not known how good the reference is")
+        reference_error = errors(checked.rows, reference.rows).error
+        entries = [Entry(kind, each, place) for kind in tried for place, each in enumerate(rungs(kind, found))]
         left_out = _first_round(sampled, entries, reference.rows, begin + 0.8 * budget, progress)
         _add_limits(system, report, entries)
         repeats = _repeat(sampled, entries, begin + budget, progress)
-    _fronts(entries)
-    return Comparison(
-        system,
-        sampled.duration,
-        sampled.interval,
-        reference_error,
-        reference.work.solve_seconds,
-        repeats,
-        left_out,
-        tuple(entries),
-    )
+    _mark_front(entries)
+    duration, interval, seconds = sampled.duration, sampled.interval, reference.work.solve_seconds
+    return Comparison(system, duration, interval, reference_error, seconds, repeats, left_out, tuple(entries))
 
 
 def _motion(system: System, method: Method, *, at_once: bool = False) -> Motion:
     """The motion by a method, in one block if `at_once`; raises RefusedError."""
     system = replace(system, method=method)
-    refuse(system, check(system), math.inf)
+    refuse(check(system))
     return solve(system, first_block=system.steps if at_once else 1)
+
+
+def _event_driven(system: System, tolerance: float, without: str) -> Motion:
+    """The motion to a tolerance; raises RefusedError where it fails, with what is missing then."""
+    motion = _motion(system, Method("event-driven", tolerance=tolerance))
+    if motion.work.failed:
+        raise RefusedError(f"{without}: {motion.work.failure_sentence}")
+    return motion
 
 
 def _reference(system: System, budget: float) -> Motion:
     """The longest part of the motion whose reference fits the budget (s), from the start on."""
-    whole = max(system.duration, FEWEST_SAMPLES * system.interval)
     duration = FEWEST_SAMPLES * system.interval
+    whole = max(system.duration, duration)
     while True:
         duration = min(duration, whole)
-        motion = _motion(replace(system, duration=duration), Method("event-driven", tolerance=REFERENCE))
-        if motion.work.failed:
-            raise RefusedError(f"there is no reference to compare with: {motion.work.failure_sentence}")
+        motion = _event_driven(
+            replace(system, duration=duration), REFERENCE, "there is no reference to compare with"
+        )
         seconds = motion.work.solve_seconds
         if duration >= whole or 3.0 * seconds > budget:
             return motion
         duration *= min(4.0, 0.7 * budget / max(seconds, 1e-3))
-
-
-def _reference_error(system: System, reference: NDArray[np.float64]) -> float:
-    """By how much the reference differs from a run at a looser tolerance."""
-    motion = _motion(system, Method("event-driven", tolerance=CHECK))
-    if motion.work.failed:
-        raise RefusedError(f"it is not known how good the reference is: {motion.work.failure_sentence}")
-    return errors(motion.rows, reference, system.interval).error
 
 
 def _first_round(
@@ -178,30 +185,25 @@ def _first_round(
 
     The coarsest of each method is run in any case.
     """
-    places: dict[Method, int] = {}
-    order = []
-    for entry in entries:
-        places[entry.rung.kind] = place = places.get(entry.rung.kind, -1) + 1
-        order.append((place, entry))
     left_out = 0
     last: dict[Method, float] = {}
-    for done, (place, entry) in enumerate(sorted(order, key=lambda pair: pair[0])):
+    for done, entry in enumerate(sorted(entries, key=lambda each: each.place)):
         progress("errors", done, len(entries))
-        if place and time.perf_counter() + 2.0 * last.get(entry.rung.kind, 0.0) > deadline:
+        if entry.place and time.perf_counter() + 2.0 * last.get(entry.kind, 0.0) > deadline:
             entry.failure = "left out: no time within the budget"
             left_out += 1
             continue
         try:
-            motion = _motion(system, entry.rung.method)
+            motion = _motion(system, entry.method)
         except BrakecliError as error:
             entry.failure = " ".join(str(error).split())
             continue
         work = entry.work = motion.work
-        last[entry.rung.kind] = work.solve_seconds
+        last[entry.kind] = work.solve_seconds
         entry.samples, entry.failure = len(motion.rows), work.failure_sentence or ""
         if not work.failed:
             entry.seconds.append(work.solve_seconds)
-            entry.errors = errors(motion.rows, reference, system.interval)
+            entry.errors = errors(motion.rows, reference)
     return left_out
 
 
@@ -220,52 +222,44 @@ def _repeat(system: System, entries: list[Entry], deadline: float, progress: Pro
         for done, entry in enumerate(timed):
             progress(f"times, turn {repeat + 1}", done, len(timed))
             at_once = entry.seconds[-1] < LONGEST_CALL
-            seconds = _motion(system, entry.rung.method, at_once=at_once).work.solve_seconds
+            seconds = _motion(system, entry.method, at_once=at_once).work.solve_seconds
             entry.seconds = [*entry.seconds, seconds] if repeat else [seconds]
     return MOST_REPEATS
 
 
-def _add_limits(system: System, report: StabilityReport, entries: list[Entry]) -> None:
+def _add_limits(system: System, report: linear.StabilityReport, entries: list[Entry]) -> None:
     """Add what the amplification matrices say, and the observed orders."""
-    stiffness_at = mean_stiffness(system, report.contact_stiffness)
+    stiffness_at = linear.mean_stiffness(system, report.contact_stiffness)
     exact = report.critical
-    limits: dict[tuple[str, tuple[float, ...]], float | None] = {}
-    biases: dict[tuple[str, tuple[float, ...], float], float | None] = {}
-    before: Entry | None = None
+
+    @cache  # neither depends on starts, iterations and evaluators
+    def limit(scheme: Method) -> float:
+        found = linear.step_limit(replace(system, method=scheme), stiffness_at)
+        return math.inf if found is None else found
+
+    @cache
+    def bias(scheme: Method, step: float) -> float | None:
+        at = replace(system, interval=step, duration=step, method=replace(scheme, step=step))
+        found = linear.discrete_critical(at, stiffness_at, exact) if exact else None
+        return found - exact.friction if found is not None and exact else None
+
     for entry in entries:
-        kind, step = entry.rung.kind, entry.rung.step
-        if before is not None and before.rung.kind == kind:
-            entry.order = _order(before, entry)
-        before = entry
+        kind, step = entry.kind, entry.method.step
         if step is None:
             entry.step_limit, entry.critical_bias = math.inf, 0.0 if exact else None
-            continue
-        if report.discrete is None:  # no steady sliding that could lose its stability
-            continue
-        scheme = kind.scheme, kind.theta
-        if (*scheme, step) not in biases:
-            at = replace(system, interval=step, duration=step, method=entry.rung.method)
-            if scheme not in limits:
-                limit = step_limit(at, stiffness_at)
-                limits[scheme] = math.inf if limit is None else limit
-            found = discrete_critical(at, stiffness_at, exact) if exact else None
-            biases[*scheme, step] = found - exact.friction if found is not None and exact else None
-        entry.step_limit, entry.critical_bias = limits[scheme], biases[*scheme, step]
+        elif report.discrete is not None:  # otherwise no steady sliding could lose its stability
+            scheme = Method(kind.scheme, kind.theta)
+            entry.step_limit, entry.critical_bias = limit(scheme), bias(scheme, step)
+    for coarse, fine in pairwise(entries):
+        long, short = coarse.method.step, fine.method.step
+        if fine.place and long and short and 0.0 < fine.error < math.inf and 0.0 < coarse.error < math.inf:
+            fine.order = math.log(coarse.error / fine.error) / math.log(long / short)
 
 
-def _order(coarse: Entry, fine: Entry) -> float | None:
-    """Observed order between two rungs: how the error falls with the step."""
-    if coarse.errors is None or fine.errors is None or not (fine.errors.error > 0.0 < coarse.errors.error):
-        return None
-    if coarse.rung.step is None or fine.rung.step is None:
-        return None
-    return math.log(coarse.errors.error / fine.errors.error) / math.log(coarse.rung.step / fine.rung.step)
-
-
-def _fronts(entries: list[Entry]) -> None:
+def _mark_front(entries: list[Entry]) -> None:
     """Mark the entries that no other beats in both error and time."""
     best = math.inf
-    able = [entry for entry in entries if entry.errors is not None and entry.wall_seconds is not None]
-    for entry in sorted(able, key=lambda each: (each.wall_seconds, each.errors.error if each.errors else 0.0)):
-        if entry.errors is not None and entry.errors.error < best:
-            entry.on_front, best = True, entry.errors.error
+    able = [entry for entry in entries if entry.errors is not None]
+    for entry in sorted(able, key=lambda each: (each.wall_seconds or 0.0, each.error)):
+        if entry.error < best:
+            entry.on_front, best = True, entry.error

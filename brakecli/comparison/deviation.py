@@ -11,7 +11,6 @@ from brakecli.solver.quantities import HISTORY
 MOTION = ("x", "y", "vx", "vy")
 FORCES = ("friction_force", "normal_force")
 _COLUMNS = {name: index for index, name in enumerate(HISTORY)}
-_QUARTER = 4
 
 
 @dataclass(frozen=True)
@@ -31,23 +30,21 @@ class Errors:
     phase: float | None
 
 
-def errors(rows: NDArray[np.float64], reference: NDArray[np.float64], interval: float) -> Errors:
-    """Compare rows of `model.HISTORY`, sampled at the same times."""
+def errors(rows: NDArray[np.float64], reference: NDArray[np.float64]) -> Errors:
+    """Compare rows of `quantities.HISTORY`, sampled at the same times."""
     largest, mean = {}, {}
     for name in (*MOTION, *FORCES):
         exact = reference[:, _COLUMNS[name]]
         apart = np.abs(rows[:, _COLUMNS[name]] - exact)
         scale = float(np.abs(exact).max()) or 1.0
         largest[name], mean[name] = float(apart.max()) / scale, float(apart.mean()) / scale
-    amplitude, phase = _line(rows[:, _COLUMNS["vx"]], reference[:, _COLUMNS["vx"]], interval)
+    amplitude, phase = _line(rows[:, _COLUMNS["vx"]], reference[:, _COLUMNS["vx"]])
     return Errors(max(largest[name] for name in MOTION), largest, mean, amplitude, phase)
 
 
-def _line(
-    values: NDArray[np.float64], reference: NDArray[np.float64], interval: float
-) -> tuple[float | None, float | None]:
+def _line(values: NDArray[np.float64], reference: NDArray[np.float64]) -> tuple[float | None, float | None]:
     """Relative error of the amplitude, and error of the phase, of the reference's strongest line."""
-    count = len(reference) // _QUARTER
+    count = len(reference) // 4
     if count < 64:
         return None, None
     window = np.hanning(count + 2)[1:-1]

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 from brakecli.errors import UsageError
 from brakecli.solver.method import Method
@@ -17,52 +16,35 @@ TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 NODE_FACTORS = (0.25, 0.5, 2.0, 4.0)
 
 
-class Rung(NamedTuple):
-    """A method at one step (s), or at one tolerance."""
-
-    kind: Method
-    step: float | None
-    tolerance: float | None
-
-    @property
-    def method(self) -> Method:
-        """The method with its step or tolerance."""
-        return replace(self.kind, step=self.step, tolerance=self.tolerance or 0.0)
-
-    @property
-    def label(self) -> str:
-        """The method in a few words."""
-        return method_label(self.kind)
-
-
 def method_label(kind: Method) -> str:
     """A method in a few words, without step and tolerance."""
-    weights = f" ({', '.join(_fraction(weight) for weight in kind.theta)})" if kind.theta else ""
-    start = ", paper's start" if kind.start == "paper" else ""
-    iteration = ", fixed point" if kind.iteration == "fixed-point" else ""
-    nodes = f", {kind.nodes} nodes" if kind.evaluator == "midpoint" else ""
-    exact = ", exact contact" if kind.evaluator == "exact" else ""
-    return f"{kind.scheme}{weights}{start}{iteration}{nodes}{exact}"
+    words = [
+        kind.scheme + (f" ({', '.join(_fraction(weight) for weight in kind.theta)})" if kind.theta else ""),
+        "paper's start" if kind.start == "paper" else "",
+        "fixed point" if kind.iteration == "fixed-point" else "",
+        {"midpoint": f"{kind.nodes} nodes", "exact": "exact contact"}.get(kind.evaluator, ""),
+    ]
+    return ", ".join(filter(None, words))
 
 
 def kinds(system: System, wanted: Sequence[str] = ()) -> list[Method]:
     """The methods that are compared on a system, the cheapest of a scheme first; `wanted` names schemes."""
     moving = system.initial.vx != 0.0 or system.initial.vy != 0.0
+    usual = "closed-form" if system.smooth else "auto"
     layered, contacts, own = [], [], []
     for name, scheme in SCHEMES.items():
         for trial in scheme.trials:
+            kind = Method(name, trial.theta, trial.start, trial.iteration)
             if (wanted and name not in wanted) or (moving and trial.start == "paper"):
                 continue
-            kind = Method(name, trial.theta, trial.start, trial.iteration)
             if scheme.own_steps:
                 own.append(kind)
                 continue
-            kind = replace(kind, evaluator="closed-form" if system.smooth else "auto", nodes=system.nodes)
-            layered.append(kind)
+            layered.append(replace(kind, evaluator=usual, nodes=system.nodes))
             if trial.contacts and not system.smooth:
                 counts = [max(2, round(system.nodes * factor)) for factor in NODE_FACTORS]
                 contacts += [replace(kind, evaluator="midpoint", nodes=count) for count in counts]
-                contacts.append(replace(kind, evaluator="exact", nodes=0))
+                contacts.append(replace(kind, evaluator="exact"))
     return layered + contacts + own
 
 
@@ -74,11 +56,11 @@ def ladder(system: System, steps: Sequence[float] = ()) -> list[float]:
     return [coarsest / 2**rung for rung in range(RUNGS)]
 
 
-def rungs(kind: Method, steps: Sequence[float]) -> list[Rung]:
+def rungs(kind: Method, steps: Sequence[float]) -> list[Method]:
     """A method over the ladder: over steps, or over tolerances if its steps are its own."""
     if kind.own_steps:
-        return [Rung(kind, None, tolerance) for tolerance in TOLERANCES]
-    return [Rung(kind, step, None) for step in steps]
+        return [replace(kind, tolerance=tolerance) for tolerance in TOLERANCES]
+    return [replace(kind, step=step) for step in steps]
 
 
 def parse_schemes(text: str | None) -> list[str]:
@@ -110,7 +92,7 @@ def parse_steps(text: str | None) -> list[float]:
 
 def _fraction(weight: float) -> str:
     for denominator in (1, 2, 3, 4, 12):
-        if math.isclose(weight * denominator, round(weight * denominator), abs_tol=1e-12):
-            numerator = round(weight * denominator)
+        numerator = round(weight * denominator)
+        if math.isclose(weight * denominator, numerator, abs_tol=1e-12):
             return str(numerator) if denominator == 1 else f"{numerator}/{denominator}"
     return f"{weight:.4g}"

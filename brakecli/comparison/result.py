@@ -10,10 +10,8 @@ from brakecli.case.read import LoadedCase
 from brakecli.comparison.compare import Comparison, Entry
 from brakecli.files import fields
 from brakecli.files.field import values_of
-from brakecli.files.write import ResultFile, new_result
+from brakecli.files.write import new_result
 from brakecli.runs.run import origin
-
-DEFAULT_TARGET = 1e-3
 
 
 @dataclass(frozen=True)
@@ -34,35 +32,24 @@ class ComparisonReport:
     def margin(self) -> float | None:
         """The target over the error of the recommended entry."""
         best = self.recommended
-        return self.target / best.errors.error if best is not None and best.errors is not None else None
+        return None if best is None else self.target / best.error
 
     def numbers(self) -> dict[str, Any]:
         """Names and values as `--json` gives them."""
         return values_of(fields.COMPARISON, self)
 
 
-def entry_numbers(entry: Entry) -> dict[str, Any]:
-    """Names and values of an entry; null where there is none."""
-    return values_of(fields.ENTRY, entry)
-
-
 def write(path: Path, loaded: LoadedCase, report: ComparisonReport, *, force: bool) -> None:
     """Write the result file; raises UsageError or CannotWriteError."""
-    with new_result(path, force=force) as result:
-        _write(result, loaded, report)
-        result.commit()
-
-
-def _write(result: ResultFile, loaded: LoadedCase, report: ComparisonReport) -> None:
     numbers, entries = report.numbers(), report.comparison.entries
     place = next((place for place, entry in enumerate(entries) if entry is report.recommended), None)
-    result.set_attributes(origin("comparison", report.title, loaded))
-    result.set_fields(fields.COMPARISON, {**numbers, "recommended": place})
-    result.axis("/", fields.ENTRY_PLACE, np.arange(len(entries)))
-    for field in fields.ENTRY:
-        values = [each[field.name] for each in numbers["entries"]]
-        result.column(field, ("entry",), [_weights(each) for each in values] if field.name == "theta" else values)
-
-
-def _weights(theta: list[float]) -> str:
-    return ", ".join(f"{weight:.6g}" for weight in theta)
+    with new_result(path, force=force) as result:
+        result.set_attributes(origin("comparison", report.title, loaded))
+        result.set_fields(fields.COMPARISON, {**numbers, "recommended": place})
+        result.axis("/", fields.ENTRY_PLACE, np.arange(len(entries)))
+        for field in fields.ENTRY:
+            values = [each[field.name] for each in numbers["entries"]]
+            if field.name == "theta":
+                values = [", ".join(f"{weight:.6g}" for weight in theta) for theta in values]
+            result.column(field, ("entry",), values)
+        result.commit()

@@ -10,7 +10,7 @@ import os
 import socket
 import stat
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from io import FileIO
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -33,10 +33,8 @@ class OutputFile(FileIO):
         """Begin with an empty file, in the place of one that a killed process left."""
         self.path = path
         self.failure: OSError | None = None
-        self._target = target
-        self._temporary = _beside(target, "part")
-        self._force = force
-        self._published = False
+        self._target, self._force = target, force
+        self._temporary = target.with_name(f".{target.name}.part")
         super().__init__(self._temporary, "w+", opener=_open_no_link)
 
     def write(self, data: "ReadableBuffer") -> int:
@@ -61,27 +59,26 @@ class OutputFile(FileIO):
 
     def truncate(self, size: int | None = None) -> int:
         """Set the length, or remember why that failed."""
+        size = self.tell() if size is None else size
         try:
-            os.ftruncate(self.fileno(), self.tell() if size is None else size)
+            os.ftruncate(self.fileno(), size)
         except OSError as error:
             self.failure = self.failure or error
-        return self.tell() if size is None else size
+        return size
 
     def check(self) -> None:
         """Raise CannotWriteError if any write so far has failed."""
-        if self.failure is not None:
-            raise cannot_write(self.path, self.failure) from self.failure
+        with explained(self.path):
+            if self.failure is not None:
+                raise self.failure
 
     def publish(self) -> None:
         """Put the finished file in the place of the target, on the disk and not only in its cache."""
         self.check()
         with explained(self.path):
             os.fsync(self.fileno())
-            if not self._force and os.path.lexists(self._target):
-                raise _exists(self.path)
-            with signals_deferred():
-                self._temporary.replace(self._target)
-                self._published = True
+            _checked_target(self.path, force=self._force)
+            self._temporary.replace(self._target)
         with suppress(OSError):  # some network file systems refuse; the file is in its place already
             directory = os.open(self._target.parent, os.O_RDONLY)
             try:
@@ -91,11 +88,9 @@ class OutputFile(FileIO):
 
     def discard(self) -> None:
         """Close, and remove the temporary file unless it was published."""
-        with suppress(OSError):  # a failing disk may refuse even this; what is left is overwritten next time
-            self.close()
-        if not self._published:
-            with suppress(OSError):
-                self._temporary.unlink()
+        for action in (self.close, self._temporary.unlink):
+            with suppress(OSError):  # a failing disk may refuse; what is left is overwritten next time
+                action()
 
 
 @contextmanager
@@ -105,21 +100,24 @@ def new_output(path: Path, *, force: bool) -> Iterator[OutputFile]:
     Raises CannotWriteError where nothing can be written, now or later, and UsageError where the file exists and
     `force` is not set or where another process is writing it. A symbolic link is followed.
     """
-    output = None
     target = _checked_target(path, force=force)
-    with _locked(path, target):
+    lock, clean_up = target.with_name(f".{target.name}.lock"), ExitStack()
+    try:
+        with signals_deferred(), explained(path):
+            descriptor = _acquired(path, lock)
+            clean_up.callback(_release, descriptor, lock)
+            os.ftruncate(descriptor, 0)
+            os.pwrite(descriptor, f"process {os.getpid()} on {socket.gethostname()}\n".encode(), 0)
+            output = OutputFile(path, target, force=force)
+            clean_up.callback(output.discard)
         try:
-            with signals_deferred(), explained(path):
-                output = OutputFile(path, target, force=force)
             yield output
         except Exception:
-            if output is not None:
-                output.check()  # the cause, where the exception is only a consequence of a failed write
+            output.check()  # the cause, where the exception is only a consequence of a failed write
             raise
-        finally:
-            with signals_deferred():
-                if output is not None:
-                    output.discard()
+    finally:
+        with signals_deferred():
+            clean_up.close()
 
 
 def _checked_target(path: Path, *, force: bool) -> Path:
@@ -127,80 +125,55 @@ def _checked_target(path: Path, *, force: bool) -> Path:
     with explained(path):
         target = Path(os.path.realpath(path))
         if not target.parent.is_dir():
-            raise CannotWriteError(
-                f"{path}: cannot write: the directory {target.parent} does not exist; "
-                "create it, or choose another output with -o"
-            )
+            raise _refused(path, f"the directory {target.parent} does not exist", "create it, or ")
         try:
             mode = target.stat().st_mode
         except FileNotFoundError:
             return target
     if stat.S_ISDIR(mode):
-        raise CannotWriteError(f"{path}: cannot write: this is a directory; name a file in it with -o")
+        raise _refused(path, "this is a directory", "name a file in it, or ")
     if not stat.S_ISREG(mode):  # replacing /dev/null would harm more than this command
-        raise CannotWriteError(f"{path}: cannot write: this is not a regular file; choose another output with -o")
+        raise _refused(path, "this is not a regular file")
     if not force:
-        raise _exists(path)
+        raise UsageError(f"{path}: exists already; replace it with --force, or choose another output with -o")
     return target
 
 
-@contextmanager
-def _locked(path: Path, target: Path) -> Iterator[None]:
-    """Hold the lock of `target`, and remove it at the end."""
-    lock = _beside(target, "lock")
-    descriptor = None
-    try:
-        with signals_deferred(), explained(path):
-            while descriptor is None:
-                descriptor = _acquired(path, lock)
-        yield
-    finally:
-        with signals_deferred():
-            if descriptor is not None:
-                _release(descriptor, lock)
-
-
-def _acquired(path: Path, lock: Path) -> int | None:
-    """Open and lock the lock file, and write into it who holds it; None where its last holder has removed it."""
-    descriptor = _open_no_link(lock, os.O_RDWR | os.O_CREAT)
-    holder = os.pread(descriptor, 1000, 0).decode(errors="replace").strip()
-    if not _take(descriptor, holder):
+def _acquired(path: Path, lock: Path) -> int:
+    """Open and lock the lock file, unless another process holds it."""
+    while True:
+        descriptor = _open_no_link(lock, os.O_RDWR | os.O_CREAT)
+        holder = os.pread(descriptor, 1000, 0).decode(errors="replace").strip()
+        if not _take(descriptor, holder):
+            os.close(descriptor)
+            raise UsageError(
+                f"{path}: is being written by {holder or 'another process'}; "
+                "wait until it has ended, or choose another output with -o"
+            )
+        with suppress(FileNotFoundError):  # its last holder has removed it meanwhile
+            if os.path.samestat(os.fstat(descriptor), lock.lstat()):
+                return descriptor
         os.close(descriptor)
-        raise UsageError(
-            f"{path}: is being written by {holder or 'another process'}; "
-            "wait until it has ended, or choose another output with -o"
-        )
-    if not _is_at(descriptor, lock):
-        os.close(descriptor)
-        return None
-    try:
-        os.ftruncate(descriptor, 0)
-        os.pwrite(descriptor, f"process {os.getpid()} on {socket.gethostname()}\n".encode(), 0)
-    except OSError:
-        _release(descriptor, lock)
-        raise
-    return descriptor
 
 
 def _take(descriptor: int, holder: str) -> bool:
     """Lock without waiting. A file system without locks: free unless the process named in the file may live."""
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        return True
     except BlockingIOError:
         return False
     except OSError:
         return not _lives(holder)
-    return True
 
 
 def _lives(holder: str) -> bool:
     """Whether the process that a lock file names may still run; one on another host counts as alive."""
     match holder.split():
         case ["process", number, "on", host] if number.isdecimal():
-            if host != socket.gethostname():
-                return True
             try:
-                os.kill(int(number), 0)
+                if host == socket.gethostname():
+                    os.kill(int(number), 0)
             except (ProcessLookupError, OverflowError):
                 return False
             except PermissionError:
@@ -212,28 +185,13 @@ def _lives(holder: str) -> bool:
 def _release(descriptor: int, lock: Path) -> None:
     """Remove the lock file while it is still locked, so that nobody holds a file without a name."""
     with suppress(OSError):
-        if _is_at(descriptor, lock):
+        if os.path.samestat(os.fstat(descriptor), lock.lstat()):
             lock.unlink()
     os.close(descriptor)
 
 
-def _is_at(descriptor: int, path: Path) -> bool:
-    try:
-        return os.path.samestat(os.fstat(descriptor), path.lstat())
-    except FileNotFoundError:
-        return False
-
-
-def _beside(target: Path, suffix: str) -> Path:
-    return target.with_name(f".{target.name}.{suffix}")
-
-
 def _open_no_link(path: str | Path, flags: int) -> int:
     return os.open(path, flags | os.O_NOFOLLOW | os.O_CLOEXEC, 0o666)
-
-
-def _exists(path: Path) -> UsageError:
-    return UsageError(f"{path}: exists already; replace it with --force, or choose another output with -o")
 
 
 @contextmanager
@@ -242,14 +200,11 @@ def explained(path: Path) -> Iterator[None]:
     try:
         yield
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-        raise cannot_write(path, error) from error
+        reason = getattr(error, "strerror", None) or str(error)
+        full = getattr(error, "errno", None) in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+        remedy = "free some space there, or " if full else ""
+        raise _refused(path, reason[:1].lower() + reason[1:], remedy) from error
 
 
-def cannot_write(path: Path, error: OSError | ValueError) -> CannotWriteError:
-    """The sentence for an output that cannot be written, with its reason and a remedy."""
-    reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-    full = isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-    remedy = "free some space there, or choose" if full else "choose"
-    return CannotWriteError(
-        f"{path}: cannot write: {reason[:1].lower()}{reason[1:]}; {remedy} another output with -o"
-    )
+def _refused(path: Path, reason: str, remedy: str = "") -> CannotWriteError:
+    return CannotWriteError(f"{path}: cannot write: {reason}; {remedy}choose another output with -o")

@@ -1,7 +1,7 @@
 """How a number or text of a result is declared and read; `brakecli.files.fields` declares them all."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, is_dataclass, replace
+from dataclasses import dataclass, is_dataclass
 from typing import Any
 
 import numpy as np
@@ -17,8 +17,8 @@ class Field:
     meaning: str
     kind: str = "f8"
     """The NumPy type of many of them. A float may be missing: null in JSON, `_FillValue` in a file."""
-    source: str = ""
-    """Path of attributes, keys and methods that leads from a report to the value; the name if empty."""
+    at: str = ""
+    """Path of attributes, keys and methods to the value; the name is added if it is empty or ends in a dot."""
     label: str = ""
     """Words for the terminal; the name if empty."""
     missing: Any = None
@@ -38,16 +38,23 @@ class Field:
     def read(self, report: object) -> Any:
         """The value that a report holds, as JSON writes it."""
         value: Any = report
-        for part in (self.source or self.name).split("."):
+        path = self.at if self.at and not self.at.endswith(".") else self.at + self.name
+        for part in path.split("."):
             if value is not None:
                 value = value[part] if isinstance(value, Mapping) else getattr(value, part)
                 value = value() if callable(value) else value
         if value is None:
             return self.missing
+        if self.rows and isinstance(value, list | tuple):
+            return [values_of(self.rows, each) for each in value]
         if self.rows:
-            many = isinstance(value, list | tuple)
-            return [values_of(self.rows, each) for each in value] if many else values_of(self.rows, value)
+            return values_of(self.rows, value)
         return int(value) if self.kind == "i8" else plain(value)
+
+
+def integer(name: str, meaning: str, at: str = "", **more: Any) -> Field:
+    """A field of a whole number, which has no unit."""
+    return Field(name, "1", meaning, "i8", at, **more)
 
 
 def values_of(fields: Iterable[Field], report: object) -> dict[str, Any]:
@@ -78,13 +85,3 @@ def plain(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {name: plain(each) for name, each in value.items()}
     return [plain(each) for each in value] if isinstance(value, list | tuple) else value
-
-
-def within(part: str, *fields: Field) -> tuple[Field, ...]:
-    """Fields that are found in a part of the report."""
-    return tuple(replace(field, source=f"{part}.{field.source or field.name}") for field in fields)
-
-
-def json_only(*fields: Field) -> tuple[Field, ...]:
-    """Fields that no file holds."""
-    return tuple(replace(field, in_file=False) for field in fields)

@@ -18,17 +18,18 @@ from brakecli.errors import CannotWriteError
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
 
-_WORDS = {signal.SIGHUP: "hung up", signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
+_WORDS: dict[int, str] = {signal.SIGHUP: "hung up", signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
 
 
 class Interrupted(BaseException):
     """A signal has arrived, and the program unwinds."""
 
+    left = "nothing unfinished was left behind"
+
     def __init__(self, number: int) -> None:
         """Remember which signal it was."""
-        super().__init__(_WORDS[signal.Signals(number)])
+        super().__init__(_WORDS[number])
         self.exit_code = 128 + number
-        self.left = "nothing unfinished was left behind"
 
 
 def handle_signals() -> None:
@@ -36,7 +37,15 @@ def handle_signals() -> None:
 
     No exception passes through imports, which may turn it into another one.
     """
-    _handle(_leave)
+
+    def leave(number: int, frame: FrameType | None) -> None:
+        try:
+            os.write(2, f"brakecli: {_WORDS[number]}\n".encode())
+        finally:
+            os._exit(128 + number)
+
+    for number in _handlers():
+        signal.signal(number, leave)
 
 
 @contextmanager
@@ -54,70 +63,57 @@ def unwinding() -> Iterator[Callable[[], None]]:
             raise Interrupted(arrived[0])
 
     def note(number: int, frame: FrameType | None) -> None:
-        if not arrived:
-            arrived.append(number)
-            if not _is_called_from_c(frame):
-                recall()
+        arrived.append(number)
+        while frame is not None and frame.f_globals.get("__name__", "").split(".")[0] not in ("numba", "llvmlite"):
+            frame = frame.f_back
+        if len(arrived) == 1 and frame is None:
+            recall()
 
-    before = _handle(note)
-    try:
-        yield recall
-    except Exception:
-        recall()
-        raise
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+    with _handled_by(note):
+        try:
+            yield recall
+        except Exception:
+            recall()
+            raise
 
 
 @contextmanager
 def signals_deferred() -> Iterator[None]:
-    """Hold back the program's own handlers of Ctrl-C, SIGTERM and SIGHUP until the block has ended.
+    """Hold back Ctrl-C, SIGTERM and SIGHUP until the block has ended.
 
     An exception out of a handler must not cut through HDF5, which calls back into Python, nor through a clean-up.
     """
     if threading.current_thread() is not threading.main_thread():  # Python runs handlers in the main thread only
         yield
         return
-    handlers = {number: signal.getsignal(number) for number in _WORDS}
-    own = {number: handler for number, handler in handlers.items() if callable(handler)}
     waiting: list[int] = []
     try:
-        for number in own:
-            signal.signal(number, lambda arrived, _frame: waiting.append(arrived))
+        with _handled_by(lambda number, _frame: waiting.append(number)):
+            yield
+    finally:
+        for number in waiting:
+            signal.raise_signal(number)
+
+
+@contextmanager
+def _handled_by(handler: Callable[[int, FrameType | None], None]) -> Iterator[None]:
+    before = _handlers()
+    try:
+        for number in before:
+            signal.signal(number, handler)
         yield
     finally:
-        for number, handler in own.items():
-            signal.signal(number, handler)
-        for arrived in waiting:
-            signal.raise_signal(arrived)
+        for number, old in before.items():
+            signal.signal(number, old)
 
 
-def _is_called_from_c(frame: FrameType | None) -> bool:
-    while frame is not None:
-        if frame.f_globals.get("__name__", "").partition(".")[0] in ("numba", "llvmlite"):
-            return True
-        frame = frame.f_back
-    return False
-
-
-def _handle(handler: Callable[[int, FrameType | None], None]) -> dict[signal.Signals, Any]:
-    """Set a handler for all signals that are not ignored; return the handlers before.
+def _handlers() -> dict[int, Any]:
+    """The handlers of all signals that are not ignored.
 
     A shell lets background jobs ignore Ctrl-C, and nohup lets every command ignore SIGHUP.
     """
-    before = {number: signal.getsignal(number) for number in _WORDS}
-    before = {number: old for number, old in before.items() if old != signal.SIG_IGN}
-    for number in before:
-        signal.signal(number, handler)
-    return before
-
-
-def _leave(number: int, frame: FrameType | None) -> None:
-    try:
-        os.write(2, f"brakecli: {_WORDS[signal.Signals(number)]}\n".encode())
-    finally:
-        os._exit(128 + number)
+    handlers = {number: signal.getsignal(number) for number in _WORDS}
+    return {number: handler for number, handler in handlers.items() if handler not in (signal.SIG_IGN, None)}
 
 
 def guard_streams() -> None:
@@ -133,7 +129,7 @@ def guard_streams() -> None:
     for number, name in ((1, "stdout"), (2, "stderr")):
         old = getattr(sys, name)  # None where it was closed before Python started
         raw = io.BufferedWriter(_Stream(number, "w", closefd=False))
-        encoding = old.encoding if old is not None else "utf-8"
+        encoding = getattr(old, "encoding", "utf-8")
         setattr(sys, name, io.TextIOWrapper(raw, encoding, "backslashreplace", line_buffering=True))
 
 
@@ -150,7 +146,6 @@ class _Stream(io.FileIO):
             self._failed = self.fileno() == 1
             # a broken pipe is not a failure: whoever read the output has gone
             if self._failed and not isinstance(error, BrokenPipeError):
-                reason = (error.strerror or str(error)).lower()
-                sentence = f"standard output: cannot write: {reason}; redirect it elsewhere"
-                raise CannotWriteError(sentence) from error
+                what = f"cannot write: {(error.strerror or str(error)).lower()}"
+                raise CannotWriteError(f"standard output: {what}; redirect it elsewhere") from error
         return memoryview(data).nbytes

@@ -24,6 +24,7 @@ from brakecli.errors import UnreadableResultError
 FORMAT = "brakecli"
 FORMAT_VERSION = 1
 
+_FOREIGN = f'it was not written by this program, attribute format = "{FORMAT}" is missing'
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _MACHINERY = {"CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_Encoding", "_FillValue"}
 
@@ -38,30 +39,28 @@ class Variable:
     attributes: dict[str, Any]
 
 
+@dataclass
 class StoredResult:
-    """An open result file; a group is named by its path, the root by ``/``."""
+    """A result file that `open_result` has verified; a group is named by its path, the root by ``/``."""
 
-    def __init__(self, path: Path, file: h5py.File) -> None:
-        """Read from a file that `open_result` has verified."""
-        self.path = path
-        self._file = file
-        self.attributes = _attributes(file)
+    path: Path
+    file: h5py.File
+    attributes: dict[str, Any]
 
     def group_attributes(self, group: str) -> dict[str, Any]:
         """The attributes of a group."""
         with _explained(self.path):
             return _attributes(self._group(group))
 
-    def groups(self, group: str = "/") -> tuple[str, ...]:
-        """The names of the groups within `group`."""
-        with _explained(self.path):
-            return tuple(name for name, node in self._group(group).items() if isinstance(node, h5py.Group))
-
     def variables(self, group: str) -> dict[str, Variable]:
         """The variables of a group, its axes included, by name."""
+        found = {}
         with _explained(self.path):
-            nodes = self._group(group).items()
-            return {name: _variable(name, node) for name, node in nodes if isinstance(node, h5py.Dataset)}
+            for name, node in self._group(group).items():
+                if isinstance(node, h5py.Dataset):
+                    dims = (name,) if node.is_scale else tuple(next(iter(dim.keys()), "") for dim in node.dims)
+                    found[name] = Variable(name, dims, node.shape, _attributes(node))
+        return found
 
     def read(self, group: str, name: str, start: int = 0, stop: int | None = None) -> NDArray[Any]:
         """The rows `start` to `stop` of a variable, checked: no damage, and no number that is not finite."""
@@ -79,7 +78,7 @@ class StoredResult:
             return values
 
     def _group(self, group: str) -> h5py.Group:
-        node = self._file.get(group)
+        node = self.file.get(group)
         if not isinstance(node, h5py.Group):
             raise ValueError(f"there is no group {group}")
         return node
@@ -98,9 +97,10 @@ def open_result(path: Path, kind: str | None = None) -> Iterator[StoredResult]:
             stream = stack.enter_context(path.open("rb", buffering=0))
             _verify(stream)
             # h5py gets the very file that was verified, and does without the file locks of HDF5
-            result = StoredResult(path, stack.enter_context(h5py.File(stream, "r")))
-            _check_header(result.attributes, kind)
-        yield result
+            file = stack.enter_context(h5py.File(stream, "r"))
+            attributes = _attributes(file)
+            _check_header(attributes, kind)
+        yield StoredResult(path, file, attributes)
 
 
 def is_hdf5(path: Path) -> bool:
@@ -129,7 +129,7 @@ def _verify(file: RawIOBase) -> None:
     if not superblock.startswith(_SIGNATURE):
         raise ValueError("this is not an HDF5 file" if superblock else "the file is empty")
     if superblock[8:9] != b"\x02":  # versions 0 and 1 have another layout; this program does not write them
-        raise ValueError(f'it was not written by this program, attribute format = "{FORMAT}" is missing')
+        raise ValueError(_FOREIGN)
     end = int.from_bytes(superblock[28:36], "little")
     behind = file.seek(0, 2) - end
     if behind == 0:
@@ -139,12 +139,11 @@ def _verify(file: RawIOBase) -> None:
 
 
 def _check_header(attributes: dict[str, Any], kind: str | None) -> None:
-    found = attributes.get("format"), attributes.get("format_version"), attributes.get("complete")
-    if found[0] != FORMAT:
-        raise ValueError(f'it was not written by this program, attribute format = "{FORMAT}" is missing')
-    if found[1] != FORMAT_VERSION:
-        raise ValueError(f"its format version is {found[1]}, and only version {FORMAT_VERSION} is known here")
-    if found[2] != 1:
+    if attributes.get("format") != FORMAT:
+        raise ValueError(_FOREIGN)
+    if (version := attributes.get("format_version")) != FORMAT_VERSION:
+        raise ValueError(f"its format version is {version}, and only version {FORMAT_VERSION} is known here")
+    if attributes.get("complete") != 1:
         raise ValueError("it is incomplete, attribute complete is not 1")
     if kind is not None and attributes.get("kind") != kind:
         raise ValueError(f"it holds a result of kind {attributes.get('kind')!r}, and {kind!r} is needed")
@@ -156,16 +155,11 @@ def _explained(path: Path) -> Iterator[None]:
     try:
         yield
     except Exception as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        reason = getattr(error, "strerror", None) or str(error)
         raise UnreadableResultError(
             f"{path}: cannot be read as a result: {' '.join(reason.split())}; name an intact result file, "
             "or compute it again"
         ) from error
-
-
-def _variable(name: str, node: h5py.Dataset) -> Variable:
-    dims = (name,) if node.is_scale else tuple(next(iter(dim.keys()), "") for dim in node.dims)
-    return Variable(name, dims, node.shape, _attributes(node))
 
 
 def _attributes(node: h5py.HLObject) -> dict[str, Any]:
@@ -176,8 +170,6 @@ def _attributes(node: h5py.HLObject) -> dict[str, Any]:
 def _plain(value: Any) -> Any:
     if isinstance(value, bytes):
         return value.decode()
-    if isinstance(value, np.generic):
-        return value.item()
-    if isinstance(value, np.ndarray) and value.dtype.kind == "O":
+    if isinstance(value, np.generic) or (isinstance(value, np.ndarray) and value.dtype.kind == "O"):
         return value.tolist()
     return value

@@ -5,7 +5,7 @@ The same calls give the same bytes, however the rows of a growing variable are c
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -26,24 +26,16 @@ _CHUNK = 16384
 
 @dataclass
 class _Variable:
-    """A declared variable, its axes, and rows that do not yet fill a chunk."""
+    """A declared variable, its axes, and rows that do not yet fill a chunk.
+
+    Only whole chunks are written, so that nothing depends on how rows are cut into pieces.
+    """
 
     field: Field
     dims: tuple[str, ...]
     attributes: dict[str, Any]
     waiting: NDArray[Any]
-
-
-@dataclass
-class _Table:
-    """The growing variables of one group. Only whole chunks are written, so nothing depends on pieces."""
-
-    variables: dict[str, _Variable] = field(default_factory=dict)
     written: int = 0
-
-    @property
-    def waiting(self) -> int:
-        return next((len(variable.waiting) for variable in self.variables.values()), 0)
 
 
 class ResultFile:
@@ -55,7 +47,7 @@ class ResultFile:
     def __init__(self, output: OutputFile) -> None:
         """Prepare a result in the file that `new_result` has opened."""
         self._output = output
-        self._tables: dict[str, _Table] = {}
+        self._growing: dict[str, dict[str, _Variable]] = {}
         self._file: Any = None
 
     def open(self) -> None:
@@ -88,81 +80,72 @@ class ResultFile:
             numbers = np.asarray(values, dtype=np.float64)
             values = np.where(np.isnan(numbers), FILL, numbers)
             attributes = {"_FillValue": np.array([FILL]), **attributes}
-        self.variable("/", field, dims, values, attributes)
+        self.variable("/", field, dims, values, **attributes)
 
     def variable(
-        self,
-        group: str,
-        field: Field,
-        dims: Sequence[str],
-        values: ArrayLike | None = None,
-        attributes: Mapping[str, Any] | None = None,
+        self, group: str, field: Field, dims: Sequence[str], values: ArrayLike | None = None, **attributes: Any
     ) -> None:
         """Write a variable over the axes `dims` of its group; without `values` it grows along its only axis.
 
         A scalar belongs in an attribute: HDF5 keeps no checksum of one.
         """
-        name, table = field.name, self._tables.setdefault(group, _Table())
-        texts = {"units": field.units, "long_name": field.meaning}
-        variable = _Variable(field, tuple(dims), {**texts, **(attributes or {})}, np.empty(0, field.kind))
-        if not dims or name in table.variables:
+        name, growing = field.name, self._growing.setdefault(group, {})
+        attributes = {"units": field.units, "long_name": field.meaning, **attributes}
+        variable = _Variable(field, tuple(dims), attributes, np.empty(0, field.kind))
+        if not dims or name in growing:
             raise ValueError(f"{group}/{name}: has no dimension, or is declared twice")
         if values is None:
-            if len(dims) != 1 or (name != dims[0] and dims[0] not in table.variables):
+            if len(dims) != 1 or (name != dims[0] and dims[0] not in growing):
                 raise ValueError(f"{group}/{name}: only a variable over one growing axis can grow")
-            table.variables[name] = variable
+            growing[name] = variable
             return
         checked = _checked(f"{group}/{name}", values, field.kind)
         if checked.dtype.kind == "S":
-            variable.attributes["_Encoding"] = "utf-8"  # by which xarray knows text from bytes
+            attributes["_Encoding"] = "utf-8"  # by which xarray knows text from bytes
         with self._hdf5():
             lengths = {axis: self._file[group][axis].shape[0] for axis in dims if axis != name}
             if checked.shape != tuple(lengths.get(axis, checked.size) for axis in dims):
                 raise ValueError(f"{group}/{name}: its shape {checked.shape} is not that of its axes {lengths}")
-            self._create(group, variable, checked, _chunk(checked.shape))[...] = checked
+            self._create(group, variable, checked, grows=0 in checked.shape)
 
     def append(self, group: str, rows: Mapping[str, ArrayLike]) -> None:
         """Append rows to all growing variables of `group`, the growing axis among them."""
-        self.check()
-        table = self._tables[group]
-        if rows.keys() != table.variables.keys():
-            raise ValueError(f"{group}: needs {sorted(table.variables)}, got {sorted(rows)}")
-        blocks = {name: _checked(f"{group}/{name}", rows[name], table.variables[name].field.kind) for name in rows}
-        shapes = {block.shape for block in blocks.values()}
-        if len(shapes) != 1 or len(shape := shapes.pop()) != 1:
+        self._output.check()
+        growing = self._growing[group]
+        if rows.keys() != growing.keys():
+            raise ValueError(f"{group}: needs {sorted(growing)}, got {sorted(rows)}")
+        blocks = {name: _checked(f"{group}/{name}", rows[name], growing[name].field.kind) for name in rows}
+        shape, *others = {block.shape for block in blocks.values()}
+        if others or len(shape) != 1:
             raise ValueError(f"{group}: every variable needs the same number of rows")
         for first in range(0, shape[0], _CHUNK):
-            for name, variable in table.variables.items():
+            for name, variable in growing.items():
                 variable.waiting = np.concatenate([variable.waiting, blocks[name][first : first + _CHUNK]])
-            if table.waiting >= _CHUNK:
-                self._write_rows(group, table, _CHUNK)
+                if len(variable.waiting) >= _CHUNK:
+                    with self._hdf5():
+                        self._write_rows(group, variable, _CHUNK)
 
     def rows(self, group: str) -> int:
         """The number of rows appended to `group` so far."""
-        return self._tables[group].written + self._tables[group].waiting
+        variable = next(iter(self._growing[group].values()))
+        return variable.written + len(variable.waiting)
 
-    def read(self, group: str, name: str, start: int = 0, stop: int | None = None) -> NDArray[Any]:
-        """The rows `start` to `stop` of a variable of numbers, of those appended so far; both are >= 0."""
+    def read(self, group: str, name: str, start: int, stop: int) -> NDArray[Any]:
+        """The rows `start` to `stop` of a growing variable, of those appended so far; both are >= 0."""
+        written, waiting = self._growing[group][name].written, self._growing[group][name].waiting
+        if not written:
+            return waiting[start:stop]
         with self._hdf5():
-            table = self._tables[group]
-            if name not in table.variables:
-                return np.asarray(self._file[group][name][start:stop])
-            first, waiting = table.written, table.variables[name].waiting
-            if not first:
-                return waiting[start:stop]
-            behind = None if stop is None else max(0, stop - first)
-            return np.concatenate([self._file[group][name][start:stop], waiting[max(0, start - first) : behind]])
-
-    def check(self) -> None:
-        """Raise CannotWriteError if any write so far has failed, so that a long run can end early."""
-        self._output.check()
+            before = self._file[group][name][start:stop]
+        return np.concatenate([before, waiting[max(0, start - written) : max(0, stop - written)]])
 
     def commit(self) -> None:
         """Finish the file and put it in its place; nothing can be written after that."""
         with self._hdf5():
-            for group, table in self._tables.items():
-                if table.variables and (table.waiting or not table.written):
-                    self._write_rows(group, table, table.waiting)
+            for group, growing in self._growing.items():
+                for variable in growing.values():
+                    if len(variable.waiting) or not variable.written:
+                        self._write_rows(group, variable, len(variable.waiting))
             self._file.attrs["complete"] = 1
         self.close()
         self._output.write(digest(self._output, self._output.seek(0, 2)))
@@ -179,36 +162,35 @@ class ResultFile:
     def _hdf5(self) -> Iterator[None]:
         """Surround all calls of HDF5 with checks, and hold back signals.
 
-        Objects of HDF5 are to be freed within the block, too: Python loses an exception that a handler raises
-        while one is freed.
+        Objects of HDF5 are to be freed within the block, too, so no variable beside it holds one: Python loses an
+        exception that a handler raises while one is freed.
         """
-        self.check()
+        self._output.check()
         with signals_deferred():
             yield
-        self.check()
+        self._output.check()
 
-    def _write_rows(self, group: str, table: _Table, count: int) -> None:
+    def _write_rows(self, group: str, variable: _Variable, count: int) -> None:
         """Write the first of the waiting rows behind those that are written."""
-        end = table.written + count
-        with self._hdf5():
-            for variable in table.variables.values():
-                rows, variable.waiting = variable.waiting[:count], variable.waiting[count:]
-                if not table.written:  # created only now, so that a short series gets a chunk of just its length
-                    self._create(group, variable, rows[:0], (max(1, end),))
-                dataset = self._file[group][variable.field.name]
-                dataset.resize(end, axis=0)
-                dataset[table.written :] = rows
-        table.written = end
+        rows, variable.waiting = variable.waiting[:count], variable.waiting[count:]
+        if not variable.written:  # created only now, so that a short series gets a chunk of just its length
+            self._create(group, variable, rows, grows=True)
+        else:
+            dataset = self._file[group][variable.field.name]
+            dataset.resize(variable.written + count, axis=0)
+            dataset[variable.written :] = rows
+        variable.written += count
 
-    def _create(
-        self, group: str, variable: _Variable, like: NDArray[Any], chunks: tuple[int, ...]
-    ) -> h5py.Dataset:
-        """Create a dataset with checksums, its attributes and its axes; `like` has its shape and type."""
+    def _create(self, group: str, variable: _Variable, values: NDArray[Any], *, grows: bool) -> None:
+        """Create a dataset with checksums, its attributes, axes and values."""
         parent, name = self._file.require_group(group), variable.field.name
-        # HDF5 takes no chunk that is longer than its dataset can get
-        maxshape = (None,) * like.ndim if 0 in like.shape else None
+        maxshape = (None,) * values.ndim if grows else None  # HDF5 takes no chunk longer than its dataset can get
+        room, chunks = _CHUNK, list[int]()  # the longest last dimensions that fit
+        for length in reversed(values.shape):
+            chunks.insert(0, max(1, min(length, room)))
+            room //= chunks[0]
         dataset = parent.create_dataset(
-            name, like.shape, like.dtype, chunks=chunks, maxshape=maxshape, fletcher32=True
+            name, values.shape, values.dtype, chunks=tuple(chunks), maxshape=maxshape, fletcher32=True
         )
         _set_attributes(dataset, variable.attributes)
         if variable.dims == (name,):
@@ -216,15 +198,14 @@ class ResultFile:
         else:
             for dimension, axis in zip(dataset.dims, variable.dims, strict=True):
                 dimension.attach_scale(parent[axis])
-        return dataset
+        dataset[...] = values
 
 
 @contextmanager
 def new_result(path: Path, *, force: bool) -> Iterator[ResultFile]:
     """Begin a result file; unless `commit` is called within the block, nothing of it remains.
 
-    Raises CannotWriteError where nothing can be written, and UsageError where the file exists and `force` is not
-    set or where another process is writing it: both at once, before anything is computed.
+    Raises what `new_output` raises, before anything is computed.
     """
     with new_output(path, force=force) as output:
         result = ResultFile(output)
@@ -235,29 +216,20 @@ def new_result(path: Path, *, force: bool) -> Iterator[ResultFile]:
             result.close()
 
 
-def _chunk(shape: tuple[int, ...]) -> tuple[int, ...]:
-    """The longest last dimensions that fit a chunk."""
-    room = _CHUNK
-    chunk: list[int] = []
-    for length in reversed(shape):
-        chunk.insert(0, max(1, min(length, room)))
-        room //= chunk[0]
-    return tuple(chunk)
-
-
 def _set_attributes(node: h5py.HLObject, attributes: Mapping[str, Any]) -> None:
     for name, value in attributes.items():
-        node.attrs[name] = _attribute(name, value)
+        if isinstance(value, str):
+            node.attrs[name] = value
+        elif isinstance(value, list | tuple) and all(isinstance(item, str) for item in value):
+            node.attrs[name] = np.array(value, dtype=h5py.string_dtype())
+        else:
+            node.attrs[name] = _finite(f"attribute {name}", value)
 
 
-def _attribute(name: str, value: Any) -> Any:
-    if isinstance(value, str):
-        return value
-    if isinstance(value, list | tuple) and all(isinstance(item, str) for item in value):
-        return np.array(value, dtype=h5py.string_dtype())
-    array = np.asarray(value)
+def _finite(name: str, values: ArrayLike) -> NDArray[Any]:
+    array = np.asarray(values)
     if array.dtype.kind not in "iuf" or not np.isfinite(array).all():
-        raise ValueError(f"attribute {name}: must be text or finite numbers (found {value!r})")
+        raise ValueError(f"{name}: must be finite numbers, or text (found {values!r})")
     return array
 
 
@@ -267,10 +239,9 @@ def _checked(name: str, values: ArrayLike, kind: str) -> NDArray[Any]:
     if array.dtype.kind == "U":
         text = np.char.encode(array, "utf-8")
         return text.astype(h5py.string_dtype("utf-8", max(1, text.dtype.itemsize)))
-    if array.dtype.kind not in "iuf" or not np.isfinite(array).all():
-        raise ValueError(f"{name}: must be finite numbers")
+    _finite(name, array)
     with np.errstate(all="ignore"):
         converted = array.astype(kind, copy=False)
-    if converted.dtype.kind not in "iuf" or not np.array_equal(converted, array):
+    if not np.array_equal(converted, array):
         raise ValueError(f"{name}: does not fit {np.dtype(kind)}")
     return converted

@@ -11,8 +11,6 @@ from brakecli.files.read import StoredResult, open_result
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_SUFFIXES = (".pdf", ".png", ".svg")
-
 
 def plot_result(result: Path, target: Path, *, force: bool, select: Sequence[str] = ()) -> None:
     """Draw a result of any kind into a PNG, PDF or SVG file; the suffix of `target` says which.
@@ -21,11 +19,23 @@ def plot_result(result: Path, target: Path, *, force: bool, select: Sequence[str
     suffix, for an existing target without `force`, for what cannot be drawn or selected, and where matplotlib is
     missing; UnreadableResultError; CannotWriteError.
     """
-    _check_target(result, target)
+    suffix = target.suffix.lower()
+    if suffix not in (".pdf", ".png", ".svg"):
+        remedy = "name a file that ends in .pdf, .png or .svg with -o"
+        raise UsageError(
+            f"{target}: its suffix does not name a kind of picture (found {target.suffix!r}); {remedy}"
+        )
+    if target.exists() and result.exists() and target.samefile(result):
+        raise UsageError(f"{target}: this is the result itself; choose another output with -o")
+    try:
+        import matplotlib.figure  # noqa: F401
+    except ImportError as error:
+        remedy = "install it with: python -m pip install matplotlib"
+        raise UsageError(f"matplotlib cannot be imported ({error}); {remedy}") from error
     from brakecli.plots import style
 
     with open_result(result) as stored, new_output(target, force=force) as file, style.applied():
-        file.write(style.rendered(draw(stored, select), target.suffix.lower()))
+        file.write(style.rendered(draw(stored, select), suffix))
         file.publish()
 
 
@@ -42,22 +52,4 @@ def draw(result: StoredResult, select: Sequence[str] = ()) -> "Figure":
         raise UsageError(f"{result.path}: holds a result of kind {kind!r}; name the result of {known}")
     if select:
         raise UsageError(f"{result.path}: --select is for sweeps (found {select[0]!r}); leave it out for a {kind}")
-    return run.draw(run.gather(result)) if kind == "run" else comparison.draw(comparison.gather(result))
-
-
-def _check_target(result: Path, target: Path) -> None:
-    """Raise UsageError where `target` cannot be a picture of this result, or where matplotlib is missing."""
-    suffix = target.suffix.lower()
-    if suffix not in _SUFFIXES:
-        raise UsageError(
-            f"{target}: its suffix does not name a kind of picture (found {target.suffix!r}); name a file "
-            f"that ends in {', '.join(_SUFFIXES[:-1])} or {_SUFFIXES[-1]} with -o"
-        )
-    if target.exists() and result.exists() and target.samefile(result):
-        raise UsageError(f"{target}: this is the result itself; choose another output with -o")
-    try:
-        import matplotlib.figure  # noqa: F401
-    except ImportError as error:
-        raise UsageError(
-            f"matplotlib cannot be imported ({error}); install it with: python -m pip install matplotlib"
-        ) from error
+    return run.draw(run.gather(result)) if kind == "run" else comparison.draw(result)

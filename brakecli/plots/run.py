@@ -12,55 +12,21 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError
 from brakecli.files.read import StoredResult
 from brakecli.plots import style
-from brakecli.plots.style import Array
 from brakecli.solver.quantities import ContactState
-from brakecli.solver.schedules import Schedule
 
-Reader = Callable[[str, int, int], NDArray[Any]]
-"""Reads the samples start … stop - 1 of a variable of the history."""
-
-CYCLES = 12
-"""Number of cycles drawn in detail."""
-MOST_DETAIL = 100_000
-"""Largest number of samples drawn one by one."""
-FEW = 4000
-"""Number of samples of the detail where no frequency says how long a cycle is."""
-COLUMNS = 1200
-"""Number of columns of the envelope: about the width of its panel in pixels."""
-BLOCK = 1 << 20
-"""Number of samples read at a time."""
+CYCLES = 12  # drawn in detail
+MOST_DETAIL = 100_000  # samples drawn one by one
+FEW = 4000  # samples of the detail where no frequency says how long a cycle is
+COLUMNS = 1200  # columns of the envelope: about the width of its panel in pixels
+BLOCK = 1 << 20  # samples read at a time
 _SHADES = ((ContactState.STICK, style.ORANGE, "stick"), (ContactState.SEPARATED, style.GREY, "no contact"))
-
-
-@dataclass(frozen=True)
-class Detail:
-    """The part of the history that is drawn sample by sample; `belt` is U (m/s)."""
-
-    name: str
-    time: Array
-    x: Array
-    vx: Array
-    state: NDArray[Any]
-    belt: Array
-    interval: float
-
-    @property
-    def near(self) -> bool:
-        """Whether the wheel's surface speed fits beside the motion without flattening it."""
-        moving = style.largest(self.vx)
-        return moving == 0.0 or style.largest(self.belt) <= 4.0 * moving
-
-    @property
-    def velocity_unit(self) -> tuple[float, str]:
-        """Factor and unit for the velocities that are drawn."""
-        return style.prefixed(max(style.largest(self.vx), style.largest(self.belt) if self.near else 0.0), "m/s")
+_BELT: dict[str, Any] = {"color": style.VERMILION, "ls": style.DASHES}
 
 
 @dataclass(frozen=True)
@@ -69,22 +35,23 @@ class RunPicture:
 
     title: str
     summary: str
-    detail: Detail
+    part: str  # what `detail` shows: time, x, vx, state and belt (U) of the samples that are drawn one by one
+    detail: dict[str, style.Array]
+    near: bool  # whether the wheel's surface speed fits beside the motion without flattening it
+    velocity_unit: tuple[float, str]  # factor and unit for the velocities that are drawn
+    interval: float
     span: tuple[float, float]  # s, of the whole run
-    envelope: tuple[Array, Array, Array]  # time, least and greatest x of its columns
-    spectrum: tuple[Array, Array]  # frequency, density
-    spectrum_from: float  # s
-    fundamental: float | None  # Hz
-    peak: float | None  # Hz
+    envelope: tuple[style.Array, style.Array, style.Array]  # time, least and greatest x of its columns
+    spectrum: tuple[float, style.Array, style.Array]  # start of its samples (s), frequency, density
+    line: tuple[str, float | None]  # name and frequency (Hz) of what the spectrum is drawn around
     passing: tuple[float, ...]  # Hz, of the waves of a wheel that turns steadily
 
 
 def gather(result: StoredResult) -> RunPicture:
     """Read from a result what its picture shows; raises UnreadableResultError where it is not there."""
-    variables = result.variables("history")
-    needed = ("time", "x", "vx", "state")
-    shapes = {variables[name].shape for name in needed if name in variables}
-    if not variables.keys() >= set(needed) or len(shapes) != 1 or not (samples := max(shapes)[0]):
+    variables, needed = result.variables("history"), ("time", "x", "vx", "state")
+    shapes = {variables[name].shape if name in variables else (0,) for name in needed}
+    if len(shapes) != 1 or not (samples := max(shapes)[0]):
         raise style.unreadable(result, f"its history has no {', '.join(needed)} of equal length above 0")
     try:
         case = parse_case(str(result.attributes.get("resolved_toml", "")), "its resolved case").case
@@ -96,74 +63,70 @@ def gather(result: StoredResult) -> RunPicture:
     start, end = (float(read("time", i, i + 1)[0]) for i in (0, samples - 1))
     interval = (end - start) / (samples - 1) if samples > 1 else case.output.sample_interval
     places, lowest, highest = envelope(partial(read, "x"), samples)
-    first_sample = result.group_attributes("spectrum").get("first_sample", 0)
+    settled = start + interval * float(result.group_attributes("spectrum").get("first_sample", 0))
+    fundamental, peak = (result.attributes.get(name) for name in ("frequency", "spectrum_peak"))
+    part, first, stop = _detail(result, samples, interval)
+    detail = {name: read(name, first, stop) for name in needed}
+    detail["belt"] = np.interp(detail["time"], system.belt["time"], system.belt["value"])
+    fastest, moving = style.largest(detail["belt"]), style.largest(detail["vx"])
+    near = moving == 0.0 or fastest <= 4.0 * moving
     return RunPicture(
         title=case.title or "Case without a title",
         summary=_summary(result),
-        detail=_detail(read, samples, interval, system.belt, result),
+        part=part,
+        detail=detail,
+        near=near,
+        velocity_unit=style.prefixed(max(moving, fastest if near else 0.0), "m/s"),
+        interval=interval,
         span=(start, end),
         envelope=(start + interval * places, lowest, highest),
-        spectrum=(result.read("spectrum", "frequency"), result.read("spectrum", "vx")),
-        spectrum_from=start + interval * float(first_sample),
-        fundamental=_number(result, "frequency"),
-        peak=_number(result, "spectrum_peak"),
+        spectrum=(settled, result.read("spectrum", "frequency"), result.read("spectrum", "vx")),
+        line=("fundamental", fundamental) if fundamental else ("highest peak", peak),
         passing=tuple(sorted(speed * system.wheel.turns)) if steady and speed else (),
     )
 
 
-def envelope(
-    read: Callable[[int, int], Array], samples: int, columns: int = COLUMNS
-) -> tuple[Array, Array, Array]:
+def envelope(read: Callable[[int, int], style.Array], samples: int, columns: int = COLUMNS) -> list[style.Array]:
     """Middle (in samples) of each column, least and greatest value of the samples that fall into it.
 
     Columns are equally wide; there are never more of them than samples. At most `BLOCK` samples are read at once.
     """
     columns = min(columns, samples)
-    lowest: Array = np.full(columns, np.inf)
-    highest: Array = np.full(columns, -np.inf)
+    lowest, highest = np.full(columns, np.inf), np.full(columns, -np.inf)
     for begin in range(0, samples, BLOCK):
         values = read(begin, min(begin + BLOCK, samples))
         column = np.arange(begin, begin + len(values)) * columns // samples
         np.minimum.at(lowest, column, values)
         np.maximum.at(highest, column, values)
     firsts = -(-np.arange(columns + 1) * samples // columns)
-    middles: Array = 0.5 * (firsts[:-1] + firsts[1:] - 1).astype(np.float64)
-    return middles, lowest, highest
+    return [0.5 * (firsts[:-1] + firsts[1:] - 1), lowest, highest]
 
 
-def episodes(state: NDArray[Any], wanted: ContactState) -> list[tuple[int, int]]:
+def episodes(state: style.Array, wanted: ContactState) -> list[tuple[int, int]]:
     """First and last sample of every unbroken stretch of a state."""
     inside = np.concatenate([[False], state == wanted, [False]])
     edges = np.flatnonzero(inside[1:] != inside[:-1])
     return [(int(first), int(behind) - 1) for first, behind in edges.reshape(-1, 2)]
 
 
-def _detail(read: Reader, samples: int, interval: float, belt: Schedule, result: StoredResult) -> Detail:
-    """The last cycles of the run, or of the motion where it has come to rest."""
-    fundamental = _number(result, "frequency")
-    frequency = fundamental or _number(result, "spectrum_peak")
+def _detail(result: StoredResult, samples: int, interval: float) -> tuple[str, int, int]:
+    """Name, first sample and end of the last cycles of the run, or of the motion where it has come to rest."""
+    fundamental = result.attributes.get("frequency")
+    frequency = fundamental or result.attributes.get("spectrum_peak")
     wanted = CYCLES / (frequency * interval) if frequency else FEW
-    length = min(samples, MOST_DETAIL, max(2, round(min(wanted, MOST_DETAIL))))
-    stop, name = samples, "End of the run" if length < samples else "Whole run"
+    length = min(samples, max(2, round(min(wanted, MOST_DETAIL))))
     if fundamental:
-        name = "Settled motion"
-    elif result.attributes.get("status") == "failed":
-        name = "Motion up to the failure"
-    elif (rest := _last_motion(read, samples) + length // 8 + 1) < samples:
-        stop, name = rest, "Last motion, then stick"
-    first = max(0, stop - length)
-    time, x, vx, state = (read(variable, first, stop) for variable in ("time", "x", "vx", "state"))
-    return Detail(name, time, x, vx, state, np.interp(time, belt["time"], belt["value"]), interval)
-
-
-def _last_motion(read: Reader, samples: int) -> int:
-    """Samples up to the last one that does not stick, searched from the end."""
-    for stop in range(samples, 0, -BLOCK):
-        begin = max(0, stop - BLOCK)
-        moving = np.flatnonzero(read("state", begin, stop) != ContactState.STICK)
+        return "Settled motion", samples - length, samples
+    if result.attributes.get("status") == "failed":
+        return "Motion up to the failure", samples - length, samples
+    for begin in range((samples - 1) // BLOCK * BLOCK, -1, -BLOCK):
+        moving = np.flatnonzero(result.read("history", "state", begin, begin + BLOCK) != ContactState.STICK)
         if moving.size:
-            return begin + int(moving[-1]) + 1
-    return 0
+            break
+    rest = (begin + int(moving[-1]) if moving.size else -1) + length // 8 + 2
+    if rest < samples:
+        return "Last motion, then stick", max(0, rest - length), rest
+    return "End of the run" if length < samples else "Whole run", samples - length, samples
 
 
 def _summary(result: StoredResult) -> str:
@@ -172,77 +135,70 @@ def _summary(result: StoredResult) -> str:
     if attributes.get("status") == "failed":
         return f"failed at {str(attributes.get('failure', '')).partition(';')[0]}"
     regime, excitation = str(attributes.get("regime")), str(attributes.get("excitation"))
-    parts = [regime if excitation == "none" else f"{regime}, {excitation}"]
-    if regime == "undecided":
-        parts = [f"{parts[0]}: {'; '.join(str(reason) for reason in attributes.get('reasons', ()))}"]
-    if frequency := _number(result, "frequency"):
+    first = regime if excitation == "none" else f"{regime}, {excitation}"
+    reasons = f": {'; '.join(map(str, attributes.get('reasons', ())))}" if regime == "undecided" else ""
+    parts = [first + reasons]
+    if frequency := attributes.get("frequency"):
         parts.append(f"{frequency:.4g} Hz")
-    if (amplitude := _number(result, "amplitude")) and excitation != "none":
+    if (amplitude := attributes.get("amplitude")) and excitation != "none":
         factor, unit = style.prefixed(amplitude, "m")
         parts.append(f"amplitude of x {amplitude * factor:.3g} {unit}")
     for name, words in (("stick_fraction", "stick"), ("contact_loss_fraction", "contact lost")):
-        if share := _number(result, name):
+        if share := attributes.get(name):
             parts.append(f"{words} {share:.1%} of the time")
     return "   ·   ".join(parts)
-
-
-def _number(result: StoredResult, name: str) -> float | None:
-    value = result.attributes.get(name)
-    return float(value) if isinstance(value, int | float) else None
 
 
 def draw(picture: RunPicture) -> Figure:
     """The figure with its four panels."""
     figure = style.headed(10.4, 7.2, picture.title, picture.summary, wspace=0.05, hspace=0.06)
     panels = figure.subplots(2, 2, width_ratios=(1.55, 1.0))
-    _draw_detail(panels[0, 0], picture.detail)
-    _draw_portrait(panels[0, 1], picture.detail)
-    _draw_history(panels[1, 0], picture)
-    _draw_spectrum(panels[1, 1], picture)
+    drawing = (_draw_detail, _draw_portrait, _draw_history, _draw_spectrum)
+    for axes, draw_panel in zip(panels.flat, drawing, strict=True):
+        draw_panel(axes, picture)
+    for axes in panels[0] if not picture.near else ():
+        note = f"U = {picture.detail['belt'][-1]:.4g} m/s, off the scale"
+        axes.set_title(note, loc="right", size=8.5, color=style.VERMILION)
+    spans: tuple[Any, ...] = (picture.detail["time"], picture.span)
+    for axes, time in zip(panels[:, 0], spans, strict=True):
+        if time[-1] > time[0]:
+            axes.set_xlim(time[0], time[-1])
+        if axes.get_legend_handles_labels()[1]:  # with room for the legend above the data
+            low, high = axes.get_ylim()
+            axes.set_ylim(low, high + 0.14 * (high - low))
+            axes.legend(loc="upper right", ncols=3)
     return figure
 
 
-def _draw_detail(axes: Axes, detail: Detail) -> None:
-    factor, unit = detail.velocity_unit
-    axes.plot(detail.time, factor * detail.vx, color=style.BLUE, marker=_marker(detail.time))
+def _draw_detail(axes: Axes, picture: RunPicture) -> None:
+    time, belt, interval = picture.detail["time"], picture.detail["belt"], picture.interval
+    factor, unit = picture.velocity_unit
+    axes.plot(time, factor * picture.detail["vx"], color=style.BLUE, marker=_marker(time))
     look: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "alpha": 0.3, "lw": 0, "zorder": 0.5}
     for state, colour, label in _SHADES:
-        spans = [
-            (detail.time[first] - 0.5 * detail.interval, (last - first + 1) * detail.interval)
-            for first, last in episodes(detail.state, state)
-        ]
+        found = episodes(picture.detail["state"], state)
+        spans = [(time[first] - 0.5 * interval, (last - first + 1) * interval) for first, last in found]
         if spans:
             axes.broken_barh(spans, (0, 1), color=colour, label=label, **look)
-    if detail.near:
-        label = f"U = {factor * detail.belt[-1]:.4g} {unit}" if np.ptp(detail.belt) == 0.0 else "U"
-        axes.plot(detail.time, factor * detail.belt, color=style.VERMILION, ls=style.DASHES, lw=1.1, label=label)
-    if len(detail.time) > 1:
-        axes.set_xlim(detail.time[0], detail.time[-1])
-    axes.set(title=f"{detail.name}: tangential velocity", xlabel="time (s)", ylabel=f"velocity ẋ ({unit})")
-    _note_far(axes, detail)
-    _add_legend(axes)
+    if picture.near:
+        label = f"U = {factor * belt[-1]:.4g} {unit}" if np.ptp(belt) == 0.0 else "U"
+        axes.plot(time, factor * belt, lw=1.1, label=label, **_BELT)
+    axes.set(title=f"{picture.part}: tangential velocity", xlabel="time (s)", ylabel=f"velocity ẋ ({unit})")
 
 
-def _draw_portrait(axes: Axes, detail: Detail) -> None:
-    centre = _centre(detail.x)
-    x_factor, x_unit = style.prefixed(style.largest(detail.x - centre), "m")
-    factor, unit = detail.velocity_unit
-    x, vx = x_factor * (detail.x - centre), factor * detail.vx
+def _draw_portrait(axes: Axes, picture: RunPicture) -> None:
+    detail, centre = picture.detail, _centre(picture.detail["x"])
+    x_factor, x_unit = style.prefixed(style.largest(detail["x"] - centre), "m")
+    factor, unit = picture.velocity_unit
+    x, vx = x_factor * (detail["x"] - centre), factor * detail["vx"]
     axes.plot(x, vx, color=style.BLUE, lw=0.9, marker=_marker(x))
-    stick = detail.state == ContactState.STICK
+    stick = detail["state"] == ContactState.STICK
     axes.plot(x[stick], vx[stick], color=style.ORANGE, ls="none", marker="o", ms=3.0)
-    for speed in np.unique([detail.belt.min(), detail.belt.max()]) if detail.near else ():
-        axes.axhline(factor * speed, color=style.VERMILION, ls=style.DASHES, lw=1.1)
+    for speed in np.unique([detail["belt"].min(), detail["belt"].max()]) if picture.near else ():
+        axes.axhline(factor * speed, lw=1.1, **_BELT)
     axes.locator_params(axis="x", nbins=6)
     about = f" − ({centre:.12g} m)".replace("-", "−") if centre else ""
     axes.set(title="Phase portrait", xlabel=f"displacement x{about} ({x_unit})", ylabel=f"velocity ẋ ({unit})")
-    _note_far(axes, detail)
-
-
-def _note_far(axes: Axes, detail: Detail) -> None:
-    if not detail.near:
-        note = f"U = {detail.belt[-1]:.4g} m/s, off the scale"
-        axes.set_title(note, loc="right", size=8.5, color=style.VERMILION)
 
 
 def _draw_history(axes: Axes, picture: RunPicture) -> None:
@@ -251,26 +207,23 @@ def _draw_history(axes: Axes, picture: RunPicture) -> None:
     axes.fill_between(time, factor * lowest, factor * highest, color=style.BLUE, lw=0.9)
     if len(time) < 3:
         axes.plot(time, factor * lowest, color=style.BLUE, marker="o", ms=4.0)
-    detail = picture.detail.time
-    if len(detail) > 1 and detail[-1] - detail[0] < 0.9 * (picture.span[1] - picture.span[0]):
-        axes.axvspan(detail[0], detail[-1], color=style.GREEN, alpha=0.25, lw=0, zorder=0.5, label="drawn above")
-    if picture.span[1] > picture.span[0]:
-        axes.set_xlim(*picture.span)
+    first, last = picture.detail["time"][[0, -1]]
+    if first < last < first + 0.9 * (picture.span[1] - picture.span[0]):
+        axes.axvspan(first, last, color=style.GREEN, alpha=0.25, lw=0, zorder=0.5, label="drawn above")
     axes.set(title="Whole run: tangential displacement", xlabel="time (s)", ylabel=f"displacement x ({unit})")
-    _add_legend(axes)
 
 
 def _draw_spectrum(axes: Axes, picture: RunPicture) -> None:
-    axes.set(title=f"Spectrum of ẋ from {picture.spectrum_from:.4g} s on")
-    axes.set(xlabel="frequency (Hz)", ylabel="power spectral density ((m/s)²/Hz)")
-    frequency, density = picture.spectrum
+    start, frequency, density = picture.spectrum
+    axes.set(title=f"Spectrum of ẋ from {start:.4g} s on", xlabel="frequency (Hz)")
+    axes.set_ylabel("power spectral density ((m/s)²/Hz)")
     shown = density > 0.0
     shown[:1] = False  # the mean was removed
     if not shown.any():
         axes.set(xticks=[], yticks=[])
-        style.write_inside(axes, "no motion")
+        axes.text(0.5, 0.5, "no motion", transform=axes.transAxes, ha="center", color="#666666")
         return
-    line = picture.fundamental or picture.peak
+    name, line = picture.line
     highest = min(frequency[-1], max([6.5 * (line or np.inf), *(1.3 * f for f in picture.passing)]))
     near = shown & (frequency <= highest)
     near = near if near.any() else shown
@@ -280,29 +233,18 @@ def _draw_spectrum(axes: Axes, picture: RunPicture) -> None:
     axes.set_ylim(lowest, 30.0 * float(density.max()))
     axes.set_xlim(0.0, min(highest, max(1.3 * float(frequency[density > lowest][-1]), 2.0 * (line or 0.0))))
     for number, wave in enumerate(picture.passing):
-        label = None if number else "waves of the wheel pass"
-        axes.axvline(wave, color=style.VERMILION, ls=style.DASHES, lw=0.9, zorder=0.8, label=label)
+        axes.axvline(wave, lw=0.9, zorder=0.8, label="" if number else "waves of the wheel pass", **_BELT)
     if line:
-        label = f"{'fundamental' if picture.fundamental else 'highest peak'} {line:.4g} Hz"
-        axes.axvline(line, color=style.GREEN, ls=(0, (1, 1.5)), lw=1.4, zorder=0.9, label=label)
-    if axes.get_legend_handles_labels()[1]:
+        axes.axvline(line, color=style.GREEN, ls=style.DOTS, lw=1.4, zorder=0.9, label=f"{name} {line:.4g} Hz")
+    if picture.passing or line:
         axes.legend(loc="upper right")
 
 
-def _add_legend(axes: Axes) -> None:
-    """A legend, if there is anything to explain, with room for it above the data."""
-    if axes.get_legend_handles_labels()[1]:
-        low, high = axes.get_ylim()
-        axes.set_ylim(low, high + 0.14 * (high - low))
-        axes.legend(loc="upper right", ncols=3)
+def _marker(values: style.Array) -> str:
+    return "." if len(values) < 40 else ""  # a line alone would not show so few samples
 
 
-def _marker(values: Array) -> str:
-    """Dots where samples are so few that a line would not show them."""
-    return "." if len(values) < 40 else ""
-
-
-def _centre(values: Array) -> float:
+def _centre(values: style.Array) -> float:
     """What to subtract from values that differ too little for readable ticks, in round numbers; otherwise 0."""
     middle, width = 0.5 * float(values.min() + values.max()), float(np.ptp(values))
     if not 0.0 < width < 0.1 * abs(middle):

@@ -2,32 +2,26 @@
 
 import math
 import textwrap
-from collections import Counter
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brakecli.case.read import parse_table
 from brakecli.errors import CaseError, UsageError
-from brakecli.files.read import StoredResult, Variable
-from brakecli.files.write import FILL
+from brakecli.files.read import StoredResult
 from brakecli.plots import style
-from brakecli.plots.style import Array
 from brakecli.sweeps.plan import label
 from brakecli.sweeps.tables import Critical, Sweep
 
-MOST_PANELS = 5
-"""Largest number of values of a third axis: its maps stand side by side."""
+MOST_PANELS = 5  # values of a third axis: its maps stand side by side
 _NEEDED = ("status", "regime", "excitation", "amplitude", "frequency")
-_CRITICAL = ("critical_status", "critical", "critical_lower", "critical_upper", "critical_error")
-_BESIDE_CRITICAL = ("critical_eigenvalue", "critical_sustained", "sustained_status")
-_LEAST_LOG = 5.0
-"""Ratio of the ends from which on an axis may be logarithmic; below it, linear ticks are easier to read."""
-_LONGEST_KEY = 45
-_MOST_LISTED = 12
+_CRITICAL = (
+    *("critical_status", "critical", "critical_lower", "critical_upper", "critical_error"),
+    *("critical_eigenvalue", "critical_sustained", "sustained_status"),
+)
+_LEAST_LOG = 5.0  # ratio of the ends of a logarithmic axis; below it, linear ticks are easier to read
 
 
 @dataclass(frozen=True)
@@ -37,13 +31,8 @@ class Axis:
     dimension: str
     key: str
     units: str
-    values: Array
+    values: style.Array
     texts: tuple[str, ...] | None = None
-
-    @property
-    def label(self) -> str:
-        """Key path and unit."""
-        return style.labelled(textwrap.shorten(self.key, _LONGEST_KEY, placeholder=" …"), self.units)
 
     @property
     def logarithmic(self) -> bool:
@@ -55,32 +44,28 @@ class Axis:
         return bool(np.std(ratios) / np.mean(ratios) < 0.999 * np.std(steps) / np.mean(steps))
 
     @property
-    def edges(self) -> Array:
+    def edges(self) -> style.Array:
         """The limits of the cells around the values: half way between neighbours."""
         places = np.log(self.values) if self.logarithmic else self.values
-        if len(places) == 1:
-            return np.array([places[0] - 0.5, places[0] + 0.5])
         middles = 0.5 * (places[1:] + places[:-1])
         edges = np.concatenate([[2.0 * places[0] - middles[0]], middles, [2.0 * places[-1] - middles[-1]]])
         return np.exp(edges) if self.logarithmic else edges
 
     def named(self, place: int) -> str:
         """The value at a place, with its key and unit."""
-        if self.texts is not None:
-            return f"{self.key} = {self.texts[place]}"
-        return f"{self.key} = {_with_unit(style.readable(float(self.values[place])), self.units)}"
+        value = self.texts[place] if self.texts is not None else style.readable(float(self.values[place]))
+        return f"{self.key} = {value} {self.units}".rstrip()
 
     def place(self, value: str) -> int | None:
         """Where a value stands on the axis, compared in the six digits that a picture shows; None if nowhere."""
-        if self.texts is not None:
-            return self.texts.index(value) if value in self.texts else None
-        try:
-            number = float(value)
-        except ValueError:
-            return None
-        nearest = int(np.argmin(np.abs(self.values - number))) if math.isfinite(number) else 0
-        size = float(np.abs(self.values).max())
-        return nearest if math.isclose(self.values[nearest], number, rel_tol=1e-5, abs_tol=1e-9 * size) else None
+        with suppress(ValueError):
+            if self.texts is not None:
+                return self.texts.index(value)
+            nearest = int(np.argmin(np.abs(self.values - float(value))))
+            size = float(np.abs(self.values).max())
+            if math.isclose(self.values[nearest], float(value), rel_tol=1e-5, abs_tol=1e-9 * size):
+                return nearest
+        return None
 
 
 @dataclass(frozen=True)
@@ -96,12 +81,12 @@ class SweepPicture:
     chosen: tuple[str, ...]  # what was selected, and axes of a single value
     directions: tuple[str, ...]
     axes: tuple[Axis, ...]
-    variables: Mapping[str, NDArray[Any]]
+    variables: Mapping[str, style.Array]
     units: Mapping[str, str]
     long_names: Mapping[str, str]
     critical: Critical | None
 
-    def __getitem__(self, name: str) -> NDArray[Any]:
+    def __getitem__(self, name: str) -> style.Array:
         """A variable."""
         return self.variables[name]
 
@@ -111,12 +96,12 @@ class SweepPicture:
         done = self["status"] == "done"
         parts = [f"{done.size} point{'s' if done.size != 1 else ''}"]
         if self.critical is None:
-            counts = Counter(self["regime"][done].tolist())
-            parts += [f"{name} {counts[name]}" for name in sorted(counts)]
+            regimes = zip(*np.unique(self["regime"][done], return_counts=True), strict=True)
+            parts += [f"{name} {count}" for name, count in regimes]
         else:
             known = self["critical"][np.isfinite(self["critical"])]
             ends = [style.readable(float(f"{end(known):.4g}")) for end in (np.min, np.max) if known.size]
-            span = f": {_with_unit(' to '.join(ends), self.units['critical'])}" if ends else ""
+            span = f": {' to '.join(ends)} {self.units['critical']}".rstrip() if ends else ""
             parts.append(f"critical value found at {known.size}{span}")
         parts += [f"failed {(~done).sum()}"] if not done.all() else []
         return "   ·   ".join(parts)
@@ -142,39 +127,43 @@ def gather(result: StoredResult, select: Sequence[str] = ()) -> SweepPicture:
     something is missing, UsageError where there is no such key or value.
     """
     try:
-        text = str(result.attributes.get("resolved_sweep_toml", ""))
-        sweep = parse_table(Sweep, text, "its resolved sweep")
+        sweep = parse_table(Sweep, str(result.attributes.get("resolved_sweep_toml", "")), "its resolved sweep")
     except CaseError as error:
         raise style.unreadable(result, f"the sweep in it is not valid: {error.problems[0]}") from error
     known = result.variables("/")
-    names = _NEEDED + (_CRITICAL + _BESIDE_CRITICAL if sweep.critical is not None else ())
+    names = _NEEDED + (_CRITICAL if sweep.critical is not None else ())
     if missing := [name for name in names if name not in known]:
         raise style.unreadable(result, f"it has no variable {missing[0]}")
     if len({(known[name].dims, known[name].shape) for name in names}) != 1:
         raise style.unreadable(result, "its variables do not lie on the same axes")
     dims = known["status"].dims
     both = dims[:1] == ("direction",)
-    variables = {}
-    for name in names:
-        values = result.read("/", name)[... if both else np.newaxis]
-        variables[name] = np.where(values == FILL, np.nan, values) if values.dtype.kind == "f" else values
-    if both and "hysteresis" in known and known["hysteresis"].dims == dims[1:]:
-        variables["hysteresis"] = np.stack(2 * [result.read("/", "hysteresis")])
+    variables = {name: style.read_column(result, name)[... if both else np.newaxis] for name in names}
+    for name in ("regime", "excitation"):  # those of points that failed mean nothing
+        variables[name] = np.where(variables["status"] == "done", variables[name], "")
+    followed = both and "hysteresis" in known and known["hysteresis"].dims == dims[1:]
+    differ = result.read("/", "hysteresis") == 1 if followed else False
+    variables["hysteresis"] = np.broadcast_to(differ, variables["status"].shape)
+    units = {name: str(each.attributes.get("units", "")) for name, each in known.items()}
+    units = {name: unit if unit != "1" else "" for name, unit in units.items()}
+    long_names = {name: str(each.attributes.get("long_name", "")) for name, each in known.items()}
     axes = []
     for number, dimension in enumerate(dims[both:], start=1):
-        axis, order = _axis(result, known[dimension], dimension)
-        axes.append(axis)
+        values = result.read("/", dimension)
+        texts = tuple(values.tolist()) if values.dtype.kind == "U" else None
+        order = np.arange(len(values)) if texts else np.argsort(values, kind="stable")
+        places = (order if texts else values[order]).astype(np.float64)
+        axes.append(Axis(dimension, long_names[dimension], units[dimension], places, texts))
         variables = {name: np.take(values, order, number) for name, values in variables.items()}
-    directions = ("up", "down") if both else (next((str(a.direction) for a in sweep.axis if a.direction), ""),)
     picture = SweepPicture(
         title=str(result.attributes.get("title", "")) or "Sweep without a title",
-        findings=tuple(str(each) for each in result.attributes.get("findings", ())),
+        findings=tuple(map(str, result.attributes.get("findings", ()))),
         chosen=(),
-        directions=directions,
+        directions=("up", "down") if both else (next((str(a.direction) for a in sweep.axis if a.direction), ""),),
         axes=tuple(axes),
         variables=variables,
-        units={name: str(known[name].attributes.get("units", "")) for name in variables},
-        long_names={name: str(known[name].attributes.get("long_name", "")) for name in variables},
+        units=units,
+        long_names=long_names,
         critical=sweep.critical,
     )
     for wanted in select:  # findings about the whole sweep need not hold for a part of it
@@ -186,56 +175,37 @@ def gather(result: StoredResult, select: Sequence[str] = ()) -> SweepPicture:
     return picture
 
 
-def _axis(result: StoredResult, variable: Variable, dimension: str) -> tuple[Axis, NDArray[np.intp]]:
-    """An axis, and the order in which its values rise."""
-    values = result.read("/", dimension)
-    key, units = (str(variable.attributes.get(name, "")) for name in ("long_name", "units"))
-    texts = tuple(values.tolist()) if values.dtype.kind == "U" else None
-    order = np.arange(len(values)) if texts else np.argsort(values, kind="stable")
-    return Axis(dimension, key, units, (order if texts else values[order]).astype(np.float64), texts), order
-
-
 def _selected(picture: SweepPicture, wanted: str, result: StoredResult) -> SweepPicture:
-    """The picture at the value of one `KEY=VALUE`."""
     key, _, value = (part.strip() for part in wanted.partition("="))
     value, both = value.strip("\"'"), len(picture.directions) > 1
-    if key == "direction" and both and value in picture.directions:
-        return picture.towards(value)
     problem, choices = "no axis has this key or value", [axis.key for axis in picture.axes] + both * ["direction"]
     if key == "direction" and both:
-        choices = ["up", "down"]
+        if value in picture.directions:
+            return picture.towards(value)
+        choices = [*picture.directions]
     for number, axis in enumerate(picture.axes):
         if key in (axis.dimension, *axis.key.split(", ")):
             if (place := axis.place(value)) is not None:
                 return picture.at(number, place)
             problem, choices = "no point has this value", [*(axis.texts or map(label, axis.values.tolist()))]
-    more = " …" if len(choices) > _MOST_LISTED else ""
-    remedy = f"give one of {', '.join(choices[:_MOST_LISTED])}{more}, as KEY=VALUE" if choices else "leave it out"
+    some = textwrap.shorten(", ".join(choices), 120, placeholder=" …")
+    remedy = f"give one of {some}, as KEY=VALUE" if choices else "leave it out"
     raise UsageError(f"{result.path}: --select {wanted}: {problem}; {remedy}")
 
 
 def _check_drawable(picture: SweepPicture, result: StoredResult) -> None:
     """Raise UsageError where there are no axes to draw along, or too many, or too long ones."""
     count, both = len(picture.axes), len(picture.directions) > 1
-    keys = ", ".join(axis.key for axis in picture.axes)
-    part = "draw a part of it with --select KEY=VALUE for"
+    keys = ", ".join([axis.key for axis in picture.axes] + both * ["direction"])
+    least = min((len(axis.values) for axis in picture.axes), default=0)
+    remedy = f"draw a part of it with --select KEY=VALUE for one of {keys}"
     if count == 0:
-        problem = (
-            "a single point makes no picture; sweep along an [[axis]] of two values or more, or "
-            "read the point's numbers in the file"
-        )
+        problem = "a single point makes no picture"
+        remedy = "sweep along an [[axis]] of two values or more, or read the point's numbers in the file"
     elif count + both > 3:
-        also = (" in two directions", ", direction") if both else ("", "")
-        problem = f"{count} axes{also[0]} are too many for one picture; {part} {keys}{also[1]}"
-    elif count == 3 and (least := min(len(axis.values) for axis in picture.axes)) > MOST_PANELS:
-        problem = (
-            f"one of three axes may have {MOST_PANELS} values at most, to stand side by side (the shortest has "
-            f"{least}); {part} one of {keys}"
-        )
+        problem = f"{count} axes{' in two directions' if both else ''} are too many for one picture"
+    elif count == 3 and least > MOST_PANELS:
+        problem = f"one of three axes may have {MOST_PANELS} values at most, and the shortest has {least}"
     else:
         return
-    raise UsageError(f"{result.path}: {problem}")
-
-
-def _with_unit(number: str, units: str) -> str:
-    return number if units in ("", "1") else f"{number} {units}"
+    raise UsageError(f"{result.path}: {problem}; {remedy}")

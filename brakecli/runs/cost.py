@@ -15,35 +15,27 @@ _OWN_STEP_SECONDS = 4e-6
 _OWN_EVALUATIONS = 27.0
 
 
-def own_steps(system: System) -> tuple[int, float]:
-    """Steps of a scheme that finds them itself, and the cost of all its runs over that of the last."""
-    method, c, frequency = system.method, system.coefficients, system.natural_frequencies[1]
-    alone = method.step is not None
+def steps_and_seconds(system: System) -> tuple[int, float]:
+    """Steps of a run, and a rough guess at the time of all runs that it takes to keep the tolerance."""
+    method, waves = system.method, 1.0 + len(system.wheel.g) ** 2 / 20.0
+    if not method.own_steps:
+        each = _STEP_SECONDS * waves
+        if system.evaluator == "exact" or system.nodes:
+            each = _STEP_SECONDS + _EVALUATIONS * evaluation_seconds(system)
+        return system.steps, system.steps * each
+    c, alone = system.coefficients, method.step is not None
     tolerance = method.tolerance if alone else max(min(1e-5 * method.tolerance, 1e-8), 1e-13)
-    rate = frequency * _OWN_STEPS * (1e-10 / tolerance) ** 0.125
+    rate = system.natural_frequencies[1] * _OWN_STEPS * (1e-10 / tolerance) ** 0.125
     rate += 8.0 * system.passing_frequency + 0.25 * (c.b_xx + c.b_yy) / c.m
-    return 1 + int(min(system.sampled_duration * rate, 1e300)), 1.0 if alone else 1.6
-
-
-def seconds_per_step(system: System) -> float:
-    """A rough guess at the time of one step."""
-    own, n_2 = system.method.own_steps, len(system.wheel.g)
-    if own:
-        return _OWN_STEP_SECONDS * (1.0 + n_2**2 / 20.0) + (
-            _OWN_EVALUATIONS * _open_part(system) * evaluation_seconds(system)
-            if system.evaluator == "exact"
-            else 0.0
-        )
-    if system.evaluator == "exact" or system.nodes:
-        return _STEP_SECONDS + _EVALUATIONS * evaluation_seconds(system)
-    return _STEP_SECONDS * (1.0 + n_2**2 / 20.0)
-
-
-def _open_part(system: System) -> float:
-    """Part of the time in which rough surfaces may be open in part: little if the load presses them together."""
-    heights = float(np.abs(system.shoe.g).sum() + np.abs(system.wheel.g).sum())
-    spring = system.coefficients.c_yy + system.contact_stiffness
-    return 0.04 if heights * spring < float(np.abs(system.load["value"]).min()) else 0.12
+    steps = 1 + int(min(system.sampled_duration * rate, 1e300))
+    each = _OWN_STEP_SECONDS * waves
+    if system.evaluator == "exact":
+        # Rough surfaces that the load presses together are seldom open in part.
+        heights = float(np.abs(system.shoe.g).sum() + np.abs(system.wheel.g).sum())
+        least_load = float(np.abs(system.load["value"]).min())
+        open_part = 0.04 if heights * (c.c_yy + system.contact_stiffness) < least_load else 0.12
+        each += _OWN_EVALUATIONS * open_part * evaluation_seconds(system)
+    return steps, (1.0 if alone else 1.6) * steps * each
 
 
 def evaluation_seconds(system: System) -> float:

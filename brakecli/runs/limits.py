@@ -12,8 +12,8 @@ import numpy as np
 from brakecli.analysis.stability.discrete import StepLimits, step_limits
 from brakecli.analysis.stability.search import bisect
 from brakecli.errors import RefusedError
-from brakecli.runs.cost import duration_text, own_steps, seconds_per_step
-from brakecli.runs.warnings import UNSTABLE, adjustments, nodes_per_wave, steps_per_period, warnings
+from brakecli.runs.cost import duration_text, steps_and_seconds
+from brakecli.runs.warnings import UNSTABLE, adjustments, warnings
 from brakecli.solver.history import ROW_BYTES
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.quantities import HISTORY
@@ -27,20 +27,14 @@ MOST_TABLE_BYTES = 4e9
 
 @dataclass(frozen=True)
 class Check:
-    """The findings, in SI units; frequencies in Hz. `warnings` are sentences that name key and number."""
+    """The findings on a system, in SI units; frequencies in Hz. Each of the `warnings` names key and number."""
 
-    coefficients: dict[str, float]  # of (6)-(7), named as in `quantities.COEFFICIENTS`
-    belt_speed: float
-    contact_stiffness: float
-    natural_frequencies: tuple[float, float]  # on the links and the contact that touches everywhere
+    system: System
     link_frequencies: tuple[float, float]
-    passing_frequency: float  # of the shortest wave of the wheel
     step: float | None  # None: the scheme finds its steps itself, and `steps` is a rough guess
     steps: int
     steps_per_period: float
     limits: StepLimits
-    evaluator: str
-    nodes: int
     nodes_per_wave: float | None
     seconds: float
     memory: float  # bytes
@@ -51,53 +45,31 @@ class Check:
 
 def check(system: System) -> Check:
     """Look at a case without stepping it."""
-    stiffness, frequencies = system.contact_stiffness, system.natural_frequencies
+    own, fastest = system.method.own_steps, system.natural_frequencies[1]
+    waves = 2.0 * system.half_length * system.most_turns
+    steps, seconds = steps_and_seconds(system)
     limits = step_limits(system)
-    step = None if system.method.own_steps else system.step
-    steps, runs = own_steps(system) if step is None else (system.steps, 1.0)
+    per_period = math.inf if own or not fastest > 0.0 else 1.0 / (fastest * system.step)
+    per_wave = system.nodes / waves if system.nodes and waves > 0.0 else None
     return Check(
-        coefficients=system.coefficients._asdict(),
-        belt_speed=system.belt_speed,
-        contact_stiffness=stiffness,
-        natural_frequencies=frequencies,
+        system=system,
         link_frequencies=natural_frequencies(system.coefficients, 0.0),
-        passing_frequency=system.passing_frequency,
-        step=step,
+        step=None if own else system.step,
         steps=steps,
-        steps_per_period=steps_per_period(system),
+        steps_per_period=per_period,
         limits=limits,
-        evaluator=system.evaluator,
-        nodes=system.nodes,
-        nodes_per_wave=nodes_per_wave(system),
-        seconds=runs * steps * seconds_per_step(system),
+        nodes_per_wave=per_wave,
+        seconds=seconds,
         memory=1.5e8 + 8.0 * system.nodes * (2 * len(system.wheel.g) + 2),
         file_size=float(system.samples) * ROW_BYTES + 1e5,
         adjustments=tuple(adjustments(system)),
-        warnings=tuple(warnings(system, limits, steps)),
+        warnings=tuple(warnings(system, limits, steps, per_period, per_wave)),
     )
 
 
-def _blows_up(growth: float, steps: float) -> bool:
-    return growth > 1.0 + UNSTABLE and (growth - 1.0) * steps > 1.0
-
-
-def _longest_stable_step(system: System) -> float | None:
-    """The longest step (s) at which a run of this duration would not blow up, rounded down to two digits."""
-    duration = system.sampled_duration
-
-    def is_stable(step: float) -> bool:
-        return not _blows_up(step_limits(system, step).growth, duration / step)
-
-    low, high = 1e-6 * system.step, system.step
-    if not is_stable(low):
-        return None
-    low, _ = bisect(is_stable, low, high, ratio=1.001, geometric=True)
-    digit: float = 10.0 ** (math.floor(math.log10(low)) - 1)
-    return math.floor(low / digit) * digit
-
-
-def refuse(system: System, found: Check, free_bytes: float) -> None:
+def refuse(found: Check, free_bytes: float = math.inf) -> None:
     """Raise RefusedError where a run would be too large, or unstable by its scheme."""
+    system, growth = found.system, found.limits.growth
     size = (
         f"about {found.steps:.3g} steps, {duration_text(found.seconds)}, {found.memory / 1e6:.0f} MB of memory, "
         f"a file of {found.file_size / 1e6:.3g} MB"
@@ -116,7 +88,6 @@ def refuse(system: System, found: Check, free_bytes: float) -> None:
             f"two histories of {system.samples:.3g} samples are compared to keep the tolerance, which takes "
             f"{compared / 1e9:.3g} GB of memory; increase output.sample_interval, or give solver.step instead"
         )
-    growth = found.limits.growth
     if _blows_up(growth, found.steps):
         longest = _longest_stable_step(system)
         shorter = f"take a solver.step of at most {longest:.2g} s" if longest else "reduce solver.step"
@@ -124,6 +95,23 @@ def refuse(system: System, found: Check, free_bytes: float) -> None:
             f"solver.theta: at this step the scheme is unstable, it multiplies disturbances by {growth:.6g} in "
             f"each of {found.steps} steps; {shorter}, {system.method.row.unstable}"
         )
+
+
+def _blows_up(growth: float, steps: float) -> bool:
+    return growth > 1.0 + UNSTABLE and (growth - 1.0) * steps > 1.0
+
+
+def _longest_stable_step(system: System) -> float | None:
+    """The longest step (s) at which a run of this duration would not blow up, rounded down to two digits."""
+
+    def is_stable(step: float) -> bool:
+        return not _blows_up(step_limits(system, step).growth, system.sampled_duration / step)
+
+    if not is_stable(1e-6 * system.step):
+        return None
+    longest, _ = bisect(is_stable, 1e-6 * system.step, system.step, ratio=1.001, geometric=True)
+    digit: float = 10.0 ** (math.floor(math.log10(longest)) - 1)
+    return math.floor(longest / digit) * digit
 
 
 def free_bytes(directory: Path) -> float:

@@ -2,40 +2,31 @@
 
 from brakecli.solver.motion import Motion
 
-_OWN = "exact"
-
 
 def modelled(motion: Motion) -> tuple[list[str], list[str]]:
     """Sentences on what was modelled and on what was left out, by the system and by the steps that were taken."""
     system, work = motion.system, motion.work
-    c = system.coefficients
-    used, left = [], []
-    kinds = work.evaluators
-    if system.smooth:
-        used.append("flat contact in closed form")
-        left.append("quadrature of the contact: both surfaces are smooth")
-    else:
-        waves = f"{len(system.shoe.g)} + {len(system.wheel.g)} waves"
-        open_steps = sum(count for kind, count in kinds.items() if kind != "closed-form")
-        if open_steps:
-            how = "exactly, patch by patch" if _OWN in kinds else f"on {system.nodes} nodes"
-            used.append(f"rough contact of {waves}, {how}, in {open_steps} of {work.steps} steps")
-        if closed := kinds.get("closed-form", 0):
-            used.append(f"rough contact of {waves} in closed form, in {closed} of {work.steps} steps")
-        if not open_steps:
-            left.append("quadrature of the contact: the pad touches everywhere, or nowhere, at every step")
-            if system.shoe.g.size:
-                left.append("the shoe's own roughness, which cancels while the pad touches everywhere")
-    if c.phi == 0.0:
-        left.append("stick and slip: there is no friction")
-    elif system.method.own_steps:
-        used.append("stick and slip as a set-valued law, its changes located in time")
-    else:
-        used.append("stick and slip as a set-valued law, solved for in every step")
-    if system.wheel.g.size == 0:
-        left.append("the wheel's phase: its surface is the same everywhere")
-    if not system.load["value"].any():
-        left.append("the load: it is zero")
-    if c.b_xx == 0.0 == c.b_yy:
-        left.append("dashpots: they are zero")
-    return used, left
+    c, smooth = system.coefficients, system.smooth
+    closed = work.evaluators.get("closed-form", 0)
+    opened = sum(work.evaluators.values()) - closed
+    rough = f"rough contact of {len(system.shoe.g)} + {len(system.wheel.g)} waves"
+    how = "exactly, patch by patch" if "exact" in work.evaluators else f"on {system.nodes} nodes"
+    friction = "its changes located in time" if system.method.own_steps else "solved for in every step"
+    used = {
+        "flat contact in closed form": smooth,
+        f"{rough}, {how}, in {opened} of {work.steps} steps": not smooth and opened,
+        f"{rough} in closed form, in {closed} of {work.steps} steps": not smooth and closed,
+        f"stick and slip as a set-valued law, {friction}": c.phi != 0.0,
+    }
+    left_out = {
+        "quadrature of the contact: both surfaces are smooth": smooth,
+        "quadrature of the contact: the pad touches everywhere, or nowhere, at every step": not (smooth or opened),
+        "the shoe's own roughness, which cancels while the pad touches everywhere": not (
+            smooth or opened or system.shoe.g.size == 0
+        ),
+        "stick and slip: there is no friction": c.phi == 0.0,
+        "the wheel's phase: its surface is the same everywhere": system.wheel.g.size == 0,
+        "the load: it is zero": not system.load["value"].any(),
+        "dashpots: they are zero": c.b_xx == 0.0 == c.b_yy,
+    }
+    return [each for each, holds in used.items() if holds], [each for each, holds in left_out.items() if holds]

@@ -1,7 +1,8 @@
 """One run, from a case to a finished result file: what `brakecli run` does."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,9 +23,15 @@ from brakecli.files.write import ResultFile, new_result
 from brakecli.runs.limits import Check, check, free_bytes, refuse, within_range
 from brakecli.runs.modelled import modelled
 from brakecli.runs.tolerance import Certificate, certify
+from brakecli.solver.history import History
 from brakecli.solver.motion import Motion, Progress, Sink, solve
 from brakecli.solver.quantities import HISTORY, ContactState
 from brakecli.solver.system import System
+
+STATES: dict[str, Any] = {
+    "flag_values": np.array(list(ContactState), dtype=np.int8),
+    "flag_meanings": " ".join(state.name.lower() for state in ContactState),
+}
 
 
 @dataclass(frozen=True)
@@ -38,16 +45,13 @@ class RunReport(RunVerdict):
     certificate: Certificate | None  # where the case gives no step
     spectrum_peak: float | None  # Hz, of vx
     warnings: tuple[str, ...]
-
-    @property
-    def failed(self) -> bool:
-        """Whether the run ended before its time."""
-        return self.motion.work.failed
+    modelled: list[str]
+    left_out: list[str]
 
     @property
     def status(self) -> str:
         """How the run has ended, in a word."""
-        return "failed" if self.failed else "done"
+        return "failed" if self.motion.work.failed else "done"
 
     @property
     def iteration(self) -> str | None:
@@ -60,16 +64,6 @@ class RunReport(RunVerdict):
         """The time step, s; None where the scheme finds its steps itself."""
         return None if self.system.method.own_steps else self.system.step
 
-    @property
-    def modelled(self) -> list[str]:
-        """What of the model the run has used."""
-        return modelled(self.motion)[0]
-
-    @property
-    def left_out(self) -> list[str]:
-        """What of the model the run has left out, and why that was safe."""
-        return modelled(self.motion)[1]
-
     def numbers(self) -> dict[str, Any]:
         """Names and values as `--json` gives them."""
         numbers = values_of(fields.RUN, self)
@@ -78,31 +72,12 @@ class RunReport(RunVerdict):
         return numbers
 
 
-@dataclass(frozen=True)
-class _Written:
-    """The history of a file that is being written, as the analysis reads it."""
-
-    result: ResultFile
-    interval: float
-
-    @property
-    def samples(self) -> int:
-        return self.result.rows("history")
-
-    def read(self, name: str, start: int, stop: int) -> NDArray[np.float64]:
-        return self.result.read("history", name, start, stop)
-
-    def append(self, rows: NDArray[np.float64]) -> None:
-        _require_finite("a force", rows)
-        time = self.interval * np.arange(self.samples, self.samples + len(rows))
-        self.result.append("history", {"time": time, **dict(zip(HISTORY, rows.T, strict=True))})
-
-
-def load_kernels(loaded: LoadedCase) -> None:
-    """Compile what a run of a case needs, or load it: this takes seconds only once."""
+def load_kernels(loaded: LoadedCase) -> System:
+    """The system of a case, whose kernels are compiled or loaded: this takes seconds only once."""
     with within_range():
         system = system_of(loaded.case)
     _ = system.scheme, system.evaluate
+    return system
 
 
 def run(
@@ -122,22 +97,17 @@ def run(
         system = system_of(loaded.case)
         found = check(system)
         with new_result(output, force=force) as result:
-            refuse(system, found, free_bytes(output.resolve().parent))
-            _declare_history(result)
-
-            def advance(done: int) -> None:
-                progress("steps" if found.step else "samples", done, system.steps)
-
-            history = _Written(result, system.interval)
-            motion, certificate = motion_of(system, advance, history.append)
+            refuse(found, free_bytes(output.resolve().parent))
+            counted, sink = "steps" if found.step else "samples", _history_sink(result, system.interval)
+            motion, certificate = motion_of(system, lambda done: progress(counted, done, system.steps), sink)
             _require_finite("an energy", list(asdict(motion.energy).values()))
+            history = History(system.interval, result.rows("history"), partial(result.read, "history"))
             verdict = verdict_on(history, motion.system, motion.work.failure_sentence)
             top = _write_spectrum(result, history, verdict.settled_from)
             warnings = (*found.warnings, *_warnings(motion, certificate))
-            report = RunReport(
-                motion.system, verdict, loaded.case.title, output, motion, found, certificate, top, warnings
-            )
-            result.set_attributes(origin("run", report.title, loaded))
+            title, shown = loaded.case.title, (top, warnings, *modelled(motion))
+            report = RunReport(motion.system, verdict, title, output, motion, found, certificate, *shown)
+            result.set_attributes(origin("run", title, loaded))
             result.set_fields(fields.RUN, report.numbers())
             _write_unconverged(result, motion.work.unconverged)
             result.commit()
@@ -156,7 +126,21 @@ def motion_of(
     certified = certify(system, progress)
     if sink is not None:
         sink(certified.motion.rows)
-    return certified.motion, certified.certificate
+    return certified
+
+
+def _history_sink(result: ResultFile, interval: float) -> Sink:
+    """Declare the history of a file; what is returned writes samples to it."""
+    for field in fields.HISTORY:
+        result.variable("history", field, ("time",), **(STATES if field.name == "state" else {}))
+
+    def append(rows: NDArray[np.float64]) -> None:
+        _require_finite("a force", rows)
+        done = result.rows("history")
+        time = interval * np.arange(done, done + len(rows))
+        result.append("history", {"time": time, **dict(zip(HISTORY, rows.T, strict=True))})
+
+    return append
 
 
 def _require_finite(what: str, values: ArrayLike) -> None:
@@ -165,34 +149,24 @@ def _require_finite(what: str, values: ArrayLike) -> None:
         raise FloatingPointError(f"{what} overflows")
 
 
-def _warnings(motion: Motion, certificate: Certificate | None) -> list[str]:
+def _warnings(motion: Motion, certificate: Certificate | None) -> Iterator[str]:
     """What a careful user should know of a finished motion."""
-    work, warnings = motion.work, []
+    work = motion.work
     if work.unconverged_steps and motion.system.method.allow_unconverged:
-        warnings.append(
+        yield (
             f"{work.unconverged_steps} of {work.steps} steps did not converge, as the case allows; their times "
             "and residuals are in the file, the history is not to be trusted there"
         )
     if work.non_unique_steps:
-        warnings.append(
+        yield (
             f"{work.non_unique_steps} steps met a point where their solution need not be unique (the contact "
             "force rises with itself); reduce solver.step or friction.coefficient"
         )
     if certificate is not None and not certificate.certified:
-        warnings.append(f"solver.tolerance: {certificate.sentence()}")
-    return warnings
+        yield f"solver.tolerance: {certificate.sentence()}"
 
 
-def _declare_history(result: ResultFile) -> None:
-    flags = {
-        "flag_values": np.array([int(state) for state in ContactState], dtype=np.int8),
-        "flag_meanings": " ".join(state.name.lower() for state in ContactState),
-    }
-    for field in fields.HISTORY:
-        result.variable("history", field, ("time",), attributes=flags if field.name == "state" else None)
-
-
-def _write_spectrum(result: ResultFile, history: _Written, start: int) -> float | None:
+def _write_spectrum(result: ResultFile, history: History, start: int) -> float | None:
     """Write the spectra of the samples from `start` on; the frequency (Hz) of the highest peak of vx."""
     lines = spectrum(history, start)
     result.axis("spectrum", fields.FREQUENCY, lines.frequency)
@@ -221,10 +195,5 @@ def origin(kind: str, title: str, loaded: LoadedCase) -> dict[str, Any]:
 
 def versions() -> dict[str, str]:
     """The versions of the numerical libraries."""
-    return {
-        "numpy_version": np.__version__,
-        "scipy_version": scipy.__version__,
-        "numba_version": numba.__version__,
-        "h5py_version": h5py.__version__,
-        "hdf5_version": h5py.version.hdf5_version,
-    }
+    found = {f"{library.__name__}_version": str(library.__version__) for library in (np, scipy, numba, h5py)}
+    return {**found, "hdf5_version": h5py.version.hdf5_version}

@@ -8,12 +8,12 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from brakecli.runs.cost import evaluation_seconds
 from brakecli.solver.contact.pad import default_nodes
-from brakecli.solver.method import Method
 from brakecli.solver.motion import Motion, Progress, solve
 from brakecli.solver.quantities import HISTORY
 from brakecli.solver.system import System
@@ -73,12 +73,8 @@ class Certificate:
         )
 
 
-@dataclass(frozen=True)
-class Certified:
-    """A motion with its certificate.
-
-    `motion.work` counts the run that is the answer; its `solve_seconds` are those of all runs together.
-    """
+class Certified(NamedTuple):
+    """A motion with its certificate; its `work` counts the last run, but `solve_seconds` those of all runs."""
 
     motion: Motion
     certificate: Certificate
@@ -94,23 +90,24 @@ def certify(system: System, progress: Progress = lambda samples: None) -> Certif
     """
     method = system.method
     if not method.own_steps:
-        return _by_steps(system, method, progress)
-    if not method.automatic or method.tolerance < LAYERED_FROM or not _opens_and_slides(system, progress):
+        return _by_steps(system, progress)
+    layered = replace(system, method=replace(method, scheme="two-layer", theta=(0.5, 0.5)))
+    if not method.automatic or method.tolerance < LAYERED_FROM or not _opens_and_slides(layered, progress):
         return _by_events(system, progress)
-    found = _by_steps(system, _two_layer(method), progress, slower_than_events(system, progress))
-    if not found.certificate.certified and found.motion.work.solve_seconds < MOST_SECONDS:
-        again, spent = _by_events(system, progress), found.motion.work.solve_seconds
-        found = min(found, again, key=lambda each: each.certificate.estimated_error)
-        found.motion.work.solve_seconds = spent + again.motion.work.solve_seconds
+    found = _by_steps(layered, progress, slower_than_events(system, progress))
+    spent = found.motion.work.solve_seconds
+    if found.certificate.certified or spent >= MOST_SECONDS:
+        return found
+    again = _by_events(system, progress)
+    spent += again.motion.work.solve_seconds
+    found = min(found, again, key=lambda each: each.certificate.estimated_error)
+    found.motion.work.solve_seconds = spent
     return found
 
 
-def _two_layer(method: Method) -> Method:
-    return replace(method, scheme="two-layer", theta=(0.5, 0.5))
-
-
-def _run(system: System, method: Method, progress: Progress) -> Motion:
-    system = replace(system, method=method)
+def _run(system: System, progress: Progress, **changes: Any) -> Motion:
+    """The motion by the system's method with these changes."""
+    system = replace(system, method=replace(system.method, **changes))
     per_sample = system.per_sample
     return solve(system, progress=lambda steps: progress(steps // per_sample))
 
@@ -122,8 +119,7 @@ def _opens_and_slides(system: System, progress: Progress) -> bool:
     """
     if system.smooth or len(system.belt) > 1 or len(system.load) > 1:
         return False
-    coarse = replace(_two_layer(system.method), step=_coarsest(system), nodes=0)
-    work = _run(system, coarse, lambda samples: progress(0)).work
+    work = _run(system, lambda samples: progress(0), step=_coarsest(system), nodes=0).work
     return set(work.evaluators) != {"closed-form"} and not work.turns
 
 
@@ -136,9 +132,8 @@ def slower_than_events(system: System, progress: Progress) -> Callable[[float], 
     @cache
     def events() -> float:
         samples = max(1, system.samples // PILOT)
-        part = replace(system, duration=samples * system.interval)
-        method = replace(system.method, tolerance=_first_event_tolerance(system.method.tolerance))
-        found = _run(part, method, lambda samples: progress(0))
+        part, tolerance = replace(system, duration=samples * system.interval), _first_event_tolerance(system)
+        found = _run(part, lambda samples: progress(0), tolerance=tolerance)
         if found.work.failed:
             return math.inf
         return float(_guessed_seconds(found) * system.samples / samples * (1.0 + EVENT_RATIO**-0.125))
@@ -153,33 +148,33 @@ def _guessed_seconds(motion: Motion) -> float:
     return float(part * motion.work.contact_evaluations * evaluation_seconds(motion.system))
 
 
-def _first_event_tolerance(tolerance: float) -> float:
+def _first_event_tolerance(system: System) -> float:
     # Two tolerances at least, as runs to the same one agree in any case.
-    return max(min(FIRST_EVENT_TOLERANCE, EVENT_MARGIN * tolerance), LEAST_EVENT_TOLERANCE / EVENT_RATIO)
+    largest = min(FIRST_EVENT_TOLERANCE, EVENT_MARGIN * system.method.tolerance)
+    return max(largest, LEAST_EVENT_TOLERANCE / EVENT_RATIO)
 
 
 def _by_events(system: System, progress: Progress) -> Certified:
     """Event-driven runs, each to a hundredth of the tolerance of the one before."""
-    wanted = system.method.tolerance
-    tolerance = _first_event_tolerance(wanted)
-    before: Motion | None = None
-    seconds, runs = 0.0, 0
+    wanted, tolerance = system.method.tolerance, _first_event_tolerance(system)
+    before = _run(system, progress, tolerance=tolerance)
+    seconds, runs = before.work.solve_seconds, 1
     while True:
-        tolerance = max(tolerance, LEAST_EVENT_TOLERANCE)
-        run = _run(system, replace(system.method, tolerance=tolerance), progress)
+        tolerance = max(EVENT_RATIO * tolerance, LEAST_EVENT_TOLERANCE)
+        run = _run(system, progress, tolerance=tolerance)
         seconds, runs = seconds + run.work.solve_seconds, runs + 1
-        if before is not None:
-            until, error = _compare(before, run, wanted)
-            failed = run.work.failed
-            if error <= wanted or failed or tolerance <= LEAST_EVENT_TOLERANCE or seconds > MOST_SECONDS:
-                method = f"event-driven runs to {tolerance / EVENT_RATIO:.0e} and {tolerance:.0e}"
-                kept = error <= wanted and not failed
-                return _answer(run, Certificate(wanted, kept, error, until, method, runs), seconds)
-        before, tolerance = run, EVENT_RATIO * tolerance
+        until, error = _compare(before, run, wanted)
+        failed = run.work.failed
+        if error <= wanted or failed or tolerance <= LEAST_EVENT_TOLERANCE or seconds > MOST_SECONDS:
+            break
+        before = run
+    run.work.solve_seconds = seconds
+    how = f"event-driven runs to {tolerance / EVENT_RATIO:.0e} and {tolerance:.0e}"
+    return Certified(run, Certificate(wanted, error <= wanted and not failed, error, until, how, runs))
 
 
 def _by_steps(
-    system: System, method: Method, progress: Progress, too_slow: Callable[[float], bool] = lambda seconds: False
+    system: System, progress: Progress, too_slow: Callable[[float], bool] = lambda seconds: False
 ) -> Certified:
     """Runs with steps half as long, and twice as many nodes, as those before.
 
@@ -188,34 +183,31 @@ def _by_steps(
     make differences fall unevenly, and one that is small by luck must not pass. Nor must differences of runs that
     all step over what speed or load do between two knots.
     """
-    wanted, step = method.tolerance, _coarsest(system)
+    method, wanted, step = system.method, system.method.tolerance, _coarsest(system)
     longest = _shortest_span(system) / STEPS_BETWEEN_KNOTS * (1.0 + 1e-9)
-    smooth, exact = system.smooth, method.evaluator == "exact"
-    nodes = 0 if smooth else default_nodes(system.half_length, system.shoe, system.wheel)
+    nodes = 0 if system.smooth else default_nodes(system.half_length, system.shoe, system.wheel)
     before: Motion | None = None
-    last = math.inf
-    seconds, runs = 0.0, 0
+    last, seconds = math.inf, 0.0
     for rung in range(MOST_RUNGS):
-        finer = replace(method, step=step / 2**rung, nodes=0 if exact else nodes * 2**rung)
-        run = _run(system, finer, progress)
-        seconds, runs = seconds + run.work.solve_seconds, runs + 1
+        finer = 0 if method.evaluator == "exact" else nodes * 2**rung
+        run = _run(system, progress, step=step / 2**rung, nodes=finer)
+        spent = run.work.solve_seconds
+        run.work.solve_seconds = seconds = seconds + spent
         if before is not None and not run.work.failed and not before.work.failed:
             until, difference = _compare(before, run, wanted)
-            error = max(_remaining(last, difference), _jump_error(run))
-            if run.system.step > longest:
-                error = math.inf
+            error = max(_remaining(last, difference), _jump_error(run)) if run.system.step <= longest else math.inf
             last = difference
-            how = f"{method.scheme} runs of {run.system.step * 2:.3g} and half of that"
             if error <= wanted:
-                return _answer(run, Certificate(wanted, True, error, until, how, runs), seconds)
-            slower = 4.5 * run.work.solve_seconds if nodes else 2.2 * run.work.solve_seconds
+                how = f"{method.scheme} runs of {run.system.step * 2:.3g} and half of that"
+                return Certified(run, Certificate(wanted, True, error, until, how, rung + 1))
+            slower = spent * (4.5 if nodes else 2.2)
             if seconds + slower > MOST_SECONDS or too_slow(4.0 * _guessed_seconds(run)):
                 break
         before = run
     seen = math.isfinite(last) and run.system.step <= longest
     error = max(3.0 * last, _jump_error(run), wanted * 1.0000001) if seen else 1.0
-    how = f"the finest of {runs} runs, with steps of {run.system.step:.3g} s,"
-    return _answer(run, Certificate(wanted, False, error, 0.0, how, runs), seconds)
+    how = f"the finest of {rung + 1} runs, with steps of {run.system.step:.3g} s,"
+    return Certified(run, Certificate(wanted, False, error, 0.0, how, rung + 1))
 
 
 def _shortest_span(system: System) -> float:
@@ -242,20 +234,15 @@ def _remaining(before: float, last: float) -> float:
     return 3.0 * max(last, last / (before / last - 1.0), before / 4.0) if last > 0.0 else ROUNDING
 
 
-def _answer(run: Motion, certificate: Certificate, seconds: float) -> Certified:
-    run.work.solve_seconds = seconds
-    return Certified(run, certificate)
-
-
 def _compare(coarse: Motion, fine: Motion, tolerance: float) -> tuple[float, float]:
     """Until when (s) two runs differ by no more than the tolerance, and by how much they differ at most.
 
     What never exceeds the rounding of the motion does not count, as velocities of a shoe that stays where it is.
     """
-    count = min(len(coarse.rows), len(fine.rows))
-    if count < len(fine.rows):
+    if len(coarse.rows) < len(fine.rows):
         return 0.0, 1.0
-    one, other = coarse.rows[:, :_MOTION], fine.rows[:, :_MOTION]
+    count = len(fine.rows)
+    one, other = coarse.rows[:count, :_MOTION], fine.rows[:, :_MOTION]
     largest, system = np.abs(other).max(axis=0), fine.system
     rate = 2.0 * math.pi * system.natural_frequencies[1]
     rounding = ROUNDING * largest[:2].max() * np.array([1.0, 1.0, rate, rate])

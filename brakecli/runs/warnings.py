@@ -40,24 +40,23 @@ def adjustments(system: System) -> list[str]:
     return found
 
 
-def steps_per_period(system: System) -> float:
-    """Steps per period of the fastest motion; infinite where the scheme finds its steps itself."""
-    fastest = system.natural_frequencies[1]
-    return math.inf if system.method.own_steps or not fastest > 0.0 else 1.0 / (fastest * system.step)
-
-
-def nodes_per_wave(system: System) -> float | None:
-    """Quadrature nodes per shortest wave on the pad; None where there is none of both."""
-    waves = 2.0 * system.half_length * system.most_turns
-    return system.nodes / waves if system.nodes and waves > 0.0 else None
-
-
-def warnings(system: System, limits: StepLimits, steps: int) -> Iterator[str]:
-    """All warnings, for a run of so many steps."""
+def warnings(
+    system: System, limits: StepLimits, steps: int, per_period: float, per_wave: float | None
+) -> Iterator[str]:
+    """All warnings on a run of so many steps, by its steps per fastest period and its nodes per shortest wave."""
     if not system.method.own_steps:
-        yield from _unresolved(system)
-    yield from _undersampled(system)
-    per_wave = nodes_per_wave(system)
+        yield from _unresolved(system, per_period)
+    nyquist = 0.5 / system.interval
+    for what, frequency in (
+        ("the contact resonance", system.natural_frequencies[1]),
+        ("the shortest wave of the wheel", system.passing_frequency),
+    ):
+        if frequency > nyquist:
+            yield (
+                f"output.sample_interval: {what} at {frequency:.4g} Hz lies above half the sampling rate "
+                f"({nyquist:.4g} Hz) and would appear at a wrong place in the spectra; sample every "
+                f"{0.4 / frequency:.2g} s or more often"
+            )
     if per_wave is not None and per_wave < _COARSE_NODES:
         yield (
             f"contact.nodes: {per_wave:.3g} nodes per shortest wavelength; "
@@ -68,10 +67,10 @@ def warnings(system: System, limits: StepLimits, steps: int) -> Iterator[str]:
         yield "load: the force is negative at times, it lifts the shoe off the wheel"
 
 
-def _unresolved(system: System) -> Iterator[str]:
+def _unresolved(system: System, per_period: float) -> Iterator[str]:
     """What the step is too long for."""
-    step, (_, fastest), passing = system.step, system.natural_frequencies, system.passing_frequency
-    per_period = steps_per_period(system)
+    c, step, fastest = system.coefficients, system.step, system.natural_frequencies[1]
+    passing = system.passing_frequency
     if per_period < RESOLVED:
         yield (
             f"solver.step: {per_period:.3g} steps per period of the fastest motion ({fastest:.4g} Hz): it is not "
@@ -87,29 +86,13 @@ def _unresolved(system: System) -> Iterator[str]:
             f"solver.step: {1.0 / (passing * step):.3g} steps per passing wave of the wheel ({passing:.4g} Hz); "
             f"take a step of at most {1.0 / (RESOLVED * passing):.2g} s"
         )
-    speed = system.fastest_belt
-    grip = system.coefficients.phi * float(np.abs(system.load["value"]).max()) / system.coefficients.m
+    speed, grip = system.fastest_belt, c.phi * float(np.abs(system.load["value"]).max()) / c.m
     if 0.0 < speed < grip * step:
         yield (
             f"solver.step: friction changes the shoe's velocity by up to {grip * step:.3g} m/s in "
             f"a step, more than the wheel's {speed:.3g} m/s: stick and slip are not resolved; take a step of at "
             f"most {speed / grip:.2g} s, or event-driven"
         )
-
-
-def _undersampled(system: System) -> Iterator[str]:
-    """What would appear at a wrong place in the spectra."""
-    nyquist = 0.5 / system.interval
-    for what, frequency in (
-        ("the contact resonance", system.natural_frequencies[1]),
-        ("the shortest wave of the wheel", system.passing_frequency),
-    ):
-        if frequency > nyquist:
-            yield (
-                f"output.sample_interval: {what} at {frequency:.4g} Hz lies above half the sampling rate "
-                f"({nyquist:.4g} Hz) and would appear at a wrong place in the spectra; sample every "
-                f"{0.4 / frequency:.2g} s or more often"
-            )
 
 
 def _of_the_scheme(system: System, limits: StepLimits, steps: int) -> Iterator[str]:
@@ -126,7 +109,7 @@ def _of_the_scheme(system: System, limits: StepLimits, steps: int) -> Iterator[s
             "friction.coefficient: a step may have more than one solution, as friction can wedge the shoe into "
             "the wheel within a step; reduce solver.step or the coefficient"
         )
-    if 1.0 + 1e-3 / steps < limits.growth and limits.growth > 1.0 + UNSTABLE:
+    if limits.growth > 1.0 + max(UNSTABLE, 1e-3 / steps):
         yield (
             f"solver.theta: the scheme itself multiplies disturbances by {limits.growth:.6g} in each step; "
             f"reduce solver.step, {method.row.unstable}"

@@ -1,7 +1,7 @@
 """A time history as the analysis sees it: read in pieces, since a long one does not fit into memory."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,34 +11,16 @@ from brakecli.solver.quantities import HISTORY
 ROW_BYTES = 8 * len(HISTORY) + 1  # of a stored sample: the time, the variables, and the state in one byte
 
 
-class History(Protocol):
-    """Samples of the variables of `model.HISTORY`, at t = 0, interval, 2 interval, …"""
-
-    @property
-    def interval(self) -> float:
-        """Time between samples, s."""
-
-    @property
-    def samples(self) -> int:
-        """How many samples there are."""
-
-    def read(self, name: str, start: int, stop: int) -> NDArray[np.float64]:
-        """The samples start … stop - 1 of a variable, in SI units."""
-
-
 @dataclass(frozen=True)
-class ArrayHistory:
-    """A history in memory: rows of `model.HISTORY`."""
+class History:
+    """Samples of the variables of `quantities.HISTORY`, at t = 0, interval, 2 interval, …"""
 
-    interval: float
-    rows: NDArray[np.float64]
+    interval: float  # s
+    samples: int
+    read: Callable[[str, int, int], NDArray[np.float64]]  # the samples start … stop - 1 of a variable, SI units
 
-    @property
-    def samples(self) -> int:
-        """How many samples there are."""
-        return len(self.rows)
 
-    def read(self, name: str, start: int, stop: int) -> NDArray[np.float64]:
-        """The samples start … stop - 1 of a variable."""
-        column: NDArray[np.float64] = self.rows[start:stop, list(HISTORY).index(name)]
-        return column
+def array_history(interval: float, rows: NDArray[np.float64]) -> History:
+    """A history in memory: rows of `quantities.HISTORY`."""
+    columns = dict(zip(HISTORY, rows.T, strict=True))
+    return History(interval, len(rows), lambda name, start, stop: columns[name][start:stop])

@@ -1,6 +1,5 @@
 """What a sweep will cost, before anything is computed."""
 
-import math
 import os
 from contextlib import suppress
 from dataclasses import dataclass
@@ -53,7 +52,7 @@ def estimate(plan: Plan, workers: int) -> Estimate:
         with suppress(CaseError, RefusedError), within_range():  # the point fails when its turn comes
             system = system_of(plan.case(plan.settings(point)))
             checked = check(system)
-            refuse(system, checked, math.inf)
+            refuse(checked)
             times.append(checked.seconds)
             samples = max(samples, system.samples)
     run = sum(times) / max(len(times), 1) + _POINT_SECONDS + _SAMPLE_SECONDS * samples
@@ -77,19 +76,9 @@ def refuse_sweep(found: Estimate, free_bytes: float) -> None:
     if found.points > MOST_POINTS or found.seconds > MOST_SECONDS:
         raise RefusedError(f"the sweep is too large: {found.sentence()}; take fewer points, or shorter runs")
     if 2.0 * found.file_size > min(MOST_BYTES, free_bytes):  # finished points and the result, side by side
-        raise RefusedError(
-            f"the file would be too large, {free_bytes / 1e6:.3g} MB are free: {found.sentence()}; take fewer "
-            "points"
-        )
-    if found.memory > _physical_bytes():
-        raise RefusedError(
-            f"the sweep needs more memory than there is: {found.sentence()}; take fewer "
-            "--jobs, or sample less often"
-        )
-
-
-def _physical_bytes() -> float:
-    try:
-        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
-    except (ValueError, OSError):
-        return math.inf
+        free = f"{free_bytes / 1e6:.3g} MB are free"
+        raise RefusedError(f"the file would be too large, {free}: {found.sentence()}; take fewer points")
+    with suppress(ValueError, OSError):  # systems that do not say how much memory they have
+        if found.memory > os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"):
+            remedy = "take fewer --jobs, or sample less often"
+            raise RefusedError(f"the sweep needs more memory than there is: {found.sentence()}; {remedy}")

@@ -1,7 +1,6 @@
 """The critical value of a parameter: where steady sliding loses its stability, and from where on it vibrates."""
 
 import math
-import operator
 from collections.abc import Callable
 from enum import StrEnum
 from functools import cache
@@ -24,16 +23,11 @@ from brakecli.sweeps.tables import Critical
 
 Found = TypeVar("Found")
 
-SCANNED = 9
-"""Values of the parameter, both ends among them, whose growth is measured before a change is narrowed down."""
+SCANNED = 9  # values of the parameter, both ends among them, between which a change is looked for by runs
 SCANNED_BY_EIGENVALUES = 129
-"""Values whose eigenvalues are computed before a change is narrowed down."""
-SCANNED_WHERE_OPEN = 17
-"""The same where surfaces open: their mean stiffness takes time."""
-GALLOP = 4.0
-"""Factor from one stride to the next in looking for the end of sustained vibration."""
-LONGER = 8.0
-"""Durations of the case that vibration beside stable sliding has to last."""
+SCANNED_WHERE_OPEN = 17  # by eigenvalues where surfaces open: their mean stiffness takes time
+GALLOP = 4.0  # factor from one stride to the next in looking for the end of sustained vibration
+LONGER = 8.0  # durations of the case that vibration beside stable sliding has to last
 
 
 class Outcome(StrEnum):
@@ -68,13 +62,6 @@ class Search(NamedTuple):
     sustained_outcome: Outcome = Outcome.NONE
 
 
-CaseAt = Callable[[float], Case]
-SystemAt = Callable[[float], System]
-VerdictOf = Callable[[Case], Verdict | None]
-Unstable = Callable[[float], bool | None]
-"""Whether steady sliding is unstable at a value of the parameter; None where there is none."""
-
-
 class _Change(NamedTuple):
     """Where stability changes, between `low` and `high`; without a value, why it does not."""
 
@@ -83,44 +70,64 @@ class _Change(NamedTuple):
     low: float = math.nan
     high: float = math.nan
     spread: float = 0.0
+    bias: float | None = None
 
 
-def search(critical: Critical, case_at: CaseAt, verdict_of: VerdictOf) -> Search:
+SlidingAt = Callable[[float], Sliding | None]
+Answer = Callable[[float], bool | None]
+"""The answer to a question at a value of the parameter; None where there is none, as without steady sliding."""
+
+
+def search(
+    critical: Critical, case_at: Callable[[float], Case], verdict_of: Callable[[Case], Verdict | None]
+) -> Search:
     """Look for the critical value of the parameter that `case_at` sets; `verdict_of` runs a case."""
 
-    def stepped(value: float) -> System:
+    def system_at(value: float) -> System:
         return with_step(system_of(case_at(value)))  # a case with a tolerance has no step
 
-    exact, bias = _by_eigenvalues(critical, stepped)
-    by_simulation = critical.method == "simulation"
-    found = _by_simulation(critical, stepped) if by_simulation else exact
+    @cache
+    def sliding_at(value: float) -> Sliding | None:
+        try:
+            return sliding(system_at(value))
+        except CaseError:  # a value that no case can have, between two that it can
+            return None
 
-    def lasts(value: float) -> bool | None:
-        known = None if found.outcome is not Outcome.FOUND else value >= found.high
-        linear = _never_opens(stepped(value))
-        case = case_at(value)
-        longer = changed(case, solver={"duration": LONGER * case.solver.duration})
-        # Beside stable sliding it may yet fade away, or has not yet come to where it lasts.
-        verdict = None if known is False else _vibrates(verdict_of(case), case.solver.duration, known, linear)
-        if verdict is not None:
-            return verdict
-        return _vibrates(verdict_of(longer), longer.solver.duration, known, linear)
-
-    lasting = _sustained(critical, lasts, found) if by_simulation else (None, Outcome.NONE)
-    if found.value is None:
-        return Search(found.outcome, None, None, None, None, bias, exact.value, *lasting)
-    error = 0.5 * (found.high - found.low) + (abs(bias or 0.0) if by_simulation else 0.0) + found.spread
-    return Search(found.outcome, found.value, found.low, found.high, error, bias, exact.value, *lasting)
-
-
-def _by_eigenvalues(critical: Critical, system_at: SystemAt) -> tuple[_Change, float | None]:
-    """Where the eigenvalues of steady sliding pass zero, and by how much the scheme at its step moves that."""
     if critical.parameter == "friction.coefficient":
-        return _friction_by_eigenvalues(critical, system_at(critical.lower))
+        exact = _friction_by_eigenvalues(critical, system_at(critical.lower))
+    else:
+        exact = _by_eigenvalues(critical, sliding_at)
+    if critical.method == "eigenvalue":
+        return _answer(exact, exact, 0.0)
+    found = _by_simulation(critical, sliding_at)
 
     @cache
-    def at(value: float) -> Sliding | None:
-        return _sliding(system_at, value)
+    def fades(value: float) -> bool | None:
+        unstable = value >= found.high if found.outcome is Outcome.FOUND else None
+        steady, case = sliding_at(value), case_at(value)
+        linear = steady is not None and not steady.opens
+        # Beside stable sliding it may yet fade away, or has not yet come to where it lasts.
+        for times in (LONGER,) if unstable is False else (1.0, LONGER):
+            duration = times * case.solver.duration
+            verdict = verdict_of(changed(case, solver={"duration": duration}))
+            if (answer := _fades(verdict, duration, unstable, linear)) is not None:
+                return answer
+        return None
+
+    sustained, outcome = _sustained(critical, fades, found)
+    answer = _answer(found, exact, abs(exact.bias or 0.0))
+    return answer._replace(sustained=sustained, sustained_outcome=outcome)
+
+
+def _answer(found: _Change, exact: _Change, bias: float) -> Search:
+    if found.value is None:
+        return Search(found.outcome, bias=exact.bias, eigenvalue=exact.value)
+    error = 0.5 * (found.high - found.low) + bias + found.spread
+    return Search(found.outcome, found.value, found.low, found.high, error, exact.bias, exact.value)
+
+
+def _by_eigenvalues(critical: Critical, sliding_at: SlidingAt) -> _Change:
+    """Where the eigenvalues of steady sliding pass zero, and by how much the scheme at its step moves that."""
 
     def grows(found: Sliding) -> bool:
         c, k = found.system.coefficients, found.stiffness
@@ -131,27 +138,18 @@ def _by_eigenvalues(critical: Critical, system_at: SystemAt) -> tuple[_Change, f
         phi = found.system.coefficients.phi
         return spectral_radius(found.system, found.stiffness, phi) > 1.0 + MARGIN
 
-    def first_change(unstable: Callable[[Sliding], bool], count: int) -> _Change:
-        """The first change among `count` values, narrowed down."""
-        answer = _if_known(at, unstable)
-        scanned = _scan(critical, answer, count)
-        if scanned.value is None:
-            return scanned
-        before = answer(scanned.low)
-        low, high = bisect(lambda value: answer(value) == before, scanned.low, scanned.high, width=width)
-        return _Change(scanned.outcome, 0.5 * (low + high), low, high)
-
-    first = at(critical.lower)
-    opens = first is not None and first.stiffness < 0.999 * first.system.contact_stiffness
+    first = sliding_at(critical.lower)
+    opens = first is not None and first.opens
     width = critical.tolerance * (1e-2 if opens else 1e-9)
-    exact = first_change(grows, SCANNED_WHERE_OPEN if opens else SCANNED_BY_EIGENVALUES)
-    own = first_change(grows_in_steps, SCANNED_WHERE_OPEN)
+    count = SCANNED_WHERE_OPEN if opens else SCANNED_BY_EIGENVALUES
+    exact = _first_change(critical, _if_known(sliding_at, grows), count, width)
+    own = _first_change(critical, _if_known(sliding_at, grows_in_steps), SCANNED_WHERE_OPEN, width)
     if exact.value is None or own.value is None or exact.outcome is not own.outcome:
-        return exact, None
-    return exact, own.value - exact.value
+        return exact
+    return exact._replace(bias=own.value - exact.value)
 
 
-def _friction_by_eigenvalues(critical: Critical, system: System) -> tuple[_Change, float | None]:
+def _friction_by_eigenvalues(critical: Critical, system: System) -> _Change:
     """The first loss of stability within the range of φ, otherwise the first regain."""
     report = stability(system)
     within = [each for each in report.crossings if critical.lower <= each.friction <= critical.upper]
@@ -159,55 +157,44 @@ def _friction_by_eigenvalues(critical: Critical, system: System) -> tuple[_Chang
         crossing = min(within, key=lambda each: not each.lost)
         bias = report.discrete.bias if report.discrete and crossing is report.critical else None
         outcome = Outcome.FOUND if crossing.lost else Outcome.REGAINED
-        return _Change(outcome, crossing.friction, crossing.friction, crossing.friction), bias
+        return _Change(outcome, crossing.friction, crossing.friction, crossing.friction, bias=bias)
     if report.stable is None or report.belt_speed == 0.0:
-        return _Change(Outcome.NO_SLIDING), None
-    return _Change(Outcome.STABLE if report.stable else Outcome.UNSTABLE), None
+        return _Change(Outcome.NO_SLIDING)
+    return _Change(Outcome.STABLE if report.stable else Outcome.UNSTABLE)
 
 
-def _sliding(system_at: SystemAt, value: float) -> Sliding | None:
-    try:
-        return sliding(system_at(value))
-    except CaseError:  # a value that no case can have, between two that it can
-        return None
+def _if_known(at: Callable[[float], Found | None], unstable: Callable[[Found], bool]) -> Answer:
+    return lambda value: None if (found := at(value)) is None else unstable(found)
 
 
-def _if_known(at: Callable[[float], Found | None], unstable: Callable[[Found], bool]) -> Unstable:
-    def answer(value: float) -> bool | None:
-        found = at(value)
-        return None if found is None else unstable(found)
-
-    return answer
-
-
-def _scan(critical: Critical, unstable: Unstable, count: int) -> _Change:
-    """Between which of `count` values stability is first lost, otherwise regained.
+def _first_change(critical: Critical, unstable: Answer, count: int, width: float = math.inf) -> _Change:
+    """Where stability is first lost among `count` values, otherwise regained, narrowed down to a width.
 
     It is lost, too, where steady sliding ends.
     """
     values = [float(value) for value in np.linspace(critical.lower, critical.upper, count)]
     verdicts = [unstable(value) for value in values]
-    stable = [verdict is False for verdict in verdicts]
     for outcome, change in ((Outcome.FOUND, (True, False)), (Outcome.REGAINED, (False, True))):
-        for (low, high), pair in zip(pairwise(values), pairwise(stable), strict=True):
-            if pair == change:
+        for bracket, (before, after) in zip(pairwise(values), pairwise(verdicts), strict=True):
+            if (before is False, after is False) == change:
+                low, high = bisect(lambda value: unstable(value) == before, *bracket, width=width)  # noqa: B023
                 return _Change(outcome, 0.5 * (low + high), low, high)
     if all(verdict is None for verdict in verdicts):
         return _Change(Outcome.NO_SLIDING)
     return _Change(Outcome.UNSTABLE if any(verdicts) else Outcome.STABLE)
 
 
-def _by_simulation(critical: Critical, system_at: SystemAt) -> _Change:
+def _by_simulation(critical: Critical, sliding_at: SlidingAt) -> _Change:
     """Where the growth of small disturbances passes zero, by Brent's method, between two values on either side."""
     from scipy.optimize import brentq
 
     @cache
     def at(value: float) -> Growth | None:
-        steady = _sliding(system_at, value)
+        steady = sliding_at(value)
         return None if steady is None else growth(steady)
 
-    unstable = _if_known(at, lambda measured: measured.unstable)
-    scanned = _scan(critical, unstable, SCANNED)
+    unstable = _if_known(at, lambda measured: measured.rate > measured.noise)
+    scanned = _first_change(critical, unstable, SCANNED)
     if scanned.value is None:
         return scanned
     low, high = scanned.low, scanned.high
@@ -224,21 +211,14 @@ def _by_simulation(critical: Critical, system_at: SystemAt) -> _Change:
             low, high = (edge, high) if unstable(edge) == below else (low, edge)
     low, high = bisect(lambda value: unstable(value) == below, low, high, width=critical.tolerance)
     value = root if low <= root <= high else 0.5 * (low + high)
-    ends = at(low), at(high)
-    spread = 0.0
-    if ends[0] is not None and ends[1] is not None and (rise := abs(ends[1].rate - ends[0].rate)) > 0.0:
-        spread = max(ends[0].spread, ends[1].spread) * (high - low) / rise
+    spread, before, after = 0.0, at(low), at(high)
+    if before is not None and after is not None and before.rate != after.rate:
+        spread = max(before.spread, after.spread) * (high - low) / abs(after.rate - before.rate)
     return _Change(scanned.outcome, value, low, high, min(spread, critical.upper - critical.lower))
 
 
-def _never_opens(system: System) -> bool:
-    """Whether surfaces that slide on each other touch everywhere: then their motion is linear."""
-    found = sliding(system)
-    return found is not None and found.stiffness >= 0.999 * found.system.contact_stiffness
-
-
-def _vibrates(verdict: Verdict | None, duration: float, unstable: bool | None, linear: bool) -> bool | None:
-    """Whether a run has ended in vibration that lasts by itself; None where the run does not answer that.
+def _fades(verdict: Verdict | None, duration: float, unstable: bool | None, linear: bool) -> bool | None:
+    """Whether the vibration of a run dies out; None where the run does not answer that.
 
     `unstable`: what is known of steady sliding. Where it is unstable no vibration can die out. A `linear` motion
     that neither sticks nor lifts off is on its way by the same equations: it lasts if sliding is unstable. One
@@ -248,38 +228,31 @@ def _vibrates(verdict: Verdict | None, duration: float, unstable: bool | None, l
         return None
     limited = verdict.stick_fraction > 0.0 or verdict.contact_loss_fraction > 0.0
     if unstable or (unstable is False and linear and not limited):
-        return unstable
-    if verdict.regime is Regime.DAMPED:
-        return False
+        return not unstable
     if verdict.regime is not Regime.UNDECIDED:
-        return True
+        return verdict.regime is Regime.DAMPED
     slope = verdict.evidence.get("envelope_slope")
     if limited:
-        return slope is None or slope * duration > -1.0
+        return slope is not None and slope * duration <= -1.0
     error = verdict.evidence.get("envelope_slope_error", 0.0)
-    return bool(slope > 0.0) if slope is not None and abs(slope) > 3.0 * error else None
+    return bool(slope <= 0.0) if slope is not None and abs(slope) > 3.0 * error else None
 
 
-def _sustained(
-    critical: Critical, vibrates: Callable[[float], bool | None], found: _Change
-) -> tuple[float | None, Outcome]:
+def _sustained(critical: Critical, fades: Answer, found: _Change) -> tuple[float | None, Outcome]:
     """The least value at which vibration lasts from the case's own start, as far as it lasts above it.
 
     From where stability is lost the search strides down, ever faster, and then narrows down by halves.
     """
-    lasts = cache(vibrates)
     low, high, tolerance = critical.lower, critical.upper, critical.tolerance
     if found.outcome is Outcome.FOUND:
         low, high = max(low, found.low), min(high, found.high)
         stride = tolerance
-        while lasts(low) is True and low > critical.lower:
+        while fades(low) is False and low > critical.lower:
             low, high = max(critical.lower, low - stride), low
             stride *= GALLOP
-    if lasts(low) is None or lasts(high) is None:
+    if fades(low) is None or fades(high) is None:
         return None, Outcome.UNDECIDED
-    if lasts(low) or not lasts(high):
-        return None, Outcome.SUSTAINED if lasts(low) else Outcome.DAMPED
-    low, high = bisect(_if_known(lasts, operator.not_), low, high, width=tolerance)
-    if high - low > tolerance:
-        return None, Outcome.UNDECIDED
-    return 0.5 * (low + high), Outcome.FOUND
+    if not fades(low) or fades(high):
+        return None, Outcome.DAMPED if fades(low) else Outcome.SUSTAINED
+    low, high = bisect(fades, low, high, width=tolerance)
+    return (None, Outcome.UNDECIDED) if high - low > tolerance else (0.5 * (low + high), Outcome.FOUND)

@@ -6,7 +6,6 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -19,24 +18,15 @@ from brakecli.files.write import new_result
 from brakecli.runs.limits import free_bytes
 from brakecli.sweeps.cost import Estimate, estimate, refuse_sweep
 from brakecli.sweeps.file import LoadedSweep
-from brakecli.sweeps.journal import Journal
+from brakecli.sweeps.journal import Journal, open_journal
 from brakecli.sweeps.plan import Plan
 from brakecli.sweeps.point import Status, blank
 from brakecli.sweeps.result import Columns, SweepReport, findings, write
 from brakecli.sweeps.workers.local import LocalEngine
 from brakecli.sweeps.workers.task import Engine, Task, compute_units
 
-TASK_SECONDS = 0.2
-"""A task has this much work in it, so that handing it out costs little."""
+TASK_SECONDS = 0.2  # of work in a task, so that handing it out costs little
 LARGEST_TASK = 1000
-
-
-@dataclass(frozen=True)
-class Progress:
-    """How far a sweep has come, in points."""
-
-    done: int
-    failed: int
 
 
 class TaskQueue:
@@ -55,7 +45,8 @@ class TaskQueue:
         if not self._tasks:
             return None
         task = self._tasks.popleft()
-        size = min(task.size, self._next_size())
+        by_time = math.ceil(min(TASK_SECONDS * self._units / max(self._seconds, 1e-9), LARGEST_TASK))
+        size = min(task.size, self._size or max(1, by_time))
         if size < task.size:
             self._tasks.appendleft(Task(task.first + size, task.size - size))
         return task._replace(size=size)
@@ -71,13 +62,6 @@ class TaskQueue:
             units = range(task.first, task.first + task.size)
             self._tasks.extendleft(Task(unit, 1, last_try=True) for unit in reversed(units))
         return not task.last_try
-
-    def _next_size(self) -> int:
-        if self._size is not None:
-            return self._size
-        if not self._units:
-            return 1
-        return math.ceil(min(TASK_SECONDS * self._units / max(self._seconds, 1e-9), LARGEST_TASK))
 
 
 def choose_engine(
@@ -109,13 +93,13 @@ def sweep(
     task_size: int | None = None,
     order: int = 1,
     begin: Callable[[Estimate, int], None] = lambda found, resumed: None,
-    progress: Callable[[Progress], None] = lambda progress: None,
+    progress: Callable[[int, int], None] = lambda done, failed: None,
 ) -> SweepReport:
     """Compute every point of a sweep that is not yet there, and write its result file.
 
     `begin` is called before the start with the estimate and the number of points that an earlier run has left,
-    `progress` often. Raises RefusedError, CannotWriteError or UsageError before anything is computed,
-    CannotWriteError also later; a point that fails is marked as such and reported.
+    `progress` often, with the points that are done and that have failed. Raises RefusedError, CannotWriteError or
+    UsageError before anything is computed, CannotWriteError also later; a point that fails is marked and reported.
     """
     plan, start = loaded.plan, time.perf_counter()
     found = estimate(plan, engine.workers)
@@ -123,12 +107,11 @@ def sweep(
     partial_file = target.with_name(f"{target.name}.partial")
     with _keeping(partial_file), new_result(output, force=force) as result:
         refuse_sweep(found, free_bytes(output.resolve().parent))
-        with Journal(partial_file, plan, force=force) as journal:
+        with open_journal(partial_file, plan, force=force) as journal:
             resumed = int(journal.finished.sum()) * plan.unit_length
             begin(found, resumed)
             notes = _compute(engine, journal, TaskQueue(journal.finished, task_size, order), progress)
-            columns = Columns(journal)
-            seconds = time.perf_counter() - start
+            columns, seconds = Columns(journal), time.perf_counter() - start
             report = SweepReport(output, loaded, findings(columns), seconds, resumed, notes)
             write(result, report, columns)
             result.commit()
@@ -151,7 +134,7 @@ def _keeping(journal: Path) -> Iterator[None]:
 
 
 def _compute(
-    engine: Engine, journal: Journal, queue: TaskQueue, progress: Callable[[Progress], None]
+    engine: Engine, journal: Journal, queue: TaskQueue, progress: Callable[[int, int], None]
 ) -> tuple[str, ...]:
     """Have the engine compute what the journal does not hold; returns what there is to say about its workers."""
     length = journal.plan.unit_length
@@ -161,7 +144,7 @@ def _compute(
 
     done, failures = int(journal.finished.sum()) * length, failed(journal.column("status")[journal.finished])
     ends: list[str] = []
-    progress(Progress(done, failures))
+    progress(done, failures)
     for task, records, seconds, failure in engine.run(queue.next_task):
         if records is None:
             ends.append(failure)
@@ -174,7 +157,7 @@ def _compute(
             journal.add(task.first, records)
             done += task.size * length
             failures += failed(np.frombuffer(records, journal.kind)["status"])
-        progress(Progress(done, failures))
+        progress(done, failures)
     if not ends:
         return ()
     times = "a worker process has ended" if len(ends) == 1 else f"{len(ends)} times a worker process has ended"

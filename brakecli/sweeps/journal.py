@@ -10,13 +10,15 @@ import struct
 import tomllib
 import zlib
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
+from contextlib import contextmanager, suppress
+from io import FileIO
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from brakecli import SAME_NUMBERS_AS
 from brakecli.errors import BrakecliError, CannotWriteError, RefusedError
 from brakecli.files.atomic import explained
 from brakecli.sweeps.plan import Plan
@@ -24,6 +26,7 @@ from brakecli.sweeps.point import record_type
 from brakecli.sweeps.workers.task import fingerprint
 
 _HEAD = struct.Struct("<qqI")  # first unit, units, checksum of the records
+_CREATE = os.O_CREAT | os.O_NOFOLLOW
 _LONGEST_HEADER = 5_000_000
 MOST_DIFFERENCES = 5
 
@@ -31,36 +34,13 @@ MOST_DIFFERENCES = 5
 class Journal:
     """The records of the units of a sweep: a point each, or a line of points that follow one another."""
 
-    def __init__(self, path: Path, plan: Plan, *, force: bool) -> None:
-        """Open the journal beside an output, or begin it.
-
-        Raises CannotWriteError where it cannot be written, and RefusedError where there is one of another sweep
-        and `force` is not set.
-        """
+    def __init__(self, path: Path, file: FileIO, plan: Plan) -> None:
+        """Begin without any records; `open_journal` reads those of the file."""
         self.path, self.plan, self.kind = path, plan, record_type(plan)
         self.finished = np.zeros(plan.units, dtype=bool)
+        self._file = file
         self._unit_bytes = plan.unit_length * self.kind.itemsize
         self._blocks: list[tuple[int, int, int]] = []  # first unit, units, where their records begin
-        with explained(path):
-            descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666)
-        self._file = open(descriptor, "r+b", buffering=0)  # noqa: SIM115, PTH123
-        try:
-            with explained(path):
-                self._begin(force=force)
-        except BaseException:
-            self._file.close()
-            raise
-
-    def __enter__(self) -> Self:
-        """Nothing more to open."""
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        """Close it; one without any finished unit is removed."""
-        with suppress(OSError):
-            self._file.close()
-        if not self._blocks:
-            self.discard()
 
     def add(self, first: int, records: bytes) -> None:
         """Append the records of finished units."""
@@ -94,20 +74,19 @@ class Journal:
         with suppress(OSError):
             self.path.unlink()
 
-    def _begin(self, *, force: bool) -> None:
-        own = identity(self.plan)
-        header = json.dumps(own).encode() + b"\n"
-        found = self._file.read(_LONGEST_HEADER)
+    def begin(self, *, force: bool) -> None:
+        """Take up what an earlier run has left, or write the header of a new journal."""
+        own, found = identity(self.plan), self._file.read(_LONGEST_HEADER)
         found = found[: found.find(b"\n") + 1]
-        if found == header:
-            self._read_blocks(len(header))
+        if not (refusal := _refusal(found, own)):
+            self._read_blocks(len(found))
             return
         if found and not force:
-            raise RefusedError(f"{self.path}: {_differences(found, own)}")
+            raise RefusedError(f"{self.path}: {refusal}")
         os.ftruncate(self._file.fileno(), 0)
         self._file.seek(0)
         try:
-            self._write(header)
+            self._write(json.dumps(own).encode() + b"\n")
         except OSError:
             self.discard()  # it holds nothing
             raise
@@ -137,6 +116,26 @@ class Journal:
             view = view[os.write(self._file.fileno(), view) :]
 
 
+@contextmanager
+def open_journal(path: Path, plan: Plan, *, force: bool) -> Iterator[Journal]:
+    """Open the journal beside an output, or begin it; one without any finished unit is removed at the end.
+
+    Raises CannotWriteError where it cannot be written, and RefusedError where there is one of another sweep and
+    `force` is not set.
+    """
+    with explained(path):
+        file = FileIO(path, "r+", opener=lambda name, flags: os.open(name, flags | _CREATE, 0o666))
+    with file:
+        journal = Journal(path, file, plan)
+        with explained(path):
+            journal.begin(force=force)
+        try:
+            yield journal
+        finally:
+            if not journal.finished.any():
+                journal.discard()
+
+
 def identity(plan: Plan) -> dict[str, Any]:
     """What makes a sweep this one: every key of the sweep and its case, and the versions it is computed with."""
     case, sweep = tomllib.loads(plan.case_text), tomllib.loads(plan.sweep_text)
@@ -154,16 +153,18 @@ def _flat(value: Any, path: str, dot: str = ".") -> Iterator[tuple[str, Any]]:
         yield path, value
 
 
-def _differences(found: bytes, own: Mapping[str, Any]) -> str:
-    """In which keys the journal that is there belongs to another sweep."""
+def _refusal(found: bytes, own: Mapping[str, Any]) -> str:
+    """Why a journal that begins with a line belongs to another sweep; empty where it belongs to this one."""
     try:
         there = json.loads(found)
+        if there.get("brakecli_version") in SAME_NUMBERS_AS:
+            there |= {key: own[key] for key in ("brakecli_version", "brakecli_sources")}
         keys = [key for key in {**there, **own} if there.get(key) != own.get(key)]
     except (ValueError, TypeError, AttributeError, RecursionError):
         return "holds no finished points; remove it, or start anew with --force"
+    if not keys:
+        return ""
     each = [f"{key} was {there.get(key, 'not set')!s:.60}, is {own.get(key, 'not set')!s:.60}" for key in keys]
-    more = [f"and {len(keys) - MOST_DIFFERENCES} more"] if len(keys) > MOST_DIFFERENCES else []
-    return (
-        f"holds finished points of another sweep: {', '.join(each[:MOST_DIFFERENCES] + more)}; undo the change to "
-        "go on, or start anew with --force, which drops the finished points"
-    )
+    each[MOST_DIFFERENCES:] = [f"and {more} more"] if (more := len(keys) - MOST_DIFFERENCES) > 0 else []
+    remedy = "undo the change to go on, or start anew with --force, which drops the finished points"
+    return f"holds finished points of another sweep: {', '.join(each)}; {remedy}"

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
@@ -20,12 +21,14 @@ from brakecli.files.field import Field, values_of
 from brakecli.runs.limits import check, refuse, within_range
 from brakecli.runs.run import motion_of
 from brakecli.runs.tolerance import Certificate
-from brakecli.solver.history import ArrayHistory
+from brakecli.solver.history import array_history
 from brakecli.solver.motion import Motion
 from brakecli.solver.roughness import TWO_PI, wheel_angles
 from brakecli.solver.schedules import integral_at
 from brakecli.sweeps.critical import search
 from brakecli.sweeps.plan import Plan, Settings
+
+OUT_OF_MEMORY = "out of memory; sample less often, or reduce contact.nodes"
 
 
 class Status(StrEnum):
@@ -53,27 +56,10 @@ class Outcome(RunVerdict):
     case: Case
     motion: Motion
     certificate: Certificate | None  # where the case gives no step
-    warnings: tuple[str, ...]
-
-    @property
-    def status(self) -> Status:
-        """How the computation of the point has ended."""
-        return Status.FAILED if self.motion.work.failed else Status.DONE
-
-    @property
-    def reason(self) -> str:
-        """Why the regime is as it is."""
-        return "; ".join(self.verdict.reasons)
-
-    @property
-    def warning(self) -> str:
-        """The first warning, empty if there is none."""
-        return self.warnings[0] if self.warnings else ""
-
-    @property
-    def warning_count(self) -> int:
-        """The number of warnings."""
-        return len(self.warnings)
+    status: Status
+    reason: str
+    warning: str  # the first one
+    warning_count: int
 
 
 def simulate(case: Case) -> Outcome:
@@ -81,18 +67,20 @@ def simulate(case: Case) -> Outcome:
     with within_range():
         system = system_of(case)
         found = check(system)
-        refuse(system, found, math.inf)
+        refuse(found)
         motion, certificate = motion_of(system)
         if not np.isfinite(motion.rows).all():
             raise FloatingPointError("a force overflows")
-        history = ArrayHistory(system.interval, motion.rows)
+        history = array_history(system.interval, motion.rows)
         verdict = verdict_on(history, motion.system, motion.work.failure_sentence)
     warnings, work = list(found.warnings), motion.work
     if work.unconverged_steps and not work.failed:
         warnings.append(f"{work.unconverged_steps} of {work.steps} steps did not converge, as the case allows")
     if certificate is not None and not certificate.certified:
         warnings.append(f"solver.tolerance: {certificate.sentence()}")
-    return Outcome(motion.system, verdict, case, motion, certificate, tuple(warnings))
+    status, reason = Status.FAILED if work.failed else Status.DONE, "; ".join(verdict.reasons)
+    first = next(iter(warnings), "")
+    return Outcome(motion.system, verdict, case, motion, certificate, status, reason, first, len(warnings))
 
 
 def blank(kind: np.dtype[Any], status: Status, reason: str) -> NDArray[Any]:
@@ -124,17 +112,13 @@ def line_points(plan: Plan, line: int) -> list[int]:
 
     With `direction = "both"` the first half of the lines goes up, the second down.
     """
-    axis = plan.followed
-    assert axis is not None
-    shape = plan.shape
-    lines = plan.points // shape[axis]
-    inner = math.prod(shape[axis + 1 :])
+    assert plan.followed is not None
+    followed, inner = plan.sweep.axis[plan.followed], math.prod(plan.shape[plan.followed + 1 :])
+    lines = plan.points // followed.size
     outer, rest = divmod(line % lines, inner)
-    points = [(outer * shape[axis] + place) * inner + rest for place in range(shape[axis])]
-    direction = plan.sweep.axis[axis].direction
-    down = direction == "down" or (direction == "both" and line >= lines)
-    value = plan.sweep.axis[axis].value
-    return sorted(points, key=lambda point: value(plan.places(point)[axis]), reverse=down)
+    down = followed.direction == "down" or (followed.direction == "both" and line >= lines)
+    places = sorted(range(followed.size), key=followed.value, reverse=down)
+    return [(outer * followed.size + place) * inner + rest for place in places]
 
 
 def next_start(outcome: Outcome) -> Settings:
@@ -154,11 +138,10 @@ def next_start(outcome: Outcome) -> Settings:
 
 def verdict_of(case: Case) -> Verdict | None:
     """The verdict on a run in memory; None where it fails."""
-    try:
+    with suppress(BrakecliError):
         outcome = simulate(case)
-    except BrakecliError:
-        return None
-    return None if outcome.motion.work.failed else outcome.verdict
+        return None if outcome.motion.work.failed else outcome.verdict
+    return None
 
 
 def _computed(plan: Plan, point: int, start: Settings) -> tuple[NDArray[Any], Outcome | None]:
@@ -173,7 +156,9 @@ def _computed(plan: Plan, point: int, start: Settings) -> tuple[NDArray[Any], Ou
                 found = search(critical, lambda value: plan.case({**settings, path: value}), verdict_of)
             values |= values_of(fields.CRITICAL, found)
     except (BrakecliError, FloatingPointError, MemoryError) as error:
-        return blank(record_type(plan), Status.FAILED, _sentence(error)), None
+        memory = isinstance(error, MemoryError)
+        reason = OUT_OF_MEMORY if memory else "; ".join(str(error).splitlines())
+        return blank(record_type(plan), Status.FAILED, reason), None
     return _filled(record_type(plan), values), outcome
 
 
@@ -182,16 +167,8 @@ def _filled(kind: np.dtype[Any], values: Mapping[str, Any]) -> NDArray[Any]:
     record = np.zeros(1, kind)
     for name in kind.names or ():
         value = values.get(name)
-        if isinstance(value, str):
-            record[name] = (
-                value.encode()[: kind[name].itemsize].decode(errors="ignore").encode()
-            )  # whole characters
+        if isinstance(value, str):  # as many whole characters as fit
+            record[name] = value.encode()[: kind[name].itemsize].decode(errors="ignore").encode()
         elif value is not None or kind[name].kind == "f":
             record[name] = math.nan if value is None else value
     return record
-
-
-def _sentence(error: BaseException) -> str:
-    if isinstance(error, MemoryError):
-        return "out of memory; sample less often, or reduce contact.nodes"
-    return "; ".join(str(error).splitlines())

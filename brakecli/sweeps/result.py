@@ -20,12 +20,11 @@ from brakecli.sweeps.file import LoadedSweep
 from brakecli.sweeps.journal import Journal
 from brakecli.sweeps.plan import Plan, label
 from brakecli.sweeps.point import Status, fields_of, line_points
+from brakecli.sweeps.tables import Axis
 
 MOST_FAILURES = 100
-MOST_AS_JSON = 10_000
-"""Points up to which `--json` prints every number; the file holds those of more."""
-SAME_AMPLITUDE = 0.05
-"""Motions whose amplitudes differ by less than this part, in the same regime, are the same."""
+MOST_AS_JSON = 10_000  # points; of more the file alone holds every number
+SAME_AMPLITUDE = 0.05  # part by which amplitudes of the same motion, in the same regime, may differ
 
 _DONE = Status.DONE.encode()
 
@@ -36,25 +35,19 @@ class Columns:
     def __init__(self, journal: Journal) -> None:
         """Read from a journal that holds every unit."""
         self._journal, self.plan = journal, journal.plan
-        both = self.plan.passes == 2
-        axes = [axis.name for axis in self.plan.sweep.axis] or ["point"]
-        self.dimensions = (*(["direction"] if both else []), *axes)
-        self.shape = (*([2] if both else []), *(self.plan.shape or (1,)))
-
-    def decoded(self, name: str) -> NDArray[Any]:
-        """A variable, its texts as str."""
-        values = self[name]
-        return np.char.decode(values, "utf-8") if values.dtype.kind == "S" else values
+        axes = {axis.name: axis.size for axis in self.plan.sweep.axis} or {"point": 1}
+        sizes = {"direction": 2, **axes} if self.plan.passes == 2 else axes
+        self.dimensions, self.shape = tuple(sizes), tuple(sizes.values())
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         """A variable; missing numbers are NaN."""
         units = self._journal.column(name)
         if self.plan.followed is None:
             return units.reshape(self.shape)
-        values = np.empty((self.plan.passes, self.plan.points), units.dtype)
-        lines = len(units) // self.plan.passes
-        for line, row in enumerate(units):
-            values[line // lines, sorted(line_points(self.plan, line))] = row
+        values = np.empty(units.size, units.dtype)
+        for line, row in enumerate(units):  # those on the way down come after all on the way up
+            first = line * len(row) // self.plan.points * self.plan.points
+            values[first + np.sort(line_points(self.plan, line))] = row
         return values.reshape(self.shape)
 
 
@@ -90,10 +83,7 @@ class SweepReport:
     def axes(self) -> dict[str, Any]:
         """The parameters and the values of each axis; none where there are too many points."""
         axes = self.loaded.sweep.axis if self.findings.variables is not None else ()
-        return {
-            axis.name: {"parameter": axis.parameter, "values": [axis.value(i) for i in range(axis.size)]}
-            for axis in axes
-        }
+        return {axis.name: {"parameter": axis.parameter, "values": _values(axis)} for axis in axes}
 
     def numbers(self) -> dict[str, Any]:
         """Names and values as `--json` gives them: the variables of the file, null where a number is missing."""
@@ -106,12 +96,11 @@ def findings(columns: Columns) -> Findings:
     failed = np.flatnonzero(status.ravel() != _DONE)
     reasons = columns["reason"].ravel()[failed[:MOST_FAILURES]]
     warned = np.flatnonzero(columns["warning_count"].ravel())
-    critical = None
+    critical, hysteresis = None, _hysteresis(columns)
     if plan.sweep.critical is not None:
-        known = columns["critical"]
-        known = known[~np.isnan(known)]
+        known = columns["critical"][~np.isnan(columns["critical"])]
         critical = (len(known), float(known.min()), float(known.max())) if len(known) else (0, 0.0, 0.0)
-    hysteresis = _hysteresis(columns)
+    few = status.size <= MOST_AS_JSON
     return Findings(
         points=status.size,
         dimensions=columns.dimensions,
@@ -126,11 +115,7 @@ def findings(columns: Columns) -> Findings:
         critical=critical,
         hysteresis=hysteresis,
         sentences=(*_on_hysteresis(columns, hysteresis), *_on_lasting_vibration(columns)),
-        variables=(
-            {field.name: plain(columns[field.name]) for field in fields_of(plan)}
-            if status.size <= MOST_AS_JSON
-            else None
-        ),
+        variables={field.name: plain(columns[field.name]) for field in fields_of(plan)} if few else None,
     )
 
 
@@ -143,20 +128,18 @@ def write(result: ResultFile, report: SweepReport, columns: Columns) -> None:
     if "direction" in found.dimensions:
         result.axis("/", fields.DIRECTION, np.array(["up", "down"]))
     for axis in plan.sweep.axis:
-        values = [axis.value(place) for place in range(axis.size)]
-        data = np.array(values, dtype=np.float64) if axis.numeric else np.array([label(value) for value in values])
+        data = np.array(_values(axis), np.float64) if axis.numeric else np.array([*map(label, _values(axis))])
         field = Field(axis.name, unit(axis.parameter[0]), ", ".join(axis.parameter))
-        result.variable("/", field, (axis.name,), data, {"parameters": list(axis.parameter)})
+        result.variable("/", field, (axis.name,), data, parameters=list(axis.parameter))
     if not plan.sweep.axis:
         result.axis("/", fields.BASE_POINT, np.zeros(1))
-    for field in fields.POINT:
-        result.column(field, columns.dimensions, columns.decoded(field.name))
-    if (critical := plan.sweep.critical) is not None:
-        for field in fields.CRITICAL:
-            numeric = field.kind == "f8"
-            of_parameter = replace(field, units=unit(critical.parameter)) if numeric else field
-            attributes = {"parameter": critical.parameter} if numeric else {}
-            result.column(of_parameter, columns.dimensions, columns.decoded(field.name), **attributes)
+    for field in fields_of(plan):
+        attributes, critical = {}, plan.sweep.critical
+        if critical is not None and field in fields.CRITICAL and field.kind == "f8":
+            attributes, field = {"parameter": critical.parameter}, replace(field, units=unit(critical.parameter))
+        data = columns[field.name]
+        data = np.char.decode(data, "utf-8") if data.dtype.kind == "S" else data
+        result.column(field, columns.dimensions, data, **attributes)
     if found.hysteresis is not None:
         result.column(*fields.DIFFERENCE, found.dimensions[1:], found.hysteresis)
 
@@ -164,6 +147,10 @@ def write(result: ResultFile, report: SweepReport, columns: Columns) -> None:
 def unit(parameter: str) -> str:
     """The unit of a key of the case, by the schema of its file; empty where it has none."""
     return str(key_schema(Case, key_path(parameter)).get("unit", ""))
+
+
+def _values(axis: Axis) -> list[Any]:
+    return [axis.value(place) for place in range(axis.size)]
 
 
 def _hysteresis(columns: Columns) -> NDArray[Any] | None:
@@ -201,15 +188,13 @@ def _on_lasting_vibration(columns: Columns) -> Iterator[str]:
     early = np.nan_to_num(columns["critical_lower"] - sustained, nan=0.0)
     late = np.nan_to_num(sustained - columns["critical_upper"], nan=0.0)
     if below := int((early > critical.tolerance).sum()):
-        yield (
-            f"hysteresis at {below} of {early.size} points: from the case's own start vibration lasts at "
-            f"values up to {early.max():.3g} below the one at which steady sliding loses its stability"
-        )
+        start = "from the case's own start vibration lasts at values up to"
+        least = "below the one at which steady sliding loses its stability"
+        yield f"hysteresis at {below} of {early.size} points: {start} {early.max():.3g} {least}"
     if above := int((late > critical.tolerance).sum()):
-        yield (
-            f"at {above} of {late.size} points the case's own start leads into lasting vibration only at "
-            f"values up to {late.max():.3g} above the critical one; longer runs may give another answer"
-        )
+        start = "the case's own start leads into lasting vibration only at values up to"
+        longer = "above the critical one; longer runs may give another answer"
+        yield f"at {above} of {late.size} points {start} {late.max():.3g} {longer}"
 
 
 def _parameters(plan: Plan, index: int) -> dict[str, Any]:

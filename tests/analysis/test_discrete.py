@@ -119,9 +119,8 @@ def test_check_changes_the_step_and_the_duration_as_the_samples_need() -> None:
 )
 def test_runs_beyond_a_limit_are_refused(changes: dict[str, object], words: str) -> None:
     case = make(SQUEAL, **{"output__sample_interval": 2e-3, **changes})
-    system = system_of(case)
     with pytest.raises(RefusedError, match=words):
-        refuse(system, check(system), 1e12)
+        refuse(check(system_of(case)), 1e12)
 
 
 def test_memory_of_the_amplification_is_the_state() -> None:

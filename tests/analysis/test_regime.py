@@ -7,14 +7,14 @@ import pytest
 from numpy.typing import NDArray
 
 from brakecli.analysis.regime.rules import Context, Excitation, Regime, classify, forced_lines
-from brakecli.solver.history import ArrayHistory
+from brakecli.solver.history import History
 from tests.analysis.histories import INTERVAL, history_of, verdict_of
 from tests.examples import COULOMB, ROUGH, SQUEAL, make
 
 TIME = INTERVAL * np.arange(20000)
 
 
-def made(vx: NDArray[np.float64], state: float | NDArray[np.float64] = -1.0) -> ArrayHistory:
+def made(vx: NDArray[np.float64], state: float | NDArray[np.float64] = -1.0) -> History:
     return history_of(len(vx), vx=vx, x=np.cumsum(vx) * INTERVAL, state=state)
 
 

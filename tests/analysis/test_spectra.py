@@ -1,5 +1,7 @@
 """Power spectral densities and cycles of signals that are known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -7,11 +9,11 @@ from scipy.signal import welch
 
 from brakecli.analysis.regime import spectra
 from brakecli.analysis.regime.spectra import SPECTRAL, peak, spectrum, upward_crossings
-from brakecli.solver.history import ArrayHistory
+from brakecli.solver.history import History
 from tests.analysis.histories import INTERVAL, history_of
 
 
-def history(vx: NDArray[np.float64]) -> ArrayHistory:
+def history(vx: NDArray[np.float64]) -> History:
     return history_of(len(vx), vx=vx)
 
 
@@ -45,12 +47,13 @@ def test_a_long_history_takes_segments_of_bounded_length(monkeypatch: pytest.Mon
     monkeypatch.setattr(spectra, "LONGEST_SEGMENT", 256)
     read: list[int] = []
 
-    class Watched(ArrayHistory):
-        def read(self, name: str, start: int, stop: int) -> NDArray[np.float64]:
-            read.append(stop - start)
-            return super().read(name, start, stop)
+    whole = history(sine(500.0))
 
-    lines = spectrum(Watched(INTERVAL, history(sine(500.0)).rows), 1000)
+    def watched(name: str, start: int, stop: int) -> NDArray[np.float64]:
+        read.append(stop - start)
+        return whole.read(name, start, stop)
+
+    lines = spectrum(replace(whole, read=watched), 1000)
     assert lines.segments == (19000 - 256) // 128 + 1
     assert max(read) <= 256 + 15 * 128
     assert peak(lines.frequency, lines.density["vx"]) == pytest.approx(500.0, abs=4.0)

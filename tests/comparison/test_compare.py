@@ -65,8 +65,8 @@ def entries_of(found: Comparison, scheme: str, theta: tuple[float, ...], **field
     return [
         entry
         for entry in found.entries
-        if (entry.rung.kind.scheme, entry.rung.kind.theta) == (scheme, theta)
-        and all(getattr(entry.rung.kind, name) == value for name, value in wanted.items())
+        if (entry.kind.scheme, entry.kind.theta) == (scheme, theta)
+        and all(getattr(entry.kind, name) == value for name, value in wanted.items())
     ]
 
 
@@ -81,7 +81,7 @@ def test_errors_are_relative_to_the_largest_value_in_each_quantity() -> None:
     rows = reference.copy()
     rows[100, COLUMNS["x"]] += 0.25 * np.abs(reference[:, COLUMNS["x"]]).max()
     rows[:, COLUMNS["vy"]] += 0.125 * np.abs(reference[:, COLUMNS["vy"]]).max()
-    found = errors(rows, reference, 1e-3)
+    found = errors(rows, reference)
     assert found.error == found.largest["x"] == pytest.approx(0.25, rel=1e-12)
     assert found.mean["x"] == pytest.approx(0.25 / len(rows), rel=1e-9)
     assert [found.largest["vy"], found.mean["vy"]] == pytest.approx([0.125, 0.125], rel=1e-9)
@@ -92,7 +92,7 @@ def test_forces_have_errors_of_their_own_that_do_not_enter_the_error() -> None:
     reference = history(64)
     rows = reference.copy()
     rows[3, COLUMNS["friction_force"]] *= -1.0  # one sample on the other side of a jump
-    found = errors(rows, reference, 1e-3)
+    found = errors(rows, reference)
     assert found.error == 0.0
     assert found.largest["friction_force"] > 0.1
     assert found.mean["friction_force"] == pytest.approx(found.largest["friction_force"] / 64.0)
@@ -105,14 +105,14 @@ def test_amplitude_and_phase_are_those_of_the_settled_line(factor: float, shift:
     wave = factor * np.sin(2.0 * np.pi * np.arange(count) / 64.0 + shift)
     rows[:, COLUMNS["vx"]] = wave * (1.0 + COLUMNS["vx"])
     rows[: count // 2, COLUMNS["vx"]] = 7.0  # what happened earlier does not matter
-    found = errors(rows, reference, 1e-3)
+    found = errors(rows, reference)
     assert found.amplitude == pytest.approx(factor - 1.0, abs=1e-5)
     assert found.phase == pytest.approx(shift, abs=1e-5)
 
 
 def test_a_motion_without_a_line_has_neither_amplitude_nor_phase() -> None:
     for reference in (np.zeros((400, len(HISTORY))), np.ones((400, len(HISTORY))), history(100)):
-        found = errors(reference, reference, 1e-3)
+        found = errors(reference, reference)
         assert (found.error, found.amplitude, found.phase) == (0.0, None, None)
 
 
@@ -162,7 +162,7 @@ def test_a_scheme_with_steps_of_its_own_climbs_tolerances() -> None:
     assert len(own) == 1
     assert [(rung.step, rung.tolerance) for rung in rungs(own[0], [1e-5])] == [(None, e) for e in TOLERANCES]
     two = kinds(system_of(make(SQUEAL)), ["two-layer"])[0]
-    assert [(rung.step, rung.tolerance) for rung in rungs(two, [2e-5, 1e-5])] == [(2e-5, None), (1e-5, None)]
+    assert [(rung.step, rung.tolerance) for rung in rungs(two, [2e-5, 1e-5])] == [(2e-5, 0.0), (1e-5, 0.0)]
 
 
 def test_lists_of_schemes_and_steps_are_read() -> None:
@@ -180,10 +180,10 @@ def test_steps_that_make_no_ladder_are_refused(text: str) -> None:
 
 def test_observed_orders_are_those_that_the_schemes_declare() -> None:
     found, checked = smooth_comparison(), 0
-    for method in dict.fromkeys(entry.rung.kind for entry in found.entries):
+    for method in dict.fromkeys(entry.kind for entry in found.entries):
         if method.scheme == "event-driven":
             continue
-        steps = [entry for entry in found.entries if entry.rung.kind == method]
+        steps = [entry for entry in found.entries if entry.kind == method]
         system = system_of(smooth(solver__scheme=method.scheme, solver__theta=method.theta))
         declared = load(method.scheme).order(system.weights, method.start)
         assert len(steps) == len(STEPS)
@@ -191,7 +191,7 @@ def test_observed_orders_are_those_that_the_schemes_declare() -> None:
         for entry in steps[-2:]:
             assert entry.errors is not None, entry.failure
             assert entry.errors.error > 10.0 * found.reference_error
-            assert entry.order == pytest.approx(declared, abs=0.15), (method_label(method), entry.rung.step)
+            assert entry.order == pytest.approx(declared, abs=0.15), (method_label(method), entry.method.step)
             checked += 1
     assert checked == 20
 
@@ -205,7 +205,7 @@ def test_observed_order_is_that_of_the_errors_of_neighbours() -> None:
 
 def test_the_event_driven_scheme_keeps_near_its_tolerance_and_reaches_the_reference() -> None:
     found = entries_of(smooth_comparison(), "event-driven", ())
-    assert [entry.rung.tolerance for entry in found] == list(TOLERANCES)
+    assert [entry.tolerance for entry in found] == list(TOLERANCES)
     sizes = [entry.errors.error for entry in found if entry.errors is not None]
     assert len(sizes) == len(TOLERANCES)
     assert sizes == sorted(sizes, reverse=True)
@@ -218,7 +218,7 @@ def test_step_limits_and_biases_are_those_of_stability() -> None:
     for theta in ((0.5, 0.5), (1.0, 1.0), (1.0, 0.5), QUARTERS, NUMEROV):
         scheme = "two-layer" if len(theta) == 2 else "three-layer"
         for entry in entries_of(smooth_comparison(), scheme, theta):
-            step = entry.rung.step
+            step = entry.method.step
             case = smooth(solver__scheme=scheme, solver__theta=theta, solver__step=step)
             known = stability(system_of(case)).discrete
             assert known is not None
@@ -229,9 +229,9 @@ def test_step_limits_and_biases_are_those_of_stability() -> None:
 
 
 def test_the_bias_of_weights_of_one_is_as_published() -> None:
-    at = next(e for e in entries_of(smooth_comparison(), "two-layer", (1.0, 1.0)) if e.rung.step == 0.1)
+    at = next(e for e in entries_of(smooth_comparison(), "two-layer", (1.0, 1.0)) if e.method.step == 0.1)
     assert at.critical_bias == pytest.approx(0.0615433, abs=5e-8)
-    half = next(e for e in entries_of(smooth_comparison(), "two-layer", (0.5, 0.5)) if e.rung.step == 0.1)
+    half = next(e for e in entries_of(smooth_comparison(), "two-layer", (0.5, 0.5)) if e.method.step == 0.1)
     assert half.critical_bias == pytest.approx(0.0, abs=1e-6)
 
 
@@ -269,7 +269,7 @@ def test_no_entry_beats_one_of_the_front_and_each_other_is_beaten() -> None:
     assert len(able) > 50
     assert front
     for entry in able:
-        assert entry.on_front != any(beats(other, entry) for other in able), entry.rung
+        assert entry.on_front != any(beats(other, entry) for other in able), entry.label
 
 
 def beats(one: Entry, other: Entry) -> bool:
@@ -313,12 +313,12 @@ def test_nothing_is_recommended_where_nothing_meets_the_target() -> None:
 
 def test_every_evaluator_appears_on_rough_surfaces_and_nodes_lower_the_error() -> None:
     found = rough_comparison()
-    evaluators = {entry.rung.kind.evaluator for entry in found.entries}
+    evaluators = {entry.kind.evaluator for entry in found.entries}
     assert {str(kind) for kind in evaluators} == {"auto", "midpoint", "exact"}
     sizes = {
-        (str(entry.rung.kind.evaluator), entry.rung.kind.nodes): entry.errors.error
+        (str(entry.kind.evaluator), entry.kind.nodes): entry.errors.error
         for entry in found.entries
-        if entry.errors is not None and entry.rung.step == 5e-6 and entry.rung.kind.theta == (0.5, 0.5)
+        if entry.errors is not None and entry.method.step == 5e-6 and entry.kind.theta == (0.5, 0.5)
     }
     nodes = [sizes["midpoint", count] for count in (16, 32, 128, 256)]
     assert nodes == sorted(nodes, reverse=True)

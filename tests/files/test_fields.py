@@ -39,23 +39,23 @@ def test_a_table_has_each_name_once_with_unit_and_meaning(name: str) -> None:
 
 def test_a_value_is_found_along_attributes_keys_and_methods() -> None:
     report = Report(Part(by_name={"x": 3.0}))
-    assert Field("size", "1", "", source="part.size").read(report) == 2.0
-    assert Field("x", "1", "", source="part.by_name.x").read(report) == 3.0
+    assert Field("size", "1", "", at="part.size").read(report) == 2.0
+    assert Field("x", "1", "", at="part.by_name.x").read(report) == 3.0
     assert Field("words", "", "", fields.TEXT, "part.words").read(report) == "two"
     with pytest.raises(AttributeError):
         Field("length", "1", "").read(report)
 
 
 def test_what_does_not_exist_is_none_or_what_stands_for_it() -> None:
-    assert Field("size", "1", "", source="part.size").read(Report(None)) is None
-    assert Field("size", "1", "", source="part.size", missing=0).read(Report(Part(None))) == 0
+    assert Field("size", "1", "", at="part.size").read(Report(None)) is None
+    assert Field("size", "1", "", at="part.size", missing=0).read(Report(Part(None))) == 0
 
 
 def test_objects_and_lists_of_objects_are_read_by_their_own_rows() -> None:
     rows = (Field("size", "1", ""),)
     assert Field("part", "", "", rows=rows).read(Report(Part())) == {"size": 2.0}
     many = Report(Part(by_name=[Part(1.0), Part(None)]))
-    found = Field("parts", "", "", source="part.by_name", rows=rows).read(many)
+    found = Field("parts", "", "", at="part.by_name", rows=rows).read(many)
     assert found == [{"size": 1.0}, {"size": None}]
 
 

@@ -18,7 +18,10 @@ from brakecli.files.field import Field
 from brakecli.files.read import is_hdf5, open_result
 from brakecli.files.write import ResultFile, new_result
 
-STATES = {"flag_values": np.array([-1, 0, 1, 2], np.int8), "flag_meanings": "backward stick forward separated"}
+STATES: dict[str, Any] = {
+    "flag_values": np.array([-1, 0, 1, 2], np.int8),
+    "flag_meanings": "backward stick forward separated",
+}
 
 
 def history(rows: int) -> dict[str, Any]:
@@ -34,7 +37,7 @@ def write(path: Path, rows: int = 100, piece: int = 1000) -> None:
         )
         result.axis("history", Field("time", "s", "time"))
         result.variable("history", Field("vx", "m/s", "horizontal velocity"), ["time"])
-        result.variable("history", Field("state", "1", "state of the pad", "i1"), ["time"], attributes=STATES)
+        result.variable("history", Field("state", "1", "state of the pad", "i1"), ["time"], **STATES)
         whole = history(rows)
         for start in range(0, rows, piece):
             result.append("history", {name: values[start : start + piece] for name, values in whole.items()})
@@ -68,7 +71,7 @@ def test_what_is_written_comes_back_exactly(tmp_path: Path, rows: int) -> None:
             "reasons": ["too short", "zu kurz"],
             "frequency": 12.5,
         }
-        assert set(result.groups()) == {"history", "points", "nothing", "regime"}
+        assert set(result.file) == {"history", "points", "nothing", "regime"}
         state = result.variables("history")["state"]
         assert (state.dims, state.shape, state.attributes["units"]) == (("time",), (rows,), "1")
         assert result.variables("points")["amplitude"].dims == ("solver_scheme", "phi")

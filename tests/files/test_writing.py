@@ -12,6 +12,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -154,6 +155,12 @@ def terminate(_number: int, _frame: FrameType | None) -> None:
     raise SystemExit(143)
 
 
+def nothing_or_whole(path: Path) -> None:
+    assert {entry.name for entry in path.parent.iterdir()} <= {path.name}
+    if path.exists():
+        read_all(path)
+
+
 def interrupted(path: Path) -> None:
     signal.signal(signal.SIGTERM, terminate)
     for sent, raised in ((signal.SIGINT, KeyboardInterrupt), (signal.SIGTERM, SystemExit)):
@@ -167,9 +174,7 @@ def interrupted(path: Path) -> None:
                 stopped += 1
             if count() < number:
                 break
-            assert {entry.name for entry in path.parent.iterdir()} <= {path.name}
-            if path.exists():
-                read_all(path)
+            nothing_or_whole(path)
         assert stopped > 20
     assert signal.getsignal(signal.SIGTERM) is terminate
 
@@ -192,9 +197,7 @@ def interrupted_at_random(path: Path) -> None:
         except SystemExit:
             stopped += 1
         timer.join()
-        assert {entry.name for entry in path.parent.iterdir()} <= {path.name}
-        if path.exists():
-            read_all(path)
+        nothing_or_whole(path)
     assert stopped == 50
 
 
@@ -253,20 +256,8 @@ def compete(path: Path) -> None:
 
 
 def test_of_many_rivals_only_one_writes_at_a_time(tmp_path: Path) -> None:
-    threads_failed: list[BaseException] = []
-
-    def run() -> None:
-        try:
-            in_a_process(compete, tmp_path / "r.h5")
-        except BaseException as error:
-            threads_failed.append(error)
-
-    threads = [threading.Thread(target=run) for _ in range(4)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert not threads_failed
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(in_a_process, [compete] * 4, [tmp_path / "r.h5"] * 4))
     assert list(tmp_path.iterdir()) == []
 
 

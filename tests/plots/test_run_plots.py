@@ -122,7 +122,7 @@ def test_stick_is_shaded_half_an_interval_around_each_of_its_samples(tmp_path: P
     ]
     assert len(shades) == 1
     spans = [(path.vertices[:, 0].min(), path.vertices[:, 0].max()) for path in shades[0].get_paths()]  # type: ignore[index, union-attr]
-    time, stick = picture.detail.time, picture.detail.state == ContactState.STICK
+    time, stick = picture.detail["time"], picture.detail["state"] == ContactState.STICK
     assert stick.any()
     inside = [any(low < moment < high for low, high in spans) for moment in time]
     np.testing.assert_array_equal(inside, stick)
@@ -162,7 +162,7 @@ def test_a_history_of_few_samples_is_drawn(samples: int, tmp_path: Path) -> None
         plot_result(result, tmp_path / f"{number}.png", force=False)
         with open_result(result) as stored:
             picture = gather(stored)
-        assert picture.detail.time.size == samples
+        assert picture.detail["time"].size == samples
         assert picture.summary == "failed at t = 0 s: it broke"
 
 
@@ -175,8 +175,8 @@ def test_motions_of_any_size_are_drawn(scale: float, tmp_path: Path) -> None:
 
 def test_a_settled_motion_shows_its_last_twelve_cycles(tmp_path: Path) -> None:
     picture = gathered(tmp_path / "r.h5", sine(5000, 2.0), frequency=2.0)
-    assert picture.detail.time.size * INTERVAL * 2.0 == pytest.approx(12.0)
-    assert picture.detail.time[-1] == picture.span[1] == 4999 * INTERVAL
+    assert picture.detail["time"].size * INTERVAL * 2.0 == pytest.approx(12.0)
+    assert picture.detail["time"][-1] == picture.span[1] == 4999 * INTERVAL
 
 
 def test_a_motion_that_comes_to_rest_is_shown_until_it_rests(tmp_path: Path) -> None:
@@ -184,14 +184,14 @@ def test_a_motion_that_comes_to_rest_is_shown_until_it_rests(tmp_path: Path) -> 
     moved["state"][7000:] = 0
     moved["state"][6999] = 1
     picture = gathered(tmp_path / "r.h5", moved, spectrum_peak=2.0, excitation="none")
-    assert picture.detail.time[0] < 6999 * INTERVAL < picture.detail.time[-1] < 7100 * INTERVAL
+    assert picture.detail["time"][0] < 6999 * INTERVAL < picture.detail["time"][-1] < 7100 * INTERVAL
 
 
 def test_the_wheel_is_drawn_with_the_speed_of_the_case(tmp_path: Path) -> None:
     changing = "wheel={radius=0.5, times=[1.0, 3.0], angular_speeds=[2.0, 0.0]}"
-    detail = gathered(tmp_path / "r.h5", sine(500), changing).detail
-    expected = 1.0 - 0.5 * np.clip(detail.time - 1.0, 0.0, 2.0)
-    np.testing.assert_allclose(detail.belt, expected, atol=1e-12)
+    picture = gathered(tmp_path / "r.h5", sine(500), changing)
+    expected = 1.0 - 0.5 * np.clip(picture.detail["time"] - 1.0, 0.0, 2.0)
+    np.testing.assert_allclose(picture.detail["belt"], expected, atol=1e-12)
 
 
 def test_lines_stand_where_the_waves_of_a_steady_wheel_pass(tmp_path: Path) -> None:

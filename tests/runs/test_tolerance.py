@@ -34,7 +34,7 @@ def truth(case: Case) -> np.ndarray[Any, Any]:
 
 def kept(found: Certified, case: Case) -> float:
     """The true error of an answer, which must not be above the estimate."""
-    error = errors(found.motion.rows, truth(case), found.motion.system.interval).error
+    error = errors(found.motion.rows, truth(case)).error
     assert error <= found.certificate.estimated_error + 1e-11  # what the truth itself may be off
     return error
 

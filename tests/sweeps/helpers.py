@@ -120,7 +120,7 @@ class Inline(Engine):
     def __init__(self, plan: Plan, compute: Compute, limit: int | None = None) -> None:
         self._plan, self._compute, self._limit = plan, compute, limit
 
-    def close(self) -> None:
+    def __exit__(self, *error: object) -> None:
         pass
 
     def run(self, next_task: NextTask) -> Iterator[Finished]:
@@ -214,7 +214,7 @@ def memory(file: str, name: str) -> None:
     """Sweep by a function, and print the largest memory of this process and of its workers, in bytes."""
     largest, looked = 0, 0.0
 
-    def progress(_: object) -> None:
+    def progress(*_: int) -> None:
         nonlocal largest, looked
         if time.monotonic() - looked > 0.2:
             looked = time.monotonic()

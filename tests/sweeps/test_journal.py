@@ -1,13 +1,16 @@
 """Finished points are taken up by the same sweep alone, as far as they are whole."""
 
+import json
 import random
+import re
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from brakecli import SAME_NUMBERS_AS, __version__
 from brakecli.errors import RefusedError
-from brakecli.sweeps.file import read_sweep
+from brakecli.sweeps.file import LoadedSweep, read_sweep
 from brakecli.sweeps.workers.task import compute_units
 from tests.commands import left_in, run
 from tests.sweeps.helpers import frictions, inline, interrupted, write_sweep
@@ -34,13 +37,17 @@ def edited(path: Path, old: str, new: str) -> Callable[[Path], None]:
             edited(Path("s.h5.partial"), '"brakecli_version": "', '"brakecli_version": "7'),
             "brakecli_version was 7",
         ),
+        (
+            edited(Path("s.h5.partial"), '"brakecli_sources": "', '"brakecli_sources": "7'),
+            "brakecli_sources was 7",
+        ),
         (edited(Path("s.h5.partial"), '"numpy_version": "', '"numpy_version": "7'), "numpy_version was 7"),
         (
             edited(Path("s.h5.partial"), '{"brakecli_version', '[{"brakecli_version'),
             "holds no finished points",
         ),
     ],
-    ids=["case", "default", "sweep", "version", "library", "foreign"],
+    ids=["case", "default", "sweep", "version", "sources", "library", "foreign"],
 )
 def test_finished_points_of_another_sweep_are_refused_and_the_key_named(
     tmp_path: Path, edit: Callable[[Path], None], difference: str
@@ -81,6 +88,32 @@ def test_a_journal_of_the_same_sweep_is_taken_up(tmp_path: Path) -> None:
     done = run("sweep", "s.toml", "--json", "-j", "1", cwd=tmp_path)
     assert done.told(0).endswith("; 12 of them are there already\n")
     assert done.json["resumed_points"] == 12
+
+
+def begun_by(version: str, folder: Path) -> LoadedSweep:
+    """A sweep with 4 of its 20 points in a journal, as a version with other sources leaves it."""
+    loaded = write_sweep(folder, frictions(20))
+    interrupted(loaded, folder / "s.h5", limit=4, task_size=1)
+    path = folder / "s.h5.partial"
+    header, blocks = path.read_bytes().split(b"\n", 1)
+    other = {"brakecli_version": version, "brakecli_sources": "9a1b2c3d4e5f6071"}
+    path.write_bytes(json.dumps({**json.loads(header), **other}).encode() + b"\n" + blocks)
+    return loaded
+
+
+@pytest.mark.parametrize("version", SAME_NUMBERS_AS)
+def test_a_journal_of_a_version_that_computes_the_same_numbers_is_taken_up(tmp_path: Path, version: str) -> None:
+    loaded = begun_by(version, tmp_path)
+    interrupted(loaded, tmp_path / "s.h5", limit=2, task_size=1)
+    assert inline(loaded, tmp_path / "s.h5").resumed == 6
+    assert left_in(tmp_path) == {"tiny.toml", "s.toml", "s.h5"}
+
+
+def test_a_journal_of_a_version_whose_numbers_may_differ_is_refused(tmp_path: Path) -> None:
+    loaded = begun_by("0.0.9", tmp_path)
+    with pytest.raises(RefusedError, match=rf"brakecli_version was 0\.0\.9, is {re.escape(__version__)}"):
+        inline(loaded, tmp_path / "s.h5")
+    assert left_in(tmp_path) == {"tiny.toml", "s.toml", "s.h5.partial"}
 
 
 @pytest.mark.parametrize("cut", [1, 5, 400])

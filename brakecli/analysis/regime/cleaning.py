@@ -4,23 +4,20 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.ndimage import median_filter, uniform_filter1d
 
-from brakecli.analysis.regime.spectra import rises
+from brakecli.analysis.regime.spectra import Array, rises
 
-Array = NDArray[np.float64]
-
-CERTAIN = 15.0
-"""A line's power over the mean power of the noise; pure noise reaches it in one bin of three million."""
-_RIPPLE = 0.3
-"""Ripple within this part of the mean size of the velocity does not count as a cycle."""
-_SPIKES = (8.0, 0.35)
-"""A spike leaves the median of its neighbours by so many deviations, and by this part of the signal's range."""
+CERTAIN = (
+    15.0  # a line's power over the mean power of the noise; pure noise reaches it in one bin of three million
+)
+_RIPPLE = 0.3  # ripple within this part of the mean size of the velocity does not count as a cycle
+_SPIKES = (8.0, 0.35)  # deviations, and part of the signal's range, by which a spike leaves its neighbours' median
 _NOISE_SHARE = 0.6
 _SMOOTHED_AWAY = 0.15
+_QUIET = 0.02
 _DRIFT_CYCLES = 8.0
-_COARSE = 24
-"""Whatever is slower than this part of the record is left out where cycles are estimated."""
+_COARSE = 24  # whatever is slower than this part of the record is left out where cycles are estimated
 _SHORTEST = 8
 _LINES_LEFT = 0.5
 
@@ -58,15 +55,11 @@ class Velocity:
 
     @cached_property
     def variances(self) -> list[tuple[int, float]]:
-        """Smoothings m = 1, 2, 4 … with the variance of the velocity there.
-
-        Those that show little but noise are left out. The list ends where the motion itself is smoothed away.
-        """
-        found: list[tuple[int, float]] = []
-        most = 0.0
+        """Smoothings m = 1, 2, 4 … with the variance there, up to where the motion itself is smoothed away."""
+        found, most = [], 0.0
         for m in (1 << k for k in range(max(1, len(self.values) // 100).bit_length())):
             variance = float(self.thinned(m).var())
-            if self.noise_at(m) >= _NOISE_SHARE * variance:
+            if self.noise_at(m) >= _NOISE_SHARE * variance:  # little but noise
                 continue
             most = max(most, variance - self.noise_at(m))
             if variance - self.noise_at(m) < _SMOOTHED_AWAY * most:
@@ -74,50 +67,37 @@ class Velocity:
             found.append((m, variance))
         return found
 
-    def quiet_scale(self, share: float = 0.02) -> int:
-        """The least smoothing at which noise is at most this share of the variance; otherwise the quietest."""
-        parts = [(m, self.noise_at(m) / variance) for m, variance in self.variances]
-        quiet = [m for m, part in parts if part <= share]
-        return quiet[0] if quiet else min(parts, key=lambda p: p[1], default=(1, 1.0))[0]
+    @cached_property
+    def quiet(self) -> int:
+        """The least smoothing at which noise is a small part of the variance; otherwise the quietest."""
+        parts = [(self.noise_at(m) / variance, m) for m, variance in self.variances]
+        return next((m for part, m in parts if part <= _QUIET), min(parts, default=(1.0, 1))[1])
 
     def amplitude(self, start: int, windows: int) -> float:
         """Half of peak to peak of the displacement from a sample on, drift removed: median of equal windows."""
-        m, c = self.quiet_scale(), self._primitive
+        m, c = self.quiet, self._primitive
         x = c if self.measured else (c[m:] - c[:-m]) / m
         return 0.5 * float(np.median([np.ptp(part) for part in np.array_split(x[start:], windows)]))
 
-    def trend(self, m: int, start: int, windows: int) -> "Trend":
-        """How the size of the velocity smoothed over m samples changes from a sample on."""
-        parts = np.array_split(self.smoothed(m)[start:], windows)
-        envelope = np.sqrt(np.maximum([float(p.var()) - self.noise_at(m) for p in parts], 0.0))
-        third = max(1, windows // 3)
-        first, last = float(envelope[:third].mean()), float(envelope[-third:].mean())
+    def trend(self, start: int, windows: int) -> tuple[Array, float, float]:
+        """Envelope from a sample on, without noise, last third over first, and rank correlation with time."""
+        parts = np.array_split(self.smoothed(self.quiet)[start:], windows)
+        envelope = np.sqrt(np.maximum([float(p.var()) - self.noise_at(self.quiet) for p in parts], 0.0))
         if float(np.ptp(envelope)) == 0.0:
-            return Trend(envelope, 1.0, 0.0)
-        ranks = np.argsort(np.argsort(envelope)).astype(float)
-        order = float(np.corrcoef(ranks, np.arange(windows))[0, 1])
-        return Trend(envelope, last / max(first, 1e-300), order)
+            return envelope, 1.0, 0.0
+        third, ranks = max(1, windows // 3), np.argsort(np.argsort(envelope)).astype(float)
+        ratio = float(envelope[-third:].mean()) / max(float(envelope[:third].mean()), 1e-300)
+        return envelope, ratio, float(np.corrcoef(ranks, np.arange(windows))[0, 1])
 
     def denoised(self) -> tuple[Array, Array]:
         """The velocity made of those lines only that stand out of the noise, and their power over rfft's bins."""
-        values = self.values[: _handy(len(self.values))]
+        values = _handy(self.values)
         spectrum = np.fft.rfft(values)
         turn = np.linspace(0.0, np.pi, len(spectrum))
         gain = np.ones(len(turn)) if self.measured else 2.0 - 2.0 * np.cos(turn)
         power = np.abs(spectrum) ** 2
-        hidden = (power <= CERTAIN * len(values) * self.noise**2 * gain) | (turn == 0.0)
-        spectrum[hidden] = 0.0
-        power[hidden] = 0.0
-        return np.fft.irfft(spectrum, len(values)), power
-
-
-@dataclass(frozen=True)
-class Trend:
-    """The envelope of the velocity in equal windows, its noise taken off, and how it changes."""
-
-    envelope: Array
-    ratio: float  # last third over first third
-    order: float  # rank correlation with time
+        lines = (power > CERTAIN * len(values) * self.noise**2 * gain) & (turn > 0.0)
+        return np.fft.irfft(np.where(lines, spectrum, 0.0), len(values)), np.where(lines, power, 0.0)
 
 
 def cleaned(values: Array, is_velocity: bool) -> Velocity:
@@ -125,16 +105,14 @@ def cleaned(values: Array, is_velocity: bool) -> Velocity:
     notes: list[str] = []
     if len(values) >= _SHORTEST and not np.isfinite(values).all():
         cycle = _cycle(_velocity(_bridged(values), is_velocity))
-        values = _bridged(values[_longest_piece(values, max(1.0, 0.25 * cycle), notes)])
+        values = _bridged(_longest_piece(values, max(1.0, 0.25 * cycle), notes))
     if len(values) < _SHORTEST:
         return replace(_velocity(values, is_velocity), notes=tuple(notes))
-    values, spikes = _without_spikes(values, is_velocity)
-    if spikes:
-        notes.append(f"{spikes} spikes removed")
+    values = _without_spikes(values, is_velocity, notes)
     velocity = _velocity(values, is_velocity)
     width = int(_DRIFT_CYCLES * _cycle(velocity))
     if 2 * width < len(values):
-        drift, m = _running_mean(velocity.values, width), velocity.quiet_scale()
+        drift, m = uniform_filter1d(velocity.values, width), velocity.quiet
         variance = float(velocity.thinned(m).var()) - velocity.noise_at(m)
         if float(drift.std()) > 0.1 * float(np.sqrt(max(variance, 0.0))):
             notes.append("drift removed")
@@ -143,39 +121,29 @@ def cleaned(values: Array, is_velocity: bool) -> Velocity:
 
 
 def _velocity(values: Array, is_velocity: bool) -> Velocity:
-    raw = values if is_velocity else np.diff(values)
-    long = len(values) >= _SHORTEST
-    return Velocity(raw - raw.mean() if len(raw) else raw, raw, _noise(values) if long else 0.0, is_velocity)
-
-
-def _noise(values: Array) -> float:
-    """Standard deviation of white noise: the lesser of what third differences and the spectrum's floor allow."""
-    rough = np.diff(values, 3)
-    local = float(np.median(np.abs(rough - np.median(rough)))) / 0.6745 / np.sqrt(20.0)
-    values = values[: _handy(len(values))]
-    line = np.linspace(values[0], values[-1], len(values))
-    floor = np.median(np.abs(np.fft.rfft(values - line)) ** 2) / np.log(2.0) / len(values)
-    return float(min(local, np.sqrt(floor)))
+    """Velocity with its noise, the lesser of what third differences and the spectrum's floor allow."""
+    raw, noise = values if is_velocity else np.diff(values), 0.0
+    if len(values) >= _SHORTEST:
+        rough, some = np.diff(values, 3), _handy(values)
+        local = float(np.median(np.abs(rough - np.median(rough)))) / 0.6745 / np.sqrt(20.0)
+        line = np.linspace(some[0], some[-1], len(some))
+        floor = np.median(np.abs(np.fft.rfft(some - line)) ** 2) / np.log(2.0) / len(some)
+        noise = float(min(local, np.sqrt(floor)))
+    return Velocity(raw - raw.mean() if len(raw) else raw, raw, noise, is_velocity)
 
 
 def _cycle(velocity: Velocity) -> float:
     """Samples of a cycle, roughly."""
-    steady = velocity.values - _running_mean(velocity.values, len(velocity.values) // _COARSE)
-    velocity = replace(velocity, values=steady)
-    values = velocity.smoothed(velocity.quiet_scale())
+    velocity = replace(velocity, values=_without_slow(velocity.values))
+    values = velocity.smoothed(velocity.quiet)
     band = _RIPPLE * float(np.abs(values).mean())
-    return len(values) / max(1, count_falls(values, -band, band))
+    return len(values) / max(1, len(rises(-values, -band, band)))
 
 
-def count_falls(values: Array, low: float, high: float) -> int:
-    """How often a signal goes from above `high` to below `low`."""
-    return len(rises(-values, -high, -low)[0])
-
-
-def line_share(power: Array, bands: int) -> float:
-    """Part of the energy in the strongest bands, each 6 % to either side."""
+def line_share(power: Array) -> float:
+    """Part of the energy in the three strongest bands, each 6 % to either side."""
     left, total, found = power.copy(), float(power.sum()), 0.0
-    for _ in range(bands):
+    for _ in range(3):
         peak = int(np.argmax(left))
         band = slice(int(peak / 1.06), int(peak * 1.06) + 2)
         found += float(left[band].sum())
@@ -183,16 +151,14 @@ def line_share(power: Array, bands: int) -> float:
     return found / total if total > 0.0 else 0.0
 
 
-def _handy(count: int) -> int:
-    """At most this number of samples, but so many that their Fourier transform is fast."""
-    return count - count % 1024 if count > 1 << 16 else count
+def _handy(values: Array) -> Array:
+    """The values, of many only so many that their Fourier transform is fast."""
+    return values[: len(values) - len(values) % 1024] if len(values) > 1 << 16 else values
 
 
-def _running_mean(values: Array, width: int) -> Array:
-    from scipy.ndimage import uniform_filter1d
-
-    mean: Array = uniform_filter1d(values, max(1, width), mode="reflect")
-    return mean
+def _without_slow(values: Array) -> Array:
+    mean: Array = uniform_filter1d(values, max(1, len(values) // _COARSE))
+    return values - mean
 
 
 def _bridged(values: Array) -> Array:
@@ -202,26 +168,24 @@ def _bridged(values: Array) -> Array:
     return values if good.all() else np.interp(places, places[good], values[good])
 
 
-def _longest_piece(values: Array, longest_gap: float, notes: list[str]) -> slice:
+def _longest_piece(values: Array, longest_gap: float, notes: list[str]) -> Array:
     """The longest part without a gap of more samples than `longest_gap`."""
     bad = np.concatenate([[False], ~np.isfinite(values), [False]])
-    starts, stops = np.flatnonzero(bad[1:] != bad[:-1]).reshape(-1, 2).T
-    cuts = stops - starts > longest_gap
-    if not cuts.all():
-        notes.append(f"{np.sum(~cuts)} short gaps bridged")
-    if not cuts.any():
-        return slice(0, len(values))
-    begins, ends = np.concatenate([[0], stops[cuts]]), np.concatenate([starts[cuts], [len(values)]])
-    i = int(np.argmax(ends - begins))
-    used = f"{ends[i] - begins[i]} of {len(values)} samples"
-    notes.append(f"{np.sum(cuts)} long gaps: only the longest piece is used, {used}")
-    return slice(int(begins[i]), int(ends[i]))
+    gaps = np.flatnonzero(bad[1:] != bad[:-1]).reshape(-1, 2)
+    cuts = gaps[np.diff(gaps)[:, 0] > longest_gap]
+    if len(cuts) < len(gaps):
+        notes.append(f"{len(gaps) - len(cuts)} short gaps bridged")
+    if not len(cuts):
+        return values
+    pieces = np.array([0, *cuts.flat, len(values)]).reshape(-1, 2)
+    begin, end = pieces[np.argmax(np.diff(pieces))]
+    used = f"{end - begin} of {len(values)} samples"
+    notes.append(f"{len(cuts)} long gaps: only the longest piece is used, {used}")
+    return values[begin:end]
 
 
-def _without_spikes(values: Array, is_velocity: bool) -> tuple[Array, int]:
-    """Replace and count single samples far from both sides. A velocity's pulses of slip are not spikes."""
-    from scipy.ndimage import median_filter
-
+def _without_spikes(values: Array, is_velocity: bool, notes: list[str]) -> Array:
+    """Replace single samples far from both sides. A velocity's pulses of slip are not spikes."""
     away = values - median_filter(values, 5, mode="nearest")
     low, high = np.quantile(values, [0.1, 0.9])
     deviation = 1.4826 * float(np.median(np.abs(away)))
@@ -230,11 +194,11 @@ def _without_spikes(values: Array, is_velocity: bool) -> tuple[Array, int]:
     spikes &= np.abs(away) > 3.0 * beside
     count = int(np.sum(spikes))
     if count == 0 or count == len(values):
-        return values, 0
+        return values
     without = _bridged(np.where(spikes, np.nan, values))
     if is_velocity and count >= 5 and abs(float(np.mean(np.sign(away[spikes])))) > 0.6:
-        rest = without[: _handy(len(without))]
-        power = np.abs(np.fft.rfft(rest - _running_mean(rest, len(rest) // _COARSE))) ** 2
-        if line_share(power, 3) < _LINES_LEFT:  # nothing is left without them
-            return values, 0
-    return without, count
+        power = np.abs(np.fft.rfft(_without_slow(_handy(without)))) ** 2
+        if line_share(power) < _LINES_LEFT:  # nothing is left without them
+            return values
+    notes.append(f"{count} spikes removed")
+    return without

@@ -1,26 +1,21 @@
 """The regime of a measured signal, which carries no flags: see docs/measured-signals.md.
 
-Stick shows in the distribution of the velocity: it stays long at one value, the belt's, and is then short and fast
-in the other direction. So its skewness is large. The velocity is smoothed over m = 1, 2, 4 … samples, and the m
-that shows the skewness best is used, so that one procedure serves any sampling rate and noise.
+Stick skews the distribution of the velocity: it stays long at the belt's, and is then short and fast in the other
+direction. Smoothing over the m = 1, 2, 4 … samples that show this best serves any sampling rate and noise.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from enum import StrEnum
-from typing import NamedTuple
+from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
-from brakecli.analysis.regime.cleaning import CERTAIN, Velocity, cleaned, count_falls, line_share
-from brakecli.analysis.regime.rules import Excitation, Regime
+from brakecli.analysis.regime.cleaning import CERTAIN, Velocity, cleaned, line_share
+from brakecli.analysis.regime.rules import Decision, Excitation, Regime
+from brakecli.analysis.regime.spectra import Array, rises
 
-Array = NDArray[np.float64]
-
-_FINE = 1000.0
-"""Samples of a cycle, after interpolation, among which a plateau is sought."""
-_PLATEAU_SAMPLES = 1 << 20
-"""A plateau is sought in at most so many samples."""
+_FINE = 1000.0  # samples of a cycle, after interpolation, among which a plateau is sought
+_PLATEAU_SAMPLES = 1 << 20  # most samples in which a plateau is sought
 _SHORTEST_PLATEAU = 0.03  # of the time
 _PARTS = 7
 _FEWEST_SAMPLES = 64
@@ -49,53 +44,32 @@ class SignalThresholds:
 
     fewest_cycles: float = 10.0
     samples_per_cycle: float = 8.0
-    decayed_to: float = 0.05
-    """A motion has died out when its velocity has fallen to this part of its largest."""
-    trend_order: float = 0.85
-    """Rank correlation of the envelope with time from which it may grow or decay."""
-    trend_ratio: float = 1.25
-    """The envelope grows or decays if also its last third is so many times its first third, or the reverse."""
-    trend_order_large: float = 0.6
-    """The rank correlation that suffices for a change by `trend_ratio_large`."""
+    decayed_to: float = 0.05  # part of its largest to which the velocity of a motion that has died out has fallen
+    trend_order: float = 0.85  # rank correlation of the envelope with time from which it may grow or decay,
+    trend_ratio: float = 1.25  # and does if also its last third is so many times its first third, or the reverse
+    trend_order_large: float = 0.6  # the rank correlation that suffices for a change by `trend_ratio_large`
     trend_ratio_large: float = 4.0
-    skewness_unlikely: float = 0.3
-    """Skewness of the velocity up to which there is no stick, except for a short one at the belt's speed."""
-    skewness_certain: float = 0.9
-    """Skewness of the velocity from which there is stick. Two lines in step reach 0.816 and no more."""
-    overtones: float = 0.03
-    """Between these two it is stick if the third to eighth multiple hold this part of the energy."""
-    plateau: float = 2.6
-    """Time at the belt's speed, over the time next to it, from which it is stick; a sine reaches 2.41."""
-    line_share: float = 0.7
-    """Part of the energy of the velocity in three narrow bands in quasi-harmonic vibration."""
+    skewness_unlikely: float = 0.3  # of the velocity; up to here no stick, except a short one at the belt's speed
+    skewness_certain: float = 0.9  # from here there is stick; two lines in step reach 0.816 and no more
+    overtones: float = 0.03  # between the two: part of the energy in the third to eighth multiple that shows stick
+    plateau: float = 2.6  # time at the belt's speed, over that next to it, that shows stick; a sine reaches 2.41
+    line_share: float = 0.7  # part of the velocity's energy in three narrow bands in quasi-harmonic vibration
 
 
 @dataclass(frozen=True)
 class SignalVerdict:
-    """The regime of a measured signal, its numbers (SI units), and the reasons in plain words.
-
-    A measurement does not show where the energy comes from, so `excitation` is always none, nor whether contact
-    was lost.
-    """
+    """The regime of a measured signal, its numbers (SI units), and the reasons in plain words."""
 
     regime: Regime
     reasons: tuple[str, ...]
-    excitation: Excitation = Excitation.NONE
-    frequency: float | None = None  # Hz: strongest line, or events of stick per second
-    amplitude: float | None = None  # m, half of peak to peak of x
-    stick_fraction: float | None = None
-    contact_loss_fraction: float | None = None
-    evidence: dict[str, float] = field(default_factory=dict)
-    warnings: tuple[str, ...] = ()
-    thresholds: SignalThresholds = field(default_factory=SignalThresholds)
-
-
-class Stick(NamedTuple):
-    """What speaks for stick: skewness of the velocity, events, part of the time."""
-
-    skewness: float
-    events: int
-    fraction: float
+    frequency: float | None  # Hz: strongest line, or events of stick per second
+    amplitude: float | None  # m, half of peak to peak of x
+    stick_fraction: float | None
+    evidence: dict[str, float]
+    warnings: tuple[str, ...]
+    thresholds: SignalThresholds
+    excitation: Excitation = Excitation.NONE  # a measurement does not show where the energy comes from,
+    contact_loss_fraction: None = None  # nor whether contact was lost
 
 
 def classify_signal(
@@ -109,168 +83,145 @@ def classify_signal(
     """The regime of a measured signal; `belt_speed` in m/s, `stiffness` in N/m (of a force) where known."""
     size = float(np.nanmax(np.abs(signal.values), initial=0.0))  # squares of the smallest numbers must not vanish
     velocity = cleaned(signal.values / (size or 1.0), quantity == Measurand.VELOCITY)
-    metres, belt = size, np.nan if belt_speed is None else abs(belt_speed)
-    if quantity == Measurand.FORCE:
-        known = np.nan if stiffness is None else stiffness
-        metres, belt = size / known, belt * known
+    spring = 1.0 if quantity != Measurand.FORCE else np.nan if stiffness is None else stiffness
+    metres, belt = size / spring, np.nan if belt_speed is None else abs(belt_speed) * spring
     if quantity == Measurand.VELOCITY:
         metres *= signal.interval
     else:
         belt *= signal.interval
     rules = _Rules(velocity, signal.interval, belt / (size or 1.0), thresholds)
-    verdict = rules.verdict()
+    decision = rules.short() or rules.unsettled() or rules.sticking() or rules.without_stick()
     amplitude = metres * velocity.amplitude(rules.start, rules.windows) if rules.above_noise else np.nan
-    return replace(
-        verdict,
+    return SignalVerdict(
+        regime=decision.regime,
+        reasons=(decision.reason,),
+        frequency=decision.frequency,
         amplitude=amplitude if np.isfinite(amplitude) else None,
+        stick_fraction=decision.stick_fraction,
         evidence={**rules.evidence, "noise": size * velocity.noise},
         warnings=(*signal.notes, *velocity.notes),
+        thresholds=thresholds,
     )
 
 
 class _Rules:
-    """The rules on one velocity: they gather evidence until one of them applies."""
+    """The rules on one velocity, in their order. They gather evidence until one of them decides."""
 
     def __init__(self, velocity: Velocity, interval: float, belt: float, limits: SignalThresholds) -> None:
-        self.velocity, self.interval, self.limits = velocity, interval, limits
+        self.velocity, self.interval, self.limits, self.count = velocity, interval, limits, len(velocity.values)
         self.belt = belt  # the belt's speed, as the velocity would show it; NaN where it is not known
-        self.duration = len(velocity.values) * interval
-        self.scale, self.start, self.windows, self.above_noise = 1, 0, 1, True
+        self.duration, self.start, self.windows = self.count * interval, 0, 1
+        self.above_noise = self.count >= _FEWEST_SAMPLES and bool(velocity.variances)
         self.evidence: dict[str, float] = {}
 
-    def verdict(self) -> SignalVerdict:
-        """Apply the rules in their order; the first that applies decides. Only the amplitude is left out."""
+    def short(self) -> Decision | None:
         velocity, limits = self.velocity, self.limits
-        count = len(velocity.values)
-        if count < _FEWEST_SAMPLES:
-            self.above_noise = False
-            return self._undecided(f"only {count} samples in one piece; measure longer")
-        self.scale = velocity.quiet_scale()
-        stick = self.stick = self._stick()
+        if self.count < _FEWEST_SAMPLES:
+            return Decision(f"only {self.count} samples in one piece; measure longer")
+        self._seek_stick()
         self.clean, self.power = velocity.denoised()
-        self.evidence |= {"samples": float(count), "skewness": stick.skewness}
-        self.evidence |= {"smoothed_over": float(self.scale), "events": float(stick.events)}
-        if not velocity.variances:
-            self.above_noise = False
-            return self._undecided("nothing stands out of the noise; measure closer, or with less noise")
-        cycles, self.frequency = self._cycles()
+        self.evidence |= {"samples": float(self.count), "skewness": self.skewness}
+        self.evidence |= {"smoothed_over": float(velocity.quiet), "events": float(self.events)}
+        if not self.above_noise:
+            return Decision("nothing stands out of the noise; measure closer, or with less noise")
+        self.strongest = strongest = int(np.argmax(self.power))
+        certain = self.skewness >= limits.skewness_certain and self.events >= limits.fewest_cycles
+        if certain or self.power[strongest] == 0.0:
+            cycles, self.frequency = float(self.events), max(self.events, 1) / self.duration
+        else:
+            length = len(self.clean) * self.interval
+            cycles, self.frequency = strongest * self.duration / length, max(strongest, 1) / length
         self.windows = int(np.clip(cycles / 3.0, 1, 40))
         period = 1.0 / (self.frequency * self.interval)
         self.evidence |= {"cycles": cycles, "samples_per_cycle": period}
         if cycles < limits.fewest_cycles:
-            return self._undecided(f"only {cycles:.0f} cycles; measure longer")
+            return Decision(f"only {cycles:.0f} cycles; measure longer")
         if period < limits.samples_per_cycle:
-            return self._undecided(f"only {period:.1f} samples a cycle; measure at a higher rate")
-        return self._unsettled(cycles) or self._sticking() or self._without_stick()
+            return Decision(f"only {period:.1f} samples a cycle; measure at a higher rate")
+        return None
 
-    def _verdict(
-        self, regime: Regime, reason: str, frequency: float | None = None, stick: float | None = None
-    ) -> SignalVerdict:
-        return SignalVerdict(regime, (reason,), frequency=frequency, stick_fraction=stick, thresholds=self.limits)
-
-    def _undecided(self, reason: str) -> SignalVerdict:
-        return self._verdict(Regime.UNDECIDED, reason)
-
-    def _stick(self) -> Stick:
-        """Skewness at the smoothing that shows it best, and the events of slip that go with it."""
-        velocity, best, sign, scale = self.velocity, 0.0, 1.0, self.scale
-        for m, _ in velocity.variances:
-            skewness = _skewness(velocity.thinned(m))
-            if abs(skewness) > max(best, 4.0 * np.sqrt(6.0 * m / len(velocity.values))):
-                best, sign, scale = abs(skewness), -np.sign(skewness), m
-        if best < self.limits.skewness_certain:
-            scale = self.scale
-        values = sign * velocity.smoothed(scale)
-        values = values - values.mean()
-        bulk = values[values > 0.0]
-        if not len(bulk):
-            return Stick(best, 0, 0.0)
-        middle, noise = float(np.median(bulk)), float(np.sqrt(velocity.noise_at(scale)))
-        events = count_falls(values, -max(0.5 * middle, 4.0 * noise), 0.25 * middle)
-        return Stick(best, events, float(np.mean(values > -0.5 * middle)))
-
-    def _cycles(self) -> tuple[float, float]:
-        """How many cycles there are, and how many a second."""
-        stick, strongest, length = self.stick, int(np.argmax(self.power)), len(self.clean) * self.interval
-        certain = stick.skewness >= self.limits.skewness_certain and stick.events >= self.limits.fewest_cycles
-        if certain or self.power[strongest] == 0.0:
-            return float(stick.events), max(stick.events, 1) / self.duration
-        return strongest * self.duration / length, max(strongest, 1) / length
-
-    def _unsettled(self, cycles: float) -> SignalVerdict | None:
+    def unsettled(self) -> Decision | None:
         """Decides where the motion has died out, still grows or decays; moves the start behind a transient."""
-        limits, velocity = self.limits, self.velocity
-        windows = int(np.clip(cycles / 3.0, 4, 40))
-        whole = velocity.trend(self.scale, 0, windows)
-        last, largest = float(whole.envelope[-max(1, windows // 4) :].mean()), float(np.sort(whole.envelope)[-3])
-        floor = np.sqrt(velocity.noise_at(self.scale))
-        died_to = last / max(largest, 1e-300)
-        self.evidence |= {"envelope_ratio": whole.ratio, "envelope_order": whole.order, "died_to": died_to}
-        early = bool(whole.envelope[: windows // 2].max() >= largest)
-        if early and last <= max(limits.decayed_to * largest, min(0.2 * largest, 0.5 * floor)):
-            return self._verdict(
-                Regime.DAMPED, f"the vibration has died out: down to {died_to:.2g} of its largest"
-            )
-        found = whole
-        for start in (0, len(velocity.values) // 4, len(velocity.values) // 2):
-            found = velocity.trend(self.scale, start, windows)
-            change, order = max(found.ratio, 1.0 / max(found.ratio, 1e-9)), abs(found.order)
-            slow = change > limits.trend_ratio and order > limits.trend_order
-            fast = change > limits.trend_ratio_large and order > limits.trend_order_large
+        limits, velocity, windows = self.limits, self.velocity, max(self.windows, 4)
+        envelope, ratio, order = velocity.trend(0, windows)
+        last, largest = float(envelope[-max(1, windows // 4) :].mean()), float(np.sort(envelope)[-3])
+        died_to, floor = last / max(largest, 1e-300), np.sqrt(velocity.noise_at(velocity.quiet))
+        self.evidence |= {"envelope_ratio": ratio, "envelope_order": order, "died_to": died_to}
+        faded = last <= max(limits.decayed_to * largest, min(0.2 * largest, 0.5 * floor))
+        if faded and envelope[: windows // 2].max() >= largest:
+            return Decision(f"the vibration has died out: down to {died_to:.2g} of its largest", Regime.DAMPED)
+        for start in (0, self.count // 4, self.count // 2):
+            _, ratio, order = velocity.trend(start, windows)
+            change = max(ratio, 1.0 / max(ratio, 1e-9))
+            slow = change > limits.trend_ratio and abs(order) > limits.trend_order
+            fast = change > limits.trend_ratio_large and abs(order) > limits.trend_order_large
             if not slow and not fast:
                 self.start = start
                 return None
-        word, end = ("growing", "settled") if found.ratio > 1.0 else ("decaying", "died out")
-        return self._undecided(f"still {word}; measure longer, until it has {end}")
+        word, end = ("growing", "settled") if ratio > 1.0 else ("decaying", "died out")
+        return Decision(f"still {word}; measure longer, until it has {end}")
 
-    def _sticking(self) -> SignalVerdict | None:
+    def sticking(self) -> Decision | None:
         """Decides where stick has skewed the velocity; undecided if noise hides whether two lines in step did."""
-        limits, stick, velocity, total = self.limits, self.stick, self.velocity, float(self.power.sum())
-        if stick.events < limits.fewest_cycles or stick.skewness < limits.skewness_unlikely:
+        limits, velocity, total = self.limits, self.velocity, float(self.power.sum())
+        if self.events < limits.fewest_cycles or self.skewness < limits.skewness_unlikely:
             return None
-        if stick.skewness < limits.skewness_certain:
-            strongest = int(np.argmax(self.power))
-            bands = [slice(int(0.97 * n * strongest), int(1.03 * n * strongest) + 2) for n in range(3, 9)]
+        if self.skewness < limits.skewness_certain:
+            bands = [
+                slice(int(0.97 * n * self.strongest), int(1.03 * n * self.strongest) + 2) for n in range(3, 9)
+            ]
             overtones = sum(float(self.power[band].sum()) for band in bands) / total
             self.evidence |= {"overtones": overtones}
             if overtones <= limits.overtones:
                 turn = 2.0 * np.pi * min(4.0 * self.frequency * self.interval, 0.5)
                 gain = 1.0 if velocity.measured else 2.0 - 2.0 * np.cos(turn)
-                if CERTAIN * len(velocity.values) * velocity.noise**2 * gain <= limits.overtones / 3.0 * total:
+                if CERTAIN * self.count * velocity.noise**2 * gain <= limits.overtones / 3.0 * total:
                     return None
                 what = "the velocity is skewed, by stick or by two lines in step, and noise hides which"
-                return self._undecided(f"{what}; measure with less noise, or for longer")
-        reason = f"{stick.events} events of stick and slip: skewness of the velocity {stick.skewness:.2g}"
-        return self._verdict(Regime.RELAXATION, reason, stick.events / self.duration, stick.fraction)
+                return Decision(f"{what}; measure with less noise, or for longer")
+        reason = f"{self.events} events of stick and slip: skewness of the velocity {self.skewness:.2g}"
+        often = self.events / self.duration
+        return Decision(reason, Regime.RELAXATION, frequency=often, stick_fraction=self.stick)
 
-    def _without_stick(self) -> SignalVerdict:
-        """Decides on a motion that neither grows nor dies out, nor sticks for long."""
+    def without_stick(self) -> Decision:
         top, beside = self._plateau()
         self.evidence |= {"plateau": top / max(beside, 1e-9), "plateau_time": top}
         flat = top > self.limits.plateau * beside
         if flat and np.isfinite(self.belt):
-            fraction = max(0.0, top - 0.5 * beside)
-            reason = (
-                f"the velocity stays at the belt's speed for {fraction:.0%} of the time, in most cycles or all"
-            )
-            return self._verdict(Regime.RELAXATION, reason, self.frequency, fraction)
-        share = line_share(self.power, 3)
+            stick = max(0.0, top - 0.5 * beside)
+            reason = f"the velocity is the belt's for {stick:.0%} of the time, in most cycles or all"
+            return Decision(reason, Regime.RELAXATION, frequency=self.frequency, stick_fraction=stick)
+        share = line_share(self.power)
         self.evidence |= {"line_share": share}
         if flat:
-            return self._undecided(
-                "the velocity is cut off flat on one side, as by short stick; give the belt speed"
-            )
+            return Decision("the velocity is flat on one side, as by short stick; give the belt speed")
         least, most = np.quantile(self.clean + self.velocity.raw.mean(), [0.01, 0.99])
         if any(0.95 * self.belt <= v <= 1.2 * self.belt for v in (-least, most)):
-            return self._undecided(
-                "the velocity just reaches the belt's; with less noise it would show if it stays"
-            )
+            return Decision("the velocity just reaches the belt's; less noise would show if it stays")
         if share < self.limits.line_share:
-            return self._undecided(
-                f"irregular without stick: {share:.0%} of the energy in three lines; measure longer"
-            )
+            return Decision(f"irregular without stick: {share:.0%} of the energy in three lines; measure longer")
         reason = f"sustained without stick: {share:.0%} of the energy of the velocity in at most three lines"
-        return self._verdict(Regime.QUASI_HARMONIC, reason, self.frequency, 0.0)
+        return Decision(reason, Regime.QUASI_HARMONIC, frequency=self.frequency, stick_fraction=0.0)
+
+    def _seek_stick(self) -> None:
+        """Find the skewness, at the smoothing that shows it best, the events of slip, and the part of stick."""
+        velocity, sign, scale = self.velocity, 1.0, self.velocity.quiet
+        self.skewness, self.events, self.stick = 0.0, 0, 0.0
+        for m, _ in velocity.variances:
+            parts = [part - part.mean() for part in np.array_split(velocity.thinned(m), _PARTS)]
+            each = [np.mean(p * p * p) / max(float(np.mean(p * p)), 1e-100) ** 1.5 for p in parts]
+            skewness = float(np.median(each))  # a single jump does not change it
+            if abs(skewness) > max(self.skewness, 4.0 * np.sqrt(6.0 * m / self.count)):
+                self.skewness, sign, scale = abs(skewness), -np.sign(skewness), m
+        if self.skewness < self.limits.skewness_certain:
+            scale = velocity.quiet
+        values = sign * velocity.smoothed(scale)
+        values = values - values.mean()
+        bulk = values[values > 0.0]
+        if len(bulk):
+            middle, noise = float(np.median(bulk)), float(np.sqrt(velocity.noise_at(scale)))
+            self.events = len(rises(-values, -0.25 * middle, max(0.5 * middle, 4.0 * noise)))
+            self.stick = float(np.mean(values > -0.5 * middle))
 
     def _plateau(self) -> tuple[float, float]:
         """Part of the time at the belt's speed (or an extreme velocity), and part of the time next to it."""
@@ -279,26 +230,16 @@ class _Rules:
         clean = finer * np.fft.irfft(np.fft.rfft(clean), finer * len(clean))
         absolute = clean + self.velocity.raw.mean()
         reach = 0.5 * float(np.ptp(np.quantile(clean, [0.01, 0.99])))
-        levels = (self.belt, -self.belt) if np.isfinite(self.belt) else _extreme_modes(absolute, reach)
+        levels = [self.belt, -self.belt]
+        if not np.isfinite(self.belt):
+            # the most frequent values of the lower and of the upper quarter of the range
+            edges = np.arange(absolute.min(), absolute.max() + 0.01 * reach, 0.01 * reach)
+            counts, quarter = np.histogram(absolute, edges)[0], max(1, len(edges) // 4)
+            places = np.argmax(counts[:quarter]), len(counts) - quarter + np.argmax(counts[-quarter:])
+            levels = [float(0.5 * (edges[i] + edges[i + 1])) for i in places]
         results = [(0.0, 1.0)]
-        for level in levels:
+        for level, width in product(levels, (0.02, 0.01, 0.005)):
             away = np.abs(absolute - level) / reach
-            for width in (0.02, 0.01, 0.005):
-                at = float(np.mean(away <= width))
-                if at >= _SHORTEST_PLATEAU:
-                    results.append((at, float(np.mean((away > width) & (away <= 3.0 * width)))))
+            if (at := float(np.mean(away <= width))) >= _SHORTEST_PLATEAU:
+                results.append((at, float(np.mean((away > width) & (away <= 3.0 * width)))))
         return max(results, key=lambda r: r[0] / max(r[1], 1e-9))
-
-
-def _skewness(values: Array) -> float:
-    """Median of the skewness of equal parts, which a single jump does not change."""
-    parts = [part - part.mean() for part in np.array_split(values, _PARTS)]
-    return float(np.median([np.mean(p * p * p) / max(float(np.mean(p * p)), 1e-100) ** 1.5 for p in parts]))
-
-
-def _extreme_modes(values: Array, reach: float) -> list[float]:
-    """The most frequent values of the upper and of the lower quarter of the range."""
-    edges = np.arange(values.min(), values.max() + 0.01 * reach, 0.01 * reach)
-    counts, quarter = np.histogram(values, edges)[0], max(1, len(edges) // 4)
-    places = int(np.argmax(counts[:quarter])), len(counts) - quarter + int(np.argmax(counts[-quarter:]))
-    return [float(0.5 * (edges[i] + edges[i + 1])) for i in places]

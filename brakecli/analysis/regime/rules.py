@@ -2,16 +2,13 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
-from brakecli.analysis.regime.evidence import Envelope, Part, cycles_of, envelope_of, powers_of
+from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, WINDOWS, Envelope, Part, cycles_of
 from brakecli.solver.history import History
 from brakecli.solver.quantities import ContactState
-
-if TYPE_CHECKING:
-    from brakecli.solver.records import Coefficients
 
 
 class Regime(StrEnum):
@@ -31,10 +28,9 @@ class Excitation(StrEnum):
     NONE = "none"
 
 
-_GROWN = math.log(1e9)
-"""Growth rate times duration by which a disturbance grows from rounding to the size of the motion."""
-_NOTHING = 1e-3
-"""Growth rate times duration that may come from the rounding of the eigenvalues."""
+# Growth rate times duration
+_GROWN = math.log(1e9)  # from which a disturbance grows from rounding to the size of the motion
+_NOTHING = 1e-3  # which may come from the rounding of the eigenvalues
 
 
 @dataclass(frozen=True)
@@ -60,9 +56,18 @@ class Context:
     steady: bool = True  # whether U and Q are constant
     forced: tuple[float, ...] = ()  # Hz, lines of the roughness
     quiet: float = 0.0  # m/s, size of vx that may come from rounding
-    coefficients: "Coefficients | None" = None  # with `load` Q (N) for the balance of powers
-    load: float = 0.0
     growth: Callable[[], float] = lambda: 0.0  # 1/s, of a small disturbance of steady sliding; 0 where it decays
+    powers: Callable[[Part], dict[str, float]] = lambda part: {}  # W, what becomes of the power of the belt
+
+
+class Decision(NamedTuple):
+    """What a rule decides, and why."""
+
+    reason: str
+    regime: Regime = Regime.UNDECIDED
+    excitation: Excitation = Excitation.NONE
+    frequency: float | None = None  # Hz
+    stick_fraction: float | None = None
 
 
 @dataclass(frozen=True)
@@ -79,15 +84,12 @@ class Verdict:
     contact_loss_fraction: float
     mean_friction_force: float  # N
     reasons: tuple[str, ...]
-    evidence: dict[str, Any] = field(default_factory=dict)
-    thresholds: Thresholds = field(default_factory=Thresholds)
+    evidence: dict[str, Any]
+    thresholds: Thresholds
 
 
 def forced_lines(belt_speed: float, waves_per_metre: Sequence[float], highest: float) -> tuple[float, ...]:
-    """Frequencies (Hz, up to `highest`) at which the passing roughness acts.
-
-    Each wave has its own and their multiples. A contact that opens adds the sums and differences of two waves.
-    """
+    """Frequencies (Hz, up to `highest`) of the passing waves, their multiples, and sums and differences of two."""
     base = [abs(belt_speed) * waves for waves in waves_per_metre]
     multiples = {n * f for f in base for n in range(1, 11)}
     pairs = {abs(f + sign * g) for f in base for g in base for sign in (1, -1)}
@@ -95,143 +97,111 @@ def forced_lines(belt_speed: float, waves_per_metre: Sequence[float], highest: f
 
 
 class _Rules:
-    """The rules on one history: they gather evidence until one of them applies."""
+    """The rules on one history, in their order. They gather evidence until one of them decides."""
 
     def __init__(self, history: History, context: Context, limits: Thresholds) -> None:
         self.history, self.context, self.limits = history, context, limits
-        self.settled_part, self.settled = self._part(history.samples // 2), False
+        self.settled_part, self.settled = Part(history, history.samples // 2, history.samples), False
         self.evidence: dict[str, Any] = {}
 
-    def verdict(self) -> Verdict:
-        """Apply the rules in their order; the first that applies decides."""
-        rules = (self._contact, self._unmoved, self._forced, self._trend)
-        return next((found for rule in rules if (found := rule()) is not None), None) or self._sustained()
-
-    def _part(self, start: int) -> Part:
-        return Part(self.history, start, self.history.samples)
-
-    def _contact(self) -> Verdict | None:
-        """Decides where the second half is without contact, or stick throughout."""
-        check = "check the sign and size of load.force"
+    def contact(self) -> Decision | None:
         if self.settled_part.fraction(ContactState.SEPARATED) == 1.0:
-            if self._part(0).fraction(ContactState.SEPARATED) == 1.0:
-                return self._undecided(f"the shoe has never touched the wheel; {check}")
-            return self._undecided(f"the shoe has lost contact for good; {check}")
+            never = replace(self.settled_part, start=0).fraction(ContactState.SEPARATED) == 1.0
+            text = "never touched the wheel" if never else "lost contact for good"
+            return Decision(f"the shoe has {text}; check the sign and size of load.force")
         if self.settled_part.fraction(ContactState.STICK) < 1.0:
             return None
         if self.context.belt_speed == 0.0:
-            return self._verdict(Regime.DAMPED, "the shoe has come to rest, sticking to the standing wheel")
-        return self._undecided("the shoe sticks throughout and is carried along by the wheel; run longer")
+            return Decision("the shoe has come to rest, sticking to the standing wheel", Regime.DAMPED)
+        return Decision("the shoe sticks throughout and is carried along by the wheel; run longer")
 
-    def _unmoved(self) -> Verdict | None:
-        """Decides where the run is too short or not steady, and where nothing has moved or all has died out."""
-        if self.history.samples < Envelope.FEWEST_SAMPLES:
-            return self._undecided(f"fewer than {Envelope.FEWEST_SAMPLES} samples; run longer")
-        envelope = self.envelope = envelope_of(self.history)
-        self.evidence |= {"envelope_final": envelope.final, "envelope_largest": envelope.largest}
-        self.evidence |= envelope.slope()
+    def unmoved(self) -> Decision | None:
+        if self.history.samples < FEWEST_SAMPLES:
+            return Decision(f"fewer than {FEWEST_SAMPLES} samples; run longer")
+        envelope = self.envelope = Envelope(self.history)
+        self.evidence |= envelope.evidence()
         if not self.context.steady:
-            return self._undecided("the wheel's speed or the load changes with time, so the motion cannot settle")
+            return Decision("the wheel's speed or the load changes with time, so the motion cannot settle")
         if envelope.largest <= self.context.quiet:
-            text = "nothing moves beyond rounding: the shoe slides steadily or rests"
-            return self._verdict(Regime.DAMPED, text)
+            return Decision("nothing moves beyond rounding: the shoe slides steadily or rests", Regime.DAMPED)
         if envelope.final <= max(self.limits.decayed_to * envelope.largest, self.context.quiet):
-            share = envelope.final / envelope.largest
-            text = f"the vibration has died out: vx has fallen to {share:.2g} of its largest amplitude"
-            return self._verdict(Regime.DAMPED, text)
+            text = f"vx has fallen to {envelope.final / envelope.largest:.2g} of its largest amplitude"
+            return Decision(f"the vibration has died out: {text}", Regime.DAMPED)
         return None
 
-    def _forced(self) -> Verdict | None:
-        """Decides where only the roughness shakes the shoe."""
+    def forced(self) -> Decision | None:
         if not self.context.forced:
             return None
-        share = self.evidence["forced_share"] = self.settled_part.power.share(self.context.forced)
+        share = self.evidence["forced_share"] = self.settled_part.share(self.context.forced)
         if share < self.limits.forced_share:
             return None
         growth = self.context.growth()
         powers_of_e = growth * self.history.samples * self.history.interval
-        if powers_of_e > _GROWN:  # the shoe's own vibration falls on the same lines
-            return None
+        if powers_of_e > _GROWN:
+            return None  # the shoe's own vibration falls on the same lines
         if powers_of_e > _NOTHING:
-            return self._undecided(
+            return Decision(
                 f"{share:.0%} of the energy of vx lies on the lines of the roughness, but sliding is unstable: "
                 f"the shoe's own vibration grows at {growth:.3g} 1/s; run at least {_GROWN / growth:.2g} s"
             )
         text = f"only the roughness shakes the shoe: {share:.0%} of the energy of vx lies on its lines"
-        return self._verdict(Regime.DAMPED, text, Excitation.FORCED)
+        return Decision(text, Regime.DAMPED, Excitation.FORCED)
 
-    def _trend(self) -> Verdict | None:
+    def trend(self) -> Decision | None:
         """Decides where the motion still grows or decays; otherwise it finds the settled part."""
         first = self.envelope.settled_window(self.limits.settled_within, self.limits.reach_within)
         if first is not None:
-            self.settled_part, self.settled = self._part(first * self.history.samples // Envelope.WINDOWS), True
+            start = first * self.history.samples // WINDOWS
+            self.settled_part, self.settled = replace(self.settled_part, start=start), True
             return None
-        slope, error = self.evidence.get("envelope_slope"), self.evidence.get("envelope_slope_error", 0.0)
+        slope = self.evidence.get("envelope_slope")
         if slope is None:
-            return self._undecided("the motion comes and goes; run longer")
-        if abs(slope) <= self.limits.trend_errors * error:
+            return Decision("the motion comes and goes; run longer")
+        if abs(slope) <= self.limits.trend_errors * self.evidence["envelope_slope_error"]:
             return None  # an amplitude that beats or wanders, without a trend
-        word = "growing" if slope > 0.0 else "decaying"
-        return self._undecided(
-            f"still {word} at {abs(slope):.3g} 1/s; run at least {3.0 / abs(slope):.2g} s longer"
-        )
+        text = f"still {'growing' if slope > 0.0 else 'decaying'} at {abs(slope):.3g} 1/s"
+        return Decision(f"{text}; run at least {3.0 / abs(slope):.2g} s longer")
 
-    def _sustained(self) -> Verdict:
-        """Decides on a motion whose amplitude has settled, by its cycles, stick and lines."""
+    def sustained(self) -> Decision:
         found = cycles_of(self.settled_part)
         self.evidence |= found
         cycles = found.get("cycles", 0.0)
         if cycles < self.limits.fewest_cycles:
-            return self._undecided(f"only {cycles:.0f} cycles in the settled part; run longer")
+            return Decision(f"only {cycles:.0f} cycles in the settled part; run longer")
         period, stick, harmonic = found["samples_per_cycle"], found["stick_cycles"], found["harmonic_share"]
         if period < self.limits.samples_per_cycle:
-            return self._undecided(f"only {period:.1f} samples a cycle; reduce output.sample_interval")
-        frequency = 1.0 / (period * self.history.interval)
+            return Decision(f"only {period:.1f} samples a cycle; reduce output.sample_interval")
+        own = Excitation.SELF_EXCITED, 1.0 / (period * self.history.interval)
         if stick >= self.limits.stick_cycles:
             text = f"sustained, with stick in {stick:.0%} of {cycles:.0f} cycles"
-            return self._verdict(Regime.RELAXATION, text, Excitation.SELF_EXCITED, frequency)
+            return Decision(text, Regime.RELAXATION, *own)
+        lines = f"{harmonic:.0%} of the energy of vx in one line and its harmonics"
         if stick == 0.0 and harmonic >= self.limits.harmonic_share:
-            text = f"sustained without stick: {harmonic:.0%} of the energy of vx in one line and its harmonics"
-            return self._verdict(Regime.QUASI_HARMONIC, text, Excitation.SELF_EXCITED, frequency)
-        return self._undecided(
-            f"irregular: stick in {stick:.0%} of the cycles, {harmonic:.0%} of the energy of vx in one line and "
-            "its harmonics; run longer, or look at the spectrum"
-        )
-
-    def _undecided(self, reason: str) -> Verdict:
-        return self._verdict(Regime.UNDECIDED, reason)
-
-    def _verdict(
-        self,
-        regime: Regime,
-        reason: str,
-        excitation: Excitation = Excitation.NONE,
-        frequency: float | None = None,
-    ) -> Verdict:
-        """The verdict, with the means and fractions of the settled part."""
-        part, belt, c = self.settled_part, self.context.belt_speed, self.context.coefficients
-        self.evidence |= {f"amplitude_{name}": part.amplitude(name) for name in ("y", "vx", "vy")}
-        if belt != 0.0:
-            self.evidence["largest_vx_over_belt_speed"] = part.extremes("vx")[int(belt > 0.0)] / belt
-        self.evidence |= part.power.lines(self.context.forced)
-        if c is not None and self.context.steady:
-            self.evidence |= powers_of(part, c, belt, self.context.load)
-        return Verdict(
-            regime=regime,
-            excitation=excitation,
-            frequency=frequency,
-            amplitude=part.amplitude("x"),
-            settled_from=part.start,
-            settled=self.settled,
-            stick_fraction=part.fraction(ContactState.STICK),
-            contact_loss_fraction=part.fraction(ContactState.SEPARATED),
-            mean_friction_force=part.mean("friction_force"),
-            reasons=(reason,),
-            evidence=self.evidence,
-            thresholds=self.limits,
-        )
+            return Decision(f"sustained without stick: {lines}", Regime.QUASI_HARMONIC, *own)
+        irregular = f"irregular: stick in {stick:.0%} of the cycles, {lines}"
+        return Decision(f"{irregular}; run longer, or look at the spectrum")
 
 
 def classify(history: History, context: Context, thresholds: Thresholds = Thresholds()) -> Verdict:
-    """The regime of a run's history, by the rules of docs/regimes.md."""
-    return _Rules(history, context, thresholds).verdict()
+    """The regime of a run's history, by the rules of docs/regimes.md; the first that applies decides."""
+    rules = _Rules(history, context, thresholds)
+    decision = rules.contact() or rules.unmoved() or rules.forced() or rules.trend() or rules.sustained()
+    part, belt = rules.settled_part, context.belt_speed
+    evidence = rules.evidence | {f"amplitude_{name}": part.amplitude(name) for name in ("y", "vx", "vy")}
+    if belt != 0.0:
+        evidence["largest_vx_over_belt_speed"] = part.extremes("vx")[int(belt > 0.0)] / belt
+    evidence |= part.lines(context.forced) | (context.powers(part) if context.steady else {})
+    return Verdict(
+        regime=decision.regime,
+        excitation=decision.excitation,
+        frequency=decision.frequency,
+        amplitude=part.amplitude("x"),
+        settled_from=part.start,
+        settled=rules.settled,
+        stick_fraction=part.fraction(ContactState.STICK),
+        contact_loss_fraction=part.fraction(ContactState.SEPARATED),
+        mean_friction_force=part.mean("friction_force"),
+        reasons=(decision.reason,),
+        evidence=evidence,
+        thresholds=thresholds,
+    )

@@ -6,52 +6,49 @@ Columns are named as in the header, or counted from 1. Whatever is wrong in the 
 import re
 import stat
 import warnings
-from dataclasses import dataclass
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brakecli.analysis.regime.of_signal import Signal
+from brakecli.analysis.regime.spectra import Array
 from brakecli.errors import UnreadableResultError, UsageError
 
-Array = NDArray[np.float64]
-
 _COMMENTS = ("#", "%")
-_HEAD = 1 << 16
-"""Bytes of a text file from which its layout is found."""
-_UNEVEN = 0.01
-"""Part of the step by which steps may differ before the signal is resampled."""
-_GAP = 1.5
-"""Steps of this many times the usual one are gaps."""
-_LONGEST = 10.0
-"""Gaps and resampling may make a signal so many times as long; a record with longer gaps is mostly gap."""
+_HEAD = 1 << 16  # bytes of a text file from which its layout is found
+_UNEVEN = 0.01  # part of the step by which steps may differ before the signal is resampled
+_GAP = 1.5  # steps of this many times the usual one are gaps
+_LONGEST = 10.0  # gaps may make a signal so many times as long; a record with longer gaps is mostly gap
 
 
 def read_signal(source: str, *, column: str | None, time_column: str | None, sample_rate: float | None) -> Signal:
     """The signal of a text file, or of ``FILE.h5:/path``; raises UnreadableResultError and UsageError."""
     if sample_rate is not None and not (np.isfinite(sample_rate) and sample_rate > 0.0):
         raise UsageError(f"--sample-rate: must be above 0 Hz, found {sample_rate}; give samples per second")
-    if sample_rate is not None and time_column is not None:
-        raise UsageError("--sample-rate and --time-column: only one of them can hold; leave one out")
     path, inside = Path(source), None
     if not path.exists() and (found := re.fullmatch(r"(.+?):(/.*)", source)):
         path, inside = Path(found[1]), found[2]
     try:
-        if sample_rate is None and time_column is None:
-            raise UsageError("no times are known; give --sample-rate HZ, or --time-column")
-        if not stat.S_ISREG(path.stat().st_mode):
-            raise UnreadableResultError("this is not a regular file; name a file")
+        if (sample_rate is None) == (time_column is None):
+            raise UsageError("the times come from --sample-rate HZ, or --time-column; give one, leave one out")
+        _require(stat.S_ISREG(path.stat().st_mode), "this is not a regular file; name a file")
         if inside is not None and (column is not None or time_column is not None):
             raise UsageError("a dataset has no columns; leave out --column, and give --sample-rate HZ")
-        values, times = _columns(path, column, time_column) if inside is None else (_dataset(path, inside), None)
-        return _signal(values, times, sample_rate)
+        values, *times = [_dataset(path, inside)] if inside else _TextFile(path).columns_of(column, time_column)
+        values = _numbers(values)
+        return Signal(values, 1.0 / sample_rate) if sample_rate is not None else _evenly(values, *times)
     except (UsageError, UnreadableResultError) as error:
         raise type(error)(f"{source}: {error}") from error
     except OSError as error:
         what = (error.strerror or str(error)).lower()
         raise UnreadableResultError(f"{source}: {what}; name a readable file") from error
+
+
+def _require(good: bool | np.bool_, problem: str) -> None:
+    if not good:
+        raise UnreadableResultError(problem)
 
 
 def _dataset(path: Path, inside: str) -> Array:
@@ -66,68 +63,69 @@ def _dataset(path: Path, inside: str) -> Array:
                 file.visititems(lambda name, n: names.append(f"/{name}") if isinstance(n, h5py.Dataset) else None)
                 raise ValueError(f"there is no dataset {inside}, only {', '.join(names[:12]) or 'none'}")
             if node.ndim != 1 or node.dtype.kind not in "iuf":
-                raise ValueError(
-                    f"dataset {inside} is not a row of numbers, found shape {node.shape}, {node.dtype}"
-                )
+                raise ValueError(f"{inside} is not a row of numbers, found shape {node.shape}, {node.dtype}")
             if node.dtype.itemsize * node.size > 100 * path.stat().st_size + (1 << 24):
                 raise ValueError(f"dataset {inside} claims {node.size} values, far more than the file holds")
             return np.asarray(node[:], dtype=np.float64)
     except Exception as error:
-        what = " ".join(str(error).split())
-        raise UnreadableResultError(
-            f"cannot be read: {what}; name an intact HDF5 file and a dataset in it"
-        ) from error
+        what = f"cannot be read: {' '.join(str(error).split())}"
+        raise UnreadableResultError(f"{what}; name an intact HDF5 file and a dataset in it") from error
 
 
-def _columns(path: Path, column: str | None, time_column: str | None) -> tuple[Array, Array | None]:
-    """The chosen column of a text file, and its times."""
-    text = _text_file(path)
-    time = None if time_column is None else text.index(time_column, "--time-column")
-    if column is not None:
-        value = text.index(column, "--column")
-    else:
-        others = [i for i in range(text.columns) if i != time]
-        if len(others) != 1:
-            raise UsageError(f"which column is the signal? give --column; there are {text.listed}")
-        value = others[0]
-    chosen = [value] if time is None else [value, time]
-    if text.columns - 1 not in chosen:
-        chosen.append(text.columns - 1)  # shows that rows are whole
-    table = text.read(chosen)
-    return table[:, 0], None if time is None else table[:, 1]
-
-
-@dataclass(frozen=True)
 class _TextFile:
-    """A text file of columns, and how it is laid out."""
+    """A text file of columns. Its first lines show separator, decimal sign and header."""
 
-    path: Path
-    separator: str | None  # None: white space
-    decimal_comma: bool
-    names: tuple[str, ...]
-    columns: int
-    skip: int  # lines before the first number
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        with path.open("rb") as file:
+            head = file.read(_HEAD)
+        _require(head.strip() != b"", "the file is empty; name a file with numbers")
+        _require(b"\0" not in head, "this is not text; name a CSV file, or FILE.h5:/path of an HDF5 file")
+        lines = head.decode("utf-8-sig", errors="replace").splitlines()
+        lines = lines[:-1] if len(head) == _HEAD and len(lines) > 1 else lines
+        self.names: list[str] = []
+        for self.skip, line in enumerate(lines):
+            if not line.strip() or line.lstrip().startswith(_COMMENTS):
+                continue
+            self.separator = next((s for s in (";", "\t", ",") if s in line), None)  # None: white space
+            self.decimal_comma = self.separator != "," and "," in line
+            cells = [cell.strip().strip('"') for cell in line.split(self.separator)]
+            numbers = [_is_number(cell, self.decimal_comma) for cell in cells]
+            self.columns, names_fit = len(cells), len(self.names) == len(cells)
+            if any(numbers) and all(good or not cell for good, cell in zip(numbers, cells, strict=True)):
+                near = lines[self.skip : self.skip + 100]
+                self.decimal_comma |= self.separator != "," and any("," in text for text in near)
+                self.names = self.names if names_fit else []
+                return
+            self.names = self.names if names_fit else cells  # a second line of names is that of the units
+        raise UnreadableResultError("no line of numbers was found at its start; name a file of columns of numbers")
 
-    @property
-    def listed(self) -> str:
-        """The columns, in words."""
-        return ", ".join(self.names) if self.names else f"columns 1 to {self.columns}, without names"
+    def columns_of(self, column: str | None, time_column: str | None) -> list[Array]:
+        """The chosen column, and the times where they are in a column."""
+        there = ", ".join(self.names) or f"columns 1 to {self.columns}, without names"
+        times = [] if time_column is None else [self._index(time_column, "--time-column", there)]
+        others = [i for i in range(self.columns) if i not in times]
+        values = others if column is None else [self._index(column, "--column", there)]
+        if len(values) != 1:
+            raise UsageError(f"which column is the signal? give --column; there are {there}")
+        chosen, last = [*values, *times], self.columns - 1
+        table = self._read(chosen if last in chosen else [*chosen, last])  # the last shows that rows are whole
+        return list(table.T[: len(chosen)])
 
-    def index(self, wanted: str, option: str) -> int:
+    def _index(self, wanted: str, option: str, there: str) -> int:
         """Place of a column; a name comes before a number."""
         if self.names.count(wanted) > 1:
             raise UsageError(f"{option}: several columns are named {wanted}; give its number, from 1")
         if wanted in self.names:
             return self.names.index(wanted)
-        if wanted.isascii() and wanted.isdigit() and 1 <= int(wanted) <= self.columns:
-            return int(wanted) - 1
-        raise UnreadableResultError(f"{option}: there is no column {wanted}; there are {self.listed}")
+        number = int(wanted) if wanted.isascii() and wanted.isdigit() else 0
+        _require(1 <= number <= self.columns, f"{option}: there is no column {wanted}; there are {there}")
+        return number - 1
 
-    def read(self, columns: list[int]) -> Array:
+    def _read(self, columns: list[int]) -> Array:
         """Some columns, by numpy's own reader; empty cells and decimal commas take it longer."""
         load = partial(
             np.loadtxt,
-            dtype=np.float64,
             comments=_COMMENTS,
             delimiter=self.separator,
             usecols=columns,
@@ -137,44 +135,16 @@ class _TextFile:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             if not self.decimal_comma:
-                try:
+                with suppress(ValueError, IndexError):  # perhaps because of an empty cell
                     return load(self.path, skiprows=self.skip)
-                except (ValueError, IndexError):
-                    pass  # perhaps because of an empty cell
             text = self.path.read_text(encoding="utf-8-sig", errors="replace")
             lines = (text.replace(",", ".") if self.decimal_comma else text).split("\n")
             try:
                 return load(lines[self.skip :], converters=lambda cell: float(cell.strip().strip('"') or "nan"))
             except (ValueError, IndexError) as error:
-                what = " ".join(str(error).split())
+                what = f"from line {self.skip + 1} on: {' '.join(str(error).split())}"
                 remedy = "give every row the same columns, and every cell a number, nothing or nan"
-                raise UnreadableResultError(f"from line {self.skip + 1} on: {what}; {remedy}") from error
-
-
-def _text_file(path: Path) -> _TextFile:
-    """Find separator, decimal sign and header from the first lines."""
-    with path.open("rb") as file:
-        head = file.read(_HEAD)
-    if not head.strip():
-        raise UnreadableResultError("the file is empty; name a file with numbers")
-    if b"\0" in head:
-        raise UnreadableResultError("this is not text; name a CSV file, or FILE.h5:/path of an HDF5 file")
-    lines = head.decode("utf-8-sig", errors="replace").splitlines()
-    lines = lines[:-1] if len(head) == _HEAD and len(lines) > 1 else lines
-    names: list[str] = []
-    for number, line in enumerate(lines):
-        if not line.strip() or line.lstrip().startswith(_COMMENTS):
-            continue
-        separator = next((s for s in (";", "\t", ",") if s in line), None)
-        comma = separator != "," and "," in line
-        cells = [cell.strip().strip('"') for cell in line.split(separator)]
-        numbers = [_is_number(cell, comma) for cell in cells]
-        if any(numbers) and all(good or not cell for good, cell in zip(numbers, cells, strict=True)):
-            comma = comma or (separator != "," and any("," in text for text in lines[number : number + 100]))
-            named = tuple(names) if len(names) == len(cells) else ()
-            return _TextFile(path, separator, comma, named, len(cells), number)
-        names = names if len(names) == len(cells) else cells  # a second line of names is that of the units
-    raise UnreadableResultError("no line of numbers was found at its start; name a file of columns of numbers")
+                raise UnreadableResultError(f"{what}; {remedy}") from error
 
 
 def _is_number(cell: str, decimal_comma: bool) -> bool:
@@ -185,50 +155,37 @@ def _is_number(cell: str, decimal_comma: bool) -> bool:
     return True
 
 
-def _signal(values: Array, times: Array | None, sample_rate: float | None) -> Signal:
-    """Equally spaced values, NaN in gaps."""
+def _numbers(values: Array) -> Array:
+    """The values, NaN in gaps; not one value at all times."""
     good = np.isfinite(values)
     numbers = values[good]
-    if not len(numbers):
-        raise UnreadableResultError("not one value is a number; name another column")
-    if len(numbers) < 2:
-        raise UnreadableResultError("only one sample; measure longer")
-    if np.ptp(numbers) == 0.0:
-        raise UnreadableResultError(f"the signal is constant, {numbers[0]:g} throughout; name another column")
-    if float(np.abs(numbers).max()) > 1e100:
-        raise UnreadableResultError("values beyond 1e100 cannot be measured; name another column, or use SI units")
-    values = np.where(good, values, np.nan)
-    if times is not None:
-        return _evenly(values, times)
-    assert sample_rate is not None
-    return Signal(values, 1.0 / sample_rate)
+    _require(len(numbers) > 0, "not one value is a number; name another column")
+    _require(len(numbers) > 1, "only one sample; measure longer")
+    _require(np.ptp(numbers) != 0.0, f"the signal is constant, {numbers[0]:g} throughout; name another column")
+    limit = "values beyond 1e100 cannot be measured; name another column, or use SI units"
+    _require(np.abs(numbers).max() <= 1e100, limit)
+    return np.where(good, values, np.nan)
 
 
 def _evenly(values: Array, times: Array) -> Signal:
     """The signal over equal steps of time; jumps of time become gaps."""
-    if not np.isfinite(times).all():
-        raise UnreadableResultError("a time is not a number; remove the rows without a time")
+    _require(np.isfinite(times).all(), "a time is not a number; remove the rows without a time")
     steps = np.diff(times)
-    if not (steps > 0.0).all():
-        row = int(np.argmin(steps > 0.0)) + 2
-        raise UnreadableResultError(f"time does not increase at sample {row}; sort the rows, without repeats")
-    step = float(np.median(steps))
-    within = steps[steps < _GAP * step]
+    row = int(np.argmin(steps > 0.0)) + 2
+    _require(steps.min() > 0.0, f"time does not increase at sample {row}; sort the rows, without repeats")
+    within = steps[steps < _GAP * np.median(steps)]
     step = float(within.mean())
     if float(np.abs(steps - step).max()) <= _UNEVEN * step:
         return Signal(values, float(times[-1] - times[0]) / (len(times) - 1))
     count = int((times[-1] - times[0]) / step + 1.5)
-    if count > _LONGEST * len(times):
-        raise UnreadableResultError("more gaps than record; give one piece of it")
-    notes = []
+    _require(count <= _LONGEST * len(times), "more gaps than record; give one piece of it")
     grid = times[0] + step * np.arange(count)
     even = np.interp(grid, times, values)  # NaN spreads to both sides of a missing value
     jumps = np.flatnonzero(steps >= _GAP * step)
     for i in jumps:
         first, last = np.searchsorted(grid, [times[i] + 0.5 * step, times[i + 1] - 0.5 * step])
         even[first:last] = np.nan
-    if len(jumps):
-        notes.append(f"{len(jumps)} jumps of time taken as gaps")
+    notes = [f"{len(jumps)} jumps of time taken as gaps"] if len(jumps) else []
     if float(np.abs(within - step).max()) > _UNEVEN * step:
         notes.append(f"sampled irregularly, resampled at {1.0 / step:.6g} Hz")
     return Signal(even, step, tuple(notes))

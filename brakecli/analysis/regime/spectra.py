@@ -10,14 +10,11 @@ from brakecli.solver.history import History
 
 Array = NDArray[np.float64]
 
-LONGEST_SEGMENT = 1 << 16
-"""Samples of one Welch segment: the memory that a spectrum takes does not grow with the run."""
+LONGEST_SEGMENT = 1 << 16  # samples, so that the memory that a spectrum takes does not grow with the run
 SEGMENTS_AT_ONCE = 16
 SEGMENTS_WANTED = 8
 SHORTEST_SEGMENT = 16
-
 SPECTRAL = ("x", "y", "vx", "vy", "friction_force", "normal_force", "contact_fraction")
-"""The variables that have a spectrum; the state has no size."""
 
 
 @dataclass(frozen=True)
@@ -32,43 +29,30 @@ class Spectrum:
 
 
 def spectrum(history: History, start: int) -> Spectrum:
-    """Welch's estimate (Hann window, half overlap, mean removed) of the samples from `start` on.
-
-    The length of the segments, at most `LONGEST_SEGMENT`, leaves about `SEGMENTS_WANTED` of them.
-    """
+    """Welch's estimate (Hann window, half overlap, mean removed) of the samples from `start` on."""
     length = history.samples - start
     size = min(LONGEST_SEGMENT, max(min(SHORTEST_SEGMENT, length), 2 * length // (SEGMENTS_WANTED + 1)))
     hop = max(1, size - size // 2)
     segments = 1 + (length - size) // hop
-    window = _window(size, history.interval)
+    window = 0.5 + 0.5 * np.cos(np.linspace(-np.pi, np.pi, size + 1)[:size]) if size > 1 else np.ones(1)
+    # The sum and the interval are rounded as in `scipy.signal.welch`, whose import takes half a second.
+    window *= 1.0 / np.sqrt(np.cumsum(window**2)[-1] / (1.0 / (1.0 / history.interval)))
     densities = {name: np.zeros(size // 2 + 1) for name in SPECTRAL}
     for first in range(0, segments, SEGMENTS_AT_ONCE):
         count = min(SEGMENTS_AT_ONCE, segments - first)
         begin = start + first * hop
         for name, total in densities.items():
             block = history.read(name, begin, begin + (count - 1) * hop + size)
-            total += _summed_periodograms(sliding_window_view(block, size)[::hop], window)
+            # Squares of the smallest numbers would vanish, so the block is brought to a scale of one.
+            scale = float(np.max(np.abs(block))) or 1.0
+            power = np.empty((size // 2 + 1, count))
+            for column, segment in zip(power.T, sliding_window_view(block / scale, size)[::hop], strict=True):
+                line = np.fft.rfft((segment - segment.mean()) * window)
+                column[:] = line.real**2 + line.imag**2
+            power[1 : (size + 1) // 2] *= 2.0
+            total += count * power.mean(axis=1) * scale**2
     frequency: Array = np.fft.rfftfreq(size, history.interval).astype(np.float64)
     return Spectrum(frequency, {name: total / segments for name, total in densities.items()}, start, segments)
-
-
-def _window(size: int, interval: float) -> Array:
-    """Periodic Hann window, scaled so that the squared transform is a density."""
-    window = 0.5 + 0.5 * np.cos(np.linspace(-np.pi, np.pi, size + 1)[:size]) if size > 1 else np.ones(1)
-    # The sum and the interval are rounded as in `scipy.signal.welch`, whose import takes half a second.
-    return np.asarray(window * (1.0 / np.sqrt(np.cumsum(window**2)[-1] / (1.0 / (1.0 / interval)))))
-
-
-def _summed_periodograms(segments: Array, window: Array) -> Array:
-    """Sum of the one-sided power spectral densities of segments, one in a row."""
-    # Squares of the smallest numbers would vanish, so the segments are brought to a scale of one.
-    scale = float(np.max(np.abs(segments), initial=0.0)) or 1.0
-    power = np.empty((len(window) // 2 + 1, len(segments)))
-    for column, segment in zip(power.T, segments / scale, strict=True):
-        line = np.fft.rfft((segment - segment.mean()) * window)
-        column[:] = line.real**2 + line.imag**2
-    power[1 : (len(window) + 1) // 2] *= 2.0
-    return np.asarray(len(segments) * power.mean(axis=1) * scale**2)
 
 
 def peak(frequency: Array, density: Array) -> float | None:
@@ -84,21 +68,15 @@ def peak(frequency: Array, density: Array) -> float | None:
     return float(frequency[i] + np.clip(shift, -0.5, 0.5) * (frequency[1] - frequency[0]))
 
 
-def rises(values: Array, low: float, high: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """The last samples below `low` and the first ones above `high`, of every rise from one to the other."""
+def rises(values: Array, low: float, high: float) -> NDArray[np.intp]:
+    """The last samples below `low` before every rise above `high`."""
     side = np.where(values > high, 1, np.where(values < low, -1, 0)).astype(np.int8)
     marked = np.flatnonzero(side)
-    found = np.flatnonzero((side[marked[:-1]] < 0) & (side[marked[1:]] > 0))
-    return marked[found], marked[found + 1]
+    return marked[np.flatnonzero((side[marked[:-1]] < 0) & (side[marked[1:]] > 0))]
 
 
 def upward_crossings(values: Array, band: float) -> Array:
-    """Places (in samples) where a signal rises through zero between leaving -band and reaching +band.
-
-    The band keeps ripple on a slow cycle from counting as cycles. The places are interpolated linearly.
-    """
-    places = []
-    for low, high in zip(*rises(values, -band, band), strict=True):
-        i = low + int(np.argmax(values[low : high + 1] >= 0.0)) - 1
-        places.append(i + values[i] / (values[i] - values[i + 1]))
-    return np.array(places)
+    """Where a signal rises through zero from below -band to above band, in samples, interpolated linearly."""
+    crossings = np.flatnonzero((values[:-1] < 0.0) & (values[1:] >= 0.0))
+    i = crossings[np.searchsorted(crossings, rises(values, -band, band))]
+    return i + values[i] / (values[i] - values[i + 1])

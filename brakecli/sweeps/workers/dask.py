@@ -5,8 +5,7 @@ import logging
 import time
 from collections import deque
 from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, suppress
-from functools import cache
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -23,13 +22,12 @@ from brakecli.sweeps.workers.task import (
 )
 
 CONNECT_SECONDS = 20
-WAIT_SECONDS = 60.0
-"""How long to wait for a worker to come (back) before giving up."""
-FETCH_SECONDS = 5.0
-"""How long to wait for a finished result, whose worker may have died with it: dask then computes it again."""
-LOOK_SECONDS = 1.0
-"""How often to look which workers there are."""
+WAIT_SECONDS = 60.0  # for a worker to come, or to come back
+FETCH_SECONDS = 5.0  # for a finished result, whose worker may have died with it: dask then computes it again
+LOOK_SECONDS = 1.0  # from one look at which workers there are to the next
 TASKS_PER_THREAD = 3
+KEPT = "; finished points are kept, run the same command again"
+INSTALL = "; install the same version there"
 
 
 class ClusterEngine(Engine):
@@ -37,39 +35,32 @@ class ClusterEngine(Engine):
 
     def __init__(self, compute: Compute, address: str | None, scheduler_file: str | None) -> None:
         """Connect to a scheduler and compare versions; raises UsageError or RefusedError."""
-        self._compute = compute
+        self._compute, self._versions = compute, fingerprint()
         option, name = ("--scheduler", address) if scheduler_file is None else ("--scheduler-file", scheduler_file)
         self._where = f"{option} {name}"
         address = str(address) if scheduler_file is None else self._address_in(scheduler_file)
-        self._versions = fingerprint()
         self._client = self._connected(address)
         with ExitStack() as failed:
-            failed.callback(self.close)
-            try:
-                self._client.wait_for_workers(1, timeout=WAIT_SECONDS)
+            failed.push(self)
+            with self._explained(UsageError, "the scheduler does not answer"):
+                try:
+                    self._client.wait_for_workers(1, timeout=WAIT_SECONDS)
+                except TimeoutError as error:
+                    none = f"{self._where}: has no workers; start some with: dask worker {address}"
+                    raise UsageError(none) from error
                 self._compare()
                 self.workers = max(1, sum(self._client.nthreads().values()))
-            except BrakecliError:
-                raise
-            except TimeoutError as error:
-                raise self._unusable(f"has no workers; start some with: dask worker {address}") from error
-            except Exception as error:
-                raise self._unusable(f"the scheduler does not answer ({first_line(error)})") from error
             failed.pop_all()
 
-    def close(self) -> None:
+    def __exit__(self, *error: object) -> None:
         """Leave, which cancels what is still to be computed; scheduler and workers go on."""
         with suppress(Exception):
             self._client.close(timeout=1)
 
     def run(self, next_task: NextTask) -> Iterator[Finished]:
         """Compute until there are no more tasks."""
-        try:
+        with self._explained(BrakecliError, "the scheduler has gone", KEPT):
             yield from self._run(next_task)
-        except BrakecliError:
-            raise
-        except Exception as error:  # dask raises many kinds once its scheduler is gone
-            raise self._lost(f"the scheduler has gone ({first_line(error)})") from error
 
     def _run(self, next_task: NextTask) -> Iterator[Finished]:
         from distributed import wait
@@ -108,7 +99,7 @@ class ClusterEngine(Engine):
                 looked = time.monotonic()
                 seen = looked if self._known else seen
             if time.monotonic() - seen > WAIT_SECONDS + LOOK_SECONDS:
-                raise self._lost("has no workers any more")
+                raise BrakecliError(f"{self._where}: has no workers any more{KEPT}")
 
     def _submit(self, task: Task) -> Any:
         return self._client.submit(_attempt, self._compute, task, self._versions, pure=False)
@@ -118,16 +109,16 @@ class ClusterEngine(Engine):
         from distributed import KilledWorker
 
         if future.status == "cancelled":
-            raise self._lost("the scheduler has gone")
+            raise BrakecliError(f"{self._where}: the scheduler has gone{KEPT}")
         if future.status == "lost":  # with its worker; it is computed again
             raise TimeoutError
         if future.status == "error":
             if isinstance(error := future.exception(), KilledWorker):
                 return None
-            raise self._lost(f"a worker cannot compute ({first_line(error)})")
+            raise BrakecliError(f"{self._where}: a worker cannot compute ({first_line(error)}){KEPT}")
         finished: Finished | str = future.result(timeout=FETCH_SECONDS)
         if isinstance(finished, str):
-            raise self._refused(finished)
+            raise RefusedError(f"{self._where}: {finished}{INSTALL}")
         return finished
 
     def _gone(self) -> Iterator[Finished]:
@@ -143,14 +134,15 @@ class ClusterEngine(Engine):
         except TypeError:  # older versions report all workers anyway
             return set(self._client.scheduler_info()["workers"])
 
-    def _lost(self, how: str) -> BrakecliError:
-        return BrakecliError(f"{self._where}: {how}; finished points are kept, run the same command again")
-
-    def _refused(self, difference: str) -> RefusedError:
-        return RefusedError(f"{self._where}: {difference}; install the same version there")
-
-    def _unusable(self, what: str) -> UsageError:
-        return UsageError(f"{self._where}: {what}")
+    @contextmanager
+    def _explained(self, kind: type[BrakecliError], what: str, remedy: str = "") -> Iterator[None]:
+        """Turn what dask raises, which is of many kinds, of all its layers, into one sentence."""
+        try:
+            yield
+        except BrakecliError:
+            raise
+        except Exception as error:
+            raise kind(f"{self._where}: {what} ({first_line(error)}){remedy}") from error
 
     def _address_in(self, scheduler_file: str) -> str:
         """The address in a scheduler's file; dask itself would wait for ever for the file to come."""
@@ -161,14 +153,14 @@ class ClusterEngine(Engine):
         except (ValueError, KeyError, TypeError, RecursionError):
             reason = "it holds no address"
         remedy = f"start a scheduler with: dask scheduler --scheduler-file {scheduler_file}"
-        raise self._unusable(f"cannot be read: {reason}; {remedy}")
+        raise UsageError(f"{self._where}: cannot be read: {reason}; {remedy}")
 
     def _connected(self, address: str) -> Any:
         try:
             from distributed import Client
         except ImportError as error:
             what = "needs dask.distributed, which is not installed; pip install 'brakecli[cluster]'"
-            raise self._unusable(what) from error
+            raise UsageError(f"{self._where}: {what}") from error
 
         _silence("distributed", "tornado", "asyncio")
 
@@ -177,22 +169,16 @@ class ClusterEngine(Engine):
                 """Where its start has failed there is nothing to close; dask would try to, and complain."""
 
         quiet: Any = _Client
-        try:
+        with self._explained(UsageError, "no scheduler answers", "; start one with: dask scheduler"):
             return quiet(address, timeout=CONNECT_SECONDS, set_as_default=False)
-        except Exception as error:  # dask raises many kinds, of all its layers
-            what = f"no scheduler answers ({first_line(error)}); start one with: dask scheduler"
-            raise self._unusable(what) from error
 
     def _compare(self) -> None:
         """Refuse workers of another version: their results would not be the same."""
-        try:
-            found = self._client.run(_own_versions)
-        except Exception as error:
-            what = f"a worker cannot load brakecli ({first_line(error)}); install the same version there"
-            raise self._unusable(what) from error
+        with self._explained(UsageError, "a worker cannot load brakecli", INSTALL):
+            found = self._client.run(fingerprint)
         for worker, theirs in sorted(found.items()):
             if difference := _difference(self._versions, theirs, f"the worker at {worker}"):
-                raise self._refused(difference)
+                raise RefusedError(f"{self._where}: {difference}{INSTALL}")
 
 
 def _silence(*packages: str) -> None:
@@ -204,13 +190,7 @@ def _silence(*packages: str) -> None:
 
 def _attempt(compute: Compute, task: Task, versions: Mapping[str, str]) -> Finished | str:
     """Compute a task in a worker of the cluster; the difference where that is of another version."""
-    return _difference(versions, _own_versions(), "a worker that has come later") or attempt(compute, task)
-
-
-@cache
-def _own_versions() -> Mapping[str, str]:
-    """Versions of the sources that this process has loaded; a long-lived worker does not notice changed files."""
-    return fingerprint()
+    return _difference(versions, fingerprint(), "a worker that has come later") or attempt(compute, task)
 
 
 def _difference(ours: Mapping[str, str], theirs: Mapping[str, str], who: str) -> str:

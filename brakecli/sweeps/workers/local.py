@@ -17,8 +17,7 @@ from brakecli.sweeps.workers.task import Compute, Engine, Finished, NextTask, Ta
 
 _SIGNALS = (signal.SIGHUP, signal.SIGINT, signal.SIGTERM)
 _THREAD_LIMITS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
-_LOOK_SECONDS = 1.0
-"""How often to look for signals that have arrived just before the wait for workers."""
+_LOOK_SECONDS = 1.0  # between two looks for signals that have arrived just before the wait for workers
 
 
 @dataclass
@@ -42,12 +41,12 @@ class LocalEngine(Engine):
         self.pool: list[Worker] = []
         self._compute = compute
 
-    def close(self) -> None:
+    def __exit__(self, *error: object) -> None:
         """Kill the workers."""
         for worker in self.pool:
             worker.process.kill()
-        for worker in [*self.pool]:
-            self._remove(worker)
+        while self.pool:
+            self._remove(self.pool[-1])
 
     def run(self, next_task: NextTask) -> Iterator[Finished]:
         """Compute until there are no more tasks."""
@@ -77,7 +76,7 @@ class LocalEngine(Engine):
         worker = Worker(context.Process(target=_serve, args=(theirs, self._compute), daemon=True), ours)
         try:
             resource_tracker.ensure_running()  # here, as it lets signals through
-            with _starting():
+            with theirs, _starting():
                 worker.process.start()
                 self.pool.append(worker)
         except OSError as error:
@@ -85,8 +84,6 @@ class LocalEngine(Engine):
                 f"a worker process cannot be started: {error.strerror or error}; finished points are kept, run "
                 "the same command again with fewer --jobs"
             ) from error
-        finally:
-            theirs.close()
         return worker
 
     def _remove(self, worker: Worker) -> None:
@@ -135,10 +132,9 @@ def _starting() -> Iterator[None]:
 
 def _serve(pipe: Connection, compute: Compute) -> None:
     """Compute tasks until the parent ends. The parent kills its workers itself, also after Ctrl-C."""
-    for number in (signal.SIGINT, signal.SIGHUP):
-        signal.signal(number, signal.SIG_IGN)
-    for number in (signal.SIGTERM, signal.SIGIO):
-        signal.signal(number, signal.SIG_DFL)
+    for number in (*_SIGNALS, signal.SIGIO):
+        ends = number in (signal.SIGTERM, signal.SIGIO)
+        signal.signal(number, signal.SIG_DFL if ends else signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, _SIGNALS)
     parent = parent_process()
     assert parent is not None

@@ -7,8 +7,9 @@ records do not depend on the engine, nor on how the units of a sweep were cut in
 import fcntl
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, suppress
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple, Self
 
@@ -51,17 +52,13 @@ class Engine(ABC):
     def run(self, next_task: NextTask) -> Iterator[Finished]:
         """Compute until there are no more tasks."""
 
-    @abstractmethod
-    def close(self) -> None:
-        """End what was started, and drop what is still being computed."""
-
     def __enter__(self) -> Self:
         """Start nothing yet."""
         return self
 
+    @abstractmethod
     def __exit__(self, *error: object) -> None:
-        """Close the engine."""
-        self.close()
+        """End what was started, and drop what is still being computed."""
 
 
 def attempt(compute: Compute, task: Task) -> Finished:
@@ -81,26 +78,10 @@ def first_line(error: object) -> str:
 
 
 def compute_units(plan: Plan, first: int, count: int) -> bytes:
-    """The records of some units of a sweep: points, or lines along which the motion is followed."""
-    with _one_compiles():
-        from brakecli.sweeps.point import compute, follow
+    """The records of some units of a sweep: points, or lines along which the motion is followed.
 
-    if plan.followed is None:
-        return compute(plan, first, count).tobytes()
-    return b"".join(follow(plan, line).tobytes() for line in range(first, first + count))
-
-
-def fingerprint() -> dict[str, str]:
-    """Versions that a result may depend on: of this program, of its sources, and of the numerical libraries."""
-    from brakecli.runs.run import versions
-    from brakecli.solver.compile import source_hash
-
-    return {"brakecli_version": __version__, "brakecli_sources": source_hash(), **versions()}
-
-
-@contextmanager
-def _one_compiles() -> Iterator[None]:
-    """Let one process at a time load kernels: several that fill one cold cache get into each other's way."""
+    One process at a time loads kernels: several that fill one cold cache get into each other's way.
+    """
     from brakecli.solver.compile import CACHE
 
     with ExitStack() as stack:
@@ -108,4 +89,20 @@ def _one_compiles() -> Iterator[None]:
             with suppress(OSError):  # a disk without locks: do without
                 file = stack.enter_context(Path(f"{CACHE}.lock").open("w"))
                 fcntl.flock(file, fcntl.LOCK_EX)
-        yield
+        from brakecli.sweeps.point import compute, follow
+
+    if plan.followed is None:
+        return compute(plan, first, count).tobytes()
+    return b"".join(follow(plan, line).tobytes() for line in range(first, first + count))
+
+
+@cache
+def fingerprint() -> Mapping[str, str]:
+    """Versions that a result may depend on: of this program, of its sources, and of the numerical libraries.
+
+    They are those that this process has loaded: a long-lived worker does not notice changed files.
+    """
+    from brakecli.runs.run import versions
+    from brakecli.solver.compile import source_hash
+
+    return {"brakecli_version": __version__, "brakecli_sources": source_hash(), **versions()}
