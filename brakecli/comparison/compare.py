@@ -23,7 +23,7 @@ from brakecli.solver.schemes import load
 from brakecli.solver.system import System
 
 REFERENCE, CHECK = 1e-12, 1e-10
-"""Tolerances of the reference, and of the run that tells how good it is."""
+"""Tolerances of the reference, and of the run that shows how good it is."""
 REFERENCE_SHARE = 0.3
 """Part of the budget that the reference may take."""
 FEWEST_SAMPLES = 64

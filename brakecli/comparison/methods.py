@@ -81,7 +81,7 @@ def parse_steps(text: str | None) -> list[float]:
     except ValueError:
         steps = []
     if not steps or not all(1e-100 < step < 1e100 for step in steps):
-        raise UsageError(f"--steps {text}: is no list of steps; write, for instance, --steps 1e-5,5e-6")
+        raise UsageError(f"--steps {text}: is not a list of steps; write, for instance, --steps 1e-5,5e-6")
     largest = max(steps)
     if any(abs(largest / step - round(largest / step)) > 1e-9 * largest / step for step in steps):
         raise UsageError(f"--steps {text}: all must be whole parts of the largest; halve it, for instance")

@@ -1,1 +1,1 @@
-"""One case: run it, keep a promised error, refuse or warn before it starts."""
+"""One case: run it, keep a requested error, refuse or warn before it starts."""

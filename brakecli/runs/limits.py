@@ -115,7 +115,7 @@ def _longest_stable_step(system: System) -> float | None:
 
 
 def free_bytes(directory: Path) -> float:
-    """What is free on the disk of a directory; infinite where that cannot be told."""
+    """What is free on the disk of a directory; infinite where that is not known."""
     try:
         return float(shutil.disk_usage(directory).free)
     except OSError:

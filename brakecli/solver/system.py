@@ -108,7 +108,7 @@ class System:
 
     @property
     def passing_frequency(self) -> float:
-        """Of the shortest wave of the wheel at its largest speed, Hz."""
+        """Passing frequency of the shortest wave of the wheel at its largest speed, Hz."""
         return self.fastest_belt * float(max(self.wheel.turns, default=0.0))
 
     @property
@@ -118,7 +118,7 @@ class System:
 
     @cached_property
     def natural_frequencies(self) -> tuple[float, float]:
-        """Of the frictionless shoe on its links and a contact that touches everywhere, Hz, rising."""
+        """Natural frequencies without friction, in a contact that touches everywhere, Hz, rising."""
         return natural_frequencies(self.coefficients, self.contact_stiffness)
 
     @property

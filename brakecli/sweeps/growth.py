@@ -118,9 +118,8 @@ def growth(found: Sliding) -> Growth | None:
     if last - first < 4:  # out of steady sliding at once
         return Growth(fast, fast, 0.0)
 
-    def rate(
-        start: int, end: int
-    ) -> float:  # of the fastest of the disturbances that are still there at the start
+    def rate(start: int, end: int) -> float:
+        """The growth rate (1/s) of the fastest of the disturbances that are still there at the start."""
         u, sizes, vh = np.linalg.svd(maps[start])
         kept = sizes > 1e-6 * sizes[0]
         step = u.T[kept] @ maps[end] @ vh.T[:, kept] / sizes[kept]
