@@ -118,7 +118,6 @@ picture: $(DEV_STAMP) ## draw docs/picture.png, from cases/relaxation.toml
 	$(BIN)/brakecli plot results/relaxation.h5 --force --output docs/picture.png
 
 paper: $(DEV_STAMP) ## reproduce the paper's claims into docs/paper-claims.md, with pictures (some minutes)
-	@mkdir -p results/paper
 	$(BIN)/python docs/paper_claims.py
 
 promises: $(DEV_STAMP) ## random cases at five tolerances: the tables of docs/accuracy.md (some minutes)

@@ -35,6 +35,7 @@ def run(name: str, folder: Path = CASES) -> xr.Dataset:
     output = RESULTS / f"{name}.h5"
     if not ("--keep" in sys.argv and output.exists()):
         print(f"sweep {name}", file=sys.stderr, flush=True)  # noqa: T201
+        RESULTS.mkdir(parents=True, exist_ok=True)
         command = [COMMAND, "sweep", folder / f"{name}.toml", "-o", output, "--force", "--quiet"]
         subprocess.run(command, check=True)
     with xr.open_dataset(output, engine="h5netcdf") as data:
