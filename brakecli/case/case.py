@@ -236,7 +236,8 @@ class Case(Table):
             what = f"is below the time step of {step!r} s"
             yield self.wrong("output.sample_interval", what, "make it at least one time step")
         exact = self.solver.row.own_steps or step is None
-        if exact and self.contact.evaluator == "midpoint":
+        evaluator = self.contact.evaluator
+        if exact and evaluator != "auto" and EVALUATORS[evaluator].needs_nodes:
             what = "is given, but event-driven is exact, and a tolerance chooses nodes itself"
             yield self.wrong("contact.evaluator", what, "leave evaluator out")
         if self.solver.start == "paper" and (self.initial.vx or self.initial.vy):

@@ -6,13 +6,14 @@ from typing import Annotated
 from brakecli.cli.inputs import load_case, result_path
 from brakecli.cli.options import AsJson, CaseArgument, Force, Overrides, Quiet, option, output_option
 from brakecli.cli.output import announce_compilation, progress, show_result
+from brakecli.solver.schemes import SCHEMES
 
 
 def command(
     case: CaseArgument,
     output: Annotated[Path | None, output_option("Result file", "the case's name with -schemes.h5, here")] = None,
     overrides: Overrides = None,
-    schemes: Annotated[str | None, option("Only these: two-layer, three-layer, event-driven.", "NAME,…")] = None,
+    schemes: Annotated[str | None, option(f"Only these: {', '.join(SCHEMES)}.", "NAME,…")] = None,
     steps: Annotated[str | None, option("Time steps in s, whole parts of the largest.", "H,…")] = None,
     budget: Annotated[float, option("Time to spend, about.", "SECONDS", min=1.0, max=86400.0)] = 60.0,
     target_error: Annotated[float, option("Name the cheapest that meets it.", "E", min=1e-12, max=1.0)] = 1e-3,

@@ -11,6 +11,7 @@ import numpy as np
 
 from brakecli.files import fields
 from brakecli.files.field import Field, named
+from brakecli.solver.contact import EVALUATORS
 from brakecli.solver.quantities import COEFFICIENTS
 
 if TYPE_CHECKING:  # what one command prints need not wait for the modules of the others
@@ -54,7 +55,8 @@ def run_table(report: RunReport) -> str:
     weights = ", ".join(f"{weight:.4g}" for weight in method.theta)
     how = f", tolerance {method.tolerance:.4g}" if method.own_steps else f" ({weights}), {method.iteration}"
     shares = ", ".join(f"{kind} {count / max(work.steps, 1):.1%}" for kind, count in work.evaluators.items())
-    nodes = f", {report.system.nodes} nodes" if "midpoint" in work.evaluators else ""
+    on_nodes = any(EVALUATORS[kind].needs_nodes for kind in work.evaluators)
+    nodes = f", {report.system.nodes} nodes" if on_nodes else ""
     step = "" if report.check.step is None else f" of {report.check.step:.4g} s"
     error = abs(numbers["energy"]["relative_closing_error"])
     rows = [

@@ -20,7 +20,7 @@ def steps_and_seconds(system: System) -> tuple[int, float]:
     method, waves = system.method, 1.0 + len(system.wheel.g) ** 2 / 20.0
     if not method.own_steps:
         each = _STEP_SECONDS * waves
-        if system.evaluator == "exact" or system.nodes:
+        if system.finds_patches or system.nodes:
             each = _STEP_SECONDS + _EVALUATIONS * evaluation_seconds(system)
         return system.steps, system.steps * each
     c, alone = system.coefficients, method.step is not None
@@ -29,7 +29,7 @@ def steps_and_seconds(system: System) -> tuple[int, float]:
     rate += 8.0 * system.passing_frequency + 0.25 * (c.b_xx + c.b_yy) / c.m
     steps = 1 + int(min(system.sampled_duration * rate, 1e300))
     each = _OWN_STEP_SECONDS * waves
-    if system.evaluator == "exact":
+    if system.finds_patches:
         # Rough surfaces that the load presses together are seldom open in part.
         heights = float(np.abs(system.shoe.g).sum() + np.abs(system.wheel.g).sum())
         least_load = float(np.abs(system.load["value"]).min())
@@ -40,7 +40,7 @@ def steps_and_seconds(system: System) -> tuple[int, float]:
 
 def evaluation_seconds(system: System) -> float:
     """A rough guess at the time that one evaluation of a contact which is open in part takes."""
-    if system.evaluator == "exact":
+    if system.finds_patches:
         return _EXACT_SECONDS * (1.0 + 2.0 * system.half_length * system.most_turns)
     return system.nodes * (_NODE_SECONDS + _NODE_WAVE_SECONDS * len(system.wheel.g))
 

@@ -10,7 +10,7 @@ def modelled(motion: Motion) -> tuple[list[str], list[str]]:
     closed = work.evaluators.get("closed-form", 0)
     opened = sum(work.evaluators.values()) - closed
     rough = f"rough contact of {len(system.shoe.g)} + {len(system.wheel.g)} waves"
-    how = "exactly, patch by patch" if "exact" in work.evaluators else f"on {system.nodes} nodes"
+    how = "exactly, patch by patch" if system.finds_patches else f"on {system.nodes} nodes"
     friction = "its changes located in time" if system.method.own_steps else "solved for in every step"
     used = {
         "flat contact in closed form": smooth,

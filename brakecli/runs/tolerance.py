@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from brakecli.runs.cost import evaluation_seconds
+from brakecli.solver.contact import EVALUATORS
 from brakecli.solver.contact.pad import default_nodes
 from brakecli.solver.motion import Motion, Progress, solve
 from brakecli.solver.quantities import HISTORY
@@ -189,7 +190,7 @@ def _by_steps(
     before: Motion | None = None
     last, seconds = math.inf, 0.0
     for rung in range(MOST_RUNGS):
-        finer = 0 if method.evaluator == "exact" else nodes * 2**rung
+        finer = nodes * 2**rung if EVALUATORS[method.evaluator].needs_nodes else 0
         run = _run(system, progress, step=step / 2**rung, nodes=finer)
         spent = run.work.solve_seconds
         run.work.solve_seconds = seconds = seconds + spent

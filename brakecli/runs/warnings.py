@@ -116,10 +116,11 @@ def _of_the_scheme(system: System, limits: StepLimits, steps: int) -> Iterator[s
         )
     taken = 0.0 if method.own_steps else _taken(system, steps)
     if taken > _TAKEN:
+        weights = list(method.row.theta)
+        remedy = f"take theta = {weights}" if weights else "take another scheme, or a shorter step"
         yield (
             f"solver.theta: with these weights the scheme itself damps, it takes {100.0 * taken:.3g} % of the "
-            "fastest motion away by the end of the run, and its errors are of first order; take theta = "
-            f"{list(method.row.theta)}"
+            f"fastest motion away by the end of the run, and its errors are of first order; {remedy}"
         )
 
 

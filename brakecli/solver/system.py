@@ -65,6 +65,11 @@ class System:
         return "closed-form" if self.smooth else "exact" if self.method.own_steps else "auto"
 
     @property
+    def finds_patches(self) -> bool:
+        """Whether the contact evaluator seeks the edges of every patch that touches."""
+        return contact.EVALUATORS[self.evaluator].finds_patches
+
+    @property
     def nodes(self) -> int:
         """Quadrature nodes; 0 where no quadrature can be needed."""
         if not contact.EVALUATORS[self.evaluator].needs_nodes:

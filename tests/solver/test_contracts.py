@@ -160,7 +160,7 @@ def test_a_scheme_s_kernels_pose_a_definite_problem_and_take_its_solution(name: 
     scheme: Any = schemes.load(name.replace("_", "-"))
     checked = 0
     for theta in weights_of(name):
-        weights = Weights(1e-5, *(*theta, 0.0)[:3])
+        weights = Weights(1e-5, *(*theta, 0.0, 0.0, 0.0)[:3])
         state, problem, work = new(scheme.STATE), new(PROBLEM), new(WORK)
         scheme.begin(weights, state, *START)
         for field in PROBLEM.names or ():

@@ -9,6 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from brakecli.cli.app import app
+from brakecli.errors import CaseError
 from brakecli.solver.contact import EVALUATORS, Evaluator
 from brakecli.solver.schemes import SCHEMES, Scheme, Trial
 from tests.commands import TINY
@@ -59,6 +60,16 @@ def test_the_small_ones_agree_with_those_of_the_solver(case: str) -> None:
     same = make(SQUEAL, solver__theta=(1.0, 1.0))  # two-layer with these weights is backward Euler
     one, other = simulate(own).rows[:, :6], simulate(same).rows[:, :6]
     np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-9 * np.abs(other).max(axis=0).max())
+
+
+def test_an_evaluator_on_nodes_is_not_taken_where_a_tolerance_chooses_nodes_itself(
+    case: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(EVALUATORS, "spring", Evaluator(f"{HERE}.small_evaluator", needs_nodes=True))
+    overrides = ("--set", "solver={tolerance=1e-3, duration=0.02}", "--set", 'contact.evaluator="spring"')
+    done = CliRunner().invoke(app, ["check", case, *overrides])
+    assert isinstance(done.exception, CaseError)
+    assert "a tolerance chooses nodes itself" in str(done.exception)
 
 
 def test_a_scheme_that_has_no_row_is_refused_with_those_that_have_one(case: str) -> None:

@@ -15,22 +15,23 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Evaluator:
-    """What a way of computing the contact states of itself; `needs_nodes`: it takes quadrature nodes."""
+    """What a way of computing the contact states of itself.
+
+    `needs_nodes`: it takes quadrature nodes. `finds_patches`: it seeks the edges of every patch that touches.
+    """
 
     module: str
     needs_nodes: bool = False
+    finds_patches: bool = False
 
 
 EVALUATORS: dict[str, Evaluator] = {
     "auto": Evaluator("brakecli.solver.contact.auto", needs_nodes=True),
     "closed-form": Evaluator("brakecli.solver.contact.closed_form"),
     "midpoint": Evaluator("brakecli.solver.contact.midpoint", needs_nodes=True),
-    "exact": Evaluator("brakecli.solver.contact.exact"),
+    "exact": Evaluator("brakecli.solver.contact.exact", finds_patches=True),
 }
 """`auto` hands over to the others."""
-
-CLOSED_FORM, MIDPOINT, EXACT = range(3)
-"""Places in `kinds()`."""
 MOST_KINDS = 8
 """How many of `kinds()` a run has counters for."""
 
@@ -38,6 +39,9 @@ MOST_KINDS = 8
 def kinds() -> tuple[str, ...]:
     """The evaluators that do the work, in the order of the kinds that they note."""
     return tuple(name for name in EVALUATORS if name != "auto")
+
+
+CLOSED_FORM, MIDPOINT, EXACT = (kinds().index(name) for name in ("closed-form", "midpoint", "exact"))
 
 
 def load(name: str) -> Any:
