@@ -81,8 +81,9 @@ def _changed(thresholds: type[Any], changes: list[str] | None) -> Any:
             nearest = difflib.get_close_matches(name, names, 1)
             remedy = f"did you mean {nearest[0]}?" if nearest else f"give one of {', '.join(names)}"
             raise UsageError(f"--threshold {change}: there is no threshold {name}; {remedy}")
+        found[name] = math.nan
         with suppress(ValueError):
             found[name] = float(text)
-        if not 0.0 <= found.get(name, math.nan) < math.inf:
+        if not 0.0 <= found[name] < math.inf:
             raise UsageError(f"--threshold {change}: is not a number from 0 on; write {name}=NUMBER")
     return thresholds(**found)

@@ -35,7 +35,7 @@ def command(
     from brakecli.cli.tables import sweep_table
     from brakecli.runs.run import load_kernels
     from brakecli.sweeps.cost import Estimate
-    from brakecli.sweeps.driver import choose_engine, sweep
+    from brakecli.sweeps.driver import choose_engine, keeping_points, sweep
 
     load_kernels(loaded.base)
     with progress(quiet) as show_progress:
@@ -48,7 +48,7 @@ def command(
             what = f"points, {failed} failed" if failed else "points"
             show_progress(what, done, loaded.plan.passes * loaded.plan.points)
 
-        with choose_engine(loaded.plan, jobs, scheduler, scheduler_file) as engine:
+        with keeping_points(target), choose_engine(loaded.plan, jobs, scheduler, scheduler_file) as engine:
             report = sweep(loaded, target, engine, force=force, task_size=task_size, begin=begin, progress=advance)
     found = report.findings
     warn(*report.notes)

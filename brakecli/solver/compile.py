@@ -26,9 +26,9 @@ config: Any = numba_config  # its settings come from the environment, so type ch
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-def source_hash() -> str:
+def source_hash(folder: Path = Path(__file__).parent) -> str:
     """Hash of the sources of the solver: otherwise a cached caller would keep the old code of an edited helper."""
-    sources = b"".join(path.read_bytes() for path in sorted(Path(__file__).parent.rglob("*.py")))
+    sources = b"".join(path.read_bytes() for path in sorted(folder.rglob("*.py")))
     return hashlib.sha256(sources).hexdigest()[:16]
 
 

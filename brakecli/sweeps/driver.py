@@ -103,11 +103,9 @@ def sweep(
     """
     plan, start = loaded.plan, time.perf_counter()
     found = estimate(plan, engine.workers)
-    target = Path(os.path.realpath(output))
-    partial_file = target.with_name(f"{target.name}.partial")
-    with _keeping(partial_file), new_result(output, force=force) as result:
+    with new_result(output, force=force) as result:
         refuse_sweep(found, free_bytes(output.resolve().parent))
-        with open_journal(partial_file, plan, force=force) as journal:
+        with open_journal(journal_path(output), plan, force=force) as journal:
             resumed = int(journal.finished.sum()) * plan.unit_length
             begin(found, resumed)
             notes = _compute(engine, journal, TaskQueue(journal.finished, task_size, order), progress)
@@ -119,13 +117,19 @@ def sweep(
     return report
 
 
+def journal_path(output: Path) -> Path:
+    """Where the finished points of a sweep are kept until its result is written."""
+    target = Path(os.path.realpath(output))
+    return target.with_name(f"{target.name}.partial")
+
+
 @contextmanager
-def _keeping(journal: Path) -> Iterator[None]:
-    """Add to the message on what could not be written that the finished points are kept, if they are."""
+def keeping_points(output: Path) -> Iterator[None]:
+    """Add to the message on an interruption, or on a failed write, that finished points are kept, if they are."""
     try:
         yield
     except (CannotWriteError, Interrupted) as error:
-        if os.path.lexists(journal):
+        if os.path.lexists(journal_path(output)):
             kept = "finished points are kept, and the same command goes on with them"
             if isinstance(error, CannotWriteError):
                 raise CannotWriteError(f"{error}; {kept}") from error

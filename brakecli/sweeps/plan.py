@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any
 
-import numpy as np
 import tomli_w
 from pydantic import ValidationError
 
@@ -79,7 +78,11 @@ class Plan:
 
     def places(self, point: int) -> tuple[int, ...]:
         """Where a point lies along each axis; points are counted with the last axis fastest."""
-        return tuple(map(int, np.unravel_index(point, self.shape)))
+        places = []
+        for size in reversed(self.shape):
+            point, place = divmod(point, size)
+            places.append(place)
+        return tuple(reversed(places))
 
     def settings(self, point: int) -> dict[tuple[str, ...], Any]:
         """What the axes set at a point."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from brakecli.analysis.regime.rules import Context, Excitation, Regime, classify, forced_lines
+from brakecli.analysis.regime.rules import Context, Excitation, Regime, Thresholds, classify, forced_lines
 from brakecli.solver.history import History
 from tests.analysis.histories import INTERVAL, history_of, verdict_of
 from tests.examples import COULOMB, ROUGH, SQUEAL, make
@@ -152,6 +152,13 @@ def test_too_few_cycles_and_too_coarse_samples_are_undecided() -> None:
     assert "cycles" in slow.reasons[0]
     assert "samples a cycle" in coarse.reasons[0]
     assert slow.regime is coarse.regime is Regime.UNDECIDED
+
+
+def test_a_motion_without_a_cycle_is_undecided_whatever_the_thresholds() -> None:
+    lenient = Thresholds(fewest_cycles=0.0, settled_within=1e9, reach_within=1e9, decayed_to=0.0)
+    verdict = classify(made(np.sin(np.pi * TIME / TIME[-1])), Context(1.0), lenient)
+    assert verdict.regime is Regime.UNDECIDED
+    assert "only 0 cycles" in verdict.reasons[0]
 
 
 def test_a_changing_wheel_speed_is_undecided() -> None:

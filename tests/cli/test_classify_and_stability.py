@@ -46,18 +46,20 @@ def test_classify_repeats_the_verdict_of_the_run(here: Path) -> None:
 
 
 def test_thresholds_are_options_and_are_reported(here: Path) -> None:
-    strict, wrong, bad = each(
+    strict, wrong, bad, again = each(
         here,
         [
             ["classify", "run.h5", "--threshold", "fewest_cycles=1e6", "--json"],
             ["classify", "run.h5", "--threshold", "fewest_cycle=3"],
             ["classify", "run.h5", "--threshold", "fewest_cycles=-1"],
+            ["classify", "run.h5", "--threshold", "fewest_cycles=1", "--threshold", "fewest_cycles=few"],
         ],
     )
     assert strict.json["regime"] == "undecided"
     assert strict.json["thresholds"]["fewest_cycles"] == 1e6
     wrong.told(2, "did you mean fewest_cycles")
     bad.told(2, "is not a number from 0 on")
+    again.told(2, "fewest_cycles=few: is not a number from 0 on")
 
 
 def test_a_measured_signal_is_classified(here: Path) -> None:

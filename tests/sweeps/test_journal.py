@@ -10,9 +10,10 @@ import pytest
 
 from brakecli import SAME_NUMBERS_AS, __version__
 from brakecli.errors import RefusedError
+from brakecli.solver.compile import source_hash
 from brakecli.sweeps.file import LoadedSweep, read_sweep
-from brakecli.sweeps.workers.task import compute_units
-from tests.commands import left_in, run
+from brakecli.sweeps.workers.task import compute_units, fingerprint
+from tests.commands import ROOT, left_in, run
 from tests.sweeps.helpers import frictions, inline, interrupted, write_sweep
 
 pytestmark = pytest.mark.usefixtures("compiled")
@@ -141,3 +142,11 @@ def test_damaged_records_of_a_journal_are_computed_again(tmp_path: Path) -> None
         assert (tmp_path / "s.h5").read_bytes() == (tmp_path / "expected.h5").read_bytes()
         (tmp_path / "s.h5").unlink()
     assert set(resumed) == {0, 1, 2, 3}
+
+
+def test_a_change_of_any_source_is_a_change_of_the_sweep(tmp_path: Path) -> None:
+    assert fingerprint()["brakecli_sources"] == source_hash(ROOT / "brakecli")
+    (tmp_path / "rules.py").write_text("LIMIT = 1\n")
+    before = source_hash(tmp_path)
+    (tmp_path / "rules.py").write_text("LIMIT = 2\n")
+    assert source_hash(tmp_path) != before

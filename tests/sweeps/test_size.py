@@ -35,6 +35,12 @@ def test_a_sweep_of_a_billion_points_is_refused_at_once_with_its_size(tmp_path: 
     assert left_in(tmp_path) == {"tiny.toml", "s.toml"}
 
 
+def test_a_sweep_of_more_points_than_an_integer_of_64_bits_holds_is_refused_too(tmp_path: Path) -> None:
+    names = ("friction.coefficient", "link2.angle_deg", "shoe.mass")
+    write_sweep(tmp_path, *(axis(name, "start = 0.1", "stop = 1.0", "num = 10000000") for name in names))
+    brakecli("check", "s.toml", cwd=tmp_path).told(3, "the sweep is too large: 1000000000000000000000 points")
+
+
 def memory_of(folder: Path, points: int, compute: str) -> dict[str, Any]:
     """The largest memory of a sweep of the shortest runs, in bytes, of its parent and of its workers."""
     shortest = TINY.replace("step = 1e-5, duration = 0.02", "step = 1e-4, duration = 1e-4")

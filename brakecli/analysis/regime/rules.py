@@ -166,7 +166,7 @@ class _Rules:
         found = cycles_of(self.settled_part)
         self.evidence |= found
         cycles = found.get("cycles", 0.0)
-        if cycles < self.limits.fewest_cycles:
+        if not found or cycles < self.limits.fewest_cycles:
             return Decision(f"only {cycles:.0f} cycles in the settled part; run longer")
         period, stick, harmonic = found["samples_per_cycle"], found["stick_cycles"], found["harmonic_share"]
         if period < self.limits.samples_per_cycle:

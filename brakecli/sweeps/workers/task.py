@@ -13,6 +13,7 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple, Self
 
+import brakecli
 from brakecli import __version__
 from brakecli.sweeps.plan import Plan
 
@@ -105,4 +106,8 @@ def fingerprint() -> Mapping[str, str]:
     from brakecli.runs.run import versions
     from brakecli.solver.compile import source_hash
 
-    return {"brakecli_version": __version__, "brakecli_sources": source_hash(), **versions()}
+    return {
+        "brakecli_version": __version__,
+        "brakecli_sources": source_hash(Path(brakecli.__file__).parent),
+        **versions(),
+    }
