@@ -119,8 +119,7 @@ def sweep(
 
 def journal_path(output: Path) -> Path:
     """Where the finished points of a sweep are kept until its result is written."""
-    target = Path(os.path.realpath(output))
-    return target.with_name(f"{target.name}.partial")
+    return Path(f"{os.path.realpath(output)}.partial")
 
 
 @contextmanager
