@@ -137,9 +137,7 @@ def main() -> None:
             f"{np.median(ratios):.2g} | {np.median([row[5] for row in rows]):.2g} |"
         )
     print()
-    print(
-        "| kind | certified | kept, of those | worst true error / tolerance | largest estimate below the truth |"
-    )
+    print("| kind | certified | kept, of those | worst true error / tolerance | largest true error / estimate |")
     print("|---|---|---|---|---|")
     for kind in KINDS:
         rows = [row for row in found if row[0] == kind]
