@@ -87,7 +87,7 @@ def disturbed(values: Array, per_cycle: int, kind: str, seed: int = 9) -> Array:
             values += size * (8.0 * time + 4.0 * np.sin(5.0 * time))
         case "offset":
             values += 100.0 * size
-        case "turned round":
+        case "sign reversed":
             values = -values
         case "short gaps":
             for place in places:
@@ -141,16 +141,16 @@ def _short_stick(stick: float, decibels: float, belt_speed: float | None) -> str
 
 def main() -> None:
     """Print the tables."""
-    lines = ["| samples a cycle, cycles, signal to noise | right | undecided | wrong |", "|---|---|---|---|"]
+    lines = ["| samples per cycle, cycles, signal to noise | right | undecided | wrong |", "|---|---|---|---|"]
     rows = [(per_cycle, 100, decibels) for per_cycle in (10, 20, 50, 200, 1000) for decibels in (40, 20, 10)]
     rows += [(50, 100, decibels) for decibels in (5, 3, 0, -3)] + [(50, cycles, 20) for cycles in (50, 30, 20, 12)]
     lines += [_row(f"{row[0]}, {row[1]}, {row[2]} dB", tally(*row)) for row in rows]
     lines += [
         "",
-        "| disturbance (50 a cycle, 20 dB): 100 cycles | right | undecided | wrong |",
+        "| disturbance (50 samples per cycle, 20 dB): 100 cycles | right | undecided | wrong |",
         "|---|---|---|---|",
     ]
-    kinds = ("spikes", "drift", "offset", "turned round", "short gaps", "long gap", "jump")
+    kinds = ("spikes", "drift", "offset", "sign reversed", "short gaps", "long gap", "jump")
     lines += [_row(kind, tally(50, 100, 20, kind)) for kind in kinds]
     lines += ["| **30 cycles** | | | |", *(_row(kind, tally(50, 30, 20, kind)) for kind in kinds)]
     lines += [

@@ -38,7 +38,7 @@ def test_no_motion_is_mistaken_for_another(per_cycle: int, quantity: Measurand) 
     assert checked == 69
 
 
-@pytest.mark.parametrize("kind", ["spikes", "drift", "offset", "turned round", "short gaps", "long gap"])
+@pytest.mark.parametrize("kind", ["spikes", "drift", "offset", "sign reversed", "short gaps", "long gap"])
 @pytest.mark.parametrize("quantity", [Measurand.DISPLACEMENT, Measurand.VELOCITY])
 def test_disturbances_do_not_change_the_regime(kind: str, quantity: Measurand) -> None:
     checked = 0
