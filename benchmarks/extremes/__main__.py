@@ -39,26 +39,26 @@ PAGE = Path(__file__).parents[2] / "docs" / "extremes.md"
 INTRODUCTION = """# The extremes
 
 `make extremes` writes this page; all its numbers come from [benchmarks/extremes](../benchmarks/extremes).
-One thing at a time is taken far beyond what any brake has, in both directions, from a shoe that sticks, slips
-and vibrates on a smooth wheel, or on a rough one whose pad opens in part. Each scheme computes each point from
-rest, over {periods:g} periods of the fastest motion with {steps} steps a period (but where the step is what is
-varied), the event-driven scheme to a certified tolerance of {event:g}, as `brakecli run` does. What comes of a
-run is one of these:
+One quantity at a time is varied far beyond the range of any brake, in both directions. The base case is a shoe
+that sticks, slips and vibrates on a smooth wheel, or one on a rough wheel whose pad opens in part. Each scheme
+computes each point from rest, over {periods:g} periods of the fastest motion with {steps} steps per period, except
+where the step is varied. The event-driven scheme runs to a certified tolerance of {event:g}, as in
+`brakecli run`. The outcome of a run is one of these:
 
-- **right**: x, y, ẋ and ẏ are off by less than a bound, relative to the largest value of each. The truth is
-  the event-driven scheme at {truth:g}. With ω of the fastest motion, r the rate of overcritical dashpots, p the
+- **right**: the errors of x, y, ẋ and ẏ, relative to the largest value of each, are below a bound. The reference
+  is the event-driven scheme at {truth:g}. With ω of the fastest motion, r the rate of overcritical dashpots, p the
   order of the scheme, T the duration, σ the growth rate of the motion and n the nodes per wave, the bound is
-  [2(ωh)^p ωT + 2(rh)^p + 2/n² + j] e^(σT), where n counts as at least {coarsest:g}; j is what the largest jump of
-  friction changes ẋ by in one step, as steps of fixed length do not know when in a step friction jumps. The
-  bound of the event-driven scheme is its tolerance itself. Beyond {most:g} nothing is right.
-- **warned**: it is off by more, and a warning of `brakecli check` or of the run names the key and the number
-  that make it so.
-- **refused**: `brakecli run` refuses it in a sentence.
+  [2(ωh)^p ωT + 2(rh)^p + 2/n² + j] e^(σT), where n counts as at least {coarsest:g}. The term j is the change of ẋ
+  in one step by the largest jump of friction, because steps of fixed length do not know when in a step friction
+  jumps. The bound of the event-driven scheme is its tolerance. No error above {most:g} is right.
+- **warned**: the error exceeds the bound, and a warning of `brakecli check` or of the run names the key and the
+  number that cause this.
+- **refused**: `brakecli run` refuses the case and says why.
 - **failed by name**: the run ends with a failure that has a name and a remedy.
-- **silently wrong**: off by more than the bound, and nothing says so. There must be none.
+- **silently wrong**: the error exceeds the bound, and no message says so. There must be none.
 
-The bound is that of a few periods. The phase of an undamped vibration goes on drifting at the same rate: with
-(ωh)²/12 in each radian at weights of one half, a run of thousands of periods needs more steps in each, or
+The bound applies to a few periods. The phase error of an undamped vibration continues to grow at the same rate,
+(ωh)²/12 per radian at weights of one half. So a run of thousands of periods needs more steps per period, or
 `solver.tolerance` in place of `solver.step`.
 """
 
@@ -107,18 +107,18 @@ def outcomes_text(points: Sequence[Point]) -> str:
 
 {table(["scheme", *KINDS], counts)}
 
-Points that are right, and the largest error of those:
+The table gives the number of points that are right, and their largest error:
 
 {table(["varied", "range", "unit", *(scheme.text for scheme in SCHEMES)], ranges)}
 
-At {len(held)} of the {len(points)} points the shoe slides one way in full contact, and the motion is linear:
-there the reference itself is within {held[-1]:.0e} of the matrix exponential, at half of them within
+At {len(held)} of the {len(points)} points the shoe slides one way in full contact, and the motion is linear.
+There the reference differs from the matrix exponential by at most {held[-1]:.0e}, at half of them by at most
 {held[len(held) // 2]:.0e}.
 Points without a reference: {without}.
 
-Every run that is not right, with what is said at the first of its values:
+These are all runs that are not right, with the message at the first of the values:
 
-{table(["varied", "scheme", "values", "outcome", "error", "what is said"], others)}
+{table(["varied", "scheme", "values", "outcome", "error", "message"], others)}
 """
 
 
@@ -143,17 +143,17 @@ def together_text() -> str:
     told = "\n".join(wrong) or "None is silently wrong."
     return f"""## Several at a time
 
-{POINTS} points on smooth surfaces, drawn with a fixed seed: three quantities of these, in SI units and evenly in
-their logarithms, and each angle anywhere in a third of the points.
+{POINTS} points on smooth surfaces are drawn with a fixed seed. At each, three of these quantities are drawn, in SI
+units and evenly in their logarithms. Each of the two angles is drawn at a third of the points.
 
 {ranges}
 
-The bound above is for one thing at a time. Here right is what is off by at most {MOST_ERROR:g}, or by the
-tolerance of the event-driven scheme.
+The bound above applies to one quantity at a time. Here a run is right if its error is at most {MOST_ERROR:g}, or,
+with the event-driven scheme, at most its tolerance.
 
 {table(["scheme", *KINDS, "median error of right ones", "largest"], rows)}
 
-Silently wrong, each by what it changes in the base case:
+These points are silently wrong, with their changes of the base case:
 
 {told}
 """
@@ -182,9 +182,10 @@ def limits_text() -> str:
         rows.append([name, *cells])
     return f"""## Limits of stability
 
-The largest stable step times ω of the fastest motion on the springs, without friction: as `brakecli stability`
-predicts it, and as observed: runs of {LIMIT_STEPS} steps from a small disturbance, by halves. "none": not up to
-{MOST_LIMIT:g}. The event-driven scheme has no limit, its steps are its own.
+The table gives the largest stable step times ω of the fastest motion on the springs, without friction. The first
+value is the prediction of `brakecli stability`. The second one is observed in runs of {LIMIT_STEPS} steps from a
+small disturbance, by bisection. "none" means no limit up to {MOST_LIMIT:g}. The event-driven scheme finds its
+steps itself and has no limit.
 
 {table(["shoe", *(scheme.text for scheme in LIMITED)], rows)}
 """
@@ -195,11 +196,11 @@ def drift_text() -> str:
     rows = [[scheme.text, *(f"{drift(scheme, count):.1e}" for count in (10, 100))] for scheme in SCHEMES]
     return f"""## Drift of energy
 
-Free vibration in full contact without dashpots and friction: the relative change of its energy over as many
-periods as {DRIFT_STEPS} steps make, at 10 and at 100 steps a period. The event-driven scheme does the same
-periods, in one run to {EVENT_TOLERANCE:g}. The weights (1, 1) take all of it, which `brakecli check` says.
+The table gives the relative change of the energy of a free vibration in full contact, without dashpots and
+friction, over {DRIFT_STEPS} steps with 10 and with 100 steps per period. The event-driven scheme computes the
+same periods in one run to {EVENT_TOLERANCE:g}. The weights (1, 1) take all of it; `brakecli check` warns of this.
 
-{table(["scheme", "10 steps a period", "100 steps a period"], rows)}
+{table(["scheme", "10 steps per period", "100 steps per period"], rows)}
 """
 
 
@@ -208,10 +209,11 @@ def hours_text() -> str:
     rows = [[scheme.text, f"{hours(scheme):.0e}"] for scheme in SCHEMES]
     return f"""## Hours of motion
 
-A heavy shoe on a rough wheel for {HOURS:g} s, against a run of {SETTLING:g} s whose wheel starts with the phases
-that the long run's has {SETTLING:g} s before its end, computed in fractions. Both have settled: the last 10 s of
-both are compared, by the largest difference relative to the range that each quantity has there. It is rounding,
-or, for the event-driven scheme, what one run to {EVENT_TOLERANCE:g} of the largest values leaves.
+A run of a heavy shoe on a rough wheel over {HOURS:g} s is compared with a run over {SETTLING:g} s. The wheel of
+the short run starts with the phases that the wheel of the long run has {SETTLING:g} s before its end; they are
+computed in fractions. Both motions have settled. The table gives the largest difference in their last 10 s,
+relative to the range of each quantity there. It is rounding or, with the event-driven scheme, the error of one run
+to {EVENT_TOLERANCE:g}.
 
 {table(["scheme", "difference"], rows)}
 """
