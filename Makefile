@@ -126,7 +126,7 @@ promises: $(DEV_STAMP) ## random cases at five tolerances: the tables of docs/ac
 bench-sweep: $(DEV_STAMP) ## what a sweep costs beside its points; needs two idle cores (some minutes)
 	$(BIN)/python -m benchmarks.sweep
 
-extremes: $(DEV_STAMP) ## go through the extremes of everything and write docs/extremes.md (a minute)
+extremes: $(DEV_STAMP) ## compute the extremes of all inputs and write docs/extremes.md (a minute)
 	$(BIN)/python -m benchmarks.extremes
 
 check: lint types imports derivations cases test ## all that must hold before a change is handed in
