@@ -60,6 +60,5 @@ def command(
         where = ", ".join(f"{key} = {value}" for key, value in failure["parameters"].items())
         say(f"point {failure['point']}{f' ({where})' if where else ''}: {failure['reason']}")
     if found.failed:
-        raise BrakecliError(
-            f"{report.output}: {found.failed} of {found.points} points failed; all others were written"
-        )
+        failed = f"{found.failed} of {found.points} points failed"
+        raise BrakecliError(f"{report.output}: {failed}; all others were written")

@@ -46,9 +46,8 @@ class Check:
 def check(system: System) -> Check:
     """Look at a case without stepping it."""
     own, fastest = system.method.own_steps, system.natural_frequencies[1]
-    waves = 2.0 * system.half_length * system.most_turns
+    waves, limits = 2.0 * system.half_length * system.most_turns, step_limits(system)
     steps, seconds = steps_and_seconds(system)
-    limits = step_limits(system)
     per_period = math.inf if own or not fastest > 0.0 else 1.0 / (fastest * system.step)
     per_wave = system.nodes / waves if system.nodes and waves > 0.0 else None
     return Check(
@@ -70,10 +69,8 @@ def check(system: System) -> Check:
 def refuse(found: Check, free_bytes: float = math.inf) -> None:
     """Raise RefusedError where a run would be too large, or unstable by its scheme."""
     system, growth = found.system, found.limits.growth
-    size = (
-        f"about {found.steps:.3g} steps, {duration_text(found.seconds)}, {found.memory / 1e6:.0f} MB of memory, "
-        f"a file of {found.file_size / 1e6:.3g} MB"
-    )
+    room = f"{found.memory / 1e6:.0f} MB of memory, a file of {found.file_size / 1e6:.3g} MB"
+    size = f"about {found.steps:.3g} steps, {duration_text(found.seconds)}, {room}"
     coarser = "solver.tolerance" if found.step is None else "solver.step"
     remedy = f"reduce solver.duration, or increase {coarser} or output.sample_interval"
     if found.steps > MOST_STEPS or found.seconds > MOST_SECONDS:
@@ -84,17 +81,15 @@ def refuse(found: Check, free_bytes: float = math.inf) -> None:
         raise RefusedError(f"the contact's tables would be too large: {size}; reduce contact.nodes")
     compared = 2.0 * 8.0 * len(HISTORY) * system.samples
     if system.method.step is None and compared > MOST_TABLE_BYTES:
-        raise RefusedError(
-            f"two histories of {system.samples:.3g} samples are compared to keep the tolerance, which takes "
-            f"{compared / 1e9:.3g} GB of memory; increase output.sample_interval, or give solver.step instead"
-        )
+        what = f"two histories of {system.samples:.3g} samples are compared to keep the tolerance, which takes"
+        instead = "increase output.sample_interval, or give solver.step instead"
+        raise RefusedError(f"{what} {compared / 1e9:.3g} GB of memory; {instead}")
     if _blows_up(growth, found.steps):
         longest = _longest_stable_step(system)
         shorter = f"take a solver.step of at most {longest:.2g} s" if longest else "reduce solver.step"
-        raise RefusedError(
-            f"solver.theta: at this step the scheme is unstable, it multiplies disturbances by {growth:.6g} in "
-            f"each of {found.steps} steps; {shorter}, {system.method.row.unstable}"
-        )
+        what = f"it multiplies disturbances by {growth:.6g} in each of {found.steps} steps"
+        remedy = f"{shorter}, {system.method.row.unstable}"
+        raise RefusedError(f"solver.theta: at this step the scheme is unstable, {what}; {remedy}")
 
 
 def _blows_up(growth: float, steps: float) -> bool:
@@ -129,7 +124,5 @@ def within_range() -> Iterator[None]:
         with np.errstate(over="raise", divide="raise", invalid="raise"):
             yield
     except (ArithmeticError, np.linalg.LinAlgError) as error:
-        raise RefusedError(
-            f"the numbers of the case are too large, too small or too far apart to compute with ({error}); look "
-            "for values in other units than m, kg, s and N"
-        ) from error
+        what = f"the numbers of the case are too large, too small or too far apart to compute with ({error})"
+        raise RefusedError(f"{what}; look for values in other units than m, kg, s and N") from error

@@ -58,6 +58,7 @@ class Context:
     quiet: float = 0.0  # m/s, size of vx that may come from rounding
     growth: Callable[[], float] = lambda: 0.0  # 1/s, of a small disturbance of steady sliding; 0 where it decays
     powers: Callable[[Part], dict[str, float]] = lambda part: {}  # W, what becomes of the power of the belt
+    radius: float = 1.0  # R, m
 
 
 class Decision(NamedTuple):
@@ -78,11 +79,13 @@ class Verdict:
     excitation: Excitation
     frequency: float | None  # Hz, fundamental of vx when sustained
     amplitude: float  # m, half of peak to peak of x
-    settled_from: int  # sample; the middle where no settled part was found
+    settled_from: float  # s; the middle where no settled part was found
+    start: int  # the sample there
     settled: bool  # whether a settled part was found
     stick_fraction: float
     contact_loss_fraction: float
     mean_friction_force: float  # N
+    braking_torque: float  # N m, its mean torque on the wheel's axis, R F_x
     reasons: tuple[str, ...]
     evidence: dict[str, Any]
     thresholds: Thresholds
@@ -186,7 +189,7 @@ def classify(history: History, context: Context, thresholds: Thresholds = Thresh
     """The regime of a run's history, by the rules of docs/regimes.md; the first that applies decides."""
     rules = _Rules(history, context, thresholds)
     decision = rules.contact() or rules.unmoved() or rules.forced() or rules.trend() or rules.sustained()
-    part, belt = rules.settled_part, context.belt_speed
+    part, belt, friction = rules.settled_part, context.belt_speed, rules.settled_part.mean("friction_force")
     evidence = rules.evidence | {f"amplitude_{name}": part.amplitude(name) for name in ("y", "vx", "vy")}
     if belt != 0.0:
         evidence["largest_vx_over_belt_speed"] = part.extremes("vx")[int(belt > 0.0)] / belt
@@ -196,11 +199,13 @@ def classify(history: History, context: Context, thresholds: Thresholds = Thresh
         excitation=decision.excitation,
         frequency=decision.frequency,
         amplitude=part.amplitude("x"),
-        settled_from=part.start,
+        settled_from=part.start * history.interval,
+        start=part.start,
         settled=rules.settled,
         stick_fraction=part.fraction(ContactState.STICK),
         contact_loss_fraction=part.fraction(ContactState.SEPARATED),
-        mean_friction_force=part.mean("friction_force"),
+        mean_friction_force=friction,
+        braking_torque=context.radius * friction,
         reasons=(decision.reason,),
         evidence=evidence,
         thresholds=thresholds,
