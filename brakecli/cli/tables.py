@@ -93,10 +93,9 @@ def check_table(title: str, found: Check) -> str:
     system, limits, has_step = found.system, found.limits, found.step is not None
     (low, high), (link_low, link_high) = system.natural_frequencies, found.link_frequencies
     growth = f"multiplies a frictionless disturbance by at most {limits.growth:.8g} a step"
-    rows: list[Row] = []
-    for each, value in zip(COEFFICIENTS.values(), system.coefficients, strict=True):
-        rows.append((f"{each.symbol}, {each.long_name}", _text(value, each.units.removeprefix("1"))))
-    rows += [
+    coefficients = zip(COEFFICIENTS.values(), system.coefficients, strict=True)
+    rows = [
+        *((f"{c.symbol}, {c.long_name}", _text(value, c.units.removeprefix("1"))) for c, value in coefficients),
         ("surface speed U", _text(system.belt_speed, "m/s")),
         ("contact stiffness 2ak", _text(system.contact_stiffness, "N/m")),
         ("natural frequencies", f"{low:.5g} and {high:.5g} Hz in full contact"),
@@ -159,12 +158,9 @@ def stability_table(title: str, report: StabilityReport, key: str, entries: Sequ
             ("its critical friction", "none" if friction is None else f"{friction:.7g}{bias}"),
             ("its stable steps", "any" if limit is None else f"up to {limit:.4g} s" if limit else "none"),
         ]
-    if not key:
-        return _table(title, rows)
-    columns = {key: [_text(each["value"]) for each in entries]}
-    for field in fields.VARIED:
-        columns[field.title] = [_text(each[field.name]) for each in entries]
-    return _table(title, rows) + "\n\n" + _grid(columns)
+    columns = {key: "value"} | {field.title: field.name for field in fields.VARIED}
+    varied = {title: [_text(each[name]) for each in entries] for title, name in columns.items()}
+    return _table(title, rows) + ("\n\n" + _grid(varied) if key else "")
 
 
 def _crossing(crossing: Crossing) -> str:
@@ -226,10 +222,8 @@ def comparison_table(report: ComparisonReport) -> str:
     failed = [entry for entry in found.entries if entry.work is not None and entry.errors is None]
     recommended = [f"none meets {report.target:g}"]
     if best is not None:
-        finer = found.finer_error(best)
-        margin = f"error {best.error:.2g}, {report.margin:.3g} times below {report.target:g}"
-        recommended = [f"{best}: {margin}"]
-        if finer > report.target:
+        recommended = [f"{best}: error {best.error:.2g}, {report.margin:.3g} times below {report.target:g}"]
+        if (finer := found.finer_error(best)) > report.target:
             recommended.append(f"by chance: at a finer step its error is {finer:.2g}; choose one with more margin")
     left_out = f"{found.left_out} entries, for want of time: give a larger --budget"
     rows = [
@@ -270,8 +264,7 @@ def _table(title: str, rows: Sequence[Row]) -> str:
     """Rows in two columns."""
     lines = [(label, text) for label, texts in rows for text in ([texts] if isinstance(texts, str) else texts)]
     labels, values = zip(*lines, strict=True)
-    style = {"title": title or None, "title_justify": "left", "show_header": False}
-    return _grid({"label": labels, "value": values}, **style)
+    return _grid({"label": labels, "value": values}, title=title or None, title_justify="left", show_header=False)
 
 
 def _grid(columns: Mapping[str, Sequence[str]], **style: Any) -> str:

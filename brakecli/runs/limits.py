@@ -3,7 +3,7 @@
 import math
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -111,10 +111,9 @@ def _longest_stable_step(system: System) -> float | None:
 
 def free_bytes(directory: Path) -> float:
     """What is free on the disk of a directory; infinite where that is not known."""
-    try:
+    with suppress(OSError):
         return float(shutil.disk_usage(directory).free)
-    except OSError:
-        return math.inf
+    return math.inf
 
 
 @contextmanager

@@ -1,6 +1,7 @@
 """The regime of the run in a result file, found from its history: what `brakecli classify RESULT.h5` does."""
 
 import math
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -52,13 +53,11 @@ def context(system: System) -> Context:
     belt, c = float(value_at(system.belt, system.sampled_duration)), system.coefficients
     compression = float(np.abs(system.load["value"]).max()) / (c.c_yy + system.contact_stiffness)
 
-    def growth_rate() -> float:
-        """By the mean stiffness of the contact."""
-        try:
-            rest = steady_sliding(system, belt=belt)
-        except CaseError:
-            return 0.0
-        return max(growth(c, rest.stiffness, math.copysign(c.phi, belt)), 0.0)
+    def growth_rate() -> float:  # by the mean stiffness of the contact
+        with suppress(CaseError):
+            stiffness = steady_sliding(system, belt=belt).stiffness
+            return max(growth(c, stiffness, math.copysign(c.phi, belt)), 0.0)
+        return 0.0
 
     return Context(
         belt,

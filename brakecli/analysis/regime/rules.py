@@ -122,7 +122,7 @@ class _Rules:
         if self.history.samples < FEWEST_SAMPLES:
             return Decision(f"fewer than {FEWEST_SAMPLES} samples; run longer")
         envelope = self.envelope = Envelope(self.history)
-        self.evidence |= envelope.evidence()
+        self.evidence |= envelope.evidence
         if not self.context.steady:
             return Decision("the wheel's speed or the load changes with time, so the motion cannot settle")
         if envelope.largest <= self.context.quiet:
@@ -143,10 +143,9 @@ class _Rules:
         if powers_of_e > _GROWN:
             return None  # the shoe's own vibration falls on the same lines
         if powers_of_e > _NOTHING:
-            return Decision(
-                f"{share:.0%} of the energy of vx lies on the lines of the roughness, but sliding is unstable: "
-                f"the shoe's own vibration grows at {growth:.3g} 1/s; run at least {_GROWN / growth:.2g} s"
-            )
+            what = f"{share:.0%} of the energy of vx lies on the lines of the roughness, but sliding is unstable"
+            own = f"the shoe's own vibration grows at {growth:.3g} 1/s"
+            return Decision(f"{what}: {own}; run at least {_GROWN / growth:.2g} s")
         text = f"only the roughness shakes the shoe: {share:.0%} of the energy of vx lies on its lines"
         return Decision(text, Regime.DAMPED, Excitation.FORCED)
 
