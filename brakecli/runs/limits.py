@@ -138,11 +138,9 @@ def _warnings(found: Check) -> Iterator[str]:
     nyquist, contact, waves = 0.5 / system.interval, system.natural_frequencies[1], system.passing_frequency
     for what, frequency in (("the contact resonance", contact), ("the shortest wave of the wheel", waves)):
         if frequency > nyquist:
-            above = f"lies above half the sampling rate ({nyquist:.4g} Hz)"
-            yield (
-                f"output.sample_interval: {what} at {frequency:.4g} Hz {above} and would appear at a wrong place "
-                f"in the spectra; sample every {0.4 / frequency:.2g} s or more often"
-            )
+            above = f"lies above half the sampling rate ({nyquist:.4g} Hz) and would appear at a wrong place"
+            remedy = f"sample every {0.4 / frequency:.2g} s or more often"
+            yield f"output.sample_interval: {what} at {frequency:.4g} Hz {above} in the spectra; {remedy}"
     if per_wave is not None and per_wave < _COARSE_NODES:
         remedy = f"take at least {math.ceil(system.nodes * _COARSE_NODES / per_wave)}, or leave nodes out"
         yield f"contact.nodes: {per_wave:.3g} nodes per shortest wavelength; {remedy}"
@@ -181,10 +179,8 @@ def _of_the_scheme(system: System, limits: StepLimits, steps: int) -> Iterator[s
         remedy = f'take "newton", or a step of at most {system.step / math.sqrt(limits.contraction):.2g} s'
         yield f"solver.iteration: the fixed-point iteration may diverge ({bound}); {remedy}"
     if not limits.unique:
-        yield (
-            "friction.coefficient: a step may have more than one solution, as friction can wedge the shoe into "
-            "the wheel within a step; reduce solver.step or the coefficient"
-        )
+        wedged = "friction can wedge the shoe into the wheel within a step; reduce solver.step or the coefficient"
+        yield f"friction.coefficient: a step may have more than one solution, as {wedged}"
     if limits.growth > 1.0 + max(UNSTABLE, 1e-3 / steps):
         what = f"the scheme itself multiplies disturbances by {limits.growth:.6g} in each step"
         yield f"solver.theta: {what}; reduce solver.step, {method.row.unstable}"
@@ -192,10 +188,9 @@ def _of_the_scheme(system: System, limits: StepLimits, steps: int) -> Iterator[s
     if taken > _TAKEN:
         weights = list(method.row.theta)
         remedy = f"take theta = {weights}" if weights else "take another scheme, or a shorter step"
-        yield (
-            f"solver.theta: with these weights the scheme itself damps, it takes {100.0 * taken:.3g} % of the "
-            f"fastest motion away by the end of the run, and its errors are of first order; {remedy}"
-        )
+        away = f"it takes {100.0 * taken:.3g} % of the fastest motion away by the end of the run"
+        what = f"the scheme itself damps, {away}, and its errors are of first order"
+        yield f"solver.theta: with these weights {what}; {remedy}"
 
 
 def _taken(system: System, steps: int) -> float:

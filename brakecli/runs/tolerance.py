@@ -28,27 +28,20 @@ MOST_RUNGS = 12
 STEPS_BETWEEN_KNOTS = 4  # of speed or load, at least: with fewer, no run sees what happens there
 WORTH_A_PILOT = 0.2  # guessed time (s) of the next run from which on it is weighed against event-driven runs
 PILOT = 32  # duration of the case over that of the event-driven pilot run, which counts the work of such runs
-EVEN_CHANCE = 0.5
-"""Guessed time of the next run over that of event-driven ones beyond which it is not begun: as likely as not it
-would not be the last one. Time is guessed from counted work, not measured, so that a case gives the same bytes
-wherever it runs.
-"""
+# Time is guessed from counted work, not measured, so that a case gives the same bytes wherever it runs.
+EVEN_CHANCE = 0.5  # beyond this part of the time of event-driven runs, a next run is likely not to be the last one
 MOST_SECONDS = 900.0  # time of the loop after which no finer run is begun
 ROUNDING = 1e-12  # least estimate: runs that share their rounding agree better than they are right
 
 
 @dataclass(frozen=True)
 class Certificate:
-    """How far the histories may be off, and how that is known.
-
-    `estimated_error`: relative to the largest value of each of x, y, vx and vy. `certified_until` (s): up to here
-    they keep the tolerance where they do not to the end.
-    """
+    """How far the histories may be off, and how that is known."""
 
     tolerance: float
     certified: bool
-    estimated_error: float
-    certified_until: float
+    estimated_error: float  # relative to the largest value of each of x, y, vx and vy
+    certified_until: float  # s; up to here they keep the tolerance where they do not to the end
     method: str
 
     def sentence(self) -> str:
@@ -120,9 +113,8 @@ def slower_than_events(system: System, progress: Progress) -> Callable[[float], 
         samples = max(1, system.samples // PILOT)
         part, tolerance = replace(system, duration=samples * system.interval), _first_event_tolerance(system)
         found = _run(part, lambda samples: progress(0), tolerance=tolerance)
-        if found.work.failed:
-            return math.inf
-        return float(_guessed_seconds(found) * system.samples / samples * (1.0 + EVENT_RATIO**-0.125))
+        seconds = _guessed_seconds(found) * system.samples / samples * (1.0 + EVENT_RATIO**-0.125)
+        return math.inf if found.work.failed else seconds
 
     return lambda seconds: seconds > WORTH_A_PILOT and seconds > EVEN_CHANCE * events()
 

@@ -107,10 +107,7 @@ class Part:
 
 
 class Envelope:
-    """A history in equal windows: standard deviation of vx (m/s), with its final and largest value.
-
-    `evidence` has both, and the slope of the logarithm of its last half (1/s), if any, with its error.
-    """
+    """Standard deviations of vx (m/s) in equal windows; `evidence`: the last, the largest and the slope (1/s)."""
 
     def __init__(self, history: History) -> None:
         """Take a history of at least `FEWEST_SAMPLES`."""

@@ -81,7 +81,7 @@ def stability(system: System) -> StabilityReport:
         no_equilibrium=reason,
         contact_stiffness=k,
         stable=fastest <= tolerance if rest else None,
-        eigenvalues=tuple(complex(value) for value in values),
+        eigenvalues=tuple(values.tolist()),
         modes=tuple(modes(c, k, grip)),
         crossings=tuple(found),
         critical=critical,
