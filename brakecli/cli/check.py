@@ -1,7 +1,6 @@
 """`brakecli check`."""
 
 import math
-from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -28,7 +27,7 @@ def command(
         from brakecli.sweeps.driver import cores
 
         cost = estimate(sweep.plan, cores())
-        numbers = {"valid": True, **asdict(cost)}
+        numbers = {"valid": True, **vars(cost)}
         show_result("check", numbers, estimate_table, sweep.title, cost, as_json=as_json, quiet=quiet)
         refuse_sweep(cost, free_bytes(Path()))
         return

@@ -1,7 +1,7 @@
 """One run, from a case to a finished result file: what `brakecli run` does."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import astuple, dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,7 @@ import h5py
 import numba
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from brakecli import __version__
 from brakecli.analysis.regime.of_run import verdict_on
@@ -88,7 +88,8 @@ def run(
             refuse(found, free_bytes(output.resolve().parent))
             counted, sink = "steps" if found.step else "samples", _history_sink(result, system.interval)
             motion, certificate = motion_of(system, lambda done: progress(counted, done, system.steps), sink)
-            _require_finite("an energy", list(asdict(motion.energy).values()))
+            if not np.isfinite(astuple(motion.energy)).all():  # compiled code overflows silently
+                raise FloatingPointError("an energy overflows")
             history = History(system.interval, result.rows("history"), partial(result.read, "history"))
             verdict = verdict_on(history, motion.system, motion.work.failure_sentence)
             top = _write_spectrum(result, history, verdict.start)
@@ -126,18 +127,13 @@ def _history_sink(result: ResultFile, interval: float) -> Sink:
         result.variable("history", field, ("time",), **(states if field.name == "state" else {}))
 
     def append(rows: NDArray[np.float64]) -> None:
-        _require_finite("a force", rows)
+        if not np.isfinite(rows).all():  # the loop bounds only the motion itself
+            raise FloatingPointError("a force overflows")
         done = result.rows("history")
         time = interval * np.arange(done, done + len(rows))
         result.append("history", {"time": time, **dict(zip(HISTORY, rows.T, strict=True))})
 
     return append
-
-
-def _require_finite(what: str, values: ArrayLike) -> None:
-    """Compiled code overflows silently; the loop bounds only the motion itself."""
-    if not np.isfinite(values).all():
-        raise FloatingPointError(f"{what} overflows")
 
 
 def _warnings(motion: Motion, certificate: Certificate | None) -> Iterator[str]:

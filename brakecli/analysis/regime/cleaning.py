@@ -189,7 +189,7 @@ def _without_spikes(values: Array, is_velocity: bool, notes: list[str]) -> Array
     beside = np.abs(np.stack([np.roll(values, 1), np.roll(values, -1)]) - (values - away)).max(axis=0)
     spikes &= np.abs(away) > 3.0 * beside
     count = int(np.sum(spikes))
-    if count == 0 or count == len(values):
+    if count == 0:
         return values
     without = _bridged(np.where(spikes, np.nan, values))
     if is_velocity and count >= 5 and abs(float(np.mean(np.sign(away[spikes])))) > 0.6:
