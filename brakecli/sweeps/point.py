@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.analysis.regime.of_run import RunVerdict, verdict_on
+from brakecli.analysis.regime.of_run import verdict_on
 from brakecli.analysis.regime.rules import Verdict
 from brakecli.case.case import Case
 from brakecli.case.read import key_path
@@ -50,9 +50,10 @@ def fields_of(plan: Plan) -> tuple[Field, ...]:
 
 
 @dataclass(frozen=True)
-class Outcome(RunVerdict):
+class Outcome:
     """A run in memory, as far as a sweep is interested in it. `fields.POINT` says where each number is."""
 
+    verdict: Verdict
     case: Case
     motion: Motion
     certificate: Certificate | None  # where the case gives no step
@@ -80,7 +81,7 @@ def simulate(case: Case) -> Outcome:
         warnings.append(f"solver.tolerance: {certificate.sentence()}")
     status, reason = Status.FAILED if work.failed else Status.DONE, "; ".join(verdict.reasons)
     first = next(iter(warnings), "")
-    return Outcome(motion.system, verdict, case, motion, certificate, status, reason, first, len(warnings))
+    return Outcome(verdict, case, motion, certificate, status, reason, first, len(warnings))
 
 
 def blank(kind: np.dtype[Any], status: Status, reason: str) -> NDArray[Any]:
