@@ -5,8 +5,8 @@ import json
 import math
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 import tomli_w
@@ -22,7 +22,6 @@ Settings = Mapping[tuple[str, ...], Any]
 """Values by key path, to be put into the base case."""
 
 
-@dataclass(frozen=True)
 class Plan:
     """A sweep with its base case: all that a worker needs.
 
@@ -30,59 +29,30 @@ class Plan:
     at every point.
     """
 
-    sweep_text: str
-    case_text: str
+    def __init__(self, sweep_text: str, case_text: str) -> None:
+        """Read the sweep and the keys of its case."""
+        self.sweep_text, self.case_text = sweep_text, case_text
+        self.sweep, self.case_keys = parse_table(Sweep, sweep_text, "the sweep"), tomllib.loads(case_text)
+        axes = self.sweep.axis
+        self.shape = tuple(axis.size for axis in axes)
+        self.points = math.prod(self.shape)  # of the grid
+        # the axis along which the motion is followed, and how often that is: twice both up and down
+        self.followed = next((index for index, axis in enumerate(axes) if axis.direction), None)
+        self.passes = 2 if any(axis.direction == "both" for axis in axes) else 1
+        sizes = {axis.name: axis.size for axis in axes} or {"point": 1}
+        self.dimensions = {"direction": 2, **sizes} if self.passes == 2 else sizes  # of the result
+        # units are what tasks consist of: single points, or lines along the followed axis
+        self.unit_length = 1 if self.followed is None else self.shape[self.followed]
+        self.units = self.passes * self.points // self.unit_length
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Travel as two texts."""
         return plan_of, (self.sweep_text, self.case_text)
 
-    @cached_property
-    def sweep(self) -> Sweep:
-        """The axes and the critical parameter."""
-        return parse_table(Sweep, self.sweep_text, "the sweep")
-
-    @cached_property
-    def _base(self) -> dict[str, Any]:
-        return tomllib.loads(self.case_text)
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Points along each axis."""
-        return tuple(axis.size for axis in self.sweep.axis)
-
-    @property
-    def points(self) -> int:
-        """Points of the grid."""
-        return math.prod(self.shape)
-
-    @cached_property
-    def followed(self) -> int | None:
-        """The axis along which the motion is followed."""
-        return next((index for index, axis in enumerate(self.sweep.axis) if axis.direction), None)
-
-    @property
-    def passes(self) -> int:
-        """How often the grid is computed: twice where the motion is followed both up and down."""
-        return 2 if any(axis.direction == "both" for axis in self.sweep.axis) else 1
-
-    @property
-    def unit_length(self) -> int:
-        """Points of a unit, which one task computes: a single point, or a line along the followed axis."""
-        return 1 if self.followed is None else self.shape[self.followed]
-
-    @property
-    def units(self) -> int:
-        """Units of the sweep."""
-        return self.passes * self.points // self.unit_length
-
     def places(self, point: int) -> tuple[int, ...]:
         """Where a point lies along each axis; points are counted with the last axis fastest."""
-        places = []
-        for size in reversed(self.shape):
-            point, place = divmod(point, size)
-            places.append(place)
-        return tuple(reversed(places))
+        strides = (math.prod(self.shape[axis + 1 :]) for axis in range(len(self.shape)))
+        return tuple(point // stride % size for stride, size in zip(strides, self.shape, strict=True))
 
     def settings(self, point: int) -> dict[tuple[str, ...], Any]:
         """What the axes set at a point."""
@@ -93,7 +63,7 @@ class Plan:
 
     def case(self, settings: Settings) -> Case:
         """The base case with some values put into it; raises CaseError."""
-        data = copy.deepcopy(self._base)
+        data = copy.deepcopy(self.case_keys)
         for path, value in settings.items():
             put(data, path, value, Case, kept=settings)
         try:

@@ -10,16 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from brakecli.errors import BrakecliError, RefusedError, UsageError
-from brakecli.sweeps.workers.task import (
-    Compute,
-    Engine,
-    Finished,
-    NextTask,
-    Task,
-    attempt,
-    fingerprint,
-    first_line,
-)
+from brakecli.sweeps.workers.task import Compute, Engine, Finished, NextTask, Task, attempt, fingerprint, headline
 
 CONNECT_SECONDS = 20
 WAIT_SECONDS = 60.0  # for a worker to come, or to come back
@@ -115,7 +106,7 @@ class ClusterEngine(Engine):
         if future.status == "error":
             if isinstance(error := future.exception(), KilledWorker):
                 return None
-            raise BrakecliError(f"{self._where}: a worker cannot compute ({first_line(error)}){KEPT}")
+            raise BrakecliError(f"{self._where}: a worker cannot compute ({headline(error)}){KEPT}")
         finished: Finished | str = future.result(timeout=FETCH_SECONDS)
         if isinstance(finished, str):
             raise RefusedError(f"{self._where}: {finished}{INSTALL}")
@@ -142,7 +133,7 @@ class ClusterEngine(Engine):
         except BrakecliError:
             raise
         except Exception as error:
-            raise kind(f"{self._where}: {what} ({first_line(error)}){remedy}") from error
+            raise kind(f"{self._where}: {what} ({headline(error)}){remedy}") from error
 
     def _address_in(self, scheduler_file: str) -> str:
         """The address in a scheduler's file; dask itself would wait for ever for the file to come."""
