@@ -18,10 +18,11 @@ from brakecli.case.case import Case, changed
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError
 from brakecli.solver.system import System
-from brakecli.sweeps.growth import Growth, Sliding, growth, sliding, with_step
+from brakecli.sweeps.growth import Sliding, growth, sliding, with_step
 from brakecli.sweeps.tables import Critical
 
-Found = TypeVar("Found")
+Known = TypeVar("Known")
+Reply = TypeVar("Reply")
 
 SCANNED = 9  # values of the parameter, both ends among them, between which a change is looked for by runs
 SCANNED_BY_EIGENVALUES = 129
@@ -145,8 +146,10 @@ def _friction_by_eigenvalues(critical: Critical, system: System) -> Search:
     return Search(Outcome.STABLE if report.stable else Outcome.UNSTABLE)
 
 
-def _if_known(at: Callable[[float], Found | None], unstable: Callable[[Found], bool]) -> Answer:
-    return lambda value: None if (found := at(value)) is None else unstable(found)
+def _if_known(
+    at: Callable[[float], Known | None], reply: Callable[[Known], Reply | None]
+) -> Callable[[float], Reply | None]:
+    return cache(lambda value: None if (known := at(value)) is None else reply(known))
 
 
 def _first_change(critical: Critical, unstable: Answer, count: int, width: float = math.inf) -> Search:
@@ -154,7 +157,7 @@ def _first_change(critical: Critical, unstable: Answer, count: int, width: float
 
     It is lost, too, where steady sliding ends.
     """
-    values = [float(value) for value in np.linspace(critical.lower, critical.upper, count)]
+    values = np.linspace(critical.lower, critical.upper, count).tolist()
     verdicts = [unstable(value) for value in values]
     for outcome, change in ((Outcome.FOUND, (True, False)), (Outcome.REGAINED, (False, True))):
         for bracket, (before, after) in zip(pairwise(values), pairwise(verdicts), strict=True):
@@ -170,11 +173,7 @@ def _by_simulation(critical: Critical, sliding_at: SlidingAt, exact: Search) -> 
     """Where the growth of small disturbances passes zero, by Brent's method, between two values on either side."""
     from scipy.optimize import brentq
 
-    @cache
-    def at(value: float) -> Growth | None:
-        steady = sliding_at(value)
-        return None if steady is None else growth(steady)
-
+    at = _if_known(sliding_at, growth)
     unstable = _if_known(at, lambda measured: measured.rate > measured.noise)
     scanned = _first_change(critical, unstable, SCANNED)
     if scanned.value is None:

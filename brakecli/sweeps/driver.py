@@ -17,9 +17,8 @@ from brakecli.files.os_signals import Interrupted
 from brakecli.files.write import new_result
 from brakecli.runs.limits import free_bytes
 from brakecli.sweeps.cost import Estimate, estimate, refuse_sweep
-from brakecli.sweeps.file import LoadedSweep
 from brakecli.sweeps.journal import Journal, open_journal
-from brakecli.sweeps.plan import Plan
+from brakecli.sweeps.plan import LoadedSweep, Plan
 from brakecli.sweeps.point import Status, blank
 from brakecli.sweeps.result import Findings, SweepReport, write
 from brakecli.sweeps.workers.local import LocalEngine

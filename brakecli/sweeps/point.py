@@ -17,7 +17,7 @@ from brakecli.case.read import key_path
 from brakecli.case.system import system_of
 from brakecli.errors import BrakecliError
 from brakecli.files import fields
-from brakecli.files.field import Field, values_of
+from brakecli.files.field import values_of
 from brakecli.runs.limits import check, refuse, within_range
 from brakecli.runs.run import motion_of
 from brakecli.runs.tolerance import Certificate
@@ -41,12 +41,7 @@ class Status(StrEnum):
 
 def record_type(plan: Plan) -> np.dtype[Any]:
     """The record of a point of the sweep."""
-    return np.dtype([(field.name, field.kind) for field in fields_of(plan)])
-
-
-def fields_of(plan: Plan) -> tuple[Field, ...]:
-    """What is known of each point of the sweep."""
-    return fields.POINT + (fields.CRITICAL if plan.sweep.critical is not None else ())
+    return np.dtype([(field.name, field.kind) for field in plan.fields])
 
 
 @dataclass(frozen=True)

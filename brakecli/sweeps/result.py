@@ -16,10 +16,9 @@ from brakecli.files import fields
 from brakecli.files.field import Field, plain, values_of
 from brakecli.files.write import ResultFile
 from brakecli.runs.run import origin
-from brakecli.sweeps.file import LoadedSweep
 from brakecli.sweeps.journal import Journal
-from brakecli.sweeps.plan import Plan, label
-from brakecli.sweeps.point import Status, fields_of
+from brakecli.sweeps.plan import LoadedSweep, Plan, label
+from brakecli.sweeps.point import Status
 from brakecli.sweeps.tables import Axis
 
 MOST_FAILURES = 100
@@ -48,16 +47,20 @@ class Findings:
         self.first_warning = journal.column("warning").ravel()[warned[0]].decode() if len(warned) else ""
         regimes = Counter(journal.column("regime").ravel())
         self.regimes = {name.decode(): count for name, count in sorted(regimes.items())}
+        self.hysteresis: NDArray[Any] | None = None
         self.critical: tuple[int, float, float] | None = None  # how many points have one, the least, the largest
+        self.sentences: list[str] = []
+        if plan.passes == 2:
+            self.hysteresis = _hysteresis(journal)
+            self.sentences += _on_hysteresis(journal, self.hysteresis)
         if plan.sweep.critical is not None:
             values = journal.column("critical")
             known = values[~np.isnan(values)]
             self.critical = (len(known), float(known.min()), float(known.max())) if len(known) else (0, 0.0, 0.0)
-        self.hysteresis = _hysteresis(journal) if plan.passes == 2 else None
-        self.sentences = (*_on_hysteresis(journal, self.hysteresis), *_on_lasting_vibration(journal))
+            self.sentences += _on_lasting_vibration(journal, plan.sweep.critical.tolerance)
         self.variables: dict[str, Any] | None = None
         if status.size <= MOST_AS_JSON:
-            self.variables = {field.name: plain(journal.column(field.name)) for field in fields_of(plan)}
+            self.variables = {field.name: plain(journal.column(field.name)) for field in plan.fields}
 
 
 @dataclass(frozen=True)
@@ -96,7 +99,7 @@ def write(result: ResultFile, report: SweepReport, journal: Journal) -> None:
         result.variable("/", field, (axis.name,), data, parameters=list(axis.parameter))
     if not plan.sweep.axis:
         result.axis("/", fields.BASE_POINT, np.zeros(1))
-    for field in fields_of(plan):
+    for field in plan.fields:
         attributes, critical = {}, plan.sweep.critical
         if critical is not None and field in fields.CRITICAL and field.kind == "f8":
             attributes, field = {"parameter": critical.parameter}, replace(field, units=unit(critical.parameter))
@@ -125,10 +128,8 @@ def _hysteresis(journal: Journal) -> NDArray[Any]:
     return np.asarray(decided & ((regime[0] != regime[1]) | (apart & lasting)), dtype=np.int64)
 
 
-def _on_hysteresis(journal: Journal, hysteresis: NDArray[Any] | None) -> Iterator[str]:
+def _on_hysteresis(journal: Journal, hysteresis: NDArray[Any]) -> Iterator[str]:
     """What is to be said about motions that were followed up and down."""
-    if hysteresis is None:
-        return
     if count := int(hysteresis.sum()):
         where = [_parameters(journal.plan, int(index)) for index in np.flatnonzero(hysteresis.ravel())[:3]]
         places = "; ".join(", ".join(f"{key} = {label(value)}" for key, value in each.items()) for each in where)
@@ -139,19 +140,16 @@ def _on_hysteresis(journal: Journal, hysteresis: NDArray[Any] | None) -> Iterato
         yield f"hysteresis is not known at {undecided} points, whose regime is undecided in a direction"
 
 
-def _on_lasting_vibration(journal: Journal) -> Iterator[str]:
+def _on_lasting_vibration(journal: Journal, tolerance: float) -> Iterator[str]:
     """What is to be said where vibration from the case's own start does not begin at the critical value."""
-    critical = journal.plan.sweep.critical
-    if critical is None:
-        return
     sustained = journal.column("critical_sustained")
     early = np.nan_to_num(journal.column("critical_lower") - sustained, nan=0.0)
     late = np.nan_to_num(sustained - journal.column("critical_upper"), nan=0.0)
-    if below := int((early > critical.tolerance).sum()):
+    if below := int((early > tolerance).sum()):
         start = "from the case's own start vibration lasts at values up to"
         least = "below the one at which steady sliding loses its stability"
         yield f"hysteresis at {below} of {early.size} points: {start} {early.max():.3g} {least}"
-    if above := int((late > critical.tolerance).sum()):
+    if above := int((late > tolerance).sum()):
         start = "the case's own start leads into lasting vibration only at values up to"
         longer = "above the critical one; longer runs may give another answer"
         yield f"at {above} of {late.size} points {start} {late.max():.3g} {longer}"
