@@ -99,10 +99,10 @@ def growth(found: Sliding) -> Growth | None:
     )
     compression = found.normal_force / found.stiffness
     scales = compression * np.array([1.0, 1.0, *[2.0 * math.pi * fast] * 2])
+    displaced = np.vstack([np.zeros(4), DISTURBANCE * np.diag(scales)])
     samples = []
-    for displaced in np.vstack([np.zeros(4), DISTURBANCE * np.diag(scales)]):
-        x, y, v_x, v_y = (float(value) for value in displaced)
-        motion = solve(replace(held, initial=Initial(found.x + x, found.y + y, v_x, v_y)))
+    for start in (np.array([found.x, found.y, 0.0, 0.0]) + displaced).tolist():
+        motion = solve(replace(held, initial=Initial(*start)))
         if motion.work.failure not in (Failure.NONE, Failure.UNBALANCED):
             return None
         samples.append(motion.rows)

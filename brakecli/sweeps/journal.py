@@ -61,8 +61,7 @@ class Journal:
         """A field of all records, in the shape of the grid; every unit has to be finished."""
         values = np.empty((len(self.finished), self.plan.unit_length), self.kind[name])
         for first, count, offset in self._blocks:
-            self._file.seek(offset)
-            data = self._file.read(count * self._unit_bytes)
+            data = os.pread(self._file.fileno(), count * self._unit_bytes, offset)
             if len(data) < count * self._unit_bytes:
                 raise BrakecliError(f"{self.path}: was cut short while in use; run the same command again")
             values[first : first + count] = np.frombuffer(data, self.kind)[name].reshape(count, -1)

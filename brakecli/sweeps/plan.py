@@ -4,7 +4,7 @@ import copy
 import json
 import math
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -23,7 +23,7 @@ from brakecli.sweeps.tables import Axis, Sweep
 
 MOST_TRIED = 1000  # listed values of an axis that are tried before the sweep starts; of a range it is both ends
 
-Settings = Mapping[tuple[str, ...], Any]
+Settings = dict[tuple[str, ...], Any]
 """Values by key path, to be put into the base case."""
 
 
@@ -60,9 +60,9 @@ class Plan:
         strides = (math.prod(self.shape[axis + 1 :]) for axis in range(len(self.shape)))
         return tuple(point // stride % size for stride, size in zip(strides, self.shape, strict=True))
 
-    def settings(self, point: int) -> dict[tuple[str, ...], Any]:
+    def settings(self, point: int) -> Settings:
         """What the axes set at a point."""
-        found: dict[tuple[str, ...], Any] = {}
+        found: Settings = {}
         for axis, place in zip(self.sweep.axis, self.places(point), strict=True):
             found |= dict.fromkeys((key_path(text) for text in axis.parameter), axis.value(place))
         return found

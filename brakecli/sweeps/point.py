@@ -91,7 +91,7 @@ def compute(plan: Plan, first: int, count: int) -> NDArray[Any]:
     """
     found = []
     for unit in range(first, first + count):
-        records, start, outcome = dict[int, NDArray[Any]](), dict[tuple[str, ...], Any](), None
+        records, start, outcome = dict[int, NDArray[Any]](), Settings(), None
         for point in line_points(plan, unit):
             if outcome is not None and not outcome.motion.work.failed:
                 start = next_start(outcome)
@@ -115,10 +115,10 @@ def line_points(plan: Plan, line: int) -> list[int]:
     return [(outer * followed.size + place) * inner + rest for place in places]
 
 
-def next_start(outcome: Outcome) -> dict[tuple[str, ...], Any]:
+def next_start(outcome: Outcome) -> Settings:
     """The start of a case where another has ended."""
     x, y, v_x, v_y = (float(value) for value in outcome.motion.rows[-1, :4])
-    start: dict[tuple[str, ...], Any] = {("initial",): {"x": x, "y": y, "vx": v_x, "vy": v_y}}
+    start: Settings = {("initial",): {"x": x, "y": y, "vx": v_x, "vy": v_y}}
     wheel = outcome.case.roughness.wheel
     if wheel is not None:
         system = outcome.motion.system

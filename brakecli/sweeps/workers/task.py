@@ -104,8 +104,5 @@ def fingerprint() -> Mapping[str, str]:
     from brakecli.runs.run import versions
     from brakecli.solver.compile import source_hash
 
-    return {
-        "brakecli_version": __version__,
-        "brakecli_sources": source_hash(Path(brakecli.__file__).parent),
-        **versions(),
-    }
+    sources = source_hash(Path(brakecli.__file__).parent)
+    return {"brakecli_version": __version__, "brakecli_sources": sources, **versions()}
