@@ -73,18 +73,15 @@ def search(
 ) -> Search:
     """Look for the critical value of the parameter that `case_at` sets; `verdict_of` runs a case."""
 
-    def system_at(value: float) -> System:
-        return with_step(system_of(case_at(value)))  # a case with a tolerance has no step
-
     @cache
     def sliding_at(value: float) -> Sliding | None:
         try:
-            return sliding(system_at(value))
+            return sliding(with_step(system_of(case_at(value))))
         except CaseError:  # no equilibrium, or a value that no case can have, between two that it can
             return None
 
     if critical.parameter == "friction.coefficient":
-        exact = _friction_by_eigenvalues(critical, system_at(critical.lower))
+        exact = _friction_by_eigenvalues(critical, with_step(system_of(case_at(critical.lower))))
     else:
         exact = _by_eigenvalues(critical, sliding_at)
     if critical.method == "eigenvalue":

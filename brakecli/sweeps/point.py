@@ -150,8 +150,7 @@ def _computed(plan: Plan, point: int, start: Settings) -> tuple[NDArray[Any], Ou
                 found = search(critical, lambda value: plan.case({**settings, path: value}), verdict_of)
             values |= values_of(fields.CRITICAL, found)
     except (BrakecliError, FloatingPointError, MemoryError) as error:
-        memory = isinstance(error, MemoryError)
-        reason = OUT_OF_MEMORY if memory else "; ".join(str(error).splitlines())
+        reason = OUT_OF_MEMORY if isinstance(error, MemoryError) else "; ".join(str(error).splitlines())
         return blank(record_type(plan), Status.FAILED, reason), None
     return _filled(record_type(plan), values), outcome
 
