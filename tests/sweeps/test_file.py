@@ -9,8 +9,7 @@ import pytest
 
 from brakecli.case.tables import json_schema
 from brakecli.errors import CaseError
-from brakecli.sweeps.file import LoadedSweep, kind_of, parse_sweep
-from brakecli.sweeps.plan import Plan
+from brakecli.sweeps.plan import LoadedSweep, Plan, kind_of, parse_sweep
 from brakecli.sweeps.tables import Sweep
 from tests.commands import TINY
 
