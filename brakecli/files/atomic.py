@@ -13,13 +13,10 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from io import FileIO
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 from brakecli.errors import CannotWriteError, UsageError
 from brakecli.files.os_signals import signals_deferred
-
-if TYPE_CHECKING:
-    from _typeshed import ReadableBuffer, WriteableBuffer
 
 
 class OutputFile(FileIO):
@@ -37,7 +34,7 @@ class OutputFile(FileIO):
         self._temporary = target.with_name(f".{target.name}.part")
         super().__init__(self._temporary, "w+", opener=_open_no_link)
 
-    def write(self, data: "ReadableBuffer") -> int:
+    def write(self, data: Any) -> int:
         """Write all of `data`, or remember why not."""
         view = memoryview(data).cast("B")
         written = 0
@@ -48,7 +45,7 @@ class OutputFile(FileIO):
             self.failure = error
         return len(view)
 
-    def readinto(self, buffer: "WriteableBuffer") -> int:
+    def readinto(self, buffer: Any) -> int:
         """Fill `buffer`, with zeros behind the end: what a failed write left out must not stop HDF5."""
         view = memoryview(buffer).cast("B")
         filled = 0

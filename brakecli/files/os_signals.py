@@ -11,12 +11,9 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from brakecli.errors import CannotWriteError
-
-if TYPE_CHECKING:
-    from _typeshed import ReadableBuffer
 
 _WORDS: dict[int, str] = {signal.SIGHUP: "hung up", signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
 
@@ -138,7 +135,7 @@ class _Stream(io.FileIO):
 
     _failed = False
 
-    def write(self, data: "ReadableBuffer") -> int:
+    def write(self, data: Any) -> int:
         try:
             if not self._failed:
                 return super().write(data)

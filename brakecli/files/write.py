@@ -4,7 +4,7 @@ The same calls give the same bytes, however the rows of a growing variable are c
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,10 +18,8 @@ from brakecli.files.field import Field
 from brakecli.files.os_signals import signals_deferred
 from brakecli.files.read import FORMAT, FORMAT_VERSION, digest
 
-FILL = 9.969209968386869e36
-"""What netCDF puts where a number is missing; the attribute ``_FillValue`` names it."""
-_CHUNK = 16384
-"""Most values in a chunk: 128 KiB of float64."""
+FILL = 9.969209968386869e36  # what netCDF puts where a number is missing; the attribute `_FillValue` names it
+_CHUNK = 16384  # most values in a chunk: 128 KiB of float64
 
 
 @dataclass
@@ -207,13 +205,9 @@ def new_result(path: Path, *, force: bool) -> Iterator[ResultFile]:
 
     Raises what `new_output` raises, before anything is computed.
     """
-    with new_output(path, force=force) as output:
-        result = ResultFile(output)
-        try:
-            result.open()
-            yield result
-        finally:
-            result.close()
+    with new_output(path, force=force) as output, closing(ResultFile(output)) as result:
+        result.open()
+        yield result
 
 
 def _set_attributes(node: h5py.HLObject, attributes: Mapping[str, Any]) -> None:
