@@ -23,9 +23,7 @@ from brakecli.errors import KeyPath, Problem, found
 from brakecli.solver.contact import EVALUATORS
 from brakecli.solver.schemes import SCHEMES
 
-SMALLEST, LARGEST = 1e-100, 1e100
-"""Magnitudes between which every number other than zero must lie, so that products neither vanish nor overflow."""
-
+SMALLEST, LARGEST = 1e-100, 1e100  # magnitudes of all numbers but 0, so that products neither vanish nor overflow
 MOST_WRONG_ENTRIES = 20  # of one list that are reported
 MISSING = "is missing"
 

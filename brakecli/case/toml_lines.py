@@ -31,7 +31,6 @@ _ROW = re.compile(r"^[ \t]*[^ \t\n].*", re.MULTILINE)
 _Value = TypeVar("_Value")
 _HEADER = re.compile(r"[ \t]*\[")
 _POSITION = re.compile(r" \(at (?:line (\d+), column \d+|end of document)\)$")
-
 WRITING = "numbers are written 1.5 or 2e-3, texts in quotes, lists as [1, 2], table headers as [table]"
 """The remedy for what is not TOML."""
 

@@ -19,7 +19,7 @@ _WHAT = {
     **dict.fromkeys(("enum", "literal_error"), "is not one of the choices"),
     "tuple_type": "is not a list",
     "model_type": "is not a table",
-    "too_short": "is too short",
+    **dict.fromkeys(("too_short", "string_too_short"), "is too short"),
     "finite_number": "is not finite",
     **dict.fromkeys(("greater_than", "greater_than_equal", "less_than_equal"), "is out of range"),
     "magnitude": f"is not between {SMALLEST:g} and {LARGEST:g} in magnitude",

@@ -9,7 +9,7 @@ edits the file cuts the 32 bytes off; then only the checksums inside remain.
 import hashlib
 import stat
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from io import RawIOBase
 from pathlib import Path
@@ -113,11 +113,9 @@ def open_result(path: Path, kind: str | None = None) -> Iterator[StoredResult]:
 
 def is_hdf5(path: Path) -> bool:
     """Whether this is a regular file with the signature of HDF5, behind a user block or not."""
-    try:
-        # looking into a pipe would use up what it holds
+    with suppress(OSError, ValueError):  # looking into a pipe would use up what it holds
         return stat.S_ISREG(path.stat().st_mode) and bool(h5py.is_hdf5(path))
-    except (OSError, ValueError):
-        return False
+    return False
 
 
 def digest(file: RawIOBase, length: int) -> bytes:
