@@ -124,15 +124,13 @@ class Located:
         table: Any = self.data
         path: KeyPath = ()
         for count, key in enumerate(keys, start=1):
-            is_entry = count == len(keys) and isinstance(leaf, list)
-            path = (*path, key)
-            table = table.setdefault(key, [] if is_entry else {})
-            if is_entry and isinstance(table, list):
+            new = leaf if count == len(keys) else {}  # [{}] for a header in double brackets
+            path, table = (*path, key), table.setdefault(key, type(new)())
+            if isinstance(table, list) and new:
                 self.lines.setdefault(path, line)
-                table.append({})
+                table += new
             if isinstance(table, list) and table:
-                path = (*path, len(table) - 1)
-                table = table[-1]
+                path, table = (*path, len(table) - 1), table[-1]
             if not isinstance(table, dict):
                 self._report_twice(path, line)
                 return None, path

@@ -76,12 +76,10 @@ class OutputFile(FileIO):
             os.fsync(self.fileno())
             _checked_target(self.path, force=self._force)
             self._temporary.replace(self._target)
-        with suppress(OSError):  # some network file systems refuse; the file is in its place already
+        with suppress(OSError), ExitStack() as clean_up:  # some network file systems refuse; the file is there
             directory = os.open(self._target.parent, os.O_RDONLY)
-            try:
-                os.fsync(directory)
-            finally:
-                os.close(directory)
+            clean_up.callback(os.close, directory)
+            os.fsync(directory)
 
     def discard(self) -> None:
         """Close, and remove the temporary file unless it was published."""

@@ -124,9 +124,8 @@ def guard_streams() -> None:
         except OSError:  # closed: the next file to be opened must not become a standard stream
             os.open(os.devnull, os.O_RDWR)
     for number, name in ((1, "stdout"), (2, "stderr")):
-        old = getattr(sys, name)  # None where it was closed before Python started
         raw = io.BufferedWriter(_Stream(number, "w", closefd=False))
-        encoding = getattr(old, "encoding", "utf-8")
+        encoding = getattr(getattr(sys, name), "encoding", "utf-8")  # None if closed before Python started
         setattr(sys, name, io.TextIOWrapper(raw, encoding, "backslashreplace", line_buffering=True))
 
 

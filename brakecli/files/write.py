@@ -24,10 +24,7 @@ _CHUNK = 16384  # most values in a chunk: 128 KiB of float64
 
 @dataclass
 class _Variable:
-    """A declared variable, its axes, and rows that do not yet fill a chunk.
-
-    Only whole chunks are written, so that nothing depends on how rows are cut into pieces.
-    """
+    """A declared variable, its axes, and rows that do not yet fill a chunk: only whole chunks are written."""
 
     field: Field
     dims: tuple[str, ...]
