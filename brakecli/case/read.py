@@ -5,7 +5,7 @@ import re
 import shlex
 import sys
 from collections.abc import Container, Sequence
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
@@ -141,12 +141,10 @@ def parse_override(override: str) -> tuple[tuple[str, ...], object]:
     path = key_path(key)
     if "=" not in override or not path:
         raise unfit(f"does not begin with a key (found {printable(key)})", "write --set key.path=VALUE")
-    try:
+    with suppress(CaseError):
         parsed = parse(f"value={value}")
-    except CaseError:
-        parsed = {}
-    if parsed.keys() == {"value"}:
-        return path, parsed["value"]
+        if parsed.keys() == {"value"}:
+            return path, parsed["value"]
     remedy = WRITING
     if re.fullmatch(r"[^\W\d][\w .-]*", value):
         remedy = f"texts need quotes: --set {key}={shlex.quote(json.dumps(value, ensure_ascii=False))}"
@@ -157,8 +155,7 @@ def key_path(text: str) -> tuple[str, ...]:
     """The parts of a key path as TOML writes it; none if it is not one."""
     if "\n" in text or text.count(".") >= toml_lines.MOST_PARTS:
         return ()
-    try:
+    with suppress(CaseError):
         path, value = toml_lines.only_path(parse(f"{text}=0"))
-    except CaseError:
-        return ()
-    return path if value == 0 else ()
+        return path if value == 0 else ()
+    return ()

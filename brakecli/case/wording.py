@@ -25,12 +25,8 @@ _WHAT = {
     "magnitude": f"is not between {SMALLEST:g} and {LARGEST:g} in magnitude",
 }
 """The kinds of error that pydantic reports for one value of a case."""
-_KINDS = {
-    "number": "a number",
-    "integer": "a whole number",
-    "boolean": "true or false",
-    "string": "one line of text in quotes",
-}
+_TEXT = "one line of text in quotes"
+_KINDS = {"number": "a number", "integer": "a whole number", "boolean": "true or false", "string": _TEXT}
 
 
 def problems(error: ValidationError, kind: type[Table]) -> Iterator[Problem]:

@@ -209,9 +209,8 @@ def new_result(path: Path, *, force: bool) -> Iterator[ResultFile]:
 
 def _set_attributes(node: h5py.HLObject, attributes: Mapping[str, Any]) -> None:
     for name, value in attributes.items():
-        if isinstance(value, str):
-            node.attrs[name] = value
-        elif isinstance(value, list | tuple) and all(isinstance(item, str) for item in value):
+        texts = [value] if isinstance(value, str) else value
+        if isinstance(texts, list | tuple) and all(isinstance(item, str) for item in texts):
             node.attrs[name] = np.array(value, dtype=h5py.string_dtype())
         else:
             node.attrs[name] = _finite(f"attribute {name}", value)
