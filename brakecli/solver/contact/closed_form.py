@@ -15,11 +15,9 @@ CLEAR, PARTLY, FULL = 0, 1, 2
 @kernel(int64(float64, PAD_TYPE))
 def coverage(y: float, pad: Any) -> int:
     """FULL or CLEAR where bounds on the surfaces prove that the pad touches everywhere or nowhere, or PARTLY."""
-    if y >= pad.wheel_bound + pad.shoe_bottom:
+    if y >= pad.clear_from:
         return CLEAR
-    if -y >= pad.wheel_bound + pad.shoe_top:
-        return FULL
-    return PARTLY
+    return FULL if y <= pad.full_up_to else PARTLY
 
 
 @kernel(EVALUATE)
