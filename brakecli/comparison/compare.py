@@ -22,28 +22,28 @@ from brakecli.solver.motion import Motion, Work, solve
 from brakecli.solver.schemes import load
 from brakecli.solver.system import System
 
-REFERENCE, CHECK = 1e-12, 1e-10
-"""Tolerances of the reference, and of the run that shows how good it is."""
-REFERENCE_SHARE = 0.3
-"""Part of the budget that the reference may take."""
+REFERENCE, CHECK = 1e-12, 1e-10  # tolerances of the reference, and of the run that shows how good it is
+REFERENCE_SHARE = 0.3  # part of the budget that the reference may take
 FEWEST_SAMPLES = 64
-MOST_REPEATS, SLOW_REPEATS, SLOW = 21, 3, 0.1
-"""Turns of most loops, and of those that take long (s): there, chance matters less."""
-LONGEST_CALL = 1.0
-"""Loops that take less (s) are timed in one call; longer ones in blocks, whose own time is small beside theirs."""
+MOST_REPEATS, SLOW_REPEATS = 21, 3  # turns of most loops, and of slow ones: there, chance matters less
+SLOW = 0.1  # s, of a loop
+LONGEST_CALL = 1.0  # s, of a loop that is timed in one call; the time that blocks take is small beside longer ones
+
+Progress = Callable[[str, int, int], None]  # called with what is done, how many rungs are done, and of how many
 
 
 @dataclass
 class Entry:
     """A method at one step or tolerance, with what came of it; None where it does not exist."""
 
+    label: str  # the method in a few words
     kind: Method  # without step and tolerance
     method: Method
     place: int  # on the ladder of steps or tolerances, from the coarsest on
     errors: Errors | None = None
     work: Work | None = None
     failure: str = ""
-    samples: int = 0
+    iterations: int = 0  # evaluations of the contact in the steps, one for each; none where steps are explicit
     seconds: list[float] = field(default_factory=list)
     order: float | None = None
     critical_bias: float | None = None
@@ -56,11 +56,6 @@ class Entry:
         return f"{self.label}, {rung}"
 
     @property
-    def label(self) -> str:
-        """The method in a few words."""
-        return method_label(self.kind)
-
-    @property
     def tolerance(self) -> float | None:
         """The tolerance; None where there is a step."""
         return self.method.tolerance or None
@@ -69,13 +64,6 @@ class Entry:
     def error(self) -> float:
         """The largest error of the motion; infinite where it is not known."""
         return math.inf if self.errors is None else self.errors.error
-
-    @property
-    def iterations(self) -> int:
-        """Evaluations of the contact in the steps, one for each iteration; none where steps are explicit."""
-        if self.work is None or self.method.step is None:
-            return 0
-        return self.work.contact_evaluations - self.samples
 
     @property
     def stable_step(self) -> float | None:
@@ -92,7 +80,6 @@ class Entry:
 class Comparison:
     """All entries on one case."""
 
-    system: System
     duration: float  # s; less than the case's where the reference would take too long
     interval: float
     reference_error: float
@@ -101,20 +88,11 @@ class Comparison:
     left_out: int  # rungs that the budget did not allow
     entries: tuple[Entry, ...]
 
-    def cheapest(self, target: float) -> Entry | None:
-        """The entry that takes the least time of those whose error is at most `target`."""
-        able = [each for each in self.entries if each.seconds and each.error + self.reference_error <= target]
-        return min(able, key=lambda entry: entry.wall_seconds or math.inf, default=None)
-
     def finer_error(self, entry: Entry) -> float:
         """The largest error of the same method at finer steps; above the entry's own, that is low by chance."""
         kind, step = entry.kind, entry.method.step or 0.0
         finer = (each for each in self.entries if each.kind == kind and (each.method.step or step) < step)
         return max((each.error for each in finer if each.errors), default=0.0)
-
-
-Progress = Callable[[str, int, int], None]
-"""Called with what is done, how many rungs are done, and of how many."""
 
 
 def compare(
@@ -139,13 +117,17 @@ def compare(
         sampled = replace(sampled, duration=(len(reference.rows) - 1) * sampled.interval)
         checked = _event_driven(sampled, CHECK, "it is not known how good the reference is")
         reference_error = errors(checked.rows, reference.rows).error
-        entries = [Entry(kind, each, place) for kind in tried for place, each in enumerate(rungs(kind, found))]
+        entries = [
+            Entry(method_label(kind), kind, method, place)
+            for kind in tried
+            for place, method in enumerate(rungs(kind, found))
+        ]
         left_out = _first_round(sampled, entries, reference.rows, begin + 0.8 * budget, progress)
         _add_limits(system, report, entries)
         repeats = _repeat(sampled, entries, begin + budget, progress)
     _mark_front(entries)
     duration, interval, seconds = sampled.duration, sampled.interval, reference.work.solve_seconds
-    return Comparison(system, duration, interval, reference_error, seconds, repeats, left_out, tuple(entries))
+    return Comparison(duration, interval, reference_error, seconds, repeats, left_out, tuple(entries))
 
 
 def _motion(system: System, method: Method, *, at_once: bool = False) -> Motion:
@@ -165,17 +147,15 @@ def _event_driven(system: System, tolerance: float, without: str) -> Motion:
 
 def _reference(system: System, budget: float) -> Motion:
     """The longest part of the motion whose reference fits the budget (s), from the start on."""
-    duration = FEWEST_SAMPLES * system.interval
-    whole = max(system.duration, duration)
+    shortest = FEWEST_SAMPLES * system.interval
+    part, whole = replace(system, duration=shortest), max(system.duration, shortest)
     while True:
-        duration = min(duration, whole)
-        motion = _event_driven(
-            replace(system, duration=duration), REFERENCE, "there is no reference to compare with"
-        )
+        motion = _event_driven(part, REFERENCE, "there is no reference to compare with")
         seconds = motion.work.solve_seconds
-        if duration >= whole or 3.0 * seconds > budget:
+        if part.duration >= whole or 3.0 * seconds > budget:
             return motion
-        duration *= min(4.0, 0.7 * budget / max(seconds, 1e-3))
+        longer = part.duration * min(4.0, 0.7 * budget / max(seconds, 1e-3))
+        part = replace(part, duration=min(longer, whole))
 
 
 def _first_round(
@@ -199,8 +179,8 @@ def _first_round(
             entry.failure = " ".join(str(error).split())
             continue
         work = entry.work = motion.work
-        last[entry.kind] = work.solve_seconds
-        entry.samples, entry.failure = len(motion.rows), work.failure_sentence or ""
+        last[entry.kind], entry.failure = work.solve_seconds, work.failure_sentence or ""
+        entry.iterations = work.contact_evaluations - len(motion.rows) if entry.method.step else 0
         if not work.failed:
             entry.seconds.append(work.solve_seconds)
             entry.errors = errors(motion.rows, reference)
@@ -244,11 +224,10 @@ def _add_limits(system: System, report: linear.StabilityReport, entries: list[En
         return found - exact.friction if found is not None and exact else None
 
     for entry in entries:
-        kind, step = entry.kind, entry.method.step
+        scheme, step = Method(entry.kind.scheme, entry.kind.theta), entry.method.step
         if step is None:
             entry.step_limit, entry.critical_bias = math.inf, 0.0 if exact else None
         elif report.discrete is not None:  # otherwise no steady sliding could lose its stability
-            scheme = Method(kind.scheme, kind.theta)
             entry.step_limit, entry.critical_bias = limit(scheme), bias(scheme, step)
     for coarse, fine in pairwise(entries):
         long, short = coarse.method.step, fine.method.step
@@ -259,7 +238,6 @@ def _add_limits(system: System, report: linear.StabilityReport, entries: list[En
 def _mark_front(entries: list[Entry]) -> None:
     """Mark the entries that no other beats in both error and time."""
     best = math.inf
-    able = [entry for entry in entries if entry.errors is not None]
-    for entry in sorted(able, key=lambda each: (each.wall_seconds or 0.0, each.error)):
+    for entry in sorted(entries, key=lambda each: (each.wall_seconds or 0.0, each.error)):
         if entry.error < best:
             entry.on_front, best = True, entry.error

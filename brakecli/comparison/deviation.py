@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 from brakecli.solver.quantities import HISTORY
 
 MOTION = ("x", "y", "vx", "vy")
-FORCES = ("friction_force", "normal_force")
-_COLUMNS = {name: index for index, name in enumerate(HISTORY)}
 
 
 @dataclass(frozen=True)
@@ -32,14 +30,13 @@ class Errors:
 
 def errors(rows: NDArray[np.float64], reference: NDArray[np.float64]) -> Errors:
     """Compare rows of `quantities.HISTORY`, sampled at the same times."""
+    columns = {name: pair for name, *pair in zip(HISTORY, rows.T, reference.T, strict=True)}
     largest, mean = {}, {}
-    for name in (*MOTION, *FORCES):
-        exact = reference[:, _COLUMNS[name]]
-        apart = np.abs(rows[:, _COLUMNS[name]] - exact)
-        scale = float(np.abs(exact).max()) or 1.0
+    for name in (*MOTION, "friction_force", "normal_force"):
+        values, exact = columns[name]
+        apart, scale = np.abs(values - exact), float(np.abs(exact).max()) or 1.0
         largest[name], mean[name] = float(apart.max()) / scale, float(apart.mean()) / scale
-    amplitude, phase = _line(rows[:, _COLUMNS["vx"]], reference[:, _COLUMNS["vx"]])
-    return Errors(max(largest[name] for name in MOTION), largest, mean, amplitude, phase)
+    return Errors(max(largest[name] for name in MOTION), largest, mean, *_line(*columns["vx"]))
 
 
 def _line(values: NDArray[np.float64], reference: NDArray[np.float64]) -> tuple[float | None, float | None]:

@@ -52,4 +52,4 @@ def draw(result: StoredResult, select: Sequence[str] = ()) -> "Figure":
         raise UsageError(f"{result.path}: holds a result of kind {kind!r}; name the result of {known}")
     if select:
         raise UsageError(f"{result.path}: --select is for sweeps (found {select[0]!r}); leave it out for a {kind}")
-    return run.draw(run.gather(result)) if kind == "run" else comparison.draw(result)
+    return run.draw(run.RunPicture(result)) if kind == "run" else comparison.draw(result)
