@@ -105,11 +105,13 @@ def compare(
 ) -> Comparison:
     """Compare the methods on a system within about `budget` s. Raises RefusedError where there is no reference."""
     with within_range():
-        tried = kinds(system, schemes)
-        for kind in tried:  # compilation is not part of the budget
+        found, entries = ladder(system, steps), list[Entry]()
+        for kind in kinds(system, schemes):  # compilation is not part of the budget
             _ = load(kind.scheme), contact.load("exact" if kind.evaluator == "auto" else kind.evaluator)
+            entries += [
+                Entry(method_label(kind), kind, each, place) for place, each in enumerate(rungs(kind, found))
+            ]
         begin = time.perf_counter()
-        found = ladder(system, steps)
         report = linear.stability(system)
         progress("reference", 0, 0)
         sampled = replace(system, interval=found[0])
@@ -117,11 +119,6 @@ def compare(
         sampled = replace(sampled, duration=(len(reference.rows) - 1) * sampled.interval)
         checked = _event_driven(sampled, CHECK, "it is not known how good the reference is")
         reference_error = errors(checked.rows, reference.rows).error
-        entries = [
-            Entry(method_label(kind), kind, method, place)
-            for kind in tried
-            for place, method in enumerate(rungs(kind, found))
-        ]
         left_out = _first_round(sampled, entries, reference.rows, begin + 0.8 * budget, progress)
         _add_limits(system, report, entries)
         repeats = _repeat(sampled, entries, begin + budget, progress)
@@ -209,13 +206,9 @@ def _repeat(system: System, entries: list[Entry], deadline: float, progress: Pro
 
 def _add_limits(system: System, report: linear.StabilityReport, entries: list[Entry]) -> None:
     """Add what the amplification matrices say, and the observed orders."""
-    stiffness_at = linear.mean_stiffness(system, report.contact_stiffness)
-    exact = report.critical
-
-    @cache  # neither depends on starts, iterations and evaluators
-    def limit(scheme: Method) -> float:
-        found = linear.step_limit(replace(system, method=scheme), stiffness_at)
-        return math.inf if found is None else found
+    stiffness_at, exact = linear.mean_stiffness(system, report.contact_stiffness), report.critical
+    # Neither depends on starts, iterations and evaluators
+    limit = cache(lambda scheme: linear.step_limit(replace(system, method=scheme), stiffness_at))
 
     @cache
     def bias(scheme: Method, step: float) -> float | None:
@@ -228,7 +221,8 @@ def _add_limits(system: System, report: linear.StabilityReport, entries: list[En
         if step is None:
             entry.step_limit, entry.critical_bias = math.inf, 0.0 if exact else None
         elif report.discrete is not None:  # otherwise no steady sliding could lose its stability
-            entry.step_limit, entry.critical_bias = limit(scheme), bias(scheme, step)
+            found = limit(scheme)
+            entry.step_limit, entry.critical_bias = math.inf if found is None else found, bias(scheme, step)
     for coarse, fine in pairwise(entries):
         long, short = coarse.method.step, fine.method.step
         if fine.place and long and short and 0.0 < fine.error < math.inf and 0.0 < coarse.error < math.inf:

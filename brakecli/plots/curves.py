@@ -95,12 +95,11 @@ def _draw_motion(axes: Axes, picture: SweepPicture, name: str) -> None:
             arrows: dict[str, Any] = {"marker": arrow, "mfc": "white", "mec": style.DARK, "ms": size}
             label = f"on the way {direction}" if direction else None
             axes.plot(x, y, color="#777777", lw=1.0, ls=dashes, label=label, **arrows)
-        for regime, where in picture.regimes():
-            colour, marker = REGIMES[regime]
+        for regime, (colour, marker) in REGIMES.items():
             points: dict[str, Any] = {"ls": "none", "mfc": colour, "mec": style.DARK, "mew": 0.6}
-            chosen = where[number]
+            chosen = picture["regime"][number] == regime
             axes.plot(x[chosen], y[chosen], marker=arrow or marker, ms=size, **points)
-            if number == 0:  # for the legend
+            if (picture["regime"] == regime).any():  # for the legend
                 axes.plot([], [], marker="s" if direction else marker, ms=7, label=str(regime), **points)
         if (seen := shaken[number] & np.isfinite(y)).any():
             axes.plot(x[seen], y[seen], "o", color=style.DARK, ms=0.4 * size, mec="white", mew=0.5)

@@ -83,8 +83,7 @@ def envelope(read: Callable[[int, int], style.Array], samples: int, columns: int
 
 def episodes(state: style.Array, wanted: ContactState) -> list[tuple[int, int]]:
     """First and last sample of every unbroken stretch of a state."""
-    inside = np.concatenate([[False], state == wanted, [False]])
-    edges = np.flatnonzero(inside[1:] != inside[:-1])
+    edges = np.flatnonzero(np.diff(state == wanted, prepend=False, append=False))
     return [(int(first), int(behind) - 1) for first, behind in edges.reshape(-1, 2)]
 
 

@@ -75,7 +75,7 @@ class Axis:
 
     def named(self, place: int) -> str:
         """The value at a place, with its key and unit."""
-        value = self.texts[place] if self.texts is not None else style.readable(float(self.values[place]))
+        value = self.texts[place] if self.texts else style.readable(float(self.values[place]))
         return f"{self.key} = {value} {self.units}".rstrip()
 
     def place(self, value: str) -> int | None:
@@ -84,8 +84,8 @@ class Axis:
             if self.texts is not None:
                 return self.texts.index(value)
             nearest = int(np.argmin(np.abs(self.values - float(value))))
-            size = float(np.abs(self.values).max())
-            if math.isclose(self.values[nearest], float(value), rel_tol=1e-5, abs_tol=1e-9 * size):
+            near = 1e-9 * style.largest(self.values)
+            if math.isclose(self.values[nearest], float(value), rel_tol=1e-5, abs_tol=near):
                 return nearest
         return None
 
@@ -159,10 +159,6 @@ class SweepPicture:
         variables = {name: values[place] for name, values in self.variables.items()}
         chosen = (*self.chosen, f"on the way {direction}")
         return replace(self, directions=(direction,), variables=variables, chosen=chosen)
-
-    def regimes(self) -> list[tuple[Regime, style.Array]]:
-        """Every regime that occurs, and where."""
-        return [(regime, where) for regime in REGIMES if (where := self["regime"] == regime).any()]
 
     def lasting_amplitudes(self) -> tuple[float, float, bool]:
         """The least and the largest amplitude (m) that lasts, or 0; whether their scale is logarithmic."""
