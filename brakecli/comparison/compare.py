@@ -12,24 +12,42 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.analysis.stability import report as linear
-from brakecli.comparison.deviation import Errors, errors
 from brakecli.comparison.methods import kinds, ladder, method_label, rungs
 from brakecli.errors import BrakecliError, RefusedError
 from brakecli.runs.limits import check, refuse, within_range
 from brakecli.solver import contact
 from brakecli.solver.method import Method
 from brakecli.solver.motion import Motion, Work, solve
+from brakecli.solver.quantities import HISTORY
 from brakecli.solver.schemes import load
 from brakecli.solver.system import System
 
 REFERENCE, CHECK = 1e-12, 1e-10  # tolerances of the reference, and of the run that shows how good it is
 REFERENCE_SHARE = 0.3  # part of the budget that the reference may take
 FEWEST_SAMPLES = 64
+MOTION, FORCES = ("x", "y", "vx", "vy"), ("friction_force", "normal_force")  # what is compared
 MOST_REPEATS, SLOW_REPEATS = 21, 3  # turns of most loops, and of slow ones: there, chance matters less
 SLOW = 0.1  # s, of a loop
 LONGEST_CALL = 1.0  # s, of a loop that is timed in one call; the time that blocks take is small beside longer ones
 
 Progress = Callable[[str, int, int], None]  # called with what is done, how many rungs are done, and of how many
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Relative errors against a reference, all of them parts of the largest value of the quantity.
+
+    `largest` of each quantity over the samples; `mean`: the same in the mean over time (L1), as one sample on
+    the other side of a jump of the friction force makes its largest error 2. `error`: the largest of x, y, vx
+    and vy. `amplitude` and `phase` (rad): of the strongest line of vx over the last quarter of the time, None
+    where there is none.
+    """
+
+    error: float
+    largest: dict[str, float]
+    mean: dict[str, float]
+    amplitude: float | None
+    phase: float | None
 
 
 @dataclass
@@ -235,3 +253,30 @@ def _mark_front(entries: list[Entry]) -> None:
     for entry in sorted(entries, key=lambda each: (each.wall_seconds or 0.0, each.error)):
         if entry.error < best:
             entry.on_front, best = True, entry.error
+
+
+def errors(rows: NDArray[np.float64], reference: NDArray[np.float64]) -> Errors:
+    """Compare rows of `quantities.HISTORY`, sampled at the same times."""
+    columns = {name: pair for name, *pair in zip(HISTORY, rows.T, reference.T, strict=True)}
+    largest, mean = {}, {}
+    for name in (*MOTION, *FORCES):
+        values, exact = columns[name]
+        apart, scale = np.abs(values - exact), float(np.abs(exact).max()) or 1.0
+        largest[name], mean[name] = float(apart.max()) / scale, float(apart.mean()) / scale
+    return Errors(max(largest[name] for name in MOTION), largest, mean, *_line(*columns["vx"]))
+
+
+def _line(values: NDArray[np.float64], reference: NDArray[np.float64]) -> tuple[float | None, float | None]:
+    """Relative error of the amplitude, and error of the phase, of the reference's strongest line."""
+    count = len(reference) // 4
+    if count < 64:
+        return None, None
+    window = np.hanning(count + 2)[1:-1]
+    late = reference[-count:] - reference[-count:].mean()
+    size = np.abs(np.fft.rfft(window * late))
+    top = int(np.argmax(size))
+    if top < 3 or size[top] <= 1e-9 * count * float(np.abs(reference).max()):
+        return None, None
+    turning = np.exp(-2j * math.pi * top / count * np.arange(count)) * window
+    exact, found = complex(turning @ late), complex(turning @ (values[-count:] - values[-count:].mean()))
+    return abs(found) / abs(exact) - 1.0, float(np.angle(found / exact))

@@ -93,12 +93,11 @@ def _lines(attributes: dict[str, Any], columns: Columns, best: int | None) -> tu
         at = f"step {step:.3g} s" if math.isfinite(step) else f"tolerance {tolerance:g}"
         cost = f" in {1e3 * seconds:.3g} ms" if math.isfinite(seconds) else ""
         first = f"cheapest of error ≤ {target}: {method}, {at}: error {error:.2g}{cost}"
-    left_out = int(attributes.get("left_out", 0))
-    failed = int(np.count_nonzero(columns["failure"] != "")) - left_out
     parts = [f"{attributes.get('duration', 0.0):.4g} s of motion"]
     parts.append(f"reference good to {attributes.get('reference_error', 0.0):.1e}")
-    counts = (("failed", failed), ("left out for want of time", left_out))
-    return first, "   ·   ".join(parts + [f"{words} {count}" for words, count in counts if count])
+    left_out = attributes.get("left_out", 0)
+    counts = {"failed": (columns["failure"] != "").sum() - left_out, "left out for want of time": left_out}
+    return first, "   ·   ".join(parts + [f"{words} {count}" for words, count in counts.items() if count])
 
 
 def _draw_errors(axes: Axes, columns: Columns, work: style.Array) -> None:
