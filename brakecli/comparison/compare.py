@@ -9,13 +9,13 @@ from itertools import pairwise
 from statistics import median
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brakecli.analysis.stability import report as linear
 from brakecli.comparison.methods import kinds, ladder, method_label, rungs
 from brakecli.errors import BrakecliError, RefusedError
 from brakecli.runs.limits import check, refuse, within_range
 from brakecli.solver import contact
+from brakecli.solver.compile import Floats
 from brakecli.solver.method import Method
 from brakecli.solver.motion import Motion, Work, solve
 from brakecli.solver.quantities import HISTORY
@@ -29,6 +29,7 @@ MOTION, FORCES = ("x", "y", "vx", "vy"), ("friction_force", "normal_force")  # w
 MOST_REPEATS, SLOW_REPEATS = 21, 3  # turns of most loops, and of slow ones: there, chance matters less
 SLOW = 0.1  # s, of a loop
 LONGEST_CALL = 1.0  # s, of a loop that is timed in one call; the time that blocks take is small beside longer ones
+LEFT_OUT = "left out: no time within the budget"
 
 Progress = Callable[[str, int, int], None]  # called with what is done, how many rungs are done, and of how many
 
@@ -137,10 +138,11 @@ def compare(
         sampled = replace(sampled, duration=(len(reference.rows) - 1) * sampled.interval)
         checked = _event_driven(sampled, CHECK, "it is not known how good the reference is")
         reference_error = errors(checked.rows, reference.rows).error
-        left_out = _first_round(sampled, entries, reference.rows, begin + 0.8 * budget, progress)
+        _measure(sampled, entries, reference.rows, begin + 0.8 * budget, progress)
         _add_limits(system, report, entries)
         repeats = _repeat(sampled, entries, begin + budget, progress)
     _mark_front(entries)
+    left_out = sum(entry.failure == LEFT_OUT for entry in entries)
     duration, interval, seconds = sampled.duration, sampled.interval, reference.work.solve_seconds
     return Comparison(duration, interval, reference_error, seconds, repeats, left_out, tuple(entries))
 
@@ -173,20 +175,14 @@ def _reference(system: System, budget: float) -> Motion:
         part = replace(part, duration=min(longer, whole))
 
 
-def _first_round(
-    system: System, entries: list[Entry], reference: NDArray[np.float64], deadline: float, progress: Progress
-) -> int:
-    """Run every rung once, the coarse ones first, and measure its error; how many there was no time for.
-
-    The coarsest of each method is run in any case.
-    """
-    left_out = 0
+def _measure(system: System, entries: list[Entry], reference: Floats, deadline: float, progress: Progress) -> None:
+    """Run every rung once, the coarse ones first, while there is time, and measure its error."""
     last: dict[Method, float] = {}
     for done, entry in enumerate(sorted(entries, key=lambda each: each.place)):
         progress("errors", done, len(entries))
+        # The coarsest of each method is run in any case
         if entry.place and time.perf_counter() + 2.0 * last.get(entry.kind, 0.0) > deadline:
-            entry.failure = "left out: no time within the budget"
-            left_out += 1
+            entry.failure = LEFT_OUT
             continue
         try:
             motion = _motion(system, entry.method)
@@ -199,14 +195,10 @@ def _first_round(
         if not work.failed:
             entry.seconds.append(work.solve_seconds)
             entry.errors = errors(motion.rows, reference)
-    return left_out
 
 
 def _repeat(system: System, entries: list[Entry], deadline: float, progress: Progress) -> int:
-    """Time all that ran again, in turns, as often as the budget allows; how many times each.
-
-    The times of the first round, which found memory and caches cold, count only where there are no others.
-    """
+    """Time all that ran again, in turns, as often as the budget allows; how many times each."""
     timed = [entry for entry in entries if entry.seconds]
     for repeat in range(MOST_REPEATS):
         if repeat == SLOW_REPEATS:
@@ -218,6 +210,7 @@ def _repeat(system: System, entries: list[Entry], deadline: float, progress: Pro
             progress(f"times, turn {repeat + 1}", done, len(timed))
             at_once = entry.seconds[-1] < LONGEST_CALL
             seconds = _motion(system, entry.method, at_once=at_once).work.solve_seconds
+            # The first time counts only where there are no others: it found memory and caches cold
             entry.seconds = [*entry.seconds, seconds] if repeat else [seconds]
     return MOST_REPEATS
 
@@ -255,7 +248,7 @@ def _mark_front(entries: list[Entry]) -> None:
             entry.on_front, best = True, entry.error
 
 
-def errors(rows: NDArray[np.float64], reference: NDArray[np.float64]) -> Errors:
+def errors(rows: Floats, reference: Floats) -> Errors:
     """Compare rows of `quantities.HISTORY`, sampled at the same times."""
     columns = {name: pair for name, *pair in zip(HISTORY, rows.T, reference.T, strict=True)}
     largest, mean = {}, {}
@@ -266,7 +259,7 @@ def errors(rows: NDArray[np.float64], reference: NDArray[np.float64]) -> Errors:
     return Errors(max(largest[name] for name in MOTION), largest, mean, *_line(*columns["vx"]))
 
 
-def _line(values: NDArray[np.float64], reference: NDArray[np.float64]) -> tuple[float | None, float | None]:
+def _line(values: Floats, reference: Floats) -> tuple[float | None, float | None]:
     """Relative error of the amplitude, and error of the phase, of the reference's strongest line."""
     count = len(reference) // 4
     if count < 64:

@@ -29,7 +29,10 @@ _BELT: dict[str, Any] = {"color": style.VERMILION, "ls": style.DASHES}
 
 
 class RunPicture:
-    """Everything that is drawn of a run, in SI units."""
+    """Everything that is drawn of a run, in SI units.
+
+    `detail` holds the samples that are drawn one by one: time, x, vx, state and belt (U); `part` says which they are.
+    """
 
     def __init__(self, result: StoredResult) -> None:
         """Read it from a result; raises UnreadableResultError where it is not there."""
@@ -46,13 +49,11 @@ class RunPicture:
         start, end = (float(read("time", i, i + 1)[0]) for i in (0, samples - 1))
         self.span = start, end  # s, of the whole run
         self.interval = (end - start) / (samples - 1) if samples > 1 else case.output.sample_interval
-        # What `detail` shows: time, x, vx, state and belt (U) of the samples that are drawn one by one
         self.part, first, stop = _detail(result, samples, self.interval)
         self.detail = {name: read(name, first, stop) for name in needed}
         self.detail["belt"] = np.interp(self.detail["time"], system.belt["time"], system.belt["value"])
         fastest, moving = style.largest(self.detail["belt"]), style.largest(self.detail["vx"])
-        # Whether the wheel's surface speed fits beside the motion without flattening it
-        self.near = moving == 0.0 or fastest <= 4.0 * moving
+        self.near = moving == 0.0 or fastest <= 4.0 * moving  # U fits beside the motion without flattening it
         self.velocity_unit = style.prefixed(max(moving, fastest if self.near else 0.0), "m/s")
         places, lowest, highest = envelope(partial(read, "x"), samples)
         self.envelope = start + self.interval * places, lowest, highest
@@ -61,8 +62,7 @@ class RunPicture:
         fundamental, peak = (result.attributes.get(name) for name in ("frequency", "spectrum_peak"))
         self.line = ("fundamental", fundamental) if fundamental else ("highest peak", peak)  # Hz
         steady, speed = np.ptp(system.belt["value"]) == 0.0, system.fastest_belt
-        # Hz, of the waves of a wheel that turns steadily
-        self.passing = tuple(sorted(speed * system.wheel.turns)) if steady and speed else ()
+        self.passing = tuple(sorted(speed * system.wheel.turns)) if steady and speed else ()  # Hz, of its waves
 
 
 def envelope(read: Callable[[int, int], style.Array], samples: int, columns: int = COLUMNS) -> list[style.Array]:
