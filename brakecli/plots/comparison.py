@@ -22,15 +22,8 @@ _PANELS = (  # column, factor, title and label of the work
     ("wall_seconds", 1e3, "Work–precision", "median time of the loop (ms)"),
     ("contact_evaluations", 1.0, "Work counted, the same on every machine", "evaluations of the contact force"),
 )
-_MARKERS = {  # by weights
-    "0.5, 0.5": "o",
-    "1, 0.5": "^",
-    "0.5, 1": "v",
-    "1, 1": "s",
-    "0.25, 0.5, 0.25": "o",
-    "0.0833333, 0.833333, 0.0833333": "D",
-    "": "*",
-}
+_MARKERS = {"0.5, 0.5": "o", "1, 0.5": "^", "0.5, 1": "v", "1, 1": "s"}  # by weights: of two layers
+_MARKERS |= {"0.25, 0.5, 0.25": "o", "0.0833333, 0.833333, 0.0833333": "D", "": "*"}  # of three, and none
 _EXACT, _OTHER_NODES = "#CC79A7", "#56B4E9"  # colours of the exact contact force, of less usual numbers of nodes
 _NODE_MARKERS = "<>ph"  # markers of the same weights with other numbers of nodes
 
@@ -121,12 +114,11 @@ def _draw_errors(axes: Axes, columns: Columns, work: style.Array) -> None:
             colour = _EXACT
         elif entry["evaluator"] == "midpoint" and entry["nodes"] in others:
             colour, marker = _OTHER_NODES, _NODE_MARKERS[others.index(entry["nodes"]) % len(_NODE_MARKERS)]
-        look: dict[str, Any] = (
-            {"ms": 9.0, "lw": 2.0, "zorder": 3.0} if own else {"ms": 5.0, "lw": 1.1, "zorder": 2.0}
-        )
+        size, width, above = (9.0, 2.0, 3.0) if own else (5.0, 1.1, 2.0)
+        face = "white" if entry["start"] == "paper" else colour
         dashes = (0, (2, 1.5)) if entry["iteration"] == "fixed-point" else "-"
-        look |= {"color": colour, "marker": marker, "mfc": "white" if entry["start"] == "paper" else colour}
-        axes.plot(work[places], columns["error"][places], label=label, ls=dashes, **look)
+        look: dict[str, Any] = {"label": label, "color": colour, "marker": marker, "mfc": face, "ls": dashes}
+        axes.plot(work[places], columns["error"][places], ms=size, lw=width, zorder=above, **look)
 
 
 def _draw_front(axes: Axes, columns: Columns, work: style.Array) -> None:

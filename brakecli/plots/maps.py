@@ -85,12 +85,10 @@ def _amplitude_scale(picture: SweepPicture) -> Scale:
 def _critical_scale(picture: SweepPicture) -> Scale:
     critical, values = picture.critical, picture["critical"][np.isfinite(picture["critical"])]
     assert critical is not None
-    low, high = critical.lower, critical.upper
-    if values.size:
-        low, high = float(values.min()), float(values.max())
-        least = 0.01 * max(abs(low), abs(high))
-        if high - low <= least:
-            low, high = low - (least or 1.0), high + (least or 1.0)
+    low, high = (float(values.min()), float(values.max())) if values.size else (critical.lower, critical.upper)
+    least = 0.01 * max(abs(low), abs(high))
+    if values.size and high - low <= least:
+        low, high = low - (least or 1.0), high + (least or 1.0)
     return Scale(style.labelled(f"critical {critical.parameter}", picture.units["critical"]), Normalize(low, high))
 
 

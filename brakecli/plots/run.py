@@ -31,7 +31,7 @@ _BELT: dict[str, Any] = {"color": style.VERMILION, "ls": style.DASHES}
 class RunPicture:
     """Everything that is drawn of a run, in SI units.
 
-    `detail` holds the samples that are drawn one by one: time, x, vx, state and belt (U); `part` says which they are.
+    `detail` holds the samples that are drawn one by one: time, x, vx, state and belt (U); `part` names them.
     """
 
     def __init__(self, result: StoredResult) -> None:
