@@ -17,7 +17,7 @@ import numpy as np
 
 from brakecli.case.case import Case, changed
 from brakecli.case.system import system_of
-from brakecli.comparison.deviation import errors
+from brakecli.comparison.compare import errors
 from brakecli.errors import BrakecliError
 from brakecli.runs.tolerance import certify
 from brakecli.solver.links import natural_frequencies

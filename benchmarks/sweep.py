@@ -13,7 +13,7 @@ import time
 from pathlib import Path
 
 from brakecli.sweeps.driver import choose_engine, sweep
-from brakecli.sweeps.file import LoadedSweep, read_sweep
+from brakecli.sweeps.plan import LoadedSweep, read_sweep
 from brakecli.sweeps.point import compute
 
 CASE = Path(__file__).parents[1] / "cases" / "relaxation.toml"

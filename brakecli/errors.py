@@ -4,6 +4,7 @@ Every message reads *where: what is wrong (what was found); what to do*.
 """
 
 import json
+import os
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -42,17 +43,17 @@ class BrakecliError(Exception):
 
     exit_code = 1
 
-
-class UsageError(BrakecliError):
-    """The command line asks for something that cannot be done: exit code 2."""
-
-    exit_code = 2
+    def __init_subclass__(cls, exit_code: int) -> None:
+        """Every kind of failure has its exit code."""
+        cls.exit_code = exit_code
 
 
-class CaseError(BrakecliError):
-    """A case or sweep file is wrong: exit code 2. Holds every problem that was found."""
+class UsageError(BrakecliError, exit_code=2):
+    """The command line asks for something that cannot be done."""
 
-    exit_code = 2
+
+class CaseError(BrakecliError, exit_code=2):
+    """A case or sweep file is wrong. Holds every problem that was found."""
 
     def __init__(self, problems: Sequence[Problem]) -> None:
         """Report every problem in a line of its own."""
@@ -60,22 +61,16 @@ class CaseError(BrakecliError):
         self.problems = tuple(problems)
 
 
-class RefusedError(BrakecliError):
-    """The work is too large, or lies beyond a limit of the method: exit code 3."""
-
-    exit_code = 3
+class RefusedError(BrakecliError, exit_code=3):
+    """The work is too large, or lies beyond a limit of the method."""
 
 
-class UnreadableResultError(BrakecliError):
-    """A result file cannot be read, or must not be trusted: exit code 4."""
-
-    exit_code = 4
+class UnreadableResultError(BrakecliError, exit_code=4):
+    """A result file cannot be read, or must not be trusted."""
 
 
-class CannotWriteError(BrakecliError):
-    """An output cannot be written: exit code 74 (EX_IOERR of sysexits.h)."""
-
-    exit_code = 74
+class CannotWriteError(BrakecliError, exit_code=os.EX_IOERR):
+    """An output cannot be written."""
 
 
 def key_text(path: KeyPath) -> str:

@@ -15,7 +15,7 @@ from brakecli.files.field import values_of
 from brakecli.files.read import open_result
 from brakecli.runs.run import run
 from brakecli.sweeps.driver import choose_engine, sweep
-from brakecli.sweeps.file import parse_sweep
+from brakecli.sweeps.plan import parse_sweep
 from tests.commands import ROOT
 
 

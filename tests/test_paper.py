@@ -18,7 +18,7 @@ from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
 from brakecli.solver.roughness import TWO_PI
 from brakecli.sweeps.critical import Outcome, Search, search
-from brakecli.sweeps.file import kind_of, read_sweep
+from brakecli.sweeps.plan import kind_of, read_sweep
 from brakecli.sweeps.point import simulate
 from brakecli.sweeps.tables import Critical
 from tests.campaign import campaign, differences

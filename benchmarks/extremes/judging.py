@@ -16,7 +16,7 @@ from scipy.linalg import expm
 from brakecli.analysis.stability.modes import eigensystem
 from brakecli.case.case import Case
 from brakecli.case.system import system_of
-from brakecli.comparison.deviation import errors
+from brakecli.comparison.compare import errors
 from brakecli.errors import RefusedError
 from brakecli.runs.limits import check, refuse, within_range
 from brakecli.runs.tolerance import certify

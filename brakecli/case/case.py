@@ -11,7 +11,7 @@ import tomli_w
 from pydantic import Field
 
 from brakecli.case import tables
-from brakecli.case.tables import NonNegative, Number, OneOf, Positive, Schedule, Series, Table, described, quantity
+from brakecli.case.tables import NonNegative, Number, Positive, Schedule, Table, described, one_of, quantity
 from brakecli.errors import Problem, found
 from brakecli.solver.contact import EVALUATORS
 from brakecli.solver.method import MOST
@@ -33,7 +33,7 @@ class Varying(Table):
         yield from super()._broken_rules()
         _, (times_key, values_key) = self.alternatives
         yield from self.different_lengths(values_key, times_key)
-        times: Series = getattr(self, times_key) or ()
+        times: tables.Series = getattr(self, times_key) or ()
         late = [index for index, (before, time) in enumerate(pairwise(times), start=1) if time <= before]
         for index in late[: tables.MOST_WRONG_ENTRIES]:
             what = f"is not later than the time before it{found(times[index])}"
@@ -82,7 +82,7 @@ class Contact(Table):
 
     half_length: Positive = quantity("m", "half length a of the contact")
     stiffness: Positive = quantity("N/m²", "stiffness k of the contact per unit of its length")
-    evaluator: Annotated[str, OneOf(lambda: EVALUATORS)] = described(
+    evaluator: Annotated[str, *one_of(lambda: EVALUATORS)] = described(
         'how the contact force is computed; "auto" takes the cheapest', "auto"
     )
     nodes: Annotated[int, Field(ge=2, le=10_000_000)] | None = described(
@@ -95,10 +95,10 @@ class Profile(Table):
 
     alternatives = (("wavelengths",), ("wavenumbers",))
 
-    amplitudes: Series = quantity("m", "amplitude of each sine")
+    amplitudes: tables.Series = quantity("m", "amplitude of each sine")
     wavelengths: tables.Lengths | None = quantity("m", "wavelength of each sine", None)
     wavenumbers: tables.Lengths | None = quantity("rad/m", "wavenumber of each sine", None)
-    phases_deg: Series = quantity("deg", "phase of each sine, 0 if left out", default_factory=tuple)
+    phases_deg: tables.Series = quantity("deg", "phase of each sine, 0 if left out", default_factory=tuple)
 
     def _fill(self) -> None:
         if "phases_deg" not in self.model_fields_set:
@@ -135,7 +135,7 @@ class Solver(Table):
     alternatives = (("step",), ("tolerance",))
     one_is_needed = False
 
-    scheme: Annotated[str, OneOf(lambda: (*SCHEMES, "auto"))] = described(
+    scheme: Annotated[str, *one_of(lambda: (*SCHEMES, "auto"))] = described(
         'the time-stepping scheme; "two-layer" with a step, otherwise "auto", which chooses one', "auto"
     )
     theta: tables.Weights = quantity(
@@ -144,11 +144,11 @@ class Solver(Table):
         "three that add up to 1 for three-layer, 0.25, 0.5 and 0.25 if left out; none for event-driven",
         default_factory=tuple,
     )
-    iteration: Annotated[str, OneOf(lambda: MOST)] = described(
+    iteration: Annotated[str, *one_of(lambda: MOST)] = described(
         'how the equations of a step are solved; "fixed-point" is the paper\'s way', "newton"
     )
-    start: Annotated[str, OneOf(lambda: [start for row in SCHEMES.values() for start in row.starts])] = described(
-        'how the second layer of three-layer is found; "paper" sets it equal to the first', "consistent"
+    start: Annotated[str, *one_of(lambda: [start for row in SCHEMES.values() for start in row.starts])] = (
+        described('how the second layer of three-layer is found; "paper" sets it equal to the first', "consistent")
     )
     step: Positive | None = quantity("s", "time step h; or tolerance instead", None)
     tolerance: tables.Tolerance | None = quantity(

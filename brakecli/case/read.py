@@ -5,7 +5,7 @@ import re
 import shlex
 import sys
 from collections.abc import Container, Sequence
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
@@ -49,8 +49,8 @@ def read_text(source: str) -> tuple[str, str]:
             data = file.read(toml_lines.LARGEST_TEXT + 1)
     except (OSError, ValueError, AttributeError) as error:
         # ValueError: a NUL in the path, or standard input is closed; AttributeError: there is no standard input.
-        reason = getattr(error, "strerror", None) or str(error)
-        reason = "it is closed" if isinstance(error, AttributeError) else reason
+        closed = isinstance(error, AttributeError)
+        reason = "it is closed" if closed else getattr(error, "strerror", None) or str(error)
         what = f"cannot be read: {reason[0].lower()}{reason[1:]}"
         raise unfit(what, 'name a TOML file, or "-" for standard input', name) from error
     check_size(data, name)
@@ -87,20 +87,17 @@ def parse_table(kind: type[_Table], text: str, label: str, overrides: Sequence[s
         sources.append(option := f"--set {printable(override)}")
         try:
             path, value = parse_override(override)
-            created = put(data, path, value, kind, kept=set_by)
+            set_by |= dict.fromkeys((*put(data, path, value, kind, kept=set_by), path), option)
         except CaseError as error:
             problems += [replace(problem, source=option, line=0) for problem in error.problems]
-        else:
-            set_by |= dict.fromkeys((*created, path), option)
     try:
         table = kind.model_validate(data)
     except ValidationError as error:
         for problem in wording.problems(error, kind):
-            if problem.what == MISSING and not all_is_readable:
-                continue  # it may stand in the part that cannot be read
             by = innermost(set_by, problem.path, "")
             line = 0 if by else innermost(located.lines, problem.path, 0)
-            problems.append(replace(problem, source=by or label, line=line))
+            if problem.what != MISSING or all_is_readable:  # otherwise it may stand where nothing can be read
+                problems.append(replace(problem, source=by or label, line=line))
     if problems:
         raise CaseError(sorted(problems, key=lambda problem: (sources.index(problem.source), problem.line)))
     return table
@@ -120,9 +117,8 @@ def put(
     for end, parent in enumerate(parents, start=1):
         if isinstance(table, dict):
             if parent not in table:
-                table[parent] = {}
                 created.append(path[:end])
-            table = table[parent]
+            table = table.setdefault(parent, {})
     if not isinstance(table, dict):
         raise CaseError([Problem(path, f"{key_text(path[:-1])} is not a table", "set a key of a table")])
     table[key] = value
@@ -145,12 +141,10 @@ def parse_override(override: str) -> tuple[tuple[str, ...], object]:
     path = key_path(key)
     if "=" not in override or not path:
         raise unfit(f"does not begin with a key (found {printable(key)})", "write --set key.path=VALUE")
-    try:
+    with suppress(CaseError):
         parsed = parse(f"value={value}")
-    except CaseError:
-        parsed = {}
-    if parsed.keys() == {"value"}:
-        return path, parsed["value"]
+        if parsed.keys() == {"value"}:
+            return path, parsed["value"]
     remedy = WRITING
     if re.fullmatch(r"[^\W\d][\w .-]*", value):
         remedy = f"texts need quotes: --set {key}={shlex.quote(json.dumps(value, ensure_ascii=False))}"
@@ -161,8 +155,7 @@ def key_path(text: str) -> tuple[str, ...]:
     """The parts of a key path as TOML writes it; none if it is not one."""
     if "\n" in text or text.count(".") >= toml_lines.MOST_PARTS:
         return ()
-    try:
+    with suppress(CaseError):
         path, value = toml_lines.only_path(parse(f"{text}=0"))
-    except CaseError:
-        return ()
-    return path if value == 0 else ()
+        return path if value == 0 else ()
+    return ()

@@ -2,12 +2,20 @@
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import nullcontext, suppress
-from dataclasses import dataclass
 from functools import cache
 from operator import attrgetter
 from typing import Annotated, Any, ClassVar, Self, cast, get_args
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, WrapValidator, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    WrapValidator,
+    model_validator,
+)
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import InitErrorDetails, PydanticCustomError, core_schema
 
@@ -15,9 +23,7 @@ from brakecli.errors import KeyPath, Problem, found
 from brakecli.solver.contact import EVALUATORS
 from brakecli.solver.schemes import SCHEMES
 
-SMALLEST, LARGEST = 1e-100, 1e100
-"""Magnitudes between which every number other than zero must lie, so that products neither vanish nor overflow."""
-
+SMALLEST, LARGEST = 1e-100, 1e100  # magnitudes of all numbers but 0, so that products neither vanish nor overflow
 MOST_WRONG_ENTRIES = 20  # of one list that are reported
 MISSING = "is missing"
 
@@ -32,25 +38,17 @@ def quantity(unit: str, description: str, default: Any = ..., **options: Any) ->
     return described(description, default, json_schema_extra={"unit": unit}, **options)
 
 
-@dataclass(frozen=True)
-class OneOf:
+def one_of(names: Callable[[], Iterable[str]]) -> tuple[Any, ...]:
     """A text that is one of some names. They are asked for at every check, so that a row may join a registry."""
 
-    names: Callable[[], Iterable[str]]
+    def checked(value: Any) -> Any:
+        if value not in tuple(names()):
+            raise PydanticCustomError("enum", "is not one of the choices")
+        return value
 
-    def __get_pydantic_core_schema__(self, *_: Any) -> core_schema.CoreSchema:
-        """Accept these names."""
-
-        def checked(value: Any) -> Any:
-            if value not in tuple(self.names()):
-                raise PydanticCustomError("enum", "is not one of the choices")
-            return value
-
-        return core_schema.no_info_plain_validator_function(checked)
-
-    def __get_pydantic_json_schema__(self, *_: Any) -> JsonSchemaValue:
-        """List these names."""
-        return {"enum": list(dict.fromkeys(self.names())), "type": "string"}
+    return BeforeValidator(checked), Field(
+        json_schema_extra=lambda schema: schema.update(enum=[*dict.fromkeys(names())])
+    )
 
 
 def _within_scale(value: float) -> float:
@@ -86,6 +84,11 @@ Schedule = Annotated[tuple[Number, ...], Field(min_length=1), *from_list]
 Title = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f-\x9f]*$", description="one line for people to read")]
 
 
+def _add_alternatives(schema: dict[str, Any], kind: "type[Table]") -> None:
+    if groups := [{"required": [*group]} for group in kind.alternatives]:
+        schema |= {"oneOf": groups} if kind.one_is_needed else {"not": {"allOf": groups}}
+
+
 class Table(BaseModel):
     """A table of a file: frozen, without unknown keys, and with rules between its keys."""
 
@@ -94,7 +97,7 @@ class Table(BaseModel):
         frozen=True,
         extra="forbid",
         allow_inf_nan=False,
-        json_schema_extra=lambda schema, model: schema.update(model._alternatives_schema()),
+        json_schema_extra=_add_alternatives,
     )
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = ()  # groups of keys that exclude each other
@@ -127,13 +130,6 @@ class Table(BaseModel):
 
     def _fill(self) -> None:
         """Give the keys that were left out their values, where these depend on other keys."""
-
-    @classmethod
-    def _alternatives_schema(cls) -> dict[str, Any]:
-        groups = [{"required": list(group)} for group in cls.alternatives]
-        if not groups:
-            return {}
-        return {"oneOf": groups} if cls.one_is_needed else {"not": {"allOf": groups}}
 
     @model_validator(mode="wrap")
     @classmethod

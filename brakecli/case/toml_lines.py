@@ -17,21 +17,20 @@ MOST_PARTS = 32  # of a dotted key: the time that tomllib takes grows with their
 MOST_STATEMENTS = 1000  # keys and table headers
 MOST_MARKS = 50_000  # commas, brackets and signs of equality outside texts; so many entries may all lists have
 
-_TOKEN = re.compile(
+_OPAQUE = re.compile(  # texts and comments, also those that do not end
     r'"""(?:\\.|[^\\])*?(?:"{3,5}|\\?\Z)'
     r"|'''.*?(?:'{3,5}|\Z)"
     r'|"(?:\\[^\n]|[^"\\\n])*"?'
     r"|'[^'\n]*'?"
-    r"|#[^\n]*(?:\n[ \t\n]*#[^\n]*)*"
-    r"|\n[ \t\n]*"
-    r"|[\[\]{}.,=]",
+    r"|#[^\n]*(?:\n[ \t\n]*#[^\n]*)*",
     re.DOTALL,
 )
+_DEEP = rf"(?:\.[^][.{{}},=\n]*+){{{MOST_PARTS - 1}}}\."  # ends with the first dot that is too much
+_MANY = rf"\A(?:[^][{{}},=]*+[][{{}},=]){{{MOST_MARKS + 1}}}"  # ends with the first mark that is too much
+_ROW = re.compile(r"^[ \t]*[^ \t\n].*", re.MULTILINE)
 _Value = TypeVar("_Value")
 _HEADER = re.compile(r"[ \t]*\[")
-_NOTHING = re.compile(r"[ \t\n]*(#.*)?", re.DOTALL)
 _POSITION = re.compile(r" \(at (?:line (\d+), column \d+|end of document)\)$")
-
 WRITING = "numbers are written 1.5 or 2e-3, texts in quotes, lists as [1, 2], table headers as [table]"
 """The remedy for what is not TOML."""
 
@@ -68,36 +67,27 @@ def split(text: str, source: str = "") -> list[tuple[int, str]]:
     Raises `CaseError` for a text that tomllib must not get.
     """
     check_size(text, source)
-    if text.startswith("\ufeff"):
-        raise unfit("begins with a byte order mark", "save the file as UTF-8 without one", source, 1)
-    if "\0" in text:
-        line = text.count("\n", 0, text.index("\0")) + 1
-        raise unfit("holds a NUL character", "save the file as UTF-8 text, not as UTF-16", source, line)
+    text = text.replace("\r\n", "\n")
+    bare = _OPAQUE.sub(lambda found: (" " if found[0][0] == "#" else "_") * len(found[0]), text)
+    for searched, pattern, what, remedy in (
+        (text, r"\A\ufeff", "begins with a byte order mark", "save the file as UTF-8 without one"),
+        (text, r"\0", "holds a NUL character", "save the file as UTF-8 text, not as UTF-16"),
+        (bare, _DEEP, f"a key has more than {MOST_PARTS} parts", "shorten the key"),
+        (bare, _MANY, f"there are more than {MOST_MARKS} commas and brackets", "give shorter lists"),
+    ):
+        if match := re.search(pattern, searched):
+            raise unfit(what, remedy, source, text.count("\n", 0, match.end() - 1) + 1)
     statements = []
-    start, line, first, depth, dots, marks = 0, 1, 1, 0, 0, 0
-    in_header = _HEADER.match(text)
-    text = text.replace("\r\n", "\n") + "\n"
-    for token in _TOKEN.finditer(text):
-        mark = token[0]
-        if mark == ".":
-            dots += 1
-            if dots == MOST_PARTS:
-                raise unfit(f"a key has more than {MOST_PARTS} parts", "shorten the key", source, line)
-            continue
-        if mark[0] in "[]{},=\n":
-            dots = 0
-            depth += (mark in "[{") - (mark in "]}")
-            marks += mark[0] != "\n"
-            if marks > MOST_MARKS:
-                what = f"there are more than {MOST_MARKS} commas and brackets"
-                raise unfit(what, "give shorter lists", source, line)
-        line += mark.count("\n")
-        if mark[0] == "\n" and (depth <= 0 or in_header):
-            statements.append((first, text[start : token.start()]))
-            start, first, depth = token.end(), line, 0
-            in_header = _HEADER.match(text, start)
-    statements.append((first, text[start:]))
-    statements = [statement for statement in statements if not _NOTHING.fullmatch(statement[1])]
+    line, begin, depth = 1, 0, 0
+    for row in _ROW.finditer(bare):
+        if not depth:
+            line, begin = line + text.count("\n", begin, row.start()), row.start()
+        opened, closed = (sum(map(row[0].count, marks)) for marks in ("[{", "]}"))
+        depth = 0 if _HEADER.match(bare, begin) else max(0, depth + opened - closed)
+        if not depth:
+            statements.append((line, text[begin : row.end()]))
+    if depth:
+        statements.append((line, text[begin:]))
     if len(statements) > MOST_STATEMENTS:
         what = f"there are more than {MOST_STATEMENTS} keys"
         raise unfit(what, "give a shorter file", source, statements[MOST_STATEMENTS][0])
@@ -134,15 +124,13 @@ class Located:
         table: Any = self.data
         path: KeyPath = ()
         for count, key in enumerate(keys, start=1):
-            is_entry = count == len(keys) and isinstance(leaf, list)
-            path = (*path, key)
-            table = table.setdefault(key, [] if is_entry else {})
-            if is_entry and isinstance(table, list):
+            new = leaf if count == len(keys) else {}  # [{}] for a header in double brackets
+            path, table = (*path, key), table.setdefault(key, type(new)())
+            if isinstance(table, list) and new:
                 self.lines.setdefault(path, line)
-                table.append({})
+                table += new
             if isinstance(table, list) and table:
-                path = (*path, len(table) - 1)
-                table = table[-1]
+                path, table = (*path, len(table) - 1), table[-1]
             if not isinstance(table, dict):
                 self._report_twice(path, line)
                 return None, path

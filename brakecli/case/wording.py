@@ -16,19 +16,15 @@ _WHAT = {
     "bool_type": "is neither true nor false",
     "string_type": "is not a text",
     "string_pattern_mismatch": "holds a line break or a control character",
-    "enum": "is not one of the choices",
-    "literal_error": "is not one of the choices",
+    **dict.fromkeys(("enum", "literal_error"), "is not one of the choices"),
     "tuple_type": "is not a list",
     "model_type": "is not a table",
-    "too_short": "is too short",
+    **dict.fromkeys(("too_short", "string_too_short"), "is too short"),
     "finite_number": "is not finite",
-    "greater_than": "is out of range",
-    "greater_than_equal": "is out of range",
-    "less_than_equal": "is out of range",
+    **dict.fromkeys(("greater_than", "greater_than_equal", "less_than_equal"), "is out of range"),
     "magnitude": f"is not between {SMALLEST:g} and {LARGEST:g} in magnitude",
 }
 """The kinds of error that pydantic reports for one value of a case."""
-
 _TEXT = "one line of text in quotes"
 _KINDS = {"number": "a number", "integer": "a whole number", "boolean": "true or false", "string": _TEXT}
 

@@ -1,7 +1,6 @@
 """`brakecli check`."""
 
 import math
-from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -28,7 +27,7 @@ def command(
         from brakecli.sweeps.driver import cores
 
         cost = estimate(sweep.plan, cores())
-        numbers = {"valid": True, **asdict(cost)}
+        numbers = {"valid": True, **vars(cost)}
         show_result("check", numbers, estimate_table, sweep.title, cost, as_json=as_json, quiet=quiet)
         refuse_sweep(cost, free_bytes(Path()))
         return
@@ -40,11 +39,11 @@ def command(
 
     with within_range():
         found = check(system_of(loaded.case))
-    of_system = {name: getattr(found.system, name) for name in OF_SYSTEM}
-    values = {"valid": True, "coefficients": found.system.coefficients._asdict(), **of_system, **vars(found)}
-    values |= vars(values.pop("limits"))
-    del values["system"]
-    numbers = {name: value for name, value in values.items() if value not in (math.inf, -math.inf)}
+    numbers = {"valid": True, "coefficients": found.system.coefficients._asdict()}
+    numbers |= {name: getattr(found.system, name) for name in OF_SYSTEM} | vars(found) | vars(found.limits)
+    infinite = [name for name, value in numbers.items() if value in (math.inf, -math.inf)]
+    for name in ("system", "limits", *infinite):
+        del numbers[name]
     show_result("check", numbers, check_table, loaded.case.title, found, as_json=as_json, quiet=quiet)
     warn(*found.warnings)
     refuse(found, free_bytes(Path()))

@@ -30,7 +30,7 @@ def command(
 ) -> None:
     """Report the regime of the run in a result file, or of a measured signal, with the evidence."""
     reading: dict[str, Any] = {"column": column, "time_column": time_column, "sample_rate": sample_rate}
-    machine = {"belt_speed": belt_speed, "stiffness": stiffness}
+    machine: dict[str, Any] = {"belt_speed": belt_speed, "stiffness": stiffness}
     _check(quantity, {**reading, **machine})
     announce_compilation(quiet or quantity is not None)
     from brakecli.cli.tables import verdict_table
@@ -42,18 +42,16 @@ def command(
         try:
             numbers = classify_result(Path(source), _changed(Thresholds, thresholds))
         except UnreadableResultError as error:
-            raise UnreadableResultError(
-                f"{error}; for a measured signal say with --quantity what it is"
-            ) from error
+            remedy = "for a measured signal say with --quantity what it is"
+            raise UnreadableResultError(f"{error}; {remedy}") from error
     else:
         from brakecli.analysis.regime.of_signal import Measurand, SignalThresholds, classify_signal
         from brakecli.analysis.regime.signal_file import read_signal
 
         if quantity not in set(Measurand):
             raise UsageError(f"--quantity {quantity}: is not known; give one of {', '.join(Measurand)}")
-        signal, moved = read_signal(source, **reading), _changed(SignalThresholds, thresholds)
-        verdict = classify_signal(signal, quantity=Measurand(quantity), thresholds=moved, **machine)
-        numbers = dataclasses.asdict(verdict)
+        signal, machine["thresholds"] = read_signal(source, **reading), _changed(SignalThresholds, thresholds)
+        numbers = dataclasses.asdict(classify_signal(signal, quantity=Measurand(quantity), **machine))
     warn(*numbers.get("warnings", ()))
     shown = {"source": source, **numbers}
     show_result("classify", shown, verdict_table, source, numbers, as_json=as_json, quiet=quiet)

@@ -10,7 +10,7 @@ from brakecli.errors import CaseError, UsageError
 
 if TYPE_CHECKING:
     from brakecli.case.read import LoadedCase
-    from brakecli.sweeps.file import LoadedSweep
+    from brakecli.sweeps.plan import LoadedSweep
 
 
 def load_case(source: str, overrides: list[str] | None) -> "LoadedCase":
@@ -33,7 +33,7 @@ def load_case(source: str, overrides: list[str] | None) -> "LoadedCase":
 
 def load_sweep(source: str, overrides: list[str] | None) -> "LoadedSweep":
     """The sweep of a sweep file."""
-    from brakecli.sweeps.file import kind_of, read_sweep
+    from brakecli.sweeps.plan import kind_of, read_sweep
 
     try:
         return read_sweep(source, overrides or ())
@@ -45,9 +45,9 @@ def load_sweep(source: str, overrides: list[str] | None) -> "LoadedSweep":
 
 def is_sweep(source: str) -> bool:
     """Whether a file is meant to be a sweep; standard input can be read only once, and holds a case."""
-    from brakecli.sweeps import file
+    from brakecli.sweeps.plan import kind_of
 
-    return source != "-" and not _is_result(source) and file.kind_of(source) == "sweep"
+    return source != "-" and not _is_result(source) and kind_of(source) == "sweep"
 
 
 def result_path(output: Path | None, source: str, kind: str = "case", ending: str = ".h5") -> Path:

@@ -20,13 +20,9 @@ def output_option(content: str, default: str) -> Any:
     return option(f"{content}  [default: {default}]", "PATH", "--output", "-o")
 
 
-def set_option(target: str) -> Any:
-    """Changes to a case or a sweep."""
-    return option(f"Set a key of {target}; repeatable.", "KEY.PATH=VALUE", "--set")
-
-
 CaseArgument = Annotated[str, source_argument("CASE.toml", 'Case file, or "-" for standard input.')]
-Overrides = Annotated[list[str] | None, set_option("the case, the value in TOML")]
+SET = "KEY.PATH=VALUE", "--set"
+Overrides = Annotated[list[str] | None, option("Set a key of the case, the value in TOML; repeatable.", *SET)]
 AsJson = Annotated[bool, option("Print one JSON object on standard output, nothing else.", None, "--json")]
 Quiet = Annotated[bool, option("Print nothing but warnings and errors.", None, "--quiet", "-q")]
 Force = Annotated[bool, option("Replace an existing output.", None, "--force")]

@@ -53,7 +53,5 @@ def _parse_range(text: str) -> tuple[str, list[float]]:
         first, last, size = float(start), float(stop), int(count)
         if key and 1 <= size <= MOST_VALUES and math.isfinite(first) and math.isfinite(last):
             return key, np.linspace(first, last, size).tolist()
-    raise UsageError(
-        f"--vary {text}: is not KEY=START:STOP:NUM with NUM from 1 to {MOST_VALUES}; write, for instance, "
-        "--vary link2.angle_deg=1:10:10"
-    )
+    what = f"is not KEY=START:STOP:NUM with NUM from 1 to {MOST_VALUES}"
+    raise UsageError(f"--vary {text}: {what}; write, for instance, --vary link2.angle_deg=1:10:10")

@@ -4,19 +4,20 @@ from pathlib import Path
 from typing import Annotated
 
 from brakecli.cli.inputs import load_sweep, result_path
-from brakecli.cli.options import AsJson, Quiet, option, output_option, set_option, source_argument
+from brakecli.cli.options import SET, AsJson, Quiet, option, output_option, source_argument
 from brakecli.cli.output import announce_compilation, progress, say, show_result, warn
 from brakecli.errors import BrakecliError
 
 JOBS = "Worker processes  [default: one for each core]"
 SCHEDULER = "Compute on a dask cluster: the scheduler's address, as tcp://host:8786."
+SETTING = "Set a key of the base case or of [critical]; repeatable."
 REPLACE = "Replace an existing output, and drop finished points of another sweep."
 
 
 def command(
     file: Annotated[str, source_argument("SWEEP.toml", 'Sweep file, or "-" for standard input.')],
     output: Annotated[Path | None, output_option("Result file", "the sweep's name with .h5, here")] = None,
-    overrides: Annotated[list[str] | None, set_option("the base case or of [critical]")] = None,
+    overrides: Annotated[list[str] | None, option(SETTING, *SET)] = None,
     jobs: Annotated[int | None, option(JOBS, None, "--jobs", "-j", min=1, max=4096)] = None,
     scheduler: Annotated[str | None, option(SCHEDULER, "ADDRESS", envvar="DASK_SCHEDULER_ADDRESS")] = None,
     scheduler_file: Annotated[str | None, option("The same, by the scheduler's file.", "FILE")] = None,
@@ -60,6 +61,5 @@ def command(
         where = ", ".join(f"{key} = {value}" for key, value in failure["parameters"].items())
         say(f"point {failure['point']}{f' ({where})' if where else ''}: {failure['reason']}")
     if found.failed:
-        raise BrakecliError(
-            f"{report.output}: {found.failed} of {found.points} points failed; all others were written"
-        )
+        failed = f"{found.failed} of {found.points} points failed"
+        raise BrakecliError(f"{report.output}: {failed}; all others were written")

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import io
-import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,15 +22,10 @@ if TYPE_CHECKING:  # what one command prints need not wait for the modules of th
     from brakecli.sweeps.result import SweepReport
 
 POINTS = named(fields.POINT, "regime", "frequency", "amplitude")
-CRITICAL_POINTS = (
-    *named(fields.POINT, "regime"),
-    *named(fields.CRITICAL, "critical", "critical_error", "critical_eigenvalue", "critical_sustained"),
-    *named(fields.CRITICAL, "critical_status"),
-)
+CRITICAL_NAMES = ("critical", "critical_error", "critical_eigenvalue", "critical_sustained", "critical_status")
+CRITICAL_POINTS = (*named(fields.POINT, "regime"), *named(fields.CRITICAL, *CRITICAL_NAMES))
 MOST_LISTED_POINTS = 30
-NARROWEST = 40
-"""Columns of a table, whatever the terminal says: nothing can be read in fewer."""
-
+NARROWEST = 40  # columns of a table, whatever the terminal says: nothing can be read in fewer
 
 Row = tuple[str, str | Sequence[str]]
 """A label with its text; a list gives a row for each of its texts, and none if it is empty."""
@@ -51,12 +44,12 @@ ENTRIES = (
 
 def run_table(report: RunReport) -> str:
     """Summary of a run."""
-    numbers, work, method = report.numbers(), report.motion.work, report.system.method
+    numbers, work, method = report.numbers(), report.motion.work, report.motion.system.method
     weights = ", ".join(f"{weight:.4g}" for weight in method.theta)
     how = f", tolerance {method.tolerance:.4g}" if method.own_steps else f" ({weights}), {method.iteration}"
     shares = ", ".join(f"{kind} {count / max(work.steps, 1):.1%}" for kind, count in work.evaluators.items())
     on_nodes = any(EVALUATORS[kind].needs_nodes for kind in work.evaluators)
-    nodes = f", {report.system.nodes} nodes" if on_nodes else ""
+    nodes = f", {numbers['nodes']} nodes" if on_nodes else ""
     step = "" if report.check.step is None else f" of {report.check.step:.4g} s"
     error = abs(numbers["energy"]["relative_closing_error"])
     rows = [
@@ -100,10 +93,9 @@ def check_table(title: str, found: Check) -> str:
     system, limits, has_step = found.system, found.limits, found.step is not None
     (low, high), (link_low, link_high) = system.natural_frequencies, found.link_frequencies
     growth = f"multiplies a frictionless disturbance by at most {limits.growth:.8g} a step"
-    rows: list[Row] = []
-    for each, value in zip(COEFFICIENTS.values(), system.coefficients, strict=True):
-        rows.append((f"{each.symbol}, {each.long_name}", _text(value, each.units.removeprefix("1"))))
-    rows += [
+    coefficients = zip(COEFFICIENTS.values(), system.coefficients, strict=True)
+    rows = [
+        *((f"{c.symbol}, {c.long_name}", _text(value, c.units.removeprefix("1"))) for c, value in coefficients),
         ("surface speed U", _text(system.belt_speed, "m/s")),
         ("contact stiffness 2ak", _text(system.contact_stiffness, "N/m")),
         ("natural frequencies", f"{low:.5g} and {high:.5g} Hz in full contact"),
@@ -124,8 +116,7 @@ def check_table(title: str, found: Check) -> str:
 
 def estimate_table(title: str, found: Estimate) -> str:
     """What a sweep would cost."""
-    rows = [("points", str(found.points)), ("workers", str(found.workers)), *_cost_rows(found)]
-    return _table(title, rows)
+    return _table(title, [("points", str(found.points)), ("workers", str(found.workers)), *_cost_rows(found)])
 
 
 def _cost_rows(found: Check | Estimate) -> list[Row]:
@@ -143,9 +134,8 @@ def stability_table(title: str, report: StabilityReport, key: str, entries: Sequ
     known = [f"{kind} at {friction:.7g}" for kind, friction in undamped.items() if friction is not None]
     sliding = f"none: {report.no_equilibrium}"
     if rest is not None:
-        sliding = (
-            f"y = {rest.y:.5g} m, F_y = {rest.normal_force:.5g} N, {rest.contact_fraction:.1%} of the pad touches"
-        )
+        touching = f"{rest.contact_fraction:.1%} of the pad touches"
+        sliding = f"y = {rest.y:.5g} m, F_y = {rest.normal_force:.5g} N, {touching}"
     rows = [
         ("surface speed U", _text(report.belt_speed, "m/s")),
         ("steady sliding", sliding),
@@ -163,18 +153,14 @@ def stability_table(title: str, report: StabilityReport, key: str, entries: Sequ
     if discrete:
         limit, friction = discrete.step_limit, discrete.critical_friction
         bias = "" if discrete.bias is None else f", {discrete.bias:+.2g} off"
-        growth = f"{discrete.growth:.5g} 1/s, a factor {discrete.spectral_radius:.8g} a step"
         rows += [
-            ("the scheme's growth", growth),
+            ("the scheme's growth", f"{discrete.growth:.5g} 1/s, a factor {discrete.spectral_radius:.8g} a step"),
             ("its critical friction", "none" if friction is None else f"{friction:.7g}{bias}"),
             ("its stable steps", "any" if limit is None else f"up to {limit:.4g} s" if limit else "none"),
         ]
-    if not key:
-        return _table(title, rows)
-    columns = {key: [_text(each["value"]) for each in entries]}
-    for field in fields.VARIED:
-        columns[field.title] = [_text(each[field.name]) for each in entries]
-    return _table(title, rows) + "\n\n" + _grid(columns)
+    columns = {key: "value"} | {field.title: field.name for field in fields.VARIED}
+    varied = {title: [_text(each[name]) for each in entries] for title, name in columns.items()}
+    return _table(title, rows) + ("\n\n" + _grid(varied) if key else "")
 
 
 def _crossing(crossing: Crossing) -> str:
@@ -236,10 +222,8 @@ def comparison_table(report: ComparisonReport) -> str:
     failed = [entry for entry in found.entries if entry.work is not None and entry.errors is None]
     recommended = [f"none meets {report.target:g}"]
     if best is not None:
-        finer = found.finer_error(best)
-        margin = f"error {best.error:.2g}, {report.margin:.3g} times below {report.target:g}"
-        recommended = [f"{best}: {margin}"]
-        if finer > report.target:
+        recommended = [f"{best}: error {best.error:.2g}, {report.margin:.3g} times below {report.target:g}"]
+        if (finer := found.finer_error(best)) > report.target:
             recommended.append(f"by chance: at a finer step its error is {finer:.2g}; choose one with more margin")
     left_out = f"{found.left_out} entries, for want of time: give a larger --budget"
     rows = [
@@ -251,12 +235,9 @@ def comparison_table(report: ComparisonReport) -> str:
         ("recommended", recommended),
         ("file", str(report.output)),
     ]
-    parts = [
-        "No other is better in both error and time:\n" + _entries(front),
-        "The finest of the others:\n" + _entries(finest.values()),
-        _table(report.title, rows),
-    ]
-    return "\n\n".join(parts)
+    best_entries = "No other is better in both error and time:\n" + _entries(front)
+    others = "The finest of the others:\n" + _entries(finest.values())
+    return "\n\n".join((best_entries, others, _table(report.title, rows)))
 
 
 def _rows(known: Iterable[Field], numbers: Mapping[str, Any], *names: str) -> list[Row]:
@@ -268,9 +249,8 @@ def _rows(known: Iterable[Field], numbers: Mapping[str, Any], *names: str) -> li
     return rows
 
 
-def _entries(records: Iterable[Mapping[str, Any]]) -> str:
-    shown = list(records)
-    return _grid({header: [_text(each[name], form=form) for each in shown] for name, header, form in ENTRIES})
+def _entries(records: Collection[Mapping[str, Any]]) -> str:
+    return _grid({header: [_text(each[name], form=form) for each in records] for name, header, form in ENTRIES})
 
 
 def _text(value: str | float | None, unit: str = "", form: str = ".6g") -> str:
@@ -284,8 +264,7 @@ def _table(title: str, rows: Sequence[Row]) -> str:
     """Rows in two columns."""
     lines = [(label, text) for label, texts in rows for text in ([texts] if isinstance(texts, str) else texts)]
     labels, values = zip(*lines, strict=True)
-    style = {"title": title or None, "title_justify": "left", "show_header": False}
-    return _grid({"label": labels, "value": values}, **style)
+    return _grid({"label": labels, "value": values}, title=title or None, title_justify="left", show_header=False)
 
 
 def _grid(columns: Mapping[str, Sequence[str]], **style: Any) -> str:
@@ -298,9 +277,8 @@ def _grid(columns: Mapping[str, Sequence[str]], **style: Any) -> str:
         table.add_column(header, overflow="fold", style="bold" if header == "label" else None)
     for line in zip(*columns.values(), strict=True):
         table.add_row(*line)
-    file, colours = io.StringIO(), sys.stdout.isatty() or None
-    # Titles and file names are not markup.
-    console = Console(file=file, force_terminal=colours, markup=False, emoji=False, highlight=False)
+    console = Console(markup=False, emoji=False, highlight=False)  # titles and file names are not markup
     console.width = max(console.width, NARROWEST)
-    console.print(table)
-    return "\n".join(line.rstrip() for line in file.getvalue().splitlines())
+    with console.capture() as shown:
+        console.print(table)
+    return "\n".join(line.rstrip() for line in shown.get().splitlines())

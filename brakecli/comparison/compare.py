@@ -9,41 +9,60 @@ from itertools import pairwise
 from statistics import median
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brakecli.analysis.stability import report as linear
-from brakecli.comparison.deviation import Errors, errors
 from brakecli.comparison.methods import kinds, ladder, method_label, rungs
 from brakecli.errors import BrakecliError, RefusedError
 from brakecli.runs.limits import check, refuse, within_range
 from brakecli.solver import contact
+from brakecli.solver.compile import Floats
 from brakecli.solver.method import Method
 from brakecli.solver.motion import Motion, Work, solve
+from brakecli.solver.quantities import HISTORY
 from brakecli.solver.schemes import load
 from brakecli.solver.system import System
 
-REFERENCE, CHECK = 1e-12, 1e-10
-"""Tolerances of the reference, and of the run that shows how good it is."""
-REFERENCE_SHARE = 0.3
-"""Part of the budget that the reference may take."""
+REFERENCE, CHECK = 1e-12, 1e-10  # tolerances of the reference, and of the run that shows how good it is
+REFERENCE_SHARE = 0.3  # part of the budget that the reference may take
 FEWEST_SAMPLES = 64
-MOST_REPEATS, SLOW_REPEATS, SLOW = 21, 3, 0.1
-"""Turns of most loops, and of those that take long (s): there, chance matters less."""
-LONGEST_CALL = 1.0
-"""Loops that take less (s) are timed in one call; longer ones in blocks, whose own time is small beside theirs."""
+MOTION, FORCES = ("x", "y", "vx", "vy"), ("friction_force", "normal_force")  # what is compared
+MOST_REPEATS, SLOW_REPEATS = 21, 3  # turns of most loops, and of slow ones: there, chance matters less
+SLOW = 0.1  # s, of a loop
+LONGEST_CALL = 1.0  # s, of a loop that is timed in one call; the time that blocks take is small beside longer ones
+LEFT_OUT = "left out: no time within the budget"
+
+Progress = Callable[[str, int, int], None]  # called with what is done, how many rungs are done, and of how many
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Relative errors against a reference, all of them parts of the largest value of the quantity.
+
+    `largest` of each quantity over the samples; `mean`: the same in the mean over time (L1), as one sample on
+    the other side of a jump of the friction force makes its largest error 2. `error`: the largest of x, y, vx
+    and vy. `amplitude` and `phase` (rad): of the strongest line of vx over the last quarter of the time, None
+    where there is none.
+    """
+
+    error: float
+    largest: dict[str, float]
+    mean: dict[str, float]
+    amplitude: float | None
+    phase: float | None
 
 
 @dataclass
 class Entry:
     """A method at one step or tolerance, with what came of it; None where it does not exist."""
 
+    label: str  # the method in a few words
     kind: Method  # without step and tolerance
     method: Method
     place: int  # on the ladder of steps or tolerances, from the coarsest on
     errors: Errors | None = None
     work: Work | None = None
     failure: str = ""
-    samples: int = 0
+    iterations: int = 0  # evaluations of the contact in the steps, one for each; none where steps are explicit
     seconds: list[float] = field(default_factory=list)
     order: float | None = None
     critical_bias: float | None = None
@@ -56,11 +75,6 @@ class Entry:
         return f"{self.label}, {rung}"
 
     @property
-    def label(self) -> str:
-        """The method in a few words."""
-        return method_label(self.kind)
-
-    @property
     def tolerance(self) -> float | None:
         """The tolerance; None where there is a step."""
         return self.method.tolerance or None
@@ -69,13 +83,6 @@ class Entry:
     def error(self) -> float:
         """The largest error of the motion; infinite where it is not known."""
         return math.inf if self.errors is None else self.errors.error
-
-    @property
-    def iterations(self) -> int:
-        """Evaluations of the contact in the steps, one for each iteration; none where steps are explicit."""
-        if self.work is None or self.method.step is None:
-            return 0
-        return self.work.contact_evaluations - self.samples
 
     @property
     def stable_step(self) -> float | None:
@@ -92,7 +99,6 @@ class Entry:
 class Comparison:
     """All entries on one case."""
 
-    system: System
     duration: float  # s; less than the case's where the reference would take too long
     interval: float
     reference_error: float
@@ -101,20 +107,11 @@ class Comparison:
     left_out: int  # rungs that the budget did not allow
     entries: tuple[Entry, ...]
 
-    def cheapest(self, target: float) -> Entry | None:
-        """The entry that takes the least time of those whose error is at most `target`."""
-        able = [each for each in self.entries if each.seconds and each.error + self.reference_error <= target]
-        return min(able, key=lambda entry: entry.wall_seconds or math.inf, default=None)
-
     def finer_error(self, entry: Entry) -> float:
         """The largest error of the same method at finer steps; above the entry's own, that is low by chance."""
         kind, step = entry.kind, entry.method.step or 0.0
         finer = (each for each in self.entries if each.kind == kind and (each.method.step or step) < step)
         return max((each.error for each in finer if each.errors), default=0.0)
-
-
-Progress = Callable[[str, int, int], None]
-"""Called with what is done, how many rungs are done, and of how many."""
 
 
 def compare(
@@ -127,11 +124,13 @@ def compare(
 ) -> Comparison:
     """Compare the methods on a system within about `budget` s. Raises RefusedError where there is no reference."""
     with within_range():
-        tried = kinds(system, schemes)
-        for kind in tried:  # compilation is not part of the budget
+        found, entries = ladder(system, steps), list[Entry]()
+        for kind in kinds(system, schemes):  # compilation is not part of the budget
             _ = load(kind.scheme), contact.load("exact" if kind.evaluator == "auto" else kind.evaluator)
+            entries += [
+                Entry(method_label(kind), kind, each, place) for place, each in enumerate(rungs(kind, found))
+            ]
         begin = time.perf_counter()
-        found = ladder(system, steps)
         report = linear.stability(system)
         progress("reference", 0, 0)
         sampled = replace(system, interval=found[0])
@@ -139,13 +138,13 @@ def compare(
         sampled = replace(sampled, duration=(len(reference.rows) - 1) * sampled.interval)
         checked = _event_driven(sampled, CHECK, "it is not known how good the reference is")
         reference_error = errors(checked.rows, reference.rows).error
-        entries = [Entry(kind, each, place) for kind in tried for place, each in enumerate(rungs(kind, found))]
-        left_out = _first_round(sampled, entries, reference.rows, begin + 0.8 * budget, progress)
+        _measure(sampled, entries, reference.rows, begin + 0.8 * budget, progress)
         _add_limits(system, report, entries)
         repeats = _repeat(sampled, entries, begin + budget, progress)
     _mark_front(entries)
+    left_out = sum(entry.failure == LEFT_OUT for entry in entries)
     duration, interval, seconds = sampled.duration, sampled.interval, reference.work.solve_seconds
-    return Comparison(system, duration, interval, reference_error, seconds, repeats, left_out, tuple(entries))
+    return Comparison(duration, interval, reference_error, seconds, repeats, left_out, tuple(entries))
 
 
 def _motion(system: System, method: Method, *, at_once: bool = False) -> Motion:
@@ -165,33 +164,25 @@ def _event_driven(system: System, tolerance: float, without: str) -> Motion:
 
 def _reference(system: System, budget: float) -> Motion:
     """The longest part of the motion whose reference fits the budget (s), from the start on."""
-    duration = FEWEST_SAMPLES * system.interval
-    whole = max(system.duration, duration)
+    shortest = FEWEST_SAMPLES * system.interval
+    part, whole = replace(system, duration=shortest), max(system.duration, shortest)
     while True:
-        duration = min(duration, whole)
-        motion = _event_driven(
-            replace(system, duration=duration), REFERENCE, "there is no reference to compare with"
-        )
+        motion = _event_driven(part, REFERENCE, "there is no reference to compare with")
         seconds = motion.work.solve_seconds
-        if duration >= whole or 3.0 * seconds > budget:
+        if part.duration >= whole or 3.0 * seconds > budget:
             return motion
-        duration *= min(4.0, 0.7 * budget / max(seconds, 1e-3))
+        longer = part.duration * min(4.0, 0.7 * budget / max(seconds, 1e-3))
+        part = replace(part, duration=min(longer, whole))
 
 
-def _first_round(
-    system: System, entries: list[Entry], reference: NDArray[np.float64], deadline: float, progress: Progress
-) -> int:
-    """Run every rung once, the coarse ones first, and measure its error; how many there was no time for.
-
-    The coarsest of each method is run in any case.
-    """
-    left_out = 0
+def _measure(system: System, entries: list[Entry], reference: Floats, deadline: float, progress: Progress) -> None:
+    """Run every rung once, the coarse ones first, while there is time, and measure its error."""
     last: dict[Method, float] = {}
     for done, entry in enumerate(sorted(entries, key=lambda each: each.place)):
         progress("errors", done, len(entries))
+        # The coarsest of each method is run in any case
         if entry.place and time.perf_counter() + 2.0 * last.get(entry.kind, 0.0) > deadline:
-            entry.failure = "left out: no time within the budget"
-            left_out += 1
+            entry.failure = LEFT_OUT
             continue
         try:
             motion = _motion(system, entry.method)
@@ -199,19 +190,15 @@ def _first_round(
             entry.failure = " ".join(str(error).split())
             continue
         work = entry.work = motion.work
-        last[entry.kind] = work.solve_seconds
-        entry.samples, entry.failure = len(motion.rows), work.failure_sentence or ""
+        last[entry.kind], entry.failure = work.solve_seconds, work.failure_sentence or ""
+        entry.iterations = work.contact_evaluations - len(motion.rows) if entry.method.step else 0
         if not work.failed:
             entry.seconds.append(work.solve_seconds)
             entry.errors = errors(motion.rows, reference)
-    return left_out
 
 
 def _repeat(system: System, entries: list[Entry], deadline: float, progress: Progress) -> int:
-    """Time all that ran again, in turns, as often as the budget allows; how many times each.
-
-    The times of the first round, which found memory and caches cold, count only where there are no others.
-    """
+    """Time all that ran again, in turns, as often as the budget allows; how many times each."""
     timed = [entry for entry in entries if entry.seconds]
     for repeat in range(MOST_REPEATS):
         if repeat == SLOW_REPEATS:
@@ -223,19 +210,16 @@ def _repeat(system: System, entries: list[Entry], deadline: float, progress: Pro
             progress(f"times, turn {repeat + 1}", done, len(timed))
             at_once = entry.seconds[-1] < LONGEST_CALL
             seconds = _motion(system, entry.method, at_once=at_once).work.solve_seconds
+            # The first time counts only where there are no others: it found memory and caches cold
             entry.seconds = [*entry.seconds, seconds] if repeat else [seconds]
     return MOST_REPEATS
 
 
 def _add_limits(system: System, report: linear.StabilityReport, entries: list[Entry]) -> None:
     """Add what the amplification matrices say, and the observed orders."""
-    stiffness_at = linear.mean_stiffness(system, report.contact_stiffness)
-    exact = report.critical
-
-    @cache  # neither depends on starts, iterations and evaluators
-    def limit(scheme: Method) -> float:
-        found = linear.step_limit(replace(system, method=scheme), stiffness_at)
-        return math.inf if found is None else found
+    stiffness_at, exact = linear.mean_stiffness(system, report.contact_stiffness), report.critical
+    # Neither depends on starts, iterations and evaluators
+    limit = cache(lambda scheme: linear.step_limit(replace(system, method=scheme), stiffness_at))
 
     @cache
     def bias(scheme: Method, step: float) -> float | None:
@@ -244,12 +228,12 @@ def _add_limits(system: System, report: linear.StabilityReport, entries: list[En
         return found - exact.friction if found is not None and exact else None
 
     for entry in entries:
-        kind, step = entry.kind, entry.method.step
+        scheme, step = Method(entry.kind.scheme, entry.kind.theta), entry.method.step
         if step is None:
             entry.step_limit, entry.critical_bias = math.inf, 0.0 if exact else None
         elif report.discrete is not None:  # otherwise no steady sliding could lose its stability
-            scheme = Method(kind.scheme, kind.theta)
-            entry.step_limit, entry.critical_bias = limit(scheme), bias(scheme, step)
+            found = limit(scheme)
+            entry.step_limit, entry.critical_bias = math.inf if found is None else found, bias(scheme, step)
     for coarse, fine in pairwise(entries):
         long, short = coarse.method.step, fine.method.step
         if fine.place and long and short and 0.0 < fine.error < math.inf and 0.0 < coarse.error < math.inf:
@@ -259,7 +243,33 @@ def _add_limits(system: System, report: linear.StabilityReport, entries: list[En
 def _mark_front(entries: list[Entry]) -> None:
     """Mark the entries that no other beats in both error and time."""
     best = math.inf
-    able = [entry for entry in entries if entry.errors is not None]
-    for entry in sorted(able, key=lambda each: (each.wall_seconds or 0.0, each.error)):
+    for entry in sorted(entries, key=lambda each: (each.wall_seconds or 0.0, each.error)):
         if entry.error < best:
             entry.on_front, best = True, entry.error
+
+
+def errors(rows: Floats, reference: Floats) -> Errors:
+    """Compare rows of `quantities.HISTORY`, sampled at the same times."""
+    columns = {name: pair for name, *pair in zip(HISTORY, rows.T, reference.T, strict=True)}
+    largest, mean = {}, {}
+    for name in (*MOTION, *FORCES):
+        values, exact = columns[name]
+        apart, scale = np.abs(values - exact), float(np.abs(exact).max()) or 1.0
+        largest[name], mean[name] = float(apart.max()) / scale, float(apart.mean()) / scale
+    return Errors(max(largest[name] for name in MOTION), largest, mean, *_line(*columns["vx"]))
+
+
+def _line(values: Floats, reference: Floats) -> tuple[float | None, float | None]:
+    """Relative error of the amplitude, and error of the phase, of the reference's strongest line."""
+    count = len(reference) // 4
+    if count < 64:
+        return None, None
+    window = np.hanning(count + 2)[1:-1]
+    late = reference[-count:] - reference[-count:].mean()
+    size = np.abs(np.fft.rfft(window * late))
+    top = int(np.argmax(size))
+    if top < 3 or size[top] <= 1e-9 * count * float(np.abs(reference).max()):
+        return None, None
+    turning = np.exp(-2j * math.pi * top / count * np.arange(count)) * window
+    exact, found = complex(turning @ late), complex(turning @ (values[-count:] - values[-count:].mean()))
+    return abs(found) / abs(exact) - 1.0, float(np.angle(found / exact))

@@ -9,9 +9,7 @@ from brakecli.solver.method import Method
 from brakecli.solver.schemes import SCHEMES
 from brakecli.solver.system import System
 
-COARSEST = 16
-"""Steps per period of the fastest motion that a ladder begins with."""
-RUNGS = 7
+COARSEST, RUNGS = 16, 7  # steps per period of the fastest motion that a ladder begins with; steps on it
 TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 NODE_FACTORS = (0.25, 0.5, 2.0, 4.0)
 
@@ -31,21 +29,18 @@ def kinds(system: System, wanted: Sequence[str] = ()) -> list[Method]:
     """The methods that are compared on a system, the cheapest of a scheme first; `wanted` names schemes."""
     moving = system.initial.vx != 0.0 or system.initial.vy != 0.0
     usual = "closed-form" if system.smooth else "auto"
-    layered, contacts, own = [], [], []
+    counts = [max(2, round(system.nodes * factor)) for factor in NODE_FACTORS]
+    found = []
     for name, scheme in SCHEMES.items():
-        for trial in scheme.trials:
+        for trial in scheme.trials if not wanted or name in wanted else ():
+            if moving and trial.start == "paper":
+                continue
             kind = Method(name, trial.theta, trial.start, trial.iteration)
-            if (wanted and name not in wanted) or (moving and trial.start == "paper"):
-                continue
-            if scheme.own_steps:
-                own.append(kind)
-                continue
-            layered.append(replace(kind, evaluator=usual, nodes=system.nodes))
+            found.append(kind if scheme.own_steps else replace(kind, evaluator=usual, nodes=system.nodes))
             if trial.contacts and not system.smooth:
-                counts = [max(2, round(system.nodes * factor)) for factor in NODE_FACTORS]
-                contacts += [replace(kind, evaluator="midpoint", nodes=count) for count in counts]
-                contacts.append(replace(kind, evaluator="exact"))
-    return layered + contacts + own
+                found += [replace(kind, evaluator="midpoint", nodes=count) for count in counts]
+                found.append(replace(kind, evaluator="exact"))
+    return sorted(found, key=lambda kind: (kind.own_steps, kind.evaluator != usual))
 
 
 def ladder(system: System, steps: Sequence[float] = ()) -> list[float]:

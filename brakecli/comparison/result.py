@@ -1,5 +1,6 @@
 """The result of a comparison: its file, and names and values for programs."""
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,8 +26,10 @@ class ComparisonReport:
 
     @property
     def recommended(self) -> Entry | None:
-        """The cheapest entry that meets the target."""
-        return self.comparison.cheapest(self.target)
+        """The entry that takes the least time of those that meet the target, the reference's error added."""
+        timed, added = [each for each in self.comparison.entries if each.seconds], self.comparison.reference_error
+        able = [each for each in timed if each.error + added <= self.target]
+        return min(able, key=lambda entry: entry.wall_seconds or math.inf, default=None)
 
     @property
     def margin(self) -> float | None:

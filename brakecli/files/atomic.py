@@ -13,13 +13,10 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from io import FileIO
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 from brakecli.errors import CannotWriteError, UsageError
 from brakecli.files.os_signals import signals_deferred
-
-if TYPE_CHECKING:
-    from _typeshed import ReadableBuffer, WriteableBuffer
 
 
 class OutputFile(FileIO):
@@ -37,7 +34,7 @@ class OutputFile(FileIO):
         self._temporary = target.with_name(f".{target.name}.part")
         super().__init__(self._temporary, "w+", opener=_open_no_link)
 
-    def write(self, data: "ReadableBuffer") -> int:
+    def write(self, data: Any) -> int:
         """Write all of `data`, or remember why not."""
         view = memoryview(data).cast("B")
         written = 0
@@ -48,7 +45,7 @@ class OutputFile(FileIO):
             self.failure = error
         return len(view)
 
-    def readinto(self, buffer: "WriteableBuffer") -> int:
+    def readinto(self, buffer: Any) -> int:
         """Fill `buffer`, with zeros behind the end: what a failed write left out must not stop HDF5."""
         view = memoryview(buffer).cast("B")
         filled = 0
@@ -79,12 +76,10 @@ class OutputFile(FileIO):
             os.fsync(self.fileno())
             _checked_target(self.path, force=self._force)
             self._temporary.replace(self._target)
-        with suppress(OSError):  # some network file systems refuse; the file is in its place already
+        with suppress(OSError), ExitStack() as clean_up:  # some network file systems refuse; the file is there
             directory = os.open(self._target.parent, os.O_RDONLY)
-            try:
-                os.fsync(directory)
-            finally:
-                os.close(directory)
+            clean_up.callback(os.close, directory)
+            os.fsync(directory)
 
     def discard(self) -> None:
         """Close, and remove the temporary file unless it was published."""

@@ -12,23 +12,15 @@ class Field:
     """A number or text of a result, or an object that holds several."""
 
     name: str
-    units: str
-    """In SI; `1` for pure numbers, empty for texts."""
+    units: str  # in SI; `1` for pure numbers, empty for texts
     meaning: str
-    kind: str = "f8"
-    """The NumPy type of many of them. A float may be missing: null in JSON, `_FillValue` in a file."""
-    at: str = ""
-    """Path of attributes, keys and methods to the value; the name is added if it is empty or ends in a dot."""
-    label: str = ""
-    """Words for the terminal; the name if empty."""
-    missing: Any = None
-    """What stands for a value that does not exist."""
-    in_file: bool = True
-    """Whether a file holds it too. What changes from one run of the same case to the next stays outside."""
-    group: str = ""
-    """Group of the file whose attributes hold the items of an object."""
-    rows: "tuple[Field, ...]" = ()
-    """The items of an object, or of each object in a list."""
+    kind: str = "f8"  # the NumPy type of many; a float may be missing: null in JSON, `_FillValue` in a file
+    at: str = ""  # attributes, keys and methods on the way to the value; ends with the name if empty or with a dot
+    label: str = ""  # words for the terminal; the name if empty
+    missing: Any = None  # what stands for a value that does not exist
+    in_file: bool = True  # what changes from one run of the same case to the next stays outside
+    group: str = ""  # of the file, whose attributes hold the items of an object
+    rows: "tuple[Field, ...]" = ()  # the items of an object, or of each object in a list
 
     @property
     def title(self) -> str:
@@ -38,7 +30,7 @@ class Field:
     def read(self, report: object) -> Any:
         """The value that a report holds, as JSON writes it."""
         value: Any = report
-        path = self.at if self.at and not self.at.endswith(".") else self.at + self.name
+        path = self.at + self.name if self.at[-1:] in ("", ".") else self.at
         for part in path.split("."):
             if value is not None:
                 value = value[part] if isinstance(value, Mapping) else getattr(value, part)
@@ -55,6 +47,11 @@ class Field:
 def integer(name: str, meaning: str, at: str = "", **more: Any) -> Field:
     """A field of a whole number, which has no unit."""
     return Field(name, "1", meaning, "i8", at, **more)
+
+
+def ratio(name: str, meaning: str, at: str = "", **more: Any) -> Field:
+    """A field of a real number without a unit."""
+    return Field(name, "1", meaning, "f8", at, **more)
 
 
 def values_of(fields: Iterable[Field], report: object) -> dict[str, Any]:

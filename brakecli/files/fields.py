@@ -6,7 +6,7 @@ that all files have in common, `docs/regimes.md` the evidence, and `docs/stabili
 stability, which have the attributes of their classes.
 """
 
-from brakecli.files.field import Field, integer, named
+from brakecli.files.field import Field, integer, named, ratio
 from brakecli.solver.quantities import HISTORY as QUANTITIES
 from brakecli.solver.quantities import TIME
 
@@ -20,16 +20,12 @@ VERDICT = (
     Field("frequency", "Hz", "fundamental frequency of vx of a sustained motion", at="verdict."),
     Field("amplitude", "m", "half of peak to peak of x, settled part", at="verdict.", label="amplitude of x"),
     integer("settled", "whether a settled part was found (0, 1); otherwise it is the second half", "verdict."),
-    Field("settled_from", "s", "start of the settled part"),
+    Field("settled_from", "s", "start of the settled part", at="verdict."),
     Field("mean_friction_force", "N", "mean friction force on the shoe, settled part", at="verdict."),
-    Field("braking_torque", "N m", "mean torque of the friction force, settled part"),
-    Field("stick_fraction", "1", "part of the time in stick, settled part", at="verdict.", label="stick"),
-    Field(
-        "contact_loss_fraction",
-        "1",
-        "part of the time off the wheel, settled part",
-        at="verdict.",
-        label="lost contact",
+    Field("braking_torque", "N m", "mean torque of the friction force, settled part", at="verdict."),
+    ratio("stick_fraction", "part of the time in stick, settled part", "verdict.", label="stick"),
+    ratio(
+        "contact_loss_fraction", "part of the time off the wheel, settled part", "verdict.", label="lost contact"
     ),
     Field("reasons", "", "why the regime is as it is", OBJECT, "verdict."),
     Field("evidence", "", "numbers by which the rules decided", OBJECT, "verdict.", group="regime/evidence"),
@@ -47,26 +43,24 @@ ENERGY = (
     Field("scheme", "J", "what the difference scheme itself takes out; 0 for weights of one half"),
     Field("stored", "J", "the larger of the stored energies, all three together, at the start and at the end"),
     Field("closing_error", "J", "what the other items leave open"),
-    Field("relative_closing_error", "1", "closing error over the largest item, `stored` included"),
+    ratio("relative_closing_error", "closing error over the largest item, `stored` included"),
 )
 RUN = (
     Field("status", "", "how the run has ended: done or failed", TEXT),
     Field("failure", "", "time and reason of a failure", TEXT, at="motion.work.failure_sentence"),
     *VERDICT,
     Field("spectrum_peak", "Hz", "highest peak of the spectrum above 0 Hz", label="peak of the spectrum of vx"),
-    Field("scheme", "", "time-stepping scheme", TEXT, "system.method."),
-    Field("theta", "1", "weights of the layers", OBJECT, "system.method."),
-    Field("iteration", "", "how the equations of a step are solved", TEXT),
-    Field("step", "s", "time step, after it was fitted to the sample interval"),
-    Field("tolerance", "1", "largest relative error of the histories that is asked for", at="certificate."),
+    Field("scheme", "", "time-stepping scheme", TEXT, "motion.system.method."),
+    Field("theta", "1", "weights of the layers", OBJECT, "motion.system.method."),
+    Field("iteration", "", "how the equations of a step are solved", TEXT, "motion.system.method."),
+    Field("step", "s", "time step, after it was fitted to the sample interval", at="motion.system."),
+    ratio("tolerance", "largest relative error of the histories that is asked for", "certificate."),
     integer("certified", "whether the error is sure to stay below the tolerance (0, 1)", "certificate."),
-    Field(
-        "estimated_error", "1", "relative error of the histories, where the case gives no step", at="certificate."
-    ),
+    ratio("estimated_error", "relative error of the histories, where the case gives no step", "certificate."),
     Field("certified_until", "s", "up to here the error stays below the tolerance", at="certificate."),
     Field("certified_by", "", "how the error is known", TEXT, at="certificate.method"),
     Field("evaluators", "", "steps that each evaluator took", OBJECT, "motion.work.", group="evaluators"),
-    integer("nodes", "cells of the midpoint sum, 0 where it could not be needed", "system."),
+    integer("nodes", "cells of the midpoint sum, 0 where it could not be needed", "motion.system."),
     integer("steps", "time steps", "motion.work."),
     integer("contact_evaluations", "evaluations of the contact force", "motion.work."),
     integer("most_evaluations_in_a_step", "most evaluations in one step", "motion.work.most_evaluations"),
@@ -153,17 +147,14 @@ ENTRY = (
     Field("evaluator", "", "how the contact force is computed", TEXT, "kind."),
     integer("nodes", "quadrature nodes, 0 where none are needed", "kind."),
     Field("step", "s", "time step; missing where the scheme finds its steps itself", at="method."),
-    Field("tolerance", "1", "tolerance of a scheme that finds its steps itself"),
-    Field("error", "1", "largest relative error of x, y, vx and vy", at="errors."),
-    *(Field(f"error_{x}", "1", f"largest relative error of {x}", at=f"errors.largest.{x}") for x in _COMPARED),
-    *(
-        Field(f"mean_error_{x}", "1", f"relative error of {x}, mean over time", at=f"errors.mean.{x}")
-        for x in _COMPARED
-    ),
-    Field("amplitude_error", "1", "relative error of the amplitude of the settled motion", at="errors.amplitude"),
+    ratio("tolerance", "tolerance of a scheme that finds its steps itself"),
+    ratio("error", "largest relative error of x, y, vx and vy", "errors."),
+    *(ratio(f"error_{x}", f"largest relative error of {x}", f"errors.largest.{x}") for x in _COMPARED),
+    *(ratio(f"mean_error_{x}", f"relative error of {x}, mean over time", f"errors.mean.{x}") for x in _COMPARED),
+    ratio("amplitude_error", "relative error of the amplitude of the settled motion", "errors.amplitude"),
     Field("phase_error", "rad", "error of the phase of the settled motion", at="errors.phase"),
-    Field("critical_bias", "1", "critical friction of the scheme at its step less the exact one"),
-    Field("observed_order", "1", "order by which the error falls from the step before", at="order"),
+    ratio("critical_bias", "critical friction of the scheme at its step less the exact one"),
+    ratio("observed_order", "order by which the error falls from the step before", "order"),
     Field("step_limit", "s", "largest stable step; missing where any is stable, or unknown", at="stable_step"),
     integer("steps", "time steps", "work.", missing=0),
     integer("contact_evaluations", "evaluations of the contact force", "work.", missing=0),
@@ -177,13 +168,13 @@ COMPARISON = (
     Field("title", "", "title of the case", TEXT),
     Field("duration", "s", "how much of the motion was compared", at="comparison."),
     Field("sample_interval", "s", "where it was compared: the largest step", at="comparison.interval"),
-    Field("reference_error", "1", "how good the reference is, at least", at="comparison."),
+    ratio("reference_error", "how good the reference is, at least", "comparison."),
     Field("reference_seconds", "s", "time of the loop of the reference", at="comparison."),
     integer("repeats", "turns that times are medians of", "comparison."),
     integer("left_out", "entries that there was no time for", "comparison."),
-    Field("target_error", "1", "the error to be met", at="target"),
+    ratio("target_error", "the error to be met", "target"),
     Field("recommended", "", "cheapest entry that meets the target; in the file its place", OBJECT, rows=ENTRY),
-    Field("margin", "1", "`target_error` over the error of the recommended entry"),
+    ratio("margin", "`target_error` over the error of the recommended entry"),
     Field("entries", "", "all entries", OBJECT, at="comparison.", rows=ENTRY, in_file=False),
 )
 
@@ -191,16 +182,16 @@ COMPARISON = (
 
 STABILITY = (
     Field("belt_speed", "m/s", "speed U of the wheel's surface"),
-    Field("friction_coefficient", "1", "friction coefficient φ of the case", at="friction"),
-    Field("critical_friction", "1", "least friction coefficient at which stability ends", at="critical.friction"),
+    ratio("friction_coefficient", "friction coefficient φ of the case", "friction"),
+    ratio("critical_friction", "least friction coefficient at which stability ends", "critical.friction"),
     Field("instability", "", "how it is lost: flutter or divergence", TEXT, "critical."),
     Field("critical_frequency", "Hz", "frequency of the mode that is lost", at="critical.frequency"),
     Field("stable", "", "whether steady sliding is stable at φ", "?"),
     Field("eigenvalues", "1/s", "eigenvalues at φ: real and imaginary parts", OBJECT),
     Field("modes", "", "modes at φ, the one that grows fastest first", OBJECT),
     Field("crossings", "", "all changes of stability along φ", OBJECT),
-    Field("undamped_flutter_friction", "1", "φ of flutter without dashpots", at="undamped_flutter"),
-    Field("undamped_divergence_friction", "1", "φ of divergence without dashpots", at="undamped_divergence"),
+    ratio("undamped_flutter_friction", "φ of flutter without dashpots", "undamped_flutter"),
+    ratio("undamped_divergence_friction", "φ of divergence without dashpots", "undamped_divergence"),
     Field("contact_stiffness", "N/m", "mean stiffness of the contact in steady sliding"),
     Field("equilibrium", "", "steady sliding; null where there is none", OBJECT),
     Field("no_equilibrium", "", "why there is no steady sliding", TEXT),
@@ -208,11 +199,10 @@ STABILITY = (
 )
 VARIED = (
     *named(STABILITY, "critical_friction", "instability"),
-    Field(
+    ratio(
         "discrete_critical_friction",
-        "1",
         "the same in the scheme",
-        at="discrete.critical_friction",
+        "discrete.critical_friction",
         label="as the scheme has it",
     ),
 )

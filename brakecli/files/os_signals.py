@@ -11,12 +11,9 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from brakecli.errors import CannotWriteError
-
-if TYPE_CHECKING:
-    from _typeshed import ReadableBuffer
 
 _WORDS: dict[int, str] = {signal.SIGHUP: "hung up", signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
 
@@ -127,9 +124,8 @@ def guard_streams() -> None:
         except OSError:  # closed: the next file to be opened must not become a standard stream
             os.open(os.devnull, os.O_RDWR)
     for number, name in ((1, "stdout"), (2, "stderr")):
-        old = getattr(sys, name)  # None where it was closed before Python started
         raw = io.BufferedWriter(_Stream(number, "w", closefd=False))
-        encoding = getattr(old, "encoding", "utf-8")
+        encoding = getattr(getattr(sys, name), "encoding", "utf-8")  # None if closed before Python started
         setattr(sys, name, io.TextIOWrapper(raw, encoding, "backslashreplace", line_buffering=True))
 
 
@@ -138,7 +134,7 @@ class _Stream(io.FileIO):
 
     _failed = False
 
-    def write(self, data: "ReadableBuffer") -> int:
+    def write(self, data: Any) -> int:
         try:
             if not self._failed:
                 return super().write(data)

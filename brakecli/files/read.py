@@ -9,7 +9,7 @@ edits the file cuts the 32 bytes off; then only the checksums inside remain.
 import hashlib
 import stat
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from io import RawIOBase
 from pathlib import Path
@@ -33,7 +33,6 @@ _MACHINERY = {"CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_Encoding", 
 class Variable:
     """A variable, without its values."""
 
-    name: str
     dims: tuple[str, ...]
     shape: tuple[int, ...]
     attributes: dict[str, Any]
@@ -59,7 +58,7 @@ class StoredResult:
             for name, node in self._group(group).items():
                 if isinstance(node, h5py.Dataset):
                     dims = (name,) if node.is_scale else tuple(next(iter(dim.keys()), "") for dim in node.dims)
-                    found[name] = Variable(name, dims, node.shape, _attributes(node))
+                    found[name] = Variable(dims, node.shape, _attributes(node))
         return found
 
     def read(self, group: str, name: str, start: int = 0, stop: int | None = None) -> NDArray[Any]:
@@ -99,17 +98,24 @@ def open_result(path: Path, kind: str | None = None) -> Iterator[StoredResult]:
             # h5py gets the very file that was verified, and does without the file locks of HDF5
             file = stack.enter_context(h5py.File(stream, "r"))
             attributes = _attributes(file)
-            _check_header(attributes, kind)
+            if attributes.get("format") != FORMAT:
+                raise ValueError(_FOREIGN)
+            if (version := attributes.get("format_version")) != FORMAT_VERSION:
+                raise ValueError(
+                    f"its format version is {version}, and only version {FORMAT_VERSION} is known here"
+                )
+            if attributes.get("complete") != 1:
+                raise ValueError("it is incomplete, attribute complete is not 1")
+            if kind is not None and attributes.get("kind") != kind:
+                raise ValueError(f"it holds a result of kind {attributes.get('kind')!r}, and {kind!r} is needed")
         yield StoredResult(path, file, attributes)
 
 
 def is_hdf5(path: Path) -> bool:
     """Whether this is a regular file with the signature of HDF5, behind a user block or not."""
-    try:
-        # looking into a pipe would use up what it holds
+    with suppress(OSError, ValueError):  # looking into a pipe would use up what it holds
         return stat.S_ISREG(path.stat().st_mode) and bool(h5py.is_hdf5(path))
-    except (OSError, ValueError):
-        return False
+    return False
 
 
 def digest(file: RawIOBase, length: int) -> bytes:
@@ -132,21 +138,8 @@ def _verify(file: RawIOBase) -> None:
         raise ValueError(_FOREIGN)
     end = int.from_bytes(superblock[28:36], "little")
     behind = file.seek(0, 2) - end
-    if behind == 0:
-        return
-    if behind != 32 or digest(file, end) != file.read(32):
+    if behind and (behind != 32 or digest(file, end) != file.read(32)):
         raise ValueError("the file is truncated, damaged or was altered by another program")
-
-
-def _check_header(attributes: dict[str, Any], kind: str | None) -> None:
-    if attributes.get("format") != FORMAT:
-        raise ValueError(_FOREIGN)
-    if (version := attributes.get("format_version")) != FORMAT_VERSION:
-        raise ValueError(f"its format version is {version}, and only version {FORMAT_VERSION} is known here")
-    if attributes.get("complete") != 1:
-        raise ValueError("it is incomplete, attribute complete is not 1")
-    if kind is not None and attributes.get("kind") != kind:
-        raise ValueError(f"it holds a result of kind {attributes.get('kind')!r}, and {kind!r} is needed")
 
 
 @contextmanager
@@ -164,12 +157,10 @@ def _explained(path: Path) -> Iterator[None]:
 
 def _attributes(node: h5py.HLObject) -> dict[str, Any]:
     """Attributes as str, int, float, list of str, or array; without those by which netCDF-4 ties dimensions."""
-    return {name: _plain(node.attrs[name]) for name in node.attrs if name not in _MACHINERY}
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, bytes):
-        return value.decode()
-    if isinstance(value, np.generic) or (isinstance(value, np.ndarray) and value.dtype.kind == "O"):
-        return value.tolist()
-    return value
+    found = {name: node.attrs[name] for name in node.attrs if name not in _MACHINERY}
+    for name, value in found.items():
+        if isinstance(value, bytes):
+            found[name] = value.decode()
+        elif isinstance(value, np.generic) or (isinstance(value, np.ndarray) and value.dtype.kind == "O"):
+            found[name] = value.tolist()
+    return found

@@ -4,7 +4,7 @@ The same calls give the same bytes, however the rows of a growing variable are c
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,18 +18,13 @@ from brakecli.files.field import Field
 from brakecli.files.os_signals import signals_deferred
 from brakecli.files.read import FORMAT, FORMAT_VERSION, digest
 
-FILL = 9.969209968386869e36
-"""What netCDF puts where a number is missing; the attribute ``_FillValue`` names it."""
-_CHUNK = 16384
-"""Most values in a chunk: 128 KiB of float64."""
+FILL = 9.969209968386869e36  # what netCDF puts where a number is missing; the attribute `_FillValue` names it
+_CHUNK = 16384  # most values in a chunk: 128 KiB of float64
 
 
 @dataclass
 class _Variable:
-    """A declared variable, its axes, and rows that do not yet fill a chunk.
-
-    Only whole chunks are written, so that nothing depends on how rows are cut into pieces.
-    """
+    """A declared variable, its axes, and rows that do not yet fill a chunk: only whole chunks are written."""
 
     field: Field
     dims: tuple[str, ...]
@@ -207,20 +202,15 @@ def new_result(path: Path, *, force: bool) -> Iterator[ResultFile]:
 
     Raises what `new_output` raises, before anything is computed.
     """
-    with new_output(path, force=force) as output:
-        result = ResultFile(output)
-        try:
-            result.open()
-            yield result
-        finally:
-            result.close()
+    with new_output(path, force=force) as output, closing(ResultFile(output)) as result:
+        result.open()
+        yield result
 
 
 def _set_attributes(node: h5py.HLObject, attributes: Mapping[str, Any]) -> None:
     for name, value in attributes.items():
-        if isinstance(value, str):
-            node.attrs[name] = value
-        elif isinstance(value, list | tuple) and all(isinstance(item, str) for item in value):
+        texts = [value] if isinstance(value, str) else value
+        if isinstance(texts, list | tuple) and all(isinstance(item, str) for item in texts):
             node.attrs[name] = np.array(value, dtype=h5py.string_dtype())
         else:
             node.attrs[name] = _finite(f"attribute {name}", value)

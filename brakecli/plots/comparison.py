@@ -14,7 +14,7 @@ from brakecli.files.read import StoredResult
 from brakecli.plots import style
 from brakecli.solver.schemes import SCHEMES
 
-Columns = dict[str, style.Array]  # over the entries; `drawn` says whether the error of an entry can be drawn
+Columns = dict[str, style.Array]  # over the entries; errors that cannot be drawn are NaN
 LARGEST = 3.0  # entries with larger errors are useless as results; they are not drawn
 _TEXTS = ("method", "scheme", "theta", "start", "iteration", "evaluator", "failure")
 _NUMBERS = ("step", "tolerance", "error", "wall_seconds", "contact_evaluations", "nodes", "on_front")
@@ -22,15 +22,8 @@ _PANELS = (  # column, factor, title and label of the work
     ("wall_seconds", 1e3, "Work–precision", "median time of the loop (ms)"),
     ("contact_evaluations", 1.0, "Work counted, the same on every machine", "evaluations of the contact force"),
 )
-_MARKERS = {  # by weights
-    "0.5, 0.5": "o",
-    "1, 0.5": "^",
-    "0.5, 1": "v",
-    "1, 1": "s",
-    "0.25, 0.5, 0.25": "o",
-    "0.0833333, 0.833333, 0.0833333": "D",
-    "": "*",
-}
+_MARKERS = {"0.5, 0.5": "o", "1, 0.5": "^", "0.5, 1": "v", "1, 1": "s"}  # by weights: of two layers
+_MARKERS |= {"0.25, 0.5, 0.25": "o", "0.0833333, 0.833333, 0.0833333": "D", "": "*"}  # of three, and none
 _EXACT, _OTHER_NODES = "#CC79A7", "#56B4E9"  # colours of the exact contact force, of less usual numbers of nodes
 _NODE_MARKERS = "<>ph"  # markers of the same weights with other numbers of nodes
 
@@ -41,7 +34,6 @@ def draw(result: StoredResult) -> Figure:
     Raises UsageError where there is nothing to draw, UnreadableResultError where something is missing.
     """
     columns = {name: style.read_column(result, name) for name in _TEXTS + _NUMBERS}
-    columns["drawn"] = (columns["error"] > 0.0) & (columns["error"] <= LARGEST)
     if not np.isfinite(columns["error"]).any():
         raise UsageError(f"{result.path}: none of its entries has an error, so there is nothing to draw")
     best = result.attributes.get("recommended")
@@ -50,17 +42,19 @@ def draw(result: StoredResult) -> Figure:
     title, lines = str(result.attributes.get("title", "")), _lines(result.attributes, columns, best)
     target, floor = (float(result.attributes.get(name, 0.0)) for name in ("target_error", "reference_error"))
     figure = style.headed(12.4, 6.6, title, *lines, wspace=0.04)
+    drawn = (columns["error"] > 0.0) & (columns["error"] <= LARGEST)
+    errors, columns["error"] = columns["error"], np.where(drawn, columns["error"], np.nan)
     rows = _PANELS if np.isfinite(columns["wall_seconds"]).any() else _PANELS[1:]
     panels = figure.subplots(1, len(rows), sharey=True, squeeze=False)[0]
     for axes, (name, factor, title, label) in zip(panels, rows, strict=True):
-        work = factor * columns[name]
+        work = np.where(drawn & (columns[name] > 0.0), factor * columns[name], np.nan)
         _draw_errors(axes, columns, work)
         if target > 0.0:
             words = f"target {target:g}"
             axes.axhline(target, color=style.GREEN, ls=style.DASHES, lw=1.3, zorder=1.0, label=words)
-        if best is not None and math.isfinite(work[best]):
+        if best is not None and math.isfinite(columns[name][best]):
             ring: dict[str, Any] = {"ms": 16.0, "mfc": "none", "mec": style.GREEN, "mew": 2.2, "zorder": 4.0}
-            axes.plot(work[best], columns["error"][best], "o", label="recommended", **ring)
+            axes.plot(factor * columns[name][best], errors[best], "o", label="recommended", **ring)
         (_draw_front if name == "wall_seconds" else _draw_slopes)(axes, columns, work)
         axes.set(title=title, xlabel=label)
         axes.label_outer()
@@ -70,9 +64,9 @@ def draw(result: StoredResult) -> Figure:
         if right / left < style.WIDE:
             axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
     panels[0].set_ylabel("largest relative error of x, y, ẋ, ẏ")
-    if (errors := columns["error"][columns["drawn"]]).size:
-        low = 0.4 * min(float(errors.min()), target or LARGEST)
-        panels[0].set_ylim(low, 2.5 * float(errors.max()))
+    if drawn.any():
+        low = 0.4 * min(float(np.nanmin(columns["error"])), target or LARGEST)
+        panels[0].set_ylim(low, 2.5 * float(np.nanmax(columns["error"])))
         panels[0].yaxis.set_major_locator(LogLocator(numticks=20))
         for axes in panels if floor > low else ():
             band: dict[str, Any] = {"color": style.GREY, "alpha": 0.2, "lw": 0, "zorder": 0.5}
@@ -92,12 +86,11 @@ def _lines(attributes: dict[str, Any], columns: Columns, best: int | None) -> tu
         at = f"step {step:.3g} s" if math.isfinite(step) else f"tolerance {tolerance:g}"
         cost = f" in {1e3 * seconds:.3g} ms" if math.isfinite(seconds) else ""
         first = f"cheapest of error ≤ {target}: {method}, {at}: error {error:.2g}{cost}"
-    left_out = int(attributes.get("left_out", 0))
-    failed = int(np.count_nonzero(columns["failure"] != "")) - left_out
     parts = [f"{attributes.get('duration', 0.0):.4g} s of motion"]
     parts.append(f"reference good to {attributes.get('reference_error', 0.0):.1e}")
-    counts = (("failed", failed), ("left out for want of time", left_out))
-    return first, "   ·   ".join(parts + [f"{words} {count}" for words, count in counts if count])
+    left_out = attributes.get("left_out", 0)
+    counts = {"failed": (columns["failure"] != "").sum() - left_out, "left out for want of time": left_out}
+    return first, "   ·   ".join(parts + [f"{words} {count}" for words, count in counts.items() if count])
 
 
 def _draw_errors(axes: Axes, columns: Columns, work: style.Array) -> None:
@@ -111,8 +104,7 @@ def _draw_errors(axes: Axes, columns: Columns, work: style.Array) -> None:
     others = sorted({*columns["nodes"].tolist()} - {0, usual})
     for label in dict.fromkeys(columns["method"].tolist()):
         places = columns["method"] == label
-        drawn = (columns["drawn"] & (work > 0.0))[places]
-        if not drawn.any():
+        if np.isnan(work[places]).all():
             continue
         entry = {name: values[places][0] for name, values in columns.items()}
         scheme = SCHEMES.get(entry["scheme"])
@@ -122,30 +114,24 @@ def _draw_errors(axes: Axes, columns: Columns, work: style.Array) -> None:
             colour = _EXACT
         elif entry["evaluator"] == "midpoint" and entry["nodes"] in others:
             colour, marker = _OTHER_NODES, _NODE_MARKERS[others.index(entry["nodes"]) % len(_NODE_MARKERS)]
-        axes.plot(
-            *(np.where(drawn, values[places], np.nan) for values in (work, columns["error"])),
-            label=label,
-            color=colour,
-            marker=marker,
-            markersize=9.0 if own else 5.0,
-            markerfacecolor="white" if entry["start"] == "paper" else colour,
-            linestyle=(0, (2, 1.5)) if entry["iteration"] == "fixed-point" else "-",
-            linewidth=2.0 if own else 1.1,
-            zorder=3.0 if own else 2.0,
-        )
+        size, width, above = (9.0, 2.0, 3.0) if own else (5.0, 1.1, 2.0)
+        face = "white" if entry["start"] == "paper" else colour
+        dashes = (0, (2, 1.5)) if entry["iteration"] == "fixed-point" else "-"
+        look: dict[str, Any] = {"label": label, "color": colour, "marker": marker, "mfc": face, "ls": dashes}
+        axes.plot(work[places], columns["error"][places], ms=size, lw=width, zorder=above, **look)
 
 
 def _draw_front(axes: Axes, columns: Columns, work: style.Array) -> None:
     """The entries that no other beats in both error and time."""
-    on = np.flatnonzero((columns["on_front"] == 1) & columns["drawn"])
-    on = on[np.argsort(work[on], kind="stable")]
+    by_work = np.argsort(work, kind="stable")  # NaN at the end
+    on = by_work[columns["on_front"][by_work] == 1]
     look: dict[str, Any] = {"color": style.GREY, "alpha": 0.45, "lw": 8.0, "solid_capstyle": "round"}
     axes.plot(work[on], columns["error"][on], zorder=0.9, label="no other is better in both", **look)
 
 
 def _draw_slopes(axes: Axes, columns: Columns, work: style.Array) -> None:
     """How errors fall with the work at orders one and two, from the coarsest steps on."""
-    stepped = np.isfinite(columns["step"]) & (work > 0.0) & columns["drawn"]
+    stepped = np.isfinite(columns["step"]) & np.isfinite(work)
     if not stepped.any():
         return
     ends = np.array([work[stepped].min(), work[stepped].max()])

@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from brakecli.analysis.regime.rules import Excitation
-from brakecli.plots import marks, style
-from brakecli.plots.sweep import SweepPicture
+from brakecli.plots import style
+from brakecli.plots.sweep import DIFFERENT, FORCED, REGIMES, WIDTH, Sign, SweepPicture, add_legend, sign
 from brakecli.sweeps.critical import Outcome
 
 _FEW = 60  # points up to which each has a marker of full size
@@ -20,20 +20,21 @@ _ALIKE = 0.02  # values whose relative difference is smaller do not fill the axi
 
 def draw(picture: SweepPicture) -> Figure:
     """The figure of a sweep over one axis: one panel, or two above each other."""
-    panels: list[Callable[[Axes, SweepPicture], None]]
-    panels = [partial(_draw_motion, name="amplitude"), partial(_draw_motion, name="frequency")]
+    panels: dict[Callable[[Axes, SweepPicture], None], float]  # with their heights
+    panels = {partial(_draw_motion, name="amplitude"): 1.5, partial(_draw_motion, name="frequency"): 1.0}
     if picture.critical is not None:
+        panels = {_draw_critical: 3.2}
         compared = np.isfinite(picture["critical"] - picture["critical_eigenvalue"]).any()
-        both = compared and picture.critical.method == "simulation"
-        panels = [_draw_critical, _draw_difference] if both else [_draw_critical]
-    figure = marks.sweep_figure(picture, marks.WIDTH, 5.2 if len(panels) == 1 else 6.4)
-    heights = (1.5 if picture.critical is None else 3.2, 1.0)[: len(panels)]
-    rows = figure.subplots(len(panels), 1, sharex=True, height_ratios=heights, squeeze=False)[:, 0]
-    for axes, draw_panel in zip(rows, panels, strict=True):
+        if compared and picture.critical.method == "simulation":
+            panels[_draw_difference] = 1.0
+    figure = picture.figure(WIDTH, 5.2 if len(panels) == 1 else 6.4)
+    rows = figure.subplots(len(panels), 1, sharex=True, height_ratios=[*panels.values()], squeeze=False)
+    for axes, draw_panel in zip(rows.flat, panels, strict=True):
         draw_panel(axes, picture)
+        picture.axes[0].apply_to(axes.xaxis)
         axes.label_outer()
     figure.align_ylabels()
-    marks.add_legend(figure)
+    add_legend(figure)
     return figure
 
 
@@ -53,11 +54,10 @@ def _draw_critical(axes: Axes, picture: SweepPicture) -> None:
                 axes.errorbar(x[there], value[there], error, mfc=face, label=label, **_bars(size))
     elif regained.any():
         axes.plot(x[regained], value[regained], "o", mfc="white", mec=style.DARK, label="stable above")
-    if (apart := marks.differs(picture)[0]).any():
+    if (apart := picture.differs()[0]).any():
         axes.vlines(x[apart], sustained[apart], value[apart], color=style.VERMILION, lw=1.0, ls=style.DOTS)
         label = "vibration lasts from here on, from the case's own start"
         axes.plot(x[apart], sustained[apart], "v", ms=size, color=style.VERMILION, label=label)
-    marks.set_scale(axes.xaxis, axis)
     axes.set_ylabel(style.labelled(f"critical {critical.parameter}", picture.units["critical"]), parse_math=False)
     drawn = np.concatenate([value, eigenvalue, sustained])
     style.set_ticks(axes.yaxis, 0.0, style.largest(drawn) or max(abs(critical.lower), abs(critical.upper)))
@@ -65,17 +65,15 @@ def _draw_critical(axes: Axes, picture: SweepPicture) -> None:
         _widen(axes, drawn)
     else:
         axes.set_ylim(critical.lower, critical.upper)
-    _mark(axes, x, marks.missing(picture))
+    _mark(axes, x, picture.missing())
 
 
 def _draw_difference(axes: Axes, picture: SweepPicture) -> None:
     """By how much the critical value by simulation lies above the one by eigenvalues, with its error bars."""
-    x = picture.axes[0].values
-    difference = picture["critical"][0] - picture["critical_eigenvalue"][0]
+    x, difference = picture.axes[0].values, (picture["critical"] - picture["critical_eigenvalue"])[0]
     error = np.where(np.isfinite(difference), picture["critical_error"][0], np.nan)
     axes.axhline(0.0, color=style.DARK, lw=1.1)
     axes.errorbar(x, difference, error, **_bars(_size(x)))
-    marks.set_scale(axes.xaxis, picture.axes[0])
     style.set_ticks(axes.yaxis, 0.0, style.largest(np.abs(difference) + error))
     axes.margins(y=0.15)
     axes.set_ylabel(style.labelled("simulation\nless eigenvalue", picture.units["critical"]), parse_math=False)
@@ -85,34 +83,31 @@ def _draw_motion(axes: Axes, picture: SweepPicture, name: str) -> None:
     """Amplitude or frequency; points have the colour of their regime, and are arrows if it was followed."""
     axis, values, unit = picture.axes[0], picture[name], picture.units[name]
     factor, unit = style.prefixed(style.largest(values), unit) if unit == "m" else (1.0, unit)
-    lasting, _, wide = marks.lasting_amplitudes(picture)
+    lasting, _, wide = picture.lasting_amplitudes()
     wide = wide and name == "amplitude"  # drawn on a logarithmic axis
-    least = max(lasting / 30.0, float(np.nanmin(values[values > 0.0]))) if wide else 0.0
+    least = max(lasting / 30.0, float(values[values > 0.0].min())) if wide else 0.0
     x, size, small = axis.values, _size(axis.values), values < least
     shaken = picture["excitation"] == Excitation.FORCED
     for number, direction in enumerate(picture.directions):
         y = factor * np.where(small[number], np.nan, values[number])
         arrow, dashes = _DIRECTIONS[direction]
-        arrows: dict[str, Any] = {"marker": arrow, "mfc": "white", "mec": style.DARK, "ms": size}
-        arrows = {"label": f"on the way {direction}", **arrows} if direction else {}
         if axis.texts is None:
-            axes.plot(x, y, color="#777777", lw=1.0, ls=dashes, **arrows)
-        for regime, where in marks.regimes(picture):
-            colour, marker = marks.REGIMES[regime]
+            arrows: dict[str, Any] = {"marker": arrow, "mfc": "white", "mec": style.DARK, "ms": size}
+            label = f"on the way {direction}" if direction else None
+            axes.plot(x, y, color="#777777", lw=1.0, ls=dashes, label=label, **arrows)
+        for regime, (colour, marker) in REGIMES.items():
             points: dict[str, Any] = {"ls": "none", "mfc": colour, "mec": style.DARK, "mew": 0.6}
-            chosen = where[number]
+            chosen = picture["regime"][number] == regime
             axes.plot(x[chosen], y[chosen], marker=arrow or marker, ms=size, **points)
-            if number == 0:  # for the legend
+            if (picture["regime"] == regime).any():  # for the legend
                 axes.plot([], [], marker="s" if direction else marker, ms=7, label=str(regime), **points)
         if (seen := shaken[number] & np.isfinite(y)).any():
             axes.plot(x[seen], y[seen], "o", color=style.DARK, ms=0.4 * size, mec="white", mew=0.5)
     if shaken.any():
-        axes.plot([], [], "o", ms=3, color=style.DARK, label=marks.FORCED)
-    edges, label = axis.edges, marks.DIFFERENT
-    for place in np.flatnonzero(picture["hysteresis"][0]):
-        axes.axvspan(edges[place], edges[place + 1], color=style.GREEN, alpha=0.16, lw=0, zorder=0.5, label=label)
-        label = "_"
-    marks.set_scale(axes.xaxis, axis)
+        axes.plot([], [], "o", ms=3, color=style.DARK, label=FORCED)
+    for place in np.flatnonzero(picture["hysteresis"][0]):  # `style.labels` names the first alone
+        span = axis.edges[place : place + 2]
+        axes.axvspan(*span, color=style.GREEN, alpha=0.16, lw=0, zorder=0.5, label=DIFFERENT)
     words = picture.long_names[name]
     axes.set(ylabel=style.labelled(name, unit), title=words[:1].upper() + words[1:])
     floor, highest = factor * least, factor * float(np.nanmax(values, initial=0.0))
@@ -126,7 +121,7 @@ def _draw_motion(axes: Axes, picture: SweepPicture, name: str) -> None:
         style.set_ticks(axes.yaxis, 0.5 * floor, 2.0 * highest)
     else:
         axes.set_ylim(-0.03 * (highest or 1.0), 1.08 * (highest or 1.0))
-    _mark(axes, x, [marks.sign(small, "smaller than drawn", "v", style.DARK, "white"), marks.failed(picture)])
+    _mark(axes, x, [sign(small, "smaller than drawn", "v", style.DARK, "white"), picture.failed()])
 
 
 def _widen(axes: Axes, values: style.Array) -> None:
@@ -139,7 +134,7 @@ def _widen(axes: Axes, values: style.Array) -> None:
         axes.margins(y=0.08)
 
 
-def _mark(axes: Axes, x: style.Array, signs: Iterable[marks.Sign]) -> None:
+def _mark(axes: Axes, x: style.Array, signs: Iterable[Sign]) -> None:
     """Signs at the edge of the axes, in room of their own: at the top for triangles that point up."""
     there = [(where.any(axis=0), look) for where, look in signs if where.any()]
     up = [look["marker"] == "^" for _, look in there]

@@ -6,15 +6,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.collections import QuadMesh
 from matplotlib.colors import ListedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
 from brakecli.analysis.regime.rules import Excitation
-from brakecli.plots import marks, style
-from brakecli.plots.sweep import MOST_PANELS, SweepPicture
+from brakecli.plots import style
+from brakecli.plots.sweep import DIFFERENT, FORCED, MOST_PANELS, REGIMES, WIDTH, Sign, SweepPicture, add_legend
 
 _LONG_TITLE = 34  # characters of a panel's title from which on it takes two lines
 _MAP_WIDTH, _PANEL_WIDTH = 10.4, 3.0  # inches, of a figure with two columns of maps, and of each of more maps
@@ -44,8 +43,8 @@ def draw(picture: SweepPicture) -> Figure:
         width, height = max(_MAP_WIDTH, 1.2 + _PANEL_WIDTH * len(pieces)), 4.6 if critical else 7.2
     else:
         pieces = [(f" on the way {way}" if way else "", picture.towards(way)) for way in picture.directions]
-        width, height = (marks.WIDTH, 5.8) if critical else (_MAP_WIDTH, 1.0 + 3.9 * len(pieces))
-    figure = marks.sweep_figure(picture, width, height)
+        width, height = (WIDTH, 5.8) if critical else (_MAP_WIDTH, 1.0 + 3.9 * len(pieces))
+    figure = picture.figure(width, height)
     shape = (len(layers), len(pieces)) if sliced else (len(pieces), len(layers))
     panels = figure.subplots(*shape, sharex=True, sharey=True, squeeze=False)
     for row, (name, piece) in zip(panels.T if sliced else panels, pieces, strict=True):
@@ -59,7 +58,7 @@ def draw(picture: SweepPicture) -> Figure:
     bar.minorticks_off()
     bar.set_label(scale.label, parse_math=False)
     bar.outline.set_visible(False)
-    marks.add_legend(figure)
+    add_legend(figure)
     return figure
 
 
@@ -68,47 +67,56 @@ def _slices(picture: SweepPicture) -> list[tuple[str, SweepPicture]]:
     lengths = [len(axis.values) for axis in picture.axes]
     short = [number for number in range(3) if lengths[number] <= MOST_PANELS]
     sliced = min(short, key=lambda number: (picture.axes[number].texts is None, lengths[number], -number))
-    names = [picture.axes[sliced].named(place) for place in range(lengths[sliced])]
-    titles = [name if len(name) < _LONG_TITLE else name.replace(" = ", "\n= ") for name in names]
-    return [(title, picture.at(sliced, place)) for place, title in enumerate(titles)]
-
-
-def _draw_regimes(axes: Axes, picture: SweepPicture, _: Scale) -> ScalarMappable:
-    codes = np.full(picture["regime"].shape, np.nan)
-    for regime, where in marks.regimes(picture):
-        codes[where] = list(marks.REGIMES).index(regime)
-        axes.plot([], [], "s", ms=9, mfc=marks.REGIMES[regime][0], mec="none", label=str(regime))
-    colours = ListedColormap([colour for colour, _ in marks.REGIMES.values()])
-    mesh = _mesh(axes, picture, codes[0], cmap=colours, vmin=-0.5, vmax=len(marks.REGIMES) - 0.5)
-    forced = picture["excitation"] == Excitation.FORCED
-    shaken = {"marker": "o", "color": style.DARK, "mec": "white", "label": marks.FORCED}
-    different = {"marker": "$≠$", "color": style.DARK, "label": marks.DIFFERENT}
-    _sign(axes, picture, (forced, shaken), (picture["hysteresis"], different), marks.failed(picture))
-    return mesh
-
-
-def _draw_amplitude(axes: Axes, picture: SweepPicture, scale: Scale) -> ScalarMappable:
-    mesh = _mesh(axes, picture, scale.factor * picture["amplitude"][0], cmap="viridis", norm=scale.norm)
-    _sign(axes, picture, marks.failed(picture))
-    return mesh
+    pieces = [(picture.axes[sliced].named(place), picture.at(sliced, place)) for place in range(lengths[sliced])]
+    return [(name if len(name) < _LONG_TITLE else name.replace(" = ", "\n= "), piece) for name, piece in pieces]
 
 
 def _amplitude_scale(picture: SweepPicture) -> Scale:
     """Colours from 0 on, or logarithmic ones if amplitudes that last are of very different size."""
-    least, largest, wide = marks.lasting_amplitudes(picture)
+    least, largest, wide = picture.lasting_amplitudes()
     largest = largest or style.largest(picture["amplitude"])
     factor, unit = style.prefixed(largest, picture.units["amplitude"])
-    low, high = factor * least if wide else 0.0, factor * largest or 1.0
-    drawn = factor * picture["amplitude"]
+    low, high, drawn = factor * least if wide else 0.0, factor * largest or 1.0, factor * picture["amplitude"]
     beyond = int((drawn < low).any()) + 2 * int((drawn > 1.0001 * high).any())
     norm = LogNorm(low, high) if wide else Normalize(low, high)
     return Scale(f"amplitude ({unit})", norm, factor, ("neither", "min", "max", "both")[beyond])
 
 
+def _critical_scale(picture: SweepPicture) -> Scale:
+    critical, values = picture.critical, picture["critical"][np.isfinite(picture["critical"])]
+    assert critical is not None
+    low, high = (float(values.min()), float(values.max())) if values.size else (critical.lower, critical.upper)
+    least = 0.01 * max(abs(low), abs(high))
+    if values.size and high - low <= least:
+        low, high = low - (least or 1.0), high + (least or 1.0)
+    return Scale(style.labelled(f"critical {critical.parameter}", picture.units["critical"]), Normalize(low, high))
+
+
+def _draw_regimes(axes: Axes, picture: SweepPicture, _: Scale) -> ScalarMappable:
+    codes = np.full(picture["regime"].shape, np.nan)
+    for code, (regime, (colour, _marker)) in enumerate(REGIMES.items()):
+        if (where := picture["regime"] == regime).any():
+            codes[where] = code
+            axes.plot([], [], "s", ms=9, mfc=colour, mec="none", label=str(regime))
+    colours = ListedColormap([colour for colour, _marker in REGIMES.values()])
+    shaken = {"marker": "o", "color": style.DARK, "mec": "white", "label": FORCED}
+    different = {"marker": "$≠$", "color": style.DARK, "label": DIFFERENT}
+    signs = (picture["excitation"] == Excitation.FORCED, shaken), (picture["hysteresis"], different)
+    return _mesh(axes, picture, codes, *signs, picture.failed(), cmap=colours, vmin=-0.5, vmax=len(REGIMES) - 0.5)
+
+
+def _draw_amplitude(axes: Axes, picture: SweepPicture, scale: Scale) -> ScalarMappable:
+    values = scale.factor * picture["amplitude"]
+    return _mesh(axes, picture, values, picture.failed(), cmap="viridis", norm=scale.norm)
+
+
 def _draw_critical(axes: Axes, picture: SweepPicture, scale: Scale) -> ScalarMappable:
     """The critical value with contours, or with numbers where there are few; points without one are marked."""
+    label = "vibration lasts elsewhere, from the case's own start"
+    elsewhere = {"marker": "d", "color": style.VERMILION, "mec": "white", "label": label}
+    signs = (picture.differs(), elsewhere), *picture.missing()
+    mesh = _mesh(axes, picture, picture["critical"], *signs, cmap="cividis", norm=scale.norm)
     values = picture["critical"][0]
-    mesh = _mesh(axes, picture, values, cmap="cividis", norm=scale.norm)
     known = np.isfinite(values)
     areas = known[1:, 1:] & known[:-1, 1:] & known[1:, :-1] & known[:-1, :-1]
     numeric = all(axis.texts is None and len(axis.values) >= 3 for axis in picture.axes)
@@ -119,35 +127,26 @@ def _draw_critical(axes: Axes, picture: SweepPicture, scale: Scale) -> ScalarMap
             x, y, value = picture.axes[0].values[i], picture.axes[1].values[j], values[i, j]
             colour = "white" if scale.norm(value) < 0.6 else "black"
             axes.text(x, y, f"{value:.4g}", ha="center", va="center", size=8.0, color=colour)
-    label = "vibration lasts elsewhere, from the case's own start"
-    elsewhere = {"marker": "d", "color": style.VERMILION, "mec": "white", "label": label}
-    _sign(axes, picture, (marks.differs(picture), elsewhere), *marks.missing(picture))
     return mesh
 
 
-def _critical_scale(picture: SweepPicture) -> Scale:
-    critical, values = picture.critical, picture["critical"][np.isfinite(picture["critical"])]
-    assert critical is not None
-    low, high = critical.lower, critical.upper
-    if values.size:
-        low, high = float(values.min()), float(values.max())
-        least = 0.01 * max(abs(low), abs(high))
-        if high - low <= least:
-            low, high = low - (least or 1.0), high + (least or 1.0)
-    return Scale(style.labelled(f"critical {critical.parameter}", picture.units["critical"]), Normalize(low, high))
-
-
-def _mesh(axes: Axes, picture: SweepPicture, values: style.Array, **look: Any) -> QuadMesh:
-    """A cell around each point, in the colour of its value; none where it is missing."""
+def _mesh(axes: Axes, picture: SweepPicture, values: style.Array, *signs: Sign, **look: Any) -> ScalarMappable:
+    """A cell around each point, in the colour of its value, none where it is missing; with signs in the middle."""
     x, y = picture.axes
-    marks.set_scale(axes.xaxis, x)
-    marks.set_scale(axes.yaxis, y)
+    x.apply_to(axes.xaxis)
+    y.apply_to(axes.yaxis)
     axes.grid(False)
     axes.set_facecolor("#F7F7F7")
-    seams = {"edgecolors": "white", "linewidth": 0.4} if values.size <= 1000 else {"edgecolors": "face"}
-    drawn = np.ma.masked_invalid(values.T)
-    mesh = axes.pcolormesh(x.edges, y.edges, drawn, **look, **seams, rasterized=values.size > _MOST_DRAWN)
+    drawn = np.ma.masked_invalid(values[0].T)
+    seams = {"edgecolors": "white", "linewidth": 0.4} if drawn.size <= 1000 else {"edgecolors": "face"}
+    mesh = axes.pcolormesh(x.edges, y.edges, drawn, **look, **seams, rasterized=drawn.size > _MOST_DRAWN)
     axes.set(xlim=x.edges[[0, -1]], ylim=y.edges[[0, -1]])
+    box, scale = axes.get_window_extent(), 72.0 / float(axes.figure.dpi)  # signs are small where cells are small
+    size = float(np.clip(0.4 * min(box.width / len(x.values), box.height / len(y.values)) * scale, 1.0, 7.0))
+    for where, sign in signs:
+        if where.any():  # drawn above contours
+            i, j = np.nonzero(where[0])
+            axes.plot(x.values[i], y.values[j], **{"ls": "none", "ms": size, "zorder": 2.1, **sign})
     return mesh
 
 
@@ -160,14 +159,3 @@ def _draw_contours(axes: Axes, picture: SweepPicture, values: style.Array, norm:
     lines.set_path_effects([withStroke(linewidth=2.2, foreground="#00000070")])
     for text in lines.clabel(fmt="%g", fontsize=8.5, use_clabeltext=True):
         text.set_path_effects([withStroke(linewidth=2.5, foreground=style.DARK)])
-
-
-def _sign(axes: Axes, picture: SweepPicture, *signs: marks.Sign) -> None:
-    """Signs in the middle of their cells, small where cells are small."""
-    x, y = (axis.values for axis in picture.axes)
-    box, scale = axes.get_window_extent(), 72.0 / float(axes.figure.dpi)
-    size = float(np.clip(0.4 * min(box.width / len(x), box.height / len(y)) * scale, 1.0, 7.0))
-    for where, look in signs:
-        if where.any():
-            i, j = np.nonzero(where[0])
-            axes.plot(x[i], y[j], **{"ls": "none", "ms": size, **look})

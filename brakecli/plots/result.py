@@ -21,17 +21,15 @@ def plot_result(result: Path, target: Path, *, force: bool, select: Sequence[str
     """
     suffix = target.suffix.lower()
     if suffix not in (".pdf", ".png", ".svg"):
-        remedy = "name a file that ends in .pdf, .png or .svg with -o"
-        raise UsageError(
-            f"{target}: its suffix does not name a kind of picture (found {target.suffix!r}); {remedy}"
-        )
+        problem = f"its suffix does not name a kind of picture (found {target.suffix!r})"
+        raise UsageError(f"{target}: {problem}; name a file that ends in .pdf, .png or .svg with -o")
     if target.exists() and result.exists() and target.samefile(result):
         raise UsageError(f"{target}: this is the result itself; choose another output with -o")
     try:
         import matplotlib.figure  # noqa: F401
     except ImportError as error:
-        remedy = "install it with: python -m pip install matplotlib"
-        raise UsageError(f"matplotlib cannot be imported ({error}); {remedy}") from error
+        problem = f"matplotlib cannot be imported ({error})"
+        raise UsageError(f"{problem}; install it with: python -m pip install matplotlib") from error
     from brakecli.plots import style
 
     with open_result(result) as stored, new_output(target, force=force) as file, style.applied():
@@ -52,4 +50,4 @@ def draw(result: StoredResult, select: Sequence[str] = ()) -> "Figure":
         raise UsageError(f"{result.path}: holds a result of kind {kind!r}; name the result of {known}")
     if select:
         raise UsageError(f"{result.path}: --select is for sweeps (found {select[0]!r}); leave it out for a {kind}")
-    return run.draw(run.gather(result)) if kind == "run" else comparison.draw(result)
+    return run.draw(run.RunPicture(result)) if kind == "run" else comparison.draw(result)

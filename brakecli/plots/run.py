@@ -5,7 +5,6 @@ The history is read in pieces: a run of 10^8 samples takes no more memory than a
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -29,61 +28,41 @@ _SHADES = ((ContactState.STICK, style.ORANGE, "stick"), (ContactState.SEPARATED,
 _BELT: dict[str, Any] = {"color": style.VERMILION, "ls": style.DASHES}
 
 
-@dataclass(frozen=True)
 class RunPicture:
-    """Everything that is drawn of a run, in SI units."""
+    """Everything that is drawn of a run, in SI units.
 
-    title: str
-    summary: str
-    part: str  # what `detail` shows: time, x, vx, state and belt (U) of the samples that are drawn one by one
-    detail: dict[str, style.Array]
-    near: bool  # whether the wheel's surface speed fits beside the motion without flattening it
-    velocity_unit: tuple[float, str]  # factor and unit for the velocities that are drawn
-    interval: float
-    span: tuple[float, float]  # s, of the whole run
-    envelope: tuple[style.Array, style.Array, style.Array]  # time, least and greatest x of its columns
-    spectrum: tuple[float, style.Array, style.Array]  # start of its samples (s), frequency, density
-    line: tuple[str, float | None]  # name and frequency (Hz) of what the spectrum is drawn around
-    passing: tuple[float, ...]  # Hz, of the waves of a wheel that turns steadily
+    `detail` holds the samples that are drawn one by one: time, x, vx, state and belt (U); `part` names them.
+    """
 
-
-def gather(result: StoredResult) -> RunPicture:
-    """Read from a result what its picture shows; raises UnreadableResultError where it is not there."""
-    variables, needed = result.variables("history"), ("time", "x", "vx", "state")
-    shapes = {variables[name].shape if name in variables else (0,) for name in needed}
-    if len(shapes) != 1 or not (samples := max(shapes)[0]):
-        raise style.unreadable(result, f"its history has no {', '.join(needed)} of equal length above 0")
-    try:
-        case = parse_case(str(result.attributes.get("resolved_toml", "")), "its resolved case").case
-    except CaseError as error:
-        raise style.unreadable(result, f"the case in it is not valid: {error.problems[0]}") from error
-    system = system_of(case)
-    steady, speed = np.ptp(system.belt["value"]) == 0.0, system.fastest_belt
-    read = partial(result.read, "history")
-    start, end = (float(read("time", i, i + 1)[0]) for i in (0, samples - 1))
-    interval = (end - start) / (samples - 1) if samples > 1 else case.output.sample_interval
-    places, lowest, highest = envelope(partial(read, "x"), samples)
-    settled = start + interval * float(result.group_attributes("spectrum").get("first_sample", 0))
-    fundamental, peak = (result.attributes.get(name) for name in ("frequency", "spectrum_peak"))
-    part, first, stop = _detail(result, samples, interval)
-    detail = {name: read(name, first, stop) for name in needed}
-    detail["belt"] = np.interp(detail["time"], system.belt["time"], system.belt["value"])
-    fastest, moving = style.largest(detail["belt"]), style.largest(detail["vx"])
-    near = moving == 0.0 or fastest <= 4.0 * moving
-    return RunPicture(
-        title=case.title or "Case without a title",
-        summary=_summary(result),
-        part=part,
-        detail=detail,
-        near=near,
-        velocity_unit=style.prefixed(max(moving, fastest if near else 0.0), "m/s"),
-        interval=interval,
-        span=(start, end),
-        envelope=(start + interval * places, lowest, highest),
-        spectrum=(settled, result.read("spectrum", "frequency"), result.read("spectrum", "vx")),
-        line=("fundamental", fundamental) if fundamental else ("highest peak", peak),
-        passing=tuple(sorted(speed * system.wheel.turns)) if steady and speed else (),
-    )
+    def __init__(self, result: StoredResult) -> None:
+        """Read it from a result; raises UnreadableResultError where it is not there."""
+        variables, needed = result.variables("history"), ("time", "x", "vx", "state")
+        shapes = {variables[name].shape if name in variables else (0,) for name in needed}
+        if len(shapes) != 1 or not (samples := max(shapes)[0]):
+            raise style.unreadable(result, f"its history has no {', '.join(needed)} of equal length above 0")
+        try:
+            case = parse_case(str(result.attributes.get("resolved_toml", "")), "its resolved case").case
+        except CaseError as error:
+            raise style.unreadable(result, f"the case in it is not valid: {error.problems[0]}") from error
+        system, read = system_of(case), partial(result.read, "history")
+        self.title, self.summary = case.title or "Case without a title", _summary(result.attributes)
+        start, end = (float(read("time", i, i + 1)[0]) for i in (0, samples - 1))
+        self.span = start, end  # s, of the whole run
+        self.interval = (end - start) / (samples - 1) if samples > 1 else case.output.sample_interval
+        self.part, first, stop = _detail(result, samples, self.interval)
+        self.detail = {name: read(name, first, stop) for name in needed}
+        self.detail["belt"] = np.interp(self.detail["time"], system.belt["time"], system.belt["value"])
+        fastest, moving = style.largest(self.detail["belt"]), style.largest(self.detail["vx"])
+        self.near = moving == 0.0 or fastest <= 4.0 * moving  # U fits beside the motion without flattening it
+        self.velocity_unit = style.prefixed(max(moving, fastest if self.near else 0.0), "m/s")
+        places, lowest, highest = envelope(partial(read, "x"), samples)
+        self.envelope = start + self.interval * places, lowest, highest
+        settled = start + self.interval * float(result.group_attributes("spectrum").get("first_sample", 0))
+        self.spectrum = settled, result.read("spectrum", "frequency"), result.read("spectrum", "vx")
+        fundamental, peak = (result.attributes.get(name) for name in ("frequency", "spectrum_peak"))
+        self.line = ("fundamental", fundamental) if fundamental else ("highest peak", peak)  # Hz
+        steady, speed = np.ptp(system.belt["value"]) == 0.0, system.fastest_belt
+        self.passing = tuple(sorted(speed * system.wheel.turns)) if steady and speed else ()  # Hz, of its waves
 
 
 def envelope(read: Callable[[int, int], style.Array], samples: int, columns: int = COLUMNS) -> list[style.Array]:
@@ -104,8 +83,7 @@ def envelope(read: Callable[[int, int], style.Array], samples: int, columns: int
 
 def episodes(state: style.Array, wanted: ContactState) -> list[tuple[int, int]]:
     """First and last sample of every unbroken stretch of a state."""
-    inside = np.concatenate([[False], state == wanted, [False]])
-    edges = np.flatnonzero(inside[1:] != inside[:-1])
+    edges = np.flatnonzero(np.diff(state == wanted, prepend=False, append=False))
     return [(int(first), int(behind) - 1) for first, behind in edges.reshape(-1, 2)]
 
 
@@ -129,15 +107,14 @@ def _detail(result: StoredResult, samples: int, interval: float) -> tuple[str, i
     return "End of the run" if length < samples else "Whole run", samples - length, samples
 
 
-def _summary(result: StoredResult) -> str:
+def _summary(attributes: dict[str, Any]) -> str:
     """Regime, excitation and numbers in one line."""
-    attributes = result.attributes
     if attributes.get("status") == "failed":
         return f"failed at {str(attributes.get('failure', '')).partition(';')[0]}"
-    regime, excitation = str(attributes.get("regime")), str(attributes.get("excitation"))
-    first = regime if excitation == "none" else f"{regime}, {excitation}"
-    reasons = f": {'; '.join(map(str, attributes.get('reasons', ())))}" if regime == "undecided" else ""
-    parts = [first + reasons]
+    regime, excitation = attributes.get("regime"), attributes.get("excitation")
+    parts = [f"{regime}" if excitation == "none" else f"{regime}, {excitation}"]
+    if regime == "undecided":
+        parts[0] += f": {'; '.join(attributes.get('reasons', ()))}"
     if frequency := attributes.get("frequency"):
         parts.append(f"{frequency:.4g} Hz")
     if (amplitude := attributes.get("amplitude")) and excitation != "none":

@@ -128,11 +128,11 @@ def set_ticks(axis: Axis, low: float, high: float) -> None:
     """Write each tick of an axis from `low` to `high` in full, without a power of ten at the end of the axis."""
     if axis.get_scale() == "log":
         axis.set_major_locator(log_locator(high / low))
-        axis.set_major_formatter(lambda value, _: readable(value))
         if high / low < WIDE:
             axis.set_minor_locator(NullLocator())
-    elif not 1e-2 <= max(abs(low), abs(high)) < 1e5:
-        axis.set_major_formatter(lambda value, _: readable(value))
+    elif 1e-2 <= max(abs(low), abs(high)) < 1e5:
+        return
+    axis.set_major_formatter(lambda value, _: readable(value))
 
 
 def log_locator(ratio: float) -> LogLocator:

@@ -1,27 +1,49 @@
-"""What the picture of a sweep shows, gathered from its result: numbers over rising axes, missing ones as NaN."""
+"""What curves and maps of a sweep share: numbers over rising axes, missing ones as NaN; heading, legend, looks."""
 
 import math
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import chain
+from typing import Any
 
 import numpy as np
+from matplotlib.axis import XAxis, YAxis
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 
+from brakecli.analysis.regime.rules import Regime
 from brakecli.case.read import parse_table
 from brakecli.errors import CaseError, UsageError
 from brakecli.files.read import StoredResult
 from brakecli.plots import style
+from brakecli.sweeps.critical import Outcome
 from brakecli.sweeps.plan import label
+from brakecli.sweeps.point import Status
 from brakecli.sweeps.tables import Critical, Sweep
 
+REGIMES = {  # colour and marker
+    Regime.DAMPED: ("#BFDDF0", "o"),
+    Regime.RELAXATION: (style.ORANGE, "s"),
+    Regime.QUASI_HARMONIC: (style.BLUE, "D"),
+    Regime.UNDECIDED: (style.GREY, "X"),
+}
+FORCED, DIFFERENT = "forced by the wheel's waves", "up and down differ"
+WIDTH = 8.8  # inches, of a figure with one column of panels
 MOST_PANELS = 5  # values of a third axis: its maps stand side by side
 _NEEDED = ("status", "regime", "excitation", "amplitude", "frequency")
 _CRITICAL = (
     *("critical_status", "critical", "critical_lower", "critical_upper", "critical_error"),
     *("critical_eigenvalue", "critical_sustained", "sustained_status"),
 )
+_FIRST = (*map(str, REGIMES), "by simulation", "by eigenvalues")  # in the legend
+_LONGEST_KEY, _MOST_TEXTS, _MOST_CHARACTERS = 45, 30, 70
+_FEW = 6  # values of an axis up to which each has its tick
 _LEAST_LOG = 5.0  # ratio of the ends of a logarithmic axis; below it, linear ticks are easier to read
+_WIDE = 20.0  # ratio of lasting amplitudes from which on their scale is logarithmic
+
+Sign = tuple[style.Array, dict[str, Any]]  # points without a value that could be drawn, the look of their marker
 
 
 @dataclass(frozen=True)
@@ -53,7 +75,7 @@ class Axis:
 
     def named(self, place: int) -> str:
         """The value at a place, with its key and unit."""
-        value = self.texts[place] if self.texts is not None else style.readable(float(self.values[place]))
+        value = self.texts[place] if self.texts else style.readable(float(self.values[place]))
         return f"{self.key} = {value} {self.units}".rstrip()
 
     def place(self, value: str) -> int | None:
@@ -62,10 +84,29 @@ class Axis:
             if self.texts is not None:
                 return self.texts.index(value)
             nearest = int(np.argmin(np.abs(self.values - float(value))))
-            size = float(np.abs(self.values).max())
-            if math.isclose(self.values[nearest], float(value), rel_tol=1e-5, abs_tol=1e-9 * size):
+            near = 1e-9 * style.largest(self.values)
+            if math.isclose(self.values[nearest], float(value), rel_tol=1e-5, abs_tol=near):
                 return nearest
         return None
+
+    def apply_to(self, axis: XAxis | YAxis) -> None:
+        """Set scale, ticks and label of an axis of a panel."""
+        side, values, texts = axis.axis_name, self.values, self.texts
+        key = textwrap.shorten(self.key, _LONGEST_KEY, placeholder=" …")
+        axis.set_label_text(style.labelled(key, self.units), parse_math=False)
+        if texts is not None:
+            step = -(-len(texts) // _MOST_TEXTS)
+            slanted = side == "x" and sum(map(len, texts)) > _MOST_CHARACTERS
+            turned: dict[str, Any] = {"rotation": 30, "ha": "right", "rotation_mode": "anchor"} if slanted else {}
+            axis.set_ticks(values[::step], labels=texts[::step], parse_math=False, **turned)
+            axis.axes.set(**{f"{side}lim": (-0.5, len(texts) - 0.5)})
+            axis.grid(False)
+        elif not self.logarithmic and len(values) <= _FEW and np.diff(values).min() > 0.1 * np.ptp(values):
+            axis.set_ticks(values, labels=[style.readable(float(value)) for value in values])
+        else:
+            if self.logarithmic:
+                axis.axes.set(**{f"{side}scale": "log"})
+            style.set_ticks(axis, values[0], values[-1])
 
 
 @dataclass(frozen=True)
@@ -93,7 +134,7 @@ class SweepPicture:
     @property
     def summary(self) -> str:
         """The number of points, and the results of their computation, in one line."""
-        done = self["status"] == "done"
+        done = self["status"] == Status.DONE
         parts = [f"{done.size} point{'s' if done.size != 1 else ''}"]
         if self.critical is None:
             regimes = zip(*np.unique(self["regime"][done], return_counts=True), strict=True)
@@ -119,6 +160,72 @@ class SweepPicture:
         chosen = (*self.chosen, f"on the way {direction}")
         return replace(self, directions=(direction,), variables=variables, chosen=chosen)
 
+    def lasting_amplitudes(self) -> tuple[float, float, bool]:
+        """The least and the largest amplitude (m) that lasts, or 0; whether their scale is logarithmic."""
+        sustained = np.isin(self["regime"], (Regime.RELAXATION, Regime.QUASI_HARMONIC))
+        amplitude = self["amplitude"][sustained & (self["amplitude"] > 0.0)]
+        least, largest = (float(amplitude.min()), float(amplitude.max())) if amplitude.size else (0.0, 0.0)
+        return least, largest, largest > _WIDE * least
+
+    def differs(self) -> style.Array:
+        """Where the least sustained value lies outside the bracket of the critical one, or where there is none."""
+        assert self.critical is not None
+        sustained, tolerance = self["critical_sustained"], self.critical.tolerance
+        early = self["critical_lower"] - sustained > tolerance  # false where one of the two is missing
+        late = sustained - self["critical_upper"] > tolerance
+        return np.asarray(np.isfinite(sustained) & (early | late | np.isnan(self["critical"])))
+
+    def failed(self) -> Sign:
+        """Points that failed."""
+        return sign(self["status"] != Status.DONE, "failed", "x", style.VERMILION, style.VERMILION)
+
+    def missing(self) -> Iterator[Sign]:
+        """Points without a critical value, or without a least sustained one, by the reason."""
+        assert self.critical is not None
+        status, sustained = self["critical_status"], self["sustained_status"]
+        low, high = style.readable(self.critical.lower), style.readable(self.critical.upper)
+        always = (sustained == Outcome.SUSTAINED) & (status != Outcome.UNSTABLE)
+        never = (sustained == Outcome.DAMPED) & (status != Outcome.STABLE)
+        yield sign(status == Outcome.STABLE, f"stable up to {high}", "^", style.BLUE, "white")
+        yield sign(status == Outcome.UNSTABLE, f"unstable from {low} on", "v", style.BLUE, style.BLUE)
+        yield sign(status == Outcome.NO_SLIDING, "no steady sliding", "s", style.DARK, "white")
+        yield sign(always, f"vibration lasts from {low} on", "v", style.VERMILION, "white")
+        yield sign(never, f"vibration fades up to {high}", "^", style.VERMILION, "white")
+        yield self.failed()
+
+    def figure(self, width: float, height: float) -> Figure:
+        """An empty figure (inches) below the heading; `height` is that of the part below the heading."""
+        wrap = textwrap.TextWrapper(round(12.0 * width), max_lines=2, placeholder=" …").wrap
+        chosen = ["   ·   ".join(self.chosen)] if self.chosen else []
+        lines = [self.summary, *chosen, *chain.from_iterable(map(wrap, self.findings[:2]))]
+        return style.headed(width, height + 0.21 * len(lines), self.title, *lines)
+
+
+def sign(where: style.Array, label: str, marker: str, colour: str, face: str) -> Sign:
+    """A sign for points without a value; a triangle that points up stands at the top of curves."""
+    return where, {"ls": "none", "label": label, "marker": marker, "mec": colour, "mfc": face, "mew": 1.2}
+
+
+def add_legend(figure: Figure) -> None:
+    """Add all labels in as few rows as fit between the heading and the panels."""
+    artists = style.labels(figure)
+    if not artists:
+        return
+    texts = sorted(artists, key=lambda text: _FIRST.index(text) if text in _FIRST else len(_FIRST))
+    width, height = figure.get_size_inches()
+    for columns in range(len(texts), 0, -1):
+        longest = [max(map(len, column)) for column in np.array_split(texts, columns)]  # as Matplotlib fills them
+        if sum(0.075 * length + 0.45 for length in longest) <= width - 0.4:
+            break
+    engine = figure.get_layout_engine()
+    assert isinstance(engine, ConstrainedLayoutEngine)
+    left, bottom, wide, high = engine.get()["rect"]
+    look: dict[str, Any] = {"frameon": False, "borderaxespad": 0.0, "borderpad": 0.0, "columnspacing": 1.6}
+    look |= {"loc": "upper left", "bbox_to_anchor": (0.125 / width, bottom + high), "ncols": columns}
+    figure.legend([artists[text] for text in texts], texts, **look).set_in_layout(False)
+    taken = (0.19 * -(-len(texts) // columns) + 0.09) / height
+    engine.set(rect=(left, bottom, wide, high - taken))
+
 
 def gather(result: StoredResult, select: Sequence[str] = ()) -> SweepPicture:
     """Read from a result what its picture shows.
@@ -140,9 +247,8 @@ def gather(result: StoredResult, select: Sequence[str] = ()) -> SweepPicture:
     both = dims[:1] == ("direction",)
     variables = {name: style.read_column(result, name)[... if both else np.newaxis] for name in names}
     for name in ("regime", "excitation"):  # those of points that failed mean nothing
-        variables[name] = np.where(variables["status"] == "done", variables[name], "")
-    followed = both and "hysteresis" in known and known["hysteresis"].dims == dims[1:]
-    differ = result.read("/", "hysteresis") == 1 if followed else False
+        variables[name] = np.where(variables["status"] == Status.DONE, variables[name], "")
+    differ = result.read("/", "hysteresis") == 1 if both and "hysteresis" in known else False
     variables["hysteresis"] = np.broadcast_to(differ, variables["status"].shape)
     units = {name: str(each.attributes.get("units", "")) for name, each in known.items()}
     units = {name: unit if unit != "1" else "" for name, unit in units.items()}
@@ -155,17 +261,11 @@ def gather(result: StoredResult, select: Sequence[str] = ()) -> SweepPicture:
         places = (order if texts else values[order]).astype(np.float64)
         axes.append(Axis(dimension, long_names[dimension], units[dimension], places, texts))
         variables = {name: np.take(values, order, number) for name, values in variables.items()}
-    picture = SweepPicture(
-        title=str(result.attributes.get("title", "")) or "Sweep without a title",
-        findings=tuple(map(str, result.attributes.get("findings", ()))),
-        chosen=(),
-        directions=("up", "down") if both else (next((str(a.direction) for a in sweep.axis if a.direction), ""),),
-        axes=tuple(axes),
-        variables=variables,
-        units=units,
-        long_names=long_names,
-        critical=sweep.critical,
-    )
+    title = str(result.attributes.get("title", "")) or "Sweep without a title"
+    findings = tuple(map(str, result.attributes.get("findings", ())))
+    way = next((axis.direction for axis in sweep.axis if axis.direction), "")
+    ways = ("up", "down") if both else (way,)
+    picture = SweepPicture(title, findings, (), ways, tuple(axes), variables, units, long_names, sweep.critical)
     for wanted in select:  # findings about the whole sweep need not hold for a part of it
         picture = replace(_selected(picture, wanted, result), findings=())
     for axis in picture.axes:

@@ -1,28 +1,33 @@
-"""What a case will cost and which limits it meets, before anything is computed."""
+"""What a case will cost, which limits it meets, and what a careful user should know of it before it runs."""
 
 import math
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from brakecli.analysis.stability.discrete import StepLimits, step_limits
+from brakecli.analysis.stability.discrete import RESOLVED, StepLimits, amplification, step_limits
+from brakecli.analysis.stability.modes import eigensystem
 from brakecli.analysis.stability.search import bisect
 from brakecli.errors import RefusedError
 from brakecli.runs.cost import duration_text, steps_and_seconds
-from brakecli.runs.warnings import UNSTABLE, adjustments, warnings
+from brakecli.solver.contact.pad import NODES_PER_WAVE
 from brakecli.solver.history import ROW_BYTES
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.quantities import HISTORY
-from brakecli.solver.system import System
+from brakecli.solver.system import WHOLE, System
 
 MOST_STEPS = 1e11
 MOST_SECONDS = 24 * 3600.0
 MOST_BYTES = 1e11
 MOST_TABLE_BYTES = 4e9
+UNSTABLE = 1e-5  # growth per step that no rounding of the eigenvalues explains
+_COARSE_NODES = NODES_PER_WAVE / 2
+_TAKEN = 0.01  # part of the fastest motion that a scheme may take out of a run unsaid
+_ROUNDING = 1e-8  # of the factors of a step
 
 
 @dataclass(frozen=True)
@@ -40,7 +45,7 @@ class Check:
     memory: float  # bytes
     file_size: float  # bytes
     adjustments: tuple[str, ...]
-    warnings: tuple[str, ...]
+    warnings: tuple[str, ...] = ()
 
 
 def check(system: System) -> Check:
@@ -48,32 +53,27 @@ def check(system: System) -> Check:
     own, fastest = system.method.own_steps, system.natural_frequencies[1]
     waves = 2.0 * system.half_length * system.most_turns
     steps, seconds = steps_and_seconds(system)
-    limits = step_limits(system)
-    per_period = math.inf if own or not fastest > 0.0 else 1.0 / (fastest * system.step)
-    per_wave = system.nodes / waves if system.nodes and waves > 0.0 else None
-    return Check(
+    found = Check(
         system=system,
         link_frequencies=natural_frequencies(system.coefficients, 0.0),
         step=None if own else system.step,
         steps=steps,
-        steps_per_period=per_period,
-        limits=limits,
-        nodes_per_wave=per_wave,
+        steps_per_period=math.inf if own or not fastest > 0.0 else 1.0 / (fastest * system.step),
+        limits=step_limits(system),
+        nodes_per_wave=system.nodes / waves if system.nodes and waves > 0.0 else None,
         seconds=seconds,
         memory=1.5e8 + 8.0 * system.nodes * (2 * len(system.wheel.g) + 2),
         file_size=float(system.samples) * ROW_BYTES + 1e5,
         adjustments=tuple(adjustments(system)),
-        warnings=tuple(warnings(system, limits, steps, per_period, per_wave)),
     )
+    return replace(found, warnings=tuple(_warnings(found)))
 
 
 def refuse(found: Check, free_bytes: float = math.inf) -> None:
     """Raise RefusedError where a run would be too large, or unstable by its scheme."""
     system, growth = found.system, found.limits.growth
-    size = (
-        f"about {found.steps:.3g} steps, {duration_text(found.seconds)}, {found.memory / 1e6:.0f} MB of memory, "
-        f"a file of {found.file_size / 1e6:.3g} MB"
-    )
+    room = f"{found.memory / 1e6:.0f} MB of memory, a file of {found.file_size / 1e6:.3g} MB"
+    size = f"about {found.steps:.3g} steps, {duration_text(found.seconds)}, {room}"
     coarser = "solver.tolerance" if found.step is None else "solver.step"
     remedy = f"reduce solver.duration, or increase {coarser} or output.sample_interval"
     if found.steps > MOST_STEPS or found.seconds > MOST_SECONDS:
@@ -84,17 +84,15 @@ def refuse(found: Check, free_bytes: float = math.inf) -> None:
         raise RefusedError(f"the contact's tables would be too large: {size}; reduce contact.nodes")
     compared = 2.0 * 8.0 * len(HISTORY) * system.samples
     if system.method.step is None and compared > MOST_TABLE_BYTES:
-        raise RefusedError(
-            f"two histories of {system.samples:.3g} samples are compared to keep the tolerance, which takes "
-            f"{compared / 1e9:.3g} GB of memory; increase output.sample_interval, or give solver.step instead"
-        )
+        what = f"two histories of {system.samples:.3g} samples are compared to keep the tolerance, which takes"
+        instead = "increase output.sample_interval, or give solver.step instead"
+        raise RefusedError(f"{what} {compared / 1e9:.3g} GB of memory; {instead}")
     if _blows_up(growth, found.steps):
         longest = _longest_stable_step(system)
         shorter = f"take a solver.step of at most {longest:.2g} s" if longest else "reduce solver.step"
-        raise RefusedError(
-            f"solver.theta: at this step the scheme is unstable, it multiplies disturbances by {growth:.6g} in "
-            f"each of {found.steps} steps; {shorter}, {system.method.row.unstable}"
-        )
+        what = f"it multiplies disturbances by {growth:.6g} in each of {found.steps} steps"
+        remedy = f"{shorter}, {system.method.row.unstable}"
+        raise RefusedError(f"solver.theta: at this step the scheme is unstable, {what}; {remedy}")
 
 
 def _blows_up(growth: float, steps: float) -> bool:
@@ -114,12 +112,102 @@ def _longest_stable_step(system: System) -> float | None:
     return math.floor(longest / digit) * digit
 
 
+def adjustments(system: System) -> list[str]:
+    """Sentences on how a run differs from what the case asks for: the grid of time, and nodes."""
+    method, interval, asked, found = system.method, system.interval, system.method.step, list[str]()
+    if method.own_steps and asked is not None:
+        kept = f"to a tolerance of {method.tolerance:g}"
+        found.append(f"solver.step: not used, event-driven finds its steps itself, {kept}")
+    if asked is None and method.nodes:
+        found.append("contact.nodes: not used, the tolerance chooses nodes itself")
+    if asked and not method.own_steps and abs(interval / asked - system.per_sample) > WHOLE * system.per_sample:
+        fitted = f"{system.step:.9g} s, {system.per_sample} to the sample interval of {interval:g} s"
+        found.append(f"solver.step: reduced from {asked:g} s to {fitted}")
+    if abs(system.duration / interval - system.samples) > WHOLE * system.samples:
+        end = f"the next sample at {system.sampled_duration:.9g} s"
+        found.append(f"solver.duration: extended from {system.duration:g} s to {end}")
+    return found
+
+
+def _warnings(found: Check) -> Iterator[str]:
+    """What a careful user would want to know: one sentence each, with its key and number."""
+    system, per_wave = found.system, found.nodes_per_wave
+    if not system.method.own_steps:
+        for what, longest, otherwise in _unresolved(system, found.steps_per_period):
+            yield f"solver.step: {what}; take a step of at most {longest:.2g} s{otherwise}"
+    nyquist, contact, waves = 0.5 / system.interval, system.natural_frequencies[1], system.passing_frequency
+    for what, frequency in (("the contact resonance", contact), ("the shortest wave of the wheel", waves)):
+        if frequency > nyquist:
+            above = f"lies above half the sampling rate ({nyquist:.4g} Hz) and would appear at a wrong place"
+            remedy = f"sample every {0.4 / frequency:.2g} s or more often"
+            yield f"output.sample_interval: {what} at {frequency:.4g} Hz {above} in the spectra; {remedy}"
+    if per_wave is not None and per_wave < _COARSE_NODES:
+        remedy = f"take at least {math.ceil(system.nodes * _COARSE_NODES / per_wave)}, or leave nodes out"
+        yield f"contact.nodes: {per_wave:.3g} nodes per shortest wavelength; {remedy}"
+    yield from _of_the_scheme(system, found.limits, found.steps)
+    if system.load["value"].min() < 0.0:
+        yield "load: the force is negative at times, it lifts the shoe off the wheel"
+
+
+def _unresolved(system: System, per_period: float) -> Iterator[tuple[str, float, str]]:
+    """What the step is too long for, the longest step (s) that is not, and another remedy."""
+    c, step, fastest = system.coefficients, system.step, system.natural_frequencies[1]
+    if per_period < RESOLVED:
+        what = f"{per_period:.3g} steps per period of the fastest motion ({fastest:.4g} Hz): it is not resolved"
+        yield what, 1.0 / (RESOLVED * fastest), ""
+    else:  # perhaps not for the dashpots, where they are overcritical
+        rate = float(np.abs(eigensystem(c, system.contact_stiffness, 0.0)[0]).max())
+        if rate * step > 2.0 * math.pi / RESOLVED:
+            what = f"the dashpots settle a motion at a rate of {rate:.4g} 1/s: it is not resolved"
+            yield what, 2.0 * math.pi / (RESOLVED * rate), ", or event-driven"
+    passing, speed = system.passing_frequency, system.fastest_belt
+    if passing * step > 1.0 / RESOLVED:
+        what = f"{1.0 / (passing * step):.3g} steps per passing wave of the wheel ({passing:.4g} Hz)"
+        yield what, 1.0 / (RESOLVED * passing), ""
+    grip = c.phi * float(np.abs(system.load["value"]).max()) / c.m
+    if 0.0 < speed < grip * step:
+        what = f"friction changes the shoe's velocity by up to {grip * step:.3g} m/s in a step"
+        more = f"more than the wheel's {speed:.3g} m/s: stick and slip are not resolved"
+        yield f"{what}, {more}", speed / grip, ", or event-driven"
+
+
+def _of_the_scheme(system: System, limits: StepLimits, steps: int) -> Iterator[str]:
+    """What iteration and weights do to the motion."""
+    method = system.method
+    if method.iteration == "fixed-point" and limits.contraction >= 1.0:
+        bound = f"its bound of contraction is {limits.contraction:.3g}, above 1"
+        remedy = f'take "newton", or a step of at most {system.step / math.sqrt(limits.contraction):.2g} s'
+        yield f"solver.iteration: the fixed-point iteration may diverge ({bound}); {remedy}"
+    if not limits.unique:
+        wedged = "friction can wedge the shoe into the wheel within a step; reduce solver.step or the coefficient"
+        yield f"friction.coefficient: a step may have more than one solution, as {wedged}"
+    if limits.growth > 1.0 + max(UNSTABLE, 1e-3 / steps):
+        what = f"the scheme itself multiplies disturbances by {limits.growth:.6g} in each step"
+        yield f"solver.theta: {what}; reduce solver.step, {method.row.unstable}"
+    taken = 0.0 if method.own_steps else _taken(system, steps)
+    if taken > _TAKEN:
+        weights = list(method.row.theta)
+        remedy = f"take theta = {weights}" if weights else "take another scheme, or a shorter step"
+        away = f"it takes {100.0 * taken:.3g} % of the fastest motion away by the end of the run"
+        what = f"the scheme itself damps, {away}, and its errors are of first order"
+        yield f"solver.theta: with these weights {what}; {remedy}"
+
+
+def _taken(system: System, steps: int) -> float:
+    """Part of the fastest motion, without dashpots and friction, that the scheme takes away in so many steps."""
+    c = system.coefficients._replace(b_xx=0.0, b_xy=0.0, b_yy=0.0, phi=0.0)
+    factors = np.linalg.eigvals(amplification(c, system.weights, system.scheme, system.contact_stiffness))
+    left = float(np.abs(factors[np.argmax(np.abs(np.angle(factors)))]))  # not a direction without a spring
+    if left > 1.0 - _ROUNDING:
+        return 0.0
+    return -math.expm1(steps * math.log(left)) if left > 0.0 else 1.0
+
+
 def free_bytes(directory: Path) -> float:
     """What is free on the disk of a directory; infinite where that is not known."""
-    try:
+    with suppress(OSError):
         return float(shutil.disk_usage(directory).free)
-    except OSError:
-        return math.inf
+    return math.inf
 
 
 @contextmanager
@@ -129,7 +217,5 @@ def within_range() -> Iterator[None]:
         with np.errstate(over="raise", divide="raise", invalid="raise"):
             yield
     except (ArithmeticError, np.linalg.LinAlgError) as error:
-        raise RefusedError(
-            f"the numbers of the case are too large, too small or too far apart to compute with ({error}); look "
-            "for values in other units than m, kg, s and N"
-        ) from error
+        what = f"the numbers of the case are too large, too small or too far apart to compute with ({error})"
+        raise RefusedError(f"{what}; look for values in other units than m, kg, s and N") from error

@@ -9,6 +9,7 @@ def modelled(motion: Motion) -> tuple[list[str], list[str]]:
     c, smooth = system.coefficients, system.smooth
     closed = work.evaluators.get("closed-form", 0)
     opened = sum(work.evaluators.values()) - closed
+    neither = not smooth and not opened
     rough = f"rough contact of {len(system.shoe.g)} + {len(system.wheel.g)} waves"
     how = "exactly, patch by patch" if system.finds_patches else f"on {system.nodes} nodes"
     friction = "its changes located in time" if system.method.own_steps else "solved for in every step"
@@ -20,10 +21,8 @@ def modelled(motion: Motion) -> tuple[list[str], list[str]]:
     }
     left_out = {
         "quadrature of the contact: both surfaces are smooth": smooth,
-        "quadrature of the contact: the pad touches everywhere, or nowhere, at every step": not (smooth or opened),
-        "the shoe's own roughness, which cancels while the pad touches everywhere": not (
-            smooth or opened or system.shoe.g.size == 0
-        ),
+        "quadrature of the contact: the pad touches everywhere, or nowhere, at every step": neither,
+        "the shoe's own roughness, which cancels while the pad touches everywhere": neither and system.shoe.g.size,
         "stick and slip: there is no friction": c.phi == 0.0,
         "the wheel's phase: its surface is the same everywhere": system.wheel.g.size == 0,
         "the load: it is zero": not system.load["value"].any(),

@@ -1,7 +1,7 @@
 """One run, from a case to a finished result file: what `brakecli run` does."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import astuple, dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -10,10 +10,11 @@ import h5py
 import numba
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from brakecli import __version__
-from brakecli.analysis.regime.of_run import RunVerdict, verdict_on
+from brakecli.analysis.regime.of_run import verdict_on
+from brakecli.analysis.regime.rules import Verdict
 from brakecli.analysis.regime.spectra import peak, spectrum
 from brakecli.case.read import LoadedCase
 from brakecli.case.system import system_of
@@ -28,18 +29,14 @@ from brakecli.solver.motion import Motion, Progress, Sink, solve
 from brakecli.solver.quantities import HISTORY, ContactState
 from brakecli.solver.system import System
 
-STATES: dict[str, Any] = {
-    "flag_values": np.array(list(ContactState), dtype=np.int8),
-    "flag_meanings": " ".join(state.name.lower() for state in ContactState),
-}
-
 
 @dataclass(frozen=True)
-class RunReport(RunVerdict):
+class RunReport:
     """Everything that a run has found out; numbers in SI units. `fields.RUN` says where each of them is."""
 
     title: str
     output: Path
+    verdict: Verdict
     motion: Motion
     check: Check
     certificate: Certificate | None  # where the case gives no step
@@ -53,20 +50,11 @@ class RunReport(RunVerdict):
         """How the run has ended, in a word."""
         return "failed" if self.motion.work.failed else "done"
 
-    @property
-    def iteration(self) -> str | None:
-        """How the equations of a step are solved; None where the scheme finds its steps itself."""
-        method = self.system.method
-        return None if method.own_steps else method.iteration
-
-    @property
-    def step(self) -> float | None:
-        """The time step, s; None where the scheme finds its steps itself."""
-        return None if self.system.method.own_steps else self.system.step
-
     def numbers(self) -> dict[str, Any]:
         """Names and values as `--json` gives them."""
         numbers = values_of(fields.RUN, self)
+        if self.motion.system.method.own_steps:
+            numbers |= {"iteration": None, "step": None}
         if self.certificate is None:
             del numbers["certified_by"]
         return numbers
@@ -100,16 +88,18 @@ def run(
             refuse(found, free_bytes(output.resolve().parent))
             counted, sink = "steps" if found.step else "samples", _history_sink(result, system.interval)
             motion, certificate = motion_of(system, lambda done: progress(counted, done, system.steps), sink)
-            _require_finite("an energy", list(asdict(motion.energy).values()))
+            if not np.isfinite(astuple(motion.energy)).all():  # compiled code overflows silently
+                raise FloatingPointError("an energy overflows")
             history = History(system.interval, result.rows("history"), partial(result.read, "history"))
             verdict = verdict_on(history, motion.system, motion.work.failure_sentence)
-            top = _write_spectrum(result, history, verdict.settled_from)
+            top = _write_spectrum(result, history, verdict.start)
             warnings = (*found.warnings, *_warnings(motion, certificate))
-            title, shown = loaded.case.title, (top, warnings, *modelled(motion))
-            report = RunReport(motion.system, verdict, title, output, motion, found, certificate, *shown)
-            result.set_attributes(origin("run", title, loaded))
+            shown = top, warnings, *modelled(motion)
+            report = RunReport(loaded.case.title, output, verdict, motion, found, certificate, *shown)
+            result.set_attributes(origin("run", report.title, loaded))
             result.set_fields(fields.RUN, report.numbers())
-            _write_unconverged(result, motion.work.unconverged)
+            if len(motion.work.unconverged):
+                _write_unconverged(result, motion.work.unconverged)
             result.commit()
     return report
 
@@ -131,11 +121,14 @@ def motion_of(
 
 def _history_sink(result: ResultFile, interval: float) -> Sink:
     """Declare the history of a file; what is returned writes samples to it."""
+    names = " ".join(state.name.lower() for state in ContactState)
+    states: dict[str, Any] = {"flag_values": np.array(list(ContactState), dtype=np.int8), "flag_meanings": names}
     for field in fields.HISTORY:
-        result.variable("history", field, ("time",), **(STATES if field.name == "state" else {}))
+        result.variable("history", field, ("time",), **(states if field.name == "state" else {}))
 
     def append(rows: NDArray[np.float64]) -> None:
-        _require_finite("a force", rows)
+        if not np.isfinite(rows).all():  # the loop bounds only the motion itself
+            raise FloatingPointError("a force overflows")
         done = result.rows("history")
         time = interval * np.arange(done, done + len(rows))
         result.append("history", {"time": time, **dict(zip(HISTORY, rows.T, strict=True))})
@@ -143,25 +136,15 @@ def _history_sink(result: ResultFile, interval: float) -> Sink:
     return append
 
 
-def _require_finite(what: str, values: ArrayLike) -> None:
-    """Compiled code overflows silently; the loop bounds only the motion itself."""
-    if not np.isfinite(values).all():
-        raise FloatingPointError(f"{what} overflows")
-
-
 def _warnings(motion: Motion, certificate: Certificate | None) -> Iterator[str]:
     """What a careful user should know of a finished motion."""
     work = motion.work
     if work.unconverged_steps and motion.system.method.allow_unconverged:
-        yield (
-            f"{work.unconverged_steps} of {work.steps} steps did not converge, as the case allows; their times "
-            "and residuals are in the file, the history is not to be trusted there"
-        )
+        what = f"{work.unconverged_steps} of {work.steps} steps did not converge, as the case allows"
+        yield f"{what}; their times and residuals are in the file, the history is not to be trusted there"
     if work.non_unique_steps:
-        yield (
-            f"{work.non_unique_steps} steps met a point where their solution need not be unique (the contact "
-            "force rises with itself); reduce solver.step or friction.coefficient"
-        )
+        what = "steps met a point where their solution need not be unique (the contact force rises with itself)"
+        yield f"{work.non_unique_steps} {what}; reduce solver.step or friction.coefficient"
     if certificate is not None and not certificate.certified:
         yield f"solver.tolerance: {certificate.sentence()}"
 
@@ -177,14 +160,11 @@ def _write_spectrum(result: ResultFile, history: History, start: int) -> float |
 
 
 def _write_unconverged(result: ResultFile, events: NDArray[np.float64]) -> None:
-    """Write times and residuals of steps that did not converge, if there are any."""
-    if not len(events):
-        return
+    """Write times and residuals of steps that did not converge."""
     event, *columns = fields.UNCONVERGED
     result.axis("unconverged", event, np.arange(len(events)))
     for field, values in zip(columns, events.T, strict=True):
-        finite = np.nan_to_num(values, nan=np.finfo(float).max)
-        result.variable("unconverged", field, ("event",), finite)
+        result.variable("unconverged", field, ("event",), np.nan_to_num(values, nan=np.finfo(float).max))
 
 
 def origin(kind: str, title: str, loaded: LoadedCase) -> dict[str, Any]:

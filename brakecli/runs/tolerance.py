@@ -20,58 +20,36 @@ from brakecli.solver.quantities import HISTORY
 from brakecli.solver.system import System
 
 FIRST_EVENT_TOLERANCE, LEAST_EVENT_TOLERANCE = 1e-6, 1e-13
-EVENT_RATIO = 1e-2
-"""From one tolerance of the event-driven scheme to the next: its errors fall by about as much."""
-EVENT_MARGIN = 1e-3
-"""Largest first tolerance over the requested one: an event that is missed must not be missed twice."""
-LAYERED_FROM = 3e-4
-"""Tolerances from which on the layered schemes are cheaper, where surfaces open: docs/accuracy.md."""
-FIRST_STEPS = 40
-"""Steps per period of the fastest motion, and per passing wave, that a ladder of steps begins with."""
+EVENT_RATIO = 1e-2  # from one tolerance of the event-driven scheme to the next: its errors fall by about as much
+EVENT_MARGIN = 1e-3  # largest first tolerance over the requested one: no event may be missed twice
+LAYERED_FROM = 3e-4  # the layered schemes are cheaper from here on, where surfaces open: docs/accuracy.md
+FIRST_STEPS = 40  # per period of the fastest motion, and per passing wave: a ladder of steps begins with them
 MOST_RUNGS = 12
-STEPS_BETWEEN_KNOTS = 4
-"""Fewest steps between two knots of speed or load: with fewer, no run sees what happens there."""
-WORTH_A_PILOT = 0.2
-"""Guessed time (s) of the next run from which on it is weighed against event-driven runs."""
-PILOT = 32
-"""Duration of the case over that of the event-driven pilot run, which counts the work of such runs."""
-EVEN_CHANCE = 0.5
-"""Guessed time of the next run over that of event-driven ones beyond which it is not begun: as likely as not it
-would not be the last one. Time is guessed from counted work, not measured, so that a case gives the same bytes
-wherever it runs.
-"""
-MOST_SECONDS = 900.0
-"""Time of the loop after which no finer run is begun."""
-ROUNDING = 1e-12
-"""No estimate is below this: runs that share their rounding agree better than they are right."""
-
-_COLUMNS = {name: index for index, name in enumerate(HISTORY)}
-_MOTION = 4  # x, y, vx, vy: the first columns of a sample
+STEPS_BETWEEN_KNOTS = 4  # of speed or load, at least: with fewer, no run sees what happens there
+WORTH_A_PILOT = 0.2  # guessed time (s) of the next run from which on it is weighed against event-driven runs
+PILOT = 32  # duration of the case over that of the event-driven pilot run, which counts the work of such runs
+# Time is guessed from counted work, not measured, so that a case gives the same bytes wherever it runs.
+EVEN_CHANCE = 0.5  # beyond this part of the time of event-driven runs, a next run is likely not to be the last one
+MOST_SECONDS = 900.0  # time of the loop after which no finer run is begun
+ROUNDING = 1e-12  # least estimate: runs that share their rounding agree better than they are right
 
 
 @dataclass(frozen=True)
 class Certificate:
-    """How far the histories may be off, and how that is known.
-
-    `estimated_error`: relative to the largest value of each of x, y, vx and vy. `certified_until` (s): up to here
-    they keep the tolerance where they do not to the end.
-    """
+    """How far the histories may be off, and how that is known."""
 
     tolerance: float
     certified: bool
-    estimated_error: float
-    certified_until: float
+    estimated_error: float  # relative to the largest value of each of x, y, vx and vy
+    certified_until: float  # s; up to here they keep the tolerance where they do not to the end
     method: str
-    runs: int
 
     def sentence(self) -> str:
         """The certificate in words."""
         if self.certified:
             return f"error at most {self.estimated_error:.1e}, by {self.method}"
-        return (
-            f"{self.tolerance:g} cannot be certified: {self.method} give {self.estimated_error:.1e}; up to "
-            f"{self.certified_until:.4g} s they keep it"
-        )
+        kept = f"up to {self.certified_until:.4g} s they keep it"
+        return f"{self.tolerance:g} cannot be certified: {self.method} give {self.estimated_error:.1e}; {kept}"
 
 
 class Certified(NamedTuple):
@@ -135,9 +113,8 @@ def slower_than_events(system: System, progress: Progress) -> Callable[[float], 
         samples = max(1, system.samples // PILOT)
         part, tolerance = replace(system, duration=samples * system.interval), _first_event_tolerance(system)
         found = _run(part, lambda samples: progress(0), tolerance=tolerance)
-        if found.work.failed:
-            return math.inf
-        return float(_guessed_seconds(found) * system.samples / samples * (1.0 + EVENT_RATIO**-0.125))
+        seconds = _guessed_seconds(found) * system.samples / samples * (1.0 + EVENT_RATIO**-0.125)
+        return math.inf if found.work.failed else seconds
 
     return lambda seconds: seconds > WORTH_A_PILOT and seconds > EVEN_CHANCE * events()
 
@@ -158,20 +135,17 @@ def _first_event_tolerance(system: System) -> float:
 def _by_events(system: System, progress: Progress) -> Certified:
     """Event-driven runs, each to a hundredth of the tolerance of the one before."""
     wanted, tolerance = system.method.tolerance, _first_event_tolerance(system)
-    before = _run(system, progress, tolerance=tolerance)
-    seconds, runs = before.work.solve_seconds, 1
+    run = _run(system, progress, tolerance=tolerance)
     while True:
-        tolerance = max(EVENT_RATIO * tolerance, LEAST_EVENT_TOLERANCE)
+        before, tolerance = run, max(EVENT_RATIO * tolerance, LEAST_EVENT_TOLERANCE)
         run = _run(system, progress, tolerance=tolerance)
-        seconds, runs = seconds + run.work.solve_seconds, runs + 1
+        run.work.solve_seconds += before.work.solve_seconds
         until, error = _compare(before, run, wanted)
-        failed = run.work.failed
-        if error <= wanted or failed or tolerance <= LEAST_EVENT_TOLERANCE or seconds > MOST_SECONDS:
+        failed, late = run.work.failed, run.work.solve_seconds > MOST_SECONDS
+        if error <= wanted or failed or late or tolerance <= LEAST_EVENT_TOLERANCE:
             break
-        before = run
-    run.work.solve_seconds = seconds
     how = f"event-driven runs to {tolerance / EVENT_RATIO:.0e} and {tolerance:.0e}"
-    return Certified(run, Certificate(wanted, error <= wanted and not failed, error, until, how, runs))
+    return Certified(run, Certificate(wanted, error <= wanted and not failed, error, until, how))
 
 
 def _by_steps(
@@ -200,7 +174,7 @@ def _by_steps(
             last = difference
             if error <= wanted:
                 how = f"{method.scheme} runs of {run.system.step * 2:.3g} and half of that"
-                return Certified(run, Certificate(wanted, True, error, until, how, rung + 1))
+                return Certified(run, Certificate(wanted, True, error, until, how))
             slower = spent * (4.5 if nodes else 2.2)
             if seconds + slower > MOST_SECONDS or too_slow(4.0 * _guessed_seconds(run)):
                 break
@@ -208,7 +182,7 @@ def _by_steps(
     seen = math.isfinite(last) and run.system.step <= longest
     error = max(3.0 * last, _jump_error(run), wanted * 1.0000001) if seen else 1.0
     how = f"the finest of {rung + 1} runs, with steps of {run.system.step:.3g} s,"
-    return Certified(run, Certificate(wanted, False, error, 0.0, how, rung + 1))
+    return Certified(run, Certificate(wanted, False, error, 0.0, how))
 
 
 def _shortest_span(system: System) -> float:
@@ -223,8 +197,9 @@ def _jump_error(run: Motion) -> float:
     """
     if not run.work.turns:
         return 0.0
-    c, fastest = run.system.coefficients, float(np.abs(run.rows[:, _COLUMNS["vx"]]).max())
-    jump = 2.0 * c.phi * float(run.rows[:, _COLUMNS["normal_force"]].max()) * run.system.step / c.m
+    c, columns = run.system.coefficients, dict(zip(HISTORY, run.rows.T, strict=True))
+    fastest = float(np.abs(columns["vx"]).max())
+    jump = 2.0 * c.phi * float(columns["normal_force"].max()) * run.system.step / c.m
     return jump / fastest if fastest > 0.0 else math.inf
 
 
@@ -240,11 +215,11 @@ def _compare(coarse: Motion, fine: Motion, tolerance: float) -> tuple[float, flo
 
     What never exceeds the rounding of the motion does not count, as velocities of a shoe that stays where it is.
     """
-    if len(coarse.rows) < len(fine.rows):
+    count, system = len(fine.rows), fine.system
+    if len(coarse.rows) < count:
         return 0.0, 1.0
-    count = len(fine.rows)
-    one, other = coarse.rows[:count, :_MOTION], fine.rows[:, :_MOTION]
-    largest, system = np.abs(other).max(axis=0), fine.system
+    one, other = coarse.rows[:count, :4], fine.rows[:, :4]  # x, y, vx, vy
+    largest = np.abs(other).max(axis=0)
     rate = 2.0 * math.pi * system.natural_frequencies[1]
     rounding = ROUNDING * largest[:2].max() * np.array([1.0, 1.0, rate, rate])
     moves = np.maximum(np.abs(one).max(axis=0), largest) > rounding

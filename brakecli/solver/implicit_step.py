@@ -9,7 +9,7 @@ from typing import Any
 
 from numba import float64, types
 
-from brakecli.solver.compile import at_address, kernel
+from brakecli.solver.compile import at_address, borrowed, kernel
 from brakecli.solver.friction import minimise, slopes
 from brakecli.solver.records import EVALUATE, LAYER, PROBLEM_TYPE, SOLVE, Layer
 
@@ -24,6 +24,7 @@ _evaluate_at = at_address(EVALUATE)
 @kernel(types.UniTuple(float64, 2)(LAYER, PROBLEM_TYPE, float64))
 def _try_force(layer: Layer, problem: Any, f: float) -> tuple[float, float]:
     """Minimise for the normal force f, evaluate the contact there; the residual and the rounding in it (N)."""
+    layer = borrowed(layer)
     a_11, a_12, a_22, phi = problem.a_11, problem.a_12, problem.a_22, problem.phi
     d, e, side = minimise(a_11, a_12, a_22, problem.g_1, problem.g_2 + f, phi * f, problem.belt)
     problem.d, problem.e, problem.side, problem.normal_force = d, e, side, f
@@ -43,6 +44,7 @@ def newton(layer: Layer, problem: Any, most: int) -> tuple[int, int, int]:
     unique there, as in Painleve's paradox. There is always one: where F = 0 the residual is not negative, and for
     a large F, since a11 a22 > a12², the shoe either sticks and lifts off or slips and lifts off.
     """
+    layer = borrowed(layer)
     contact = layer.contact
     low, high = 0.0, math.inf
     f = problem.normal_force

@@ -77,7 +77,8 @@ COUNTS = record(
 PAD = record(
     "k",  # stiffness per length, N/m²
     "half_length",  # a, m
-    "shoe_top shoe_bottom wheel_bound",  # upper bounds of f1, of -f1 and of |f2|, m
+    "full_up_to clear_from",  # heights: up to it all touches for sure, from it on nothing, m
+    "shoe_bound wheel_bound",  # upper bounds of |f1| and |f2|, m
     "shoe_mean shoe_square",  # means of f1 (m) and ∫ f1² dξ (m³) over the pad
     "cell",  # widest interval in which roots are sought, m
     shoe_terms=int,  # harmonics

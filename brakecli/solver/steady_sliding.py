@@ -63,7 +63,8 @@ def tabulated(system: System) -> Mean:
     """
     from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
-    mean, (full, top) = partial(mean_contact, system), system.pad.edges
+    mean, pad = partial(mean_contact, system), system.pad.constants
+    full, top = float(pad.full_up_to), float(pad.clear_from)
     if full == top:
         return mean
     heights = np.linspace(full, top, TABLE)
@@ -103,7 +104,7 @@ def steady_sliding(
     def unbalanced(y: float) -> float:
         return spring * y + push - uplift * mean(y)[0]
 
-    (full, top), stiffness = system.pad.edges, system.contact_stiffness
+    full, top, stiffness = float(pad.full_up_to), float(pad.clear_from), system.contact_stiffness
     whole = spring + uplift * stiffness
     y = -(push + uplift * stiffness * pad.shoe_mean) / whole if whole != 0.0 else np.inf
     if not y <= full:

@@ -18,10 +18,11 @@ from brakecli.case.case import Case, changed
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError
 from brakecli.solver.system import System
-from brakecli.sweeps.growth import Growth, Sliding, growth, sliding, with_step
+from brakecli.sweeps.growth import Sliding, growth, sliding, with_step
 from brakecli.sweeps.tables import Critical
 
-Found = TypeVar("Found")
+Known = TypeVar("Known")
+Reply = TypeVar("Reply")
 
 SCANNED = 9  # values of the parameter, both ends among them, between which a change is looked for by runs
 SCANNED_BY_EIGENVALUES = 129
@@ -45,7 +46,7 @@ class Outcome(StrEnum):
 
 
 class Search(NamedTuple):
-    """The answer for one point; None stands for what there is not.
+    """The answer for one point; None, or NaN, stands for what there is not.
 
     `error` is the half width of the bracket, plus the bias of the scheme at its step, plus what the growth
     measured in two halves of the time leaves open. `bias`: the scheme's own critical value less the exact one.
@@ -53,24 +54,13 @@ class Search(NamedTuple):
 
     outcome: Outcome
     value: float | None = None
-    lower: float | None = None
-    upper: float | None = None
+    lower: float = math.nan
+    upper: float = math.nan
     error: float | None = None
     bias: float | None = None
     eigenvalue: float | None = None
     sustained: float | None = None
     sustained_outcome: Outcome = Outcome.NONE
-
-
-class _Change(NamedTuple):
-    """Where stability changes, between `low` and `high`; without a value, why it does not."""
-
-    outcome: Outcome
-    value: float | None = None
-    low: float = math.nan
-    high: float = math.nan
-    spread: float = 0.0
-    bias: float | None = None
 
 
 SlidingAt = Callable[[float], Sliding | None]
@@ -83,27 +73,24 @@ def search(
 ) -> Search:
     """Look for the critical value of the parameter that `case_at` sets; `verdict_of` runs a case."""
 
-    def system_at(value: float) -> System:
-        return with_step(system_of(case_at(value)))  # a case with a tolerance has no step
-
     @cache
     def sliding_at(value: float) -> Sliding | None:
         try:
-            return sliding(system_at(value))
-        except CaseError:  # a value that no case can have, between two that it can
+            return sliding(with_step(system_of(case_at(value))))
+        except CaseError:  # no equilibrium, or a value that no case can have, between two that it can
             return None
 
     if critical.parameter == "friction.coefficient":
-        exact = _friction_by_eigenvalues(critical, system_at(critical.lower))
+        exact = _friction_by_eigenvalues(critical, with_step(system_of(case_at(critical.lower))))
     else:
         exact = _by_eigenvalues(critical, sliding_at)
     if critical.method == "eigenvalue":
-        return _answer(exact, exact, 0.0)
-    found = _by_simulation(critical, sliding_at)
+        return exact
+    found = _by_simulation(critical, sliding_at, exact)
 
     @cache
     def fades(value: float) -> bool | None:
-        unstable = value >= found.high if found.outcome is Outcome.FOUND else None
+        unstable = value >= found.upper if found.outcome is Outcome.FOUND else None
         steady, case = sliding_at(value), case_at(value)
         linear = steady is not None and not steady.opens
         # Beside stable sliding it may yet fade away, or has not yet come to where it lasts.
@@ -115,18 +102,10 @@ def search(
         return None
 
     sustained, outcome = _sustained(critical, fades, found)
-    answer = _answer(found, exact, abs(exact.bias or 0.0))
-    return answer._replace(sustained=sustained, sustained_outcome=outcome)
+    return found._replace(sustained=sustained, sustained_outcome=outcome)
 
 
-def _answer(found: _Change, exact: _Change, bias: float) -> Search:
-    if found.value is None:
-        return Search(found.outcome, bias=exact.bias, eigenvalue=exact.value)
-    error = 0.5 * (found.high - found.low) + bias + found.spread
-    return Search(found.outcome, found.value, found.low, found.high, error, exact.bias, exact.value)
-
-
-def _by_eigenvalues(critical: Critical, sliding_at: SlidingAt) -> _Change:
+def _by_eigenvalues(critical: Critical, sliding_at: SlidingAt) -> Search:
     """Where the eigenvalues of steady sliding pass zero, and by how much the scheme at its step moves that."""
 
     def grows(found: Sliding) -> bool:
@@ -144,60 +123,59 @@ def _by_eigenvalues(critical: Critical, sliding_at: SlidingAt) -> _Change:
     count = SCANNED_WHERE_OPEN if opens else SCANNED_BY_EIGENVALUES
     exact = _first_change(critical, _if_known(sliding_at, grows), count, width)
     own = _first_change(critical, _if_known(sliding_at, grows_in_steps), SCANNED_WHERE_OPEN, width)
+    exact = exact._replace(eigenvalue=exact.value)
     if exact.value is None or own.value is None or exact.outcome is not own.outcome:
         return exact
     return exact._replace(bias=own.value - exact.value)
 
 
-def _friction_by_eigenvalues(critical: Critical, system: System) -> _Change:
+def _friction_by_eigenvalues(critical: Critical, system: System) -> Search:
     """The first loss of stability within the range of φ, otherwise the first regain."""
     report = stability(system)
     within = [each for each in report.crossings if critical.lower <= each.friction <= critical.upper]
     if within:
         crossing = min(within, key=lambda each: not each.lost)
         bias = report.discrete.bias if report.discrete and crossing is report.critical else None
-        outcome = Outcome.FOUND if crossing.lost else Outcome.REGAINED
-        return _Change(outcome, crossing.friction, crossing.friction, crossing.friction, bias=bias)
+        outcome, value = Outcome.FOUND if crossing.lost else Outcome.REGAINED, crossing.friction
+        return Search(outcome, value, value, value, 0.0, bias, eigenvalue=value)
     if report.stable is None or report.belt_speed == 0.0:
-        return _Change(Outcome.NO_SLIDING)
-    return _Change(Outcome.STABLE if report.stable else Outcome.UNSTABLE)
+        return Search(Outcome.NO_SLIDING)
+    return Search(Outcome.STABLE if report.stable else Outcome.UNSTABLE)
 
 
-def _if_known(at: Callable[[float], Found | None], unstable: Callable[[Found], bool]) -> Answer:
-    return lambda value: None if (found := at(value)) is None else unstable(found)
+def _if_known(
+    at: Callable[[float], Known | None], reply: Callable[[Known], Reply | None]
+) -> Callable[[float], Reply | None]:
+    return cache(lambda value: None if (known := at(value)) is None else reply(known))
 
 
-def _first_change(critical: Critical, unstable: Answer, count: int, width: float = math.inf) -> _Change:
+def _first_change(critical: Critical, unstable: Answer, count: int, width: float = math.inf) -> Search:
     """Where stability is first lost among `count` values, otherwise regained, narrowed down to a width.
 
     It is lost, too, where steady sliding ends.
     """
-    values = [float(value) for value in np.linspace(critical.lower, critical.upper, count)]
+    values = np.linspace(critical.lower, critical.upper, count).tolist()
     verdicts = [unstable(value) for value in values]
     for outcome, change in ((Outcome.FOUND, (True, False)), (Outcome.REGAINED, (False, True))):
         for bracket, (before, after) in zip(pairwise(values), pairwise(verdicts), strict=True):
             if (before is False, after is False) == change:
                 low, high = bisect(lambda value: unstable(value) == before, *bracket, width=width)  # noqa: B023
-                return _Change(outcome, 0.5 * (low + high), low, high)
+                return Search(outcome, 0.5 * (low + high), low, high, 0.5 * (high - low))
     if all(verdict is None for verdict in verdicts):
-        return _Change(Outcome.NO_SLIDING)
-    return _Change(Outcome.UNSTABLE if any(verdicts) else Outcome.STABLE)
+        return Search(Outcome.NO_SLIDING)
+    return Search(Outcome.UNSTABLE if any(verdicts) else Outcome.STABLE)
 
 
-def _by_simulation(critical: Critical, sliding_at: SlidingAt) -> _Change:
+def _by_simulation(critical: Critical, sliding_at: SlidingAt, exact: Search) -> Search:
     """Where the growth of small disturbances passes zero, by Brent's method, between two values on either side."""
     from scipy.optimize import brentq
 
-    @cache
-    def at(value: float) -> Growth | None:
-        steady = sliding_at(value)
-        return None if steady is None else growth(steady)
-
+    at = _if_known(sliding_at, growth)
     unstable = _if_known(at, lambda measured: measured.rate > measured.noise)
     scanned = _first_change(critical, unstable, SCANNED)
     if scanned.value is None:
-        return scanned
-    low, high = scanned.low, scanned.high
+        return scanned._replace(bias=exact.bias, eigenvalue=exact.value)
+    low, high = scanned.lower, scanned.upper
     below = unstable(low)
     largest = max(abs(measured.rate) for measured in (at(low), at(high)) if measured is not None)
 
@@ -214,7 +192,8 @@ def _by_simulation(critical: Critical, sliding_at: SlidingAt) -> _Change:
     spread, before, after = 0.0, at(low), at(high)
     if before is not None and after is not None and before.rate != after.rate:
         spread = max(before.spread, after.spread) * (high - low) / abs(after.rate - before.rate)
-    return _Change(scanned.outcome, value, low, high, min(spread, critical.upper - critical.lower))
+    error = 0.5 * (high - low) + abs(exact.bias or 0.0) + min(spread, critical.upper - critical.lower)
+    return Search(scanned.outcome, value, low, high, error, exact.bias, exact.value)
 
 
 def _fades(verdict: Verdict | None, duration: float, unstable: bool | None, linear: bool) -> bool | None:
@@ -238,14 +217,14 @@ def _fades(verdict: Verdict | None, duration: float, unstable: bool | None, line
     return bool(slope <= 0.0) if slope is not None and abs(slope) > 3.0 * error else None
 
 
-def _sustained(critical: Critical, fades: Answer, found: _Change) -> tuple[float | None, Outcome]:
+def _sustained(critical: Critical, fades: Answer, found: Search) -> tuple[float | None, Outcome]:
     """The least value at which vibration lasts from the case's own start, as far as it lasts above it.
 
     From where stability is lost the search strides down, ever faster, and then narrows down by halves.
     """
     low, high, tolerance = critical.lower, critical.upper, critical.tolerance
     if found.outcome is Outcome.FOUND:
-        low, high = max(low, found.low), min(high, found.high)
+        low, high = max(low, found.lower), min(high, found.upper)
         stride = tolerance
         while fades(low) is False and low > critical.lower:
             low, high = max(critical.lower, low - stride), low

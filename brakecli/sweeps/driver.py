@@ -17,11 +17,10 @@ from brakecli.files.os_signals import Interrupted
 from brakecli.files.write import new_result
 from brakecli.runs.limits import free_bytes
 from brakecli.sweeps.cost import Estimate, estimate, refuse_sweep
-from brakecli.sweeps.file import LoadedSweep
 from brakecli.sweeps.journal import Journal, open_journal
-from brakecli.sweeps.plan import Plan
+from brakecli.sweeps.plan import LoadedSweep, Plan
 from brakecli.sweeps.point import Status, blank
-from brakecli.sweeps.result import Columns, SweepReport, findings, write
+from brakecli.sweeps.result import Findings, SweepReport, write
 from brakecli.sweeps.workers.local import LocalEngine
 from brakecli.sweeps.workers.task import Engine, Task, compute_units
 
@@ -106,12 +105,12 @@ def sweep(
     with new_result(output, force=force) as result:
         refuse_sweep(found, free_bytes(output.resolve().parent))
         with open_journal(journal_path(output), plan, force=force) as journal:
-            resumed = int(journal.finished.sum()) * plan.unit_length
+            resumed = journal.done
             begin(found, resumed)
             notes = _compute(engine, journal, TaskQueue(journal.finished, task_size, order), progress)
-            columns, seconds = Columns(journal), time.perf_counter() - start
-            report = SweepReport(output, loaded, findings(columns), seconds, resumed, notes)
-            write(result, report, columns)
+            seconds = time.perf_counter() - start
+            report = SweepReport(output, loaded, Findings(journal), seconds, resumed, notes)
+            write(result, report, journal)
             result.commit()
             journal.discard()
     return report
@@ -140,27 +139,19 @@ def _compute(
     engine: Engine, journal: Journal, queue: TaskQueue, progress: Callable[[int, int], None]
 ) -> tuple[str, ...]:
     """Have the engine compute what the journal does not hold; returns what there is to say about its workers."""
-    length = journal.plan.unit_length
-
-    def failed(statuses: NDArray[np.bytes_]) -> int:
-        return int((statuses != Status.DONE.encode()).sum())
-
-    done, failures = int(journal.finished.sum()) * length, failed(journal.column("status")[journal.finished])
     ends: list[str] = []
-    progress(done, failures)
+    progress(journal.done, journal.failed)
     for task, records, seconds, failure in engine.run(queue.next_task):
         if records is None:
             ends.append(failure)
             if task is not None and not queue.retry(task):
                 record = blank(journal.kind, Status.CRASHED, f"the point ends its worker: {failure}")
-                records = np.repeat(record, task.size * length).tobytes()
+                records = np.repeat(record, task.size * journal.plan.unit_length).tobytes()
         elif task is not None:
             queue.note_time(task, seconds)
         if task is not None and records is not None:
             journal.add(task.first, records)
-            done += task.size * length
-            failures += failed(np.frombuffer(records, journal.kind)["status"])
-        progress(done, failures)
+        progress(journal.done, journal.failed)
     if not ends:
         return ()
     times = "a worker process has ended" if len(ends) == 1 else f"{len(ends)} times a worker process has ended"

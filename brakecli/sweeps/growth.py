@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.analysis.stability.modes import is_undamped
-from brakecli.errors import CaseError
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.motion import solve
 from brakecli.solver.quantities import HISTORY, Failure
@@ -75,13 +74,10 @@ def with_step(system: System) -> System:
 
 
 def sliding(system: System) -> Sliding | None:
-    """Steady sliding of a system; None where the wheel does not turn, or no load presses."""
+    """Steady sliding of a system; None where the wheel does not turn, or no load presses. Raises CaseError."""
     if system.belt_speed == 0.0:
         return None
-    try:
-        rest = steady_sliding(system)
-    except CaseError:
-        return None
+    rest = steady_sliding(system)
     return Sliding(**vars(rest), system=system) if rest.stiffness > 0.0 else None
 
 
@@ -103,10 +99,10 @@ def growth(found: Sliding) -> Growth | None:
     )
     compression = found.normal_force / found.stiffness
     scales = compression * np.array([1.0, 1.0, *[2.0 * math.pi * fast] * 2])
+    displaced = np.vstack([np.zeros(4), DISTURBANCE * np.diag(scales)])
     samples = []
-    for displaced in np.vstack([np.zeros(4), DISTURBANCE * np.diag(scales)]):
-        x, y, v_x, v_y = (float(value) for value in displaced)
-        motion = solve(replace(held, initial=Initial(found.x + x, found.y + y, v_x, v_y)))
+    for start in (np.array([found.x, found.y, 0.0, 0.0]) + displaced).tolist():
+        motion = solve(replace(held, initial=Initial(*start)))
         if motion.work.failure not in (Failure.NONE, Failure.UNBALANCED):
             return None
         samples.append(motion.rows)

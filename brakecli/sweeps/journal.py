@@ -22,7 +22,7 @@ from brakecli import SAME_NUMBERS_AS
 from brakecli.errors import BrakecliError, CannotWriteError, RefusedError
 from brakecli.files.atomic import explained
 from brakecli.sweeps.plan import Plan
-from brakecli.sweeps.point import record_type
+from brakecli.sweeps.point import Status, record_type
 from brakecli.sweeps.workers.task import fingerprint
 
 _HEAD = struct.Struct("<qqI")  # first unit, units, checksum of the records
@@ -38,15 +38,14 @@ class Journal:
         """Begin without any records; `open_journal` reads those of the file."""
         self.path, self.plan, self.kind = path, plan, record_type(plan)
         self.finished = np.zeros(plan.units, dtype=bool)
+        self.done, self.failed = 0, 0  # points
         self._file = file
         self._unit_bytes = plan.unit_length * self.kind.itemsize
         self._blocks: list[tuple[int, int, int]] = []  # first unit, units, where their records begin
 
     def add(self, first: int, records: bytes) -> None:
         """Append the records of finished units."""
-        count, rest = divmod(len(records), self._unit_bytes)
-        if rest or self.finished[first : first + count].any():
-            raise ValueError(f"units {first} … hold {len(records)} bytes, or are there already")
+        count = len(records) // self._unit_bytes
         offset = self._file.seek(0, os.SEEK_END)
         try:
             with explained(self.path):
@@ -56,18 +55,20 @@ class Journal:
             with suppress(OSError):
                 os.ftruncate(self._file.fileno(), offset)
             raise
-        self._note(first, count, offset + _HEAD.size)
+        self._note(first, count, offset + _HEAD.size, records)
 
     def column(self, name: str) -> NDArray[Any]:
-        """A field of all records in the order of the units, which have to be finished: a row for each unit."""
+        """A field of all records, in the shape of the grid; every unit has to be finished."""
         values = np.empty((len(self.finished), self.plan.unit_length), self.kind[name])
         for first, count, offset in self._blocks:
-            self._file.seek(offset)
-            data = self._file.read(count * self._unit_bytes)
+            data = os.pread(self._file.fileno(), count * self._unit_bytes, offset)
             if len(data) < count * self._unit_bytes:
                 raise BrakecliError(f"{self.path}: was cut short while in use; run the same command again")
             values[first : first + count] = np.frombuffer(data, self.kind)[name].reshape(count, -1)
-        return values
+        shape, followed = list(self.plan.dimensions.values()), self.plan.followed
+        along = len(shape) - 1 if followed is None else followed + self.plan.passes - 1
+        del shape[along]
+        return np.moveaxis(values.reshape(*shape, -1), -1, along)
 
     def discard(self) -> None:
         """Remove the file: its sweep is finished."""
@@ -101,13 +102,16 @@ class Journal:
             records = self._file.read(count * self._unit_bytes)
             if len(records) < count * self._unit_bytes or zlib.crc32(records) != checksum:
                 break
-            self._note(first, count, offset + _HEAD.size)
+            self._note(first, count, offset + _HEAD.size, records)
             offset = self._file.tell()
         os.ftruncate(self._file.fileno(), offset)
 
-    def _note(self, first: int, count: int, offset: int) -> None:
+    def _note(self, first: int, count: int, offset: int, records: bytes) -> None:
         self._blocks.append((first, count, offset))
         self.finished[first : first + count] = True
+        statuses = np.frombuffer(records, self.kind)["status"]
+        self.done += len(statuses)
+        self.failed += int((statuses != Status.DONE.encode()).sum())
 
     def _write(self, data: bytes) -> None:
         """Write all of it: a disk that is nearly full takes a part."""
@@ -138,8 +142,8 @@ def open_journal(path: Path, plan: Plan, *, force: bool) -> Iterator[Journal]:
 
 def identity(plan: Plan) -> dict[str, Any]:
     """What makes a sweep this one: every key of the sweep and its case, and the versions it is computed with."""
-    case, sweep = tomllib.loads(plan.case_text), tomllib.loads(plan.sweep_text)
-    return {**fingerprint(), **dict(_flat(case, "", "")), **dict(_flat(sweep, "sweep ", ""))}
+    sweep = tomllib.loads(plan.sweep_text)
+    return {**fingerprint(), **dict(_flat(plan.case_keys, "", "")), **dict(_flat(sweep, "sweep ", ""))}
 
 
 def _flat(value: Any, path: str, dot: str = ".") -> Iterator[tuple[str, Any]]:

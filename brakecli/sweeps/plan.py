@@ -1,12 +1,13 @@
-"""What a sweep computes: the case of every point of its grid."""
+"""Sweep file → the case of every point of its grid, or every problem of the sweep and of its base case at once."""
 
 import copy
 import json
 import math
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import tomli_w
@@ -14,15 +15,18 @@ from pydantic import ValidationError
 
 from brakecli.case import wording
 from brakecli.case.case import Case
-from brakecli.case.read import key_path, parse_table, put
-from brakecli.errors import CaseError, Problem
-from brakecli.sweeps.tables import Sweep
+from brakecli.case.read import LoadedCase, key_path, parse_case, parse_table, put, read_text
+from brakecli.case.toml_lines import Located, innermost
+from brakecli.errors import CaseError, KeyPath, Problem
+from brakecli.files import fields
+from brakecli.sweeps.tables import Axis, Sweep
 
-Settings = Mapping[tuple[str, ...], Any]
+MOST_TRIED = 1000  # listed values of an axis that are tried before the sweep starts; of a range it is both ends
+
+Settings = dict[tuple[str, ...], Any]
 """Values by key path, to be put into the base case."""
 
 
-@dataclass(frozen=True)
 class Plan:
     """A sweep with its base case: all that a worker needs.
 
@@ -30,70 +34,42 @@ class Plan:
     at every point.
     """
 
-    sweep_text: str
-    case_text: str
+    def __init__(self, sweep_text: str, case_text: str) -> None:
+        """Read the sweep and the keys of its case."""
+        self.sweep_text, self.case_text = sweep_text, case_text
+        self.sweep, self.case_keys = parse_table(Sweep, sweep_text, "the sweep"), tomllib.loads(case_text)
+        axes = self.sweep.axis
+        self.shape = tuple(axis.size for axis in axes)
+        self.points = math.prod(self.shape)  # of the grid
+        # the axis along which the motion is followed, and how often that is: twice both up and down
+        self.followed = next((index for index, axis in enumerate(axes) if axis.direction), None)
+        self.passes = 2 if any(axis.direction == "both" for axis in axes) else 1
+        sizes = {axis.name: axis.size for axis in axes} or {"point": 1}
+        self.dimensions = {"direction": 2, **sizes} if self.passes == 2 else sizes  # of the result
+        self.fields = fields.POINT + (fields.CRITICAL if self.sweep.critical is not None else ())  # of a point
+        # units are what tasks consist of: single points, or lines along the followed axis
+        self.unit_length = 1 if self.followed is None else self.shape[self.followed]
+        self.units = self.passes * self.points // self.unit_length
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Travel as two texts."""
         return plan_of, (self.sweep_text, self.case_text)
 
-    @cached_property
-    def sweep(self) -> Sweep:
-        """The axes and the critical parameter."""
-        return parse_table(Sweep, self.sweep_text, "the sweep")
-
-    @cached_property
-    def _base(self) -> dict[str, Any]:
-        return tomllib.loads(self.case_text)
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Points along each axis."""
-        return tuple(axis.size for axis in self.sweep.axis)
-
-    @property
-    def points(self) -> int:
-        """Points of the grid."""
-        return math.prod(self.shape)
-
-    @cached_property
-    def followed(self) -> int | None:
-        """The axis along which the motion is followed."""
-        return next((index for index, axis in enumerate(self.sweep.axis) if axis.direction), None)
-
-    @property
-    def passes(self) -> int:
-        """How often the grid is computed: twice where the motion is followed both up and down."""
-        return 2 if any(axis.direction == "both" for axis in self.sweep.axis) else 1
-
-    @property
-    def unit_length(self) -> int:
-        """Points of a unit, which one task computes: a single point, or a line along the followed axis."""
-        return 1 if self.followed is None else self.shape[self.followed]
-
-    @property
-    def units(self) -> int:
-        """Units of the sweep."""
-        return self.passes * self.points // self.unit_length
-
     def places(self, point: int) -> tuple[int, ...]:
         """Where a point lies along each axis; points are counted with the last axis fastest."""
-        places = []
-        for size in reversed(self.shape):
-            point, place = divmod(point, size)
-            places.append(place)
-        return tuple(reversed(places))
+        strides = (math.prod(self.shape[axis + 1 :]) for axis in range(len(self.shape)))
+        return tuple(point // stride % size for stride, size in zip(strides, self.shape, strict=True))
 
-    def settings(self, point: int) -> dict[tuple[str, ...], Any]:
+    def settings(self, point: int) -> Settings:
         """What the axes set at a point."""
-        found: dict[tuple[str, ...], Any] = {}
+        found: Settings = {}
         for axis, place in zip(self.sweep.axis, self.places(point), strict=True):
             found |= dict.fromkeys((key_path(text) for text in axis.parameter), axis.value(place))
         return found
 
     def case(self, settings: Settings) -> Case:
         """The base case with some values put into it; raises CaseError."""
-        data = copy.deepcopy(self._base)
+        data = copy.deepcopy(self.case_keys)
         for path, value in settings.items():
             put(data, path, value, Case, kept=settings)
         try:
@@ -127,8 +103,77 @@ def plan_of(sweep_text: str, case_text: str) -> Plan:
     return Plan(sweep_text, case_text)  # `lru_cache(Plan)` would inherit `__reduce__`, and could not be sent
 
 
+@dataclass(frozen=True)
+class LoadedSweep:
+    """A sweep with the texts it was read from; `resolved` is its file with every default filled in."""
+
+    sweep: Sweep
+    text: str
+    resolved: str
+    base: LoadedCase
+    plan: Plan
+
+    @property
+    def title(self) -> str:
+        """The title of the sweep, otherwise that of its case."""
+        return self.sweep.title or self.base.case.title
+
+
+def read_sweep(source: str, overrides: Sequence[str] = ()) -> LoadedSweep:
+    """Read a sweep from a path, or from standard input where the path is "-"; see `parse_sweep`."""
+    return parse_sweep(*read_text(source), Path() if source == "-" else Path(source).parent, overrides)
+
+
+def parse_sweep(text: str, name: str, folder: Path, overrides: Sequence[str] = ()) -> LoadedSweep:
+    """Make a sweep of its text; the path of its base case begins at `folder`. Raises `CaseError`.
+
+    Overrides of `critical` and `case` belong to the sweep, all others to its base case.
+    """
+    own = [each for each in overrides if key_path(each.partition("=")[0])[:1] in (("case",), ("critical",))]
+    sweep = parse_table(Sweep, text, name, own)
+    others = [override for override in overrides if override not in own]
+    base = parse_case(*read_text(str(folder / sweep.case)), others)
+    plan = Plan(given_toml(sweep), given_toml(base.case))
+    if problems := _wrong_values(plan, text, name):
+        raise CaseError(problems)
+    resolved = tomli_w.dumps(sweep.model_dump(mode="json", exclude_none=True))
+    return LoadedSweep(sweep, text, resolved, base, plan)
+
+
+def kind_of(path: str) -> str:
+    """What a file is meant to be, by its keys at the top: "case", "sweep", or neither."""
+    try:
+        keys = set(Located(*read_text(path)).data)
+    except CaseError:
+        return ""
+    if "shoe" in keys:
+        return "" if keys & {"axis", "critical"} else "case"
+    return "sweep" if keys & {"case", "axis", "critical"} else ""
+
+
 def label(value: Any) -> str:
     """A value of an axis as TOML writes it, but a text without its quotes."""
     if isinstance(value, str):
         return value
     return f"{value:.9g}" if isinstance(value, float) else json.dumps(value)
+
+
+def _wrong_values(plan: Plan, text: str, name: str) -> list[Problem]:
+    """What is wrong with the axes and the search: keys that no case has, and values that no key takes.
+
+    A value may need those of other axes: it is wrong if it fits neither the base case nor a corner of the grid.
+    """
+    axes: dict[KeyPath, Axis] = {("axis", index): axis for index, axis in enumerate(plan.sweep.axis)}
+    if (critical := plan.sweep.critical) is not None:
+        axes["critical",] = Axis(parameter=(critical.parameter,), values=(critical.lower, critical.upper))
+    lines = Located(text, name).lines
+    corners = [{}, plan.settings(0), plan.settings(plan.points - 1)]
+    problems: dict[tuple[int, str], Problem] = {}
+    for path, axis in axes.items():
+        line = innermost(lines, (*path, "parameter"), 0)
+        for value in (axis.start, axis.stop) if axis.values is None else axis.values[:MOST_TRIED]:
+            settings = {key_path(parameter): value for parameter in axis.parameter}
+            found = [plan.problems(corner | settings) for corner in corners]
+            for problem in found[0] if all(found) else ():
+                problems.setdefault((line, problem.key), replace(problem, source=name, line=line))
+    return list(problems.values())

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.analysis.regime.of_run import RunVerdict, verdict_on
+from brakecli.analysis.regime.of_run import verdict_on
 from brakecli.analysis.regime.rules import Verdict
 from brakecli.case.case import Case
 from brakecli.case.read import key_path
 from brakecli.case.system import system_of
 from brakecli.errors import BrakecliError
 from brakecli.files import fields
-from brakecli.files.field import Field, values_of
+from brakecli.files.field import values_of
 from brakecli.runs.limits import check, refuse, within_range
 from brakecli.runs.run import motion_of
 from brakecli.runs.tolerance import Certificate
@@ -41,18 +41,14 @@ class Status(StrEnum):
 
 def record_type(plan: Plan) -> np.dtype[Any]:
     """The record of a point of the sweep."""
-    return np.dtype([(field.name, field.kind) for field in fields_of(plan)])
-
-
-def fields_of(plan: Plan) -> tuple[Field, ...]:
-    """What is known of each point of the sweep."""
-    return fields.POINT + (fields.CRITICAL if plan.sweep.critical is not None else ())
+    return np.dtype([(field.name, field.kind) for field in plan.fields])
 
 
 @dataclass(frozen=True)
-class Outcome(RunVerdict):
+class Outcome:
     """A run in memory, as far as a sweep is interested in it. `fields.POINT` says where each number is."""
 
+    verdict: Verdict
     case: Case
     motion: Motion
     certificate: Certificate | None  # where the case gives no step
@@ -80,7 +76,7 @@ def simulate(case: Case) -> Outcome:
         warnings.append(f"solver.tolerance: {certificate.sentence()}")
     status, reason = Status.FAILED if work.failed else Status.DONE, "; ".join(verdict.reasons)
     first = next(iter(warnings), "")
-    return Outcome(motion.system, verdict, case, motion, certificate, status, reason, first, len(warnings))
+    return Outcome(verdict, case, motion, certificate, status, reason, first, len(warnings))
 
 
 def blank(kind: np.dtype[Any], status: Status, reason: str) -> NDArray[Any]:
@@ -89,30 +85,29 @@ def blank(kind: np.dtype[Any], status: Status, reason: str) -> NDArray[Any]:
 
 
 def compute(plan: Plan, first: int, count: int) -> NDArray[Any]:
-    """The records of some neighbouring points, each computed for itself."""
-    return np.concatenate([_computed(plan, point, {})[0] for point in range(first, first + count)])
+    """The records of some neighbouring units; those of a line stand in the order of the grid.
 
-
-def follow(plan: Plan, line: int) -> NDArray[Any]:
-    """The records of one line of points, in the order of the grid, each started from the end of the one before.
-
-    The wheel goes on turning from one point to the next: its waves keep the phases that they have come to.
+    Along a line each point starts from the end of the one before. The wheel goes on turning: its waves keep the
+    phases that they have come to.
     """
-    records: dict[int, NDArray[Any]] = {}
-    start: Settings = {}
-    for point in line_points(plan, line):
-        records[point], outcome = _computed(plan, point, start)
-        if outcome is not None and not outcome.motion.work.failed:
-            start = next_start(outcome)
-    return np.concatenate([records[point] for point in sorted(records)])
+    found = []
+    for unit in range(first, first + count):
+        records, start, outcome = dict[int, NDArray[Any]](), Settings(), None
+        for point in line_points(plan, unit):
+            if outcome is not None and not outcome.motion.work.failed:
+                start = next_start(outcome)
+            records[point], outcome = _computed(plan, point, start)
+        found += [records[point] for point in sorted(records)]
+    return np.concatenate(found)
 
 
 def line_points(plan: Plan, line: int) -> list[int]:
-    """The points of a line along the followed axis, in the order in which the motion passes them.
+    """The points of a unit: of a line along the followed axis, in the order in which the motion passes them.
 
     With `direction = "both"` the first half of the lines goes up, the second down.
     """
-    assert plan.followed is not None
+    if plan.followed is None:
+        return [line]
     followed, inner = plan.sweep.axis[plan.followed], math.prod(plan.shape[plan.followed + 1 :])
     lines = plan.points // followed.size
     outer, rest = divmod(line % lines, inner)
@@ -124,7 +119,7 @@ def line_points(plan: Plan, line: int) -> list[int]:
 def next_start(outcome: Outcome) -> Settings:
     """The start of a case where another has ended."""
     x, y, v_x, v_y = (float(value) for value in outcome.motion.rows[-1, :4])
-    start: dict[tuple[str, ...], Any] = {("initial",): {"x": x, "y": y, "vx": v_x, "vy": v_y}}
+    start: Settings = {("initial",): {"x": x, "y": y, "vx": v_x, "vy": v_y}}
     wheel = outcome.case.roughness.wheel
     if wheel is not None:
         system = outcome.motion.system
@@ -156,8 +151,7 @@ def _computed(plan: Plan, point: int, start: Settings) -> tuple[NDArray[Any], Ou
                 found = search(critical, lambda value: plan.case({**settings, path: value}), verdict_of)
             values |= values_of(fields.CRITICAL, found)
     except (BrakecliError, FloatingPointError, MemoryError) as error:
-        memory = isinstance(error, MemoryError)
-        reason = OUT_OF_MEMORY if memory else "; ".join(str(error).splitlines())
+        reason = OUT_OF_MEMORY if isinstance(error, MemoryError) else "; ".join(str(error).splitlines())
         return blank(record_type(plan), Status.FAILED, reason), None
     return _filled(record_type(plan), values), outcome
 

@@ -16,10 +16,9 @@ from brakecli.files import fields
 from brakecli.files.field import Field, plain, values_of
 from brakecli.files.write import ResultFile
 from brakecli.runs.run import origin
-from brakecli.sweeps.file import LoadedSweep
 from brakecli.sweeps.journal import Journal
-from brakecli.sweeps.plan import Plan, label
-from brakecli.sweeps.point import Status, fields_of, line_points
+from brakecli.sweeps.plan import LoadedSweep, Plan, label
+from brakecli.sweeps.point import Status
 from brakecli.sweeps.tables import Axis
 
 MOST_FAILURES = 100
@@ -29,43 +28,39 @@ SAME_AMPLITUDE = 0.05  # part by which amplitudes of the same motion, in the sam
 _DONE = Status.DONE.encode()
 
 
-class Columns:
-    """The variables of a finished sweep in the shape of its grid, read one by one."""
-
-    def __init__(self, journal: Journal) -> None:
-        """Read from a journal that holds every unit."""
-        self._journal, self.plan = journal, journal.plan
-        axes = {axis.name: axis.size for axis in self.plan.sweep.axis} or {"point": 1}
-        sizes = {"direction": 2, **axes} if self.plan.passes == 2 else axes
-        self.dimensions, self.shape = tuple(sizes), tuple(sizes.values())
-
-    def __getitem__(self, name: str) -> NDArray[Any]:
-        """A variable; missing numbers are NaN."""
-        units = self._journal.column(name)
-        if self.plan.followed is None:
-            return units.reshape(self.shape)
-        values = np.empty(units.size, units.dtype)
-        for line, row in enumerate(units):  # those on the way down come after all on the way up
-            first = line * len(row) // self.plan.points * self.plan.points
-            values[first + np.sort(line_points(self.plan, line))] = row
-        return values.reshape(self.shape)
-
-
-@dataclass(frozen=True)
 class Findings:
     """What the command reports of a sweep as a whole."""
 
-    points: int
-    dimensions: tuple[str, ...]
-    failed: int
-    failures: tuple[dict[str, Any], ...]  # the first of them
-    warned: int
-    first_warning: str
-    regimes: dict[str, int]
-    critical: tuple[int, float, float] | None  # how many points have a critical value, the least, the largest
-    hysteresis: NDArray[Any] | None
-    sentences: tuple[str, ...]
-    variables: dict[str, Any] | None
+    def __init__(self, journal: Journal) -> None:
+        """Look through the variables of a sweep."""
+        plan, status = journal.plan, journal.column("status")
+        self.points, self.dimensions = status.size, tuple(journal.plan.dimensions)
+        failed = np.flatnonzero(status.ravel() != _DONE)
+        self.failed = len(failed)
+        first = failed[:MOST_FAILURES]
+        self.failures = [
+            {"point": point, "parameters": _parameters(plan, point), "reason": reason.decode()}
+            for point, reason in zip(first.tolist(), journal.column("reason").ravel()[first], strict=True)
+        ]
+        warned = np.flatnonzero(journal.column("warning_count").ravel())
+        self.warned = len(warned)
+        self.first_warning = journal.column("warning").ravel()[warned[0]].decode() if len(warned) else ""
+        regimes = Counter(journal.column("regime").ravel())
+        self.regimes = {name.decode(): count for name, count in sorted(regimes.items())}
+        self.hysteresis: NDArray[Any] | None = None
+        self.critical: tuple[int, float, float] | None = None  # how many points have one, the least, the largest
+        self.sentences: list[str] = []
+        if plan.passes == 2:
+            self.hysteresis = _hysteresis(journal)
+            self.sentences += _on_hysteresis(journal, self.hysteresis)
+        if plan.sweep.critical is not None:
+            values = journal.column("critical")
+            known = values[~np.isnan(values)]
+            self.critical = (len(known), float(known.min()), float(known.max())) if len(known) else (0, 0.0, 0.0)
+            self.sentences += _on_lasting_vibration(journal, plan.sweep.critical.tolerance)
+        self.variables: dict[str, Any] | None = None
+        if status.size <= MOST_AS_JSON:
+            self.variables = {field.name: plain(journal.column(field.name)) for field in plan.fields}
 
 
 @dataclass(frozen=True)
@@ -90,38 +85,9 @@ class SweepReport:
         return {**values_of(fields.SWEEP, self), **(self.findings.variables or {})}
 
 
-def findings(columns: Columns) -> Findings:
-    """Look through the variables of a sweep."""
-    plan, status = columns.plan, columns["status"]
-    failed = np.flatnonzero(status.ravel() != _DONE)
-    reasons = columns["reason"].ravel()[failed[:MOST_FAILURES]]
-    warned = np.flatnonzero(columns["warning_count"].ravel())
-    critical, hysteresis = None, _hysteresis(columns)
-    if plan.sweep.critical is not None:
-        known = columns["critical"][~np.isnan(columns["critical"])]
-        critical = (len(known), float(known.min()), float(known.max())) if len(known) else (0, 0.0, 0.0)
-    few = status.size <= MOST_AS_JSON
-    return Findings(
-        points=status.size,
-        dimensions=columns.dimensions,
-        failed=len(failed),
-        failures=tuple(
-            {"point": point, "parameters": _parameters(plan, point), "reason": reason.decode()}
-            for point, reason in zip(failed[:MOST_FAILURES].tolist(), reasons, strict=True)
-        ),
-        warned=len(warned),
-        first_warning=columns["warning"].ravel()[warned[0]].decode() if len(warned) else "",
-        regimes={name.decode(): count for name, count in sorted(Counter(columns["regime"].ravel()).items())},
-        critical=critical,
-        hysteresis=hysteresis,
-        sentences=(*_on_hysteresis(columns, hysteresis), *_on_lasting_vibration(columns)),
-        variables={field.name: plain(columns[field.name]) for field in fields_of(plan)} if few else None,
-    )
-
-
-def write(result: ResultFile, report: SweepReport, columns: Columns) -> None:
+def write(result: ResultFile, report: SweepReport, journal: Journal) -> None:
     """Everything that the file holds."""
-    loaded, found, plan = report.loaded, report.findings, columns.plan
+    loaded, found, plan = report.loaded, report.findings, journal.plan
     sweep = {"sweep_toml": loaded.text, "resolved_sweep_toml": loaded.resolved}
     result.set_attributes({**origin("sweep", loaded.title, loaded.base), **sweep})
     result.set_fields(fields.SWEEP, report.numbers())
@@ -133,13 +99,13 @@ def write(result: ResultFile, report: SweepReport, columns: Columns) -> None:
         result.variable("/", field, (axis.name,), data, parameters=list(axis.parameter))
     if not plan.sweep.axis:
         result.axis("/", fields.BASE_POINT, np.zeros(1))
-    for field in fields_of(plan):
+    for field in plan.fields:
         attributes, critical = {}, plan.sweep.critical
         if critical is not None and field in fields.CRITICAL and field.kind == "f8":
             attributes, field = {"parameter": critical.parameter}, replace(field, units=unit(critical.parameter))
-        data = columns[field.name]
+        data = journal.column(field.name)
         data = np.char.decode(data, "utf-8") if data.dtype.kind == "S" else data
-        result.column(field, columns.dimensions, data, **attributes)
+        result.column(field, found.dimensions, data, **attributes)
     if found.hysteresis is not None:
         result.column(*fields.DIFFERENCE, found.dimensions[1:], found.hysteresis)
 
@@ -153,45 +119,37 @@ def _values(axis: Axis) -> list[Any]:
     return [axis.value(place) for place in range(axis.size)]
 
 
-def _hysteresis(columns: Columns) -> NDArray[Any] | None:
-    """Where the motions on the way up and on the way down differ (1); None unless both were followed."""
-    if columns.plan.passes != 2:
-        return None
-    regime, amplitude = columns["regime"], columns["amplitude"]
-    decided = ((columns["status"] == _DONE) & (regime != b"undecided")).all(axis=0)
-    larger = np.fmax(amplitude[0], amplitude[1])
-    apart = np.nan_to_num(np.abs(amplitude[0] - amplitude[1])) > SAME_AMPLITUDE * np.nan_to_num(larger)
+def _hysteresis(journal: Journal) -> NDArray[Any]:
+    """Where the motions on the way up and on the way down differ (1)."""
+    regime, amplitude = journal.column("regime"), journal.column("amplitude")
+    decided = ((journal.column("status") == _DONE) & (regime != b"undecided")).all(axis=0)
+    apart = np.ptp(amplitude, axis=0) > SAME_AMPLITUDE * amplitude.max(axis=0)  # not where one is missing
     lasting = (regime != b"damped").any(axis=0)
     return np.asarray(decided & ((regime[0] != regime[1]) | (apart & lasting)), dtype=np.int64)
 
 
-def _on_hysteresis(columns: Columns, hysteresis: NDArray[Any] | None) -> Iterator[str]:
+def _on_hysteresis(journal: Journal, hysteresis: NDArray[Any]) -> Iterator[str]:
     """What is to be said about motions that were followed up and down."""
-    if hysteresis is None:
-        return
     if count := int(hysteresis.sum()):
-        where = [_parameters(columns.plan, int(index)) for index in np.flatnonzero(hysteresis.ravel())[:3]]
+        where = [_parameters(journal.plan, int(index)) for index in np.flatnonzero(hysteresis.ravel())[:3]]
         places = "; ".join(", ".join(f"{key} = {label(value)}" for key, value in each.items()) for each in where)
         yield f"hysteresis at {count} of {hysteresis.size} points: {places}{' …' if count > 3 else ''}"
     else:
         yield "no hysteresis: the motion is the same on the way up and on the way down"
-    if undecided := int((columns["regime"] == b"undecided").any(axis=0).sum()):
+    if undecided := int((journal.column("regime") == b"undecided").any(axis=0).sum()):
         yield f"hysteresis is not known at {undecided} points, whose regime is undecided in a direction"
 
 
-def _on_lasting_vibration(columns: Columns) -> Iterator[str]:
+def _on_lasting_vibration(journal: Journal, tolerance: float) -> Iterator[str]:
     """What is to be said where vibration from the case's own start does not begin at the critical value."""
-    critical = columns.plan.sweep.critical
-    if critical is None:
-        return
-    sustained = columns["critical_sustained"]
-    early = np.nan_to_num(columns["critical_lower"] - sustained, nan=0.0)
-    late = np.nan_to_num(sustained - columns["critical_upper"], nan=0.0)
-    if below := int((early > critical.tolerance).sum()):
+    sustained = journal.column("critical_sustained")
+    early = np.nan_to_num(journal.column("critical_lower") - sustained, nan=0.0)
+    late = np.nan_to_num(sustained - journal.column("critical_upper"), nan=0.0)
+    if below := int((early > tolerance).sum()):
         start = "from the case's own start vibration lasts at values up to"
         least = "below the one at which steady sliding loses its stability"
         yield f"hysteresis at {below} of {early.size} points: {start} {early.max():.3g} {least}"
-    if above := int((late > critical.tolerance).sum()):
+    if above := int((late > tolerance).sum()):
         start = "the case's own start leads into lasting vibration only at values up to"
         longer = "above the critical one; longer runs may give another answer"
         yield f"at {above} of {late.size} points {start} {late.max():.3g} {longer}"

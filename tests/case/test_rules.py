@@ -4,7 +4,7 @@ import pytest
 
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
-from brakecli.runs.warnings import adjustments
+from brakecli.runs.limits import adjustments
 from tests.case.examples import CONSTANT, EVENT_DRIVEN, change, lines_of, messages, where
 
 RULES = [

@@ -16,8 +16,7 @@ from brakecli.case.case import Case
 from brakecli.case.read import read_case
 from brakecli.case.system import system_of
 from brakecli.cli.tables import comparison_table
-from brakecli.comparison.compare import Comparison, Entry, compare
-from brakecli.comparison.deviation import errors
+from brakecli.comparison.compare import Comparison, Entry, compare, errors
 from brakecli.comparison.methods import (
     COARSEST,
     RUNGS,

@@ -23,7 +23,7 @@ from brakecli.files.read import open_result
 from brakecli.files.write import new_result
 from brakecli.plots import run
 from brakecli.plots.result import plot_result
-from brakecli.plots.run import RunPicture, draw, envelope, episodes, gather
+from brakecli.plots.run import RunPicture, draw, envelope, episodes
 from brakecli.solver.quantities import HISTORY, ContactState
 
 CASE = """
@@ -73,7 +73,7 @@ def write(path: Path, moved: Samples, *overrides: str, **attributes: Any) -> Pat
 
 def gathered(path: Path, moved: Samples, *overrides: str, **attributes: Any) -> RunPicture:
     with open_result(write(path, moved, *overrides, **attributes), kind="run") as result:
-        return gather(result)
+        return RunPicture(result)
 
 
 @pytest.fixture
@@ -161,7 +161,7 @@ def test_a_history_of_few_samples_is_drawn(samples: int, tmp_path: Path) -> None
         result = write(tmp_path / f"{number}.h5", moved, **attributes)
         plot_result(result, tmp_path / f"{number}.png", force=False)
         with open_result(result) as stored:
-            picture = gather(stored)
+            picture = RunPicture(stored)
         assert picture.detail["time"].size == samples
         assert picture.summary == "failed at t = 0 s: it broke"
 

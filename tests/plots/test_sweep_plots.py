@@ -17,7 +17,7 @@ from brakecli.plots.result import plot_result
 from brakecli.plots.style import applied, readable
 from brakecli.plots.sweep import Axis
 from brakecli.sweeps.driver import choose_engine, sweep
-from brakecli.sweeps.file import parse_sweep
+from brakecli.sweeps.plan import parse_sweep
 from tests.plots.helpers import ANGLE, CRITICAL, SCHEME, SPEED, columns, drawn, gathered, write
 
 

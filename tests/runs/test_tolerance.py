@@ -8,7 +8,7 @@ import pytest
 
 from brakecli.case.case import Case, changed
 from brakecli.case.system import system_of
-from brakecli.comparison.deviation import errors
+from brakecli.comparison.compare import errors
 from brakecli.runs import tolerance as module
 from brakecli.runs.modelled import modelled
 from brakecli.runs.tolerance import Certified, certify

@@ -19,8 +19,7 @@ import numpy as np
 
 from brakecli.errors import RefusedError
 from brakecli.sweeps.driver import sweep
-from brakecli.sweeps.file import LoadedSweep, read_sweep
-from brakecli.sweeps.plan import Plan
+from brakecli.sweeps.plan import LoadedSweep, Plan, read_sweep
 from brakecli.sweeps.point import Status, blank, record_type
 from brakecli.sweeps.result import SweepReport
 from brakecli.sweeps.workers.dask import ClusterEngine

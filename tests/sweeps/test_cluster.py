@@ -258,6 +258,7 @@ def test_a_cluster_without_workers_or_with_those_of_another_version_is_reported(
         rival.wait()
 
         cluster.worker("--no-nanny")
+        write_sweep(here, frictions(2000), ANGLES, case=SLOWER)  # far longer than a worker takes to start
         with started(*command, cwd=here) as process:
             wait_until(lambda: journal_size(here) > 1500)
             cluster.worker("--no-nanny", PYTHONPATH=str(other))  # one that comes later

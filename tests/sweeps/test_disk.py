@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from brakecli.errors import CannotWriteError
-from brakecli.sweeps.file import read_sweep
 from brakecli.sweeps.journal import identity
+from brakecli.sweeps.plan import read_sweep
 from brakecli.sweeps.point import record_type
 from tests.commands import left_in, shell
 from tests.sweeps.helpers import frictions, inline, interrupted, journal_size, write_sweep

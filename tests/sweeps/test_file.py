@@ -9,8 +9,7 @@ import pytest
 
 from brakecli.case.tables import json_schema
 from brakecli.errors import CaseError
-from brakecli.sweeps.file import LoadedSweep, kind_of, parse_sweep
-from brakecli.sweeps.plan import Plan
+from brakecli.sweeps.plan import LoadedSweep, Plan, kind_of, parse_sweep
 from brakecli.sweeps.tables import Sweep
 from tests.commands import TINY
 
@@ -145,6 +144,7 @@ AXIS = '[[axis]]\nparameter = "link2.angle_deg"\n'
         (GRID.replace("1e3]", "-1e3]"), "sweep.toml:8: link1.damping: is out of range (found -1000.0)"),
         (GRID.replace('"link2.angle_deg"', '"title.x"'), "sweep.toml:3: title.x: title is not a table"),
         (CRITICAL.replace("friction.", "friktion."), "friktion: is unknown"),
+        ('case = ""', 'sweep.toml:1: case: is too short (found ""); give one line of text'),
         ("", "axis: is missing; give at least one [[axis]], or [critical]"),
         (AXIS + "values = []", "axis[0].values: is too short"),
         (AXIS + "values = [1.0]\nstart = 1.0", "is given together with"),

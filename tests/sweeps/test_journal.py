@@ -11,7 +11,7 @@ import pytest
 from brakecli import SAME_NUMBERS_AS, __version__
 from brakecli.errors import RefusedError
 from brakecli.solver.compile import source_hash
-from brakecli.sweeps.file import LoadedSweep, read_sweep
+from brakecli.sweeps.plan import LoadedSweep, read_sweep
 from brakecli.sweeps.workers.task import compute_units, fingerprint
 from tests.commands import ROOT, left_in, run
 from tests.sweeps.helpers import frictions, inline, interrupted, write_sweep

@@ -10,8 +10,7 @@ import xarray as xr
 from brakecli.case.case import resolved_toml
 from brakecli.case.read import parse_case
 from brakecli.sweeps.driver import TaskQueue, choose_engine, sweep
-from brakecli.sweeps.file import LoadedSweep, parse_sweep
-from brakecli.sweeps.plan import plan_of
+from brakecli.sweeps.plan import LoadedSweep, parse_sweep, plan_of
 from brakecli.sweeps.point import Status, blank, line_points, next_start, record_type, simulate
 from brakecli.sweeps.result import SweepReport
 from brakecli.sweeps.workers.task import Task

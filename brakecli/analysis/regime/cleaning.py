@@ -8,9 +8,7 @@ from scipy.ndimage import median_filter, uniform_filter1d
 
 from brakecli.analysis.regime.spectra import Array, rises
 
-CERTAIN = (
-    15.0  # a line's power over the mean power of the noise; pure noise reaches it in one bin of three million
-)
+CERTAIN = 15.0  # a line's power over the mean of the noise, which reaches it in one bin of three million
 _RIPPLE = 0.3  # ripple within this part of the mean size of the velocity does not count as a cycle
 _SPIKES = (8.0, 0.35)  # deviations, and part of the signal's range, by which a spike leaves its neighbours' median
 _NOISE_SHARE = 0.6
@@ -30,7 +28,6 @@ class Velocity:
     raw: Array  # the same with its mean and drift
     noise: float  # standard deviation of one sample of the signal
     measured: bool  # otherwise it is the difference of what was measured
-    notes: tuple[str, ...] = ()  # what was changed
 
     @cached_property
     def _primitive(self) -> Array:
@@ -100,14 +97,14 @@ class Velocity:
         return np.fft.irfft(np.where(lines, spectrum, 0.0), len(values)), np.where(lines, power, 0.0)
 
 
-def cleaned(values: Array, is_velocity: bool) -> Velocity:
-    """The velocity of a signal without its gaps, spikes and drift; the notes report each of them."""
+def cleaned(values: Array, is_velocity: bool) -> tuple[Velocity, list[str]]:
+    """The velocity of a signal without its gaps, spikes and drift; notes report each of them."""
     notes: list[str] = []
     if len(values) >= _SHORTEST and not np.isfinite(values).all():
         cycle = _cycle(_velocity(_bridged(values), is_velocity))
         values = _bridged(_longest_piece(values, max(1.0, 0.25 * cycle), notes))
     if len(values) < _SHORTEST:
-        return replace(_velocity(values, is_velocity), notes=tuple(notes))
+        return _velocity(values, is_velocity), notes
     values = _without_spikes(values, is_velocity, notes)
     velocity = _velocity(values, is_velocity)
     width = int(_DRIFT_CYCLES * _cycle(velocity))
@@ -117,7 +114,7 @@ def cleaned(values: Array, is_velocity: bool) -> Velocity:
         if float(drift.std()) > 0.1 * float(np.sqrt(max(variance, 0.0))):
             notes.append("drift removed")
         velocity = replace(velocity, values=velocity.values - drift)
-    return replace(velocity, notes=tuple(notes))
+    return velocity, notes
 
 
 def _velocity(values: Array, is_velocity: bool) -> Velocity:
@@ -163,8 +160,7 @@ def _without_slow(values: Array) -> Array:
 
 def _bridged(values: Array) -> Array:
     """Gaps filled by straight lines."""
-    good = np.isfinite(values)
-    places = np.arange(len(values))
+    good, places = np.isfinite(values), np.arange(len(values))
     return values if good.all() else np.interp(places, places[good], values[good])
 
 
@@ -193,7 +189,7 @@ def _without_spikes(values: Array, is_velocity: bool, notes: list[str]) -> Array
     beside = np.abs(np.stack([np.roll(values, 1), np.roll(values, -1)]) - (values - away)).max(axis=0)
     spikes &= np.abs(away) > 3.0 * beside
     count = int(np.sum(spikes))
-    if count == 0 or count == len(values):
+    if count == 0:
         return values
     without = _bridged(np.where(spikes, np.nan, values))
     if is_velocity and count >= 5 and abs(float(np.mean(np.sign(away[spikes])))) > 0.6:

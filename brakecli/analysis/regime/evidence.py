@@ -107,7 +107,7 @@ class Part:
 
 
 class Envelope:
-    """A history in equal windows: standard deviation of vx (m/s), and its final and largest value."""
+    """Standard deviations of vx (m/s) in equal windows; `evidence`: the last, the largest and the slope (1/s)."""
 
     def __init__(self, history: History) -> None:
         """Take a history of at least `FEWEST_SAMPLES`."""
@@ -115,16 +115,12 @@ class Envelope:
         windows = [Part(history, begin, end) for begin, end in pairwise(edges)]
         self.vx, *self._x = np.array([(window.deviation("vx"), *window.extremes("x")) for window in windows]).T
         self.final, self.largest = float(np.mean(self.vx[_LAST])), float(self.vx.max())
-        self._centres = np.array(0.5 * (edges[:-1] + edges[1:]) * history.interval)
-
-    def evidence(self) -> dict[str, float]:
-        """Final and largest value; slope of the logarithm of its last half (1/s), if any, with its error."""
-        found, half = {"envelope_final": self.final, "envelope_largest": self.largest}, WINDOWS // 2
-        if self.vx[half:].min() > 0.0:
-            (slope, _), covariance = np.polyfit(self._centres[half:], np.log(self.vx[half:]), 1, cov=True)
-            found["envelope_slope"] = float(slope)
-            found["envelope_slope_error"] = float(np.sqrt(max(covariance[0, 0], 0.0)))
-        return found
+        self.evidence = {"envelope_final": self.final, "envelope_largest": self.largest}
+        half, centres = slice(WINDOWS // 2, None), np.array(0.5 * (edges[:-1] + edges[1:]) * history.interval)
+        if self.vx[half].min() > 0.0:
+            (slope, _), covariance = np.polyfit(centres[half], np.log(self.vx[half]), 1, cov=True)
+            self.evidence["envelope_slope"] = float(slope)
+            self.evidence["envelope_slope_error"] = float(np.sqrt(max(covariance[0, 0], 0.0)))
 
     def settled_window(self, within: float, reach: float) -> int | None:
         """The window, never the first, from which on all are settled; None if fewer than ten are."""

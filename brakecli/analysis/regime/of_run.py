@@ -1,7 +1,8 @@
 """The regime of the run in a result file, found from its history: what `brakecli classify RESULT.h5` does."""
 
 import math
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -23,24 +24,6 @@ from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import System
 
 
-@dataclass(frozen=True)
-class RunVerdict:
-    """The verdict on the motion of a system."""
-
-    system: System
-    verdict: Verdict
-
-    @property
-    def settled_from(self) -> float:
-        """Begin of the settled part, s."""
-        return self.verdict.settled_from * self.system.interval
-
-    @property
-    def braking_torque(self) -> float:
-        """Mean torque of the friction force on the wheel's axis, R F_x, N m."""
-        return self.system.radius * self.verdict.mean_friction_force
-
-
 def classify_result(path: Path, thresholds: Thresholds) -> dict[str, Any]:
     """Names and values of the verdict on a stored run; raises UnreadableResultError for anything else."""
     with open_result(path, kind="run") as result:
@@ -54,7 +37,7 @@ def classify_result(path: Path, thresholds: Thresholds) -> dict[str, Any]:
         history = History(system.interval, time.shape[0], partial(result.read, "history"))
         failure = result.attributes.get("failure")
         verdict = verdict_on(history, system, failure, thresholds)
-    return {**values_of(fields.VERDICT, RunVerdict(system, verdict)), "failure": failure}
+    return {**values_of(fields.VERDICT, {"verdict": verdict}), "failure": failure}
 
 
 def verdict_on(history: History, system: System, failure: str | None, limits: Thresholds | None = None) -> Verdict:
@@ -70,16 +53,15 @@ def context(system: System) -> Context:
     belt, c = float(value_at(system.belt, system.sampled_duration)), system.coefficients
     compression = float(np.abs(system.load["value"]).max()) / (c.c_yy + system.contact_stiffness)
 
-    def growth_rate() -> float:
-        """By the mean stiffness of the contact."""
-        try:
-            rest = steady_sliding(system, belt=belt)
-        except CaseError:
-            return 0.0
-        return max(growth(c, rest.stiffness, math.copysign(c.phi, belt)), 0.0)
+    def growth_rate() -> float:  # by the mean stiffness of the contact
+        with suppress(CaseError):
+            stiffness = steady_sliding(system, belt=belt).stiffness
+            return max(growth(c, stiffness, math.copysign(c.phi, belt)), 0.0)
+        return 0.0
 
     return Context(
         belt,
+        radius=system.radius,
         steady=len(system.belt) == 1 and len(system.load) == 1,
         forced=forced_lines(belt, [float(turns) for turns in system.wheel.turns], 0.5 / system.interval),
         quiet=1e-9 * compression * system.natural_frequencies[1],

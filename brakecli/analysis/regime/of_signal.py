@@ -82,7 +82,7 @@ def classify_signal(
 ) -> SignalVerdict:
     """The regime of a measured signal; `belt_speed` in m/s, `stiffness` in N/m (of a force) where known."""
     size = float(np.nanmax(np.abs(signal.values), initial=0.0))  # squares of the smallest numbers must not vanish
-    velocity = cleaned(signal.values / (size or 1.0), quantity == Measurand.VELOCITY)
+    velocity, notes = cleaned(signal.values / (size or 1.0), quantity == Measurand.VELOCITY)
     spring = 1.0 if quantity != Measurand.FORCE else np.nan if stiffness is None else stiffness
     metres, belt = size / spring, np.nan if belt_speed is None else abs(belt_speed) * spring
     if quantity == Measurand.VELOCITY:
@@ -99,7 +99,7 @@ def classify_signal(
         amplitude=amplitude if np.isfinite(amplitude) else None,
         stick_fraction=decision.stick_fraction,
         evidence={**rules.evidence, "noise": size * velocity.noise},
-        warnings=(*signal.notes, *velocity.notes),
+        warnings=(*signal.notes, *notes),
         thresholds=thresholds,
     )
 

@@ -58,6 +58,7 @@ class Context:
     quiet: float = 0.0  # m/s, size of vx that may come from rounding
     growth: Callable[[], float] = lambda: 0.0  # 1/s, of a small disturbance of steady sliding; 0 where it decays
     powers: Callable[[Part], dict[str, float]] = lambda part: {}  # W, what becomes of the power of the belt
+    radius: float = 1.0  # R, m
 
 
 class Decision(NamedTuple):
@@ -78,11 +79,13 @@ class Verdict:
     excitation: Excitation
     frequency: float | None  # Hz, fundamental of vx when sustained
     amplitude: float  # m, half of peak to peak of x
-    settled_from: int  # sample; the middle where no settled part was found
+    settled_from: float  # s; the middle where no settled part was found
+    start: int  # the sample there
     settled: bool  # whether a settled part was found
     stick_fraction: float
     contact_loss_fraction: float
     mean_friction_force: float  # N
+    braking_torque: float  # N m, its mean torque on the wheel's axis, R F_x
     reasons: tuple[str, ...]
     evidence: dict[str, Any]
     thresholds: Thresholds
@@ -119,7 +122,7 @@ class _Rules:
         if self.history.samples < FEWEST_SAMPLES:
             return Decision(f"fewer than {FEWEST_SAMPLES} samples; run longer")
         envelope = self.envelope = Envelope(self.history)
-        self.evidence |= envelope.evidence()
+        self.evidence |= envelope.evidence
         if not self.context.steady:
             return Decision("the wheel's speed or the load changes with time, so the motion cannot settle")
         if envelope.largest <= self.context.quiet:
@@ -140,10 +143,9 @@ class _Rules:
         if powers_of_e > _GROWN:
             return None  # the shoe's own vibration falls on the same lines
         if powers_of_e > _NOTHING:
-            return Decision(
-                f"{share:.0%} of the energy of vx lies on the lines of the roughness, but sliding is unstable: "
-                f"the shoe's own vibration grows at {growth:.3g} 1/s; run at least {_GROWN / growth:.2g} s"
-            )
+            what = f"{share:.0%} of the energy of vx lies on the lines of the roughness, but sliding is unstable"
+            own = f"the shoe's own vibration grows at {growth:.3g} 1/s"
+            return Decision(f"{what}: {own}; run at least {_GROWN / growth:.2g} s")
         text = f"only the roughness shakes the shoe: {share:.0%} of the energy of vx lies on its lines"
         return Decision(text, Regime.DAMPED, Excitation.FORCED)
 
@@ -186,7 +188,7 @@ def classify(history: History, context: Context, thresholds: Thresholds = Thresh
     """The regime of a run's history, by the rules of docs/regimes.md; the first that applies decides."""
     rules = _Rules(history, context, thresholds)
     decision = rules.contact() or rules.unmoved() or rules.forced() or rules.trend() or rules.sustained()
-    part, belt = rules.settled_part, context.belt_speed
+    part, belt, friction = rules.settled_part, context.belt_speed, rules.settled_part.mean("friction_force")
     evidence = rules.evidence | {f"amplitude_{name}": part.amplitude(name) for name in ("y", "vx", "vy")}
     if belt != 0.0:
         evidence["largest_vx_over_belt_speed"] = part.extremes("vx")[int(belt > 0.0)] / belt
@@ -196,11 +198,13 @@ def classify(history: History, context: Context, thresholds: Thresholds = Thresh
         excitation=decision.excitation,
         frequency=decision.frequency,
         amplitude=part.amplitude("x"),
-        settled_from=part.start,
+        settled_from=part.start * history.interval,
+        start=part.start,
         settled=rules.settled,
         stick_fraction=part.fraction(ContactState.STICK),
         contact_loss_fraction=part.fraction(ContactState.SEPARATED),
-        mean_friction_force=part.mean("friction_force"),
+        mean_friction_force=friction,
+        braking_torque=context.radius * friction,
         reasons=(decision.reason,),
         evidence=evidence,
         thresholds=thresholds,

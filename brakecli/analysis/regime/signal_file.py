@@ -124,19 +124,12 @@ class _TextFile:
 
     def _read(self, columns: list[int]) -> Array:
         """Some columns, by numpy's own reader; empty cells and decimal commas take it longer."""
-        load = partial(
-            np.loadtxt,
-            comments=_COMMENTS,
-            delimiter=self.separator,
-            usecols=columns,
-            ndmin=2,
-            encoding="utf-8-sig",
-        )
+        load = partial(np.loadtxt, comments=_COMMENTS, delimiter=self.separator, usecols=columns, ndmin=2)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             if not self.decimal_comma:
                 with suppress(ValueError, IndexError):  # perhaps because of an empty cell
-                    return load(self.path, skiprows=self.skip)
+                    return load(self.path, skiprows=self.skip, encoding="utf-8-sig")
             text = self.path.read_text(encoding="utf-8-sig", errors="replace")
             lines = (text.replace(",", ".") if self.decimal_comma else text).split("\n")
             try:

@@ -45,10 +45,9 @@ def spectrum(history: History, start: int) -> Spectrum:
             block = history.read(name, begin, begin + (count - 1) * hop + size)
             # Squares of the smallest numbers would vanish, so the block is brought to a scale of one.
             scale = float(np.max(np.abs(block))) or 1.0
-            power = np.empty((size // 2 + 1, count))
-            for column, segment in zip(power.T, sliding_window_view(block / scale, size)[::hop], strict=True):
-                line = np.fft.rfft((segment - segment.mean()) * window)
-                column[:] = line.real**2 + line.imag**2
+            parts = sliding_window_view(block / scale, size)[::hop]
+            lines = np.fft.rfft((parts - parts.mean(axis=1, keepdims=True)) * window)
+            power = np.ascontiguousarray((lines.real**2 + lines.imag**2).T)
             power[1 : (size + 1) // 2] *= 2.0
             total += count * power.mean(axis=1) * scale**2
     frequency: Array = np.fft.rfftfreq(size, history.interval).astype(np.float64)

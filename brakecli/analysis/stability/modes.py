@@ -86,15 +86,9 @@ def modes(c: Coefficients, contact_stiffness: float, grip: float) -> list[Mode]:
             continue
         moves = abs(vector[0]) > 1e-12 * abs(vector[1])
         ratio = vector[1] / vector[0] if moves else 0.0
-        found.append(
-            Mode(
-                growth=float(value.real),
-                frequency=float(value.imag / (2.0 * math.pi)),
-                damping_ratio=float(-value.real / abs(value)) if value != 0.0 else 0.0,
-                shape=float(abs(ratio)) if moves else None,
-                shape_phase=float(np.degrees(np.angle(ratio))) if moves else None,
-            )
-        )
+        shape = (float(abs(ratio)), float(np.degrees(np.angle(ratio)))) if moves else (None, None)
+        damping_ratio = float(-value.real / abs(value)) if value != 0.0 else 0.0
+        found.append(Mode(float(value.real), float(value.imag / (2.0 * math.pi)), damping_ratio, *shape))
     return sorted(found, key=lambda mode: -mode.growth)
 
 
@@ -118,16 +112,16 @@ def crossings(c: Coefficients, contact_stiffness: float, belt: float) -> list[Cr
     a2 = c.m * (s[0, 0] + s[1, 1]) + c.b_xx * c.b_yy - c.b_xy**2
     a1 = np.array([c.b_xx * s[1, 1] + c.b_yy * s[0, 0] - 2.0 * c.b_xy * c.c_xy, -c.b_xy * pull])  # + φ ...
     a0 = np.array([s[0, 0] * s[1, 1] - c.c_xy**2, -c.c_xy * pull])
-    divergence = [(phi, 0.0) for phi in _positive_roots(a0)]
+    candidates = [(phi, 0.0) for phi in _positive_roots(a0)]  # φ and ω², which is 0 for divergence
     if is_undamped(c):
         gap = 0.5 * (s[0, 0] - s[1, 1])  # a2² - 4 a4 a0 without the cancellation
         meeting = c.m**2 * 4.0 * np.array([gap**2 + c.c_xy**2, c.c_xy * pull])
-        flutter = [(phi, 0.5 * a2 / a4) for phi in _positive_roots(meeting)]
+        candidates += [(phi, 0.5 * a2 / a4) for phi in _positive_roots(meeting)]
     else:
         hurwitz = np.append(a2 * a3 * a1 - a3**2 * a0, 0.0) - a4 * np.convolve(a1, a1)
         turning = [(phi, (a1[0] + a1[1] * phi) / a3) for phi in _positive_roots(hurwitz)]
-        flutter = [(phi, square) for phi, square in turning if square > 0.0]
-    candidates = sorted((*divergence, *flutter))  # φ and ω², which is 0 for divergence
+        candidates += [(phi, square) for phi, square in turning if square > 0.0]
+    candidates.sort()
     edges = [0.0, *(phi for phi, _ in candidates), 2.0 * candidates[-1][0] if candidates else 0.0]
     middles = [0.5 * (low + high) for low, high in pairwise(edges)]
     unstable = [growth(c, contact_stiffness, math.copysign(phi, belt)) > 0.0 for phi in middles]

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
@@ -80,7 +81,7 @@ def stability(system: System) -> StabilityReport:
         no_equilibrium=reason,
         contact_stiffness=k,
         stable=fastest <= tolerance if rest else None,
-        eigenvalues=tuple(complex(value) for value in values),
+        eigenvalues=tuple(values.tolist()),
         modes=tuple(modes(c, k, grip)),
         crossings=tuple(found),
         critical=critical,
@@ -113,10 +114,9 @@ def mean_stiffness(system: System, smooth: float) -> StiffnessAt:
 
     @cache
     def at(phi: float) -> float:
-        try:
+        with suppress(CaseError):
             return steady_sliding(system, phi=phi, mean=mean).stiffness
-        except CaseError:
-            return math.nan
+        return math.nan
 
     return at
 
@@ -158,15 +158,13 @@ def _discrete(system: System, stiffness_at: StiffnessAt, exact: Crossing | None,
     if system.method.own_steps:  # the motion itself
         critical, bias = (exact.friction, 0.0) if exact else (None, None)
         return Discrete(math.exp(rate * h), rate, None, critical, bias)
-    radius = spectral_radius(system, stiffness_at(phi), phi)
-    critical = discrete_critical(system, stiffness_at, exact)
-    return Discrete(
-        spectral_radius=radius,
-        growth=math.log(radius) / h if radius > 0.0 else -math.inf,
-        step_limit=step_limit(system, stiffness_at),
-        critical_friction=critical,
-        bias=critical - exact.friction if critical is not None and exact else None,
+    radius, critical = (
+        spectral_radius(system, stiffness_at(phi), phi),
+        discrete_critical(system, stiffness_at, exact),
     )
+    growth = math.log(radius) / h if radius > 0.0 else -math.inf
+    bias = critical - exact.friction if critical is not None and exact else None
+    return Discrete(radius, growth, step_limit(system, stiffness_at), critical, bias)
 
 
 def discrete_critical(system: System, stiffness_at: StiffnessAt, exact: Crossing | None) -> float | None:
@@ -201,9 +199,7 @@ def step_limit(system: System, stiffness_at: StiffnessAt) -> float | None:
         return spectral_radius(system, k, 0.0, h) <= 1.0 + max(_CLEAR_MARGIN, rounding)
 
     ladder = (10.0 ** np.arange(-2.0, 4.1, 0.25) / omega).tolist()
-    first = next((place for place, h in enumerate(ladder) if not is_stable(h)), None)
-    if first is None:
-        return None
-    if first == 0:
+    if not is_stable(ladder[0]):
         return 0.0
-    return bisect(is_stable, ladder[first - 1], ladder[first], halvings=60, geometric=True)[0]
+    bracket = next((pair for pair in pairwise(ladder) if not is_stable(pair[1])), None)
+    return bisect(is_stable, *bracket, halvings=60, geometric=True)[0] if bracket else None

@@ -5,7 +5,7 @@ from typing import Any
 
 from numba import float64, int64, void
 
-from brakecli.solver.compile import kernel
+from brakecli.solver.compile import borrowed, kernel
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.records import CONTACT_TYPE, EVALUATE, PAD_TYPE, Layer
 
@@ -15,16 +15,15 @@ CLEAR, PARTLY, FULL = 0, 1, 2
 @kernel(int64(float64, PAD_TYPE))
 def coverage(y: float, pad: Any) -> int:
     """FULL or CLEAR where bounds on the surfaces prove that the pad touches everywhere or nowhere, or PARTLY."""
-    if y >= pad.wheel_bound + pad.shoe_bottom:
+    if y >= pad.clear_from:
         return CLEAR
-    if -y >= pad.wheel_bound + pad.shoe_top:
-        return FULL
-    return PARTLY
+    return FULL if y <= pad.full_up_to else PARTLY
 
 
 @kernel(EVALUATE)
 def full_contact(x: float, y: float, layer: Layer) -> None:
     """The pad touches everywhere: F_y = 2ak [-y - mean f1 + Σ g2 sinc(ω2 a) sin(ω2 (x - travel))]."""
+    layer = borrowed(layer)
     pad, tables, contact, angles = layer.pad, layer.tables, layer.contact, layer.angles
     k, length, n = pad.k, 2.0 * pad.half_length, pad.wheel_terms
     omega_at, full_at, ss_at, cc_at, pr_at = pad.wheel_at + n, pad.full_at, pad.ss_at, pad.cc_at, pad.pr_at
@@ -66,6 +65,7 @@ def clear(contact: Any) -> None:
 @kernel(EVALUATE)
 def evaluate(x: float, y: float, layer: Layer) -> None:
     """See the package; `valid` is 0 where a rough pad may touch in part, which this evaluator cannot know."""
+    layer = borrowed(layer)
     covered = coverage(y, layer.pad)
     if covered == CLEAR:
         clear(layer.contact)

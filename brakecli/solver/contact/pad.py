@@ -29,20 +29,15 @@ class Pad(NamedTuple):
     constants: Any
     tables: Floats
 
-    @property
-    def edges(self) -> tuple[float, float]:
-        """Heights (m) up to which it is sure to touch everywhere, and from which on it is sure to be clear."""
-        pad = self.constants
-        return -pad.wheel_bound - pad.shoe_top, pad.wheel_bound + pad.shoe_bottom
-
 
 def build_pad(k: float, half_length: float, shoe: Surface, wheel: Surface, nodes: int) -> Pad:
     """The pad for stiffness k (N/m²), half length (m) and surfaces; `nodes` = 0 without quadrature tables."""
     pad = new(PAD)
     pad.k, pad.half_length, pad.nodes = k, half_length, nodes
     pad.shoe_terms, pad.wheel_terms = shoe.g.size, wheel.g.size
-    pad.shoe_top, pad.shoe_bottom = _shoe_bounds(half_length, shoe)
-    pad.wheel_bound = np.abs(wheel.g).sum()
+    top, bottom = _shoe_bounds(half_length, shoe)
+    pad.shoe_bound, pad.wheel_bound = max(top, bottom), np.abs(wheel.g).sum()
+    pad.full_up_to, pad.clear_from = -pad.wheel_bound - top, pad.wheel_bound + bottom
     pad.cell = 2.0 * half_length / max(8.0, 8.0 * half_length * max([*shoe.turns, *wheel.turns], default=0.0))
     ss, cc, pr, pad.shoe_mean, pad.shoe_square = _products(half_length, shoe, wheel)
     f1, sines, cosines = _node_tables(half_length, shoe, wheel, nodes)

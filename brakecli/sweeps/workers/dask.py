@@ -10,22 +10,14 @@ from pathlib import Path
 from typing import Any
 
 from brakecli.errors import BrakecliError, RefusedError, UsageError
-from brakecli.sweeps.workers.task import (
-    Compute,
-    Engine,
-    Finished,
-    NextTask,
-    Task,
-    attempt,
-    fingerprint,
-    first_line,
-)
+from brakecli.sweeps.workers.task import Compute, Engine, Finished, NextTask, Task, attempt, fingerprint, headline
 
 CONNECT_SECONDS = 20
 WAIT_SECONDS = 60.0  # for a worker to come, or to come back
 FETCH_SECONDS = 5.0  # for a finished result, whose worker may have died with it: dask then computes it again
 LOOK_SECONDS = 1.0  # from one look at which workers there are to the next
 TASKS_PER_THREAD = 3
+NOISY = ("distributed", "tornado", "asyncio")  # packages whose logs do not belong on standard error
 KEPT = "; finished points are kept, run the same command again"
 INSTALL = "; install the same version there"
 
@@ -115,7 +107,7 @@ class ClusterEngine(Engine):
         if future.status == "error":
             if isinstance(error := future.exception(), KilledWorker):
                 return None
-            raise BrakecliError(f"{self._where}: a worker cannot compute ({first_line(error)}){KEPT}")
+            raise BrakecliError(f"{self._where}: a worker cannot compute ({headline(error)}){KEPT}")
         finished: Finished | str = future.result(timeout=FETCH_SECONDS)
         if isinstance(finished, str):
             raise RefusedError(f"{self._where}: {finished}{INSTALL}")
@@ -142,7 +134,7 @@ class ClusterEngine(Engine):
         except BrakecliError:
             raise
         except Exception as error:
-            raise kind(f"{self._where}: {what} ({first_line(error)}){remedy}") from error
+            raise kind(f"{self._where}: {what} ({headline(error)}){remedy}") from error
 
     def _address_in(self, scheduler_file: str) -> str:
         """The address in a scheduler's file; dask itself would wait for ever for the file to come."""
@@ -162,7 +154,9 @@ class ClusterEngine(Engine):
             what = "needs dask.distributed, which is not installed; pip install 'brakecli[cluster]'"
             raise UsageError(f"{self._where}: {what}") from error
 
-        _silence("distributed", "tornado", "asyncio")
+        for name in {*NOISY, *logging.root.manager.loggerDict}:  # dask has given its loggers levels of their own
+            if name.partition(".")[0] in NOISY:
+                logging.getLogger(name).setLevel(logging.CRITICAL + 1)
 
         class _Client(Client):
             def __del__(self) -> None:
@@ -179,13 +173,6 @@ class ClusterEngine(Engine):
         for worker, theirs in sorted(found.items()):
             if difference := _difference(self._versions, theirs, f"the worker at {worker}"):
                 raise RefusedError(f"{self._where}: {difference}{INSTALL}")
-
-
-def _silence(*packages: str) -> None:
-    """Keep the logs of packages off standard error; dask's loggers have got levels of their own by now."""
-    for name in {*packages, *logging.root.manager.loggerDict}:
-        if name.partition(".")[0] in packages:
-            logging.getLogger(name).setLevel(logging.CRITICAL + 1)
 
 
 def _attempt(compute: Compute, task: Task, versions: Mapping[str, str]) -> Finished | str:

@@ -49,10 +49,6 @@ class Engine(ABC):
 
     workers: int
 
-    @abstractmethod
-    def run(self, next_task: NextTask) -> Iterator[Finished]:
-        """Compute until there are no more tasks."""
-
     def __enter__(self) -> Self:
         """Start nothing yet."""
         return self
@@ -60,6 +56,10 @@ class Engine(ABC):
     @abstractmethod
     def __exit__(self, *error: object) -> None:
         """End what was started, and drop what is still being computed."""
+
+    @abstractmethod
+    def run(self, next_task: NextTask) -> Iterator[Finished]:
+        """Compute until there are no more tasks."""
 
 
 def attempt(compute: Compute, task: Task) -> Finished:
@@ -70,16 +70,16 @@ def attempt(compute: Compute, task: Task) -> Finished:
     except MemoryError:
         return Finished(task, failure="it ran out of memory")
     except Exception as error:  # of one task, which must not cost the others
-        return Finished(task, failure=f"{type(error).__name__}: {first_line(error)}")
+        return Finished(task, failure=f"{type(error).__name__}: {headline(error)}")
 
 
-def first_line(error: object) -> str:
+def headline(error: object) -> str:
     """The first line of an error's text; its kind where it has none."""
     return (str(error).splitlines() or [type(error).__name__])[0]
 
 
 def compute_units(plan: Plan, first: int, count: int) -> bytes:
-    """The records of some units of a sweep: points, or lines along which the motion is followed.
+    """The records of some units of a sweep.
 
     One process at a time loads kernels: several that fill one cold cache get into each other's way.
     """
@@ -90,11 +90,9 @@ def compute_units(plan: Plan, first: int, count: int) -> bytes:
             with suppress(OSError):  # a disk without locks: do without
                 file = stack.enter_context(Path(f"{CACHE}.lock").open("w"))
                 fcntl.flock(file, fcntl.LOCK_EX)
-        from brakecli.sweeps.point import compute, follow
+        from brakecli.sweeps.point import compute
 
-    if plan.followed is None:
-        return compute(plan, first, count).tobytes()
-    return b"".join(follow(plan, line).tobytes() for line in range(first, first + count))
+    return compute(plan, first, count).tobytes()
 
 
 @cache
@@ -106,8 +104,5 @@ def fingerprint() -> Mapping[str, str]:
     from brakecli.runs.run import versions
     from brakecli.solver.compile import source_hash
 
-    return {
-        "brakecli_version": __version__,
-        "brakecli_sources": source_hash(Path(brakecli.__file__).parent),
-        **versions(),
-    }
+    sources = source_hash(Path(brakecli.__file__).parent)
+    return {"brakecli_version": __version__, "brakecli_sources": sources, **versions()}

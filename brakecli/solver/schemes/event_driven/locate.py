@@ -5,7 +5,7 @@ import math
 from numba import float64, int64, types
 
 from brakecli.solver.compile import kernel
-from brakecli.solver.schemes.event_driven.phases import EPSILON, SHOE, Shoe, clear_height, margins, rounding
+from brakecli.solver.schemes.event_driven.phases import EPSILON, SHOE, Shoe, margins, rounding
 
 NONE = -1
 LOOKS = 8
@@ -19,7 +19,7 @@ _GOLDEN = 0.3819660112501051
 def _allowances(p: Shoe) -> tuple[float, float, float]:
     """How far each margin may be below zero by rounding alone."""
     m = p.motion
-    height = 4.0 * EPSILON * (abs(m.y) + clear_height(p.layer.pad))
+    height = 4.0 * EPSILON * (abs(m.y) + p.layer.pad.clear_from)
     if m.side != 0.0:
         late = abs(m.belt_slope) * (m.time + m.tau)  # the wheel's velocity at a time that is rounded
         return 4.0 * EPSILON * (abs(m.v_x) + abs(m.belt) + late), 0.0, height

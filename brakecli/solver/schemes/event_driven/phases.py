@@ -41,12 +41,6 @@ _PAIR = types.UniTuple(float64, 2)
 _TRIPLE = types.UniTuple(float64, 3)
 
 
-@kernel(float64(records.PAD_TYPE))
-def clear_height(pad: Any) -> float:
-    """The height (m) from which on the pad is sure to touch nowhere: 0 on smooth surfaces, as it must be."""
-    return pad.wheel_bound + pad.shoe_bottom  # type: ignore[no-any-return]
-
-
 @kernel(_PAIR(COEFFICIENTS, float64, float64, float64, float64, float64))
 def resistance(c: Coefficients, load: float, x: float, y: float, v_x: float, v_y: float) -> tuple[float, float]:
     """Forces of links and load against x and y: what friction and normal force work against."""
@@ -63,7 +57,7 @@ def rounding(p: Shoe) -> tuple[float, float]:
     x, y, v_x, v_y = abs(m.x), abs(m.y), abs(m.v_x), abs(m.v_y)
     load, normal = abs(m.load), 0.0
     if m.touching != 0:
-        normal = 2.0 * pad.half_length * pad.k * (y + pad.wheel_bound + max(pad.shoe_top, pad.shoe_bottom))
+        normal = 2.0 * pad.half_length * pad.k * (y + pad.wheel_bound + pad.shoe_bound)
     along = c.b_xx * v_x + abs(c.b_xy) * v_y + c.c_xx * x + abs(c.c_xy) * y + load * abs(c.sin_beta)
     across = abs(c.b_xy) * v_x + c.b_yy * v_y + abs(c.c_xy) * x + c.c_yy * y + load * c.cos_beta
     along += c.m * abs(m.belt_slope) + c.phi * normal
@@ -141,7 +135,7 @@ def margins(p: Shoe, h: float, theta: float) -> tuple[float, float, float]:
     """
     c, m, since = p.c, p.motion, theta * h
     y = interpolated(m, Y, theta)
-    height = clear_height(p.layer.pad) - y if m.touching != 0 else y - clear_height(p.layer.pad)
+    height = p.layer.pad.clear_from - y if m.touching != 0 else y - p.layer.pad.clear_from
     belt = m.belt + m.belt_slope * since
     if m.side != 0.0:
         return m.side * (interpolated(m, V_X, theta) - belt), 1.0, height
@@ -190,7 +184,7 @@ def switch(p: Shoe, which: int) -> None:
     """Enter the phase that follows where a margin has run out."""
     m = p.motion
     if which == 2:
-        m.y = clear_height(p.layer.pad)
+        m.y = p.layer.pad.clear_from  # 0 on smooth surfaces, as it must be
         m.touching = 1 - m.touching
     elif m.side == 0.0:
         m.side = -1.0 if which == 0 else 1.0  # friction cannot pull that hard, or cannot push

@@ -72,7 +72,7 @@ def first_step(p: Shoe, drive: Drive, grid: Grid) -> None:
     m.tolerance = _LOCAL * grid.tolerance
     phases.arrive(p, drive)
     m.largest[X], m.largest[Y], m.largest[V_X], m.largest[V_Y] = abs(m.x), abs(m.y), abs(m.v_x), abs(m.v_y)
-    height = m.y - phases.clear_height(p.layer.pad)
+    height = m.y - p.layer.pad.clear_from
     m.touching = 0 if height > 0.0 or (height == 0.0 and m.v_y > 0.0) else 1
     if m.v_x == m.belt:
         phases.take_hold(p)
