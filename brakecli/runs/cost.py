@@ -1,5 +1,7 @@
 """What a run is likely to cost; rough guesses that tell minutes from days."""
 
+import math
+
 import numpy as np
 
 from brakecli.solver.system import System
@@ -8,7 +10,7 @@ from brakecli.solver.system import System
 _STEP_SECONDS = 1.5e-7
 _NODE_SECONDS = 1.2e-9  # per node, and again per node and wave of the wheel:
 _NODE_WAVE_SECONDS = 4e-10
-_EXACT_SECONDS = 5e-6  # per wave on the pad
+_TERM_SECONDS, _PAIR_SECONDS = 2.5e-7, 5e-9  # exact, for each wave on the pad: per harmonic, and per pair of them
 _EVALUATIONS = 3.0  # of the contact in a step
 _OWN_STEPS = 25.0  # in a period, of a scheme that finds them itself, at a tolerance of 1e-10
 _OWN_STEP_SECONDS = 4e-6
@@ -25,8 +27,12 @@ def steps_and_seconds(system: System) -> tuple[int, float]:
         return system.steps, system.steps * each
     c, alone = system.coefficients, method.step is not None
     tolerance = method.tolerance if alone else max(min(1e-5 * method.tolerance, 1e-8), 1e-13)
-    rate = system.natural_frequencies[1] * _OWN_STEPS * (1e-10 / tolerance) ** 0.125
-    rate += 8.0 * system.passing_frequency + 0.25 * (c.b_xx + c.b_yy) / c.m
+    fastest, start = system.natural_frequencies[1], system.initial
+    bound = c.c_xx + c.c_yy + 2.0 * abs(c.c_xy) + (1.0 + c.phi) * system.contact_stiffness  # as a step is limited
+    rate = max(fastest * _OWN_STEPS * (1e-10 / tolerance) ** 0.125, 0.5 * math.sqrt(bound / c.m))
+    swing = 2.0 * math.pi * fastest * (abs(start.x) + abs(start.y)) + abs(start.vx) + abs(start.vy)
+    turns = float(max(system.wheel.turns, default=0.0))
+    rate += 8.0 * turns * (system.fastest_belt + swing) + 0.25 * (c.b_xx + c.b_yy) / c.m
     steps = 1 + int(min(system.sampled_duration * rate, 1e300))
     each = _OWN_STEP_SECONDS * waves
     if system.finds_patches:
@@ -41,7 +47,8 @@ def steps_and_seconds(system: System) -> tuple[int, float]:
 def evaluation_seconds(system: System) -> float:
     """A rough guess at the time that one evaluation of a contact which is open in part takes."""
     if system.finds_patches:
-        return _EXACT_SECONDS * (1.0 + 2.0 * system.half_length * system.most_turns)
+        terms, waves = len(system.shoe.g) + len(system.wheel.g), 1.0 + 2.0 * system.half_length * system.most_turns
+        return waves * terms * (_TERM_SECONDS + _PAIR_SECONDS * terms)
     return system.nodes * (_NODE_SECONDS + _NODE_WAVE_SECONDS * len(system.wheel.g))
 
 

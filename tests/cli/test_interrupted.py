@@ -15,6 +15,7 @@ from tests.commands import (
     LIMIT,
     LONG,
     QUICK,
+    TINY,
     Done,
     brakecli,
     environment,
@@ -92,6 +93,22 @@ def test_a_signal_ends_a_run_of_slow_steps(here: Path) -> None:
         wait_until((here / ".tiny.h5.part").exists)
         time.sleep(1.0)  # for the tables of the contact
         interrupt(process, signal.SIGINT)
+    assert left_in(here) == {"tiny.toml"}
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_steps_that_find_the_patches_of_many_waves(here: Path, number: signal.Signals) -> None:
+    """A step takes 0.1 s and more, so that a call of the loop must not take as many as on smooth surfaces."""
+    waves = [round(0.03 * 0.1 ** (i / 300), 6) for i in range(300)]
+    rough = f"\n[roughness.wheel]\namplitudes = {[2e-7] * 300}\nwavelengths = {waves}\n"
+    case = TINY.replace(
+        "step = 1e-5, duration = 0.02", 'scheme = "event-driven", tolerance = 1e-6, duration = 2.0'
+    )
+    (here / "tiny.toml").write_text(case.replace("load.force = 5000.0", "load.force = 200.0") + rough)
+    with started("run", "tiny.toml", cwd=here) as process:
+        wait_until((here / ".tiny.h5.part").exists)
+        time.sleep(1.0)
+        interrupt(process, number)
     assert left_in(here) == {"tiny.toml"}
 
 

@@ -29,7 +29,8 @@ _PLANT = plant_type(MOTION)
 _step_at = at_address(STEP)  # compiled in its own place: otherwise `advance` would compile it again
 
 _BUDGET, _EXACT = 4096, 64
-"""Steps of one call, and as how many one counts that finds patches: an interruption need not wait for a sample."""
+"""Steps of one call on smooth surfaces, and as how many one counts that finds patches; the square of the number of
+waves adds to both. An interruption need not wait for a sample."""
 
 _NONE = int(Failure.NONE)
 
@@ -90,6 +91,7 @@ def advance(p: Plant, rows: Floats, events: Floats, stop: int) -> int:
     """
     p = borrowed(p)
     m, counts, drive, grid, row, steps = p.state, p.counts, p.drive, p.grid, 0, 0
+    waves = p.layer.pad.shoe_terms + p.layer.pad.wheel_terms
     shoe = Shoe(p.c, p.layer, m, p.work, counts)
     if m.started == 0:
         first_step(shoe, drive, grid)
@@ -105,7 +107,7 @@ def advance(p: Plant, rows: Floats, events: Floats, stop: int) -> int:
         if counts.level == stop or steps >= _BUDGET:
             return _NONE
         failure: int = _step_at(p.plug.solve)(shoe, drive, grid)
-        steps += 1 if p.layer.contact.kind == CLOSED_FORM else _EXACT
+        steps += 1 + waves * waves // 2000 if p.layer.contact.kind == CLOSED_FORM else _EXACT + waves * waves // 3
         if failure != _NONE:
             for column in range(rows.shape[1]):
                 rows[row, column] = m.row[column]
