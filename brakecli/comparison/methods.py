@@ -79,7 +79,7 @@ def parse_steps(text: str | None) -> list[float]:
         raise UsageError(f"--steps {text}: is not a list of steps; write, for instance, --steps 1e-5,5e-6")
     largest = max(steps)
     if any(abs(largest / step - round(largest / step)) > 1e-9 * largest / step for step in steps):
-        raise UsageError(f"--steps {text}: all must be whole parts of the largest; halve it, for instance")
+        raise UsageError(f"--steps {text}: each must divide the largest; halve it, for instance")
     if len({round(largest / step) for step in steps}) < len(steps):
         raise UsageError(f"--steps {text}: names a step twice; give each once")
     return steps

@@ -89,7 +89,7 @@ def _lines(attributes: dict[str, Any], columns: Columns, best: int | None) -> tu
     parts = [f"{attributes.get('duration', 0.0):.4g} s of motion"]
     parts.append(f"reference good to {attributes.get('reference_error', 0.0):.1e}")
     left_out = attributes.get("left_out", 0)
-    counts = {"failed": (columns["failure"] != "").sum() - left_out, "left out for want of time": left_out}
+    counts = {"failed": (columns["failure"] != "").sum() - left_out, "left out because of the budget": left_out}
     return first, "   ·   ".join(parts + [f"{words} {count}" for words, count in counts.items() if count])
 
 

@@ -92,7 +92,7 @@ def refuse(found: Check, free_bytes: float = math.inf) -> None:
         shorter = f"take a solver.step of at most {longest:.2g} s" if longest else "reduce solver.step"
         what = f"it multiplies disturbances by {growth:.6g} in each of {found.steps} steps"
         remedy = f"{shorter}, {system.method.row.unstable}"
-        raise RefusedError(f"solver.theta: at this step the scheme is unstable, {what}; {remedy}")
+        raise RefusedError(f"solver.theta: at this step the scheme is unstable: {what}; {remedy}")
 
 
 def _blows_up(growth: float, steps: float) -> bool:
@@ -138,7 +138,7 @@ def _warnings(found: Check) -> Iterator[str]:
     nyquist, contact, waves = 0.5 / system.interval, system.natural_frequencies[1], system.passing_frequency
     for what, frequency in (("the contact resonance", contact), ("the shortest wave of the wheel", waves)):
         if frequency > nyquist:
-            above = f"lies above half the sampling rate ({nyquist:.4g} Hz) and would appear at a wrong place"
+            above = f"lies above half the sampling rate ({nyquist:.4g} Hz) and would be aliased"
             remedy = f"sample every {0.4 / frequency:.2g} s or more often"
             yield f"output.sample_interval: {what} at {frequency:.4g} Hz {above} in the spectra; {remedy}"
     if per_wave is not None and per_wave < _COARSE_NODES:
@@ -158,7 +158,7 @@ def _unresolved(system: System, per_period: float) -> Iterator[tuple[str, float,
     else:  # perhaps not for the dashpots, where they are overcritical
         rate = float(np.abs(eigensystem(c, system.contact_stiffness, 0.0)[0]).max())
         if rate * step > 2.0 * math.pi / RESOLVED:
-            what = f"the dashpots settle a motion at a rate of {rate:.4g} 1/s: it is not resolved"
+            what = f"the dashpots damp a motion at a rate of {rate:.4g} 1/s, which the step does not resolve"
             yield what, 2.0 * math.pi / (RESOLVED * rate), ", or event-driven"
     passing, speed = system.passing_frequency, system.fastest_belt
     if passing * step > 1.0 / RESOLVED:
@@ -175,7 +175,7 @@ def _of_the_scheme(system: System, limits: StepLimits, steps: int) -> Iterator[s
     """What iteration and weights do to the motion."""
     method = system.method
     if method.iteration == "fixed-point" and limits.contraction >= 1.0:
-        bound = f"its bound of contraction is {limits.contraction:.3g}, above 1"
+        bound = f"the bound of its contraction factor is {limits.contraction:.3g}, above 1"
         remedy = f'take "newton", or a step of at most {system.step / math.sqrt(limits.contraction):.2g} s'
         yield f"solver.iteration: the fixed-point iteration may diverge ({bound}); {remedy}"
     if not limits.unique:

@@ -141,7 +141,7 @@ def _warnings(motion: Motion, certificate: Certificate | None) -> Iterator[str]:
     work = motion.work
     if work.unconverged_steps and motion.system.method.allow_unconverged:
         what = f"{work.unconverged_steps} of {work.steps} steps did not converge, as the case allows"
-        yield f"{what}; their times and residuals are in the file, the history is not to be trusted there"
+        yield f"{what}; their times and residuals are in the file, the history is not reliable there"
     if work.non_unique_steps:
         what = "steps met a point where their solution need not be unique (the contact force rises with itself)"
         yield f"{work.non_unique_steps} {what}; reduce solver.step or friction.coefficient"

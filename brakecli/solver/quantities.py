@@ -74,7 +74,7 @@ class Failure(IntEnum):
     UNCONVERGED = (
         1,
         'the iteration of a step did not converge; reduce solver.step, take solver.iteration = "newton", '
-        "or set solver.allow_unconverged = true to go on and count such steps",
+        "or set solver.allow_unconverged = true to continue and count these steps",
     )
     DIVERGED = 2, "the motion grew beyond all bounds; reduce solver.step"
     NOT_CLOSED = (
@@ -84,11 +84,11 @@ class Failure(IntEnum):
     )
     UNBALANCED = (
         4,
-        "the energy account does not close, so the step does not resolve the motion and the history is not to be "
-        "trusted; reduce solver.step",
+        "the energy account does not close, so the step does not resolve the motion and the history is not "
+        "reliable; reduce solver.step",
     )
     STALLED = (
         5,
-        "the steps shrink to nothing: stick, slip, lift-off and touch-down follow each other without progress, or "
-        "the tolerance is below what the forces are known to; increase solver.tolerance",
+        "the steps shrink to nothing: stick, slip, lift-off and touch-down alternate without progress, or "
+        "the tolerance is below the accuracy of the forces; increase solver.tolerance",
     )

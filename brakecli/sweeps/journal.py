@@ -165,10 +165,10 @@ def _refusal(found: bytes, own: Mapping[str, Any]) -> str:
             there |= {key: own[key] for key in ("brakecli_version", "brakecli_sources")}
         keys = [key for key in {**there, **own} if there.get(key) != own.get(key)]
     except (ValueError, TypeError, AttributeError, RecursionError):
-        return "holds no finished points; remove it, or start anew with --force"
+        return "holds no finished points; remove it, or start again with --force"
     if not keys:
         return ""
     each = [f"{key} was {there.get(key, 'not set')!s:.60}, is {own.get(key, 'not set')!s:.60}" for key in keys]
     each[MOST_DIFFERENCES:] = [f"and {more} more"] if (more := len(keys) - MOST_DIFFERENCES) > 0 else []
-    remedy = "undo the change to go on, or start anew with --force, which drops the finished points"
+    remedy = "undo the change to go on, or start again with --force, which drops the finished points"
     return f"holds finished points of another sweep: {', '.join(each)}; {remedy}"

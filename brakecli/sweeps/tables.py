@@ -34,7 +34,7 @@ class Axis(Table):
     start: Number | None = described("first value", None)
     stop: Number | None = described("last value", None)
     num: Annotated[int, Field(ge=1)] | None = described("number of values", None)
-    spacing: Literal["linear", "log"] = described("how the values lie between the first and last", "linear")
+    spacing: Literal["linear", "log"] = described("how the values are spaced between the first and last", "linear")
     values: Annotated[tuple[Any, ...], Field(min_length=1), *from_list] | None = described(
         "the values themselves", None
     )
@@ -108,7 +108,7 @@ class Sweep(Table):
 
     title: Title = ""
     case: str = described("the base case's file, seen from the sweep's own", min_length=1)
-    axis: Annotated[tuple[Axis, ...], *from_list] = described("the axes of the grid, the last one fastest", ())
+    axis: Annotated[tuple[Axis, ...], *from_list] = described("the axes of the grid; the last varies fastest", ())
     critical: Critical | None = described("the critical parameter to find at each point", None)
 
     def _broken_rules(self) -> Iterator[Problem]:

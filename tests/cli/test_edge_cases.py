@@ -63,7 +63,7 @@ def test_an_explicit_scheme_beyond_its_step_is_refused_with_the_limit_which_then
     )
     limits = []
     for done in (two_layer, three_layer):
-        told = done.told(3, "solver.theta: at this step the scheme is unstable, it multiplies disturbances by")
+        told = done.told(3, "solver.theta: at this step the scheme is unstable: it multiplies disturbances by")
         limits.append(float(told.split("take a solver.step of at most ")[1].split()[0]))
     # Leapfrog is stable up to 2/ω of the highest frequency, 181.8 Hz (dashpots lower it a little).
     assert limits[1] == pytest.approx(2.0 / (2.0 * np.pi * 181.8), rel=0.05)
@@ -92,7 +92,9 @@ def test_steps_that_do_not_converge_end_the_run_unless_allowed_and_are_kept(here
     diverging = ["solver.iteration='fixed-point'", "solver.step=2e-3", "output.sample_interval=2e-3"]
     diverging += ["solver.duration=0.2", "contact.stiffness=2e9"]
     strict, allowed = variants(here, diverging, [*diverging, "solver.allow_unconverged=true"])
-    strict.told(1, "solver.iteration: the fixed-point iteration may diverge (its bound of contraction is ")
+    strict.told(
+        1, "solver.iteration: the fixed-point iteration may diverge (the bound of its contraction factor is "
+    )
     strict.told(1, "the iteration of a step did not converge", "0.h5: the history up to the failure was written")
     assert strict.json["unconverged_steps"] == 1
     assert strict.json["status"] == "failed"

@@ -370,7 +370,7 @@ def test_options_and_outputs_that_cannot_be_are_refused_before_anything_is_compu
     wrong = {
         ("-o", "there.h5"): "--force",
         ("--schemes", "one-layer"): "give some of two-layer, three-layer, event-driven",
-        ("--steps", "1e-5,3e-6"): "whole parts of the largest",
+        ("--steps", "1e-5,3e-6"): "must divide the largest",
         ("--steps", "1e-5,1e-5"): "twice",
         ("--budget", "0"): "--budget",
         ("--target-error", "2"): "--target-error",

@@ -111,6 +111,7 @@ def test_dashpots_that_a_step_does_not_resolve_are_told() -> None:
     # b/m of the stronger dashpot is 1e6 1/s: in steps of 1e-5 s ten of its time constants pass.
     found = check(system_of(make(SQUEAL, link1__damping=1e7)))
     assert any(
-        "the dashpots settle a motion at a rate of 1e+06 1/s: it is not resolved" in w for w in found.warnings
+        "the dashpots damp a motion at a rate of 1e+06 1/s, which the step does not resolve" in w
+        for w in found.warnings
     )
     assert check(system_of(make(SQUEAL, link1__damping=1e4))).warnings == ()

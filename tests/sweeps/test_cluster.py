@@ -262,7 +262,7 @@ def test_a_cluster_without_workers_or_with_those_of_another_version_is_reported(
         with started(*command, cwd=here) as process:
             wait_until(lambda: journal_size(here) > 1500)
             cluster.worker("--no-nanny", PYTHONPATH=str(other))  # one that comes later
-            told = ended(process).told(3, "brakecli_version is 99.0 on a worker that has come later")
+            told = ended(process).told(3, "brakecli_version is 99.0 on a worker that joined later")
         assert told.count("\n") == 1
         kept = journal_size(here)
         assert kept > 1500

@@ -58,7 +58,7 @@ def test_finished_points_of_another_sweep_are_refused_and_the_key_named(
     assert left_in(tmp_path) == {"tiny.toml", "s.toml", "s.h5.partial"}
     edit(tmp_path)
     before = (tmp_path / "s.h5.partial").read_bytes()
-    with pytest.raises(RefusedError, match=r"s\.h5\.partial: holds .* start anew with --force") as refused:
+    with pytest.raises(RefusedError, match=r"s\.h5\.partial: holds .* start again with --force") as refused:
         inline(read_sweep(str(tmp_path / "s.toml")), tmp_path / "s.h5", compute_units)
     assert refused.value.exit_code == 3
     assert difference in str(refused.value)

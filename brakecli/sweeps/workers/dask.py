@@ -177,7 +177,7 @@ class ClusterEngine(Engine):
 
 def _attempt(compute: Compute, task: Task, versions: Mapping[str, str]) -> Finished | str:
     """Compute a task in a worker of the cluster; the difference where that is of another version."""
-    return _difference(versions, fingerprint(), "a worker that has come later") or attempt(compute, task)
+    return _difference(versions, fingerprint(), "a worker that joined later") or attempt(compute, task)
 
 
 def _difference(ours: Mapping[str, str], theirs: Mapping[str, str], who: str) -> str:
