@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from brakecli.errors import CaseError, UsageError
+from brakecli.errors import CaseError, UnreadableResultError, UsageError
 
 if TYPE_CHECKING:
     from brakecli.case.read import LoadedCase
@@ -31,8 +31,14 @@ def load_case(source: str, overrides: list[str] | None) -> "LoadedCase":
     from brakecli.files.read import open_result
 
     with open_result(Path(source), kind="run") as result:
-        text, resolved = result.attributes["case_toml"], result.attributes["resolved_toml"]
-    return replace(parse_case(resolved, f"{source} (its resolved case)", overrides or ()), text=text)
+        given, resolved = result.text("case_toml"), result.text("resolved_toml")
+    label = f"{source} (its resolved case)"
+    try:
+        parse_case(resolved, label)
+    except CaseError as error:
+        what = f"{source}: the case in it is not valid: {error.problems[0]}"
+        raise UnreadableResultError(f"{what}; name an intact result file") from error
+    return replace(parse_case(resolved, label, overrides or ()), text=given)
 
 
 def load_sweep(source: str, overrides: list[str] | None) -> "LoadedSweep":

@@ -37,7 +37,7 @@ def test_a_broken_result_is_no_case_to_run_again(good: Path, tmp_path: Path) -> 
     expected = {name: (code, reason) for name, (_, code, reason) in files.items()} | {
         "foreign.h5": (4, "was not written by this program"),
         "sweep.h5": (4, "holds a result of kind 'sweep'"),
-        "edited.h5": (2, "shoe.mass"),
+        "edited.h5": (4, "the case in it is not valid: "),
         "missing.h5": (2, "missing.h5: cannot be read"),
     }
     done = each(tmp_path, [["run", name, "-o", "out.h5"] for name in expected])
