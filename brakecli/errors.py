@@ -6,9 +6,11 @@ Every message reads *where: what is wrong (what was found); what to do*.
 import json
 import os
 import re
+import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+_ODD = {"Cc", "Cf", "Cn", "Co", "Cs", "Zl", "Zp"}  # categories of Unicode
 KeyPath = tuple[str | int, ...]
 """The names of the tables and of the key, from the top of a file on; a number is a place in a list."""
 
@@ -111,5 +113,12 @@ def value_text(value: object) -> str:
 
 def printable(text: str) -> str:
     """A text in one line of at most 80 characters that a terminal shows as they are."""
-    text = text if len(text) <= 80 else text[:79] + "…"
-    return "".join(char if char.isprintable() else f"\\u{ord(char):04x}" for char in text)
+    return escaped(text if len(text) <= 80 else text[:79] + "…")
+
+
+def escaped(text: str, kept: str = "") -> str:
+    """A text for a terminal: control characters, and those that turn its direction, are written as in JSON."""
+    if text.isprintable():
+        return text
+    odd = {char for char in text if unicodedata.category(char) in _ODD and char not in kept}
+    return text.translate({ord(char): json.dumps(char)[1:-1] for char in odd})

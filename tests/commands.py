@@ -8,6 +8,7 @@ import atexit
 import json
 import math
 import os
+import resource
 import shlex
 import signal
 import subprocess
@@ -82,7 +83,11 @@ class Done:
 
 
 def brakecli(
-    *arguments: str | Path, cwd: Path, stdin: str | None = None, stdout: str | None = None, **changes: str | None
+    *arguments: str | Path,
+    cwd: Path,
+    stdin: str | None = None,
+    stdout: str | None = None,
+    **changes: str | None,
 ) -> Done:
     """Run one command to its end: a fork, unless it needs another environment or standard input.
 
@@ -90,12 +95,7 @@ def brakecli(
     """
     words = [str(argument) for argument in arguments]
     if stdin is None and not changes:
-        server = _server()
-        assert server.stdin is not None
-        assert server.stdout is not None
-        server.stdin.write(json.dumps([str(cwd), words, stdout]) + "\n")
-        server.stdin.flush()
-        return Done(**json.loads(server.stdout.readline()))
+        return forked(*words, cwd=cwd, stdout=stdout)
     done = subprocess.run(
         [*COMMAND, *words],
         cwd=cwd,
@@ -105,6 +105,16 @@ def brakecli(
         env=environment(**changes),
     )
     return Done(done.returncode, done.stdout.decode(), done.stderr.decode())
+
+
+def forked(*words: str, cwd: Path, stdout: str | None = None, memory: int | None = None) -> Done:
+    """Run one command in a fork, which may take so many bytes of memory."""
+    server = _server()
+    assert server.stdin is not None
+    assert server.stdout is not None
+    server.stdin.write(json.dumps([str(cwd), words, stdout, memory]) + "\n")
+    server.stdin.flush()
+    return Done(**json.loads(server.stdout.readline()))
 
 
 @contextmanager
@@ -200,11 +210,14 @@ def _serve() -> None:
     from brakecli.__main__ import main
 
     for line in sys.stdin:
-        cwd, words, place = json.loads(line)
+        cwd, words, place, memory = json.loads(line)
         with TemporaryFile() as out, TemporaryFile() as err, Path(os.devnull).open("rb") as nothing:
             child = os.fork()
             if child == 0:
                 os.chdir(cwd)
+                if memory:
+                    pages = int(Path("/proc/self/statm").read_text().split()[0])
+                    resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + memory,) * 2)
                 written = os.open(place, os.O_WRONLY) if place else out.fileno()
                 for number, opened in enumerate((nothing.fileno(), written, err.fileno())):
                     os.dup2(opened, number)

@@ -68,8 +68,8 @@ def test_every_file_beside_the_cases_reads() -> None:
     kinds = {True: 0, False: 0}
     for path in sorted(FOLDER.glob("*.toml")):
         text = path.read_text()
-        kinds[(kind_of(str(path)) == "sweep")] += 1
-        if kind_of(str(path)) == "sweep":
+        kinds[(kind_of(text) == "sweep")] += 1
+        if kind_of(text) == "sweep":
             assert read_sweep(str(path)).plan.points > 1
         else:
             system_of(parse_case(text, path.name).case)

@@ -63,40 +63,43 @@ def read_text(source: str) -> tuple[str, str]:
         raise unfit(what, "save the file as UTF-8", name, line) from error
 
 
-def parse_case(text: str, label: str, overrides: Sequence[str] = ()) -> LoadedCase:
+def parse_case(text: str, label: str, overrides: Sequence[str] = (), option: str = "--set") -> LoadedCase:
     """Make a case of a TOML text, which messages call `label`. Raises `CaseError`, which holds every problem.
 
-    An override reads `key.path=VALUE`, the value in TOML. It replaces what the text says, creates the tables
-    that it needs, and takes effect before anything is checked. Of two keys that exclude each other (a constant
-    load or a schedule), an override of one removes the other from the text.
+    An override reads `key.path=VALUE`, the value in TOML; messages call it by its option. It replaces what the
+    text says, creates the tables that it needs, and takes effect before anything is checked. Of two keys that
+    exclude each other (a constant load or a schedule), an override of one removes the other from the text.
     """
-    case = parse_table(Case, text, label, overrides)
+    case = parse_table(Case, text, label, overrides, option)
     return LoadedCase(case, text, resolved_toml(case))
 
 
-def parse_table(kind: type[_Table], text: str, label: str, overrides: Sequence[str] = ()) -> _Table:
+def parse_table(
+    kind: type[_Table], text: str, label: str, overrides: Sequence[str] = (), option: str = "--set"
+) -> _Table:
     """Make a table of some kind, such as a case, of a whole TOML text; see `parse_case`."""
     located, problems = Located(text, label), list[Problem]()
     try:
         data = parse(text, label)
     except CaseError as error:
         data, problems = located.data, located.problems or [*error.problems]
-    all_is_readable = all(problem.path for problem in problems)
+    all_is_readable, twice = all(problem.path for problem in problems), {problem.path for problem in problems}
     sources, set_by = [label], dict[KeyPath, str]()
     for override in overrides:
-        sources.append(option := f"--set {printable(override)}")
+        sources.append(by := f"{option} {printable(override)}")
         try:
             path, value = parse_override(override)
-            set_by |= dict.fromkeys((*put(data, path, value, kind, kept=set_by), path), option)
+            set_by |= dict.fromkeys((*put(data, path, value, kind, kept=set_by), path), by)
         except CaseError as error:
-            problems += [replace(problem, source=option, line=0) for problem in error.problems]
+            problems += [replace(problem, source=by, line=0) for problem in error.problems]
     try:
         table = kind.model_validate(data)
     except ValidationError as error:
         for problem in wording.problems(error, kind):
             by = innermost(set_by, problem.path, "")
             line = 0 if by else innermost(located.lines, problem.path, 0)
-            if problem.what != MISSING or all_is_readable:  # otherwise it may stand where nothing can be read
+            # what is missing may stand where nothing can be read, and of what is given twice one is kept
+            if (problem.what != MISSING or all_is_readable) and problem.path not in twice:
                 problems.append(replace(problem, source=by or label, line=line))
     if problems:
         raise CaseError(sorted(problems, key=lambda problem: (sources.index(problem.source), problem.line)))

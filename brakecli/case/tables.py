@@ -12,6 +12,7 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
+    TypeAdapter,
     ValidationError,
     WrapValidator,
     model_validator,
@@ -157,13 +158,18 @@ class Table(BaseModel):
         """The table with the keys that are wrong by themselves left out, not even set to their defaults."""
         values = {key: data[key] for key in (cls.model_fields.keys() & data.keys()) - wrong}
         for key in values:
-            kind = cls.model_fields[key].annotation
-            if isinstance(kind, type) and issubclass(kind, Table):
-                values[key] = kind.model_validate(values[key])
+            values[key] = _adapter(cls, key).validate_python(values[key])
         table = cast(Self, cls.model_construct(**values))  # the mypy plugin loses Self here
         for key in wrong:
             table.__dict__.pop(key, None)
         return table
+
+
+@cache
+def _adapter(kind: type[Table], key: str) -> TypeAdapter[Any]:
+    """What makes the value of one key."""
+    form: Any = Annotated[kind.model_fields[key].annotation, kind.model_fields[key]]
+    return TypeAdapter(form)
 
 
 def entries(values: tuple[Any, ...]) -> str:

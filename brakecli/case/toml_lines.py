@@ -9,7 +9,7 @@ import tomllib
 from collections.abc import Mapping
 from typing import Any, TypeVar
 
-from brakecli.errors import CaseError, KeyPath, Problem, printable
+from brakecli.errors import CaseError, KeyPath, Problem, key_text, printable
 
 # Within these limits every problem of a file is reported within half a second.
 LARGEST_TEXT = 500_000  # bytes
@@ -102,7 +102,7 @@ class Located:
         self.data: dict[str, Any] = {}
         self.lines: dict[KeyPath, int] = {}
         self.problems: list[Problem] = []
-        self._source = source
+        self._source, self._repeated = source, False
         table: dict[str, Any] | None = self.data
         path: KeyPath = ()
         for line, statement in split(text, source):
@@ -126,6 +126,9 @@ class Located:
         for count, key in enumerate(keys, start=1):
             new = leaf if count == len(keys) else {}  # [{}] for a header in double brackets
             path, table = (*path, key), table.setdefault(key, type(new)())
+            if new is leaf and {type(table), type(leaf)} == {dict, list}:
+                self._report_twice(path, line, f"has both headers [{key_text(path)}] and [[{key_text(path)}]]")
+                return None, path
             if isinstance(table, list) and new:
                 self.lines.setdefault(path, line)
                 table += new
@@ -134,7 +137,8 @@ class Located:
             if not isinstance(table, dict):
                 self._report_twice(path, line)
                 return None, path
-        if path in self.lines:
+        self._repeated = path in self.lines
+        if self._repeated:
             self._report_twice(path, line)
         self.lines.setdefault(path, line)
         return table, path
@@ -145,15 +149,15 @@ class Located:
             if isinstance(value, dict) and isinstance(table.setdefault(key, {}), dict):
                 self.lines.setdefault(here, line)
                 self._add(table[key], here, value, line)
-            elif key in table:
-                self._report_twice(here, line)
-            else:
+            elif key not in table:
                 table[key] = value
                 self.lines.setdefault(here, line)
+            elif not self._repeated:  # otherwise its table was reported
+                self._report_twice(here, line)
 
-    def _report_twice(self, path: KeyPath, line: int) -> None:
+    def _report_twice(self, path: KeyPath, line: int, what: str = "is given twice") -> None:
         first = innermost(self.lines, path, 0)
-        what = "is given twice" + (f", first in line {first}" if first else "")
+        what += f", first in line {first}" if first else ""
         self.problems.append(Problem(path, what, "keep one of the two", self._source, line))
 
 

@@ -1,5 +1,6 @@
 """What pydantic found wrong with a table, in plain sentences that name the remedy."""
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from difflib import get_close_matches
@@ -19,7 +20,8 @@ _WHAT = {
     **dict.fromkeys(("enum", "literal_error"), "is not one of the choices"),
     "tuple_type": "is not a list",
     "model_type": "is not a table",
-    **dict.fromkeys(("too_short", "string_too_short"), "is too short"),
+    "too_short": "is too short",
+    "string_too_short": "is empty",
     "finite_number": "is not finite",
     **dict.fromkeys(("greater_than", "greater_than_equal", "less_than_equal"), "is out of range"),
     "magnitude": f"is not between {SMALLEST:g} and {LARGEST:g} in magnitude",
@@ -34,11 +36,13 @@ def problems(error: ValidationError, kind: type[Table]) -> Iterator[Problem]:
     tables = tables_within(kind)
     errors = error.errors(include_url=False)
     meant = {each["loc"]: _meant(each["loc"], tables) for each in errors if each["type"] == "extra_forbidden"}
-    misspelt = {paths[0] for paths in meant.values() if paths}
+    misspelt = [paths[0] for paths in meant.values() if paths]
     for each in errors:
         path, value, reason = each["loc"], each["input"], each["type"]
         if reason == "rule":
-            yield replace(each["ctx"]["problem"], path=path)
+            problem = replace(each["ctx"]["problem"], path=path)
+            if problem.what != MISSING or not any(_may_be(problem, near) for near in misspelt):
+                yield problem
         elif reason == "missing":
             if path not in misspelt:
                 yield Problem(path, MISSING, f"give {_expected(path, kind)}")
@@ -54,7 +58,7 @@ def problems(error: ValidationError, kind: type[Table]) -> Iterator[Problem]:
         else:
             near = " or ".join(_name(near, tables) for near in meant[path])
             yield Problem(path, "is unknown" + found(value), f"did you mean {near}?")
-            inner = tables.get(meant[path][0])
+            inner = tables.get(_names(meant[path][0]))
             if inner and isinstance(value, dict):  # a table whose name is misspelt has keys, too
                 try:
                     inner.model_validate(value)
@@ -67,19 +71,36 @@ def _meant(path: KeyPath, tables: dict[KeyPath, type[Table]]) -> list[KeyPath]:
     parent, key = _table(path), str(path[-1])
     known = dict.fromkeys(name for kind in tables.values() for name in kind.model_fields)
     if key not in known:
-        if near := get_close_matches(key, tables[parent].model_fields, n=1, cutoff=0.7):
-            return [(*parent, near[0])]
+        if near := get_close_matches(key, tables[parent].model_fields, n=1, cutoff=0.65):  # nmu for num
+            return [(*path[:-1], near[0])]
         key = next(iter(get_close_matches(key, known, n=1, cutoff=0.7)), "")
     return [(*table, key) for table, kind in tables.items() if key in kind.model_fields]
 
 
+def _may_be(missing: Problem, path: KeyPath) -> bool:
+    """Whether a key is the one that is missing, or one of the choices in its place."""
+    choices = re.findall(r"\w+", missing.remedy) if ", or " in missing.remedy else ()
+    return missing.path == path or (missing.path[:-1] == path[:-1] and path[-1] in choices)
+
+
 def _name(path: KeyPath, tables: dict[KeyPath, type[Table]]) -> str:
-    return f"[{key_text(path)}]" if path in tables else key_text(path)
+    path = _names(path)
+    return _header(path, tables[()]) if path in tables else key_text(path)
+
+
+def _header(path: KeyPath, kind: type[Table]) -> str:
+    is_list = key_schema(kind, path)["type"] == "array"
+    return f"[[{key_text(path)}]]" if is_list else f"[{key_text(path)}]"
+
+
+def _names(path: KeyPath) -> KeyPath:
+    """A path without the places in lists."""
+    return tuple(part for part in path if isinstance(part, str))
 
 
 def _table(path: KeyPath) -> KeyPath:
     """The table around a key, without the places in lists."""
-    return tuple(part for part in path[:-1] if isinstance(part, str))
+    return _names(path[:-1])
 
 
 def _expected(path: KeyPath, kind: type[Table]) -> str:
@@ -90,8 +111,12 @@ def _expected(path: KeyPath, kind: type[Table]) -> str:
     if node["type"] == "object":
         required = node.get("required", []) + node.get("oneOf", [{}])[0].get("required", [])
         return f"the table [{key_text(path)}]" + (f" with {' and '.join(required)}" if required else "")
+    if "array" in node["type"] and path in tables_within(kind):
+        return f"each entry under a header of its own, {_header(path, kind)}"
     if "array" in node["type"]:
         text = f"a list{' of at least one entry' if 'minItems' in node else ''}, each {_value(node['items'])}"
+    elif "minLength" in node:
+        text = "a text of at least one character"
     else:
         text = _value(node)
     return text if node.get("unit") in (None, "1") else f"{text}, in {node['unit']}"

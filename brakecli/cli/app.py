@@ -4,6 +4,8 @@ A new command is one file and one entry of `COMMANDS`. Heavy imports stand insid
 that `--help` is quick.
 """
 
+import os
+import resource
 import sys
 from typing import Annotated
 
@@ -13,11 +15,14 @@ from brakecli import __version__
 from brakecli.cli import check, classify, compare_schemes, new, plot, run, schema, stability, sweep
 from brakecli.cli.options import option
 from brakecli.cli.output import say, show
-from brakecli.errors import BrakecliError
+from brakecli.errors import BrakecliError, RefusedError
 from brakecli.files.os_signals import Interrupted
 
 COMMANDS = (run, sweep, classify, compare_schemes, stability, check, new, schema, plot)
 """The files of the commands, in the order in which `--help` lists them."""
+
+LIBRARIES, LIBRARIES_PER_CORE = 600_000_000, 50_000_000
+"""Bytes of address space to load the libraries and compile all kernels; with less, LLVM aborts or never ends."""
 
 app = typer.Typer(
     name="brakecli",
@@ -44,7 +49,7 @@ def main() -> None:
     except OSError as error:  # not of an input or output, but of a file such as the cache of compiled code
         message = f"{error.filename or 'a file'}: cannot be read or written: {error.strerror or error}"
         code = 74
-    say(*message.splitlines())
+    say(*message.split("\n"))
     sys.exit(code)
 
 
@@ -59,4 +64,10 @@ VERSION = option("Print the version and exit.", None, "--version", callback=_pri
 
 @app.callback()
 def _common(version: Annotated[bool, VERSION] = False) -> None:
-    pass
+    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+    needed = LIBRARIES + LIBRARIES_PER_CORE * min(os.cpu_count() or 1, 64)
+    if 0 <= limit < needed:
+        what = (
+            f"the address space is limited to {limit / 1e6:.0f} MB, and the libraries need {needed / 1e6:.0f} MB"
+        )
+        raise RefusedError(f"{what}; raise the limit with: ulimit -v unlimited")

@@ -1,12 +1,14 @@
 """The files that a command is given: of which kind they are, what they hold, and where their results go."""
 
 import os
+import shlex
 from contextlib import suppress
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from brakecli.errors import CaseError, UsageError
+from brakecli.errors import CaseError, UnreadableResultError, UsageError
 
 if TYPE_CHECKING:
     from brakecli.case.read import LoadedCase
@@ -15,39 +17,64 @@ if TYPE_CHECKING:
 
 def load_case(source: str, overrides: list[str] | None) -> "LoadedCase":
     """The case of a case file, or the one that a result file holds."""
-    from brakecli.case.read import parse_case, read_case
+    from brakecli.case.read import parse_case
 
     if not _is_result(source):
+        text = _text(source)
         try:
-            return read_case(source, overrides or ())
+            return parse_case(*text, overrides or ())
         except CaseError as error:
             if is_sweep(source):
-                raise UsageError(f"{source}: this is a sweep; compute it with: brakecli sweep {source}") from error
+                remedy = f"compute it with: brakecli sweep {as_argument(source)}"
+                raise UsageError(f"{text[1]}: this is a sweep; {remedy}") from error
             raise
     from brakecli.files.read import open_result
 
     with open_result(Path(source), kind="run") as result:
-        text, resolved = result.attributes["case_toml"], result.attributes["resolved_toml"]
-    return replace(parse_case(resolved, f"{source} (its resolved case)", overrides or ()), text=text)
+        given, resolved = result.text("case_toml"), result.text("resolved_toml")
+    label = f"{source} (its resolved case)"
+    try:
+        parse_case(resolved, label)
+    except CaseError as error:
+        what = f"{source}: the case in it is not valid: {error.problems[0]}"
+        raise UnreadableResultError(f"{what}; name an intact result file") from error
+    return replace(parse_case(resolved, label, overrides or ()), text=given)
 
 
 def load_sweep(source: str, overrides: list[str] | None) -> "LoadedSweep":
     """The sweep of a sweep file."""
-    from brakecli.sweeps.plan import kind_of, read_sweep
+    from brakecli.sweeps.plan import kind_of, parse_sweep
 
+    text, name = _text(source)
     try:
-        return read_sweep(source, overrides or ())
+        folder = Path(source).parent if os.path.isfile(source) else Path()  # noqa: PTH113 - pathlib's may raise
+        return parse_sweep(text, name, folder, overrides or ())
     except CaseError as error:
-        if source != "-" and kind_of(source) == "case":
-            raise UsageError(f"{source}: this is a case; simulate it with: brakecli run {source}") from error
+        if kind_of(text) == "case":
+            remedy = f"simulate it with: brakecli run {as_argument(source)}"
+            raise UsageError(f"{name}: this is a case; {remedy}") from error
         raise
 
 
 def is_sweep(source: str) -> bool:
-    """Whether a file is meant to be a sweep; standard input can be read only once, and holds a case."""
+    """Whether a file is meant to be a sweep."""
     from brakecli.sweeps.plan import kind_of
 
-    return source != "-" and not _is_result(source) and kind_of(source) == "sweep"
+    return not _is_result(source) and kind_of(_text(source)[0]) == "sweep"
+
+
+def as_argument(path: str | Path) -> str:
+    """A path as the shell takes it, and as no command takes it for an option."""
+    text = str(path)
+    return shlex.quote(f"./{text}" if text.startswith("-") and text != "-" else text)
+
+
+@cache
+def _text(source: str) -> tuple[str, str]:
+    """The text of a source and its name; a pipe can be read only once."""
+    from brakecli.case.read import read_text
+
+    return read_text(source)
 
 
 def result_path(output: Path | None, source: str, kind: str = "case", ending: str = ".h5") -> Path:

@@ -1,11 +1,11 @@
 """`brakecli new`."""
 
-import shlex
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from brakecli.cli.inputs import as_argument
 from brakecli.cli.options import Force, Quiet, output_option
 from brakecli.cli.output import show
 from brakecli.errors import UsageError
@@ -29,4 +29,4 @@ def command(
         file.write(starter_text().encode())
         file.publish()
     if not quiet:
-        show(f"{path}: written; run it with: brakecli run {shlex.quote(str(path))}")
+        show(f"{path}: written; run it with: brakecli run {as_argument(path)}")

@@ -4,9 +4,9 @@ import json
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, TextIO, cast
 
-from brakecli.files.os_signals import unwinding
+from brakecli.files.os_signals import Styled, unwinding
 
 
 def show(text: str) -> None:
@@ -27,7 +27,7 @@ def show_result(
     if as_json:
         show_json({"command": command, **numbers})
     elif not quiet:
-        show(table(*found))
+        print(table(*found), file=Styled(sys.stdout), flush=True)  # it escapes what is in its cells
 
 
 def say(*lines: str) -> None:
@@ -67,8 +67,9 @@ def progress(quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
         from rich import progress as rich_progress
         from rich.console import Console
 
+        console = Console(file=cast(TextIO, Styled(sys.stderr)))
         columns = (*rich_progress.Progress.get_default_columns(), rich_progress.MofNCompleteColumn())
-        with rich_progress.Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        with rich_progress.Progress(*columns, console=console, transient=True) as bar:
             task = bar.add_task("", visible=False)
 
             def show(what: str, done: int, total: int) -> None:

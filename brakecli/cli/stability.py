@@ -35,7 +35,7 @@ def command(
     with within_range():
         report = stability(system_of(loaded.case))
         for value in values:
-            varied = parse_case(loaded.resolved, "--vary", (f"{key}={value!r}",)).case
+            varied = parse_case(loaded.resolved, "--vary", (f"{key}={value!r}",), "--vary").case
             entries.append({"value": value, **values_of(VARIED, stability(system_of(varied)))})
     numbers, found = values_of(STABILITY, report), (loaded.case.title, report, key, entries)
     if key:
@@ -47,11 +47,13 @@ def _parse_range(text: str) -> tuple[str, list[float]]:
     """The key and the values of KEY=START:STOP:NUM, both ends included; raises UsageError."""
     import numpy as np
 
+    from brakecli.case.read import key_path
+
     key, _, numbers = text.partition("=")
     with suppress(ValueError):
         start, stop, count = numbers.split(":")
         first, last, size = float(start), float(stop), int(count)
-        if key and 1 <= size <= MOST_VALUES and math.isfinite(first) and math.isfinite(last):
+        if key_path(key) and 1 <= size <= MOST_VALUES and math.isfinite(first) and math.isfinite(last):
             return key, np.linspace(first, last, size).tolist()
     what = f"is not KEY=START:STOP:NUM with NUM from 1 to {MOST_VALUES}"
     raise UsageError(f"--vary {text}: {what}; write, for instance, --vary link2.angle_deg=1:10:10")

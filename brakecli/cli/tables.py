@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from brakecli.errors import escaped
 from brakecli.files import fields
 from brakecli.files.field import Field, named
 from brakecli.solver.contact import EVALUATORS
@@ -264,7 +265,9 @@ def _table(title: str, rows: Sequence[Row]) -> str:
     """Rows in two columns."""
     lines = [(label, text) for label, texts in rows for text in ([texts] if isinstance(texts, str) else texts)]
     labels, values = zip(*lines, strict=True)
-    return _grid({"label": labels, "value": values}, title=title or None, title_justify="left", show_header=False)
+    return _grid(
+        {"label": labels, "value": values}, title=escaped(title) or None, title_justify="left", show_header=False
+    )
 
 
 def _grid(columns: Mapping[str, Sequence[str]], **style: Any) -> str:
@@ -274,9 +277,9 @@ def _grid(columns: Mapping[str, Sequence[str]], **style: Any) -> str:
 
     table = Table(box=None, padding=(0, 2, 0, 0), **style)
     for header in columns:
-        table.add_column(header, overflow="fold", style="bold" if header == "label" else None)
+        table.add_column(escaped(header), overflow="fold", style="bold" if header == "label" else None)
     for line in zip(*columns.values(), strict=True):
-        table.add_row(*line)
+        table.add_row(*map(escaped, line))
     console = Console(markup=False, emoji=False, highlight=False)  # titles and file names are not markup
     console.width = max(console.width, NARROWEST)
     with console.capture() as shown:

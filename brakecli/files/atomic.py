@@ -32,7 +32,7 @@ class OutputFile(FileIO):
         self.failure: OSError | None = None
         self._target, self._force = target, force
         self._temporary = target.with_name(f".{target.name}.part")
-        super().__init__(self._temporary, "w+", opener=_open_no_link)
+        super().__init__(self._temporary, "w+", opener=open_own)
 
     def write(self, data: Any) -> int:
         """Write all of `data`, or remember why not."""
@@ -101,6 +101,9 @@ def new_output(path: Path, *, force: bool) -> Iterator[OutputFile]:
         with signals_deferred(), explained(path):
             descriptor = _acquired(path, lock)
             clean_up.callback(_release, descriptor, lock)
+            part = target.with_name(f".{target.name}.part")
+            if os.path.lexists(part) and not os.fstat(descriptor).st_size:  # a killed process leaves both
+                raise _not_ours(part)
             os.ftruncate(descriptor, 0)
             os.pwrite(descriptor, f"process {os.getpid()} on {socket.gethostname()}\n".encode(), 0)
             output = OutputFile(path, target, force=force)
@@ -137,8 +140,11 @@ def _checked_target(path: Path, *, force: bool) -> Path:
 def _acquired(path: Path, lock: Path) -> int:
     """Open and lock the lock file, unless another process holds it."""
     while True:
-        descriptor = _open_no_link(lock, os.O_RDWR | os.O_CREAT)
+        descriptor = open_own(lock, os.O_RDWR | os.O_CREAT)
         holder = os.pread(descriptor, 1000, 0).decode(errors="replace").strip()
+        if holder and not holder.startswith("process "):
+            os.close(descriptor)
+            raise _not_ours(lock)
         if not _take(descriptor, holder):
             os.close(descriptor)
             raise UsageError(
@@ -185,8 +191,18 @@ def _release(descriptor: int, lock: Path) -> None:
     os.close(descriptor)
 
 
-def _open_no_link(path: str | Path, flags: int) -> int:
+def open_own(path: str | Path, flags: int) -> int:
+    """Open a file that stands beside an output: a regular one of this user without other names, or a new one."""
+    with suppress(FileNotFoundError):
+        there = os.lstat(path)
+        if not stat.S_ISREG(there.st_mode) or there.st_uid != os.geteuid() or there.st_nlink > 1:
+            raise _not_ours(path)
     return os.open(path, flags | os.O_NOFOLLOW | os.O_CLOEXEC, 0o666)
+
+
+def _not_ours(path: str | Path) -> CannotWriteError:
+    what = "is in the way: it is not a file that this program has written"
+    return CannotWriteError(f"{path}: {what}; move it away, or choose another output with -o")
 
 
 @contextmanager

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
-from brakecli.errors import CannotWriteError
+from brakecli.errors import CannotWriteError, escaped
 
 _WORDS: dict[int, str] = {signal.SIGHUP: "hung up", signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
 
@@ -126,7 +126,34 @@ def guard_streams() -> None:
     for number, name in ((1, "stdout"), (2, "stderr")):
         raw = io.BufferedWriter(_Stream(number, "w", closefd=False))
         encoding = getattr(getattr(sys, name), "encoding", "utf-8")  # None if closed before Python started
-        setattr(sys, name, io.TextIOWrapper(raw, encoding, "backslashreplace", line_buffering=True))
+        setattr(sys, name, _Shown(raw, encoding, "backslashreplace", line_buffering=True))
+
+
+class _Shown(io.TextIOWrapper):
+    """A standard stream that no file, name or title can use to control the terminal."""
+
+    def write(self, text: str) -> int:
+        return super().write(escaped(text, kept="\n"))
+
+
+class Styled:
+    """A standard stream for a text whose control characters are the program's own."""
+
+    def __init__(self, stream: Any) -> None:
+        """Write to `stream`, which is `sys.stdout` or `sys.stderr`."""
+        self._stream = stream
+
+    def __getattr__(self, name: str) -> Any:
+        """All but `write` is the stream's own."""
+        return getattr(self._stream, name)
+
+    def write(self, text: str) -> int:
+        """Write a text as it is."""
+        return (
+            super(_Shown, self._stream).write(text)
+            if isinstance(self._stream, _Shown)
+            else self._stream.write(text)
+        )
 
 
 class _Stream(io.FileIO):

@@ -20,13 +20,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.errors import UnreadableResultError
+from brakecli.files.valid import (
+    LARGEST,
+    LARGEST_IN_HISTORY,
+    attributes_of,
+    axes_of,
+    check_size,
+    check_variables,
+    member,
+    plain_attribute,
+)
 
 FORMAT = "brakecli"
 FORMAT_VERSION = 1
 
 _FOREIGN = f'it was not written by this program, attribute format = "{FORMAT}" is missing'
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
-_MACHINERY = {"CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_Encoding", "_FillValue"}
 
 
 @dataclass(frozen=True)
@@ -45,39 +54,50 @@ class StoredResult:
     path: Path
     file: h5py.File
     attributes: dict[str, Any]
+    length: int  # bytes
 
     def group_attributes(self, group: str) -> dict[str, Any]:
         """The attributes of a group."""
         with _explained(self.path):
-            return _attributes(self._group(group))
+            return attributes_of(self._group(group), str(self.attributes.get("kind")))
+
+    def text(self, name: str) -> str:
+        """A text among the attributes of the root."""
+        with _explained(self.path):
+            if name not in self.attributes:
+                raise ValueError(f"attribute {name} is missing")
+            return str(self.attributes[name])
 
     def variables(self, group: str) -> dict[str, Variable]:
         """The variables of a group, its axes included, by name."""
         found = {}
         with _explained(self.path):
-            for name, node in self._group(group).items():
+            parent = self._group(group)
+            for name in parent:
+                node = member(parent, name)
                 if isinstance(node, h5py.Dataset):
-                    dims = (name,) if node.is_scale else tuple(next(iter(dim.keys()), "") for dim in node.dims)
-                    found[name] = Variable(dims, node.shape, _attributes(node))
+                    found[name] = Variable(axes_of(node, name), node.shape, attributes_of(node, ""))
         return found
 
     def read(self, group: str, name: str, start: int = 0, stop: int | None = None) -> NDArray[Any]:
         """The rows `start` to `stop` of a variable, checked: no damage, and no number that is not finite."""
         with _explained(self.path):
-            node = self._group(group).get(name)
+            node, where = member(self._group(group), name), f"variable {name} in group {group}"
             if not isinstance(node, h5py.Dataset) or node.ndim == 0:
-                raise ValueError(f"there is no variable {name} in group {group}")
+                raise ValueError(f"there is no {where}")
+            if node.dtype.kind not in "iufS":
+                raise ValueError(f"{where} holds no numbers")
+            check_size(node, self.length, where)
             values = np.asarray(node[start:stop])
             if values.dtype.kind == "S":
                 return np.char.decode(values, "utf-8")
-            if values.dtype.kind not in "iuf":
-                raise ValueError(f"variable {name} in group {group} holds no numbers")
-            if not np.isfinite(values).all():
-                raise ValueError(f"variable {name} in group {group} holds values that are not finite")
+            limit = LARGEST_IN_HISTORY if group == "history" else LARGEST
+            if values.dtype.kind == "f" and not (np.abs(values) <= limit).all():
+                raise ValueError(f"{where} holds values that are not finite, or too large")
             return values
 
     def _group(self, group: str) -> h5py.Group:
-        node = self.file.get(group)
+        node = member(self.file, group)
         if not isinstance(node, h5py.Group):
             raise ValueError(f"there is no group {group}")
         return node
@@ -97,7 +117,8 @@ def open_result(path: Path, kind: str | None = None) -> Iterator[StoredResult]:
             _verify(stream)
             # h5py gets the very file that was verified, and does without the file locks of HDF5
             file = stack.enter_context(h5py.File(stream, "r"))
-            attributes = _attributes(file)
+            its_kind = str(plain_attribute(file, "kind"))
+            attributes = attributes_of(file, its_kind)
             if attributes.get("format") != FORMAT:
                 raise ValueError(_FOREIGN)
             if (version := attributes.get("format_version")) != FORMAT_VERSION:
@@ -108,7 +129,9 @@ def open_result(path: Path, kind: str | None = None) -> Iterator[StoredResult]:
                 raise ValueError("it is incomplete, attribute complete is not 1")
             if kind is not None and attributes.get("kind") != kind:
                 raise ValueError(f"it holds a result of kind {attributes.get('kind')!r}, and {kind!r} is needed")
-        yield StoredResult(path, file, attributes)
+            length = path.stat().st_size
+            check_variables(file, its_kind, length)
+        yield StoredResult(path, file, attributes, length)
 
 
 def is_hdf5(path: Path) -> bool:
@@ -153,14 +176,3 @@ def _explained(path: Path) -> Iterator[None]:
             f"{path}: cannot be read as a result: {' '.join(reason.split())}; name an intact result file, "
             "or compute it again"
         ) from error
-
-
-def _attributes(node: h5py.HLObject) -> dict[str, Any]:
-    """Attributes as str, int, float, list of str, or array; without those by which netCDF-4 ties dimensions."""
-    found = {name: node.attrs[name] for name in node.attrs if name not in _MACHINERY}
-    for name, value in found.items():
-        if isinstance(value, bytes):
-            found[name] = value.decode()
-        elif isinstance(value, np.generic) or (isinstance(value, np.ndarray) and value.dtype.kind == "O"):
-            found[name] = value.tolist()
-    return found

@@ -6,7 +6,9 @@ loop serves them all and stays in the cache. Kernels neither allocate, raise nor
 
 import hashlib
 import os
+import stat
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -33,14 +35,17 @@ def source_hash(folder: Path = Path(__file__).parent) -> str:
 
 
 def _cache_directory() -> Path | None:
-    """Where machine code is kept, or None where nothing can be written (then nothing is cached)."""
+    """Where machine code is kept; None where nothing can be written, or where somebody else could write, too."""
     base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
     try:
         directory = (Path(base) if base else Path.home() / ".cache") / "brakecli" / source_hash()
-        directory.mkdir(parents=True, exist_ok=True)
+        directory.parent.mkdir(parents=True, exist_ok=True)
+        directory.mkdir(mode=0o700, exist_ok=True)
+        found = [each.lstat() for each in (directory.parent, directory)]
     except (OSError, RuntimeError):
         return None
-    return directory if os.access(directory, os.W_OK) else None
+    own = all(stat.S_ISDIR(each.st_mode) and each.st_uid == os.geteuid() for each in found)
+    return directory if own and not found[1].st_mode & 0o022 and os.access(directory, os.W_OK) else None
 
 
 CACHE = _cache_directory()
@@ -59,6 +64,22 @@ class _ForKernels(CPUDispatcher):
         raise TypeError(f"{name} has no wrapper for calls from Python: only other kernels can call it")
 
 
+def _compiled(signature: Any, function: Any, options: dict[str, Any]) -> Any:
+    """The machine code of a function: of the cache, if that can be used."""
+    if CACHE is not None:
+        for _ in range(2):
+            try:
+                return njit(signature, cache=True, **options)(function)
+            except Exception:  # pickle raises almost anything on a damaged file
+                damaged = [*CACHE.rglob(f"*.{function.__name__}-*.nb?")]
+                with suppress(OSError):
+                    for path in damaged:
+                        path.unlink()
+                if not damaged:  # the cache cannot be written, on a full disk: do without
+                    break
+    return njit(signature, **options)(function)
+
+
 def kernel(signature: Any, *, fastmath: frozenset[str] = frozenset(), inlined: bool = True) -> Callable[[F], F]:
     """Compile a function ahead of its first call for one signature, strictly (no fastmath unless named).
 
@@ -73,9 +94,7 @@ def kernel(signature: Any, *, fastmath: frozenset[str] = frozenset(), inlined: b
         options: dict[str, Any] = {"fastmath": set(fastmath), "forceinline": inlined, "no_cfunc_wrapper": True}
         options["no_cpython_wrapper"] = private
         try:
-            compiled: Any = njit(signature, cache=CACHE is not None, **options)(function)
-        except OSError:  # a cache that cannot be written or read, on a full disk: do without
-            compiled = njit(signature, **options)(function)
+            compiled: Any = _compiled(signature, function, options)
         finally:
             config.CACHE_DIR = before
         if private and not config.DISABLE_JIT:

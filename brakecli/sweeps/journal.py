@@ -20,14 +20,13 @@ from numpy.typing import NDArray
 
 from brakecli import SAME_NUMBERS_AS
 from brakecli.errors import BrakecliError, CannotWriteError, RefusedError
-from brakecli.files.atomic import explained
+from brakecli.files.atomic import explained, open_own
 from brakecli.sweeps.plan import Plan
 from brakecli.sweeps.point import Status, record_type
 from brakecli.sweeps.workers.task import fingerprint
 
 _HEAD = struct.Struct("<qqI")  # first unit, units, checksum of the records
-_CREATE = os.O_CREAT | os.O_NOFOLLOW
-_LONGEST_HEADER = 5_000_000
+_LONGEST_HEADER, _FIRST_KEY = 5_000_000, b"brakecli_version"
 MOST_DIFFERENCES = 5
 
 
@@ -78,12 +77,16 @@ class Journal:
     def begin(self, *, force: bool) -> None:
         """Take up what an earlier run has left, or write the header of a new journal."""
         own, found = identity(self.plan), self._file.read(_LONGEST_HEADER)
-        found = found[: found.find(b"\n") + 1]
+        found = found[: found.find(b"\n") + 1] or found
         if not (refusal := _refusal(found, own)):
             self._read_blocks(len(found))
             return
         if found and not force:
             raise RefusedError(f"{self.path}: {refusal}")
+        if found and _FIRST_KEY not in found[:100]:
+            raise RefusedError(
+                f"{self.path}: was not written by this program; move it away, or choose another output"
+            )
         os.ftruncate(self._file.fileno(), 0)
         self._file.seek(0)
         try:
@@ -128,7 +131,7 @@ def open_journal(path: Path, plan: Plan, *, force: bool) -> Iterator[Journal]:
     `force` is not set.
     """
     with explained(path):
-        file = FileIO(path, "r+", opener=lambda name, flags: os.open(name, flags | _CREATE, 0o666))
+        file = FileIO(path, "r+", opener=lambda name, flags: open_own(name, flags | os.O_CREAT))
     with file:
         journal = Journal(path, file, plan)
         with explained(path):

@@ -140,10 +140,10 @@ def parse_sweep(text: str, name: str, folder: Path, overrides: Sequence[str] = (
     return LoadedSweep(sweep, text, resolved, base, plan)
 
 
-def kind_of(path: str) -> str:
-    """What a file is meant to be, by its keys at the top: "case", "sweep", or neither."""
+def kind_of(text: str) -> str:
+    """What a text is meant to be, by its keys at the top: "case", "sweep", or neither."""
     try:
-        keys = set(Located(*read_text(path)).data)
+        keys = set(Located(text).data)
     except CaseError:
         return ""
     if "shoe" in keys:

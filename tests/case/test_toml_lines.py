@@ -56,6 +56,21 @@ def test_a_table_that_is_a_list_is_reported() -> None:
     assert where(change(CONSTANT, ("[shoe]", "[[shoe]]"))) == [("case.toml:2", "shoe")]
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("[wheel]", "[[shoe]]\nmass = 1.0\n[wheel]", "4: shoe: has both headers [shoe] and [[shoe]]"),
+        ("[shoe]", "[[shoe]]\nmass = 1.0\n[shoe]", "4: shoe: has both headers [shoe] and [[shoe]]"),
+        ("[wheel]", "[shoe]\nmass = 1.0\n[wheel]", "4: shoe: is given twice"),
+        ("[shoe]", "shoe = 3\n[shoe]", "3: shoe: is given twice"),
+    ],
+)  # fmt: skip
+def test_a_table_that_is_given_twice_brings_one_message(old: str, new: str, expected: str) -> None:
+    assert messages(change(CONSTANT, (old, new))) == [
+        f"case.toml:{expected}, first in line 2; keep one of the two"
+    ]
+
+
 def test_an_empty_file_lacks_every_required_table() -> None:
     found = where("# nothing\n")
     assert [key for _, key in found] == [

@@ -7,7 +7,7 @@ import h5py
 import numpy as np
 import pytest
 
-from tests.commands import LONG, TINY, brakecli, each, left_in, variants
+from tests.commands import LONG, TINY, brakecli, each, left_in, shell, variants
 
 pytestmark = pytest.mark.usefixtures("compiled")
 
@@ -37,7 +37,7 @@ def test_a_broken_result_is_no_case_to_run_again(good: Path, tmp_path: Path) -> 
     expected = {name: (code, reason) for name, (_, code, reason) in files.items()} | {
         "foreign.h5": (4, "was not written by this program"),
         "sweep.h5": (4, "holds a result of kind 'sweep'"),
-        "edited.h5": (2, "shoe.mass"),
+        "edited.h5": (4, "the case in it is not valid: "),
         "missing.h5": (2, "missing.h5: cannot be read"),
     }
     done = each(tmp_path, [["run", name, "-o", "out.h5"] for name in expected])
@@ -175,3 +175,41 @@ def test_no_command_line_ends_in_a_traceback(good: Path, here: Path) -> None:
     assert 2 in codes
     assert (here / "tiny.toml").read_text() == TINY
     assert not any(name.endswith((".part", ".lock")) for name in left_in(here))
+
+
+def test_a_pipe_is_read_once(tmp_path: Path) -> None:
+    (tmp_path / "tiny.toml").write_text(TINY)
+    sweep = 'case = "tiny.toml"\n[[axis]]\nparameter = "shoe.mass"\nvalues = [1.0]\n'
+    (tmp_path / "bad.toml").write_text(sweep.replace("shoe.mass", "shoe.mas"))
+    assert shell("$B check <(cat tiny.toml) --json", tmp_path).json["valid"]
+    told = shell("$B check <(cat bad.toml)", tmp_path).told(2, "/dev/fd/63:3: shoe.mas: is unknown")
+    assert told.count("\n") == 1
+    shell("$B check <(printf '\\xff')", tmp_path).told(2, "is not UTF-8")
+    shell("$B run <(cat bad.toml)", tmp_path).told(2, "this is a sweep")
+    shell("$B sweep <(cat tiny.toml)", tmp_path).told(2, "this is a case")
+    for text, words in ((TINY, "steps"), (sweep, "points")):
+        assert words in brakecli("check", "-", cwd=tmp_path, stdin=text).out
+
+
+def test_a_case_whose_name_begins_with_a_dash_is_suggested_as_a_path(here: Path) -> None:
+    (here / "-dash.toml").write_text(TINY)
+    sweep, new = each(here, [["sweep", "--", "-dash.toml"], ["new", "--", "-new case"]])
+    sweep.told(2, "-dash.toml: this is a case; simulate it with: brakecli run ./-dash.toml")
+    assert new.out == "-new case.toml: written; run it with: brakecli run './-new case.toml'\n"
+    brakecli("check", "./-dash.toml", cwd=here).told(0)
+
+
+@pytest.mark.parametrize(
+    "vary",
+    [
+        "friction.coefficiant=0.1:0.2:2",
+        "shoe.mass=-1:1:2",
+        "shoe=1:2:2",
+        "shoe.mass.x=1:2:2",
+        "a b=1:2:2",
+        "x..y=1:2:2",
+    ],
+)
+def test_a_key_that_cannot_be_varied_is_told_of_the_option_that_named_it(here: Path, vary: str) -> None:
+    told = brakecli("stability", "tiny.toml", "--vary", vary, cwd=here).told(2, f"--vary {vary[:4]}")
+    assert "--set" not in told

@@ -2,12 +2,14 @@
 
 import os
 import re
+import unicodedata
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import h5py
 import pytest
 
-from tests.commands import TINY, Done, brakecli, each
+from tests.commands import TINY, Done, brakecli, each, shell
 
 pytestmark = pytest.mark.usefixtures("compiled")
 
@@ -52,3 +54,51 @@ def test_paths_may_hold_spaces_and_letters_of_any_script_or_none(good: Path, tmp
         result = name.removesuffix(".toml") + ".h5"
         assert done.json["output"] == result
         assert (folder / result).read_bytes() == (good / "tiny.h5").read_bytes()
+
+
+ODD = "a\x1b[2J\x07\x9b\u202eb\u2066c\r\x7f"
+SHOWN = r"a\u001b[2J\u0007\u009b\u202eb\u2066c\r\u007f"
+
+
+def odd_in(text: str) -> set[str]:
+    return {char for char in text if char != "\n" and unicodedata.category(char) in ("Cc", "Cf")}
+
+
+def test_no_control_character_of_a_file_a_name_or_a_title_reaches_the_terminal(good: Path, tmp_path: Path) -> None:
+    (tmp_path / f"{ODD}.toml").write_text(TINY)
+    (tmp_path / f"{ODD}.csv").write_text(f"{ODD},y\n0,1\n1,2\n")
+    (tmp_path / f"{ODD}.h5").write_bytes((good / "tiny.h5").read_bytes()[:-32])
+    with h5py.File(tmp_path / f"{ODD}.h5", "r+") as file:
+        text = file.attrs["resolved_toml"].replace('title = "Tiny"', r'title = "\u202Ex"')
+        file.attrs["resolved_toml"], file.attrs["failure"], file.attrs["kind"] = text, ODD, "run"
+    signal = ["classify", f"{ODD}.csv", "--quantity", "force", "--sample-rate", "1"]
+    lines = [
+        *(["check", f"{ODD}.toml"], ["run", f"{ODD}.toml", "--set", 'title="\\u202Ex"'], ["run", f"{ODD}.toml"]),
+        *(
+            ["classify", f"{ODD}.h5"],
+            ["plot", f"{ODD}.h5"],
+            ["plot", f"{ODD}.h5"],
+            ["new", ODD],
+            [ODD],
+            ["--" + ODD],
+        ),
+        *(["check", f"{ODD}.toml", "--set", f"{ODD}=1"], ["check", f"{ODD}.toml", ODD, ODD], ["check", ODD]),
+        *([*signal], [*signal, "--column", ODD], ["stability", f"{ODD}.toml", "--vary", ODD]),
+        *(["run", f"{ODD}.toml", "-o", f"{ODD}/x.h5"], ["compare-schemes", f"{ODD}.toml", "--schemes", ODD]),
+    ]
+    for line, done in zip(lines, each(tmp_path, lines), strict=True):
+        assert odd_in(done.out + done.err) == set(), line
+        assert "Traceback" not in done.err
+    done = brakecli("classify", f"{ODD}.h5", "--json", cwd=tmp_path)
+    assert SHOWN in done.out
+    assert r"\u202ex" in brakecli("check", f"{ODD}.toml", "--set", r'title="\u202Ex"', cwd=tmp_path).out
+    assert done.json["source"] == f"{ODD}.h5"
+
+
+@pytest.mark.parametrize("kilobytes", [100_000, 300_000, 400_000])
+def test_an_address_space_too_small_for_the_libraries_is_told_before_they_are_loaded(
+    here: Path, kilobytes: int
+) -> None:
+    done = shell(f"ulimit -v {kilobytes}; $B run tiny.toml", here)
+    assert done.told(3, "the address space is limited to", "raise the limit with: ulimit -v").count("\n") == 1
+    assert "Usage" in shell(f"ulimit -v {kilobytes}; $B --help", here).out

@@ -286,6 +286,30 @@ def test_without_file_locks_the_process_named_in_the_lock_decides(
         assert [entry.name for entry in tmp_path.iterdir()] == [".r.h5.lock"]
 
 
+@pytest.mark.parametrize("name", [".r.h5.lock", ".r.h5.part"])
+@pytest.mark.parametrize("kind", ["text", "pipe", "directory", "link", "dangling", "second name"])
+def test_what_this_program_has_not_written_is_named_and_left_alone(tmp_path: Path, name: str, kind: str) -> None:
+    precious, place = tmp_path / "precious", tmp_path / name
+    precious.write_text("kept")
+    make: dict[str, Callable[[], object]] = {
+        "text": lambda: place.write_text("kept"),
+        "pipe": lambda: os.mkfifo(place),
+        "directory": place.mkdir,
+        "link": lambda: place.symlink_to(precious),
+        "dangling": lambda: place.symlink_to(tmp_path / "nowhere"),
+        "second name": lambda: place.hardlink_to(precious),
+    }
+    make[kind]()
+    before = place.lstat()
+    with pytest.raises(CannotWriteError, match=re.escape(f"{place}: is in the way")):
+        write(tmp_path / "r.h5")
+    assert (place.lstat().st_ino, place.lstat().st_mode, place.lstat().st_size) == (
+        *(before.st_ino, before.st_mode, before.st_size),
+    )
+    assert precious.read_text() == "kept"
+    assert {entry.name for entry in tmp_path.iterdir()} == {"precious", name}
+
+
 def memory(path: Path) -> None:
     peaks = []
     for rows in (200_000, 5_000_000):

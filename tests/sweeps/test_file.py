@@ -144,7 +144,7 @@ AXIS = '[[axis]]\nparameter = "link2.angle_deg"\n'
         (GRID.replace("1e3]", "-1e3]"), "sweep.toml:8: link1.damping: is out of range (found -1000.0)"),
         (GRID.replace('"link2.angle_deg"', '"title.x"'), "sweep.toml:3: title.x: title is not a table"),
         (CRITICAL.replace("friction.", "friktion."), "friktion: is unknown"),
-        ('case = ""', 'sweep.toml:1: case: is too short (found ""); give one line of text'),
+        ('case = ""', 'sweep.toml:1: case: is empty (found ""); give'),
         ("", "axis: is missing; give at least one [[axis]], or [critical]"),
         (AXIS + "values = []", "axis[0].values: is too short"),
         (AXIS + "values = [1.0]\nstart = 1.0", "is given together with"),
@@ -171,6 +171,31 @@ def test_what_is_wrong_is_named_with_its_line_and_a_remedy(tmp_path: Path, text:
     assert words in "\n".join(problems(tmp_path, head + text))
 
 
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[axis]\nparameter = 'shoe.mass'\nvalues = [1.0]",
+         "2: axis: is not a list (found a table); give each entry under a header of its own, [[axis]]"),
+        (AXIS + "start = 1.0\nstop = 2.0\nnmu = 3",
+         "6: axis[0].nmu: is unknown (found 3); did you mean axis.num?"),
+        (AXIS + "valeus = [1.0]", "4: axis[0].valeus: is unknown (found [1.0]); did you mean axis.values?"),
+        (AXIS + "values = [1.0]\nx = 1", "5: axis[0].x: is unknown (found 1); the keys of [[axis]] are "
+         "parameter, start, stop, num, spacing, values, direction"),
+        ("[[axes]]\nparameter = 'shoe.mass'\nvalues = [1.0]",
+         "2: axes: is unknown (found [a table]); did you mean [[axis]]?"),
+        (CRITICAL.replace("critical", "critcal"),
+         "2: critcal: is unknown (found a table); did you mean [critical]?"),
+        (AXIS + "values = [1.0]\n[axis]\nparameter = 'shoe.mass'",
+         "5: axis: has both headers [axis] and [[axis]], first in line 2; keep one of the two"),
+        ("case = ''\n" + AXIS + "values = [1.0]",
+         '1: case: is empty (found ""); give a text of at least one character'),
+    ],
+)  # fmt: skip
+def test_one_mistake_brings_one_message(tmp_path: Path, text: str, words: str) -> None:
+    head = "" if text.startswith("case") else 'case = "tiny.toml"\n'
+    assert problems(tmp_path, head + text) == [f"sweep.toml:{words}"]
+
+
 def test_a_base_case_that_is_missing_or_wrong_is_named_by_its_own_file(tmp_path: Path) -> None:
     assert "other.toml: cannot be read" in problems(tmp_path, GRID.replace("tiny", "other"))[0]
     (tmp_path / "wrong.toml").write_text(TINY.replace("mass = 10.0", "mass = -1"))
@@ -188,10 +213,8 @@ def test_values_that_fit_only_together_are_no_problem(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "expected"), [(GRID, "sweep"), (CRITICAL, "sweep"), (TINY, "case"), ("", ""), ("=", "")]
 )
-def test_a_sweep_is_told_from_a_case_by_its_keys(tmp_path: Path, text: str, expected: str) -> None:
-    path = tmp_path / "file.toml"
-    path.write_text(text)
-    assert kind_of(str(path)) == expected
+def test_a_sweep_is_told_from_a_case_by_its_keys(text: str, expected: str) -> None:
+    assert kind_of(text) == expected
 
 
 def test_the_schema_of_sweep_files_accepts_what_is_accepted_here() -> None:

@@ -1,6 +1,7 @@
 """Finished points are taken up by the same sweep alone, as far as they are whole."""
 
 import json
+import os
 import random
 import re
 from collections.abc import Callable
@@ -9,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from brakecli import SAME_NUMBERS_AS, __version__
-from brakecli.errors import RefusedError
+from brakecli.errors import CannotWriteError, RefusedError
 from brakecli.solver.compile import source_hash
 from brakecli.sweeps.plan import LoadedSweep, read_sweep
 from brakecli.sweeps.workers.task import compute_units, fingerprint
@@ -150,3 +151,22 @@ def test_a_change_of_any_source_is_a_change_of_the_sweep(tmp_path: Path) -> None
     before = source_hash(tmp_path)
     (tmp_path / "rules.py").write_text("LIMIT = 2\n")
     assert source_hash(tmp_path) != before
+
+
+@pytest.mark.parametrize("force", [False, True])
+@pytest.mark.parametrize("kind", ["text", "binary", "pipe", "link"])
+def test_what_is_no_journal_is_named_and_left_alone(tmp_path: Path, kind: str, force: bool) -> None:
+    loaded, place = write_sweep(tmp_path, frictions(2)), tmp_path / "s.h5.partial"
+    (tmp_path / "precious").write_bytes(b"kept\n")
+    make: dict[str, Callable[[], object]] = {
+        "text": lambda: place.write_bytes(b"kept\n"),
+        "binary": lambda: place.write_bytes(b"\xff" * 1000),
+        "pipe": lambda: os.mkfifo(place),
+        "link": lambda: place.symlink_to(tmp_path / "precious"),
+    }
+    make[kind]()
+    before = place.lstat()
+    with pytest.raises((RefusedError, CannotWriteError), match=r"s\.h5\.partial: "):
+        inline(loaded, tmp_path / "s.h5", compute_units, force=force)
+    assert (place.lstat().st_mode, place.lstat().st_size) == (before.st_mode, before.st_size)
+    assert (tmp_path / "precious").read_bytes() == b"kept\n"

@@ -28,7 +28,7 @@ def classify_result(path: Path, thresholds: Thresholds) -> dict[str, Any]:
     """Names and values of the verdict on a stored run; raises UnreadableResultError for anything else."""
     with open_result(path, kind="run") as result:
         try:
-            system = system_of(parse_case(str(result.attributes["resolved_toml"]), str(path)).case)
+            system = system_of(parse_case(result.text("resolved_toml"), str(path)).case)
         except (CaseError, KeyError) as error:
             raise UnreadableResultError(f"{path}: holds no case of this version; run its case again") from error
         time = result.variables("history").get("time")

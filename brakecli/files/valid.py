@@ -1,0 +1,179 @@
+"""What a result file holds under declared names is checked before anyone uses it; other contents are left alone.
+
+HDF5 ends the process on some attributes of a wrong type, and makes room for whatever size a file claims. So types
+and sizes are looked at first, and references are followed here.
+"""
+
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+import h5py
+import numpy as np
+from h5py import h5a, h5d, h5s, h5t, h5z
+
+from brakecli.files import fields
+from brakecli.files.field import Field
+
+LARGEST, LARGEST_IN_HISTORY = 1e300, 1e150  # magnitudes; the squares of the latter are finite
+_BLOCK = 1 << 20  # rows read at a time
+_RATIO = 1100  # no filter of HDF5 makes data smaller than this
+_TEXTS = ("format", "kind", "title", "case_toml", "resolved_toml", "sweep_toml", "resolved_sweep_toml")
+_ATTRIBUTES = {
+    ("run", "/"): fields.RUN,
+    ("run", "/spectrum"): fields.WELCH,
+    ("sweep", "/"): fields.SWEEP,
+    ("comparison", "/"): fields.COMPARISON,
+}
+_VARIABLES = {  # the first of a run or a comparison is the axis of all
+    ("run", "history"): fields.HISTORY,
+    ("run", "spectrum"): (fields.FREQUENCY, *fields.SPECTRUM.values()),
+    ("run", "unconverged"): fields.UNCONVERGED,
+    ("sweep", "/"): (*fields.POINT, *fields.CRITICAL, *fields.DIFFERENCE, fields.DIRECTION),
+    ("comparison", "/"): (fields.ENTRY_PLACE, *fields.ENTRY),
+}
+_RISING = ("time", "frequency")
+_MACHINERY = {"CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_Encoding", "_FillValue"}  # of netCDF-4
+
+
+def check_variables(file: h5py.File, kind: str, length: int) -> None:
+    """Raise ValueError for a declared variable of a wrong type, shape or size, or an axis that does not rise.
+
+    `length`: of the file in bytes.
+    """
+    for (its_kind, group), declared in _VARIABLES.items():
+        parent = member(file, group) if its_kind == kind else None
+        if parent is None:
+            continue
+        if not isinstance(parent, h5py.Group):
+            raise ValueError(f"{group} is not a group")
+        found = {
+            field.name: (field, node) for field in declared if (node := member(parent, field.name)) is not None
+        }
+        for name, (field, node) in found.items():
+            where = f"variable {name} in group {group}"
+            if not isinstance(node, h5py.Dataset) or node.ndim == 0 or node.dtype.kind not in _kinds(field):
+                raise ValueError(f"{where} is not what belongs there: {field.meaning}")
+            check_size(node, length, where)
+            axis = declared[0].name if kind != "sweep" else "status"
+            shape = found[axis][1].shape if axis in found else node.shape
+            if kind == "sweep" and field in (fields.DIRECTION, *fields.DIFFERENCE):
+                shape = shape[1:] if field is not fields.DIRECTION else shape[:1]
+            if node.shape != shape:
+                raise ValueError(f"{where} has the shape {node.shape}, and {axis} has {shape}")
+            if kind == "run" and name in _RISING:
+                _check_rising(node, where)
+
+
+def check_size(node: h5py.Dataset, length: int, where: str) -> None:
+    """Raise ValueError for a dataset that claims more than a file of this length (bytes) can hold."""
+    plist, stored = node.id.get_create_plist(), node.id.get_storage_size()
+    filters = {plist.get_filter(number)[0] for number in range(plist.get_nfilters())}
+    ratio = 1 if filters <= {h5z.FILTER_FLETCHER32, h5z.FILTER_SHUFFLE} else _RATIO
+    room, chunk = node.size * node.dtype.itemsize, 0
+    if plist.get_layout() == h5d.CHUNKED:
+        chunk = int(np.prod(node.chunks, dtype=object)) * node.dtype.itemsize
+    own = plist.get_layout() in (h5d.CHUNKED, h5d.CONTIGUOUS, h5d.COMPACT) and not plist.get_external_count()
+    if not own or stored > length or max(room, chunk * bool(room)) > ratio * stored:
+        raise ValueError(f"{where} claims {node.size} values, which are not in the file")
+
+
+def axes_of(node: h5py.Dataset, name: str) -> tuple[str, ...]:
+    """The names of the axes of a variable; empty where it has none."""
+    if plain_attribute(node, "CLASS") == "DIMENSION_SCALE":
+        return (name,)
+    if "DIMENSION_LIST" not in node.attrs:
+        return tuple("" for _ in node.shape)
+    attribute = h5a.open(node.id, b"DIMENSION_LIST")
+    kind = attribute.get_type()
+    if not isinstance(kind, h5t.TypeVlenID) or not kind.get_super().equal(h5t.STD_REF_OBJ):
+        raise ValueError(f"attribute DIMENSION_LIST of {name} holds no references")
+    lists = node.attrs["DIMENSION_LIST"]
+    if np.shape(lists) != (node.ndim,):
+        raise ValueError(f"attribute DIMENSION_LIST of {name} does not fit its {node.ndim} dimensions")
+    names = [str(node.file[axes[0]].name) if len(axes) else "" for axes in lists]
+    return tuple([each.rpartition("/")[2] for each in names])
+
+
+def member(group: h5py.Group, name: str) -> Any:
+    """What a group holds under a name; None where there is nothing, or only a link to somewhere else."""
+    if name == "/":
+        return group
+    for part in name.strip("/").split("/"):
+        if not isinstance(group, h5py.Group) or not isinstance(group.get(part, getlink=True), h5py.HardLink):
+            return None
+        group = group[part]
+    return group
+
+
+def attributes_of(node: h5py.HLObject, kind: str) -> dict[str, Any]:
+    """Attributes as str, int, float, list of str, or array of numbers; foreign ones of other types are left out.
+
+    Raises ValueError for a declared one that is not what was declared.
+    """
+    declared: Iterable[Field] = _ATTRIBUTES.get((kind, str(node.name)), ())
+    texts = [Field(name, "", name, fields.TEXT) for name in _TEXTS if node.name == "/"]
+    known = {field.name: field for field in (*texts, *declared)}
+    found = {name: plain_attribute(node, name) for name in node.attrs if name not in _MACHINERY}
+    for name, field in known.items():
+        if name in found and not _fits(field, found[name]):
+            raise ValueError(f"attribute {name} is not what belongs there: {field.meaning}")
+    return {name: value for name, value in found.items() if value is not None}
+
+
+def plain_attribute(node: h5py.HLObject, name: str) -> Any:
+    """An attribute; None where it is missing, or neither numbers nor UTF-8."""
+    if name not in node.attrs:
+        return None
+    attribute = h5a.open(node.id, name.encode("utf-8", "surrogateescape"))
+    plain = attribute.get_type().get_class() in (h5t.INTEGER, h5t.FLOAT, h5t.STRING)
+    if not plain or attribute.get_space().get_simple_extent_type() == h5s.NULL:
+        return None
+    value = node.attrs[name]
+    if isinstance(value, np.ndarray) and value.dtype.kind in "iuf":
+        return value
+    value = value.tolist() if isinstance(value, np.generic | np.ndarray) else value
+    try:
+        return _decoded(value)
+    except UnicodeError:
+        return None
+
+
+def _decoded(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_decoded(each) for each in value]
+    if isinstance(value, str):
+        value.encode()  # h5py marks what is not UTF-8
+    return value.decode() if isinstance(value, bytes) else value
+
+
+def _kinds(field: Field) -> str:
+    """The kinds of NumPy types that a variable may have."""
+    return {"f": "f", "i": "iu"}.get(field.kind[0], "S")
+
+
+def _fits(field: Field, value: Any) -> bool:
+    """Whether an attribute is what was declared."""
+    whole = isinstance(value, int)
+    if field.kind[0] == "f":
+        return (whole or isinstance(value, float)) and abs(value) <= LARGEST_IN_HISTORY
+    if field.kind[0] == "i" or field.rows:
+        return whole
+    if field.kind != fields.OBJECT:
+        return isinstance(value, str)
+    if field.units:
+        return isinstance(value, np.ndarray)
+    return isinstance(value, list) and all(isinstance(each, str) for each in value)
+
+
+def _check_rising(node: h5py.Dataset, where: str) -> None:
+    for block in _blocks(node):
+        if not np.isfinite(block).all() or np.abs(block).max(initial=0.0) > LARGEST_IN_HISTORY:
+            raise ValueError(f"{where} holds values that are not finite, or too large")
+        if not (np.diff(block) > 0.0).all():
+            raise ValueError(f"{where} does not increase")
+
+
+def _blocks(node: h5py.Dataset) -> Iterator[Any]:
+    """The rows of a dataset in pieces, each beginning with the last row of the one before."""
+    for start in range(0, node.shape[0], _BLOCK):
+        yield np.asarray(node[max(start - 1, 0) : start + _BLOCK])

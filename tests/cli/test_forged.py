@@ -1,0 +1,149 @@
+"""Result files that were changed by hand: a sentence and exit code 4, or an answer, within little memory."""
+
+import random
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from brakecli.files.read import open_result
+from tests.campaign import campaign
+from tests.commands import TINY, Done, brakecli, forked
+from tests.files.forger import forge
+
+MEMORY = 700_000_000  # bytes beside the libraries: matplotlib and a run of the tiny case take a third of them
+GRID = """\
+case = "tiny.toml"
+[[axis]]
+parameter = "friction.coefficient"
+values = [0.3, 0.6]
+[[axis]]
+parameter = "shoe.mass"
+values = [8.0, 10.0, 12.0]
+"""
+COMMANDS = {
+    "run": [
+        ["classify"],
+        ["classify", "--json"],
+        ["classify"],
+        ["run", "-o", "o.h5", "--force", "-q"],
+        ["plot", "-q"],
+    ],
+    "sweep": [["plot", "-q"], ["classify"], ["run", "-o", "o.h5"]],
+    "comparison": [["plot", "-q"], ["classify"]],
+}
+
+
+@pytest.fixture(scope="module")
+def results(good: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A result of each kind, without its digest."""
+    folder = tmp_path_factory.mktemp("results")
+    (folder / "tiny.toml").write_text(TINY)
+    (folder / "s.toml").write_text(GRID)
+    brakecli("sweep", "s.toml", "-q", "-j", "1", "-o", "sweep.h5", cwd=folder).told(0)
+    schemes = ["--schemes", "two-layer", "--steps", "1e-4,5e-5", "--budget", "1"]
+    brakecli("compare-schemes", "tiny.toml", "-q", "-o", "comparison.h5", *schemes, cwd=folder).told(0)
+    shutil.copy(good / "tiny.h5", folder / "run.h5")
+    for kind in COMMANDS:
+        path = folder / f"{kind}.h5"
+        path.write_bytes(path.read_bytes()[:-32])
+    return folder
+
+
+def tried(folder: Path, name: str, command: list[str]) -> Done:
+    first, *rest = command
+    more = ["-o", "p.png", "--force"] if first == "plot" else []
+    return forked(first, name, *rest, *more, cwd=folder, memory=MEMORY)
+
+
+@pytest.mark.parametrize(("number", "spared"), [(200, 0.9), pytest.param(500, 0.0, marks=campaign)])
+def test_a_forged_result_is_refused_with_a_sentence_or_used(
+    results: Path, tmp_path: Path, number: int, spared: float
+) -> None:
+    """`spared`: part of the pictures, which take long, that are replaced by a verdict."""
+    chance, found = random.Random(number), 0
+    for _ in range(number):
+        kind = chance.choice(("run", "run", "run", "run", "sweep", "comparison"))
+        shutil.copy(results / f"{kind}.h5", tmp_path / "f.h5")
+        what = forge(tmp_path / "f.h5", chance)
+        command = chance.choice(COMMANDS[kind])
+        if command[0] == "plot" and chance.random() < spared:
+            command = ["classify"]
+        done = tried(tmp_path, "f.h5", command)
+        # 1: a run fails; 2: there is nothing to draw in what was left
+        assert done.code in ((0, 2, 4) if command[0] == "plot" else (0, 1, 4)), (what, command, done)
+        assert "Traceback" not in done.err, (what, command, done)
+        assert done.code == 0 or done.err.count("\n") == 1, (what, command, done)
+        found += done.code == 4
+    assert number / 5 < found < number
+
+
+def test_what_other_programs_have_added_does_no_harm(results: Path, tmp_path: Path) -> None:
+    shutil.copy(results / "run.h5", tmp_path / "f.h5")
+    with h5py.File(tmp_path / "f.h5", "r+") as file:
+        for place in (file, file["history"], file["history/x"]):
+            place.attrs["note"], place.attrs["bytes"], place.attrs["of"] = (
+                "ü",
+                np.bytes_(b"\xff"),
+                np.arange(6.0).reshape(2, 3),
+            )
+            place.attrs["flag"], place.attrs["empty"], place.attrs["link"] = (
+                True,
+                h5py.Empty("f8"),
+                file["history"].ref,
+            )
+        file["history/own"], file["history/one"] = np.arange(3), 1.0
+        file.create_dataset("history/large", (10**9,), "f8", chunks=(1000,))
+        file["history/elsewhere"], file["more/x"] = h5py.SoftLink("/nowhere"), [b"a"]
+    for command in COMMANDS["run"]:
+        tried(tmp_path, "f.h5", command).told(0)
+    with open_result(tmp_path / "f.h5") as stored:
+        assert stored.attributes["note"] == "ü"
+        assert stored.read("history", "own").tolist() == [0, 1, 2]
+
+
+def dims(kind: str) -> Callable[[h5py.File], object]:
+    def change(file: h5py.File) -> None:
+        del file["history/x"].attrs["DIMENSION_LIST"]
+        file["history/x"].attrs["DIMENSION_LIST"] = np.zeros(1, kind)
+
+    return change
+
+
+def replaced(name: str, values: object, **more: object) -> Callable[[h5py.File], object]:
+    def change(file: h5py.File) -> None:
+        del file[name]
+        file.create_dataset(name, data=values, **more)
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        (dims("i8"), "attribute DIMENSION_LIST of x holds no references"),
+        (replaced("history/x", np.zeros(7)), "variable x in group history has the shape (7,)"),
+        (replaced("history/time", np.zeros(201)), "variable time in group history does not increase"),
+        (replaced("history/time", np.full(201, 1e308)), "not finite, or too large"),
+        (replaced("history/vx", np.full(201, 1e308)), "not finite, or too large"),
+        (replaced("history/vx", np.full(201, b"x")), "variable vx in group history is not what belongs there"),
+        (replaced("spectrum/vx", None, shape=(3 * 10**8,), dtype="f8", chunks=(1000,)), "claims 300000000 values"),
+        (
+            lambda file: file.attrs.__setitem__("failure", np.bytes_(b"\xff")),
+            "attribute failure is not what belongs",
+        ),
+        (lambda file: file.attrs.__setitem__("failure", np.arange(3)), "attribute failure is not what belongs"),
+        (lambda file: file.attrs.__delitem__("resolved_toml"), "attribute resolved_toml is missing"),
+    ],
+)
+def test_a_forgery_is_named(
+    results: Path, tmp_path: Path, change: Callable[[h5py.File], object], reason: str
+) -> None:
+    shutil.copy(results / "run.h5", tmp_path / "f.h5")
+    with h5py.File(tmp_path / "f.h5", "r+") as file:
+        change(file)
+    done = tried(tmp_path, "f.h5", ["classify"])
+    assert done.told(4, "f.h5: cannot be read as a result: ", reason).count("\n") == 1
