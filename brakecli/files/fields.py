@@ -18,7 +18,16 @@ VERDICT = (
     Field("regime", "", "regime of the motion", "S16", "verdict."),
     Field("excitation", "", "where the energy of a sustained motion comes from", "S16", "verdict."),
     Field("frequency", "Hz", "fundamental frequency of vx of a sustained motion", at="verdict."),
-    Field("amplitude", "m", "half of peak to peak of x, settled part", at="verdict.", label="amplitude of x"),
+    Field("growth_rate", "1/s", "where the motion is linear: growth rate of its slowest mode", at="verdict."),
+    Field("ringing_frequency", "Hz", "frequency of that mode", at="verdict."),
+    Field(
+        "amplitude", "m", "half of peak to peak of x: median of the cycles", at="verdict.", label="amplitude of x"
+    ),
+    Field("amplitude_spread", "m", "half of the range of the middle two thirds of the cycles", at="verdict."),
+    Field("amplitude_forced", "m", "on a rough wheel: what the roughness forces", at="verdict."),
+    Field("amplitude_own", "m", "on a rough wheel: what the shoe adds", at="verdict."),
+    Field("frequency_resolution", "Hz", "up to which a line of the spectrum is known", at="verdict."),
+    Field("torque_variation", "N m", "peak to peak of the torque of the friction force", at="verdict."),
     integer("settled", "whether a settled part was found (0, 1); otherwise it is the second half", "verdict."),
     Field("settled_from", "s", "start of the settled part", at="verdict."),
     Field("mean_friction_force", "N", "mean friction force on the shoe, settled part", at="verdict."),
