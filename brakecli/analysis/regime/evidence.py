@@ -1,5 +1,6 @@
 """What the rules of the regimes go by: envelope, cycles, stick, lines and powers of a history."""
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -91,10 +92,16 @@ class Part:
         x = np.concatenate(picked)
         return x, self.history.interval * (self.start + stride * np.arange(len(x)))
 
-    @cached_property
-    def resolution(self) -> float:
-        """Distance of two frequencies in the spectrum of the last samples, Hz."""
-        return 1.0 / (min(self.stop - self.start, _LONGEST) * self.history.interval)
+    def power(self, force: str, velocity: str) -> tuple[float, float]:
+        """Mean power (W) that a force gives to the vibration, by its deviation from the mean, and its standard error.
+
+        The error is that of ten equal pieces.
+        """
+        edges, mean = np.linspace(self.start, self.stop, _GROUPS + 1).astype(int), self.mean(force)
+        parts = [Part(self.history, begin, end) for begin, end in pairwise(edges)]
+        both = [zip(part.pieces(force), part.pieces(velocity), strict=True) for part in parts]
+        means = np.array([sum(float((f - mean) @ v) for f, v in pair) for pair in both]) / np.diff(edges)
+        return float(means.mean()), float(means.std()) / math.sqrt(_GROUPS)
 
     @cached_property
     def _spectrum(self) -> tuple[Array, Array, float]:
@@ -170,8 +177,8 @@ def median(values: Array) -> tuple[float, float]:
     return float(middle), 0.5 * float(high - low)
 
 
-def swings(part: Part, edges: Array) -> tuple[float, float]:
-    """Median over cycles, and its spread, of half of peak to peak of x (m); `edges` part the last samples.
+def swings(part: Part, edges: Array) -> Array:
+    """Half of peak to peak of x (m) in each cycle; `edges` part the last samples.
 
     Between samples an extreme value is that of a parabola.
     """
@@ -183,7 +190,7 @@ def swings(part: Part, edges: Array) -> tuple[float, float]:
         refined = sign * x
         refined[1:-1][extreme] += (sign * (after - before) ** 2 / (8.0 * np.where(bend, bend, 1.0)))[extreme]
         tops.append(np.maximum.reduceat(refined[: int(edges[-1])], np.asarray(edges[:-1], int)))
-    return median(0.5 * (tops[0] + tops[1]))
+    return np.asarray(0.5 * (tops[0] + tops[1]))
 
 
 class Envelope:
@@ -224,6 +231,7 @@ class Cycles:
     stick_fraction: float
     contact_loss_fraction: float
     limited: float  # part of the groups of cycles in which the shoe sticks, leaves the wheel or overtakes it
+    drift: float  # by which the amplitude changes, over itself, from the first third of the cycles to the last
 
 
 def cycles_of(part: Part, slip: ContactState | None = None) -> Cycles | None:
@@ -244,13 +252,13 @@ def cycles_of(part: Part, slip: ContactState | None = None) -> Cycles | None:
             break
     else:
         rises = 1
-    if len(crossings) <= rises:
-        return None
     crossings = crossings[::rises]
+    if len(crossings) < 4:
+        return None
     cycles = len(crossings) - 1
-    groups = crossings[np.linspace(0, cycles, min(cycles, _GROUPS) + 1).astype(int)]
-    counts = np.diff(np.linspace(0, cycles, min(cycles, _GROUPS) + 1).astype(int))
-    period, period_spread = median(np.diff(groups) / counts)
+    edges = np.linspace(0, cycles, min(cycles, _GROUPS) + 1).astype(int)
+    groups = crossings[edges]
+    period, period_spread = median(np.diff(groups) / np.diff(edges))
     state = part.history.read("state", part.stop - len(velocity), part.stop)
     sticks = np.flatnonzero((state[1:] == ContactState.STICK) & (state[:-1] != ContactState.STICK)) + 1
     per_cycle = np.histogram(sticks, crossings)[0]
@@ -272,4 +280,7 @@ def cycles_of(part: Part, slip: ContactState | None = None) -> Cycles | None:
         "contact_loss_spread": median(loss)[1],
     }
     limited = float(np.mean([bool(np.any(piece != slip)) for piece in pieces]))
-    return Cycles(evidence, frequency, *swings(part, crossings), median(stick)[0], median(loss)[0], limited)
+    sizes = swings(part, crossings)
+    first, *_, last = (float(np.median(third)) for third in np.array_split(sizes, 3) if len(third))
+    drift = last / first - 1.0 if first > 0.0 else 0.0
+    return Cycles(evidence, frequency, *median(sizes), median(stick)[0], median(loss)[0], limited, drift)

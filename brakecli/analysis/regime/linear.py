@@ -6,7 +6,7 @@ that phase is left out: it changes f by the slope of the surface times that moti
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -78,6 +78,7 @@ def linear_theory(system: System, belt: float) -> Linear | None:
     waves = np.array(responses, complex).reshape(-1, 2) * phases[:, None]
     values, vectors = eigensystem(c, stiffness, grip)
     mode, known_to = modes(c, stiffness, grip)[0], 0.0 if is_undamped(c) else _ROUNDING * np.abs(values).max()
+    direction = int(np.sign(mode.growth)) if abs(mode.growth) > known_to else 0
     slip = ContactState.BACKWARD_SLIP if belt > 0.0 else ContactState.FORWARD_SLIP
     return Linear(
         belt,
@@ -85,8 +86,8 @@ def linear_theory(system: System, belt: float) -> Linear | None:
         rest,
         float(force),
         float(force / stiffness),
-        mode,
-        int(np.sign(mode.growth)) if abs(mode.growth) > known_to else 0,
+        mode if direction else replace(mode, growth=0.0),
+        direction,
         values,
         np.concatenate([vectors, vectors * values]),
         passing,

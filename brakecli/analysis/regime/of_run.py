@@ -11,7 +11,7 @@ import numpy as np
 
 from brakecli.analysis.regime.evidence import Part
 from brakecli.analysis.regime.linear import linear_theory
-from brakecli.analysis.regime.rules import Context, Regime, Thresholds, Verdict, classify, forced_lines, subharmonics
+from brakecli.analysis.regime.rules import Context, Excitation, Regime, Thresholds, Verdict, classify, forced_lines, subharmonics
 from brakecli.analysis.stability.modes import growth
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
@@ -46,7 +46,9 @@ def verdict_on(history: History, system: System, failure: str | None, limits: Th
     verdict = classify(history, context(system), limits or Thresholds())
     if not failure:
         return verdict
-    return replace(verdict, regime=Regime.UNDECIDED, frequency=None, reasons=(f"the run failed: {failure}",))
+    unknown = {"growth_rate": None, "ringing_frequency": None, "frequency": None, "settled": False}
+    unknown |= {"regime": Regime.UNDECIDED, "excitation": Excitation.NONE}
+    return replace(verdict, **unknown, reasons=(f"the run failed: {failure}",))
 
 
 def context(system: System) -> Context:

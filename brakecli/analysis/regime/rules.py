@@ -4,15 +4,17 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, WINDOWS, Cycles, Envelope, Part, cycles_of, swings
-from brakecli.analysis.regime.linear import Linear
+from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, WINDOWS, Cycles, Envelope, Part, cycles_of, median, swings
 from brakecli.analysis.regime.spectra import segment
 from brakecli.solver.history import History
 from brakecli.solver.quantities import ContactState
+
+if TYPE_CHECKING:  # a measured signal needs no compiled code
+    from brakecli.analysis.regime.linear import Linear
 
 
 class Regime(StrEnum):
@@ -37,6 +39,8 @@ _GROWN = math.log(1e9)  # from which a disturbance grows from rounding to the si
 _QUARTER = 4.0 / 3.0  # a run whose last quarter is settled, over what comes before
 _MOST_COMBINED = 6  # waves whose frequencies are combined by threes
 _COMBINATIONS = [(i, j, k) for i in range(-2, 3) for j in range(-2, 3) for k in (-1, 0, 1)]
+_NEAR = 0.2  # by which the amplitude of a motion that stick or loss of contact limits may still change
+_DRIFT = 5e-3  # by which the amplitude of a settled motion may change where sliding is stable
 _NOTHING = 1e-3  # which may come from the rounding of the eigenvalues
 
 
@@ -68,9 +72,17 @@ class Context:
     scale: float = math.inf  # m/s, of a motion that would open the contact
     frictionless: bool = False
     growth: Callable[[], float] = lambda: 0.0  # 1/s, of a small disturbance of steady sliding; below 0 it decays
-    linear: Callable[[], Linear | None] = lambda: None  # the theory of full contact
+    linear: Callable[[], "Linear | None"] = lambda: None  # the theory of full contact
     powers: Callable[[Part], dict[str, float]] = lambda part: {}  # W, what becomes of the power of the belt
     radius: float = 1.0  # R, m
+
+
+class Feeds(StrEnum):
+    """What gives energy to the vibration on a rough wheel."""
+
+    FRICTION = "friction"
+    ROUGHNESS = "roughness"
+    UNKNOWN = "unknown"
 
 
 class Decision(NamedTuple):
@@ -195,7 +207,7 @@ class _Rules:
         state = [float(self.history.read(name, last, last + 1)[0]) for name in ("x", "y", "vx", "vy")]
         return last * self.history.interval, np.array(state)
 
-    def _shaken(self, theory: Linear, slow: float, decays: str) -> Decision | None:
+    def _shaken(self, theory: "Linear", slow: float, decays: str) -> Decision | None:
         """The forced motion that lasts, with the settled part in which the shoe's own part has gone."""
         x, time = self.whole.places()
         lasting = theory.forced(time)[0][0]
@@ -248,7 +260,9 @@ class _Rules:
             return self._too_short(slow)
         growth = self.context.growth()
         if self.context.frictionless and growth < 0.0:
-            return self._forced("without friction nothing but the roughness shakes the shoe", slow)
+            return self._forced("without friction nothing but the roughness shakes the shoe")
+        if self._feeds() is Feeds.FRICTION and self.evidence["power_of_roughness"] < 0.0:
+            return None
         share, dense = self._share(self.context.forced, 0.5)
         self.evidence["forced_share"] = share
         if share < self.limits.forced_share:
@@ -264,8 +278,9 @@ class _Rules:
             own = f"but sliding is unstable: the shoe's own vibration grows at {growth:.3g} 1/s"
             return Decision(f"{what}, {own}; run at least {_GROWN / growth:.2g} s")
         if dense:
-            return Decision(f"{what}, which lie too close to be told from others; run twice as long")
-        return self._forced(f"only the roughness shakes the shoe: {what}", slow)
+            text = f"{what}, which lie too close to be told from others; run twice as long"
+            return self.fed() or Decision(text)
+        return self._forced(f"only the roughness shakes the shoe: {what}")
 
     def _share(self, lines: Sequence[float], most: float) -> tuple[float, bool]:
         """Part of the energy of vx on lines, in the second half or in the last quarter, where it is more.
@@ -280,9 +295,10 @@ class _Rules:
         clear = [share for share, dense in shares if not dense and share >= self.limits.forced_share]
         return (max(clear), False) if clear else max(shares)
 
-    def _forced(self, text: str, slow: float) -> Decision:
+    def _forced(self, text: str) -> Decision:
         """Forced, as seen in a settled part of two periods of the slowest wave."""
         self._settle()
+        slow = self._slowest(self.settled_part.amplitude("x"))
         if self._settled_seconds < 2.0 * slow:
             return self._too_short(slow)
         return Decision(text, Regime.DAMPED, Excitation.FORCED)
@@ -312,10 +328,10 @@ class _Rules:
 
     def trend(self) -> Decision | None:
         """Decides where the motion still grows or decays; otherwise it finds the settled part."""
-        if self.context.frictionless and not self.context.forced:
+        if self.context.frictionless:
             if self.context.growth() < 0.0:
                 return Decision("without friction nothing excites the shoe, and the dashpots damp it", Regime.DAMPED)
-            return Decision("without friction and dashpots the motion goes on as it began; a dashpot would decide")
+            return Decision("without friction nothing excites the shoe, but no dashpot damps it; a dashpot would decide")
         if self._settle():
             return None
         slope = self.evidence.get("envelope_slope")
@@ -323,6 +339,8 @@ class _Rules:
             return Decision("the motion comes and goes; run longer")
         if abs(slope) <= self.limits.trend_errors * self.evidence["envelope_slope_error"]:
             return None  # an amplitude that beats or wanders, without a trend
+        if self.context.growth() > 0.0 and 0.5 * abs(slope) * self.duration <= _NEAR:
+            return None  # a vibration that has reached its limits, cannot die out, and comes near its amplitude
         text = f"still {'growing' if slope > 0.0 else 'decaying'} at {abs(slope):.3g} 1/s"
         return Decision(f"{text}; run at least {3.0 / abs(slope):.2g} s longer")
 
@@ -338,11 +356,11 @@ class _Rules:
             return Decision(f"only {period:.1f} samples a cycle; reduce output.sample_interval")
         if self._settled_seconds < 2.0 * (slow := self._slowest(found.amplitude)):
             return self._too_short(slow)
-        if theory and found.limited < self.limits.stick_cycles:
-            text = f"the shoe sticks or leaves the wheel only now and then, in {found.limited:.0%} of the settled part"
-            return Decision(f"{text}; run longer")
-        if self.context.frictionless:
-            return Decision("without friction nothing excites the shoe, and no dashpot damps it; a dashpot would decide")
+        if theory and (decision := self._unfounded(theory, found)):
+            return decision
+        if self.context.forced and self._feeds() is Feeds.UNKNOWN:
+            remedy = "a second run, without roughness or with less friction, decides at the cost of this one"
+            return Decision(f"{self._powers}, so that either may keep it up; {remedy}")
         own = Excitation.SELF_EXCITED, found.frequency
         if stick >= self.limits.stick_cycles:
             text = f"sustained, with stick in {stick:.0%} of {cycles:.0f} cycles"
@@ -353,10 +371,57 @@ class _Rules:
         irregular = f"irregular: stick in {stick:.0%} of the cycles, {lines}"
         return Decision(f"{irregular}; run longer, or look at the spectrum")
 
+    def _unfounded(self, theory: "Linear", found: Cycles) -> Decision | None:
+        """What speaks against self-excited vibration on smooth surfaces, where theory knows small vibrations."""
+        if found.limited < self.limits.stick_cycles:
+            text = f"the shoe sticks or leaves the wheel in only {found.limited:.0%} of the settled part"
+            return Decision(f"{text}; run longer")
+        if theory.direction > 0:
+            return None
+        if theory.direction == 0:
+            return Decision("sliding is stable, and no dashpot makes a large vibration settle; a dashpot would decide")
+        if abs(found.drift) > _DRIFT:
+            text = f"sliding is stable, and the amplitude still changes by {found.drift:.2%}"
+            return Decision(f"{text} within the last part of the run; run longer")
+        return None
+
+    def _feeds(self) -> "Feeds":
+        """Who gives energy to the vibration on a rough wheel.
+
+        The roughness, where friction takes energy in the mean, or gives less than half as much as the roughness while
+        sliding is stable. Friction, where the roughness takes energy, or gives less than friction, or less than half
+        as much if sliding is stable.
+        """
+        friction, off = self.settled_part.power("friction_force", "vx")
+        roughness, off_too = self.settled_part.power("normal_force", "vy")
+        self.evidence |= {"power_of_friction": friction, "power_of_roughness": roughness}
+        error, stable = self.limits.trend_errors * math.hypot(off, off_too), self.context.growth() < 0.0
+        if friction + error < 0.0 or (stable and roughness - 2.0 * max(friction, 0.0) > error):
+            return Feeds.ROUGHNESS
+        if friction > error and (roughness + error < 0.0 or friction > (2.0 if stable else 1.0) * roughness):
+            return Feeds.FRICTION
+        return Feeds.UNKNOWN
+
+    def fed(self) -> Decision | None:
+        """On a rough wheel: forced where it is the roughness that feeds the vibration."""
+        if not self.context.forced or self._feeds() is not Feeds.ROUGHNESS:
+            return None
+        return self._forced(f"only the roughness shakes the shoe: {self._powers}")
+
+    @property
+    def _powers(self) -> str:
+        friction, roughness = (self.evidence[name] for name in ("power_of_friction", "power_of_roughness"))
+        return f"friction gives {friction:.2g} W and the roughness {roughness:.2g} W to the vibration"
+
     def decide(self) -> Decision:
         """What the first rule that applies decides."""
-        rules = (self.contact, self.unmoved, self.linear, self.forced, self.died_out, self.trend)
+        rules = (self.contact, self.unmoved, self.linear, self.forced, self.died_out, self.trend, self.fed)
         return next((found for rule in rules if (found := rule()) is not None), None) or self.sustained()
+
+    def split(self) -> tuple[float, float] | None:
+        """Half of peak to peak of x (m) that roughness forces and that the shoe adds, by the lines of the spectrum."""
+        slow = min((frequency for frequency, _ in self.context.waves), default=0.0)
+        return self.settled_part.split(self.context.forced) if self._settled_seconds * slow >= 2.0 else None
 
     def amplitude(self, decision: Decision) -> tuple[float, float | None]:
         """Half of peak to peak of x (m) as a median over cycles, and its spread."""
@@ -370,7 +435,7 @@ class _Rules:
         period = max(self._slowest(0.0) / self.history.interval, 1.0)
         samples = len(part.last("x"))
         edges = samples - period * np.arange(int(samples / period), -1, -1)
-        return swings(part, edges) if len(edges) > 1 else (part.amplitude("x"), None)
+        return median(swings(part, edges)) if len(edges) > 1 else (part.amplitude("x"), None)
 
 
 def classify(history: History, context: Context, thresholds: Thresholds = Thresholds()) -> Verdict:
@@ -384,7 +449,7 @@ def classify(history: History, context: Context, thresholds: Thresholds = Thresh
     if belt != 0.0:
         evidence["largest_vx_over_belt_speed"] = part.extremes("vx")[int(belt > 0.0)] / belt
     evidence |= part.lines(context.forced) | (context.powers(part) if context.steady else {})
-    forced, own = rules.parts or (part.split(context.forced) if context.forced else None) or (None, None)
+    forced, own = rules.parts or rules.split() or (None, None)
     amplitude, spread = rules.amplitude(decision)
     return Verdict(
         regime=decision.regime,
