@@ -156,7 +156,7 @@ def _write_spectrum(result: ResultFile, history: History, start: int) -> float |
     for name, density in lines.density.items():
         result.variable("spectrum", fields.SPECTRUM[name], ("frequency",), density)
     result.set_attributes(values_of(fields.WELCH, lines), "spectrum")
-    return peak(lines.frequency, lines.density["vx"])
+    return peak(lines.frequency, lines.density["vx"], (history.samples - start) * history.interval)
 
 
 def _write_unconverged(result: ResultFile, events: NDArray[np.float64]) -> None:

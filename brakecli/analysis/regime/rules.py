@@ -261,8 +261,6 @@ class _Rules:
         growth = self.context.growth()
         if self.context.frictionless and growth < 0.0:
             return self._forced("without friction nothing but the roughness shakes the shoe")
-        if self._feeds() is Feeds.FRICTION and self.evidence["power_of_roughness"] < 0.0:
-            return None
         share, dense = self._share(self.context.forced, 0.5)
         self.evidence["forced_share"] = share
         if share < self.limits.forced_share:
@@ -277,6 +275,8 @@ class _Rules:
         if powers_of_e > _NOTHING:
             own = f"but sliding is unstable: the shoe's own vibration grows at {growth:.3g} 1/s"
             return Decision(f"{what}, {own}; run at least {_GROWN / growth:.2g} s")
+        if self._feeds() is Feeds.FRICTION:
+            return None if self.evidence["power_of_roughness"] < 0.0 else self._either()
         if dense:
             text = f"{what}, which lie too close to be told from others; run twice as long"
             return self.fed() or Decision(text)
@@ -359,8 +359,7 @@ class _Rules:
         if theory and (decision := self._unfounded(theory, found)):
             return decision
         if self.context.forced and self._feeds() is Feeds.UNKNOWN:
-            remedy = "a second run, without roughness or with less friction, decides at the cost of this one"
-            return Decision(f"{self._powers}, so that either may keep it up; {remedy}")
+            return self._either()
         own = Excitation.SELF_EXCITED, found.frequency
         if stick >= self.limits.stick_cycles:
             text = f"sustained, with stick in {stick:.0%} of {cycles:.0f} cycles"
@@ -396,7 +395,9 @@ class _Rules:
         roughness, off_too = self.settled_part.power("normal_force", "vy")
         self.evidence |= {"power_of_friction": friction, "power_of_roughness": roughness}
         error, stable = self.limits.trend_errors * math.hypot(off, off_too), self.context.growth() < 0.0
-        if friction + error < 0.0 or (stable and roughness - 2.0 * max(friction, 0.0) > error):
+        if stable and roughness - 2.0 * max(friction, 0.0) > error:
+            return Feeds.ROUGHNESS
+        if friction + self.limits.trend_errors * off < 0.0 and roughness > -0.5 * friction:
             return Feeds.ROUGHNESS
         if friction > error and (roughness + error < 0.0 or friction > (2.0 if stable else 1.0) * roughness):
             return Feeds.FRICTION
@@ -407,6 +408,10 @@ class _Rules:
         if not self.context.forced or self._feeds() is not Feeds.ROUGHNESS:
             return None
         return self._forced(f"only the roughness shakes the shoe: {self._powers}")
+
+    def _either(self) -> Decision:
+        remedy = "a second run, without roughness or with less friction, decides at the cost of this one"
+        return Decision(f"{self._powers}, so that either may keep it up; {remedy}")
 
     @property
     def _powers(self) -> str:
