@@ -39,6 +39,7 @@ _GROWN = math.log(1e9)  # from which a disturbance grows from rounding to the si
 _QUARTER = 4.0 / 3.0  # a run whose last quarter is settled, over what comes before
 _MOST_COMBINED = 6  # waves whose frequencies are combined by threes
 _COMBINATIONS = [(i, j, k) for i in range(-2, 3) for j in range(-2, 3) for k in (-1, 0, 1)]
+_LARGER = 5.0  # times what the waves force in full contact: a larger motion needs more proof that it is forced
 _NEAR = 0.2  # by which the amplitude of a motion that stick or loss of contact limits may still change
 _DRIFT = 5e-3  # by which the amplitude of a settled motion may change where sliding is stable
 _NOTHING = 1e-3  # which may come from the rounding of the eigenvalues
@@ -275,12 +276,26 @@ class _Rules:
         if powers_of_e > _NOTHING:
             own = f"but sliding is unstable: the shoe's own vibration grows at {growth:.3g} 1/s"
             return Decision(f"{what}, {own}; run at least {_GROWN / growth:.2g} s")
-        if self._feeds() is Feeds.FRICTION:
-            return None if self.evidence["power_of_roughness"] < 0.0 else self._either()
+        expected, feeds = _LARGER * self._expected, self._feeds()
+        if feeds is Feeds.FRICTION and self.evidence["power_of_roughness"] < 0.0:
+            return None
+        doubtful = 0.0 < expected < self.last.deviation("x") or self._unstable_in_full_contact
+        if feeds is Feeds.FRICTION or (doubtful and feeds is Feeds.UNKNOWN):
+            return self._either()
         if dense:
             text = f"{what}, which lie too close to be told from others; run twice as long"
             return self.fed() or Decision(text)
         return self._forced(f"only the roughness shakes the shoe: {what}")
+
+    @property
+    def _unstable_in_full_contact(self) -> bool:
+        theory = self.context.linear()
+        return theory is not None and theory.direction > 0
+
+    @property
+    def _expected(self) -> float:
+        """Standard deviation of x (m) that the waves force in full contact."""
+        return math.sqrt(0.5 * sum(swing**2 for _, swing in self.context.waves))
 
     def _share(self, lines: Sequence[float], most: float) -> tuple[float, bool]:
         """Part of the energy of vx on lines, in the second half or in the last quarter, where it is more.
@@ -288,9 +303,9 @@ class _Rules:
         Also whether that shows nothing: the lines cover more than `most` of the band, and the motion is larger than
         what they force.
         """
-        expected, shares = math.sqrt(0.5 * sum(swing**2 for _, swing in self.context.waves)), []
+        shares = []
         for part in (self.settled_part, self.last):
-            dense = part.covered(lines) > most and part.deviation("x") > 2.0 * expected
+            dense = part.covered(lines) > most and part.deviation("x") > 2.0 * self._expected
             shares.append((part.share(lines), dense))
         clear = [share for share, dense in shares if not dense and share >= self.limits.forced_share]
         return (max(clear), False) if clear else max(shares)
@@ -394,7 +409,8 @@ class _Rules:
         friction, off = self.settled_part.power("friction_force", "vx")
         roughness, off_too = self.settled_part.power("normal_force", "vy")
         self.evidence |= {"power_of_friction": friction, "power_of_roughness": roughness}
-        error, stable = self.limits.trend_errors * math.hypot(off, off_too), self.context.growth() < 0.0
+        error = self.limits.trend_errors * math.hypot(off, off_too)
+        stable = self.context.growth() < 0.0 and not self._unstable_in_full_contact
         if stable and roughness - 2.0 * max(friction, 0.0) > error:
             return Feeds.ROUGHNESS
         if friction + self.limits.trend_errors * off < 0.0 and roughness > -0.5 * friction:
