@@ -58,7 +58,10 @@ def run_table(report: RunReport) -> str:
     rows = [
         ("failed", [numbers["failure"]] if work.failed else []),
         *_verdict_rows(numbers),
-        ("peak of the spectrum of vx", f"{peak} ± {numbers['frequency_resolution']:.2g} Hz" if peak else "not resolved"),
+        (
+            "peak of the spectrum of vx",
+            f"{peak} ± {numbers['frequency_resolution']:.2g} Hz" if peak else "not resolved",
+        ),
         *_rows(fields.RUN, numbers, "mean_friction_force", "braking_torque", "torque_variation"),
         ("settled part", f"{'' if numbers['settled'] else 'none; the numbers are those '}{since}"),
         ("scheme", method.scheme + how),

@@ -32,10 +32,10 @@ VERDICT = (
     Field("settled_from", "s", "start of the settled part, or of the second half", at="verdict."),
     Field("mean_friction_force", "N", "mean friction force on the shoe, from `settled_from` on", at="verdict."),
     Field("braking_torque", "N m", "mean torque of the friction force, from `settled_from` on", at="verdict."),
-    ratio("stick_fraction", "part of the time in stick; a median where the motion lasts", "verdict.", label="stick"),
     ratio(
-        "contact_loss_fraction", "part of the time off the wheel; likewise", "verdict.", label="lost contact"
+        "stick_fraction", "part of the time in stick; a median where the motion lasts", "verdict.", label="stick"
     ),
+    ratio("contact_loss_fraction", "part of the time off the wheel; likewise", "verdict.", label="lost contact"),
     Field("reasons", "", "why the regime is as it is", OBJECT, "verdict."),
     Field("evidence", "", "numbers by which the rules decided", OBJECT, "verdict.", group="regime/evidence"),
     Field("thresholds", "", "limits of the rules", OBJECT, "verdict.", group="regime/thresholds"),
@@ -58,7 +58,12 @@ RUN = (
     Field("status", "", "how the run has ended: done or failed", TEXT),
     Field("failure", "", "time and reason of a failure", TEXT, at="motion.work.failure_sentence"),
     *VERDICT,
-    Field("spectrum_peak", "Hz", "highest peak of the spectrum; missing where it is not resolved", label="peak of the spectrum of vx"),
+    Field(
+        "spectrum_peak",
+        "Hz",
+        "highest peak of the spectrum; missing where it is not resolved",
+        label="peak of the spectrum of vx",
+    ),
     Field("scheme", "", "time-stepping scheme", TEXT, "motion.system.method."),
     Field("theta", "1", "weights of the layers", OBJECT, "motion.system.method."),
     Field("iteration", "", "how the equations of a step are solved", TEXT, "motion.system.method."),

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from brakecli import __version__
 from brakecli.analysis.regime.of_run import verdict_on
-from brakecli.analysis.regime.rules import Verdict
 from brakecli.analysis.regime.spectra import peak, spectrum
+from brakecli.analysis.regime.verdict import Verdict
 from brakecli.case.read import LoadedCase
 from brakecli.case.system import system_of
 from brakecli.files import fields

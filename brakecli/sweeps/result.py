@@ -147,8 +147,8 @@ def _on_hysteresis(journal: Journal, hysteresis: NDArray[Any]) -> Iterator[str]:
         yield f"hysteresis at {count} of {hysteresis.size} points: {places}{' …' if count > 3 else ''}"
     known = hysteresis.size - int(_unknown(journal).sum())
     if known and not count:
-        where = "" if known == hysteresis.size else f" at the {known} points that are decided"
-        yield f"no hysteresis{where}: the motion is the same on the way up and on the way down"
+        those = "" if known == hysteresis.size else f" at the {known} points that are decided"
+        yield f"no hysteresis{those}: the motion is the same on the way up and on the way down"
     if known < hysteresis.size:
         apart = int((_unknown(journal) & _apart(journal)).sum())
         differ = f"; the amplitudes of the two ways differ at {apart} of them" if apart else ""

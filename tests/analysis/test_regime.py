@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from brakecli.analysis.regime.rules import Context, Excitation, Regime, Thresholds, classify, forced_lines
+from brakecli.analysis.regime.rules import classify
+from brakecli.analysis.regime.verdict import Context, Excitation, Regime, Thresholds, forced_lines
 from brakecli.solver.history import History
 from tests.analysis.histories import INTERVAL, history_of, verdict_of
 from tests.examples import COULOMB, ROUGH, SQUEAL, make

@@ -89,12 +89,12 @@ class Part:
             picked.append(values[first - begin :: stride])
             first += stride * len(picked[-1])
         x = np.concatenate(picked)
-        return x, self.history.interval * (self.start + stride * np.arange(len(x)))
+        return x, np.asarray(self.history.interval * (self.start + stride * np.arange(len(x))), np.float64)
 
     def power(self, force: str, velocity: str) -> tuple[float, float]:
-        """Mean power (W) that a force gives to the vibration, by its deviation from the mean, and its standard error.
+        """Mean power (W) that the deviation of a force gives to the vibration, and its standard error.
 
-        Four overlapping pieces of the last samples, under a window that keeps cycles cut at the ends from counting.
+        Four overlapping pieces of the last samples, under a window that weighs cut cycles at the ends little.
         """
         f, v = self.last(force), self.last(velocity)
         size = max(2 * len(f) // 5, 1)
@@ -162,7 +162,7 @@ class Part:
         return {name: [line[i] for line in found] for i, name in enumerate(names)}
 
 
-def _near(lines: Sequence[float], frequencies: Array) -> NDArray[np.bool_]:
+def _near(lines: Sequence[float], frequencies: NDArray[Any]) -> NDArray[np.bool_]:
     """Which frequencies of a spectrum belong to lines (Hz)."""
     chosen = np.zeros(len(frequencies), dtype=bool)
     for line in lines:
@@ -237,8 +237,8 @@ class Cycles:
 def cycles_of(part: Part, slip: ContactState | None = None) -> Cycles | None:
     """The cycles of a part; None if there are none. `slip` is the side to which the shoe slips in steady sliding.
 
-    Stick, loss of contact and frequency are medians of ten groups of neighbouring cycles, so that samples that fall
-    differently into each cycle do not matter.
+    Stick, loss of contact and frequency are medians of ten groups of neighbouring cycles, so that it does not
+    matter how samples fall into each cycle.
     """
     velocity = part.last("vx")
     crossings = upward_crossings(velocity, 0.3 * float(velocity.std()))

@@ -1,8 +1,8 @@
 """Linear theory of a shoe that slides in full contact: it rests, rings and is shaken by the wheel's waves.
 
-While the pad touches everywhere and the shoe slips to one side only, (6)-(7) are linear: m z̈ + B ż + S z = f, where
-the waves of the wheel give f = (sign(U) φ, 1) 2ak Σ g sinc(ωa) sin(ω(x - Ut) + phase). The shoe's own small motion in
-that phase is left out: it changes f by the slope of the surface times that motion.
+While the pad touches everywhere and the shoe slips to one side only, (6)-(7) are linear: m z̈ + B ż + S z = f.
+The waves of the wheel give f = (sign(U) φ, 1) 2ak Σ g sinc(ωa) sin(ω(x - Ut) + phase). The shoe's own small motion
+in that phase is left out: it changes f by the slope of the surface times that motion.
 """
 
 import math
@@ -42,8 +42,13 @@ class Linear:
             position, velocity = position + turn.imag, velocity + 2.0 * math.pi * frequency * turn.real
         return position, velocity
 
+    def parts(self, x: Array, time: Array) -> tuple[float, Array, Array]:
+        """Half of peak to peak of what the waves force (m), what of x (m) the shoe adds, and the times again."""
+        lasting = self.forced(time)[0][0]
+        return 0.5 * float(np.ptp(lasting)), x - self.rest[0] - lasting, time
+
     def seconds_to_limit(self, time: float, state: Array) -> float:
-        """How long the fastest mode grows from x, y, vx, vy at a time until the shoe sticks or leaves the wheel."""
+        """How long the fastest mode grows from x, y, vx, vy at a time until stick or loss of contact."""
         position, velocity = self.forced(np.array([time]))
         away = state - np.concatenate([self.rest + position[:, 0], velocity[:, 0]])
         fastest = int(np.argmax(self.values.real))
@@ -83,7 +88,7 @@ def linear_theory(system: System, belt: float) -> Linear | None:
     return Linear(
         belt,
         slip if c.phi > 0.0 else None,
-        rest,
+        np.asarray(rest, np.float64),
         float(force),
         float(force / stiffness),
         mode if direction else replace(mode, growth=0.0),

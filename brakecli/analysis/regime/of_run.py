@@ -11,7 +11,16 @@ import numpy as np
 
 from brakecli.analysis.regime.evidence import Part
 from brakecli.analysis.regime.linear import linear_theory
-from brakecli.analysis.regime.rules import Context, Excitation, Regime, Thresholds, Verdict, classify, forced_lines, subharmonics
+from brakecli.analysis.regime.rules import classify
+from brakecli.analysis.regime.verdict import (
+    Context,
+    Excitation,
+    Regime,
+    Thresholds,
+    Verdict,
+    forced_lines,
+    subharmonics,
+)
 from brakecli.analysis.stability.modes import growth
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
@@ -46,9 +55,9 @@ def verdict_on(history: History, system: System, failure: str | None, limits: Th
     verdict = classify(history, context(system), limits or Thresholds())
     if not failure:
         return verdict
-    unknown = {"growth_rate": None, "ringing_frequency": None, "frequency": None, "settled": False}
-    unknown |= {"regime": Regime.UNDECIDED, "excitation": Excitation.NONE}
-    return replace(verdict, **unknown, reasons=(f"the run failed: {failure}",))
+    verdict = replace(verdict, growth_rate=None, ringing_frequency=None, frequency=None, settled=False)
+    why = (f"the run failed: {failure}",)
+    return replace(verdict, regime=Regime.UNDECIDED, excitation=Excitation.NONE, reasons=why)
 
 
 def context(system: System) -> Context:
