@@ -17,7 +17,7 @@ if TYPE_CHECKING:  # a measured signal needs no compiled code
     from brakecli.analysis.regime.linear import Linear
 
 _NEAR = 0.3  # by which the amplitude of a motion that stick or loss of contact limits may still change
-_DRIFT = 5e-3  # by which the amplitude of a settled motion may change where sliding is stable
+_DRIFT = 5e-3  # by which the amplitude of a motion without stick may change where sliding is stable
 _DEFAULT = Thresholds()
 
 
@@ -179,7 +179,8 @@ class _Rules(ForcedRules):
             return Decision(
                 "sliding is stable, and no dashpot makes a large vibration settle; a dashpot would decide"
             )
-        if abs(found.drift) > _DRIFT:
+        sticks = found.evidence["stick_cycles"] >= self.limits.stick_cycles
+        if abs(found.drift) > (self.limits.settled_within if sticks else _DRIFT):
             text = f"sliding is stable, and the amplitude still changes by {found.drift:.2%}"
             return Decision(f"{text} within the last part of the run; run longer")
         return None
