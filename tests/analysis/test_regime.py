@@ -135,7 +135,7 @@ def test_where_sliding_is_unstable_a_motion_is_not_forced(
 
 @pytest.mark.parametrize("duration", [0.5, 2.0])
 def test_squeal_on_a_wheel_of_many_waves_is_not_called_forced(duration: float) -> None:
-    """In a short run their lines cover the spectrum, and the squeal: then the power shows that friction feeds it."""
+    """In a short run their lines cover all, the squeal too: then the power shows that friction feeds it."""
     roughness = {
         "shoe": {"amplitudes": [2e-6, 1e-6], "wavelengths": [0.020, 0.011]},
         "wheel": {"amplitudes": [4e-6, 2e-6], "wavelengths": [0.030, 0.017]},
