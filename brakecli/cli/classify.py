@@ -37,7 +37,7 @@ def command(
 
     if quantity is None:
         from brakecli.analysis.regime.of_run import classify_result
-        from brakecli.analysis.regime.rules import Thresholds
+        from brakecli.analysis.regime.verdict import Thresholds
 
         try:
             numbers = classify_result(Path(source), _changed(Thresholds, thresholds))

@@ -25,6 +25,7 @@ if TYPE_CHECKING:  # what one command prints need not wait for the modules of th
 POINTS = named(fields.POINT, "regime", "frequency", "amplitude")
 CRITICAL_NAMES = ("critical", "critical_error", "critical_eigenvalue", "critical_sustained", "critical_status")
 CRITICAL_POINTS = (*named(fields.POINT, "regime"), *named(fields.CRITICAL, *CRITICAL_NAMES))
+IF_KNOWN = ("growth_rate", "ringing_frequency", "amplitude_spread", "amplitude_forced", "amplitude_own")
 MOST_LISTED_POINTS = 30
 NARROWEST = 40  # columns of a table, whatever the terminal says: nothing can be read in fewer
 
@@ -53,11 +54,17 @@ def run_table(report: RunReport) -> str:
     nodes = f", {numbers['nodes']} nodes" if on_nodes else ""
     step = "" if report.check.step is None else f" of {report.check.step:.4g} s"
     error = abs(numbers["energy"]["relative_closing_error"])
+    peak = _text(numbers["spectrum_peak"]) if numbers["spectrum_peak"] is not None else ""
+    since = f"from {numbers['settled_from']:.4g} s on"
     rows = [
         ("failed", [numbers["failure"]] if work.failed else []),
         *_verdict_rows(numbers),
-        *_rows(fields.RUN, numbers, "spectrum_peak", "mean_friction_force", "braking_torque"),
-        ("settled part", f"from {numbers['settled_from']:.4g} s on"),
+        (
+            "peak of the spectrum of vx",
+            f"{peak} ± {numbers['frequency_resolution']:.2g} Hz" if peak else "not resolved",
+        ),
+        *_rows(fields.RUN, numbers, "mean_friction_force", "braking_torque", "torque_variation"),
+        ("settled part", f"{'' if numbers['settled'] else 'none; the numbers are those '}{since}"),
         ("scheme", method.scheme + how),
         ("tolerance", [report.certificate.sentence()] if report.certificate else []),
         ("contact", shares + nodes),
@@ -86,6 +93,7 @@ def _verdict_rows(numbers: Mapping[str, Any]) -> list[Row]:
         ("regime", regime if excitation == "none" else f"{regime} ({excitation})"),
         ("because", "; ".join(numbers["reasons"])),
         *_rows(fields.VERDICT, numbers, "frequency", "amplitude", "stick_fraction", "contact_loss_fraction"),
+        *_rows(fields.VERDICT, numbers, *(name for name in IF_KNOWN if numbers.get(name) is not None)),
     ]
 
 

@@ -18,15 +18,24 @@ VERDICT = (
     Field("regime", "", "regime of the motion", "S16", "verdict."),
     Field("excitation", "", "where the energy of a sustained motion comes from", "S16", "verdict."),
     Field("frequency", "Hz", "fundamental frequency of vx of a sustained motion", at="verdict."),
-    Field("amplitude", "m", "half of peak to peak of x, settled part", at="verdict.", label="amplitude of x"),
-    integer("settled", "whether a settled part was found (0, 1); otherwise it is the second half", "verdict."),
-    Field("settled_from", "s", "start of the settled part", at="verdict."),
-    Field("mean_friction_force", "N", "mean friction force on the shoe, settled part", at="verdict."),
-    Field("braking_torque", "N m", "mean torque of the friction force, settled part", at="verdict."),
-    ratio("stick_fraction", "part of the time in stick, settled part", "verdict.", label="stick"),
-    ratio(
-        "contact_loss_fraction", "part of the time off the wheel, settled part", "verdict.", label="lost contact"
+    Field("growth_rate", "1/s", "where the motion is linear: growth rate of its slowest mode", at="verdict."),
+    Field("ringing_frequency", "Hz", "frequency of that mode", at="verdict."),
+    Field(
+        "amplitude", "m", "half of peak to peak of x: median of the cycles", at="verdict.", label="amplitude of x"
     ),
+    Field("amplitude_spread", "m", "half of the range of the middle two thirds of the cycles", at="verdict."),
+    Field("amplitude_forced", "m", "on a rough wheel: what the roughness forces", at="verdict."),
+    Field("amplitude_own", "m", "on a rough wheel: what the shoe adds", at="verdict."),
+    Field("frequency_resolution", "Hz", "distance of two lines in the spectrum", at="verdict."),
+    Field("torque_variation", "N m", "braking torque, peak to peak", at="verdict."),
+    integer("settled", "whether a settled part was found (0, 1); otherwise the second half is judged", "verdict."),
+    Field("settled_from", "s", "start of the settled part, or of the second half", at="verdict."),
+    Field("mean_friction_force", "N", "mean friction force on the shoe, from `settled_from` on", at="verdict."),
+    Field("braking_torque", "N m", "mean torque of the friction force, from `settled_from` on", at="verdict."),
+    ratio(
+        "stick_fraction", "part of the time in stick; a median where the motion lasts", "verdict.", label="stick"
+    ),
+    ratio("contact_loss_fraction", "part of the time off the wheel; likewise", "verdict.", label="lost contact"),
     Field("reasons", "", "why the regime is as it is", OBJECT, "verdict."),
     Field("evidence", "", "numbers by which the rules decided", OBJECT, "verdict.", group="regime/evidence"),
     Field("thresholds", "", "limits of the rules", OBJECT, "verdict.", group="regime/thresholds"),
@@ -49,7 +58,12 @@ RUN = (
     Field("status", "", "how the run has ended: done or failed", TEXT),
     Field("failure", "", "time and reason of a failure", TEXT, at="motion.work.failure_sentence"),
     *VERDICT,
-    Field("spectrum_peak", "Hz", "highest peak of the spectrum above 0 Hz", label="peak of the spectrum of vx"),
+    Field(
+        "spectrum_peak",
+        "Hz",
+        "highest peak of the spectrum; missing where it is not resolved",
+        label="peak of the spectrum of vx",
+    ),
     Field("scheme", "", "time-stepping scheme", TEXT, "motion.system.method."),
     Field("theta", "1", "weights of the layers", OBJECT, "motion.system.method."),
     Field("iteration", "", "how the equations of a step are solved", TEXT, "motion.system.method."),

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from brakecli.analysis.regime.rules import Excitation
+from brakecli.analysis.regime.verdict import Excitation
 from brakecli.plots import style
 from brakecli.plots.sweep import DIFFERENT, FORCED, REGIMES, WIDTH, Sign, SweepPicture, add_legend, sign
 from brakecli.sweeps.critical import Outcome

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
-from brakecli.analysis.regime.rules import Excitation
+from brakecli.analysis.regime.verdict import Excitation
 from brakecli.plots import style
 from brakecli.plots.sweep import DIFFERENT, FORCED, MOST_PANELS, REGIMES, WIDTH, Sign, SweepPicture, add_legend
 

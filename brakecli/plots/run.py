@@ -61,6 +61,7 @@ class RunPicture:
         self.spectrum = settled, result.read("spectrum", "frequency"), result.read("spectrum", "vx")
         fundamental, peak = (result.attributes.get(name) for name in ("frequency", "spectrum_peak"))
         self.line = ("fundamental", fundamental) if fundamental else ("highest peak", peak)  # Hz
+        self.resolution = result.attributes.get("frequency_resolution")  # Hz, not in older files
         steady, speed = np.ptp(system.belt["value"]) == 0.0, system.fastest_belt
         self.passing = tuple(sorted(speed * system.wheel.turns)) if steady and speed else ()  # Hz, of its waves
 
@@ -212,7 +213,9 @@ def _draw_spectrum(axes: Axes, picture: RunPicture) -> None:
     for number, wave in enumerate(picture.passing):
         axes.axvline(wave, lw=0.9, zorder=0.8, label="" if number else "waves of the wheel pass", **_BELT)
     if line:
-        axes.axvline(line, color=style.GREEN, ls=style.DOTS, lw=1.4, zorder=0.9, label=f"{name} {line:.4g} Hz")
+        known = f" ± {picture.resolution:.2g}" if picture.resolution and name != "fundamental" else ""
+        label = f"{name} {line:.4g}{known} Hz"
+        axes.axvline(line, color=style.GREEN, ls=style.DOTS, lw=1.4, zorder=0.9, label=label)
     if picture.passing or line:
         axes.legend(loc="upper right")
 

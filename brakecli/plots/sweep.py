@@ -13,7 +13,7 @@ from matplotlib.axis import XAxis, YAxis
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-from brakecli.analysis.regime.rules import Regime
+from brakecli.analysis.regime.verdict import Regime
 from brakecli.case.read import parse_table
 from brakecli.errors import CaseError, UsageError
 from brakecli.files.read import StoredResult

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from brakecli import __version__
 from brakecli.analysis.regime.of_run import verdict_on
-from brakecli.analysis.regime.rules import Verdict
 from brakecli.analysis.regime.spectra import peak, spectrum
+from brakecli.analysis.regime.verdict import Verdict
 from brakecli.case.read import LoadedCase
 from brakecli.case.system import system_of
 from brakecli.files import fields
@@ -156,7 +156,7 @@ def _write_spectrum(result: ResultFile, history: History, start: int) -> float |
     for name, density in lines.density.items():
         result.variable("spectrum", fields.SPECTRUM[name], ("frequency",), density)
     result.set_attributes(values_of(fields.WELCH, lines), "spectrum")
-    return peak(lines.frequency, lines.density["vx"])
+    return peak(lines.frequency, lines.density["vx"], (history.samples - start) * history.interval)
 
 
 def _write_unconverged(result: ResultFile, events: NDArray[np.float64]) -> None:

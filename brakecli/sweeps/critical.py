@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from brakecli.analysis.regime.rules import Regime, Verdict
+from brakecli.analysis.regime.verdict import Regime, Verdict
 from brakecli.analysis.stability.discrete import spectral_radius
 from brakecli.analysis.stability.modes import growth as eigenvalue_growth
 from brakecli.analysis.stability.report import MARGIN, stability

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.analysis.regime.of_run import verdict_on
-from brakecli.analysis.regime.rules import Verdict
+from brakecli.analysis.regime.verdict import Verdict
 from brakecli.case.case import Case
 from brakecli.case.read import key_path
 from brakecli.case.system import system_of

@@ -121,11 +121,22 @@ def _values(axis: Axis) -> list[Any]:
 
 def _hysteresis(journal: Journal) -> NDArray[Any]:
     """Where the motions on the way up and on the way down differ (1)."""
-    regime, amplitude = journal.column("regime"), journal.column("amplitude")
-    decided = ((journal.column("status") == _DONE) & (regime != b"undecided")).all(axis=0)
-    apart = np.ptp(amplitude, axis=0) > SAME_AMPLITUDE * amplitude.max(axis=0)  # not where one is missing
+    regime = journal.column("regime")
     lasting = (regime != b"damped").any(axis=0)
-    return np.asarray(decided & ((regime[0] != regime[1]) | (apart & lasting)), dtype=np.int64)
+    differ = (regime[0] != regime[1]) | (_apart(journal) & lasting)
+    return np.asarray(~_unknown(journal) & differ, dtype=np.int64)
+
+
+def _unknown(journal: Journal) -> NDArray[np.bool_]:
+    """Where the motion of a direction is undecided or has failed."""
+    done = (journal.column("status") == _DONE) & (journal.column("regime") != b"undecided")
+    return np.asarray(~done.all(axis=0))
+
+
+def _apart(journal: Journal) -> NDArray[np.bool_]:
+    """Where the amplitudes of both directions differ; not where one is missing."""
+    amplitude = journal.column("amplitude")
+    return np.asarray(np.ptp(amplitude, axis=0) > SAME_AMPLITUDE * amplitude.max(axis=0))
 
 
 def _on_hysteresis(journal: Journal, hysteresis: NDArray[Any]) -> Iterator[str]:
@@ -134,10 +145,15 @@ def _on_hysteresis(journal: Journal, hysteresis: NDArray[Any]) -> Iterator[str]:
         where = [_parameters(journal.plan, int(index)) for index in np.flatnonzero(hysteresis.ravel())[:3]]
         places = "; ".join(", ".join(f"{key} = {label(value)}" for key, value in each.items()) for each in where)
         yield f"hysteresis at {count} of {hysteresis.size} points: {places}{' …' if count > 3 else ''}"
-    else:
-        yield "no hysteresis: the motion is the same on the way up and on the way down"
-    if undecided := int((journal.column("regime") == b"undecided").any(axis=0).sum()):
-        yield f"hysteresis is not known at {undecided} points, whose regime is undecided in a direction"
+    known = hysteresis.size - int(_unknown(journal).sum())
+    if known and not count:
+        those = "" if known == hysteresis.size else f" at the {known} points that are decided"
+        yield f"no hysteresis{those}: the motion is the same on the way up and on the way down"
+    if known < hysteresis.size:
+        apart = int((_unknown(journal) & _apart(journal)).sum())
+        differ = f"; the amplitudes of the two ways differ at {apart} of them" if apart else ""
+        undecided = f"{hysteresis.size - known} points, which failed or are undecided in a direction"
+        yield f"hysteresis is not known at {undecided}{differ}"
 
 
 def _on_lasting_vibration(journal: Journal, tolerance: float) -> Iterator[str]:

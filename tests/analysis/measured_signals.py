@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.analysis.regime.of_signal import Measurand, Signal, SignalVerdict, classify_signal
-from brakecli.analysis.regime.rules import Regime
+from brakecli.analysis.regime.verdict import Regime
 
 Array = NDArray[np.float64]
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from brakecli.analysis.regime.of_signal import Measurand, Signal, SignalThresholds, SignalVerdict, classify_signal
-from brakecli.analysis.regime.rules import Excitation, Regime
+from brakecli.analysis.regime.verdict import Excitation, Regime
 from tests.analysis.measured_signals import (
     Array,
     clipped,

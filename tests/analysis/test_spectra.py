@@ -99,3 +99,16 @@ def test_density_is_that_of_scipy(samples: int) -> None:
     _, density = welch(noise, 1.0 / INTERVAL, nperseg=size, noverlap=size // 2)
     # Both sum the same numbers, but for the scale that is taken out here and put back.
     np.testing.assert_allclose(lines.density["vx"], density, rtol=1e-12, atol=1e-15 * density.max())
+
+
+@pytest.mark.parametrize(("frequency", "samples"), [(4.0, 20000), (174.0, 200), (20.0, 2000)])
+def test_a_peak_of_few_bins_or_cycles_is_left_out(frequency: float, samples: int) -> None:
+    lines = spectrum(history(sine(frequency, samples)), 0)
+    assert peak(lines.frequency, lines.density["vx"], samples * INTERVAL) is None
+
+
+@pytest.mark.parametrize("samples", [1500, 4000, 20000])
+def test_a_peak_is_known_to_the_distance_of_two_frequencies(samples: int) -> None:
+    lines = spectrum(history(sine(174.0, samples)), 0)
+    found = peak(lines.frequency, lines.density["vx"], samples * INTERVAL)
+    assert found == pytest.approx(174.0, abs=float(lines.frequency[1]))

@@ -186,6 +186,21 @@ def test_lines_go_up_and_down_through_every_point_once() -> None:
     assert [value(plan.places(point)[1]) for point in lines[8]] == [0.9, 0.5, 0.1]
 
 
+GROWING = """\
+shoe.mass = 10.0
+wheel = { radius = 0.5, angular_speed = 2.0 }
+link1 = { stiffness = 1e7, damping = 300.0 }
+link2 = { stiffness = 1.2e7, damping = 300.0, angle_deg = 5.0 }
+load.force = 5000.0
+friction.coefficient = 0.5
+contact = { half_length = 0.05, stiffness = 2e7 }
+initial.at = "equilibrium"
+initial.x = 1e-8
+solver = { step = 2e-5, duration = 0.2 }
+output.sample_interval = 1e-4
+"""
+
+
 def test_hysteresis_between_up_and_down_is_found_and_reported(tmp_path: Path) -> None:
     """A shoe that vibrates on a stiff contact goes on doing so where one at rest on it stays at rest."""
     case = """\
@@ -212,6 +227,22 @@ output.sample_interval = 1e-4
         "hysteresis at 2 of 4 points: friction.coefficient = 1; friction.coefficient = 2"
         in report.findings.sentences[0]
     )
+
+
+def test_no_hysteresis_is_said_of_points_alone_that_are_decided(tmp_path: Path) -> None:
+    """Growth is undecided after so short a run; decay, below the critical friction 0.575, is not."""
+    axis = '[[axis]]\nparameter = "friction.coefficient"\nvalues = {}\ndirection = "both"\n'
+    sentences = []
+    for number, values in enumerate(("[0.2, 0.3]", "[0.2, 0.58]", "[0.58, 0.6]")):
+        (folder := tmp_path / str(number)).mkdir()
+        found = run(folder, 'case = "tiny.toml"\n' + axis.format(values), GROWING).findings
+        sentences.append("; ".join(found.sentences))
+    decided, some, none = sentences
+    assert decided == "no hysteresis: the motion is the same on the way up and on the way down"
+    assert "no hysteresis at the 1 points that are decided" in some
+    assert "hysteresis is not known at 1 points" in some
+    assert "no hysteresis" not in none
+    assert "hysteresis is not known at 2 points" in none
 
 
 def test_the_summary_and_the_json_carry_the_names_of_the_file(tmp_path: Path) -> None:

@@ -7,8 +7,9 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from brakecli.analysis.regime.spectra import Array, upward_crossings
+from brakecli.analysis.regime.spectra import FEWEST_CYCLES, Array, interpolated, upward_crossings
 from brakecli.solver.history import History
 from brakecli.solver.quantities import ContactState
 
@@ -21,6 +22,10 @@ _MOST_LINES = 8
 _LEAST_LINE = 1e-3  # part of the energy
 _HARMONICS = 5
 _MOST_RISES_PER_CYCLE = 4
+_GROUPS = 10  # of neighbouring cycles, of which a median is taken
+_MOST_PLACES = 1 << 16  # samples at which a forced motion is computed
+_FULL = 1.0 - 1e-9  # part of the pad that touches in full contact, but for rounding
+_ENDS = (ContactState.STICK, ContactState.SEPARATED)
 _SAME = 0.02  # squared difference, over twice the variance, between one period of vx and the next
 
 
@@ -69,6 +74,35 @@ class Part:
         count = self.stop - self.start
         return float(np.sqrt(max(square / count - (total / count) ** 2, 0.0)))
 
+    def slides(self, slip: ContactState | None) -> bool:
+        """Whether the whole pad touches and the shoe slips to this side (None: to any) at all of the samples."""
+        if slip is not None and self.fraction(slip) < 1.0:
+            return False
+        return self.extremes("contact_fraction")[0] >= _FULL
+
+    def places(self) -> tuple[Array, Array]:
+        """Evenly spaced samples of x, not too many, and their times (s)."""
+        stride = -(-(self.stop - self.start) // _MOST_PLACES)
+        picked, first = [], self.start
+        for begin in range(self.start, self.stop, _LONGEST):
+            values = self.history.read("x", begin, min(begin + _LONGEST, self.stop))
+            picked.append(values[first - begin :: stride])
+            first += stride * len(picked[-1])
+        x = np.concatenate(picked)
+        return x, np.asarray(self.history.interval * (self.start + stride * np.arange(len(x))), np.float64)
+
+    def power(self, force: str, velocity: str) -> tuple[float, float]:
+        """Mean power (W) that the deviation of a force gives to the vibration, and its standard error.
+
+        Four overlapping pieces of the last samples, under a window that weighs cut cycles at the ends little.
+        """
+        f, v = self.last(force), self.last(velocity)
+        size = max(2 * len(f) // 5, 1)
+        window = np.hanning(size + 2)[1:-1]
+        starts = np.linspace(0, len(f) - size, 4).astype(int)
+        means = [window @ (f[i : i + size] * v[i : i + size]) / window.sum() for i in starts]
+        return float(np.mean(means)), float(np.std(means)) / 2.0
+
     @cached_property
     def _spectrum(self) -> tuple[Array, Array, float]:
         """Frequencies (Hz), power of the last samples of vx under a Hann window, to some scale, and its sum."""
@@ -83,11 +117,30 @@ class Part:
         frequencies, power, total = self._spectrum
         if not lines or total == 0.0:
             return 0.0
-        chosen = np.zeros(len(power), dtype=bool)
-        for line in lines:
-            middle = round(line / frequencies[1])
-            chosen[max(middle - _LINE_BINS, 0) : middle + _LINE_BINS + 1] = True
-        return float(power[chosen].sum()) / total
+        return float(power[_near(lines, frequencies)].sum()) / total
+
+    def covered(self, lines: Sequence[float]) -> float:
+        """Part of the band up to the highest frequency of note that lines (Hz) take: what chance would find."""
+        frequencies, power, total = self._spectrum
+        band = 1 + int(np.searchsorted(np.cumsum(power), 0.99 * total)) + _LINE_BINS
+        return float(_near(lines, frequencies)[:band].mean()) if lines else 0.0
+
+    def split(self, lines: Sequence[float]) -> tuple[float, float] | None:
+        """Half of peak to peak of the parts of x on lines (Hz) and beside them, in the middle half of the samples.
+
+        None where the lines lie too close for the length of the record.
+        """
+        if self.covered(lines) > 0.5 or self.stop - self.start < FEWEST_SAMPLES // 4:
+            return None
+        x = self.last("x")
+        window, middle = np.hanning(len(x)), slice(len(x) // 4, 3 * len(x) // 4)
+        spectrum = np.fft.rfft(x * window)
+        chosen = _near(lines, np.fft.rfftfreq(len(x), self.history.interval))
+        chosen[: _LINE_BINS // 2] = True
+        forced = np.fft.irfft(np.where(chosen, spectrum, 0.0), len(x))[middle] / window[middle]
+        forced -= 0.5 * (forced.max() + forced.min())
+        own = x[middle] - forced
+        return 0.5 * float(np.ptp(forced)), 0.5 * float(np.ptp(own))
 
     def lines(self, forced: Sequence[float]) -> dict[str, list[float]]:
         """The strongest lines of vx: frequencies (Hz), parts of the energy, and 1 where roughness acts there."""
@@ -100,10 +153,44 @@ class Part:
             if share < _LEAST_LINE:
                 break
             left[near] = 0.0
-            distance = min((abs(line - frequencies[top]) for line in forced), default=np.inf)
-            found.append((float(frequencies[top]), share, float(distance <= _LINE_BINS * frequencies[1])))
+            if top < FEWEST_CYCLES:
+                continue  # a line of fewer cycles is not told from the drift of the mean
+            frequency = interpolated(frequencies, power, top)
+            distance = min((abs(line - frequency) for line in forced), default=np.inf)
+            found.append((frequency, share, float(distance <= _LINE_BINS * frequencies[1])))
         names = ("line_frequencies", "line_shares", "line_forced")
         return {name: [line[i] for line in found] for i, name in enumerate(names)}
+
+
+def _near(lines: Sequence[float], frequencies: NDArray[Any]) -> NDArray[np.bool_]:
+    """Which frequencies of a spectrum belong to lines (Hz)."""
+    chosen = np.zeros(len(frequencies), dtype=bool)
+    for line in lines:
+        middle = round(line / frequencies[1])
+        chosen[max(middle - _LINE_BINS, 0) : middle + _LINE_BINS + 1] = True
+    return chosen
+
+
+def median(values: Array) -> tuple[float, float]:
+    """Median, and half of the range of the middle two thirds."""
+    low, middle, high = np.quantile(values, [1.0 / 6.0, 0.5, 5.0 / 6.0])
+    return float(middle), 0.5 * float(high - low)
+
+
+def swings(part: Part, edges: Array) -> Array:
+    """Half of peak to peak of x (m) in each cycle; `edges` part the last samples.
+
+    Between samples an extreme value is that of a parabola.
+    """
+    x = part.last("x")
+    inner, before, after = x[1:-1], x[:-2], x[2:]
+    bend, tops = 2.0 * inner - before - after, []
+    for sign in (1.0, -1.0):
+        extreme = (sign * inner >= sign * before) & (sign * inner > sign * after)
+        refined = sign * x
+        refined[1:-1][extreme] += (sign * (after - before) ** 2 / (8.0 * np.where(bend, bend, 1.0)))[extreme]
+        tops.append(np.maximum.reduceat(refined[: int(edges[-1])], np.asarray(edges[:-1], int)))
+    return np.asarray(0.5 * (tops[0] + tops[1]))
 
 
 class Envelope:
@@ -133,12 +220,30 @@ class Envelope:
         return first if first <= WINDOWS - 10 else None
 
 
-def cycles_of(part: Part) -> dict[str, Any]:
-    """What the cycles of vx show, which are counted by its rises through the mean; empty if there are none."""
+@dataclass(frozen=True)
+class Cycles:
+    """What the cycles of vx show, which are counted by its rises through the mean; medians with their spread."""
+
+    evidence: dict[str, Any]
+    frequency: float  # Hz
+    amplitude: float  # m
+    amplitude_spread: float
+    stick_fraction: float
+    contact_loss_fraction: float
+    limited: float  # part of the groups of cycles in which the shoe sticks, leaves the wheel or overtakes it
+    drift: float  # by which the amplitude changes, over itself, from the first third of the cycles to the last
+
+
+def cycles_of(part: Part, slip: ContactState | None = None) -> Cycles | None:
+    """The cycles of a part; None if there are none. `slip` is the side to which the shoe slips in steady sliding.
+
+    Stick, loss of contact and frequency are medians of ten groups of neighbouring cycles, so that it does not
+    matter how samples fall into each cycle.
+    """
     velocity = part.last("vx")
     crossings = upward_crossings(velocity, 0.3 * float(velocity.std()))
     if len(crossings) < 2:
-        return {}
+        return None
     period = float(crossings[-1] - crossings[0]) / (len(crossings) - 1)
     close = 2.0 * _SAME * float(velocity.var())
     for rises in range(1, _MOST_RISES_PER_CYCLE + 1):  # after which the motion repeats
@@ -147,14 +252,22 @@ def cycles_of(part: Part) -> dict[str, Any]:
             break
     else:
         rises = 1
-    crossings, period = crossings[::rises], period * rises
+    crossings = crossings[::rises]
+    if len(crossings) < 4:
+        return None
+    cycles = len(crossings) - 1
+    edges = np.linspace(0, cycles, min(cycles, _GROUPS) + 1).astype(int)
+    groups = crossings[edges]
+    period, period_spread = median(np.diff(groups) / np.diff(edges))
     state = part.history.read("state", part.stop - len(velocity), part.stop)
     sticks = np.flatnonzero((state[1:] == ContactState.STICK) & (state[:-1] != ContactState.STICK)) + 1
-    per_cycle = np.histogram(sticks, crossings)[0] if len(crossings) > 1 else np.zeros(1)
+    per_cycle = np.histogram(sticks, crossings)[0]
+    pieces = [state[int(begin) : int(end) + 1] for begin, end in pairwise(groups)]
+    stick, loss = (np.array([float(np.mean(piece == which)) for piece in pieces]) for which in _ENDS)
     frequency = 1.0 / (period * part.history.interval)
     first, *higher = (part.share([n * frequency]) for n in range(1, _HARMONICS + 1))
-    return {
-        "cycles": float(len(crossings) - 1),
+    evidence = {
+        "cycles": float(cycles),
         "samples_per_cycle": period,
         "rises_per_cycle": float(rises),
         "fundamental_share": first,
@@ -162,4 +275,12 @@ def cycles_of(part: Part) -> dict[str, Any]:
         "harmonics": [float(np.sqrt(share / first)) for share in higher if first > 0.0],
         "stick_cycles": float(np.mean(per_cycle > 0)),
         "stick_episodes_per_cycle": float(np.mean(per_cycle)),
+        "frequency_spread": frequency * period_spread / period,
+        "stick_spread": median(stick)[1],
+        "contact_loss_spread": median(loss)[1],
     }
+    limited = float(np.mean([bool(np.any(piece != slip)) for piece in pieces]))
+    sizes = swings(part, crossings)
+    first, *_, last = (float(np.median(third)) for third in np.array_split(sizes, 3) if len(third))
+    drift = last / first - 1.0 if first > 0.0 else 0.0
+    return Cycles(evidence, frequency, *median(sizes), median(stick)[0], median(loss)[0], limited, drift)

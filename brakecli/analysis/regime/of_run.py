@@ -10,7 +10,17 @@ from typing import Any
 import numpy as np
 
 from brakecli.analysis.regime.evidence import Part
-from brakecli.analysis.regime.rules import Context, Regime, Thresholds, Verdict, classify, forced_lines
+from brakecli.analysis.regime.linear import linear_theory
+from brakecli.analysis.regime.rules import classify
+from brakecli.analysis.regime.verdict import (
+    Context,
+    Excitation,
+    Regime,
+    Thresholds,
+    Verdict,
+    forced_lines,
+    subharmonics,
+)
 from brakecli.analysis.stability.modes import growth
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
@@ -45,7 +55,9 @@ def verdict_on(history: History, system: System, failure: str | None, limits: Th
     verdict = classify(history, context(system), limits or Thresholds())
     if not failure:
         return verdict
-    return replace(verdict, regime=Regime.UNDECIDED, frequency=None, reasons=(f"the run failed: {failure}",))
+    verdict = replace(verdict, growth_rate=None, ringing_frequency=None, frequency=None, settled=False)
+    why = (f"the run failed: {failure}",)
+    return replace(verdict, regime=Regime.UNDECIDED, excitation=Excitation.NONE, reasons=why)
 
 
 def context(system: System) -> Context:
@@ -56,16 +68,25 @@ def context(system: System) -> Context:
     def growth_rate() -> float:  # by the mean stiffness of the contact
         with suppress(CaseError):
             stiffness = steady_sliding(system, belt=belt).stiffness
-            return max(growth(c, stiffness, math.copysign(c.phi, belt)), 0.0)
+            return growth(c, stiffness, math.copysign(c.phi, belt) if belt else 0.0)
         return 0.0
 
+    theory, turns, highest = linear_theory(system, belt), system.wheel.turns.tolist(), 0.5 / system.interval
+    swings = np.abs(theory.waves[:, 0]) if theory else np.ones(len(turns))
+    waves = tuple((abs(belt) * turn, float(swing)) for turn, swing in zip(turns, swings, strict=True))
+    fastest = compression * system.natural_frequencies[1]
     return Context(
         belt,
         radius=system.radius,
         steady=len(system.belt) == 1 and len(system.load) == 1,
-        forced=forced_lines(belt, [float(turns) for turns in system.wheel.turns], 0.5 / system.interval),
-        quiet=1e-9 * compression * system.natural_frequencies[1],
+        forced=forced_lines(belt, turns, highest),
+        subharmonics=subharmonics(belt, turns, highest),
+        waves=waves if belt else (),
+        quiet=1e-9 * fastest,
+        scale=fastest,
+        frictionless=c.phi == 0.0,
         growth=growth_rate,
+        linear=lambda: theory,
         powers=partial(_powers, system, belt),
     )
 

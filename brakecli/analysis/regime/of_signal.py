@@ -11,8 +11,8 @@ from itertools import product
 import numpy as np
 
 from brakecli.analysis.regime.cleaning import CERTAIN, Velocity, cleaned, line_share
-from brakecli.analysis.regime.rules import Decision, Excitation, Regime
 from brakecli.analysis.regime.spectra import Array, rises
+from brakecli.analysis.regime.verdict import Decision, Excitation, Regime
 
 _FINE = 1000.0  # samples of a cycle, after interpolation, among which a plateau is sought
 _PLATEAU_SAMPLES = 1 << 20  # most samples in which a plateau is sought

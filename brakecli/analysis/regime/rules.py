@@ -1,120 +1,38 @@
 """What kind of vibration a history shows, and why: the rules. `evidence` measures what they go by."""
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from enum import StrEnum
-from typing import Any, NamedTuple
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
-from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, WINDOWS, Envelope, Part, cycles_of
+import numpy as np
+
+from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, WINDOWS, Cycles, Envelope, cycles_of, median, swings
+from brakecli.analysis.regime.forced import GROWN, QUARTER, ForcedRules
+from brakecli.analysis.regime.spectra import segment
+from brakecli.analysis.regime.verdict import Context, Decision, Excitation, Feeds, Regime, Thresholds, Verdict
 from brakecli.solver.history import History
 from brakecli.solver.quantities import ContactState
 
+if TYPE_CHECKING:  # a measured signal needs no compiled code
+    from brakecli.analysis.regime.linear import Linear
 
-class Regime(StrEnum):
-    """The paper's three regimes, and `undecided`."""
-
-    DAMPED = "damped"
-    RELAXATION = "relaxation"
-    QUASI_HARMONIC = "quasi-harmonic"
-    UNDECIDED = "undecided"
+_NEAR = 0.3  # by which the amplitude of a motion that stick or loss of contact limits may still change
+_DRIFT = 5e-3  # by which the amplitude of a motion without stick may change where sliding is stable
+_DEFAULT = Thresholds()
 
 
-class Excitation(StrEnum):
-    """Where the energy of a sustained motion comes from."""
-
-    SELF_EXCITED = "self-excited"
-    FORCED = "forced"
-    NONE = "none"
-
-
-# Growth rate times duration
-_GROWN = math.log(1e9)  # from which a disturbance grows from rounding to the size of the motion
-_NOTHING = 1e-3  # which may come from the rounding of the eigenvalues
-
-
-@dataclass(frozen=True)
-class Thresholds:
-    """The thresholds of docs/regimes.md, which every verdict carries."""
-
-    decayed_to: float = 0.02
-    settled_within: float = 0.05
-    reach_within: float = 0.02
-    trend_errors: float = 3.0
-    fewest_cycles: float = 10.0
-    samples_per_cycle: float = 8.0
-    stick_cycles: float = 0.8
-    harmonic_share: float = 0.8
-    forced_share: float = 0.8
-
-
-@dataclass(frozen=True)
-class Context:
-    """What is known of the case behind a history."""
-
-    belt_speed: float  # U, m/s
-    steady: bool = True  # whether U and Q are constant
-    forced: tuple[float, ...] = ()  # Hz, lines of the roughness
-    quiet: float = 0.0  # m/s, size of vx that may come from rounding
-    growth: Callable[[], float] = lambda: 0.0  # 1/s, of a small disturbance of steady sliding; 0 where it decays
-    powers: Callable[[Part], dict[str, float]] = lambda part: {}  # W, what becomes of the power of the belt
-    radius: float = 1.0  # R, m
-
-
-class Decision(NamedTuple):
-    """What a rule decides, and why."""
-
-    reason: str
-    regime: Regime = Regime.UNDECIDED
-    excitation: Excitation = Excitation.NONE
-    frequency: float | None = None  # Hz
-    stick_fraction: float | None = None
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """The regime of a history, its numbers (SI units) over the settled part, and the reasons in plain words."""
-
-    regime: Regime
-    excitation: Excitation
-    frequency: float | None  # Hz, fundamental of vx when sustained
-    amplitude: float  # m, half of peak to peak of x
-    settled_from: float  # s; the middle where no settled part was found
-    start: int  # the sample there
-    settled: bool  # whether a settled part was found
-    stick_fraction: float
-    contact_loss_fraction: float
-    mean_friction_force: float  # N
-    braking_torque: float  # N m, its mean torque on the wheel's axis, R F_x
-    reasons: tuple[str, ...]
-    evidence: dict[str, Any]
-    thresholds: Thresholds
-
-
-def forced_lines(belt_speed: float, waves_per_metre: Sequence[float], highest: float) -> tuple[float, ...]:
-    """Frequencies (Hz, up to `highest`) of the passing waves, their multiples, and sums and differences of two."""
-    base = [abs(belt_speed) * waves for waves in waves_per_metre]
-    multiples = {n * f for f in base for n in range(1, 11)}
-    pairs = {abs(f + sign * g) for f in base for g in base for sign in (1, -1)}
-    return tuple(sorted(f for f in multiples | pairs if 0.0 < f <= highest))
-
-
-class _Rules:
+class _Rules(ForcedRules):
     """The rules on one history, in their order. They gather evidence until one of them decides."""
 
-    def __init__(self, history: History, context: Context, limits: Thresholds) -> None:
-        self.history, self.context, self.limits = history, context, limits
-        self.settled_part, self.settled = Part(history, history.samples // 2, history.samples), False
-        self.evidence: dict[str, Any] = {}
-
     def contact(self) -> Decision | None:
+        standing = self.context.belt_speed == 0.0
         if self.settled_part.fraction(ContactState.SEPARATED) == 1.0:
-            never = replace(self.settled_part, start=0).fraction(ContactState.SEPARATED) == 1.0
+            never = self.whole.fraction(ContactState.SEPARATED) == 1.0
             text = "never touched the wheel" if never else "lost contact for good"
             return Decision(f"the shoe has {text}; check the sign and size of load.force")
-        if self.settled_part.fraction(ContactState.STICK) < 1.0:
+        if (self.last if standing else self.settled_part).fraction(ContactState.STICK) < 1.0:
             return None
-        if self.context.belt_speed == 0.0:
+        if standing:
             return Decision("the shoe has come to rest, sticking to the standing wheel", Regime.DAMPED)
         return Decision("the shoe sticks throughout and is carried along by the wheel; run longer")
 
@@ -125,55 +43,122 @@ class _Rules:
         self.evidence |= envelope.evidence
         if not self.context.steady:
             return Decision("the wheel's speed or the load changes with time, so the motion cannot settle")
-        if envelope.largest <= self.context.quiet:
-            return Decision("nothing moves beyond rounding: the shoe slides steadily or rests", Regime.DAMPED)
-        if envelope.final <= max(self.limits.decayed_to * envelope.largest, self.context.quiet):
-            text = f"vx has fallen to {envelope.final / envelope.largest:.2g} of its largest amplitude"
-            return Decision(f"the vibration has died out: {text}", Regime.DAMPED)
-        return None
+        if envelope.largest > self.context.quiet:
+            return None
+        if (growth := self.context.growth()) > 0.0:
+            text = f"nothing moves yet, but sliding is unstable: a disturbance grows at {growth:.3g} 1/s"
+            return Decision(f"{text}; start beside steady sliding, or run at least {GROWN / growth:.2g} s")
+        return Decision("nothing moves beyond rounding: the shoe slides steadily or rests", Regime.DAMPED)
 
-    def forced(self) -> Decision | None:
-        if not self.context.forced:
+    def linear(self) -> Decision | None:
+        """Theory decides where the shoe has long been sliding in full contact, to one side."""
+        theory, slow = self.context.linear(), self._slowest(0.0)
+        start = max(min(self.last.start, self.history.samples - int(slow / self.history.interval)), 0)
+        if theory is None or not replace(self.last, start=start).slides(theory.slip):
             return None
-        share = self.evidence["forced_share"] = self.settled_part.share(self.context.forced)
-        if share < self.limits.forced_share:
-            return None
-        growth = self.context.growth()
-        powers_of_e = growth * self.history.samples * self.history.interval
-        if powers_of_e > _GROWN:
-            return None  # the shoe's own vibration falls on the same lines
-        if powers_of_e > _NOTHING:
-            what = f"{share:.0%} of the energy of vx lies on the lines of the roughness, but sliding is unstable"
-            own = f"the shoe's own vibration grows at {growth:.3g} 1/s"
-            return Decision(f"{what}: {own}; run at least {_GROWN / growth:.2g} s")
-        text = f"only the roughness shakes the shoe: {share:.0%} of the energy of vx lies on its lines"
+        self.theory, mode = theory, theory.mode
+        how = f"{mode.frequency:.4g} Hz" if mode.frequency else "without oscillation"
+        linear = "full contact and slip to one side make the motion linear"
+        if theory.direction == 0:
+            return Decision(f"{linear}: it neither grows nor decays ({how}); a dashpot would decide")
+        if theory.direction > 0:
+            self.evidence["seconds_to_go"] = more = theory.seconds_to_limit(*self._end()) + 3.0 / mode.growth
+            growing = f"{linear}: still growing at {mode.growth:.3g} 1/s ({how})"
+            return Decision(f"{growing}; run at least {QUARTER * (self.duration + more):.3g} s")
+        decays = f"{linear}: the shoe's own vibration decays at {-mode.growth:.3g} 1/s ({how})"
+        if not len(theory.waves):
+            return Decision(decays, Regime.DAMPED)
+        if self.duration < slow:
+            return self._too_short(slow)
+        return self._shaken(theory, slow, decays)
+
+    def _end(self) -> tuple[float, Any]:
+        """Time and state of the last sample."""
+        last = self.history.samples - 1
+        state = [float(self.history.read(name, last, last + 1)[0]) for name in ("x", "y", "vx", "vy")]
+        return last * self.history.interval, np.array(state)
+
+    def _shaken(self, theory: "Linear", slow: float, decays: str) -> Decision | None:
+        """The forced motion that lasts, with the settled part in which the shoe's own part has gone."""
+        forced, own, time = theory.parts(*self.whole.places())
+        left = np.array([0.5 * float(np.ptp(part)) for part in np.array_split(own, WINDOWS)])
+        end = float(left[-10:].mean())
+        slope = np.polyfit(np.arange(WINDOWS // 2), np.log(np.maximum(left[WINDOWS // 2 :], 1e-300)), 1)[0]
+        if slope * WINDOWS > 1.0 and end > self.limits.settled_within * forced:
+            return None  # the passing waves excite what the mean stiffness damps
+        first = WINDOWS - int(np.argmin((left <= self.limits.settled_within * forced)[::-1]))
+        begin = max(first, 1) * self.history.samples // WINDOWS
+        wait = max(math.log(max(end / (self.limits.settled_within * forced), 1.0)) / -theory.mode.growth, 0.0)
+        hint = ""
+        if first <= WINDOWS - 10 and self.duration - begin * self.history.interval >= 2.0 * slow:
+            self.settled_part, self.settled = replace(self.whole, start=begin), True
+        else:
+            hint = f"; run at least {max(QUARTER * (self.duration + wait), self._long_enough(slow)):.3g} s"
+            hint += " to see only that"
+        chosen = time >= self.settled_part.start * self.history.interval
+        self.parts = forced, 0.5 * float(np.ptp(own[chosen]))
+        text = f"only the roughness shakes the shoe, by {forced:.3g} m: {decays}{hint}"
         return Decision(text, Regime.DAMPED, Excitation.FORCED)
+
+    def died_out(self) -> Decision | None:
+        """Little is left beside the start, beside the wheel's speed and beside the compression, and it falls."""
+        envelope, belt = self.envelope, abs(self.context.belt_speed)
+        if belt == 0.0 and self.context.growth() < 0.0:
+            return Decision("the wheel stands: friction and dashpots take the energy", Regime.DAMPED)
+        small = min(envelope.largest, belt or math.inf, self.context.scale)
+        falls = self.evidence.get("envelope_slope", -1.0) < 0.0 or envelope.final <= self.context.quiet
+        ends = self.last.fraction(ContactState.STICK) == self.last.fraction(ContactState.SEPARATED) == 0.0
+        if envelope.final > max(self.limits.decayed_to * small, self.context.quiet) or not (falls and ends):
+            return None
+        if self.context.growth() > 0.0:
+            return None
+        text = f"vx has fallen to {envelope.final / envelope.largest:.2g} of its largest amplitude"
+        return Decision(f"the vibration has died out: {text}", Regime.DAMPED)
 
     def trend(self) -> Decision | None:
         """Decides where the motion still grows or decays; otherwise it finds the settled part."""
-        first = self.envelope.settled_window(self.limits.settled_within, self.limits.reach_within)
-        if first is not None:
-            start = first * self.history.samples // WINDOWS
-            self.settled_part, self.settled = replace(self.settled_part, start=start), True
+        if self.context.frictionless:
+            if self.context.growth() < 0.0:
+                return Decision(
+                    "without friction nothing excites the shoe, and the dashpots damp it", Regime.DAMPED
+                )
+            return Decision(
+                "without friction nothing excites the shoe, but no dashpot damps it; a dashpot would decide"
+            )
+        if self._settle():
             return None
         slope = self.evidence.get("envelope_slope")
         if slope is None:
             return Decision("the motion comes and goes; run longer")
         if abs(slope) <= self.limits.trend_errors * self.evidence["envelope_slope_error"]:
             return None  # an amplitude that beats or wanders, without a trend
+        if self.context.growth() > 0.0 and 0.5 * abs(slope) * self.duration <= _NEAR:
+            return None  # a vibration that has reached its limits, cannot die out, and comes near its amplitude
         text = f"still {'growing' if slope > 0.0 else 'decaying'} at {abs(slope):.3g} 1/s"
         return Decision(f"{text}; run at least {3.0 / abs(slope):.2g} s longer")
 
     def sustained(self) -> Decision:
-        found = cycles_of(self.settled_part)
-        self.evidence |= found
-        cycles = found.get("cycles", 0.0)
+        theory = self.context.linear() if not self.context.forced else None
+        self.cycles = found = cycles_of(self.settled_part, theory.slip if theory else None)
+        cycles = found.evidence["cycles"] if found else 0.0
+        self.evidence |= found.evidence if found else {}
         if not found or cycles < self.limits.fewest_cycles:
             return Decision(f"only {cycles:.0f} cycles in the settled part; run longer")
-        period, stick, harmonic = found["samples_per_cycle"], found["stick_cycles"], found["harmonic_share"]
+        period, stick, harmonic = (
+            found.evidence[name] for name in ("samples_per_cycle", "stick_cycles", "harmonic_share")
+        )
         if period < self.limits.samples_per_cycle:
             return Decision(f"only {period:.1f} samples a cycle; reduce output.sample_interval")
-        own = Excitation.SELF_EXCITED, 1.0 / (period * self.history.interval)
+        if self._settled_seconds < 2.0 * (slow := self._slowest(found.amplitude)):
+            return self._too_short(slow)
+        if theory and (decision := self._unfounded(theory, found)):
+            return decision
+        certain = (
+            self._larger and self.context.growth() > 0.0
+        )  # the waves cannot force it, and sliding is unstable
+        if self.context.forced and not certain and self._feeds() is Feeds.UNKNOWN:
+            return self._either()
+        own = Excitation.SELF_EXCITED, found.frequency
         if stick >= self.limits.stick_cycles:
             text = f"sustained, with stick in {stick:.0%} of {cycles:.0f} cycles"
             return Decision(text, Regime.RELAXATION, *own)
@@ -183,26 +168,75 @@ class _Rules:
         irregular = f"irregular: stick in {stick:.0%} of the cycles, {lines}"
         return Decision(f"{irregular}; run longer, or look at the spectrum")
 
+    def _unfounded(self, theory: "Linear", found: Cycles) -> Decision | None:
+        """What speaks against self-excited vibration on smooth surfaces, where theory knows small vibrations."""
+        if found.limited < self.limits.stick_cycles:
+            text = f"the shoe sticks or leaves the wheel in only {found.limited:.0%} of the settled part"
+            return Decision(f"{text}; run longer")
+        if theory.direction > 0:
+            return None
+        if theory.direction == 0:
+            return Decision(
+                "sliding is stable, and no dashpot makes a large vibration settle; a dashpot would decide"
+            )
+        sticks = found.evidence["stick_cycles"] >= self.limits.stick_cycles
+        if abs(found.drift) > (self.limits.settled_within if sticks else _DRIFT):
+            text = f"sliding is stable, and the amplitude still changes by {found.drift:.2%}"
+            return Decision(f"{text} within the last part of the run; run longer")
+        return None
 
-def classify(history: History, context: Context, thresholds: Thresholds = Thresholds()) -> Verdict:
+    def decide(self) -> Decision:
+        """What the first rule that applies decides."""
+        rules = (self.contact, self.unmoved, self.linear, self.forced, self.died_out, self.trend, self.fed)
+        return next((found for rule in rules if (found := rule()) is not None), None) or self.sustained()
+
+    def amplitude(self, decision: Decision) -> tuple[float, float | None]:
+        """Half of peak to peak of x (m) as a median over cycles, and its spread."""
+        part = self.settled_part
+        if self.cycles and decision.excitation is Excitation.SELF_EXCITED:
+            return self.cycles.amplitude, self.cycles.amplitude_spread
+        if decision.excitation is not Excitation.FORCED:
+            return part.amplitude("x"), None
+        if self.theory and self.parts and not self.settled:
+            return self.parts[0], None
+        period = max(self._slowest(0.0) / self.history.interval, 1.0)
+        samples = len(part.last("x"))
+        edges = np.asarray(samples - period * np.arange(int(samples / period), -1, -1), np.float64)
+        return median(swings(part, edges)) if len(edges) > 1 else (part.amplitude("x"), None)
+
+
+def classify(history: History, context: Context, thresholds: Thresholds = _DEFAULT) -> Verdict:
     """The regime of a run's history, by the rules of docs/regimes.md; the first that applies decides."""
     rules = _Rules(history, context, thresholds)
-    decision = rules.contact() or rules.unmoved() or rules.forced() or rules.trend() or rules.sustained()
-    part, belt, friction = rules.settled_part, context.belt_speed, rules.settled_part.mean("friction_force")
+    decision = rules.decide()
+    part, belt, cycles = rules.settled_part, context.belt_speed, rules.cycles
+    sustained = cycles is not None and decision.excitation is Excitation.SELF_EXCITED
+    friction, torques = part.mean("friction_force"), part.extremes("friction_force")
     evidence = rules.evidence | {f"amplitude_{name}": part.amplitude(name) for name in ("y", "vx", "vy")}
     if belt != 0.0:
         evidence["largest_vx_over_belt_speed"] = part.extremes("vx")[int(belt > 0.0)] / belt
     evidence |= part.lines(context.forced) | (context.powers(part) if context.steady else {})
+    forced, own = rules.parts or rules.split() or (None, None)
+    amplitude, spread = rules.amplitude(decision)
     return Verdict(
         regime=decision.regime,
         excitation=decision.excitation,
         frequency=decision.frequency,
-        amplitude=part.amplitude("x"),
+        amplitude=amplitude,
+        amplitude_spread=spread,
+        amplitude_forced=forced,
+        amplitude_own=own,
+        growth_rate=rules.theory.mode.growth if rules.theory else None,
+        ringing_frequency=rules.theory.mode.frequency if rules.theory else None,
+        frequency_resolution=1.0 / (segment(part.stop - part.start) * history.interval),
+        torque_variation=context.radius * (torques[1] - torques[0]),
         settled_from=part.start * history.interval,
         start=part.start,
-        settled=rules.settled,
-        stick_fraction=part.fraction(ContactState.STICK),
-        contact_loss_fraction=part.fraction(ContactState.SEPARATED),
+        settled=rules.settled and decision.regime is not Regime.UNDECIDED,
+        stick_fraction=cycles.stick_fraction if sustained and cycles else part.fraction(ContactState.STICK),
+        contact_loss_fraction=(
+            cycles.contact_loss_fraction if sustained and cycles else part.fraction(ContactState.SEPARATED)
+        ),
         mean_friction_force=friction,
         braking_torque=context.radius * friction,
         reasons=(decision.reason,),

@@ -1,5 +1,6 @@
 """Power spectral densities, their peak, and the rises of a signal through zero."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,8 @@ LONGEST_SEGMENT = 1 << 16  # samples, so that the memory that a spectrum takes d
 SEGMENTS_AT_ONCE = 16
 SEGMENTS_WANTED = 8
 SHORTEST_SEGMENT = 16
+FEWEST_CYCLES = 5  # of a line in the record, and bins below it: what is slower is not told from drift
+_FEWEST_BINS = 3
 SPECTRAL = ("x", "y", "vx", "vy", "friction_force", "normal_force", "contact_fraction")
 
 
@@ -28,10 +31,15 @@ class Spectrum:
     window: str = "hann"
 
 
+def segment(samples: int) -> int:
+    """Samples of a segment of the spectrum of so many samples."""
+    return min(LONGEST_SEGMENT, max(min(SHORTEST_SEGMENT, samples), 2 * samples // (SEGMENTS_WANTED + 1)))
+
+
 def spectrum(history: History, start: int) -> Spectrum:
     """Welch's estimate (Hann window, half overlap, mean removed) of the samples from `start` on."""
     length = history.samples - start
-    size = min(LONGEST_SEGMENT, max(min(SHORTEST_SEGMENT, length), 2 * length // (SEGMENTS_WANTED + 1)))
+    size = segment(length)
     hop = max(1, size - size // 2)
     segments = 1 + (length - size) // hop
     window = 0.5 + 0.5 * np.cos(np.linspace(-np.pi, np.pi, size + 1)[:size]) if size > 1 else np.ones(1)
@@ -54,11 +62,20 @@ def spectrum(history: History, start: int) -> Spectrum:
     return Spectrum(frequency, {name: total / segments for name, total in densities.items()}, start, segments)
 
 
-def peak(frequency: Array, density: Array) -> float | None:
-    """Frequency (Hz) of the highest peak above zero, from a parabola through its logarithm; None without one."""
+def peak(frequency: Array, density: Array, duration: float = math.inf) -> float | None:
+    """Frequency (Hz) of the highest peak above zero; None where none is resolved.
+
+    That takes three bins below it, and five cycles in the duration (s) of the record.
+    """
     if density.size < 3 or not density[1:].max() > 0.0:
         return None
     i = 1 + int(np.argmax(density[1:]))
+    found = interpolated(frequency, density, i)
+    return found if i >= _FEWEST_BINS and found * duration >= FEWEST_CYCLES else None
+
+
+def interpolated(frequency: Array, density: Array, i: int) -> float:
+    """Frequency (Hz) of the peak at bin i, from a parabola through its logarithm."""
     if i + 1 >= density.size or density[i - 1] <= 0.0 or density[i + 1] <= 0.0:
         return float(frequency[i])
     left, middle, right = np.log(density[i - 1 : i + 2])

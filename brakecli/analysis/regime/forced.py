@@ -1,0 +1,186 @@
+"""Forced or not: the rules on a rough wheel, by lines, power and the sign of σ."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from brakecli.analysis.regime.evidence import WINDOWS, Cycles, Envelope, Part
+from brakecli.analysis.regime.verdict import Context, Decision, Excitation, Feeds, Regime, Thresholds
+from brakecli.solver.history import History
+
+if TYPE_CHECKING:  # a measured signal needs no compiled code
+    from brakecli.analysis.regime.linear import Linear
+
+# Growth rate times duration
+GROWN = math.log(1e9)  # from which a disturbance grows from rounding to the size of the motion
+_NOTHING = 1e-3  # which may come from the rounding of the eigenvalues
+
+QUARTER = 4.0 / 3.0  # a run whose last quarter is settled, over what comes before
+_ERRORS = 2.0  # standard errors of a mean power
+_LARGER = 5.0  # times what the waves force in full contact: a larger motion needs more proof that it is forced
+
+
+class ForcedRules:
+    """A history as it is judged, and the rules that say whether the roughness shakes the shoe."""
+
+    envelope: Envelope
+
+    def __init__(self, history: History, context: Context, limits: Thresholds) -> None:
+        """Take a history and what is known of its case."""
+        self.history, self.context, self.limits = history, context, limits
+        self.duration = history.samples * history.interval
+        self.whole = Part(history, 0, history.samples)
+        self.last = replace(self.whole, start=history.samples * (WINDOWS - 10) // WINDOWS)
+        self.settled_part, self.settled = replace(self.whole, start=history.samples // 2), False
+        self.theory: Linear | None = None  # where the motion is linear
+        self.cycles: Cycles | None = None
+        self.parts: tuple[float, float] | None = (
+            None  # m, half of peak to peak of what is forced and what is added
+        )
+        self.evidence: dict[str, Any] = {}
+
+    def _slowest(self, amplitude: float) -> float:
+        """Period (s) of the slowest wave that counts beside an amplitude of x (m) and beside the others; or 0."""
+        least = max([amplitude, *(swing for _, swing in self.context.waves)]) if self.context.waves else 0.0
+        counts = [f for f, swing in self.context.waves if swing >= self.limits.settled_within * least]
+        return 1.0 / min(counts) if counts else 0.0
+
+    def _long_enough(self, slow: float) -> float:
+        """Duration (s) of a run whose settled part holds two periods."""
+        start = self.settled_part.start * self.history.interval if self.settled else 0.5 * self.duration
+        return max(start + 2.0 * slow, QUARTER * 2.0 * slow) * 1.05
+
+    def _too_short(self, slow: float) -> Decision:
+        turns = (self.duration if self.duration < slow else self._settled_seconds) / slow
+        what = "run" if self.duration < slow else "settled part"
+        text = f"the {what} holds only {turns:.2g} periods of the slowest wave, which passes every {slow:.3g} s"
+        return Decision(f"{text}; run at least {self._long_enough(slow):.3g} s")
+
+    @property
+    def _settled_seconds(self) -> float:
+        return self.duration - self.settled_part.start * self.history.interval
+
+    def forced(self) -> Decision | None:
+        """Decides where the roughness shakes the shoe, by where the energy of vx lies."""
+        if not self.context.forced:
+            return None
+        slow = self._slowest(self.settled_part.amplitude("x"))
+        if self.duration < slow:
+            return self._too_short(slow)
+        growth = self.context.growth()
+        if self.context.frictionless:
+            text = "without friction nothing but the roughness shakes the shoe"
+            return self._forced(text) if growth < 0.0 else Decision(f"{text}, but no dashpot damps it")
+        share, dense = self._share(self.context.forced, 0.5)
+        self.evidence["forced_share"] = share
+        if share < self.limits.forced_share:
+            lines = tuple({*self.context.forced, *self.context.subharmonics})
+            share, dense = self._share(lines, 0.3)
+            if growth >= 0.0 or dense or share < self.limits.forced_share:
+                return None
+        powers_of_e = growth * self.duration
+        if powers_of_e > GROWN:
+            return None  # the shoe's own vibration falls on the same lines
+        feeds, larger = self._feeds(), self._larger
+        if feeds is Feeds.FRICTION and larger and self._settle():
+            return None
+        what = f"{share:.0%} of the energy of vx lies on the lines of the roughness"
+        if powers_of_e > _NOTHING:
+            own = f"but sliding is unstable: the shoe's own vibration grows at {growth:.3g} 1/s"
+            return self.fed() or Decision(f"{what}, {own}; run at least {GROWN / growth:.2g} s")
+        if feeds is Feeds.FRICTION and self.evidence["power_of_roughness"] < 0.0:
+            return None
+        doubtful = larger or self._unstable_in_full_contact
+        if feeds is Feeds.FRICTION or (doubtful and feeds is Feeds.UNKNOWN):
+            return self._either()
+        if dense:
+            text = f"{what}, which lie too close to be told from others; run twice as long"
+            return self.fed() or Decision(text)
+        return self._forced(f"only the roughness shakes the shoe: {what}")
+
+    @property
+    def _unstable_in_full_contact(self) -> bool:
+        theory = self.context.linear()
+        return theory is not None and theory.direction > 0
+
+    @property
+    def _larger(self) -> bool:
+        return 0.0 < _LARGER * self._expected < self.last.deviation("x")
+
+    @property
+    def _expected(self) -> float:
+        """Standard deviation of x (m) that the waves force in full contact."""
+        return math.sqrt(0.5 * sum(swing**2 for _, swing in self.context.waves))
+
+    def _share(self, lines: Sequence[float], most: float) -> tuple[float, bool]:
+        """Part of the energy of vx on lines, in the second half or in the last quarter, where it is more.
+
+        Also whether that shows nothing: the lines cover more than `most` of the band, and the motion is larger
+        than what they force.
+        """
+        shares = []
+        for part in (self.settled_part, self.last):
+            dense = part.covered(lines) > most and part.deviation("x") > 2.0 * self._expected
+            shares.append((part.share(lines), dense))
+        clear = [share for share, dense in shares if not dense and share >= self.limits.forced_share]
+        return (max(clear), False) if clear else max(shares)
+
+    def _forced(self, text: str) -> Decision:
+        """Forced, as seen in a settled part of two periods of the slowest wave."""
+        self._settle()
+        slow = self._slowest(self.settled_part.amplitude("x"))
+        if self._settled_seconds < 2.0 * slow:
+            return self._too_short(slow)
+        return Decision(text, Regime.DAMPED, Excitation.FORCED)
+
+    def _settle(self) -> bool:
+        """Find the settled part."""
+        first = self.envelope.settled_window(self.limits.settled_within, self.limits.reach_within)
+        if first is not None:
+            start = first * self.history.samples // WINDOWS
+            self.settled_part, self.settled = replace(self.settled_part, start=start), True
+        return self.settled
+
+    def _feeds(self) -> "Feeds":
+        """Who gives energy to the vibration on a rough wheel.
+
+        The roughness, where sliding is stable and friction takes energy in the mean or gives less than half as
+        much. Friction, where the roughness takes energy or gives less; less than half as much if sliding is
+        stable. Nobody knows where the account stays open by half of that: F_x jumps between samples.
+        """
+        friction, off = self.settled_part.power("friction_force", "vx")
+        roughness, off_too = self.settled_part.power("normal_force", "vy")
+        self.evidence |= {"power_of_friction": friction, "power_of_roughness": roughness}
+        lost = self.context.powers(self.settled_part).get("power_dashpots", friction + roughness)
+        open_by = abs(friction + roughness - lost)
+        error = _ERRORS * max(math.hypot(off, off_too), open_by)
+        stable = self.context.growth() < 0.0 and not self._unstable_in_full_contact
+        if stable and roughness - 2.0 * max(friction, 0.0) > error:
+            return Feeds.ROUGHNESS
+        takes = self.context.growth() < 0.0 and friction + _ERRORS * max(off, open_by) < 0.0
+        if takes and roughness > -0.5 * friction:
+            return Feeds.ROUGHNESS
+        if friction > error and (roughness + error < 0.0 or friction > (2.0 if stable else 1.0) * roughness):
+            return Feeds.FRICTION
+        return Feeds.UNKNOWN
+
+    def fed(self) -> Decision | None:
+        """On a rough wheel: forced where it is the roughness that feeds the vibration."""
+        if not self.context.forced or self._feeds() is not Feeds.ROUGHNESS:
+            return None
+        return self._forced(f"only the roughness shakes the shoe: {self._powers}")
+
+    def _either(self) -> Decision:
+        remedy = "a second run, without roughness or with less friction, decides at the cost of this one"
+        return Decision(f"{self._powers}, so that either may keep it up; {remedy}")
+
+    @property
+    def _powers(self) -> str:
+        friction, roughness = (self.evidence[name] for name in ("power_of_friction", "power_of_roughness"))
+        return f"friction gives {friction:.2g} W and the roughness {roughness:.2g} W to the vibration"
+
+    def split(self) -> tuple[float, float] | None:
+        """Half of peak to peak of x (m) that roughness forces and that the shoe adds, by the spectrum."""
+        slow = min((frequency for frequency, _ in self.context.waves), default=0.0)
+        return self.settled_part.split(self.context.forced) if self._settled_seconds * slow >= 2.0 else None

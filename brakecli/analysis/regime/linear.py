@@ -1,0 +1,100 @@
+"""Linear theory of a shoe that slides in full contact: it rests, rings and is shaken by the wheel's waves.
+
+While the pad touches everywhere and the shoe slips to one side only, (6)-(7) are linear: m z̈ + B ż + S z = f.
+The waves of the wheel give f = (sign(U) φ, 1) 2ak Σ g sinc(ωa) sin(ω(x - Ut) + phase). The shoe's own small motion
+in that phase is left out: it changes f by the slope of the surface times that motion.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from brakecli.analysis.regime.spectra import Array
+from brakecli.analysis.stability.modes import Complex, Mode, eigensystem, is_undamped, modes, stiffness_matrix
+from brakecli.solver.quantities import ContactState
+from brakecli.solver.system import System
+
+_ROUNDING = 1e-12  # of the largest eigenvalue: what a growth rate of zero may be off
+
+
+@dataclass(frozen=True)
+class Linear:
+    """Rest, modes and forced motion; positions are pairs of x and y (m)."""
+
+    belt: float  # U, m/s
+    slip: ContactState | None  # the side to which the shoe slips; None without friction, where it does not matter
+    rest: Array  # x, y
+    force: float  # normal force at rest, N
+    depth: float  # by which y has to rise from rest until the mean contact opens, m
+    mode: Mode  # that decays slowest or grows fastest
+    direction: int  # 1 where it grows, -1 where it decays, 0 where it does neither
+    values: Complex
+    vectors: Complex  # of position and velocity
+    passing: Array  # frequency with its sign at which each wave passes, Hz
+    waves: Complex  # amplitude of x and y that each of them forces, with its phase at t = 0
+
+    def forced(self, time: Array) -> tuple[Array, Array]:
+        """Positions and velocities (rows x, y) that the waves force."""
+        position, velocity = np.zeros((2, time.size)), np.zeros((2, time.size))
+        for frequency, wave in zip(self.passing, self.waves, strict=True):
+            turn = wave[:, None] * np.exp(2j * math.pi * (frequency * time % 1.0))
+            position, velocity = position + turn.imag, velocity + 2.0 * math.pi * frequency * turn.real
+        return position, velocity
+
+    def parts(self, x: Array, time: Array) -> tuple[float, Array, Array]:
+        """Half of peak to peak of what the waves force (m), what of x (m) the shoe adds, and the times again."""
+        lasting = self.forced(time)[0][0]
+        return 0.5 * float(np.ptp(lasting)), x - self.rest[0] - lasting, time
+
+    def seconds_to_limit(self, time: float, state: Array) -> float:
+        """How long the fastest mode grows from x, y, vx, vy at a time until stick or loss of contact."""
+        position, velocity = self.forced(np.array([time]))
+        away = state - np.concatenate([self.rest + position[:, 0], velocity[:, 0]])
+        fastest = int(np.argmax(self.values.real))
+        size = abs(np.linalg.lstsq(self.vectors, away.astype(complex), rcond=None)[0][fastest])
+        size *= 2.0 if self.values[fastest].imag else 1.0
+        _, y, vx, _ = size * np.abs(self.vectors[:, fastest])
+        bounds = [bound / part for bound, part in ((abs(self.belt), vx), (self.depth, y)) if part > 0.0]
+        return max(math.log(min(bounds, default=1.0)), 0.0) / self.mode.growth
+
+
+def linear_theory(system: System, belt: float) -> Linear | None:
+    """The theory at a constant speed U (m/s); None where no rest in contact exists, or friction holds the shoe."""
+    c, stiffness, pad = system.coefficients, system.contact_stiffness, system.pad
+    if belt == 0.0 and c.phi > 0.0:
+        return None
+    grip = math.copysign(c.phi, belt)
+    push, offset = np.array([grip, 1.0]), -stiffness * float(pad.constants.shoe_mean)
+    s, load = stiffness_matrix(c, stiffness, grip), system.load_at_start
+    damping = np.array([[c.b_xx, c.b_xy], [c.b_xy, c.b_yy]])
+    try:
+        rest = np.linalg.solve(s, offset * push - load * np.array([c.sin_beta, c.cos_beta]))
+        first, wheel = int(pad.constants.full_at), system.wheel
+        forces, passing = pad.tables[first : first + wheel.g.size], -belt * wheel.turns
+        omega = 2.0 * math.pi * passing
+        responses = [np.linalg.solve(s - c.m * w * w * np.eye(2) + 1j * w * damping, push) for w in omega]
+    except np.linalg.LinAlgError:
+        return None
+    force = offset - stiffness * rest[1]
+    if not (np.isfinite(rest).all() and force > 0.0):
+        return None
+    phases = forces * np.exp(1j * (wheel.omega * rest[0] + wheel.phase))
+    waves = np.array(responses, complex).reshape(-1, 2) * phases[:, None]
+    values, vectors = eigensystem(c, stiffness, grip)
+    mode, known_to = modes(c, stiffness, grip)[0], 0.0 if is_undamped(c) else _ROUNDING * np.abs(values).max()
+    direction = int(np.sign(mode.growth)) if abs(mode.growth) > known_to else 0
+    slip = ContactState.BACKWARD_SLIP if belt > 0.0 else ContactState.FORWARD_SLIP
+    return Linear(
+        belt,
+        slip if c.phi > 0.0 else None,
+        np.asarray(rest, np.float64),
+        float(force),
+        float(force / stiffness),
+        mode if direction else replace(mode, growth=0.0),
+        direction,
+        values,
+        np.concatenate([vectors, vectors * values]),
+        passing,
+        waves,
+    )

@@ -1,0 +1,129 @@
+"""What a verdict says, what it goes by, and the lines of the roughness; `rules` finds it."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from brakecli.analysis.regime.evidence import Part
+
+if TYPE_CHECKING:  # a measured signal needs no compiled code
+    from brakecli.analysis.regime.linear import Linear
+
+_MOST_COMBINED = 6  # waves whose frequencies are combined by threes
+_COMBINATIONS = [(i, j, k) for i in range(-2, 3) for j in range(-2, 3) for k in (-1, 0, 1)]
+
+
+class Regime(StrEnum):
+    """The paper's three regimes, and `undecided`."""
+
+    DAMPED = "damped"
+    RELAXATION = "relaxation"
+    QUASI_HARMONIC = "quasi-harmonic"
+    UNDECIDED = "undecided"
+
+
+class Excitation(StrEnum):
+    """Where the energy of a sustained motion comes from."""
+
+    SELF_EXCITED = "self-excited"
+    FORCED = "forced"
+    NONE = "none"
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """The thresholds of docs/regimes.md, which every verdict carries."""
+
+    decayed_to: float = 0.02
+    settled_within: float = 0.05
+    reach_within: float = 0.02
+    trend_errors: float = 3.0
+    fewest_cycles: float = 10.0
+    samples_per_cycle: float = 8.0
+    stick_cycles: float = 0.8
+    harmonic_share: float = 0.8
+    forced_share: float = 0.8
+
+
+@dataclass(frozen=True)
+class Context:
+    """What is known of the case behind a history."""
+
+    belt_speed: float  # U, m/s
+    steady: bool = True  # whether U and Q are constant
+    forced: tuple[float, ...] = ()  # Hz, lines of the roughness
+    subharmonics: tuple[float, ...] = ()  # Hz, further lines that a pad that opens may add
+    waves: tuple[
+        tuple[float, float], ...
+    ] = ()  # Hz and m, passing frequencies and the swing of x that each forces
+    quiet: float = 0.0  # m/s, size of vx that may come from rounding
+    scale: float = math.inf  # m/s, of a motion that would open the contact
+    frictionless: bool = False
+    growth: Callable[[], float] = lambda: 0.0  # 1/s, of a small disturbance of steady sliding; below 0 it decays
+    linear: Callable[[], "Linear | None"] = lambda: None  # the theory of full contact
+    powers: Callable[[Part], dict[str, float]] = lambda part: {}  # W, what becomes of the power of the belt
+    radius: float = 1.0  # R, m
+
+
+class Feeds(StrEnum):
+    """What gives energy to the vibration on a rough wheel."""
+
+    FRICTION = "friction"
+    ROUGHNESS = "roughness"
+    UNKNOWN = "unknown"
+
+
+class Decision(NamedTuple):
+    """What a rule decides, and why."""
+
+    reason: str
+    regime: Regime = Regime.UNDECIDED
+    excitation: Excitation = Excitation.NONE
+    frequency: float | None = None  # Hz
+    stick_fraction: float | None = None
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The regime of a history, its numbers (SI units) over the settled part, and the reasons in plain words."""
+
+    regime: Regime
+    excitation: Excitation
+    frequency: float | None  # Hz, fundamental of vx when sustained
+    amplitude: float  # m, half of peak to peak of x: median over the cycles
+    amplitude_spread: float | None  # m, of the amplitudes of the cycles
+    amplitude_forced: float | None  # m, on a rough wheel: what the roughness forces
+    amplitude_own: float | None  # m, on a rough wheel: what the shoe adds
+    growth_rate: float | None  # 1/s, of the slowest mode where the motion is linear
+    ringing_frequency: float | None  # Hz, of that mode
+    frequency_resolution: float  # Hz, to which a line of the spectrum is known
+    torque_variation: float  # N m, peak to peak
+    settled_from: float  # s; the middle where no settled part was found
+    start: int  # the sample there
+    settled: bool  # whether a settled part was found
+    stick_fraction: float
+    contact_loss_fraction: float
+    mean_friction_force: float  # N
+    braking_torque: float  # N m, its mean torque on the wheel's axis, R F_x
+    reasons: tuple[str, ...]
+    evidence: dict[str, Any]
+    thresholds: Thresholds
+
+
+def forced_lines(belt_speed: float, waves_per_metre: Sequence[float], highest: float) -> tuple[float, ...]:
+    """Frequencies (Hz, up to `highest`) of the passing waves, their multiples, and sums and differences of two."""
+    base = [abs(belt_speed) * waves for waves in waves_per_metre]
+    multiples = {n * f for f in base for n in range(1, 11)}
+    pairs = {abs(f + sign * g) for f in base for g in base for sign in (1, -1)}
+    return tuple(sorted(f for f in multiples | pairs if 0.0 < f <= highest))
+
+
+def subharmonics(belt_speed: float, waves_per_metre: Sequence[float], highest: float) -> tuple[float, ...]:
+    """Halves, thirds and quarters of the passing frequencies, their multiples, and sums of up to three."""
+    base = [abs(belt_speed) * waves for waves in waves_per_metre]
+    parts = {k * f / n for f in base for n in (2, 3, 4) for k in range(1, 4 * n)}
+    few = base if len(base) <= _MOST_COMBINED else []
+    sums = {abs(i * f + j * g + k * h) for f in few for g in few for h in few for i, j, k in _COMBINATIONS}
+    return tuple(sorted(f for f in parts | sums if 0.0 < f <= highest))

@@ -1,0 +1,176 @@
+"""Verdicts that rest on theory: linear motion, what roughness forces in full contact, and no friction."""
+
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+
+from brakecli.analysis.regime.of_run import verdict_on
+from brakecli.analysis.regime.rules import classify
+from brakecli.analysis.regime.verdict import Context, Excitation, Regime
+from brakecli.analysis.stability.report import stability
+from brakecli.case.system import system_of
+from brakecli.solver.history import array_history
+from tests.analysis.histories import INTERVAL, history_of, verdict_of
+from tests.campaign import counts
+from tests.examples import SQUEAL, make, simulate
+
+UNDAMPED: dict[str, Any] = {"link1__damping": 0.0, "link2__damping": 0.0}
+DRUM: dict[str, Any] = {  # swings once per turn of 3 m
+    "shoe": {"mass": 10.0},
+    "wheel": {"radius": 0.5, "angular_speed": 8.0},
+    "link1": {"stiffness": 2e7, "damping": 300.0},
+    "link2": {"stiffness": 6e7, "damping": 300.0, "angle_deg": 15.0},
+    "load": {"force": 15e3},
+    "friction": {"coefficient": 0.3},
+    "contact": {"half_length": 0.05, "stiffness": 2e8},
+    "roughness": {"wheel": {"amplitudes": [30e-6, 10e-6], "wavelengths": [3.0, 1.5]}},
+    "solver": {"duration": 6.0, "step": 2e-5},
+    "output": {"sample_interval": 1e-4},
+}
+
+
+@pytest.mark.parametrize("friction", [0.3, 0.5, 0.57, 0.574, 0.5765, 0.58])
+def test_a_slow_motion_is_judged_by_its_eigenvalues(friction: float) -> None:
+    case = make(SQUEAL, friction__coefficient=friction, wheel__angular_speed=1.0)
+    verdict, mode = verdict_of(case), stability(system_of(case)).modes[0]
+    assert verdict.regime is (Regime.DAMPED if mode.growth < 0.0 else Regime.UNDECIDED)
+    assert verdict.excitation is Excitation.NONE
+    assert (verdict.growth_rate, verdict.ringing_frequency) == (mode.growth, mode.frequency)
+    assert ("still growing" in verdict.reasons[0]) == (mode.growth > 0.0)
+    assert verdict.settled is False
+
+
+@pytest.mark.parametrize("weights", [(0.5, 0.5), (1.0, 1.0)])
+def test_the_rate_is_that_of_the_case_and_not_of_the_scheme(weights: tuple[float, float]) -> None:
+    changes: dict[str, Any] = {"wheel__angular_speed": 1.0, "solver__theta": weights}
+    case = make(SQUEAL, friction__coefficient=0.5, **changes)
+    assert verdict_of(case).growth_rate == pytest.approx(stability(system_of(case)).modes[0].growth)
+
+
+def test_a_growing_motion_has_settled_after_the_time_that_is_told() -> None:
+    changes: dict[str, Any] = {"wheel__angular_speed": 1.0, "friction__coefficient": 0.6}
+    growing = verdict_of(make(SQUEAL, **changes, solver__duration=0.2))
+    needed = re.search(r"run at least ([\d.e+]+) s", growing.reasons[0])
+    assert growing.regime is Regime.UNDECIDED
+    assert needed is not None
+    later = verdict_of(make(SQUEAL, **changes, solver__duration=float(needed[1])))
+    assert (later.regime, later.settled) == (Regime.QUASI_HARMONIC, True)
+    assert later.growth_rate is None
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.2, 0.5])
+def test_without_dashpots_and_below_flutter_a_motion_is_neutral(friction: float) -> None:
+    case = make(SQUEAL, friction__coefficient=friction, wheel__angular_speed=4.0, **UNDAMPED)
+    verdict = verdict_of(case)
+    assert verdict.regime is Regime.UNDECIDED
+    assert "neither grows nor decays" in verdict.reasons[0]
+    assert verdict.growth_rate == 0.0
+
+
+@pytest.mark.parametrize("speed", [0.002, 0.005, 0.02])
+def test_what_sticks_in_every_cycle_has_not_died_out_after_a_hard_start(speed: float) -> None:
+    changes: dict[str, Any] = {"wheel__angular_speed": speed, "initial__vx": -0.5, "solver__duration": 0.5}
+    verdict = verdict_of(make(SQUEAL, friction__coefficient=0.7, **changes))
+    assert (verdict.regime, verdict.excitation) == (Regime.RELAXATION, Excitation.SELF_EXCITED)
+
+
+def test_small_is_not_died_out_beside_a_slow_wheel() -> None:
+    time = INTERVAL * np.arange(20000)
+    vx = (np.exp(-20.0 * time) + 1e-3 * np.exp(-0.01 * time)) * np.sin(2 * np.pi * 170.0 * time)
+    motion = history_of(len(vx), vx=vx, x=np.cumsum(vx) * INTERVAL, state=-1.0)
+    assert "died out" in classify(motion, Context(1.0)).reasons[0]
+    assert "died out" not in classify(motion, Context(1e-3)).reasons[0]
+    assert "died out" not in classify(motion, Context(1.0, scale=1e-3)).reasons[0]
+    assert "died out" not in classify(motion, Context(1.0, growth=lambda: 1.0)).reasons[0]
+
+
+@pytest.mark.parametrize("damping", [300.0, 3000.0])
+def test_a_drum_that_swings_once_per_turn_is_forced_with_the_amplitude_that_lasts(damping: float) -> None:
+    case = make(DRUM, link1__damping=damping, link2__damping=damping)
+    verdict = verdict_of(case)
+    assert (verdict.regime, verdict.excitation) == (Regime.DAMPED, Excitation.FORCED)
+    assert verdict.settled
+    # So slow a wave forces the static displacement under the force that it adds: S z = (φ, 1) 2ak g sin, with both
+    # waves from the same phase; inertia adds less than 1e-3. sinc(ωa) is 1 within 0.7 %.
+    c, k = system_of(case).coefficients, 2e7
+    s = np.array([[c.c_xx, c.c_xy + c.phi * k], [c.c_xy, c.c_yy + k]])
+    turn = np.linspace(0.0, 2.0 * np.pi, 10_001)
+    swing = np.linalg.solve(s, [c.phi, 1.0]) * k * 0.5 * np.ptp(30e-6 * np.sin(turn) + 10e-6 * np.sin(2.0 * turn))
+    assert verdict.amplitude == pytest.approx(abs(swing[0]), rel=0.01)
+    assert verdict.amplitude_forced == pytest.approx(abs(swing[0]), rel=0.01)
+    assert verdict.amplitude_own is not None
+    assert verdict.amplitude_own < 0.05 * verdict.amplitude
+    # R φ times the change of F_y = 2ak (g sin - y)
+    force = c.phi * (
+        2.0 * k * 0.5 * np.ptp(30e-6 * np.sin(turn) + 10e-6 * np.sin(2.0 * turn)) - 2.0 * k * swing[1]
+    )
+    assert verdict.torque_variation == pytest.approx(0.5 * force, rel=0.02)
+
+
+@pytest.mark.parametrize("duration", [0.3, 0.5, 1.0])
+def test_a_run_of_few_turns_says_how_long_it_must_be(duration: float) -> None:
+    short = verdict_of(make(DRUM, solver__duration=duration))
+    needed = re.search(r"run at least ([\d.]+) s", short.reasons[0])
+    assert short.settled is False
+    assert (short.regime is Regime.UNDECIDED) == (duration < 0.75)  # a turn
+    assert needed is not None
+    assert verdict_of(make(DRUM, solver__duration=float(needed[1]))).settled
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_roughness_forces_in_full_contact_is_the_motion_that_lasts(seed: int) -> None:
+    """By a run from the closed-form start until the shoe's own part has gone."""
+    rng = np.random.default_rng(seed)
+    waves = {"amplitudes": [1e-6, 0.7e-6], "wavelengths": [0.031, rng.uniform(0.01, 0.06)]}
+    tables = SQUEAL | {"roughness": {"wheel": waves}}
+    changes = {"friction__coefficient": rng.uniform(0.1, 0.4), "wheel__angular_speed": rng.uniform(2.0, 6.0)}
+    case = make(tables, **changes, link1__damping=3000.0, link2__damping=3000.0, solver__duration=0.6)
+    result, verdict = simulate(case), verdict_of(case)
+    last = result.x[len(result.x) // 2 :]
+    assert (verdict.regime, verdict.excitation, verdict.settled) == (Regime.DAMPED, Excitation.FORCED, True)
+    # The record ends within a turn of the beat of two waves; the shoe's motion acts on the phase of a wave by the
+    # slope 2π g/λ = 2e-4 times 30.
+    assert verdict.amplitude_forced == pytest.approx(0.5 * float(np.ptp(last)), rel=0.03)
+
+
+@pytest.mark.parametrize("shoes", counts(6, 100))
+def test_without_friction_nothing_is_self_excited(shoes: int) -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(shoes):
+        speed, waves = rng.uniform(1.0, 6.0), rng.uniform(0.02, 0.06, int(rng.integers(1, 4)))
+        rough = {"amplitudes": [float(rng.uniform(1e-4, 1e-3))] * len(waves), "wavelengths": waves.tolist()}
+        changes: dict[str, Any] = {"friction__coefficient": 0.0, "wheel__angular_speed": speed}
+        case = make(SQUEAL | {"roughness": {"wheel": rough}}, **changes, solver__duration=0.5, contact__nodes=128)
+        verdict = verdict_of(case)
+        assert verdict.excitation is not Excitation.SELF_EXCITED, verdict.reasons
+        assert verdict.regime in (Regime.DAMPED, Regime.UNDECIDED)
+
+
+def test_numbers_of_a_lasting_motion_are_medians_without_its_transient() -> None:
+    time = INTERVAL * np.arange(20000)
+    vx = 1e-2 * (1.0 + 0.04 * np.exp(-4.0 * time)) * np.sin(2 * np.pi * 170.0 * time)
+    state = np.where(vx > 0.0099, 0.0, -1.0)
+    motion = history_of(len(vx), vx=vx, x=np.cumsum(vx) * INTERVAL, state=state, friction_force=vx)
+    verdict = classify(motion, Context(1e-2))
+    assert verdict.regime is Regime.RELAXATION
+    # The transient has fallen to less than e^-4 of 4 % by the middle of the settled part.
+    assert verdict.amplitude == pytest.approx(1e-2 / (2 * np.pi * 170.0), rel=2e-3)
+    assert verdict.frequency == pytest.approx(170.0, rel=1e-4)
+    assert verdict.amplitude_spread is not None
+    assert 0.0 < verdict.amplitude_spread < 0.03 * verdict.amplitude
+
+
+def test_a_stop_is_not_called_settled() -> None:
+    changes: dict[str, Any] = {"wheel__angular_speed": None, "wheel__times": [0.0, 0.5]}
+    verdict = verdict_of(make(SQUEAL, **changes, wheel__angular_speeds=[1.0, 0.0], solver__duration=0.3))
+    assert (verdict.regime, verdict.settled) == (Regime.UNDECIDED, False)
+
+
+def test_a_failed_run_is_neither_forced_nor_settled() -> None:
+    case = make(DRUM, solver__duration=2.0)
+    motion = array_history(1e-4, simulate(case).rows)
+    verdict = verdict_on(motion, system_of(case), "it broke")
+    assert (verdict.regime, verdict.excitation, verdict.settled) == (Regime.UNDECIDED, Excitation.NONE, False)
+    assert verdict.growth_rate is None
