@@ -29,19 +29,28 @@ PERIODS, PASSES = 40, 20
 take as many of the slowest motion, and passes of the wheel's longest wave, within the case's duration."""
 STEPS_PER_PERIOD = 200  # of the two-layer scheme, where the case gives no step
 _SAMPLES_PER_PERIOD = 20
-_VX, _NORMAL_FORCE = (list(HISTORY).index(name) for name in ("vx", "normal_force"))
+_VX, _NORMAL_FORCE, _CONTACT = (list(HISTORY).index(name) for name in ("vx", "normal_force", "contact_fraction"))
 
 
 @dataclass(frozen=True)
 class Growth:
     """The growth rate (1/s) of the fastest disturbance of steady sliding; one up to `noise` may be none.
 
-    `spread` (1/s): by how much it differs between two halves of the time watched.
+    `spread` (1/s): by how much it differs between two halves of the time watched. `opened`: the pad did not touch
+    everywhere all the time. `bar` (1/s): of a mean over a time, within which it is not known.
     """
 
     rate: float
     spread: float
     noise: float
+    opened: bool = False
+    bar: float = 0.0
+
+    @property
+    def unstable(self) -> bool | None:
+        """Whether disturbances grow; None where zero lies within the bar."""
+        excess = self.rate - self.noise
+        return None if abs(excess) < self.bar else excess > 0.0
 
 
 @dataclass(frozen=True)
@@ -74,11 +83,19 @@ def with_step(system: System) -> System:
 
 
 def sliding(system: System) -> Sliding | None:
-    """Steady sliding of a system; None where the wheel does not turn, or no load presses. Raises CaseError."""
-    if system.belt_speed == 0.0:
+    """Steady sliding of a system; None where the wheel does not turn, no load presses, or no link holds the shoe
+    along the wheel. Raises CaseError.
+    """
+    if system.belt_speed == 0.0 or system.coefficients.c_xx == 0.0:
         return None
     rest = steady_sliding(system)
     return Sliding(**vars(rest), system=system) if rest.stiffness > 0.0 else None
+
+
+def held(system: System) -> System:
+    """The system at the speed and load of its start throughout."""
+    belt = schedule((0.0,), (system.belt_speed / system.radius,), system.radius)
+    return replace(system, belt=belt, load=schedule((0.0,), (system.load_at_start,)))
 
 
 def growth(found: Sliding) -> Growth | None:
@@ -89,10 +106,8 @@ def growth(found: Sliding) -> Growth | None:
     system = found.system
     slow, fast = natural_frequencies(system.coefficients, found.stiffness)
     interval = max(1, int(1.0 / (_SAMPLES_PER_PERIOD * fast * system.step))) * system.step
-    held = replace(
-        system,
-        belt=schedule((0.0,), (system.belt_speed / system.radius,), system.radius),
-        load=schedule((0.0,), (system.load_at_start,)),
+    watched = replace(
+        held(system),
         interval=interval,
         duration=max(_watched(system, slow, fast), 8.0 * interval),
         method=replace(system.method, step=system.step, start="consistent"),
@@ -102,7 +117,7 @@ def growth(found: Sliding) -> Growth | None:
     displaced = np.vstack([np.zeros(4), DISTURBANCE * np.diag(scales)])
     samples = []
     for start in (np.array([found.x, found.y, 0.0, 0.0]) + displaced).tolist():
-        motion = solve(replace(held, initial=Initial(*start)))
+        motion = solve(replace(watched, initial=Initial(*start)))
         if motion.work.failure not in (Failure.NONE, Failure.UNBALANCED):
             return None
         samples.append(motion.rows)
@@ -111,8 +126,9 @@ def growth(found: Sliding) -> Growth | None:
     maps = ((runs[1:, :, :4] - runs[0, :, :4]) / (DISTURBANCE * scales)).transpose(1, 2, 0)
     last = _last_linear(found, runs, np.abs(maps).max(axis=(1, 2)), interval, slow)
     first = max(1, last // 4)
+    opened = bool((runs[:, : last + 1, _CONTACT] < 1.0).any())
     if last - first < 4:  # out of steady sliding at once
-        return Growth(fast, fast, 0.0)
+        return Growth(fast, fast, 0.0, opened)
 
     def rate(start: int, end: int) -> float:
         """The growth rate (1/s) of the fastest of the disturbances that are still there at the start."""
@@ -124,7 +140,7 @@ def growth(found: Sliding) -> Growth | None:
 
     middle = (first + last) // 2
     noise = 1e-4 / ((last - first) * interval) if is_undamped(system.coefficients) else 0.0
-    return Growth(rate(first, last), 0.5 * abs(rate(middle, last) - rate(first, middle)), noise)
+    return Growth(rate(first, last), 0.5 * abs(rate(middle, last) - rate(first, middle)), noise, opened)
 
 
 def _watched(system: System, slow: float, fast: float) -> float:

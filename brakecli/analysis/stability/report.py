@@ -124,8 +124,11 @@ def mean_stiffness(system: System, smooth: float) -> StiffnessAt:
 def _rough_crossings(c: Coefficients, belt: float, stiffness_at: StiffnessAt) -> list[Crossing]:
     """Changes of stability on rough surfaces, whose mean stiffness depends on φ.
 
-    Where steady sliding ends, it is lost by self-locking.
+    Where steady sliding ends, it is lost by self-locking. Where no link holds the shoe along the wheel there is
+    none with friction, and nothing to lose.
     """
+    if c.c_xx == 0.0:
+        return []
 
     def first_mode(phi: float) -> Mode | None:
         k = stiffness_at(phi)
