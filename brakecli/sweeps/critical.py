@@ -238,7 +238,7 @@ def _scanned(critical: Critical, at: Disturbances, exact: Search) -> list[float]
     Where surfaces open they lie closer, and closest beside values where stability is nearly lost or regained.
     Otherwise the windows that eigenvalues show have one value each.
     """
-    values = np.linspace(critical.lower, critical.upper, PARTS * (SCANNED - 1) + 1).tolist()
+    values: list[float] = np.linspace(critical.lower, critical.upper, PARTS * (SCANNED - 1) + 1).tolist()
     at.scan(values[::PARTS])
     if not any(measured and measured.opened for measured in map(at.at, values[::PARTS])):
         ends = [critical.lower, *(end for window in exact.windows for end in window), critical.upper]
@@ -248,8 +248,10 @@ def _scanned(critical: Critical, at: Disturbances, exact: Search) -> list[float]
         added = set[float]()
         for triple in zip(values, values[1:], values[2:], strict=False):
             rates = [measured.rate for measured in map(at.at, triple) if measured]
-            least = min(rates, key=abs) if len(rates) == len(triple) else None
-            if least == rates[1] and min(rates) * max(rates) > 0.0 and abs(least) < 2.0 * np.ptp(rates):
+            if len(rates) < len(triple) or min(rates) * max(rates) <= 0.0:
+                continue
+            least = min(map(abs, rates))
+            if least == abs(rates[1]) and least < 2.0 * np.ptp(rates):
                 added |= {0.5 * (low + high) for low, high in pairwise(triple)}
         values = sorted({*values, *added})
         at.scan(sorted(added))
@@ -257,7 +259,7 @@ def _scanned(critical: Critical, at: Disturbances, exact: Search) -> list[float]
 
 
 def _narrowed(at: Disturbances, low: float, high: float, critical: Critical, bias: float) -> Edge:
-    """The change between two values with opposite answers, in a bracket no wider than the tolerance if possible."""
+    """The change between two values with opposite answers, in a bracket as narrow as the tolerance if possible."""
     below, tolerance = at.unstable(low), critical.tolerance
     ends = [measured for measured in (at.at(low), at.at(high)) if measured is not None]
     value, largest = None, max(abs(measured.rate) for measured in ends)

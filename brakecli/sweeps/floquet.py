@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,11 +27,11 @@ LARGEST_DENOMINATOR = 10**6  # of the ratio of two wavelengths
 SAME = 1e-15  # relative difference of ratios that are the same but for rounding
 DISTURBANCE = 1e-6  # in static compressions: the rounding of a run is 1e-10 of it
 CLOSED = 1e-7  # largest gap, in static compressions, between the end of a segment and the next one
-ITERATIONS, HALVINGS = 15, 5
+ITERATIONS = 10
 SEGMENT = 10.0  # periods of the slowest motion
 MOST_SEGMENTS = 250
 SAMPLES = 64  # of a segment
-SUBDIVISIONS = 2  # halvings of the way from a known motion to the next
+SUBDIVISIONS = 1  # halvings of the way from a known motion to the next
 RELAXED = 100.0  # periods of the slowest motion after which a stable motion has come near its orbit
 BATCHES, BATCH, TRANSIENT = 8, 4, 16  # batches of a long run, segments of a batch, segments before the first
 CERTAIN = 3.5  # standard errors of the mean of eight batches: 99 % of Student's distribution
@@ -76,7 +77,8 @@ class Segments:
 
     def end(self, k: int, state: Floats) -> Floats:
         """Where the segment `k` ends that begins at a state; NaN where the run fails."""
-        return self._run(self.systems[k], state)[-1]
+        end: Floats = self._run(self.systems[k], state)[-1]
+        return end
 
     def ends(self, states: Floats) -> Floats:
         """Where the segments end."""
@@ -121,7 +123,7 @@ class Orbit:
 
 
 class Disturbances:
-    """Growth of small disturbances at values of a parameter; a periodic motion is followed from its neighbour's."""
+    """Growth of small disturbances along a parameter; a periodic motion is followed from its neighbour's."""
 
     def __init__(self, sliding_at: Callable[[float], Sliding | None]) -> None:
         """Begin without any value."""
@@ -130,7 +132,7 @@ class Disturbances:
         self.orbits: dict[float, Orbit] = {}
 
     def at(self, value: float) -> Growth | None:
-        """The growth at a value; None without steady sliding, and where no motion is found that could be stable."""
+        """The growth at a value; None without steady sliding, and where no forced motion is found."""
         if value not in self.known:
             found = self.sliding_at(value)
             self.known[value] = None if found is None else self._measured(value, found)
@@ -142,8 +144,9 @@ class Disturbances:
 
     def scan(self, values: list[float]) -> None:
         """Measure in order, and where no periodic motion was found, look again from the ones above."""
-        for value in [*values, *reversed(values)]:
-            if self.at(value) is None and self.orbits:
+        lost = [value for value in values if self.at(value) is None]
+        for value in reversed(lost):
+            if max(self.orbits, default=value) > value:
                 del self.known[value]
                 self.at(value)
 
@@ -159,14 +162,20 @@ class Disturbances:
         return 2.0 * abs(fine.rate - coarse.rate) if fine else math.inf
 
     def _measured(self, value: float, found: Sliding) -> Growth | None:
-        plain = growth(found)
-        if found.system.wheel.g.size == 0 or (plain is not None and not plain.opened):
+        plain = None if self.orbits else growth(found)  # from the first motion that opens on, all may
+        if not self.orbits and (found.system.wheel.g.size == 0 or (plain and not plain.opened)):
             return plain
         if (period := common_period(found.system)) is None:
             return lyapunov(found, plain)
-        forced = self._followed(value, found, period, SUBDIVISIONS)
-        if forced is None and (self.orbits or plain is None or plain.rate <= plain.spread):
-            forced = self._waited(value, found, period)
+        place, near = self._near(value)
+        low, high = sorted((place, value))
+        gap = any(lost is None and low < other < high for other, lost in self.known.items())
+        forced = None if gap else self._followed(value, found, period, SUBDIVISIONS)
+        if forced is None:
+            if plain is None and near is not None and near.rate > 0.0:
+                plain = growth(found)
+            if plain is None or plain.rate <= 0.0:
+                forced = self._waited(value, found, period)
         if forced is None:
             return None
         self.orbits[value] = forced
@@ -203,8 +212,6 @@ class Disturbances:
         then that one has been left for a limit cycle.
         """
         segments, (_, near) = self._segments(value, found, period), self._near(value)
-        if near is not None and near.rate > 0.0:
-            return None
         slow = natural_frequencies(found.system.coefficients, found.stiffness)[0]
         start = segments.moved(near)[0] if near else segments.rest
         waited = segments.settled(start, min(RELAXED / slow, LONGEST) if slow > 0.0 else LONGEST)
@@ -287,7 +294,8 @@ def _correction(maps: Floats, gaps: Floats) -> Floats:
         matrix[k, :, (k + 1) % count] += np.eye(4)
         matrix[k, :, k] -= maps[k]
     try:
-        return np.linalg.solve(matrix.reshape(4 * count, -1), gaps.ravel()).reshape(count, 4)
+        changes: NDArray[Any] = np.linalg.solve(matrix.reshape(4 * count, -1), gaps.ravel())
+        return changes.reshape(count, 4)
     except np.linalg.LinAlgError:
         return np.full((count, 4), np.nan)
 
@@ -296,7 +304,7 @@ def _log_radius(maps: Floats) -> float:
     """ln of the largest modulus of the eigenvalues of the product of all maps."""
     product, log_size = np.eye(4), 0.0
     for each in maps:
-        product = each @ product
+        product = np.matmul(each, product)
         size = float(np.abs(product).max())
         if not size > 0.0:
             return -math.inf

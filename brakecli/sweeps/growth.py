@@ -20,8 +20,10 @@ from brakecli.solver.schedules import schedule
 from brakecli.solver.steady_sliding import SteadySliding, steady_sliding
 from brakecli.solver.system import Initial, System
 
-DISTURBANCE = 1e-7  # in static compressions: the rounding of a run is 1e-9 of it
+DISTURBANCE = 1e-7  # in static compressions: the rounding of a run is 1e-9 of it, unless a soft link reaches far
 SATURATED = 1e-3  # largest difference, in static compressions, that follows the linear equations to 1e-3
+LARGEST = 1e-3, 1e-5  # of disturbances on smooth surfaces, where motions are linear until they lift off, and others
+ROUNDED = 1e-9  # least ratio of a disturbance to the shoe's distance from the origin: rounding is 1e-16 of that
 FADED = 1e-5  # smallest difference, in parts of its first size, that holds four digits
 DEPARTED = 2.0  # times as far from steady sliding as roughness alone takes a run
 PERIODS, PASSES = 40, 20
@@ -114,7 +116,8 @@ def growth(found: Sliding) -> Growth | None:
     )
     compression = found.normal_force / found.stiffness
     scales = compression * np.array([1.0, 1.0, *[2.0 * math.pi * fast] * 2])
-    displaced = np.vstack([np.zeros(4), DISTURBANCE * np.diag(scales)])
+    small, saturated = _sizes(found, compression, float(scales[2]))
+    displaced = np.vstack([np.zeros(4), small * np.diag(scales)])
     samples = []
     for start in (np.array([found.x, found.y, 0.0, 0.0]) + displaced).tolist():
         motion = solve(replace(watched, initial=Initial(*start)))
@@ -123,8 +126,9 @@ def growth(found: Sliding) -> Growth | None:
         samples.append(motion.rows)
     runs = np.array(samples)
     # D[t]: columns are the differences of the neighbours, rows x, y, ẋ, ẏ, each in its scale.
-    maps = ((runs[1:, :, :4] - runs[0, :, :4]) / (DISTURBANCE * scales)).transpose(1, 2, 0)
-    last = _last_linear(found, runs, np.abs(maps).max(axis=(1, 2)), interval, slow)
+    maps = ((runs[1:, :, :4] - runs[0, :, :4]) / (small * scales)).transpose(1, 2, 0)
+    sizes = np.abs(maps).max(axis=(1, 2))
+    last = _last_linear(found, runs, (sizes > saturated / small) | (sizes < FADED), interval, slow)
     first = max(1, last // 4)
     opened = bool((runs[:, : last + 1, _CONTACT] < 1.0).any())
     if last - first < 4:  # out of steady sliding at once
@@ -140,7 +144,34 @@ def growth(found: Sliding) -> Growth | None:
 
     middle = (first + last) // 2
     noise = 1e-4 / ((last - first) * interval) if is_undamped(system.coefficients) else 0.0
-    return Growth(rate(first, last), 0.5 * abs(rate(middle, last) - rate(first, middle)), noise, opened)
+    spread = 0.5 * abs(rate(middle, last) - rate(first, middle)) + _rounding(found, small * compression, slow, fast)
+    return Growth(rate(first, last), spread, noise, opened)
+
+
+def _rounding(found: Sliding, small: float, slow: float, fast: float) -> float:
+    """What rounding may add to a growth rate (1/s) from disturbances of a size (m).
+
+    Every step rounds the position. A three-layer scheme takes the velocity from its differences, and on a soft link
+    a wrong velocity is kept for long.
+    """
+    system = found.system
+    kick = np.finfo(float).eps * math.hypot(found.x, found.y) / small
+    if system.scheme.LAG and slow > 0.0:
+        kick /= 2.0 * math.pi * slow * system.step
+    return float(kick * math.sqrt(fast / (PERIODS * system.step)))
+
+
+def _sizes(found: Sliding, compression: float, speed: float) -> tuple[float, float]:
+    """The size of disturbances at the start, and at the end, in static compressions, whose velocity is `speed`.
+
+    They are well above the rounding of the position. Those of smooth surfaces do not bring the shoe to the speed
+    of the wheel.
+    """
+    reach = math.hypot(found.x, found.y) / compression
+    if not found.system.smooth:
+        return max(DISTURBANCE, min(ROUNDED * reach, LARGEST[1])), SATURATED
+    slips = abs(found.system.belt_speed) / speed
+    return max(DISTURBANCE, min(0.01 * slips, LARGEST[0])), max(SATURATED, min(0.5 * slips, 0.1))
 
 
 def _watched(system: System, slow: float, fast: float) -> float:
@@ -154,7 +185,7 @@ def _watched(system: System, slow: float, fast: float) -> float:
 
 
 def _last_linear(
-    found: Sliding, runs: NDArray[np.float64], sizes: NDArray[np.float64], interval: float, slow: float
+    found: Sliding, runs: NDArray[np.float64], ended: NDArray[np.bool_], interval: float, slow: float
 ) -> int:
     """The last sample up to which the differences follow linear equations and are more than rounding.
 
@@ -163,7 +194,6 @@ def _last_linear(
     times as far from steady sliding as in its first periods and its first passing wave.
     """
     system, belt = found.system, found.system.belt_speed
-    ended = (sizes > SATURATED / DISTURBANCE) | (sizes < FADED)
     if system.smooth:  # stick is found by the velocity: a three-layer scheme's slow sliding may pass for it
         sticks = (runs[:, :, _VX] - belt) * belt >= 0.0
         ended |= (sticks | (runs[:, :, _NORMAL_FORCE] == 0.0)).any(axis=0)
@@ -173,4 +203,4 @@ def _last_linear(
         opening = max(1, int(max(3.0 / slow if slow > 0.0 else 0.0, 1.0 / passing) / interval))
         ended |= away > DEPARTED * away[:opening].max()
     ended[0] = False
-    return int(np.argmax(ended)) - 1 if ended.any() else len(sizes) - 1
+    return int(np.argmax(ended)) - 1 if ended.any() else len(ended) - 1
