@@ -260,7 +260,7 @@ def _scanned(critical: Critical, at: Disturbances, exact: Search) -> list[float]
 
 def _narrowed(at: Disturbances, low: float, high: float, critical: Critical, bias: float) -> Edge:
     """The change between two values with opposite answers, in a bracket as narrow as the tolerance if possible."""
-    below, tolerance = at.unstable(low), critical.tolerance
+    below, tolerance, wide = at.unstable(low), critical.tolerance, (low, high)
     ends = [measured for measured in (at.at(low), at.at(high)) if measured is not None]
     value, largest = None, max(abs(measured.rate) for measured in ends)
     if not any(measured.bar for measured in ends):
@@ -284,25 +284,33 @@ def _narrowed(at: Disturbances, low: float, high: float, critical: Critical, bia
         low = bisect(lambda value: at.unstable(value) is below, low, middle, width=tolerance, halvings=EDGES)[0]
         high = bisect(lambda value: as_below(value) is not False, middle, high, width=tolerance, halvings=EDGES)[1]
     value = value if value is not None and low <= value <= high else 0.5 * (low + high)
-    error = 0.5 * (high - low) + min(_left_open(at, low, high, bias), critical.upper - critical.lower)
+    error = 0.5 * (high - low) + min(_left_open(at, low, high, wide, bias), critical.upper - critical.lower)
     return Edge(value, low, high, error, not below)
 
 
-def _left_open(at: Disturbances, low: float, high: float, bias: float) -> float:
+def _left_open(at: Disturbances, low: float, high: float, wide: tuple[float, float], bias: float) -> float:
     """By how much the change in a bracket may be wrong: the error of the growth over its slope, and the bias.
 
-    The error of a periodic motion holds that of its scheme.
+    The error of a periodic motion holds that of its scheme. A three-layer scheme takes velocities from differences of
+    positions: near self-locking, where the force grows beyond all bounds, their rounding makes the growth jump, so
+    that the slope counts only as far as the ends of the bracket that was found first show it.
     """
     known = {value: measured for value, measured in at.known.items() if measured is not None}
     near = sorted(known, key=lambda value: max(low - value, value - high, 0.0))[:2]
     one, other = near[0], near[-1]
-    rise = abs(known[other].rate - known[one].rate)
+
+    def slope(other: float) -> float:
+        return abs((known[other].rate - known[one].rate) / (other - one)) if other != one else 0.0
+
     if known[one].bar:  # the bracket holds it
         return bias
+    steep = slope(other)
     if one in at.orbits:
-        return at.error(one) * abs(other - one) / rise if rise > 0.0 else math.inf
-    spread = max(known[one].spread, known[other].spread)
-    return bias + (spread * abs(other - one) / rise if rise > 0.0 else 0.0)
+        return at.error(one) / steep if steep > 0.0 else math.inf
+    found, far = at.sliding_at(one), max((slope(end) for end in wide if end in known), default=0.0)
+    if found is not None and found.system.scheme.LAG and far > 0.0 and not known[one].noise:
+        steep = min(steep, far)
+    return bias + (max(known[one].spread, known[other].spread) / steep if steep > 0.0 else 0.0)
 
 
 def _lasting(answer: bool, before: Verdict | None, verdict: Verdict) -> bool:

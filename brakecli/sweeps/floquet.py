@@ -159,7 +159,8 @@ class Disturbances:
             return 0.0
         segments = Segments(found, coarse.segments.time, len(coarse.states), halved=True)
         fine = orbit(segments, coarse.states, coarse.maps)
-        return 2.0 * abs(fine.rate - coarse.rate) if fine else math.inf
+        maps = fine.maps if fine else segments.maps(coarse.states, segments.ends(coarse.states))
+        return 2.0 * abs(_log_radius(maps) / segments.time - coarse.rate)
 
     def _measured(self, value: float, found: Sliding) -> Growth | None:
         plain = None if self.orbits else growth(found)  # from the first motion that opens on, all may

@@ -22,7 +22,7 @@ from brakecli.solver.system import Initial, System
 
 DISTURBANCE = 1e-7  # in static compressions: the rounding of a run is 1e-9 of it, unless a soft link reaches far
 SATURATED = 1e-3  # largest difference, in static compressions, that follows the linear equations to 1e-3
-LARGEST = 1e-3, 1e-5  # of disturbances on smooth surfaces, where motions are linear until they lift off, and others
+LARGEST = 1e-2, 1e-5  # of disturbances on smooth surfaces, where motions are linear until they lift off, and others
 ROUNDED = 1e-9  # least ratio of a disturbance to the shoe's distance from the origin: rounding is 1e-16 of that
 FADED = 1e-5  # smallest difference, in parts of its first size, that holds four digits
 DEPARTED = 2.0  # times as far from steady sliding as roughness alone takes a run
@@ -129,8 +129,9 @@ def growth(found: Sliding) -> Growth | None:
     maps = ((runs[1:, :, :4] - runs[0, :, :4]) / (small * scales)).transpose(1, 2, 0)
     sizes = np.abs(maps).max(axis=(1, 2))
     last = _last_linear(found, runs, (sizes > saturated / small) | (sizes < FADED), interval, slow)
-    first = max(1, last // 4)
     opened = bool((runs[:, : last + 1, _CONTACT] < 1.0).any())
+    # A linear motion has all its directions from the start on: none has faded there. Others come to their orbit.
+    first = max(1, last // 4) if opened else 1
     if last - first < 4:  # out of steady sliding at once
         return Growth(fast, fast, 0.0, opened)
 
@@ -144,21 +145,14 @@ def growth(found: Sliding) -> Growth | None:
 
     middle = (first + last) // 2
     noise = 1e-4 / ((last - first) * interval) if is_undamped(system.coefficients) else 0.0
-    spread = 0.5 * abs(rate(middle, last) - rate(first, middle)) + _rounding(found, small * compression, slow, fast)
+    later = rate(middle, last) if opened else rate(first, last)
+    spread = 0.5 * abs(later - rate(first, middle)) + _rounding(found, small * compression)
     return Growth(rate(first, last), spread, noise, opened)
 
 
-def _rounding(found: Sliding, small: float, slow: float, fast: float) -> float:
-    """What rounding may add to a growth rate (1/s) from disturbances of a size (m).
-
-    Every step rounds the position. A three-layer scheme takes the velocity from its differences, and on a soft link
-    a wrong velocity is kept for long.
-    """
-    system = found.system
-    kick = np.finfo(float).eps * math.hypot(found.x, found.y) / small
-    if system.scheme.LAG and slow > 0.0:
-        kick /= 2.0 * math.pi * slow * system.step
-    return float(kick * math.sqrt(fast / (PERIODS * system.step)))
+def _rounding(found: Sliding, small: float) -> float:
+    """Growth (1/s) of a disturbance of a size (m) that changes the position in a step by no more than its rounding."""
+    return float(np.finfo(float).eps * math.hypot(found.x, found.y) / (small * found.system.step))
 
 
 def _sizes(found: Sliding, compression: float, speed: float) -> tuple[float, float]:
@@ -171,7 +165,7 @@ def _sizes(found: Sliding, compression: float, speed: float) -> tuple[float, flo
     if not found.system.smooth:
         return max(DISTURBANCE, min(ROUNDED * reach, LARGEST[1])), SATURATED
     slips = abs(found.system.belt_speed) / speed
-    return max(DISTURBANCE, min(0.01 * slips, LARGEST[0])), max(SATURATED, min(0.5 * slips, 0.1))
+    return max(DISTURBANCE, min(0.01 * slips, LARGEST[0])), max(SATURATED, min(0.5 * slips, 0.3))
 
 
 def _watched(system: System, slow: float, fast: float) -> float:
