@@ -55,10 +55,10 @@ def common_period(system: System) -> float | None:
 class Segments:
     """The motion about steady sliding over a time (s), cut into equal segments; states are counted in `scales`."""
 
-    def __init__(self, found: Sliding, time: float, count: int, *, halved: bool = False) -> None:
+    def __init__(self, found: Sliding, time: float, count: int, finer: float = 1.0) -> None:
         """Prepare the systems of all segments: the wheel has turned on from one to the next.
 
-        `halved`: half the step, and twice the nodes of the contact.
+        `finer`: divides the step, and multiplies the nodes of the contact.
         """
         system, fast = found.system, natural_frequencies(found.system.coefficients, found.stiffness)[1]
         self.scales = found.normal_force / found.stiffness * np.array([1.0, 1.0, *[2.0 * math.pi * fast] * 2])
@@ -67,8 +67,8 @@ class Segments:
         interval = length / SAMPLES
         step = interval / math.ceil(interval / system.step * (1.0 - 1e-9))
         method = replace(system.method, step=step, start="consistent")
-        if halved:
-            method = replace(method, step=0.5 * step, nodes=2 * system.nodes)
+        if finer != 1.0:
+            method = replace(method, step=step / finer, nodes=int(finer * system.nodes))
         whole = held(replace(system, interval=interval, duration=length, method=method))
         angles, self.systems = np.zeros(system.wheel.g.size), list[System]()
         for k in range(count):
@@ -151,16 +151,20 @@ class Disturbances:
                 self.at(value)
 
     def error(self, value: float) -> float:
-        """By how much the step may falsify the growth (1/s) of a periodic motion, from half the step.
+        """By how much the step may falsify the growth (1/s) of a periodic motion, from half and twice the step.
 
-        Of a scheme of first order the other half is as large, of second order it is a third.
+        With half the step the error changes by at least a half of itself, with twice the step by at least all of it.
+        Where patches open, errors need not fall evenly: the larger one counts.
         """
         if (coarse := self.orbits.get(value)) is None or (found := self.sliding_at(value)) is None:
             return 0.0
-        segments = Segments(found, coarse.segments.time, len(coarse.states), halved=True)
-        fine = orbit(segments, coarse.states, coarse.maps)
-        maps = fine.maps if fine else segments.maps(coarse.states, segments.ends(coarse.states))
-        return 2.0 * abs(_log_radius(maps) / segments.time - coarse.rate)
+        errors = []
+        for finer in (2.0, 0.5):
+            segments = Segments(found, coarse.segments.time, len(coarse.states), finer)
+            other = orbit(segments, coarse.states, coarse.maps)
+            maps = other.maps if other else segments.maps(coarse.states, segments.ends(coarse.states))
+            errors.append(finer * abs(_log_radius(maps) / segments.time - coarse.rate))
+        return max(errors)
 
     def _measured(self, value: float, found: Sliding) -> Growth | None:
         plain = None if self.orbits else growth(found)  # from the first motion that opens on, all may
