@@ -22,9 +22,6 @@ from brakecli.sweeps.floquet import Disturbances
 from brakecli.sweeps.growth import Sliding, sliding, with_step
 from brakecli.sweeps.tables import Critical
 
-SCANNED = 9  # values of the parameter, both ends among them, between which a change is looked for by runs
-PARTS = 4  # of each interval between them, where surfaces open in a run
-REFINED = 3  # times that values are added beside one at which stability is nearly lost or regained
 EDGES = 4  # halvings towards the ends of a range of the parameter in which the answer is not known
 MOST_WINDOWS = 16
 SCANNED_BY_EIGENVALUES = 129
@@ -221,7 +218,7 @@ def _of_edges(critical: Critical, unstable: bool, edges: list[Edge]) -> Search:
 def _by_simulation(critical: Critical, sliding_at: SlidingAt, exact: Search) -> Search:
     """Where the growth of small disturbances passes zero, by Brent's method, between two values on either side."""
     at = Disturbances(sliding_at)
-    values = _scanned(critical, at, exact)
+    values = at.scanned(critical.lower, critical.upper, exact.windows)
     bias = abs(exact.bias or 0.0)
 
     def edge(low: float, high: float) -> Edge:
@@ -230,32 +227,6 @@ def _by_simulation(critical: Critical, sliding_at: SlidingAt, exact: Search) -> 
     return _answer(critical, sliding_at, at.unstable, values, edge)._replace(
         bias=exact.bias, eigenvalue=exact.eigenvalue
     )
-
-
-def _scanned(critical: Critical, at: Disturbances, exact: Search) -> list[float]:
-    """The values between which changes are looked for.
-
-    Where surfaces open they lie closer, and closest beside values where stability is nearly lost or regained.
-    Otherwise the windows that eigenvalues show have one value each.
-    """
-    values: list[float] = np.linspace(critical.lower, critical.upper, PARTS * (SCANNED - 1) + 1).tolist()
-    at.scan(values[::PARTS])
-    if not any(measured and measured.opened for measured in map(at.at, values[::PARTS])):
-        ends = [critical.lower, *(end for window in exact.windows for end in window), critical.upper]
-        return sorted({*values[::PARTS], *(0.5 * (low + high) for low, high in pairwise(ends))})
-    at.scan(values)
-    for _ in range(REFINED):
-        added = set[float]()
-        for triple in zip(values, values[1:], values[2:], strict=False):
-            rates = [measured.rate for measured in map(at.at, triple) if measured]
-            if len(rates) < len(triple) or min(rates) * max(rates) <= 0.0:
-                continue
-            least = min(map(abs, rates))
-            if least == abs(rates[1]) and least < 2.0 * np.ptp(rates):
-                added |= {0.5 * (low + high) for low, high in pairwise(triple)}
-        values = sorted({*values, *added})
-        at.scan(sorted(added))
-    return values
 
 
 def _narrowed(at: Disturbances, low: float, high: float, critical: Critical, bias: float) -> Edge:
@@ -291,9 +262,9 @@ def _narrowed(at: Disturbances, low: float, high: float, critical: Critical, bia
 def _left_open(at: Disturbances, low: float, high: float, wide: tuple[float, float], bias: float) -> float:
     """By how much the change in a bracket may be wrong: the error of the growth over its slope, and the bias.
 
-    The error of a periodic motion holds that of its scheme. A three-layer scheme takes velocities from differences of
-    positions: near self-locking, where the force grows beyond all bounds, their rounding makes the growth jump, so
-    that the slope counts only as far as the ends of the bracket that was found first show it.
+    The error of a periodic motion holds that of its scheme. A three-layer scheme takes velocities from differences
+    of positions: near self-locking, where the force grows beyond all bounds, their rounding makes the growth jump,
+    so that the slope counts only as far as the ends of the bracket that was found first show it.
     """
     known = {value: measured for value, measured in at.known.items() if measured is not None}
     near = sorted(known, key=lambda value: max(low - value, value - high, 0.0))[:2]

@@ -7,9 +7,10 @@ Without a common period the same derivatives along a long run give Lyapunov's ex
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,9 @@ CLOSED = 1e-7  # largest gap, in static compressions, between the end of a segme
 ITERATIONS = 10
 SEGMENT = 10.0  # periods of the slowest motion
 MOST_SEGMENTS = 250
+SCANNED = 9  # values of the parameter, both ends among them, between which a change is looked for by runs
+PARTS = 4  # of each interval between them, where surfaces open in a run
+REFINED = 3  # times that values are added beside one at which stability is nearly lost or regained
 SAMPLES = 64  # of a segment
 SUBDIVISIONS = 1  # halvings of the way from a known motion to the next
 RELAXED = 100.0  # periods of the slowest motion after which a stable motion has come near its orbit
@@ -150,10 +154,35 @@ class Disturbances:
                 del self.known[value]
                 self.at(value)
 
+    def scanned(self, lower: float, upper: float, windows: Iterable[tuple[float, float]]) -> list[float]:
+        """The values between which changes are looked for.
+
+        Where surfaces open they lie closer, and closest beside values where stability is nearly lost or regained.
+        Otherwise the `windows` that eigenvalues show have one value each.
+        """
+        values: list[float] = np.linspace(lower, upper, PARTS * (SCANNED - 1) + 1).tolist()
+        self.scan(values[::PARTS])
+        if not any(measured and measured.opened for measured in map(self.at, values[::PARTS])):
+            ends = [lower, *(end for window in windows for end in window), upper]
+            return sorted({*values[::PARTS], *(0.5 * (low + high) for low, high in pairwise(ends))})
+        self.scan(values)
+        for _ in range(REFINED):
+            added = set[float]()
+            for triple in zip(values, values[1:], values[2:], strict=False):
+                rates = [measured.rate for measured in map(self.at, triple) if measured]
+                if len(rates) < len(triple) or min(rates) * max(rates) <= 0.0:
+                    continue
+                least = min(map(abs, rates))
+                if least == abs(rates[1]) and least < 2.0 * np.ptp(rates):
+                    added |= {0.5 * (low + high) for low, high in pairwise(triple)}
+            values = sorted({*values, *added})
+            self.scan(sorted(added))
+        return values
+
     def error(self, value: float) -> float:
         """By how much the step may falsify the growth (1/s) of a periodic motion, from half and twice the step.
 
-        With half the step the error changes by at least a half of itself, with twice the step by at least all of it.
+        With half the step the error changes by a half of itself or more, with twice the step by all of it or more.
         Where patches open, errors need not fall evenly: the larger one counts.
         """
         if (coarse := self.orbits.get(value)) is None or (found := self.sliding_at(value)) is None:

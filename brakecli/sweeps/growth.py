@@ -154,7 +154,7 @@ def growth(found: Sliding) -> Growth | None:
 
 
 def _rounding(found: Sliding, small: float) -> float:
-    """Growth (1/s) of a disturbance of a size (m) that changes the position in a step by no more than its rounding."""
+    """Growth (1/s) that moves a disturbance of a size (m) in a step by no more than the position is rounded."""
     return float(np.finfo(float).eps * math.hypot(found.x, found.y) / (small * found.system.step))
 
 
