@@ -11,6 +11,8 @@ from brakecli.solver.quantities import HISTORY as QUANTITIES
 from brakecli.solver.quantities import TIME
 
 TEXT, OBJECT, SENTENCE = "S", "O", "S240"
+MOST_WINDOWS = 16
+WINDOWS = f"({MOST_WINDOWS},)f8"
 
 # A run
 
@@ -127,12 +129,15 @@ CRITICAL = (
     Field("critical_error", "", "error bar of the critical value, bias included", at="error", label="±"),
     Field("critical_bias", "", "critical value of the scheme at its step less the exact one", at="bias"),
     Field("critical_eigenvalue", "", "critical value by eigenvalues", at="eigenvalue"),
+    Field("critical_windows_lower", "", "where each interval of instability begins", WINDOWS, at="windows_lower"),
+    Field("critical_windows_upper", "", "where each interval of instability ends", WINDOWS, at="windows_upper"),
     Field("critical_sustained", "", "least value at which vibration lasts from the case's start", at="sustained"),
     Field("sustained_status", "", "how the search for that value has ended", "S24", at="sustained_outcome"),
 )
 """Numbers have the unit of the parameter that is looked for."""
 DIFFERENCE = (integer("hysteresis", "whether the motions on the way up and down differ (0, 1)"),)
 DIRECTION = Field("direction", "", "direction in which the motion was followed", TEXT)
+WINDOW = Field("window", "1", "number of an interval of instability, from 0")
 BASE_POINT = Field("point", "1", "the base case")
 SWEEP = (
     Field("title", "", "title of the sweep, or of its case", TEXT, at="loaded."),

@@ -54,12 +54,19 @@ def _draw_critical(axes: Axes, picture: SweepPicture) -> None:
                 axes.errorbar(x[there], value[there], error, mfc=face, label=label, **_bars(size))
     elif regained.any():
         axes.plot(x[regained], value[regained], "o", mfc="white", mec=style.DARK, label="stable above")
+    low, high = picture["critical_windows_lower"][0], picture["critical_windows_upper"][0]
+    if (high < critical.upper).any():  # otherwise all is unstable above the critical value
+        bars: dict[str, Any] = {"color": style.BLUE, "alpha": 0.2, "lw": 1.2 * size, "zorder": 0.8}
+        axes.vlines(np.repeat(x, low.shape[1]), low.ravel(), high.ravel(), label="unstable", **bars)
     if (apart := picture.differs()[0]).any():
         axes.vlines(x[apart], sustained[apart], value[apart], color=style.VERMILION, lw=1.0, ls=style.DOTS)
         label = "vibration lasts from here on, from the case's own start"
         axes.plot(x[apart], sustained[apart], "v", ms=size, color=style.VERMILION, label=label)
     axes.set_ylabel(style.labelled(f"critical {critical.parameter}", picture.units["critical"]), parse_math=False)
-    drawn = np.concatenate([value, eigenvalue, sustained])
+    ends = np.concatenate([low.ravel(), high.ravel()])
+    within = ends[(ends > critical.lower) & (ends < critical.upper)]  # not those that a bound cuts
+    error = np.nan_to_num(picture["critical_error"][0])
+    drawn = np.concatenate([value - error, value + error, eigenvalue, sustained, within])
     style.set_ticks(axes.yaxis, 0.0, style.largest(drawn) or max(abs(critical.lower), abs(critical.upper)))
     if np.isfinite(drawn).any():
         _widen(axes, drawn)
@@ -125,13 +132,14 @@ def _draw_motion(axes: Axes, picture: SweepPicture, name: str) -> None:
 
 
 def _widen(axes: Axes, values: style.Array) -> None:
-    """Keep values that differ too little in the middle of the axis."""
+    """Fit the axis to the values, and keep those that differ too little in its middle."""
     low, high = np.nanmin(values), np.nanmax(values)
     if high - low < _ALIKE * abs(high + low) / 2.0:
         middle, half = 0.5 * (high + low), 0.25 * _ALIKE * abs(high + low)
         axes.set_ylim(middle - half, middle + half)
     else:
-        axes.margins(y=0.08)
+        room = 0.08 * (high - low)
+        axes.set_ylim(low - room, high + room)
 
 
 def _mark(axes: Axes, x: style.Array, signs: Iterable[Sign]) -> None:

@@ -16,6 +16,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from brakecli.analysis.regime.verdict import Regime
 from brakecli.case.read import parse_table
 from brakecli.errors import CaseError, UsageError
+from brakecli.files import fields
 from brakecli.files.read import StoredResult
 from brakecli.plots import style
 from brakecli.sweeps.critical import Outcome
@@ -37,6 +38,7 @@ _CRITICAL = (
     *("critical_status", "critical", "critical_lower", "critical_upper", "critical_error"),
     *("critical_eigenvalue", "critical_sustained", "sustained_status"),
 )
+_WINDOWS = ("critical_windows_lower", "critical_windows_upper")
 _FIRST = (*map(str, REGIMES), "by simulation", "by eigenvalues")  # in the legend
 _LONGEST_KEY, _MOST_TEXTS, _MOST_CHARACTERS = 45, 30, 70
 _FEW = 6  # values of an axis up to which each has its tick
@@ -191,6 +193,8 @@ class SweepPicture:
         yield sign(status == Outcome.NO_SLIDING, "no steady sliding", "s", style.DARK, "white")
         yield sign(always, f"vibration lasts from {low} on", "v", style.VERMILION, "white")
         yield sign(never, f"vibration fades up to {high}", "^", style.VERMILION, "white")
+        several = np.isfinite(self["critical_windows_lower"]).sum(axis=-1) > 1
+        yield sign(several, "several windows of instability", "+", style.DARK, style.DARK)
         yield self.failed()
 
     def figure(self, width: float, height: float) -> Figure:
@@ -246,6 +250,12 @@ def gather(result: StoredResult, select: Sequence[str] = ()) -> SweepPicture:
     dims = known["status"].dims
     both = dims[:1] == ("direction",)
     variables = {name: style.read_column(result, name)[... if both else np.newaxis] for name in names}
+    for name in _WINDOWS if sweep.critical is not None else ():  # older results have none
+        shape = (*variables["status"].shape, 1)
+        there = name in known and known[name].dims == (*dims, fields.WINDOW.name)
+        variables[name] = (
+            style.read_column(result, name)[... if both else np.newaxis] if there else np.full(shape, np.nan)
+        )
     for name in ("regime", "excitation"):  # those of points that failed mean nothing
         variables[name] = np.where(variables["status"] == Status.DONE, variables[name], "")
     differ = result.read("/", "hysteresis") == 1 if both and "hysteresis" in known else False

@@ -3,9 +3,9 @@
 import math
 from collections.abc import Callable
 from enum import StrEnum
-from functools import cache
+from functools import cache, partial
 from itertools import pairwise
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,17 +18,17 @@ from brakecli.case.case import Case, changed
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError
 from brakecli.solver.system import System
-from brakecli.sweeps.growth import Sliding, growth, sliding, with_step
+from brakecli.sweeps.floquet import Disturbances
+from brakecli.sweeps.growth import Sliding, sliding, with_step
 from brakecli.sweeps.tables import Critical
 
-Known = TypeVar("Known")
-Reply = TypeVar("Reply")
-
-SCANNED = 9  # values of the parameter, both ends among them, between which a change is looked for by runs
+EDGES = 4  # halvings towards the ends of a range of the parameter in which the answer is not known
+MOST_WINDOWS = 16
 SCANNED_BY_EIGENVALUES = 129
 SCANNED_WHERE_OPEN = 17  # by eigenvalues where surfaces open: their mean stiffness takes time
 GALLOP = 4.0  # factor from one stride to the next in looking for the end of sustained vibration
 LONGER = 8.0  # durations of the case that vibration beside stable sliding has to last
+STEADY = 0.01  # relative change of the amplitude in a run twice as long that shows that a vibration lasts
 
 
 class Outcome(StrEnum):
@@ -49,7 +49,8 @@ class Search(NamedTuple):
     """The answer for one point; None, or NaN, stands for what there is not.
 
     `error` is the half width of the bracket, plus the bias of the scheme at its step, plus what the growth
-    measured in two halves of the time leaves open. `bias`: the scheme's own critical value less the exact one.
+    measured leaves open. `bias`: the scheme's own critical value less the exact one. `windows`: both ends of every
+    interval of instability.
     """
 
     outcome: Outcome
@@ -61,11 +62,32 @@ class Search(NamedTuple):
     eigenvalue: float | None = None
     sustained: float | None = None
     sustained_outcome: Outcome = Outcome.NONE
+    windows: tuple[tuple[float, float], ...] = ()
+
+    @property
+    def windows_lower(self) -> list[float]:
+        """Where each interval of instability begins."""
+        return [low for low, _ in self.windows]
+
+    @property
+    def windows_upper(self) -> list[float]:
+        """Where each interval of instability ends."""
+        return [high for _, high in self.windows]
+
+
+class Edge(NamedTuple):
+    """Where stability is lost, or regained, with its bracket and error bar."""
+
+    value: float
+    lower: float
+    upper: float
+    error: float
+    lost: bool
 
 
 SlidingAt = Callable[[float], Sliding | None]
 Answer = Callable[[float], bool | None]
-"""The answer to a question at a value of the parameter; None where there is none, as without steady sliding."""
+"""The answer to a question at a value of the parameter; None where it is not known."""
 
 
 def search(
@@ -94,11 +116,15 @@ def search(
         steady, case = sliding_at(value), case_at(value)
         linear = steady is not None and not steady.opens
         # Beside stable sliding it may yet fade away, or has not yet come to where it lasts.
-        for times in (LONGER,) if unstable is False else (1.0, LONGER):
+        times, before = 1.0, None
+        while times <= LONGER:
             duration = times * case.solver.duration
             verdict = verdict_of(changed(case, solver={"duration": duration}))
-            if (answer := _fades(verdict, duration, unstable, linear)) is not None:
+            answer = _fades(verdict, duration, unstable, linear)
+            last = times == LONGER or unstable is not False
+            if verdict is not None and answer is not None and (last or _lasting(answer, before, verdict)):
                 return answer
+            times, before = 2.0 * times, verdict
         return None
 
     sustained, outcome = _sustained(critical, fades, found)
@@ -108,21 +134,33 @@ def search(
 def _by_eigenvalues(critical: Critical, sliding_at: SlidingAt) -> Search:
     """Where the eigenvalues of steady sliding pass zero, and by how much the scheme at its step moves that."""
 
-    def grows(found: Sliding) -> bool:
+    def grows(value: float) -> bool:
+        if (found := sliding_at(value)) is None:
+            return True
         c, k = found.system.coefficients, found.stiffness
         rate = eigenvalue_growth(c, k, found.grip)
         return rate > 1e-12 * math.sqrt((abs(c.c_xx) + abs(c.c_yy) + k) / c.m)
 
-    def grows_in_steps(found: Sliding) -> bool:
-        phi = found.system.coefficients.phi
-        return spectral_radius(found.system, found.stiffness, phi) > 1.0 + MARGIN
+    def grows_in_steps(value: float) -> bool:
+        found = sliding_at(value)
+        phi = found.system.coefficients.phi if found else 0.0
+        return found is None or spectral_radius(found.system, found.stiffness, phi) > 1.0 + MARGIN
 
     first = sliding_at(critical.lower)
     opens = first is not None and first.opens
     width = critical.tolerance * (1e-2 if opens else 1e-9)
-    count = SCANNED_WHERE_OPEN if opens else SCANNED_BY_EIGENVALUES
-    exact = _first_change(critical, _if_known(sliding_at, grows), count, width)
-    own = _first_change(critical, _if_known(sliding_at, grows_in_steps), SCANNED_WHERE_OPEN, width)
+
+    def edge(unstable: Callable[[float], bool], low: float, high: float) -> Edge:
+        lost = unstable(high)
+        low, high = bisect(lambda value: unstable(value) is not lost, low, high, width=width)
+        return Edge(0.5 * (low + high), low, high, 0.5 * (high - low), lost)
+
+    def found(unstable: Callable[[float], bool], count: int) -> Search:
+        values = np.linspace(critical.lower, critical.upper, count).tolist()
+        return _answer(critical, sliding_at, cache(unstable), values, partial(edge, unstable))
+
+    exact = found(grows, SCANNED_WHERE_OPEN if opens else SCANNED_BY_EIGENVALUES)
+    own = found(grows_in_steps, SCANNED_WHERE_OPEN)
     exact = exact._replace(eigenvalue=exact.value)
     if exact.value is None or own.value is None or exact.outcome is not own.outcome:
         return exact
@@ -133,67 +171,130 @@ def _friction_by_eigenvalues(critical: Critical, system: System) -> Search:
     """The first loss of stability within the range of φ, otherwise the first regain."""
     report = stability(system)
     within = [each for each in report.crossings if critical.lower <= each.friction <= critical.upper]
-    if within:
-        crossing = min(within, key=lambda each: not each.lost)
-        bias = report.discrete.bias if report.discrete and crossing is report.critical else None
-        outcome, value = Outcome.FOUND if crossing.lost else Outcome.REGAINED, crossing.friction
-        return Search(outcome, value, value, value, 0.0, bias, eigenvalue=value)
-    if report.stable is None or report.belt_speed == 0.0:
+    edges = [Edge(each.friction, each.friction, each.friction, 0.0, each.lost) for each in within]
+    held = system.coefficients.c_xx > 0.0  # otherwise there is steady sliding without friction only
+    if not edges and (report.stable is None or report.belt_speed == 0.0 or not held):
         return Search(Outcome.NO_SLIDING)
-    return Search(Outcome.STABLE if report.stable else Outcome.UNSTABLE)
+    found = _of_edges(critical, not edges[0].lost if edges else not report.stable, edges)
+    if found.value is None:
+        return found
+    lost = report.critical is not None and found.value == report.critical.friction
+    return found._replace(eigenvalue=found.value, bias=report.discrete.bias if report.discrete and lost else None)
 
 
-def _if_known(
-    at: Callable[[float], Known | None], reply: Callable[[Known], Reply | None]
-) -> Callable[[float], Reply | None]:
-    return cache(lambda value: None if (known := at(value)) is None else reply(known))
+def _answer(
+    critical: Critical,
+    sliding_at: SlidingAt,
+    unstable: Answer,
+    values: list[float],
+    edge: Callable[[float, float], Edge],
+) -> Search:
+    """What the answers at some values say; `edge` narrows a change between two of them down.
 
-
-def _first_change(critical: Critical, unstable: Answer, count: int, width: float = math.inf) -> Search:
-    """Where stability is first lost among `count` values, otherwise regained, narrowed down to a width.
-
-    It is lost, too, where steady sliding ends.
+    Stability is lost, too, where steady sliding ends.
     """
-    values = np.linspace(critical.lower, critical.upper, count).tolist()
-    verdicts = [unstable(value) for value in values]
-    for outcome, change in ((Outcome.FOUND, (True, False)), (Outcome.REGAINED, (False, True))):
-        for bracket, (before, after) in zip(pairwise(values), pairwise(verdicts), strict=True):
-            if (before is False, after is False) == change:
-                low, high = bisect(lambda value: unstable(value) == before, *bracket, width=width)  # noqa: B023
-                return Search(outcome, 0.5 * (low + high), low, high, 0.5 * (high - low))
-    if all(verdict is None for verdict in verdicts):
+    if all(sliding_at(value) is None for value in values):
         return Search(Outcome.NO_SLIDING)
-    return Search(Outcome.UNSTABLE if any(verdicts) else Outcome.STABLE)
+    answers = [(value, unstable(value)) for value in values]
+    decided = [each for each in answers if each[1] is not None]
+    changes = [(one, other) for (one, before), (other, after) in pairwise(decided) if before is not after]
+    if not changes and len(decided) < len(answers):
+        return Search(Outcome.UNDECIDED)
+    return _of_edges(critical, bool(decided[0][1]), [edge(*change) for change in changes])
+
+
+def _of_edges(critical: Critical, unstable: bool, edges: list[Edge]) -> Search:
+    """The critical value and all windows of instability; `unstable`: whether the range begins in one."""
+    ends = [critical.lower] * unstable + [each.value for each in edges]
+    ends += [critical.upper] * (len(ends) % 2)
+    windows = tuple(zip(ends[::2], ends[1::2], strict=True))
+    if not edges:
+        return Search(Outcome.UNSTABLE if unstable else Outcome.STABLE, windows=windows)
+    first = next((each for each in edges if each.lost), edges[0])
+    outcome = Outcome.FOUND if first.lost else Outcome.REGAINED
+    return Search(outcome, *first[:4], windows=windows)
 
 
 def _by_simulation(critical: Critical, sliding_at: SlidingAt, exact: Search) -> Search:
     """Where the growth of small disturbances passes zero, by Brent's method, between two values on either side."""
-    from scipy.optimize import brentq
+    at = Disturbances(sliding_at)
+    values = at.scanned(critical.lower, critical.upper, exact.windows)
+    bias = abs(exact.bias or 0.0)
 
-    at = _if_known(sliding_at, growth)
-    unstable = _if_known(at, lambda measured: measured.rate > measured.noise)
-    scanned = _first_change(critical, unstable, SCANNED)
-    if scanned.value is None:
-        return scanned._replace(bias=exact.bias, eigenvalue=exact.value)
-    low, high = scanned.lower, scanned.upper
-    below = unstable(low)
-    largest = max(abs(measured.rate) for measured in (at(low), at(high)) if measured is not None)
+    def edge(low: float, high: float) -> Edge:
+        return _narrowed(at, low, high, critical, bias)
 
-    def excess(value: float) -> float:  # where steady sliding has ended: as far beyond as the growth is large
-        measured = at(value)
-        return largest if measured is None else measured.rate - measured.noise
+    return _answer(critical, sliding_at, at.unstable, values, edge)._replace(
+        bias=exact.bias, eigenvalue=exact.eigenvalue
+    )
 
-    root = float(brentq(excess, low, high, xtol=0.05 * critical.tolerance))
-    for edge in (root - 0.4 * critical.tolerance, root + 0.4 * critical.tolerance):
-        if low < edge < high:
-            low, high = (edge, high) if unstable(edge) == below else (low, edge)
-    low, high = bisect(lambda value: unstable(value) == below, low, high, width=critical.tolerance)
-    value = root if low <= root <= high else 0.5 * (low + high)
-    spread, before, after = 0.0, at(low), at(high)
-    if before is not None and after is not None and before.rate != after.rate:
-        spread = max(before.spread, after.spread) * (high - low) / abs(after.rate - before.rate)
-    error = 0.5 * (high - low) + abs(exact.bias or 0.0) + min(spread, critical.upper - critical.lower)
-    return Search(scanned.outcome, value, low, high, error, exact.bias, exact.value)
+
+def _narrowed(at: Disturbances, low: float, high: float, critical: Critical, bias: float) -> Edge:
+    """The change between two values with opposite answers, in a bracket as narrow as the tolerance if possible."""
+    below, tolerance, wide = at.unstable(low), critical.tolerance, (low, high)
+    ends = [measured for measured in (at.at(low), at.at(high)) if measured is not None]
+    value, largest = None, max(abs(measured.rate) for measured in ends)
+    if not any(measured.bar for measured in ends):
+        from scipy.optimize import brentq
+
+        def excess(value: float) -> float:  # where steady sliding has ended: as far beyond as the growth is large
+            measured = at.at(value)
+            return largest if measured is None else measured.rate - measured.noise
+
+        value = float(brentq(excess, low, high, xtol=0.05 * tolerance))
+        for end in (value - 0.4 * tolerance, value + 0.4 * tolerance):
+            if low < end < high:
+                low, high = (end, high) if at.unstable(end) == below else (low, end)
+
+    def as_below(value: float) -> bool | None:
+        return None if (answer := at.unstable(value)) is None else answer == below
+
+    low, high = bisect(as_below, low, high, width=tolerance)
+    if high - low > tolerance:  # not known in the middle
+        middle = 0.5 * (low + high)
+        low = bisect(lambda value: at.unstable(value) is below, low, middle, width=tolerance, halvings=EDGES)[0]
+        high = bisect(lambda value: as_below(value) is not False, middle, high, width=tolerance, halvings=EDGES)[1]
+    value = value if value is not None and low <= value <= high else 0.5 * (low + high)
+    error = 0.5 * (high - low) + min(_left_open(at, low, high, wide, bias), critical.upper - critical.lower)
+    return Edge(value, low, high, error, not below)
+
+
+def _left_open(at: Disturbances, low: float, high: float, wide: tuple[float, float], bias: float) -> float:
+    """By how much the change in a bracket may be wrong: the error of the growth over its slope, and the bias.
+
+    The error of a periodic motion holds that of its scheme. A three-layer scheme takes velocities from differences
+    of positions: near self-locking, where the force grows beyond all bounds, their rounding makes the growth jump,
+    so that the slope counts only as far as the ends of the bracket that was found first show it.
+    """
+    known = {value: measured for value, measured in at.known.items() if measured is not None}
+    near = sorted(known, key=lambda value: max(low - value, value - high, 0.0))[:2]
+    one, other = near[0], near[-1]
+
+    def slope(other: float) -> float:
+        return abs((known[other].rate - known[one].rate) / (other - one)) if other != one else 0.0
+
+    if known[one].bar:  # the bracket holds it
+        return bias
+    steep = slope(other)
+    if one in at.orbits:
+        return at.error(one) / steep if steep > 0.0 else math.inf
+    found, far = at.sliding_at(one), max((slope(end) for end in wide if end in known), default=0.0)
+    if found is not None and found.system.scheme.LAG and far > 0.0 and not known[one].noise:
+        steep = min(steep, far)
+    return bias + (max(known[one].spread, known[other].spread) / steep if steep > 0.0 else 0.0)
+
+
+def _lasting(answer: bool, before: Verdict | None, verdict: Verdict) -> bool:
+    """Whether the answer of a run beside stable sliding is that of a longer one, too.
+
+    It is once the shoe has come to rest or moves by linear equations, and where the vibration is the same as in a
+    run half as long.
+    """
+    if answer:
+        return verdict.regime is Regime.DAMPED or verdict.stick_fraction + verdict.contact_loss_fraction == 0.0
+    if before is None or before.regime is not verdict.regime:
+        return False
+    return abs(before.amplitude - verdict.amplitude) <= STEADY * verdict.amplitude
 
 
 def _fades(verdict: Verdict | None, duration: float, unstable: bool | None, linear: bool) -> bool | None:

@@ -20,8 +20,13 @@ from brakecli.solver.schedules import schedule
 from brakecli.solver.steady_sliding import SteadySliding, steady_sliding
 from brakecli.solver.system import Initial, System
 
-DISTURBANCE = 1e-7  # in static compressions: the rounding of a run is 1e-9 of it
+DISTURBANCE = 1e-7  # in static compressions: the rounding of a run is 1e-9 of it, unless a soft link reaches far
 SATURATED = 1e-3  # largest difference, in static compressions, that follows the linear equations to 1e-3
+LARGEST = (
+    1e-2,
+    1e-5,
+)  # of disturbances on smooth surfaces, where motions are linear until they lift off, and others
+ROUNDED = 1e-9  # least ratio of a disturbance to the shoe's distance from the origin: rounding is 1e-16 of that
 FADED = 1e-5  # smallest difference, in parts of its first size, that holds four digits
 DEPARTED = 2.0  # times as far from steady sliding as roughness alone takes a run
 PERIODS, PASSES = 40, 20
@@ -29,19 +34,28 @@ PERIODS, PASSES = 40, 20
 take as many of the slowest motion, and passes of the wheel's longest wave, within the case's duration."""
 STEPS_PER_PERIOD = 200  # of the two-layer scheme, where the case gives no step
 _SAMPLES_PER_PERIOD = 20
-_VX, _NORMAL_FORCE = (list(HISTORY).index(name) for name in ("vx", "normal_force"))
+_VX, _NORMAL_FORCE, _CONTACT = (list(HISTORY).index(name) for name in ("vx", "normal_force", "contact_fraction"))
 
 
 @dataclass(frozen=True)
 class Growth:
     """The growth rate (1/s) of the fastest disturbance of steady sliding; one up to `noise` may be none.
 
-    `spread` (1/s): by how much it differs between two halves of the time watched.
+    `spread` (1/s): by how much it differs between two halves of the time watched. `opened`: the pad did not touch
+    everywhere all the time. `bar` (1/s): of a mean over a time, within which it is not known.
     """
 
     rate: float
     spread: float
     noise: float
+    opened: bool = False
+    bar: float = 0.0
+
+    @property
+    def unstable(self) -> bool | None:
+        """Whether disturbances grow; None where zero lies within the bar."""
+        excess = self.rate - self.noise
+        return None if abs(excess) < self.bar else excess > 0.0
 
 
 @dataclass(frozen=True)
@@ -74,11 +88,19 @@ def with_step(system: System) -> System:
 
 
 def sliding(system: System) -> Sliding | None:
-    """Steady sliding of a system; None where the wheel does not turn, or no load presses. Raises CaseError."""
-    if system.belt_speed == 0.0:
+    """Steady sliding of a system; None where the wheel does not turn, no load presses, or no link holds the shoe
+    along the wheel. Raises CaseError.
+    """
+    if system.belt_speed == 0.0 or system.coefficients.c_xx == 0.0:
         return None
     rest = steady_sliding(system)
     return Sliding(**vars(rest), system=system) if rest.stiffness > 0.0 else None
+
+
+def held(system: System) -> System:
+    """The system at the speed and load of its start throughout."""
+    belt = schedule((0.0,), (system.belt_speed / system.radius,), system.radius)
+    return replace(system, belt=belt, load=schedule((0.0,), (system.load_at_start,)))
 
 
 def growth(found: Sliding) -> Growth | None:
@@ -89,30 +111,32 @@ def growth(found: Sliding) -> Growth | None:
     system = found.system
     slow, fast = natural_frequencies(system.coefficients, found.stiffness)
     interval = max(1, int(1.0 / (_SAMPLES_PER_PERIOD * fast * system.step))) * system.step
-    held = replace(
-        system,
-        belt=schedule((0.0,), (system.belt_speed / system.radius,), system.radius),
-        load=schedule((0.0,), (system.load_at_start,)),
+    watched = replace(
+        held(system),
         interval=interval,
         duration=max(_watched(system, slow, fast), 8.0 * interval),
         method=replace(system.method, step=system.step, start="consistent"),
     )
     compression = found.normal_force / found.stiffness
     scales = compression * np.array([1.0, 1.0, *[2.0 * math.pi * fast] * 2])
-    displaced = np.vstack([np.zeros(4), DISTURBANCE * np.diag(scales)])
+    small, saturated = _sizes(found, compression, float(scales[2]))
+    displaced = np.vstack([np.zeros(4), small * np.diag(scales)])
     samples = []
     for start in (np.array([found.x, found.y, 0.0, 0.0]) + displaced).tolist():
-        motion = solve(replace(held, initial=Initial(*start)))
+        motion = solve(replace(watched, initial=Initial(*start)))
         if motion.work.failure not in (Failure.NONE, Failure.UNBALANCED):
             return None
         samples.append(motion.rows)
     runs = np.array(samples)
     # D[t]: columns are the differences of the neighbours, rows x, y, ẋ, ẏ, each in its scale.
-    maps = ((runs[1:, :, :4] - runs[0, :, :4]) / (DISTURBANCE * scales)).transpose(1, 2, 0)
-    last = _last_linear(found, runs, np.abs(maps).max(axis=(1, 2)), interval, slow)
-    first = max(1, last // 4)
+    maps = ((runs[1:, :, :4] - runs[0, :, :4]) / (small * scales)).transpose(1, 2, 0)
+    sizes = np.abs(maps).max(axis=(1, 2))
+    last = _last_linear(found, runs, (sizes > saturated / small) | (sizes < FADED), interval, slow)
+    opened = bool((runs[:, : last + 1, _CONTACT] < 1.0).any())
+    # A linear motion has all its directions from the start on: none has faded there. Others come to their orbit.
+    first = max(1, last // 4) if opened else 1
     if last - first < 4:  # out of steady sliding at once
-        return Growth(fast, fast, 0.0)
+        return Growth(fast, fast, 0.0, opened)
 
     def rate(start: int, end: int) -> float:
         """The growth rate (1/s) of the fastest of the disturbances that are still there at the start."""
@@ -124,7 +148,27 @@ def growth(found: Sliding) -> Growth | None:
 
     middle = (first + last) // 2
     noise = 1e-4 / ((last - first) * interval) if is_undamped(system.coefficients) else 0.0
-    return Growth(rate(first, last), 0.5 * abs(rate(middle, last) - rate(first, middle)), noise)
+    later = rate(middle, last) if opened else rate(first, last)
+    spread = 0.5 * abs(later - rate(first, middle)) + _rounding(found, small * compression)
+    return Growth(rate(first, last), spread, noise, opened)
+
+
+def _rounding(found: Sliding, small: float) -> float:
+    """Growth (1/s) that moves a disturbance of a size (m) in a step by no more than the position is rounded."""
+    return float(np.finfo(float).eps * math.hypot(found.x, found.y) / (small * found.system.step))
+
+
+def _sizes(found: Sliding, compression: float, speed: float) -> tuple[float, float]:
+    """The size of disturbances at the start, and at the end, in static compressions, whose velocity is `speed`.
+
+    They are well above the rounding of the position. Those of smooth surfaces do not bring the shoe to the speed
+    of the wheel.
+    """
+    reach = math.hypot(found.x, found.y) / compression
+    if not found.system.smooth:
+        return max(DISTURBANCE, min(ROUNDED * reach, LARGEST[1])), SATURATED
+    slips = abs(found.system.belt_speed) / speed
+    return max(DISTURBANCE, min(0.01 * slips, LARGEST[0])), max(SATURATED, min(0.5 * slips, 0.3))
 
 
 def _watched(system: System, slow: float, fast: float) -> float:
@@ -138,7 +182,7 @@ def _watched(system: System, slow: float, fast: float) -> float:
 
 
 def _last_linear(
-    found: Sliding, runs: NDArray[np.float64], sizes: NDArray[np.float64], interval: float, slow: float
+    found: Sliding, runs: NDArray[np.float64], ended: NDArray[np.bool_], interval: float, slow: float
 ) -> int:
     """The last sample up to which the differences follow linear equations and are more than rounding.
 
@@ -147,7 +191,6 @@ def _last_linear(
     times as far from steady sliding as in its first periods and its first passing wave.
     """
     system, belt = found.system, found.system.belt_speed
-    ended = (sizes > SATURATED / DISTURBANCE) | (sizes < FADED)
     if system.smooth:  # stick is found by the velocity: a three-layer scheme's slow sliding may pass for it
         sticks = (runs[:, :, _VX] - belt) * belt >= 0.0
         ended |= (sticks | (runs[:, :, _NORMAL_FORCE] == 0.0)).any(axis=0)
@@ -157,4 +200,4 @@ def _last_linear(
         opening = max(1, int(max(3.0 / slow if slow > 0.0 else 0.0, 1.0 / passing) / interval))
         ended |= away > DEPARTED * away[:opening].max()
     ended[0] = False
-    return int(np.argmax(ended)) - 1 if ended.any() else len(sizes) - 1
+    return int(np.argmax(ended)) - 1 if ended.any() else len(ended) - 1

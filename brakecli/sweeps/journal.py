@@ -57,17 +57,24 @@ class Journal:
         self._note(first, count, offset + _HEAD.size, records)
 
     def column(self, name: str) -> NDArray[Any]:
-        """A field of all records, in the shape of the grid; every unit has to be finished."""
-        values = np.empty((len(self.finished), self.plan.unit_length), self.kind[name])
+        """A field of all records, in the shape of the grid; every unit has to be finished.
+
+        A field of several numbers has one more dimension, as long as the record that holds most of them needs.
+        """
+        kind = self.kind[name]
+        values = np.empty((len(self.finished), self.plan.unit_length), kind)
         for first, count, offset in self._blocks:
             data = os.pread(self._file.fileno(), count * self._unit_bytes, offset)
             if len(data) < count * self._unit_bytes:
                 raise BrakecliError(f"{self.path}: was cut short while in use; run the same command again")
-            values[first : first + count] = np.frombuffer(data, self.kind)[name].reshape(count, -1)
+            values[first : first + count] = np.frombuffer(data, self.kind)[name].reshape(count, -1, *kind.shape)
         shape, followed = list(self.plan.dimensions.values()), self.plan.followed
         along = len(shape) - 1 if followed is None else followed + self.plan.passes - 1
-        del shape[along]
-        return np.moveaxis(values.reshape(*shape, -1), -1, along)
+        length = shape.pop(along)
+        column = np.moveaxis(values.reshape(*shape, length, *kind.shape), len(shape), along)
+        if kind.shape:
+            column = column[..., : max(1, int(np.isfinite(column).sum(axis=-1).max()))]
+        return column
 
     def discard(self) -> None:
         """Remove the file: its sweep is finished."""

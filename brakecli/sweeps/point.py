@@ -163,6 +163,8 @@ def _filled(kind: np.dtype[Any], values: Mapping[str, Any]) -> NDArray[Any]:
         value = values.get(name)
         if isinstance(value, str):  # as many whole characters as fit
             record[name] = value.encode()[: kind[name].itemsize].decode(errors="ignore").encode()
-        elif value is not None or kind[name].kind == "f":
+        elif isinstance(value, list):  # as many as there are, the rest missing
+            record[name] = np.resize(value + [math.nan] * kind[name].shape[0], kind[name].shape)
+        elif value is not None or kind[name].base.kind == "f":
             record[name] = math.nan if value is None else value
     return record

@@ -99,13 +99,18 @@ def write(result: ResultFile, report: SweepReport, journal: Journal) -> None:
         result.variable("/", field, (axis.name,), data, parameters=list(axis.parameter))
     if not plan.sweep.axis:
         result.axis("/", fields.BASE_POINT, np.zeros(1))
+    if plan.sweep.critical is not None:
+        result.axis("/", fields.WINDOW, np.arange(float(journal.column("critical_windows_lower").shape[-1])))
     for field in plan.fields:
         attributes, critical = {}, plan.sweep.critical
-        if critical is not None and field in fields.CRITICAL and field.kind == "f8":
+        if critical is not None and field in fields.CRITICAL and "f8" in field.kind:
             attributes, field = {"parameter": critical.parameter}, replace(field, units=unit(critical.parameter))
         data = journal.column(field.name)
         data = np.char.decode(data, "utf-8") if data.dtype.kind == "S" else data
-        result.column(field, found.dimensions, data, **attributes)
+        dimensions = found.dimensions
+        if field.kind == fields.WINDOWS:
+            dimensions, field = (*dimensions, fields.WINDOW.name), replace(field, kind="f8")
+        result.column(field, dimensions, data, **attributes)
     if found.hysteresis is not None:
         result.column(*fields.DIFFERENCE, found.dimensions[1:], found.hysteresis)
 

@@ -1,6 +1,7 @@
 """Critical values by the growth of small disturbances, held against eigenvalues and closed forms."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,15 +12,43 @@ from brakecli.analysis.stability.report import stability
 from brakecli.case.case import Case
 from brakecli.case.system import system_of
 from brakecli.solver.links import natural_frequencies
-from brakecli.sweeps.critical import Outcome, Search, search
-from brakecli.sweeps.growth import growth, sliding
+from brakecli.solver.motion import solve
+from brakecli.solver.system import Initial
+from brakecli.sweeps.critical import LONGER, Outcome, Search, search
+from brakecli.sweeps.floquet import Disturbances, common_period
+from brakecli.sweeps.growth import Sliding, growth, sliding
 from brakecli.sweeps.point import verdict_of
 from brakecli.sweeps.tables import Critical
 from tests.analysis.test_regime_table import random_case
-from tests.campaign import counts
+from tests.campaign import campaign, counts
 from tests.examples import MODE_COUPLING, ROUGH, SQUEAL, make
 
 WAVES = {"amplitudes": [1e-6, 7e-7], "wavelengths": [0.02, 0.011]}
+
+OPENS: dict[str, Any] = {  # surfaces that open; the wheel repeats after 11.3 ms, the shoe's waves do not matter
+    "shoe": {"mass": 17.109774},
+    "wheel": {"radius": 0.5, "angular_speed": 6.74},
+    "link1": {"stiffness": 32232120.1, "damping": 139.432415},
+    "link2": {"stiffness": 31646471.7, "damping": 139.432415, "angle_deg": 15.583161},
+    "load": {"force": 109.98632},
+    "friction": {"coefficient": 0.3},
+    "contact": {"half_length": 0.05, "stiffness": 116877910.0},
+    "roughness": {
+        "shoe": {"amplitudes": [1.0619e-5, 1.0619e-5], "wavelengths": [0.038, 0.028]},
+        "wheel": {"amplitudes": [2.1238e-5], "wavelengths": [0.038]},
+    },
+    "solver": {"step": 2e-5, "duration": 0.5},
+}
+SOFT: dict[str, Any] = {  # a soft link lets the shoe run far before it locks
+    "shoe": {"mass": 4.357554925953838},
+    "wheel": {"radius": 0.5, "angular_speed": 4.0},
+    "link1": {"stiffness": 1549163.5720932626, "damping": 250.09318022772501},
+    "link2": {"stiffness": 4476.515362739354, "damping": 250.09318022772501, "angle_deg": -15.760678435130377},
+    "load": {"force": 1000.0},
+    "friction": {"coefficient": 0.3},
+    "contact": {"half_length": 0.05, "stiffness": 103205132.89205056},
+    "solver": {"step": 6.344985077102577e-05, "duration": 0.3},
+}
 
 
 def found(
@@ -315,3 +344,127 @@ def test_roughness_that_opens_the_contact_moves_the_critical_friction() -> None:
     assert rough.value is not None
     assert abs(rough.value - flat.value) > 0.05 * flat.value
     assert math.isfinite(rough.value)
+
+
+def sliding_on_opening_surfaces(friction: float) -> Sliding | None:
+    return sliding(system_of(make(OPENS, friction__coefficient=friction)))
+
+
+def event_driven_growth(friction: float) -> float:
+    """Growth (1/s) by the event-driven scheme with the exact contact, over a whole period of the wheel.
+
+    Newton's method on the map over the period finds the forced motion; its derivative has the multipliers.
+    """
+    values = Disturbances(sliding_on_opening_surfaces)
+    values.at(friction)
+    start = values.orbits[friction]
+    solver = {"scheme": "event-driven", "tolerance": 1e-11, "duration": 1.0}
+    system = system_of(
+        make({**OPENS, "solver": solver, "output": {"sample_interval": 1e-4}}, friction__coefficient=friction)
+    )
+    period, scales = common_period(system), start.segments.scales
+    assert period is not None
+    system = replace(system, interval=period, duration=period)
+
+    def end(state: Any) -> Any:
+        return solve(replace(system, initial=Initial(*(state * scales).tolist()))).rows[-1, :4] / scales
+
+    state = start.states[0]
+    for _ in range(4):
+        after = end(state)
+        derivative = np.array([end(state + 1e-5 * direction) - after for direction in np.eye(4)]).T / 1e-5
+        state = state + np.linalg.solve(np.eye(4) - derivative, after - state)
+    assert np.abs(end(state) - state).max() < 1e-6
+    return math.log(float(np.abs(np.linalg.eigvals(derivative)).max())) / period
+
+
+@pytest.mark.parametrize("friction", [1.943, 1.98, pytest.param(2.01, marks=campaign), 2.1])
+def test_multipliers_of_a_motion_that_opens_are_those_of_the_event_driven_scheme(friction: float) -> None:
+    values = Disturbances(sliding_on_opening_surfaces)
+    measured = values.at(friction)
+    assert measured is not None
+    exact = event_driven_growth(friction)
+    assert abs(measured.rate - exact) <= values.error(friction)  # what half the step says of its error
+    assert abs(measured.rate - exact) < 0.1 * abs(exact)
+
+
+def test_the_error_bar_on_surfaces_that_open_holds_where_the_multiplier_passes_one() -> None:
+    answer = found(OPENS, 1.94, 1.97, tolerance=2e-3)
+    value, _, _, error = bracket(answer)
+    assert event_driven_growth(value - error) < 0.0 < event_driven_growth(value + error)
+
+
+@campaign
+def test_all_windows_of_instability_are_found_where_surfaces_open() -> None:
+    answer = found(OPENS, 1.8, 2.2)
+    assert len(answer.windows) == 2
+    assert answer.windows_upper[-1] == 2.2
+    inside = [0.5 * (low + high) for low, high in answer.windows]
+    between = 0.5 * (answer.windows_upper[0] + answer.windows_lower[1])
+    assert [event_driven_growth(value) > 0.0 for value in (*inside, between, 1.9)] == [True, True, False, False]
+
+
+@pytest.mark.parametrize(
+    ("waves", "period"),
+    [
+        ({"wavelengths": [0.03, 0.013]}, 0.39),
+        ({"wavelengths": [0.1, 0.3]}, 0.3),
+        ({"wavenumbers": [200.0, 300.0]}, 2.0 * math.pi / 100.0),
+        ({"wavelengths": [0.02, 0.02 * math.sqrt(2.0)]}, None),
+        ({"wavelengths": [0.03011, 0.01327]}, None),  # after 40 m and more than ten seconds
+    ],
+)
+def test_the_period_of_the_wheel_is_that_of_the_decimals_that_are_written(
+    waves: dict[str, Any], period: float | None
+) -> None:
+    wheel = {"amplitudes": [1e-6, 1e-6], **waves}
+    time = common_period(system_of(make(SQUEAL, wheel__angular_speed=2.0, roughness__wheel=wheel)))
+    assert (time is None) if period is None else time == pytest.approx(period, rel=1e-12)  # U = 1 m/s
+
+
+def test_windows_are_found_by_both_methods_and_cut_by_the_bounds() -> None:
+    for method in ("simulation", "eigenvalue"):
+        answer = found(SQUEAL, 1.0, 10.0, "link2__angle_deg", method=method)
+        assert answer.windows == ((1.0, answer.value),)
+        above = found(SQUEAL, 0.3, 0.9, method=method)
+        assert above.windows == ((above.value, 0.9),)
+        assert found(SQUEAL, 0.0, 0.3, method=method).windows == ()
+        assert found(SQUEAL, 0.8, 1.2, method=method).windows == ((0.8, 1.2),)
+
+
+@pytest.mark.parametrize("scheme", ["two-layer", "three-layer"])
+def test_rounding_of_a_far_position_is_in_the_error_bar_near_self_locking(scheme: str) -> None:
+    exact = stability(system_of(make(SOFT))).critical
+    assert exact is not None
+    assert exact.instability == "divergence"
+    answer = found(SOFT, 0.0, 1.5 * exact.friction, tolerance=1e-5 * exact.friction, solver__scheme=scheme)
+    value, _, _, error = bracket(answer)
+    assert abs(value - exact.friction) <= error
+    assert error < 0.01 * exact.friction
+
+
+@pytest.mark.parametrize("angle", [90.0, -90.0])
+@pytest.mark.parametrize("method", ["simulation", "eigenvalue"])
+def test_a_shoe_that_no_link_holds_has_no_critical_friction(angle: float, method: str) -> None:
+    rough: dict[str, Any] = {
+        "link2__angle_deg": angle,
+        "roughness__wheel": {"amplitudes": [3e-5], "wavelengths": [0.025]},
+    }
+    report = stability(system_of(make(SQUEAL, **rough)))
+    assert report.equilibrium is None
+    assert report.critical is None
+    answer = found(SQUEAL, 0.0, 1.0, method=method, **rough)
+    assert (answer.outcome, answer.value, answer.windows) == (Outcome.NO_SLIDING, None, ())
+
+
+def test_runs_for_the_least_sustained_value_end_once_they_are_decided() -> None:
+    durations = []
+
+    def counted(case: Case) -> Any:
+        durations.append(case.solver.duration)
+        return verdict_of(case)
+
+    critical = Critical(parameter="friction.coefficient", lower=0.3, upper=0.9, tolerance=1e-2)
+    answer = search(critical, lambda value: make(SQUEAL, friction__coefficient=value), counted)
+    assert answer.sustained == pytest.approx(answer.value, abs=1e-2)
+    assert max(durations) < LONGER * SQUEAL["solver"]["duration"]

@@ -106,9 +106,9 @@ def undamped_critical(c: Coefficients, k: float, belt: float) -> tuple[float | N
 def mean_stiffness(system: System, smooth: float) -> StiffnessAt:
     """Mean stiffness of a rough contact as it depends on φ through the mean force; NaN where there is none.
 
-    That of smooth surfaces (N/m) is known, and of a wheel at rest it is not needed.
+    That of smooth surfaces (N/m) is known. Of a wheel at rest, and of a shoe that no link holds, it is not needed.
     """
-    if system.smooth or system.belt_speed == 0.0:
+    if system.smooth or system.belt_speed == 0.0 or system.coefficients.c_xx == 0.0:
         return lambda phi: smooth
     mean = tabulated(system)
 
@@ -124,8 +124,11 @@ def mean_stiffness(system: System, smooth: float) -> StiffnessAt:
 def _rough_crossings(c: Coefficients, belt: float, stiffness_at: StiffnessAt) -> list[Crossing]:
     """Changes of stability on rough surfaces, whose mean stiffness depends on φ.
 
-    Where steady sliding ends, it is lost by self-locking.
+    Where steady sliding ends, it is lost by self-locking. Where no link holds the shoe along the wheel there is
+    none with friction, and nothing to lose.
     """
+    if c.c_xx == 0.0:
+        return []
 
     def first_mode(phi: float) -> Mode | None:
         k = stiffness_at(phi)
