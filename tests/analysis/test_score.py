@@ -1,6 +1,7 @@
-"""The score of the verdicts: random shoes against answers that share nothing with the rules; `score` finds them."""
+"""The score of the verdicts: random shoes against answers that share nothing with the rules, found by `score`."""
 
 import math
+import sys
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -89,11 +90,11 @@ def test_no_verdict_contradicts_an_independent_answer(stratum: str, count: int) 
 def test_few_shoes_stay_undecided_that_neither_grow_nor_stay_neutral() -> None:
     scores = {stratum: score(stratum, count, SEED) for stratum, count in MANY.items()}
     said_of = sum((found.said for found in scores.values()), Counter[tuple[str, str]]())
-    for (true, word), count in sorted(said_of.items()):
-        print(f"{true:18s} {word:10s} {count:4d}")
+    table = [f"{true:18s} {word:10s} {count:4d}" for (true, word), count in sorted(said_of.items())]
     for stratum, found in scores.items():
-        wrong = f"{len(found.mistakes)} wrong, {found.undecided} undecided"
-        print(f"{STRATA[stratum]}: {wrong} of {found.judged}; {found.failed} failed")
+        counts = f"{len(found.mistakes)} wrong, {found.undecided} undecided of {found.judged}"
+        table.append(f"{STRATA[stratum]}: {counts}; {found.failed} failed")
+    sys.stdout.write("\n".join(["", *table, ""]))
     judged = sum(found.judged for found in scores.values())
     assert judged >= 500
     assert sum(found.undecided for found in scores.values()) <= 0.08 * judged
