@@ -8,7 +8,8 @@ from typing import Any
 
 import pytest
 
-from tests.analysis.score import STRATA, Score, Shoe, random_shoes, said, score, verdict
+from tests.analysis.score import Score, said, score, verdict
+from tests.analysis.shoes import STRATA, Shoe, random_shoes
 from tests.campaign import campaign
 
 FEW = {"smooth": 12, "slow": 8, "full": 4, "open": 2, "frictionless": 2}
@@ -24,7 +25,7 @@ RELAXATION: dict[str, Any] = {
     "friction": {"coefficient": 0.7},
     "contact": {"half_length": 0.05, "stiffness": 2e7},
     "initial": {"vx": -0.5},
-    "solver": {"tolerance": 1e-3, "duration": 0.5},
+    "solver": {"step": 5e-6, "duration": 0.5},
     "output": {"sample_interval": 5e-5},
 }
 DRUM: dict[str, Any] = {
