@@ -1,8 +1,8 @@
 """What becomes of a shoe, by means that share nothing with the rules of the regimes.
 
 The eigenvalues of the linear equations decide where the motion neither sticks nor opens, and two neighbouring runs
-where a steep surface may change them. Otherwise a run decides that is eight times longer, with the same shoe without
-roughness, at low friction and from another start beside it.
+where a steep surface may change them. Otherwise a run decides that is eight times longer, beside the same shoe
+without roughness, at low friction and from another start.
 """
 
 import math

@@ -8,11 +8,12 @@ from typing import Any
 
 import pytest
 
-from tests.analysis.score import Score, said, score, verdict
+from tests.analysis.answers import answer
+from tests.analysis.score import Score, said, score, verdict, wrong
 from tests.analysis.shoes import STRATA, Shoe, random_shoes
 from tests.campaign import campaign
 
-FEW = {"smooth": 12, "slow": 8, "full": 4, "open": 2, "frictionless": 2}
+FEW = {"smooth": 10, "slow": 6, "full": 3, "open": 2, "frictionless": 2}
 MANY = {"smooth": 150, "slow": 100, "full": 150, "open": 100, "frictionless": 50}
 SEED = 2026
 
@@ -68,6 +69,18 @@ def test_named_shoes_are_not_said_to_have_died_out(
     told = verdict(tables, tmp_path)
     assert told is not None
     assert said(told[1]) in words, told[1]["reasons"]
+
+
+def test_score_counts_a_verdict_that_contradicts_the_eigenvalues(tmp_path: Path) -> None:
+    stable = {**RELAXATION, "friction": {"coefficient": 0.3}, "wheel": {"radius": 0.5, "angular_speed": 4.0}}
+    told = verdict({**stable, "initial": {"at": "equilibrium", "x": 1e-6}}, tmp_path)
+    assert told is not None
+    tables, numbers, rows = told
+    true = answer(tables, rows)
+    assert (true.name, said(numbers)) == ("dies", "none")
+    assert wrong(tables, numbers, rows, true) is None
+    other = {**numbers, "regime": "quasi-harmonic", "excitation": "self-excited"}
+    assert wrong(tables, other, rows, true) == "sustained is said of what dies"
 
 
 def told_of(found: Score) -> str:
