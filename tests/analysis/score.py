@@ -105,27 +105,23 @@ BESIDE = ("neutral", "grows", "swells", "carried", "gone")  # answers of which n
 
 @dataclass
 class Score:
-    """What was said of how many shoes with which answers, what was wrong, and how many runs failed."""
+    """What was said of how many shoes with which answers, what was wrong or left undecided, how many runs failed."""
 
     said: Counter[tuple[str, str]]
     mistakes: list[tuple[Tables, dict[str, Any], Answer, str]]
+    undecided: list[tuple[Tables, str, Answer]]  # with the reason, where more might be said
     failed: int = 0
 
     @property
     def judged(self) -> int:
-        """All of them."""
+        """All of them but failed runs."""
         return sum(self.said.values())
-
-    @property
-    def undecided(self) -> int:
-        """How many stay undecided that are neither neutral nor still growing, and that have not left."""
-        return sum(n for (true, word), n in self.said.items() if word == "undecided" and true not in BESIDE)
 
 
 @cache
 def score(stratum: str, count: int, seed: int) -> Score:
     """Judge so many random shoes."""
-    found = Score(Counter(), [])
+    found = Score(Counter(), [], [])
     with TemporaryDirectory() as folder:
         for drawn in islice(random_shoes(stratum, seed), count):
             told = verdict(drawn, Path(folder))
@@ -137,6 +133,8 @@ def score(stratum: str, count: int, seed: int) -> Score:
             if true.name == "lasts" and levels(rows)[-1] > 1.03 * levels(rows)[-2]:
                 true = replace(true, name="swells")
             found.said[true.name, said(numbers)] += 1
+            if said(numbers) == "undecided" and true.name not in BESIDE:
+                found.undecided.append((tables, numbers["reasons"][0], true))
             if why := wrong(tables, numbers, rows, true):
                 found.mistakes.append((tables, numbers, true, why))
     return found

@@ -106,12 +106,12 @@ def test_few_shoes_stay_undecided_that_neither_grow_nor_stay_neutral() -> None:
     said_of = sum((found.said for found in scores.values()), Counter[tuple[str, str]]())
     table = [f"{true:18s} {word:10s} {count:4d}" for (true, word), count in sorted(said_of.items())]
     for stratum, found in scores.items():
-        counts = f"{len(found.mistakes)} wrong, {found.undecided} undecided of {found.judged}"
+        counts = f"{len(found.mistakes)} wrong, {len(found.undecided)} undecided of {found.judged}"
         table.append(f"{STRATA[stratum]}: {counts}; {found.failed} failed")
     sys.stdout.write("\n".join(["", *table, ""]))
     judged = sum(found.judged for found in scores.values())
     assert judged >= 500
-    assert sum(found.undecided for found in scores.values()) <= 0.08 * judged
+    assert sum(len(found.undecided) for found in scores.values()) <= 0.08 * judged
 
 
 def test_every_stratum_draws_what_it_names() -> None:
