@@ -150,7 +150,7 @@ def late_answer(shoe: Shoe, long: Array) -> Answer:
         return left
     if linear(last, shoe):
         found = linear_answer({}, shoe, "eigenvalues at the end of the longer run")
-        return replace(found, name="lasts", sticks=None) if found.name == "grows" else found
+        return replace(found, name="swells") if found.name == "grows" else found
     if shoe.phi == 0.0:
         return Answer("dies" if shoe.b.any() else "neutral", "no friction")
     ratio = level[-1] / max(level[-2], 1e-300)
@@ -199,10 +199,10 @@ def shaken_answer(tables: Tables, shoe: Shoe, long: Array) -> Answer:
         return Answer("forced", how, sticks)
     if stable and (apart < 1e-3 or by_roughness > 2.0 * max(by_friction, 0.0) + 2.0 * open_account):
         return Answer("forced" if damped else "not self-excited", how, sticks)
-    if flat == "lasts" and apart < 1e-3 and 0.7 < times < 1.4:
-        return Answer("forced", how, sticks)  # the roughness holds the shoe's own vibration down
     pays = by_friction > 2.0 * max(by_roughness, 0.0) + 2.0 * open_account
     pays = pays or (not damped and by_friction > -2.0 * open_account)
+    if flat == "lasts" and apart < 1e-3 and 0.7 < times < 1.4 and not pays:
+        return Answer("forced", how, sticks)  # the roughness holds the shoe's own vibration down
     if flat == "lasts" and pays and times > 1.4 and (apart > 1e-2 or times > 3.0):
         return Answer("lasts", how, sticks)
     return Answer("no answer", how, sticks)

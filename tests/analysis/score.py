@@ -105,7 +105,7 @@ BESIDE = ("neutral", "grows", "swells", "carried", "gone")  # answers of which n
 
 @dataclass
 class Score:
-    """What was said of how many shoes with which answers, what was wrong or left undecided, how many runs failed."""
+    """What was said of how many shoes with which answers, what was wrong or undecided, how many runs failed."""
 
     said: Counter[tuple[str, str]]
     mistakes: list[tuple[Tables, dict[str, Any], Answer, str]]
