@@ -133,7 +133,8 @@ def score(stratum: str, count: int, seed: int) -> Score:
             if true.name == "lasts" and levels(rows)[-1] > 1.03 * levels(rows)[-2]:
                 true = replace(true, name="swells")
             found.said[true.name, said(numbers)] += 1
-            if said(numbers) == "undecided" and true.name not in BESIDE:
+            neutral = Shoe.of(tables).rate == 0.0 and not Shoe.of(tables).b.any()
+            if said(numbers) == "undecided" and not neutral and true.name not in BESIDE:
                 found.undecided.append((tables, numbers["reasons"][0], true))
             if why := wrong(tables, numbers, rows, true):
                 found.mistakes.append((tables, numbers, true, why))
