@@ -14,7 +14,7 @@ from tests.analysis.shoes import STRATA, Shoe, random_shoes
 from tests.campaign import campaign
 
 FEW = {"smooth": 10, "slow": 5, "full": 2, "open": 1, "frictionless": 2}
-MANY = {"smooth": 150, "slow": 100, "full": 150, "open": 100, "frictionless": 50}
+MANY = {"smooth": 190, "slow": 100, "full": 150, "open": 100, "frictionless": 50}
 SEED = 2026
 
 RELAXATION: dict[str, Any] = {
@@ -114,7 +114,7 @@ def test_few_shoes_stay_undecided_that_are_neither_neutral_nor_still_growing() -
         counts = f"{len(found.mistakes)} wrong, {len(found.undecided)} undecided of {found.judged}"
         table.append(f"{STRATA[stratum]}: {counts}; {found.failed} failed")
     sys.stdout.write("\n".join(["", *table, ""]))
-    assert sum(found.judged for found in scores.values()) >= 500
+    assert sum(count for (true, _), count in said_of.items() if true != "no answer") >= 500
     for stratum in ("slow", "frictionless"):
         assert len(scores[stratum].undecided) <= 0.08 * scores[stratum].judged
 
