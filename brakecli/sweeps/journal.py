@@ -18,14 +18,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli import SAME_NUMBERS_AS
 from brakecli.errors import BrakecliError, CannotWriteError, RefusedError
 from brakecli.files.atomic import explained, open_own
 from brakecli.sweeps.plan import Plan
 from brakecli.sweeps.point import Status, record_type
 from brakecli.sweeps.workers.task import fingerprint
 
-_HEAD = struct.Struct("<qqI")  # first unit, units, checksum of the records
+_PLACE = struct.Struct("<qq")  # first unit, units
+_HEAD = struct.Struct("<qqI")  # the place, checksum of the place and the records
 _LONGEST_HEADER, _FIRST_KEY = 5_000_000, b"brakecli_version"
 MOST_DIFFERENCES = 5
 
@@ -48,7 +48,7 @@ class Journal:
         offset = self._file.seek(0, os.SEEK_END)
         try:
             with explained(self.path):
-                self._write(_HEAD.pack(first, count, zlib.crc32(records)) + records)
+                self._write(_HEAD.pack(first, count, _checksum(first, count, records)) + records)
                 os.fsync(self._file.fileno())
         except CannotWriteError:
             with suppress(OSError):
@@ -110,7 +110,7 @@ class Journal:
             if not 0 <= first < first + count <= len(self.finished):
                 break
             records = self._file.read(count * self._unit_bytes)
-            if len(records) < count * self._unit_bytes or zlib.crc32(records) != checksum:
+            if len(records) < count * self._unit_bytes or _checksum(first, count, records) != checksum:
                 break
             self._note(first, count, offset + _HEAD.size, records)
             offset = self._file.tell()
@@ -150,6 +150,10 @@ def open_journal(path: Path, plan: Plan, *, force: bool) -> Iterator[Journal]:
                 journal.discard()
 
 
+def _checksum(first: int, count: int, records: bytes) -> int:
+    return zlib.crc32(records, zlib.crc32(_PLACE.pack(first, count)))
+
+
 def identity(plan: Plan) -> dict[str, Any]:
     """What makes a sweep this one: every key of the sweep and its case, and the versions it is computed with."""
     sweep = tomllib.loads(plan.sweep_text)
@@ -171,8 +175,6 @@ def _refusal(found: bytes, own: Mapping[str, Any]) -> str:
     """Why a journal that begins with a line belongs to another sweep; empty where it belongs to this one."""
     try:
         there = json.loads(found)
-        if there.get("brakecli_version") in SAME_NUMBERS_AS:
-            there |= {key: own[key] for key in ("brakecli_version", "brakecli_sources")}
         keys = [key for key in {**there, **own} if there.get(key) != own.get(key)]
     except (ValueError, TypeError, AttributeError, RecursionError):
         return "holds no finished points; remove it, or start again with --force"
