@@ -11,7 +11,7 @@ LOWEST_STAMP := $(LOWEST)/.installed
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 CASES := $(sort $(wildcard cases/*.toml))
 # Two processes: one test waits for what it has started while another computes. PYTEST_ARGS=-n0 takes one alone.
-PYTEST := -m pytest --numprocesses 2 --dist loadfile
+PYTEST := -m pytest --numprocesses 3 --dist loadfile
 PYTEST_ARGS ?=
 
 .DEFAULT_GOAL := help

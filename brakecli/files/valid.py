@@ -58,7 +58,7 @@ def check_variables(file: h5py.File, kind: str, length: int) -> None:
             shape = found[axis][1].shape if axis in found else node.shape
             if kind == "sweep" and field in (fields.DIRECTION, *fields.DIFFERENCE):
                 shape = shape[1:] if field is not fields.DIRECTION else shape[:1]
-            if node.shape != shape:
+            if node.shape[: node.ndim - (field.kind == fields.WINDOWS)] != shape:
                 raise ValueError(f"{where} has the shape {node.shape}, and {axis} has {shape}")
             if kind == "run" and name in _RISING:
                 _check_rising(node, where)
@@ -147,8 +147,8 @@ def _decoded(value: Any) -> Any:
 
 
 def _kinds(field: Field) -> str:
-    """The kinds of NumPy types that a variable may have."""
-    return {"f": "f", "i": "iu"}.get(field.kind[0], "S")
+    """The kinds of NumPy types that a variable may have; other programs write whole numbers as floats."""
+    return "S" if field.kind[0] in "SO" else "iuf"
 
 
 def _fits(field: Field, value: Any) -> bool:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from brakecli.files.field import Field
 from brakecli.files.fields import CRITICAL as CRITICAL_FIELDS
-from brakecli.files.fields import POINT
+from brakecli.files.fields import POINT, WINDOWS
 from brakecli.files.read import open_result
 from brakecli.files.write import FILL, new_result
 from brakecli.plots.result import draw
@@ -36,6 +36,7 @@ def columns(shape: tuple[int, ...], *, critical: bool) -> Columns:
     values: Columns = {
         field.name: (np.zeros(shape) if field.kind[0] in "fi" else np.full(shape, "x"))
         for field in (*POINT, *(CRITICAL_FIELDS if critical else ()))
+        if field.kind != WINDOWS
     }
     places = np.arange(count, dtype=float).reshape(shape)
     values["status"] = np.full(shape, "done", "U24")
