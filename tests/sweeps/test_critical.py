@@ -388,6 +388,25 @@ def test_multipliers_of_a_motion_that_opens_are_those_of_the_event_driven_scheme
     assert abs(measured.rate - exact) < 0.1 * abs(exact)
 
 
+@pytest.mark.parametrize("friction", [0.6, 1.2, 1.8, 1.9, 2.1])
+def test_an_exponent_without_a_common_period_agrees_with_multipliers_or_is_undecided(
+    friction: float,
+) -> None:
+    """A second wave of 10⁻¹³ m takes the period away and changes nothing else."""
+    wheel = {"amplitudes": [2.1238e-5, 1e-13], "wavelengths": [0.038, 0.038 * math.sqrt(2.0)]}
+    tables = {**OPENS, "roughness": {**OPENS["roughness"], "wheel": wheel}}
+    assert common_period(system_of(make(tables, friction__coefficient=friction))) is None
+    exponent = Disturbances(lambda value: sliding(system_of(make(tables, friction__coefficient=value)))).at(
+        friction
+    )
+    multiplier = Disturbances(sliding_on_opening_surfaces).at(friction)
+    assert exponent is not None
+    assert multiplier is not None
+    assert exponent.unstable in (multiplier.unstable, None)
+    if exponent.unstable is not None or multiplier.rate < 0.0:
+        assert abs(exponent.rate - multiplier.rate) <= exponent.bar
+
+
 def test_the_error_bar_on_surfaces_that_open_holds_where_the_multiplier_passes_one() -> None:
     answer = found(OPENS, 1.94, 1.97, tolerance=2e-3)
     value, _, _, error = bracket(answer)
