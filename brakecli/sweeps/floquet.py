@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from brakecli.analysis.stability.modes import is_undamped
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.motion import solve
 from brakecli.solver.quantities import Failure
@@ -35,6 +36,7 @@ SCANNED = 9  # values of the parameter, both ends among them, between which a ch
 PARTS = 4  # of each interval between them, where surfaces open in a run
 REFINED = 3  # times that values are added beside one at which stability is nearly lost or regained
 SAMPLES = 64  # of a segment
+NEUTRAL = 1e-4  # of ln of a multiplier that is one but for rounding, as all are without dashpots below flutter
 SUBDIVISIONS = 1  # halvings of the way from a known motion to the next
 RELAXED = 100.0  # periods of the slowest motion after which a stable motion has come near its orbit
 BATCHES, BATCH, TRANSIENT = 8, 4, 16  # batches of a long run, segments of a batch, segments before the first
@@ -143,8 +145,9 @@ class Disturbances:
         return self.known[value]
 
     def unstable(self, value: float) -> bool | None:
-        """Whether disturbances grow at a value, or there is nothing to disturb; None where that is not known."""
-        return True if (measured := self.at(value)) is None else measured.unstable
+        """Whether disturbances grow or steady sliding has ended; None where no forced motion is known."""
+        measured = self.at(value)
+        return measured.unstable if measured else True if self.sliding_at(value) is None else None
 
     def scan(self, values: list[float]) -> None:
         """Measure in order, and where no periodic motion was found, look again from the ones above."""
@@ -213,7 +216,8 @@ class Disturbances:
         if forced is None:
             return None
         self.orbits[value] = forced
-        return Growth(forced.rate, 0.0, 0.0, opened=True)
+        noise = NEUTRAL / period if is_undamped(found.system.coefficients) else 0.0
+        return Growth(forced.rate, 0.0, noise, opened=True)
 
     def _near(self, value: float) -> tuple[float, Orbit | None]:
         near = min(self.orbits, key=lambda other: abs(other - value), default=math.nan)
