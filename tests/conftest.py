@@ -1,10 +1,13 @@
 """Settings of the tests: property-based tests are repeatable and have no clock; kernels are compiled once."""
 
+import signal
+
 import pytest
 from hypothesis import settings
 
 from tests.commands import warm_up
 
+signal.signal(signal.SIGHUP, signal.SIG_DFL)  # also under nohup, whose commands would not hear it
 settings.register_profile("repeatable", deadline=None, derandomize=True, print_blob=False)
 settings.load_profile("repeatable")
 

@@ -23,7 +23,6 @@ from brakecli.sweeps.growth import Sliding, sliding, with_step
 from brakecli.sweeps.tables import Critical
 
 EDGES = 4  # halvings towards the ends of a range of the parameter in which the answer is not known
-MOST_WINDOWS = 16
 SCANNED_BY_EIGENVALUES = 129
 SCANNED_WHERE_OPEN = 17  # by eigenvalues where surfaces open: their mean stiffness takes time
 GALLOP = 4.0  # factor from one stride to the next in looking for the end of sustained vibration

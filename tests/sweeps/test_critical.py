@@ -9,18 +9,20 @@ import pytest
 
 from brakecli.analysis.stability.modes import growth as eigenvalue_growth
 from brakecli.analysis.stability.report import stability
-from brakecli.case.case import Case
+from brakecli.case.case import Case, changed
 from brakecli.case.system import system_of
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.motion import solve
 from brakecli.solver.system import Initial
 from brakecli.sweeps.critical import LONGER, Outcome, Search, search
 from brakecli.sweeps.floquet import Disturbances, common_period
-from brakecli.sweeps.growth import Sliding, growth, sliding
+from brakecli.sweeps.growth import Sliding, growth, sliding, with_step
+from brakecli.sweeps.plan import read_sweep
 from brakecli.sweeps.point import verdict_of
 from brakecli.sweeps.tables import Critical
 from tests.analysis.test_regime_table import random_case
 from tests.campaign import campaign, counts
+from tests.commands import ROOT
 from tests.examples import MODE_COUPLING, ROUGH, SQUEAL, make
 
 WAVES = {"amplitudes": [1e-6, 7e-7], "wavelengths": [0.02, 0.011]}
@@ -405,6 +407,27 @@ def test_an_exponent_without_a_common_period_agrees_with_multipliers_or_is_undec
     assert exponent.unstable in (multiplier.unstable, None)
     if exponent.unstable is not None or multiplier.rate < 0.0:
         assert abs(exponent.rate - multiplier.rate) <= exponent.bar
+
+
+@pytest.mark.parametrize(
+    ("angle", "friction", "unstable"), [(15.0, 0.3, False), (15.0, 1.9, True), (25.0, 0.2, None)]
+)
+def test_multipliers_of_one_are_no_instability_and_a_resonance_without_dashpots_is_undecided(
+    angle: float, friction: float, unstable: bool | None
+) -> None:
+    """Without dashpots all multipliers have modulus one below flutter; where the wave meets a natural frequency,
+    no bounded forced motion is found.
+    """
+    case = read_sweep(str(ROOT / "cases/paper/alpha-open.toml")).plan.case({})
+    bare = changed(case, link1={"damping": 0.0}, link2={"damping": 0.0, "angle_deg": angle})
+
+    def sliding_at(value: float) -> Sliding | None:
+        return sliding(with_step(system_of(changed(bare, friction={"coefficient": value}))))
+
+    values = Disturbances(sliding_at)
+    values.at(0.05)
+    assert sliding_at(friction) is not None
+    assert values.unstable(friction) is unstable
 
 
 def test_the_error_bar_on_surfaces_that_open_holds_where_the_multiplier_passes_one() -> None:

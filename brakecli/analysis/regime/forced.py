@@ -19,6 +19,25 @@ _NOTHING = 1e-3  # which may come from the rounding of the eigenvalues
 QUARTER = 4.0 / 3.0  # a run whose last quarter is settled, over what comes before
 _ERRORS = 2.0  # standard errors of a mean power
 _LARGER = 5.0  # times what the waves force in full contact: a larger motion needs more proof that it is forced
+_MOST_COMBINED = 6  # waves whose frequencies are combined by threes
+_COMBINATIONS = [(i, j, k) for i in range(-2, 3) for j in range(-2, 3) for k in (-1, 0, 1)]
+
+
+def forced_lines(belt_speed: float, waves_per_metre: Sequence[float], highest: float) -> tuple[float, ...]:
+    """Frequencies (Hz, up to `highest`) of the passing waves, their multiples, and sums and differences of two."""
+    base = [abs(belt_speed) * waves for waves in waves_per_metre]
+    multiples = {n * f for f in base for n in range(1, 11)}
+    pairs = {abs(f + sign * g) for f in base for g in base for sign in (1, -1)}
+    return tuple(sorted(f for f in multiples | pairs if 0.0 < f <= highest))
+
+
+def subharmonics(belt_speed: float, waves_per_metre: Sequence[float], highest: float) -> tuple[float, ...]:
+    """Halves, thirds and quarters of the passing frequencies, their multiples, and sums of up to three."""
+    base = [abs(belt_speed) * waves for waves in waves_per_metre]
+    parts = {k * f / n for f in base for n in (2, 3, 4) for k in range(1, 4 * n)}
+    few = base if len(base) <= _MOST_COMBINED else []
+    sums = {abs(i * f + j * g + k * h) for f in few for g in few for h in few for i, j, k in _COMBINATIONS}
+    return tuple(sorted(f for f in parts | sums if 0.0 < f <= highest))
 
 
 class ForcedRules:
@@ -35,9 +54,8 @@ class ForcedRules:
         self.settled_part, self.settled = replace(self.whole, start=history.samples // 2), False
         self.theory: Linear | None = None  # where the motion is linear
         self.cycles: Cycles | None = None
-        self.parts: tuple[float, float] | None = (
-            None  # m, half of peak to peak of what is forced and what is added
-        )
+        # m, half of peak to peak of what is forced and what is added
+        self.parts: tuple[float, float] | None = None
         self.evidence: dict[str, Any] = {}
 
     def _slowest(self, amplitude: float) -> float:

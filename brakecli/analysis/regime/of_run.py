@@ -10,17 +10,10 @@ from typing import Any
 import numpy as np
 
 from brakecli.analysis.regime.evidence import Part
+from brakecli.analysis.regime.forced import forced_lines, subharmonics
 from brakecli.analysis.regime.linear import linear_theory
 from brakecli.analysis.regime.rules import classify
-from brakecli.analysis.regime.verdict import (
-    Context,
-    Excitation,
-    Regime,
-    Thresholds,
-    Verdict,
-    forced_lines,
-    subharmonics,
-)
+from brakecli.analysis.regime.verdict import Context, Excitation, Regime, Thresholds, Verdict
 from brakecli.analysis.stability.modes import growth
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of

@@ -1,7 +1,7 @@
-"""What a verdict says, what it goes by, and the lines of the roughness; `rules` finds it."""
+"""What a verdict says, and what of the case it goes by; `rules` finds it."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -10,9 +10,6 @@ from brakecli.analysis.regime.evidence import Part
 
 if TYPE_CHECKING:  # a measured signal needs no compiled code
     from brakecli.analysis.regime.linear import Linear
-
-_MOST_COMBINED = 6  # waves whose frequencies are combined by threes
-_COMBINATIONS = [(i, j, k) for i in range(-2, 3) for j in range(-2, 3) for k in (-1, 0, 1)]
 
 
 class Regime(StrEnum):
@@ -55,9 +52,7 @@ class Context:
     steady: bool = True  # whether U and Q are constant
     forced: tuple[float, ...] = ()  # Hz, lines of the roughness
     subharmonics: tuple[float, ...] = ()  # Hz, further lines that a pad that opens may add
-    waves: tuple[
-        tuple[float, float], ...
-    ] = ()  # Hz and m, passing frequencies and the swing of x that each forces
+    waves: tuple[tuple[float, float], ...] = ()  # Hz and m: passing frequency, and the swing of x that it forces
     quiet: float = 0.0  # m/s, size of vx that may come from rounding
     scale: float = math.inf  # m/s, of a motion that would open the contact
     frictionless: bool = False
@@ -110,20 +105,3 @@ class Verdict:
     reasons: tuple[str, ...]
     evidence: dict[str, Any]
     thresholds: Thresholds
-
-
-def forced_lines(belt_speed: float, waves_per_metre: Sequence[float], highest: float) -> tuple[float, ...]:
-    """Frequencies (Hz, up to `highest`) of the passing waves, their multiples, and sums and differences of two."""
-    base = [abs(belt_speed) * waves for waves in waves_per_metre]
-    multiples = {n * f for f in base for n in range(1, 11)}
-    pairs = {abs(f + sign * g) for f in base for g in base for sign in (1, -1)}
-    return tuple(sorted(f for f in multiples | pairs if 0.0 < f <= highest))
-
-
-def subharmonics(belt_speed: float, waves_per_metre: Sequence[float], highest: float) -> tuple[float, ...]:
-    """Halves, thirds and quarters of the passing frequencies, their multiples, and sums of up to three."""
-    base = [abs(belt_speed) * waves for waves in waves_per_metre]
-    parts = {k * f / n for f in base for n in (2, 3, 4) for k in range(1, 4 * n)}
-    few = base if len(base) <= _MOST_COMBINED else []
-    sums = {abs(i * f + j * g + k * h) for f in few for g in few for h in few for i, j, k in _COMBINATIONS}
-    return tuple(sorted(f for f in parts | sums if 0.0 < f <= highest))

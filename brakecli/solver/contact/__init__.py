@@ -5,7 +5,8 @@ The rows are plain data; a file is imported when it is used.
 Contract of an evaluator module: `evaluate(x, y, layer)`, a kernel of the signature `records.EVALUATE`, fills
 `layer.contact`, a record of `records.CONTACT`, for the shoe at (x, y) and the phases `layer.angles` of the wheel's
 harmonics (`roughness.wheel_angles`). It takes constants and tables from `layer.pad` and `layer.tables`, changes
-nothing but the contact and `layer.scratch`, and notes its place in `kinds()`.
+nothing but the contact and `layer.scratch`, and notes its place in `kinds()`. One whose work is small begins with
+`layer = borrowed(layer)`: reference counts would cost a third of a step.
 """
 
 from dataclasses import dataclass
