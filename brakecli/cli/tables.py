@@ -160,10 +160,10 @@ def stability_table(title: str, report: StabilityReport, key: str, entries: Sequ
         what = f"{motion}, damping ratio {mode.damping_ratio:.3g}, {shape}"
         rows.append((f"mode at {mode.frequency:.5g} Hz", what))
     if discrete:
-        limit, friction = discrete.step_limit, discrete.critical_friction
+        limit, friction, radius = discrete.step_limit, discrete.critical_friction, discrete.spectral_radius
         bias = "" if discrete.bias is None else f", {discrete.bias:+.2g} off"
         rows += [
-            ("the scheme's growth", f"{discrete.growth:.5g} 1/s, a factor {discrete.spectral_radius:.8g} a step"),
+            ("the scheme's growth", f"{_text(discrete.growth, '1/s')}, a factor {radius:.8g} a step"),
             ("its critical friction", "none" if friction is None else f"{friction:.7g}{bias}"),
             ("its stable steps", "any" if limit is None else f"up to {limit:.4g} s" if limit else "none"),
         ]
