@@ -20,6 +20,7 @@ if TYPE_CHECKING:  # what one command prints need not wait for the modules of th
     from brakecli.runs.limits import Check
     from brakecli.runs.run import RunReport
     from brakecli.sweeps.cost import Estimate
+    from brakecli.sweeps.lock_in import LockIn
     from brakecli.sweeps.result import SweepReport
 
 POINTS = named(fields.POINT, "regime", "frequency", "amplitude")
@@ -136,8 +137,8 @@ def _cost_rows(found: Check | Estimate) -> list[Row]:
     ]
 
 
-def stability_table(title: str, report: StabilityReport, key: str, entries: Sequence[Mapping[str, Any]]) -> str:
-    """Steady sliding, its modes and its critical friction; below that the critical friction along a key."""
+def stability_table(title: str, report: StabilityReport, found: LockIn | None) -> str:
+    """Steady sliding, its modes and its critical friction; below that what there is along a key."""
     rest, critical, discrete = report.equilibrium, report.critical, report.discrete
     undamped = {"flutter": report.undamped_flutter, "divergence": report.undamped_divergence}
     known = [f"{kind} at {friction:.7g}" for kind, friction in undamped.items() if friction is not None]
@@ -167,9 +168,29 @@ def stability_table(title: str, report: StabilityReport, key: str, entries: Sequ
             ("its critical friction", "none" if friction is None else f"{friction:.7g}{bias}"),
             ("its stable steps", "any" if limit is None else f"up to {limit:.4g} s" if limit else "none"),
         ]
-    columns = {key: "value"} | {field.title: field.name for field in fields.VARIED}
-    varied = {title: [_text(each[name]) for each in entries] for title, name in columns.items()}
-    return _table(title, rows) + ("\n\n" + _grid(varied) if key else "")
+    return _table(title, rows) + (_lock_in(found) if found else "")
+
+
+def _lock_in(found: LockIn) -> str:
+    """Critical friction and both modes along a key, and where stability changes."""
+    from brakecli.sweeps.result import unit
+
+    entries, keys = found.entries, ", ".join(found.parameters)
+    values = {"value": [f"{entry['value']:.6g}" for entry in entries]}
+    varied = {field.title: [_text(each[field.name]) for each in entries] for field in fields.VARIED}
+    looks = (("frequency {}, Hz", 1.0, ".5g"), ("growth {}, 1/s", 1.0, ".4g"), ("damping {}, %", 100.0, ".3g"))
+    modes = {
+        head.format(mode + 1): [
+            _text(None if value is None else factor * value, form=form)
+            for value in (each[field.name][mode] for each in entries)
+        ]
+        for field, (head, factor, form) in zip(fields.MODES, looks, strict=True)
+        for mode in (0, 1)
+    }
+    units = unit(found.parameters[0])
+    critical = ", ".join(_text(value, units.removeprefix("1"), ".7g") for value in found.critical_values)
+    changes = f"Stability changes at: {critical or 'none of the values between'}"
+    return "\n\n" + "\n\n".join((f"Along {keys}:\n" + _grid(values | varied), _grid(values | modes), changes))
 
 
 def _crossing(crossing: Crossing) -> str:

@@ -12,7 +12,7 @@ from brakecli.solver.quantities import TIME
 
 TEXT, OBJECT, SENTENCE = "S", "O", "S240"
 MOST_WINDOWS = 16
-WINDOWS = f"({MOST_WINDOWS},)f8"
+WINDOWS, PAIR = f"({MOST_WINDOWS},)f8", "(2,)f8"
 
 # A run
 
@@ -197,7 +197,7 @@ COMPARISON = (
     Field("entries", "", "all entries", OBJECT, at="comparison.", rows=ENTRY, in_file=False),
 )
 
-# Linear stability, in JSON alone
+# Linear stability
 
 STABILITY = (
     Field("belt_speed", "m/s", "speed U of the wheel's surface"),
@@ -225,4 +225,14 @@ VARIED = (
         label="as the scheme has it",
     ),
 )
-"""Along a key of the case, beside its `value`."""
+MODES = (
+    Field("frequencies", "Hz", "frequency of each mode, 0 of a pair of real eigenvalues", PAIR),
+    Field("growth_rates", "1/s", "growth rate of each mode, negative where it decays", PAIR),
+    Field("damping_ratios", "1", "damping ratio of each mode, negative where it grows", PAIR),
+)
+"""Along a key of the case, beside its `value`: what there is, and both modes, each followed by continuity."""
+MODE = integer("mode", "number of the mode, by frequency at the first value")
+LOCK_IN = (
+    Field("parameters", "", "the keys that are varied", OBJECT),
+    Field("critical_values", "of the key", "where along the key sliding stops being stable, or starts", OBJECT),
+)

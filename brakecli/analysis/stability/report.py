@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from brakecli.analysis.stability.discrete import spectral_radius
-from brakecli.analysis.stability.modes import Crossing, Mode, crossings, eigensystem, is_undamped, modes
+from brakecli.analysis.stability.modes import Complex, Crossing, Mode, crossings, eigensystem, is_undamped, modes
 from brakecli.analysis.stability.search import bisect
 from brakecli.errors import CaseError
 from brakecli.solver.links import natural_frequencies
@@ -74,14 +74,13 @@ def stability(system: System) -> StabilityReport:
     grip = math.copysign(c.phi, belt) if belt else 0.0
     values, _ = eigensystem(c, k, grip)
     fastest = float(values.real.max())
-    tolerance = 0.0 if is_undamped(c) else 1e-12 * float(np.abs(values).max())
     return StabilityReport(
         belt_speed=belt,
         friction=c.phi,
         equilibrium=rest,
         no_equilibrium=reason,
         contact_stiffness=k,
-        stable=fastest <= tolerance if rest else None,
+        stable=_all_decay(c, values) if rest else None,
         eigenvalues=tuple(values.tolist()),
         modes=tuple(modes(c, k, grip)),
         crossings=tuple(found),
@@ -91,6 +90,21 @@ def stability(system: System) -> StabilityReport:
         discrete=_discrete(system, stiffness_at, critical, fastest) if rest else None,
         stiffness_at=stiffness_at,
     )
+
+
+def is_stable(system: System) -> bool | None:
+    """Whether steady sliding is stable at the system's own friction; None where there is none."""
+    c, belt = system.coefficients, system.belt_speed
+    try:
+        k = steady_sliding(system).stiffness
+    except CaseError:
+        return None
+    return _all_decay(c, eigensystem(c, k, math.copysign(c.phi, belt) if belt else 0.0)[0])
+
+
+def _all_decay(c: Coefficients, eigenvalues: Complex) -> bool:
+    tolerance = 0.0 if is_undamped(c) else 1e-12 * float(np.abs(eigenvalues).max())
+    return bool(eigenvalues.real.max() <= tolerance)
 
 
 def undamped_critical(c: Coefficients, k: float, belt: float) -> tuple[float | None, float | None]:
