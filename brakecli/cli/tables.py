@@ -17,6 +17,7 @@ if TYPE_CHECKING:  # what one command prints need not wait for the modules of th
     from brakecli.analysis.stability.modes import Crossing
     from brakecli.analysis.stability.report import StabilityReport
     from brakecli.comparison.result import ComparisonReport
+    from brakecli.runs.advise import AdviceReport
     from brakecli.runs.limits import Check
     from brakecli.runs.run import RunReport
     from brakecli.sweeps.cost import Estimate
@@ -33,6 +34,7 @@ NARROWEST = 40  # columns of a table, whatever the terminal says: nothing can be
 Row = tuple[str, str | Sequence[str]]
 """A label with its text; a list gives a row for each of its texts, and none if it is empty."""
 
+_STATE = {True: "stable", False: "unstable", None: "-"}
 ENTRIES = (
     ("method", "method", ""),
     ("step", "step, s", ".3g"),
@@ -153,7 +155,7 @@ def stability_table(title: str, report: StabilityReport, found: LockIn | None) -
         ("critical friction", _crossing(critical) if critical else "none"),
         ("also changes at", [_crossing(each) for each in report.crossings if each is not critical]),
         ("without dashpots", ", ".join(known) or "neither flutter nor divergence"),
-        (f"at φ = {report.friction:g}", {True: "stable", False: "unstable", None: "-"}[report.stable]),
+        (f"at φ = {report.friction:g}", _STATE[report.stable]),
     ]
     for mode in report.modes:
         motion = f"grows at {mode.growth:.4g} 1/s" if mode.growth > 0.0 else f"decays at {-mode.growth:.4g} 1/s"
@@ -197,6 +199,39 @@ def _crossing(crossing: Crossing) -> str:
     change = "lost" if crossing.lost else "regained"
     where = f" at {crossing.frequency:.5g} Hz" if crossing.frequency else ""
     return f"{crossing.friction:.7g}: stability {change} by {crossing.instability}{where}"
+
+
+def advice_table(report: AdviceReport) -> str:
+    """What moves the critical friction, what to change, and the answer in a sentence."""
+    found, check, margin = report.stability, report.check, report.margin
+    moving = [each for each in report.sensitivities if each.elasticity or each.derivative or each.growth_change]
+    moves = {
+        "what moves it": [each.parameter for each in moving],
+        "value": [_text(each.value) if isinstance(each.value, float) else "list" for each in moving],
+        "% for 1 %": [_text(each.elasticity, form=".3g") for each in moving],
+        "for a unit": [_text(each.derivative, form=".3g") for each in moving],
+        "growth for 1 %": [_text(each.growth_change, form=".3g") for each in moving],
+    }
+    helps = {
+        "what helps": [each.parameter for each in report.advice],
+        "from": [_text(each.start) for each in report.advice],
+        "to": [each.rounded for each in report.advice],
+        "critical φ": [_text(each.critical_friction, form=".4g") for each in report.advice],
+        "tried from": [f"{each.lowest:.4g} to {each.highest:.4g}" for each in report.advice],
+    }
+    rows: list[Row] = [
+        ("critical friction", _crossing(found.critical) if found.critical else "none"),
+        (f"at φ = {found.friction:g}", _STATE[found.stable]),
+        ("margin", "-" if margin is None else f"{margin:.1%}; {report.wanted_margin:.1%} is wanted"),
+    ]
+    ends: list[Row] = [("note", report.notes())]
+    if check:
+        ran = f"{check.parameter} = {check.value:.6g}: {check.duration:.3g} s of motion, in {check.seconds:.2g} s"
+        ends.append(("checked by a run", [ran, f"{check.verdict.regime}: {'; '.join(check.verdict.reasons)}"]))
+    ends.append(("in a sentence", report.conclusion()))
+    meant = "Critical friction for 1 % and for 1 unit of a value; growth rate (1/s) for 1 %:\n"
+    grids = [meant + _grid(moves)] * bool(moving) + [_grid(helps)] * bool(report.advice)
+    return "\n\n".join((_table(report.title, rows), *grids, _table("", ends)))
 
 
 def sweep_table(report: SweepReport) -> str:

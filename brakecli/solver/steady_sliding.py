@@ -59,7 +59,7 @@ def mean_contact(system: System, y: float) -> tuple[float, float, float]:
 
 @dataclass(frozen=True)
 class _Surfaces:
-    """What the mean contact depends on; systems that are alike in it share a table."""
+    """What the mean contact of a layer of 1 N/m² depends on; systems that are alike in it share a table."""
 
     key: tuple[object, ...]
     system: System = field(compare=False)
@@ -76,6 +76,7 @@ def _table(surfaces: _Surfaces) -> tuple[Any, Any, Any]:
     pad = surfaces.system.pad.constants
     heights = np.linspace(float(pad.full_up_to), float(pad.clear_from), TABLE)
     values = np.array([mean_contact(surfaces.system, float(y)) for y in heights])
+    values[:, :2] /= surfaces.system.layer_stiffness
     force = CubicHermiteSpline(heights, values[:, 0], -values[:, 1])
     return force, force.derivative(), PchipInterpolator(heights, values[:, 2])
 
@@ -85,14 +86,14 @@ def tabulated(system: System) -> Mean:
     mean, pad = partial(mean_contact, system), system.pad.constants
     full, top = float(pad.full_up_to), float(pad.clear_from)
     profiles = [each.tobytes() for profile in (system.shoe, system.wheel) for each in profile]
-    key = (system.half_length, system.layer_stiffness, system.evaluator, system.nodes, *profiles)
-    surfaces = _Surfaces(key, system)
+    surfaces = _Surfaces((system.half_length, system.evaluator, system.nodes, *profiles), system)
+    k = system.layer_stiffness
 
     def interpolated(y: float) -> tuple[float, float, float]:
         if not full < y < top:
             return mean(y)
         force, slope, fraction = _table(surfaces)
-        return float(force(y)), -float(slope(y)), float(fraction(y))
+        return k * float(force(y)), -k * float(slope(y)), float(fraction(y))
 
     return interpolated
 

@@ -19,7 +19,7 @@ from tests.plots.helpers import panels
 
 xarray = import_module("xarray")  # imported so because h5netcdf has no type hints
 
-MODE_COUPLING = ROOT / "cases" / "mode-coupling.toml"
+MODE_COUPLING, DAMPED = (str(ROOT / "cases" / f"{name}.toml") for name in ("mode-coupling", "damped"))
 FRICTION = ["--vary", "friction.coefficient=0:1.5:7"]
 NAMES = ("frequencies", "growth_rates", "damping_ratios")
 
@@ -84,14 +84,14 @@ def test_the_minimal_model_grows_as_published(here: Path) -> None:
 def test_values_without_steady_sliding_are_gaps_and_the_ends_of_sliding_are_marked(here: Path) -> None:
     locking = ["--set", "link2.angle_deg=-5.0", "--vary", "friction.coefficient=0:100:5"]
     speed = ["--vary", "wheel.angular_speed=1:-1:5"]
-    lines = [["stability", ROOT / "cases" / "damped.toml", *more, "--json"] for more in (locking, speed)]
+    lines = [["stability", DAMPED, *more, "--json"] for more in (locking, speed)]
     locks, turns = (done.json for done in each(here, lines))
     assert [entry["frequencies"][0] is None for entry in locks["vary"]] == [False, False, False, True, True]
     assert locks["critical_values"] == pytest.approx([locks["critical_friction"]], rel=1e-9)
     gap = turns["vary"][2]
     assert [gap[name] for name in NAMES] == [[None, None]] * 3
     assert [entry["instability"] for entry in turns["vary"]] == ["flutter", "flutter", None, *["divergence"] * 2]
-    brakecli("stability", ROOT / "cases" / "damped.toml", *speed, "-o", "gap.h5", "-q", cwd=here).told(0)
+    brakecli("stability", DAMPED, *speed, "-o", "gap.h5", "-q", cwd=here).told(0)
     with xarray.open_dataset(here / "gap.h5", engine="h5netcdf") as stored:
         assert np.isnan(stored.frequencies.values).any(axis=1).tolist() == [False, False, True, False, False]
         assert stored.wheel_angular_speed.units == "rad/s"
@@ -107,13 +107,8 @@ def test_keys_are_tied_and_whole_numbers_stay_whole(here: Path) -> None:
         "--vary",
         "contact.nodes=64:256:2",
     ]
-    case = ROOT / "cases" / "damped.toml"
-    many, one, whole = (
-        done.json
-        for done in each(
-            here, [["stability", case, *more] for more in (tied, alone)] + [["stability", case, *nodes, "--json"]]
-        )
-    )
+    lines = [["stability", DAMPED, *more] for more in (tied, alone, [*nodes, "--json"])]
+    many, one, whole = (done.json for done in each(here, lines))
     assert many["parameters"] == ["link1.stiffness", "link2.stiffness"]
     assert many["vary"][1]["critical_friction"] == one["critical_friction"]
     assert sorted(many["vary"][1]["growth_rates"]) == sorted(mode["growth"] for mode in one["modes"])
@@ -122,7 +117,7 @@ def test_keys_are_tied_and_whole_numbers_stay_whole(here: Path) -> None:
 
 def test_a_table_fits_into_eighty_columns_and_breaks_no_word(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "80")
-    case = read_case(str(ROOT / "cases" / "damped.toml"))
+    case = read_case(DAMPED)
     axis = Axis(parameter=("link1.stiffness", "link2.stiffness"), start=1e7, stop=2e7, num=3)
     found = lock_in(case, axis, "--vary", lambda what, done, total: None)
     table = stability_table("Title", stability(system_of(case.case)), found).split("Along ")[1]
