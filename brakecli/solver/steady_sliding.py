@@ -6,16 +6,23 @@ from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
+from numba import float64, void
+from numpy.typing import NDArray
 
 from brakecli.errors import CaseError, Problem
+from brakecli.solver.compile import Floats, at_address, kernel, vector
 from brakecli.solver.contact.closed_form import CLEAR, FULL, coverage
 from brakecli.solver.contact.pad import build_layer
+from brakecli.solver.records import EVALUATE, LAYER, WAVES, Layer
 from brakecli.solver.roughness import wheel_angles
 from brakecli.solver.system import System
 
 PLACES = 1024
 """Positions of the wheel that an average takes, over 50 of its longest waves."""
 TABLE = 129
+_AT_ONCE = 64  # places
+
+_evaluate_at = at_address(EVALUATE)
 
 Mean = Callable[[float], tuple[float, float, float]]
 """Mean force (N), stiffness (N/m) and touching part of the contact at a height y (m)."""
@@ -48,13 +55,22 @@ def mean_contact(system: System, y: float) -> tuple[float, float, float]:
     places = np.zeros(1) if wheel.g.size == 0 else 50.0 / wheel.turns.min() * (np.arange(PLACES) + 0.5) / PLACES
     weights = np.ones(1) if wheel.g.size == 0 else 2.0 * np.sin(np.pi * (np.arange(PLACES) + 0.5) / PLACES) ** 2
     found, layer, waves = np.zeros(3), build_layer(system.evaluate, system.pad), wheel.waves
-    contact = layer.contact
-    for place, weight in zip(places, weights, strict=True):
-        wheel_angles(waves, float(place), 0.0, layer.angles)
-        system.evaluate(0.0, y, layer)
-        found += weight * np.array([contact.normal_force, contact.stiffness, contact.fraction])
+    for start in range(0, len(places), _AT_ONCE):  # between calls Ctrl-C is heard
+        some = slice(start, start + _AT_ONCE)
+        add_contacts(y, waves, layer, np.stack([places[some], weights[some]]), found)
     force, stiffness, fraction = found / len(places)
     return float(force), float(stiffness), float(fraction)
+
+
+@kernel(void(float64, WAVES, LAYER, float64[:, ::1], vector))
+def add_contacts(y: float, waves: NDArray[Any], layer: Layer, weighted: Floats, found: Floats) -> None:
+    """Add the weighted force, stiffness and touching part at some places of the wheel (m) to those found."""
+    for i in range(weighted.shape[1]):
+        wheel_angles(waves, weighted[0, i], 0.0, layer.angles)
+        _evaluate_at(layer.evaluate)(0.0, y, layer)
+        found[0] += weighted[1, i] * layer.contact.normal_force
+        found[1] += weighted[1, i] * layer.contact.stiffness
+        found[2] += weighted[1, i] * layer.contact.fraction
 
 
 @dataclass(frozen=True)
