@@ -25,7 +25,7 @@ KEYS = ("*.mass", "*.stiffness", "*.damping", "*.angle_deg", "load.*")
 FACTOR, RUNGS = 10.0, 40  # values are tried up to this factor away, in so many steps each way
 DEGREE = 1.0  # step of angles, which are tried up to ±90°
 _IDLE = ("initial", "solver", "output")  # steady sliding does not depend on these tables
-_STEP, _ROUGH_STEP = 1e-3, 2e-2  # of a derivative, as a part of the value; averages over roughness are noisy
+_STEP, _ROUGH_STEP = 1e-3, 0.1  # of a derivative, as a part of the value; averages over roughness are noisy
 _ROUNDING = 1e-12  # of an answer
 _SURE = 0.05  # largest relative error of a derivative; beyond it there is none, as where the answer jumps
 
@@ -164,7 +164,10 @@ def sensitivity(case: Case, path: Path, critical: float | None, tell: Tell) -> S
         there = changed(case, path, given)
         return answer(there, up_to) if there else None
 
-    step = (_ROUGH_STEP if path[0] == "roughness" else _STEP) * (abs(at) or _scale(case, parameter))
+    noisy = path[0] == "roughness" or (
+        path[-1] == "half_length" and dict(case.roughness) != {"shoe": None, "wheel": None}
+    )
+    step = (_ROUGH_STEP if noisy else _STEP) * (abs(at) or _scale(case, parameter))
     slope, error = _derivative(lambda x: getattr(found(x), "critical", None), at, step)
     rate, _ = _derivative(lambda x: getattr(found(x), "growth", None), at, step)
     elasticity = slope * at / critical if slope is not None and critical and at else None
@@ -183,7 +186,10 @@ def advised(case: Case, path: Path, margin: float, tell: Tell) -> Change:
         tell()
         there = changed(case, path, x)
         least = (1.0 + margin) * there.friction.coefficient if there else 0.0
-        reached = answer(there, 1.01 * least + 0.01) if there else None
+        slower = changed(there, ("friction", "coefficient"), least) if there else None
+        if there is None or slower is None or _grows(slower):  # quick, where surfaces open
+            return False
+        reached = answer(there, 1.01 * least + 0.01)
         return reached is not None and reached.safe(least)
 
     for rung in range(1, max(map(len, ways))):
@@ -195,6 +201,12 @@ def advised(case: Case, path: Path, margin: float, tell: Tell) -> Change:
                 critical = reached.critical if reached else None
                 return Change(parameter, value, to, critical, min(ends), max(ends))
     return Change(parameter, value, None, None, min(ends), max(ends))
+
+
+def _grows(case: Case) -> bool:
+    """Whether sliding is not steady, or not stable, at the case's own friction."""
+    found = answer(case, 0.0)
+    return found is None or found.growth is None or found.critical == 0.0
 
 
 def _first(safe: Callable[[float], bool], before: float, after: float) -> float:
