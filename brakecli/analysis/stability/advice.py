@@ -164,9 +164,7 @@ def sensitivity(case: Case, path: Path, critical: float | None, tell: Tell) -> S
         there = changed(case, path, given)
         return answer(there, up_to) if there else None
 
-    noisy = path[0] == "roughness" or (
-        path[-1] == "half_length" and dict(case.roughness) != {"shoe": None, "wheel": None}
-    )
+    noisy = _rough(case) and (path[0] == "roughness" or path[-1] == "half_length")
     step = (_ROUGH_STEP if noisy else _STEP) * (abs(at) or _scale(case, parameter))
     slope, error = _derivative(lambda x: getattr(found(x), "critical", None), at, step)
     rate, _ = _derivative(lambda x: getattr(found(x), "growth", None), at, step)
@@ -187,7 +185,7 @@ def advised(case: Case, path: Path, margin: float, tell: Tell) -> Change:
         there = changed(case, path, x)
         least = (1.0 + margin) * there.friction.coefficient if there else 0.0
         slower = changed(there, ("friction", "coefficient"), least) if there else None
-        if there is None or slower is None or _grows(slower):  # quick, where surfaces open
+        if there is None or slower is None or (_rough(case) and _grows(slower)):  # a search takes long there
             return False
         reached = answer(there, 1.01 * least + 0.01)
         return reached is not None and reached.safe(least)
@@ -201,6 +199,10 @@ def advised(case: Case, path: Path, margin: float, tell: Tell) -> Change:
                 critical = reached.critical if reached else None
                 return Change(parameter, value, to, critical, min(ends), max(ends))
     return Change(parameter, value, None, None, min(ends), max(ends))
+
+
+def _rough(case: Case) -> bool:
+    return case.roughness.shoe is not None or case.roughness.wheel is not None
 
 
 def _grows(case: Case) -> bool:
