@@ -191,7 +191,7 @@ def _lock_in(found: LockIn) -> str:
     }
     units = unit(found.parameters[0])
     critical = ", ".join(_text(value, units.removeprefix("1"), ".7g") for value in found.critical_values)
-    changes = f"Stability changes at: {critical or 'none of the values between'}"
+    changes = f"Stability changes at {critical}." if critical else "Stability does not change in between."
     return "\n\n" + "\n\n".join((f"Along {keys}:\n" + _grid(values | varied), _grid(values | modes), changes))
 
 

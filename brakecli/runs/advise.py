@@ -102,10 +102,7 @@ class AdviceReport:
         if critical == 0.0:
             yield "unstable at any friction, however small"
         elif critical is not None:
-            margin, far = self.margin or 0.0, ""
-            if margin:
-                far = f", {100.0 * abs(margin):.2g} % {'above' if margin > 0.0 else 'below'} the case's {own:g}"
-            yield f"stable up to {critical:.3g}{far}"
+            yield f"stable up to {critical:.3g}{_far(self.margin, own)}"
             if report.stable and critical < own:
                 turns = [
                     f"{'lost' if each.lost else 'regained'} at {each.friction:.3g}" for each in report.crossings
@@ -129,6 +126,18 @@ class AdviceReport:
         )
         if self.check and self.check.verdict.regime not in (Regime.DAMPED, Regime.UNDECIDED):
             yield f"but from the case's own start it still vibrates: {self.check.verdict.regime}"
+
+
+def _far(margin: float | None, own: float) -> str:
+    """How far the critical friction lies from a case's own."""
+    if not margin:
+        return ""
+    if margin > 10.0:
+        return f", {margin + 1.0:.3g} times the case's {own:g}"
+    part = 100.0 * abs(margin)
+    return (
+        f", {part:{'.0f' if part > 99.0 else '.2g'}} % {'above' if margin > 0.0 else 'below'} the case's {own:g}"
+    )
 
 
 def advise(loaded: LoadedCase, patterns: Sequence[str], margin: float, progress: Progress) -> AdviceReport:
