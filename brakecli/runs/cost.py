@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from brakecli.solver.steady_sliding import PLACES
 from brakecli.solver.system import System
 
 # Seconds, measured with `make cases` on one core.
@@ -15,6 +16,7 @@ _EVALUATIONS = 3.0  # of the contact in a step
 _OWN_STEPS = 25.0  # in a period, of a scheme that finds them itself, at a tolerance of 1e-10
 _OWN_STEP_SECONDS = 4e-6
 _OWN_EVALUATIONS = 27.0
+_START_EVALUATIONS = 12.0  # at each place of the wheel
 
 
 def steps_and_seconds(system: System) -> tuple[int, float]:
@@ -36,12 +38,22 @@ def steps_and_seconds(system: System) -> tuple[int, float]:
     steps = 1 + int(min(system.sampled_duration * rate, 1e300))
     each = _OWN_STEP_SECONDS * waves
     if system.finds_patches:
-        # Rough surfaces that the load presses together are seldom open in part.
-        heights = float(np.abs(system.shoe.g).sum() + np.abs(system.wheel.g).sum())
-        least_load = float(np.abs(system.load["value"]).min())
-        open_part = 0.04 if heights * (c.c_yy + system.contact_stiffness) < least_load else 0.12
-        each += _OWN_EVALUATIONS * open_part * evaluation_seconds(system)
+        each += _OWN_EVALUATIONS * (0.12 if _may_open(system) else 0.04) * evaluation_seconds(system)
     return steps, (1.0 if alone else 1.6) * steps * each
+
+
+def start_seconds(system: System) -> float:
+    """A rough guess at the time to find steady sliding, where the case starts from it and the pad may open."""
+    if not system.initial.from_equilibrium or system.smooth or not _may_open(system):
+        return 0.0
+    return _START_EVALUATIONS * (PLACES if len(system.wheel.g) else 1) * evaluation_seconds(system)
+
+
+def _may_open(system: System) -> bool:
+    """Rough surfaces that the load presses together are seldom open in part."""
+    heights = float(np.abs(system.shoe.g).sum() + np.abs(system.wheel.g).sum())
+    least_load = float(np.abs(system.load["value"]).min())
+    return heights * (system.coefficients.c_yy + system.contact_stiffness) >= least_load
 
 
 def evaluation_seconds(system: System) -> float:

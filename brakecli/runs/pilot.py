@@ -1,0 +1,74 @@
+"""Measure what a case costs by beginning it: formulas cannot know how often friction and patches cut the steps."""
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+
+from brakecli.runs.cost import evaluation_seconds, start_seconds
+from brakecli.runs.tolerance import EVENT_RATIO, LAYERED_FROM, coarsest_step, first_event_tolerance
+from brakecli.solver.contact import CLOSED_FORM
+from brakecli.solver.motion import Stepping
+from brakecli.solver.system import System
+
+SECONDS = 0.15
+"""Time of a pilot run, as long as single steps are short beside it."""
+MOST_EVALUATION = 0.02  # guessed time (s) of an evaluation of the contact, beyond which no step is tried
+SECOND_RUN = EVENT_RATIO**-0.125  # what the second of two event-driven runs costs over the first
+RUNGS = 5.0  # two runs of a ladder, of steps and nodes, over the first
+
+Clock = Callable[[], float]
+
+
+class Price(NamedTuple):
+    """What a case costs: steps of a run, seconds of all of its runs, and whether it may well be much more."""
+
+    steps: int
+    seconds: float
+    at_least: bool
+
+
+def measured(system: System, clock: Clock = time.perf_counter) -> Price | None:
+    """The cost of a case by a pilot run, or None where a single step may take too long."""
+    if system.finds_patches and evaluation_seconds(system) > MOST_EVALUATION:
+        return None
+    method = system.method
+    if method.step is not None:
+        return _begun(system, clock)
+    if not method.own_steps:
+        return _ladder(system, clock)
+    first = replace(system, method=replace(method, tolerance=first_event_tolerance(system)))
+    events = _begun(first, clock)
+    events = Price(int(events.steps * SECOND_RUN), events.seconds * (1.0 + SECOND_RUN), events.at_least)
+    if not method.automatic or method.tolerance < LAYERED_FROM or system.smooth:
+        return events
+    ladder = _ladder(replace(system, method=replace(method, scheme="two-layer", theta=(0.5, 0.5))), clock)
+    return ladder if ladder.seconds < events.seconds else events._replace(at_least=True)
+
+
+def _ladder(system: System, clock: Clock) -> Price:
+    """Two runs of a ladder of steps at least."""
+    found = _begun(replace(system, method=replace(system.method, step=coarsest_step(system), nodes=0)), clock)
+    return Price(2 * found.steps, RUNGS * found.seconds, at_least=True)
+
+
+def _begun(system: System, clock: Clock) -> Price:
+    """One run, begun and continued at the same pace."""
+    own, slow_start = system.method.own_steps, start_seconds(system)
+    if slow_start > SECONDS:  # a shoe that starts elsewhere moves as fast
+        system = replace(system, initial=replace(system.initial, from_equilibrium=False))
+    _ = system.scheme, system.evaluate  # compiled
+    begin = clock()
+    stepping = Stepping(system)
+    counts, state, ready = stepping.counts, stepping.plant.state, clock()
+    first, last, size, seconds = int(counts.level), system.steps + stepping.scheme.LAG, 1, 0.0
+    while counts.level < last and not stepping.work.failed and seconds < SECONDS:
+        stepping.block(last if own else min(last, int(counts.level) + size))
+        seconds = clock() - ready
+        size = 2 * size if seconds < SECONDS / 8.0 else size
+    steps = int(counts.kinds.sum())
+    part = float(state.time + state.tau) if own else (counts.level - first) * system.step
+    more = 1.0 if counts.level >= last or stepping.work.failed else system.sampled_duration / max(part, 1e-300)
+    opens = own and not system.smooth and more > 1.0 and counts.kinds[CLOSED_FORM] == steps
+    seconds = ready - begin + seconds * more + (slow_start if slow_start > SECONDS else 0.0)
+    return Price(int(min(steps * more, 1e300)), seconds, at_least=bool(opens))
