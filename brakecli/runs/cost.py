@@ -16,14 +16,14 @@ _EVALUATIONS = 3.0  # of the contact in a step
 _OWN_STEPS = 25.0  # in a period, of a scheme that finds them itself, at a tolerance of 1e-10
 _OWN_STEP_SECONDS = 4e-6
 _OWN_EVALUATIONS = 27.0
-_START_EVALUATIONS = 12.0  # at each place of the wheel
+_START_EVALUATIONS = 6.0  # at each place of the wheel
 
 
 def steps_and_seconds(system: System) -> tuple[int, float]:
     """Steps of a run, and a rough guess at the time of all runs that it takes to keep the tolerance."""
-    method, waves = system.method, 1.0 + len(system.wheel.g) ** 2 / 20.0
+    method, pairs = system.method, float(len(system.wheel.g) ** 2)
     if not method.own_steps:
-        each = _STEP_SECONDS * waves
+        each = _STEP_SECONDS * (1.0 + pairs / 20.0)
         if system.finds_patches or system.nodes:
             each = _STEP_SECONDS + _EVALUATIONS * evaluation_seconds(system)
         return system.steps, system.steps * each
@@ -36,9 +36,9 @@ def steps_and_seconds(system: System) -> tuple[int, float]:
     turns = float(max(system.wheel.turns, default=0.0))
     rate += 8.0 * turns * (system.fastest_belt + swing) + 0.25 * (c.b_xx + c.b_yy) / c.m
     steps = 1 + int(min(system.sampled_duration * rate, 1e300))
-    each = _OWN_STEP_SECONDS * waves
+    each = _OWN_STEP_SECONDS * (1.0 + pairs / 80.0)
     if system.finds_patches:
-        each += _OWN_EVALUATIONS * (0.12 if _may_open(system) else 0.04) * evaluation_seconds(system)
+        each += _OWN_EVALUATIONS * (0.12 if _may_open(system) else 0.01) * evaluation_seconds(system)
     return steps, (1.0 if alone else 1.6) * steps * each
 
 
@@ -46,7 +46,7 @@ def start_seconds(system: System) -> float:
     """A rough guess at the time to find steady sliding, where the case starts from it and the pad may open."""
     if not system.initial.from_equilibrium or system.smooth or not _may_open(system):
         return 0.0
-    return _START_EVALUATIONS * (PLACES if len(system.wheel.g) else 1) * evaluation_seconds(system)
+    return float(_START_EVALUATIONS * (PLACES if len(system.wheel.g) else 1) * evaluation_seconds(system))
 
 
 def _may_open(system: System) -> bool:

@@ -13,9 +13,11 @@ from brakecli.solver.system import System
 
 SECONDS = 0.15
 """Time of a pilot run, as long as single steps are short beside it."""
-MOST_EVALUATION = 0.02  # guessed time (s) of an evaluation of the contact, beyond which no step is tried
+MOST_EVALUATION, MOST_AT_NODES = 0.02, 2e-3
+"""Guessed time (s) of an evaluation of the contact, exact and by nodes, beyond which no step is tried."""
 SECOND_RUN = EVENT_RATIO**-0.125  # what the second of two event-driven runs costs over the first
 RUNGS = 5.0  # two runs of a ladder, of steps and nodes, over the first
+SLOWER = 2.0  # pace of the latter half of a pilot run over the mean pace, beyond which the rest may be slower yet
 
 Clock = Callable[[], float]
 
@@ -30,7 +32,7 @@ class Price(NamedTuple):
 
 def measured(system: System, clock: Clock = time.perf_counter) -> Price | None:
     """The cost of a case by a pilot run, or None where a single step may take too long."""
-    if system.finds_patches and evaluation_seconds(system) > MOST_EVALUATION:
+    if evaluation_seconds(system) > (MOST_EVALUATION if system.finds_patches else MOST_AT_NODES):
         return None
     method = system.method
     if method.step is not None:
@@ -60,15 +62,21 @@ def _begun(system: System, clock: Clock) -> Price:
     _ = system.scheme, system.evaluate  # compiled
     begin = clock()
     stepping = Stepping(system)
-    counts, state, ready = stepping.counts, stepping.plant.state, clock()
-    first, last, size, seconds = int(counts.level), system.steps + stepping.scheme.LAG, 1, 0.0
-    while counts.level < last and not stepping.work.failed and seconds < SECONDS:
-        stepping.block(last if own else min(last, int(counts.level) + size))
-        seconds = clock() - ready
-        size = 2 * size if seconds < SECONDS / 8.0 else size
-    steps = int(counts.kinds.sum())
-    part = float(state.time + state.tau) if own else (counts.level - first) * system.step
-    more = 1.0 if counts.level >= last or stepping.work.failed else system.sampled_duration / max(part, 1e-300)
-    opens = own and not system.smooth and more > 1.0 and counts.kinds[CLOSED_FORM] == steps
-    seconds = ready - begin + seconds * more + (slow_start if slow_start > SECONDS else 0.0)
-    return Price(int(min(steps * more, 1e300)), seconds, at_least=bool(opens))
+    counts, state, ready, size = stepping.counts, stepping.plant.state, clock(), 1
+    first, last = int(counts.level), system.steps + stepping.scheme.LAG
+    marks = [(0.0, 0.0)]  # seconds spent, and time that has been reached
+    while counts.level < last and not stepping.work.failed and marks[-1][0] < SECONDS:
+        stepping.block(min(last, int(counts.level) + size))
+        reached = float(state.time + state.tau) if own else (counts.level - first) * system.step
+        marks.append((clock() - ready, reached))
+        size = 2 * size if marks[-1][0] < SECONDS / 8.0 else size
+    steps, (seconds, reached) = int(counts.kinds.sum()), marks[-1]
+    start = ready - begin + (slow_start if slow_start > SECONDS else 0.0)
+    if counts.level >= last or stepping.work.failed:
+        return Price(steps, start + seconds, at_least=False)
+    more = system.sampled_duration / max(reached, 1e-300)
+    about = int(float(f"{min(steps * more, 1e300):.2g}")) if own else system.steps
+    before, reached_before = max(mark for mark in marks if mark[0] <= 0.5 * seconds)
+    slower = (seconds - before) * reached > SLOWER * seconds * (reached - reached_before)
+    may_open = own and not system.smooth and int(counts.kinds[CLOSED_FORM]) == steps
+    return Price(about, start + seconds * more, at_least=slower or may_open)
