@@ -1,10 +1,12 @@
 """What a run is likely to cost; rough guesses that tell minutes from days."""
 
 import math
+from contextlib import suppress
 
 import numpy as np
 
-from brakecli.solver.steady_sliding import PLACES
+from brakecli.errors import CaseError
+from brakecli.solver.steady_sliding import PLACES, steady_sliding
 from brakecli.solver.system import System
 
 # Seconds, measured with `make cases` on one core.
@@ -38,22 +40,29 @@ def steps_and_seconds(system: System) -> tuple[int, float]:
     steps = 1 + int(min(system.sampled_duration * rate, 1e300))
     each = _OWN_STEP_SECONDS * (1.0 + pairs / 80.0)
     if system.finds_patches:
-        each += _OWN_EVALUATIONS * (0.12 if _may_open(system) else 0.01) * evaluation_seconds(system)
+        # Rough surfaces that the load presses together are seldom open in part.
+        heights = float(np.abs(system.shoe.g).sum() + np.abs(system.wheel.g).sum())
+        least_load = float(np.abs(system.load["value"]).min())
+        open_part = 0.01 if heights * (c.c_yy + system.contact_stiffness) < least_load else 0.12
+        each += _OWN_EVALUATIONS * open_part * evaluation_seconds(system)
     return steps, (1.0 if alone else 1.6) * steps * each
 
 
 def start_seconds(system: System) -> float:
-    """A rough guess at the time to find steady sliding, where the case starts from it and the pad may open."""
-    if not system.initial.from_equilibrium or system.smooth or not _may_open(system):
+    """A rough guess at the time to find steady sliding, where the case starts from it on a pad that opens."""
+    if not system.initial.from_equilibrium or system.smooth:
         return 0.0
-    return float(_START_EVALUATIONS * (PLACES if len(system.wheel.g) else 1) * evaluation_seconds(system))
+    pad, opens = system.pad.constants, False
 
+    def mean(y: float) -> tuple[float, float, float]:
+        nonlocal opens
+        opens = opens or y > pad.full_up_to
+        return max(-system.contact_stiffness * (y + pad.shoe_mean), 0.0), 0.0, 0.0
 
-def _may_open(system: System) -> bool:
-    """Rough surfaces that the load presses together are seldom open in part."""
-    heights = float(np.abs(system.shoe.g).sum() + np.abs(system.wheel.g).sum())
-    least_load = float(np.abs(system.load["value"]).min())
-    return heights * (system.coefficients.c_yy + system.contact_stiffness) >= least_load
+    with suppress(CaseError):
+        steady_sliding(system, mean=mean)
+    places = PLACES if len(system.wheel.g) else 1
+    return float(_START_EVALUATIONS * places * evaluation_seconds(system)) if opens else 0.0
 
 
 def evaluation_seconds(system: System) -> float:

@@ -54,7 +54,7 @@ def check(system: System, *, begin: bool = False) -> Check:
     own, fastest = system.method.own_steps, system.natural_frequencies[1]
     waves = 2.0 * system.half_length * system.most_turns
     price = Price(*steps_and_seconds(system), at_least=False)
-    if begin or price.seconds > MOST_SECONDS:
+    if (begin or price.seconds > MOST_SECONDS) and system.steps <= MOST_STEPS:
         price = measured(system) or price._replace(at_least=system.finds_patches)
     found = Check(
         system=system,

@@ -17,6 +17,7 @@ MOST_EVALUATION, MOST_AT_NODES = 0.02, 2e-3
 """Guessed time (s) of an evaluation of the contact, exact and by nodes, beyond which no step is tried."""
 SECOND_RUN = EVENT_RATIO**-0.125  # what the second of two event-driven runs costs over the first
 RUNGS = 5.0  # two runs of a ladder, of steps and nodes, over the first
+FEW = 20  # steps, the first of which are shorter than those that follow
 SLOWER = 2.0  # pace of the latter half of a pilot run over the mean pace, beyond which the rest may be slower yet
 
 Clock = Callable[[], float]
@@ -74,7 +75,8 @@ def _begun(system: System, clock: Clock) -> Price:
     start = ready - begin + (slow_start if slow_start > SECONDS else 0.0)
     if counts.level >= last or stepping.work.failed:
         return Price(steps, start + seconds, at_least=False)
-    more = system.sampled_duration / max(reached, 1e-300)
+    length = max(reached / steps, state.step if own and steps < FEW else 0.0)  # the first steps are short
+    more = 1.0 + (system.sampled_duration - reached) / max(length * steps, 1e-300)
     about = int(float(f"{min(steps * more, 1e300):.2g}")) if own else system.steps
     before, reached_before = max(mark for mark in marks if mark[0] <= 0.5 * seconds)
     slower = (seconds - before) * reached > SLOWER * seconds * (reached - reached_before)

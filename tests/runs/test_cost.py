@@ -14,8 +14,8 @@ from brakecli.solver.system import System
 from tests.campaign import campaign
 
 FACTOR = 3.0
-CASES, RIGHT, SILENT = 200, 0.9, 10.0
-"""Random cases, the part that is to be within the factor, and by how much no estimate may be too low unsaid."""
+CASES, RIGHT, AT_LEAST = 200, 0.9, 0.3
+"""Random cases, the part that is to be right, and the largest part of which "at least" may be said."""
 
 
 def geometric(random_: random.Random, low: float, high: float) -> float:
@@ -27,7 +27,7 @@ def solver(r: random.Random, f: float) -> str:
     if kind == "tolerance":
         return f"tolerance = {geometric(r, 1e-6, 1e-2)}"
     if kind == "event-driven":
-        asked = [f"step = {1e-3 / f}", f"tolerance = {geometric(r, 1e-8, 1e-3)}"]  # the first makes it one run
+        asked = ["step = 1e-30", f"tolerance = {geometric(r, 1e-8, 1e-3)}"]  # the first makes it one run
         return f'scheme = "event-driven"\n{r.choice(asked)}'
     return f'scheme = "{kind}"\nstep = {1.0 / (f * geometric(r, 30.0, 300.0))}'
 
@@ -89,30 +89,37 @@ def spent(system: System, most: float) -> float:
         return float(pipe.read() or most)
 
 
-def outcome(seed: int) -> tuple[float, float, bool]:
-    """Seconds said, seconds spent, and whether "at least" was said."""
+def outcome(seed: int) -> tuple[float, float, bool] | None:
+    """Seconds said, seconds spent, whether "at least" was said; None where the shortest part takes too long."""
     target = geometric(random.Random(-1 - seed), 0.03, 1.0)
     said = measured(case(seed, 1.0), time.process_time)
     assert said is not None
     system = case(seed, target / max(said.seconds, 1e-3))
     said = measured(system, time.process_time)
     assert said is not None
-    return said.seconds, spent(system, min(FACTOR * said.seconds + 2.0, 8.0)), said.at_least
+    if said.seconds > 2.0:
+        return None
+    return said.seconds, spent(system, FACTOR * said.seconds + 2.0), said.at_least
 
 
 @campaign
 def test_the_cost_of_nine_in_ten_random_cases_is_within_a_factor_of_three_or_said_to_be_at_least_that() -> None:
-    """Seconds below the clock's resolution, 10 ms, count as that."""
-    wrong, more = [], 0
-    for seed in range(CASES):
+    """Seconds below 10 ms, which is beyond the resolution of some clocks, count as 10 ms."""
+    found: dict[int, tuple[float, float, bool]] = {}
+    for seed in range(2 * CASES):
         for _ in range(2):  # a machine that is busy with others may be at fault once
-            said, took, at_least = outcome(seed)
-            ratio = max(said, 0.01) / max(took, 0.01)
-            right = 1.0 / FACTOR <= ratio <= FACTOR or (at_least and ratio <= FACTOR)
-            if right:
+            if (result := outcome(seed)) is None or right(*result):
                 break
-        more += at_least
-        if not right:
-            wrong.append((seed, said, took, at_least))
+        if result is not None:
+            found[seed] = result
+        if len(found) == CASES:
+            break
+    wrong = {seed: result for seed, result in found.items() if not right(*result)}
+    assert len(found) == CASES
     assert len(wrong) <= (1.0 - RIGHT) * CASES, wrong
-    assert more <= 0.3 * CASES
+    assert sum(at_least for _, _, at_least in found.values()) <= AT_LEAST * CASES
+
+
+def right(said: float, took: float, at_least: bool) -> bool:
+    ratio = max(said, 0.01) / max(took, 0.01)
+    return ratio <= FACTOR and (at_least or ratio >= 1.0 / FACTOR)
