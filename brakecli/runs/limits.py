@@ -55,7 +55,8 @@ def check(system: System, *, begin: bool = False) -> Check:
     waves = 2.0 * system.half_length * system.most_turns
     price = Price(*steps_and_seconds(system), at_least=False)
     if (begin or price.seconds > MOST_SECONDS) and system.steps <= MOST_STEPS:
-        price = measured(system) or price._replace(at_least=system.finds_patches)
+        begun = measured(system) or price._replace(at_least=system.finds_patches)
+        price = begun if begun.seconds > 0.0 else price  # beyond the resolution of the clock
     found = Check(
         system=system,
         link_frequencies=natural_frequencies(system.coefficients, 0.0),
