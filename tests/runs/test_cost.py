@@ -8,10 +8,12 @@ import time
 
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
+from brakecli.runs.limits import check
 from brakecli.runs.pilot import measured
 from brakecli.runs.run import motion_of
 from brakecli.solver.system import System
 from tests.campaign import campaign
+from tests.examples import ROUGH, SQUEAL, make
 
 FACTOR = 3.0
 CASES, RIGHT, AT_LEAST = 200, 0.9, 0.3
@@ -123,3 +125,26 @@ def test_the_cost_of_nine_in_ten_random_cases_is_within_a_factor_of_three_or_sai
 def right(said: float, took: float, at_least: bool) -> bool:
     ratio = max(said, 0.01) / max(took, 0.01)
     return ratio <= FACTOR and (at_least or ratio >= 1.0 / FACTOR)
+
+
+def test_a_case_that_ends_within_the_pilot_run_is_counted_and_not_guessed() -> None:
+    for scheme in ("two-layer", "event-driven"):
+        system = system_of(make(SQUEAL, solver__scheme=scheme, solver__duration=0.01))
+        said = measured(system)
+        assert said is not None
+        assert (said.steps, said.at_least) == (motion_of(system)[0].work.steps, False)
+
+
+def test_what_may_cost_more_is_said_to_cost_at_least_so_much() -> None:
+    # It flies for the whole pilot run, hits the wheel at 1e10 m/s, and passes a wave in 1e-12 s from then on.
+    events = {"solver__scheme": "event-driven", "contact__nodes": None, "solver__duration": 1.0}
+    far = check(system_of(make(ROUGH, initial__x=2e7, **events)), begin=True)
+    assert far.at_least or far.seconds > 60.0
+    # A step with so many waves takes minutes, and is not tried.
+    waves = {"amplitudes": [1e-6] * 2000, "wavelengths": [1e-3 + 1e-6 * i for i in range(2000)]}
+    many = system_of(make({**ROUGH, "roughness": {"wheel": waves}}, **events))
+    assert measured(many) is None
+    assert check(many, begin=True).at_least
+    ladder = measured(system_of(make(ROUGH, solver__step=None, contact__nodes=None, solver__tolerance=1e-3)))
+    assert ladder is not None
+    assert ladder.at_least
