@@ -117,7 +117,7 @@ def check_table(title: str, found: Check) -> str:
         ("scheme", [growth] * has_step),
         ("contact", system.evaluator + (f", {system.nodes} nodes" if system.nodes else "")),
         ("nodes per shortest wave", _text(found.nodes_per_wave)),
-        *_cost_rows(found),
+        *_cost_rows(found, "at least" if found.at_least else "about"),
         ("adjusted", found.adjustments),
     ]
     return _table(title, rows)
@@ -128,9 +128,11 @@ def estimate_table(title: str, found: Estimate) -> str:
     return _table(title, [("points", str(found.points)), ("workers", str(found.workers)), *_cost_rows(found)])
 
 
-def _cost_rows(found: Check | Estimate) -> list[Row]:
+def _cost_rows(found: Check | Estimate, about: str = "about") -> list[Row]:
+    from brakecli.runs.cost import duration_text
+
     return [
-        ("time", f"about {found.seconds:.2g} s"),
+        ("time", f"{about} {duration_text(found.seconds)}"),
         ("memory", f"about {found.memory / 1e6:.0f} MB"),
         ("file", f"about {found.file_size / 1e6:.2g} MB"),
     ]
