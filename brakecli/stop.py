@@ -7,18 +7,18 @@ into a file that kernels see as memory. Only the standard library is imported he
 import mmap
 import os
 import signal
-from contextlib import suppress
 
-memory: bytearray | mmap.mmap = bytearray(8)
-"""Its first byte is the number of the first signal, or 0."""
+try:
+    _file = os.memfd_create("signals")
+    os.truncate(_file, mmap.PAGESIZE)
+    os.set_blocking(_file, False)
+    memory: bytearray | mmap.mmap = mmap.mmap(_file, mmap.PAGESIZE)
+except (AttributeError, OSError):  # some systems have no such files: kernels then see no signal
+    _file, memory = -1, bytearray(8)
+"""The first byte of `memory` is the number of the first signal, or 0; its address never changes."""
 
 
 def show_signals() -> None:
-    """Show kernels the signals that come from now on. Some systems have no such files: kernels then see none."""
-    global memory
-    with suppress(AttributeError, OSError):
-        file = os.memfd_create("signals")
-        os.truncate(file, mmap.PAGESIZE)
-        os.set_blocking(file, False)
-        memory = mmap.mmap(file, mmap.PAGESIZE)
-        signal.set_wakeup_fd(file, warn_on_full_buffer=False)
+    """Show kernels the signals that come from now on."""
+    if _file >= 0:
+        signal.set_wakeup_fd(_file, warn_on_full_buffer=False)
