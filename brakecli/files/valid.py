@@ -95,13 +95,18 @@ def axes_of(node: h5py.Dataset, name: str) -> tuple[str, ...]:
 
 
 def member(group: h5py.Group, name: str) -> Any:
-    """What a group holds under a name; None where there is nothing, or only a link to somewhere else."""
+    """What a group holds under a name; None where there is nothing, or only a link or a view of something else.
+
+    HDF5 opens what such a view shows as soon as its shape is asked for, and crashes on one that shows itself.
+    """
     if name == "/":
         return group
     for part in name.strip("/").split("/"):
         if not isinstance(group, h5py.Group) or not isinstance(group.get(part, getlink=True), h5py.HardLink):
             return None
         group = group[part]
+        if isinstance(group, h5py.Dataset) and group.id.get_create_plist().get_layout() == h5d.VIRTUAL:
+            return None
     return group
 
 

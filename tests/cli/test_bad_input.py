@@ -193,7 +193,15 @@ def test_a_pipe_is_read_once(tmp_path: Path) -> None:
 
 def test_a_case_whose_name_begins_with_a_dash_is_suggested_as_a_path(here: Path) -> None:
     (here / "-dash.toml").write_text(TINY)
-    sweep, new = each(here, [["sweep", "--", "-dash.toml"], ["new", "--", "-new case"]])
+    lines = [
+        ["check", "-dash.toml"],
+        ["check", "-absent.toml"],
+        ["sweep", "--", "-dash.toml"],
+        ["new", "--", "-new case"],
+    ]
+    check, absent, sweep, new = each(here, lines)
+    check.told(2, "No such option", "brakecli: -dash.toml: was read as options; name the file ./-dash.toml")
+    assert "./" not in absent.told(2, "No such option")
     sweep.told(2, "-dash.toml: this is a case; simulate it with: brakecli run ./-dash.toml")
     assert new.out == "-new case.toml: written; run it with: brakecli run './-new case.toml'\n"
     brakecli("check", "./-dash.toml", cwd=here).told(0)
