@@ -5,6 +5,7 @@ and sizes are looked at first, and references are followed here.
 """
 
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from typing import Any
 
 import h5py
@@ -62,6 +63,24 @@ def check_variables(file: h5py.File, kind: str, length: int) -> None:
                 raise ValueError(f"{where} has the shape {node.shape}, and {axis} has {shape}")
             if kind == "run" and name in _RISING:
                 _check_rising(node, where)
+
+
+def read_everything(file: h5py.File, length: int) -> None:
+    """Read all attributes and variables, also where some of them cannot be read."""
+    names = ["/"]
+    with suppress(Exception):
+        file.visit(names.append)
+    for name in names:
+        with suppress(Exception):
+            node = member(file, name)
+            for attribute in node.attrs:
+                with suppress(Exception):
+                    plain_attribute(node, attribute)
+            if isinstance(node, h5py.Dataset):
+                axes_of(node, name)
+                check_size(node, length, name)
+                for _ in _blocks(node):
+                    pass
 
 
 def check_size(node: h5py.Dataset, length: int, where: str) -> None:
