@@ -48,8 +48,8 @@ def main() -> None:
     except MemoryError:
         message, code = "out of memory; reduce contact.nodes, or sample less often", 3
     except OSError as error:  # not of an input or output, but of a file such as the cache of compiled code
-        message = f"{error.filename or 'a file'}: cannot be read or written: {error.strerror or error}"
-        code = 74
+        what = f"{error.filename or 'a file'}: cannot be read or written: {error.strerror or error}"
+        message, code = f"{what}; check its path and permissions", 74
     except SystemExit as end:
         if end.code == 2:  # bad usage, which is reported already
             files = [word for word in sys.argv[1:] if word[1:] and word[0] == "-" and os.path.isfile(word)]  # noqa: PTH113
