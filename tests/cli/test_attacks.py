@@ -51,21 +51,15 @@ vx = -0.5
 """
 
 
-@pytest.fixture
-def streams(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> pytest.CaptureFixture[str]:
-    """What standard streams get, which are those of a process, and those of the tests at the end."""
-    for name in ("stdout", "stderr", "argv"):
-        monkeypatch.setattr(sys, name, getattr(sys, name))
-    guard_streams()
-    return capfd
-
-
 @pytest.mark.parametrize("number", counts(50, 5000))
 def test_a_file_with_mistakes_is_refused_with_a_sentence_for_each_or_valid(
-    number: int, here: Path, streams: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    number: int, here: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     """In this process, as 5,000 others would take too long."""
     monkeypatch.chdir(here)
+    for name in ("stdout", "stderr", "argv"):  # are restored at the end
+        monkeypatch.setattr(sys, name, getattr(sys, name))
+    guard_streams()
     chance, codes = random.Random(number), list[object]()
     texts = (TINY, starter_text(), starter_text() + ROUGH, SWEEP)
     for n in range(number):
@@ -79,7 +73,7 @@ def test_a_file_with_mistakes_is_refused_with_a_sentence_for_each_or_valid(
         except SystemExit as end:
             codes.append(end.code)
         Path(name).unlink()
-        out, err = streams.readouterr()
+        out, err = capfd.readouterr()
         assert codes[-1] in (0, 2, 3), (data, err)
         assert not odd_in(out + err), (data, err)
         for line in err.splitlines() if codes[-1] else ():
