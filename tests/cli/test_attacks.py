@@ -166,12 +166,7 @@ def test_whatever_damage_a_kernel_cache_has_is_repaired(here: Path) -> None:
     for _ in range(10):
         for path in chance.sample(files, 2):
             data = path.read_bytes()
-            bad = (
-                b"",
-                data[: len(data) // 2],
-                chance.randbytes(len(data)),
-                data[:50] + chance.randbytes(50) + data[100:],
-            )
+            bad = (b"", data[: len(data) // 2], chance.randbytes(len(data)))
             path.write_bytes(chance.choice(bad))
         done = brakecli("check", "tiny.toml", "--json", cwd=here, stdin="", XDG_CACHE_HOME=str(cache))
         assert done.told(0) == ""
