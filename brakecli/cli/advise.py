@@ -22,7 +22,7 @@ def command(
     loaded = load_case(case, overrides)
     announce_compilation(quiet)
     from brakecli.analysis.stability.advice import KEYS as USUAL
-    from brakecli.cli.tables import advice_table
+    from brakecli.cli.stability_tables import advice_table
     from brakecli.runs.advise import advise
     from brakecli.runs.limits import within_range
     from brakecli.runs.run import load_kernels

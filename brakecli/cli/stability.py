@@ -35,7 +35,7 @@ def command(
     announce_compilation(quiet)
     from brakecli.analysis.stability.report import stability
     from brakecli.case.system import system_of
-    from brakecli.cli.tables import stability_table
+    from brakecli.cli.stability_tables import stability_table
     from brakecli.files.field import values_of
     from brakecli.files.fields import LOCK_IN, STABILITY
     from brakecli.runs.limits import within_range

@@ -14,14 +14,10 @@ from brakecli.solver.contact import EVALUATORS
 from brakecli.solver.quantities import COEFFICIENTS
 
 if TYPE_CHECKING:  # what one command prints need not wait for the modules of the others
-    from brakecli.analysis.stability.modes import Crossing
-    from brakecli.analysis.stability.report import StabilityReport
     from brakecli.comparison.result import ComparisonReport
-    from brakecli.runs.advise import AdviceReport
     from brakecli.runs.limits import Check
     from brakecli.runs.run import RunReport
     from brakecli.sweeps.cost import Estimate
-    from brakecli.sweeps.lock_in import LockIn
     from brakecli.sweeps.result import SweepReport
 
 POINTS = named(fields.POINT, "regime", "frequency", "amplitude")
@@ -34,7 +30,6 @@ NARROWEST = 40  # columns of a table, whatever the terminal says: nothing can be
 Row = tuple[str, str | Sequence[str]]
 """A label with its text; a list gives a row for each of its texts, and none if it is empty."""
 
-_STATE = {True: "stable", False: "unstable", None: "-"}
 ENTRIES = (
     ("method", "method", ""),
     ("step", "step, s", ".3g"),
@@ -57,7 +52,7 @@ def run_table(report: RunReport) -> str:
     nodes = f", {numbers['nodes']} nodes" if on_nodes else ""
     step = "" if report.check.step is None else f" of {report.check.step:.4g} s"
     error = abs(numbers["energy"]["relative_closing_error"])
-    peak = _text(numbers["spectrum_peak"]) if numbers["spectrum_peak"] is not None else ""
+    peak = text_of(numbers["spectrum_peak"]) if numbers["spectrum_peak"] is not None else ""
     since = f"from {numbers['settled_from']:.4g} s on"
     rows = [
         ("failed", [numbers["failure"]] if work.failed else []),
@@ -75,10 +70,10 @@ def run_table(report: RunReport) -> str:
         ("left out", "; ".join(numbers["left_out"]) or "nothing"),
         ("steps", f"{work.steps}{step}, {work.contact_evaluations} contact evaluations"),
         ("energy account", f"closes to {error:.1e} of its largest item"),
-        ("time of the loop", _text(work.solve_seconds, "s", ".3g")),
+        ("time of the loop", text_of(work.solve_seconds, "s", ".3g")),
         ("file", str(report.output)),
     ]
-    return _table(report.title, rows)
+    return two_columns(report.title, rows)
 
 
 def verdict_table(source: str, numbers: Mapping[str, Any]) -> str:
@@ -86,8 +81,8 @@ def verdict_table(source: str, numbers: Mapping[str, Any]) -> str:
     rows = _verdict_rows(numbers)
     for name, value in numbers["evidence"].items():
         shown = ", ".join(f"{item:.4g}" for item in value) or "-" if isinstance(value, list | tuple) else value
-        rows.append((name.replace("_", " "), _text(shown)))
-    return _table(source, rows)
+        rows.append((name.replace("_", " "), text_of(shown)))
+    return two_columns(source, rows)
 
 
 def _verdict_rows(numbers: Mapping[str, Any]) -> list[Row]:
@@ -107,131 +102,38 @@ def check_table(title: str, found: Check) -> str:
     growth = f"multiplies a frictionless disturbance by at most {limits.growth:.8g} a step"
     coefficients = zip(COEFFICIENTS.values(), system.coefficients, strict=True)
     rows = [
-        *((f"{c.symbol}, {c.long_name}", _text(value, c.units.removeprefix("1"))) for c, value in coefficients),
-        ("surface speed U", _text(system.belt_speed, "m/s")),
-        ("contact stiffness 2ak", _text(system.contact_stiffness, "N/m")),
+        *((f"{c.symbol}, {c.long_name}", text_of(value, c.units.removeprefix("1"))) for c, value in coefficients),
+        ("surface speed U", text_of(system.belt_speed, "m/s")),
+        ("contact stiffness 2ak", text_of(system.contact_stiffness, "N/m")),
         ("natural frequencies", f"{low:.5g} and {high:.5g} Hz in full contact"),
         ("without contact", f"{link_low:.5g} and {link_high:.5g} Hz"),
-        ("shortest wave passes at", _text(system.passing_frequency, "Hz")),
+        ("shortest wave passes at", text_of(system.passing_frequency, "Hz")),
         ("step", (f"{found.step:.6g} s, " if has_step else "its own, about ") + f"{found.steps} steps"),
         ("steps per period", [f"{found.steps_per_period:.4g} of the fastest motion"] * has_step),
-        ("fixed-point contraction", [f"{limits.contraction:.3g} (it may diverge from 1 on)"] * has_step),
-        ("solution of a step", [f"{'' if limits.unique else 'not '}sure to be unique"] * has_step),
+        ("fixed-point contraction", [f"{limits.contraction:.3g} (1 or more: it may diverge)"] * has_step),
+        ("solution of each step", [f"{'unique' if limits.unique else 'perhaps not unique'}"] * has_step),
         ("scheme", [growth] * has_step),
         ("contact", system.evaluator + (f", {system.nodes} nodes" if system.nodes else "")),
-        ("nodes per shortest wave", _text(found.nodes_per_wave)),
-        *_cost_rows(found),
+        ("nodes per shortest wave", text_of(found.nodes_per_wave)),
+        *_cost_rows(found, "at least" if found.at_least else "about"),
         ("adjusted", found.adjustments),
     ]
-    return _table(title, rows)
+    return two_columns(title, rows)
 
 
 def estimate_table(title: str, found: Estimate) -> str:
     """What a sweep would cost."""
-    return _table(title, [("points", str(found.points)), ("workers", str(found.workers)), *_cost_rows(found)])
+    return two_columns(title, [("points", str(found.points)), ("workers", str(found.workers)), *_cost_rows(found)])
 
 
-def _cost_rows(found: Check | Estimate) -> list[Row]:
+def _cost_rows(found: Check | Estimate, about: str = "about") -> list[Row]:
+    from brakecli.runs.cost import duration_text
+
     return [
-        ("time", f"about {found.seconds:.2g} s"),
+        ("time", f"{about} {duration_text(found.seconds)}"),
         ("memory", f"about {found.memory / 1e6:.0f} MB"),
         ("file", f"about {found.file_size / 1e6:.2g} MB"),
     ]
-
-
-def stability_table(title: str, report: StabilityReport, found: LockIn | None) -> str:
-    """Steady sliding, its modes and its critical friction; below that what there is along a key."""
-    rest, critical, discrete = report.equilibrium, report.critical, report.discrete
-    undamped = {"flutter": report.undamped_flutter, "divergence": report.undamped_divergence}
-    known = [f"{kind} at {friction:.7g}" for kind, friction in undamped.items() if friction is not None]
-    sliding = f"none: {report.no_equilibrium}"
-    if rest is not None:
-        touching = f"{rest.contact_fraction:.1%} of the pad touches"
-        sliding = f"y = {rest.y:.5g} m, F_y = {rest.normal_force:.5g} N, {touching}"
-    rows = [
-        ("surface speed U", _text(report.belt_speed, "m/s")),
-        ("steady sliding", sliding),
-        ("contact stiffness K", _text(report.contact_stiffness, "N/m")),
-        ("critical friction", _crossing(critical) if critical else "none"),
-        ("also changes at", [_crossing(each) for each in report.crossings if each is not critical]),
-        ("without dashpots", ", ".join(known) or "neither flutter nor divergence"),
-        (f"at φ = {report.friction:g}", _STATE[report.stable]),
-    ]
-    for mode in report.modes:
-        motion = f"grows at {mode.growth:.4g} 1/s" if mode.growth > 0.0 else f"decays at {-mode.growth:.4g} 1/s"
-        shape = f"y/x {mode.shape:.3g} at {mode.shape_phase:.0f}°" if mode.shape is not None else "along y alone"
-        what = f"{motion}, damping ratio {mode.damping_ratio:.3g}, {shape}"
-        rows.append((f"mode at {mode.frequency:.5g} Hz", what))
-    if discrete:
-        limit, friction, radius = discrete.step_limit, discrete.critical_friction, discrete.spectral_radius
-        bias = "" if discrete.bias is None else f", {discrete.bias:+.2g} off"
-        rows += [
-            ("the scheme's growth", f"{_text(discrete.growth, '1/s')}, a factor {radius:.8g} a step"),
-            ("its critical friction", "none" if friction is None else f"{friction:.7g}{bias}"),
-            ("its stable steps", "any" if limit is None else f"up to {limit:.4g} s" if limit else "none"),
-        ]
-    return _table(title, rows) + (_lock_in(found) if found else "")
-
-
-def _lock_in(found: LockIn) -> str:
-    """Critical friction and both modes along a key, and where stability changes."""
-    from brakecli.sweeps.result import unit
-
-    entries, keys = found.entries, ", ".join(found.parameters)
-    values = {"value": [f"{entry['value']:.6g}" for entry in entries]}
-    varied = {field.title: [_text(each[field.name]) for each in entries] for field in fields.VARIED}
-    looks = (("frequency {}, Hz", 1.0, ".5g"), ("growth {}, 1/s", 1.0, ".4g"), ("damping {}, %", 100.0, ".3g"))
-    modes = {
-        head.format(mode + 1): [
-            _text(None if value is None else factor * value, form=form)
-            for value in (each[field.name][mode] for each in entries)
-        ]
-        for field, (head, factor, form) in zip(fields.MODES, looks, strict=True)
-        for mode in (0, 1)
-    }
-    units = unit(found.parameters[0])
-    critical = ", ".join(_text(value, units.removeprefix("1"), ".7g") for value in found.critical_values)
-    changes = f"Stability changes at {critical}." if critical else "Stability does not change in between."
-    return "\n\n" + "\n\n".join((f"Along {keys}:\n" + _grid(values | varied), _grid(values | modes), changes))
-
-
-def _crossing(crossing: Crossing) -> str:
-    change = "lost" if crossing.lost else "regained"
-    where = f" at {crossing.frequency:.5g} Hz" if crossing.frequency else ""
-    return f"{crossing.friction:.7g}: stability {change} by {crossing.instability}{where}"
-
-
-def advice_table(report: AdviceReport) -> str:
-    """What moves the critical friction, what to change, and the answer in a sentence."""
-    found, check, margin = report.stability, report.check, report.margin
-    moving = [each for each in report.sensitivities if each.elasticity or each.derivative or each.growth_change]
-    moves = {
-        "what moves it": [each.parameter for each in moving],
-        "value": [_text(each.value) if isinstance(each.value, float) else "list" for each in moving],
-        "% for 1 %": [_text(each.elasticity, form=".3g") for each in moving],
-        "for a unit": [_text(each.derivative, form=".3g") for each in moving],
-        "growth for 1 %": [_text(each.growth_change, form=".3g") for each in moving],
-    }
-    helps = {
-        "what helps": [each.parameter for each in report.advice],
-        "from": [_text(each.start) for each in report.advice],
-        "to": [each.rounded for each in report.advice],
-        "critical φ": [_text(each.critical_friction, form=".4g") for each in report.advice],
-        "tried from": [f"{each.lowest:.4g} to {each.highest:.4g}" for each in report.advice],
-    }
-    rows: list[Row] = [
-        ("critical friction", _crossing(found.critical) if found.critical else "none"),
-        (f"at φ = {found.friction:g}", _STATE[found.stable]),
-        ("margin", "-" if margin is None else f"{margin:.1%}; {report.wanted_margin:.1%} is wanted"),
-    ]
-    ends: list[Row] = [("note", report.notes())]
-    if check:
-        ran = f"{check.parameter} = {check.value:.6g}: {check.duration:.3g} s of motion, in {check.seconds:.2g} s"
-        ends.append(("checked by a run", [ran, f"{check.verdict.regime}: {'; '.join(check.verdict.reasons)}"]))
-    ends.append(("in a sentence", report.conclusion()))
-    meant = "Critical friction for 1 % and for 1 unit of a value; growth rate (1/s) for 1 %:\n"
-    grids = [meant + _grid(moves)] * bool(moving) + [_grid(helps)] * bool(report.advice)
-    return "\n\n".join((_table(report.title, rows), *grids, _table("", ends)))
 
 
 def sweep_table(report: SweepReport) -> str:
@@ -249,11 +151,11 @@ def sweep_table(report: SweepReport) -> str:
     rows += [
         ("note", found.sentences),
         ("failed", [f"{found.failed} points"] if found.failed else []),
-        ("time", _text(report.seconds, "s", ".3g")),
+        ("time", text_of(report.seconds, "s", ".3g")),
         ("file", str(report.output)),
     ]
     listed = _points_table(report) + "\n\n" if found.points <= MOST_LISTED_POINTS else ""
-    return listed + _table(report.loaded.title, rows)
+    return listed + two_columns(report.loaded.title, rows)
 
 
 def _points_table(report: SweepReport) -> str:
@@ -270,8 +172,8 @@ def _points_table(report: SweepReport) -> str:
     for field in POINTS if found.critical is None else CRITICAL_POINTS:
         values = np.ravel(np.array((found.variables or {})[field.name], object))
         header = f"{field.title}, {field.units}" if field.units else field.title
-        columns[header] = [_text(value, form=".5g") for value in values]
-    return _grid(columns)
+        columns[header] = [text_of(value, form=".5g") for value in values]
+    return grid(columns)
 
 
 def comparison_table(report: ComparisonReport) -> str:
@@ -289,12 +191,14 @@ def comparison_table(report: ComparisonReport) -> str:
     if best is not None:
         recommended = [f"{best}: error {best.error:.2g}, {report.margin:.3g} times below {report.target:g}"]
         if (finer := found.finer_error(best)) > report.target:
-            recommended.append(f"by chance: at a finer step its error is {finer:.2g}; choose one with more margin")
-    left_out = f"{found.left_out} entries, for want of time: give a larger --budget"
+            recommended.append(
+                f"this is by chance: at a finer step its error is {finer:.2g}; choose a method with more margin"
+            )
+    left_out = f"{found.left_out} entries, because the time was used up; give a larger --budget"
     rows = [
         ("compared over", f"{found.duration:.6g} s of motion"),
-        ("reference", f"event-driven, good to {found.reference_error:.1e}, {found.reference_seconds:.3g} s"),
-        ("times", f"median of {found.repeats} turns, of the loop alone"),
+        ("reference", f"event-driven, error below {found.reference_error:.1e}, {found.reference_seconds:.3g} s"),
+        ("times", f"median of {found.repeats} repetitions, of the time loop alone"),
         ("left out", [left_out] if found.left_out else []),
         ("failed", [f"{len(failed)} entries, such as {each}: {each.failure}" for each in failed[:1]]),
         ("recommended", recommended),
@@ -302,7 +206,7 @@ def comparison_table(report: ComparisonReport) -> str:
     ]
     best_entries = "No other is better in both error and time:\n" + _entries(front)
     others = "The finest of the others:\n" + _entries(finest.values())
-    return "\n\n".join((best_entries, others, _table(report.title, rows)))
+    return "\n\n".join((best_entries, others, two_columns(report.title, rows)))
 
 
 def _rows(known: Iterable[Field], numbers: Mapping[str, Any], *names: str) -> list[Row]:
@@ -310,31 +214,31 @@ def _rows(known: Iterable[Field], numbers: Mapping[str, Any], *names: str) -> li
     rows: list[Row] = []
     for each in named(known, *names):
         shown = ("of the time", ".2%") if each.units == "1" else (each.units,)
-        rows.append((each.title, _text(numbers[each.name], *shown)))
+        rows.append((each.title, text_of(numbers[each.name], *shown)))
     return rows
 
 
 def _entries(records: Collection[Mapping[str, Any]]) -> str:
-    return _grid({header: [_text(each[name], form=form) for each in records] for name, header, form in ENTRIES})
+    return grid({header: [text_of(each[name], form=form) for each in records] for name, header, form in ENTRIES})
 
 
-def _text(value: str | float | None, unit: str = "", form: str = ".6g") -> str:
+def text_of(value: str | float | None, unit: str = "", form: str = ".6g") -> str:
     """A value with its unit; a dash stands for what does not exist."""
     if value is None:
         return "-"
     return value if isinstance(value, str) else f"{value:{form}} {unit}".rstrip()
 
 
-def _table(title: str, rows: Sequence[Row]) -> str:
+def two_columns(title: str, rows: Sequence[Row]) -> str:
     """Rows in two columns."""
     lines = [(label, text) for label, texts in rows for text in ([texts] if isinstance(texts, str) else texts)]
     labels, values = zip(*lines, strict=True)
-    return _grid(
+    return grid(
         {"label": labels, "value": values}, title=escaped(title) or None, title_justify="left", show_header=False
     )
 
 
-def _grid(columns: Mapping[str, Sequence[str]], **style: Any) -> str:
+def grid(columns: Mapping[str, Sequence[str]], **style: Any) -> str:
     """Columns under their headers, as wide as the terminal."""
     from rich.console import Console
     from rich.table import Table

@@ -8,7 +8,7 @@ import pytest
 
 from brakecli.analysis.stability.advice import KEYS
 from brakecli.case.read import read_case
-from brakecli.cli.tables import advice_table
+from brakecli.cli.stability_tables import advice_table
 from brakecli.runs.advise import advise
 from tests.campaign import campaign
 from tests.commands import LIMIT, LONG, QUICK, ROOT, brakecli, each, started
