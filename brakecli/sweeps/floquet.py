@@ -37,8 +37,16 @@ PARTS = 4  # of each interval between them, where surfaces open in a run
 REFINED = 3  # times that values are added beside one at which stability is nearly lost or regained
 SAMPLES = 64  # of a segment
 NEUTRAL = 1e-4  # of ln of a multiplier that is one but for rounding, as all are without dashpots below flutter
-SUBDIVISIONS = 1  # halvings of the way from a known motion to the next
+SHORTEST = 16  # parts of the way from a known motion to the next that are tried
+LARGEST_PART = 0.25  # of the waves' amplitudes that is added at once to a motion
 RELAXED = 100.0  # periods of the slowest motion after which a stable motion has come near its orbit
+STEPS = {2.0: 2.0, 0.5: -0.5}
+"""Divisors of the step, which also multiply the nodes, and the error in changes of the growth: with half the step
+it changes by a half of its error or more, with twice the step by all of it or more; at least half of that counts,
+as patches that open make errors fall unevenly."""
+WIDER = 1.5  # times the shift that these show
+STRIDES = 7  # towards the place where growth with other steps passes zero
+MISSED = 3  # searches for a motion that grows out of steady sliding that may fail
 BATCHES, BATCH, TRANSIENT = 8, 4, 16  # batches of a long run, segments of a batch, segments before the first
 CERTAIN = 3.5  # standard errors of the mean of eight batches: 99 % of Student's distribution
 
@@ -136,6 +144,7 @@ class Disturbances:
         self.sliding_at = sliding_at
         self.known: dict[float, Growth | None] = {}
         self.orbits: dict[float, Orbit] = {}
+        self.missed = 0
 
     def at(self, value: float) -> Growth | None:
         """The growth at a value; None without steady sliding, and where no forced motion is found."""
@@ -183,36 +192,68 @@ class Disturbances:
         return values
 
     def error(self, value: float) -> float:
-        """By how much the step may falsify the growth (1/s) of a periodic motion, from half and twice the step.
+        """By how much the step may falsify the growth (1/s) of a periodic motion."""
+        coarse = self.orbits[value]
+        return max(
+            abs(part * (self._finer(value, coarse, finer).rate - coarse.rate)) for finer, part in STEPS.items()
+        )
 
-        With half the step the error changes by a half of itself or more, with twice the step by all of it or more.
-        Where patches open, errors need not fall evenly: the larger one counts.
-        """
-        if (coarse := self.orbits.get(value)) is None or (found := self.sliding_at(value)) is None:
-            return 0.0
-        errors = []
-        for finer in (2.0, 0.5):
-            segments = Segments(found, coarse.segments.time, len(coarse.states), finer)
-            other = orbit(segments, coarse.states, coarse.maps)
-            maps = other.maps if other else segments.maps(coarse.states, segments.ends(coarse.states))
-            errors.append(finer * abs(_log_radius(maps) / segments.time - coarse.rate))
-        return max(errors)
+    def shift(self, value: float, slope: float, lower: float, upper: float) -> float:
+        """By how much the step may falsify the place, near a value, where growth of a slope passes zero."""
+        return WIDER * max(self._shifted(value, slope, lower, upper, *step) for step in STEPS.items())
+
+    def _shifted(
+        self, value: float, slope: float, lower: float, upper: float, finer: float, part: float
+    ) -> float:
+        """How far from a value growth less its error passes zero: growing strides, and a straight line."""
+        near, place, stride, rate = self.orbits[value], value, 0.0, math.nan
+        for count in range(STRIDES):
+            before, last = rate, place
+            place = min(max(place + stride, lower), upper)
+            measured = self.at(place)
+            if measured is None:
+                break
+            near = self._finer(place, near, finer)
+            rate = measured.rate + part * (near.rate - measured.rate)
+            if not math.isfinite(rate):
+                return math.inf
+            if before * rate <= 0.0 and before != rate:
+                return abs(last + (place - last) * before / (before - rate) - value)
+            stride = 3.0 * stride if count else -rate / slope
+        return abs(place - value)
+
+    def _finer(self, value: float, near: Orbit, finer: float) -> Orbit:
+        """The periodic motion at a value near another one, with the step divided and the nodes multiplied."""
+        found = self.sliding_at(value)
+        period = common_period(found.system) if found else None
+        if found is None or period is None:
+            return replace(near, rate=math.nan)
+        segments = Segments(found, period, len(near.states), finer)
+        states = segments.moved(near)
+        if (forced := orbit(segments, states, near.maps)) is not None:
+            return forced
+        maps = segments.maps(states, segments.ends(states))
+        return Orbit(segments, states, maps, _log_radius(maps) / period, near.size)
 
     def _measured(self, value: float, found: Sliding) -> Growth | None:
-        plain = None if self.orbits else growth(found)  # from the first motion that opens on, all may
-        if not self.orbits and (found.system.wheel.g.size == 0 or (plain and not plain.opened)):
-            return plain
+        smooth, periodic = found.system.wheel.g.size == 0, bool(self.orbits) or found.modulated
+        plain = None if periodic else growth(found)  # from the first motion that opens on, all may
+        if smooth or (not periodic and plain and not plain.opened):
+            return plain or growth(found)
         if (period := common_period(found.system)) is None:
             return lyapunov(found, plain)
         place, near = self._near(value)
         low, high = sorted((place, value))
         gap = any(lost is None and low < other < high for other, lost in self.known.items())
-        forced = None if gap else self._followed(value, found, period, SUBDIVISIONS)
-        if forced is None:
+        forced = None if gap else self._followed(value, found, period)
+        if forced is None and not is_undamped(found.system.coefficients):
             if plain is None and near is not None and near.rate > 0.0:
                 plain = growth(found)
             if plain is None or plain.rate <= 0.0:
                 forced = self._waited(value, found, period)
+        if forced is None and self.missed < MISSED:
+            forced = self._grown(value, found, period)
+            self.missed += forced is None
         if forced is None:
             return None
         self.orbits[value] = forced
@@ -223,27 +264,61 @@ class Disturbances:
         near = min(self.orbits, key=lambda other: abs(other - value), default=math.nan)
         return near, self.orbits.get(near)
 
+    def _nearest(self, value: float) -> tuple[float, float]:
+        """Where the two nearest motions are, or twice the only one."""
+        near = sorted(self.orbits, key=lambda other: abs(other - value))[:2]
+        return near[0], near[-1]
+
     def _segments(self, value: float, found: Sliding, period: float) -> Segments:
         _, near = self._near(value)
         slow = natural_frequencies(found.system.coefficients, found.stiffness)[0]
         count = min(max(1, math.ceil(period * slow / SEGMENT)), MOST_SEGMENTS)
         return Segments(found, period, len(near.states) if near else count)
 
-    def _followed(self, value: float, found: Sliding, period: float, divisions: int) -> Orbit | None:
-        """The periodic motion from the nearest one that is known, or from steady sliding where none is."""
-        segments, (place, near) = self._segments(value, found, period), self._near(value)
+    def _followed(self, value: float, found: Sliding, period: float) -> Orbit | None:
+        """The periodic motion from the nearest one that is known, on the way in strides; from steady sliding where
+        none is known.
+        """
+        place, near = self._near(value)
         if near is None:
+            segments = self._segments(value, found, period)
             return orbit(segments, np.tile(segments.rest, (len(segments.systems), 1)), None)
-        if (forced := orbit(segments, segments.moved(near), near.maps)) is not None or divisions == 0:
-            return forced
-        middle = 0.5 * (place + value)
-        between = self.sliding_at(middle)
-        if between is None or (length := common_period(between.system)) is None:
-            return None
-        if (forced := self._followed(middle, between, length, divisions - 1)) is None:
-            return None
-        self.orbits[middle] = forced
-        return orbit(segments, segments.moved(forced), forced.maps)
+        stride, shortest = value - place, abs(value - place) / SHORTEST
+        while abs(stride) >= shortest:
+            aim = value if abs(value - place) <= abs(stride) else place + stride
+            at = found if aim == value else self.sliding_at(aim)
+            length = common_period(at.system) if at else None
+            forced = self._beside(aim, at, length) if at and length else None
+            if forced is None:
+                stride *= 0.5
+            elif aim == value:
+                return forced
+            else:
+                self.orbits[aim], place = forced, aim
+        return None
+
+    def _beside(self, value: float, found: Sliding, period: float) -> Orbit | None:
+        """The periodic motion that continues the line through the two nearest ones, or is near the nearest."""
+        segments, (one, other) = self._segments(value, found, period), self._nearest(value)
+        near = self.orbits[one]
+        guesses = [segments.moved(near)]
+        if abs(value - one) <= 2.0 * abs(one - other):
+            along = guesses[0] - segments.moved(self.orbits[other])
+            guesses.insert(0, guesses[0] + along * ((value - one) / (one - other)))
+        tried = (orbit(segments, guess, near.maps) for guess in guesses)
+        return next((forced for forced in tried if forced), None)
+
+    def _grown(self, value: float, found: Sliding, period: float) -> Orbit | None:
+        """The periodic motion that grows out of steady sliding with the waves of the wheel."""
+        wheel, near, part, stride = found.system.wheel, None, 0.0, LARGEST_PART
+        while part < 1.0 and stride >= LARGEST_PART / SHORTEST:
+            more = min(part + stride, 1.0)
+            system = replace(found.system, wheel=wheel._replace(g=more * wheel.g))
+            segments = self._segments(value, replace(found, system=system), period)
+            guess = near.states if near else np.tile(segments.rest, (len(segments.systems), 1))
+            forced = orbit(segments, guess, near.maps if near else None)
+            part, near, stride = (more, forced, stride) if forced else (part, near, 0.5 * stride)
+        return near if part == 1.0 else None
 
     def _waited(self, value: float, found: Sliding, period: float) -> Orbit | None:
         """A stable periodic motion that is reached by waiting, unless it is far larger than the nearest one known:
