@@ -18,6 +18,7 @@ from brakecli.case.case import Case, changed
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError
 from brakecli.solver.system import System
+from brakecli.sweeps.error_bar import left_open
 from brakecli.sweeps.floquet import Disturbances
 from brakecli.sweeps.growth import Sliding, sliding, with_step
 from brakecli.sweeps.tables import Critical
@@ -256,49 +257,9 @@ def _narrowed(at: Disturbances, low: float, high: float, critical: Critical, bia
         low = bisect(lambda value: at.unstable(value) is below, low, middle, width=tolerance, halvings=EDGES)[0]
         high = bisect(lambda value: as_below(value) is not False, middle, high, width=tolerance, halvings=EDGES)[1]
     value = value if value is not None and low <= value <= high else 0.5 * (low + high)
-    error = 0.5 * (high - low) + min(_left_open(at, (low, high), wide, bias, critical), critical.upper - critical.lower)
+    bar = left_open(at, (low, high), wide, bias, critical)
+    error = 0.5 * (high - low) + min(bar, critical.upper - critical.lower)
     return Edge(value, low, high, error, not below)
-
-
-def _left_open(
-    at: Disturbances, bracket: tuple[float, float], wide: tuple[float, float], bias: float, critical: Critical
-) -> float:
-    """By how much the change in a bracket may be wrong: the error of the growth over its slope, and the bias.
-
-    The error of a periodic motion holds that of its scheme. A three-layer scheme takes velocities from differences
-    of positions: near self-locking, where the force grows beyond all bounds, their rounding makes the growth jump,
-    so that the slope counts only as far as the ends of the bracket that was found first show it.
-    """
-    known, (low, high) = {value: each for value, each in at.known.items() if each is not None}, bracket
-    near = sorted(known, key=lambda value: max(low - value, value - high, 0.0))[:2]
-    one, other = near[0], near[-1]
-
-    def slope(other: float) -> float:
-        return (known[other].rate - known[one].rate) / (other - one) if other != one else 0.0
-
-    if known[one].bar:  # the bracket holds it
-        return bias
-    steep = abs(slope(other))
-    if known[one].noise:
-        error = at.error(one) if one in at.orbits else max(known[one].spread, known[other].spread)
-        return bias + _reach(at, low, high, 2.0 * known[one].noise + error)
-    if one in at.orbits:
-        return at.shift(one, slope(other), critical.lower, critical.upper) if steep > 0.0 else math.inf
-    found, far = at.sliding_at(one), max((abs(slope(end)) for end in wide if end in known), default=0.0)
-    if found is not None and found.system.scheme.LAG and far > 0.0:
-        steep = min(steep, far)
-    return bias + (max(known[one].spread, known[other].spread) / steep if steep > 0.0 else 0.0)
-
-
-def _reach(at: Disturbances, low: float, high: float, level: float) -> float:
-    """How far from a bracket growth passes a level that its error may hide, or steady sliding ends.
-
-    Without dashpots nothing decays, and growth begins like a root.
-    """
-    values, growing = sorted(at.known), bool(at.unstable(high))
-    side = [value for value in values if value >= high] if growing else [v for v in values if v <= low][::-1]
-    beyond = (value for value in side if (measured := at.known[value]) is None or measured.rate >= level)
-    return abs(next(beyond, math.inf) - side[0])
 
 
 def _lasting(answer: bool, before: Verdict | None, verdict: Verdict) -> bool:

@@ -1,0 +1,102 @@
+"""The error bar of a critical value: what the measured growth leaves open."""
+
+import math
+from dataclasses import replace
+
+from brakecli.sweeps.floquet import Disturbances
+from brakecli.sweeps.periodic import Orbit, Segments, common_period, log_radius, orbit
+from brakecli.sweeps.tables import Critical
+
+STEPS = {2.0: 2.0, 0.5: -0.5}
+"""Divisors of the step, which also multiply the nodes, and the error in changes of the growth: with half the step
+it changes by a half of its error or more, with twice the step by all of it or more; at least half of that counts,
+as patches that open make errors fall unevenly."""
+WIDER = 1.5  # times the shift that these show
+STRIDES = 7  # towards the place where growth with other steps passes zero
+
+
+def left_open(
+    at: Disturbances, bracket: tuple[float, float], wide: tuple[float, float], bias: float, critical: Critical
+) -> float:
+    """By how much the change in a bracket may be wrong: the error of the growth over its slope, and the bias.
+
+    The error of a periodic motion holds that of its scheme. A three-layer scheme takes velocities from differences
+    of positions: near self-locking, where the force grows beyond all bounds, their rounding makes the growth jump,
+    so that the slope counts only as far as the ends of the bracket that was found first show it.
+    """
+    known, (low, high) = {value: each for value, each in at.known.items() if each is not None}, bracket
+    near = sorted(known, key=lambda value: max(low - value, value - high, 0.0))[:2]
+    one, other = near[0], near[-1]
+
+    def slope(other: float) -> float:
+        return (known[other].rate - known[one].rate) / (other - one) if other != one else 0.0
+
+    if known[one].bar:  # the bracket holds it
+        return bias
+    steep = abs(slope(other))
+    if known[one].noise:
+        hidden = error(at, one) if one in at.orbits else max(known[one].spread, known[other].spread)
+        return bias + _reach(at, low, high, 2.0 * known[one].noise + hidden)
+    if one in at.orbits:
+        return _shift(at, one, slope(other), critical.lower, critical.upper) if steep > 0.0 else math.inf
+    found, far = at.sliding_at(one), max((abs(slope(end)) for end in wide if end in known), default=0.0)
+    if found is not None and found.system.scheme.LAG and far > 0.0:
+        steep = min(steep, far)
+    return bias + (max(known[one].spread, known[other].spread) / steep if steep > 0.0 else 0.0)
+
+
+def _reach(at: Disturbances, low: float, high: float, level: float) -> float:
+    """How far from a bracket growth passes a level that its error may hide, or steady sliding ends.
+
+    Without dashpots nothing decays, and growth begins like a root.
+    """
+    values, growing = sorted(at.known), bool(at.unstable(high))
+    side = [value for value in values if value >= high] if growing else [v for v in values if v <= low][::-1]
+    beyond = (value for value in side if (measured := at.known[value]) is None or measured.rate >= level)
+    return abs(next(beyond, math.inf) - side[0])
+
+
+def error(at: Disturbances, value: float) -> float:
+    """By how much the step may falsify the growth (1/s) of a periodic motion."""
+    coarse = at.orbits[value]
+    return max(abs(part * (_finer(at, value, coarse, finer).rate - coarse.rate)) for finer, part in STEPS.items())
+
+
+def _shift(at: Disturbances, value: float, slope: float, lower: float, upper: float) -> float:
+    """By how much the step may falsify the place, near a value, where growth of a slope passes zero."""
+    return WIDER * max(_shifted(at, value, slope, lower, upper, *step) for step in STEPS.items())
+
+
+def _shifted(
+    at: Disturbances, value: float, slope: float, lower: float, upper: float, finer: float, part: float
+) -> float:
+    """How far from a value growth less its error passes zero: growing strides, and a straight line."""
+    near, place, stride, rate = at.orbits[value], value, 0.0, math.nan
+    for count in range(STRIDES):
+        before, last = rate, place
+        place = min(max(place + stride, lower), upper)
+        measured = at.at(place)
+        if measured is None:
+            break
+        near = _finer(at, place, near, finer)
+        rate = measured.rate + part * (near.rate - measured.rate)
+        if not math.isfinite(rate):
+            return math.inf
+        if before * rate <= 0.0 and before != rate:
+            return abs(last + (place - last) * before / (before - rate) - value)
+        stride = 3.0 * stride if count else -rate / slope
+    return abs(place - value)
+
+
+def _finer(at: Disturbances, value: float, near: Orbit, finer: float) -> Orbit:
+    """The periodic motion at a value near another one, with the step divided and the nodes multiplied."""
+    found = at.sliding_at(value)
+    period = common_period(found.system) if found else None
+    if found is None or period is None:
+        return replace(near, rate=math.nan)
+    segments = Segments(found, period, len(near.states), finer)
+    states = segments.moved(near)
+    if (forced := orbit(segments, states, near.maps)) is not None:
+        return forced
+    maps = segments.maps(states, segments.ends(states))
+    return Orbit(segments, states, maps, log_radius(maps) / period, near.size)
