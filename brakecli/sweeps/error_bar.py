@@ -29,17 +29,18 @@ def left_open(
     one, other = near[0], near[-1]
 
     def slope(other: float) -> float:
-        return (known[other].rate - known[one].rate) / (other - one) if other != one else 0.0
+        return abs((known[other].rate - known[one].rate) / (other - one)) if other != one else 0.0
 
     if known[one].bar:  # the bracket holds it
         return bias
-    steep = abs(slope(other))
-    if known[one].noise:
-        hidden = error(at, one) if one in at.orbits else max(known[one].spread, known[other].spread)
-        return bias + _reach(at, low, high, 2.0 * known[one].noise + hidden)
     if one in at.orbits:
-        return _shift(at, one, slope(other), critical.lower, critical.upper) if steep > 0.0 else math.inf
-    found, far = at.sliding_at(one), max((abs(slope(end)) for end in wide if end in known), default=0.0)
+        stride = high - low if at.unstable(high) else low - high
+        return WIDER * max(_shifted(at, one, stride, critical, *step) for step in STEPS.items())
+    if known[one].noise:
+        hidden = max(known[one].spread, known[other].spread)
+        return bias + _reach(at, low, high, 2.0 * known[one].noise + hidden)
+    steep, found = slope(other), at.sliding_at(one)
+    far = max((slope(end) for end in wide if end in known), default=0.0)
     if found is not None and found.system.scheme.LAG and far > 0.0:
         steep = min(steep, far)
     return bias + (max(known[one].spread, known[other].spread) / steep if steep > 0.0 else 0.0)
@@ -62,29 +63,28 @@ def error(at: Disturbances, value: float) -> float:
     return max(abs(part * (_finer(at, value, coarse, finer).rate - coarse.rate)) for finer, part in STEPS.items())
 
 
-def _shift(at: Disturbances, value: float, slope: float, lower: float, upper: float) -> float:
-    """By how much the step may falsify the place, near a value, where growth of a slope passes zero."""
-    return WIDER * max(_shifted(at, value, slope, lower, upper, *step) for step in STEPS.items())
-
-
 def _shifted(
-    at: Disturbances, value: float, slope: float, lower: float, upper: float, finer: float, part: float
+    at: Disturbances, value: float, stride: float, critical: Critical, finer: float, part: float
 ) -> float:
-    """How far from a value growth less its error passes zero: growing strides, and a straight line."""
-    near, place, stride, rate = at.orbits[value], value, 0.0, math.nan
+    """How far from a value growth less its error begins: growing strides, and a straight line within the last.
+
+    The given stride leads to more growth. Without dashpots growth begins like a root, not in a line, and the longer
+    way counts.
+    """
+    near, place, excess = at.orbits[value], value, math.nan
     for count in range(STRIDES):
-        before, last = rate, place
-        place = min(max(place + stride, lower), upper)
-        measured = at.at(place)
-        if measured is None:
+        before, last = excess, place
+        place = min(max(place + (stride if count else 0.0), critical.lower), critical.upper)
+        if (measured := at.at(place)) is None:
             break
         near = _finer(at, place, near, finer)
-        rate = measured.rate + part * (near.rate - measured.rate)
-        if not math.isfinite(rate):
+        excess = measured.rate - measured.noise + part * (near.rate - measured.rate)
+        if not math.isfinite(excess):
             return math.inf
-        if before * rate <= 0.0 and before != rate:
-            return abs(last + (place - last) * before / (before - rate) - value)
-        stride = 3.0 * stride if count else -rate / slope
+        if before * excess <= 0.0 and before != excess:
+            straight = 0.0 if measured.noise else (place - last) * excess / (before - excess)
+            return abs(place + straight - value)
+        stride = 3.0 * stride if count else math.copysign(stride, -stride * excess)
     return abs(place - value)
 
 

@@ -10,16 +10,18 @@ from itertools import pairwise
 
 import numpy as np
 
-from brakecli.analysis.stability.modes import is_undamped
+from brakecli.analysis.stability.modes import is_undamped, modes
+from brakecli.analysis.stability.search import bisect
 from brakecli.solver.links import natural_frequencies
 from brakecli.sweeps.growth import DEPARTED, Growth, Sliding, growth
-from brakecli.sweeps.periodic import LONGEST, Orbit, Segments, common_period, lyapunov, orbit
+from brakecli.sweeps.periodic import LONGEST, Floats, Orbit, Segments, common_period, lyapunov, orbit
 
 SEGMENT = 10.0  # periods of the slowest motion
 MOST_SEGMENTS = 250
 SCANNED = 9  # values of the parameter, both ends among them, between which a change is looked for by runs
 PARTS = 4  # of each interval between them, where surfaces open in a run
 REFINED = 3  # times that values are added beside one at which stability is nearly lost or regained
+MOST_RESONANCES, HALVINGS = 32, 12  # places where values are put, and how exactly
 NEUTRAL = 1e-4  # of ln of a multiplier that is one but for rounding, as all are without dashpots below flutter
 SHORTEST = 16  # parts of the way from a known motion to the next that are tried
 LARGEST_PART = 0.25  # of the waves' amplitudes that is added at once to a motion
@@ -68,6 +70,7 @@ class Disturbances:
         if not any(measured and measured.opened for measured in map(self.at, values[::PARTS])):
             ends = [lower, *(end for window in windows for end in window), upper]
             return sorted({*values[::PARTS], *(0.5 * (low + high) for low, high in pairwise(ends))})
+        values = sorted({*values, *self.resonances(values)})
         self.scan(values)
         for _ in range(REFINED):
             added = set[float]()
@@ -81,6 +84,37 @@ class Disturbances:
             values = sorted({*values, *added})
             self.scan(sorted(added))
         return values
+
+    def resonances(self, values: list[float]) -> list[float]:
+        """Between the values: where a wave of the wheel, or half of it, passes at twice a natural frequency, or at
+        the sum or the difference of both. There it may feed a vibration, in a narrow range of the parameter.
+        """
+
+        count = max((found.system.wheel.turns.size for found in map(self.sliding_at, values) if found), default=0)
+
+        def away(value: float) -> Floats:
+            if (found := self.sliding_at(value)) is None:
+                return np.full(8 * count, np.nan)
+            first, second = sorted(
+                mode.frequency for mode in modes(found.system.coefficients, found.stiffness, found.grip)
+            )[-2:]
+            passing = abs(found.system.belt_speed) * found.system.wheel.turns
+            vibrating = np.array([2.0 * first, 2.0 * second, first + second, second - first])
+            distances: Floats = np.subtract.outer(np.outer([1.0, 2.0], passing), vibrating).ravel()
+            return distances
+
+        rows = [away(value) for value in values]
+        changes = [
+            (low, high, int(which))
+            for (low, high), (before, after) in zip(pairwise(values), pairwise(rows), strict=True)
+            for which in np.flatnonzero(before * after < 0.0)
+        ]
+        found = []
+        for low, high, which in changes[:MOST_RESONANCES]:
+            side = away(low)[which] > 0.0
+            ends = bisect(lambda v: (away(v)[which] > 0.0) == side, low, high, halvings=HALVINGS)  # noqa: B023 - used at once
+            found.append(0.5 * sum(ends))
+        return found
 
     def _measured(self, value: float, found: Sliding) -> Growth | None:
         smooth, periodic = found.system.wheel.g.size == 0, bool(self.orbits) or found.modulated
