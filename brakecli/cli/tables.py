@@ -125,12 +125,15 @@ def check_table(title: str, found: Check) -> str:
 
 def estimate_table(title: str, found: Estimate) -> str:
     """What a sweep would cost."""
-    return _table(title, [("points", str(found.points)), ("workers", str(found.workers)), *_cost_rows(found)])
+    about = "at least" if found.at_least else "about"
+    return _table(
+        title, [("points", str(found.points)), ("workers", str(found.workers)), *_cost_rows(found, about)]
+    )
 
 
-def _cost_rows(found: Check | Estimate) -> list[Row]:
+def _cost_rows(found: Check | Estimate, about: str = "about") -> list[Row]:
     return [
-        ("time", f"about {found.seconds:.2g} s"),
+        ("time", f"{about} {found.seconds:.2g} s"),
         ("memory", f"about {found.memory / 1e6:.0f} MB"),
         ("file", f"about {found.file_size / 1e6:.2g} MB"),
     ]

@@ -13,6 +13,7 @@ it changes by a half of its error or more, with twice the step by all of it or m
 as patches that open make errors fall unevenly."""
 WIDER = 1.5  # times the shift that these show
 STRIDES = 7  # towards the place where growth with other steps passes zero
+ROUNDED = 20.0  # times the spread of growth that rounding makes in a three-layer scheme near self-locking
 
 
 def left_open(
@@ -37,7 +38,9 @@ def left_open(
         stride = high - low if at.unstable(high) else low - high
         return WIDER * max(_shifted(at, one, stride, critical, *step) for step in STEPS.items())
     if known[one].noise:
-        hidden = max(known[one].spread, known[other].spread)
+        found = at.sliding_at(one)
+        rounded = ROUNDED if found and found.system.scheme.LAG else 1.0
+        hidden = rounded * max(known[one].spread, known[other].spread)
         return bias + _reach(at, low, high, 2.0 * known[one].noise + hidden)
     steep, found = slope(other), at.sliding_at(one)
     far = max((slope(end) for end in wide if end in known), default=0.0)
@@ -68,8 +71,7 @@ def _shifted(
 ) -> float:
     """How far from a value growth less its error begins: growing strides, and a straight line within the last.
 
-    The given stride leads to more growth. Without dashpots growth begins like a root, not in a line, and the longer
-    way counts.
+    The given stride leads to more growth. Without dashpots growth begins like a root, and the longer way counts.
     """
     near, place, excess = at.orbits[value], value, math.nan
     for count in range(STRIDES):

@@ -22,7 +22,9 @@ SCANNED = 9  # values of the parameter, both ends among them, between which a ch
 PARTS = 4  # of each interval between them, where surfaces open in a run
 REFINED = 3  # times that values are added beside one at which stability is nearly lost or regained
 MOST_RESONANCES, HALVINGS = 32, 12  # places where values are put, and how exactly
-NEUTRAL = 1e-4  # of ln of a multiplier that is one but for rounding, as all are without dashpots below flutter
+NEUTRAL = (
+    1e-5  # damping ratio, of the slowest motion, that would stop a growth which counts as none without dashpots
+)
 SHORTEST = 16  # parts of the way from a known motion to the next that are tried
 LARGEST_PART = 0.25  # of the waves' amplitudes that is added at once to a motion
 RELAXED = 100.0  # periods of the slowest motion after which a stable motion has come near its orbit
@@ -138,7 +140,8 @@ class Disturbances:
         if forced is None:
             return None
         self.orbits[value] = forced
-        noise = NEUTRAL / period if is_undamped(found.system.coefficients) else 0.0
+        slow, fast = natural_frequencies(found.system.coefficients, found.stiffness)
+        noise = NEUTRAL * 2.0 * math.pi * (slow or fast) if is_undamped(found.system.coefficients) else 0.0
         return Growth(forced.rate, 0.0, noise, opened=True)
 
     def _near(self, value: float) -> tuple[float, Orbit | None]:

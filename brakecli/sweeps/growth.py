@@ -80,6 +80,11 @@ class Sliding(SteadySliding):
         return bool(np.abs(slopes).sum() > SLOPE)
 
     @property
+    def forced(self) -> bool:
+        """Whether a rough wheel forces a motion that is not linear, or whose disturbances it feeds."""
+        return bool(self.system.wheel.g.size) and (self.opens or self.modulated)
+
+    @property
     def opens(self) -> bool:
         """Whether the surfaces touch in part only, so that the motion is not linear."""
         return self.stiffness < 0.999 * self.system.contact_stiffness

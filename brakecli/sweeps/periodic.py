@@ -146,17 +146,23 @@ def orbit(segments: Segments, states: Floats, maps: Floats | None) -> Orbit | No
     return None
 
 
+def exponent_length(found: Sliding) -> float:
+    """The time (s) of the run that Lyapunov's exponent is measured in."""
+    slow = natural_frequencies(found.system.coefficients, found.stiffness)[0]
+    passing = abs(found.system.belt_speed) * float(found.system.wheel.turns.min())
+    return (TRANSIENT + BATCHES * BATCH) * min(
+        max(2.0 / slow if slow > 0.0 else 0.0, 1.0 / passing), LONGEST / BATCH
+    )
+
+
 def lyapunov(found: Sliding, plain: Growth | None) -> Growth | None:
     """Lyapunov's exponent of the motion from steady sliding, from means over batches of a long run.
 
     A motion that leaves what roughness forces on it is on its way to another one: its exponent says nothing, and
     the growth counts that was measured before, if it is one.
     """
-    system = found.system
-    slow = natural_frequencies(system.coefficients, found.stiffness)[0]
-    passing = abs(system.belt_speed) * float(system.wheel.turns.min())
-    length = min(max(2.0 / slow if slow > 0.0 else 0.0, 1.0 / passing), LONGEST / BATCH)
     count = TRANSIENT + BATCHES * BATCH
+    length = exponent_length(found) / count
     segments = Segments(found, count * length, count)
     states = [segments.rest]
     for k in range(count):
