@@ -113,7 +113,7 @@ def search(
     @cache
     def fades(value: float) -> bool | None:
         unstable = value >= found.upper if found.outcome is Outcome.FOUND else None
-        steady, case = sliding_at(value), case_at(value)
+        steady, case = sliding_at(value), _stepped(case_at(value))
         linear = steady is not None and not steady.opens
         # Beside stable sliding it may yet fade away, or has not yet come to where it lasts.
         times, before = 1.0, None
@@ -129,6 +129,16 @@ def search(
 
     sustained, outcome = _sustained(critical, fades, found)
     return found._replace(sustained=sustained, sustained_outcome=outcome)
+
+
+def _stepped(case: Case) -> Case:
+    """The case with the step that growth is measured with, where it gives none: no run is computed twice."""
+    system = system_of(case)
+    method = with_step(system).method
+    if method == system.method:
+        return case
+    keys = ("scheme", "theta", "start", "step")
+    return changed(case, solver={**{key: getattr(method, key) for key in keys}, "tolerance": None})
 
 
 def _by_eigenvalues(critical: Critical, sliding_at: SlidingAt) -> Search:
