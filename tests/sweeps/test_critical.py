@@ -487,6 +487,21 @@ def test_rounding_of_a_far_position_is_in_the_error_bar_near_self_locking(scheme
     assert error < 0.01 * exact.friction
 
 
+def test_without_dashpots_rounding_near_self_locking_is_in_the_error_bar_of_three_layer() -> None:
+    bare = {
+        "shoe": {"mass": 1.64},
+        "wheel": {"radius": 0.5, "angular_speed": 8.97},
+        "link1": {"stiffness": 413000.0, "angle_deg": 0.0421},
+        "link2": {"stiffness": 260.0, "angle_deg": -36.8},
+        "load": {"force": 21.2},
+        "friction": {"coefficient": 0.1},
+        "contact": {"half_length": 0.05, "stiffness": 2770000.0},
+        "solver": {"scheme": "three-layer", "step": 4.8e-5, "duration": 0.05},
+    }
+    value, _, _, error = bracket(found(bare, 0.0, 2.9, tolerance=1e-6))
+    assert abs(value - 0.9697081603340532) <= error < 1e-3  # Hurwitz in 50 digits
+
+
 @pytest.mark.parametrize("angle", [90.0, -90.0])
 @pytest.mark.parametrize("method", ["simulation", "eigenvalue"])
 def test_a_shoe_that_no_link_holds_has_no_critical_friction(angle: float, method: str) -> None:
