@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from brakecli.analysis.regime.cleaning import line_share
 from brakecli.analysis.regime.spectra import FEWEST_CYCLES, Array, interpolated, upward_crossings
 from brakecli.solver.history import History
 from brakecli.solver.quantities import ContactState
@@ -118,6 +119,10 @@ class Part:
         if not lines or total == 0.0:
             return 0.0
         return float(power[_near(lines, frequencies)].sum()) / total
+
+    def narrow(self) -> float:
+        """Part of the energy of vx in its three strongest narrow bands."""
+        return line_share(self._spectrum[1])
 
     def covered(self, lines: Sequence[float]) -> float:
         """Part of the band up to the highest frequency of note that lines (Hz) take: what chance would find."""

@@ -5,6 +5,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from brakecli.analysis.regime.evidence import WINDOWS, Cycles, Envelope, Part
 from brakecli.analysis.regime.verdict import Context, Decision, Excitation, Feeds, Regime, Thresholds
 from brakecli.solver.history import History
@@ -20,6 +23,8 @@ QUARTER = 4.0 / 3.0  # a run whose last quarter is settled, over what comes befo
 _ERRORS = 2.0  # standard errors of a mean power
 _LARGER = 5.0  # times what the waves force in full contact: a larger motion needs more proof that it is forced
 _MOST_COMBINED = 6  # waves whose frequencies are combined by threes
+_FOLLOWS = 0.1  # part of the energy of vx and vy in which a motion differs that comes back with the waves
+_PROBES, _MOST_RETURNS, _APART = 400, 1 << 14, 5  # times compared, among how many, so many cycles of vx apart
 _COMBINATIONS = [(i, j, k) for i in range(-2, 3) for j in range(-2, 3) for k in (-1, 0, 1)]
 
 
@@ -92,6 +97,12 @@ class ForcedRules:
             return self._forced(text) if growth < 0.0 else Decision(f"{text}, but no dashpot damps it")
         share, dense = self._share(self.context.forced, 0.5)
         self.evidence["forced_share"] = share
+        if share >= self.limits.forced_share and self.context.undamped and growth <= 0.0:
+            text = f"{share:.0%} of the energy of vx lies on the lines of the roughness"
+            return Decision(f"{text}, but no dashpot damps what the shoe adds; a dashpot would decide")
+        if growth < 0.0 and not self._unstable_in_full_contact and not self._larger and self._follows():
+            text = "the motion comes back wherever the waves of the wheel do, and sliding is stable"
+            return self._forced(f"only the roughness shakes the shoe: {text}")
         if share < self.limits.forced_share:
             lines = tuple({*self.context.forced, *self.context.subharmonics})
             share, dense = self._share(lines, 0.3)
@@ -130,6 +141,34 @@ class ForcedRules:
     def _expected(self) -> float:
         """Standard deviation of x (m) that the waves force in full contact."""
         return math.sqrt(0.5 * sum(swing**2 for _, swing in self.context.waves))
+
+    def _follows(self) -> bool:
+        """Whether vx and vy come back, at times far from one another, wherever all waves have the same phase."""
+        from scipy.spatial import cKDTree
+
+        speeds = np.array([frequency * swing for frequency, swing in self.context.waves])
+        for part in (self.settled_part, self.last):
+            velocity = np.stack([part.last("vx"), part.last("vy")], axis=1)
+            rises = np.count_nonzero((velocity[:-1, 0] < 0.0) & (velocity[1:, 0] >= 0.0))
+            size = velocity.std(axis=0)
+            if rises <= 2 * _APART or not size.all():
+                continue
+            stride = -(-len(velocity) // _MOST_RETURNS)
+            places: NDArray[np.intp] = np.arange(0, len(velocity), stride)
+            turns = np.outer(places * part.history.interval, [frequency for frequency, _ in self.context.waves])
+            waves = speeds / speeds.max() * np.exp(2j * math.pi * turns)
+            points = np.concatenate([waves.real, waves.imag], axis=1)
+            probes = np.linspace(0, len(places) - 1, _PROBES).astype(int)
+            near = np.asarray(cKDTree(points).query(points[probes], k=min(_PROBES, len(places)))[1])
+            far = np.abs(near - probes[:, None]) * stride > _APART * len(velocity) / rises
+            found = far.any(axis=1)
+            if np.count_nonzero(found) < _PROBES // 2:
+                continue
+            pairs = probes[found], near[found, far[found].argmax(axis=1)]
+            apart = np.subtract(*(velocity[places[each]] / size for each in pairs))
+            if float(np.mean(apart**2)) <= 2.0 * _FOLLOWS:
+                return True
+        return False
 
     def _share(self, lines: Sequence[float], most: float) -> tuple[float, bool]:
         """Part of the energy of vx on lines, in the second half or in the last quarter, where it is more.

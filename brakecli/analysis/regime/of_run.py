@@ -14,7 +14,7 @@ from brakecli.analysis.regime.forced import forced_lines, subharmonics
 from brakecli.analysis.regime.linear import linear_theory
 from brakecli.analysis.regime.rules import classify
 from brakecli.analysis.regime.verdict import Context, Excitation, Regime, Thresholds, Verdict
-from brakecli.analysis.stability.modes import growth
+from brakecli.analysis.stability.modes import growth, is_undamped
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError, UnreadableResultError
@@ -78,6 +78,7 @@ def context(system: System) -> Context:
         quiet=1e-9 * fastest,
         scale=fastest,
         frictionless=c.phi == 0.0,
+        undamped=is_undamped(c),
         growth=growth_rate,
         linear=lambda: theory,
         powers=partial(_powers, system, belt),

@@ -18,6 +18,7 @@ if TYPE_CHECKING:  # a measured signal needs no compiled code
 
 _NEAR = 0.3  # by which the amplitude of a motion that stick or loss of contact limits may still change
 _DRIFT = 5e-3  # by which the amplitude of a motion without stick may change where sliding is stable
+_FAR = 0.3  # rad, of a wave, by which what the shoe adds moves it
 _DEFAULT = Thresholds()
 
 
@@ -56,7 +57,11 @@ class _Rules(ForcedRules):
         start = max(min(self.last.start, self.history.samples - int(slow / self.history.interval)), 0)
         if theory is None or not replace(self.last, start=start).slides(theory.slip):
             return None
-        self.theory, mode = theory, theory.mode
+        mean, theory = theory, theory.with_slopes()
+        mode = theory.mode
+        if theory.direction != mean.direction and (theory.direction == 0 or self._swings_far(theory)):
+            return self._steep(theory)
+        self.theory = theory
         how = f"{mode.frequency:.4g} Hz" if mode.frequency else "without oscillation"
         linear = "full contact and slip to one side make the motion linear"
         if theory.direction == 0:
@@ -71,6 +76,20 @@ class _Rules(ForcedRules):
         if self.duration < slow:
             return self._too_short(slow)
         return self._shaken(theory, slow, decays)
+
+    def _swings_far(self, theory: "Linear") -> bool:
+        """Whether what the shoe adds is no longer small beside the waves, so that their slope is not linear."""
+        own = theory.parts(*self.last.places())[1]
+        return 0.5 * float(np.ptp(own)) * float(theory.wavenumbers.max()) > _FAR
+
+    def _steep(self, theory: "Linear") -> Decision:
+        """The slopes of the waves leave open whether a small vibration grows: lines may show that it is forced."""
+        found = self.forced()
+        if found and found.regime is Regime.DAMPED:
+            return found
+        rate = f"{theory.mode.growth:.2g} ± {theory.known_to:.1g} 1/s"
+        text = f"in full contact the slopes of the passing waves make the shoe's own vibration grow at {rate}"
+        return Decision(f"{text}; run longer, and see whether amplitude_own falls")
 
     def _end(self) -> tuple[float, Any]:
         """Time and state of the last sample."""
@@ -162,9 +181,13 @@ class _Rules(ForcedRules):
         if stick >= self.limits.stick_cycles:
             text = f"sustained, with stick in {stick:.0%} of {cycles:.0f} cycles"
             return Decision(text, Regime.RELAXATION, *own)
+        bands = self.evidence["band_share"] = self.settled_part.narrow()
         lines = f"{harmonic:.0%} of the energy of vx in one line and its harmonics"
-        if stick == 0.0 and harmonic >= self.limits.harmonic_share:
-            return Decision(f"sustained without stick: {lines}", Regime.QUASI_HARMONIC, *own)
+        if harmonic < bands:
+            lines = f"{bands:.0%} of the energy of vx in three narrow bands"
+        if stick <= 1.0 - self.limits.stick_cycles and max(harmonic, bands) >= self.limits.harmonic_share:
+            how = f"with stick in only {stick:.0%} of the cycles" if stick else "without stick"
+            return Decision(f"sustained {how}: {lines}", Regime.QUASI_HARMONIC, *own)
         irregular = f"irregular: stick in {stick:.0%} of the cycles, {lines}"
         return Decision(f"{irregular}; run longer, or look at the spectrum")
 

@@ -56,6 +56,7 @@ class Context:
     quiet: float = 0.0  # m/s, size of vx that may come from rounding
     scale: float = math.inf  # m/s, of a motion that would open the contact
     frictionless: bool = False
+    undamped: bool = False
     growth: Callable[[], float] = lambda: 0.0  # 1/s, of a small disturbance of steady sliding; below 0 it decays
     linear: Callable[[], "Linear | None"] = lambda: None  # the theory of full contact
     powers: Callable[[Part], dict[str, float]] = lambda part: {}  # W, what becomes of the power of the belt
