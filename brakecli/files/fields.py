@@ -20,7 +20,12 @@ VERDICT = (
     Field("regime", "", "regime of the motion", "S16", "verdict."),
     Field("excitation", "", "where the energy of a sustained motion comes from", "S16", "verdict."),
     Field("frequency", "Hz", "fundamental frequency of vx of a sustained motion", at="verdict."),
-    Field("growth_rate", "1/s", "where the motion is linear: growth rate of its slowest mode, slopes of passing waves included", at="verdict."),
+    Field(
+        "growth_rate",
+        "1/s",
+        "where the motion is linear: growth rate of its slowest mode, slopes of passing waves included",
+        at="verdict.",
+    ),
     Field("ringing_frequency", "Hz", "frequency of that mode", at="verdict."),
     Field(
         "amplitude", "m", "half of peak to peak of x: median of the cycles", at="verdict.", label="amplitude of x"
