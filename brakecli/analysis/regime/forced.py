@@ -25,6 +25,7 @@ _LARGER = 5.0  # times what the waves force in full contact: a larger motion nee
 _MOST_COMBINED = 6  # waves whose frequencies are combined by threes
 _FOLLOWS = 0.1  # part of the energy of vx and vy in which a motion differs that comes back with the waves
 _PROBES, _MOST_RETURNS, _APART = 400, 1 << 14, 5  # times compared, among how many, so many cycles of vx apart
+SECOND_RUN = "a second run: brakecli classify RESULT.h5 --second-run"
 _COMBINATIONS = [(i, j, k) for i in range(-2, 3) for j in range(-2, 3) for k in (-1, 0, 1)]
 
 
@@ -95,6 +96,10 @@ class ForcedRules:
         if self.context.frictionless:
             text = "without friction nothing but the roughness shakes the shoe"
             return self._forced(text) if growth < 0.0 else Decision(f"{text}, but no dashpot damps it")
+        if self.context.feeds is Feeds.ROUGHNESS:
+            return self._forced("only the roughness shakes the shoe, as a second run shows")
+        if self.context.feeds is Feeds.FRICTION:
+            return None
         share, dense = self._share(self.context.forced, 0.5)
         self.evidence["forced_share"] = share
         if share >= self.limits.forced_share and self.context.undamped and growth <= 0.0:
@@ -117,15 +122,18 @@ class ForcedRules:
         what = f"{share:.0%} of the energy of vx lies on the lines of the roughness"
         if powers_of_e > _NOTHING:
             own = f"but sliding is unstable: the shoe's own vibration grows at {growth:.3g} 1/s"
-            return self.fed() or Decision(f"{what}, {own}; run at least {GROWN / growth:.2g} s")
+            text = f"{what}, {own}; run at least {GROWN / growth:.2g} s, or decide by {SECOND_RUN}"
+            return self.fed() or Decision(text, second_run=True)
         if feeds is Feeds.FRICTION and self.evidence["power_of_roughness"] < 0.0:
             return None
         doubtful = larger or self._unstable_in_full_contact
         if feeds is Feeds.FRICTION or (doubtful and feeds is Feeds.UNKNOWN):
             return self._either()
         if dense:
-            text = f"{what}, which lie too close to be told from others; run twice as long"
-            return self.fed() or Decision(text)
+            text = (
+                f"{what}, which lie too close to be told from others; run twice as long, or decide by {SECOND_RUN}"
+            )
+            return self.fed() or Decision(text, second_run=True)
         return self._forced(f"only the roughness shakes the shoe: {what}")
 
     @property
@@ -209,6 +217,8 @@ class ForcedRules:
         friction, off = self.settled_part.power("friction_force", "vx")
         roughness, off_too = self.settled_part.power("normal_force", "vy")
         self.evidence |= {"power_of_friction": friction, "power_of_roughness": roughness}
+        if self.context.feeds is not Feeds.UNKNOWN:
+            return self.context.feeds
         lost = self.context.powers(self.settled_part).get("power_dashpots", friction + roughness)
         open_by = abs(friction + roughness - lost)
         error = _ERRORS * max(math.hypot(off, off_too), open_by)
@@ -229,8 +239,10 @@ class ForcedRules:
         return self._forced(f"only the roughness shakes the shoe: {self._powers}")
 
     def _either(self) -> Decision:
-        remedy = "a second run, without roughness or with less friction, decides at the cost of this one"
-        return Decision(f"{self._powers}, so that either may keep it up; {remedy}")
+        text = f"{self._powers}, so that either may keep it up"
+        if self.context.undamped and self.context.growth() <= 0.0:
+            return Decision(f"{text}, and no dashpot damps what the shoe adds; a dashpot would decide")
+        return Decision(f"{text}; decide by {SECOND_RUN}, at about the cost of this one", second_run=True)
 
     @property
     def _powers(self) -> str:

@@ -265,4 +265,5 @@ def classify(history: History, context: Context, thresholds: Thresholds = _DEFAU
         reasons=(decision.reason,),
         evidence=evidence,
         thresholds=thresholds,
+        second_run=decision.second_run,
     )
