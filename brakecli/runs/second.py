@@ -23,6 +23,8 @@ from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import Initial, System
 
 _REDUCED = 1.0 / 3.0  # of the critical friction: far below it also where surfaces that open move it
+_LOST = 4.0  # powers of e by which what is not forced has decayed
+_LONGER = 4.0  # times as long, so that it loses its start, and a vibration that dies becomes linear
 _REMAINS, _VANISHES = 0.7, 0.2  # part of the level of the first run
 
 
@@ -50,7 +52,7 @@ def classify_twice(
         if (size := 8.0 * len(HISTORY) * found.system.samples) > MOST_TABLE_BYTES:
             remedy = "run the case with a shorter solver.duration or a larger output.sample_interval"
             raise RefusedError(f"--second-run: its history would take {size / 1e9:.3g} GB of memory; {remedy}")
-        say(f"second run, {second.change}: about {duration_text(found.seconds)}")
+        say(f"second run, {second.change}, four times as long: about {duration_text(found.seconds)}")
         feeds, shown = compared(second, history, lambda done: progress("steps", done, second.system.steps))
         verdict = verdict_on(history, system, failure, thresholds, feeds)
         return numbers_of(replace(verdict, reasons=(*verdict.reasons, shown)), failure)
@@ -63,18 +65,20 @@ def second_system(system: System, history: History) -> Second:
     run goes on from the end of the first, without the roughness of the wheel. Otherwise it has less friction than
     makes sliding unstable.
     """
+    longer = replace(system, duration=_LONGER * system.duration)
     belt, c, theory = system.belt_speed, system.coefficients, (known := context(system)).linear()
     if known.growth() < 0.0 and (theory is None or theory.direction < 0):
         last = history.samples - 1
         x, y, vx, vy = (float(history.read(name, last, last + 1)[0]) for name in ("x", "y", "vx", "vy"))
-        smooth = replace(system, wheel=surface(), initial=Initial(x, y, vx, vy))
+        start = Initial(x, y, vx, vy)
+        smooth = replace(longer, wheel=surface(), initial=start)
         return Second(smooth, "without the roughness of the wheel, from the end of this one", smooth=True)
     stiffnesses = [system.contact_stiffness]
     with suppress(CaseError):
         stiffnesses.append(steady_sliding(system, belt=belt).stiffness)
     lost = [crossing.friction for stiffness in stiffnesses for crossing in crossings(c, stiffness, belt)]
     phi = min([c.phi, *lost])
-    less = replace(system, coefficients=c._replace(phi=_REDUCED * phi))
+    less = replace(longer, coefficients=c._replace(phi=_REDUCED * phi))
     return Second(
         less, f"with a friction coefficient of {_REDUCED * phi:.3g}, at which sliding is stable", smooth=False
     )
@@ -88,10 +92,12 @@ def compared(second: Second, history: History, progress: Progress = lambda steps
     again = array_history(second.system.interval, motion.rows)
     part = level(again) / level(history)
     text = f"in the second run, {second.change}, vx has {part:.2g} times the level"
-    if not second.smooth:
-        feeds = Feeds.ROUGHNESS if part >= _REMAINS else Feeds.FRICTION if part <= _VANISHES else Feeds.UNKNOWN
-        return feeds, text
     verdict = verdict_on(again, second.system, None)
+    if not second.smooth:
+        lost = -context(second.system).growth() * second.system.duration > _LOST  # what is left of the start
+        lost &= verdict.excitation is not Excitation.SELF_EXCITED
+        remains = part >= _REMAINS and (lost or verdict.excitation is Excitation.FORCED)
+        return Feeds.ROUGHNESS if remains else Feeds.FRICTION if part <= _VANISHES else Feeds.UNKNOWN, text
     if verdict.regime is Regime.DAMPED:
         return Feeds.ROUGHNESS, f"{text}: {verdict.reasons[0]}"
     lasts = verdict.settled and verdict.excitation is Excitation.SELF_EXCITED and part >= _REMAINS

@@ -59,7 +59,10 @@ def test_a_second_run_decides_what_its_verdict_leaves_open(here: Path) -> None:
     forced, own = each(here, [["classify", name, "--second-run", "--json"] for name in names])
     assert (forced.json["regime"], forced.json["excitation"]) == ("damped", "forced")
     assert (own.json["regime"], own.json["excitation"]) == ("relaxation", "self-excited")
-    assert "second run, without the roughness of the wheel, from the end of this one: about" in forced.err
+    assert (
+        "second run, without the roughness of the wheel, from the end of this one, four times as long: about"
+        in forced.err
+    )
     assert "second run, with a friction coefficient of" in own.err
     assert all("in the second run" in result.json["reasons"][-1] for result in (forced, own))
 

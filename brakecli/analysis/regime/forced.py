@@ -72,7 +72,7 @@ class ForcedRules:
 
     def _long_enough(self, slow: float) -> float:
         """Duration (s) of a run whose settled part holds two periods."""
-        start = self.settled_part.start * self.history.interval if self.settled else 0.5 * self.duration
+        start = self.settled_part.start * self.history.interval if self.settled else 2.0 * slow
         return max(start + 2.0 * slow, QUARTER * 2.0 * slow) * 1.05
 
     def _too_short(self, slow: float) -> Decision:
@@ -142,6 +142,12 @@ class ForcedRules:
         return theory is not None and theory.direction > 0
 
     @property
+    def _doubtful(self) -> bool:
+        """Whether friction can keep up only a large vibration, which no second run has shown."""
+        stable = self.context.growth() < 0.0 and not self._unstable_in_full_contact
+        return stable and self.context.feeds is not Feeds.FRICTION
+
+    @property
     def _larger(self) -> bool:
         return 0.0 < _LARGER * self._expected < self.last.deviation("x")
 
@@ -197,6 +203,9 @@ class ForcedRules:
         slow = self._slowest(self.settled_part.amplitude("x"))
         if self._settled_seconds < 2.0 * slow:
             return self._too_short(slow)
+        if not self.settled and (growth := self.context.growth()) < 0.0:
+            needed = max(QUARTER * (self.duration - 3.0 / growth), self._long_enough(slow))
+            text += f"; run at least {needed:.3g} s to see the amplitude that lasts"
         return Decision(text, Regime.DAMPED, Excitation.FORCED)
 
     def _settle(self) -> bool:
@@ -242,7 +251,9 @@ class ForcedRules:
         text = f"{self._powers}, so that either may keep it up"
         if self.context.undamped and self.context.growth() <= 0.0:
             return Decision(f"{text}, and no dashpot damps what the shoe adds; a dashpot would decide")
-        return Decision(f"{text}; decide by {SECOND_RUN}, at about the cost of this one", second_run=True)
+        return Decision(
+            f"{text}; decide by {SECOND_RUN}, at some four times the cost of this one", second_run=True
+        )
 
     @property
     def _powers(self) -> str:
