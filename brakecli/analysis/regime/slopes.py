@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-_MOST_WAVES, _MOST_SUMS = 6, 100  # with which sums of two frequencies are kept
+_MOST_WAVES, _MOST_SUMS = 4, 41  # with which sums of two frequencies are kept
 _HIGHEST = 4  # frequencies in a sum
 _OWN = 0.2  # least part of an eigenvector at the sum 0: others are copies, moved by a frequency and cut off
 _NEGLIGIBLE = 1e-3  # part of the growth rate
