@@ -103,12 +103,12 @@ def test_no_verdict_contradicts_an_independent_answer(stratum: str, count: int) 
 MOST_UNDECIDED = {"smooth": 0.08, "slow": 0.02, "full": 0.11, "open": 0.20, "frictionless": 0.02}
 """Parts that may stay undecided after a second run, beside the neutral and those that still grow.
 
-What is left has no answer in a run of its length: a strong start that still decays (a run need not hold the few
-powers of e that this takes), an amplitude that drifts by more than 5 %, stick in a quarter to three quarters of the
-cycles, and on surfaces that open vibrations that lose a part of their level without friction. Of most of these the
-independent answer, from runs eight times longer, does not know either. They are a tenth of the shoes in full contact
-and a sixth of those that open. The bounds leave one shoe in forty for other processors, on which a chaotic motion
-ends elsewhere.
+What is left has no answer in a run of its length: a strong start that still decays (a run need not hold
+the few powers of e that this takes), an amplitude that drifts by more than 5 %, stick in a quarter to
+three quarters of the cycles, and on surfaces that open vibrations that lose a part of their level
+without friction. Of most of these the independent answer, from runs eight times longer, does not know
+either. They are a tenth of the shoes in full contact and a sixth of those that open. The bounds leave
+one shoe in forty for other processors, on which a chaotic motion ends elsewhere.
 """
 
 
