@@ -123,7 +123,10 @@ def check_table(title: str, found: Check) -> str:
 
 def estimate_table(title: str, found: Estimate) -> str:
     """What a sweep would cost."""
-    return two_columns(title, [("points", str(found.points)), ("workers", str(found.workers)), *_cost_rows(found)])
+    about = "at least" if found.at_least else "about"
+    return two_columns(
+        title, [("points", str(found.points)), ("workers", str(found.workers)), *_cost_rows(found, about)]
+    )
 
 
 def _cost_rows(found: Check | Estimate, about: str = "about") -> list[Row]:

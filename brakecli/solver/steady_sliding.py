@@ -10,7 +10,7 @@ from numba import float64, void
 from numpy.typing import NDArray
 
 from brakecli.errors import CaseError, Problem
-from brakecli.solver.compile import Floats, at_address, kernel, vector
+from brakecli.solver.compile import Floats, at_address, borrowed, kernel, vector
 from brakecli.solver.contact.closed_form import CLEAR, FULL, coverage
 from brakecli.solver.contact.pad import build_layer
 from brakecli.solver.records import EVALUATE, LAYER, WAVES, Layer
@@ -20,7 +20,6 @@ from brakecli.solver.system import System
 PLACES = 1024
 """Positions of the wheel that an average takes, over 50 of its longest waves."""
 TABLE = 129
-_AT_ONCE = 64  # places
 
 _evaluate_at = at_address(EVALUATE)
 
@@ -39,6 +38,19 @@ class SteadySliding:
     contact_fraction: float
 
 
+@kernel(void(float64, vector, vector, WAVES, LAYER, vector))
+def add_places(y: float, places: Floats, weights: Floats, waves: NDArray[Any], layer: Layer, sums: Floats) -> None:
+    """Add force, stiffness and touching part at places of the wheel, with their weights."""
+    layer = borrowed(layer)
+    contact = layer.contact
+    for i in range(places.size):
+        wheel_angles(waves, places[i], 0.0, layer.angles)
+        _evaluate_at(layer.evaluate)(0.0, y, layer)
+        sums[0] += weights[i] * contact.normal_force
+        sums[1] += weights[i] * contact.stiffness
+        sums[2] += weights[i] * contact.fraction
+
+
 def mean_contact(system: System, y: float) -> tuple[float, float, float]:
     """Force (N), stiffness (N/m) and touching part at a height y (m), averaged over the travel of the wheel.
 
@@ -54,23 +66,10 @@ def mean_contact(system: System, y: float) -> tuple[float, float, float]:
         return -pad.k * length * (y + pad.shoe_mean), pad.k * length, 1.0
     places = np.zeros(1) if wheel.g.size == 0 else 50.0 / wheel.turns.min() * (np.arange(PLACES) + 0.5) / PLACES
     weights = np.ones(1) if wheel.g.size == 0 else 2.0 * np.sin(np.pi * (np.arange(PLACES) + 0.5) / PLACES) ** 2
-    found, layer, waves = np.zeros(3), build_layer(system.evaluate, system.pad), wheel.waves
-    for start in range(0, len(places), _AT_ONCE):  # between calls Ctrl-C is heard
-        some = slice(start, start + _AT_ONCE)
-        add_contacts(y, waves, layer, np.stack([places[some], weights[some]]), found)
+    found = np.zeros(3)
+    add_places(y, places, weights, wheel.waves, build_layer(system.evaluate, system.pad), found)
     force, stiffness, fraction = found / len(places)
     return float(force), float(stiffness), float(fraction)
-
-
-@kernel(void(float64, WAVES, LAYER, float64[:, ::1], vector))
-def add_contacts(y: float, waves: NDArray[Any], layer: Layer, weighted: Floats, found: Floats) -> None:
-    """Add the weighted force, stiffness and touching part at some places of the wheel (m) to those found."""
-    for i in range(weighted.shape[1]):
-        wheel_angles(waves, weighted[0, i], 0.0, layer.angles)
-        _evaluate_at(layer.evaluate)(0.0, y, layer)
-        found[0] += weighted[1, i] * layer.contact.normal_force
-        found[1] += weighted[1, i] * layer.contact.stiffness
-        found[2] += weighted[1, i] * layer.contact.fraction
 
 
 @dataclass(frozen=True)
