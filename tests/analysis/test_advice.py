@@ -75,7 +75,7 @@ def test_sensitivities_of_the_minimal_model_are_those_of_its_closed_form() -> No
             assert found.elasticity == pytest.approx(exact * value / 0.75, abs=1e-8), name
 
 
-@pytest.mark.parametrize("shoes", counts(4, 60))
+@pytest.mark.parametrize("shoes", counts(4, 40))
 def test_derivatives_are_those_of_perturbation_theory(shoes: int) -> None:
     """Where a pair crosses, Re(uᴴ dA v / uᴴ v) = 0 along the change of a number and of φ together."""
 
