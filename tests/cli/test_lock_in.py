@@ -83,7 +83,7 @@ def test_the_minimal_model_grows_as_published(here: Path) -> None:
 
 def test_values_without_steady_sliding_are_gaps_and_the_ends_of_sliding_are_marked(here: Path) -> None:
     locking = ["--set", "link2.angle_deg=-5.0", "--vary", "friction.coefficient=0:100:5"]
-    speed = ["--vary", "wheel.angular_speed=1:-1:5"]
+    speed = ["--vary", "wheel.angular_speed=1:-1:5", "-o", "gap.h5"]
     lines = [["stability", DAMPED, *more, "--json"] for more in (locking, speed)]
     locks, turns = (done.json for done in each(here, lines))
     assert [entry["frequencies"][0] is None for entry in locks["vary"]] == [False, False, False, True, True]
@@ -91,11 +91,10 @@ def test_values_without_steady_sliding_are_gaps_and_the_ends_of_sliding_are_mark
     gap = turns["vary"][2]
     assert [gap[name] for name in NAMES] == [[None, None]] * 3
     assert [entry["instability"] for entry in turns["vary"]] == ["flutter", "flutter", None, *["divergence"] * 2]
-    brakecli("stability", DAMPED, *speed, "-o", "gap.h5", "-q", cwd=here).told(0)
     with xarray.open_dataset(here / "gap.h5", engine="h5netcdf") as stored:
         assert np.isnan(stored.frequencies.values).any(axis=1).tolist() == [False, False, True, False, False]
         assert stored.wheel_angular_speed.units == "rad/s"
-    brakecli("plot", "gap.h5", "-q", cwd=here).told(0)
+    assert np.isnan(panels(here / "gap.h5")[0].get_lines()[0].get_ydata()).any()
 
 
 def test_keys_are_tied_and_whole_numbers_stay_whole(here: Path) -> None:
@@ -139,9 +138,7 @@ def test_what_cannot_be_varied_or_written_is_told_before_anything_is_computed(he
         ("--vary", "title=0:1:2"): "title: is not a text (found 0.0)",
         ("--vary", "shoe.mass,shoe.mass=1:2:2"): "is not KEY=START:STOP:NUM",
         ("--vary", "shoe.mass=1:1e200:2"): "is not KEY=START:STOP:NUM",
-        ("--vary", "shoe.mass=1:1:2"): "is not KEY=START:STOP:NUM",
         ("--vary", "shoe.mass,shoe.weight=1:2:2"): "shoe.weight: is unknown",
-        ("--vary", "shoe.mass=0:2:2"): "shoe.mass: is out of range (found 0.0)",
         ("--vary", "contact.nodes=2:3:3"): "is not a whole number (found 2.5)",
         (*FRICTION, "-o", "d.h5"): "d.h5: exists already; replace it with --force",
         (*FRICTION, "-o", "d.xlsx"): "ends in .h5 or .csv",
