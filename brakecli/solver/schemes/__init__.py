@@ -39,9 +39,7 @@ class Scheme:
     """What a scheme states of itself.
 
     `theta`: its weights where a case gives none. `sum_is_one`: whether weights must add up to one. `own_steps`: it
-    finds its steps itself and keeps a tolerance, so that no step can be unstable, or bias anything. `unstable`:
-    what to do where it multiplies disturbances. `colour`: in pictures.
-    """
+X    """
 
     module: str
     trials: tuple[Trial, ...]
@@ -49,6 +47,7 @@ class Scheme:
     theta: tuple[float, ...] = ()
     sum_is_one: bool = False
     own_steps: bool = False
+    exact: bool = False
     starts: tuple[str, ...] = ("consistent",)
     unstable: str = ""
 
@@ -83,6 +82,9 @@ SCHEMES: dict[str, Scheme] = {
         unstable="or take theta = [0.25, 0.5, 0.25]",
     ),
     "event-driven": Scheme("brakecli.solver.schemes.event_driven", (Trial(),), colour="#222222", own_steps=True),
+    "piecewise-exact": Scheme(
+        "brakecli.solver.schemes.piecewise_exact", (Trial(),), colour="#009E73", own_steps=True, exact=True
+    ),
 }
 
 
