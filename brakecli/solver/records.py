@@ -143,7 +143,7 @@ BELT, BELT_SLOPE, LOAD, LOAD_SLOPE = range(4, 8)
 """Further components of a piecewise-exact motion, beside those of an event-driven one: U, Q and their slopes."""
 
 SIZE, PHASES, MARGINS, WORKS, TERMS, NODES = 8, 4, 3, 4, 18, 6
-"""Its components, phases, margins of a phase, works that it adds up, terms of its series, nodes of its quadrature."""
+"""Its components, phases, margins of a phase, works, terms of its series, nodes of its quadrature."""
 
 FLOW = record(
     "x y v_x v_y",  # motion at the level reached, m and m/s
@@ -164,7 +164,10 @@ FLOW = record(
     needed=(float, SIZE),  # row whose product with z is the friction force that stick takes, N
     generator=(float, (PHASES, SIZE, SIZE)),  # A
     friction=(float, (PHASES, SIZE)),  # row of the friction force, N
-    margins=(float, (PHASES, 2 * MARGINS, SIZE)),  # rows of what is positive while the phase lasts, and of `before`
+    margins=(
+        float,
+        (PHASES, 2 * MARGINS, SIZE),
+    ),  # rows of what is positive while the phase lasts, and of `before`
     step=(float, (PHASES, 4 + 2 * MARGINS, SIZE)),  # rows of exp(A h) for x, y, v_x and v_y, and of `after`
     works=(float, (PHASES, WORKS, SIZE, SIZE)),  # forms in z that are the works of a step from z on, J
     sums=(float, (SIZE, SIZE)),  # sum of z zᵀ over the steps whose works wait to be added up

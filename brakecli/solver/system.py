@@ -133,11 +133,11 @@ class System:
     def per_sample(self) -> int:
         """Steps of a sample interval."""
         method = self.method
-        asked = method.share * self._longest_step if method.row.exact else None if method.own_steps else method.step
+        asked = method.share * self.longest_step if method.row.exact else None if method.own_steps else method.step
         return _at_least(self.interval / (asked or self.interval))
 
     @property
-    def _longest_step(self) -> float:
+    def longest_step(self) -> float:
         """The longest exact step, s, by bounds of the fastest motion and of the fastest decay."""
         c = self.coefficients
         bound = c.c_xx + c.c_yy + 2.0 * abs(c.c_xy) + (1.0 + c.phi) * self.contact_stiffness

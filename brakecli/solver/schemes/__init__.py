@@ -39,7 +39,10 @@ class Scheme:
     """What a scheme states of itself.
 
     `theta`: its weights where a case gives none. `sum_is_one`: whether weights must add up to one. `own_steps`: it
-X    """
+    finds its steps itself and keeps a tolerance, so that no step can be unstable, or bias anything. `exact`: its
+    steps make no error but rounding, on smooth surfaces alone. `unstable`: what to do where it multiplies
+    disturbances. `colour`: in pictures.
+    """
 
     module: str
     trials: tuple[Trial, ...]

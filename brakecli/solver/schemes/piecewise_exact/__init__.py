@@ -1,14 +1,14 @@
-"""The piecewise-exact scheme, for smooth surfaces: between two events the motion is linear, so a step is one matrix.
+"""The piecewise-exact scheme, for smooth surfaces: between two events the motion is linear, a step is a matrix.
 
-A whole step multiplies the state by exp(A h), which is made once per phase. Where a margin of the phase runs out in
-a step, or may dip below zero inside it, the step follows the Taylor series of the motion, from event to event.
-Whatever happens, steps end on the grid of samples. Nothing is smoothed, nothing stepped over.
+A whole step multiplies the motion by exp(A h), which is made once for each phase. Where a margin of the phase runs
+out in a step, or may dip below zero inside it, the step follows Taylor series from event to event. Whatever happens,
+steps end on the grid of samples. Nothing is smoothed, nothing stepped over.
 """
 
 import math
 from typing import Any
 
-from numba import float64, int64, types, void
+from numba import float64, int64, void
 
 from brakecli.solver.compile import Floats, borrowed, kernel
 from brakecli.solver.contact import CLOSED_FORM
@@ -19,6 +19,7 @@ from brakecli.solver.quantities import BOUND, Failure
 from brakecli.solver.records import (
     BELT,
     BELT_SLOPE,
+    COUNTS_TYPE,
     FLOW,
     FLOW_TYPE,
     LOAD,
@@ -37,6 +38,7 @@ from brakecli.solver.records import (
 )
 from brakecli.solver.schedules import integral_at, segment, slope_at, value_at
 from brakecli.solver.schemes.piecewise_exact import phases
+from brakecli.solver.schemes.piecewise_exact.locate import NO_EVENT, ROUNDING, first_event
 from brakecli.solver.schemes.piecewise_exact.phases import BACKWARD, FORWARD, HEIGHT, OPEN, STICK, add_works
 
 STATE = FLOW
@@ -45,14 +47,10 @@ MEMORY = ("x", "y", "v_x", "v_y")
 VELOCITIES = ("v_x", "v_y")
 mechanical_energy = energy_at_level
 
-_EPSILON = 2.220446049250313e-16
-_ROUNDING = 8.0 * _EPSILON  # of a margin, over the sum of its terms
-_LOOKS = 12  # how often a margin that begins at zero is sought above it, each time in an eighth of the time
 _MOST_EVENTS, _NO_PROGRESS = 1000, 1e-6  # a run ends after so many events within that part of a step
 _KEPT = 4096  # levels from one sum of the works to the next, so that rounding does not add up
 
 _PLANT = plant_type(FLOW)
-_NO_EVENT = -1
 _NONE, _, _DIVERGED, _, _, _STALLED = (int(failure) for failure in Failure)
 
 
@@ -70,88 +68,6 @@ def begin(s: Weights, state: Any, position: Pair, velocity: Pair, acceleration: 
     """The initial state; its phase is found with the first step."""
     state.x, state.y = position
     state.v_x, state.v_y = velocity
-
-
-@kernel(types.UniTuple(float64, 2)(FLOW_TYPE, int64, float64))
-def _value(m: Any, row: int, theta: float) -> tuple[float, float]:
-    """A polynomial and its slope at a part of the span."""
-    value, slope = 0.0, 0.0
-    for k in range(TERMS - 1, -1, -1):
-        slope = slope * theta + value
-        value = value * theta + m.polynomial[row, k]
-    return value, slope
-
-
-@kernel(float64(FLOW_TYPE, int64, float64, float64), inlined=False)
-def _root(m: Any, row: int, left: float, right: float) -> float:
-    """Where a polynomial falls through zero between left and right: Newton's iteration, kept in the bracket."""
-    place = right
-    for _ in range(200):
-        value, slope = _value(m, row, place)
-        if value > 0.0:
-            left = place
-        else:
-            right = place
-        if slope < 0.0 and abs(value) <= -_EPSILON * place * slope:
-            break
-        new = place - value / slope if slope < 0.0 else left
-        if not left < new < right:
-            new = 0.5 * (left + right)
-        if not left < new < right:
-            break
-        place = new
-    return place
-
-
-@kernel(types.UniTuple(float64, 3)(FLOW_TYPE, int64), inlined=False)
-def _follow(m: Any, which: int) -> tuple[float, float, float]:
-    """A margin on the series as a polynomial: its value and slope at the end, and what rounding does to it."""
-    terms, value, slope = 0.0, 0.0, 0.0
-    for k in range(TERMS):
-        m.polynomial[0, k] = 0.0
-    for i in range(SIZE):
-        row = m.margins[m.phase, which, i]
-        if row != 0.0:
-            terms += abs(row * m.series[0, i])
-            for k in range(TERMS):
-                m.polynomial[0, k] += row * m.series[k, i]
-    for k in range(TERMS):
-        value, slope = value + m.polynomial[0, k], slope + k * m.polynomial[0, k]
-        terms += abs(m.polynomial[0, k])
-    return value, slope, _ROUNDING * terms
-
-
-@kernel(types.Tuple((int64, float64))(FLOW_TYPE), inlined=False)
-def _first_event(m: Any) -> tuple[int, float]:
-    """The margin that runs out first on the series, and at which part of the span; 0 where it never was positive."""
-    found, first = _NO_EVENT, 1.0
-    for which in range(MARGINS if m.phase == STICK else MARGINS - 1):
-        last, slope, allowed = _follow(m, which)
-        start, right = m.polynomial[0, 0], 0.0
-        if start < -allowed:
-            return which, 0.0
-        if last < -allowed:
-            right = 1.0
-        elif m.polynomial[0, 1] < 0.0 < slope:  # it is lowest inside
-            for k in range(1, TERMS):
-                m.polynomial[1, k - 1] = -k * m.polynomial[0, k]
-            place = _root(m, 1, 0.0, 1.0)
-            right = place if _value(m, 0, place)[0] < -allowed else 0.0
-        if right == 0.0:
-            continue
-        left = 0.0
-        if start <= allowed:  # it begins at zero: where is it positive?
-            left = right
-            for _ in range(_LOOKS):
-                left *= 0.125
-                if _value(m, 0, left)[0] > allowed:
-                    break
-            else:
-                return which, 0.0
-        root = _root(m, 0, left, right)
-        if root < first:
-            found, first = which, root
-    return found, first
 
 
 @kernel(float64(FLOW_TYPE, int64))
@@ -207,13 +123,14 @@ def _pass_knot(p: Plant, t: float) -> None:
     m.z[LOAD], m.z[LOAD_SLOPE] = value_at(load, t), slope_at(load, t)
     in_belt, in_load = segment(belt, t) + 1, segment(load, t) + 1
     m.knot = min(
-        belt[in_belt].time if in_belt < belt.size else math.inf, load[in_load].time if in_load < load.size else math.inf
+        belt[in_belt].time if in_belt < belt.size else math.inf,
+        load[in_load].time if in_load < load.size else math.inf,
     )
 
 
 @kernel(void(_PLANT, float64, float64), inlined=False)
 def _take_hold(p: Plant, t: float, tau: float) -> None:
-    """The phase of a touching shoe that moves with the wheel: stick if friction can hold it there, else slip, (3)-(5)."""
+    """The phase of a touching shoe at the wheel's velocity: stick if friction can hold it, else slip, (3)-(5)."""
     m = p.state
     phases.make(p.c, m, STICK, p.s.h)
     for which in range(1, MARGINS):
@@ -221,7 +138,7 @@ def _take_hold(p: Plant, t: float, tau: float) -> None:
         for i in range(SIZE):
             part = m.margins[STICK, which, i] * m.z[i]
             total, terms = total + part, terms + abs(part)
-        if total < -0.5 * _ROUNDING * terms:
+        if total < -0.5 * ROUNDING * terms:
             m.phase = BACKWARD if which == 1 else FORWARD
             return
     travel, travel_low = integral_at(p.drive.belt, t, tau)
@@ -273,6 +190,15 @@ def _start(p: Plant) -> None:
     m.started = 1
 
 
+@kernel(void(FLOW_TYPE, COUNTS_TYPE))
+def _count(m: Any, counts: Any) -> None:
+    """Count a step; its matrix evaluates the contact once, where there is any."""
+    counts.kinds[CLOSED_FORM] += 1
+    if m.phase != OPEN:
+        counts.evaluations += 1
+        counts.most = 1
+
+
 @kernel(int64(_PLANT, float64), inlined=False)
 def _through(p: Plant, t: float) -> int:
     """Take the step that begins at time t, through all its events and knots; a `Failure`."""
@@ -283,11 +209,11 @@ def _through(p: Plant, t: float) -> int:
         for i in range(SIZE):
             m.series[0, i] = m.z[i]
         phases.expand(m, m.phase, span)
-        which, theta = _first_event(m)
+        which, theta = first_event(m)
         if theta > 0.0:
             phases.take_part(p.c, m, p.work, span, theta)
-            p.counts.kinds[CLOSED_FORM] += 1
-        if which != _NO_EVENT:
+            _count(m, p.counts)
+        if which != NO_EVENT:
             tau += theta * span
             if t + tau - m.events_time > _NO_PROGRESS * h:
                 m.events_time, m.events = t + tau, 0
@@ -306,7 +232,7 @@ def _through(p: Plant, t: float) -> int:
 
 @kernel(void(_PLANT, float64), inlined=False)
 def _sample(p: Plant, t: float) -> None:
-    """Put the sample at the level reached into the state; in stick the shoe is where the wheel is, without drift."""
+    """Put the sample at the level reached into the state; in stick the shoe is carried along without drift."""
     m, c, z, belt = p.state, p.c, p.state.z, p.drive.belt
     if m.phase == STICK:
         travel, travel_low = integral_at(belt, t, 0.0)
@@ -347,7 +273,7 @@ def advance(p: Plant, rows: Floats, events: Floats, stop: int) -> int:
                 rows[row, column] = m.row[column]
             row += 1
         if t + h < m.knot and _whole(m, h) == 1:
-            counts.kinds[CLOSED_FORM] += 1
+            _count(m, counts)
         else:
             failure = _through(p, t)
         if not abs(m.z[X]) + abs(m.z[Y]) + abs(m.z[V_X]) + abs(m.z[V_Y]) < BOUND:
@@ -360,6 +286,4 @@ def advance(p: Plant, rows: Floats, events: Floats, stop: int) -> int:
         if failure != _NONE or counts.level % _KEPT == 0 or counts.level == last:
             add_works(m, p.work)
     m.x, m.y, m.v_x, m.v_y = m.z[X], m.z[Y], m.z[V_X], m.z[V_Y]
-    counts.evaluations = counts.kinds[CLOSED_FORM]  # one in each step, as a part of its matrix
-    counts.most = 1
     return failure

@@ -35,7 +35,7 @@ BACKWARD, STICK, FORWARD, OPEN = range(PHASES)
 """The sign of the sliding velocity plus one, or the pad that is clear."""
 HEIGHT, SLIDING = 0, 1
 """Margins: how far the pad is pressed in, or clear; then, in slip, the sliding speed; in stick, how far the force
-needed is within the friction cone, on the side of backward slip and, in the third place, on that of forward slip."""
+needed is within the friction cone, on the side of backward slip and, third, on that of forward slip."""
 
 _NODES = 0.5 + 0.5 * np.polynomial.legendre.leggauss(NODES)[0]
 _SHARES = 0.5 * np.polynomial.legendre.leggauss(NODES)[1]
@@ -117,7 +117,7 @@ def _describe(c: Coefficients, m: Any, phase: int) -> None:
 
 @kernel(void(COEFFICIENTS, FLOW_TYPE, int64, float64), inlined=False)
 def make(c: Coefficients, m: Any, phase: int, h: float) -> None:
-    """The matrices of a phase for steps h: exp(A h), and the works of a step as forms in the motion at its start."""
+    """The matrices of a phase for steps h: exp(A h), and the works of a step as forms in its first motion."""
     if m.made[phase] == 1:
         return
     m.made[phase] = 1
@@ -167,7 +167,10 @@ def add_works(m: Any, work: Any) -> None:
     belt, heat, dashpots, load = 0.0, 0.0, 0.0, 0.0
     for i in range(SIZE):
         for j in range(SIZE):
-            belt, heat = belt + m.works[m.phase, 0, i, j] * m.sums[i, j], heat + m.works[m.phase, 1, i, j] * m.sums[i, j]
+            belt, heat = (
+                belt + m.works[m.phase, 0, i, j] * m.sums[i, j],
+                heat + m.works[m.phase, 1, i, j] * m.sums[i, j],
+            )
             dashpots += m.works[m.phase, 2, i, j] * m.sums[i, j]
             load += m.works[m.phase, 3, i, j] * m.sums[i, j]
             m.sums[i, j] = 0.0
