@@ -65,8 +65,8 @@ def certify(system: System, progress: Progress = lambda samples: None) -> Certif
     """Compute a motion to the tolerance of its method; `progress` receives the samples of the run in progress.
 
     Smooth surfaces go to the piecewise-exact scheme, rough ones that touch everywhere to the event-driven one, as
-    their cost hardly depends on the error. Where surfaces open, the latter needs the exact contact integral, which is
-    expensive: while friction does not jump, a ladder of steps and nodes of the two-layer scheme may be cheaper
+    their cost hardly depends on the error. Where surfaces open, the latter needs the exact contact integral, which
+    is expensive: while friction does not jump, a ladder of steps and nodes of the two-layer scheme may be cheaper
     down to `LAYERED_FROM`. It is left where its next run takes long beside all the event-driven ones.
     """
     method = system.method

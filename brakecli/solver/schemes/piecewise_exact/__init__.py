@@ -1,8 +1,8 @@
 """The piecewise-exact scheme, for smooth surfaces: between two events the motion is linear, a step is a matrix.
 
 A whole step multiplies the motion by exp(A h), which is made once for each phase. Where a margin of the phase runs
-out in a step, or may dip below zero inside it, the step follows Taylor series from event to event. Whatever happens,
-steps end on the grid of samples. Nothing is smoothed, nothing stepped over.
+out in a step, or may dip below zero in it, the step follows Taylor series from event to event. Whatever happens,
+steps end on the grid of samples. Nothing is smoothed, and nothing is passed over.
 """
 
 import math
