@@ -230,7 +230,7 @@ def _through(p: Plant, t: float) -> int:
     return _NONE
 
 
-@kernel(void(_PLANT, float64), inlined=False)
+@kernel(void(_PLANT, float64))
 def _sample(p: Plant, t: float) -> None:
     """Put the sample at the level reached into the state; in stick the shoe is carried along without drift."""
     m, c, z, belt = p.state, p.c, p.state.z, p.drive.belt
