@@ -172,6 +172,7 @@ FLOW = record(
     works=(float, (PHASES, WORKS, SIZE, SIZE)),  # forms in z that are the works of a step from z on, J
     sums=(float, (SIZE, SIZE)),  # sum of z zᵀ over the steps whose works wait to be added up
     series=(float, (TERMS, SIZE)),  # of the motion over the span of a step
+    pull=(float, (NODES + 1, SIZE)),  # friction force in `at`, N
     at=(float, (NODES + 1, SIZE, SIZE)),  # motions at the nodes of Gauss' rule, and at the end of the step
     polynomial=(float, (2, TERMS)),  # a margin on it, and the margin's slope, negative
 )

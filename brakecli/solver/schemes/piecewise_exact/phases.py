@@ -60,9 +60,9 @@ def expand(m: Any, phase: int, span: float) -> None:
         z[k, BELT_SLOPE] = z[k, LOAD_SLOPE] = 0.0
 
 
-@kernel(void(FLOW_TYPE, float64, int64, int64))
-def reach(m: Any, theta: float, node: int, column: int) -> None:
-    """Put the motion at a part of the span of the series into `m.at[node, column]`."""
+@kernel(void(FLOW_TYPE, int64, float64, int64, int64))
+def reach(m: Any, phase: int, theta: float, node: int, column: int) -> None:
+    """Put the motion at a part of the span of the series into `m.at[node, column]`, with its friction force."""
     z, last, at = m.series, TERMS - 1, m.at
     x, y, v_x, v_y = z[last, X], z[last, Y], z[last, V_X], z[last, V_Y]
     for k in range(TERMS - 2, -1, -1):
@@ -70,6 +70,9 @@ def reach(m: Any, theta: float, node: int, column: int) -> None:
     at[node, column, X], at[node, column, Y], at[node, column, V_X], at[node, column, V_Y] = x, y, v_x, v_y
     at[node, column, BELT], at[node, column, BELT_SLOPE] = z[0, BELT] + theta * z[1, BELT], z[0, BELT_SLOPE]
     at[node, column, LOAD], at[node, column, LOAD_SLOPE] = z[0, LOAD] + theta * z[1, LOAD], z[0, LOAD_SLOPE]
+    m.pull[node, column] = 0.0
+    for i in range(SIZE):
+        m.pull[node, column] += m.friction[phase, i] * at[node, column, i]
 
 
 @kernel(types.UniTuple(float64, WORKS)(COEFFICIENTS, FLOW_TYPE, int64, int64, int64, int64))
@@ -77,10 +80,7 @@ def _powers(
     c: Coefficients, m: Any, phase: int, node: int, one: int, other: int
 ) -> tuple[float, float, float, float]:
     """The powers of the account (W) in a motion at a node, or their bilinear form in two."""
-    z, w = m.at[node, one], m.at[node, other]
-    force, f_z, f_w = m.friction, 0.0, 0.0
-    for j in range(SIZE):
-        f_z, f_w = f_z + force[phase, j] * z[j], f_w + force[phase, j] * w[j]
+    z, w, f_z, f_w = m.at[node, one], m.at[node, other], m.pull[node, one], m.pull[node, other]
     belt = f_z * w[BELT] + f_w * z[BELT]
     heat = f_z * (w[BELT] - w[V_X]) + f_w * (z[BELT] - z[V_X]) if phase != STICK else 0.0
     dashpots = c.b_xx * z[V_X] * w[V_X] + c.b_xy * (z[V_X] * w[V_Y] + z[V_Y] * w[V_X]) + c.b_yy * z[V_Y] * w[V_Y]
@@ -132,16 +132,16 @@ def make(c: Coefficients, m: Any, phase: int, h: float) -> None:
             m.series[0, i] = 1.0 if i == j else 0.0
         expand(m, phase, h)
         for node in range(NODES + 1):
-            reach(m, _NODES[node] if node < NODES else 1.0, node, j)
+            reach(m, phase, _NODES[node] if node < NODES else 1.0, node, j)
         for i in range(SIZE):
             if i <= V_Y:
                 step[i, j] = m.at[NODES, j, i]
             for k in range(2 * MARGINS):
                 step[4 + k, j] += margins[k, i] * m.at[NODES, j, i]
     for node in range(NODES):
-        share = h * _SHARES[node]
         for i in range(SIZE):
-            for j in range(SIZE):
+            for j in range(i + 1):
+                share = h * _SHARES[node] * (1.0 if i == j else 2.0)  # pairs count twice
                 belt, heat, dashpots, load = _powers(c, m, phase, node, i, j)
                 works[0, i, j], works[1, i, j] = works[0, i, j] + share * belt, works[1, i, j] + share * heat
                 works[2, i, j], works[3, i, j] = works[2, i, j] + share * dashpots, works[3, i, j] + share * load
@@ -151,12 +151,12 @@ def make(c: Coefficients, m: Any, phase: int, h: float) -> None:
 def take_part(c: Coefficients, m: Any, work: Any, span: float, theta: float) -> None:
     """Move to a part of the span of the series, and add the works on the way."""
     for node in range(NODES):
-        reach(m, theta * _NODES[node], node, 0)
+        reach(m, m.phase, theta * _NODES[node], node, 0)
         share = theta * span * _SHARES[node]
         belt, heat, dashpots, load = _powers(c, m, m.phase, node, 0, 0)
         work.belt, work.friction = work.belt + share * belt, work.friction + share * heat
         work.dashpots, work.load = work.dashpots + share * dashpots, work.load + share * load
-    reach(m, theta, NODES, 0)
+    reach(m, m.phase, theta, NODES, 0)
     for i in range(SIZE):
         m.z[i] = m.at[NODES, 0, i]
 
