@@ -86,7 +86,7 @@ SCHEMES: dict[str, Scheme] = {
     ),
     "event-driven": Scheme("brakecli.solver.schemes.event_driven", (Trial(),), colour="#222222", own_steps=True),
     "piecewise-exact": Scheme(
-        "brakecli.solver.schemes.piecewise_exact", (Trial(),), colour="#009E73", own_steps=True, exact=True
+        "brakecli.solver.schemes.piecewise_exact", (Trial(),), colour="#6A3D9A", own_steps=True, exact=True
     ),
 }
 
