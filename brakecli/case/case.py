@@ -182,9 +182,9 @@ class Solver(Table):
         if row.own_steps:
             for key, neutral in (("theta", ()), ("iteration", "newton"), ("allow_unconverged", False)):
                 if getattr(self, key) != neutral:
-                    yield self.wrong(key, f"is not for {self.scheme}", f"leave {key} out")
+                    yield self.wrong(key, f"is not used by {self.scheme}", f"leave {key} out")
         elif len(self.theta) != count:
-            what = f"has {tables.entries(self.theta)} where {self.scheme} has {count} weights"
+            what = f"has {tables.entries(self.theta)}, but {self.scheme} needs {count} weights"
             yield self.wrong("theta", what, f"give {count} weights, or leave theta out")
         elif row.sum_is_one and abs(sum(self.theta) - 1) > 1e-9:
             yield self.wrong("theta", f"adds up to {sum(self.theta):.12g}", "let the weights add up to 1")
@@ -230,7 +230,7 @@ class Case(Table):
     def _broken_rules(self) -> Iterator[Problem]:
         step = self.solver.step
         if step is None and "sample_interval" not in self.output.model_fields_set:
-            what = f"{tables.MISSING}, and there is no time step to take its place"
+            what = f"{tables.MISSING}, and there is no solver.step to use instead"
             yield Problem(("output", "sample_interval"), what, "give a number above 0, in s")
         if step is not None and self.output.sample_interval < step * (1 - 1e-9):
             what = f"is below the time step of {step!r} s"
@@ -239,14 +239,14 @@ class Case(Table):
         evaluator = self.contact.evaluator
         if exact and evaluator != "auto" and EVALUATORS[evaluator].needs_nodes:
             name = self.solver.scheme if self.solver.row.exact else "event-driven"
-            what = f"is given, but {name} is exact, and a tolerance chooses nodes itself"
+            what = f"has no effect: {name} needs no nodes, and with a tolerance the program chooses them"
             yield self.wrong("contact.evaluator", what, "leave evaluator out")
         rough = [name for name, profile in self.roughness if profile and any(profile.amplitudes)]
         if self.solver.row.exact and rough:
             what = f"is for smooth surfaces, but roughness.{rough[0]} is given"
             yield self.wrong("solver.scheme", what, 'set scheme to "event-driven", or leave the roughness out')
         if self.solver.start == "paper" and (self.initial.vx or self.initial.vy):
-            what = "takes the second layer for equal to the first, but the initial velocity is not zero"
+            what = "sets the second layer equal to the first, but the initial velocity is not zero"
             remedy = 'set start to "consistent", or initial.vx and initial.vy to 0'
             yield self.wrong("solver.start", what, remedy)
 

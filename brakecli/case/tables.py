@@ -122,7 +122,7 @@ class Table(BaseModel):
         """Yield a problem if a list is not as long as another one; either may be absent."""
         values, others = getattr(self, key), getattr(self, other)
         if None not in (values, others) and len(values) != len(others):
-            what = f"has {entries(values)} where {other} has {len(others)}"
+            what = f"has {entries(values)}, but {other} has {len(others)}"
             yield self.wrong(key, what, f"give one value for each {other.removesuffix('s')}")
 
     def wrong(self, key: str, what: str, remedy: str) -> Problem:

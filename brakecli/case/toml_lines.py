@@ -174,5 +174,5 @@ def parse(text: str, source: str = "", line: int = 1) -> dict[str, Any]:
         if position := _POSITION.search(message):
             message, place = message[: position.start()], int(position[1] or 1) - 1
         shown = printable(text.split("\n")[place].strip())
-        what = f"is not valid TOML: {message[0].lower()}{message[1:]} (found {shown})"
+        what = f"is not valid TOML: {message[0].lower()}{message[1:]}" + (f" (found {shown})" if shown else "")
         raise unfit(what, WRITING, source, line + place) from None

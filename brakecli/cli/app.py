@@ -13,6 +13,7 @@ import typer
 
 from brakecli import __version__
 from brakecli.cli import check, classify, compare_schemes, new, plot, run, schema, stability, sweep
+from brakecli.cli.inputs import as_argument
 from brakecli.cli.options import option
 from brakecli.cli.output import say, show
 from brakecli.errors import BrakecliError, RefusedError
@@ -21,7 +22,7 @@ from brakecli.files.os_signals import Interrupted
 COMMANDS = (run, sweep, classify, compare_schemes, stability, check, new, schema, plot)
 """The files of the commands, in the order in which `--help` lists them."""
 
-LIBRARIES, LIBRARIES_PER_CORE = 600_000_000, 50_000_000
+LIBRARIES = 600_000_000
 """Bytes of address space to load the libraries and compile all kernels; with less, LLVM aborts or never ends."""
 
 app = typer.Typer(
@@ -47,8 +48,13 @@ def main() -> None:
     except MemoryError:
         message, code = "out of memory; reduce contact.nodes, or sample less often", 3
     except OSError as error:  # not of an input or output, but of a file such as the cache of compiled code
-        message = f"{error.filename or 'a file'}: cannot be read or written: {error.strerror or error}"
-        code = 74
+        what = f"{error.filename or 'a file'}: cannot be read or written: {error.strerror or error}"
+        message, code = f"{what}; check its path and permissions", 74
+    except SystemExit as end:
+        if end.code == 2:  # bad usage, which is reported already
+            files = [word for word in sys.argv[1:] if word[1:] and word[0] == "-" and os.path.isfile(word)]  # noqa: PTH113
+            say(*(f"{word}: was read as options; name the file {as_argument(word)}" for word in files))
+        raise
     say(*message.split("\n"))
     sys.exit(code)
 
@@ -65,9 +71,10 @@ VERSION = option("Print the version and exit.", None, "--version", callback=_pri
 @app.callback()
 def _common(version: Annotated[bool, VERSION] = False) -> None:
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)
-    needed = LIBRARIES + LIBRARIES_PER_CORE * min(os.cpu_count() or 1, 64)
-    if 0 <= limit < needed:
-        what = (
-            f"the address space is limited to {limit / 1e6:.0f} MB, and the libraries need {needed / 1e6:.0f} MB"
-        )
+    if limit == resource.RLIM_INFINITY:
+        return
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"  # otherwise it takes 80 MB more for each core
+    if limit < LIBRARIES:
+        limited = f"the address space is limited to {limit / 1e6:.0f} MB"
+        what = f"{limited}, and the libraries need {LIBRARIES / 1e6:.0f} MB"
         raise RefusedError(f"{what}; raise the limit with: ulimit -v unlimited")

@@ -38,7 +38,7 @@ def command(
     from brakecli.runs.limits import check, free_bytes, refuse, within_range
 
     with within_range():
-        found = check(system_of(loaded.case))
+        found = check(system_of(loaded.case), begin=True)
     numbers = {"valid": True, "coefficients": found.system.coefficients._asdict()}
     numbers |= {name: getattr(found.system, name) for name in OF_SYSTEM} | vars(found) | vars(found.limits)
     infinite = [name for name, value in numbers.items() if value in (math.inf, -math.inf)]

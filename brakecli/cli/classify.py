@@ -12,8 +12,8 @@ from brakecli.cli.options import AsJson, Quiet, option, source_argument
 from brakecli.cli.output import announce_compilation, show_result, warn
 from brakecli.errors import UnreadableResultError, UsageError
 
-SOURCE = "Result of a run; with --quantity a measured signal: CSV, or FILE.h5:/path in any HDF5 file."
-THRESHOLD = option("Move a threshold of the rules; repeatable.", "NAME=VALUE", "--threshold")
+SOURCE = "Result of a run; with --quantity a measured signal, in a CSV file or in any HDF5 file (FILE.h5:/path)."
+THRESHOLD = option("Change a threshold of the rules; repeatable.", "NAME=VALUE", "--threshold")
 
 
 def command(
@@ -42,7 +42,7 @@ def command(
         try:
             numbers = classify_result(Path(source), _changed(Thresholds, thresholds))
         except UnreadableResultError as error:
-            remedy = "for a measured signal say with --quantity what it is"
+            remedy = "for a measured signal, state with --quantity what was measured"
             raise UnreadableResultError(f"{error}; {remedy}") from error
     else:
         from brakecli.analysis.regime.of_signal import Measurand, SignalThresholds, classify_signal
@@ -62,7 +62,7 @@ def _check(quantity: str | None, given: Mapping[str, Any]) -> None:
     for name, value in given.items():
         where = "--" + name.replace("_", "-")
         if value is not None and quantity is None:
-            raise UsageError(f"{where}: is for a measured signal; say with --quantity what was measured")
+            raise UsageError(f"{where}: is only for a measured signal; state with --quantity what was measured")
         if name == "stiffness" and value is not None and not 0.0 < value < math.inf:
             raise UsageError(f"{where} {value}: is not a positive number; give one in SI units")
         if name == "belt_speed" and value is not None and not math.isfinite(value):
@@ -83,5 +83,5 @@ def _changed(thresholds: type[Any], changes: list[str] | None) -> Any:
         with suppress(ValueError):
             found[name] = float(text)
         if not 0.0 <= found[name] < math.inf:
-            raise UsageError(f"--threshold {change}: is not a number from 0 on; write {name}=NUMBER")
+            raise UsageError(f"--threshold {change}: is not a number of at least 0; write {name}=NUMBER")
     return thresholds(**found)

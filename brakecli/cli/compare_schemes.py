@@ -13,10 +13,14 @@ def command(
     case: CaseArgument,
     output: Annotated[Path | None, output_option("Result file", "the case's name with -schemes.h5, here")] = None,
     overrides: Overrides = None,
-    schemes: Annotated[str | None, option(f"Only these: {', '.join(SCHEMES)}.", "NAME,…")] = None,
-    steps: Annotated[str | None, option("Time steps in s, whole parts of the largest.", "H,…")] = None,
-    budget: Annotated[float, option("Time to spend, about.", "SECONDS", min=1.0, max=86400.0)] = 60.0,
-    target_error: Annotated[float, option("Name the cheapest that meets it.", "E", min=1e-12, max=1.0)] = 1e-3,
+    schemes: Annotated[str | None, option(f"Compare only these: {', '.join(SCHEMES)}.", "NAME,…")] = None,
+    steps: Annotated[
+        str | None, option("Time steps in s; the largest is a whole multiple of each.", "H,…")
+    ] = None,
+    budget: Annotated[float, option("Approximate time to spend.", "SECONDS", min=1.0, max=86400.0)] = 60.0,
+    target_error: Annotated[
+        float, option("Recommend the cheapest method with this error.", "E", min=1e-12, max=1.0)
+    ] = 1e-3,
     force: Force = False,
     as_json: AsJson = False,
     quiet: Quiet = False,

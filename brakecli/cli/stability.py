@@ -53,7 +53,7 @@ def _parse_range(text: str) -> tuple[str, list[float]]:
     with suppress(ValueError):
         start, stop, count = numbers.split(":")
         first, last, size = float(start), float(stop), int(count)
-        if key_path(key) and 1 <= size <= MOST_VALUES and math.isfinite(first) and math.isfinite(last):
+        if key_path(key) and 1 <= size <= MOST_VALUES and math.isfinite(last - first):
             return key, np.linspace(first, last, size).tolist()
     what = f"is not KEY=START:STOP:NUM with NUM from 1 to {MOST_VALUES}"
     raise UsageError(f"--vary {text}: {what}; write, for instance, --vary link2.angle_deg=1:10:10")

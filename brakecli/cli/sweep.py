@@ -20,8 +20,12 @@ def command(
     overrides: Annotated[list[str] | None, option(SETTING, *SET)] = None,
     jobs: Annotated[int | None, option(JOBS, None, "--jobs", "-j", min=1, max=4096)] = None,
     scheduler: Annotated[str | None, option(SCHEDULER, "ADDRESS", envvar="DASK_SCHEDULER_ADDRESS")] = None,
-    scheduler_file: Annotated[str | None, option("The same, by the scheduler's file.", "FILE")] = None,
-    task_size: Annotated[int | None, option("Points of a task  [default: as many as take 0.2 s]", min=1)] = None,
+    scheduler_file: Annotated[
+        str | None, option("The same cluster, given by the scheduler's file.", "FILE")
+    ] = None,
+    task_size: Annotated[
+        int | None, option("Points in each task  [default: as many as take 0.2 s]", min=1)
+    ] = None,
     force: Annotated[bool, option(REPLACE, None, "--force")] = False,
     as_json: AsJson = False,
     quiet: Quiet = False,

@@ -113,12 +113,12 @@ def check_table(title: str, found: Check) -> str:
         ("shortest wave passes at", _text(system.passing_frequency, "Hz")),
         ("step", (f"{found.step:.6g} s, " if has_step else "its own, about ") + f"{found.steps} steps"),
         ("steps per period", [f"{found.steps_per_period:.4g} of the fastest motion"] * has_step),
-        ("fixed-point contraction", [f"{limits.contraction:.3g} (it may diverge from 1 on)"] * has_step),
-        ("solution of a step", [f"{'' if limits.unique else 'not '}sure to be unique"] * has_step),
+        ("fixed-point contraction", [f"{limits.contraction:.3g} (1 or more: it may diverge)"] * has_step),
+        ("solution of each step", [f"{'unique' if limits.unique else 'perhaps not unique'}"] * has_step),
         ("scheme", [growth] * has_step),
         ("contact", system.evaluator + (f", {system.nodes} nodes" if system.nodes else "")),
         ("nodes per shortest wave", _text(found.nodes_per_wave)),
-        *_cost_rows(found),
+        *_cost_rows(found, "at least" if found.at_least else "about"),
         ("adjusted", found.adjustments),
     ]
     return _table(title, rows)
@@ -126,12 +126,17 @@ def check_table(title: str, found: Check) -> str:
 
 def estimate_table(title: str, found: Estimate) -> str:
     """What a sweep would cost."""
-    return _table(title, [("points", str(found.points)), ("workers", str(found.workers)), *_cost_rows(found)])
+    about = "at least" if found.at_least else "about"
+    return _table(
+        title, [("points", str(found.points)), ("workers", str(found.workers)), *_cost_rows(found, about)]
+    )
 
 
-def _cost_rows(found: Check | Estimate) -> list[Row]:
+def _cost_rows(found: Check | Estimate, about: str = "about") -> list[Row]:
+    from brakecli.runs.cost import duration_text
+
     return [
-        ("time", f"about {found.seconds:.2g} s"),
+        ("time", f"{about} {duration_text(found.seconds)}"),
         ("memory", f"about {found.memory / 1e6:.0f} MB"),
         ("file", f"about {found.file_size / 1e6:.2g} MB"),
     ]
@@ -161,10 +166,10 @@ def stability_table(title: str, report: StabilityReport, key: str, entries: Sequ
         what = f"{motion}, damping ratio {mode.damping_ratio:.3g}, {shape}"
         rows.append((f"mode at {mode.frequency:.5g} Hz", what))
     if discrete:
-        limit, friction = discrete.step_limit, discrete.critical_friction
-        bias = "" if discrete.bias is None else f", {discrete.bias:+.2g} off"
+        limit, friction, radius = discrete.step_limit, discrete.critical_friction, discrete.spectral_radius
+        bias = "" if discrete.bias is None else f", {discrete.bias:+.2g} from the exact one"
         rows += [
-            ("the scheme's growth", f"{discrete.growth:.5g} 1/s, a factor {discrete.spectral_radius:.8g} a step"),
+            ("the scheme's growth", f"{_text(discrete.growth, '1/s')}, a factor {radius:.8g} a step"),
             ("its critical friction", "none" if friction is None else f"{friction:.7g}{bias}"),
             ("its stable steps", "any" if limit is None else f"up to {limit:.4g} s" if limit else "none"),
         ]
@@ -234,12 +239,14 @@ def comparison_table(report: ComparisonReport) -> str:
     if best is not None:
         recommended = [f"{best}: error {best.error:.2g}, {report.margin:.3g} times below {report.target:g}"]
         if (finer := found.finer_error(best)) > report.target:
-            recommended.append(f"by chance: at a finer step its error is {finer:.2g}; choose one with more margin")
-    left_out = f"{found.left_out} entries, for want of time: give a larger --budget"
+            recommended.append(
+                f"this is by chance: at a finer step its error is {finer:.2g}; choose a method with more margin"
+            )
+    left_out = f"{found.left_out} entries, because the time was used up; give a larger --budget"
     rows = [
         ("compared over", f"{found.duration:.6g} s of motion"),
-        ("reference", f"event-driven, good to {found.reference_error:.1e}, {found.reference_seconds:.3g} s"),
-        ("times", f"median of {found.repeats} turns, of the loop alone"),
+        ("reference", f"event-driven, error below {found.reference_error:.1e}, {found.reference_seconds:.3g} s"),
+        ("times", f"median of {found.repeats} repetitions, of the time loop alone"),
         ("left out", [left_out] if found.left_out else []),
         ("failed", [f"{len(failed)} entries, such as {each}: {each.failure}" for each in failed[:1]]),
         ("recommended", recommended),

@@ -219,7 +219,7 @@ def _repeat(system: System, entries: list[Entry], deadline: float, progress: Pro
 
 def _add_limits(system: System, report: linear.StabilityReport, entries: list[Entry]) -> None:
     """Add what the amplification matrices say, and the observed orders."""
-    stiffness_at, exact = linear.mean_stiffness(system, report.contact_stiffness), report.critical
+    stiffness_at, exact = report.stiffness_at, report.critical
     # Neither depends on starts, iterations and evaluators
     limit = cache(lambda scheme: linear.step_limit(replace(system, method=scheme), stiffness_at))
 

@@ -14,6 +14,7 @@ from types import FrameType
 from typing import Any
 
 from brakecli.errors import CannotWriteError, escaped
+from brakecli.stop import show_signals
 
 _WORDS: dict[int, str] = {signal.SIGHUP: "hung up", signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
 
@@ -43,6 +44,7 @@ def handle_signals() -> None:
 
     for number in _handlers():
         signal.signal(number, leave)
+    show_signals()
 
 
 @contextmanager

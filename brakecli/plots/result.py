@@ -1,6 +1,7 @@
 """Draw any result: read its file, choose the picture of its kind, write the file of the picture."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,8 +24,9 @@ def plot_result(result: Path, target: Path, *, force: bool, select: Sequence[str
     if suffix not in (".pdf", ".png", ".svg"):
         problem = f"its suffix does not name a kind of picture (found {target.suffix!r})"
         raise UsageError(f"{target}: {problem}; name a file that ends in .pdf, .png or .svg with -o")
-    if target.exists() and result.exists() and target.samefile(result):
-        raise UsageError(f"{target}: this is the result itself; choose another output with -o")
+    with suppress(OSError, ValueError):  # one of them does not exist, or cannot
+        if target.samefile(result):
+            raise UsageError(f"{target}: this is the result itself; choose another output with -o")
     try:
         import matplotlib.figure  # noqa: F401
     except ImportError as error:

@@ -1,9 +1,12 @@
 """What a run is likely to cost; rough guesses that tell minutes from days."""
 
 import math
+from contextlib import suppress
 
 import numpy as np
 
+from brakecli.errors import CaseError
+from brakecli.solver.steady_sliding import PLACES, steady_sliding
 from brakecli.solver.system import System
 
 # Seconds, measured with `make cases` on one core.
@@ -16,13 +19,14 @@ _OWN_STEPS = 25.0  # in a period, of a scheme that finds them itself, at a toler
 _OWN_STEP_SECONDS = 4e-6
 _OWN_EVALUATIONS = 27.0
 _EXACT_STEP_SECONDS = 2e-7  # events included
+_START_EVALUATIONS = 6.0  # at each place of the wheel
 
 
 def steps_and_seconds(system: System) -> tuple[int, float]:
     """Steps of a run, and a rough guess at the time of all runs that it takes to keep the tolerance."""
-    method, waves = system.method, 1.0 + len(system.wheel.g) ** 2 / 20.0
+    method, pairs = system.method, float(len(system.wheel.g) ** 2)
     if not method.own_steps:
-        each = _STEP_SECONDS * waves
+        each = _STEP_SECONDS * (1.0 + pairs / 20.0)
         if system.finds_patches or system.nodes:
             each = _STEP_SECONDS + _EVALUATIONS * evaluation_seconds(system)
         return system.steps, system.steps * each
@@ -37,14 +41,31 @@ def steps_and_seconds(system: System) -> tuple[int, float]:
     turns = float(max(system.wheel.turns, default=0.0))
     rate += 8.0 * turns * (system.fastest_belt + swing) + 0.25 * (c.b_xx + c.b_yy) / c.m
     steps = 1 + int(min(system.sampled_duration * rate, 1e300))
-    each = _OWN_STEP_SECONDS * waves
+    each = _OWN_STEP_SECONDS * (1.0 + pairs / 80.0)
     if system.finds_patches:
         # Rough surfaces that the load presses together are seldom open in part.
         heights = float(np.abs(system.shoe.g).sum() + np.abs(system.wheel.g).sum())
         least_load = float(np.abs(system.load["value"]).min())
-        open_part = 0.04 if heights * (c.c_yy + system.contact_stiffness) < least_load else 0.12
+        open_part = 0.01 if heights * (c.c_yy + system.contact_stiffness) < least_load else 0.12
         each += _OWN_EVALUATIONS * open_part * evaluation_seconds(system)
     return steps, (1.0 if alone else 1.6) * steps * each
+
+
+def start_seconds(system: System) -> float:
+    """A rough guess at the time to find steady sliding, where the case starts from it on a pad that opens."""
+    if not system.initial.from_equilibrium or system.smooth:
+        return 0.0
+    pad, opens = system.pad.constants, False
+
+    def mean(y: float) -> tuple[float, float, float]:
+        nonlocal opens
+        opens = opens or y > pad.full_up_to
+        return max(-system.contact_stiffness * (y + pad.shoe_mean), 0.0), 0.0, 0.0
+
+    with suppress(CaseError):
+        steady_sliding(system, mean=mean)
+    places = PLACES if len(system.wheel.g) else 1
+    return float(_START_EVALUATIONS * places * evaluation_seconds(system)) if opens else 0.0
 
 
 def evaluation_seconds(system: System) -> float:

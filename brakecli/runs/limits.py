@@ -14,16 +14,16 @@ from brakecli.analysis.stability.modes import eigensystem
 from brakecli.analysis.stability.search import bisect
 from brakecli.errors import RefusedError
 from brakecli.runs.cost import duration_text, steps_and_seconds
+from brakecli.runs.pilot import Price, measured
 from brakecli.solver.contact.pad import NODES_PER_WAVE
 from brakecli.solver.history import ROW_BYTES
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.quantities import HISTORY
-from brakecli.solver.system import WHOLE, System
+from brakecli.solver.system import MOST_TABLE_BYTES, WHOLE, System
 
 MOST_STEPS = 1e11
 MOST_SECONDS = 24 * 3600.0
 MOST_BYTES = 1e11
-MOST_TABLE_BYTES = 4e9
 UNSTABLE = 1e-5  # growth per step that no rounding of the eigenvalues explains
 _COARSE_NODES = NODES_PER_WAVE / 2
 _TAKEN = 0.01  # part of the fastest motion that a scheme may take out of a run unsaid
@@ -42,27 +42,32 @@ class Check:
     limits: StepLimits
     nodes_per_wave: float | None
     seconds: float
+    at_least: bool  # whether it may take much longer than that
     memory: float  # bytes
     file_size: float  # bytes
     adjustments: tuple[str, ...]
     warnings: tuple[str, ...] = ()
 
 
-def check(system: System) -> Check:
-    """Look at a case without stepping it."""
+def check(system: System, *, begin: bool = False) -> Check:
+    """Look at a case; where `begin`, or where it seems too long, run it for a moment to see what it costs."""
     own, fastest = system.method.own_steps, system.natural_frequencies[1]
     waves = 2.0 * system.half_length * system.most_turns
-    steps, seconds = steps_and_seconds(system)
+    price = Price(*steps_and_seconds(system), at_least=False)
+    if (begin or price.seconds > MOST_SECONDS) and system.steps <= MOST_STEPS:
+        begun = measured(system) or price._replace(at_least=system.finds_patches)
+        price = begun if begun.seconds > 0.0 else price  # beyond the resolution of the clock
     found = Check(
         system=system,
         link_frequencies=natural_frequencies(system.coefficients, 0.0),
         step=None if own else system.step,
-        steps=steps,
+        steps=price.steps,
         steps_per_period=math.inf if own or not fastest > 0.0 else 1.0 / (fastest * system.step),
         limits=step_limits(system),
         nodes_per_wave=system.nodes / waves if system.nodes and waves > 0.0 else None,
-        seconds=seconds,
-        memory=1.5e8 + 8.0 * system.nodes * (2 * len(system.wheel.g) + 2),
+        seconds=price.seconds,
+        at_least=price.at_least,
+        memory=1.5e8 + system.table_bytes,
         file_size=float(system.samples) * ROW_BYTES + 1e5,
         adjustments=tuple(adjustments(system)),
     )
@@ -73,15 +78,15 @@ def refuse(found: Check, free_bytes: float = math.inf) -> None:
     """Raise RefusedError where a run would be too large, or unstable by its scheme."""
     system, growth = found.system, found.limits.growth
     room = f"{found.memory / 1e6:.0f} MB of memory, a file of {found.file_size / 1e6:.3g} MB"
-    size = f"about {found.steps:.3g} steps, {duration_text(found.seconds)}, {room}"
+    least = "at least " if found.at_least else ""
+    size = f"about {found.steps:.3g} steps, {least}{duration_text(found.seconds)}, {room}"
     coarser = "solver.tolerance" if found.step is None else "solver.step"
     remedy = f"reduce solver.duration, or increase {coarser} or output.sample_interval"
     if found.steps > MOST_STEPS or found.seconds > MOST_SECONDS:
         raise RefusedError(f"the run is too long: {size}; {remedy}")
     if found.file_size > min(MOST_BYTES, free_bytes):
         raise RefusedError(f"the file would be too large, {free_bytes / 1e6:.3g} MB are free: {size}; {remedy}")
-    if found.memory > MOST_TABLE_BYTES:
-        raise RefusedError(f"the contact's tables would be too large: {size}; reduce contact.nodes")
+    system.refuse_tables()
     compared = 2.0 * 8.0 * len(HISTORY) * system.samples
     if system.method.step is None and compared > MOST_TABLE_BYTES:
         what = f"two histories of {system.samples:.3g} samples are compared to keep the tolerance, which takes"

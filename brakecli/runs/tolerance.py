@@ -102,7 +102,7 @@ def _opens_and_slides(system: System, progress: Progress) -> bool:
     """
     if system.smooth or len(system.belt) > 1 or len(system.load) > 1:
         return False
-    work = _run(system, lambda samples: progress(0), step=_coarsest(system), nodes=0).work
+    work = _run(system, lambda samples: progress(0), step=coarsest_step(system), nodes=0).work
     return set(work.evaluators) != {"closed-form"} and not work.turns
 
 
@@ -115,7 +115,7 @@ def slower_than_events(system: System, progress: Progress) -> Callable[[float], 
     @cache
     def events() -> float:
         samples = max(1, system.samples // PILOT)
-        part, tolerance = replace(system, duration=samples * system.interval), _first_event_tolerance(system)
+        part, tolerance = replace(system, duration=samples * system.interval), first_event_tolerance(system)
         found = _run(part, lambda samples: progress(0), tolerance=tolerance)
         seconds = _guessed_seconds(found) * system.samples / samples * (1.0 + EVENT_RATIO**-0.125)
         return math.inf if found.work.failed else seconds
@@ -130,7 +130,8 @@ def _guessed_seconds(motion: Motion) -> float:
     return float(part * motion.work.contact_evaluations * evaluation_seconds(motion.system))
 
 
-def _first_event_tolerance(system: System) -> float:
+def first_event_tolerance(system: System) -> float:
+    """The tolerance of the first event-driven run."""
     # Two tolerances at least, as runs to the same one agree in any case.
     largest = min(FIRST_EVENT_TOLERANCE, EVENT_MARGIN * system.method.tolerance)
     return max(largest, LEAST_EVENT_TOLERANCE / EVENT_RATIO)
@@ -155,7 +156,7 @@ def _by_phases(system: System, progress: Progress) -> Certified:
 
 def _by_events(system: System, progress: Progress) -> Certified:
     """Event-driven runs, each to a hundredth of the tolerance of the one before."""
-    wanted, tolerance = system.method.tolerance, _first_event_tolerance(system)
+    wanted, tolerance = system.method.tolerance, first_event_tolerance(system)
     run = _run(system, progress, tolerance=tolerance)
     while True:
         before, tolerance = run, max(EVENT_RATIO * tolerance, LEAST_EVENT_TOLERANCE)
@@ -179,7 +180,7 @@ def _by_steps(
     make differences fall unevenly, and one that is small by luck must not pass. Nor must differences of runs that
     all step over what speed or load do between two knots.
     """
-    method, wanted, step = system.method, system.method.tolerance, _coarsest(system)
+    method, wanted, step = system.method, system.method.tolerance, coarsest_step(system)
     longest = _shortest_span(system) / STEPS_BETWEEN_KNOTS * (1.0 + 1e-9)
     nodes = 0 if system.smooth else default_nodes(system.half_length, system.shoe, system.wheel)
     before: Motion | None = None
@@ -250,7 +251,7 @@ def _compare(coarse: Motion, fine: Motion, tolerance: float) -> tuple[float, flo
     return max(until, 0.0), max(float(apart.max()), ROUNDING)
 
 
-def _coarsest(system: System) -> float:
+def coarsest_step(system: System) -> float:
     """The step (s) that a ladder begins with: a whole part of the sample interval."""
     interval = system.interval
     wanted = 1.0 / (FIRST_STEPS * max(system.natural_frequencies[1], system.passing_frequency, 1e-300))

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-from numba import float64, njit, types
+from numba import boolean, float64, int64, njit, types
 from numba.core import cgutils
 from numba.core import config as numba_config
 from numba.core.registry import CPUDispatcher
@@ -135,6 +135,30 @@ def at_address(signature: Any) -> Any:
         return function(types.int64), codegen
 
     return _functions.__getitem__ if config.DISABLE_JIT else callable_at
+
+
+@intrinsic
+def _byte_at(typing: Any, address: Any) -> Any:
+    """The byte at an address, read anew each time."""
+
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        place = builder.inttoptr(arguments[0], cgutils.voidptr_t)
+        return builder.zext(builder.load_atomic(place, "monotonic", 1), cgutils.intp_t)
+
+    return types.intp(types.int64), codegen
+
+
+_first_byte: Any = (lambda address: 0) if config.DISABLE_JIT else _byte_at  # interpreted ones are interrupted
+
+
+@kernel(boolean(int64))
+def stopped(signals: int) -> bool:
+    """Whether the process has been told to end: Python does so as soon as kernels return, whatever they return.
+
+    `signals` is the address of `brakecli.stop.memory`.
+    """
+    number: int = _first_byte(signals)
+    return number == 1 or number == 2 or number == 15  # SIGHUP, SIGINT, SIGTERM
 
 
 def _without_counts(context: Any, builder: Any, type_: Any, value: Any) -> Any:

@@ -4,7 +4,7 @@ import math
 
 from numba import float64, int64, void
 
-from brakecli.solver.compile import Floats, at_address, borrowed, kernel, vector
+from brakecli.solver.compile import Floats, at_address, borrowed, kernel, stopped, vector
 from brakecli.solver.friction import observed
 from brakecli.solver.implicit_step import SOLVED
 from brakecli.solver.quantities import BOUND, Failure
@@ -103,4 +103,6 @@ def advance(p: Plant, rows: Floats, events: Floats, stop: int) -> int:
         part += 1
         if part == grid.per_sample:
             sampled, part = sampled + 1, 0
+        if stopped(layer.pad.signals):
+            break
     return _NONE

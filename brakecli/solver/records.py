@@ -84,6 +84,7 @@ PAD = record(
     shoe_terms=int,  # harmonics
     wheel_terms=int,
     nodes=int,  # of the midpoint rule; 0 without its tables
+    signals=int,  # where to see that a signal has come, see `compile.stopped`
     gap_at=int,  # where in the tables begin: amplitudes, wavenumbers, phases of f2 - f1
     wheel_at=int,  # amplitudes and wavenumbers of the wheel
     full_at=int,  # ∂(k ∫ f2 dξ)/∂(sin) of each of its harmonics, N

@@ -3,18 +3,25 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
+from numba import float64, void
+from numpy.typing import NDArray
 
 from brakecli.errors import CaseError, Problem
+from brakecli.solver.compile import Floats, at_address, borrowed, kernel, vector
 from brakecli.solver.contact.closed_form import CLEAR, FULL, coverage
 from brakecli.solver.contact.pad import build_layer
+from brakecli.solver.records import EVALUATE, LAYER, WAVES, Layer
 from brakecli.solver.roughness import wheel_angles
 from brakecli.solver.system import System
 
 PLACES = 1024
 """Positions of the wheel that an average takes, over 50 of its longest waves."""
 TABLE = 129
+
+_evaluate_at = at_address(EVALUATE)
 
 Mean = Callable[[float], tuple[float, float, float]]
 """Mean force (N), stiffness (N/m) and touching part of the contact at a height y (m)."""
@@ -29,6 +36,19 @@ class SteadySliding:
     normal_force: float
     stiffness: float
     contact_fraction: float
+
+
+@kernel(void(float64, vector, vector, WAVES, LAYER, vector))
+def add_places(y: float, places: Floats, weights: Floats, waves: NDArray[Any], layer: Layer, sums: Floats) -> None:
+    """Add force, stiffness and touching part at places of the wheel, with their weights."""
+    layer = borrowed(layer)
+    contact = layer.contact
+    for i in range(places.size):
+        wheel_angles(waves, places[i], 0.0, layer.angles)
+        _evaluate_at(layer.evaluate)(0.0, y, layer)
+        sums[0] += weights[i] * contact.normal_force
+        sums[1] += weights[i] * contact.stiffness
+        sums[2] += weights[i] * contact.fraction
 
 
 def mean_contact(system: System, y: float) -> tuple[float, float, float]:
@@ -46,12 +66,8 @@ def mean_contact(system: System, y: float) -> tuple[float, float, float]:
         return -pad.k * length * (y + pad.shoe_mean), pad.k * length, 1.0
     places = np.zeros(1) if wheel.g.size == 0 else 50.0 / wheel.turns.min() * (np.arange(PLACES) + 0.5) / PLACES
     weights = np.ones(1) if wheel.g.size == 0 else 2.0 * np.sin(np.pi * (np.arange(PLACES) + 0.5) / PLACES) ** 2
-    found, layer, waves = np.zeros(3), build_layer(system.evaluate, system.pad), wheel.waves
-    contact = layer.contact
-    for place, weight in zip(places, weights, strict=True):
-        wheel_angles(waves, float(place), 0.0, layer.angles)
-        system.evaluate(0.0, y, layer)
-        found += weight * np.array([contact.normal_force, contact.stiffness, contact.fraction])
+    found = np.zeros(3)
+    add_places(y, places, weights, wheel.waves, build_layer(system.evaluate, system.pad), found)
     force, stiffness, fraction = found / len(places)
     return float(force), float(stiffness), float(fraction)
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from brakecli.errors import RefusedError
 from brakecli.solver import contact, schemes
 from brakecli.solver.contact.pad import Pad, build_pad, default_nodes
 from brakecli.solver.links import natural_frequencies
@@ -16,6 +17,7 @@ from brakecli.solver.records import Coefficients, Grid, Weights
 from brakecli.solver.roughness import Surface
 from brakecli.solver.schedules import Schedule, value_at
 
+MOST_TABLE_BYTES = 4e9
 WHOLE = 1e-9
 """A ratio this close to a whole number is whole."""
 RADIANS = 0.8
@@ -58,7 +60,22 @@ class System:
     @cached_property
     def pad(self) -> Pad:
         """Constants and tables of the contact."""
+        self.refuse_tables()
         return build_pad(self.layer_stiffness, self.half_length, self.shoe, self.wheel, self.nodes)
+
+    @property
+    def table_bytes(self) -> float:
+        """Memory that `pad` takes while it is made: values at nodes, and eight numbers for each pair of waves."""
+        terms, nodes = len(self.shoe.g) + len(self.wheel.g), self.nodes
+        return 8.0 * (nodes * (2.0 * len(self.wheel.g) + 2.0) + 8.0 * terms**2)
+
+    def refuse_tables(self) -> None:
+        """Raise RefusedError where the tables of the contact would be too large."""
+        if self.table_bytes > MOST_TABLE_BYTES:
+            waves = len(self.shoe.g) + len(self.wheel.g)
+            what = f"the contact's tables for {waves} waves and {self.nodes} nodes would take"
+            remedy = "reduce contact.nodes, or the number of waves in roughness"
+            raise RefusedError(f"{what} {self.table_bytes / 1e9:.3g} GB of memory; {remedy}")
 
     @property
     def evaluator(self) -> str:

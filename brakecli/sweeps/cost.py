@@ -2,14 +2,18 @@
 
 import os
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from brakecli.case.read import key_path
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError, RefusedError
-from brakecli.runs.cost import duration_text
+from brakecli.runs.cost import duration_text, steps_and_seconds
 from brakecli.runs.limits import MOST_BYTES, check, refuse, within_range
-from brakecli.sweeps.plan import Plan
+from brakecli.sweeps.growth import sliding, with_step
+from brakecli.sweeps.periodic import common_period, exponent_length
+from brakecli.sweeps.plan import Plan, Settings
 from brakecli.sweeps.point import record_type
+from brakecli.sweeps.tables import Critical
 
 MOST_POINTS = 10_000_000
 MOST_SECONDS = 30 * 86400.0
@@ -20,6 +24,10 @@ _SAMPLE_SECONDS = 1e-7
 _SEARCH_RUNS = 12.0  # for the least sustained value
 _SEARCH_GROWTHS = 20.0
 _GROWTH_SECONDS = 0.03
+_FORCED_RUNS = (
+    1000.0  # over a period of the wheel, in a search that follows a forced motion; more where it is lost
+)
+_EXPONENT_RUNS = 200.0  # of as long as an exponent needs
 _EIGENVALUE_SECONDS = 0.1
 _WORKER_BYTES = 1.8e8
 _SAMPLE_BYTES = 8.0 * 24
@@ -35,19 +43,21 @@ class Estimate:
     seconds: float
     memory: float
     file_size: float
+    at_least: bool = False  # motions may have to be looked for many times
 
     def sentence(self) -> str:
         """The estimate in words."""
         noun, crew = ("point" if self.points == 1 else "points"), ("worker" if self.workers == 1 else "workers")
+        about = "at least" if self.at_least else "about"
         return (
-            f"{self.points} {noun} on {self.workers} {crew}: about {duration_text(self.seconds)}, "
+            f"{self.points} {noun} on {self.workers} {crew}: {about} {duration_text(self.seconds)}, "
             f"{self.memory / 1e6:.0f} MB of memory, a file of {self.file_size / 1e6:.2g} MB"
         )
 
 
 def estimate(plan: Plan, workers: int) -> Estimate:
     """Estimate a sweep by two corners of its grid."""
-    times, samples = [], 0
+    times, samples, forced = [], 0, 0.0
     for point in sorted({0, plan.points - 1}):
         with suppress(CaseError, RefusedError), within_range():  # the point fails when its turn comes
             system = system_of(plan.case(plan.settings(point)))
@@ -55,20 +65,37 @@ def estimate(plan: Plan, workers: int) -> Estimate:
             refuse(checked)
             times.append(checked.seconds)
             samples = max(samples, system.samples)
+            if (critical := plan.sweep.critical) is not None and critical.method == "simulation":
+                forced = max(forced, _forced_seconds(plan, plan.settings(point), critical))
     run = sum(times) / max(len(times), 1) + _POINT_SECONDS + _SAMPLE_SECONDS * samples
     each = run
     if (critical := plan.sweep.critical) is not None:
         each += _EIGENVALUE_SECONDS
         if critical.method == "simulation":
-            each += _SEARCH_RUNS * run + _SEARCH_GROWTHS * _GROWTH_SECONDS
+            each += _SEARCH_RUNS * run + _SEARCH_GROWTHS * _GROWTH_SECONDS + forced
     records = plan.passes * plan.points
     return Estimate(
         points=plan.points,
         workers=workers,
-        seconds=2.0 + records * each / workers,
+        seconds=2.0 + records * each / min(workers, records),
         memory=_WORKER_BYTES * (workers + 1) + _SAMPLE_BYTES * samples * workers + _POINT_BYTES * records,
         file_size=float(records * record_type(plan).itemsize) + 1e5,
+        at_least=forced > 0.0,
     )
+
+
+def _forced_seconds(plan: Plan, settings: Settings, critical: Critical) -> float:
+    """The time (s) of a search that follows the motion which a rough wheel forces; 0 where it forces none."""
+    seconds = 0.0
+    for value in (critical.lower, critical.upper):
+        with suppress(CaseError):
+            case = plan.case({**settings, key_path(critical.parameter): value})
+            found = sliding(with_step(system_of(case)))
+            if found is not None and found.forced:
+                period = common_period(found.system)
+                length, runs = (period, _FORCED_RUNS) if period else (exponent_length(found), _EXPONENT_RUNS)
+                seconds = max(seconds, runs * steps_and_seconds(replace(found.system, duration=length))[1])
+    return seconds
 
 
 def refuse_sweep(found: Estimate, free_bytes: float) -> None:

@@ -18,6 +18,7 @@ from brakecli.case.case import Case, changed
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError
 from brakecli.solver.system import System
+from brakecli.sweeps.error_bar import left_open
 from brakecli.sweeps.floquet import Disturbances
 from brakecli.sweeps.growth import Sliding, sliding, with_step
 from brakecli.sweeps.tables import Critical
@@ -112,7 +113,7 @@ def search(
     @cache
     def fades(value: float) -> bool | None:
         unstable = value >= found.upper if found.outcome is Outcome.FOUND else None
-        steady, case = sliding_at(value), case_at(value)
+        steady, case = sliding_at(value), _stepped(case_at(value))
         linear = steady is not None and not steady.opens
         # Beside stable sliding it may yet fade away, or has not yet come to where it lasts.
         times, before = 1.0, None
@@ -128,6 +129,16 @@ def search(
 
     sustained, outcome = _sustained(critical, fades, found)
     return found._replace(sustained=sustained, sustained_outcome=outcome)
+
+
+def _stepped(case: Case) -> Case:
+    """The case with the step that growth is measured with, where it gives none: no run is computed twice."""
+    system = system_of(case)
+    method = with_step(system).method
+    if method == system.method:
+        return case
+    keys = ("scheme", "theta", "start", "step")
+    return changed(case, solver={**{key: getattr(method, key) for key in keys}, "tolerance": None})
 
 
 def _by_eigenvalues(critical: Critical, sliding_at: SlidingAt) -> Search:
@@ -210,6 +221,8 @@ def _of_edges(critical: Critical, unstable: bool, edges: list[Edge]) -> Search:
     if not edges:
         return Search(Outcome.UNSTABLE if unstable else Outcome.STABLE, windows=windows)
     first = next((each for each in edges if each.lost), edges[0])
+    if first.error >= critical.upper - critical.lower:  # any value of the range may be it
+        return Search(Outcome.UNDECIDED)
     outcome = Outcome.FOUND if first.lost else Outcome.REGAINED
     return Search(outcome, *first[:4], windows=windows)
 
@@ -223,9 +236,12 @@ def _by_simulation(critical: Critical, sliding_at: SlidingAt, exact: Search) -> 
     def edge(low: float, high: float) -> Edge:
         return _narrowed(at, low, high, critical, bias)
 
-    return _answer(critical, sliding_at, at.unstable, values, edge)._replace(
-        bias=exact.bias, eigenvalue=exact.eigenvalue
-    )
+    found = _answer(critical, sliding_at, at.unstable, values, edge)
+    opened = any(measured.opened for measured in at.known.values() if measured)
+    if not opened and found.error is not None and found.value is not None and exact.outcome is found.outcome:
+        # Motions are linear and eigenvalues exact: what the bar does not hold is rounding near self-locking.
+        found = found._replace(error=max(found.error, 1.001 * abs(found.value - (exact.value or found.value))))
+    return found._replace(bias=exact.bias, eigenvalue=exact.eigenvalue)
 
 
 def _narrowed(at: Disturbances, low: float, high: float, critical: Critical, bias: float) -> Edge:
@@ -254,33 +270,9 @@ def _narrowed(at: Disturbances, low: float, high: float, critical: Critical, bia
         low = bisect(lambda value: at.unstable(value) is below, low, middle, width=tolerance, halvings=EDGES)[0]
         high = bisect(lambda value: as_below(value) is not False, middle, high, width=tolerance, halvings=EDGES)[1]
     value = value if value is not None and low <= value <= high else 0.5 * (low + high)
-    error = 0.5 * (high - low) + min(_left_open(at, low, high, wide, bias), critical.upper - critical.lower)
+    bar = left_open(at, (low, high), wide, bias, critical)
+    error = 0.5 * (high - low) + min(bar, critical.upper - critical.lower)
     return Edge(value, low, high, error, not below)
-
-
-def _left_open(at: Disturbances, low: float, high: float, wide: tuple[float, float], bias: float) -> float:
-    """By how much the change in a bracket may be wrong: the error of the growth over its slope, and the bias.
-
-    The error of a periodic motion holds that of its scheme. A three-layer scheme takes velocities from differences
-    of positions: near self-locking, where the force grows beyond all bounds, their rounding makes the growth jump,
-    so that the slope counts only as far as the ends of the bracket that was found first show it.
-    """
-    known = {value: measured for value, measured in at.known.items() if measured is not None}
-    near = sorted(known, key=lambda value: max(low - value, value - high, 0.0))[:2]
-    one, other = near[0], near[-1]
-
-    def slope(other: float) -> float:
-        return abs((known[other].rate - known[one].rate) / (other - one)) if other != one else 0.0
-
-    if known[one].bar:  # the bracket holds it
-        return bias
-    steep = slope(other)
-    if one in at.orbits:
-        return at.error(one) / steep if steep > 0.0 else math.inf
-    found, far = at.sliding_at(one), max((slope(end) for end in wide if end in known), default=0.0)
-    if found is not None and found.system.scheme.LAG and far > 0.0 and not known[one].noise:
-        steep = min(steep, far)
-    return bias + (max(known[one].spread, known[other].spread) / steep if steep > 0.0 else 0.0)
 
 
 def _lasting(answer: bool, before: Verdict | None, verdict: Verdict) -> bool:

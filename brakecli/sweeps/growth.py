@@ -28,6 +28,7 @@ LARGEST = (
 )  # of disturbances on smooth surfaces, where motions are linear until they lift off, and others
 ROUNDED = 1e-9  # least ratio of a disturbance to the shoe's distance from the origin: rounding is 1e-16 of that
 FADED = 1e-5  # smallest difference, in parts of its first size, that holds four digits
+SLOPE = 1e-3  # of a wheel's waves that feed no disturbance
 DEPARTED = 2.0  # times as far from steady sliding as roughness alone takes a run
 PERIODS, PASSES = 40, 20
 """Periods of the fastest motion that are watched: disturbances on smooth surfaces are exactly linear. Rough ones
@@ -68,6 +69,20 @@ class Sliding(SteadySliding):
     def grip(self) -> float:
         """sign(U) φ."""
         return math.copysign(self.system.coefficients.phi, self.system.belt_speed)
+
+    @property
+    def modulated(self) -> bool:
+        """Whether the slopes of the wheel's waves change the growth of disturbances in a contact that touches
+        everywhere: ∂F_y/∂x over 2ak.
+        """
+        wheel = self.system.wheel
+        slopes = wheel.g * wheel.omega * np.sinc(wheel.omega * self.system.half_length / np.pi)
+        return bool(np.abs(slopes).sum() > SLOPE)
+
+    @property
+    def forced(self) -> bool:
+        """Whether a rough wheel forces a motion that is not linear, or whose disturbances it feeds."""
+        return bool(self.system.wheel.g.size) and (self.opens or self.modulated)
 
     @property
     def opens(self) -> bool:

@@ -122,7 +122,7 @@ def test_every_undecided_names_its_reason() -> None:
     _undecided(np.sin(2.0 * np.pi * time / 5.03), "samples a cycle; measure at a higher rate")
     _undecided(np.exp(time / 800) * np.sin(0.3 * time), "still growing")
     _undecided(np.exp(-time / 2000) * np.sin(0.3 * time), "still decaying")
-    _undecided(np.random.default_rng(1).normal(0.0, 1.0, 3000), "out of the noise")
+    _undecided(np.random.default_rng(1).normal(0.0, 1.0, 3000), "hidden by noise")
 
 
 def test_short_and_hostile_signals_are_undecided_at_worst() -> None:

@@ -57,7 +57,7 @@ def test_missing_values_and_jumps_of_time_are_gaps(tmp_path: Path) -> None:
     assert np.isnan(missing).tolist() == [False, True, True, False]
     jump = read(written(tmp_path, "0,1\n1,2\n2,3\n6,7\n7,8\n8,10\n"), time="1")
     assert np.isnan(jump.values).tolist() == [False, False, False, True, True, True, False, False, False]
-    assert "1 jumps of time" in jump.notes[0]
+    assert "1 jumps in time" in jump.notes[0]
 
 
 def test_irregular_sampling_is_resampled_and_reported(tmp_path: Path) -> None:
@@ -99,9 +99,9 @@ def test_a_missing_column_is_reported_with_those_there_are(tmp_path: Path) -> No
 
 def test_wrong_options_differ_from_a_wrong_file(tmp_path: Path) -> None:
     path = written(tmp_path, "a,b,c\n0,1,2\n1,2,4\n")
-    with pytest.raises(UsageError, match="--sample-rate HZ, or --time-column"):
+    with pytest.raises(UsageError, match="--sample-rate HZ or --time-column"):
         read(path, "a")
-    with pytest.raises(UsageError, match="leave one out"):
+    with pytest.raises(UsageError, match="give either"):
         read(path, "b", "a", 1.0)
     with pytest.raises(UsageError, match="which column"):
         read(path, time="a")

@@ -57,12 +57,12 @@ def test_the_paper_start_needs_a_shoe_at_rest() -> None:
             "solver.tolerance",
             "is given together with step (found 1e-10); keep one of the two",
         ),
-        ("duration = 1.0", "duration = 1.0\ntheta = [0.5, 0.5]", "solver.theta", "is not for event-driven"),
-        ('"newton"', '"fixed-point"', "solver.iteration", "is not for event-driven"),
+        ("duration = 1.0", "duration = 1.0\ntheta = [0.5, 0.5]", "solver.theta", "is not used by event-driven"),
+        ('"newton"', '"fixed-point"', "solver.iteration", "is not used by event-driven"),
         ('"consistent"', '"paper"', "solver.start", "is only for the three-layer scheme"),
-        ("= false", "= true", "solver.allow_unconverged", "is not for event-driven"),
-        ("sample_interval = 1e-4", "", "output.sample_interval", "there is no time step to take its place"),
-        ('"auto"', '"midpoint"', "contact.evaluator", "event-driven is exact"),
+        ("= false", "= true", "solver.allow_unconverged", "is not used by event-driven"),
+        ("sample_interval = 1e-4", "", "output.sample_interval", "there is no solver.step to use instead"),
+        ('"auto"', '"midpoint"', "contact.evaluator", "event-driven needs no nodes"),
     ],
 )
 def test_what_is_not_for_the_event_driven_scheme_is_reported(old: str, new: str, line: str, what: str) -> None:

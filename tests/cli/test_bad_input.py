@@ -177,6 +177,10 @@ def test_no_command_line_ends_in_a_traceback(good: Path, here: Path) -> None:
     assert not any(name.endswith((".part", ".lock")) for name in left_in(here))
 
 
+def test_a_name_that_is_too_long_to_be_drawn_from_is_told(tmp_path: Path) -> None:
+    brakecli("plot", "x" * 300, cwd=tmp_path).told(4, "cannot be read as a result: File name too long; ")
+
+
 def test_a_pipe_is_read_once(tmp_path: Path) -> None:
     (tmp_path / "tiny.toml").write_text(TINY)
     sweep = 'case = "tiny.toml"\n[[axis]]\nparameter = "shoe.mass"\nvalues = [1.0]\n'
@@ -193,7 +197,15 @@ def test_a_pipe_is_read_once(tmp_path: Path) -> None:
 
 def test_a_case_whose_name_begins_with_a_dash_is_suggested_as_a_path(here: Path) -> None:
     (here / "-dash.toml").write_text(TINY)
-    sweep, new = each(here, [["sweep", "--", "-dash.toml"], ["new", "--", "-new case"]])
+    lines = [
+        ["check", "-dash.toml"],
+        ["check", "-absent.toml"],
+        ["sweep", "--", "-dash.toml"],
+        ["new", "--", "-new case"],
+    ]
+    check, absent, sweep, new = each(here, lines)
+    check.told(2, "No such option", "brakecli: -dash.toml: was read as options; name the file ./-dash.toml")
+    assert "./" not in absent.told(2, "No such option")
     sweep.told(2, "-dash.toml: this is a case; simulate it with: brakecli run ./-dash.toml")
     assert new.out == "-new case.toml: written; run it with: brakecli run './-new case.toml'\n"
     brakecli("check", "./-dash.toml", cwd=here).told(0)
@@ -208,6 +220,7 @@ def test_a_case_whose_name_begins_with_a_dash_is_suggested_as_a_path(here: Path)
         "shoe.mass.x=1:2:2",
         "a b=1:2:2",
         "x..y=1:2:2",
+        "link2.angle_deg=1e308:-1e308:3",
     ],
 )
 def test_a_key_that_cannot_be_varied_is_told_of_the_option_that_named_it(here: Path, vary: str) -> None:

@@ -58,8 +58,8 @@ def test_thresholds_are_options_and_are_reported(here: Path) -> None:
     assert strict.json["regime"] == "undecided"
     assert strict.json["thresholds"]["fewest_cycles"] == 1e6
     wrong.told(2, "did you mean fewest_cycles")
-    bad.told(2, "is not a number from 0 on")
-    again.told(2, "fewest_cycles=few: is not a number from 0 on")
+    bad.told(2, "is not a number of at least 0")
+    again.told(2, "fewest_cycles=few: is not a number of at least 0")
 
 
 def test_a_measured_signal_is_classified(here: Path) -> None:
@@ -135,6 +135,6 @@ def test_stability_varies_a_key(here: Path) -> None:
     table, numbers = each(
         here, [["stability", RELAXATION, "--vary", "link2.angle_deg=-5:5:3", *more] for more in ([], ["--json"])]
     )
-    assert "as the scheme has it" in table.out
+    assert "critical friction of the scheme" in table.out
     kinds = [entry["instability"] for entry in numbers.json["vary"]]
     assert kinds == ["divergence", None, "flutter"]

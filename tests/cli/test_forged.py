@@ -121,9 +121,25 @@ def replaced(name: str, values: object, **more: object) -> Callable[[h5py.File],
     return change
 
 
+def view_of_itself(name: str) -> Callable[[h5py.File], object]:
+    """A virtual dataset without a fixed length: HDF5 crashes as soon as its shape is asked for."""
+
+    def change(file: h5py.File) -> None:
+        if name in file:
+            del file[name]
+        grows = h5py.h5s.create_simple((5,), (h5py.h5s.UNLIMITED,))
+        grows.select_hyperslab((0,), (1,), block=(h5py.h5s.UNLIMITED,))
+        plist = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+        plist.set_virtual(grows, b".", name.encode(), grows)
+        h5py.h5d.create(file.id, name.encode(), h5py.h5t.NATIVE_DOUBLE, grows, plist)
+
+    return change
+
+
 @pytest.mark.parametrize(
     ("change", "reason"),
     [
+        (view_of_itself("history/x"), "there is no variable x in group history"),
         (dims("i8"), "attribute DIMENSION_LIST of x holds no references"),
         (replaced("history/x", np.zeros(7)), "variable x in group history has the shape (7,)"),
         (replaced("history/time", np.zeros(201)), "variable time in group history does not increase"),
@@ -147,3 +163,15 @@ def test_a_forgery_is_named(
         change(file)
     done = tried(tmp_path, "f.h5", ["classify"])
     assert done.told(4, "f.h5: cannot be read as a result: ", reason).count("\n") == 1
+
+
+def test_a_view_of_itself_is_no_signal_and_does_no_harm_in_a_result(results: Path, tmp_path: Path) -> None:
+    shutil.copy(results / "run.h5", tmp_path / "f.h5")
+    with h5py.File(tmp_path / "f.h5", "r+") as file:
+        view_of_itself("history/own")(file)
+    tried(tmp_path, "f.h5", ["classify"]).told(0)
+    signal = ["classify", "--quantity", "force", "--sample-rate", "1000"]
+    told = tried(tmp_path, "f.h5:/history/own", signal).told(
+        4, "there is no dataset /history/own, only /history/contact"
+    )
+    assert told.count("/history/own") == 2

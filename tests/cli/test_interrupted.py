@@ -96,20 +96,60 @@ def test_a_signal_ends_a_run_of_slow_steps(here: Path) -> None:
     assert left_in(here) == {"tiny.toml"}
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_steps_that_find_the_patches_of_many_waves(here: Path, number: signal.Signals) -> None:
-    """A step takes 0.1 s and more, so that a call of the loop must not take as many as on smooth surfaces."""
-    waves = [round(0.03 * 0.1 ** (i / 300), 6) for i in range(300)]
-    rough = f"\n[roughness.wheel]\namplitudes = {[2e-7] * 300}\nwavelengths = {waves}\n"
-    case = TINY.replace(
-        "step = 1e-5, duration = 0.02", 'scheme = "event-driven", tolerance = 1e-6, duration = 2.0'
-    )
-    (here / "tiny.toml").write_text(case.replace("load.force = 5000.0", "load.force = 200.0") + rough)
+def many_waves(count: int, duration: float) -> str:
+    """A case on an open pad, whose steps take 0.1 s with 300 waves, and minutes with 3000."""
+    waves = [round(0.03 * 0.1 ** (i / count), 9) for i in range(count)]
+    rough = f"\n[roughness.wheel]\namplitudes = {[6e-5 / count] * count}\nwavelengths = {waves}\n"
+    solver = f'scheme = "event-driven", tolerance = 1e-6, duration = {duration}'
+    case = TINY.replace("step = 1e-5, duration = 0.02", solver)
+    return case.replace("load.force = 5000.0", "load.force = 200.0") + rough
+
+
+@pytest.mark.parametrize(
+    ("count", "number"),
+    [
+        (300, signal.SIGINT),
+        (3000, signal.SIGTERM),
+        pytest.param(300, signal.SIGTERM, marks=campaign),
+        pytest.param(3000, signal.SIGINT, marks=campaign),
+    ],
+)
+def test_a_signal_ends_steps_that_find_the_patches_of_many_waves(
+    here: Path, count: int, number: signal.Signals
+) -> None:
+    (here / "tiny.toml").write_text(many_waves(count, 2e-3))
     with started("run", "tiny.toml", cwd=here) as process:
         wait_until((here / ".tiny.h5.part").exists)
-        time.sleep(1.0)
+        time.sleep(1.0 if count < 1000 else 3.0)  # for the tables of the contact
         interrupt(process, number)
     assert left_in(here) == {"tiny.toml"}
+
+
+@campaign
+@pytest.mark.parametrize("count", [300, 3000])
+@pytest.mark.parametrize("command", ["run", "check", "stability", "compare-schemes", "sweep"])
+def test_a_signal_ends_every_command_on_many_waves_at_any_time(here: Path, command: str, count: int) -> None:
+    """Ten commands, in their imports and later."""
+    (here / "tiny.toml").write_text(many_waves(count, 2e-3))
+    axis = '[[axis]]\nparameter = "load.force"\nvalues = [200.0, 250.0]\n'
+    search = '[critical]\nparameter = "friction.coefficient"\nlower = 0.0\nupper = 2.0\n'
+    (here / "map.toml").write_text(f'case = "tiny.toml"\n{axis}{search}')
+    file = "map.toml" if command == "sweep" else "tiny.toml"
+    for number, delay in ((signal.SIGINT, 1.5), (signal.SIGTERM, 6.0)):
+        with started(command, file, "--quiet", cwd=here) as process:
+            time.sleep(delay)
+            if process.poll() is None:  # `check` may have ended
+                interrupt(process, number)
+        assert left_in(here) <= {"tiny.toml", "map.toml", "map.h5.partial"}
+
+
+def test_more_waves_than_memory_are_refused_by_every_command(here: Path) -> None:
+    (here / "tiny.toml").write_text(many_waves(9000, 2e-3))
+    for command in ("run", "check", "stability"):
+        said = brakecli(command, "tiny.toml", cwd=here).told(
+            3, "5.18 GB of memory", "number of waves in roughness"
+        )
+        assert said.count("9000 waves") == 1
 
 
 def test_many_signals_at_once_leave_nothing_either(here: Path) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 import h5py
 import pytest
 
+from tests.campaign import campaign
 from tests.commands import TINY, Done, brakecli, each, shell
 
 pytestmark = pytest.mark.usefixtures("compiled")
@@ -102,3 +103,9 @@ def test_an_address_space_too_small_for_the_libraries_is_told_before_they_are_lo
     done = shell(f"ulimit -v {kilobytes}; $B run tiny.toml", here)
     assert done.told(3, "the address space is limited to", "raise the limit with: ulimit -v").count("\n") == 1
     assert "Usage" in shell(f"ulimit -v {kilobytes}; $B --help", here).out
+
+
+@campaign
+def test_an_address_space_that_is_just_large_enough_is(here: Path) -> None:
+    for command in ("run tiny.toml", "compare-schemes tiny.toml --budget 1"):  # the second compiles every scheme
+        shell(f"ulimit -v 600000; $B {command} -q", here, XDG_CACHE_HOME=str(here)).told(0)

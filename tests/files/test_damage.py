@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from brakecli.errors import UnreadableResultError
+from brakecli.files import read
 from brakecli.files.read import open_result
 from tests.files.results import ROWS, in_a_process, read_all, write
 
@@ -100,6 +101,22 @@ def test_a_file_that_is_no_result_is_refused_with_the_reason(
     with pytest.raises(UnreadableResultError, match=f"(?i){reason}") as caught, open_result(path, "run") as result:
         result.read("history", "time")
     assert str(caught.value).startswith(f"{path}: ")
+
+
+def test_a_file_on_which_hdf5_never_ends_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a heap of texts, free space that claims no length makes HDF5 read the same place again and again."""
+    path = tmp_path / "r.h5"
+    write(path, 10)
+    data = bytearray(path.read_bytes()[:-32])
+    place = data.index(b"GCOL") + 16
+    while number := int.from_bytes(data[place : place + 2], "little"):
+        assert 0 < number < 1000
+        place += 16 + (int.from_bytes(data[place + 8 : place + 16], "little") + 7) // 8 * 8
+    data[place + 8 : place + 16] = bytes(8)
+    path.write_bytes(data)
+    monkeypatch.setattr(read, "SHORTEST_TRIAL", 1.0)
+    with pytest.raises(UnreadableResultError, match="HDF5 cannot read it"), open_result(path):
+        raise AssertionError
 
 
 @pytest.mark.parametrize("name", ["nul\0", "x" * 300])

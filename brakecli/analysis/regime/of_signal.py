@@ -117,13 +117,13 @@ class _Rules:
     def short(self) -> Decision | None:
         velocity, limits = self.velocity, self.limits
         if self.count < _FEWEST_SAMPLES:
-            return Decision(f"only {self.count} samples in one piece; measure longer")
+            return Decision(f"only {self.count} samples without a gap; measure longer")
         self._seek_stick()
         self.clean, self.power = velocity.denoised()
         self.evidence |= {"samples": float(self.count), "skewness": self.skewness}
         self.evidence |= {"smoothed_over": float(velocity.quiet), "events": float(self.events)}
         if not self.above_noise:
-            return Decision("nothing stands out of the noise; measure closer, or with less noise")
+            return Decision("the vibration is hidden by noise; measure closer to the shoe, or with less noise")
         self.strongest = strongest = int(np.argmax(self.power))
         certain = self.skewness >= limits.skewness_certain and self.events >= limits.fewest_cycles
         if certain or self.power[strongest] == 0.0:
@@ -177,7 +177,7 @@ class _Rules:
                 gain = 1.0 if velocity.measured else 2.0 - 2.0 * np.cos(turn)
                 if CERTAIN * self.count * velocity.noise**2 * gain <= limits.overtones / 3.0 * total:
                     return None
-                what = "the velocity is skewed, by stick or by two lines in step, and noise hides which"
+                what = "stick, or two lines in phase, have skewed the velocity, and noise hides which of them"
                 return Decision(f"{what}; measure with less noise, or for longer")
         reason = f"{self.events} events of stick and slip: skewness of the velocity {self.skewness:.2g}"
         often = self.events / self.duration
@@ -189,15 +189,19 @@ class _Rules:
         flat = top > self.limits.plateau * beside
         if flat and np.isfinite(self.belt):
             stick = max(0.0, top - 0.5 * beside)
-            reason = f"the velocity is the belt's for {stick:.0%} of the time, in most cycles or all"
+            reason = f"the velocity is that of the belt for {stick:.0%} of the time, in most cycles or in all"
             return Decision(reason, Regime.RELAXATION, frequency=self.frequency, stick_fraction=stick)
         share = line_share(self.power)
         self.evidence |= {"line_share": share}
         if flat:
-            return Decision("the velocity is flat on one side, as by short stick; give the belt speed")
+            return Decision(
+                "the velocity has a plateau on one side, which short stick can cause; give --belt-speed"
+            )
         least, most = np.quantile(self.clean + self.velocity.raw.mean(), [0.01, 0.99])
         if any(0.95 * self.belt <= v <= 1.2 * self.belt for v in (-least, most)):
-            return Decision("the velocity just reaches the belt's; less noise would show if it stays")
+            return Decision(
+                "the velocity just reaches that of the belt; with less noise it would show whether it stays"
+            )
         if share < self.limits.line_share:
             return Decision(f"irregular without stick: {share:.0%} of the energy in three lines; measure longer")
         reason = f"sustained without stick: {share:.0%} of the energy of the velocity in at most three lines"

@@ -31,7 +31,7 @@ class Discrete:
     """What the case's scheme makes of the same motion at its step."""
 
     spectral_radius: float  # factor of the fastest disturbance in a step, or sample interval if steps are its own
-    growth: float  # 1/s, its logarithm over that time
+    growth: float | None  # 1/s, its logarithm over that time; None where nothing is left after a step
     step_limit: float | None  # s, below which the frictionless shoe is stable; None where any step is
     critical_friction: float | None  # where the radius passes one
     bias: float | None  # its distance from the exact one
@@ -54,6 +54,7 @@ class StabilityReport:
     undamped_flutter: float | None  # φ, closed forms for the contact stiffness above
     undamped_divergence: float | None
     discrete: Discrete | None
+    stiffness_at: StiffnessAt  # mean stiffness (N/m) by φ
 
 
 def stability(system: System) -> StabilityReport:
@@ -88,6 +89,7 @@ def stability(system: System) -> StabilityReport:
         undamped_flutter=flutter,
         undamped_divergence=divergence,
         discrete=_discrete(system, stiffness_at, critical, fastest) if rest else None,
+        stiffness_at=stiffness_at,
     )
 
 
@@ -165,7 +167,7 @@ def _discrete(system: System, stiffness_at: StiffnessAt, exact: Crossing | None,
         spectral_radius(system, stiffness_at(phi), phi),
         discrete_critical(system, stiffness_at, exact),
     )
-    growth = math.log(radius) / h if radius > 0.0 else -math.inf
+    growth = math.log(radius) / h if radius > 0.0 else None
     bias = critical - exact.friction if critical is not None and exact else None
     return Discrete(radius, growth, step_limit(system, stiffness_at), critical, bias)
 

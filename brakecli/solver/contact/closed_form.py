@@ -5,7 +5,7 @@ from typing import Any
 
 from numba import float64, int64, void
 
-from brakecli.solver.compile import borrowed, kernel
+from brakecli.solver.compile import borrowed, kernel, stopped
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.records import CONTACT_TYPE, EVALUATE, PAD_TYPE, Layer
 
@@ -37,6 +37,8 @@ def full_contact(x: float, y: float, layer: Layer) -> None:
         tangential += tables[full_at + i] * omega * cosines[i]
     square, square_x = pad.shoe_square, 0.0  # ∫ (f2 - f1)² and its derivative by x
     for i in range(n):
+        if stopped(pad.signals):
+            return
         ss, cc = -tables[pr_at + i], -tables[pr_at + n + i]
         square += cosines[i] * ss + sines[i] * cc
         for j in range(n):

@@ -10,7 +10,7 @@ from typing import Any
 
 from numba import float64, int64, types, void
 
-from brakecli.solver.compile import Floats, kernel, vector
+from brakecli.solver.compile import Floats, kernel, stopped, vector
 from brakecli.solver.contact import EXACT
 from brakecli.solver.contact.closed_form import CLEAR, FULL, clear, coverage
 from brakecli.solver.records import CONTACT_TYPE, EVALUATE, PAD_TYPE, Layer
@@ -62,11 +62,10 @@ def _sinc_of(sine: float, z: float) -> float:
     return sine / z if z != 0.0 else 1.0
 
 
-@kernel(void(float64, float64, float64, int64, int64, vector, CONTACT_TYPE))
-def _add_interval(
-    left: float, right: float, y: float, wheel_terms: int, n: int, waves: Floats, contact: Any
-) -> None:
+@kernel(void(float64, float64, float64, PAD_TYPE, vector, CONTACT_TYPE))
+def _add_interval(left: float, right: float, y: float, pad: Any, waves: Floats, contact: Any) -> None:
     """Add the closed integrals of a touching interval, without the factor k."""
+    wheel_terms, n = pad.wheel_terms, pad.wheel_terms + pad.shoe_terms
     length, middle = right - left, 0.5 * (left + right)
     at_sine, at_cosine, at_half = SINE * n, COSINE * n, HALF_TURN * n
     heights, rise = 0.0, 0.0  # ∫ (f2 - f1), and f2(right) - f2(left) = ∫ f2'
@@ -80,6 +79,8 @@ def _add_interval(
             rise += 2.0 * g * cosine * sine_half
     square, work = 0.0, 0.0  # ∫ (f2 - f1)², ∫ (f2 - f1) f2'
     for i in range(n):
+        if stopped(pad.signals):
+            return
         for j in range(n):
             half_i, half_j = waves[at_half + i], waves[at_half + j]
             minus = _sinc_of(math.sin(half_i - half_j), half_i - half_j)
@@ -96,10 +97,10 @@ def _add_interval(
     contact.store_x += work - y * rise
 
 
-@kernel(void(float64, int64, int64, PAD_TYPE, vector, CONTACT_TYPE))
-def _add_touching(y: float, wheel_terms: int, n: int, pad: Any, waves: Floats, contact: Any) -> None:
+@kernel(void(float64, PAD_TYPE, vector, CONTACT_TYPE))
+def _add_touching(y: float, pad: Any, waves: Floats, contact: Any) -> None:
     """Walk over the pad and add every interval on which the gap is positive."""
-    end, widest = pad.half_length, pad.cell
+    end, widest, n = pad.half_length, pad.cell, pad.wheel_terms + pad.shoe_terms
     fourth, rounding = 0.0, abs(y)  # bounds of the gap's fourth derivative, and of the rounding in the gap (m)
     for i in range(n):
         g, omega = abs(waves[i]), waves[n + i]
@@ -108,7 +109,7 @@ def _add_touching(y: float, wheel_terms: int, n: int, pad: Any, waves: Floats, c
     rounding *= _EPSILON
     left, width = -end, widest
     touching, start = False, left
-    while left < end:
+    while left < end and not stopped(pad.signals):
         right = min(left + width, end)
         half = 0.5 * (right - left)
         gap, slope, second, third = _gap(0.5 * (left + right), y, n, waves)
@@ -124,20 +125,19 @@ def _add_touching(y: float, wheel_terms: int, n: int, pad: Any, waves: Floats, c
             if (gap > 0.0) != (at_right > 0.0):
                 root = _root(left, right, gap, y, n, waves)
                 if touching or gap > 0.0:
-                    _add_interval(
-                        start if touching else left, root if gap > 0.0 else left, y, wheel_terms, n, waves, contact
-                    )
+                    begin = start if touching else left
+                    _add_interval(begin, root if gap > 0.0 else left, y, pad, waves, contact)
                 touching, start = at_right > 0.0, root
                 left, width = right, min(4.0 * half, widest)
                 continue
         if gap > 0.0 and not touching:
             touching, start = True, left
         elif gap <= 0.0 and touching:
-            _add_interval(start, left, y, wheel_terms, n, waves, contact)
+            _add_interval(start, left, y, pad, waves, contact)
             touching = False
         left, width = right, min(4.0 * half, widest)
     if touching:
-        _add_interval(start, end, y, wheel_terms, n, waves, contact)
+        _add_interval(start, end, y, pad, waves, contact)
 
 
 @kernel(EVALUATE)
@@ -156,9 +156,9 @@ def evaluate(x: float, y: float, layer: Layer) -> None:
     for i in range(wheel_terms):
         waves[2 * n + i] = waves[n + i] * x + angles[i]
     if covered == FULL:
-        _add_interval(-pad.half_length, pad.half_length, y, wheel_terms, n, waves, contact)
+        _add_interval(-pad.half_length, pad.half_length, y, pad, waves, contact)
     else:
-        _add_touching(y, wheel_terms, n, pad, waves, contact)
+        _add_touching(y, pad, waves, contact)
     contact.fraction = contact.stiffness / (2.0 * pad.half_length)
     k = pad.k
     contact.normal_force = max(k * contact.normal_force, 0.0)  # Eq. (2), not below zero by rounding

@@ -4,7 +4,7 @@ import math
 
 from numba import float64, types, void
 
-from brakecli.solver.compile import Floats, kernel, vector
+from brakecli.solver.compile import Floats, kernel, stopped, vector
 from brakecli.solver.contact import MIDPOINT
 from brakecli.solver.records import EVALUATE, Layer
 
@@ -50,6 +50,8 @@ def evaluate(x: float, y: float, layer: Layer) -> None:
     f2 = layer.scratch[:columns]
     f2[:] = 0.0
     for i in range(pad.wheel_terms):
+        if stopped(pad.signals):
+            return
         psi = tables[omega_at + i] * x + angles[i]
         sines = tables[pad.sin_at + i * columns : pad.sin_at + (i + 1) * columns]
         cosines = tables[pad.cos_at + i * columns : pad.cos_at + (i + 1) * columns]

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from brakecli import stop
 from brakecli.solver.compile import Floats, address
 from brakecli.solver.records import CONTACT, PAD, Layer, new
 from brakecli.solver.roughness import Surface, height
@@ -35,6 +36,7 @@ def build_pad(k: float, half_length: float, shoe: Surface, wheel: Surface, nodes
     pad = new(PAD)
     pad.k, pad.half_length, pad.nodes = k, half_length, nodes
     pad.shoe_terms, pad.wheel_terms = shoe.g.size, wheel.g.size
+    pad.signals = np.frombuffer(stop.memory, np.uint8).ctypes.data
     top, bottom = _shoe_bounds(half_length, shoe)
     pad.shoe_bound, pad.wheel_bound = max(top, bottom), np.abs(wheel.g).sum()
     pad.full_up_to, pad.clear_from = -pad.wheel_bound - top, pad.wheel_bound + bottom

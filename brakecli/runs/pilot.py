@@ -1,0 +1,84 @@
+"""Measure what a case costs by beginning it: formulas cannot know how often friction and patches cut the steps."""
+
+from dataclasses import replace
+from time import process_time
+from typing import NamedTuple
+
+from brakecli.runs.cost import evaluation_seconds, start_seconds
+from brakecli.runs.tolerance import EVENT_RATIO, LAYERED_FROM, SHORTER, coarsest_step, first_event_tolerance
+from brakecli.solver.contact import CLOSED_FORM
+from brakecli.solver.motion import Stepping
+from brakecli.solver.system import System
+
+SECONDS = 0.15
+"""Processor time of a pilot run, which no other program disturbs, as long as single steps are short beside it."""
+MOST_EVALUATION, MOST_AT_NODES = 0.02, 2e-3
+"""Guessed time (s) of an evaluation of the contact, exact and by nodes, beyond which no step is tried."""
+SECOND_RUN = EVENT_RATIO**-0.125  # what the second of two event-driven runs costs over the first
+RUNGS = 5.0  # two runs of a ladder, of steps and nodes, over the first
+FEW = 20  # steps, the first of which are shorter than those that follow
+SLOWER = 2.0  # pace of the latter half of a pilot run over the mean pace, beyond which the rest may be slower yet
+
+
+class Price(NamedTuple):
+    """What a case costs: steps of a run, seconds of all of its runs, and whether it may well be much more."""
+
+    steps: int
+    seconds: float
+    at_least: bool
+
+
+def measured(system: System) -> Price | None:
+    """The cost of a case by a pilot run, or None where a single step may take too long."""
+    if evaluation_seconds(system) > (MOST_EVALUATION if system.finds_patches else MOST_AT_NODES):
+        return None
+    method = system.method
+    if method.step is not None:
+        return _begun(system)
+    if method.row.exact:
+        found = _begun(system)
+        return found._replace(seconds=found.seconds * (1.0 + 1.0 / SHORTER))
+    if not method.own_steps:
+        return _ladder(system)
+    first = replace(system, method=replace(method, tolerance=first_event_tolerance(system)))
+    events = _begun(first)
+    events = Price(int(events.steps * SECOND_RUN), events.seconds * (1.0 + SECOND_RUN), events.at_least)
+    if not method.automatic or method.tolerance < LAYERED_FROM or system.smooth:
+        return events
+    ladder = _ladder(replace(system, method=replace(method, scheme="two-layer", theta=(0.5, 0.5))))
+    return ladder if ladder.seconds < events.seconds else events._replace(at_least=True)
+
+
+def _ladder(system: System) -> Price:
+    """Two runs of a ladder of steps at least."""
+    found = _begun(replace(system, method=replace(system.method, step=coarsest_step(system), nodes=0)))
+    return Price(2 * found.steps, RUNGS * found.seconds, at_least=True)
+
+
+def _begun(system: System) -> Price:
+    """One run, begun and continued at the same pace."""
+    own, slow_start = system.method.own_steps and not system.method.row.exact, start_seconds(system)
+    if slow_start > SECONDS:  # a shoe that starts elsewhere moves as fast
+        system = replace(system, initial=replace(system.initial, from_equilibrium=False))
+    _ = system.scheme, system.evaluate  # compiled
+    begin = process_time()
+    stepping = Stepping(system)
+    counts, state, ready, size = stepping.counts, stepping.plant.state, process_time(), 1
+    first, last = int(counts.level), system.steps + stepping.scheme.LAG
+    marks = [(0.0, 0.0)]  # seconds spent, and time that has been reached
+    while counts.level < last and not stepping.work.failed and marks[-1][0] < SECONDS:
+        stepping.block(min(last, int(counts.level) + size))
+        reached = float(state.time + state.tau) if own else (counts.level - first) * system.step
+        marks.append((process_time() - ready, reached))
+        size = 2 * size if marks[-1][0] < SECONDS / 8.0 else size
+    steps, (seconds, reached) = int(counts.kinds.sum()), marks[-1]
+    start = ready - begin + (slow_start if slow_start > SECONDS else 0.0)
+    if counts.level >= last or stepping.work.failed:
+        return Price(steps, start + seconds, at_least=False)
+    length = max(reached / steps, state.step if own and steps < FEW else 0.0)  # the first steps are short
+    more = float(1.0 + (system.sampled_duration - reached) / max(length * steps, 1e-300))
+    about = int(float(f"{min(steps * more, 1e300):.2g}")) if own else system.steps
+    before, reached_before = max(mark for mark in marks if mark[0] <= 0.5 * seconds)
+    slower = (seconds - before) * reached > SLOWER * seconds * (reached - reached_before)
+    may_open = own and not system.smooth and int(counts.kinds[CLOSED_FORM]) == steps
+    return Price(about, start + seconds * more, at_least=slower or may_open)

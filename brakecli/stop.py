@@ -1,0 +1,24 @@
+"""Where compiled code sees that a signal has come, on which it gives up what takes long.
+
+Handlers in Python wait until compiled code returns. The handler in C does not: it writes the number of the signal
+into a file that kernels see as memory. Only the standard library is imported here.
+"""
+
+import mmap
+import os
+import signal
+
+try:
+    _file = os.memfd_create("signals")
+    os.truncate(_file, mmap.PAGESIZE)
+    os.set_blocking(_file, False)
+    memory: bytearray | mmap.mmap = mmap.mmap(_file, mmap.PAGESIZE)
+except (AttributeError, OSError):  # some systems have no such files: kernels then see no signal
+    _file, memory = -1, bytearray(8)
+"""The first byte of `memory` is the number of the first signal, or 0; its address never changes."""
+
+
+def show_signals() -> None:
+    """Show kernels the signals that come from now on."""
+    if _file >= 0:
+        signal.set_wakeup_fd(_file, warn_on_full_buffer=False)

@@ -1,0 +1,216 @@
+"""The motion that a rough wheel forces on a shoe, and what becomes of disturbances of it.
+
+The wheel's waves repeat after a common period. The forced motion is then a fixed point of the map over the period,
+and the eigenvalues of the map's derivative are Floquet's multipliers. The period is cut into segments (multiple
+shooting), so that a disturbance stays small and above rounding within each of them. Without a common period the
+same derivatives along a long run give Lyapunov's exponent.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brakecli.solver.links import natural_frequencies
+from brakecli.solver.motion import solve
+from brakecli.solver.quantities import Failure
+from brakecli.solver.roughness import wheel_angles
+from brakecli.solver.system import Initial, System
+from brakecli.sweeps.growth import DEPARTED, Growth, Sliding, held
+
+LONGEST = 10.0  # s, of a period that is worth computing
+LARGEST_DENOMINATOR = 10**6  # of the ratio of two wavelengths
+SAME = 1e-15  # relative difference of ratios that are the same but for rounding
+DISTURBANCE = 1e-6  # in static compressions: the rounding of a run is 1e-10 of it
+CLOSED = 1e-7  # largest gap, in static compressions, between the end of a segment and the next one
+ITERATIONS = 10
+SAMPLES = 64  # of a segment
+BATCHES, BATCH, TRANSIENT = 8, 4, 16  # batches of a long run, segments of a batch, segments before the first
+CERTAIN = 3.5  # standard errors of the mean of eight batches: 99 % of Student's distribution
+
+Floats = NDArray[np.float64]
+
+
+def common_period(system: System) -> float | None:
+    """The time (s) after which all waves of the wheel repeat; None where there is none, or none short enough."""
+    turns, belt = system.wheel.turns, abs(system.belt_speed)
+    if belt == 0.0 or not turns.size:
+        return None
+    ratios = [Fraction(turn / turns[0]).limit_denominator(LARGEST_DENOMINATOR) for turn in turns.tolist()]
+    if any(abs(float(ratio) * turns[0] - turn) > SAME * turn for ratio, turn in zip(ratios, turns, strict=True)):
+        return None
+    common = math.gcd(*(each.numerator for each in ratios)) / math.lcm(*(each.denominator for each in ratios))
+    period = 1.0 / (turns[0] * common * belt) if common > 0.0 else math.inf
+    return float(period) if period <= LONGEST else None
+
+
+class Segments:
+    """The motion about steady sliding over a time (s), cut into equal segments; states are counted in `scales`."""
+
+    def __init__(self, found: Sliding, time: float, count: int, finer: float = 1.0) -> None:
+        """Prepare the systems of all segments: the wheel has turned on from one to the next.
+
+        `finer`: divides the step, and multiplies the nodes of the contact.
+        """
+        system, fast = found.system, natural_frequencies(found.system.coefficients, found.stiffness)[1]
+        self.scales = found.normal_force / found.stiffness * np.array([1.0, 1.0, *[2.0 * math.pi * fast] * 2])
+        self.rest = np.array([found.x, found.y, 0.0, 0.0]) / self.scales
+        self.time, length = time, time / count
+        interval = length / SAMPLES
+        step = interval / math.ceil(interval / system.step * (1.0 - 1e-9))
+        method = replace(system.method, step=step, start="consistent")
+        if finer != 1.0:
+            method = replace(method, step=step / finer, nodes=int(finer * system.nodes))
+        whole = held(replace(system, interval=interval, duration=length, method=method))
+        angles, self.systems = np.zeros(system.wheel.g.size), list[System]()
+        for k in range(count):
+            wheel_angles(system.wheel.waves, system.belt_speed * time * k / count, 0.0, angles)
+            self.systems.append(replace(whole, wheel=system.wheel._replace(phase=angles.copy())))
+
+    def end(self, k: int, state: Floats) -> Floats:
+        """Where the segment `k` ends that begins at a state; NaN where the run fails."""
+        end: Floats = self._run(self.systems[k], state)[-1]
+        return end
+
+    def ends(self, states: Floats) -> Floats:
+        """Where the segments end."""
+        return np.array([self.end(k, state) for k, state in enumerate(states)])
+
+    def maps(self, states: Floats, ends: Floats) -> Floats:
+        """The derivative of each end by the state where its segment begins."""
+        moved = [self.ends(states + DISTURBANCE * direction) - ends for direction in np.eye(4)]
+        return np.stack(moved, axis=2) / DISTURBANCE
+
+    def settled(self, state: Floats, time: float) -> Floats:
+        """The states of the last period, after so many whole ones that a time (s) has passed."""
+        count = len(self.systems)
+        periods = max(1, math.ceil(time / self.time))
+        rows = self._run(replace(self.systems[0], duration=periods * self.time), state)
+        return rows[-count * SAMPLES - 1 : -1 : SAMPLES] if len(rows) > 1 else np.full((count, 4), np.nan)
+
+    def size(self, states: Floats) -> float:
+        """The largest distance from steady sliding on the way from some states."""
+        runs = [self._run(system, state) for system, state in zip(self.systems, states, strict=True)]
+        return float(np.abs(np.concatenate(runs) - self.rest).max())
+
+    def moved(self, near: "Orbit") -> Floats:
+        """The states of a motion at another value of the parameter, moved with steady sliding."""
+        return (near.states - near.segments.rest) * (near.segments.scales / self.scales) + self.rest
+
+    def _run(self, system: System, state: Floats) -> Floats:
+        motion = solve(replace(system, initial=Initial(*(state * self.scales).tolist())))
+        failed = motion.work.failure not in (Failure.NONE, Failure.UNBALANCED)
+        return np.full((1, 4), np.nan) if failed else motion.rows[:, :4] / self.scales
+
+
+@dataclass(frozen=True)
+class Orbit:
+    """A periodic motion: its states where segments begin, and the derivatives of where they end."""
+
+    segments: Segments
+    states: Floats
+    maps: Floats
+    rate: float  # ln of the largest multiplier's modulus over the period, 1/s
+    size: float  # largest distance from steady sliding
+
+
+def orbit(segments: Segments, states: Floats, maps: Floats | None) -> Orbit | None:
+    """The periodic motion near some states, by Newton's method; None where it does not converge.
+
+    Derivatives are taken anew where those at hand do not halve the gaps, and where the motion has closed. A step
+    that does not lessen the gaps is shortened.
+    """
+    fresh, (ends, gaps, gap) = False, _gaps(segments, states)
+    for _ in range(ITERATIONS):
+        if not math.isfinite(gap):
+            return None
+        if maps is None or gap <= CLOSED:
+            maps, fresh = segments.maps(states, ends), True
+        if not np.isfinite(maps).all():
+            return None
+        if gap <= CLOSED:
+            return Orbit(segments, states, maps, log_radius(maps) / segments.time, segments.size(states))
+        change = _correction(maps, gaps)
+        for part in (1.0, 0.5, 0.25, 0.125) if fresh else (1.0,):
+            moved = _gaps(segments, states + part * change)
+            if moved[2] < (1.0 - 0.3 * part if fresh else 0.5) * gap:
+                states, (ends, gaps, gap), fresh = states + part * change, moved, False
+                break
+        else:
+            if fresh:
+                return None
+            maps = None
+    return None
+
+
+def exponent_length(found: Sliding) -> float:
+    """The time (s) of the run that Lyapunov's exponent is measured in."""
+    slow = natural_frequencies(found.system.coefficients, found.stiffness)[0]
+    passing = abs(found.system.belt_speed) * float(found.system.wheel.turns.min())
+    return (TRANSIENT + BATCHES * BATCH) * min(
+        max(2.0 / slow if slow > 0.0 else 0.0, 1.0 / passing), LONGEST / BATCH
+    )
+
+
+def lyapunov(found: Sliding, plain: Growth | None) -> Growth | None:
+    """Lyapunov's exponent of the motion from steady sliding, from means over batches of a long run.
+
+    A motion that leaves what roughness forces on it is on its way to another one: its exponent says nothing, and
+    the growth counts that was measured before, if it is one.
+    """
+    count = TRANSIENT + BATCHES * BATCH
+    length = exponent_length(found) / count
+    segments = Segments(found, count * length, count)
+    states = [segments.rest]
+    for k in range(count):
+        states.append(segments.end(k, states[-1]))
+    visited = np.array(states)
+    if not np.isfinite(visited).all():
+        return None
+    away = np.abs(visited - segments.rest).max(axis=1)
+    if away[TRANSIENT:].max() > DEPARTED * away[: TRANSIENT // 2].max():
+        return plain
+    maps, logs, frame = segments.maps(visited[:-1], visited[1:]), np.zeros(count), np.eye(4)
+    for k in range(count):
+        frame, triangle = np.linalg.qr(maps[k] @ frame)
+        logs[k] = math.log(max(abs(float(triangle[0, 0])), 1e-300))
+    means = logs[TRANSIENT:].reshape(BATCHES, BATCH).mean(axis=1) / length
+    error = CERTAIN * float(means.std(ddof=1)) / math.sqrt(BATCHES)
+    return Growth(float(means.mean()), 0.0, 0.0, opened=True, bar=error)
+
+
+def _gaps(segments: Segments, states: Floats) -> tuple[Floats, Floats, float]:
+    """Where segments end, what lies between there and the next ones, and the largest of these gaps."""
+    ends = segments.ends(states)
+    gaps = ends - np.roll(states, -1, axis=0)
+    gap = float(np.abs(gaps).max())
+    return ends, gaps, gap if math.isfinite(gap) else math.inf
+
+
+def _correction(maps: Floats, gaps: Floats) -> Floats:
+    """The changes d of the states that close the gaps to first order: d[k + 1] - maps[k] d[k] = gaps[k]."""
+    count = len(maps)
+    matrix = np.zeros((count, 4, count, 4))
+    for k in range(count):
+        matrix[k, :, (k + 1) % count] += np.eye(4)
+        matrix[k, :, k] -= maps[k]
+    try:
+        changes: NDArray[Any] = np.linalg.solve(matrix.reshape(4 * count, -1), gaps.ravel())
+        return changes.reshape(count, 4)
+    except np.linalg.LinAlgError:
+        return np.full((count, 4), np.nan)
+
+
+def log_radius(maps: Floats) -> float:
+    """ln of the largest modulus of the eigenvalues of the product of all maps."""
+    product, log_size = np.eye(4), 0.0
+    for each in maps:
+        product = np.matmul(each, product)
+        size = float(np.abs(product).max())
+        if not size > 0.0:
+            return -math.inf
+        product, log_size = product / size, log_size + math.log(size)
+    return log_size + math.log(max(float(np.abs(np.linalg.eigvals(product)).max()), 1e-300))

@@ -1,0 +1,174 @@
+"""Attacks by random inputs: whatever a command is given, it ends with an exit code of its own and a sentence."""
+
+import os
+import random
+import shutil
+import socket
+import sys
+from pathlib import Path
+
+import pytest
+
+from brakecli.case.read import starter_text
+from brakecli.cli.app import main
+from brakecli.files.os_signals import guard_streams
+from tests.campaign import campaign, counts
+from tests.cli.mutator import mutated, with_another_header
+from tests.cli.test_surroundings import ODD, odd_in
+from tests.commands import TINY, brakecli, forked, left_in, shell
+
+pytestmark = pytest.mark.usefixtures("compiled")
+
+SWEEP = """\
+case = "tiny.toml"
+title = "two axes"
+[[axis]]
+parameter = "link2.angle_deg"
+start = 1.0
+stop = 10.0
+num = 2
+[[axis]]
+parameter = ["shoe.mass", "contact.nodes"]
+values = [8, 10]
+spacing = "linear"
+[critical]
+parameter = "friction.coefficient"
+lower = 0.0
+upper = 2.0
+method = "eigenvalue"
+"""
+ROUGH = """
+[roughness.shoe]
+amplitudes = [1e-6, 7e-7]
+wavelengths = [0.020, 0.011]
+[roughness.wheel]
+amplitudes = [1e-6, 8e-7]
+wavenumbers = [250.0, 480.0]
+phases_deg = [0.0, 90.0]
+[initial]
+at = "equilibrium"
+vx = -0.5
+"""
+
+
+@pytest.mark.parametrize("number", counts(50, 5000))
+def test_a_file_with_mistakes_is_refused_with_a_sentence_for_each_or_valid(
+    number: int, here: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """In this process, as 5,000 others would take too long."""
+    monkeypatch.chdir(here)
+    for name in ("stdout", "stderr", "argv"):  # are restored at the end
+        monkeypatch.setattr(sys, name, getattr(sys, name))
+    guard_streams()
+    chance, codes = random.Random(number), list[object]()
+    texts = (TINY, starter_text(), starter_text() + ROUGH, SWEEP)
+    for n in range(number):
+        name = f"{n}.toml"  # pipes are read once, and so is each name
+        data = mutated(chance.choice(texts), chance)
+        Path(name).write_bytes(data)
+        sys.argv = ["brakecli", "check", name, *chance.choice(([], ["--json"], ["--set", "shoe.mass=9.0"]))]
+        try:
+            main()
+            codes.append(0)
+        except SystemExit as end:
+            codes.append(end.code)
+        Path(name).unlink()
+        out, err = capfd.readouterr()
+        assert codes[-1] in (0, 2, 3), (data, err)
+        assert not odd_in(out + err), (data, err)
+        for line in err.splitlines() if codes[-1] else ():
+            assert line.startswith("brakecli: "), (data, err)
+            assert "; " in line, (data, err)
+            assert "(found )" not in line, (data, err)
+    assert left_in(here) == {"tiny.toml"}
+    assert number / 20 < codes.count(0) < number / 2
+
+
+@pytest.mark.parametrize("number", counts(3, 100))
+def test_a_result_with_another_header_is_refused_with_a_sentence_or_used(
+    number: int, good: Path, tmp_path: Path
+) -> None:
+    whole, chance, refused = (good / "tiny.h5").read_bytes()[:-32], random.Random(number), 0
+    for _ in range(number):
+        (tmp_path / "f.h5").write_bytes(with_another_header(whole, chance))
+        words = chance.choice((["classify"], ["classify", "--json"], ["run", "-o", "o.h5", "--force", "-q"]))
+        done = forked(words[0], "f.h5", *words[1:], cwd=tmp_path, memory=700_000_000)
+        assert done.code in (0, 1, 4), done
+        assert done.code == 0 or done.err.count("\n") == 1, done
+        assert not odd_in(done.err), done
+        refused += done.code == 4
+    assert refused > number / 5
+
+
+@campaign
+def test_odd_names_and_titles_reach_no_terminal(tmp_path: Path) -> None:
+    chance = random.Random(16)
+    for _ in range(10):
+        odd = "a" + "".join(chance.choices(ODD + "\u2028\u200f\u0085\u061c\u2069", k=6))
+        (tmp_path / f"{odd}.toml").write_text(TINY.replace("Tiny", odd.replace("\r", "").replace("\x1b", "")))
+        for words in (
+            ["check", f"{odd}.toml"],
+            ["check", odd],
+            ["new", odd],
+            ["check", f"{odd}.toml", "--set", f"{odd}=1"],
+        ):
+            done = brakecli(*words, cwd=tmp_path)
+            assert not odd_in(done.out + done.err), done
+            assert "Traceback" not in done.err
+
+
+@campaign
+@pytest.mark.parametrize("ending", [".lock", ".part"])
+@pytest.mark.parametrize("kind", ["pipe", "folder", "link", "link to nothing", "second name", "socket", "text"])
+def test_what_stands_in_the_way_of_an_output_is_named_and_left_alone(
+    kind: str, ending: str, tmp_path: Path
+) -> None:
+    place, other = tmp_path / f".case.toml{ending}", tmp_path / "other"
+    other.write_text("mine")
+    match kind:
+        case "pipe":
+            os.mkfifo(place)
+        case "folder":
+            place.mkdir()
+        case "link":
+            place.symlink_to(other)
+        case "link to nothing":
+            place.symlink_to(tmp_path / "nothing")
+        case "second name":
+            place.hardlink_to(other)
+        case "socket":
+            with socket.socket(socket.AF_UNIX) as opened:
+                opened.bind(str(place))
+        case _:
+            place.write_text("mine")
+    before = place.lstat()
+    brakecli("new", cwd=tmp_path).told(74, place.name, "is in the way")
+    assert place.lstat() == before
+    assert left_in(tmp_path) == {place.name, "other"}
+    assert other.read_text() == "mine"
+
+
+@campaign
+def test_every_limit_of_the_address_space_that_is_too_small_is_told(here: Path) -> None:
+    chance = random.Random(18)
+    for _ in range(10):
+        done = shell(f"ulimit -v {chance.randrange(100_000, 580_000)}; $B check tiny.toml", here)
+        assert done.told(3, "the address space is limited to").count("\n") == 1
+
+
+@campaign
+def test_whatever_damage_a_kernel_cache_has_is_repaired(here: Path) -> None:
+    chance, cache = random.Random(17), here / "cache"
+    brakecli("check", "tiny.toml", cwd=here, stdin="", XDG_CACHE_HOME=str(cache)).told(0)
+    files = sorted(cache.rglob("*.nb?"))
+    assert files
+    kept = shutil.copytree(cache, here / "kept")
+    for _ in range(10):
+        for path in chance.sample(files, 2):
+            data = path.read_bytes()
+            bad = (b"", data[: len(data) // 2], chance.randbytes(len(data)))
+            path.write_bytes(chance.choice(bad))
+        done = brakecli("check", "tiny.toml", "--json", cwd=here, stdin="", XDG_CACHE_HOME=str(cache))
+        assert done.told(0) == ""
+        assert done.json["steps"] == 2000
+        shutil.copytree(kept, cache, dirs_exist_ok=True)

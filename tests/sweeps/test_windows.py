@@ -1,0 +1,94 @@
+"""Windows of instability: resonances of a wheel's wave, found by a search, stored, printed and drawn.
+
+The answers come from the equations of motion in full contact and their derivative, integrated over a period of the
+wheel by another program (SciPy's DOP853).
+"""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+import xarray as xr
+from scipy.integrate import solve_ivp
+
+from brakecli.case.system import system_of
+from tests.commands import brakecli
+from tests.examples import make
+from tests.plots.helpers import drawn
+
+TONGUES: dict[str, Any] = {  # a wave of the wheel, whose slope feeds vibration near two speeds
+    "shoe": {"mass": 28.0},
+    "wheel": {"radius": 0.5, "angular_speed": -18.57},
+    "link1": {"stiffness": 5190000.0, "damping": 31.2, "angle_deg": -3.1},
+    "link2": {"stiffness": 10100000.0, "damping": 42.8, "angle_deg": -7.55},
+    "load": {"force": 15900.0},
+    "friction": {"coefficient": 0.305},
+    "contact": {"half_length": 0.01, "stiffness": 428000000.0},
+    "roughness": {"wheel": {"amplitudes": [0.000398], "wavelengths": [0.041]}},
+    "solver": {"duration": 0.05, "step": 2.5e-5},
+}
+
+
+def exact_growth(tables: dict[str, Any], **changes: Any) -> float:
+    """ln of the largest multiplier over a period of the wheel (1/s), in a contact that touches everywhere."""
+    system = system_of(make(tables, **changes))
+    c, load, belt, a = system.coefficients, system.load_at_start, system.belt_speed, system.half_length
+    stiffness, phi = system.contact_stiffness, math.copysign(c.phi, belt)
+    g, omega, phase = (np.array(each) for each in (system.wheel.g, system.wheel.omega, system.wheel.phase))
+    height = g * np.sinc(omega * a / math.pi)
+    period = 2.0 * math.pi / (omega.min() * abs(belt))
+    inertia = np.array([[c.b_xx, c.b_xy], [c.b_xy, c.b_yy]])
+    links = np.array([[c.c_xx, c.c_xy], [c.c_xy, c.c_yy]])
+    pull = np.array([phi, 1.0])
+
+    def slope(t: float, z: Any) -> Any:
+        state, tangent = z[:4], z[4:].reshape(4, 4)
+        angle = omega * (state[0] - belt * t) + phase
+        force = stiffness * (height @ np.sin(angle) - state[1])
+        by_place = stiffness * np.array([height * omega @ np.cos(angle), -1.0])
+        loads = load * np.array([c.sin_beta, c.cos_beta])
+        acceleration = (pull * force - inertia @ state[2:] - links @ state[:2] - loads) / c.m
+        pulled = (np.outer(pull, by_place) - links) @ tangent[:2] - inertia @ tangent[2:]
+        return np.concatenate([state[2:], acceleration, tangent[2:].ravel(), pulled.ravel() / c.m])
+
+    state = np.zeros(4)
+    for _ in range(6):
+        start = np.concatenate([state, np.eye(4).ravel()])
+        end = solve_ivp(slope, (0.0, period), start, "DOP853", rtol=1e-11, atol=1e-15).y[:, -1]
+        multipliers = end[4:].reshape(4, 4)
+        state = state + np.linalg.solve(np.eye(4) - multipliers, end[:4] - state)
+    return math.log(float(np.abs(np.linalg.eigvals(multipliers)).max())) / float(period)
+
+
+def test_two_windows_of_a_passing_wave_are_found_stored_printed_and_drawn(tmp_path: Path) -> None:
+    """More damping closes one of them; a bound of the range cuts that one, which ends there."""
+    table = {
+        "case": "c.toml",
+        "axis": [{"parameter": "link1.damping", "values": [31.2, 300.0]}],
+        "critical": {"parameter": "wheel.angular_speed", "lower": -18.08, "upper": -14.9, "tolerance": 0.004},
+    }
+    (tmp_path / "c.toml").write_text(tomli_w.dumps(TONGUES))
+    (tmp_path / "s.toml").write_text(tomli_w.dumps(table))
+    printed = brakecli("sweep", tmp_path / "s.toml", "-o", tmp_path / "s.h5", "--json", cwd=tmp_path).json
+    with xr.open_dataset(tmp_path / "s.h5", engine="h5netcdf") as result:
+        assert result.critical_windows_lower.dims == ("link1_damping", "window")
+        lower, upper = result.critical_windows_lower.values, result.critical_windows_upper.values
+    for found, name in ((lower, "critical_windows_lower"), (upper, "critical_windows_upper")):
+        assert printed[name] == [[None if math.isnan(value) else value for value in row] for row in found]
+    np.testing.assert_array_equal(np.isnan(lower), [[False, False], [False, True]])
+    assert lower[0, 0] == -18.08
+    lost = [(31.2, lower[0, 1]), (300.0, lower[1, 0])]
+    regained = [(31.2, upper[0, 0]), (31.2, upper[0, 1]), (300.0, upper[1, 0])]
+    ends = [(*end, 1.0) for end in lost] + [(*end, -1.0) for end in regained]
+    for damping, end, rises in ends:
+        case = {**TONGUES, "link1": {**TONGUES["link1"], "damping": damping}}
+        before, after = (exact_growth(case, wheel__angular_speed=end + by) for by in (-0.004, 0.004))
+        assert rises * before < 0.0 < rises * after
+    axes = drawn(tmp_path / "s.h5").axes[0]
+    bars = next(lines for lines in axes.collections if lines.get_label() == "unstable")
+    segments = np.array([path.vertices for path in bars.get_paths()])[:, :, 1]
+    segments = segments[np.isfinite(segments).all(axis=1)]
+    np.testing.assert_allclose(segments[:, 0], lower[np.isfinite(lower)])
+    np.testing.assert_allclose(segments[:, -1], upper[np.isfinite(upper)])
