@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from brakecli.cli.options import AsJson, Quiet, option, source_argument
-from brakecli.cli.output import announce_compilation, show_result, warn
+from brakecli.cli.output import announce_compilation, progress, say, show_result, warn
 from brakecli.errors import UnreadableResultError, UsageError
 
 SOURCE = "Result of a run; with --quantity a measured signal, in a CSV file or in any HDF5 file (FILE.h5:/path)."
+SECOND = "Where friction or roughness may keep a vibration up, run the case once more to decide."
 THRESHOLD = option("Change a threshold of the rules; repeatable.", "NAME=VALUE", "--threshold")
 
 
@@ -25,6 +26,7 @@ def command(
     belt_speed: Annotated[float | None, option("Speed of the wheel's surface, if known.", "M/S")] = None,
     stiffness: Annotated[float | None, option("Stiffness behind a measured force, if known.", "N/M")] = None,
     thresholds: Annotated[list[str] | None, THRESHOLD] = None,
+    second_run: Annotated[bool, option(SECOND, None, "--second-run")] = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
@@ -32,6 +34,8 @@ def command(
     reading: dict[str, Any] = {"column": column, "time_column": time_column, "sample_rate": sample_rate}
     machine: dict[str, Any] = {"belt_speed": belt_speed, "stiffness": stiffness}
     _check(quantity, {**reading, **machine})
+    if second_run and quantity is not None:
+        raise UsageError("--second-run: is for the result of a run, whose case can be run again; leave it out")
     announce_compilation(quiet or quantity is not None)
     from brakecli.cli.tables import verdict_table
 
@@ -40,7 +44,8 @@ def command(
         from brakecli.analysis.regime.verdict import Thresholds
 
         try:
-            numbers = classify_result(Path(source), _changed(Thresholds, thresholds))
+            limits = _changed(Thresholds, thresholds)
+            numbers = _twice(source, limits, quiet) if second_run else classify_result(Path(source), limits)
         except UnreadableResultError as error:
             remedy = "for a measured signal, state with --quantity what was measured"
             raise UnreadableResultError(f"{error}; {remedy}") from error
@@ -55,6 +60,14 @@ def command(
     warn(*numbers.get("warnings", ()))
     shown = {"source": source, **numbers}
     show_result("classify", shown, verdict_table, source, numbers, as_json=as_json, quiet=quiet)
+
+
+def _twice(source: str, limits: Any, quiet: bool) -> dict[str, Any]:
+    """The verdict by a second run, whose cost is said before."""
+    from brakecli.runs.second import classify_twice
+
+    with progress(quiet) as show_progress:
+        return classify_twice(Path(source), limits, lambda text: None if quiet else say(text), show_progress)
 
 
 def _check(quantity: str | None, given: Mapping[str, Any]) -> None:

@@ -20,7 +20,12 @@ VERDICT = (
     Field("regime", "", "regime of the motion", "S16", "verdict."),
     Field("excitation", "", "where the energy of a sustained motion comes from", "S16", "verdict."),
     Field("frequency", "Hz", "fundamental frequency of vx of a sustained motion", at="verdict."),
-    Field("growth_rate", "1/s", "where the motion is linear: growth rate of its slowest mode", at="verdict."),
+    Field(
+        "growth_rate",
+        "1/s",
+        "where the motion is linear: growth rate of its slowest mode, slopes of passing waves included",
+        at="verdict.",
+    ),
     Field("ringing_frequency", "Hz", "frequency of that mode", at="verdict."),
     Field(
         "amplitude", "m", "half of peak to peak of x: median of the cycles", at="verdict.", label="amplitude of x"
@@ -29,7 +34,9 @@ VERDICT = (
     Field("amplitude_forced", "m", "on a rough wheel: what the roughness forces", at="verdict."),
     Field("amplitude_own", "m", "on a rough wheel: what the shoe adds", at="verdict."),
     Field("frequency_resolution", "Hz", "distance of two lines in the spectrum", at="verdict."),
-    Field("torque_variation", "N m", "braking torque, peak to peak", at="verdict."),
+    Field(
+        "torque_variation", "N m", "braking torque, peak to peak; a median where the motion lasts", at="verdict."
+    ),
     integer("settled", "whether a settled part was found (0, 1); otherwise the second half is judged", "verdict."),
     Field("settled_from", "s", "start of the settled part, or of the second half", at="verdict."),
     Field("mean_friction_force", "N", "mean friction force on the shoe, from `settled_from` on", at="verdict."),

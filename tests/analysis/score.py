@@ -1,4 +1,7 @@
-"""The score: what `brakecli run` says of random shoes, beside the answers, and what of it is wrong."""
+"""The score: what `brakecli run` says of random shoes, beside the answers, and what of it is wrong.
+
+Where it says `undecided` and names a second run, `brakecli classify --second-run` has the last word.
+"""
 
 import math
 from collections import Counter
@@ -12,13 +15,16 @@ from typing import Any
 import numpy as np
 import tomli_w
 
+from brakecli.analysis.regime.verdict import Thresholds
 from brakecli.case.read import parse_case
 from brakecli.files.read import open_result
 from brakecli.runs.run import run
+from brakecli.runs.second import classify_twice
 from brakecli.solver.quantities import HISTORY
 from tests.analysis.answers import VX, Answer, X, answer, last_eighth, levels, sticks_per_cycle
 from tests.analysis.shoes import Array, Shoe, Tables, random_shoes
 
+RESULT = "score.h5"
 SUSTAINED = ("relaxation", "quasi-harmonic")
 WRONG: dict[str, dict[str, str]] = {  # answer: what may not be said of it, and why
     "dies": {"sustained": "sustained is said of what dies", "forced": "forced is said of a smooth wheel"},
@@ -89,7 +95,7 @@ def own_share(tables: Tables, rows: Array) -> float:
 
 def verdict(tables: Tables, folder: Path) -> tuple[Tables, dict[str, Any], Array] | None:
     """The case, what `brakecli run` says of it, and its samples; None where the run fails at three steps."""
-    path = folder / "score.h5"
+    path = folder / RESULT
     for finer in (1, 3, 3):
         tables = {**tables, "solver": {**tables["solver"], "step": tables["solver"]["step"] / finer}}
         numbers = run(parse_case(tomli_w.dumps(tables), "score"), path, force=True).numbers()
@@ -109,7 +115,8 @@ class Score:
 
     said: Counter[tuple[str, str]]
     mistakes: list[tuple[Tables, dict[str, Any], Answer, str]]
-    undecided: list[tuple[Tables, str, Answer]]  # with the reason, where more might be said
+    undecided: list[tuple[Tables, str, Answer]]  # with the reason, where more might be said, after a second run
+    undecided_at_once: int = 0  # before it
     failed: int = 0
 
     @property
@@ -134,8 +141,14 @@ def score(stratum: str, count: int, seed: int) -> Score:
                 true = replace(true, name="swells")
             found.said[true.name, said(numbers)] += 1
             neutral = Shoe.of(tables).rate == 0.0 and not Shoe.of(tables).b.any()
-            if said(numbers) == "undecided" and not neutral and true.name not in BESIDE:
-                found.undecided.append((tables, numbers["reasons"][0], true))
-            if why := wrong(tables, numbers, rows, true):
-                found.mistakes.append((tables, numbers, true, why))
+            more = not neutral and true.name not in BESIDE
+            found.undecided_at_once += more and said(numbers) == "undecided"
+            again = numbers
+            if said(numbers) == "undecided":
+                again = classify_twice(Path(folder) / RESULT, Thresholds(), lambda text: None, lambda *done: None)
+                if more and said(again) == "undecided":
+                    found.undecided.append((tables, again["reasons"][0], true))
+            for told_so in (numbers, again):
+                if why := wrong(tables, told_so, rows, true):
+                    found.mistakes.append((tables, told_so, true, why))
     return found

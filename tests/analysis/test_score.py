@@ -100,23 +100,34 @@ def test_no_verdict_contradicts_an_independent_answer(stratum: str, count: int) 
     assert not found.mistakes, told_of(found)
 
 
+MOST_UNDECIDED = {"smooth": 0.08, "slow": 0.02, "full": 0.11, "open": 0.20, "frictionless": 0.02}
+"""Parts that may stay undecided after a second run, beside the neutral and those that still grow.
+
+What is left has no answer in a run of its length: a strong start that still decays (a run need not hold
+the few powers of e that this takes), an amplitude that drifts by more than 5 %, stick in a quarter to
+three quarters of the cycles, and on surfaces that open vibrations that lose a part of their level
+without friction. Of most of these the independent answer, from runs eight times longer, does not know
+either. They are a tenth of the shoes in full contact and a sixth of those that open. The bounds leave
+one shoe in forty for other processors, on which a chaotic motion ends elsewhere.
+"""
+
+
 @campaign
 def test_few_shoes_stay_undecided_that_are_neither_neutral_nor_still_growing() -> None:
-    """The aim is at most 8 % of all. It holds in the strata that are asserted; the score of all is printed (-s).
-
-    In the others most of the undecided ones decay still from a strong start, or are irregular; of half of those on
-    surfaces that open, nor does the answer say whether friction or the roughness keeps them up.
-    """
+    """At most 8 % of all, and of each kind what `MOST_UNDECIDED` explains; the score is printed (-s)."""
     scores = {stratum: score(stratum, count, SEED) for stratum, count in MANY.items()}
     said_of = sum((found.said for found in scores.values()), Counter[tuple[str, str]]())
     table = [f"{true:18s} {word:10s} {count:4d}" for (true, word), count in sorted(said_of.items())]
     for stratum, found in scores.items():
         counts = f"{len(found.mistakes)} wrong, {len(found.undecided)} undecided of {found.judged}"
-        table.append(f"{STRATA[stratum]}: {counts}; {found.failed} failed")
+        before = f"{found.undecided_at_once} before a second run"
+        table.append(f"{STRATA[stratum]}: {counts} ({before}); {found.failed} failed")
     sys.stdout.write("\n".join(["", *table, ""]))
     assert sum(count for (true, _), count in said_of.items() if true != "no answer") >= 500
-    for stratum in ("slow", "frictionless"):
-        assert len(scores[stratum].undecided) <= 0.08 * scores[stratum].judged
+    for stratum, most in MOST_UNDECIDED.items():
+        assert len(scores[stratum].undecided) <= most * scores[stratum].judged, stratum
+    judged = sum(found.judged for found in scores.values())
+    assert sum(len(found.undecided) for found in scores.values()) <= 0.08 * judged
 
 
 def test_every_stratum_draws_what_it_names() -> None:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from brakecli.analysis.regime.cleaning import line_share
 from brakecli.analysis.regime.spectra import FEWEST_CYCLES, Array, interpolated, upward_crossings
 from brakecli.solver.history import History
 from brakecli.solver.quantities import ContactState
@@ -26,6 +27,9 @@ _GROUPS = 10  # of neighbouring cycles, of which a median is taken
 _MOST_PLACES = 1 << 16  # samples at which a forced motion is computed
 _FULL = 1.0 - 1e-9  # part of the pad that touches in full contact, but for rounding
 _ENDS = (ContactState.STICK, ContactState.SEPARATED)
+_MOST_COVERED = 0.2  # part of the band on lines, beyond which they are not told from what lies beside them
+_LEAST_FORCED = 0.02  # of what lies beside the lines: that much of a decaying motion leaks onto them
+_TREND = 3.0  # standard errors of the slope of ten medians, beyond which an amplitude drifts
 _SAME = 0.02  # squared difference, over twice the variance, between one period of vx and the next
 
 
@@ -119,6 +123,10 @@ class Part:
             return 0.0
         return float(power[_near(lines, frequencies)].sum()) / total
 
+    def narrow(self) -> float:
+        """Part of the energy of vx in its three strongest narrow bands."""
+        return line_share(self._spectrum[1])
+
     def covered(self, lines: Sequence[float]) -> float:
         """Part of the band up to the highest frequency of note that lines (Hz) take: what chance would find."""
         frequencies, power, total = self._spectrum
@@ -128,9 +136,9 @@ class Part:
     def split(self, lines: Sequence[float]) -> tuple[float, float] | None:
         """Half of peak to peak of the parts of x on lines (Hz) and beside them, in the middle half of the samples.
 
-        None where the lines lie too close for the length of the record.
+        None where the lines lie too close for the length of the record, or hold no more than leaks onto them.
         """
-        if self.covered(lines) > 0.5 or self.stop - self.start < FEWEST_SAMPLES // 4:
+        if self.covered(lines) > _MOST_COVERED or self.stop - self.start < FEWEST_SAMPLES // 4:
             return None
         x = self.last("x")
         window, middle = np.hanning(len(x)), slice(len(x) // 4, 3 * len(x) // 4)
@@ -139,8 +147,8 @@ class Part:
         chosen[: _LINE_BINS // 2] = True
         forced = np.fft.irfft(np.where(chosen, spectrum, 0.0), len(x))[middle] / window[middle]
         forced -= 0.5 * (forced.max() + forced.min())
-        own = x[middle] - forced
-        return 0.5 * float(np.ptp(forced)), 0.5 * float(np.ptp(own))
+        parts = 0.5 * float(np.ptp(forced)), 0.5 * float(np.ptp(x[middle] - forced))
+        return parts if parts[0] > _LEAST_FORCED * parts[1] else None
 
     def lines(self, forced: Sequence[float]) -> dict[str, list[float]]:
         """The strongest lines of vx: frequencies (Hz), parts of the energy, and 1 where roughness acts there."""
@@ -232,6 +240,8 @@ class Cycles:
     contact_loss_fraction: float
     limited: float  # part of the groups of cycles in which the shoe sticks, leaves the wheel or overtakes it
     drift: float  # by which the amplitude changes, over itself, from the first third of the cycles to the last
+    drifts: bool  # whether that is more than chance; then the spread contains it
+    force_variation: float  # N, peak to peak of the friction force
 
 
 def cycles_of(part: Part, slip: ContactState | None = None) -> Cycles | None:
@@ -283,4 +293,13 @@ def cycles_of(part: Part, slip: ContactState | None = None) -> Cycles | None:
     sizes = swings(part, crossings)
     first, *_, last = (float(np.median(third)) for third in np.array_split(sizes, 3) if len(third))
     drift = last / first - 1.0 if first > 0.0 else 0.0
-    return Cycles(evidence, frequency, *median(sizes), median(stick)[0], median(loss)[0], limited, drift)
+    groups = np.array([np.median(group) for group in np.array_split(sizes, min(cycles, _GROUPS))])
+    line = np.polynomial.Polynomial.fit(places := np.arange(len(groups)), groups, 1).convert()
+    error = float(np.std(groups - line(places)) / (np.std(places) * np.sqrt(max(len(groups) - 2, 1))))
+    drifts = abs(float(line.coef[-1])) > _TREND * error
+    force, whole = part.history.read("friction_force", part.stop - len(velocity), part.stop), crossings.astype(int)
+    most, least = (each.reduceat(force[: whole[-1]], whole[:-1]) for each in (np.maximum, np.minimum))
+    size, spread = median(sizes)
+    spread += abs(drift) * size if drifts else 0.0
+    medians = size, spread, median(stick)[0], median(loss)[0]
+    return Cycles(evidence, frequency, *medians, limited, drift, drifts, float(np.median(most - least)))

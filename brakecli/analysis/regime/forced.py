@@ -5,6 +5,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from brakecli.analysis.regime.evidence import WINDOWS, Cycles, Envelope, Part
 from brakecli.analysis.regime.verdict import Context, Decision, Excitation, Feeds, Regime, Thresholds
 from brakecli.solver.history import History
@@ -20,6 +23,9 @@ QUARTER = 4.0 / 3.0  # a run whose last quarter is settled, over what comes befo
 _ERRORS = 2.0  # standard errors of a mean power
 _LARGER = 5.0  # times what the waves force in full contact: a larger motion needs more proof that it is forced
 _MOST_COMBINED = 6  # waves whose frequencies are combined by threes
+_FOLLOWS = 0.1  # part of the energy of vx and vy in which a motion differs that comes back with the waves
+_PROBES, _MOST_RETURNS, _APART = 400, 1 << 14, 5  # times compared, among how many, so many cycles of vx apart
+SECOND_RUN = "a second run: brakecli classify RESULT.h5 --second-run"
 _COMBINATIONS = [(i, j, k) for i in range(-2, 3) for j in range(-2, 3) for k in (-1, 0, 1)]
 
 
@@ -66,7 +72,7 @@ class ForcedRules:
 
     def _long_enough(self, slow: float) -> float:
         """Duration (s) of a run whose settled part holds two periods."""
-        start = self.settled_part.start * self.history.interval if self.settled else 0.5 * self.duration
+        start = self.settled_part.start * self.history.interval if self.settled else 2.0 * slow
         return max(start + 2.0 * slow, QUARTER * 2.0 * slow) * 1.05
 
     def _too_short(self, slow: float) -> Decision:
@@ -90,8 +96,18 @@ class ForcedRules:
         if self.context.frictionless:
             text = "without friction nothing but the roughness shakes the shoe"
             return self._forced(text) if growth < 0.0 else Decision(f"{text}, but no dashpot damps it")
+        if self.context.feeds is Feeds.ROUGHNESS:
+            return self._forced("only the roughness shakes the shoe, as a second run shows")
+        if self.context.feeds is Feeds.FRICTION:
+            return None
         share, dense = self._share(self.context.forced, 0.5)
         self.evidence["forced_share"] = share
+        if share >= self.limits.forced_share and self.context.undamped and growth <= 0.0:
+            text = f"{share:.0%} of the energy of vx lies on the lines of the roughness"
+            return Decision(f"{text}, but no dashpot damps what the shoe adds; a dashpot would decide")
+        if growth < 0.0 and not self._unstable_in_full_contact and not self._larger and self._follows():
+            text = "the motion comes back wherever the waves of the wheel do, and sliding is stable"
+            return self._forced(f"only the roughness shakes the shoe: {text}")
         if share < self.limits.forced_share:
             lines = tuple({*self.context.forced, *self.context.subharmonics})
             share, dense = self._share(lines, 0.3)
@@ -106,21 +122,30 @@ class ForcedRules:
         what = f"{share:.0%} of the energy of vx lies on the lines of the roughness"
         if powers_of_e > _NOTHING:
             own = f"but sliding is unstable: the shoe's own vibration grows at {growth:.3g} 1/s"
-            return self.fed() or Decision(f"{what}, {own}; run at least {GROWN / growth:.2g} s")
+            text = f"{what}, {own}; run at least {GROWN / growth:.2g} s, or decide by {SECOND_RUN}"
+            return self.fed() or Decision(text, second_run=True)
         if feeds is Feeds.FRICTION and self.evidence["power_of_roughness"] < 0.0:
             return None
         doubtful = larger or self._unstable_in_full_contact
         if feeds is Feeds.FRICTION or (doubtful and feeds is Feeds.UNKNOWN):
             return self._either()
         if dense:
-            text = f"{what}, which lie too close to be told from others; run twice as long"
-            return self.fed() or Decision(text)
+            text = (
+                f"{what}, which lie too close to be told from others; run twice as long, or decide by {SECOND_RUN}"
+            )
+            return self.fed() or Decision(text, second_run=True)
         return self._forced(f"only the roughness shakes the shoe: {what}")
 
     @property
     def _unstable_in_full_contact(self) -> bool:
         theory = self.context.linear()
         return theory is not None and theory.direction > 0
+
+    @property
+    def _doubtful(self) -> bool:
+        """Whether friction can keep up only a large vibration, which no second run has shown."""
+        stable = self.context.growth() < 0.0 and not self._unstable_in_full_contact
+        return stable and self.context.feeds is not Feeds.FRICTION
 
     @property
     def _larger(self) -> bool:
@@ -130,6 +155,34 @@ class ForcedRules:
     def _expected(self) -> float:
         """Standard deviation of x (m) that the waves force in full contact."""
         return math.sqrt(0.5 * sum(swing**2 for _, swing in self.context.waves))
+
+    def _follows(self) -> bool:
+        """Whether vx and vy come back, at times far from one another, wherever all waves have the same phase."""
+        from scipy.spatial import cKDTree
+
+        speeds = np.array([frequency * swing for frequency, swing in self.context.waves])
+        for part in (self.settled_part, self.last):
+            velocity = np.stack([part.last("vx"), part.last("vy")], axis=1)
+            rises = np.count_nonzero((velocity[:-1, 0] < 0.0) & (velocity[1:, 0] >= 0.0))
+            size = velocity.std(axis=0)
+            if rises <= 2 * _APART or not size.all():
+                continue
+            stride = -(-len(velocity) // _MOST_RETURNS)
+            places: NDArray[np.intp] = np.arange(0, len(velocity), stride)
+            turns = np.outer(places * part.history.interval, [frequency for frequency, _ in self.context.waves])
+            waves = speeds / speeds.max() * np.exp(2j * math.pi * turns)
+            points = np.concatenate([waves.real, waves.imag], axis=1)
+            probes = np.linspace(0, len(places) - 1, _PROBES).astype(int)
+            near = np.asarray(cKDTree(points).query(points[probes], k=min(_PROBES, len(places)))[1])
+            far = np.abs(near - probes[:, None]) * stride > _APART * len(velocity) / rises
+            found = far.any(axis=1)
+            if np.count_nonzero(found) < _PROBES // 2:
+                continue
+            pairs = probes[found], near[found, far[found].argmax(axis=1)]
+            apart = np.subtract(*(velocity[places[each]] / size for each in pairs))
+            if float(np.mean(apart**2)) <= 2.0 * _FOLLOWS:
+                return True
+        return False
 
     def _share(self, lines: Sequence[float], most: float) -> tuple[float, bool]:
         """Part of the energy of vx on lines, in the second half or in the last quarter, where it is more.
@@ -150,6 +203,9 @@ class ForcedRules:
         slow = self._slowest(self.settled_part.amplitude("x"))
         if self._settled_seconds < 2.0 * slow:
             return self._too_short(slow)
+        if not self.settled and (growth := self.context.growth()) < 0.0:
+            needed = max(QUARTER * (self.duration - 3.0 / growth), self._long_enough(slow))
+            text += f"; run at least {needed:.3g} s to see the amplitude that lasts"
         return Decision(text, Regime.DAMPED, Excitation.FORCED)
 
     def _settle(self) -> bool:
@@ -170,6 +226,8 @@ class ForcedRules:
         friction, off = self.settled_part.power("friction_force", "vx")
         roughness, off_too = self.settled_part.power("normal_force", "vy")
         self.evidence |= {"power_of_friction": friction, "power_of_roughness": roughness}
+        if self.context.feeds is not Feeds.UNKNOWN:
+            return self.context.feeds
         lost = self.context.powers(self.settled_part).get("power_dashpots", friction + roughness)
         open_by = abs(friction + roughness - lost)
         error = _ERRORS * max(math.hypot(off, off_too), open_by)
@@ -190,8 +248,12 @@ class ForcedRules:
         return self._forced(f"only the roughness shakes the shoe: {self._powers}")
 
     def _either(self) -> Decision:
-        remedy = "a second run, without roughness or with less friction, decides at the cost of this one"
-        return Decision(f"{self._powers}, so that either may keep it up; {remedy}")
+        text = f"{self._powers}, so that either may keep it up"
+        if self.context.undamped and self.context.growth() <= 0.0:
+            return Decision(f"{text}, and no dashpot damps what the shoe adds; a dashpot would decide")
+        return Decision(
+            f"{text}; decide by {SECOND_RUN}, at some four times the cost of this one", second_run=True
+        )
 
     @property
     def _powers(self) -> str:

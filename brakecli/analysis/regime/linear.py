@@ -2,7 +2,7 @@
 
 While the pad touches everywhere and the shoe slips to one side only, (6)-(7) are linear: m z̈ + B ż + S z = f.
 The waves of the wheel give f = (sign(U) φ, 1) 2ak Σ g sinc(ωa) sin(ω(x - Ut) + phase). The shoe's own small motion
-in that phase is left out: it changes f by the slope of the surface times that motion.
+in that phase changes f by the slope of the surface times that motion: `slopes` says what this does to the growth.
 """
 
 import math
@@ -10,12 +10,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from brakecli.analysis.regime.slopes import growth_with_slopes
 from brakecli.analysis.regime.spectra import Array
 from brakecli.analysis.stability.modes import Complex, Mode, eigensystem, is_undamped, modes, stiffness_matrix
 from brakecli.solver.quantities import ContactState
 from brakecli.solver.system import System
 
 _ROUNDING = 1e-12  # of the largest eigenvalue: what a growth rate of zero may be off
+_ROUNDING_WITH_SLOPES = 1e-9  # the same where the passing waves enter it
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,24 @@ class Linear:
     vectors: Complex  # of position and velocity
     passing: Array  # frequency with its sign at which each wave passes, Hz
     waves: Complex  # amplitude of x and y that each of them forces, with its phase at t = 0
+    matrix: Array  # of ż = A z for x, y, vx, vy
+    push: Array  # the same of a normal force of 1 N
+    slopes: Complex  # N/m, by which each wave changes the normal force with x, with its phase at t = 0
+    wavenumbers: Array  # rad/m
+    known_to: float = 0.0  # 1/s, by how much the growth may be off
+
+    def with_slopes(self) -> "Linear":
+        """The same with the growth that the passing waves leave to the mode by their slopes."""
+        if not len(self.waves):
+            return self
+        p = np.outer(self.push, [1.0, 0.0, 0.0, 0.0])
+        bends = np.outer(self.wavenumbers, self.waves[:, 0])
+        rate, off = growth_with_slopes(self.matrix, p, 2.0 * math.pi * self.passing, self.slopes, bends)
+        off += _ROUNDING_WITH_SLOPES * float(np.abs(self.values).max())
+        if not abs(rate) < math.inf:
+            return replace(self, direction=0, known_to=math.inf)
+        direction = int(np.sign(rate)) if abs(rate) > off else 0
+        return replace(self, mode=replace(self.mode, growth=rate), direction=direction, known_to=off)
 
     def forced(self, time: Array) -> tuple[Array, Array]:
         """Positions and velocities (rows x, y) that the waves force."""
@@ -80,6 +100,7 @@ def linear_theory(system: System, belt: float) -> Linear | None:
     if not (np.isfinite(rest).all() and force > 0.0):
         return None
     phases = forces * np.exp(1j * (wheel.omega * rest[0] + wheel.phase))
+    zero, one = np.zeros((2, 2)), np.eye(2)
     waves = np.array(responses, complex).reshape(-1, 2) * phases[:, None]
     values, vectors = eigensystem(c, stiffness, grip)
     mode, known_to = modes(c, stiffness, grip)[0], 0.0 if is_undamped(c) else _ROUNDING * np.abs(values).max()
@@ -97,4 +118,8 @@ def linear_theory(system: System, belt: float) -> Linear | None:
         np.concatenate([vectors, vectors * values]),
         passing,
         waves,
+        np.block([[zero, one], [-s / c.m, -damping / c.m]]),
+        np.concatenate([np.zeros(2), push / c.m]),
+        wheel.omega * phases,
+        wheel.omega,
     )

@@ -1,7 +1,8 @@
 """The regime of the run in a result file, found from its history: what `brakecli classify RESULT.h5` does."""
 
 import math
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -13,8 +14,8 @@ from brakecli.analysis.regime.evidence import Part
 from brakecli.analysis.regime.forced import forced_lines, subharmonics
 from brakecli.analysis.regime.linear import linear_theory
 from brakecli.analysis.regime.rules import classify
-from brakecli.analysis.regime.verdict import Context, Excitation, Regime, Thresholds, Verdict
-from brakecli.analysis.stability.modes import growth
+from brakecli.analysis.regime.verdict import Context, Excitation, Feeds, Regime, Thresholds, Verdict
+from brakecli.analysis.stability.modes import growth, is_undamped
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError, UnreadableResultError
@@ -29,6 +30,13 @@ from brakecli.solver.system import System
 
 def classify_result(path: Path, thresholds: Thresholds) -> dict[str, Any]:
     """Names and values of the verdict on a stored run; raises UnreadableResultError for anything else."""
+    with stored_run(path) as (system, history, failure):
+        return numbers_of(verdict_on(history, system, failure, thresholds), failure)
+
+
+@contextmanager
+def stored_run(path: Path) -> Iterator[tuple[System, History, str | None]]:
+    """System, history and failure of a stored run; raises UnreadableResultError for anything else."""
     with open_result(path, kind="run") as result:
         try:
             system = system_of(parse_case(result.text("resolved_toml"), str(path)).case)
@@ -38,19 +46,28 @@ def classify_result(path: Path, thresholds: Thresholds) -> dict[str, Any]:
         if time is None or time.shape[0] < 1:
             raise UnreadableResultError(f"{path}: has no history; run its case again")
         history = History(system.interval, time.shape[0], partial(result.read, "history"))
-        failure = result.attributes.get("failure")
-        verdict = verdict_on(history, system, failure, thresholds)
+        yield system, history, result.attributes.get("failure")
+
+
+def numbers_of(verdict: Verdict, failure: str | None) -> dict[str, Any]:
+    """Names and values of a verdict as `--json` gives them."""
     return {**values_of(fields.VERDICT, {"verdict": verdict}), "failure": failure}
 
 
-def verdict_on(history: History, system: System, failure: str | None, limits: Thresholds | None = None) -> Verdict:
-    """The verdict on the motion of a system; a run that has failed has no regime."""
-    verdict = classify(history, context(system), limits or Thresholds())
+def verdict_on(
+    history: History,
+    system: System,
+    failure: str | None,
+    limits: Thresholds | None = None,
+    feeds: Feeds = Feeds.UNKNOWN,
+) -> Verdict:
+    """The verdict on the motion of a system; a run that has failed has none. `feeds` is what is known already."""
+    verdict = classify(history, replace(context(system), feeds=feeds), limits or Thresholds())
     if not failure:
         return verdict
     verdict = replace(verdict, growth_rate=None, ringing_frequency=None, frequency=None, settled=False)
-    why = (f"the run failed: {failure}",)
-    return replace(verdict, regime=Regime.UNDECIDED, excitation=Excitation.NONE, reasons=why)
+    why, none = (f"the run failed: {failure}",), Excitation.NONE
+    return replace(verdict, regime=Regime.UNDECIDED, excitation=none, reasons=why, second_run=False)
 
 
 def context(system: System) -> Context:
@@ -78,6 +95,7 @@ def context(system: System) -> Context:
         quiet=1e-9 * fastest,
         scale=fastest,
         frictionless=c.phi == 0.0,
+        undamped=is_undamped(c),
         growth=growth_rate,
         linear=lambda: theory,
         powers=partial(_powers, system, belt),

@@ -18,6 +18,8 @@ if TYPE_CHECKING:  # a measured signal needs no compiled code
 
 _NEAR = 0.3  # by which the amplitude of a motion that stick or loss of contact limits may still change
 _DRIFT = 5e-3  # by which the amplitude of a motion without stick may change where sliding is stable
+_LONGER = 1.4  # a run whose last quarter and the window before it are settled, over what comes before
+_FAR = 0.3  # rad, of a wave, by which what the shoe adds moves it
 _DEFAULT = Thresholds()
 
 
@@ -56,7 +58,11 @@ class _Rules(ForcedRules):
         start = max(min(self.last.start, self.history.samples - int(slow / self.history.interval)), 0)
         if theory is None or not replace(self.last, start=start).slides(theory.slip):
             return None
-        self.theory, mode = theory, theory.mode
+        mean, theory = theory, theory.with_slopes()
+        mode = theory.mode
+        if theory.direction != mean.direction and (theory.direction == 0 or self._swings_far(theory)):
+            return self._steep(theory)
+        self.theory = theory
         how = f"{mode.frequency:.4g} Hz" if mode.frequency else "without oscillation"
         linear = "full contact and slip to one side make the motion linear"
         if theory.direction == 0:
@@ -71,6 +77,20 @@ class _Rules(ForcedRules):
         if self.duration < slow:
             return self._too_short(slow)
         return self._shaken(theory, slow, decays)
+
+    def _swings_far(self, theory: "Linear") -> bool:
+        """Whether what the shoe adds is no longer small beside the waves, so that their slope is not linear."""
+        own = theory.parts(*self.last.places())[1]
+        return 0.5 * float(np.ptp(own)) * float(theory.wavenumbers.max()) > _FAR
+
+    def _steep(self, theory: "Linear") -> Decision:
+        """The slopes of the waves leave open whether a small vibration grows: lines may show that it is forced."""
+        found = self.forced()
+        if found and found.regime is Regime.DAMPED:
+            return found
+        rate = f"{theory.mode.growth:.2g} ± {theory.known_to:.1g} 1/s"
+        text = f"in full contact the slopes of the passing waves make the shoe's own vibration grow at {rate}"
+        return Decision(f"{text}; run longer, and see whether amplitude_own falls")
 
     def _end(self) -> tuple[float, Any]:
         """Time and state of the last sample."""
@@ -93,7 +113,7 @@ class _Rules(ForcedRules):
         if first <= WINDOWS - 10 and self.duration - begin * self.history.interval >= 2.0 * slow:
             self.settled_part, self.settled = replace(self.whole, start=begin), True
         else:
-            hint = f"; run at least {max(QUARTER * (self.duration + wait), self._long_enough(slow)):.3g} s"
+            hint = f"; run at least {max(_LONGER * (self.duration + wait), self._long_enough(slow)):.3g} s"
             hint += " to see only that"
         chosen = time >= self.settled_part.start * self.history.interval
         self.parts = forced, 0.5 * float(np.ptp(own[chosen]))
@@ -135,7 +155,12 @@ class _Rules(ForcedRules):
         if self.context.growth() > 0.0 and 0.5 * abs(slope) * self.duration <= _NEAR:
             return None  # a vibration that has reached its limits, cannot die out, and comes near its amplitude
         text = f"still {'growing' if slope > 0.0 else 'decaying'} at {abs(slope):.3g} 1/s"
-        return Decision(f"{text}; run at least {3.0 / abs(slope):.2g} s longer")
+        lasting = self.limits.decayed_to * math.sqrt(
+            0.5 * sum((f * swing) ** 2 for f, swing in self.context.waves)
+        )
+        left = self.envelope.final / (2.0 * math.pi * lasting) if slope < 0.0 and lasting > 0.0 else 1.0
+        more = max(3.0, math.log(max(left, 1.0))) / abs(slope)
+        return Decision(f"{text}; run at least {more:.2g} s longer")
 
     def sustained(self) -> Decision:
         theory = self.context.linear() if not self.context.forced else None
@@ -153,18 +178,27 @@ class _Rules(ForcedRules):
             return self._too_short(slow)
         if theory and (decision := self._unfounded(theory, found)):
             return decision
-        certain = (
-            self._larger and self.context.growth() > 0.0
-        )  # the waves cannot force it, and sliding is unstable
-        if self.context.forced and not certain and self._feeds() is Feeds.UNKNOWN:
+        # The waves cannot force it, and sliding is unstable.
+        certain = self._larger and self.context.growth() > 0.0
+        if self.context.forced and not certain and (self._feeds() is Feeds.UNKNOWN or self._doubtful):
             return self._either()
+        if found.drifts and abs(found.drift) > _DRIFT:
+            self.settled = False
+            unsure = self.context.undamped or self.context.growth() < 0.0
+            if abs(found.drift) > (_DRIFT if unsure else self.limits.settled_within):
+                text = f"the amplitude still changes by {found.drift:.1%} within the last part of the run"
+                return Decision(f"{text}; run longer")
         own = Excitation.SELF_EXCITED, found.frequency
         if stick >= self.limits.stick_cycles:
             text = f"sustained, with stick in {stick:.0%} of {cycles:.0f} cycles"
             return Decision(text, Regime.RELAXATION, *own)
+        bands = self.evidence["band_share"] = self.settled_part.narrow()
         lines = f"{harmonic:.0%} of the energy of vx in one line and its harmonics"
-        if stick == 0.0 and harmonic >= self.limits.harmonic_share:
-            return Decision(f"sustained without stick: {lines}", Regime.QUASI_HARMONIC, *own)
+        if harmonic < bands:
+            lines = f"{bands:.0%} of the energy of vx in three narrow bands"
+        if stick <= 1.0 - self.limits.stick_cycles and max(harmonic, bands) >= self.limits.harmonic_share:
+            how = f"with stick in only {stick:.0%} of the cycles" if stick else "without stick"
+            return Decision(f"sustained {how}: {lines}", Regime.QUASI_HARMONIC, *own)
         irregular = f"irregular: stick in {stick:.0%} of the cycles, {lines}"
         return Decision(f"{irregular}; run longer, or look at the spectrum")
 
@@ -197,10 +231,12 @@ class _Rules(ForcedRules):
             return self.cycles.amplitude, self.cycles.amplitude_spread
         if decision.excitation is not Excitation.FORCED:
             return part.amplitude("x"), None
-        if self.theory and self.parts and not self.settled:
-            return self.parts[0], None
-        period = max(self._slowest(0.0) / self.history.interval, 1.0)
+        if self.theory and self.parts:
+            return self.parts[0], self.parts[1] if self.settled else None
         samples = len(part.last("x"))
+        beats = [abs(f - g) for f, _ in self.context.waves for g, _ in self.context.waves if f != g]
+        slow = max([self._slowest(0.0), *(1.0 / beat for beat in beats)])
+        period = max(min(slow / self.history.interval, samples - 1), 1.0)
         edges = np.asarray(samples - period * np.arange(int(samples / period), -1, -1), np.float64)
         return median(swings(part, edges)) if len(edges) > 1 else (part.amplitude("x"), None)
 
@@ -229,7 +265,8 @@ def classify(history: History, context: Context, thresholds: Thresholds = _DEFAU
         growth_rate=rules.theory.mode.growth if rules.theory else None,
         ringing_frequency=rules.theory.mode.frequency if rules.theory else None,
         frequency_resolution=1.0 / (segment(part.stop - part.start) * history.interval),
-        torque_variation=context.radius * (torques[1] - torques[0]),
+        torque_variation=context.radius
+        * (cycles.force_variation if sustained and cycles else torques[1] - torques[0]),
         settled_from=part.start * history.interval,
         start=part.start,
         settled=rules.settled and decision.regime is not Regime.UNDECIDED,
@@ -242,4 +279,5 @@ def classify(history: History, context: Context, thresholds: Thresholds = _DEFAU
         reasons=(decision.reason,),
         evidence=evidence,
         thresholds=thresholds,
+        second_run=decision.second_run,
     )

@@ -44,6 +44,14 @@ class Thresholds:
     forced_share: float = 0.8
 
 
+class Feeds(StrEnum):
+    """What gives energy to the vibration on a rough wheel."""
+
+    FRICTION = "friction"
+    ROUGHNESS = "roughness"
+    UNKNOWN = "unknown"
+
+
 @dataclass(frozen=True)
 class Context:
     """What is known of the case behind a history."""
@@ -56,18 +64,12 @@ class Context:
     quiet: float = 0.0  # m/s, size of vx that may come from rounding
     scale: float = math.inf  # m/s, of a motion that would open the contact
     frictionless: bool = False
+    undamped: bool = False
     growth: Callable[[], float] = lambda: 0.0  # 1/s, of a small disturbance of steady sliding; below 0 it decays
     linear: Callable[[], "Linear | None"] = lambda: None  # the theory of full contact
     powers: Callable[[Part], dict[str, float]] = lambda part: {}  # W, what becomes of the power of the belt
     radius: float = 1.0  # R, m
-
-
-class Feeds(StrEnum):
-    """What gives energy to the vibration on a rough wheel."""
-
-    FRICTION = "friction"
-    ROUGHNESS = "roughness"
-    UNKNOWN = "unknown"
+    feeds: Feeds = Feeds.UNKNOWN  # what a second run has shown
 
 
 class Decision(NamedTuple):
@@ -78,6 +80,7 @@ class Decision(NamedTuple):
     excitation: Excitation = Excitation.NONE
     frequency: float | None = None  # Hz
     stick_fraction: float | None = None
+    second_run: bool = False  # whether a second run may decide
 
 
 @dataclass(frozen=True)
@@ -105,3 +108,4 @@ class Verdict:
     reasons: tuple[str, ...]
     evidence: dict[str, Any]
     thresholds: Thresholds
+    second_run: bool  # whether a second run may decide who keeps the vibration up

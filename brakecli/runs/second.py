@@ -1,0 +1,109 @@
+"""A second run of a case, which decides whether friction or the roughness keeps its vibration up."""
+
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from brakecli.analysis.regime.of_run import context, numbers_of, stored_run, verdict_on
+from brakecli.analysis.regime.verdict import Excitation, Feeds, Regime, Thresholds
+from brakecli.analysis.stability.modes import crossings
+from brakecli.errors import CaseError, RefusedError
+from brakecli.runs.cost import duration_text
+from brakecli.runs.limits import MOST_TABLE_BYTES, check, refuse
+from brakecli.runs.run import motion_of
+from brakecli.solver.history import History, array_history
+from brakecli.solver.motion import Progress
+from brakecli.solver.quantities import HISTORY
+from brakecli.solver.roughness import surface
+from brakecli.solver.steady_sliding import steady_sliding
+from brakecli.solver.system import Initial, System
+
+_REDUCED = 1.0 / 3.0  # of the critical friction: far below it also where surfaces that open move it
+_LOST = 4.0  # powers of e by which what is not forced has decayed
+_LONGER = 4.0  # times as long, so that it loses its start, and a vibration that dies becomes linear
+_REMAINS, _VANISHES = 0.7, 0.2  # part of the level of the first run
+
+
+@dataclass(frozen=True)
+class Second:
+    """What is run a second time, and which question it answers."""
+
+    system: System
+    change: str
+    smooth: bool  # the same without the wheel's roughness, from where the first has ended
+
+
+def classify_twice(
+    path: Path, thresholds: Thresholds, say: Callable[[str], None], progress: Callable[[str, int, int], None]
+) -> dict[str, Any]:
+    """The verdict on a stored run as `classify_result` gives it, by a second run where one is asked for."""
+    with stored_run(path) as (system, history, failure):
+        verdict = verdict_on(history, system, failure, thresholds)
+        if not verdict.second_run:
+            say("--second-run: this verdict asks for none; nothing was run")
+            return numbers_of(verdict, failure)
+        second = second_system(system, history)
+        found = check(second.system)
+        refuse(found)
+        if (size := 8.0 * len(HISTORY) * found.system.samples) > MOST_TABLE_BYTES:
+            remedy = "run the case with a shorter solver.duration or a larger output.sample_interval"
+            raise RefusedError(f"--second-run: its history would take {size / 1e9:.3g} GB of memory; {remedy}")
+        say(f"second run, {second.change}, four times as long: about {duration_text(found.seconds)}")
+        feeds, shown = compared(second, history, lambda done: progress("steps", done, second.system.steps))
+        verdict = verdict_on(history, system, failure, thresholds, feeds)
+        return numbers_of(replace(verdict, reasons=(*verdict.reasons, shown)), failure)
+
+
+def second_system(system: System, history: History) -> Second:
+    """What has to be run again.
+
+    Where sliding is stable, also in full contact, friction alone can keep only a large vibration up: the second
+    run goes on from the end of the first, without the roughness of the wheel. Otherwise it has less friction than
+    makes sliding unstable.
+    """
+    longer = replace(system, duration=_LONGER * system.duration)
+    belt, c, theory = system.belt_speed, system.coefficients, (known := context(system)).linear()
+    if known.growth() < 0.0 and (theory is None or theory.direction < 0):
+        last = history.samples - 1
+        x, y, vx, vy = (float(history.read(name, last, last + 1)[0]) for name in ("x", "y", "vx", "vy"))
+        start = Initial(x, y, vx, vy)
+        smooth = replace(longer, wheel=surface(), initial=start)
+        return Second(smooth, "without the roughness of the wheel, from the end of this one", smooth=True)
+    stiffnesses = [system.contact_stiffness]
+    with suppress(CaseError):
+        stiffnesses.append(steady_sliding(system, belt=belt).stiffness)
+    lost = [crossing.friction for stiffness in stiffnesses for crossing in crossings(c, stiffness, belt)]
+    phi = min([c.phi, *lost])
+    less = replace(longer, coefficients=c._replace(phi=_REDUCED * phi))
+    return Second(
+        less, f"with a friction coefficient of {_REDUCED * phi:.3g}, at which sliding is stable", smooth=False
+    )
+
+
+def compared(second: Second, history: History, progress: Progress = lambda steps: None) -> tuple[Feeds, str]:
+    """Run it in memory; who keeps the vibration of the first run up, and what shows that."""
+    motion, _ = motion_of(second.system, progress)
+    if motion.work.failed:
+        return Feeds.UNKNOWN, f"the second run failed: {motion.work.failure_sentence}"
+    again = array_history(second.system.interval, motion.rows)
+    part = level(again) / level(history)
+    text = f"in the second run, {second.change}, vx has {part:.2g} times the level"
+    verdict = verdict_on(again, second.system, None)
+    if not second.smooth:
+        lost = -context(second.system).growth() * second.system.duration > _LOST  # what is left of the start
+        lost &= verdict.excitation is not Excitation.SELF_EXCITED
+        remains = part >= _REMAINS and (lost or verdict.excitation is Excitation.FORCED)
+        return Feeds.ROUGHNESS if remains else Feeds.FRICTION if part <= _VANISHES else Feeds.UNKNOWN, text
+    if verdict.regime is Regime.DAMPED:
+        return Feeds.ROUGHNESS, f"{text}: {verdict.reasons[0]}"
+    lasts = verdict.settled and verdict.excitation is Excitation.SELF_EXCITED and part >= _REMAINS
+    return Feeds.FRICTION if lasts else Feeds.UNKNOWN, f"{text}: {verdict.reasons[0]}"
+
+
+def level(history: History) -> float:
+    """Standard deviation of vx in the last quarter, m/s."""
+    return float(np.std(history.read("vx", 3 * history.samples // 4, history.samples)))
