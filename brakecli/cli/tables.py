@@ -46,7 +46,8 @@ def run_table(report: RunReport) -> str:
     """Summary of a run."""
     numbers, work, method = report.numbers(), report.motion.work, report.motion.system.method
     weights = ", ".join(f"{weight:.4g}" for weight in method.theta)
-    how = f", tolerance {method.tolerance:.4g}" if method.own_steps else f" ({weights}), {method.iteration}"
+    kept = "" if method.row.exact else f", tolerance {method.tolerance:.4g}"
+    how = kept if method.own_steps else f" ({weights}), {method.iteration}"
     shares = ", ".join(f"{kind} {count / max(work.steps, 1):.1%}" for kind, count in work.evaluators.items())
     on_nodes = any(EVALUATORS[kind].needs_nodes for kind in work.evaluators)
     nodes = f", {numbers['nodes']} nodes" if on_nodes else ""
@@ -185,7 +186,7 @@ def comparison_table(report: ComparisonReport) -> str:
     entries = list(zip(found.entries, report.numbers()["entries"], strict=True))
     for _, numbers in entries:
         numbers["milliseconds"] = 1e3 * (numbers["wall_seconds"] or 0.0)
-        numbers["step"] = numbers["step"] or f"to {numbers['tolerance']:g}"
+        numbers["step"] = numbers["step"] or (f"to {numbers['tolerance']:g}" if numbers["tolerance"] else "exact")
     able = [(entry, numbers) for entry, numbers in entries if entry.errors is not None]
     front = sorted((numbers for entry, numbers in able if entry.on_front), key=lambda each: each["milliseconds"])
     finest = {entry.kind: numbers for entry, numbers in able if not entry.on_front}
