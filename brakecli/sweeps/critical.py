@@ -231,10 +231,9 @@ def _by_simulation(critical: Critical, sliding_at: SlidingAt, exact: Search) -> 
     """Where the growth of small disturbances passes zero, by Brent's method, between two values on either side."""
     at = Disturbances(sliding_at)
     values = at.scanned(critical.lower, critical.upper, exact.windows)
-    bias = abs(exact.bias or 0.0)
 
     def edge(low: float, high: float) -> Edge:
-        return _narrowed(at, low, high, critical, bias)
+        return _narrowed(at, low, high, critical, exact.bias)
 
     found = _answer(critical, sliding_at, at.unstable, values, edge)
     opened = any(measured.opened for measured in at.known.values() if measured)
@@ -244,7 +243,7 @@ def _by_simulation(critical: Critical, sliding_at: SlidingAt, exact: Search) -> 
     return found._replace(bias=exact.bias, eigenvalue=exact.eigenvalue)
 
 
-def _narrowed(at: Disturbances, low: float, high: float, critical: Critical, bias: float) -> Edge:
+def _narrowed(at: Disturbances, low: float, high: float, critical: Critical, bias: float | None) -> Edge:
     """The change between two values with opposite answers, in a bracket as narrow as the tolerance if possible."""
     below, tolerance, wide = at.unstable(low), critical.tolerance, (low, high)
     ends = [measured for measured in (at.at(low), at.at(high)) if measured is not None]

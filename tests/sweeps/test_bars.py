@@ -1,0 +1,91 @@
+"""Error bars of critical values of random shoes, held against answers that share nothing with the package.
+
+A bar holds the truth if the growth of disturbances changes its sign within it.
+"""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from brakecli.case.case import Case
+from brakecli.sweeps.critical import Outcome, Search, search
+from brakecli.sweeps.tables import Critical
+from tests.campaign import campaign
+from tests.examples import make
+from tests.sweeps.independent import Tables, forced, smooth_is_unstable
+from tests.sweeps.shoes import drawn
+
+SEEDS = {  # shoes with a critical value in their range
+    "opening": [1, 2, 5, 6, 7, 8, 9, 10, 11, 13, 15, 16, 17, 19, 21, 26, 28, 29, 30, 34],
+    "undamped": [2, 3, 4, 5, 7, 9, 11, 16, 17, 19],
+    "passing": [1, 2, 3, 8, 10, 11, 13, 18, 21, 22, 23, 24],
+    "smooth": [1, 2, 5, 10, 16, 20, 27, 32],
+    "soft": [6, 8, 9, 10, 13, 21, 26, 29, 42, 56],
+}
+FEW = [("smooth", 10), ("smooth", 27), ("soft", 13), ("soft", 42)]
+WAY = 12  # values on the way to the bar, along which the forced motion is followed
+WITHIN = (-0.5, -0.25, -0.1, -0.03, -0.01, 0.01, 0.03, 0.1, 0.25, 0.5, 1.0)  # of a bar that holds several windows
+
+
+def answer(kind: str, seed: int) -> tuple[Search, Tables, str, float, float]:
+    """What a search finds, without its runs for the least sustained value; and what was searched."""
+    tables, key, lower, upper, tolerance = drawn(seed, kind)
+    critical = Critical(parameter=key.replace("__", "."), lower=lower, upper=upper, tolerance=tolerance)
+
+    def case_at(value: float) -> Case:
+        return make(tables, **{key: value})
+
+    return search(critical, case_at, lambda case: None), tables, key, lower, upper
+
+
+def at(tables: Tables, key: str, value: float) -> Tables:
+    table, name = key.split("__")
+    return {**tables, table: {**tables[table], name: value}}
+
+
+def changes_within(tables: Tables, key: str, value: float, bar: float, start: float) -> bool:
+    """Whether the growth of the motion that is followed from the start of a range changes sign beside a value."""
+    state: Any = None
+    for place in np.linspace(start, value - bar, WAY)[:-1].tolist():
+        state = forced(at(tables, key, place), state)[1]
+    first, state = forced(at(tables, key, value - bar), state)
+    if forced(at(tables, key, value + bar), state)[0] * first < 0.0:
+        return True
+    for part in WITHIN:
+        rate, state = forced(at(tables, key, value + part * bar), state)
+        if rate * first < 0.0:
+            return True
+    return False
+
+
+@pytest.mark.parametrize(
+    ("kind", "seed"),
+    [
+        pytest.param(kind, seed, marks=() if (kind, seed) in FEW else campaign)
+        for kind, seeds in SEEDS.items()
+        for seed in seeds
+    ],
+)
+def test_the_truth_lies_within_the_error_bar(kind: str, seed: int) -> None:
+    found, tables, key, lower, upper = answer(kind, seed)
+    assert found.value is not None
+    assert found.error is not None
+    assert found.error < upper - lower
+    if kind in ("smooth", "soft"):
+        below, above = (
+            smooth_is_unstable(at(tables, key, found.value + by)) for by in (-found.error, found.error)
+        )
+        assert below is not above
+        return
+    lost = found.outcome is Outcome.FOUND
+    bar, start = (found.error, lower) if lost else (-found.error, upper)
+    assert changes_within(tables, key, found.value, bar, start)
+
+
+def test_a_loss_of_stability_that_only_the_scheme_has_is_undecided() -> None:
+    """Its weights damp: without them sliding is unstable from below the range on, as the eigenvalues say."""
+    found, tables, key, lower, _ = answer("passing", 40)
+    assert smooth_is_unstable(at(tables, key, lower))
+    assert found.outcome is Outcome.UNDECIDED
+    assert (found.value, found.windows) == (None, ())
