@@ -23,6 +23,7 @@ from brakecli.sweeps.floquet import Disturbances
 from brakecli.sweeps.growth import Sliding, sliding, with_step
 from brakecli.sweeps.tables import Critical
 
+WIDEST = 1.0 / 3.0  # of the range, that an error bar with an answer may have
 EDGES = 4  # halvings towards the ends of a range of the parameter in which the answer is not known
 SCANNED_BY_EIGENVALUES = 129
 SCANNED_WHERE_OPEN = 17  # by eigenvalues where surfaces open: their mean stiffness takes time
@@ -221,7 +222,7 @@ def _of_edges(critical: Critical, unstable: bool, edges: list[Edge]) -> Search:
     if not edges:
         return Search(Outcome.UNSTABLE if unstable else Outcome.STABLE, windows=windows)
     first = next((each for each in edges if each.lost), edges[0])
-    if first.error >= critical.upper - critical.lower:  # any value of the range may be it
+    if first.error >= WIDEST * (critical.upper - critical.lower):  # almost any value of the range may be it
         return Search(Outcome.UNDECIDED)
     outcome = Outcome.FOUND if first.lost else Outcome.REGAINED
     return Search(outcome, *first[:4], windows=windows)
