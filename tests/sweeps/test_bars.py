@@ -86,6 +86,27 @@ def test_the_truth_lies_within_the_error_bar(kind: str, seed: int) -> None:
     assert changes_within(tables, key, found.value, bar, start)
 
 
+@campaign
+def test_a_narrow_window_lies_where_the_scheme_vibrates_at_half_the_frequency_of_a_wave() -> None:
+    """At the exact natural frequency, half a width of the window away, the scheme at its step is stable."""
+    tables: Tables = {
+        "shoe": {"mass": 15.6},
+        "wheel": {"radius": 0.5, "angular_speed": 6.903},
+        "link1": {"stiffness": 2150000.0, "damping": 0.0, "angle_deg": -11.8},
+        "link2": {"stiffness": 1410000.0, "damping": 0.0, "angle_deg": 13.2},
+        "load": {"force": 631.0},
+        "friction": {"coefficient": 1.73},
+        "contact": {"half_length": 0.01, "stiffness": 21700000.0},
+        "roughness": {"wheel": {"amplitudes": [2.59e-5, 3.51e-5], "wavelengths": [0.035, 0.064]}},
+        "solver": {"duration": 0.3, "step": 0.00026},
+    }
+    key, critical = "friction__coefficient", Critical(parameter="friction.coefficient", lower=1.4, upper=2.2)
+    found = search(critical, lambda value: make(tables, **{key: value}), lambda case: None)
+    assert found.value is not None
+    assert found.error is not None
+    assert changes_within(tables, key, found.value, found.error, 1.4)
+
+
 def test_a_loss_of_stability_that_only_the_scheme_has_is_undecided() -> None:
     """Its weights damp: without them sliding is unstable from below the range on, as the eigenvalues say."""
     found, tables, key, lower, _ = answer("passing", 40)
