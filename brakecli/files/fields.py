@@ -161,7 +161,7 @@ SWEEP = (
     Field("dimensions", "", "names of the dimensions", OBJECT, at="findings.", in_file=False),
     Field("axes", "", "parameters and values along each axis", OBJECT, in_file=False),
     Field("seconds", "s", "time of the command", in_file=False),
-    Field("findings", "", "sentences on hysteresis", OBJECT, at="findings.sentences"),
+    Field("findings", "", "sentences on hysteresis and on wide error bars", OBJECT, at="findings.sentences"),
     Field("warnings", "", "what a careful user should know", OBJECT, at="notes", in_file=False),
 )
 

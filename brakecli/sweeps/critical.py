@@ -23,6 +23,7 @@ from brakecli.sweeps.floquet import Disturbances
 from brakecli.sweeps.growth import Sliding, sliding, with_step
 from brakecli.sweeps.tables import Critical
 
+WIDEST = 1.0 / 3.0  # of the range, that an error bar with an answer may have
 EDGES = 4  # halvings towards the ends of a range of the parameter in which the answer is not known
 SCANNED_BY_EIGENVALUES = 129
 SCANNED_WHERE_OPEN = 17  # by eigenvalues where surfaces open: their mean stiffness takes time
@@ -221,7 +222,7 @@ def _of_edges(critical: Critical, unstable: bool, edges: list[Edge]) -> Search:
     if not edges:
         return Search(Outcome.UNSTABLE if unstable else Outcome.STABLE, windows=windows)
     first = next((each for each in edges if each.lost), edges[0])
-    if first.error >= critical.upper - critical.lower:  # any value of the range may be it
+    if first.error >= WIDEST * (critical.upper - critical.lower):  # almost any value of the range may be it
         return Search(Outcome.UNDECIDED)
     outcome = Outcome.FOUND if first.lost else Outcome.REGAINED
     return Search(outcome, *first[:4], windows=windows)
@@ -231,10 +232,9 @@ def _by_simulation(critical: Critical, sliding_at: SlidingAt, exact: Search) -> 
     """Where the growth of small disturbances passes zero, by Brent's method, between two values on either side."""
     at = Disturbances(sliding_at)
     values = at.scanned(critical.lower, critical.upper, exact.windows)
-    bias = abs(exact.bias or 0.0)
 
     def edge(low: float, high: float) -> Edge:
-        return _narrowed(at, low, high, critical, bias)
+        return _narrowed(at, low, high, critical, exact.bias)
 
     found = _answer(critical, sliding_at, at.unstable, values, edge)
     opened = any(measured.opened for measured in at.known.values() if measured)
@@ -244,7 +244,7 @@ def _by_simulation(critical: Critical, sliding_at: SlidingAt, exact: Search) -> 
     return found._replace(bias=exact.bias, eigenvalue=exact.eigenvalue)
 
 
-def _narrowed(at: Disturbances, low: float, high: float, critical: Critical, bias: float) -> Edge:
+def _narrowed(at: Disturbances, low: float, high: float, critical: Critical, bias: float | None) -> Edge:
     """The change between two values with opposite answers, in a bracket as narrow as the tolerance if possible."""
     below, tolerance, wide = at.unstable(low), critical.tolerance, (low, high)
     ends = [measured for measured in (at.at(low), at.at(high)) if measured is not None]

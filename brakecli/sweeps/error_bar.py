@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 
+from brakecli.analysis.stability.modes import growth as eigenvalue_growth
 from brakecli.sweeps.floquet import Disturbances
 from brakecli.sweeps.periodic import Orbit, Segments, common_period, log_radius, orbit
 from brakecli.sweeps.tables import Critical
@@ -17,13 +18,18 @@ ROUNDED = 20.0  # times the spread of growth that rounding makes in a three-laye
 
 
 def left_open(
-    at: Disturbances, bracket: tuple[float, float], wide: tuple[float, float], bias: float, critical: Critical
+    at: Disturbances,
+    bracket: tuple[float, float],
+    wide: tuple[float, float],
+    bias: float | None,
+    critical: Critical,
 ) -> float:
     """By how much the change in a bracket may be wrong: the error of the growth over its slope, and the bias.
 
     The error of a periodic motion holds that of its scheme. A three-layer scheme takes velocities from differences
     of positions: near self-locking, where the force grows beyond all bounds, their rounding makes the growth jump,
-    so that the slope counts only as far as the ends of the bracket that was found first show it.
+    so that the slope counts only as far as the ends of the bracket that was found first show it. Where
+    the `bias` is not known, the bar of a linear motion reaches to where the eigenvalues change.
     """
     known, (low, high) = {value: each for value, each in at.known.items() if each is not None}, bracket
     near = sorted(known, key=lambda value: max(low - value, value - high, 0.0))[:2]
@@ -32,21 +38,44 @@ def left_open(
     def slope(other: float) -> float:
         return abs((known[other].rate - known[one].rate) / (other - one)) if other != one else 0.0
 
+    found = at.sliding_at(one)
+    if bias is None and found and not found.forced and not known[one].noise:
+        bias = _to_eigenvalues(at, low, high, critical)
+    bias = abs(bias or 0.0)
     if known[one].bar:  # the bracket holds it
         return bias
     if one in at.orbits:
         stride = high - low if at.unstable(high) else low - high
         return WIDER * max(_shifted(at, one, stride, critical, *step) for step in STEPS.items())
     if known[one].noise:
-        found = at.sliding_at(one)
         rounded = ROUNDED if found and found.system.scheme.LAG else 1.0
         hidden = rounded * max(known[one].spread, known[other].spread)
         return bias + _reach(at, low, high, 2.0 * known[one].noise + hidden)
-    steep, found = slope(other), at.sliding_at(one)
+    steep = slope(other)
     far = max((slope(end) for end in wide if end in known), default=0.0)
     if found is not None and found.system.scheme.LAG and far > 0.0:
         steep = min(steep, far)
     return bias + (max(known[one].spread, known[other].spread) / steep if steep > 0.0 else 0.0)
+
+
+def _to_eigenvalues(at: Disturbances, low: float, high: float, critical: Critical) -> float:
+    """How far from a bracket the eigenvalues change, or up to twice that; infinite if not within the range."""
+
+    def grows(value: float) -> bool:
+        found = at.sliding_at(value)
+        return found is None or eigenvalue_growth(found.system.coefficients, found.stiffness, found.grip) > 0.0
+
+    above = at.unstable(high) is True
+    if grows(low) is not above and grows(high) is above:
+        return 0.0
+    down = grows(low) is above
+    start, stride = (low, -critical.tolerance) if down else (high, critical.tolerance)
+    place = start
+    while (grows(place) is above) is down:
+        place, stride = place + stride, 2.0 * stride
+        if not critical.lower <= place <= critical.upper:
+            return math.inf
+    return abs(place - start)
 
 
 def _reach(at: Disturbances, low: float, high: float, level: float) -> float:

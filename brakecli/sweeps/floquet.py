@@ -97,9 +97,13 @@ class Disturbances:
         def away(value: float) -> Floats:
             if (found := self.sliding_at(value)) is None:
                 return np.full(8 * count, np.nan)
-            first, second = sorted(
+            exact = sorted(
                 mode.frequency for mode in modes(found.system.coefficients, found.stiffness, found.grip)
-            )[-2:]
+            )
+            turned = (
+                math.pi * found.system.step
+            )  # the schemes vibrate a little too slowly, by the trapezoidal rule
+            first, second = np.arctan(turned * np.array(exact[-2:])) / turned
             passing = abs(found.system.belt_speed) * found.system.wheel.turns
             vibrating = np.array([2.0 * first, 2.0 * second, first + second, second - first])
             distances: Floats = np.subtract.outer(np.outer([1.0, 2.0], passing), vibrating).ravel()

@@ -146,7 +146,9 @@ def growth(found: Sliding) -> Growth | None:
     # D[t]: columns are the differences of the neighbours, rows x, y, ẋ, ẏ, each in its scale.
     maps = ((runs[1:, :, :4] - runs[0, :, :4]) / (small * scales)).transpose(1, 2, 0)
     sizes = np.abs(maps).max(axis=(1, 2))
-    last = _last_linear(found, runs, (sizes > saturated / small) | (sizes < FADED), interval, slow)
+    # A smooth wheel is the same everywhere: a soft link may let x run. Rounding adds up there with three layers.
+    moved = np.abs(maps[:, 1:]).max(axis=(1, 2)) if system.smooth and not system.scheme.LAG else sizes
+    last = _last_linear(found, runs, (moved > saturated / small) | (sizes < FADED), interval, slow)
     opened = bool((runs[:, : last + 1, _CONTACT] < 1.0).any())
     # A linear motion has all its directions from the start on: none has faded there. Others come to their orbit.
     first = max(1, last // 4) if opened else 1

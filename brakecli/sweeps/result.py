@@ -25,6 +25,7 @@ MOST_FAILURES = 100
 MOST_AS_JSON = 10_000  # points; of more the file alone holds every number
 SAME_AMPLITUDE = 0.05  # part by which amplitudes of the same motion, in the same regime, may differ
 
+WIDE = 0.1  # of the range, from which on an error bar is named
 _DONE = Status.DONE.encode()
 
 
@@ -58,6 +59,9 @@ class Findings:
             known = values[~np.isnan(values)]
             self.critical = (len(known), float(known.min()), float(known.max())) if len(known) else (0, 0.0, 0.0)
             self.sentences += _on_lasting_vibration(journal, plan.sweep.critical.tolerance)
+            self.sentences += _on_wide_bars(
+                journal, WIDE * (plan.sweep.critical.upper - plan.sweep.critical.lower)
+            )
         self.variables: dict[str, Any] | None = None
         if status.size <= MOST_AS_JSON:
             self.variables = {field.name: plain(journal.column(field.name)) for field in plan.fields}
@@ -174,6 +178,20 @@ def _on_lasting_vibration(journal: Journal, tolerance: float) -> Iterator[str]:
         start = "the case's own start leads into lasting vibration only at values up to"
         longer = "above the critical one; longer runs may give another answer"
         yield f"at {above} of {late.size} points {start} {late.max():.3g} {longer}"
+
+
+def _on_wide_bars(journal: Journal, wide: float) -> Iterator[str]:
+    """What is to be done where no critical value is known, or hardly one."""
+    undecided = int((journal.column("critical_status") == b"undecided").sum())
+    unsure = int((np.nan_to_num(journal.column("critical_error"), nan=0.0) > wide).sum())
+    wheel = "or waves of the wheel that have a common period"
+    remedy = f"try a narrower range, finer steps of the two-layer scheme, {wheel}"
+    for count, what in (
+        (undecided, "no critical value is decided"),
+        (unsure, "the error bar is a tenth of the range or wider"),
+    ):
+        if count:
+            yield f"at {count} of {journal.column('status').size} points {what}; {remedy}"
 
 
 def _parameters(plan: Plan, index: int) -> dict[str, Any]:
