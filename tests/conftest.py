@@ -7,7 +7,9 @@ from hypothesis import settings
 
 from tests.commands import warm_up
 
-signal.signal(signal.SIGHUP, signal.SIG_DFL)  # also under nohup, whose commands would not hear it
+# Also under nohup and in the background of a shell, whose commands would not hear them
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
+signal.signal(signal.SIGINT, signal.default_int_handler)
 settings.register_profile("repeatable", deadline=None, derandomize=True, print_blob=False)
 settings.load_profile("repeatable")
 

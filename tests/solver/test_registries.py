@@ -69,7 +69,7 @@ def test_an_evaluator_on_nodes_is_not_taken_where_a_tolerance_chooses_nodes_itse
     overrides = ("--set", "solver={tolerance=1e-3, duration=0.02}", "--set", 'contact.evaluator="spring"')
     done = CliRunner().invoke(app, ["check", case, *overrides])
     assert isinstance(done.exception, CaseError)
-    assert "a tolerance chooses nodes itself" in str(done.exception)
+    assert "with a tolerance the program chooses them" in str(done.exception)
 
 
 def test_a_scheme_that_has_no_row_is_refused_with_those_that_have_one(case: str) -> None:
