@@ -16,7 +16,7 @@ SEGMENTS_AT_ONCE = 16
 SEGMENTS_WANTED = 8
 SHORTEST_SEGMENT = 16
 FEWEST_CYCLES = 5  # of a line in the record, and bins below it: what is slower is not told from drift
-_FEWEST_BINS = 3
+FEWEST_BINS = 3
 SPECTRAL = ("x", "y", "vx", "vy", "friction_force", "normal_force", "contact_fraction")
 
 
@@ -71,7 +71,7 @@ def peak(frequency: Array, density: Array, duration: float = math.inf) -> float 
         return None
     i = 1 + int(np.argmax(density[1:]))
     found = interpolated(frequency, density, i)
-    return found if i >= _FEWEST_BINS and found * duration >= FEWEST_CYCLES else None
+    return found if i >= FEWEST_BINS and found * duration >= FEWEST_CYCLES else None
 
 
 def interpolated(frequency: Array, density: Array, i: int) -> float:
