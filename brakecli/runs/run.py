@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from brakecli import __version__
 from brakecli.analysis.regime.of_run import verdict_on
-from brakecli.analysis.regime.spectra import FEWEST_BINS, peak, spectrum
+from brakecli.analysis.regime.spectra import peak, spectrum
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.case.read import LoadedCase
 from brakecli.case.system import system_of
@@ -157,12 +157,9 @@ def _write_spectrum(result: ResultFile, history: History, verdict: Verdict) -> f
     for name, density in lines.density.items():
         result.variable("spectrum", fields.SPECTRUM[name], ("frequency",), density)
     result.set_attributes(values_of(fields.WELCH, lines), "spectrum")
-    if (
-        min(verdict.evidence["line_frequencies"][:1], default=math.inf)
-        < FEWEST_BINS * verdict.frequency_resolution
-    ):
-        return None  # the strongest line lies below the first that the spectrum shows
-    return peak(lines.frequency, lines.density["vx"], (history.samples - verdict.start) * history.interval)
+    strongest = min(verdict.evidence["line_frequencies"][:1], default=math.inf)
+    duration = (history.samples - verdict.start) * history.interval
+    return peak(lines.frequency, lines.density["vx"], duration, strongest)
 
 
 def _write_unconverged(result: ResultFile, events: NDArray[np.float64]) -> None:

@@ -13,14 +13,14 @@ from brakecli.analysis.regime.verdict import Excitation, Feeds, Regime, Threshol
 from brakecli.analysis.stability.modes import crossings
 from brakecli.errors import CaseError, RefusedError
 from brakecli.runs.cost import duration_text
-from brakecli.runs.limits import MOST_TABLE_BYTES, check, refuse
+from brakecli.runs.limits import check, refuse
 from brakecli.runs.run import motion_of
 from brakecli.solver.history import History, array_history
 from brakecli.solver.motion import Progress
 from brakecli.solver.quantities import HISTORY
 from brakecli.solver.roughness import surface
 from brakecli.solver.steady_sliding import steady_sliding
-from brakecli.solver.system import Initial, System
+from brakecli.solver.system import MOST_TABLE_BYTES, Initial, System
 
 _REDUCED = 1.0 / 3.0  # of the critical friction: far below it also where surfaces that open move it
 _LOST = 4.0  # powers of e by which what is not forced has decayed

@@ -16,7 +16,7 @@ SEGMENTS_AT_ONCE = 16
 SEGMENTS_WANTED = 8
 SHORTEST_SEGMENT = 16
 FEWEST_CYCLES = 5  # of a line in the record, and bins below it: what is slower is not told from drift
-FEWEST_BINS = 3
+_FEWEST_BINS = 3
 SPECTRAL = ("x", "y", "vx", "vy", "friction_force", "normal_force", "contact_fraction")
 
 
@@ -62,16 +62,19 @@ def spectrum(history: History, start: int) -> Spectrum:
     return Spectrum(frequency, {name: total / segments for name, total in densities.items()}, start, segments)
 
 
-def peak(frequency: Array, density: Array, duration: float = math.inf) -> float | None:
+def peak(
+    frequency: Array, density: Array, duration: float = math.inf, strongest: float = math.inf
+) -> float | None:
     """Frequency (Hz) of the highest peak above zero; None where none is resolved.
 
-    That takes three bins below it, and five cycles in the duration (s) of the record.
+    That takes three bins below it, also below the strongest line (Hz) that the whole record shows, and five cycles in
+    the duration (s) of the record.
     """
-    if density.size < 3 or not density[1:].max() > 0.0:
+    if density.size < 3 or not density[1:].max() > 0.0 or strongest < _FEWEST_BINS * frequency[1]:
         return None
     i = 1 + int(np.argmax(density[1:]))
     found = interpolated(frequency, density, i)
-    return found if i >= FEWEST_BINS and found * duration >= FEWEST_CYCLES else None
+    return found if i >= _FEWEST_BINS and found * duration >= FEWEST_CYCLES else None
 
 
 def interpolated(frequency: Array, density: Array, i: int) -> float:
