@@ -18,7 +18,7 @@ PYTEST_ARGS ?=
 .DELETE_ON_ERROR:
 .NOTPARALLEL: # two installations into one .venv at a time would collide
 .PHONY: help demo test campaign lowest lint format types imports derivations tables cases check \
-    accuracy promises picture paper extremes bench-sweep clean
+    accuracy promises picture lock-in paper extremes bench-sweep clean
 
 help: ## list the targets (this text)
 	@echo "make TARGET, where TARGET is one of"
@@ -116,6 +116,11 @@ picture: $(DEV_STAMP) ## draw docs/picture.png, from cases/relaxation.toml
 	@mkdir -p results
 	$(BIN)/brakecli run cases/relaxation.toml --force --quiet --output results/relaxation.h5
 	$(BIN)/brakecli plot results/relaxation.h5 --force --output docs/picture.png
+
+lock-in: $(DEV_STAMP) ## draw docs/lock-in.png, from cases/mode-coupling.toml
+	@mkdir -p results
+	$(BIN)/brakecli stability cases/mode-coupling.toml --vary friction.coefficient=0:1.5:151 --force --quiet -o results/lock-in.h5
+	$(BIN)/brakecli plot results/lock-in.h5 --force --output docs/lock-in.png
 
 paper: $(DEV_STAMP) ## reproduce the paper's claims into docs/paper-claims.md, with pictures (some minutes)
 	$(BIN)/python docs/paper_claims.py

@@ -480,6 +480,32 @@ def scheme_energy() -> None:
 
 
 @check
+def linear_phases() -> None:
+    """Piecewise-exact: each phase is linear in z and solves (6)-(7); its powers are those of the account."""
+    x, y, v_x, v_y, slope, Q, sin, cos = z = sp.symbols("x y v_x v_y slope Q sin cos", real=True)
+    K = sp.Symbol("K", positive=True)
+    resist_x = b_xx * v_x + b_xy * v_y + c_xx * x + c_xy * y + Q * sin
+    resist_y = b_xy * v_x + b_yy * v_y + c_xy * x + c_yy * y + Q * cos
+    needed = m * slope + resist_x.subs(v_x, U)
+    for side, touching in ((-1, 1), (0, 1), (1, 1), (0, 0)):
+        pressed, sticks = -touching * K * y, side == 0 and touching == 1
+        force = needed if sticks else -side * phi * pressed
+        a_x, a_y = slope if sticks else (force - resist_x) / m, (pressed - resist_y) / m
+        at_wheel = {v_x: U} if sticks else {}
+        zero((m * a_x + resist_x - force).subs(at_wheel), m * a_y + resist_y - pressed)  # (6) and (7)
+        margins = (pressed, side * (v_x - U)) if not sticks else (phi * pressed - needed, phi * pressed + needed)
+        for row in (a_x, a_y, force, *margins):
+            zero(*(row.diff(one, other) for one in (*z[:6], U) for other in (*z[:6], U)))
+        store = (
+            m * (v_x**2 + v_y**2) / 2 + c_xx * x**2 / 2 + c_xy * x * y + c_yy * y**2 / 2 + touching * K * y**2 / 2
+        )
+        rate = store.diff(x) * v_x + store.diff(y) * v_y + store.diff(v_x) * a_x + store.diff(v_y) * a_y
+        dashpots = b_xx * v_x**2 + 2 * b_xy * v_x * v_y + b_yy * v_y**2
+        powers = force * U - force * (U - v_x) - dashpots - Q * (sin * v_x + cos * v_y)
+        zero((rate - powers).subs(at_wheel))
+
+
+@check
 def unique_step() -> None:
     """Step on a flat pad: r' < 0 on every branch where phi |a_12| < a_11, whatever the contact's stiffness."""
     a_11, a, w, K, coupling, spare = sp.symbols("a_11 a w K coupling spare", positive=True)

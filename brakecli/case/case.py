@@ -141,7 +141,7 @@ class Solver(Table):
     theta: tables.Weights = quantity(
         "1",
         "weights of the layers: two for two-layer, 0.5 and 0.5 if left out; "
-        "three that add up to 1 for three-layer, 0.25, 0.5 and 0.25 if left out; none for event-driven",
+        "three that add up to 1 for three-layer, 0.25, 0.5 and 0.25 if left out; none for others",
         default_factory=tuple,
     )
     iteration: Annotated[str, *one_of(lambda: MOST)] = described(
@@ -238,8 +238,13 @@ class Case(Table):
         exact = self.solver.row.own_steps or step is None
         evaluator = self.contact.evaluator
         if exact and evaluator != "auto" and EVALUATORS[evaluator].needs_nodes:
-            what = "has no effect: event-driven needs no nodes, and with a tolerance the program chooses them"
+            name = self.solver.scheme if self.solver.row.exact else "event-driven"
+            what = f"has no effect: {name} needs no nodes, and with a tolerance the program chooses them"
             yield self.wrong("contact.evaluator", what, "leave evaluator out")
+        rough = [name for name, profile in self.roughness if profile and any(profile.amplitudes)]
+        if self.solver.row.exact and rough:
+            what = f"is for smooth surfaces, but roughness.{rough[0]} is given"
+            yield self.wrong("solver.scheme", what, 'set scheme to "event-driven", or leave the roughness out')
         if self.solver.start == "paper" and (self.initial.vx or self.initial.vy):
             what = "sets the second layer equal to the first, but the initial velocity is not zero"
             remedy = 'set start to "consistent", or initial.vx and initial.vy to 0'

@@ -14,6 +14,10 @@ def system_of(case: Case) -> System:
     """The system of a case, with the method that the case asks for."""
     wheel, load, initial, solver = case.wheel, case.load, case.initial, case.solver
     automatic = solver.scheme == "auto"
+    shoe, wheel_surface = surface(**dict(case.roughness.shoe or ())), surface(**dict(case.roughness.wheel or ()))
+    chosen = (
+        "event-driven" if shoe.g.size or wheel_surface.g.size else "piecewise-exact"
+    )  # a tolerance may change it
     return System(
         coefficients=coefficients(
             mass=case.shoe.mass,
@@ -27,8 +31,8 @@ def system_of(case: Case) -> System:
         ),
         belt=schedule(wheel.times or (0.0,), wheel.angular_speeds or (wheel.angular_speed or 0.0,), wheel.radius),
         load=schedule(load.times or (0.0,), load.forces or (load.force or 0.0,)),
-        shoe=surface(**dict(case.roughness.shoe or ())),
-        wheel=surface(**dict(case.roughness.wheel or ())),
+        shoe=shoe,
+        wheel=wheel_surface,
         radius=wheel.radius,
         half_length=case.contact.half_length,
         layer_stiffness=case.contact.stiffness,
@@ -36,7 +40,7 @@ def system_of(case: Case) -> System:
         interval=case.output.sample_interval,
         duration=solver.duration,
         method=Method(
-            scheme="event-driven" if automatic else solver.scheme,  # until a tolerance chooses one
+            scheme=chosen if automatic else solver.scheme,
             theta=solver.theta,
             start=solver.start,
             iteration=solver.iteration,

@@ -9,7 +9,7 @@ from brakecli.files.os_signals import unwinding
 
 
 def command(
-    result: Annotated[Path, source_argument("FILE.h5", "Result of a run, a sweep or a comparison.")],
+    result: Annotated[Path, source_argument("FILE.h5", "Result of a run, a sweep, a comparison or stability.")],
     output: Annotated[Path | None, output_option("Picture", "FILE.png, here")] = None,
     select: Annotated[
         list[str] | None, option("Draw one value of a sweep's axis; repeatable.", "KEY=VALUE")
@@ -17,7 +17,7 @@ def command(
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
-    """Draw the motion of a run, values of a sweep, or errors of a comparison (needs matplotlib)."""
+    """Draw a run, a sweep, a comparison, or modes along a key (needs matplotlib)."""
     from brakecli.plots.result import plot_result
 
     target = output or Path(f"{result.stem}.png")

@@ -1,59 +1,75 @@
 """`brakecli stability`."""
 
-import math
-from contextlib import suppress
-from typing import Annotated
+from contextlib import nullcontext, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
-from brakecli.cli.inputs import load_case
-from brakecli.cli.options import AsJson, CaseArgument, Overrides, Quiet, option
-from brakecli.cli.output import announce_compilation, show_result
+from brakecli.cli.inputs import load_case, result_path
+from brakecli.cli.options import AsJson, CaseArgument, Force, Overrides, Quiet, option, output_option
+from brakecli.cli.output import announce_compilation, progress, show_result
 from brakecli.errors import UsageError
+
+if TYPE_CHECKING:
+    from brakecli.sweeps.tables import Axis
 
 MOST_VALUES = 10_000
 
 
 def command(
     case: CaseArgument,
+    output: Annotated[Path | None, output_option("File of --vary: .h5 or .csv", "none")] = None,
     overrides: Overrides = None,
-    vary: Annotated[str | None, option("Tabulate critical friction along a key.", "KEY=START:STOP:NUM")] = None,
+    vary: Annotated[
+        str | None, option("Follow both modes along a key, or along several alike.", "KEY[,KEY]=START:STOP:NUM")
+    ] = None,
+    force: Force = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
     """Critical friction coefficient, eigenvalues and growth of steady sliding, without stepping in time."""
-    key, values = _parse_range(vary) if vary is not None else ("", [])
+    axis = _parse_axis(vary) if vary is not None else None
+    if output is not None and (axis is None or output.suffix.lower() not in (".h5", ".csv")):
+        raise UsageError(f"{output}: holds what --vary finds; give --vary, and a name that ends in .h5 or .csv")
     loaded = load_case(case, overrides)
+    target = result_path(output, case) if output is not None else None
     announce_compilation(quiet)
     from brakecli.analysis.stability.report import stability
-    from brakecli.case.read import parse_case
     from brakecli.case.system import system_of
-    from brakecli.cli.tables import stability_table
+    from brakecli.cli.stability_tables import stability_table
     from brakecli.files.field import values_of
-    from brakecli.files.fields import STABILITY, VARIED
+    from brakecli.files.fields import LOCK_IN, STABILITY
     from brakecli.runs.limits import within_range
 
-    entries = []
-    with within_range():
-        report = stability(system_of(loaded.case))
-        for value in values:
-            varied = parse_case(loaded.resolved, "--vary", (f"{key}={value!r}",), "--vary").case
-            entries.append({"value": value, **values_of(VARIED, stability(system_of(varied)))})
-    numbers, found = values_of(STABILITY, report), (loaded.case.title, report, key, entries)
-    if key:
-        numbers["vary"] = entries
-    show_result("stability", numbers, stability_table, *found, as_json=as_json, quiet=quiet)
+    with progress(quiet) as show_progress, within_range():
+        report, found = stability(system_of(loaded.case)), None
+        if axis:
+            from brakecli.files.atomic import new_output
+            from brakecli.sweeps.lock_in import lock_in, write
+
+            with new_output(target, force=force) if target else nullcontext():  # whether it can be written
+                pass
+            found = lock_in(loaded, axis, f"--vary {vary}", show_progress)
+            if target:
+                write(target, loaded, found, force=force)
+    numbers = values_of(STABILITY, report)
+    if found:
+        numbers |= {"vary": found.entries, **values_of(LOCK_IN, found), "output": target and str(target)}
+    show_result(
+        "stability", numbers, stability_table, loaded.case.title, report, found, as_json=as_json, quiet=quiet
+    )
 
 
-def _parse_range(text: str) -> tuple[str, list[float]]:
-    """The key and the values of KEY=START:STOP:NUM, both ends included; raises UsageError."""
-    import numpy as np
-
+def _parse_axis(text: str) -> "Axis":
+    """The axis of KEY,KEY=START:STOP:NUM, both ends included; raises UsageError."""
     from brakecli.case.read import key_path
+    from brakecli.sweeps.tables import Axis
 
-    key, _, numbers = text.partition("=")
-    with suppress(ValueError):
+    keys, _, numbers = text.partition("=")
+    with suppress(ValueError):  # pydantic's own is one, too
         start, stop, count = numbers.split(":")
-        first, last, size = float(start), float(stop), int(count)
-        if key_path(key) and 1 <= size <= MOST_VALUES and math.isfinite(last - first):
-            return key, np.linspace(first, last, size).tolist()
+        axis = Axis(parameter=tuple(keys.split(",")), start=float(start), stop=float(stop), num=int(count))
+        different = len({*map(key_path, axis.parameter)}) == len(axis.parameter)
+        if different and axis.size <= MOST_VALUES and (axis.size == 1 or axis.start != axis.stop):
+            return axis
     what = f"is not KEY=START:STOP:NUM with NUM from 1 to {MOST_VALUES}"
     raise UsageError(f"--vary {text}: {what}; write, for instance, --vary link2.angle_deg=1:10:10")

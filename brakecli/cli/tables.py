@@ -14,8 +14,6 @@ from brakecli.solver.contact import EVALUATORS
 from brakecli.solver.quantities import COEFFICIENTS
 
 if TYPE_CHECKING:  # what one command prints need not wait for the modules of the others
-    from brakecli.analysis.stability.modes import Crossing
-    from brakecli.analysis.stability.report import StabilityReport
     from brakecli.comparison.result import ComparisonReport
     from brakecli.runs.limits import Check
     from brakecli.runs.run import RunReport
@@ -48,13 +46,14 @@ def run_table(report: RunReport) -> str:
     """Summary of a run."""
     numbers, work, method = report.numbers(), report.motion.work, report.motion.system.method
     weights = ", ".join(f"{weight:.4g}" for weight in method.theta)
-    how = f", tolerance {method.tolerance:.4g}" if method.own_steps else f" ({weights}), {method.iteration}"
+    kept = "" if method.row.exact else f", tolerance {method.tolerance:.4g}"
+    how = kept if method.own_steps else f" ({weights}), {method.iteration}"
     shares = ", ".join(f"{kind} {count / max(work.steps, 1):.1%}" for kind, count in work.evaluators.items())
     on_nodes = any(EVALUATORS[kind].needs_nodes for kind in work.evaluators)
     nodes = f", {numbers['nodes']} nodes" if on_nodes else ""
     step = "" if report.check.step is None else f" of {report.check.step:.4g} s"
     error = abs(numbers["energy"]["relative_closing_error"])
-    peak = _text(numbers["spectrum_peak"]) if numbers["spectrum_peak"] is not None else ""
+    peak = text_of(numbers["spectrum_peak"]) if numbers["spectrum_peak"] is not None else ""
     since = f"from {numbers['settled_from']:.4g} s on"
     rows = [
         ("failed", [numbers["failure"]] if work.failed else []),
@@ -72,10 +71,10 @@ def run_table(report: RunReport) -> str:
         ("left out", "; ".join(numbers["left_out"]) or "nothing"),
         ("steps", f"{work.steps}{step}, {work.contact_evaluations} contact evaluations"),
         ("energy account", f"closes to {error:.1e} of its largest item"),
-        ("time of the loop", _text(work.solve_seconds, "s", ".3g")),
+        ("time of the loop", text_of(work.solve_seconds, "s", ".3g")),
         ("file", str(report.output)),
     ]
-    return _table(report.title, rows)
+    return two_columns(report.title, rows)
 
 
 def verdict_table(source: str, numbers: Mapping[str, Any]) -> str:
@@ -83,8 +82,8 @@ def verdict_table(source: str, numbers: Mapping[str, Any]) -> str:
     rows = _verdict_rows(numbers)
     for name, value in numbers["evidence"].items():
         shown = ", ".join(f"{item:.4g}" for item in value) or "-" if isinstance(value, list | tuple) else value
-        rows.append((name.replace("_", " "), _text(shown)))
-    return _table(source, rows)
+        rows.append((name.replace("_", " "), text_of(shown)))
+    return two_columns(source, rows)
 
 
 def _verdict_rows(numbers: Mapping[str, Any]) -> list[Row]:
@@ -104,29 +103,29 @@ def check_table(title: str, found: Check) -> str:
     growth = f"multiplies a frictionless disturbance by at most {limits.growth:.8g} a step"
     coefficients = zip(COEFFICIENTS.values(), system.coefficients, strict=True)
     rows = [
-        *((f"{c.symbol}, {c.long_name}", _text(value, c.units.removeprefix("1"))) for c, value in coefficients),
-        ("surface speed U", _text(system.belt_speed, "m/s")),
-        ("contact stiffness 2ak", _text(system.contact_stiffness, "N/m")),
+        *((f"{c.symbol}, {c.long_name}", text_of(value, c.units.removeprefix("1"))) for c, value in coefficients),
+        ("surface speed U", text_of(system.belt_speed, "m/s")),
+        ("contact stiffness 2ak", text_of(system.contact_stiffness, "N/m")),
         ("natural frequencies", f"{low:.5g} and {high:.5g} Hz in full contact"),
         ("without contact", f"{link_low:.5g} and {link_high:.5g} Hz"),
-        ("shortest wave passes at", _text(system.passing_frequency, "Hz")),
+        ("shortest wave passes at", text_of(system.passing_frequency, "Hz")),
         ("step", (f"{found.step:.6g} s, " if has_step else "its own, about ") + f"{found.steps} steps"),
         ("steps per period", [f"{found.steps_per_period:.4g} of the fastest motion"] * has_step),
         ("fixed-point contraction", [f"{limits.contraction:.3g} (1 or more: it may diverge)"] * has_step),
         ("solution of each step", [f"{'unique' if limits.unique else 'perhaps not unique'}"] * has_step),
         ("scheme", [growth] * has_step),
         ("contact", system.evaluator + (f", {system.nodes} nodes" if system.nodes else "")),
-        ("nodes per shortest wave", _text(found.nodes_per_wave)),
+        ("nodes per shortest wave", text_of(found.nodes_per_wave)),
         *_cost_rows(found, "at least" if found.at_least else "about"),
         ("adjusted", found.adjustments),
     ]
-    return _table(title, rows)
+    return two_columns(title, rows)
 
 
 def estimate_table(title: str, found: Estimate) -> str:
     """What a sweep would cost."""
     about = "at least" if found.at_least else "about"
-    return _table(
+    return two_columns(
         title, [("points", str(found.points)), ("workers", str(found.workers)), *_cost_rows(found, about)]
     )
 
@@ -139,48 +138,6 @@ def _cost_rows(found: Check | Estimate, about: str = "about") -> list[Row]:
         ("memory", f"about {found.memory / 1e6:.0f} MB"),
         ("file", f"about {found.file_size / 1e6:.2g} MB"),
     ]
-
-
-def stability_table(title: str, report: StabilityReport, key: str, entries: Sequence[Mapping[str, Any]]) -> str:
-    """Steady sliding, its modes and its critical friction; below that the critical friction along a key."""
-    rest, critical, discrete = report.equilibrium, report.critical, report.discrete
-    undamped = {"flutter": report.undamped_flutter, "divergence": report.undamped_divergence}
-    known = [f"{kind} at {friction:.7g}" for kind, friction in undamped.items() if friction is not None]
-    sliding = f"none: {report.no_equilibrium}"
-    if rest is not None:
-        touching = f"{rest.contact_fraction:.1%} of the pad touches"
-        sliding = f"y = {rest.y:.5g} m, F_y = {rest.normal_force:.5g} N, {touching}"
-    rows = [
-        ("surface speed U", _text(report.belt_speed, "m/s")),
-        ("steady sliding", sliding),
-        ("contact stiffness K", _text(report.contact_stiffness, "N/m")),
-        ("critical friction", _crossing(critical) if critical else "none"),
-        ("also changes at", [_crossing(each) for each in report.crossings if each is not critical]),
-        ("without dashpots", ", ".join(known) or "neither flutter nor divergence"),
-        (f"at φ = {report.friction:g}", {True: "stable", False: "unstable", None: "-"}[report.stable]),
-    ]
-    for mode in report.modes:
-        motion = f"grows at {mode.growth:.4g} 1/s" if mode.growth > 0.0 else f"decays at {-mode.growth:.4g} 1/s"
-        shape = f"y/x {mode.shape:.3g} at {mode.shape_phase:.0f}°" if mode.shape is not None else "along y alone"
-        what = f"{motion}, damping ratio {mode.damping_ratio:.3g}, {shape}"
-        rows.append((f"mode at {mode.frequency:.5g} Hz", what))
-    if discrete:
-        limit, friction, radius = discrete.step_limit, discrete.critical_friction, discrete.spectral_radius
-        bias = "" if discrete.bias is None else f", {discrete.bias:+.2g} from the exact one"
-        rows += [
-            ("the scheme's growth", f"{_text(discrete.growth, '1/s')}, a factor {radius:.8g} a step"),
-            ("its critical friction", "none" if friction is None else f"{friction:.7g}{bias}"),
-            ("its stable steps", "any" if limit is None else f"up to {limit:.4g} s" if limit else "none"),
-        ]
-    columns = {key: "value"} | {field.title: field.name for field in fields.VARIED}
-    varied = {title: [_text(each[name]) for each in entries] for title, name in columns.items()}
-    return _table(title, rows) + ("\n\n" + _grid(varied) if key else "")
-
-
-def _crossing(crossing: Crossing) -> str:
-    change = "lost" if crossing.lost else "regained"
-    where = f" at {crossing.frequency:.5g} Hz" if crossing.frequency else ""
-    return f"{crossing.friction:.7g}: stability {change} by {crossing.instability}{where}"
 
 
 def sweep_table(report: SweepReport) -> str:
@@ -198,11 +155,11 @@ def sweep_table(report: SweepReport) -> str:
     rows += [
         ("note", found.sentences),
         ("failed", [f"{found.failed} points"] if found.failed else []),
-        ("time", _text(report.seconds, "s", ".3g")),
+        ("time", text_of(report.seconds, "s", ".3g")),
         ("file", str(report.output)),
     ]
     listed = _points_table(report) + "\n\n" if found.points <= MOST_LISTED_POINTS else ""
-    return listed + _table(report.loaded.title, rows)
+    return listed + two_columns(report.loaded.title, rows)
 
 
 def _points_table(report: SweepReport) -> str:
@@ -219,8 +176,8 @@ def _points_table(report: SweepReport) -> str:
     for field in POINTS if found.critical is None else CRITICAL_POINTS:
         values = np.ravel(np.array((found.variables or {})[field.name], object))
         header = f"{field.title}, {field.units}" if field.units else field.title
-        columns[header] = [_text(value, form=".5g") for value in values]
-    return _grid(columns)
+        columns[header] = [text_of(value, form=".5g") for value in values]
+    return grid(columns)
 
 
 def comparison_table(report: ComparisonReport) -> str:
@@ -229,7 +186,7 @@ def comparison_table(report: ComparisonReport) -> str:
     entries = list(zip(found.entries, report.numbers()["entries"], strict=True))
     for _, numbers in entries:
         numbers["milliseconds"] = 1e3 * (numbers["wall_seconds"] or 0.0)
-        numbers["step"] = numbers["step"] or f"to {numbers['tolerance']:g}"
+        numbers["step"] = numbers["step"] or (f"to {numbers['tolerance']:g}" if numbers["tolerance"] else "exact")
     able = [(entry, numbers) for entry, numbers in entries if entry.errors is not None]
     front = sorted((numbers for entry, numbers in able if entry.on_front), key=lambda each: each["milliseconds"])
     finest = {entry.kind: numbers for entry, numbers in able if not entry.on_front}
@@ -253,7 +210,7 @@ def comparison_table(report: ComparisonReport) -> str:
     ]
     best_entries = "No other is better in both error and time:\n" + _entries(front)
     others = "The finest of the others:\n" + _entries(finest.values())
-    return "\n\n".join((best_entries, others, _table(report.title, rows)))
+    return "\n\n".join((best_entries, others, two_columns(report.title, rows)))
 
 
 def _rows(known: Iterable[Field], numbers: Mapping[str, Any], *names: str) -> list[Row]:
@@ -261,31 +218,31 @@ def _rows(known: Iterable[Field], numbers: Mapping[str, Any], *names: str) -> li
     rows: list[Row] = []
     for each in named(known, *names):
         shown = ("of the time", ".2%") if each.units == "1" else (each.units,)
-        rows.append((each.title, _text(numbers[each.name], *shown)))
+        rows.append((each.title, text_of(numbers[each.name], *shown)))
     return rows
 
 
 def _entries(records: Collection[Mapping[str, Any]]) -> str:
-    return _grid({header: [_text(each[name], form=form) for each in records] for name, header, form in ENTRIES})
+    return grid({header: [text_of(each[name], form=form) for each in records] for name, header, form in ENTRIES})
 
 
-def _text(value: str | float | None, unit: str = "", form: str = ".6g") -> str:
+def text_of(value: str | float | None, unit: str = "", form: str = ".6g") -> str:
     """A value with its unit; a dash stands for what does not exist."""
     if value is None:
         return "-"
     return value if isinstance(value, str) else f"{value:{form}} {unit}".rstrip()
 
 
-def _table(title: str, rows: Sequence[Row]) -> str:
+def two_columns(title: str, rows: Sequence[Row]) -> str:
     """Rows in two columns."""
     lines = [(label, text) for label, texts in rows for text in ([texts] if isinstance(texts, str) else texts)]
     labels, values = zip(*lines, strict=True)
-    return _grid(
+    return grid(
         {"label": labels, "value": values}, title=escaped(title) or None, title_justify="left", show_header=False
     )
 
 
-def _grid(columns: Mapping[str, Sequence[str]], **style: Any) -> str:
+def grid(columns: Mapping[str, Sequence[str]], **style: Any) -> str:
     """Columns under their headers, as wide as the terminal."""
     from rich.console import Console
     from rich.table import Table

@@ -71,6 +71,8 @@ class Entry:
 
     def __str__(self) -> str:
         """The method with its step or tolerance."""
+        if self.method.row.exact:
+            return self.label
         rung = f"tolerance {self.tolerance:g}" if self.method.step is None else f"step {self.method.step:.3g} s"
         return f"{self.label}, {rung}"
 

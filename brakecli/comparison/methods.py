@@ -32,6 +32,8 @@ def kinds(system: System, wanted: Sequence[str] = ()) -> list[Method]:
     counts = [max(2, round(system.nodes * factor)) for factor in NODE_FACTORS]
     found = []
     for name, scheme in SCHEMES.items():
+        if scheme.exact and not system.smooth:
+            continue
         for trial in scheme.trials if not wanted or name in wanted else ():
             if moving and trial.start == "paper":
                 continue
@@ -52,7 +54,9 @@ def ladder(system: System, steps: Sequence[float] = ()) -> list[float]:
 
 
 def rungs(kind: Method, steps: Sequence[float]) -> list[Method]:
-    """A method over the ladder: over steps, or over tolerances if its steps are its own."""
+    """A method over the ladder of steps, or over tolerances if its steps are its own; alone if they are exact."""
+    if kind.row.exact:
+        return [kind]
     if kind.own_steps:
         return [replace(kind, tolerance=tolerance) for tolerance in TOLERANCES]
     return [replace(kind, step=step) for step in steps]

@@ -12,7 +12,7 @@ from brakecli.solver.quantities import TIME
 
 TEXT, OBJECT, SENTENCE = "S", "O", "S240"
 MOST_WINDOWS = 16
-WINDOWS = f"({MOST_WINDOWS},)f8"
+WINDOWS, PAIR = f"({MOST_WINDOWS},)f8", "(2,)f8"
 
 # A run
 
@@ -215,7 +215,7 @@ COMPARISON = (
     Field("entries", "", "all entries", OBJECT, at="comparison.", rows=ENTRY, in_file=False),
 )
 
-# Linear stability, in JSON alone
+# Linear stability
 
 STABILITY = (
     Field("belt_speed", "m/s", "speed U of the wheel's surface"),
@@ -243,4 +243,53 @@ VARIED = (
         label="critical friction of the scheme",
     ),
 )
-"""Along a key of the case, beside its `value`."""
+MODES = (
+    Field("frequencies", "Hz", "frequency of each mode, 0 of a pair of real eigenvalues", PAIR),
+    Field("growth_rates", "1/s", "growth rate of each mode, negative where it decays", PAIR),
+    Field("damping_ratios", "1", "damping ratio of each mode, negative where it grows", PAIR),
+)
+"""Along a key of the case, beside its `value`: what there is, and both modes, each followed by continuity."""
+MODE = integer("mode", "number of the mode, by frequency at the first value")
+LOCK_IN = (
+    Field("parameters", "", "the keys that are varied", OBJECT),
+    Field("critical_values", "of the key", "where along the key sliding stops being stable, or starts", OBJECT),
+)
+
+# Advice, in JSON alone
+
+SENSITIVITY = (
+    Field("parameter", "", "key of the case", TEXT),
+    Field("value", "of the key", "its value, or its values, which are scaled alike"),
+    ratio("elasticity", "per cent of critical friction for one per cent of the value; null where it is 0"),
+    Field("derivative", "1 per unit", "critical friction by the value; null for lists, and where it jumps"),
+    ratio("error", "relative error of both"),
+    Field("growth_derivative", "1/s per unit", "growth rate at φ by the value; for lists by their factor"),
+)
+CHANGE = (
+    Field("parameter", "", "key of the case", TEXT),
+    Field("from", "of the key", "its value", at="start"),
+    Field("to", "of the key", "the nearest value with the margin; null where there is none"),
+    ratio("critical_friction", "critical friction there; null where no friction makes it unstable"),
+    Field("lowest", "of the key", "least value that was tried"),
+    Field("highest", "of the key", "largest value that was tried"),
+)
+CHECK_RUN = (
+    Field("parameter", "", "key that was changed", TEXT),
+    Field("value", "of the key", "its new value"),
+    *named(VERDICT, "regime", "excitation", "frequency", "reasons"),
+    Field("duration", "s", "time that was simulated"),
+    Field("seconds", "s", "what the run has cost"),
+)
+ADVICE = (
+    ratio("critical_friction", "least friction coefficient at which stability ends; 0 where there is none"),
+    Field("instability", "", "how it is lost: flutter or divergence", TEXT, "stability.critical."),
+    ratio("friction_coefficient", "friction coefficient φ of the case", "stability.friction"),
+    ratio("margin", "`critical_friction` over `friction_coefficient`, less 1"),
+    ratio("wanted_margin", "the margin that is asked for"),
+    Field("stable", "", "whether steady sliding is stable at φ", "?", "stability."),
+    Field("sensitivities", "", "all numbers of the case, those that move it most first", OBJECT, rows=SENSITIVITY),
+    Field("advice", "", "all keys that may be advised, the smallest change first", OBJECT, rows=CHANGE),
+    Field("check", "", "a run of the case with the first advice followed", OBJECT, rows=CHECK_RUN),
+    Field("notes", "", "what the answer rests on", OBJECT),
+    Field("conclusion", "", "the answer in a sentence", TEXT),
+)

@@ -24,13 +24,15 @@ _ATTRIBUTES = {
     ("run", "/spectrum"): fields.WELCH,
     ("sweep", "/"): fields.SWEEP,
     ("comparison", "/"): fields.COMPARISON,
+    ("stability", "/"): fields.LOCK_IN,
 }
-_VARIABLES = {  # the first of a run or a comparison is the axis of all
+_VARIABLES = {  # the first of a kind, of a sweep its status, has the length of all
     ("run", "history"): fields.HISTORY,
     ("run", "spectrum"): (fields.FREQUENCY, *fields.SPECTRUM.values()),
     ("run", "unconverged"): fields.UNCONVERGED,
     ("sweep", "/"): (*fields.POINT, *fields.CRITICAL, *fields.DIFFERENCE, fields.DIRECTION),
     ("comparison", "/"): (fields.ENTRY_PLACE, *fields.ENTRY),
+    ("stability", "/"): (*fields.VARIED, *fields.MODES),
 }
 _RISING = ("time", "frequency")
 _MACHINERY = {"CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_Encoding", "_FillValue"}  # of netCDF-4
@@ -59,7 +61,7 @@ def check_variables(file: h5py.File, kind: str, length: int) -> None:
             shape = found[axis][1].shape if axis in found else node.shape
             if kind == "sweep" and field in (fields.DIRECTION, *fields.DIFFERENCE):
                 shape = shape[1:] if field is not fields.DIRECTION else shape[:1]
-            if node.shape[: node.ndim - (field.kind == fields.WINDOWS)] != shape:
+            if node.shape[: node.ndim - field.kind.startswith("(")] != shape:
                 raise ValueError(f"{where} has the shape {node.shape}, and {axis} has {shape}")
             if kind == "run" and name in _RISING:
                 _check_rising(node, where)

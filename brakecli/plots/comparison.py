@@ -83,9 +83,10 @@ def _lines(attributes: dict[str, Any], columns: Columns, best: int | None) -> tu
     if best is not None:
         names = ("method", "step", "tolerance", "error", "wall_seconds")
         method, step, tolerance, error, seconds = (columns[name][best] for name in names)
-        at = f"step {step:.3g} s" if math.isfinite(step) else f"tolerance {tolerance:g}"
+        at = f", step {step:.3g} s" if math.isfinite(step) else ""
+        at += f", tolerance {tolerance:g}" if math.isfinite(tolerance) else ""
         cost = f" in {1e3 * seconds:.3g} ms" if math.isfinite(seconds) else ""
-        first = f"cheapest of error ≤ {target}: {method}, {at}: error {error:.2g}{cost}"
+        first = f"cheapest of error ≤ {target}: {method}{at}: error {error:.2g}{cost}"
     parts = [f"{attributes.get('duration', 0.0):.4g} s of motion"]
     parts.append(f"reference good to {attributes.get('reference_error', 0.0):.1e}")
     left_out = attributes.get("left_out", 0)

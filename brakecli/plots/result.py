@@ -41,15 +41,17 @@ def plot_result(result: Path, target: Path, *, force: bool, select: Sequence[str
 
 def draw(result: StoredResult, select: Sequence[str] = ()) -> "Figure":
     """The picture of an open result, drawn with the style that is set."""
-    from brakecli.plots import comparison, curves, maps, run, sweep
+    from brakecli.plots import comparison, curves, lock_in, maps, run, sweep
 
     kind = result.attributes.get("kind")
     if kind == "sweep":
         picture = sweep.gather(result, select)
         return curves.draw(picture) if len(picture.axes) == 1 else maps.draw(picture)
-    if kind not in ("run", "comparison"):
-        known = "a run, of a sweep or of a comparison"
+    if kind not in ("run", "comparison", "stability"):
+        known = "a run, of a sweep, of a comparison or of stability"
         raise UsageError(f"{result.path}: holds a result of kind {kind!r}; name the result of {known}")
     if select:
         raise UsageError(f"{result.path}: --select is for sweeps (found {select[0]!r}); leave it out for a {kind}")
-    return run.draw(run.RunPicture(result)) if kind == "run" else comparison.draw(result)
+    if kind == "run":
+        return run.draw(run.RunPicture(result))
+    return comparison.draw(result) if kind == "comparison" else lock_in.draw(result)

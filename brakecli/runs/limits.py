@@ -121,8 +121,8 @@ def adjustments(system: System) -> list[str]:
     """Sentences on how a run differs from what the case asks for: the grid of time, and nodes."""
     method, interval, asked, found = system.method, system.interval, system.method.step, list[str]()
     if method.own_steps and asked is not None:
-        kept = f"to a tolerance of {method.tolerance:g}"
-        found.append(f"solver.step: not used, event-driven finds its steps itself, {kept}")
+        kept = "which are exact" if method.row.exact else f"to a tolerance of {method.tolerance:g}"
+        found.append(f"solver.step: not used, {method.scheme} finds its steps itself, {kept}")
     if asked is None and method.nodes:
         found.append("contact.nodes: not used, the tolerance chooses nodes itself")
     if asked and not method.own_steps and abs(interval / asked - system.per_sample) > WHOLE * system.per_sample:

@@ -5,7 +5,7 @@ from time import process_time
 from typing import NamedTuple
 
 from brakecli.runs.cost import evaluation_seconds, start_seconds
-from brakecli.runs.tolerance import EVENT_RATIO, LAYERED_FROM, coarsest_step, first_event_tolerance
+from brakecli.runs.tolerance import EVENT_RATIO, LAYERED_FROM, SHORTER, coarsest_step, first_event_tolerance
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.motion import Stepping
 from brakecli.solver.system import System
@@ -35,6 +35,9 @@ def measured(system: System) -> Price | None:
     method = system.method
     if method.step is not None:
         return _begun(system)
+    if method.row.exact:
+        found = _begun(system)
+        return found._replace(seconds=found.seconds * (1.0 + 1.0 / SHORTER))
     if not method.own_steps:
         return _ladder(system)
     first = replace(system, method=replace(method, tolerance=first_event_tolerance(system)))
@@ -54,7 +57,7 @@ def _ladder(system: System) -> Price:
 
 def _begun(system: System) -> Price:
     """One run, begun and continued at the same pace."""
-    own, slow_start = system.method.own_steps, start_seconds(system)
+    own, slow_start = system.method.own_steps and not system.method.row.exact, start_seconds(system)
     if slow_start > SECONDS:  # a shoe that starts elsewhere moves as fast
         system = replace(system, initial=replace(system.initial, from_equilibrium=False))
     _ = system.scheme, system.evaluate  # compiled

@@ -88,7 +88,8 @@ def run(
         with new_result(output, force=force) as result:
             refuse(found, free_bytes(output.resolve().parent))
             counted, sink = "steps" if found.step else "samples", _history_sink(result, system.interval)
-            motion, certificate = motion_of(system, lambda done: progress(counted, done, system.steps), sink)
+            total = system.samples if system.method.step is None else system.steps
+            motion, certificate = motion_of(system, lambda done: progress(counted, done, total), sink)
             if not np.isfinite(astuple(motion.energy)).all():  # compiled code overflows silently
                 raise FloatingPointError("an energy overflows")
             history = History(system.interval, result.rows("history"), partial(result.read, "history"))

@@ -31,6 +31,8 @@ PILOT = 32  # duration of the case over that of the event-driven pilot run, whic
 # Time is guessed from counted work, not measured, so that a case gives the same bytes wherever it runs.
 EVEN_CHANCE = 0.5  # beyond this part of the time of event-driven runs, a next run is likely not to be the last one
 MOST_SECONDS = 900.0  # time of the loop after which no finer run is begun
+SHORTER = 0.7  # step of the second of two piecewise-exact runs over that of the first
+ROUNDING_MARGIN = 4.0  # the error of such a run over what two of them differ by, at most
 ROUNDING = 1e-12  # least estimate: runs that share their rounding agree better than they are right
 
 
@@ -62,14 +64,16 @@ class Certified(NamedTuple):
 def certify(system: System, progress: Progress = lambda samples: None) -> Certified:
     """Compute a motion to the tolerance of its method; `progress` receives the samples of the run in progress.
 
-    Smooth surfaces, and rough ones that touch everywhere, go to the event-driven scheme, whose cost hardly depends
-    on the error. Where surfaces open, that scheme needs the exact contact integral, which is expensive: while
-    friction does not jump, a ladder of steps and nodes of the two-layer scheme may be cheaper down to
-    `LAYERED_FROM`. The ladder is left where its next run takes long beside all the event-driven ones.
+    Smooth surfaces go to the piecewise-exact scheme, rough ones that touch everywhere to the event-driven one, as
+    their cost hardly depends on the error. Where surfaces open, the latter needs the exact contact integral, which
+    is expensive: while friction does not jump, a ladder of steps and nodes of the two-layer scheme may be cheaper
+    down to `LAYERED_FROM`. It is left where its next run takes long beside all the event-driven ones.
     """
     method = system.method
     if not method.own_steps:
         return _by_steps(system, progress)
+    if method.row.exact:
+        return _by_phases(system, progress)
     layered = replace(system, method=replace(method, scheme="two-layer", theta=(0.5, 0.5)))
     if not method.automatic or method.tolerance < LAYERED_FROM or not _opens_and_slides(layered, progress):
         return _by_events(system, progress)
@@ -131,6 +135,23 @@ def first_event_tolerance(system: System) -> float:
     # Two tolerances at least, as runs to the same one agree in any case.
     largest = min(FIRST_EVENT_TOLERANCE, EVENT_MARGIN * system.method.tolerance)
     return max(largest, LEAST_EVENT_TOLERANCE / EVENT_RATIO)
+
+
+def _by_phases(system: System, progress: Progress) -> Certified:
+    """Two piecewise-exact runs with different steps: they differ by what the motion makes of rounding.
+
+    Where samples are close, a step of the second run passes over several of them.
+    """
+    wanted, run, longest = system.method.tolerance, _run(system, progress), SHORTER * system.longest_step
+    every = max(n for n in range(1, 1 + max(1, int(longest / system.interval))) if system.samples % n == 0)
+    share = min(1.0, run.system.step / system.longest_step) if every == 1 else 1.0
+    sparse = replace(system, interval=every * system.interval, duration=system.sampled_duration)
+    other = _run(sparse, lambda samples: None, share=SHORTER * share)
+    run.work.solve_seconds += other.work.solve_seconds
+    until, difference = _compare(replace(run, rows=run.rows[::every]), other, wanted / ROUNDING_MARGIN)
+    error, failed = ROUNDING_MARGIN * difference, run.work.failed or other.work.failed
+    how = f"piecewise-exact runs with steps of {run.system.step:.3g} and {other.system.step:.3g} s"
+    return Certified(run, Certificate(wanted, error <= wanted and not failed, error, until, how))
 
 
 def _by_events(system: System, progress: Progress) -> Certified:

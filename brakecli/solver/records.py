@@ -140,6 +140,46 @@ MOTION = record(
 """An event-driven motion and its last step."""
 
 
+BELT, BELT_SLOPE, LOAD, LOAD_SLOPE = range(4, 8)
+"""Further components of a piecewise-exact motion, beside those of an event-driven one: U, Q and their slopes."""
+
+SIZE, PHASES, MARGINS, WORKS, TERMS, NODES = 8, 4, 3, 4, 18, 6
+"""Its components, phases, margins of a phase, works, terms of its series, nodes of its quadrature."""
+
+FLOW = record(
+    "x y v_x v_y",  # motion at the level reached, m and m/s
+    "force",  # normal force at the start, N
+    "stiffness",  # of the contact, N/m
+    "anchor anchor_low",  # x - travel in stick, a sum of two doubles, m
+    "knot",  # time from which on speed or load change otherwise, s
+    "events_time",  # since which `events` are counted, s
+    phase=int,
+    started=int,  # 0 before the phase of the start is known
+    events=int,  # events without progress
+    made=(int, PHASES),  # 1 where the matrices of a phase are made
+    row=(float, 8),  # the sample at the level reached
+    z=(float, SIZE),  # motion reached
+    end=(float, 4),  # x, y, v_x and v_y at the end of a whole step
+    before=(float, 2 * MARGINS),  # margins of the motion reached, and their slopes times the step
+    after=(float, 2 * MARGINS),  # those at the end
+    needed=(float, SIZE),  # row whose product with z is the friction force that stick takes, N
+    generator=(float, (PHASES, SIZE, SIZE)),  # A
+    friction=(float, (PHASES, SIZE)),  # row of the friction force, N
+    margins=(
+        float,
+        (PHASES, 2 * MARGINS, SIZE),
+    ),  # rows of what is positive while the phase lasts, and of `before`
+    step=(float, (PHASES, 4 + 2 * MARGINS, SIZE)),  # rows of exp(A h) for x, y, v_x and v_y, and of `after`
+    works=(float, (PHASES, WORKS, SIZE, SIZE)),  # forms in z that are the works of a step from z on, J
+    sums=(float, (SIZE, SIZE)),  # sum of z zᵀ over the steps whose works wait to be added up
+    series=(float, (TERMS, SIZE)),  # of the motion over the span of a step
+    pull=(float, (NODES + 1, SIZE)),  # friction force in `at`, N
+    at=(float, (NODES + 1, SIZE, SIZE)),  # motions at the nodes of Gauss' rule, and at the end of the step
+    polynomial=(float, (2, TERMS)),  # a margin on it, and the margin's slope, negative
+)
+"""A piecewise-exact motion with the matrices of its phases."""
+
+
 class Coefficients(NamedTuple):
     """The constants of (6)-(7) and of the friction law, in the paper's symbols (SI units)."""
 
@@ -219,8 +259,8 @@ class Plant(NamedTuple):
     counts: Any
 
 
-STATE_TYPE, MOTION_TYPE, PROBLEM_TYPE, CONTACT_TYPE, WORK_TYPE, COUNTS_TYPE, PAD_TYPE = (
-    numba.from_dtype(each) for each in (STATE, MOTION, PROBLEM, CONTACT, WORK, COUNTS, PAD)
+STATE_TYPE, MOTION_TYPE, FLOW_TYPE, PROBLEM_TYPE, CONTACT_TYPE, WORK_TYPE, COUNTS_TYPE, PAD_TYPE = (
+    numba.from_dtype(each) for each in (STATE, MOTION, FLOW, PROBLEM, CONTACT, WORK, COUNTS, PAD)
 )
 KNOTS = types.Array(numba.from_dtype(KNOT), 1, "C")
 WAVES = types.Array(numba.from_dtype(WAVE), 1, "C")

@@ -1,8 +1,8 @@
 """Steady sliding: the position at which (6)-(7) hold without motion, averaged over the wheel's roughness."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, field
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -72,26 +72,43 @@ def mean_contact(system: System, y: float) -> tuple[float, float, float]:
     return float(force), float(stiffness), float(fraction)
 
 
-def tabulated(system: System) -> Mean:
-    """The mean contact, interpolated between `TABLE` heights where the pad touches in part: for many calls.
+@dataclass(frozen=True)
+class _Surfaces:
+    """What the mean contact of a layer of 1 N/m² depends on; systems that are alike in it share a table."""
+
+    key: tuple[object, ...]
+    system: System = field(compare=False)
+
+
+@lru_cache(maxsize=4)
+def _table(surfaces: _Surfaces) -> tuple[Any, Any, Any]:
+    """Force, its slope and the touching part between full contact and none, interpolated.
 
     The force is a cubic through its values and slopes; its error falls with the fourth power of the spacing.
     """
     from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
+    pad = surfaces.system.pad.constants
+    heights = np.linspace(float(pad.full_up_to), float(pad.clear_from), TABLE)
+    values = np.array([mean_contact(surfaces.system, float(y)) for y in heights])
+    values[:, :2] /= surfaces.system.layer_stiffness
+    force = CubicHermiteSpline(heights, values[:, 0], -values[:, 1])
+    return force, force.derivative(), PchipInterpolator(heights, values[:, 2])
+
+
+def tabulated(system: System) -> Mean:
+    """The mean contact, interpolated between `TABLE` heights where the pad touches in part: for many calls."""
     mean, pad = partial(mean_contact, system), system.pad.constants
     full, top = float(pad.full_up_to), float(pad.clear_from)
-    if full == top:
-        return mean
-    heights = np.linspace(full, top, TABLE)
-    values = np.array([mean(float(y)) for y in heights])
-    force = CubicHermiteSpline(heights, values[:, 0], -values[:, 1])
-    slope, fraction = force.derivative(), PchipInterpolator(heights, values[:, 2])
+    profiles = [each.tobytes() for profile in (system.shoe, system.wheel) for each in profile]
+    surfaces = _Surfaces((system.half_length, system.evaluator, system.nodes, *profiles), system)
+    k = system.layer_stiffness
 
     def interpolated(y: float) -> tuple[float, float, float]:
         if not full < y < top:
             return mean(y)
-        return float(force(y)), -float(slope(y)), float(fraction(y))
+        force, slope, fraction = _table(surfaces)
+        return k * float(force(y)), -k * float(slope(y)), float(fraction(y))
 
     return interpolated
 

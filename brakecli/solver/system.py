@@ -20,6 +20,9 @@ from brakecli.solver.schedules import Schedule, value_at
 MOST_TABLE_BYTES = 4e9
 WHOLE = 1e-9
 """A ratio this close to a whole number is whole."""
+RADIANS = 0.8
+"""Largest angle that the fastest motion turns by in an exact step: so small that a margin is lowest in it once at
+most, and that the series of the step need few terms."""
 
 
 @dataclass(frozen=True)
@@ -146,12 +149,20 @@ class System:
     @property
     def per_sample(self) -> int:
         """Steps of a sample interval."""
-        asked = None if self.method.own_steps else self.method.step
+        method = self.method
+        asked = method.share * self.longest_step if method.row.exact else None if method.own_steps else method.step
         return _at_least(self.interval / (asked or self.interval))
 
     @property
+    def longest_step(self) -> float:
+        """The longest exact step, s, by bounds of the fastest motion and of the fastest decay."""
+        c = self.coefficients
+        bound = c.c_xx + c.c_yy + 2.0 * abs(c.c_xy) + (1.0 + c.phi) * self.contact_stiffness
+        return RADIANS / (math.sqrt(bound / c.m) + (c.b_xx + c.b_yy) / c.m)
+
+    @property
     def step(self) -> float:
-        """h, s; the sample interval where the scheme finds its steps itself."""
+        """h, s; the sample interval where the scheme finds its steps itself, unless they are exact."""
         return self.interval / self.per_sample
 
     @property

@@ -87,6 +87,19 @@ def test_nodes_are_chosen_by_the_tolerance() -> None:
     assert "contact.nodes: not used, the tolerance chooses nodes itself" in adjustments(system_of(case))
 
 
+def test_the_piecewise_exact_scheme_is_for_smooth_surfaces() -> None:
+    exact = change(CONSTANT, ('"two-layer"\ntheta = [0.5, 0.5]', '"piecewise-exact"'))
+    (line,) = messages(exact)
+    assert 'solver.scheme: is for smooth surfaces, but roughness.shoe is given (found "piecewise-exact")' in line
+    zero = [f"roughness.{surface}.amplitudes=[0, 0]" for surface in ("shoe", "wheel")]
+    for overrides in (["roughness={}"], zero):
+        system = system_of(parse_case(exact, "case.toml", overrides).case)
+        assert system.method.scheme == "piecewise-exact"
+        assert "solver.step: not used, piecewise-exact finds its steps itself, which are exact" in adjustments(
+            system
+        )
+
+
 def test_event_driven_takes_the_step_of_a_case_for_its_samples_alone() -> None:
     case = parse_case(CONSTANT, "case.toml", ['solver.scheme="event-driven"', "solver.theta=[]"]).case
     (adjustment,) = adjustments(system_of(case))

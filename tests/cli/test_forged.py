@@ -34,6 +34,7 @@ COMMANDS = {
     ],
     "sweep": [["plot", "-q"], ["classify"], ["run", "-o", "o.h5"]],
     "comparison": [["plot", "-q"], ["classify"]],
+    "stability": [["plot", "-q"], ["classify"]],
 }
 
 
@@ -46,6 +47,8 @@ def results(good: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     brakecli("sweep", "s.toml", "-q", "-j", "1", "-o", "sweep.h5", cwd=folder).told(0)
     schemes = ["--schemes", "two-layer", "--steps", "1e-4,5e-5", "--budget", "1"]
     brakecli("compare-schemes", "tiny.toml", "-q", "-o", "comparison.h5", *schemes, cwd=folder).told(0)
+    vary = ["--vary", "friction.coefficient=0.5:0.7:3"]
+    brakecli("stability", "tiny.toml", "-q", "-o", "stability.h5", *vary, cwd=folder).told(0)
     shutil.copy(good / "tiny.h5", folder / "run.h5")
     for kind in COMMANDS:
         path = folder / f"{kind}.h5"

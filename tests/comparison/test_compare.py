@@ -116,7 +116,7 @@ def test_a_motion_without_a_line_has_neither_amplitude_nor_phase() -> None:
 
 
 def test_every_method_of_a_case_is_told_apart_by_its_label() -> None:
-    for base, count in ((SQUEAL, 11), (ROUGH, 16)):
+    for base, count in ((SQUEAL, 12), (ROUGH, 16)):
         found = kinds(system_of(make(base)))
         assert len({method_label(method) for method in found}) == len(found) == count
     labels = {method_label(method) for method in found}
@@ -132,7 +132,7 @@ def test_every_method_of_a_case_is_told_apart_by_its_label() -> None:
 
 def test_a_start_that_moves_leaves_out_the_papers_start_which_is_one_from_rest() -> None:
     moving = kinds(system_of(make(SQUEAL, initial__vx=0.01)))
-    assert len(moving) == 8
+    assert len(moving) == 9
     assert {method.start for method in moving} == {"consistent"}
 
 
@@ -164,6 +164,16 @@ def test_a_scheme_with_steps_of_its_own_climbs_tolerances() -> None:
     assert [(rung.step, rung.tolerance) for rung in rungs(two, [2e-5, 1e-5])] == [(2e-5, 0.0), (1e-5, 0.0)]
 
 
+def test_a_scheme_that_is_exact_is_one_entry_on_smooth_surfaces_alone() -> None:
+    (exact,) = kinds(system_of(make(SQUEAL)), ["piecewise-exact"])
+    assert rungs(exact, [1e-5]) == [exact]
+    assert kinds(system_of(make(ROUGH)), ["piecewise-exact"]) == []
+    (entry,) = entries_of(smooth_comparison(), "piecewise-exact", ())
+    assert entry.errors is not None
+    assert entry.error < 10.0 * smooth_comparison().reference_error
+    assert str(entry) == "piecewise-exact"
+
+
 def test_lists_of_schemes_and_steps_are_read() -> None:
     assert parse_schemes(None) == []
     assert parse_schemes("two-layer, event-driven") == ["two-layer", "event-driven"]
@@ -180,7 +190,7 @@ def test_steps_that_make_no_ladder_are_refused(text: str) -> None:
 def test_observed_orders_are_those_that_the_schemes_declare() -> None:
     found, checked = smooth_comparison(), 0
     for method in dict.fromkeys(entry.kind for entry in found.entries):
-        if method.scheme == "event-driven":
+        if method.own_steps:
             continue
         steps = [entry for entry in found.entries if entry.kind == method]
         system = system_of(smooth(solver__scheme=method.scheme, solver__theta=method.theta))
@@ -346,7 +356,7 @@ def test_json_and_file_hold_the_same_entries(tmp_path: Path) -> None:
     assert done.code == 0, done.err
     numbers = done.json
     assert left_in(tmp_path) == {"tiny.toml", "tiny-schemes.h5"}
-    assert len(numbers["entries"]) == 10 * 2 + len(TOLERANCES)
+    assert len(numbers["entries"]) == 10 * 2 + len(TOLERANCES) + 1
     assert all(set(entry) >= ENTRY_NAMES for entry in numbers["entries"])
     assert numbers["recommended"] in numbers["entries"]
     path = tmp_path / numbers["output"]

@@ -136,7 +136,7 @@ def test_a_result_without_what_is_drawn_is_unreadable(tmp_path: Path) -> None:
 
 def test_other_kinds_of_results_are_refused_and_select_is_for_sweeps(tmp_path: Path) -> None:
     refused: tuple[tuple[str, list[str], str], ...] = (
-        ("other", [], "a run, of a sweep or of a comparison"),
+        ("other", [], "a run, of a sweep, of a comparison or of stability"),
         ("run", ["a=1"], "leave it out for a run"),
     )
     for kind, select, words in refused:

@@ -1,5 +1,6 @@
 """A tolerance is a promise: what is certified is true, and what is not true is not certified."""
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +14,10 @@ from brakecli.runs import tolerance as module
 from brakecli.runs.modelled import modelled
 from brakecli.runs.tolerance import Certified, certify
 from brakecli.solver.quantities import HISTORY
-from tests.campaign import campaign
+from tests.campaign import campaign, counts
 from tests.commands import TINY, attributes, brakecli
 from tests.examples import COULOMB, ROUGH, SQUEAL, make, simulate
+from tests.solver.test_event_driven import flat_case
 
 FULL = {"amplitudes": [1e-6, 7e-7], "wavelengths": [0.02, 0.011]}
 
@@ -26,9 +28,9 @@ def promised(base: dict[str, Any], tolerance: float, **changes: Any) -> Case:
     return make({**base, "output": {"sample_interval": 1e-4}}, **solver, **changes)
 
 
-def truth(case: Case) -> np.ndarray[Any, Any]:
+def truth(case: Case, tolerance: float = 1e-12) -> np.ndarray[Any, Any]:
     """The event-driven motion to 1e-12, which tests/solver/test_event_driven.py holds to independent solutions."""
-    exact = changed(case, solver={"scheme": "event-driven", "tolerance": 1e-12, "step": None, "theta": ()})
+    exact = changed(case, solver={"scheme": "event-driven", "tolerance": tolerance, "step": None, "theta": ()})
     return simulate(exact).rows
 
 
@@ -47,7 +49,38 @@ def test_smooth_surfaces_keep_any_tolerance(tolerance: float, friction: float) -
     assert found.certificate.certified
     assert found.certificate.certified_until == pytest.approx(0.3)
     assert kept(found, case) <= tolerance
+    assert found.motion.system.method.scheme == "piecewise-exact"
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-9])
+def test_the_event_driven_scheme_keeps_them_too(tolerance: float) -> None:
+    case = promised(SQUEAL, tolerance, solver__scheme="event-driven", solver__duration=0.3)
+    found = certify(system_of(case))
+    assert found.certificate.certified
+    assert kept(found, case) <= tolerance
     assert found.motion.system.method.scheme == "event-driven"
+
+
+@pytest.mark.parametrize("many", counts(6, 100))
+def test_exact_steps_know_what_motions_make_of_their_rounding(many: int) -> None:
+    rng, loose = np.random.default_rng(6), 0
+    for _ in range(many):
+        case, omega = flat_case(rng, 1e-12)
+        case["solver"] = {"duration": 10 ** rng.uniform(1.5, 2.5) / omega, "tolerance": 1e-12}
+        found = certify(system_of(Case.model_validate(case)))
+        estimate, loose = found.certificate.estimated_error, loose + (found.certificate.estimated_error > 4e-12)
+        assert found.motion.system.method.scheme == "piecewise-exact"
+        error = errors(found.motion.rows, truth(Case.model_validate(case), 1e-13)).error
+        assert error <= 10.0 * estimate + 1e-11  # both err by chance; and what the truth itself may be off
+    assert many < 10 or 0 < loose < many
+
+
+@pytest.mark.parametrize("interval", [1e-5, 1e-1])
+def test_exact_runs_are_not_compared_with_themselves(interval: float) -> None:
+    found = certify(system_of(promised(SQUEAL, 1e-6, output__sample_interval=interval, solver__duration=0.1)))
+    one, other = map(float, found.certificate.method.split("steps of ")[1].removesuffix(" s").split(" and "))
+    assert abs(math.log(other / one)) > 0.25
+    assert found.certificate.certified
 
 
 def test_rough_surfaces_in_full_contact_never_see_a_quadrature() -> None:
@@ -169,7 +202,8 @@ def test_a_scheme_that_is_named_is_kept(scheme: str) -> None:
 
 
 def test_no_run_is_compared_with_itself() -> None:
-    found = certify(system_of(promised(SQUEAL, 1e-12, solver__duration=0.05)))
+    case = promised(SQUEAL, 1e-12, solver__duration=0.05, solver__scheme="event-driven")
+    found = certify(system_of(case))
     assert found.certificate.method == "event-driven runs to 1e-11 and 1e-13"
 
 
@@ -196,7 +230,7 @@ def test_a_case_without_a_step_keeps_a_thousandth(tmp_path: Path) -> None:
     assert done.code == 0
     assert (done.json["tolerance"], done.json["certified"]) == (1e-3, 1)
     assert done.json["estimated_error"] <= 1e-3
-    assert done.json["scheme"] == "event-driven"
+    assert done.json["scheme"] == "piecewise-exact"
     again = brakecli("run", "tiny.h5", "-o", "again.h5", cwd=tmp_path)
     assert again.code == 0
     assert (tmp_path / "again.h5").read_bytes() == (tmp_path / "tiny.h5").read_bytes()

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from scipy.ndimage import median_filter, uniform_filter1d
 
-from brakecli.analysis.regime.spectra import Array, rises
+from brakecli.analysis.regime.spectra import Array, line_share, rises
 
 CERTAIN = 15.0  # a line's power over the mean of the noise, which reaches it in one bin of three million
 _RIPPLE = 0.3  # ripple within this part of the mean size of the velocity does not count as a cycle
@@ -135,17 +135,6 @@ def _cycle(velocity: Velocity) -> float:
     values = velocity.smoothed(velocity.quiet)
     band = _RIPPLE * float(np.abs(values).mean())
     return len(values) / max(1, len(rises(-values, -band, band)))
-
-
-def line_share(power: Array) -> float:
-    """Part of the energy in the three strongest bands, each 6 % to either side."""
-    left, total, found = power.copy(), float(power.sum()), 0.0
-    for _ in range(3):
-        peak = int(np.argmax(left))
-        band = slice(int(peak / 1.06), int(peak * 1.06) + 2)
-        found += float(left[band].sum())
-        left[band] = 0.0
-    return found / total if total > 0.0 else 0.0
 
 
 def _handy(values: Array) -> Array:

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.analysis.regime.cleaning import line_share
-from brakecli.analysis.regime.spectra import FEWEST_CYCLES, Array, interpolated, upward_crossings
+from brakecli.analysis.regime.spectra import FEWEST_CYCLES, Array, interpolated, line_share, upward_crossings
 from brakecli.solver.history import History
 from brakecli.solver.quantities import ContactState
 

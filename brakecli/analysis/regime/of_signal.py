@@ -10,8 +10,8 @@ from itertools import product
 
 import numpy as np
 
-from brakecli.analysis.regime.cleaning import CERTAIN, Velocity, cleaned, line_share
-from brakecli.analysis.regime.spectra import Array, rises
+from brakecli.analysis.regime.cleaning import CERTAIN, Velocity, cleaned
+from brakecli.analysis.regime.spectra import Array, line_share, rises
 from brakecli.analysis.regime.verdict import Decision, Excitation, Regime
 
 _FINE = 1000.0  # samples of a cycle, after interpolation, among which a plateau is sought

@@ -15,7 +15,6 @@ import numpy as np
 from brakecli.analysis.regime.of_signal import Signal
 from brakecli.analysis.regime.spectra import Array
 from brakecli.errors import UnreadableResultError, UsageError
-from brakecli.files.valid import check_size, member
 
 _COMMENTS = ("#", "%")
 _HEAD = 1 << 16  # bytes of a text file from which its layout is found
@@ -57,6 +56,8 @@ def _require(good: bool | np.bool_, problem: str) -> None:
 def _dataset(path: Path, inside: str) -> Array:
     """A one-dimensional dataset of numbers; whatever h5py raises on damage is reported."""
     import h5py
+
+    from brakecli.files.valid import check_size, member
 
     try:
         with h5py.File(path, "r", locking=False) as file:

@@ -99,3 +99,14 @@ def upward_crossings(values: Array, band: float) -> Array:
     crossings = np.flatnonzero((values[:-1] < 0.0) & (values[1:] >= 0.0))
     i = crossings[np.searchsorted(crossings, rises(values, -band, band))]
     return i + values[i] / (values[i] - values[i + 1])
+
+
+def line_share(power: Array) -> float:
+    """Part of the energy in the three strongest bands, each 6 % to either side."""
+    left, total, found = power.copy(), float(power.sum()), 0.0
+    for _ in range(3):
+        peak = int(np.argmax(left))
+        band = slice(int(peak / 1.06), int(peak * 1.06) + 2)
+        found += float(left[band].sum())
+        left[band] = 0.0
+    return found / total if total > 0.0 else 0.0

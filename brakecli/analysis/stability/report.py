@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from brakecli.analysis.stability.discrete import spectral_radius
-from brakecli.analysis.stability.modes import Crossing, Mode, crossings, eigensystem, is_undamped, modes
+from brakecli.analysis.stability.modes import Complex, Crossing, Mode, crossings, eigensystem, is_undamped, modes
 from brakecli.analysis.stability.search import bisect
 from brakecli.errors import CaseError
 from brakecli.solver.links import natural_frequencies
@@ -19,7 +19,7 @@ from brakecli.solver.steady_sliding import SteadySliding, steady_sliding, tabula
 from brakecli.solver.system import System
 
 LARGEST_FRICTION = 10.0  # to which rough surfaces are searched, whose stiffness depends on friction
-FRICTIONS = 401
+FRICTION_STEP = 0.025
 MARGIN = 1e-9  # growth per step that counts as growth: above the rounding of simple eigenvalues
 _CLEAR_MARGIN = 1e-6  # above that of double ones, where a direction has no spring
 
@@ -67,21 +67,19 @@ def stability(system: System) -> StabilityReport:
         reason = error.problems[0].what
     k = rest.stiffness if rest else system.contact_stiffness
     stiffness_at = mean_stiffness(system, k)
-    rough = belt != 0.0 and not system.smooth
-    found = _rough_crossings(c, belt, stiffness_at) if rough else crossings(c, k, belt)
+    found = changes(system, stiffness_at)
     critical = next((crossing for crossing in found if crossing.lost), None)
     flutter, divergence = undamped_critical(c, k, belt)
     grip = math.copysign(c.phi, belt) if belt else 0.0
     values, _ = eigensystem(c, k, grip)
     fastest = float(values.real.max())
-    tolerance = 0.0 if is_undamped(c) else 1e-12 * float(np.abs(values).max())
     return StabilityReport(
         belt_speed=belt,
         friction=c.phi,
         equilibrium=rest,
         no_equilibrium=reason,
         contact_stiffness=k,
-        stable=fastest <= tolerance if rest else None,
+        stable=_all_decay(c, values) if rest else None,
         eigenvalues=tuple(values.tolist()),
         modes=tuple(modes(c, k, grip)),
         crossings=tuple(found),
@@ -91,6 +89,29 @@ def stability(system: System) -> StabilityReport:
         discrete=_discrete(system, stiffness_at, critical, fastest) if rest else None,
         stiffness_at=stiffness_at,
     )
+
+
+def changes(system: System, stiffness_at: StiffnessAt, up_to: float = LARGEST_FRICTION) -> list[Crossing]:
+    """Every change of stability along φ; on rough surfaces those up to a friction coefficient."""
+    c, belt = system.coefficients, system.belt_speed
+    if belt == 0.0 or system.smooth:
+        return crossings(c, stiffness_at(c.phi), belt)
+    return _rough_crossings(c, belt, stiffness_at, up_to)
+
+
+def is_stable(system: System) -> bool | None:
+    """Whether steady sliding is stable at the system's own friction; None where there is none."""
+    c, belt = system.coefficients, system.belt_speed
+    try:
+        k = steady_sliding(system).stiffness
+    except CaseError:
+        return None
+    return _all_decay(c, eigensystem(c, k, math.copysign(c.phi, belt) if belt else 0.0)[0])
+
+
+def _all_decay(c: Coefficients, eigenvalues: Complex) -> bool:
+    tolerance = 0.0 if is_undamped(c) else 1e-12 * float(np.abs(eigenvalues).max())
+    return bool(eigenvalues.real.max() <= tolerance)
 
 
 def undamped_critical(c: Coefficients, k: float, belt: float) -> tuple[float | None, float | None]:
@@ -123,7 +144,7 @@ def mean_stiffness(system: System, smooth: float) -> StiffnessAt:
     return at
 
 
-def _rough_crossings(c: Coefficients, belt: float, stiffness_at: StiffnessAt) -> list[Crossing]:
+def _rough_crossings(c: Coefficients, belt: float, stiffness_at: StiffnessAt, up_to: float) -> list[Crossing]:
     """Changes of stability on rough surfaces, whose mean stiffness depends on φ.
 
     Where steady sliding ends, it is lost by self-locking. Where no link holds the shoe along the wheel there is
@@ -140,7 +161,7 @@ def _rough_crossings(c: Coefficients, belt: float, stiffness_at: StiffnessAt) ->
         mode = first_mode(phi)
         return mode.growth > 0.0 if mode else None
 
-    frictions = np.linspace(0.0, LARGEST_FRICTION, FRICTIONS).tolist()
+    frictions = np.linspace(0.0, up_to, math.ceil(up_to / FRICTION_STEP) + 1).tolist()
     found = []
     for (low, high), (before, after) in zip(pairwise(frictions), pairwise(map(unstable, frictions)), strict=True):
         if before is None or before == after or (before and after is None):

@@ -11,10 +11,10 @@ Contract of every scheme module:
 - `begin(...)`: fills the state from which the loop starts, at level `LAG`;
 - `mechanical_energy(...)`: kinetic energy and energy of the links that the scheme keeps;
 - `advance`, a kernel, and `sample`: those of `solver.loop`, or its own, with the same arguments, where its
-  steps are its own, held to a tolerance, on the grid of samples alone;
+  steps are its own, held to a tolerance, on the grid of samples alone, or exact, on a grid between them;
 - in the first case kernels `prepare` and `finish`, of the signatures in `solver.records`: the minimisation that a
-  step comes down to, and the new state with the works of the step; otherwise `solve`, the kernel of one step,
-  which `advance` calls at the address in `plug.solve`.
+  step comes down to, and the new state with the works of the step; where steps are its own and not exact `solve`,
+  the kernel of one step, which `advance` calls at the address in `plug.solve`.
 """
 
 from dataclasses import dataclass
@@ -39,8 +39,9 @@ class Scheme:
     """What a scheme states of itself.
 
     `theta`: its weights where a case gives none. `sum_is_one`: whether weights must add up to one. `own_steps`: it
-    finds its steps itself and keeps a tolerance, so that no step can be unstable, or bias anything. `unstable`:
-    what to do where it multiplies disturbances. `colour`: in pictures.
+    finds its steps itself and keeps a tolerance, so that no step can be unstable, or bias anything. `exact`: its
+    steps make no error but rounding, on smooth surfaces alone. `unstable`: what to do where it multiplies
+    disturbances. `colour`: in pictures.
     """
 
     module: str
@@ -49,6 +50,7 @@ class Scheme:
     theta: tuple[float, ...] = ()
     sum_is_one: bool = False
     own_steps: bool = False
+    exact: bool = False
     starts: tuple[str, ...] = ("consistent",)
     unstable: str = ""
 
@@ -83,6 +85,9 @@ SCHEMES: dict[str, Scheme] = {
         unstable="or take theta = [0.25, 0.5, 0.25]",
     ),
     "event-driven": Scheme("brakecli.solver.schemes.event_driven", (Trial(),), colour="#222222", own_steps=True),
+    "piecewise-exact": Scheme(
+        "brakecli.solver.schemes.piecewise_exact", (Trial(),), colour="#6A3D9A", own_steps=True, exact=True
+    ),
 }
 
 

@@ -1,0 +1,33 @@
+"""`brakecli advise`."""
+
+from typing import Annotated
+
+from brakecli.cli.inputs import load_case
+from brakecli.cli.options import AsJson, CaseArgument, Overrides, Quiet, option
+from brakecli.cli.output import announce_compilation, progress, show_result
+
+KEYS = "Keys that may be advised, with * for any part; masses, stiffnesses, dampings, angles and load if left out."
+MARGIN = "Part of its friction by which the case is to stay stable above it."
+
+
+def command(
+    case: CaseArgument,
+    overrides: Overrides = None,
+    keys: Annotated[str | None, option(KEYS, "KEY,…")] = None,
+    margin: Annotated[float, option(MARGIN, "PART", min=0.0, max=10.0)] = 0.2,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+) -> None:
+    """What moves the critical friction coefficient most, and what to change so that the shoe does not squeal."""
+    loaded = load_case(case, overrides)
+    announce_compilation(quiet)
+    from brakecli.analysis.stability.advice import KEYS as USUAL
+    from brakecli.cli.stability_tables import advice_table
+    from brakecli.runs.advise import advise
+    from brakecli.runs.limits import within_range
+    from brakecli.runs.run import load_kernels
+
+    load_kernels(loaded)
+    with progress(quiet) as show_progress, within_range():
+        report = advise(loaded, keys.split(",") if keys is not None else USUAL, margin, show_progress)
+    show_result("advise", report.numbers(), advice_table, report, as_json=as_json, quiet=quiet)

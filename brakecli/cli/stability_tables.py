@@ -1,0 +1,111 @@
+"""What `stability` and `advise` have found, as tables for people."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from brakecli.cli.tables import Row, grid, text_of, two_columns
+from brakecli.files import fields
+
+if TYPE_CHECKING:
+    from brakecli.analysis.stability.modes import Crossing
+    from brakecli.analysis.stability.report import StabilityReport
+    from brakecli.runs.advise import AdviceReport
+    from brakecli.sweeps.lock_in import LockIn
+
+_STATE = {True: "stable", False: "unstable", None: "-"}
+
+
+def stability_table(title: str, report: StabilityReport, found: LockIn | None) -> str:
+    """Steady sliding, its modes and its critical friction; below that what there is along a key."""
+    rest, critical, discrete = report.equilibrium, report.critical, report.discrete
+    undamped = {"flutter": report.undamped_flutter, "divergence": report.undamped_divergence}
+    known = [f"{kind} at {friction:.7g}" for kind, friction in undamped.items() if friction is not None]
+    sliding = f"none: {report.no_equilibrium}"
+    if rest is not None:
+        touching = f"{rest.contact_fraction:.1%} of the pad touches"
+        sliding = f"y = {rest.y:.5g} m, F_y = {rest.normal_force:.5g} N, {touching}"
+    rows = [
+        ("surface speed U", text_of(report.belt_speed, "m/s")),
+        ("steady sliding", sliding),
+        ("contact stiffness K", text_of(report.contact_stiffness, "N/m")),
+        ("critical friction", _crossing(critical) if critical else "none"),
+        ("also changes at", [_crossing(each) for each in report.crossings if each is not critical]),
+        ("without dashpots", ", ".join(known) or "neither flutter nor divergence"),
+        (f"at φ = {report.friction:g}", _STATE[report.stable]),
+    ]
+    for mode in report.modes:
+        motion = f"grows at {mode.growth:.4g} 1/s" if mode.growth > 0.0 else f"decays at {-mode.growth:.4g} 1/s"
+        shape = f"y/x {mode.shape:.3g} at {mode.shape_phase:.0f}°" if mode.shape is not None else "along y alone"
+        what = f"{motion}, damping ratio {mode.damping_ratio:.3g}, {shape}"
+        rows.append((f"mode at {mode.frequency:.5g} Hz", what))
+    if discrete:
+        limit, friction, radius = discrete.step_limit, discrete.critical_friction, discrete.spectral_radius
+        bias = "" if discrete.bias is None else f", {discrete.bias:+.2g} from the exact one"
+        rows += [
+            ("the scheme's growth", f"{text_of(discrete.growth, '1/s')}, a factor {radius:.8g} a step"),
+            ("its critical friction", "none" if friction is None else f"{friction:.7g}{bias}"),
+            ("its stable steps", "any" if limit is None else f"up to {limit:.4g} s" if limit else "none"),
+        ]
+    return two_columns(title, rows) + (_lock_in(found) if found else "")
+
+
+def _lock_in(found: LockIn) -> str:
+    """Critical friction and both modes along a key, and where stability changes."""
+    from brakecli.sweeps.result import unit
+
+    entries, keys = found.entries, ", ".join(found.parameters)
+    values = {"value": [f"{entry['value']:.6g}" for entry in entries]}
+    varied = {field.title: [text_of(each[field.name]) for each in entries] for field in fields.VARIED}
+    looks = (("frequency {}, Hz", 1.0, ".5g"), ("growth {}, 1/s", 1.0, ".4g"), ("damping {}, %", 100.0, ".3g"))
+    modes = {
+        head.format(mode + 1): [
+            text_of(None if value is None else factor * value, form=form)
+            for value in (each[field.name][mode] for each in entries)
+        ]
+        for field, (head, factor, form) in zip(fields.MODES, looks, strict=True)
+        for mode in (0, 1)
+    }
+    units = unit(found.parameters[0])
+    critical = ", ".join(text_of(value, units.removeprefix("1"), ".7g") for value in found.critical_values)
+    changes = f"Stability changes at {critical}." if critical else "Stability does not change in between."
+    return "\n\n" + "\n\n".join((f"Along {keys}:\n" + grid(values | varied), grid(values | modes), changes))
+
+
+def _crossing(crossing: Crossing) -> str:
+    change = "lost" if crossing.lost else "regained"
+    where = f" at {crossing.frequency:.5g} Hz" if crossing.frequency else ""
+    return f"{crossing.friction:.7g}: stability {change} by {crossing.instability}{where}"
+
+
+def advice_table(report: AdviceReport) -> str:
+    """What moves the critical friction, what to change, and the answer in a sentence."""
+    found, check, margin = report.stability, report.check, report.margin
+    moving = [each for each in report.sensitivities if each.elasticity or each.derivative or each.growth_change]
+    moves = {
+        "what moves it": [each.parameter for each in moving],
+        "value": [text_of(each.value) if isinstance(each.value, float) else "list" for each in moving],
+        "% for 1 %": [text_of(each.elasticity, form=".3g") for each in moving],
+        "for a unit": [text_of(each.derivative, form=".3g") for each in moving],
+        "growth for 1 %": [text_of(each.growth_change, form=".3g") for each in moving],
+    }
+    helps = {
+        "what helps": [each.parameter for each in report.advice],
+        "from": [text_of(each.start) for each in report.advice],
+        "to": [each.rounded for each in report.advice],
+        "critical φ": [text_of(each.critical_friction, form=".4g") for each in report.advice],
+        "tried from": [f"{each.lowest:.4g} to {each.highest:.4g}" for each in report.advice],
+    }
+    rows: list[Row] = [
+        ("critical friction", _crossing(found.critical) if found.critical else "none"),
+        (f"at φ = {found.friction:g}", _STATE[found.stable]),
+        ("margin", "-" if margin is None else f"{margin:.1%}; {report.wanted_margin:.1%} is wanted"),
+    ]
+    ends: list[Row] = [("note", report.notes())]
+    if check:
+        ran = f"{check.parameter} = {check.value:.6g}: {check.duration:.3g} s of motion, in {check.seconds:.2g} s"
+        ends.append(("checked by a run", [ran, f"{check.verdict.regime}: {'; '.join(check.verdict.reasons)}"]))
+    ends.append(("in a sentence", report.conclusion()))
+    meant = "Critical friction for 1 % and for 1 unit of a value; growth rate (1/s) for 1 %:\n"
+    grids = [meant + grid(moves)] * bool(moving) + [grid(helps)] * bool(report.advice)
+    return "\n\n".join((two_columns(report.title, rows), *grids, two_columns("", ends)))

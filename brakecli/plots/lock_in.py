@@ -1,0 +1,55 @@
+"""The lock-in diagram: frequencies of both modes along a key of the case, and their growth below."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from brakecli.errors import UsageError
+from brakecli.files.read import StoredResult
+from brakecli.plots import style
+
+_WIDTH, _FEW = 8.8, 40  # inches; values up to which each has a marker
+_MOST_NUMBERED = 4  # critical values whose numbers fit beside their lines
+_LOOKS: tuple[dict[str, Any], ...] = (  # the wide line is seen behind the dashed one where modes have met
+    {"color": "#7DB9DE", "lw": 4.0, "ls": "-", "marker": "o", "ms": 6.5, "solid_capstyle": "round"},
+    {"color": style.VERMILION, "lw": 1.5, "ls": style.DASHES, "marker": "o", "ms": 3.0},
+)
+
+
+def draw(result: StoredResult) -> Figure:
+    """The figure: frequencies above, growth rates below. Raises UsageError where there is nothing to draw."""
+    place = next((name for name, each in result.variables("/").items() if "parameters" in each.attributes), "")
+    if not place:
+        raise style.unreadable(result, "the axis of the key is missing")
+    key, units = (str(result.variables("/")[place].attributes.get(name, "")) for name in ("long_name", "units"))
+    x, *modes = (style.read_column(result, name) for name in (place, "frequencies", "growth_rates"))
+    if not np.isfinite(x).all() or any(values.shape != (len(x), 2) for values in modes):
+        raise style.unreadable(result, "its variables do not fit the axis of the key")
+    if not np.isfinite(modes[0]).any():
+        raise UsageError(f"{result.path}: there is no steady sliding at any value, so there is nothing to draw")
+    critical = np.asarray(result.attributes.get("critical_values", ()), float).ravel()
+    critical = critical[np.isfinite(critical)]
+    unit = units.removeprefix("1")
+    numbers = ", ".join(style.readable(float(value)) for value in critical[: 2 * _MOST_NUMBERED])
+    more = " …" if len(critical) > 2 * _MOST_NUMBERED else ""
+    said = f"stability changes at {numbers}{more} {unit}".rstrip()
+    summary = f"{len(x)} values   ·   {said if len(critical) else 'stability does not change between them'}"
+    figure = style.headed(_WIDTH, 6.4, str(result.attributes.get("title", "")), summary, hspace=0.05)
+    panels = figure.subplots(2, 1, sharex=True, height_ratios=[1.35, 1.0])
+    for axes, values, label in zip(panels, modes, ("frequency (Hz)", "growth rate (1/s)"), strict=True):
+        for mode, look in enumerate(_LOOKS):
+            shown = look if len(x) <= _FEW else {**look, "marker": None}
+            axes.plot(x, values[:, mode], label=f"mode {mode + 1}", **shown)
+        axes.set_ylabel(label)
+        axes.margins(y=0.08)
+        for number, value in enumerate(critical):
+            look = {"label": "stability changes"} if number == 0 else {}
+            axes.axvline(value, color=style.DARK, lw=1.1, ls=style.DOTS, zorder=1.6, **look)
+        style.set_ticks(axes.yaxis, 0.0, style.largest(values))
+    panels[1].axhline(0.0, color=style.DARK, lw=1.0, zorder=1.5)
+    panels[1].set_xlabel(style.labelled(key, unit), parse_math=False)
+    style.set_ticks(panels[1].xaxis, float(x.min()), float(x.max()))
+    figure.align_ylabels()
+    panels[0].legend(loc="best")
+    return figure

@@ -1,0 +1,180 @@
+"""What to change so that a shoe does not squeal: sensitivities, advised values, and a run that checks the best."""
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+from brakecli.analysis.regime.of_run import verdict_on
+from brakecli.analysis.regime.verdict import Regime, Verdict
+from brakecli.analysis.stability.advice import (
+    Change,
+    Sensitivity,
+    advised,
+    advised_keys,
+    answer,
+    changed,
+    sensitivity,
+)
+from brakecli.analysis.stability.advice import numbers as numbers_of
+from brakecli.analysis.stability.modes import is_undamped
+from brakecli.analysis.stability.report import LARGEST_FRICTION, StabilityReport, stability
+from brakecli.case.case import Case
+from brakecli.case.read import LoadedCase, key_path
+from brakecli.case.system import system_of
+from brakecli.files import fields
+from brakecli.files.field import values_of
+from brakecli.runs.cost import steps_and_seconds
+from brakecli.runs.run import motion_of
+from brakecli.solver.history import array_history
+from brakecli.solver.system import System
+
+CHECK_SECONDS = 5.0  # of computing; a run that would take longer is cut short
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class CheckRun:
+    """A run of the case with the best advice followed, from the case's own start."""
+
+    parameter: str
+    value: float
+    verdict: Verdict
+    duration: float  # s of motion
+    seconds: float  # s of computing
+
+
+@dataclass(frozen=True)
+class AdviceReport:
+    """Everything that is known of a case and its changes; `fields.ADVICE` says where each number is."""
+
+    title: str
+    system: System
+    stability: StabilityReport
+    critical_friction: float | None
+    wanted_margin: float
+    sensitivities: list[Sensitivity]
+    advice: list[Change]
+    check: CheckRun | None
+
+    @property
+    def margin(self) -> float | None:
+        """The critical friction over the case's own, less 1; None without one of the two."""
+        critical, own = self.critical_friction, self.stability.friction
+        return critical / own - 1.0 if critical is not None and own > 0.0 else None
+
+    def numbers(self) -> dict[str, Any]:
+        """Names and values as `--json` gives them."""
+        return values_of(fields.ADVICE, self)
+
+    def conclusion(self) -> str:
+        """The answer in a sentence."""
+        return "; ".join((*self._state(), *self._remedy()))
+
+    def notes(self) -> list[str]:
+        """What the answer rests on."""
+        rest, found = self.stability.equilibrium, []
+        if rest is not None and 0.0 < rest.contact_fraction < 1.0:
+            instead = 'a sweep with method = "simulation" follows the motion itself'
+            found.append(f"the pad opens in part: this rests on the mean stiffness of the contact; {instead}")
+        if is_undamped(self.system.coefficients):
+            found.append("no dashpot acts: where sliding is stable, vibration does not die away either")
+        if len(self.system.belt) > 1 or len(self.system.load) > 1:
+            found.append("speed and load are those of t = 0")
+        return found
+
+    def _state(self) -> Iterator[str]:
+        report, critical, own = self.stability, self.critical_friction, self.stability.friction
+        if report.belt_speed == 0.0:
+            yield "the wheel stands, so that nothing slides: give wheel.angular_speed"
+            return
+        if report.equilibrium is None:
+            yield f"there is no steady sliding at {own:g}: {str(report.no_equilibrium).partition(': ')[2]}"
+        elif report.contact_stiffness == 0.0:
+            yield "the shoe does not touch the wheel: give a load that presses it on"
+        elif own == 0.0:
+            yield "without friction nothing squeals"
+        elif not report.stable:
+            first = report.modes[0]
+            yield f"squeals at {first.frequency:.4g} Hz" if first.frequency else "locks, without vibration"
+        if critical == 0.0:
+            yield "unstable at any friction, however small"
+        elif critical is not None:
+            yield f"stable up to {critical:.3g}{_far(self.margin, own)}"
+            if report.stable and critical < own:
+                turns = [
+                    f"{'lost' if each.lost else 'regained'} at {each.friction:.3g}" for each in report.crossings
+                ]
+                yield f"the case lies above a range of instability, as stability is {', '.join(turns)}"
+        elif report.equilibrium is not None and report.contact_stiffness > 0.0:
+            yield "stable: no friction makes it unstable" + (
+                "" if self.system.smooth else f", up to {LARGEST_FRICTION:g}"
+            )
+
+    def _remedy(self) -> Iterator[str]:
+        if not self.advice:
+            return
+        best = self.advice[0]
+        if best.to is None:
+            yield f"no key alone gives a margin of {100.0 * self.wanted_margin:.3g} %"
+            return
+        critical = best.critical_friction
+        yield f"{best.parameter} {best.start:.4g} → {best.rounded} " + (
+            f"gives {critical:.3g}" if critical is not None else "takes the instability away"
+        )
+        if self.check and self.check.verdict.regime not in (Regime.DAMPED, Regime.UNDECIDED):
+            yield f"but from the case's own start it still vibrates: {self.check.verdict.regime}"
+
+
+def _far(margin: float | None, own: float) -> str:
+    """How far the critical friction lies from a case's own."""
+    if not margin:
+        return ""
+    if margin > 10.0:
+        return f", {margin + 1.0:.3g} times the case's {own:g}"
+    part = 100.0 * abs(margin)
+    return (
+        f", {part:{'.0f' if part > 99.0 else '.2g'}} % {'above' if margin > 0.0 else 'below'} the case's {own:g}"
+    )
+
+
+def advise(loaded: LoadedCase, patterns: Sequence[str], margin: float, progress: Progress) -> AdviceReport:
+    """Sensitivities of a case, the nearest safe value of each key that fits a pattern, and a run of the best.
+
+    A case that has the margin (a part of its friction) needs no advice. Raises UsageError.
+    """
+    case, advice, check = loaded.case, list[Change](), None
+    keys, everything = advised_keys(case, patterns), numbers_of(case)
+    system = system_of(case)
+    report, found = stability(system), answer(case)
+    critical = found.critical if found else None
+    sensitivities = list[Sensitivity]()
+    if found is not None:
+        for done, path in enumerate(everything):
+            tell = partial(progress, "derivatives", done, len(everything))
+            sensitivities.append(sensitivity(case, path, critical, tell))
+        if not found.safe((1.0 + margin) * report.friction):
+            for done, path in enumerate(keys):
+                advice.append(advised(case, path, margin, partial(progress, "keys", done, len(keys))))
+    sensitivities.sort(key=lambda each: -abs(each.elasticity or 0.0))
+    advice.sort(key=lambda each: each.size)
+    if advice and advice[0].to is not None:
+        check = _checked(case, advice[0], progress)
+    return AdviceReport(case.title, system, report, critical, margin, sensitivities, advice, check)
+
+
+def _checked(case: Case, best: Change, progress: Progress) -> CheckRun | None:
+    """Run the case with an advised value, from its own start and for its own time if that is short."""
+    there = changed(case, key_path(best.parameter), best.to or 0.0)
+    if there is None:
+        return None
+    system = system_of(there)
+    _, seconds = steps_and_seconds(system)
+    system = replace(system, duration=system.duration * min(1.0, CHECK_SECONDS / max(seconds, 1e-9)))
+    start = time.perf_counter()
+    motion, _ = motion_of(system, lambda done: progress("steps of the check", done, system.steps))
+    verdict = verdict_on(array_history(system.interval, motion.rows), motion.system, motion.work.failure_sentence)
+    spent = time.perf_counter() - start
+    return CheckRun(best.parameter, best.to or 0.0, verdict, system.sampled_duration, spent)

@@ -1,0 +1,289 @@
+"""The piecewise-exact scheme, for smooth surfaces: between two events the motion is linear, a step is a matrix.
+
+A whole step multiplies the motion by exp(A h), which is made once for each phase. Where a margin of the phase runs
+out in a step, or may dip below zero in it, the step follows Taylor series from event to event. Whatever happens,
+steps end on the grid of samples. Nothing is smoothed, and nothing is passed over.
+"""
+
+import math
+from typing import Any
+
+from numba import float64, int64, void
+
+from brakecli.solver.compile import Floats, borrowed, kernel
+from brakecli.solver.contact import CLOSED_FORM
+from brakecli.solver.double_double import two_sum
+from brakecli.solver.energy import energy_at_level
+from brakecli.solver.friction import observed
+from brakecli.solver.quantities import BOUND, Failure
+from brakecli.solver.records import (
+    BELT,
+    BELT_SLOPE,
+    COUNTS_TYPE,
+    FLOW,
+    FLOW_TYPE,
+    LOAD,
+    LOAD_SLOPE,
+    MARGINS,
+    SIZE,
+    TERMS,
+    V_X,
+    V_Y,
+    Pair,
+    Plant,
+    Weights,
+    X,
+    Y,
+    plant_type,
+)
+from brakecli.solver.schedules import integral_at, segment, slope_at, value_at
+from brakecli.solver.schemes.piecewise_exact import phases
+from brakecli.solver.schemes.piecewise_exact.locate import NO_EVENT, ROUNDING, first_event
+from brakecli.solver.schemes.piecewise_exact.phases import BACKWARD, FORWARD, HEIGHT, OPEN, STICK, add_works
+
+STATE = FLOW
+LAG = 0
+MEMORY = ("x", "y", "v_x", "v_y")
+VELOCITIES = ("v_x", "v_y")
+mechanical_energy = energy_at_level
+
+_MOST_EVENTS, _NO_PROGRESS = 1000, 1e-6  # a run ends after so many events within that part of a step
+_KEPT = 4096  # levels from one sum of the works to the next, so that rounding does not add up
+
+_PLANT = plant_type(FLOW)
+_NONE, _, _DIVERGED, _, _, _STALLED = (int(failure) for failure in Failure)
+
+
+def weighted_time(s: Weights) -> float:
+    """Steps of other schemes place their forces; this one has none."""
+    return 0.0
+
+
+def order(s: Weights, start: str) -> int:
+    """The order of the series that steps with events follow; all others are exact."""
+    return TERMS - 1
+
+
+def begin(s: Weights, state: Any, position: Pair, velocity: Pair, acceleration: Pair) -> None:
+    """The initial state; its phase is found with the first step."""
+    state.x, state.y = position
+    state.v_x, state.v_y = velocity
+
+
+@kernel(float64(FLOW_TYPE, int64))
+def _ahead(m: Any, place: int) -> float:
+    """A row of the matrix of a step times the motion; a tree of sums has less latency than a loop."""
+    a, z, phase = m.step, m.z, m.phase
+    one = a[phase, place, 0] * z[0] + a[phase, place, 1] * z[1]
+    two = a[phase, place, 2] * z[2] + a[phase, place, 3] * z[3]
+    three = a[phase, place, 4] * z[4] + a[phase, place, 5] * z[5]
+    four = a[phase, place, 6] * z[6] + a[phase, place, 7] * z[7]
+    return (one + two) + (three + four)  # type: ignore[no-any-return]
+
+
+@kernel(int64(FLOW_TYPE, float64), inlined=False)
+def _whole(m: Any, h: float) -> int:
+    """Take a whole step and return 1, unless a margin runs out in it or may do so.
+
+    A margin that falls at first and rises at last is lowest inside, and not below its tangents at both ends.
+    """
+    for k in range(2 * MARGINS):
+        m.after[k] = _ahead(m, 4 + k)
+    for k in range(MARGINS):
+        fall, rise = m.before[MARGINS + k], m.after[MARGINS + k]
+        if m.after[k] < 0.0 or (fall < 0.0 < rise and min(m.before[k] + fall, m.after[k] - rise) < 0.0):
+            return 0
+    for i in range(4):
+        m.end[i] = _ahead(m, i)
+    for i in range(SIZE):
+        for j in range(SIZE):
+            m.sums[i, j] += m.z[i] * m.z[j]
+    for i in range(4):
+        m.z[i] = m.end[i]
+    m.z[BELT], m.z[LOAD] = m.z[BELT] + h * m.z[BELT_SLOPE], m.z[LOAD] + h * m.z[LOAD_SLOPE]
+    for k in range(2 * MARGINS):
+        m.before[k] = m.after[k]
+    return 1
+
+
+@kernel(void(FLOW_TYPE), inlined=False)
+def _look(m: Any) -> None:
+    """The margins of the motion reached, and their slopes."""
+    for k in range(2 * MARGINS):
+        m.before[k] = 0.0
+        for i in range(SIZE):
+            m.before[k] += m.margins[m.phase, k, i] * m.z[i]
+
+
+@kernel(void(_PLANT, float64), inlined=False)
+def _pass_knot(p: Plant, t: float) -> None:
+    """Speed, load and their slopes from a knot on, or from the start; then when the next knot is."""
+    m, belt, load = p.state, p.drive.belt, p.drive.load
+    m.z[BELT], m.z[BELT_SLOPE] = value_at(belt, t), slope_at(belt, t)
+    m.z[LOAD], m.z[LOAD_SLOPE] = value_at(load, t), slope_at(load, t)
+    in_belt, in_load = segment(belt, t) + 1, segment(load, t) + 1
+    m.knot = min(
+        belt[in_belt].time if in_belt < belt.size else math.inf,
+        load[in_load].time if in_load < load.size else math.inf,
+    )
+
+
+@kernel(void(_PLANT, float64, float64), inlined=False)
+def _take_hold(p: Plant, t: float, tau: float) -> None:
+    """The phase of a touching shoe at the wheel's velocity: stick if friction can hold it, else slip, (3)-(5)."""
+    m = p.state
+    phases.make(p.c, m, STICK, p.s.h)
+    for which in range(1, MARGINS):
+        total, terms = 0.0, 0.0
+        for i in range(SIZE):
+            part = m.margins[STICK, which, i] * m.z[i]
+            total, terms = total + part, terms + abs(part)
+        if total < -0.5 * ROUNDING * terms:
+            m.phase = BACKWARD if which == 1 else FORWARD
+            return
+    travel, travel_low = integral_at(p.drive.belt, t, tau)
+    m.anchor, anchor_low = two_sum(m.z[X], -travel)
+    m.anchor_low, m.z[V_X], m.phase = anchor_low - travel_low, m.z[BELT], STICK
+
+
+@kernel(void(_PLANT, float64, float64), inlined=False)
+def _land(p: Plant, t: float, tau: float) -> None:
+    """The phase of a shoe that touches, by its sliding velocity."""
+    m = p.state
+    if m.z[V_X] == m.z[BELT]:
+        _take_hold(p, t, tau)
+    else:
+        m.phase = FORWARD if m.z[V_X] > m.z[BELT] else BACKWARD
+
+
+@kernel(void(_PLANT, int64, float64, float64), inlined=False)
+def _switch(p: Plant, which: int, t: float, tau: float) -> None:
+    """Enter the phase that follows where a margin has run out."""
+    m = p.state
+    add_works(m, p.work)
+    if which == HEIGHT:
+        m.z[Y] = 0.0
+        if m.phase == OPEN:
+            _land(p, t, tau)
+        else:
+            m.phase = OPEN
+    elif m.phase == STICK:
+        m.phase = BACKWARD if which == 1 else FORWARD  # friction cannot pull that hard, or cannot push
+    else:
+        _take_hold(p, t, tau)
+    phases.make(p.c, m, m.phase, p.s.h)
+
+
+@kernel(void(_PLANT), inlined=False)
+def _start(p: Plant) -> None:
+    """Find the phase of the initial state."""
+    m = p.state
+    m.stiffness = 2.0 * p.layer.pad.half_length * p.layer.pad.k
+    m.z[X], m.z[Y], m.z[V_X], m.z[V_Y] = m.x, m.y, m.v_x, m.v_y
+    _pass_knot(p, 0.0)
+    if m.y > 0.0 or (m.y == 0.0 and m.v_y > 0.0):
+        m.phase = OPEN
+    else:
+        _land(p, 0.0, 0.0)
+    phases.make(p.c, m, m.phase, p.s.h)
+    _look(m)
+    m.started = 1
+
+
+@kernel(void(FLOW_TYPE, COUNTS_TYPE))
+def _count(m: Any, counts: Any) -> None:
+    """Count a step; its matrix evaluates the contact once, where there is any."""
+    counts.kinds[CLOSED_FORM] += 1
+    if m.phase != OPEN:
+        counts.evaluations += 1
+        counts.most = 1
+
+
+@kernel(int64(_PLANT, float64), inlined=False)
+def _through(p: Plant, t: float) -> int:
+    """Take the step that begins at time t, through all its events and knots; a `Failure`."""
+    m, h, tau = p.state, p.s.h, 0.0
+    while True:
+        to_knot = m.knot - t - tau
+        span = max(min(h - tau, to_knot), 0.0)
+        for i in range(SIZE):
+            m.series[0, i] = m.z[i]
+        phases.expand(m, m.phase, span)
+        which, theta = first_event(m)
+        if theta > 0.0:
+            phases.take_part(p.c, m, p.work, span, theta)
+            _count(m, p.counts)
+        if which != NO_EVENT:
+            tau += theta * span
+            if t + tau - m.events_time > _NO_PROGRESS * h:
+                m.events_time, m.events = t + tau, 0
+            m.events += 1
+            if m.events > _MOST_EVENTS:
+                return _STALLED
+            _switch(p, which, t, tau)
+        elif to_knot <= h - tau:
+            tau += span
+            _pass_knot(p, m.knot)
+        else:
+            break
+    _look(m)
+    return _NONE
+
+
+@kernel(void(_PLANT, float64))
+def _sample(p: Plant, t: float) -> None:
+    """Put the sample at the level reached into the state; in stick the shoe is carried along without drift."""
+    m, c, z, belt = p.state, p.c, p.state.z, p.drive.belt
+    if m.phase == STICK:
+        travel, travel_low = integral_at(belt, t, 0.0)
+        z[BELT] = z[V_X] = value_at(belt, t)
+        z[X] = (m.anchor + travel) + (m.anchor_low + travel_low)
+    normal = max(-m.stiffness * z[Y], 0.0) if m.phase != OPEN else 0.0
+    needed = 0.0
+    for i in range(SIZE):
+        needed += m.needed[i] * z[i]
+    holds = m.phase == STICK and abs(needed) <= c.phi * normal * (1.0 + 1e-12)  # by the rounding it still sticks
+    state, friction = observed(float(m.phase - STICK), holds, needed, normal, c.phi * normal)
+    m.row[0], m.row[1], m.row[2], m.row[3] = z[X], z[Y], z[V_X], z[V_Y]
+    m.row[4], m.row[5], m.row[6], m.row[7] = friction, normal, 1.0 if normal > 0.0 else 0.0, state
+
+
+def sample(p: Plant, row: Floats) -> None:
+    """Write the sample at the level that has been reached."""
+    row[:] = p.state.row
+
+
+@kernel(int64(_PLANT, float64[:, ::1], float64[:, ::1], int64))
+def advance(p: Plant, rows: Floats, events: Floats, stop: int) -> int:
+    """Step from the level reached to `stop`, filling `rows` with the samples before each step; a `Failure`."""
+    p = borrowed(p)
+    m, counts, grid, h, row = p.state, p.counts, p.grid, p.s.h, 0
+    if m.started == 0:
+        _start(p)
+    last, failure = grid.samples * grid.per_sample, _NONE
+    sampled, part = counts.level // grid.per_sample, counts.level % grid.per_sample
+    while failure == _NONE:
+        t = grid.interval * sampled + part * h
+        if part == 0:
+            _sample(p, t)
+        if counts.level == stop:
+            break
+        if part == 0:
+            for column in range(rows.shape[1]):  # a slice would take seconds to compile
+                rows[row, column] = m.row[column]
+            row += 1
+        if t + h < m.knot and _whole(m, h) == 1:
+            _count(m, counts)
+        else:
+            failure = _through(p, t)
+        if not abs(m.z[X]) + abs(m.z[Y]) + abs(m.z[V_X]) + abs(m.z[V_Y]) < BOUND:
+            failure = _DIVERGED
+        if failure == _NONE:
+            counts.level += 1
+            part += 1
+            if part == grid.per_sample:
+                sampled, part = sampled + 1, 0
+        if failure != _NONE or counts.level % _KEPT == 0 or counts.level == last:
+            add_works(m, p.work)
+    m.x, m.y, m.v_x, m.v_y = m.z[X], m.z[Y], m.z[V_X], m.z[V_Y]
+    return failure

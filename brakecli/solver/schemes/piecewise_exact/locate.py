@@ -1,0 +1,97 @@
+"""The first event in a step: which margin of the phase runs out, and where, on the series of the motion."""
+
+from typing import Any
+
+from numba import float64, int64, types
+
+from brakecli.solver.compile import kernel
+from brakecli.solver.records import FLOW_TYPE, MARGINS, SIZE, TERMS
+from brakecli.solver.schemes.piecewise_exact.phases import STICK
+
+NO_EVENT = -1
+_EPSILON = 2.220446049250313e-16
+ROUNDING = 8.0 * _EPSILON
+"""Rounding of a margin over the sum of its terms."""
+_LOOKS = 12  # how often a margin that begins at zero is sought above it, each time in an eighth of the time
+
+
+@kernel(types.UniTuple(float64, 2)(FLOW_TYPE, int64, float64))
+def _value(m: Any, row: int, theta: float) -> tuple[float, float]:
+    """A polynomial and its slope at a part of the span."""
+    value, slope = 0.0, 0.0
+    for k in range(TERMS - 1, -1, -1):
+        slope = slope * theta + value
+        value = value * theta + m.polynomial[row, k]
+    return value, slope
+
+
+@kernel(float64(FLOW_TYPE, int64, float64, float64), inlined=False)
+def _root(m: Any, row: int, left: float, right: float) -> float:
+    """Where a polynomial falls through zero between left and right: Newton's iteration, kept in the bracket."""
+    place = right
+    for _ in range(200):
+        value, slope = _value(m, row, place)
+        if value > 0.0:
+            left = place
+        else:
+            right = place
+        if slope < 0.0 and abs(value) <= -_EPSILON * place * slope:
+            break
+        new = place - value / slope if slope < 0.0 else left
+        if not left < new < right:
+            new = 0.5 * (left + right)
+        if not left < new < right:
+            break
+        place = new
+    return place
+
+
+@kernel(types.UniTuple(float64, 3)(FLOW_TYPE, int64), inlined=False)
+def _follow(m: Any, which: int) -> tuple[float, float, float]:
+    """A margin on the series as a polynomial: its value and slope at the end, and what rounding does to it."""
+    terms, value, slope = 0.0, 0.0, 0.0
+    for k in range(TERMS):
+        m.polynomial[0, k] = 0.0
+    for i in range(SIZE):
+        row = m.margins[m.phase, which, i]
+        if row != 0.0:
+            terms += abs(row * m.series[0, i])
+            for k in range(TERMS):
+                m.polynomial[0, k] += row * m.series[k, i]
+    for k in range(TERMS):
+        value, slope = value + m.polynomial[0, k], slope + k * m.polynomial[0, k]
+        terms += abs(m.polynomial[0, k])
+    return value, slope, ROUNDING * terms
+
+
+@kernel(types.Tuple((int64, float64))(FLOW_TYPE), inlined=False)
+def first_event(m: Any) -> tuple[int, float]:
+    """The margin that runs out first on the series, and at which part of the span; 0 if it never was positive."""
+    found, first = NO_EVENT, 1.0
+    for which in range(MARGINS if m.phase == STICK else MARGINS - 1):
+        last, slope, allowed = _follow(m, which)
+        start, right = m.polynomial[0, 0], 0.0
+        if start < -allowed:
+            return which, 0.0
+        if last < -allowed:
+            right = 1.0
+        elif m.polynomial[0, 1] < 0.0 < slope:  # it is lowest inside
+            for k in range(1, TERMS):
+                m.polynomial[1, k - 1] = -k * m.polynomial[0, k]
+            place = _root(m, 1, 0.0, 1.0)
+            right = place if _value(m, 0, place)[0] < -allowed else 0.0
+        if right == 0.0:
+            continue
+        left = 0.0
+        if start <= allowed:  # it begins at zero: where is it positive?
+            left = right
+            for _ in range(_LOOKS):
+                left *= 0.125
+                if _value(m, 0, left)[0] > allowed:
+                    break
+            else:
+                return which, 0.0
+        root = _root(m, 0, left, right)
+        if root < first:
+            found, first = which, root
+    return found, first

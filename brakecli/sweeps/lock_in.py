@@ -1,0 +1,125 @@
+"""The lock-in diagram: both modes of steady sliding along a key of the case, and where stability changes."""
+
+import csv
+import io
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from brakecli.analysis.stability.follow import followed
+from brakecli.analysis.stability.report import is_stable, stability
+from brakecli.analysis.stability.search import bisect
+from brakecli.case.read import LoadedCase
+from brakecli.case.system import system_of
+from brakecli.errors import CaseError
+from brakecli.files import fields
+from brakecli.files.atomic import new_output
+from brakecli.files.field import Field, values_of
+from brakecli.files.write import new_result
+from brakecli.runs.run import origin
+from brakecli.solver.system import System
+from brakecli.sweeps.plan import Plan, given_toml
+from brakecli.sweeps.result import unit
+from brakecli.sweeps.tables import Axis
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class LockIn:
+    """Stability along an axis; an entry holds the names of `fields.VARIED` and `fields.MODES`."""
+
+    axis: Axis
+    entries: list[dict[str, Any]]
+    critical_values: list[float]  # in the order of the axis
+
+    @property
+    def parameters(self) -> list[str]:
+        """The keys that are varied."""
+        return list(self.axis.parameter)
+
+
+def lock_in(loaded: LoadedCase, axis: Axis, option: str, progress: Progress) -> LockIn:
+    """Modes and critical friction at each value of an axis; messages call the axis `option`. Raises CaseError."""
+    sweep = {"case": "-", "axis": [axis.model_dump(exclude_unset=True)]}
+    plan = Plan(tomli_w.dumps(sweep), given_toml(loaded.case))
+
+    def system_at(value: float) -> System:
+        settings = dict.fromkeys(plan.settings(0), value)
+        try:
+            return system_of(plan.case(settings))
+        except CaseError as error:
+            raise CaseError([replace(each, source=option) for each in error.problems]) from None
+
+    values, reports = [axis.value(place) for place in range(axis.size)], []
+    for value in (values[0], values[-1]):  # so that a wrong end is known before anything is computed
+        system_at(value)
+    for place, value in enumerate(values):
+        progress("values", place, axis.size)
+        reports.append(stability(system_at(value)))
+    sliding = (report.modes if report.stable is not None and report.belt_speed else () for report in reports)
+    entries = []
+    for value, report, pair in zip(values, reports, followed(sliding), strict=True):
+        names = ("frequency", "growth", "damping_ratio")
+        columns = ([mode and getattr(mode, name) + 0.0 for mode in pair or (None, None)] for name in names)
+        found = dict(zip((field.name for field in fields.MODES), columns, strict=True))  # + 0.0: without -0
+        entries.append({"value": value, **values_of(fields.VARIED, report), **found})
+    critical = list[float]()
+    turning = [
+        (value, report.stable is True) for value, report in zip(values, reports, strict=True) if report.belt_speed
+    ]
+    for (low, before), (high, after) in pairwise(turning):
+        if before != after:
+            ends, at_low = sorted((low, high)), before if low < high else after
+
+            def as_below(value: float, at_low: bool = at_low) -> bool:
+                progress("critical values", len(critical), len(critical) + 1)
+                return (is_stable(system_at(value)) is True) == at_low
+
+            middle = 0.5 * sum(bisect(as_below, ends[0], ends[1], halvings=45))
+            critical.append(middle if abs(middle) > 1e-12 * abs(values[-1] - values[0]) else 0.0)
+    return LockIn(axis, entries, critical)
+
+
+def write(path: Path, loaded: LoadedCase, found: LockIn, *, force: bool) -> None:
+    """Write the diagram as HDF5, or as CSV where the name ends so; raises UsageError or CannotWriteError."""
+    if path.suffix.lower() == ".csv":
+        with new_output(path, force=force) as file:
+            file.write(_csv(found).encode())
+            file.publish()
+        return
+    axis, names = found.axis, found.parameters
+    with new_result(path, force=force) as result:
+        result.set_attributes(origin("stability", loaded.case.title, loaded))
+        result.set_fields(fields.LOCK_IN, values_of(fields.LOCK_IN, found))
+        place = Field(axis.name, unit(names[0]), ", ".join(names))
+        result.variable("/", place, (axis.name,), [entry["value"] for entry in found.entries], parameters=names)
+        result.axis("/", fields.MODE, [1, 2])
+        for field in (*fields.VARIED, *fields.MODES):
+            dims, kind = ((axis.name, "mode"), "f8") if field in fields.MODES else ((axis.name,), field.kind)
+            column = [entry[field.name] for entry in found.entries]
+            data = [text or "" for text in column] if kind == fields.TEXT else column
+            result.column(replace(field, kind=kind), dims, data)
+        result.commit()
+
+
+def _csv(found: LockIn) -> str:
+    """A line for each value; what does not exist is empty."""
+    key = ", ".join(found.parameters)
+    columns = {_head(key, unit(found.parameters[0])): [entry["value"] for entry in found.entries]}
+    for field in fields.VARIED:
+        columns[_head(field.name, field.units)] = [entry[field.name] for entry in found.entries]
+    for field, mode in ((field, mode) for field in fields.MODES for mode in (1, 2)):
+        values = [entry[field.name][mode - 1] for entry in found.entries]
+        columns[_head(f"{field.name} of mode {mode}", field.units)] = values
+    stream = io.StringIO()
+    csv.writer(stream, lineterminator="\n").writerows([columns, *zip(*columns.values(), strict=True)])
+    return stream.getvalue()
+
+
+def _head(name: str, units: str) -> str:
+    return name if units in ("", "1") else f"{name} ({units})"

@@ -1,0 +1,288 @@
+"""Sensitivities against perturbation theory and closed forms; advised values against eigenvalues computed here."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from importlib import import_module
+from itertools import islice
+from typing import Any
+
+import numpy as np
+import pytest
+
+from brakecli.analysis.stability.advice import KEYS, advised, advised_keys, answer, changed, numbers, sensitivity
+from brakecli.analysis.stability.modes import Crossing
+from brakecli.case.case import Case
+from brakecli.case.read import LoadedCase
+from brakecli.errors import UsageError
+from brakecli.runs.advise import AdviceReport, advise
+from tests.analysis.shoes import Shoe, random_shoes
+from tests.campaign import campaign, counts
+from tests.examples import MODE_COUPLING, ROUGH, SQUEAL, make
+
+mpmath = import_module("mpmath")  # imported so because it has no type hints
+
+Tables = dict[str, Any]
+ENDS = {"mass": "shoe.mass", "c_1": "link1.stiffness", "c_2": "link2.stiffness"}
+ENDS |= {"beta": "link1.angle_deg", "alpha": "link2.angle_deg", "k": "contact.stiffness"}
+
+
+def tell() -> None:
+    pass
+
+
+def advice_on(case: Case, margin: float = 0.2) -> AdviceReport:
+    return advise(LoadedCase(case, "", ""), KEYS, margin, lambda what, done, total: None)
+
+
+def unstable_shoes(seed: int) -> Iterator[tuple[Case, Tables]]:
+    """Smooth shoes with dashpots at 1.3 times their critical friction, which is found from eigenvalues."""
+    for tables in random_shoes("smooth", seed):
+        critical = Shoe.of(tables).critical
+        damped = all(tables[link]["damping"] > 0.0 for link in ("link1", "link2"))
+        if critical is not None and critical > 1e-3 and damped and tables["wheel"]["angular_speed"] != 0.0:
+            tables["friction"] = {"coefficient": 1.3 * critical}
+            yield Case.model_validate(tables), tables
+
+
+def test_sensitivities_of_the_minimal_model_are_those_of_its_closed_form() -> None:
+    """φ of flutter without dashpots, differentiated by mpmath with 30 digits."""
+    case = make(MODE_COUPLING)
+    one, two = case.link1, case.link2
+    values = {
+        "mass": 1.0,
+        "c_1": one.stiffness,
+        "c_2": two.stiffness,
+        "beta": one.angle_deg,
+        "alpha": two.angle_deg,
+    }
+    values["k"] = case.contact.stiffness
+
+    def flutter(**v: Any) -> Any:
+        beta, alpha = v["beta"] * mpmath.pi / 180, v["alpha"] * mpmath.pi / 180
+        s, c = (mpmath.sin(beta), mpmath.cos(beta)), (mpmath.sin(alpha), mpmath.cos(alpha))
+        k = 2 * case.contact.half_length * v["k"]
+        xx, yy = v["c_1"] * s[0] ** 2 + v["c_2"] * c[1] ** 2, v["c_1"] * s[1] ** 2 + v["c_2"] * c[0] ** 2
+        xy = -(v["c_1"] * s[0] * s[1] - v["c_2"] * c[0] * c[1])
+        return (xy + (xx - yy - k) ** 2 / (4 * xy)) / k
+
+    with mpmath.workdps(30):
+        assert float(flutter(**values)) == pytest.approx(0.75, abs=1e-12)
+        for name, value in values.items():
+            exact = float(mpmath.diff(lambda x, name=name: flutter(**{**values, name: x}), value))
+            found = sensitivity(case, tuple(ENDS[name].split(".")), 0.75, tell)
+            assert found.derivative == pytest.approx(exact, abs=1e-9 / value), name
+            assert found.elasticity == pytest.approx(exact * value / 0.75, abs=1e-8), name
+
+
+@pytest.mark.parametrize("shoes", counts(4, 40))
+def test_derivatives_are_those_of_perturbation_theory(shoes: int) -> None:
+    """Where a pair crosses, Re(uᴴ dA v / uᴴ v) = 0 along the change of a number and of φ together."""
+
+    def matrix(tables: Tables, phi: float) -> Any:
+        shoe = replace(Shoe.of(tables), phi=phi)
+        lower = [-shoe.stiffness / shoe.m, -shoe.b / shoe.m]
+        return np.block([[np.zeros((2, 2)), np.eye(2)], lower])
+
+    compared = 0
+    for case, tables in islice(unstable_shoes(3), shoes):
+        found = answer(case)
+        assert found is not None
+        phi = found.critical or 0.0
+        assert phi == pytest.approx(Shoe.of(tables).critical, rel=1e-6)
+        a = matrix(tables, phi)
+        values, right = np.linalg.eig(a)
+        worst = int(np.argmax(values.real))
+        left = np.linalg.inv(right)[worst]
+
+        def slope(change: Any, left: Any = left, right: Any = right, worst: int = worst) -> float:
+            return float((left @ change @ right[:, worst]).real)
+
+        by_friction = slope((matrix(tables, 1.001 * phi) - matrix(tables, 0.999 * phi)) / (0.002 * phi))
+        for path in (("shoe", "mass"), ("link1", "stiffness"), ("link2", "damping"), ("link2", "angle_deg")):
+            value = tables[path[0]][path[1]]
+            ends = [{**tables, path[0]: {**tables[path[0]], path[1]: value * (1.0 + e)}} for e in (1e-5, -1e-5)]
+            by_value = slope((matrix(ends[0], phi) - matrix(ends[1], phi)) / (2e-5 * value))
+            given = sensitivity(case, path, phi, tell)
+            if given.derivative is None:  # two crossings are about to meet: the error is above five per cent
+                continue
+            assert given.error is not None
+            expected = -by_value / by_friction
+            # the matrix's own central difference is good to 1e-9, its eigenvectors to 1e-10 of their condition
+            bound = (given.error + 1e-5) * abs(expected) + 1e-7 * phi / abs(value)
+            assert given.derivative == pytest.approx(expected, abs=bound), path
+            compared += 1
+    assert compared > 3 * shoes
+
+
+@pytest.mark.parametrize("shoes", counts(2, 50))
+def test_an_advised_value_is_stable_up_to_the_margin_and_unstable_just_beyond(shoes: int) -> None:
+    """By growth rates of matrices that are built here, up to 1.2 times the friction, and 10⁻⁶ before the value."""
+    helped = 0
+    for case, tables in islice(unstable_shoes(4), shoes):
+        target = 1.2 * tables["friction"]["coefficient"]
+        for path in advised_keys(case, ("link2.angle_deg", "link*.stiffness")):
+            found = advised(case, path, 0.2, tell)
+            if found.to is None:
+                continue
+
+            def rate(value: float, phi: float, path: Any = path, tables: Tables = tables) -> float:
+                there = {**tables, path[0]: {**tables[path[0]], path[1]: value}}
+                return replace(Shoe.of(there), phi=phi).rate
+
+            rounding = 1e-9 * 2.0 * math.pi * Shoe.of(tables).fast
+            assert max(rate(found.to, phi) for phi in np.linspace(0.0, target, 50)) <= rounding, found
+            back = found.to + 1e-6 * (found.start - found.to)
+            assert rate(back, target * (1.0 + 1e-12)) > -rounding, found
+            assert found.lowest <= found.to <= found.highest
+            helped += 1
+    assert helped > shoes
+
+
+def test_a_damping_of_zero_has_a_derivative_where_the_other_link_is_damped_and_none_where_it_jumps() -> None:
+    damped = make(SQUEAL, link1__damping=0.0)
+    found = answer(damped)
+    assert found is not None
+    assert found.critical is not None
+    given = sensitivity(damped, ("link1", "damping"), found.critical, tell)
+    near = answer(make(SQUEAL, link1__damping=0.01))
+    assert given.elasticity is None
+    assert near is not None
+    assert near.critical is not None
+    assert given.derivative == pytest.approx((near.critical - found.critical) / 0.01, rel=1e-3)
+    jumps = sensitivity(make(MODE_COUPLING, link1__damping=0.0), ("link1", "damping"), 0.75, tell)
+    assert (jumps.elasticity, jumps.derivative) == (
+        None,
+        None,
+    )  # one dashpot alone, however weak, moves it at once
+
+
+def test_what_cannot_help_is_no_help_within_bounds_that_are_told() -> None:
+    case = make(MODE_COUPLING)
+    mass = advised(case, ("shoe", "mass"), 0.2, tell)  # φ of flutter does not depend on the mass
+    assert (mass.to, mass.critical_friction) == (None, None)
+    assert (mass.lowest, mass.highest) == pytest.approx((0.1, 10.0))
+    angle = advised(case, ("link2", "angle_deg"), 0.2, tell)
+    assert (angle.lowest, angle.highest) == (-90.0, 90.0)
+    assert angle.to is not None
+    there = changed(case, ("link2", "angle_deg"), angle.to)
+    assert there is not None
+    assert angle.critical_friction == pytest.approx(1.2, rel=1e-9)
+
+
+def test_every_number_has_a_sensitivity_and_those_of_the_solver_move_nothing() -> None:
+    report = advice_on(make(SQUEAL, friction__coefficient=0.3))
+    keys = [each.parameter for each in report.sensitivities]
+    assert sorted(keys) == sorted(".".join(path) for path in numbers(make(SQUEAL)))
+    assert len(keys) > 15
+    by_key = {each.parameter: each for each in report.sensitivities}
+    for key in ("solver.step", "initial.vx", "load.force", "friction.coefficient", "wheel.angular_speed"):
+        assert by_key[key].derivative == 0.0
+    ranked = [abs(each.elasticity or 0.0) for each in report.sensitivities]
+    assert ranked == sorted(ranked, reverse=True)
+    # growth at the case's own friction, one per cent further
+    mass = by_key["shoe.mass"]
+    ends = [answer(make(SQUEAL, friction__coefficient=0.3, shoe__mass=m)) for m in (9.99, 10.01)]
+    assert all(end is not None and end.growth is not None for end in ends)
+    rates = [end.growth for end in ends if end is not None and end.growth is not None]
+    assert mass.growth_derivative == pytest.approx((rates[1] - rates[0]) / 0.02, rel=1e-5)
+
+
+SQUEALS = {"friction__coefficient": 0.7, "solver__duration": 0.05}
+ZERO = {"link1__angle_deg": 20.0, "link2__damping": 0.0, "friction__coefficient": 0.3, "solver__duration": 0.05}
+ZERO["link2__stiffness"] = 2e6 * math.sin(math.radians(40.0)) / math.sin(math.radians(30.0))
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        (
+            SQUEALS,
+            ["squeals at 174", "stable up to 0.575, 18 % below the case's 0.7", "link2.angle_deg 5 → 7.692"],
+        ),
+        ({"friction__coefficient": 0.3}, ["stable up to 0.575, 92 % above the case's 0.3"]),
+        ({"friction__coefficient": 0.0}, ["without friction nothing squeals; stable up to 0.575"]),
+        ({"wheel__angular_speed": 0.0}, ["the wheel stands, so that nothing slides"]),
+        ({"load__force": -100.0}, ["the shoe does not touch the wheel"]),
+        ({"link2__angle_deg": 0.0}, ["stable: no friction makes it unstable"]),
+        (
+            {"link2__angle_deg": -5.0, "friction__coefficient": 80.0, "solver__duration": 0.05},
+            ["there is no steady sliding at 80", "self-locking", "stable up to 68.6, 14 % below", "→"],
+        ),
+        (ZERO, ["squeals at", "unstable at any friction, however small", "gives 0.36"]),
+    ],
+)
+def test_the_answer_is_a_sentence(changes: Tables, words: list[str]) -> None:
+    report = advice_on(make(SQUEAL, **changes))
+    for word in words:
+        assert word in report.conclusion()
+    assert (report.check is None) == ("→" not in report.conclusion())
+
+
+def test_a_case_above_a_range_of_instability_is_told_so() -> None:
+    """Only where surfaces open can stability be regained: otherwise Hurwitz' determinant is concave in φ."""
+    report = advice_on(make(SQUEAL, friction__coefficient=0.4))
+    turns = (Crossing(0.5, "flutter", 170.0, lost=True), Crossing(0.7, "flutter", 170.0, lost=False))
+    stability = replace(report.stability, crossings=turns, critical=turns[0], friction=2.0)
+    above = replace(report, stability=stability, critical_friction=0.5)
+    assert above.margin == pytest.approx(-0.75)
+    words = "the case lies above a range of instability, as stability is lost at 0.5, regained at 0.7"
+    assert f"stable up to 0.5, 75 % below the case's 2; {words}" in above.conclusion()
+
+
+def test_what_the_answer_rests_on_is_told() -> None:
+    report = advice_on(make(SQUEAL, friction__coefficient=0.3))
+    assert report.stability.equilibrium is not None
+    assert report.notes() == []
+    opens = replace(report.stability, equilibrium=replace(report.stability.equilibrium, contact_fraction=0.7))
+    assert "mean stiffness of the contact" in replace(report, stability=opens).notes()[0]
+    stops = {"wheel__angular_speed": None, "wheel__times": [0.0, 1.0], "wheel__angular_speeds": [0.2, 0.0]}
+    other = advice_on(make(SQUEAL, friction__coefficient=0.3, link1__damping=0.0, link2__damping=0.0, **stops))
+    assert [note.split(":")[0] for note in other.notes()] == [
+        "no dashpot acts",
+        "speed and load are those of t = 0",
+    ]
+    by_key = {each.parameter: each for each in other.sensitivities}
+    assert by_key["wheel.angular_speeds"].value == (0.2, 0.0)
+    assert by_key["wheel.angular_speeds"].elasticity == 0.0
+
+
+@campaign
+def test_open_pads_rest_on_the_mean_stiffness_and_lists_are_scaled_as_a_whole() -> None:
+    waves = {"amplitudes": [30e-6, 20e-6], "wavelengths": [0.02, 0.013]}
+    case = make(
+        SQUEAL, load__force=200.0, friction__coefficient=1.5, roughness__wheel=waves, solver__duration=0.02
+    )
+    report = advice_on(case)
+    assert any("mean stiffness" in note for note in report.notes())
+    by_key = {each.parameter: each for each in report.sensitivities}
+    given = by_key["roughness.wheel.amplitudes"]
+    assert given.value == (30e-6, 20e-6)
+    assert given.elasticity is not None
+    more = changed(case, ("roughness", "wheel", "amplitudes"), (33e-6, 22e-6))
+    assert more is not None
+    moved = answer(more)
+    assert moved is not None
+    assert moved.critical is not None
+    assert report.critical_friction is not None
+    part = math.log(moved.critical / report.critical_friction) / math.log(1.1)
+    assert given.elasticity == pytest.approx(part, rel=0.1)  # over a tenth the curve bends
+    best = report.advice[0]
+    assert best.to is not None
+    there = changed(case, tuple(best.parameter.split(".")), best.to)
+    assert there is not None
+    reached = answer(there)
+    assert reached is not None
+    assert reached.critical == pytest.approx(1.8, rel=1e-3)
+
+
+def test_keys_are_chosen_by_patterns() -> None:
+    case = make(ROUGH)
+    assert ("load", "force") in advised_keys(case, KEYS)
+    assert advised_keys(case, ("link?.angle_deg",)) == [("link1", "angle_deg"), ("link2", "angle_deg")]
+    assert advised_keys(case, ("friction.coefficient",)) == [("friction", "coefficient")]
+    for wrong in ("link3.*", "solver.step", "solver.scheme", "roughness.wheel.amplitudes", ""):
+        with pytest.raises(UsageError, match="names no number that may be advised"):
+            advised_keys(case, (wrong,))
+    lower = advised(make(SQUEAL, friction__coefficient=0.7), ("friction", "coefficient"), 0.2, tell)
+    assert lower.to == pytest.approx(0.57537616 / 1.2, rel=1e-7)

@@ -1,0 +1,93 @@
+"""`advise`, as its users meet it."""
+
+import signal
+import time
+from pathlib import Path
+
+import pytest
+
+from brakecli.analysis.stability.advice import KEYS
+from brakecli.case.read import read_case
+from brakecli.cli.stability_tables import advice_table
+from brakecli.runs.advise import advise
+from tests.campaign import campaign
+from tests.commands import LIMIT, LONG, QUICK, ROOT, brakecli, each, started
+
+CASES = {name: str(ROOT / "cases" / f"{name}.toml") for name in ("relaxation", "damped", "rough-partly-open")}
+SHORT = ["--set", "solver.duration=0.1"]
+
+pytestmark = pytest.mark.usefixtures("compiled")
+
+
+def test_json_has_the_names_of_the_page_and_the_advised_value_keeps_its_promise(tmp_path: Path) -> None:
+    line = ["advise", CASES["relaxation"], *SHORT, "--json", "--keys", "link2.angle_deg,shoe.*", "--margin", "0.1"]
+    numbers = brakecli(*line, cwd=tmp_path).json
+    assert numbers["critical_friction"] == pytest.approx(0.5753762, abs=1e-7)
+    assert numbers["friction_coefficient"] == 0.7
+    assert numbers["margin"] == pytest.approx(0.5753762 / 0.7 - 1.0, abs=1e-6)
+    assert numbers["conclusion"].startswith("squeals at 174.3 Hz; stable up to 0.575, 18 % below the case's 0.7; ")
+    by_key = {each["parameter"]: each for each in numbers["sensitivities"]}
+    assert set(by_key["link2.angle_deg"]) >= {"parameter", "value", "elasticity", "derivative"}
+    assert by_key["link1.angle_deg"]["elasticity"] is None
+    assert by_key["link1.angle_deg"]["derivative"] < 0.0
+    best, other = numbers["advice"]
+    assert [best["parameter"], other["parameter"]] == ["link2.angle_deg", "shoe.mass"]
+    assert best["from"] == 5.0
+    assert best["critical_friction"] == pytest.approx(0.77, rel=1e-9)
+    assert numbers["check"]["regime"] == "damped"
+    again = ["stability", CASES["relaxation"], "--set", f"link2.angle_deg={best['to']!r}", "--json"]
+    assert brakecli(*again, cwd=tmp_path).json["critical_friction"] == pytest.approx(best["critical_friction"])
+    page = (ROOT / "docs" / "stability.md").read_text(encoding="utf-8")
+    names = [*list(numbers)[1:], *best, *by_key["shoe.mass"], *numbers["check"]]
+    assert [name for name in names if f"`{name}`" not in page] == []
+
+
+def test_the_table_fits_into_eighty_columns_and_ends_in_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    loaded = read_case(CASES["relaxation"], ["solver.duration=0.1"])
+    table = advice_table(advise(loaded, KEYS, 0.2, lambda what, done, total: None))
+    assert max(map(len, table.splitlines())) <= 80
+    for words in ("contact.half_length  ", "link2.angle_deg    5        7.692", "no help    -           500 to"):
+        assert words in table
+    assert "in a sentence     squeals at 174.3 Hz; stable up to 0.575" in table
+    assert "checked by a run  link2.angle_deg = 7.6916: 0.1 s of motion" in table
+
+
+def test_wrong_options_are_told(tmp_path: Path) -> None:
+    lines = [["--keys", "shoe.weight"], ["--keys", "solver.step"], ["--margin", "-1"], ["--margin", "x"]]
+    words = [
+        "--keys shoe.weight: names no number that may be advised; these are shoe.mass, ",
+        "--keys solver.step",
+    ]
+    for word, done in zip(
+        [*words, "margin", "margin"],
+        each(tmp_path, [["advise", CASES["damped"], *line] for line in lines]),
+        strict=True,
+    ):
+        done.told(2, word)
+        assert done.out == ""
+
+
+@campaign
+@pytest.mark.parametrize(
+    ("line", "number"),
+    [
+        (["advise", CASES["rough-partly-open"], "--set", "friction.coefficient=1.0"], signal.SIGINT),
+        (["advise", CASES["relaxation"], *LONG], signal.SIGTERM),
+        (["stability", CASES["rough-partly-open"], "--vary", "contact.half_length=0.01:0.1:200"], signal.SIGTERM),
+        (["stability", CASES["relaxation"], "--vary", "link2.angle_deg=-5:5:9000", "-o", "x.h5"], signal.SIGINT),
+    ],
+)
+def test_a_signal_ends_a_command_soon_and_leaves_nothing(
+    tmp_path: Path, line: list[str], number: signal.Signals
+) -> None:
+    with started(*line, cwd=tmp_path) as process:
+        time.sleep(4.0)  # for the imports
+        assert process.poll() is None
+        start = time.monotonic()
+        process.send_signal(number)
+        out, err = process.communicate(timeout=LIMIT)
+    assert time.monotonic() - start < QUICK
+    assert (process.returncode, out) == (128 + number, b"")
+    assert err.count(b"\n") == 1
+    assert list(tmp_path.iterdir()) == []

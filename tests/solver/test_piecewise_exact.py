@@ -1,0 +1,280 @@
+"""The piecewise-exact scheme against matrix exponentials, the event-driven scheme and exact solutions."""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from brakecli.case.case import Case
+from brakecli.case.system import system_of
+from brakecli.solver.method import Method
+from brakecli.solver.motion import Motion, Stepping, solve
+from brakecli.solver.quantities import ContactState, Failure
+from tests.campaign import counts
+from tests.examples import COULOMB, SQUEAL, make
+from tests.solver.piecewise_exact import PiecewiseExact
+from tests.solver.test_event_driven import error, flat_case
+
+EXACT = Method("piecewise-exact")
+SUITE, CAMPAIGN = 8, 200
+
+
+def motion(case: Case | dict[str, Any], method: Method = EXACT) -> Motion:
+    """The motion of a case by a method; it must not fail."""
+    found = solve(system_of(case if isinstance(case, Case) else Case.model_validate(case)), method)
+    assert found.work.failure is Failure.NONE
+    return found
+
+
+def tabled(base: dict[str, Any], **changes: Any) -> Case:
+    """A shared case without a step."""
+    sampled = {"output__sample_interval": base.get("output", {}).get("sample_interval", base["solver"]["step"])}
+    return make(base, **{"solver__step": None, **sampled, **changes})
+
+
+def same_as_event_driven(case: Case | dict[str, Any], bound: float) -> Motion:
+    """The motion, if the event-driven scheme finds the same samples, states and works within a relative bound."""
+    found, other = motion(case), motion(case, Method("event-driven", tolerance=1e-13))
+    moving = np.abs(other.rows[:, :4]).max(axis=0) > 0.0
+    np.testing.assert_array_equal(found.rows[:, :4][:, ~moving], 0.0)
+    scale = np.where(moving, np.abs(other.rows[:, :4]).max(axis=0), 1.0)
+    assert float((np.abs(found.rows[:, :4] - other.rows[:, :4]).max(axis=0) / scale).max()) < bound
+    np.testing.assert_array_equal(found.rows[:, 6:], other.rows[:, 6:])
+    forces = np.abs(other.rows[:, 4:6]).max()
+    np.testing.assert_allclose(found.rows[:, 4:6], other.rows[:, 4:6], rtol=0.0, atol=10.0 * bound * forces)
+    largest = max(map(abs, vars(other.energy).values()))
+    known = (1e-8 + 10.0 * abs(other.energy.relative_closing_error)) * largest  # its works are its weakest part
+    for name, energy in vars(other.energy).items():
+        assert getattr(found.energy, name) == pytest.approx(energy, abs=known), name
+    assert abs(found.energy.relative_closing_error) < 1e-11
+    return found
+
+
+# --- one phase -----------------------------------------------------------------------------------------------
+
+RAMPS: dict[str, Any] = {"wheel__times": [0.0, 1.0], "load__times": [0.0, 1.0]}
+PHASES: dict[float, dict[str, Any]] = {  # the state, and what keeps a shoe in it
+    -1.0: {"wheel__angular_speeds": [2.0, 9.0], "load__forces": [5e3, 2e5]},
+    0.0: {"wheel__angular_speeds": [0.1, 0.3], "load__forces": [5e3, 9e3], "friction__coefficient": 50.0},
+    1.0: {"wheel__angular_speeds": [-2.0, -9.0], "load__forces": [5e3, 2e5]},
+    2.0: {"wheel__angular_speeds": [0.1, 0.3], "load__forces": [-5e3, -9e4], "initial__y": 1e-3},
+}
+
+
+@pytest.mark.parametrize("state", PHASES)
+def test_a_phase_is_a_matrix_exponential(state: float) -> None:
+    changes = {"wheel__angular_speed": None, "load__force": None, "solver__duration": 0.02, **RAMPS}
+    changes |= {"initial__vx": 0.05, "initial__y": -4e-4} if state == 0.0 else {"initial__y": -1e-4}
+    case = tabled(SQUEAL, **{**changes, **PHASES[state]})
+    found, system = motion(case), system_of(case)
+    assert set(found.rows[:, 7]) == {state}
+    c, k = system.coefficients, system.contact_stiffness if state != 2.0 else 0.0
+    belt, load = system.belt[0], system.load[0]
+    a = np.zeros((8, 8))  # of x, y, vx, vy, U, U', Q, Q'
+    a[0, 2] = a[1, 3] = a[4, 5] = a[6, 7] = 1.0
+    a[3] = np.array([-c.c_xy, -c.c_yy - k, -c.b_xy, -c.b_yy, 0, 0, -c.cos_beta, 0]) / c.m
+    a[2] = np.array([-c.c_xx, -c.c_xy, -c.b_xx, -c.b_xy, 0, 0, -c.sin_beta, 0]) / c.m
+    if state in (-1.0, 1.0):
+        a[2, 1] += state * c.phi * k / c.m  # F_x = -side φ F_y, F_y = -k y
+    if state == 0.0:
+        a[2] = [0, 0, 0, 0, 0, 1, 0, 0]
+    start = np.array([*found.rows[0, :4], belt["value"], belt["slope"], load["value"], load["slope"]])
+    exact = np.array([(expm(a * t) @ start)[:4] for t in 1e-4 * np.arange(len(found.rows))])
+    assert error(found.rows, exact) < 1e-12
+
+
+# --- random shoes --------------------------------------------------------------------------------------------
+
+
+def drawn(rng: np.random.Generator, kind: int) -> dict[str, Any]:
+    """A smooth shoe thrown onto the wheel, of one of several kinds."""
+    case, omega = flat_case(rng, 1e-12)
+    links = (case["link1"], case["link2"])
+    if kind == 1:  # overcritical dashpots
+        for link in links:
+            link["damping"] = case["shoe"]["mass"] * omega * 10 ** rng.uniform(0.3, 1.7)
+    elif kind == 2:  # no dashpots, and friction that can lock
+        case["friction"]["coefficient"] *= 4.0
+        for link in links:
+            link["damping"] = 0.0
+    elif kind == 3:  # speed and load change, and the wheel turns back
+        load, belt, times = (
+            case["load"]["force"],
+            case["wheel"]["angular_speed"],
+            np.sort(rng.uniform(0, 30, 4)) / omega,
+        )
+        case["load"] = {"times": times.tolist(), "forces": (load * rng.uniform(-0.3, 2, 4)).tolist()}
+        case["wheel"] = {
+            "radius": 0.5,
+            "times": times.tolist(),
+            "angular_speeds": (belt * rng.normal(size=4)).tolist(),
+        }
+    elif kind == 4:  # links along the axes
+        links[0]["angle_deg"], links[1]["angle_deg"] = rng.choice([-90, 0, 90]), rng.choice([-90, 0, 90])
+    return case
+
+
+@pytest.mark.parametrize("many", counts(SUITE, CAMPAIGN))
+def test_random_shoes_move_as_by_the_event_driven_scheme(many: int) -> None:
+    """Rounding errors of some 1e-15 a step, of two solutions, in motions that amplify them by up to 1e4."""
+    rng, seen = np.random.default_rng(31), set[float]()
+    for number in range(many):
+        seen |= set(same_as_event_driven(drawn(rng, number % 5), 1e-10).rows[:, 7])
+    assert seen == {-1.0, 0.0, 1.0, 2.0}
+
+
+@pytest.mark.parametrize("many", counts(4, 100))
+def test_random_shoes_move_as_matrix_exponentials_say(many: int) -> None:
+    rng = np.random.default_rng(32)
+    for _ in range(many):
+        case, omega = flat_case(rng, 1e-12)
+        found = motion(case)
+        reference = PiecewiseExact(system_of(Case.model_validate(case)), 0.05 / omega)
+        start = found.rows[0, :4]
+        exact = reference.run(start, *reference.first_phase(start), samples=len(found.rows) - 1, per_sample=2)
+        assert error(found.rows, exact) < 1e-10
+
+
+# --- hard cases ----------------------------------------------------------------------------------------------
+
+FREE = {"link1__damping": 0.0, "link2__damping": 0.0}
+HARD: dict[str, dict[str, Any]] = {
+    "from rest": {},
+    "no dashpots": FREE,
+    "no friction": {"friction__coefficient": 0.0},
+    "self-locking": {"friction__coefficient": 8.0, "link2__angle_deg": -40.0},
+    "a wheel at rest": {"wheel__angular_speed": 0.0, "initial__vx": 0.3},
+    "a wheel at rest, from rest": {"wheel__angular_speed": 0.0},
+    "a wheel that turns back": {"wheel__angular_speed": -0.1},
+    "no link along the wheel": {"link2__stiffness": 0.0, "link2__damping": 0.0},
+    "no links at all": {f"link{i}__{key}": 0.0 for i in (1, 2) for key in ("stiffness", "damping")},
+    "link 2 upright": {"link2__angle_deg": 90.0, "link1__angle_deg": 20.0},
+    "link 2 upright, other way": {"link2__angle_deg": -90.0, "link1__angle_deg": -90.0},
+    "equal eigenvalues": {
+        **FREE,
+        "friction__coefficient": 0.0,
+        "link1__stiffness": 1e7,
+        "link2__stiffness": 1.2e7,
+        "link2__angle_deg": 0.0,
+    },
+    "critical damping": {"link1__damping": 2.0 * math.sqrt(1.2e7 * 10.0), "link2__angle_deg": 0.0},
+    "thrown up": {"initial__y": 1e-3, "initial__vx": 0.4, "initial__vy": 0.5},
+    "pulled off": {"load__force": -4e3},
+    "no load": {"load__force": 0.0},
+    "speed and load in tables": {
+        "wheel__angular_speed": None,
+        "wheel__times": [0.0101, 0.0203, 0.0204],
+        "wheel__angular_speeds": [0.1, 0.02, -0.1],
+        "load__force": None,
+        "load__times": [-0.01, 0.00707, 0.0150001],
+        "load__forces": [5000.0, 9000.0, 4000.0],
+    },
+    "a wheel that turns back at once": {
+        "wheel__angular_speed": None,
+        "wheel__times": [0.02, 0.02 + 1e-8],
+        "wheel__angular_speeds": [2.0, -2.0],
+    },
+}
+
+
+@pytest.mark.parametrize("name", HARD)
+def test_hard_cases_move_as_by_the_event_driven_scheme(name: str) -> None:
+    same_as_event_driven(tabled(SQUEAL, solver__duration=0.05, **HARD[name]), 1e-10)
+
+
+def test_relaxation_is_that_of_the_event_driven_scheme() -> None:
+    found = same_as_event_driven(tabled(SQUEAL, friction__coefficient=0.7, solver__duration=0.2), 1e-11)
+    assert {-1.0, 0.0} <= set(found.rows[:, 7])
+
+
+def test_coulomb_oscillator_comes_to_its_exact_rest() -> None:
+    rows = motion(tabled(COULOMB)).rows
+    # 6000 steps, each with a rounding of up to 13 m
+    assert rows[-1, 0] == pytest.approx(0.6821789367236466, abs=6000 * np.spacing(13.0))
+    assert rows[-1, 7] == ContactState.STICK
+    assert rows[-1, 2] == 0.0
+
+
+@pytest.mark.parametrize("gap", [1e-2, 1e-4, 1e-6, 1e-8, -1e-8, -1e-6, -1e-4, -1e-2])
+def test_a_touch_within_a_step_is_not_passed_over(gap: float) -> None:
+    """The shoe swings freely about its rest, and its velocity just reaches the wheel's, or just does not.
+
+    Where it does, friction turns for a time of sqrt(8 gap)/ω, which may be a ten thousandth of a step.
+    """
+    base = {
+        **COULOMB,
+        "wheel": {"radius": 1.0, "angular_speed": 1.0},
+        "initial": {"at": "equilibrium", "x": 1.0 + gap},
+    }
+    case = tabled(base, solver__duration=20.0, output__sample_interval=0.01)
+    found, other = motion(case), motion(case, Method("event-driven", tolerance=1e-12))
+    np.testing.assert_allclose(found.rows[:, [0, 2]], other.rows[:, [0, 2]], rtol=0.0, atol=1e-10)
+    assert found.work.steps > system_of(case).samples if gap > 0.0 else found.work.steps == system_of(case).samples
+
+
+def test_a_stuck_shoe_moves_with_the_wheel_to_rounding() -> None:
+    speeds = {"angular_speed": None, "times": [0.0, 0.001], "angular_speeds": [0.1, 0.3]}
+    start = {"friction__coefficient": 5.0, "initial__y": -4e-4, "initial__vx": 0.05, "initial__x": -1e-4}
+    wheel = {f"wheel__{key}": value for key, value in speeds.items()}
+    rows = motion(tabled(SQUEAL, solver__duration=0.002, **start, **wheel)).rows
+    assert set(rows[:, 7]) == {ContactState.STICK}
+    t = 1e-4 * np.arange(len(rows))
+    travel = np.where(t < 0.001, 0.05 * t + 50.0 * t**2, 1e-4 + 0.15 * (t - 0.001))
+    assert np.abs(rows[:, 0] - (travel - 1e-4)).max() < 1e-18
+    np.testing.assert_allclose(rows[:, 2], np.where(t < 0.001, 0.05 + 100.0 * t, 0.15), rtol=4e-16)
+
+
+def test_a_shoe_without_springs_flies_and_lands() -> None:
+    # Thrown up with 3 m/s against a load of 2 N: y = 3 t - t² for 3 s. Then the contact alone, with ω² = 10, turns
+    # it about y = -0.2: y = -0.2 + 0.2 cos ωτ - 3/ω sin ωτ.
+    none = {"link1__stiffness": 0.0, "link2__stiffness": 0.0, "initial": {"vy": 3.0}}
+    base = {**COULOMB, "initial": none.pop("initial"), "load": {"force": 2.0}}
+    rows = motion(tabled(base, solver__duration=4.0, output__sample_interval=0.01, **none)).rows
+    t, omega = 0.01 * np.arange(len(rows)), math.sqrt(10.0)
+    landed = -0.2 + 0.2 * np.cos(omega * (t - 3.0)) - 3.0 / omega * np.sin(omega * (t - 3.0))
+    np.testing.assert_allclose(rows[:, 1], np.where(t < 3.0, 3.0 * t - t * t, landed), atol=1e-13 * 2.25)
+    assert set(rows[:, 7]) == {ContactState.SEPARATED, ContactState.STICK}  # x rests on a wheel at rest
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_mirror_image_of_a_motion_is_a_motion(seed: int) -> None:
+    case, _ = flat_case(np.random.default_rng(seed), 1e-10)
+    mirrored = {**case, "wheel": {**case["wheel"], "angular_speed": -case["wheel"]["angular_speed"]}}
+    for link in ("link1", "link2"):
+        mirrored[link] = {**case[link], "angle_deg": -case[link]["angle_deg"]}
+    initial = case["initial"]
+    mirrored["initial"] = {**initial, "x": -initial["x"], "vx": -initial["vx"]}
+    one, other = motion(case).rows, motion(mirrored).rows
+    np.testing.assert_array_equal(other[:, [1, 3, 5, 6]], one[:, [1, 3, 5, 6]])
+    np.testing.assert_array_equal(other[:, [0, 2, 4]], -one[:, [0, 2, 4]])
+
+
+def test_a_run_may_be_cut_into_blocks_anywhere() -> None:
+    case = tabled(SQUEAL, solver__duration=0.02, output__sample_interval=1e-3)
+    whole, parts = motion(case), Stepping(replace(system_of(case), method=EXACT))
+    assert parts.system.per_sample > 1
+    rows = [parts.block(stop) for stop in range(1, parts.system.steps + 1)]
+    np.testing.assert_array_equal(np.concatenate(rows), whole.rows[:-1])
+    assert parts.run().energy == whole.energy
+
+
+@pytest.mark.parametrize("share", [0.9, 0.5, 0.03])
+def test_neither_samples_nor_steps_change_the_motion(share: float) -> None:
+    close = motion(tabled(SQUEAL, solver__duration=0.1))
+    far = motion(tabled(SQUEAL, solver__duration=0.1, output__sample_interval=0.02), replace(EXACT, share=share))
+    assert error(far.rows, close.rows[::200]) < 1e-11
+    assert far.energy.friction == pytest.approx(close.energy.friction, rel=1e-11)
+
+
+def test_a_motion_without_bounds_and_events_without_progress_are_failures_with_a_name() -> None:
+    case = tabled(SQUEAL)
+    for field, value, failure in (("x", 1e20, Failure.DIVERGED), ("events", 1000, Failure.STALLED)):
+        found = Stepping(replace(system_of(case), method=EXACT))
+        setattr(found.plant.state, field, value)
+        found.plant.state.events_time = 1e9  # as if no time had gone by
+        ended = found.run()
+        assert ended.work.failure is failure
+        assert np.isfinite(ended.rows).all()
