@@ -67,8 +67,8 @@ def peak(
 ) -> float | None:
     """Frequency (Hz) of the highest peak above zero; None where none is resolved.
 
-    That takes three bins below it, also below the strongest line (Hz) that the whole record shows, and five cycles in
-    the duration (s) of the record.
+    That takes three bins below it, also below the strongest line (Hz) that the whole record shows, and five
+    cycles in the duration (s) of the record.
     """
     if density.size < 3 or not density[1:].max() > 0.0 or strongest < _FEWEST_BINS * frequency[1]:
         return None
