@@ -221,7 +221,7 @@ def test_what_small_disturbances_outlast_is_not_settled(rate: float, undamped: b
 
 
 def test_bands_whose_frequency_wanders_hold_no_vibration() -> None:
-    """Frequencies drawn for every tenth of a second: bands hold nearly all, but cycles differ from part to part."""
+    """Frequencies drawn for every tenth of a second: bands hold nearly all, but cycles differ."""
     for swing, regime in ((0.002, Regime.QUASI_HARMONIC), (0.15, Regime.UNDECIDED)):
         drawn = 1.0 + swing * np.random.default_rng(4).uniform(-1.0, 1.0, 20)
         frequency = 150.0 * np.interp(TIME, np.linspace(0.0, TIME[-1], 20), drawn)
