@@ -261,7 +261,8 @@ def classify(history: History, context: Context, thresholds: Thresholds = _DEFAU
     if belt != 0.0:
         evidence["largest_vx_over_belt_speed"] = part.extremes("vx")[int(belt > 0.0)] / belt
     evidence |= part.lines(context.forced) | (context.powers(part) if context.steady else {})
-    forced, own = rules.parts or rules.split() or (None, None)
+    split = rules.parts or rules.split()
+    forced, own = split if split and not (sustained and split[0] > split[1]) else (None, None)
     amplitude, spread = rules.amplitude(decision)
     return Verdict(
         regime=decision.regime,
