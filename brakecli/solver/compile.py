@@ -5,15 +5,18 @@ loop serves them all and stays in the cache. Kernels neither allocate, raise nor
 """
 
 import hashlib
+import io
 import os
 import stat
-from collections.abc import Callable
-from contextlib import suppress
+import zlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 from numba import boolean, float64, int64, njit, types
+from numba.core import caching as numba_caching
 from numba.core import cgutils
 from numba.core import config as numba_config
 from numba.core.registry import CPUDispatcher
@@ -25,6 +28,7 @@ vector = float64[::1]
 """A contiguous array of doubles, for the compiler."""
 
 config: Any = numba_config  # its settings come from the environment, so type checkers know none of them
+caching: Any = numba_caching  # has no types
 F = TypeVar("F", bound=Callable[..., Any])
 
 
@@ -64,19 +68,52 @@ class _ForKernels(CPUDispatcher):
         raise TypeError(f"{name} has no wrapper for calls from Python: only other kernels can call it")
 
 
+class _CheckedFiles(caching.IndexDataCacheFile):  # type: ignore[misc]
+    """The files of a kernel in the cache, each with its checksum at the end, which pickle does not read.
+
+    A damaged file counts as missing, so that it is written anew: damaged machine code would end the process.
+    """
+
+    def _load_index(self) -> Any:
+        return super()._load_index() if _is_whole(self._index_path) else {}
+
+    def _load_data(self, name: str) -> Any:
+        if not _is_whole(self._data_path(name)):
+            raise FileNotFoundError(name)
+        return super()._load_data(name)
+
+    @contextmanager
+    def _open_for_write(self, filepath: str) -> Iterator[Any]:
+        with super()._open_for_write(filepath) as file:
+            contents = io.BytesIO()
+            yield contents
+            file.write(contents.getvalue() + _checksum(filepath, contents.getvalue()))
+
+
+def _is_whole(path: str) -> bool:
+    try:
+        data = Path(path).read_bytes()
+    except OSError:
+        return False
+    return data[-4:] == _checksum(path, data[:-4])
+
+
+def _checksum(path: str, contents: bytes) -> bytes:
+    """What the file at a path ends with: of its name as well, since another kernel has other contents."""
+    return zlib.crc32(contents, zlib.crc32(Path(path).name.encode())).to_bytes(4)
+
+
 def _compiled(signature: Any, function: Any, options: dict[str, Any]) -> Any:
     """The machine code of a function: of the cache, if that can be used."""
     if CACHE is not None:
-        for _ in range(2):
-            try:
-                return njit(signature, cache=True, **options)(function)
-            except Exception:  # pickle raises almost anything on a damaged file
-                damaged = [*CACHE.rglob(f"*.{function.__name__}-*.nb?")]
-                with suppress(OSError):
-                    for path in damaged:
-                        path.unlink()
-                if not damaged:  # the cache cannot be written, on a full disk: do without
-                    break
+        before = config.CACHE_DIR, caching.IndexDataCacheFile
+        config.CACHE_DIR, caching.IndexDataCacheFile = str(CACHE), _CheckedFiles
+        try:
+            return njit(signature, cache=True, **options)(function)
+        except Exception:  # the cache cannot be written, on a full disk: do without
+            pass
+        finally:
+            config.CACHE_DIR, caching.IndexDataCacheFile = before
     return njit(signature, **options)(function)
 
 
@@ -89,14 +126,10 @@ def kernel(signature: Any, *, fastmath: frozenset[str] = frozenset(), inlined: b
     """
 
     def compile_(function: F) -> F:
-        before, config.CACHE_DIR = config.CACHE_DIR, str(CACHE or config.CACHE_DIR)
         private = not inlined or function.__name__.startswith("_")
         options: dict[str, Any] = {"fastmath": set(fastmath), "forceinline": inlined, "no_cfunc_wrapper": True}
         options["no_cpython_wrapper"] = private
-        try:
-            compiled: Any = _compiled(signature, function, options)
-        finally:
-            config.CACHE_DIR = before
+        compiled: Any = _compiled(signature, function, options)
         if private and not config.DISABLE_JIT:
             compiled.__class__ = _ForKernels
         return compiled  # type: ignore[no-any-return]

@@ -112,7 +112,8 @@ class Journal:
             records = self._file.read(count * self._unit_bytes)
             if len(records) < count * self._unit_bytes or _checksum(first, count, records) != checksum:
                 break
-            self._note(first, count, offset + _HEAD.size, records)
+            if not self.finished[first : first + count].any():  # a copy of a block brings nothing new
+                self._note(first, count, offset + _HEAD.size, records)
             offset = self._file.tell()
         os.ftruncate(self._file.fileno(), offset)
 

@@ -166,7 +166,9 @@ def test_whatever_damage_a_kernel_cache_has_is_repaired(here: Path) -> None:
     for _ in range(10):
         for path in chance.sample(files, 2):
             data = path.read_bytes()
-            bad = (b"", data[: len(data) // 2], chance.randbytes(len(data)))
+            at = chance.randrange(len(data))
+            noise = data[:at] + chance.randbytes(50) + data[at + 50 :]
+            bad = (b"", data[:at], chance.randbytes(len(data)), noise, noise, noise)
             path.write_bytes(chance.choice(bad))
         done = brakecli("check", "tiny.toml", "--json", cwd=here, stdin="", XDG_CACHE_HOME=str(cache))
         assert done.told(0) == ""

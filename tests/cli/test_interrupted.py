@@ -126,7 +126,28 @@ def test_a_signal_ends_steps_that_find_the_patches_of_many_waves(
 
 
 @campaign
-@pytest.mark.parametrize("count", [300, 3000])
+@pytest.mark.parametrize(
+    ("command", "surface", "wavelength", "height", "delay"),
+    [
+        ("stability", "wheel", 1.8e-5, 0.1, 5.0),
+        ("run", "shoe", 4e-8, 1e-6, 5.0),
+        ("run", "wheel", 4e-8, 1e-6, 10.0),
+    ],
+)
+def test_a_signal_ends_a_search_for_the_patches_of_millions_of_waves(
+    here: Path, command: str, surface: str, wavelength: float, height: float, delay: float
+) -> None:
+    solver = "tolerance = 1e-4, duration = 1e-3"
+    rough = f"[roughness.{surface}]\namplitudes = [{height}]\nwavelengths = [{wavelength}]\n"
+    (here / "tiny.toml").write_text(TINY.replace("step = 1e-5, duration = 0.02", solver) + rough)
+    with started(command, "tiny.toml", "--quiet", cwd=here) as process:
+        time.sleep(delay)
+        interrupt(process, signal.SIGTERM)
+    assert left_in(here) == {"tiny.toml"}
+
+
+@campaign
+@pytest.mark.parametrize("count", [300, 3000, 7800])
 @pytest.mark.parametrize("command", ["run", "check", "stability", "compare-schemes", "sweep"])
 def test_a_signal_ends_every_command_on_many_waves_at_any_time(here: Path, command: str, count: int) -> None:
     """Ten commands, in their imports and later."""

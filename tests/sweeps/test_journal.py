@@ -138,6 +138,18 @@ def test_damaged_records_of_a_journal_are_computed_again(tmp_path: Path) -> None
     assert set(resumed) == {0, 1, 2, 3}
 
 
+def test_a_block_that_is_there_twice_counts_once(tmp_path: Path) -> None:
+    loaded = write_sweep(tmp_path, frictions(20))
+    inline(loaded, tmp_path / "expected.h5")
+    interrupted(loaded, tmp_path / "s.h5", limit=4, task_size=1)
+    path = tmp_path / "s.h5.partial"
+    header, blocks = path.read_bytes().split(b"\n", 1)
+    path.write_bytes(header + b"\n" + blocks + blocks)
+    result = inline(loaded, tmp_path / "s.h5")
+    assert result.resumed == 4
+    assert (tmp_path / "s.h5").read_bytes() == (tmp_path / "expected.h5").read_bytes()
+
+
 def test_every_bit_of_the_place_of_a_block_is_part_of_its_checksum(tmp_path: Path) -> None:
     loaded = write_sweep(tmp_path, frictions(20))
     interrupted(loaded, tmp_path / "s.h5", limit=4, task_size=1)

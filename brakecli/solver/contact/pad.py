@@ -17,6 +17,9 @@ from brakecli.solver.roughness import Surface, height
 NODES_PER_WAVE = 16
 """Nodes per shortest wavelength that `nodes` is chosen for; measured in tests/solver/test_contact.py."""
 
+PIECE = 100_000
+"""Pairs of waves that tables are made of at a time: signals are heard in between."""
+
 
 def default_nodes(half_length: float, shoe: Surface, wheel: Surface) -> int:
     """Quadrature nodes for the shortest wavelength of both surfaces, at least 64, a multiple of 64."""
@@ -94,11 +97,14 @@ def _node_tables(a: float, shoe: Surface, wheel: Surface, nodes: int) -> tuple[F
     xi = -a + spacing * (np.arange(nodes + 2) - 0.5)
 
     def mean(f: Surface) -> Floats:
-        return (f.g * np.sinc(f.omega * spacing / (2.0 * np.pi)))[:, None]
+        return f.g * np.sinc(f.omega * spacing / (2.0 * np.pi))
 
-    waves = np.outer(wheel.omega, xi)
-    f1 = np.sum(mean(shoe) * np.sin(np.outer(shoe.omega, xi) + shoe.phase[:, None]), axis=0)
-    return f1, mean(wheel) * np.sin(waves), mean(wheel) * np.cos(waves)
+    f1, sines, cosines = np.zeros(xi.size), *np.empty((2, wheel.g.size, xi.size))
+    for g, omega, phase in zip(mean(shoe), shoe.omega, shoe.phase, strict=True):  # signals are heard between waves
+        f1 += g * np.sin(omega * xi + phase)
+    for i, (g, omega) in enumerate(zip(mean(wheel), wheel.omega, strict=True)):
+        sines[i], cosines[i] = g * np.sin(omega * xi), g * np.cos(omega * xi)
+    return f1, sines, cosines
 
 
 def _products(a: float, shoe: Surface, wheel: Surface) -> tuple[Floats, Floats, Floats, float, float]:
@@ -109,10 +115,16 @@ def _products(a: float, shoe: Surface, wheel: Surface) -> tuple[Floats, Floats, 
     """
 
     def pair(f: Surface, h: Surface) -> tuple[Floats, Floats]:
-        minus = np.sinc(np.subtract.outer(f.omega, h.omega) * a / np.pi)
-        plus = np.sinc(np.add.outer(f.omega, h.omega) * a / np.pi)
-        g = a * np.outer(f.g, h.g)
-        return g * (minus - plus), g * (minus + plus)  # ∫ sin sin, ∫ cos cos
+        """∫ sin sin and ∫ cos cos."""
+        sines, cosines = np.empty((2, f.g.size, h.g.size))
+        rows = 1 + PIECE // (1 + h.g.size)
+        for i in range(0, f.g.size, rows):
+            part = slice(i, i + rows)
+            minus = np.sinc(np.subtract.outer(f.omega[part], h.omega) * a / np.pi)
+            plus = np.sinc(np.add.outer(f.omega[part], h.omega) * a / np.pi)
+            g = a * np.outer(f.g[part], h.g)
+            sines[part], cosines[part] = g * (minus - plus), g * (minus + plus)
+        return sines, cosines
 
     sin_1, cos_1 = np.sin(shoe.phase), np.cos(shoe.phase)
     ss, cc = pair(wheel, wheel)
