@@ -1,5 +1,6 @@
 """One run, from a case to a finished result file: what `brakecli run` does."""
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import astuple, dataclass
 from functools import partial
@@ -93,7 +94,7 @@ def run(
                 raise FloatingPointError("an energy overflows")
             history = History(system.interval, result.rows("history"), partial(result.read, "history"))
             verdict = verdict_on(history, motion.system, motion.work.failure_sentence)
-            top = _write_spectrum(result, history, verdict.start)
+            top = _write_spectrum(result, history, verdict)
             warnings = (*found.warnings, *_warnings(motion, certificate))
             shown = top, warnings, *modelled(motion)
             report = RunReport(loaded.case.title, output, verdict, motion, found, certificate, *shown)
@@ -150,14 +151,16 @@ def _warnings(motion: Motion, certificate: Certificate | None) -> Iterator[str]:
         yield f"solver.tolerance: {certificate.sentence()}"
 
 
-def _write_spectrum(result: ResultFile, history: History, start: int) -> float | None:
-    """Write the spectra of the samples from `start` on; the frequency (Hz) of the highest peak of vx."""
-    lines = spectrum(history, start)
+def _write_spectrum(result: ResultFile, history: History, verdict: Verdict) -> float | None:
+    """Write the spectra of the samples that a verdict judges; the frequency (Hz) of the highest peak of vx."""
+    lines = spectrum(history, verdict.start)
     result.axis("spectrum", fields.FREQUENCY, lines.frequency)
     for name, density in lines.density.items():
         result.variable("spectrum", fields.SPECTRUM[name], ("frequency",), density)
     result.set_attributes(values_of(fields.WELCH, lines), "spectrum")
-    return peak(lines.frequency, lines.density["vx"], (history.samples - start) * history.interval)
+    strongest = min(verdict.evidence["line_frequencies"][:1], default=math.inf)
+    duration = (history.samples - verdict.start) * history.interval
+    return peak(lines.frequency, lines.density["vx"], duration, strongest)
 
 
 def _write_unconverged(result: ResultFile, events: NDArray[np.float64]) -> None:

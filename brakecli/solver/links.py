@@ -1,6 +1,7 @@
 """The coefficients of (6)-(7) from the two inclined links, and the frequencies that follow from them."""
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
@@ -32,6 +33,7 @@ def coefficients(
     return Coefficients(mass, *tensor(b_1, b_2), *tensor(c_1, c_2), sin_beta, cos_beta, phi)
 
 
+@lru_cache(maxsize=4)
 def natural_frequencies(c: Coefficients, contact_stiffness: float) -> tuple[float, float]:
     """Undamped natural frequencies (Hz, rising) of the shoe on its links and a contact stiffness (N/m)."""
     stiffness = np.array([[c.c_xx, c.c_xy], [c.c_xy, c.c_yy + contact_stiffness]])

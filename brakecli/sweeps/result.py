@@ -131,9 +131,13 @@ def _values(axis: Axis) -> list[Any]:
 def _hysteresis(journal: Journal) -> NDArray[Any]:
     """Where the motions on the way up and on the way down differ (1)."""
     regime = journal.column("regime")
-    lasting = (regime != b"damped").any(axis=0)
-    differ = (regime[0] != regime[1]) | (_apart(journal) & lasting)
+    differ = (regime[0] != regime[1]) | (_apart(journal) & _lasting(journal))
     return np.asarray(~_unknown(journal) & differ, dtype=np.int64)
+
+
+def _lasting(journal: Journal) -> NDArray[np.bool_]:
+    """Where the motion of a direction is not damped."""
+    return np.asarray((journal.column("regime") != b"damped").any(axis=0))
 
 
 def _unknown(journal: Journal) -> NDArray[np.bool_]:
@@ -156,8 +160,12 @@ def _on_hysteresis(journal: Journal, hysteresis: NDArray[Any]) -> Iterator[str]:
         yield f"hysteresis at {count} of {hysteresis.size} points: {places}{' …' if count > 3 else ''}"
     known = hysteresis.size - int(_unknown(journal).sum())
     if known and not count:
-        those = "" if known == hysteresis.size else f" at the {known} points that are decided"
-        yield f"no hysteresis{those}: the motion is the same on the way up and on the way down"
+        those = f" at the {known} points that are decided" if known < hysteresis.size else ""
+        same = "the motion is the same on the way up and on the way down"
+        if damped := int((~_unknown(journal) & ~_lasting(journal)).sum()):
+            both = "damped on the way up and on the way down"
+            same = both if damped == known else f"{both} at {damped} of them, and {same} at the others"
+        yield f"no hysteresis{those}: {same}"
     if known < hysteresis.size:
         apart = int((_unknown(journal) & _apart(journal)).sum())
         differ = f"; the amplitudes of the two ways differ at {apart} of them" if apart else ""

@@ -209,3 +209,21 @@ def test_lines_of_the_roughness_are_distinguished_from_others() -> None:
     evidence = classify(made(both), Context(2.0, True, lines)).evidence
     found = dict(zip(evidence["line_frequencies"], evidence["line_forced"], strict=True))
     assert {round(frequency): flag for frequency, flag in found.items()} == {100: 1.0, 151: 0.0}
+
+
+@pytest.mark.parametrize(
+    ("rate", "undamped", "settled"), [(0.1, False, False), (5.0, False, True), (5.0, True, False)]
+)
+def test_what_small_disturbances_outlast_is_not_settled(rate: float, undamped: bool, settled: bool) -> None:
+    known = Context(2.0, undamped=undamped, growth=lambda: rate)
+    verdict = classify(made(np.sin(2 * np.pi * 151.0 * TIME)), known)
+    assert (verdict.regime, verdict.settled) == (Regime.QUASI_HARMONIC, settled)
+
+
+def test_bands_whose_frequency_wanders_hold_no_vibration() -> None:
+    """Frequencies drawn for every tenth of a second: bands hold nearly all, but cycles differ."""
+    for swing, regime in ((0.002, Regime.QUASI_HARMONIC), (0.15, Regime.UNDECIDED)):
+        drawn = 1.0 + swing * np.random.default_rng(4).uniform(-1.0, 1.0, 20)
+        frequency = 150.0 * np.interp(TIME, np.linspace(0.0, TIME[-1], 20), drawn)
+        verdict = classify(made(np.sin(2 * np.pi * np.cumsum(frequency) * INTERVAL)), Context(2.0))
+        assert verdict.regime is regime, verdict.reasons

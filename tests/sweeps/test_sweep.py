@@ -238,8 +238,8 @@ def test_no_hysteresis_is_said_of_points_alone_that_are_decided(tmp_path: Path) 
         found = run(folder, 'case = "tiny.toml"\n' + axis.format(values), GROWING).findings
         sentences.append("; ".join(found.sentences))
     decided, some, none = sentences
-    assert decided == "no hysteresis: the motion is the same on the way up and on the way down"
-    assert "no hysteresis at the 1 points that are decided" in some
+    assert decided == "no hysteresis: damped on the way up and on the way down"
+    assert "no hysteresis at the 1 points that are decided: damped" in some
     assert "hysteresis is not known at 1 points" in some
     assert "no hysteresis" not in none
     assert "hysteresis is not known at 2 points" in none

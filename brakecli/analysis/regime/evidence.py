@@ -28,6 +28,7 @@ _FULL = 1.0 - 1e-9  # part of the pad that touches in full contact, but for roun
 _ENDS = (ContactState.STICK, ContactState.SEPARATED)
 _MOST_COVERED = 0.2  # part of the band on lines, beyond which they are not told from what lies beside them
 _LEAST_FORCED = 0.02  # of what lies beside the lines: that much of a decaying motion leaks onto them
+_MIDDLE = np.array([1.0 / 6.0, 0.5, 5.0 / 6.0])  # quantiles
 _TREND = 3.0  # standard errors of the slope of ten medians, beyond which an amplitude drifts
 _SAME = 0.02  # squared difference, over twice the variance, between one period of vx and the next
 
@@ -180,8 +181,9 @@ def _near(lines: Sequence[float], frequencies: NDArray[Any]) -> NDArray[np.bool_
 
 def median(values: Array) -> tuple[float, float]:
     """Median, and half of the range of the middle two thirds."""
-    low, middle, high = np.quantile(values, [1.0 / 6.0, 0.5, 5.0 / 6.0])
-    return float(middle), 0.5 * float(high - low)
+    last = len(values) - 1
+    low, middle, high = np.interp(last * _MIDDLE, np.arange(last + 1), np.sort(values)).tolist()
+    return middle, 0.5 * (high - low)
 
 
 def swings(part: Part, edges: Array) -> Array:
@@ -206,8 +208,19 @@ class Envelope:
     def __init__(self, history: History) -> None:
         """Take a history of at least `FEWEST_SAMPLES`."""
         edges = np.linspace(0, history.samples, WINDOWS + 1).astype(int)
-        windows = [Part(history, begin, end) for begin, end in pairwise(edges)]
-        self.vx, *self._x = np.array([(window.deviation("vx"), *window.extremes("x")) for window in windows]).T
+        if history.samples > _LONGEST:
+            windows = [Part(history, begin, end) for begin, end in pairwise(edges)]
+            self.vx, *self._x = np.array([(each.deviation("vx"), *each.extremes("x")) for each in windows]).T
+        else:
+            (x, vx), starts, counts = (
+                (history.read(n, 0, history.samples) for n in ("x", "vx")),
+                edges[:-1],
+                np.diff(edges),
+            )
+            self._x = [each.reduceat(x, starts) for each in (np.minimum, np.maximum)]
+            away = vx - np.repeat(vx[starts], counts)
+            mean, square = (np.add.reduceat(each, starts) / counts for each in (away, away * away))
+            self.vx = np.sqrt(np.maximum(square - mean**2, 0.0))
         self.final, self.largest = float(np.mean(self.vx[_LAST])), float(self.vx.max())
         self.evidence = {"envelope_final": self.final, "envelope_largest": self.largest}
         half, centres = slice(WINDOWS // 2, None), np.array(0.5 * (edges[:-1] + edges[1:]) * history.interval)
@@ -271,8 +284,14 @@ def cycles_of(part: Part, slip: ContactState | None = None) -> Cycles | None:
     state = part.history.read("state", part.stop - len(velocity), part.stop)
     sticks = np.flatnonzero((state[1:] == ContactState.STICK) & (state[:-1] != ContactState.STICK)) + 1
     per_cycle = np.histogram(sticks, crossings)[0]
-    pieces = [state[int(begin) : int(end) + 1] for begin, end in pairwise(groups)]
-    stick, loss = (np.array([float(np.mean(piece == which)) for piece in pieces]) for which in _ENDS)
+    begin, end = groups[:-1].astype(int), groups[1:].astype(int) + 1
+
+    def shares(found: NDArray[np.bool_]) -> Array:
+        """Part of the samples of each group."""
+        count = np.concatenate([[0], np.cumsum(found)])
+        return np.asarray((count[end] - count[begin]) / (end - begin))
+
+    (stick, stick_spread), (loss, loss_spread) = (median(shares(state == which)) for which in _ENDS)
     frequency = 1.0 / (period * part.history.interval)
     first, *higher = (part.share([n * frequency]) for n in range(1, _HARMONICS + 1))
     evidence = {
@@ -285,20 +304,21 @@ def cycles_of(part: Part, slip: ContactState | None = None) -> Cycles | None:
         "stick_cycles": float(np.mean(per_cycle > 0)),
         "stick_episodes_per_cycle": float(np.mean(per_cycle)),
         "frequency_spread": frequency * period_spread / period,
-        "stick_spread": median(stick)[1],
-        "contact_loss_spread": median(loss)[1],
+        "stick_spread": stick_spread,
+        "contact_loss_spread": loss_spread,
     }
-    limited = float(np.mean([bool(np.any(piece != slip)) for piece in pieces]))
+    limited = float(np.mean(shares(state != slip) > 0.0))
     sizes = swings(part, crossings)
-    first, *_, last = (float(np.median(third)) for third in np.array_split(sizes, 3) if len(third))
+    first, *_, last = (median(third)[0] for third in np.array_split(sizes, 3) if len(third))
     drift = last / first - 1.0 if first > 0.0 else 0.0
-    groups = np.array([np.median(group) for group in np.array_split(sizes, min(cycles, _GROUPS))])
-    line = np.polynomial.Polynomial.fit(places := np.arange(len(groups)), groups, 1).convert()
-    error = float(np.std(groups - line(places)) / (np.std(places) * np.sqrt(max(len(groups) - 2, 1))))
-    drifts = abs(float(line.coef[-1])) > _TREND * error
+    groups = np.array([median(group)[0] for group in np.array_split(sizes, min(cycles, _GROUPS))])
+    places = np.arange(len(groups)) - 0.5 * (len(groups) - 1)
+    slope = float(places @ groups / (places @ places))
+    rest = groups - groups.mean() - slope * places
+    drifts = abs(slope) > _TREND * float(np.std(rest) / (np.std(places) * np.sqrt(max(len(groups) - 2, 1))))
     force, whole = part.history.read("friction_force", part.stop - len(velocity), part.stop), crossings.astype(int)
     most, least = (each.reduceat(force[: whole[-1]], whole[:-1]) for each in (np.maximum, np.minimum))
     size, spread = median(sizes)
     spread += abs(drift) * size if drifts else 0.0
-    medians = size, spread, median(stick)[0], median(loss)[0]
-    return Cycles(evidence, frequency, *medians, limited, drift, drifts, float(np.median(most - least)))
+    medians = size, spread, stick, loss
+    return Cycles(evidence, frequency, *medians, limited, drift, drifts, median(most - least)[0])

@@ -18,6 +18,7 @@ if TYPE_CHECKING:  # a measured signal needs no compiled code
 # Growth rate times duration
 GROWN = math.log(1e9)  # from which a disturbance grows from rounding to the size of the motion
 _NOTHING = 1e-3  # which may come from the rounding of the eigenvalues
+_RELAXED = 1.0  # within a settled part, from which on what it shows does last
 
 QUARTER = 4.0 / 3.0  # a run whose last quarter is settled, over what comes before
 _ERRORS = 2.0  # standard errors of a mean power
@@ -148,6 +149,21 @@ class ForcedRules:
         return stable and self.context.feeds is not Feeds.FRICTION
 
     @property
+    def _relaxed(self) -> bool:
+        """Whether small disturbances change by a factor of e within the settled part: slower drifts hide in it."""
+        return abs(self.context.growth()) * self._settled_seconds >= _RELAXED
+
+    @property
+    def _relaxing(self) -> float:
+        """Duration (s) of a run in whose last quarter they do."""
+        return 4.0 * _RELAXED / abs(self.context.growth())
+
+    @property
+    def lasts(self) -> bool:
+        """Whether the numbers of the settled part are those of any longer run."""
+        return self.settled and (self.theory is not None or (self._relaxed and not self.context.undamped))
+
+    @property
     def _larger(self) -> bool:
         return 0.0 < _LARGER * self._expected < self.last.deviation("x")
 
@@ -203,7 +219,7 @@ class ForcedRules:
         slow = self._slowest(self.settled_part.amplitude("x"))
         if self._settled_seconds < 2.0 * slow:
             return self._too_short(slow)
-        if not self.settled and (growth := self.context.growth()) < 0.0:
+        if not self.lasts and (growth := self.context.growth()) < 0.0:
             needed = max(QUARTER * (self.duration - 3.0 / growth), self._long_enough(slow))
             text += f"; run at least {needed:.3g} s to see the amplitude that lasts"
         return Decision(text, Regime.DAMPED, Excitation.FORCED)

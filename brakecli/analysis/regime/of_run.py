@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -75,14 +75,19 @@ def context(system: System) -> Context:
     belt, c = float(value_at(system.belt, system.sampled_duration)), system.coefficients
     compression = float(np.abs(system.load["value"]).max()) / (c.c_yy + system.contact_stiffness)
 
+    @cache
     def growth_rate() -> float:  # by the mean stiffness of the contact
         with suppress(CaseError):
             stiffness = steady_sliding(system, belt=belt).stiffness
             return growth(c, stiffness, math.copysign(c.phi, belt) if belt else 0.0)
         return 0.0
 
-    theory, turns, highest = linear_theory(system, belt), system.wheel.turns.tolist(), 0.5 / system.interval
-    swings = np.abs(theory.waves[:, 0]) if theory else np.ones(len(turns))
+    theory, turns, highest = (
+        cache(partial(linear_theory, system, belt)),
+        system.wheel.turns.tolist(),
+        0.5 / system.interval,
+    )
+    swings = np.abs(known.waves[:, 0]) if turns and (known := theory()) else np.ones(len(turns))
     waves = tuple((abs(belt) * turn, float(swing)) for turn, swing in zip(turns, swings, strict=True))
     fastest = compression * system.natural_frequencies[1]
     return Context(
@@ -97,7 +102,7 @@ def context(system: System) -> Context:
         frictionless=c.phi == 0.0,
         undamped=is_undamped(c),
         growth=growth_rate,
-        linear=lambda: theory,
+        linear=theory,
         powers=partial(_powers, system, belt),
     )
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:  # a measured signal needs no compiled code
 
 _NEAR = 0.3  # by which the amplitude of a motion that stick or loss of contact limits may still change
 _DRIFT = 5e-3  # by which the amplitude of a motion without stick may change where sliding is stable
+_SPREAD = 0.05  # of the frequency of cycles, beyond which three bands hold no vibration
 _LONGER = 1.4  # a run whose last quarter and the window before it are settled, over what comes before
 _FAR = 0.3  # rad, of a wave, by which what the shoe adds moves it
 _DEFAULT = Thresholds()
@@ -102,7 +103,7 @@ class _Rules(ForcedRules):
         """The forced motion that lasts, with the settled part in which the shoe's own part has gone."""
         forced, own, time = theory.parts(*self.whole.places())
         left = np.array([0.5 * float(np.ptp(part)) for part in np.array_split(own, WINDOWS)])
-        end = float(left[-10:].mean())
+        end = float(left[-10:].max())
         slope = np.polyfit(np.arange(WINDOWS // 2), np.log(np.maximum(left[WINDOWS // 2 :], 1e-300)), 1)[0]
         if slope * WINDOWS > 1.0 and end > self.limits.settled_within * forced:
             return None  # the passing waves excite what the mean stiffness damps
@@ -113,8 +114,8 @@ class _Rules(ForcedRules):
         if first <= WINDOWS - 10 and self.duration - begin * self.history.interval >= 2.0 * slow:
             self.settled_part, self.settled = replace(self.whole, start=begin), True
         else:
-            hint = f"; run at least {max(_LONGER * (self.duration + wait), self._long_enough(slow)):.3g} s"
-            hint += " to see only that"
+            needed = max(_LONGER * (self.duration + wait), 1.05 * (self.duration + wait + 2.0 * slow))
+            hint = f"; run at least {needed:.3g} s to see only that"
         chosen = time >= self.settled_part.start * self.history.interval
         self.parts = forced, 0.5 * float(np.ptp(own[chosen]))
         text = f"only the roughness shakes the shoe, by {forced:.3g} m: {decays}{hint}"
@@ -179,7 +180,7 @@ class _Rules(ForcedRules):
         if theory and (decision := self._unfounded(theory, found)):
             return decision
         # The waves cannot force it, and sliding is unstable.
-        certain = self._larger and self.context.growth() > 0.0
+        certain = self._larger and self.context.growth() > 0.0 and self._relaxed
         if self.context.forced and not certain and (self._feeds() is Feeds.UNKNOWN or self._doubtful):
             return self._either()
         if found.drifts and abs(found.drift) > _DRIFT:
@@ -196,10 +197,13 @@ class _Rules(ForcedRules):
         lines = f"{harmonic:.0%} of the energy of vx in one line and its harmonics"
         if harmonic < bands:
             lines = f"{bands:.0%} of the energy of vx in three narrow bands"
-        if stick <= 1.0 - self.limits.stick_cycles and max(harmonic, bands) >= self.limits.harmonic_share:
+        wanders = found.evidence["frequency_spread"] > _SPREAD * found.frequency
+        regular = harmonic if wanders else max(harmonic, bands)
+        if stick <= 1.0 - self.limits.stick_cycles and regular >= self.limits.harmonic_share:
             how = f"with stick in only {stick:.0%} of the cycles" if stick else "without stick"
             return Decision(f"sustained {how}: {lines}", Regime.QUASI_HARMONIC, *own)
         irregular = f"irregular: stick in {stick:.0%} of the cycles, {lines}"
+        irregular += ", but the frequency wanders" if wanders else ""
         return Decision(f"{irregular}; run longer, or look at the spectrum")
 
     def _unfounded(self, theory: "Linear", found: Cycles) -> Decision | None:
@@ -212,6 +216,11 @@ class _Rules(ForcedRules):
         if theory.direction == 0:
             return Decision(
                 "sliding is stable, and no dashpot makes a large vibration settle; a dashpot would decide"
+            )
+        if not self._relaxed:
+            text = f"sliding is stable, but disturbances decay at only {-theory.mode.growth:.2g} 1/s"
+            return Decision(
+                f"{text}, so that the vibration may still die out; run at least {self._relaxing:.3g} s"
             )
         sticks = found.evidence["stick_cycles"] >= self.limits.stick_cycles
         if abs(found.drift) > (self.limits.settled_within if sticks else _DRIFT):
@@ -252,7 +261,8 @@ def classify(history: History, context: Context, thresholds: Thresholds = _DEFAU
     if belt != 0.0:
         evidence["largest_vx_over_belt_speed"] = part.extremes("vx")[int(belt > 0.0)] / belt
     evidence |= part.lines(context.forced) | (context.powers(part) if context.steady else {})
-    forced, own = rules.parts or rules.split() or (None, None)
+    split = rules.parts or rules.split()
+    forced, own = split if split and not (sustained and split[0] > split[1]) else (None, None)
     amplitude, spread = rules.amplitude(decision)
     return Verdict(
         regime=decision.regime,
@@ -269,7 +279,7 @@ def classify(history: History, context: Context, thresholds: Thresholds = _DEFAU
         * (cycles.force_variation if sustained and cycles else torques[1] - torques[0]),
         settled_from=part.start * history.interval,
         start=part.start,
-        settled=rules.settled and decision.regime is not Regime.UNDECIDED,
+        settled=rules.lasts and decision.regime is not Regime.UNDECIDED,
         stick_fraction=cycles.stick_fraction if sustained and cycles else part.fraction(ContactState.STICK),
         contact_loss_fraction=(
             cycles.contact_loss_fraction if sustained and cycles else part.fraction(ContactState.SEPARATED)

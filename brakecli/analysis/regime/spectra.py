@@ -62,12 +62,15 @@ def spectrum(history: History, start: int) -> Spectrum:
     return Spectrum(frequency, {name: total / segments for name, total in densities.items()}, start, segments)
 
 
-def peak(frequency: Array, density: Array, duration: float = math.inf) -> float | None:
+def peak(
+    frequency: Array, density: Array, duration: float = math.inf, strongest: float = math.inf
+) -> float | None:
     """Frequency (Hz) of the highest peak above zero; None where none is resolved.
 
-    That takes three bins below it, and five cycles in the duration (s) of the record.
+    That takes three bins below it, also below the strongest line (Hz) that the whole record shows, and five
+    cycles in the duration (s) of the record.
     """
-    if density.size < 3 or not density[1:].max() > 0.0:
+    if density.size < 3 or not density[1:].max() > 0.0 or strongest < _FEWEST_BINS * frequency[1]:
         return None
     i = 1 + int(np.argmax(density[1:]))
     found = interpolated(frequency, density, i)

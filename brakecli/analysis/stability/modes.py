@@ -7,6 +7,7 @@ the wedge that friction and links form can lock (divergence).
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -48,6 +49,7 @@ def is_undamped(c: Coefficients) -> bool:
     return c.b_xx == 0.0 and c.b_yy == 0.0
 
 
+@lru_cache(maxsize=4)
 def eigensystem(c: Coefficients, contact_stiffness: float, grip: float) -> tuple[Complex, Complex]:
     """The four eigenvalues (1/s) and the displacement parts of their vectors, in columns.
 
