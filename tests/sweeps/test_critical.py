@@ -316,7 +316,7 @@ def test_a_start_that_takes_long_to_settle_is_given_the_time() -> None:
     answer = found(tables, 4.0, 20.0, tolerance=1e-2)
     assert answer.value == pytest.approx(5.683, abs=1e-2)
     assert (answer.sustained, answer.sustained_outcome) == (None, Outcome.SUSTAINED)
-    verdict = verdict_of(make(tables, friction__coefficient=4.0, solver__duration=6.0))
+    verdict = verdict_of(make(tables, friction__coefficient=4.0, solver__duration=16.0))  # as one of 6 s asks
     assert verdict is not None
     assert verdict.regime == "relaxation"
 

@@ -212,11 +212,8 @@ class Envelope:
             windows = [Part(history, begin, end) for begin, end in pairwise(edges)]
             self.vx, *self._x = np.array([(each.deviation("vx"), *each.extremes("x")) for each in windows]).T
         else:
-            (x, vx), starts, counts = (
-                (history.read(n, 0, history.samples) for n in ("x", "vx")),
-                edges[:-1],
-                np.diff(edges),
-            )
+            x, vx = (history.read(name, 0, history.samples) for name in ("x", "vx"))
+            starts, counts = edges[:-1], np.diff(edges)
             self._x = [each.reduceat(x, starts) for each in (np.minimum, np.maximum)]
             away = vx - np.repeat(vx[starts], counts)
             mean, square = (np.add.reduceat(each, starts) / counts for each in (away, away * away))
@@ -263,18 +260,7 @@ def cycles_of(part: Part, slip: ContactState | None = None) -> Cycles | None:
     matter how samples fall into each cycle.
     """
     velocity = part.last("vx")
-    crossings = upward_crossings(velocity, 0.3 * float(velocity.std()))
-    if len(crossings) < 2:
-        return None
-    period = float(crossings[-1] - crossings[0]) / (len(crossings) - 1)
-    close = 2.0 * _SAME * float(velocity.var())
-    for rises in range(1, _MOST_RISES_PER_CYCLE + 1):  # after which the motion repeats
-        shift = round(rises * period)
-        if 0 < shift < len(velocity) // 2 and np.mean((velocity[shift:] - velocity[:-shift]) ** 2) <= close:
-            break
-    else:
-        rises = 1
-    crossings = crossings[::rises]
+    crossings, rises = _beginnings(velocity)
     if len(crossings) < 4:
         return None
     cycles = len(crossings) - 1
@@ -309,16 +295,35 @@ def cycles_of(part: Part, slip: ContactState | None = None) -> Cycles | None:
     }
     limited = float(np.mean(shares(state != slip) > 0.0))
     sizes = swings(part, crossings)
-    first, *_, last = (median(third)[0] for third in np.array_split(sizes, 3) if len(third))
-    drift = last / first - 1.0 if first > 0.0 else 0.0
-    groups = np.array([median(group)[0] for group in np.array_split(sizes, min(cycles, _GROUPS))])
-    places = np.arange(len(groups)) - 0.5 * (len(groups) - 1)
-    slope = float(places @ groups / (places @ places))
-    rest = groups - groups.mean() - slope * places
-    drifts = abs(slope) > _TREND * float(np.std(rest) / (np.std(places) * np.sqrt(max(len(groups) - 2, 1))))
+    drift, drifts = _drift(sizes)
     force, whole = part.history.read("friction_force", part.stop - len(velocity), part.stop), crossings.astype(int)
     most, least = (each.reduceat(force[: whole[-1]], whole[:-1]) for each in (np.maximum, np.minimum))
     size, spread = median(sizes)
     spread += abs(drift) * size if drifts else 0.0
     medians = size, spread, stick, loss
     return Cycles(evidence, frequency, *medians, limited, drift, drifts, median(most - least)[0])
+
+
+def _beginnings(velocity: Array) -> tuple[Array, int]:
+    """Where cycles begin, and how many rises of the velocity each holds."""
+    crossings = upward_crossings(velocity, 0.3 * float(velocity.std()))
+    if len(crossings) < 2:
+        return crossings, 1
+    period = float(crossings[-1] - crossings[0]) / (len(crossings) - 1)
+    close = 2.0 * _SAME * float(velocity.var())
+    for rises in range(1, _MOST_RISES_PER_CYCLE + 1):  # after which the motion repeats
+        shift = round(rises * period)
+        if 0 < shift < len(velocity) // 2 and np.mean((velocity[shift:] - velocity[:-shift]) ** 2) <= close:
+            return crossings[::rises], rises
+    return crossings, 1
+
+
+def _drift(sizes: Array) -> tuple[float, bool]:
+    """By which the size of cycles changes, over itself, and whether that is more than chance."""
+    first, *_, last = (median(third)[0] for third in np.array_split(sizes, 3) if len(third))
+    groups = np.array([median(group)[0] for group in np.array_split(sizes, min(len(sizes), _GROUPS))])
+    places = np.arange(len(groups)) - 0.5 * (len(groups) - 1)
+    slope = float(places @ groups / (places @ places))
+    rest = groups - groups.mean() - slope * places
+    error = float(np.std(rest) / (np.std(places) * np.sqrt(max(len(groups) - 2, 1))))
+    return last / first - 1.0 if first > 0.0 else 0.0, abs(slope) > _TREND * error
