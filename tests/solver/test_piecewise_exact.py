@@ -16,7 +16,7 @@ from brakecli.solver.quantities import ContactState, Failure
 from tests.campaign import counts
 from tests.examples import COULOMB, SQUEAL, make
 from tests.solver.piecewise_exact import PiecewiseExact
-from tests.solver.test_event_driven import error, flat_case
+from tests.solver.test_event_driven import error, flat_case, mirrored
 
 EXACT = Method("piecewise-exact")
 SUITE, CAMPAIGN = 8, 200
@@ -242,12 +242,7 @@ def test_a_shoe_without_springs_flies_and_lands() -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_the_mirror_image_of_a_motion_is_a_motion(seed: int) -> None:
     case, _ = flat_case(np.random.default_rng(seed), 1e-10)
-    mirrored = {**case, "wheel": {**case["wheel"], "angular_speed": -case["wheel"]["angular_speed"]}}
-    for link in ("link1", "link2"):
-        mirrored[link] = {**case[link], "angle_deg": -case[link]["angle_deg"]}
-    initial = case["initial"]
-    mirrored["initial"] = {**initial, "x": -initial["x"], "vx": -initial["vx"]}
-    one, other = motion(case).rows, motion(mirrored).rows
+    one, other = motion(case).rows, motion(mirrored(case)).rows
     np.testing.assert_array_equal(other[:, [1, 3, 5, 6]], one[:, [1, 3, 5, 6]])
     np.testing.assert_array_equal(other[:, [0, 2, 4]], -one[:, [0, 2, 4]])
 

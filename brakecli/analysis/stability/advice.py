@@ -15,6 +15,7 @@ from brakecli.analysis.stability.modes import growth
 from brakecli.analysis.stability.report import LARGEST_FRICTION, changes, mean_stiffness
 from brakecli.analysis.stability.search import bisect
 from brakecli.case.case import Case
+from brakecli.case.read import put
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError, UsageError
 from brakecli.solver.links import natural_frequencies
@@ -138,10 +139,8 @@ def advised_keys(case: Case, patterns: Sequence[str]) -> list[Path]:
 
 def changed(case: Case, path: Path, value: Number) -> Case | None:
     """The case with another value; None where that is not valid."""
-    data = table = case.model_dump(exclude_unset=True)
-    for key in path[:-1]:
-        table = table.setdefault(key, {})
-    table[path[-1]] = value
+    data = case.model_dump(exclude_unset=True)
+    put(data, path, value, Case, kept=())
     with suppress(ValidationError):
         return Case.model_validate(data)
     return None
