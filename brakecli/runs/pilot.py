@@ -11,7 +11,7 @@ from brakecli.solver.motion import Stepping
 from brakecli.solver.system import System
 
 SECONDS = 0.15
-"""Processor time of a pilot run, which no other program disturbs, as long as single steps are short beside it."""
+"""Processor time (s) after which a pilot run stops, at the end of its step. Other programs do not change it."""
 MOST_EVALUATION, MOST_AT_NODES = 0.02, 2e-3
 """Guessed time (s) of an evaluation of the contact, exact and by nodes, beyond which no step is tried."""
 SECOND_RUN = EVENT_RATIO**-0.125  # what the second of two event-driven runs costs over the first
