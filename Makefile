@@ -18,7 +18,7 @@ PYTEST_ARGS ?=
 .DELETE_ON_ERROR:
 .NOTPARALLEL: # two installations into one .venv at a time would collide
 .PHONY: help demo test campaign lowest lint format types imports derivations tables cases check \
-    accuracy promises picture lock-in paper extremes bench-sweep clean
+    accuracy promises promise-cost picture lock-in paper extremes bench-sweep clean
 
 help: ## list the targets (this text)
 	@echo "make TARGET, where TARGET is one of"
@@ -127,6 +127,9 @@ paper: $(DEV_STAMP) ## reproduce the paper's claims into docs/paper-claims.md, w
 
 promises: $(DEV_STAMP) ## random cases at five tolerances: the tables of docs/accuracy.md (some minutes)
 	$(BIN)/python -m benchmarks.promises
+
+promise-cost: $(DEV_STAMP) ## a tolerance beside the cheapest entry that keeps it: a table of docs/accuracy.md (15 minutes)
+	$(BIN)/python -m benchmarks.promise_cost 80
 
 bench-sweep: $(DEV_STAMP) ## what a sweep costs beside its points; needs two idle cores (some minutes)
 	$(BIN)/python -m benchmarks.sweep

@@ -1,7 +1,7 @@
 """Choose scheme, nodes and step so that the error of the histories stays below the requested tolerance.
 
-The error is never taken from one run: two runs of different fineness are compared, and the finer one is the
-answer. What they differ by is the error of the coarser one, so the answer is better than it is said to be.
+The error is never taken from one run: runs of different fineness are compared, and the finest one is the answer.
+What two of them differ by is the error of the coarser one, so the answer is better than it is said to be.
 """
 
 import math
@@ -22,13 +22,16 @@ from brakecli.solver.system import System
 FIRST_EVENT_TOLERANCE, LEAST_EVENT_TOLERANCE = 1e-6, 1e-13
 EVENT_RATIO = 1e-2  # from one tolerance of the event-driven scheme to the next: its errors fall by about as much
 EVENT_MARGIN = 1e-3  # largest first tolerance over the requested one: no event may be missed twice
-LAYERED: tuple[dict[str, Any], ...] = (  # what a ladder is tried with, the second where friction turns
+LAYERED: tuple[dict[str, Any], ...] = (  # cheapest by compare-schemes: in slip, and where friction turns
     {"scheme": "three-layer", "theta": NUMEROV},
     {"scheme": "two-layer", "theta": HALF},
 )
-LAYERED_FROM = 1e-6  # tolerance from which on a ladder may be cheaper than events, where surfaces open
-FIRST_TURN, LONGEST_TURN = 15.0, 0.4  # of the fastest motion in a first step (rad): its square over the tolerance,
-# so that two halvings leave a (1/12, 10/12, 1/12) run in slip a sixth of the tolerance, and the longest
+LAYERED_FROM = 1e-5  # tolerance from which on a ladder may be cheaper than events, where surfaces open
+FIRST_TURN = (
+    15.0  # square of the turn (rad) of the fastest motion in a first step, over the tolerance: two halvings
+)
+# leave an error of a sixth of the tolerance, as (1/12, 10/12, 1/12) takes a sixth of that square off a velocity
+LONGEST_TURN = 0.4  # rad, in a first step
 FIRST_PER_WAVE = 8.0  # first steps to a passing wave, at least
 FINEST_FIRST = 4e-4  # tolerance from which on a quarter of the usual nodes is enough to begin with
 MOST_SPARSE = 4  # halvings of a first step before it has reached the sample interval, at most
@@ -39,7 +42,7 @@ JUMPS = 3.0  # what estimates are multiplied by where friction turns, or speed o
 WORTH_A_PILOT = 1.0  # guessed time (s) of the next runs from which on they are weighed against event-driven ones
 PILOT = 32  # duration of the case over that of the event-driven pilot run, which counts the work of such runs
 # Time is guessed from counted work, not measured, so that a case gives the same bytes wherever it runs.
-FIRST_BLOCK = 5e-3  # guessed time (s) of the first block of a run, if each step took one evaluation of the contact
+FIRST_BLOCK = 5e-3  # guessed time (s) of the first block of a run whose steps take one evaluation of the contact
 MOST_SECONDS = 900.0  # time of the loop after which no finer run is begun
 SHORTER = 0.7  # step of the second of two piecewise-exact runs over that of the first
 ROUNDING_MARGIN = 4.0  # the error of such a run over what two of them differ by, at most
@@ -93,8 +96,8 @@ def certify(system: System, progress: Progress = lambda samples: None) -> Certif
         if certificate.certified or not motion.work.turns:
             break
     if not found or (not found[0].certificate.certified and spent < MOST_SECONDS):
-        found.append(_by_events(system, progress))
-        spent += found[-1].motion.work.solve_seconds
+        found.insert(0, _by_events(system, progress))
+        spent += found[0].motion.work.solve_seconds
     best = min(found, key=lambda each: each.certificate.estimated_error)
     best.motion.work.solve_seconds = spent
     return best
@@ -103,8 +106,8 @@ def certify(system: System, progress: Progress = lambda samples: None) -> Certif
 def _run(system: System, progress: Progress, **changes: Any) -> Motion:
     """The motion by the system's method with these changes."""
     system = replace(system, method=replace(system.method, **changes))
-    per_sample = system.per_sample
-    block = 1 + int(FIRST_BLOCK / (evaluation_seconds(system) + 1e-6))
+    per_sample, each = system.per_sample, evaluation_seconds(system) + 1e-6
+    block = 1 if system.method.own_steps else 1 + int(FIRST_BLOCK / each)
     return solve(system, progress=lambda steps: progress(steps // per_sample), first_block=block)
 
 
