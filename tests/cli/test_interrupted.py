@@ -167,9 +167,7 @@ def test_a_signal_ends_every_command_on_many_waves_at_any_time(here: Path, comma
 def test_more_waves_than_memory_are_refused_by_every_command(here: Path) -> None:
     (here / "tiny.toml").write_text(many_waves(16000, 2e-3))
     for command in ("run", "check", "stability"):
-        said = brakecli(command, "tiny.toml", cwd=here).told(
-            3, "4.1 GB of memory", "number of waves in roughness"
-        )
+        said = brakecli(command, "tiny.toml", cwd=here).told(3, "4.1 GB of memory", "number of waves in roughness")
         assert said.count("16000 waves") == 1
 
 
