@@ -38,7 +38,7 @@ MOST_SPARSE = 4  # halvings of a first step before it has reached the sample int
 MOST_DOUBLINGS = 12  # of steps and nodes each
 FIRST_ORDER = 9.0  # over a single difference: thrice what first order leaves, and as much again by luck
 STEPS_BETWEEN_KNOTS = 4  # of speed or load, at least: with fewer, no run sees what happens there
-JUMPS = 3.0  # what estimates are multiplied by where friction turns, or speed or load have knots
+JUMPS = 3.0  # what the estimate of steps is multiplied by where friction turns, or speed or load have knots
 WORTH_A_PILOT = 1.0  # guessed time (s) of the next runs from which on they are weighed against event-driven ones
 PILOT = 32  # duration of the case over that of the event-driven pilot run, which counts the work of such runs
 # Time is guessed from counted work, not measured, so that a case gives the same bytes wherever it runs.
@@ -237,14 +237,14 @@ def _by_steps(
         used = quadrature if nodes and _opens(run) else _Axis(last=0.0)
         margin = JUMPS if run.work.turns or len(system.belt) + len(system.load) > 2 else 1.0
         jump = _jump_error(run)
-        error = math.inf if failed else max(margin * (steps.error + used.error), jump)
+        error = math.inf if failed else max(margin * steps.error + used.error, jump)
         short = run.system.step <= longest
         if certified := short and error <= wanted:
             break
         coarse = failed or not short or jump > wanted
-        finer = steps if coarse or steps.error >= used.error else quadrature
+        finer = steps if coarse or margin * steps.error >= used.error else quadrature
         late = run.system.interval == system.interval and seconds + 2.2 * spent > MOST_SECONDS
-        more = 2.0 * math.prod(axis.more(wanted / (2.0 * margin)) for axis in (steps, used))
+        more = 2.0 * steps.more(0.5 * wanted / margin) * used.more(0.5 * wanted)
         if finer.doublings == MOST_DOUBLINGS or late or is_left(run, more):
             break
         finer.doublings += 1
