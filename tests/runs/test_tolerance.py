@@ -297,6 +297,12 @@ def test_the_coulomb_oscillator_ends_where_it_must() -> None:
     assert found.motion.rows[-1, 0] == pytest.approx(15.0 - 205.0**0.5, abs=1e-8 * 15.0)
 
 
+def test_a_shoe_that_sticks_does_not_turn_within_a_step() -> None:
+    work = simulate(make(SQUEAL, friction__coefficient=0.7, solver__scheme="two-layer", solver__duration=0.3)).work
+    assert work.turns > 100
+    assert work.crossing == 0.0
+
+
 @pytest.mark.parametrize("later", [0.0, 1e-9, 0.3, 0.9])
 def test_friction_that_turns_at_a_time_that_all_steps_share_is_not_overlooked(later: float) -> None:
     """The oscillator turns at atan(6/11) + π, so much of a sample interval behind a sample."""
