@@ -14,6 +14,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from brakecli.solver.compile import config
+
 SCHEMES = ("two-layer", "three-layer", "event-driven")
 EVALUATORS = ("closed-form", "midpoint", "exact", "auto")
 PAIRS = [pair for pair in product(SCHEMES, EVALUATORS) if pair != ("event-driven", "midpoint")]
@@ -71,18 +73,15 @@ def histories() -> dict[str, NDArray[np.float64]]:
 
 @pytest.fixture(scope="module")
 def both(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], dict[str, Any]]:
-    folder = tmp_path_factory.mktemp("interpreted")
-    results = []
-    for disabled in ("0", "1"):
-        path = folder / f"{disabled}.npz"
-        environment = {**os.environ, "NUMBA_DISABLE_JIT": disabled}
-        root = Path(__file__).parents[2]
-        command = [sys.executable, "-W", "error", "-m", "tests.solver.test_interpreted", str(path)]
-        done = subprocess.run(command, env=environment, cwd=root, capture_output=True, text=True, check=False)
-        assert done.returncode == 0, done.stderr
-        with np.load(path) as file:
-            results.append(dict(file))
-    return results[0], results[1]
+    assert not config.DISABLE_JIT
+    path = tmp_path_factory.mktemp("interpreted") / "interpreted.npz"
+    environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
+    root = Path(__file__).parents[2]
+    command = [sys.executable, "-W", "error", "-m", "tests.solver.test_interpreted", str(path)]
+    done = subprocess.run(command, env=environment, cwd=root, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    with np.load(path) as file:
+        return histories(), dict(file)
 
 
 @pytest.mark.parametrize(("scheme", "evaluator"), PAIRS)
