@@ -12,7 +12,6 @@ from brakecli.solver import contact
 from brakecli.solver.contact.closed_form import CLEAR, FULL, coverage
 from brakecli.solver.contact.pad import NODES_PER_WAVE, build_layer, build_pad, default_nodes
 from brakecli.solver.roughness import Surface, surface
-from tests.campaign import campaign
 from tests.solver.rough_gap import EPS, EVALUATORS, Gap, Wave, gaps, outputs
 
 # Case B of the roughness: five waves on each surface.
@@ -332,7 +331,7 @@ def test_exact_finds_a_patch_however_narrow(depth: float) -> None:
         assert result.normal_force == pytest.approx(4 / 3 * d * half * gap.k, rel=tolerance)
 
 
-@pytest.mark.parametrize("depth", [1e-6, 1e-12, *(pytest.param(depth, marks=campaign) for depth in (1e-3, 1e-9))])
+@pytest.mark.parametrize("depth", [1e-3, 1e-6, 1e-9, 1e-12])
 def test_exact_finds_every_patch_and_hole_at_grazing_extremes(depth: float) -> None:
     """Heights at which some extreme of the gap, high or low, is passed by a hair on either side."""
     rng = np.random.default_rng(23)
@@ -344,10 +343,9 @@ def test_exact_finds_every_patch_and_hole_at_grazing_extremes(depth: float) -> N
         for xi in inner:
             for side in (-1.0, 1.0):
                 y = gap.value(xi) + side * depth * gap.crest
-                at = Gap(gap.shoe, gap.wheel, gap.a, gap.x, y, gap.travel, gap.k)
                 delta = 4 * EPS * (abs(y) + gap.crest) * 100  # phases up to 100 rad
-                touching = at.evaluate("exact", pad=pad).stiffness / gap.k
-                assert at.length(delta) - 1e-16 <= touching <= at.length(-delta) + 1e-16
+                touching = gap.evaluate("exact", dy=y, pad=pad).stiffness / gap.k
+                assert gap.length(y + delta) - 1e-16 <= touching <= gap.length(y - delta) + 1e-16
                 checked += 1
     assert checked > 80
 
