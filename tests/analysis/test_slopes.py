@@ -38,7 +38,7 @@ def floquet(a: Any, b: Any, push: Any, waves: Any, period: float) -> float:
     return math.log(np.abs(np.linalg.eigvals(monodromy)).max()) / period
 
 
-@pytest.mark.parametrize("systems", counts(2, 60))
+@pytest.mark.parametrize("systems", counts(4, 60))
 def test_growth_with_slopes_is_that_of_the_monodromy(systems: int) -> None:
     """Random systems, many near a resonance of a wave with sums, differences or doubles of frequencies."""
     rng, found = np.random.default_rng(11), 0
