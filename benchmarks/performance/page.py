@@ -95,8 +95,9 @@ def goals(found: list[Goal], reasons: dict[str, str]) -> list[str]:
     lines = table(["", "goal", "measured", "reached"], rows)
     if all(kept for *_, kept in found):
         return lines
-    missed = [(what, reasons.get(what.split(":")[0], "")) for what, _, _, kept in found if not kept]
-    return [*lines, "Why the rest is not reached:", "", *dict.fromkeys(f"- {why}" for _, why in missed if why), ""]
+    missed = [what for what, _, _, kept in found if not kept]
+    why = [next((why for begin, why in reasons.items() if what.startswith(begin)), "not known") for what in missed]
+    return [*lines, "Why the rest is not reached:", "", *dict.fromkeys(f"- {each}" for each in why), ""]
 
 
 def rates(found: list[Rate]) -> list[str]:
