@@ -60,7 +60,7 @@ REASONS = {
     "numbalsoda DOP853: S": _ON_S,
     "heyoka.py: S": _ON_S,
     "numbalsoda": _ON_ROUGH,
-    "SciPy": "SciPy has a compiled right-hand side and its cheapest method at each error, LSODA on S, a compiled loop.",
+    "SciPy": "SciPy has a compiled right-hand side and its cheapest method at each error, LSODA on S.",
     "heyoka.py: relaxation": "relaxation.toml: a certificate takes a second run; setting up both takes a fifth.",
     "promise": "A promise on B: each rung of the ladder doubles the nodes with the steps.",
     "one evaluation": (
