@@ -11,7 +11,6 @@ import stat
 import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -27,9 +26,6 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 vector = float64[::1]
 """A contiguous array of doubles, for the compiler."""
-
-_WORDS = 512
-"""Room for a tuple that is kept in memory, in words of 8 bytes."""
 
 config: Any = numba_config  # its settings come from the environment, so type checkers know none of them
 caching: Any = numba_caching  # has no types
@@ -172,64 +168,6 @@ def at_address(signature: Any) -> Any:
         return function(types.int64), codegen
 
     return _functions.__getitem__ if config.DISABLE_JIT else callable_at
-
-
-@intrinsic
-def _put(typing: Any, value: Any, address: Any) -> Any:
-    """Write a value to an address."""
-
-    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        if context.get_abi_sizeof(arguments[0].type) > 8 * _WORDS:
-            raise ValueError("a tuple is too large to be kept; increase _WORDS")
-        builder.store(arguments[0], builder.inttoptr(arguments[1], arguments[0].type.as_pointer()))
-        return context.get_dummy_value()
-
-    return types.void(value, types.int64), codegen
-
-
-_write: Any = _put
-
-
-def keep_at(value: Any, address: int) -> None:
-    """Write a tuple without its reference counts to an address."""
-    _write(borrowed(value), address)
-
-
-@cache
-def _keeper(type_: Any) -> Any:
-    """The kernel that puts a tuple of this type to an address."""
-    return kernel(types.void(type_, types.int64))(keep_at)
-
-
-def keep(value: Any, type_: Any) -> tuple[int, Any]:
-    """The address of a tuple of records and arrays, and what must live for as long as that is used.
-
-    A tuple that is handed to compiled code costs 13 µs in each call, its address nothing; see `kept`.
-    """
-    if config.DISABLE_JIT:
-        _functions.append(value)
-        return len(_functions) - 1, None
-    memory = np.zeros(_WORDS)
-    address = memory.ctypes.data
-    _keeper(type_)(value, address)
-    return address, (memory, value)
-
-
-def kept(type_: Any) -> Any:
-    """What turns the address of a tuple of this type into the tuple, in compiled code."""
-    if config.DISABLE_JIT:
-        return _functions.__getitem__
-    _keeper(type_)  # compiled with the kernels that use it, before workers start
-
-    @intrinsic
-    def at(typing: Any, address: Any) -> Any:
-        def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            pointer = context.get_value_type(type_).as_pointer()
-            return builder.load(builder.inttoptr(arguments[0], pointer))
-
-        return type_(types.int64), codegen
-
-    return at
 
 
 @intrinsic

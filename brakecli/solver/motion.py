@@ -7,13 +7,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from brakecli.solver import contact
-from brakecli.solver.compile import Floats, address, keep
+from brakecli.solver.compile import Floats, address
 from brakecli.solver.contact.pad import build_layer
 from brakecli.solver.energy import OPEN_ACCOUNT, EnergyAccount, account
 from brakecli.solver.friction import minimise
 from brakecli.solver.method import Method
 from brakecli.solver.quantities import HISTORY, Failure
-from brakecli.solver.records import COUNTS, PROBLEM, WORK, Drive, Pair, Plant, Plug, new, plant_type
+from brakecli.solver.records import COUNTS, PROBLEM, WORK, Drive, Pair, Plant, Plug, new
 from brakecli.solver.roughness import wheel_angles
 from brakecli.solver.schedules import integral_at, slope_at
 from brakecli.solver.steady_sliding import steady_sliding
@@ -114,7 +114,6 @@ class Stepping:
             work=new(WORK),
             counts=self.counts,
         )
-        self._place, self._alive = keep(self.plant, plant_type(self.scheme.STATE))
         self._begin()
         self._start_energy = self._energy()
 
@@ -149,7 +148,7 @@ class Stepping:
         system, lag, per_sample = self.system, self.scheme.LAG, self.system.per_sample
         first = int(self.counts.level) - lag
         rows = np.zeros((-(-(stop - lag) // per_sample) + (-first // per_sample), len(HISTORY)))
-        self.work.failure = Failure(self.scheme.advance(self._place, rows, self.events, stop))
+        self.work.failure = Failure(self.scheme.advance(self.plant, rows, self.events, stop))
         done = int(self.counts.level) - lag
         if self.work.failed:
             self.work.failure_time = system.step * done

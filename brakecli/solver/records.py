@@ -1,6 +1,5 @@
 """What compiled code works on: records with named fields, what is given to a step, signatures of the plug-ins."""
 
-from functools import cache
 from typing import Any, NamedTuple
 
 import numba
@@ -273,7 +272,6 @@ LAYER = types.NamedTuple([int64, PAD_TYPE, vector, vector, vector, CONTACT_TYPE]
 PLUG = types.NamedUniTuple(int64, 3, Plug)
 
 
-@cache
 def plant_type(state: np.dtype[Any]) -> Any:
     """The type of a `Plant` whose scheme keeps its motion in this record."""
     members = [COEFFICIENTS, WEIGHTS, GRID, DRIVE, LAYER, PLUG, numba.from_dtype(state)]
