@@ -43,7 +43,7 @@ TURN_SECONDS = 3.0
 AGAINST_LSODA = {("S", 0.02): 5, ("B", 0.02): 3, ("C", 0.02): 5, ("S", 0.5): 12, ("B", 0.5): 3, ("C", 0.5): 10}
 AGAINST_SCIPY = {"S": 500, "B": 70, "C": 100}
 _ON_S = (
-    "S over 20 ms takes 20 µs: some 5 for the call, 4 for the matrices of the phases, 11 for 80 steps and"
+    "S over 20 ms takes 36 µs: some 20 for the call, 4 for the matrices of the phases, 11 for 80 steps and"
     " the events. DOP853 and heyoka.py take fewer and longer steps, and fill in the samples."
 )
 _ON_ROUGH = (
