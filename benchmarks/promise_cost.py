@@ -67,7 +67,7 @@ def cell(system: System, tried: list[tuple[float, float, Method]], exact: Floats
     best = min(alone, key=lambda number: alone[number])
     error, ratio = errors(found.motion.rows, exact).error, min(promise) / alone[best]
     method = tried[best][2]
-    print(f"# {tolerance:g}: {method_label(method)}, step {method.step}", file=sys.stderr)
+    print(f"# {tolerance:g}: {method_label(method)}, {method.step or method.tolerance:.3g}", file=sys.stderr)
     print(f"# {found.certificate.sentence()}, {error:.1e} in truth", file=sys.stderr, flush=True)
     broken = "" if found.certificate.certified and error <= tolerance else ", not kept"
     return f"{alone[best] * 1e3:.2g} → {min(promise) * 1e3:.2g}, **{ratio:.2g}**{broken}"
