@@ -140,7 +140,11 @@ paper: $(DEV_STAMP) ## reproduce the paper's claims into docs/paper-claims.md, w
 promises: $(DEV_STAMP) ## random cases at five tolerances: the tables of docs/accuracy.md (some minutes)
 	$(BIN)/python -m benchmarks.promises
 
-    accuracy promises promise-cost picture lock-in paper extremes bench bench-sweep clean
+promise-cost: $(DEV_STAMP) ## a tolerance beside the cheapest entry that keeps it: a table of docs/accuracy.md (some minutes)
+	$(BIN)/python -m benchmarks.promise_cost
+
+bench: $(PEERS_STAMP) ## measure brakecli beside general solvers and write docs/performance.md (ten minutes)
+	$(PEERS)/bin/python -m benchmarks.performance
 
 bench-sweep: $(DEV_STAMP) ## what a sweep costs beside its points; needs two idle cores (some minutes)
 	$(BIN)/python -m benchmarks.sweep
