@@ -36,7 +36,6 @@ FIRST_PER_WAVE = 8.0  # first steps to a passing wave, at least
 FINEST_FIRST = 4e-4  # tolerance from which on a quarter of the usual nodes is enough to begin with
 MOST_SPARSE = 4  # halvings of a first step before it has reached the sample interval, at most
 MOST_DOUBLINGS = 12  # of steps and nodes each
-FIRST_ORDER = 9.0  # over a single difference: thrice what first order leaves, and as much again by luck
 STEPS_BETWEEN_KNOTS = 4  # of speed or load, at least: with fewer, no run sees what happens there
 JUMPS = 3.0  # what the estimate of steps is multiplied by where friction turns, or speed or load have knots
 WORTH_A_PILOT = 1.0  # guessed time (s) of the next runs from which on they are weighed against event-driven ones
@@ -198,15 +197,13 @@ class _Axis:
         """Thrice the error that is left.
 
         Differences that fall by a factor r leave the last one over r - 1. They fall unevenly, and one that is
-        small by luck must not pass: no less is left than second order makes of each of the last two, and of a
-        single one no less than first order does.
+        small by luck must not pass: no less is left than second order makes of each of the last two. A single one
+        says nothing: where no edge of a patch crosses the middle of a cell, twice the nodes give the same force.
         """
-        if self.last <= ROUNDING:
+        if max(self.before, self.last) <= ROUNDING:
             return self.last
-        if self.last >= self.before:
+        if math.isinf(self.before) or self.last >= self.before:
             return math.inf
-        if math.isinf(self.before):
-            return FIRST_ORDER * self.last
         return max(self.last, 3.0 * self.last / (self.before / self.last - 1.0), self.before / 4.0)
 
     def more(self, tolerance: float) -> float:
@@ -234,7 +231,7 @@ def _by_steps(
         if before is not None and not failed:
             finer.before, finer.last = finer.last, _compare(before, run, wanted)[1]
         before = before if failed else run
-        used = quadrature if nodes and _opens(run) else _Axis(last=0.0)
+        used = quadrature if nodes and _opens(run) else _Axis(0, 0.0, 0.0)
         margin = JUMPS if run.work.turns or len(system.belt) + len(system.load) > 2 else 1.0
         jump = _jump_error(run)
         error = math.inf if failed else max(margin * steps.error + used.error, jump)
