@@ -234,11 +234,11 @@ def _by_steps(
         used = quadrature if nodes and _opens(run) else _Axis(0, 0.0, 0.0)
         margin = JUMPS if run.work.turns or len(system.belt) + len(system.load) > 2 else 1.0
         jump = _jump_error(run)
-        error = math.inf if failed else max(margin * steps.error + used.error, jump)
+        error = math.inf if failed else margin * steps.error + used.error + jump
         short = run.system.step <= longest
         if certified := short and error <= wanted:
             break
-        coarse = failed or not short or jump > wanted
+        coarse = failed or not short or jump > 0.5 * wanted
         finer = steps if coarse or margin * steps.error >= used.error else quadrature
         late = run.system.interval == system.interval and seconds + 2.2 * spent > MOST_SECONDS
         more = 2.0 * steps.more(0.5 * wanted / margin) * used.more(0.5 * wanted)
