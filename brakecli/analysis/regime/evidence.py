@@ -17,7 +17,7 @@ FEWEST_SAMPLES = 160  # of a history that has an envelope
 WINDOWS = 40
 _LAST = slice(-10, None)  # windows that give the final values
 _LONGEST = 1 << 20  # samples read at a time; cycles and lines are sought in at most so many, the last ones
-_LINE_BINS = 4  # on either side of a line: the Hann window's main lobe, and the line's drift within the record
+LINE_BINS = 4  # on either side of a line: the Hann window's main lobe, and the line's drift within the record
 _MOST_LINES = 8
 _LEAST_LINE = 1e-3  # part of the energy
 _HARMONICS = 5
@@ -130,7 +130,7 @@ class Part:
     def covered(self, lines: Sequence[float]) -> float:
         """Part of the band up to the highest frequency of note that lines (Hz) take: what chance would find."""
         frequencies, power, total = self._spectrum
-        band = 1 + int(np.searchsorted(np.cumsum(power), 0.99 * total)) + _LINE_BINS
+        band = 1 + int(np.searchsorted(np.cumsum(power), 0.99 * total)) + LINE_BINS
         return float(_near(lines, frequencies)[:band].mean()) if lines else 0.0
 
     def split(self, lines: Sequence[float]) -> tuple[float, float] | None:
@@ -144,7 +144,7 @@ class Part:
         window, middle = np.hanning(len(x)), slice(len(x) // 4, 3 * len(x) // 4)
         spectrum = np.fft.rfft(x * window)
         chosen = _near(lines, np.fft.rfftfreq(len(x), self.history.interval))
-        chosen[: _LINE_BINS // 2] = True
+        chosen[: LINE_BINS // 2] = True
         forced = np.fft.irfft(np.where(chosen, spectrum, 0.0), len(x))[middle] / window[middle]
         forced -= 0.5 * (forced.max() + forced.min())
         parts = 0.5 * float(np.ptp(forced)), 0.5 * float(np.ptp(x[middle] - forced))
@@ -156,7 +156,7 @@ class Part:
         left, found = power.copy(), list[tuple[float, float, float]]()
         while total > 0.0 and len(found) < _MOST_LINES:
             top = int(np.argmax(left))
-            near = slice(max(top - _LINE_BINS, 0), top + _LINE_BINS + 1)
+            near = slice(max(top - LINE_BINS, 0), top + LINE_BINS + 1)
             share = float(left[near].sum()) / total
             if share < _LEAST_LINE:
                 break
@@ -165,7 +165,7 @@ class Part:
                 continue  # a line of fewer cycles is not told from the drift of the mean
             frequency = interpolated(frequencies, power, top)
             distance = min((abs(line - frequency) for line in forced), default=np.inf)
-            found.append((frequency, share, float(distance <= _LINE_BINS * frequencies[1])))
+            found.append((frequency, share, float(distance <= LINE_BINS * frequencies[1])))
         names = ("line_frequencies", "line_shares", "line_forced")
         return {name: [line[i] for line in found] for i, name in enumerate(names)}
 
@@ -175,7 +175,7 @@ def _near(lines: Sequence[float], frequencies: NDArray[Any]) -> NDArray[np.bool_
     chosen = np.zeros(len(frequencies), dtype=bool)
     for line in lines:
         middle = round(line / frequencies[1])
-        chosen[max(middle - _LINE_BINS, 0) : middle + _LINE_BINS + 1] = True
+        chosen[max(middle - LINE_BINS, 0) : middle + LINE_BINS + 1] = True
     return chosen
 
 

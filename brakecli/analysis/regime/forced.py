@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.analysis.regime.evidence import WINDOWS, Cycles, Envelope, Part
+from brakecli.analysis.regime.evidence import LINE_BINS, WINDOWS, Cycles, Envelope, Part
 from brakecli.analysis.regime.verdict import Context, Decision, Excitation, Feeds, Regime, Thresholds
 from brakecli.solver.history import History
 
@@ -63,6 +63,7 @@ class ForcedRules:
         self.cycles: Cycles | None = None
         # m, half of peak to peak of what is forced and what is added
         self.parts: tuple[float, float] | None = None
+        self.rings = False  # whether what the shoe adds to a forced motion has not died away yet
         self.evidence: dict[str, Any] = {}
 
     def _slowest(self, amplitude: float) -> float:
@@ -215,14 +216,45 @@ class ForcedRules:
 
     def _forced(self, text: str) -> Decision:
         """Forced, as seen in a settled part of two periods of the slowest wave."""
-        self._settle()
+        growth = self.context.growth()
+        fading = 0.25 * self.duration * growth > -_RELAXED  # too slowly to be seen within a quarter of the run
+        if not self._settle() and not fading:
+            self.settled = self._level()
         slow = self._slowest(self.settled_part.amplitude("x"))
         if self._settled_seconds < 2.0 * slow:
             return self._too_short(slow)
-        if not self.lasts and (growth := self.context.growth()) < 0.0:
-            needed = max(QUARTER * (self.duration - 3.0 / growth), self._long_enough(slow))
+        self.rings = not self.lasts and growth < 0.0 and (fading or self.evidence.get("envelope_slope", 0.0) < 0.0)
+        if self.rings:
+            if own := self._own_line():
+                ringing = f"the shoe's own vibration at {own:.4g} Hz, which decays, lies on the same lines"
+                text = f"sliding is stable, and the roughness shakes the shoe; {ringing}"
+            needed = max(QUARTER * (self.duration - self._powers_to_lose / growth), self._long_enough(slow))
             text += f"; run at least {needed:.3g} s to see the amplitude that lasts"
         return Decision(text, Regime.DAMPED, Excitation.FORCED)
+
+    def _level(self) -> bool:
+        """Whether vx and x swing in the last quarter as in the quarter before."""
+        before = replace(self.whole, start=self.settled_part.start, stop=3 * self.history.samples // 4)
+        sizes = [np.array([each.deviation("vx"), each.amplitude("x")]) for each in (before, self.last)]
+        return bool((np.abs(sizes[0] - sizes[1]) <= self.limits.settled_within * sizes[1]).all())
+
+    def _own_line(self) -> float | None:
+        """Frequency (Hz) of a mode that lies on lines with more of the energy than forced motion may lack."""
+        bins = LINE_BINS / self._settled_seconds
+        for own in (mode.frequency for mode in self.context.modes() if mode.frequency > 0.0):
+            near = [line for line in self.context.forced if abs(line - own) <= 2.0 * bins]
+            if self.settled_part.share(near) > 1.0 - self.limits.forced_share:
+                return own
+        return None
+
+    @property
+    def _powers_to_lose(self) -> float:
+        """Powers of e by which what the shoe adds has to decay until the forced motion is left."""
+        lasting = self.limits.decayed_to * math.sqrt(
+            0.5 * sum((f * swing) ** 2 for f, swing in self.context.waves)
+        )
+        left = self.envelope.final / (2.0 * math.pi * lasting) if lasting > 0.0 else 1.0
+        return min(max(3.0, math.log(max(left, 1.0))), GROWN)
 
     def _settle(self) -> bool:
         """Find the settled part."""

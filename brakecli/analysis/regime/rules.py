@@ -127,13 +127,15 @@ class _Rules(ForcedRules):
         if belt == 0.0 and self.context.growth() < 0.0:
             return Decision("the wheel stands: friction and dashpots take the energy", Regime.DAMPED)
         small = min(envelope.largest, belt or math.inf, self.context.scale)
-        falls = self.evidence.get("envelope_slope", -1.0) < 0.0 or envelope.final <= self.context.quiet
+        falls = self.evidence.get("envelope_slope", 0.0) < 0.0 or envelope.final <= self.context.quiet
         ends = self.last.fraction(ContactState.STICK) == self.last.fraction(ContactState.SEPARATED) == 0.0
         if envelope.final > max(self.limits.decayed_to * small, self.context.quiet) or not (falls and ends):
             return None
         if self.context.growth() > 0.0:
             return None
         text = f"vx has fallen to {envelope.final / envelope.largest:.2g} of its largest amplitude"
+        if self.context.forced and self.context.growth() < 0.0:
+            return self._forced(f"the shoe's own vibration has died out: {text}, and only the roughness shakes it")
         return Decision(f"the vibration has died out: {text}", Regime.DAMPED)
 
     def trend(self) -> Decision | None:
@@ -156,11 +158,7 @@ class _Rules(ForcedRules):
         if self.context.growth() > 0.0 and 0.5 * abs(slope) * self.duration <= _NEAR:
             return None  # a vibration that has reached its limits, cannot die out, and comes near its amplitude
         text = f"still {'growing' if slope > 0.0 else 'decaying'} at {abs(slope):.3g} 1/s"
-        lasting = self.limits.decayed_to * math.sqrt(
-            0.5 * sum((f * swing) ** 2 for f, swing in self.context.waves)
-        )
-        left = self.envelope.final / (2.0 * math.pi * lasting) if slope < 0.0 and lasting > 0.0 else 1.0
-        more = max(3.0, math.log(max(left, 1.0))) / abs(slope)
+        more = (self._powers_to_lose if slope < 0.0 else 3.0) / abs(slope)
         return Decision(f"{text}; run at least {more:.2g} s longer")
 
     def sustained(self) -> Decision:
@@ -247,7 +245,8 @@ class _Rules(ForcedRules):
         slow = max([self._slowest(0.0), *(1.0 / beat for beat in beats)])
         period = max(min(slow / self.history.interval, samples - 1), 1.0)
         edges = np.asarray(samples - period * np.arange(int(samples / period), -1, -1), np.float64)
-        return median(swings(part, edges)) if len(edges) > 1 else (part.amplitude("x"), None)
+        size, spread = median(swings(part, edges)) if len(edges) > 1 else (part.amplitude("x"), None)
+        return size, None if self.rings else spread
 
 
 def classify(history: History, context: Context, thresholds: Thresholds = _DEFAULT) -> Verdict:
@@ -261,7 +260,7 @@ def classify(history: History, context: Context, thresholds: Thresholds = _DEFAU
     if belt != 0.0:
         evidence["largest_vx_over_belt_speed"] = part.extremes("vx")[int(belt > 0.0)] / belt
     evidence |= part.lines(context.forced) | (context.powers(part) if context.steady else {})
-    split = rules.parts or rules.split()
+    split = rules.parts or (None if rules.rings else rules.split())
     forced, own = split if split and not (sustained and split[0] > split[1]) else (None, None)
     amplitude, spread = rules.amplitude(decision)
     return Verdict(

@@ -10,6 +10,7 @@ from brakecli.analysis.regime.evidence import Part
 
 if TYPE_CHECKING:  # a measured signal needs no compiled code
     from brakecli.analysis.regime.linear import Linear
+    from brakecli.analysis.stability.modes import Mode
 
 
 class Regime(StrEnum):
@@ -66,6 +67,7 @@ class Context:
     frictionless: bool = False
     undamped: bool = False
     growth: Callable[[], float] = lambda: 0.0  # 1/s, of a small disturbance of steady sliding; below 0 it decays
+    modes: Callable[[], list["Mode"]] = list  # of small vibrations
     linear: Callable[[], "Linear | None"] = lambda: None  # the theory of full contact
     powers: Callable[[Part], dict[str, float]] = lambda part: {}  # W, what becomes of the power of the belt
     radius: float = 1.0  # R, m
