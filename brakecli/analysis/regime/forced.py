@@ -63,6 +63,7 @@ class ForcedRules:
         self.cycles: Cycles | None = None
         # m, half of peak to peak of what is forced and what is added
         self.parts: tuple[float, float] | None = None
+        self.unseen = 0.0  # m, by which waves that beat force more at other times
         self.rings = False  # whether what the shoe adds to a forced motion has not died away yet
         self.evidence: dict[str, Any] = {}
 

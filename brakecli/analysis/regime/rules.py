@@ -81,7 +81,7 @@ class _Rules(ForcedRules):
 
     def _swings_far(self, theory: "Linear") -> bool:
         """Whether what the shoe adds is no longer small beside the waves, so that their slope is not linear."""
-        own = theory.parts(*self.last.places())[1]
+        own = theory.parts(*self.last.places())[2]
         return 0.5 * float(np.ptp(own)) * float(theory.wavenumbers.max()) > _FAR
 
     def _steep(self, theory: "Linear") -> Decision:
@@ -101,7 +101,7 @@ class _Rules(ForcedRules):
 
     def _shaken(self, theory: "Linear", slow: float, decays: str) -> Decision | None:
         """The forced motion that lasts, with the settled part in which the shoe's own part has gone."""
-        forced, own, time = theory.parts(*self.whole.places())
+        forced, lasting, own, time = theory.parts(*self.whole.places())
         left = np.array([0.5 * float(np.ptp(part)) for part in np.array_split(own, WINDOWS)])
         end = float(left[-10:].max())
         slope = np.polyfit(np.arange(WINDOWS // 2), np.log(np.maximum(left[WINDOWS // 2 :], 1e-300)), 1)[0]
@@ -117,7 +117,7 @@ class _Rules(ForcedRules):
             needed = max(_LONGER * (self.duration + wait), 1.05 * (self.duration + wait + 2.0 * slow))
             hint = f"; run at least {needed:.3g} s to see only that"
         chosen = time >= self.settled_part.start * self.history.interval
-        self.parts = forced, 0.5 * float(np.ptp(own[chosen]))
+        self.parts, self.unseen = (forced, 0.5 * float(np.ptp(own[chosen]))), forced - 0.5 * float(np.ptp(lasting))
         text = f"only the roughness shakes the shoe, by {forced:.3g} m: {decays}{hint}"
         return Decision(text, Regime.DAMPED, Excitation.FORCED)
 
@@ -239,7 +239,7 @@ class _Rules(ForcedRules):
         if decision.excitation is not Excitation.FORCED:
             return part.amplitude("x"), None
         if self.theory and self.parts:
-            return self.parts[0], self.parts[1] if self.settled else None
+            return self.parts[0], self.parts[1] + self.unseen if self.settled else None
         samples = len(part.last("x"))
         beats = [abs(f - g) for f, _ in self.context.waves for g, _ in self.context.waves if f != g]
         slow = max([self._slowest(0.0), *(1.0 / beat for beat in beats)])
