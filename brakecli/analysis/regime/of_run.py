@@ -13,6 +13,7 @@ import numpy as np
 from brakecli.analysis.regime.evidence import Part
 from brakecli.analysis.regime.forced import forced_lines, subharmonics
 from brakecli.analysis.regime.linear import linear_theory
+from brakecli.analysis.regime.ripple import ripple
 from brakecli.analysis.regime.rules import classify
 from brakecli.analysis.regime.verdict import Context, Excitation, Feeds, Regime, Thresholds, Verdict
 from brakecli.analysis.stability.modes import growth, is_undamped, modes
@@ -106,6 +107,7 @@ def context(system: System) -> Context:
         growth=lambda: growth(c, stiffness(), grip),
         modes=lambda: [each for k in (stiffness(), system.contact_stiffness) for each in modes(c, k, grip)],
         linear=theory,
+        ripple=lambda part: ripple(system, belt, stiffness(), part),
         powers=partial(_powers, system, belt),
     )
 

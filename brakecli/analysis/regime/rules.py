@@ -263,6 +263,10 @@ def classify(history: History, context: Context, thresholds: Thresholds = _DEFAU
     split = rules.parts or (None if rules.rings else rules.split())
     forced, own = split if split and not (sustained and split[0] > split[1]) else (None, None)
     amplitude, spread = rules.amplitude(decision)
+    ripple = context.ripple(part) if context.steady and not sustained else None
+    if ripple:
+        evidence |= {f"ripple_{name}": getattr(ripple, name) for name in ("x", "vx", "force")}
+        spread = spread + ripple.size if spread is not None else None
     return Verdict(
         regime=decision.regime,
         excitation=decision.excitation,
@@ -278,14 +282,14 @@ def classify(history: History, context: Context, thresholds: Thresholds = _DEFAU
         * (cycles.force_variation if sustained and cycles else torques[1] - torques[0]),
         settled_from=part.start * history.interval,
         start=part.start,
-        settled=rules.lasts and decision.regime is not Regime.UNDECIDED,
+        settled=rules.lasts and decision.regime is not Regime.UNDECIDED and not ripple,
         stick_fraction=cycles.stick_fraction if sustained and cycles else part.fraction(ContactState.STICK),
         contact_loss_fraction=(
             cycles.contact_loss_fraction if sustained and cycles else part.fraction(ContactState.SEPARATED)
         ),
         mean_friction_force=friction,
         braking_torque=context.radius * friction,
-        reasons=(decision.reason,),
+        reasons=(decision.reason, *([ripple.sentence] if ripple else [])),
         evidence=evidence,
         thresholds=thresholds,
         second_run=decision.second_run,
