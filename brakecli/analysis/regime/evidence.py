@@ -250,6 +250,7 @@ class Cycles:
     limited: float  # part of the groups of cycles in which the shoe sticks, leaves the wheel or overtakes it
     drift: float  # by which the amplitude changes, over itself, from the first third of the cycles to the last
     drifts: bool  # whether that is more than chance; then the spread contains it
+    detunes: float  # the same of the period, 0 where it is no more than chance
     force_variation: float  # N, peak to peak of the friction force
 
 
@@ -295,13 +296,15 @@ def cycles_of(part: Part, slip: ContactState | None = None) -> Cycles | None:
     }
     limited = float(np.mean(shares(state != slip) > 0.0))
     sizes = swings(part, crossings)
-    drift, drifts = _drift(sizes)
+    (drift, drifts), (slower, detunes) = _drift(sizes), _drift(np.diff(crossings))
+    evidence["frequency_spread"] += abs(slower) * frequency if detunes else 0.0
     force, whole = part.history.read("friction_force", part.stop - len(velocity), part.stop), crossings.astype(int)
     most, least = (each.reduceat(force[: whole[-1]], whole[:-1]) for each in (np.maximum, np.minimum))
     size, spread = median(sizes)
     spread += abs(drift) * size if drifts else 0.0
     medians = size, spread, stick, loss
-    return Cycles(evidence, frequency, *medians, limited, drift, drifts, median(most - least)[0])
+    detuned = slower if detunes else 0.0
+    return Cycles(evidence, frequency, *medians, limited, drift, drifts, detuned, median(most - least)[0])
 
 
 def _beginnings(velocity: Array) -> tuple[Array, int]:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:  # a measured signal needs no compiled code
 
 _NEAR = 0.3  # by which the amplitude of a motion that stick or loss of contact limits may still change
 _DRIFT = 5e-3  # by which the amplitude of a motion without stick may change where sliding is stable
+_BANDS = 0.9  # least part of the energy in three bands: chaos may have less
 _SPREAD = 0.05  # of the frequency of cycles, beyond which three bands hold no vibration
 _LONGER = 1.4  # a run whose last quarter and the window before it are settled, over what comes before
 _FAR = 0.3  # rad, of a wave, by which what the shoe adds moves it
@@ -181,6 +182,7 @@ class _Rules(ForcedRules):
         certain = self._larger and self.context.growth() > 0.0 and self._relaxed
         if self.context.forced and not certain and (self._feeds() is Feeds.UNKNOWN or self._doubtful):
             return self._either()
+        self.settled &= abs(found.detunes) <= _DRIFT
         if found.drifts and abs(found.drift) > _DRIFT:
             self.settled = False
             unsure = self.context.undamped or self.context.growth() < 0.0
@@ -196,7 +198,7 @@ class _Rules(ForcedRules):
         if harmonic < bands:
             lines = f"{bands:.0%} of the energy of vx in three narrow bands"
         wanders = found.evidence["frequency_spread"] > _SPREAD * found.frequency
-        regular = harmonic if wanders else max(harmonic, bands)
+        regular = harmonic if wanders or bands < _BANDS else max(harmonic, bands)
         if stick <= 1.0 - self.limits.stick_cycles and regular >= self.limits.harmonic_share:
             how = f"with stick in only {stick:.0%} of the cycles" if stick else "without stick"
             return Decision(f"sustained {how}: {lines}", Regime.QUASI_HARMONIC, *own)
@@ -235,7 +237,7 @@ class _Rules(ForcedRules):
         """Half of peak to peak of x (m) as a median over cycles, and its spread."""
         part = self.settled_part
         if self.cycles and decision.excitation is Excitation.SELF_EXCITED:
-            return self.cycles.amplitude, self.cycles.amplitude_spread
+            return self.cycles.amplitude, self._spread(self.cycles)
         if decision.excitation is not Excitation.FORCED:
             return part.amplitude("x"), None
         if self.theory and self.parts:
@@ -247,6 +249,16 @@ class _Rules(ForcedRules):
         edges = np.asarray(samples - period * np.arange(int(samples / period), -1, -1), np.float64)
         size, spread = median(swings(part, edges)) if len(edges) > 1 else (part.amplitude("x"), None)
         return size, None if self.rings else spread
+
+
+    def _spread(self, found: Cycles) -> float | None:
+        """Spread (m) with what a drift becomes until small disturbances have decayed or grown by a factor of e."""
+        if self.lasts:
+            return found.amplitude_spread
+        if self.context.undamped:
+            return None  # there is no end
+        ends = min(abs(self.context.growth()) * self._settled_seconds, 1.0)
+        return min(found.amplitude_spread + abs(found.drift) * found.amplitude / max(ends, 1e-9), found.amplitude)
 
 
 def classify(history: History, context: Context, thresholds: Thresholds = _DEFAULT) -> Verdict:
