@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -248,9 +248,8 @@ class Cycles:
     stick_fraction: float
     contact_loss_fraction: float
     limited: float  # part of the groups of cycles in which the shoe sticks, leaves the wheel or overtakes it
-    drift: float  # by which the amplitude changes, over itself, from the first third of the cycles to the last
-    drifts: bool  # whether that is more than chance; then the spread contains it
-    detunes: float  # the same of the period, 0 where it is no more than chance
+    drift: "Drift"  # of the amplitude
+    detuning: "Drift"  # of the period
     force_variation: float  # N, peak to peak of the friction force
 
 
@@ -296,15 +295,11 @@ def cycles_of(part: Part, slip: ContactState | None = None) -> Cycles | None:
     }
     limited = float(np.mean(shares(state != slip) > 0.0))
     sizes = swings(part, crossings)
-    (drift, drifts), (slower, detunes) = _drift(sizes), _drift(np.diff(crossings))
-    evidence["frequency_spread"] += abs(slower) * frequency if detunes else 0.0
+    drift, detuning = _drift(sizes), _drift(np.diff(crossings))
     force, whole = part.history.read("friction_force", part.stop - len(velocity), part.stop), crossings.astype(int)
     most, least = (each.reduceat(force[: whole[-1]], whole[:-1]) for each in (np.maximum, np.minimum))
-    size, spread = median(sizes)
-    spread += abs(drift) * size if drifts else 0.0
-    medians = size, spread, stick, loss
-    detuned = slower if detunes else 0.0
-    return Cycles(evidence, frequency, *medians, limited, drift, drifts, detuned, median(most - least)[0])
+    medians = *median(sizes), stick, loss
+    return Cycles(evidence, frequency, *medians, limited, drift, detuning, median(most - least)[0])
 
 
 def _beginnings(velocity: Array) -> tuple[Array, int]:
@@ -321,12 +316,19 @@ def _beginnings(velocity: Array) -> tuple[Array, int]:
     return crossings, 1
 
 
-def _drift(sizes: Array) -> tuple[float, bool]:
-    """By which the size of cycles changes, over itself, and whether that is more than chance."""
+class Drift(NamedTuple):
+    """Part of itself by which a number changes from the first third of the cycles to the last; whether that is sure."""
+
+    part: float
+    sure: bool
+
+
+def _drift(sizes: Array) -> Drift:
+    """The drift of a number, one for each cycle."""
     first, *_, last = (median(third)[0] for third in np.array_split(sizes, 3) if len(third))
     groups = np.array([median(group)[0] for group in np.array_split(sizes, min(len(sizes), _GROUPS))])
     places = np.arange(len(groups)) - 0.5 * (len(groups) - 1)
     slope = float(places @ groups / (places @ places))
     rest = groups - groups.mean() - slope * places
     error = float(np.std(rest) / (np.std(places) * np.sqrt(max(len(groups) - 2, 1))))
-    return last / first - 1.0 if first > 0.0 else 0.0, abs(slope) > _TREND * error
+    return Drift(last / first - 1.0 if first > 0.0 else 0.0, abs(slope) > _TREND * error)

@@ -44,9 +44,7 @@ def ripple(system: System, belt: float, stiffness: float, part: Part) -> Ripple 
     work = samples * _FINER * system.nodes * len(system.wheel.g)
     if not 0 < work <= _MOST_WORK or system.method.step is None or end.slides(None):
         return None
-    pad = build_pad(
-        system.layer_stiffness, system.half_length, system.shoe, system.wheel, _FINER * system.nodes
-    )
+    pad = build_pad(system.layer_stiffness, system.half_length, system.shoe, system.wheel, _FINER * system.nodes)
     layer, waves = build_layer(system.evaluate, pad), system.wheel.waves
     x, y, v_x, force = (part.history.read(name, end.start, end.stop) for name in ("x", "y", "vx", "normal_force"))
     travel = belt * part.history.interval * np.arange(end.start, end.stop) - x
@@ -62,10 +60,10 @@ def ripple(system: System, belt: float, stiffness: float, part: Part) -> Ripple 
     d, e = s_yx + 1j * omega * c.b_xy, s_yy - c.m * omega**2 + 1j * omega * c.b_yy
     shaken = (grip * e - b) / (a * e - b * d) * off
     pressed = off - stiffness * (a - grip * d) / (a * e - b * d) * off
-    sizes = [
+    in_x, in_vx, in_force = (
         min(float(np.linalg.norm(ours) / size), 1.0) if (size := np.linalg.norm(whole)) else 0.0
         for ours, whole in zip((shaken, 1j * omega * shaken, pressed), seen, strict=True)
-    ]
-    if max(sizes) < _LEAST:
+    )
+    if max(in_x, in_vx, in_force) < _LEAST:
         return None
-    return Ripple(*sizes, 0.5 * float(np.ptp(np.fft.irfft(shaken, samples))), system.nodes)
+    return Ripple(in_x, in_vx, in_force, 0.5 * float(np.ptp(np.fft.irfft(shaken, samples))), system.nodes)

@@ -6,7 +6,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, WINDOWS, Cycles, Envelope, cycles_of, median, swings
+from brakecli.analysis.regime.evidence import (
+    FEWEST_SAMPLES,
+    WINDOWS,
+    Cycles,
+    Drift,
+    Envelope,
+    cycles_of,
+    median,
+    swings,
+)
 from brakecli.analysis.regime.forced import GROWN, QUARTER, ForcedRules
 from brakecli.analysis.regime.spectra import segment
 from brakecli.analysis.regime.verdict import Context, Decision, Excitation, Feeds, Regime, Thresholds, Verdict
@@ -136,7 +145,11 @@ class _Rules(ForcedRules):
             return None
         text = f"vx has fallen to {envelope.final / envelope.largest:.2g} of its largest amplitude"
         if self.context.forced and self.context.growth() < 0.0:
-            return self._forced(f"the shoe's own vibration has died out: {text}, and only the roughness shakes it")
+            text = f"the shoe's own vibration has died out: {text}, and only the roughness shakes it"
+            found = self._forced(text)
+            if found.regime is Regime.DAMPED:
+                return found
+            return Decision(f"{text}; {found.reason}", Regime.DAMPED, Excitation.FORCED)
         return Decision(f"the vibration has died out: {text}", Regime.DAMPED)
 
     def trend(self) -> Decision | None:
@@ -182,14 +195,15 @@ class _Rules(ForcedRules):
         certain = self._larger and self.context.growth() > 0.0 and self._relaxed
         if self.context.forced and not certain and (self._feeds() is Feeds.UNKNOWN or self._doubtful):
             return self._either()
-        self.settled &= abs(found.detunes) <= _DRIFT
-        if found.drifts and abs(found.drift) > _DRIFT:
-            self.settled = False
-            unsure = self.context.undamped or self.context.growth() < 0.0
-            if abs(found.drift) > (_DRIFT if unsure else self.limits.settled_within):
-                text = f"the amplitude still changes by {found.drift:.1%} within the last part of the run"
-                return Decision(f"{text}; run longer")
-        own = Excitation.SELF_EXCITED, found.frequency
+        drift = abs(found.drift.part) if found.drift.sure else 0.0
+        self.settled &= max(drift, abs(found.detuning.part) if found.detuning.sure else 0.0) <= _DRIFT
+        unsure = self.context.undamped or self.context.growth() < 0.0
+        if drift > (_DRIFT if unsure else self.limits.settled_within):
+            text = f"the amplitude still changes by {found.drift.part:.1%} within the last part of the run"
+            return Decision(f"{text}; run longer")
+        own, wander = (Excitation.SELF_EXCITED, found.frequency), found.evidence["frequency_spread"]
+        if (held := self._held(wander, found.frequency, found.detuning)) is not None:
+            self.evidence["frequency_spread"] = held
         if stick >= self.limits.stick_cycles:
             text = f"sustained, with stick in {stick:.0%} of {cycles:.0f} cycles"
             return Decision(text, Regime.RELAXATION, *own)
@@ -197,7 +211,7 @@ class _Rules(ForcedRules):
         lines = f"{harmonic:.0%} of the energy of vx in one line and its harmonics"
         if harmonic < bands:
             lines = f"{bands:.0%} of the energy of vx in three narrow bands"
-        wanders = found.evidence["frequency_spread"] > _SPREAD * found.frequency
+        wanders = wander > _SPREAD * found.frequency
         regular = harmonic if wanders or bands < _BANDS else max(harmonic, bands)
         if stick <= 1.0 - self.limits.stick_cycles and regular >= self.limits.harmonic_share:
             how = f"with stick in only {stick:.0%} of the cycles" if stick else "without stick"
@@ -223,8 +237,8 @@ class _Rules(ForcedRules):
                 f"{text}, so that the vibration may still die out; run at least {self._relaxing:.3g} s"
             )
         sticks = found.evidence["stick_cycles"] >= self.limits.stick_cycles
-        if abs(found.drift) > (self.limits.settled_within if sticks else _DRIFT):
-            text = f"sliding is stable, and the amplitude still changes by {found.drift:.2%}"
+        if abs(found.drift.part) > (self.limits.settled_within if sticks else _DRIFT):
+            text = f"sliding is stable, and the amplitude still changes by {found.drift.part:.2%}"
             return Decision(f"{text} within the last part of the run; run longer")
         return None
 
@@ -237,7 +251,8 @@ class _Rules(ForcedRules):
         """Half of peak to peak of x (m) as a median over cycles, and its spread."""
         part = self.settled_part
         if self.cycles and decision.excitation is Excitation.SELF_EXCITED:
-            return self.cycles.amplitude, self._spread(self.cycles)
+            spread = self._held(self.cycles.amplitude_spread, self.cycles.amplitude, self.cycles.drift)
+            return self.cycles.amplitude, spread
         if decision.excitation is not Excitation.FORCED:
             return part.amplitude("x"), None
         if self.theory and self.parts:
@@ -247,18 +262,17 @@ class _Rules(ForcedRules):
         slow = max([self._slowest(0.0), *(1.0 / beat for beat in beats)])
         period = max(min(slow / self.history.interval, samples - 1), 1.0)
         edges = np.asarray(samples - period * np.arange(int(samples / period), -1, -1), np.float64)
-        size, spread = median(swings(part, edges)) if len(edges) > 1 else (part.amplitude("x"), None)
-        return size, None if self.rings else spread
+        size, spread = median(swings(part, edges))
+        return size, None if self.rings else max(spread, part.amplitude("x") - size)
 
-
-    def _spread(self, found: Cycles) -> float | None:
-        """Spread (m) with what a drift becomes until small disturbances have decayed or grown by a factor of e."""
-        if self.lasts:
-            return found.amplitude_spread
+    def _held(self, spread: float, value: float, drift: Drift) -> float | None:
+        """A spread with what a drift becomes until small disturbances have changed by a factor of e."""
         if self.context.undamped:
-            return None  # there is no end
+            return None  # there is no end to it
         ends = min(abs(self.context.growth()) * self._settled_seconds, 1.0)
-        return min(found.amplitude_spread + abs(found.drift) * found.amplitude / max(ends, 1e-9), found.amplitude)
+        if self.lasts:
+            return spread + (abs(drift.part) * value if drift.sure else 0.0)
+        return min(spread + abs(drift.part) * value / max(ends, 1e-9), value)
 
 
 def classify(history: History, context: Context, thresholds: Thresholds = _DEFAULT) -> Verdict:
