@@ -317,10 +317,10 @@ def _beginnings(velocity: Array) -> tuple[Array, int]:
 
 
 class Drift(NamedTuple):
-    """Part of itself by which a number changes from the first third of the cycles to the last; whether that is sure."""
+    """Part of itself by which a number changes from the first third of the cycles to the last."""
 
     part: float
-    sure: bool
+    sure: bool  # whether it is more than chance
 
 
 def _drift(sizes: Array) -> Drift:

@@ -125,7 +125,7 @@ class ForcedRules:
         what = f"{share:.0%} of the energy of vx lies on the lines of the roughness"
         if powers_of_e > _NOTHING:
             own = f"but sliding is unstable: the shoe's own vibration grows at {growth:.3g} 1/s"
-            text = f"{what}, {own}; run at least {GROWN / growth:.2g} s, or decide by {SECOND_RUN}"
+            text = f"{what}, {own}; run at least {1.01 * GROWN / growth:.3g} s, or decide by {SECOND_RUN}"
             return self.fed() or Decision(text, second_run=True)
         if feeds is Feeds.FRICTION and self.evidence["power_of_roughness"] < 0.0:
             return None
@@ -224,7 +224,7 @@ class ForcedRules:
         slow = self._slowest(self.settled_part.amplitude("x"))
         if self._settled_seconds < 2.0 * slow:
             return self._too_short(slow)
-        self.rings = not self.lasts and growth < 0.0 and (fading or self.evidence.get("envelope_slope", 0.0) < 0.0)
+        self.rings = not self.lasts and growth < 0.0 and (fading or self._trend < 0.0)
         if self.rings:
             if own := self._own_line():
                 ringing = f"the shoe's own vibration at {own:.4g} Hz, which decays, lies on the same lines"
@@ -232,6 +232,12 @@ class ForcedRules:
             needed = max(QUARTER * (self.duration - self._powers_to_lose / growth), self._long_enough(slow))
             text += f"; run at least {needed:.3g} s to see the amplitude that lasts"
         return Decision(text, Regime.DAMPED, Excitation.FORCED)
+
+    @property
+    def _trend(self) -> float:
+        """Slope (1/s) of the logarithm of the envelope's second half; 0 where it is unknown or chance."""
+        slope, error = (self.evidence.get(f"envelope_slope{what}", 0.0) for what in ("", "_error"))
+        return slope if abs(slope) > self.limits.trend_errors * error else 0.0
 
     def _level(self) -> bool:
         """Whether vx and x swing in the last quarter as in the quarter before."""

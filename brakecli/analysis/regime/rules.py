@@ -137,14 +137,16 @@ class _Rules(ForcedRules):
         if belt == 0.0 and self.context.growth() < 0.0:
             return Decision("the wheel stands: friction and dashpots take the energy", Regime.DAMPED)
         small = min(envelope.largest, belt or math.inf, self.context.scale)
-        falls = self.evidence.get("envelope_slope", 0.0) < 0.0 or envelope.final <= self.context.quiet
+        kept = bool(self.context.forced) and self.context.growth() < 0.0  # up by the roughness
+        falls = self.evidence.get("envelope_slope", 0.0) < 0.0 or (kept and self._trend == 0.0)
+        falls |= envelope.final <= self.context.quiet
         ends = self.last.fraction(ContactState.STICK) == self.last.fraction(ContactState.SEPARATED) == 0.0
         if envelope.final > max(self.limits.decayed_to * small, self.context.quiet) or not (falls and ends):
             return None
         if self.context.growth() > 0.0:
             return None
         text = f"vx has fallen to {envelope.final / envelope.largest:.2g} of its largest amplitude"
-        if self.context.forced and self.context.growth() < 0.0:
+        if kept:
             text = f"the shoe's own vibration has died out: {text}, and only the roughness shakes it"
             found = self._forced(text)
             if found.regime is Regime.DAMPED:
@@ -164,10 +166,9 @@ class _Rules(ForcedRules):
             )
         if self._settle():
             return None
-        slope = self.evidence.get("envelope_slope")
-        if slope is None:
+        if "envelope_slope" not in self.evidence:
             return Decision("the motion comes and goes; run longer")
-        if abs(slope) <= self.limits.trend_errors * self.evidence["envelope_slope_error"]:
+        if not (slope := self._trend):
             return None  # an amplitude that beats or wanders, without a trend
         if self.context.growth() > 0.0 and 0.5 * abs(slope) * self.duration <= _NEAR:
             return None  # a vibration that has reached its limits, cannot die out, and comes near its amplitude
