@@ -19,7 +19,7 @@ def _shoe(
     start: dict[str, Any],
     time: Numbers,
 ) -> Tables:
-    """The tables of a case. Waves are amplitude, wavelength and phase; `time` is step, duration, sample interval."""
+    """The tables of a case. Waves: amplitude, wavelength, phase; `time`: step, duration, sample interval."""
 
     def rough(terms: list[Numbers]) -> dict[str, list[float]]:
         names, padded = ("amplitudes", "wavelengths", "phases_deg"), [(*term, 0.0)[:3] for term in terms]

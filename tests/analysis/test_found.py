@@ -94,7 +94,7 @@ def test_what_the_wheel_keeps_up_has_not_died_out_without_excitation() -> None:
 
 
 def test_waves_that_beat_more_slowly_than_the_run_force_the_sum_of_their_amplitudes() -> None:
-    waves = {"amplitudes": [1e-6, 0.7e-6], "wavelengths": [0.031, 0.0311]}  # a beat of 2.4 s
+    waves = {"amplitudes": [1e-6, 0.7e-6], "wavelengths": [0.031, 0.0311], "phases_deg": [0.0, 180.0]}
     changes: dict[str, Any] = {"friction__coefficient": 0.3, "wheel__angular_speed": 8.0, "solver__duration": 0.6}
     tables = SQUEAL | {"roughness": {"wheel": waves}}
     case = make(tables, **changes, link1__damping=3000.0, link2__damping=3000.0)

@@ -29,6 +29,7 @@ _NEAR = 0.3  # by which the amplitude of a motion that stick or loss of contact 
 _DRIFT = 5e-3  # by which the amplitude of a motion without stick may change where sliding is stable
 _BANDS = 0.9  # least part of the energy in three bands: chaos may have less
 _SPREAD = 0.05  # of the frequency of cycles, beyond which three bands hold no vibration
+_REST = 0.3  # of a forced motion, by which its closed form may be off
 _LONGER = 1.4  # a run whose last quarter and the window before it are settled, over what comes before
 _FAR = 0.3  # rad, of a wave, by which what the shoe adds moves it
 _DEFAULT = Thresholds()
@@ -117,9 +118,14 @@ class _Rules(ForcedRules):
         slope = np.polyfit(np.arange(WINDOWS // 2), np.log(np.maximum(left[WINDOWS // 2 :], 1e-300)), 1)[0]
         if slope * WINDOWS > 1.0 and end > self.limits.settled_within * forced:
             return None  # the passing waves excite what the mean stiffness damps
-        first = WINDOWS - int(np.argmin((left <= self.limits.settled_within * forced)[::-1]))
+        level, decay = self.limits.settled_within * forced, theory.mode.growth * self.duration / WINDOWS
+        if 0.25 * WINDOWS * decay < -1.0 and slope > 0.25 * decay and end < _REST * forced:
+            level = max(
+                level, 1.2 * end
+            )  # what does not decay is what the closed form leaves out of the forced motion
+        first = WINDOWS - int(np.argmin((left <= level)[::-1]))
         begin = max(first, 1) * self.history.samples // WINDOWS
-        wait = max(math.log(max(end / (self.limits.settled_within * forced), 1.0)) / -theory.mode.growth, 0.0)
+        wait = math.log(max(end / level, 1.0)) / -theory.mode.growth
         hint = ""
         if first <= WINDOWS - 10 and self.duration - begin * self.history.interval >= 2.0 * slow:
             self.settled_part, self.settled = replace(self.whole, start=begin), True
