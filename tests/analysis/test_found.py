@@ -112,6 +112,7 @@ def test_waves_that_beat_more_slowly_than_the_run_force_the_sum_of_their_amplitu
     assert verdict.amplitude_spread > 0.1 * verdict.amplitude  # by which the run itself shows less
 
 
+RATE = re.compile(r"still (?:growing|decaying) at ([\d.e+-]+) 1/s; ")
 ASKED = re.compile(r"run at least ([\d.e+-]+) s( longer)?")
 
 
@@ -121,12 +122,12 @@ def asked(verdict: Verdict, duration: float) -> float | None:
     return float(found[1]) + (duration if found[2] else 0.0) if found else None
 
 
-@pytest.mark.parametrize("shoes", counts(4, 60))
+@pytest.mark.parametrize("shoes", counts(3, 40))
 def test_the_time_that_a_verdict_asks_for_is_enough_or_the_new_one_has_another_reason(shoes: int) -> None:
     tried, kinds = 0, [random_shoes(stratum, 5) for stratum in ("smooth", "full", "open")]
     for tables in chain.from_iterable(zip(*kinds, strict=True)):
         duration = tables["solver"]["duration"]
-        if duration > 3e4 * tables["solver"]["step"]:
+        if duration > (2e4 if shoes > 3 else 5e3) * tables["solver"]["step"]:
             continue
         first = verdict_of(make(tables))
         needed = asked(first, duration)
@@ -134,6 +135,8 @@ def test_the_time_that_a_verdict_asks_for_is_enough_or_the_new_one_has_another_r
             continue
         again = verdict_of(make(tables, solver__duration=needed))
         reasons = [re.sub(r"[\d.e+-]+", "", ASKED.sub("", each.reasons[0])) for each in (first, again)]
-        assert again.regime is not Regime.UNDECIDED or reasons[0] != reasons[1], (tables, first, again)
+        slower = [float(rate[1]) for each in (first, again) if (rate := RATE.search(each.reasons[0]))]
+        explained = reasons[0] != reasons[1] or (len(slower) == 2 and slower[1] < 0.8 * slower[0])
+        assert again.regime is not Regime.UNDECIDED or explained, (tables, first.reasons, again.reasons)
         if (tried := tried + 1) == shoes:
             return

@@ -120,12 +120,10 @@ class _Rules(ForcedRules):
             return None  # the passing waves excite what the mean stiffness damps
         level, decay = self.limits.settled_within * forced, theory.mode.growth * self.duration / WINDOWS
         if 0.25 * WINDOWS * decay < -1.0 and slope > 0.25 * decay and end < _REST * forced:
-            level = max(
-                level, 1.2 * end
-            )  # what does not decay is what the closed form leaves out of the forced motion
+            level = max(level, 1.2 * end)  # what does not decay is forced, and missing in the closed form
         first = WINDOWS - int(np.argmin((left <= level)[::-1]))
         begin = max(first, 1) * self.history.samples // WINDOWS
-        wait = math.log(max(end / level, 1.0)) / -theory.mode.growth
+        wait = math.log(max(end / max(level, 1e-300), 1.0)) / -theory.mode.growth
         hint = ""
         if first <= WINDOWS - 10 and self.duration - begin * self.history.interval >= 2.0 * slow:
             self.settled_part, self.settled = replace(self.whole, start=begin), True
