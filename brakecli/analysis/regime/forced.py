@@ -219,12 +219,14 @@ class ForcedRules:
         """Forced, as seen in a settled part of two periods of the slowest wave."""
         growth = self.context.growth()
         fading = 0.25 * self.duration * growth > -_RELAXED  # too slowly to be seen within a quarter of the run
+        falls = 0.0
         if not self._settle() and not fading:
-            self.settled = self._level()
+            falls, changes = self._changes()
+            self.settled = changes <= self.limits.settled_within
         slow = self._slowest(self.settled_part.amplitude("x"))
         if self._settled_seconds < 2.0 * slow:
             return self._too_short(slow)
-        self.rings = not self.lasts and growth < 0.0 and (fading or self._trend < 0.0)
+        self.rings = not self.lasts and growth < 0.0 and (fading or falls > self.limits.settled_within)
         if self.rings:
             if own := self._own_line():
                 ringing = f"the shoe's own vibration at {own:.4g} Hz, which decays, lies on the same lines"
@@ -239,11 +241,12 @@ class ForcedRules:
         slope, error = (self.evidence.get(f"envelope_slope{what}", 0.0) for what in ("", "_error"))
         return slope if abs(slope) > self.limits.trend_errors * error else 0.0
 
-    def _level(self) -> bool:
-        """Whether vx and x swing in the last quarter as in the quarter before."""
+    def _changes(self) -> tuple[float, float]:
+        """By which vx or x, the one that does so most, swings less in the last quarter, and by which differently."""
         before = replace(self.whole, start=self.settled_part.start, stop=3 * self.history.samples // 4)
         sizes = [np.array([each.deviation("vx"), each.amplitude("x")]) for each in (before, self.last)]
-        return bool((np.abs(sizes[0] - sizes[1]) <= self.limits.settled_within * sizes[1]).all())
+        parts = sizes[0] / np.maximum(sizes[1], 1e-300) - 1.0
+        return float(parts.max()), float(np.abs(parts).max())
 
     def _own_line(self) -> float | None:
         """Frequency (Hz) of a mode that lies on lines with more of the energy than forced motion may lack."""

@@ -140,12 +140,11 @@ class _Rules(ForcedRules):
         envelope, belt = self.envelope, abs(self.context.belt_speed)
         if belt == 0.0 and self.context.growth() < 0.0:
             return Decision("the wheel stands: friction and dashpots take the energy", Regime.DAMPED)
-        small = min(envelope.largest, belt or math.inf, self.context.scale)
         kept = bool(self.context.forced) and self.context.growth() < 0.0  # up by the roughness
         falls = self.evidence.get("envelope_slope", 0.0) < 0.0 or (kept and self._trend == 0.0)
         falls |= envelope.final <= self.context.quiet
         ends = self.last.fraction(ContactState.STICK) == self.last.fraction(ContactState.SEPARATED) == 0.0
-        if envelope.final > max(self.limits.decayed_to * small, self.context.quiet) or not (falls and ends):
+        if envelope.final > max(self._little, self.context.quiet) or not (falls and ends):
             return None
         if self.context.growth() > 0.0:
             return None
@@ -157,6 +156,12 @@ class _Rules(ForcedRules):
                 return found
             return Decision(f"{text}; {found.reason}", Regime.DAMPED, Excitation.FORCED)
         return Decision(f"the vibration has died out: {text}", Regime.DAMPED)
+
+    @property
+    def _little(self) -> float:
+        """Standard deviation of vx (m/s) below which a vibration has died out."""
+        belt = abs(self.context.belt_speed) or math.inf
+        return self.limits.decayed_to * min(self.envelope.largest, belt, self.context.scale)
 
     def trend(self) -> Decision | None:
         """Decides where the motion still grows or decays; otherwise it finds the settled part."""
@@ -177,7 +182,9 @@ class _Rules(ForcedRules):
         if self.context.growth() > 0.0 and 0.5 * abs(slope) * self.duration <= _NEAR:
             return None  # a vibration that has reached its limits, cannot die out, and comes near its amplitude
         text = f"still {'growing' if slope > 0.0 else 'decaying'} at {abs(slope):.3g} 1/s"
-        more = (self._powers_to_lose if slope < 0.0 else 3.0) / abs(slope)
+        more = 3.0 / abs(slope)
+        if slope < 0.0:  # until what is left is forced, has died out, or lasts
+            more = max(self._powers_to_lose, math.log(max(self.envelope.final / self._little, 1.0))) / -slope
         return Decision(f"{text}; run at least {more:.2g} s longer")
 
     def sustained(self) -> Decision:
