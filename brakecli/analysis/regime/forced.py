@@ -242,7 +242,7 @@ class ForcedRules:
         return slope if abs(slope) > self.limits.trend_errors * error else 0.0
 
     def _changes(self) -> tuple[float, float]:
-        """By which vx or x, the one that does so most, swings less in the last quarter, and by which differently."""
+        """By which vx or x, whichever does more so, swings less in the last quarter, and by which otherwise."""
         before = replace(self.whole, start=self.settled_part.start, stop=3 * self.history.samples // 4)
         sizes = [np.array([each.deviation("vx"), each.amplitude("x")]) for each in (before, self.last)]
         parts = sizes[0] / np.maximum(sizes[1], 1e-300) - 1.0
