@@ -69,7 +69,7 @@ def test_a_forged_result_is_refused_with_a_sentence_or_used(
     """`spared`: part of the pictures, which take long, that are replaced by a verdict."""
     chance, found = random.Random(number), 0
     for _ in range(number):
-        kind = chance.choice(("run", "run", "run", "run", "sweep", "comparison"))
+        kind = chance.choice(("run", "run", "run", "run", "sweep", "comparison", "stability"))
         shutil.copy(results / f"{kind}.h5", tmp_path / "f.h5")
         what = forge(tmp_path / "f.h5", chance)
         command = chance.choice(COMMANDS[kind])
