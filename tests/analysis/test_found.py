@@ -32,6 +32,33 @@ def test_a_shoe_that_locks_itself_is_not_called_forced_while_it_drifts_away() ->
     assert f"grows at {Shoe.of(tables).rate:.3g} 1/s" in verdict.reasons[0]  # in full contact
 
 
+@campaign
+@pytest.mark.parametrize("seed", range(10))
+def test_none_of_its_neighbours_is_called_forced(seed: int) -> None:
+    factors = 1.0 + np.random.default_rng(seed).uniform(-0.3, 0.3, 4)
+    tables = SHOES["locks itself"]
+    changes = {
+        "wheel__angular_speed": tables["wheel"]["angular_speed"] * factors[0],
+        "load__force": tables["load"]["force"] * factors[1],
+        "shoe__mass": tables["shoe"]["mass"] * factors[2],
+        "initial__vx": tables["initial"]["vx"] * factors[3],
+    }
+    assert stability(system_of(make(tables, **changes))).equilibrium is None
+    assert judged("locks itself", float(factors[3]), **changes).regime is not Regime.DAMPED
+
+
+@campaign
+@pytest.mark.parametrize("seed", range(10))
+def test_no_line_near_an_own_frequency_is_counted_as_forced(seed: int) -> None:
+    name, rng = "a line on its own mode, in full contact", np.random.default_rng(seed)
+    mass = SHOES[name]["shoe"]["mass"] * float(
+        rng.uniform(0.85, 1.15)
+    )  # own frequency within two bins of the line
+    verdict = judged(name, shoe__mass=mass, initial__vx=float(rng.uniform(-1e-4, 1e-4)))
+    assert "only the roughness" not in verdict.reasons[0]
+    assert (verdict.amplitude_spread, verdict.amplitude_forced) == (None, None)
+
+
 @pytest.mark.parametrize("name", ["a line on its own mode, in full contact", "a line on its own mode, open"])
 def test_a_line_at_an_own_frequency_is_not_counted_as_forced(name: str) -> None:
     """The shoe's own vibration takes thousands of times the run, or fifty, to die."""
