@@ -185,7 +185,8 @@ class _Rules(ForcedRules):
         more = 3.0 / abs(slope)
         if slope < 0.0:  # until what is left is forced, has died out, or lasts
             more = max(self._powers_to_lose, math.log(max(self.envelope.final / self._little, 1.0))) / -slope
-        return Decision(f"{text}; run at least {more:.2g} s longer")
+        longer = QUARTER * (self.duration + more) - self.duration  # the last quarter is judged
+        return Decision(f"{text}; run at least {longer:.2g} s longer")
 
     def sustained(self) -> Decision:
         theory = self.context.linear() if not self.context.forced else None
