@@ -62,7 +62,7 @@ def tried(folder: Path, name: str, command: list[str]) -> Done:
     return forked(first, name, *rest, *more, cwd=folder, memory=MEMORY)
 
 
-@pytest.mark.parametrize(("number", "spared"), [(40, 0.9), pytest.param(500, 0.0, marks=campaign)])
+@pytest.mark.parametrize(("number", "spared"), [(24, 0.9), pytest.param(500, 0.0, marks=campaign)])
 def test_a_forged_result_is_refused_with_a_sentence_or_used(
     results: Path, tmp_path: Path, number: int, spared: float
 ) -> None:
