@@ -175,5 +175,5 @@ def test_the_time_that_a_verdict_asks_for_is_enough_or_the_new_one_has_another_r
         slower = [float(rate[1]) for each in (first, again) if (rate := RATE.search(each.reasons[0]))]
         explained = reasons[0] != reasons[1] or (len(slower) == 2 and slower[1] < 0.8 * slower[0])
         assert again.regime is not Regime.UNDECIDED or explained, (tables, first.reasons, again.reasons)
-        if (tried := tried + 1) == 20:
+        if (tried := tried + 1) == 10:
             return
