@@ -24,7 +24,7 @@ def stability_table(title: str, report: StabilityReport, found: LockIn | None) -
     sliding = f"none: {report.no_equilibrium}"
     if rest is not None:
         touching = f"{rest.contact_fraction:.1%} of the pad touches"
-        sliding = f"y = {rest.y:.5g} m, F_y = {rest.normal_force:.5g} N, {touching}"
+        sliding = f"y = {rest.y + 0.0:.5g} m, F_y = {rest.normal_force:.5g} N, {touching}"
     rows = [
         ("surface speed U", text_of(report.belt_speed, "m/s")),
         ("steady sliding", sliding),

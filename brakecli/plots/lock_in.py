@@ -33,8 +33,8 @@ def draw(result: StoredResult) -> Figure:
     unit = units.removeprefix("1")
     numbers = ", ".join(style.readable(float(value)) for value in critical[: 2 * _MOST_NUMBERED])
     more = " …" if len(critical) > 2 * _MOST_NUMBERED else ""
-    said = f"stability changes at {numbers}{more} {unit}".rstrip()
-    summary = f"{len(x)} values   ·   {said if len(critical) else 'stability does not change between them'}"
+    said = f"changes at {numbers}{more} {unit}".rstrip() if len(critical) else "does not change in between"
+    summary = f"{len(x)} value{'s' * (len(x) > 1)}   ·   stability {said}"
     figure = style.headed(_WIDTH, 6.4, str(result.attributes.get("title", "")), summary, hspace=0.05)
     panels = figure.subplots(2, 1, sharex=True, height_ratios=[1.35, 1.0])
     for axes, values, label in zip(panels, modes, ("frequency (Hz)", "growth rate (1/s)"), strict=True):
