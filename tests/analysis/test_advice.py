@@ -289,7 +289,7 @@ def test_keys_are_chosen_by_patterns() -> None:
 
 
 def test_an_angle_that_helps_at_0_alone_is_advised_so_exactly() -> None:
-    """With a dashpot along the wheel alone the shoe is stable where nothing couples it: at an angle of 0, not near it."""
+    """With a dashpot along the wheel alone the shoe is stable where nothing couples it: at 0, not near it."""
     case = make(SQUEAL, link1__damping=0.0, link2__angle_deg=0.7)
     found = advised(case, ("link2", "angle_deg"), 0.2, tell)
     assert (found.to, found.rounded, found.critical_friction) == (0.0, "0", None)

@@ -265,7 +265,7 @@ def test_modes_of_a_decoupled_shoe_have_the_ratios_of_single_oscillators() -> No
 
 
 def test_zeros_have_no_sign() -> None:
-    """Without dashpots and beyond divergence, at φ = 3 with the wheel turning back: two real eigenvalues, two not."""
+    """Without dashpots and beyond divergence, as the wheel turns back: two eigenvalues are real, two are not."""
     c = Coefficients(1.0, 0.0, 0.0, 0.0, 2.0, -1.0, 2.0 - 4.0 / 3.0, 0.0, 1.0, 3.0)
     zeros = [
         n
