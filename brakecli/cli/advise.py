@@ -18,7 +18,10 @@ def command(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """What moves the critical friction coefficient most, and what to change so that the shoe does not squeal."""
+    """What to change so that the shoe does not squeal.
+
+    All numbers of the case are ranked by how much they move the critical friction coefficient.
+    """
     loaded = load_case(case, overrides)
     announce_compilation(quiet)
     from brakecli.analysis.stability.advice import KEYS as USUAL

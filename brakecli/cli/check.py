@@ -17,7 +17,10 @@ def command(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Validate a case or a sweep; report what it would cost and which limits it meets, without computing it."""
+    """Validate a case or a sweep and estimate its cost.
+
+    Limits that it meets are reported; nothing is computed.
+    """
     if is_sweep(file):
         sweep = load_sweep(file, overrides)
         announce_compilation(quiet)

@@ -8,7 +8,6 @@ import numpy as np
 from brakecli.analysis.stability.modes import Complex, Mode
 
 Pair = tuple[Mode, Mode]
-_TIE = 1e-9  # of a cost: where modes have just met, both orders are as near
 
 
 def followed(found: Iterable[tuple[Mode, ...]]) -> Iterator[Pair | None]:
@@ -19,15 +18,16 @@ def followed(found: Iterable[tuple[Mode, ...]]) -> Iterator[Pair | None]:
     """
     before: Pair | None = None
     for modes in found:
-        pairs = _pairs(modes) if modes else []
+        if not modes:
+            yield None
+            continue
+        pairs = _pairs(modes)
         if before is None or any(mode.frequency for mode in before):
             pairs = pairs[:1]
-        pair = pairs[0] if pairs else None
-        for other in [*pairs, *(each[::-1] for each in pairs)] if before else ():
-            nearer = sum(map(_distance, before, other)) < sum(map(_distance, before, pair or other)) - _TIE
-            pair = other if nearer else pair
-        before = pair or before
-        yield pair
+        pairs += [(other, one) for one, other in pairs]
+        costs = [sum(map(_distance, before, each)) if before else 0.0 for each in pairs]
+        before = pairs[np.argmin(np.round(costs, 9))]  # where modes have just met, both orders are as near
+        yield before
 
 
 def _pairs(modes: tuple[Mode, ...]) -> list[Pair]:
