@@ -18,10 +18,7 @@ def command(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """What to change so that the shoe does not squeal.
-
-    All numbers of the case are ranked by how much they move the critical friction coefficient.
-    """
+    """What moves the critical friction, and what to change."""
     loaded = load_case(case, overrides)
     announce_compilation(quiet)
     from brakecli.analysis.stability.advice import KEYS as USUAL

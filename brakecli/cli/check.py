@@ -17,10 +17,7 @@ def command(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Validate a case or a sweep and estimate its cost.
-
-    Limits that it meets are reported; nothing is computed.
-    """
+    """Validate a case or a sweep; estimate its cost and limits."""
     if is_sweep(file):
         sweep = load_sweep(file, overrides)
         announce_compilation(quiet)

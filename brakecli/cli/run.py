@@ -19,10 +19,7 @@ def command(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Simulate one case and write its motion to a file.
-
-    The HDF5 file holds time histories, spectra, the regime with its evidence, and the energy account.
-    """
+    """Simulate one case; write motion and regime to HDF5."""
     loaded = load_case(case, overrides)
     target = result_path(output, case)
     announce_compilation(quiet)

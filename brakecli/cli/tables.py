@@ -257,11 +257,9 @@ def grid(columns: Mapping[str, Sequence[str]], keys: int = 1, title: str = "", s
     console = Console(markup=False, emoji=False, highlight=False)  # titles and file names are not markup
     console.width = room = max(console.width, NARROWEST)
     texts = {escaped(header): [*map(escaped, cells)] for header, cells in columns.items()}
-    least, most = dict[str, int](), dict[str, int]()
-    for header, cells in texts.items():
-        words = " ".join((header.replace(".", ". "), *cells)).split()
-        least[header] = min(max(map(cell_len, words)), room // 2)
-        most[header] = max(map(cell_len, (header, *cells)))
+    most = {header: max(map(cell_len, (header, *cells))) for header, cells in texts.items()}
+    words = {header: " ".join((header.replace(".", ". "), *cells)).split() for header, cells in texts.items()}
+    least = {header: min(max(map(cell_len, words[header])), room // 2) for header in texts}
     names = [*texts]
     while len(names) > keys + 1 and sum(least[name] + 2 for name in names) > room + 2:
         names.pop()
@@ -276,10 +274,9 @@ def grid(columns: Mapping[str, Sequence[str]], keys: int = 1, title: str = "", s
     for line in zip(*map(texts.get, names), strict=True):
         table.add_row(*line)
     with console.capture() as shown:
-        console.print(*[escaped(title)] * bool(title), style="italic", end="\n" * bool(title))
+        if title:
+            console.print(escaped(title), style="italic")
         console.print(table)
-    others = {
-        name: cells for place, (name, cells) in enumerate(texts.items()) if place < keys or name not in names
-    }
+    others = {name: texts[name] for name in (*names[:keys], *[*texts][len(names) :])}
     below = ["", grid(others, keys)] if len(names) < len(texts) else []
     return "\n".join([*(line.rstrip() for line in shown.get().splitlines()), *below])
