@@ -1,6 +1,7 @@
 """What a terminal of 80 columns shows, what long work says without one, and the starters."""
 
 import re
+import time
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -72,7 +73,7 @@ def test_long_work_without_a_terminal_says_a_line_now_and_then(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     seconds = iter([0.0, 5.0, 21.0, 30.0, 41.0, 50.0, 99.0, 101.0])
-    monkeypatch.setattr(output.time, "monotonic", lambda: next(seconds, 200.0))
+    monkeypatch.setattr(time, "monotonic", lambda: next(seconds, 200.0))
     with output.progress(False) as tell:
         for done in range(6):
             tell("steps", 10 * done, 100)
