@@ -37,11 +37,6 @@ def starters() -> dict[str, str]:
     return {each.name.removesuffix(".toml"): each.read_text(encoding="utf-8") for each in sorted(files, key=str)}
 
 
-def starter_text() -> str:
-    """The starter that explains every key of a case."""
-    return starters()["case"]
-
-
 def read_case(source: str, overrides: Sequence[str] = ()) -> LoadedCase:
     """Read the case from a path, or from standard input where the path is "-"; see `parse_case`."""
     return parse_case(*read_text(source), overrides)
