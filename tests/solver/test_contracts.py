@@ -18,7 +18,7 @@ from brakecli.solver.implicit_step import SOLVED, newton
 from brakecli.solver.loop import advance
 from brakecli.solver.records import PROBLEM, WORK, Coefficients, Weights, new
 from brakecli.solver.roughness import surface
-from tests.solver.rough_gap import unfilled
+from tests.solver.rough_gap import outputs, unfilled
 
 EVALUATORS = sorted(module.name for module in pkgutil.iter_modules(contact.__path__) if module.name != "pad")
 SCHEMES = sorted(module.name for module in pkgutil.iter_modules(schemes.__path__))
@@ -89,7 +89,8 @@ def test_an_evaluator_fills_its_results_and_leaves_everything_else(name: str) ->
         y = rng.uniform(-1.5, 1.5) * height
         evaluate(rng.uniform(-1e-2, 1e-2), y, layer)
         filled = layer.contact
-        assert np.isfinite(filled.tolist()).all()
+        assert np.isfinite([*outputs(filled), filled.blur]).all()
+        assert filled.near >= 0.0
         assert filled.normal_force >= 0.0
         assert filled.stiffness >= 0.0
         assert 0.0 <= filled.fraction <= 1.0
