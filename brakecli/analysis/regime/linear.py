@@ -41,6 +41,17 @@ class Linear:
     wavenumbers: Array  # rad/m
     known_to: float = 0.0  # 1/s, by how much the growth may be off
 
+    @property
+    def sentence(self) -> str:
+        """What becomes of the shoe's own vibration, and why."""
+        mode, fate = self.mode, "it neither grows nor decays"
+        if self.direction > 0:
+            fate = f"still growing at {mode.growth:.3g} 1/s"
+        elif self.direction < 0:
+            fate = f"the shoe's own vibration decays at {-mode.growth:.3g} 1/s"
+        how = f"{mode.frequency:.4g} Hz" if mode.frequency else "without oscillation"
+        return f"full contact and slip to one side make the motion linear: {fate} ({how})"
+
     def with_slopes(self) -> "Linear":
         """The same with the growth that the passing waves leave to the mode by their slopes."""
         if not len(self.waves):

@@ -1,0 +1,395 @@
+"""The limit cycle that a motion on smooth pads comes to, found before the motion has come to it.
+
+At constant speed and load the motion is followed from event to event, without samples. Each fall of ẋ through 0 is
+a point (x, y, ẏ) of the section ẋ = 0, and P leads from one to the next. Where two of them in a row lie close together,
+Newton's iteration s + (I - M)⁻¹ (P(s) - s) finds the point that returns to itself, and with it the orbit.
+
+M = dP/ds is a product of known matrices. Within a phase a small disturbance w follows the same linear equation as
+the motion: w(t) = exp(A t) w(0). An event n·z = 0 of the disturbed motion comes by -n·w / n·f later, where f = A z is
+the velocity with which the motion arrives there. For that time it has moved with f instead of f', the velocity with
+which it leaves, so that behind the event
+
+    w' = (I + (f' - f) nᵀ / (nᵀ f)) w,
+
+the saltation matrix (R. I. Leine, H. Nijmeijer, Dynamics and bifurcations of non-smooth mechanical systems, Springer
+2004, ch. 7). Where stick begins it takes away what w has along ẋ; where stick ends and where contact is lost or made
+forces do not jump, f' = f, and it is the identity. In the same way the end on the section takes away f (n·w) / (n·f),
+n along ẋ. The eigenvalues of M are Floquet's multipliers: all within the unit circle, and the orbit attracts.
+"""
+
+import math
+from typing import Any
+
+import numba
+from numba import float64, int64, types, void
+
+from brakecli.solver.compile import kernel
+from brakecli.solver.records import (
+    COEFFICIENTS,
+    FLOW_TYPE,
+    NODES,
+    PHASES,
+    SIZE,
+    TERMS,
+    V_X,
+    V_Y,
+    Coefficients,
+    X,
+    Y,
+    record,
+)
+from brakecli.solver.roughness import TWO_PI
+from brakecli.solver.schemes.piecewise_exact import look, phases, whole
+from brakecli.solver.schemes.piecewise_exact.locate import NO_EVENT, first_event, root
+from brakecli.solver.schemes.piecewise_exact.phases import OPEN
+from brakecli.solver.schemes.piecewise_exact.switch import place, switch
+
+GOING_ON, LINEAR, FOUND, ENDED = range(4)
+"""What `seek` has come to: nothing yet; no event can follow; an orbit; the end of the time, or of the progress."""
+
+_NEAR = 0.02  # of the size of a cycle: distance of two returns from which on Newton's iteration is tried
+_REACH = 0.1  # the same of its first step, beyond which it may lead elsewhere
+_ROUNDS = 6
+_CLOSED = 1e-11  # of the size of a cycle, by which an orbit may fail to close
+_FOLLOWS = 0.25  # part by which a return to the orbit may differ from what the multipliers say
+_MOST_STEPS = 100_000  # in a call: Python hears signals in between
+_MOST_EVENTS = 60  # in a cycle
+_PRIME = 1_000_003
+
+ORBIT = record(
+    "h",  # step, s
+    "duration",  # of the run, s
+    "time",  # reached, s
+    "part",  # of the last step that was taken, up to its event
+    "fall",  # time of the last fall of v_x through 0, s
+    "period",  # of the last cycle, or of the orbit, s
+    "amplitude",  # half of peak to peak of x in it, m
+    "low high",  # least and largest x since the last fall, m; of an orbit v_x, m/s
+    "error",  # of the orbit, in sizes
+    "away",  # of the last return from the orbit, in sizes
+    "mean_x mean_y square",  # integrals of x, y and v_x² over the orbit, m s and m²/s
+    which=int,  # event at the end of the last step
+    old=int,  # phase of that step
+    started=int,
+    steps=int,
+    evaluations=int,  # of the contact: steps in which the shoe touches
+    events=int,  # since the last fall
+    falls=int,
+    next_try=int,  # fall from which on an orbit is sought again
+    way=int,  # phases entered since the last fall, as a number that other ways hardly share
+    last_way=int,  # those of the last cycle
+    sliding=int,  # phase of steady sliding
+    begin=(float, SIZE),  # motion at the begin of the last step
+    kept=(float, SIZE),  # a place on the way round the cycle
+    saved=(float, SIZE),  # motion to go on with
+    returns=(float, (2, 3)),  # the last two points of the section
+    point=(float, 3),  # of the orbit
+    tangents=(float, (3, 4)),  # small disturbances of x, y and v_y on the way round the cycle
+    map=(float, (3, 3)),  # M
+    spent=(float, PHASES),  # time of the cycle in each phase, s
+    rest=(float, 4),  # steady sliding
+    into=(float, (2, 4, 4)),  # from a motion beside it to the amplitudes of its modes, real and imaginary parts
+    growth=(float, 4),  # of each mode, 1/s
+    reach=(float, (4, 3)),  # of a mode of amplitude 1 in x, y (m) and v_x (m/s)
+    bound=(float, 3),  # of the motion's distance from steady sliding in them
+    room=(float, 2),  # of y and v_x until an event comes
+)
+"""A motion on its way to its orbit, and the orbit."""
+ORBIT_TYPE = numba.from_dtype(ORBIT)
+
+
+@kernel(void(FLOW_TYPE, ORBIT_TYPE))
+def _expand(m: Any, o: Any) -> None:
+    """The series of the last step."""
+    for i in range(SIZE):
+        m.series[0, i] = o.begin[i]
+    phases.expand(m, o.old, o.h)
+
+
+@kernel(void(FLOW_TYPE, ORBIT_TYPE, float64))
+def _take(m: Any, o: Any, part: float) -> None:
+    """The motion at a part of the series."""
+    phases.reach(m, o.old, part, NODES, 0)
+
+
+@kernel(void(COEFFICIENTS, FLOW_TYPE, ORBIT_TYPE, int64), inlined=False)
+def _step(c: Coefficients, m: Any, o: Any, closely: int) -> None:
+    """Move to the end of a step, or through the event in it; `closely` follows the series in any case."""
+    for i in range(SIZE):
+        o.begin[i] = m.z[i]
+    o.old, o.part, o.which = m.phase, 1.0, NO_EVENT
+    o.steps += 1
+    o.evaluations += 1 if m.phase != OPEN else 0
+    if closely == 1 or whole(m, o.h) == 0:
+        _expand(m, o)
+        o.which, o.part = first_event(m)
+        _take(m, o, o.part)
+        for i in range(SIZE):
+            m.z[i] = m.at[NODES, 0, i]
+        if o.which != NO_EVENT:
+            switch(c, m, o.which, o.h)
+        look(m)
+
+
+@kernel(float64(FLOW_TYPE, ORBIT_TYPE, float64), inlined=False)
+def _zero(m: Any, o: Any, sign: float) -> float:
+    """The part of the last step at which v_x falls through zero, or rises where the sign is -1; goes there."""
+    _expand(m, o)
+    for k in range(TERMS):
+        m.polynomial[0, k] = sign * m.series[k, V_X]
+    part = root(m, 0, 0.0, o.part)
+    _take(m, o, part)
+    return part  # type: ignore[no-any-return]
+
+
+@kernel(void(ORBIT_TYPE, int64))
+def _note_event(o: Any, phase: int) -> None:
+    """Note the phase that the last step has ended in."""
+    if o.which != NO_EVENT:
+        o.events, o.way = o.events + 1, (o.way * 5 + phase + 1) % _PRIME
+
+
+@kernel(void(FLOW_TYPE, ORBIT_TYPE, float64), inlined=False)
+def _carry(m: Any, o: Any, part: float) -> None:
+    """Move the disturbances along a part of the last step."""
+    whole_step = part == 1.0
+    for j in range(3):
+        if whole_step:
+            for i in range(4):
+                m.end[i] = 0.0
+                for k in range(4):
+                    m.end[i] += m.step[o.old, i, k] * o.tangents[j, k]
+        else:
+            for i in range(SIZE):
+                m.series[0, i] = o.tangents[j, i] if i < 4 else 0.0
+            phases.expand(m, o.old, o.h)
+            _take(m, o, part)
+        for i in range(4):
+            o.tangents[j, i] = m.end[i] if whole_step else m.at[NODES, 0, i]
+
+
+@kernel(float64(FLOW_TYPE, ORBIT_TYPE, int64, int64))
+def _velocity(m: Any, o: Any, phase: int, i: int) -> float:
+    """A component of the velocity A z of a phase at the place `o.kept`."""
+    total = 0.0
+    for k in range(SIZE):
+        total += m.generator[phase, i, k] * o.kept[k]
+    return total
+
+
+@kernel(int64(FLOW_TYPE, ORBIT_TYPE, int64), inlined=False)
+def _jump(m: Any, o: Any, section: int) -> int:
+    """Take the disturbances through an event, or onto the section, at `o.kept`; 0 where the motion only grazes it."""
+    rate = 0.0
+    for i in range(4):
+        normal = (1.0 if i == V_X else 0.0) if section == 1 else m.margins[o.old, o.which, i]
+        rate += normal * _velocity(m, o, o.old, i)
+    if rate >= 0.0:
+        return 0
+    for j in range(3):
+        late = 0.0
+        for i in range(4):
+            normal = (1.0 if i == V_X else 0.0) if section == 1 else m.margins[o.old, o.which, i]
+            late += normal * o.tangents[j, i] / rate
+        for i in range(4):
+            leaves = 0.0 if section == 1 else _velocity(m, o, m.phase, i)
+            o.tangents[j, i] += (leaves - _velocity(m, o, o.old, i)) * late
+    return 1
+
+
+@kernel(int64(COEFFICIENTS, FLOW_TYPE, ORBIT_TYPE, int64), inlined=False)
+def _around(c: Coefficients, m: Any, o: Any, closely: int) -> int:
+    """From `point` to the next fall, with M or, `closely`, with the numbers of the cycle; 0 where there is none.
+
+    It ends with the point of return in `kept`.
+    """
+    for j in range(3):
+        for i in range(4):
+            o.tangents[j, i] = 1.0 if i == (j if j < 2 else V_Y) else 0.0
+    m.z[X], m.z[Y], m.z[V_X], m.z[V_Y] = o.point[0], o.point[1], 0.0, o.point[2]
+    place(c, m, o.h)
+    look(m)
+    o.period, o.mean_x, o.mean_y, o.square, o.low, o.high, o.events, o.way = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, 0
+    for k in range(PHASES):
+        o.spent[k] = 0.0
+    for _ in range(_MOST_STEPS):
+        _step(c, m, o, closely)
+        falls, part = o.begin[V_X] > 0.0 >= m.z[V_X], o.part
+        if falls:
+            part = _zero(m, o, 1.0)
+        for i in range(SIZE):
+            o.kept[i] = m.at[NODES, 0, i] if falls else m.z[i]
+        o.period, o.spent[o.old] = o.period + part * o.h, o.spent[o.old] + part * o.h
+        if closely == 1:
+            for k in range(TERMS - 1, -1, -1):
+                power = o.h * part ** (k + 1) / (k + 1)
+                o.mean_x, o.mean_y = o.mean_x + power * m.series[k, X], o.mean_y + power * m.series[k, Y]
+            o.low, o.high = min(o.low, m.z[V_X]), max(o.high, m.z[V_X])
+            o.square += 0.5 * part * o.h * (o.begin[V_X] ** 2 + m.z[V_X] ** 2)
+            if o.begin[V_X] < 0.0 <= m.z[V_X]:
+                _zero(m, o, -1.0)
+                o.amplitude = 0.5 * (o.point[0] - m.at[NODES, 0, X])
+        else:
+            _carry(m, o, part)
+            if (falls or o.which != NO_EVENT) and _jump(m, o, int(falls)) == 0:
+                return 0
+        if falls:
+            for j in range(3 if closely == 0 else 0):
+                o.map[0, j], o.map[1, j], o.map[2, j] = o.tangents[j, X], o.tangents[j, Y], o.tangents[j, V_Y]
+            return 1
+        _note_event(o, m.phase)
+        if o.events > _MOST_EVENTS:
+            return 0
+    return 0
+
+
+@kernel(float64(ORBIT_TYPE, float64, float64, float64))
+def _sizes(o: Any, x: float, y: float, v_y: float) -> float:
+    """A distance on the section, in sizes of the cycle."""
+    return max(abs(x), abs(y), abs(v_y) * o.period / TWO_PI) / o.amplitude  # type: ignore[no-any-return]
+
+
+@kernel(types.UniTuple(float64, 3)(ORBIT_TYPE, float64, float64, float64), inlined=False)
+def _solved(o: Any, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """(I - M)⁻¹ of a vector, by Cramer's rule; far away where there is none."""
+    a, b, c = 1.0 - o.map[0, 0], -o.map[0, 1], -o.map[0, 2]
+    d, e, f = -o.map[1, 0], 1.0 - o.map[1, 1], -o.map[1, 2]
+    g, h, i = -o.map[2, 0], -o.map[2, 1], 1.0 - o.map[2, 2]
+    whole = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
+    if whole == 0.0:
+        return 1e300, 1e300, 1e300
+    one = x * (e * i - f * h) - b * (y * i - f * z) + c * (y * h - e * z)
+    two = a * (y * i - f * z) - x * (d * i - f * g) + c * (d * z - y * g)
+    three = a * (e * z - y * h) - b * (d * z - y * g) + x * (d * h - e * g)
+    return one / whole, two / whole, three / whole
+
+
+@kernel(int64(COEFFICIENTS, FLOW_TYPE, ORBIT_TYPE), inlined=False)
+def _closed(c: Coefficients, m: Any, o: Any) -> int:
+    """Find the orbit near the last return; 0 where Newton's iteration finds none that the motion is coming to."""
+    for i in range(3):
+        o.point[i] = o.returns[1, i]
+    for _ in range(_ROUNDS):
+        if _around(c, m, o, 0) == 0:
+            return 0
+        x, y, v_y = _solved(o, o.kept[X] - o.point[0], o.kept[Y] - o.point[1], o.kept[V_Y] - o.point[2])
+        o.error = _sizes(o, x, y, v_y)
+        if not o.error < _REACH:
+            return 0
+        if o.error < _CLOSED:
+            break
+        o.point[0], o.point[1], o.point[2] = o.point[0] + x, o.point[1] + y, o.point[2] + v_y
+    if o.error >= _CLOSED or o.way != o.last_way:
+        return 0
+    for i in range(3):  # does the last return follow from the one before it as M says?
+        o.kept[i] = o.returns[1, i] - o.point[i]
+        for k in range(3):
+            o.kept[i] -= o.map[i, k] * (o.returns[0, k] - o.point[k])
+    s, at = o.returns, o.point
+    was = _sizes(o, s[0, 0] - at[0], s[0, 1] - at[1], s[0, 2] - at[2])
+    o.away = _sizes(o, s[1, 0] - at[0], s[1, 1] - at[1], s[1, 2] - at[2])
+    if not (_sizes(o, o.kept[0], o.kept[1], o.kept[2]) <= _FOLLOWS * was + 100.0 * _CLOSED and was < _REACH):
+        return 0
+    return _around(c, m, o, 1)
+
+
+@kernel(void(FLOW_TYPE, ORBIT_TYPE, float64), inlined=False)
+def _bound(m: Any, o: Any, seconds: float) -> None:
+    """How far from steady sliding the modes of a linear motion can come within some time: the sum of their sizes."""
+    for k in range(3):
+        o.bound[k] = 0.0
+    for q in range(4):
+        real, imaginary = 0.0, 0.0
+        for i in range(4):
+            real += o.into[0, q, i] * (m.z[i] - o.rest[i])
+            imaginary += o.into[1, q, i] * (m.z[i] - o.rest[i])
+        size = math.hypot(real, imaginary) * math.exp(min(max(o.growth[q], 0.0) * seconds, 700.0))
+        for k in range(3):
+            o.bound[k] += size * o.reach[q, k]
+
+
+@kernel(int64(FLOW_TYPE, ORBIT_TYPE), inlined=False)
+def _stays_linear(m: Any, o: Any) -> int:
+    """Whether the motion slides steadily, or beside that, and no event can come before the end."""
+    if m.phase != o.sliding:
+        return 0
+    _bound(m, o, o.duration - o.time)
+    return 1 if o.bound[1] < o.room[0] and o.bound[2] < o.room[1] else 0
+
+
+@kernel(int64(FLOW_TYPE, ORBIT_TYPE, float64), inlined=False)
+def _returned(m: Any, o: Any, fall: float) -> int:
+    """Note a return to the section, which is in `m.at`; whether it lies close to the one before."""
+    for i in range(3):
+        o.returns[0, i] = o.returns[1, i]
+    o.returns[1, 0], o.returns[1, 1], o.returns[1, 2] = m.at[NODES, 0, X], m.at[NODES, 0, Y], m.at[NODES, 0, V_Y]
+    o.period, o.fall, o.falls = fall - o.fall, fall, o.falls + 1
+    o.amplitude, o.low = 0.5 * (o.returns[1, 0] - o.low), o.returns[1, 0]
+    o.last_way, o.way, o.events = o.way, 0, 0
+    if o.falls < max(o.next_try, 3) or not o.amplitude > 0.0:
+        return 0
+    s = o.returns
+    return 1 if _sizes(o, s[1, 0] - s[0, 0], s[1, 1] - s[0, 1], s[1, 2] - s[0, 2]) < _NEAR else 0
+
+
+@kernel(int64(COEFFICIENTS, FLOW_TYPE, ORBIT_TYPE), inlined=False)
+def _try(c: Coefficients, m: Any, o: Any) -> int:
+    """Seek an orbit near the last return. Where there is none the motion goes on as if nothing had been sought."""
+    phase, way, events, low, period, size = m.phase, o.way, o.events, o.low, o.period, o.amplitude
+    for i in range(SIZE):
+        o.saved[i] = m.z[i]
+    found = _closed(c, m, o)
+    for i in range(SIZE):
+        m.z[i] = o.saved[i]
+    m.phase = phase
+    if found == 0:
+        o.way, o.events, o.low, o.period, o.amplitude = way, events, low, period, size
+    look(m)
+    o.next_try = o.falls + 3 + (o.falls - o.next_try) // 2
+    return found  # type: ignore[no-any-return]
+
+
+@kernel(int64(COEFFICIENTS, FLOW_TYPE, ORBIT_TYPE))
+def seek(c: Coefficients, m: Any, o: Any) -> int:
+    """Follow the motion until something is known of all that is to come; what that is, or `GOING_ON`."""
+    if o.started == 0:
+        m.z[X], m.z[Y], m.z[V_X], m.z[V_Y], o.low = m.x, m.y, m.v_x, m.v_y, m.x
+        place(c, m, o.h)
+        look(m)
+        o.started = 1
+        if _stays_linear(m, o) == 1:
+            return LINEAR
+    for _ in range(_MOST_STEPS):
+        if o.time >= o.duration or o.events > _MOST_EVENTS:
+            return ENDED
+        _step(c, m, o, 0)
+        o.low, near, falls = min(o.low, m.z[X]), 0, o.begin[V_X] > 0.0 >= m.z[V_X]
+        if falls:
+            near = _returned(m, o, o.time + _zero(m, o, 1.0) * o.h)
+        o.time += o.part * o.h
+        _note_event(o, m.phase)
+        if near == 1 and _try(c, m, o) == 1:
+            return FOUND
+        if falls and _stays_linear(m, o) == 1:
+            return LINEAR
+    return GOING_ON
+
+
+@kernel(void(COEFFICIENTS, FLOW_TYPE, ORBIT_TYPE, float64))
+def swing(c: Coefficients, m: Any, o: Any, seconds: float) -> None:
+    """Widen `low` and `high` to the least and largest x of a linear motion from `m.z` on, for some time.
+
+    It ends early where the modes that are left can reach no further.
+    """
+    m.phase = o.sliding
+    phases.make(c, m, m.phase, o.h)
+    look(m)
+    o.low, o.high = min(o.low, m.z[X]), max(o.high, m.z[X])
+    for _ in range(int(seconds / o.h)):
+        _step(c, m, o, 0)
+        if o.begin[V_X] * m.z[V_X] < 0.0:
+            _zero(m, o, 1.0 if o.begin[V_X] > 0.0 else -1.0)
+            o.low, o.high = min(o.low, m.at[NODES, 0, X]), max(o.high, m.at[NODES, 0, X])
+            _bound(m, o, seconds)
+            if o.rest[X] + o.bound[0] <= o.high and o.rest[X] - o.bound[0] >= o.low:
+                return

@@ -1,0 +1,185 @@
+"""A verdict as soon as it is known, on smooth pads at constant speed and load: what a sweep needs of a point.
+
+The motion is followed without samples (`solver.schemes.piecewise_exact.orbit`) until one of two things is certain.
+
+- It slides to one side, and the sum of what its modes can do until the end of the run neither reaches the speed of the
+  wheel nor opens the contact. All that is to come is linear, and the eigenvalues decide.
+- It comes to a limit cycle that attracts it. Newton's iteration gives the orbit, Floquet's multipliers say how soon the
+  motion has come to it. The verdict is given where a whole run would show it settled.
+
+Where neither is certain, or the whole run would see its motion otherwise than the orbit is (few samples in a cycle or
+in a stick, a settled part that is too short), there is no early verdict, and the run goes to its end.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from brakecli.analysis.regime.evidence import FEWEST_SAMPLES
+from brakecli.analysis.regime.forced import QUARTER
+from brakecli.analysis.regime.linear import Linear, linear_theory
+from brakecli.analysis.regime.verdict import Excitation, Regime
+from brakecli.analysis.stability.modes import is_undamped
+from brakecli.runs.tolerance import ROUNDING, Certificate
+from brakecli.solver.compile import Floats
+from brakecli.solver.motion import Work
+from brakecli.solver.records import BELT, FLOW, LOAD, new
+from brakecli.solver.schemes.piecewise_exact import orbit
+from brakecli.solver.schemes.piecewise_exact.phases import BACKWARD, FORWARD, OPEN, STICK
+from brakecli.solver.system import System
+
+_SETTLED = 0.02  # of the size of a cycle: a motion so near to its orbit is settled
+_POWERS = 10.0  # of e, by which what is left then fades until the end: drift is seen no more
+_SETTLED_PART = 0.35  # of the run, at least: a quarter and the width of windows
+_CYCLES = 12.0  # in it
+_SAMPLES = 40.0  # in a cycle, so that its shape is seen
+_SEEN = 2.5  # samples in a stick, or off the wheel
+_HYSTERESIS = 0.4  # of the standard deviation of vx, which its least and largest values exceed in a counted cycle
+_WINDOW = 0.05  # of the run, by which a whole run may see the settled part begin earlier or later
+
+
+class Known(NamedTuple):
+    """A verdict on the motion itself, without samples: numbers of the orbit, or of the linear motion (SI units)."""
+
+    regime: Regime
+    excitation: Excitation
+    reasons: tuple[str]
+    frequency: float | None  # Hz
+    amplitude: float  # m
+    stick_fraction: float
+    contact_loss_fraction: float
+    mean_friction_force: float  # N
+    braking_torque: float  # N m
+    settled: bool
+    settled_from: float  # s
+    evidence: dict[str, Any] = {}  # noqa: RUF012
+
+
+class Ending(NamedTuple):
+    """What stands for the motion of a whole run: its system, its last state as a row, its cost."""
+
+    system: System
+    rows: Floats
+    work: Work
+
+
+class Early(NamedTuple):
+    """An early verdict, with what a sweep goes on with."""
+
+    verdict: Known
+    motion: Ending
+    certificate: Certificate | None
+
+
+def early(system: System) -> Early | None:
+    """The verdict on the motion of a system before its end; None where none is certain."""
+    theory = _theory(system)
+    if theory is None:
+        return None
+    c, flow, o = system.coefficients, new(FLOW), _prepared(system, theory)
+    rest, start = theory.rest if system.initial.from_equilibrium else (0.0, 0.0), system.initial
+    flow.x, flow.y, flow.v_x, flow.v_y = start.x + rest[0], start.y + rest[1], start.vx, start.vy
+    flow.stiffness, flow.z[BELT], flow.z[LOAD] = system.contact_stiffness, system.belt_speed, system.load_at_start
+    while (outcome := orbit.seek(c, flow, o)) == orbit.GOING_ON:
+        pass
+    if outcome == orbit.LINEAR:
+        found = _linear(system, theory, flow, o)
+    else:
+        found = _cycle(system, theory, flow, o) if outcome == orbit.FOUND else None
+    if found is None:
+        return None
+    verdict, end = found
+    work = Work(steps=int(o.steps), contact_evaluations=int(o.evaluations))
+    tolerance, error, until = system.method.tolerance, max(float(o.error), ROUNDING), system.sampled_duration
+    certificate = Certificate(tolerance, True, error, until, "the orbit itself")  # noqa: FBT003
+    row = np.array([end])
+    return Early(verdict, Ending(system, row, work), certificate if system.method.step is None else None)
+
+
+def _theory(system: System) -> Linear | None:
+    """The theory of steady sliding, where a verdict may be early and eigenvalues say which way it goes."""
+    c, steady = system.coefficients, len(system.belt) == 1 and len(system.load) == 1
+    smooth = system.smooth and system.method.row.exact
+    if not (smooth and steady and system.samples >= FEWEST_SAMPLES) or c.phi == 0.0 or is_undamped(c):
+        return None
+    theory = linear_theory(system, system.belt_speed)
+    return theory if theory is not None and theory.direction != 0 else None
+
+
+def _prepared(system: System, theory: Linear) -> Any:
+    """The record that a motion is followed with."""
+    o, inverse = new(orbit.ORBIT), np.linalg.inv(theory.vectors)
+    o.h, o.duration = system.longest_step, system.sampled_duration
+    o.sliding = BACKWARD if theory.belt > 0.0 else FORWARD
+    o.rest[:2], o.room[:] = theory.rest, (theory.depth, abs(theory.belt))
+    o.into[0], o.into[1], o.growth[:] = inverse.real, inverse.imag, theory.values.real
+    o.reach[:] = np.abs(theory.vectors[:3]).T
+    return o
+
+
+def _linear(system: System, theory: Linear, flow: Any, o: Any) -> tuple[Known, list[float]] | None:
+    """The verdict on a motion that is linear from its first half on, and its last state."""
+    start, end = (system.samples + 1) // 2 * system.interval, system.sampled_duration
+    if o.time > start:
+        return None
+    rest, values, vectors = np.array(o.rest), theory.values, theory.vectors
+    parts = np.linalg.solve(vectors, np.array(flow.z[:4]) - rest)
+
+    def at(time: float) -> Floats:
+        return np.asarray(rest + (vectors @ (parts * np.exp(values * (time - o.time)))).real)
+
+    o.low, o.high, span = math.inf, -math.inf, end - start
+    windows = [(start, span)]
+    if theory.direction > 0:  # what grows is largest at the end
+        span = min(span, 3.0 / system.natural_frequencies[0])
+        windows = [(start, span), (end - span, span)]
+    for begin, seconds in windows:
+        flow.z[:4] = at(begin)
+        orbit.swing(system.coefficients, flow, o, seconds)
+    fades = np.exp(values * (end - o.time)) - np.exp(values * (start - o.time))
+    height = rest[1] + (vectors[1] @ (parts * fades / values)).real / (end - start)
+    force = math.copysign(system.coefficients.phi, theory.belt) * -system.contact_stiffness * float(height)
+    reason, last = theory.sentence, at(end)
+    if theory.direction > 0:
+        more = theory.seconds_to_limit(end, last) + 3.0 / theory.mode.growth
+        reason += f"; run at least {QUARTER * (end + more):.3g} s"
+    regime, amplitude = Regime.DAMPED if theory.direction < 0 else Regime.UNDECIDED, 0.5 * float(o.high - o.low)
+    torque = system.radius * force
+    known = Known(
+        regime, Excitation.NONE, (reason,), None, amplitude, 0.0, 0.0, force, torque, settled=False, settled_from=start
+    )
+    return known, last.tolist()
+
+
+def _cycle(system: System, theory: Linear, flow: Any, o: Any) -> tuple[Known, list[float]] | None:
+    """The verdict on an orbit that the motion has come to well before the end of the run, and a state on it."""
+    end, period, interval = system.sampled_duration, float(o.period), system.interval
+    factor = float(np.abs(np.linalg.eigvals(o.map)).max())
+    if not factor < 1.0:
+        return None
+    rate = -math.log(max(factor, 1e-300)) / period
+    start = float(o.fall) + max(math.log(max(float(o.away), 1e-300) / _SETTLED), 0.0) / rate
+    part, growth = end - start, abs(theory.mode.growth)
+    stick, clear = float(o.spent[STICK]), float(o.spent[OPEN])
+    limited = period - float(o.spent[o.sliding])
+    swing = _HYSTERESIS * math.sqrt(float(o.square) / period)
+    if (
+        rate * part < _POWERS
+        or part < max(_SETTLED_PART * end, _CYCLES * period)
+        or period < _SAMPLES * interval
+        or min(limited, stick or limited, clear or limited) < _SEEN * interval
+        or min(-float(o.low), float(o.high)) < swing
+    ):
+        return None
+    lasts = growth * (part - _WINDOW * end) >= 1.0
+    if not lasts and (theory.direction < 0 or growth * end >= 1.0):
+        return None  # whether the vibration lasts depends on where exactly a whole run sees it settled
+    c, how = system.coefficients, "with" if stick > 0.0 else "without"
+    force = (c.c_xx * float(o.mean_x) + c.c_xy * float(o.mean_y)) / period + system.load_at_start * c.sin_beta
+    reason = f"sustained: a limit cycle {how} stick, to which disturbances of it return by a factor of {factor:.2g} each"
+    regime = Regime.RELAXATION if stick > 0.0 else Regime.QUASI_HARMONIC
+    numbers = float(o.amplitude), stick / period, clear / period, force, system.radius * force
+    known = Known(regime, Excitation.SELF_EXCITED, (reason,), 1.0 / period, *numbers, settled=lasts, settled_from=start)
+    x, y, v_y = o.point.tolist()
+    return known, [x, y, 0.0, v_y]
