@@ -5,7 +5,7 @@ from collections.abc import Callable
 from enum import StrEnum
 from functools import cache, partial
 from itertools import pairwise
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from brakecli.case.case import Case, changed
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError
 from brakecli.solver.system import System
+from brakecli.sweeps.early import Known
 from brakecli.sweeps.error_bar import left_open
 from brakecli.sweeps.floquet import Disturbances
 from brakecli.sweeps.growth import Sliding, sliding, with_step
@@ -92,7 +93,7 @@ Answer = Callable[[float], bool | None]
 
 
 def search(
-    critical: Critical, case_at: Callable[[float], Case], verdict_of: Callable[[Case], Verdict | None]
+    critical: Critical, case_at: Callable[[float], Case], verdict_of: Callable[[Case], Verdict | Known | None]
 ) -> Search:
     """Look for the critical value of the parameter that `case_at` sets; `verdict_of` runs a case."""
 
@@ -117,7 +118,7 @@ def search(
         steady, case = sliding_at(value), _stepped(case_at(value))
         linear = steady is not None and not steady.opens
         # Beside stable sliding it may yet fade away, or has not yet come to where it lasts.
-        times, before = 1.0, None
+        times, before = 1.0, cast("Verdict | Known | None", None)
         while times <= LONGER:
             duration = times * case.solver.duration
             verdict = verdict_of(changed(case, solver={"duration": duration}))
@@ -133,10 +134,13 @@ def search(
 
 
 def _stepped(case: Case) -> Case:
-    """The case with the step that growth is measured with, where it gives none: no run is computed twice."""
+    """The case with the step that growth is measured with, where it gives none and no run of it is exact.
+
+    No run is then computed twice.
+    """
     system = system_of(case)
     method = with_step(system).method
-    if method == system.method:
+    if method == system.method or system.method.row.exact:
         return case
     keys = ("scheme", "theta", "start", "step")
     return changed(case, solver={**{key: getattr(method, key) for key in keys}, "tolerance": None})
@@ -275,12 +279,14 @@ def _narrowed(at: Disturbances, low: float, high: float, critical: Critical, bia
     return Edge(value, low, high, error, not below)
 
 
-def _lasting(answer: bool, before: Verdict | None, verdict: Verdict) -> bool:
+def _lasting(answer: bool, before: Verdict | Known | None, verdict: Verdict | Known) -> bool:
     """Whether the answer of a run beside stable sliding is that of a longer one, too.
 
-    It is once the shoe has come to rest or moves by linear equations, and where the vibration is the same as in a
-    run half as long.
+    It is once the shoe has come to rest or moves by linear equations, where its orbit is known, and where the
+    vibration is the same as in a run half as long.
     """
+    if isinstance(verdict, Known):
+        return True
     if answer:
         return verdict.regime is Regime.DAMPED or verdict.stick_fraction + verdict.contact_loss_fraction == 0.0
     if before is None or before.regime is not verdict.regime:
@@ -288,7 +294,7 @@ def _lasting(answer: bool, before: Verdict | None, verdict: Verdict) -> bool:
     return abs(before.amplitude - verdict.amplitude) <= STEADY * verdict.amplitude
 
 
-def _fades(verdict: Verdict | None, duration: float, unstable: bool | None, linear: bool) -> bool | None:
+def _fades(verdict: Verdict | Known | None, duration: float, unstable: bool | None, linear: bool) -> bool | None:
     """Whether the vibration of a run dies out; None where the run does not answer that.
 
     `unstable`: what is known of steady sliding. Where it is unstable no vibration can die out. A `linear` motion

@@ -1,14 +1,14 @@
 """A verdict as soon as it is known, on smooth pads at constant speed and load: what a sweep needs of a point.
 
-The motion is followed without samples (`solver.schemes.piecewise_exact.orbit`) until one of two things is certain.
+The motion is followed without samples (`solver.schemes.piecewise_exact.seek`) until one of two things is certain.
 
-- It slides to one side, and the sum of what its modes can do until the end of the run neither reaches the speed of the
-  wheel nor opens the contact. All that is to come is linear, and the eigenvalues decide.
-- It comes to a limit cycle that attracts it. Newton's iteration gives the orbit, Floquet's multipliers say how soon the
-  motion has come to it. The verdict is given where a whole run would show it settled.
+- It slides to one side, and the sum of its modes can neither reach the speed of the wheel nor open the contact until
+  the end of the run. All that is to come is linear, and the eigenvalues decide.
+- It comes to a limit cycle that attracts it. Floquet's multipliers say when it will have come to it, and the verdict
+  is given where a whole run would find it settled.
 
-Where neither is certain, or the whole run would see its motion otherwise than the orbit is (few samples in a cycle or
-in a stick, a settled part that is too short), there is no early verdict, and the run goes to its end.
+Where neither is certain, or where a whole run would see something else (too few samples in a cycle or in a stick, a
+settled part that is too short), there is no early verdict, and the run goes to its end.
 """
 
 import math
@@ -25,8 +25,9 @@ from brakecli.runs.tolerance import ROUNDING, Certificate
 from brakecli.solver.compile import Floats
 from brakecli.solver.motion import Work
 from brakecli.solver.records import BELT, FLOW, LOAD, new
-from brakecli.solver.schemes.piecewise_exact import orbit
+from brakecli.solver.schemes.piecewise_exact.orbit import ORBIT
 from brakecli.solver.schemes.piecewise_exact.phases import BACKWARD, FORWARD, OPEN, STICK
+from brakecli.solver.schemes.piecewise_exact.seek import FOUND, GOING_ON, LINEAR, seek, swing
 from brakecli.solver.system import System
 
 _SETTLED = 0.02  # of the size of a cycle: a motion so near to its orbit is settled
@@ -40,7 +41,7 @@ _WINDOW = 0.05  # of the run, by which a whole run may see the settled part begi
 
 
 class Known(NamedTuple):
-    """A verdict on the motion itself, without samples: numbers of the orbit, or of the linear motion (SI units)."""
+    """A verdict on the motion itself, without samples: numbers of its orbit, or of its linear motion (SI units)."""
 
     regime: Regime
     excitation: Excitation
@@ -77,22 +78,26 @@ def early(system: System) -> Early | None:
     theory = _theory(system)
     if theory is None:
         return None
-    c, flow, o = system.coefficients, new(FLOW), _prepared(system, theory)
+    c, flow = system.coefficients, new(FLOW)
+    try:
+        o = _prepared(system, theory)
+    except np.linalg.LinAlgError:  # modes that are alike
+        return None
     rest, start = theory.rest if system.initial.from_equilibrium else (0.0, 0.0), system.initial
     flow.x, flow.y, flow.v_x, flow.v_y = start.x + rest[0], start.y + rest[1], start.vx, start.vy
     flow.stiffness, flow.z[BELT], flow.z[LOAD] = system.contact_stiffness, system.belt_speed, system.load_at_start
-    while (outcome := orbit.seek(c, flow, o)) == orbit.GOING_ON:
+    while (outcome := seek(c, flow, o)) == GOING_ON:
         pass
-    if outcome == orbit.LINEAR:
+    if outcome == LINEAR:
         found = _linear(system, theory, flow, o)
     else:
-        found = _cycle(system, theory, flow, o) if outcome == orbit.FOUND else None
+        found = _cycle(system, theory, flow, o) if outcome == FOUND else None
     if found is None:
         return None
     verdict, end = found
     work = Work(steps=int(o.steps), contact_evaluations=int(o.evaluations))
     tolerance, error, until = system.method.tolerance, max(float(o.error), ROUNDING), system.sampled_duration
-    certificate = Certificate(tolerance, True, error, until, "the orbit itself")  # noqa: FBT003
+    certificate = Certificate(tolerance, True, error, until, "the orbit itself")
     row = np.array([end])
     return Early(verdict, Ending(system, row, work), certificate if system.method.step is None else None)
 
@@ -101,7 +106,7 @@ def _theory(system: System) -> Linear | None:
     """The theory of steady sliding, where a verdict may be early and eigenvalues say which way it goes."""
     c, steady = system.coefficients, len(system.belt) == 1 and len(system.load) == 1
     smooth = system.smooth and system.method.row.exact
-    if not (smooth and steady and system.samples >= FEWEST_SAMPLES) or c.phi == 0.0 or is_undamped(c):
+    if not (smooth and steady and system.samples >= FEWEST_SAMPLES) or c.phi == 0.0:
         return None
     theory = linear_theory(system, system.belt_speed)
     return theory if theory is not None and theory.direction != 0 else None
@@ -109,7 +114,7 @@ def _theory(system: System) -> Linear | None:
 
 def _prepared(system: System, theory: Linear) -> Any:
     """The record that a motion is followed with."""
-    o, inverse = new(orbit.ORBIT), np.linalg.inv(theory.vectors)
+    o, inverse = new(ORBIT), np.linalg.inv(theory.vectors)
     o.h, o.duration = system.longest_step, system.sampled_duration
     o.sliding = BACKWARD if theory.belt > 0.0 else FORWARD
     o.rest[:2], o.room[:] = theory.rest, (theory.depth, abs(theory.belt))
@@ -129,27 +134,22 @@ def _linear(system: System, theory: Linear, flow: Any, o: Any) -> tuple[Known, l
     def at(time: float) -> Floats:
         return np.asarray(rest + (vectors @ (parts * np.exp(values * (time - o.time)))).real)
 
-    o.low, o.high, span = math.inf, -math.inf, end - start
-    windows = [(start, span)]
-    if theory.direction > 0:  # what grows is largest at the end
-        span = min(span, 3.0 / system.natural_frequencies[0])
-        windows = [(start, span), (end - span, span)]
-    for begin, seconds in windows:
-        flow.z[:4] = at(begin)
-        orbit.swing(system.coefficients, flow, o, seconds)
+    last = at(end)
+    o.low = o.high = float(last[0])
+    flow.z[:4] = at(start)
+    swing(system.coefficients, flow, o, end - start)
     fades = np.exp(values * (end - o.time)) - np.exp(values * (start - o.time))
     height = rest[1] + (vectors[1] @ (parts * fades / values)).real / (end - start)
     force = math.copysign(system.coefficients.phi, theory.belt) * -system.contact_stiffness * float(height)
-    reason, last = theory.sentence, at(end)
+    reason = theory.sentence
     if theory.direction > 0:
         more = theory.seconds_to_limit(end, last) + 3.0 / theory.mode.growth
         reason += f"; run at least {QUARTER * (end + more):.3g} s"
     regime, amplitude = Regime.DAMPED if theory.direction < 0 else Regime.UNDECIDED, 0.5 * float(o.high - o.low)
     torque = system.radius * force
-    known = Known(
-        regime, Excitation.NONE, (reason,), None, amplitude, 0.0, 0.0, force, torque, settled=False, settled_from=start
-    )
-    return known, last.tolist()
+    slope = {"envelope_slope": theory.mode.growth}
+    numbers = amplitude, 0.0, 0.0, force, torque
+    return Known(regime, Excitation.NONE, (reason,), None, *numbers, False, start, slope), last.tolist()
 
 
 def _cycle(system: System, theory: Linear, flow: Any, o: Any) -> tuple[Known, list[float]] | None:
@@ -163,23 +163,26 @@ def _cycle(system: System, theory: Linear, flow: Any, o: Any) -> tuple[Known, li
     part, growth = end - start, abs(theory.mode.growth)
     stick, clear = float(o.spent[STICK]), float(o.spent[OPEN])
     limited = period - float(o.spent[o.sliding])
-    swing = _HYSTERESIS * math.sqrt(float(o.square) / period)
+    counted = _HYSTERESIS * math.sqrt(float(o.square) / period)
     if (
         rate * part < _POWERS
         or part < max(_SETTLED_PART * end, _CYCLES * period)
         or period < _SAMPLES * interval
         or min(limited, stick or limited, clear or limited) < _SEEN * interval
-        or min(-float(o.low), float(o.high)) < swing
+        or min(-float(o.low), float(o.high)) < counted
     ):
         return None
-    lasts = growth * (part - _WINDOW * end) >= 1.0
-    if not lasts and (theory.direction < 0 or growth * end >= 1.0):
+    undamped = is_undamped(system.coefficients)
+    lasts = growth * (part - _WINDOW * end) >= 1.0 and not undamped
+    if not lasts and (theory.direction < 0 or (growth * end >= 1.0 and not undamped)):
         return None  # whether the vibration lasts depends on where exactly a whole run sees it settled
     c, how = system.coefficients, "with" if stick > 0.0 else "without"
     force = (c.c_xx * float(o.mean_x) + c.c_xy * float(o.mean_y)) / period + system.load_at_start * c.sin_beta
-    reason = f"sustained: a limit cycle {how} stick, to which disturbances of it return by a factor of {factor:.2g} each"
+    reason = f"sustained: a limit cycle {how} stick; a disturbance keeps {factor:.2g} of its size in a cycle"
     regime = Regime.RELAXATION if stick > 0.0 else Regime.QUASI_HARMONIC
     numbers = float(o.amplitude), stick / period, clear / period, force, system.radius * force
-    known = Known(regime, Excitation.SELF_EXCITED, (reason,), 1.0 / period, *numbers, settled=lasts, settled_from=start)
+    known = Known(
+        regime, Excitation.SELF_EXCITED, (reason,), 1.0 / period, *numbers, settled=lasts, settled_from=start
+    )
     x, y, v_y = o.point.tolist()
     return known, [x, y, 0.0, v_y]

@@ -26,6 +26,7 @@ from brakecli.solver.motion import Motion
 from brakecli.solver.roughness import TWO_PI, wheel_angles
 from brakecli.solver.schedules import integral_at
 from brakecli.sweeps.critical import search
+from brakecli.sweeps.early import Ending, Known, early
 from brakecli.sweeps.plan import Plan, Settings
 
 OUT_OF_MEMORY = "out of memory; sample less often, or reduce contact.nodes"
@@ -48,9 +49,9 @@ def record_type(plan: Plan) -> np.dtype[Any]:
 class Outcome:
     """A run in memory, as far as a sweep is interested in it. `fields.POINT` says where each number is."""
 
-    verdict: Verdict
+    verdict: Verdict | Known
     case: Case
-    motion: Motion
+    motion: Motion | Ending
     certificate: Certificate | None  # where the case gives no step
     status: Status
     reason: str
@@ -58,17 +59,25 @@ class Outcome:
     warning_count: int
 
 
-def simulate(case: Case) -> Outcome:
-    """Run a case in memory; raises RefusedError, and CaseError where it has no start."""
+def simulate(case: Case, *, whole: bool = True) -> Outcome:
+    """Run a case in memory, to its end or, unless `whole`, only until its verdict is known.
+
+    Raises RefusedError, and CaseError where it has no start.
+    """
+    verdict: Verdict | Known
+    motion: Motion | Ending
     with within_range():
         system = system_of(case)
         found = check(system)
         refuse(found)
-        motion, certificate = motion_of(system)
-        if not np.isfinite(motion.rows).all():
-            raise FloatingPointError("a force overflows")
-        history = array_history(system.interval, motion.rows)
-        verdict = verdict_on(history, motion.system, motion.work.failure_sentence)
+        if not whole and (known := early(system)) is not None:
+            verdict, motion, certificate = known
+        else:
+            motion, certificate = motion_of(system)
+            if not np.isfinite(motion.rows).all():
+                raise FloatingPointError("a force overflows")
+            history = array_history(system.interval, motion.rows)
+            verdict = verdict_on(history, motion.system, motion.work.failure_sentence)
     warnings, work = list(found.warnings), motion.work
     if work.unconverged_steps and not work.failed:
         warnings.append(f"{work.unconverged_steps} of {work.steps} steps did not converge, as the case allows")
@@ -131,10 +140,10 @@ def next_start(outcome: Outcome) -> Settings:
     return start
 
 
-def verdict_of(case: Case) -> Verdict | None:
-    """The verdict on a run in memory; None where it fails."""
+def verdict_of(case: Case) -> Verdict | Known | None:
+    """The verdict on a run in memory, as soon as it is known; None where the run fails."""
     with suppress(BrakecliError):
-        outcome = simulate(case)
+        outcome = simulate(case, whole=False)
         return None if outcome.motion.work.failed else outcome.verdict
     return None
 
@@ -143,7 +152,7 @@ def _computed(plan: Plan, point: int, start: Settings) -> tuple[NDArray[Any], Ou
     """The record of a point and its run, which is None where it was not possible."""
     settings = {**plan.settings(point), **start}
     try:
-        outcome = simulate(plan.case(settings))
+        outcome = simulate(plan.case(settings), whole=False)
         values = values_of(fields.POINT, outcome)
         if (critical := plan.sweep.critical) is not None:
             path = key_path(critical.parameter)

@@ -1,23 +1,20 @@
 """The limit cycle that a motion on smooth pads comes to, found before the motion has come to it.
 
-At constant speed and load the motion is followed from event to event, without samples. Each fall of ẋ through 0 is
-a point (x, y, ẏ) of the section ẋ = 0, and P leads from one to the next. Where two of them in a row lie close together,
-Newton's iteration s + (I - M)⁻¹ (P(s) - s) finds the point that returns to itself, and with it the orbit.
+Each fall of ẋ through 0 is a point s = (x, y, ẏ) of the section ẋ = 0, and the return map P leads from one to the
+next. Newton's iteration s + (I - M)⁻¹ (P(s) - s) finds the point that returns to itself, and with it the orbit.
 
-M = dP/ds is a product of known matrices. Within a phase a small disturbance w follows the same linear equation as
-the motion: w(t) = exp(A t) w(0). An event n·z = 0 of the disturbed motion comes by -n·w / n·f later, where f = A z is
-the velocity with which the motion arrives there. For that time it has moved with f instead of f', the velocity with
-which it leaves, so that behind the event
+M = dP/ds is a product of known matrices. Within a phase a small disturbance w follows the same linear equation as the
+motion: w(t) = exp(A t) w(0). The disturbed motion comes to an event n·z = 0 later, by -n·w / n·f, where f = A z is the
+velocity of the motion as it arrives. For that time it goes on with f and not with f', the velocity behind the event:
 
     w' = (I + (f' - f) nᵀ / (nᵀ f)) w,
 
-the saltation matrix (R. I. Leine, H. Nijmeijer, Dynamics and bifurcations of non-smooth mechanical systems, Springer
-2004, ch. 7). Where stick begins it takes away what w has along ẋ; where stick ends and where contact is lost or made
-forces do not jump, f' = f, and it is the identity. In the same way the end on the section takes away f (n·w) / (n·f),
-n along ẋ. The eigenvalues of M are Floquet's multipliers: all within the unit circle, and the orbit attracts.
+the saltation matrix (R. I. Leine, H. Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems, Springer
+2004, ch. 7). Where stick begins it takes away what w has along ẋ. Where stick ends, and where contact is lost or made,
+no force jumps: f' = f, and it is the identity. The end on the section takes away f (n·w) / (n·f), with n along ẋ. The
+eigenvalues of M are Floquet's multipliers. If all lie within the unit circle, the orbit attracts its neighbours.
 """
 
-import math
 from typing import Any
 
 import numba
@@ -44,16 +41,12 @@ from brakecli.solver.schemes.piecewise_exact.locate import NO_EVENT, first_event
 from brakecli.solver.schemes.piecewise_exact.phases import OPEN
 from brakecli.solver.schemes.piecewise_exact.switch import place, switch
 
-GOING_ON, LINEAR, FOUND, ENDED = range(4)
-"""What `seek` has come to: nothing yet; no event can follow; an orbit; the end of the time, or of the progress."""
-
-_NEAR = 0.02  # of the size of a cycle: distance of two returns from which on Newton's iteration is tried
-_REACH = 0.1  # the same of its first step, beyond which it may lead elsewhere
+_REACH = 0.1  # of the size of a cycle: step of Newton's iteration beyond which it may lead elsewhere
 _ROUNDS = 6
 _CLOSED = 1e-11  # of the size of a cycle, by which an orbit may fail to close
 _FOLLOWS = 0.25  # part by which a return to the orbit may differ from what the multipliers say
-_MOST_STEPS = 100_000  # in a call: Python hears signals in between
-_MOST_EVENTS = 60  # in a cycle
+MOST_STEPS = 100_000  # in a call: Python hears signals in between
+MOST_EVENTS = 60  # in a cycle
 _PRIME = 1_000_003
 
 ORBIT = record(
@@ -113,7 +106,7 @@ def _take(m: Any, o: Any, part: float) -> None:
 
 
 @kernel(void(COEFFICIENTS, FLOW_TYPE, ORBIT_TYPE, int64), inlined=False)
-def _step(c: Coefficients, m: Any, o: Any, closely: int) -> None:
+def step(c: Coefficients, m: Any, o: Any, closely: int) -> None:
     """Move to the end of a step, or through the event in it; `closely` follows the series in any case."""
     for i in range(SIZE):
         o.begin[i] = m.z[i]
@@ -132,18 +125,18 @@ def _step(c: Coefficients, m: Any, o: Any, closely: int) -> None:
 
 
 @kernel(float64(FLOW_TYPE, ORBIT_TYPE, float64), inlined=False)
-def _zero(m: Any, o: Any, sign: float) -> float:
+def zero_of_velocity(m: Any, o: Any, sign: float) -> float:
     """The part of the last step at which v_x falls through zero, or rises where the sign is -1; goes there."""
     _expand(m, o)
     for k in range(TERMS):
         m.polynomial[0, k] = sign * m.series[k, V_X]
     part = root(m, 0, 0.0, o.part)
     _take(m, o, part)
-    return part  # type: ignore[no-any-return]
+    return part
 
 
 @kernel(void(ORBIT_TYPE, int64))
-def _note_event(o: Any, phase: int) -> None:
+def note_event(o: Any, phase: int) -> None:
     """Note the phase that the last step has ended in."""
     if o.which != NO_EVENT:
         o.events, o.way = o.events + 1, (o.way * 5 + phase + 1) % _PRIME
@@ -179,7 +172,7 @@ def _velocity(m: Any, o: Any, phase: int, i: int) -> float:
 
 @kernel(int64(FLOW_TYPE, ORBIT_TYPE, int64), inlined=False)
 def _jump(m: Any, o: Any, section: int) -> int:
-    """Take the disturbances through an event, or onto the section, at `o.kept`; 0 where the motion only grazes it."""
+    """Take the disturbances through an event, or onto the section, at `o.kept`; 0 where it is only grazed."""
     rate = 0.0
     for i in range(4):
         normal = (1.0 if i == V_X else 0.0) if section == 1 else m.margins[o.old, o.which, i]
@@ -212,11 +205,11 @@ def _around(c: Coefficients, m: Any, o: Any, closely: int) -> int:
     o.period, o.mean_x, o.mean_y, o.square, o.low, o.high, o.events, o.way = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, 0
     for k in range(PHASES):
         o.spent[k] = 0.0
-    for _ in range(_MOST_STEPS):
-        _step(c, m, o, closely)
+    for _ in range(MOST_STEPS):
+        step(c, m, o, closely)
         falls, part = o.begin[V_X] > 0.0 >= m.z[V_X], o.part
         if falls:
-            part = _zero(m, o, 1.0)
+            part = zero_of_velocity(m, o, 1.0)
         for i in range(SIZE):
             o.kept[i] = m.at[NODES, 0, i] if falls else m.z[i]
         o.period, o.spent[o.old] = o.period + part * o.h, o.spent[o.old] + part * o.h
@@ -227,7 +220,7 @@ def _around(c: Coefficients, m: Any, o: Any, closely: int) -> int:
             o.low, o.high = min(o.low, m.z[V_X]), max(o.high, m.z[V_X])
             o.square += 0.5 * part * o.h * (o.begin[V_X] ** 2 + m.z[V_X] ** 2)
             if o.begin[V_X] < 0.0 <= m.z[V_X]:
-                _zero(m, o, -1.0)
+                zero_of_velocity(m, o, -1.0)
                 o.amplitude = 0.5 * (o.point[0] - m.at[NODES, 0, X])
         else:
             _carry(m, o, part)
@@ -237,14 +230,14 @@ def _around(c: Coefficients, m: Any, o: Any, closely: int) -> int:
             for j in range(3 if closely == 0 else 0):
                 o.map[0, j], o.map[1, j], o.map[2, j] = o.tangents[j, X], o.tangents[j, Y], o.tangents[j, V_Y]
             return 1
-        _note_event(o, m.phase)
-        if o.events > _MOST_EVENTS:
+        note_event(o, m.phase)
+        if o.events > MOST_EVENTS:
             return 0
     return 0
 
 
 @kernel(float64(ORBIT_TYPE, float64, float64, float64))
-def _sizes(o: Any, x: float, y: float, v_y: float) -> float:
+def sizes(o: Any, x: float, y: float, v_y: float) -> float:
     """A distance on the section, in sizes of the cycle."""
     return max(abs(x), abs(y), abs(v_y) * o.period / TWO_PI) / o.amplitude  # type: ignore[no-any-return]
 
@@ -265,7 +258,7 @@ def _solved(o: Any, x: float, y: float, z: float) -> tuple[float, float, float]:
 
 
 @kernel(int64(COEFFICIENTS, FLOW_TYPE, ORBIT_TYPE), inlined=False)
-def _closed(c: Coefficients, m: Any, o: Any) -> int:
+def closed(c: Coefficients, m: Any, o: Any) -> int:
     """Find the orbit near the last return; 0 where Newton's iteration finds none that the motion is coming to."""
     for i in range(3):
         o.point[i] = o.returns[1, i]
@@ -273,7 +266,7 @@ def _closed(c: Coefficients, m: Any, o: Any) -> int:
         if _around(c, m, o, 0) == 0:
             return 0
         x, y, v_y = _solved(o, o.kept[X] - o.point[0], o.kept[Y] - o.point[1], o.kept[V_Y] - o.point[2])
-        o.error = _sizes(o, x, y, v_y)
+        o.error = sizes(o, x, y, v_y)
         if not o.error < _REACH:
             return 0
         if o.error < _CLOSED:
@@ -286,110 +279,8 @@ def _closed(c: Coefficients, m: Any, o: Any) -> int:
         for k in range(3):
             o.kept[i] -= o.map[i, k] * (o.returns[0, k] - o.point[k])
     s, at = o.returns, o.point
-    was = _sizes(o, s[0, 0] - at[0], s[0, 1] - at[1], s[0, 2] - at[2])
-    o.away = _sizes(o, s[1, 0] - at[0], s[1, 1] - at[1], s[1, 2] - at[2])
-    if not (_sizes(o, o.kept[0], o.kept[1], o.kept[2]) <= _FOLLOWS * was + 100.0 * _CLOSED and was < _REACH):
+    was = sizes(o, s[0, 0] - at[0], s[0, 1] - at[1], s[0, 2] - at[2])
+    o.away = sizes(o, s[1, 0] - at[0], s[1, 1] - at[1], s[1, 2] - at[2])
+    if not (sizes(o, o.kept[0], o.kept[1], o.kept[2]) <= _FOLLOWS * was + 100.0 * _CLOSED and was < _REACH):
         return 0
     return _around(c, m, o, 1)
-
-
-@kernel(void(FLOW_TYPE, ORBIT_TYPE, float64), inlined=False)
-def _bound(m: Any, o: Any, seconds: float) -> None:
-    """How far from steady sliding the modes of a linear motion can come within some time: the sum of their sizes."""
-    for k in range(3):
-        o.bound[k] = 0.0
-    for q in range(4):
-        real, imaginary = 0.0, 0.0
-        for i in range(4):
-            real += o.into[0, q, i] * (m.z[i] - o.rest[i])
-            imaginary += o.into[1, q, i] * (m.z[i] - o.rest[i])
-        size = math.hypot(real, imaginary) * math.exp(min(max(o.growth[q], 0.0) * seconds, 700.0))
-        for k in range(3):
-            o.bound[k] += size * o.reach[q, k]
-
-
-@kernel(int64(FLOW_TYPE, ORBIT_TYPE), inlined=False)
-def _stays_linear(m: Any, o: Any) -> int:
-    """Whether the motion slides steadily, or beside that, and no event can come before the end."""
-    if m.phase != o.sliding:
-        return 0
-    _bound(m, o, o.duration - o.time)
-    return 1 if o.bound[1] < o.room[0] and o.bound[2] < o.room[1] else 0
-
-
-@kernel(int64(FLOW_TYPE, ORBIT_TYPE, float64), inlined=False)
-def _returned(m: Any, o: Any, fall: float) -> int:
-    """Note a return to the section, which is in `m.at`; whether it lies close to the one before."""
-    for i in range(3):
-        o.returns[0, i] = o.returns[1, i]
-    o.returns[1, 0], o.returns[1, 1], o.returns[1, 2] = m.at[NODES, 0, X], m.at[NODES, 0, Y], m.at[NODES, 0, V_Y]
-    o.period, o.fall, o.falls = fall - o.fall, fall, o.falls + 1
-    o.amplitude, o.low = 0.5 * (o.returns[1, 0] - o.low), o.returns[1, 0]
-    o.last_way, o.way, o.events = o.way, 0, 0
-    if o.falls < max(o.next_try, 3) or not o.amplitude > 0.0:
-        return 0
-    s = o.returns
-    return 1 if _sizes(o, s[1, 0] - s[0, 0], s[1, 1] - s[0, 1], s[1, 2] - s[0, 2]) < _NEAR else 0
-
-
-@kernel(int64(COEFFICIENTS, FLOW_TYPE, ORBIT_TYPE), inlined=False)
-def _try(c: Coefficients, m: Any, o: Any) -> int:
-    """Seek an orbit near the last return. Where there is none the motion goes on as if nothing had been sought."""
-    phase, way, events, low, period, size = m.phase, o.way, o.events, o.low, o.period, o.amplitude
-    for i in range(SIZE):
-        o.saved[i] = m.z[i]
-    found = _closed(c, m, o)
-    for i in range(SIZE):
-        m.z[i] = o.saved[i]
-    m.phase = phase
-    if found == 0:
-        o.way, o.events, o.low, o.period, o.amplitude = way, events, low, period, size
-    look(m)
-    o.next_try = o.falls + 3 + (o.falls - o.next_try) // 2
-    return found  # type: ignore[no-any-return]
-
-
-@kernel(int64(COEFFICIENTS, FLOW_TYPE, ORBIT_TYPE))
-def seek(c: Coefficients, m: Any, o: Any) -> int:
-    """Follow the motion until something is known of all that is to come; what that is, or `GOING_ON`."""
-    if o.started == 0:
-        m.z[X], m.z[Y], m.z[V_X], m.z[V_Y], o.low = m.x, m.y, m.v_x, m.v_y, m.x
-        place(c, m, o.h)
-        look(m)
-        o.started = 1
-        if _stays_linear(m, o) == 1:
-            return LINEAR
-    for _ in range(_MOST_STEPS):
-        if o.time >= o.duration or o.events > _MOST_EVENTS:
-            return ENDED
-        _step(c, m, o, 0)
-        o.low, near, falls = min(o.low, m.z[X]), 0, o.begin[V_X] > 0.0 >= m.z[V_X]
-        if falls:
-            near = _returned(m, o, o.time + _zero(m, o, 1.0) * o.h)
-        o.time += o.part * o.h
-        _note_event(o, m.phase)
-        if near == 1 and _try(c, m, o) == 1:
-            return FOUND
-        if falls and _stays_linear(m, o) == 1:
-            return LINEAR
-    return GOING_ON
-
-
-@kernel(void(COEFFICIENTS, FLOW_TYPE, ORBIT_TYPE, float64))
-def swing(c: Coefficients, m: Any, o: Any, seconds: float) -> None:
-    """Widen `low` and `high` to the least and largest x of a linear motion from `m.z` on, for some time.
-
-    It ends early where the modes that are left can reach no further.
-    """
-    m.phase = o.sliding
-    phases.make(c, m, m.phase, o.h)
-    look(m)
-    o.low, o.high = min(o.low, m.z[X]), max(o.high, m.z[X])
-    for _ in range(int(seconds / o.h)):
-        _step(c, m, o, 0)
-        if o.begin[V_X] * m.z[V_X] < 0.0:
-            _zero(m, o, 1.0 if o.begin[V_X] > 0.0 else -1.0)
-            o.low, o.high = min(o.low, m.at[NODES, 0, X]), max(o.high, m.at[NODES, 0, X])
-            _bound(m, o, seconds)
-            if o.rest[X] + o.bound[0] <= o.high and o.rest[X] - o.bound[0] >= o.low:
-                return
