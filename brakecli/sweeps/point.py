@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -40,6 +41,7 @@ class Status(StrEnum):
     CRASHED = "crashed"
 
 
+@lru_cache(maxsize=4)
 def record_type(plan: Plan) -> np.dtype[Any]:
     """The record of a point of the sweep."""
     return np.dtype([(field.name, field.kind) for field in plan.fields])
@@ -99,15 +101,15 @@ def compute(plan: Plan, first: int, count: int) -> NDArray[Any]:
     Along a line each point starts from the end of the one before. The wheel goes on turning: its waves keep the
     phases that they have come to.
     """
-    found = []
-    for unit in range(first, first + count):
-        records, start, outcome = dict[int, NDArray[Any]](), Settings(), None
-        for point in line_points(plan, unit):
+    found, length = np.zeros(count * plan.unit_length, record_type(plan)), plan.unit_length
+    for begin, unit in enumerate(range(first, first + count)):
+        points, start, outcome = line_points(plan, unit), Settings(), None
+        places = {point: place for place, point in enumerate(sorted(points), begin * length)}
+        for point in points:
             if outcome is not None and not outcome.motion.work.failed:
                 start = next_start(outcome)
-            records[point], outcome = _computed(plan, point, start)
-        found += [records[point] for point in sorted(records)]
-    return np.concatenate(found)
+            found[places[point]], outcome = _computed(plan, point, start)
+    return found
 
 
 def line_points(plan: Plan, line: int) -> list[int]:
@@ -167,13 +169,16 @@ def _computed(plan: Plan, point: int, start: Settings) -> tuple[NDArray[Any], Ou
 
 def _filled(kind: np.dtype[Any], values: Mapping[str, Any]) -> NDArray[Any]:
     """A record of some values; missing numbers are NaN."""
-    record = np.zeros(1, kind)
-    for name in kind.names or ():
-        value = values.get(name)
-        if isinstance(value, str):  # as many whole characters as fit
-            record[name] = value.encode()[: kind[name].itemsize].decode(errors="ignore").encode()
-        elif isinstance(value, list):  # as many as there are, the rest missing
-            record[name] = np.resize(value + [math.nan] * kind[name].shape[0], kind[name].shape)
-        elif value is not None or kind[name].base.kind == "f":
-            record[name] = math.nan if value is None else value
-    return record
+    return np.array([tuple(_fitted(kind[name], values.get(name)) for name in kind.names or ())], kind)
+
+
+def _fitted(kind: np.dtype[Any], value: Any) -> Any:
+    """A value as its place in a record takes it."""
+    if isinstance(value, str):  # as many whole characters as fit
+        value = value.encode()
+        return value if len(value) <= kind.itemsize else value[: kind.itemsize].decode(errors="ignore").encode()
+    if isinstance(value, list):  # as many as there are, the rest missing
+        return np.resize(value + [math.nan] * kind.shape[0], kind.shape)
+    if value is None:
+        return b"" if kind.kind == "S" else math.nan if kind.base.kind == "f" else 0
+    return value
