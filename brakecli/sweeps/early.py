@@ -1,14 +1,15 @@
 """A verdict as soon as it is known, on smooth pads at constant speed and load: what a sweep needs of a point.
 
-The motion is followed without samples (`solver.schemes.piecewise_exact.seek`) until one of two things is certain.
+The motion is followed without samples (`solver.schemes.piecewise_exact.seek`) until one of two things is
+certain.
 
-- It slides to one side, and the sum of its modes can neither reach the speed of the wheel nor open the contact until
-  the end of the run. All that is to come is linear, and the eigenvalues decide.
-- It comes to a limit cycle that attracts it. Floquet's multipliers say when it will have come to it, and the verdict
-  is given where a whole run would find it settled.
+- It slides to one side, and the sum of its modes can neither reach the speed of the wheel nor open the contact
+  until the end of the run. All that is to come is linear, and the eigenvalues decide.
+- It comes to a limit cycle that attracts it. Floquet's multipliers say when it will have come to it, and the
+  verdict is given where a whole run would find it settled.
 
-Where neither is certain, or where a whole run would see something else (too few samples in a cycle or in a stick, a
-settled part that is too short), there is no early verdict, and the run goes to its end.
+Where neither is certain, or where a whole run would see something else (too few samples in a cycle or in a
+stick, a settled part that is too short), there is no early verdict, and the run goes to its end.
 """
 
 import math
@@ -41,7 +42,7 @@ _WINDOW = 0.05  # of the run, by which a whole run may see the settled part begi
 
 
 class Known(NamedTuple):
-    """A verdict on the motion itself, without samples: numbers of its orbit, or of its linear motion (SI units)."""
+    """A verdict on the motion itself: numbers of its orbit, or of its linear motion (SI units)."""
 
     regime: Regime
     excitation: Excitation

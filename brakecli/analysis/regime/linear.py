@@ -12,7 +12,15 @@ import numpy as np
 
 from brakecli.analysis.regime.slopes import growth_with_slopes
 from brakecli.analysis.regime.spectra import Array
-from brakecli.analysis.stability.modes import Complex, Mode, eigensystem, first_order, is_undamped, modes, stiffness_matrix
+from brakecli.analysis.stability.modes import (
+    Complex,
+    Mode,
+    eigensystem,
+    first_order,
+    is_undamped,
+    modes,
+    stiffness_matrix,
+)
 from brakecli.solver.quantities import ContactState
 from brakecli.solver.system import System
 

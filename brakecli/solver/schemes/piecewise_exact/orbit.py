@@ -1,18 +1,21 @@
 """The limit cycle that a motion on smooth pads comes to, found before the motion has come to it.
 
-Each fall of ẋ through 0 is a point s = (x, y, ẏ) of the section ẋ = 0, and the return map P leads from one to the
-next. Newton's iteration s + (I - M)⁻¹ (P(s) - s) finds the point that returns to itself, and with it the orbit.
+Each fall of ẋ through 0 is a point s = (x, y, ẏ) of the section ẋ = 0, and the return map P leads from one to
+the next. Newton's iteration s + (I - M)⁻¹ (P(s) - s) finds the point that returns to itself, and with it the
+orbit.
 
-M = dP/ds is a product of known matrices. Within a phase a small disturbance w follows the same linear equation as the
-motion: w(t) = exp(A t) w(0). The disturbed motion comes to an event n·z = 0 later, by -n·w / n·f, where f = A z is the
-velocity of the motion as it arrives. For that time it goes on with f and not with f', the velocity behind the event:
+M = dP/ds is a product of known matrices. Within a phase a small disturbance w follows the same linear equation
+as the motion: w(t) = exp(A t) w(0). The disturbed motion comes to an event n·z = 0 later, by -n·w / n·f, where
+f = A z is the velocity of the motion as it arrives. For that time it goes on with f and not with f', the
+velocity behind the event:
 
     w' = (I + (f' - f) nᵀ / (nᵀ f)) w,
 
-the saltation matrix (R. I. Leine, H. Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems, Springer
-2004, ch. 7). Where stick begins it takes away what w has along ẋ. Where stick ends, and where contact is lost or made,
-no force jumps: f' = f, and it is the identity. The end on the section takes away f (n·w) / (n·f), with n along ẋ. The
-eigenvalues of M are Floquet's multipliers. If all lie within the unit circle, the orbit attracts its neighbours.
+the saltation matrix (R. I. Leine, H. Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems,
+Springer 2004, ch. 7). Where stick begins it takes away what w has along ẋ. Where stick ends, and where contact
+is lost or made, no force jumps: f' = f, and it is the identity. The end on the section takes away f (n·w) /
+(n·f), with n along ẋ. The eigenvalues of M are Floquet's multipliers. If all lie within the unit circle, the
+orbit attracts its neighbours.
 """
 
 from typing import Any

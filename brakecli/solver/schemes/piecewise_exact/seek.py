@@ -1,9 +1,10 @@
 """Follow a motion on smooth pads, without samples, until it is known what becomes of it.
 
-At constant speed and load it either comes so near to steady sliding that no event can follow, or its returns to the
-section ẋ = 0 come close to one another, and `orbit` finds the limit cycle. The modes of steady sliding bound the first:
-the sum of |a_q V_q|, with the amplitudes a_q of the motion beside steady sliding along the eigenvectors V_q, is not
-reached at any later time where they decay, and it is multiplied by exp(σ_q t) where they grow.
+At constant speed and load it either comes so near to steady sliding that no event can follow, or its returns to
+the section ẋ = 0 come close to one another, and `orbit` finds the limit cycle. The modes of steady sliding
+bound the first: the sum of |a_q V_q|, with the amplitudes a_q of the motion beside steady sliding along the
+eigenvectors V_q, is not reached at any later time where they decay, and it is multiplied by exp(σ_q t) where
+they grow.
 """
 
 import math
