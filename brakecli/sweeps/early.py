@@ -103,11 +103,15 @@ def early(system: System) -> Early | None:
     return Early(verdict, Ending(system, row, work), certificate if system.method.step is None else None)
 
 
+def may_be_early(system: System) -> bool:
+    """Whether a verdict may come early: smooth pads, the piecewise-exact scheme, constant speed and load."""
+    steady = len(system.belt) == 1 and len(system.load) == 1
+    return system.smooth and system.method.row.exact and steady and system.samples >= FEWEST_SAMPLES
+
+
 def _theory(system: System) -> Linear | None:
     """The theory of steady sliding, where a verdict may be early and eigenvalues say which way it goes."""
-    c, steady = system.coefficients, len(system.belt) == 1 and len(system.load) == 1
-    smooth = system.smooth and system.method.row.exact
-    if not (smooth and steady and system.samples >= FEWEST_SAMPLES) or c.phi == 0.0:
+    if not may_be_early(system) or system.coefficients.phi == 0.0:
         return None
     theory = linear_theory(system, system.belt_speed)
     return theory if theory is not None and theory.direction != 0 else None

@@ -73,7 +73,7 @@ class Journal:
         return np.dtype([(name, lengths.get(name, self.kind[name])) for name in self.kind.names or ()])
 
     def read(self, start: int, stop: int) -> NDArray[Any]:
-        """The records of the places start … stop - 1 of the result, in its order; all units have to be finished."""
+        """The records of the places start … stop - 1 of the result, in its order; no unit may be missing."""
         plan = self.plan
         if plan.followed is None:
             return self._units(start, stop)

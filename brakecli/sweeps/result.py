@@ -76,9 +76,16 @@ class SweepReport:
     output: Path
     loaded: LoadedSweep
     findings: Findings
-    seconds: float
     resumed: int  # points that were there already
     notes: tuple[str, ...]
+    computed: int  # points that were not
+    seconds: float = 0.0  # of the command
+    overhead: float = 0.0  # part of the workers' time that they did not spend on points
+
+    @property
+    def points_per_second(self) -> float | None:
+        """How fast points were computed, start and end of the command included."""
+        return self.computed / self.seconds if self.computed and self.seconds else None
 
     @property
     def axes(self) -> dict[str, Any]:
