@@ -186,8 +186,6 @@ def _cycle(system: System, theory: Linear, flow: Any, o: Any) -> tuple[Known, li
     reason = f"sustained: a limit cycle {how} stick; a disturbance keeps {factor:.2g} of its size in a cycle"
     regime = Regime.RELAXATION if stick > 0.0 else Regime.QUASI_HARMONIC
     numbers = float(o.amplitude), stick / period, clear / period, force, system.radius * force
-    known = Known(
-        regime, Excitation.SELF_EXCITED, (reason,), 1.0 / period, *numbers, settled=lasts, settled_from=start
-    )
+    excited, shown = (regime, Excitation.SELF_EXCITED, (reason,), 1.0 / period), {"largest_multiplier": factor}
     x, y, v_y = o.point.tolist()
-    return known, [x, y, 0.0, v_y]
+    return Known(*excited, *numbers, lasts, start, shown), [x, y, 0.0, v_y]
