@@ -126,10 +126,12 @@ def swing(c: Coefficients, m: Any, o: Any, seconds: float) -> None:
     phases.make(c, m, m.phase, o.h)
     look(m)
     o.low, o.high = min(o.low, m.z[X]), max(o.high, m.z[X])
-    for _ in range(int(seconds / o.h)):
+    for number in range(int(math.ceil(seconds / o.h))):
         step(c, m, o, 0)
         if o.begin[V_X] * m.z[V_X] < 0.0:
-            zero_of_velocity(m, o, 1.0 if o.begin[V_X] > 0.0 else -1.0)
+            part = zero_of_velocity(m, o, 1.0 if o.begin[V_X] > 0.0 else -1.0)
+            if (number + part) * o.h > seconds:
+                return
             o.low, o.high = min(o.low, m.at[NODES, 0, X]), max(o.high, m.at[NODES, 0, X])
             _bound(m, o, seconds)
             if o.rest[X] + o.bound[0] <= o.high and o.rest[X] - o.bound[0] >= o.low:
