@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from brakecli.analysis.regime.evidence import FEWEST_SAMPLES
+from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, WINDOWS
 from brakecli.analysis.regime.forced import QUARTER
 from brakecli.analysis.regime.linear import Linear, linear_theory
 from brakecli.analysis.regime.verdict import Excitation, Regime
@@ -34,10 +34,9 @@ from brakecli.solver.system import System
 _SETTLED = 0.02  # of the size of a cycle: a motion so near to its orbit is settled
 _POWERS = 10.0  # of e, by which what is left then fades until the end: drift is seen no more
 _SETTLED_PART = 0.35  # of the run, at least: a quarter and the width of windows
-_CYCLES = 12.0  # in it
+_CYCLES = 5.0  # in a window of its envelope: of fewer, windows differ by where they cut the cycles
 _SAMPLES = 40.0  # in a cycle, so that its shape is seen
 _SEEN = 2.5  # samples in a stick, or off the wheel
-_HYSTERESIS = 0.4  # of the standard deviation of vx, which its least and largest values exceed in a counted cycle
 _WINDOW = 0.05  # of the run, by which a whole run may see the settled part begin earlier or later
 
 
@@ -164,17 +163,17 @@ def _cycle(system: System, theory: Linear, flow: Any, o: Any) -> tuple[Known, li
     if not factor < 1.0:
         return None
     rate = -math.log(max(factor, 1e-300)) / period
-    start = float(o.fall) + max(math.log(max(float(o.away), 1e-300) / _SETTLED), 0.0) / rate
+    start = float(o.fell[0]) + max(math.log(max(float(o.away), 1e-300) / _SETTLED), 0.0) / rate
     part, growth = end - start, abs(theory.mode.growth)
     stick, clear = float(o.spent[STICK]), float(o.spent[OPEN])
     limited = period - float(o.spent[o.sliding])
-    counted = _HYSTERESIS * math.sqrt(float(o.square) / period)
     if (
         rate * part < _POWERS
-        or part < max(_SETTLED_PART * end, _CYCLES * period)
+        or part < _SETTLED_PART * end
+        or end < _CYCLES * WINDOWS * period
         or period < _SAMPLES * interval
         or min(limited, stick or limited, clear or limited) < _SEEN * interval
-        or min(-float(o.low), float(o.high)) < counted
+        or o.beaten.tolist() != [1, 1]
     ):
         return None
     undamped = is_undamped(system.coefficients)

@@ -18,6 +18,7 @@ is lost or made, no force jumps: f' = f, and it is the identity. The end on the 
 orbit attracts its neighbours.
 """
 
+import math
 from typing import Any
 
 import numba
@@ -50,6 +51,8 @@ _CLOSED = 1e-11  # of the size of a cycle, by which an orbit may fail to close
 _FOLLOWS = 0.25  # part by which a return to the orbit may differ from what the multipliers say
 MOST_STEPS = 100_000  # in a call: Python hears signals in between
 MOST_EVENTS = 60  # in a cycle
+_BANDS = (0.25, 0.35)  # of the standard deviation of v_x: a whole run counts the rises through one of 0.3
+MOST_TURNS = 6  # falls in a cycle
 _PRIME = 1_000_003
 
 ORBIT = record(
@@ -57,10 +60,9 @@ ORBIT = record(
     "duration",  # of the run, s
     "time",  # reached, s
     "part",  # of the last step that was taken, up to its event
-    "fall",  # time of the last fall of v_x through 0, s
     "period",  # of the last cycle, or of the orbit, s
     "amplitude",  # half of peak to peak of x in it, m
-    "low high",  # least and largest x since the last fall, m; of an orbit v_x, m/s
+    "low high",  # least and largest x since the last fall, or of the cycle, m
     "error",  # of the orbit, in sizes
     "away",  # of the last return from the orbit, in sizes
     "mean_x mean_y square",  # integrals of x, y and v_x² over the orbit, m s and m²/s
@@ -72,13 +74,19 @@ ORBIT = record(
     events=int,  # since the last fall
     falls=int,
     next_try=int,  # fall from which on an orbit is sought again
-    way=int,  # phases entered since the last fall, as a number that other ways hardly share
-    last_way=int,  # those of the last cycle
+    way=int,  # phases entered since the last fall
     sliding=int,  # phase of steady sliding
     begin=(float, SIZE),  # motion at the begin of the last step
     kept=(float, SIZE),  # a place on the way round the cycle
     saved=(float, SIZE),  # motion to go on with
-    returns=(float, (2, 3)),  # the last two points of the section
+    turns=int,  # falls in a cycle
+    returns=(float, (MOST_TURNS + 1, 3)),  # the last points of the section, the latest first
+    fell=(float, MOST_TURNS + 1),  # when, s
+    lows=(float, MOST_TURNS),  # least x before each of them, m
+    ways=(int, MOST_TURNS),  # phases entered before each, as numbers that other ways hardly share
+    strange=int,  # ways of the cycle that the motion has not taken
+    beaten=(int, 2),  # rises of v_x from below a band to above it in the cycle, for a narrow band and a wide one
+    side=(int, 2),  # 1 where v_x was below the band last
     point=(float, 3),  # of the orbit
     tangents=(float, (3, 4)),  # small disturbances of x, y and v_y on the way round the cycle
     map=(float, (3, 3)),  # M
@@ -193,9 +201,25 @@ def _jump(m: Any, o: Any, section: int) -> int:
     return 1
 
 
+@kernel(void(FLOW_TYPE, ORBIT_TYPE, float64, float64, int64), inlined=False)
+def _add_up(m: Any, o: Any, part: float, band: float, falls: int) -> None:
+    """Add a part of the last step to the numbers of the cycle."""
+    for k in range(TERMS):
+        power = o.h * part ** (k + 1) / (k + 1)
+        o.mean_x, o.mean_y = o.mean_x + power * m.series[k, X], o.mean_y + power * m.series[k, Y]
+    o.square += 0.5 * part * o.h * (o.begin[V_X] ** 2 + m.z[V_X] ** 2)
+    for k in range(2):
+        if abs(m.z[V_X]) > _BANDS[k] * band:
+            below = 1 if m.z[V_X] < 0.0 else 0
+            o.beaten[k], o.side[k] = o.beaten[k] + (1 if o.side[k] > below else 0), below
+    if falls == 1 or o.begin[V_X] < 0.0 <= m.z[V_X]:
+        zero_of_velocity(m, o, 1.0 if falls == 1 else -1.0)
+        o.low, o.high = min(o.low, m.at[NODES, 0, X]), max(o.high, m.at[NODES, 0, X])
+
+
 @kernel(int64(COEFFICIENTS, FLOW_TYPE, ORBIT_TYPE, int64), inlined=False)
 def _around(c: Coefficients, m: Any, o: Any, closely: int) -> int:
-    """From `point` to the next fall, with M or, `closely`, with the numbers of the cycle; 0 where there is none.
+    """From `point` once round, with M or, `closely`, with the numbers of the cycle; 0 where it does not close.
 
     It ends with the point of return in `kept`.
     """
@@ -205,38 +229,42 @@ def _around(c: Coefficients, m: Any, o: Any, closely: int) -> int:
     m.z[X], m.z[Y], m.z[V_X], m.z[V_Y] = o.point[0], o.point[1], 0.0, o.point[2]
     place(c, m, o.h)
     look(m)
-    o.period, o.mean_x, o.mean_y, o.square, o.low, o.high, o.events, o.way = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, 0
+    band, turns = math.sqrt(o.square / o.period), 0  # of the round before
+    o.period, o.mean_x, o.mean_y, o.square, o.events, o.way, o.strange = 0.0, 0.0, 0.0, 0.0, 0, 0, 0
+    o.low = o.high = o.point[0]
+    for k in range(2):
+        o.beaten[k], o.side[k] = 0, 0
     for k in range(PHASES):
         o.spent[k] = 0.0
     for _ in range(MOST_STEPS):
         step(c, m, o, closely)
-        falls, part = o.begin[V_X] > 0.0 >= m.z[V_X], o.part
-        if falls:
+        falls, part = 1 if o.begin[V_X] > 0.0 >= m.z[V_X] else 0, o.part
+        turns += falls
+        last = falls == 1 and turns == o.turns
+        if last:
             part = zero_of_velocity(m, o, 1.0)
         for i in range(SIZE):
-            o.kept[i] = m.at[NODES, 0, i] if falls else m.z[i]
+            o.kept[i] = m.at[NODES, 0, i] if last else m.z[i]
         o.period, o.spent[o.old] = o.period + part * o.h, o.spent[o.old] + part * o.h
         if closely == 1:
-            for k in range(TERMS - 1, -1, -1):
-                power = o.h * part ** (k + 1) / (k + 1)
-                o.mean_x, o.mean_y = o.mean_x + power * m.series[k, X], o.mean_y + power * m.series[k, Y]
-            o.low, o.high = min(o.low, m.z[V_X]), max(o.high, m.z[V_X])
-            o.square += 0.5 * part * o.h * (o.begin[V_X] ** 2 + m.z[V_X] ** 2)
-            if o.begin[V_X] < 0.0 <= m.z[V_X]:
-                zero_of_velocity(m, o, -1.0)
-                o.amplitude = 0.5 * (o.point[0] - m.at[NODES, 0, X])
+            _add_up(m, o, part, band, falls)
         else:
             _carry(m, o, part)
-            if (falls or o.which != NO_EVENT) and _jump(m, o, int(falls)) == 0:
+            if (last or o.which != NO_EVENT) and _jump(m, o, int(last)) == 0:
                 return 0
-        if falls:
-            for j in range(3 if closely == 0 else 0):
-                o.map[0, j], o.map[1, j], o.map[2, j] = o.tangents[j, X], o.tangents[j, Y], o.tangents[j, V_Y]
-            return 1
+        if falls == 1:
+            o.strange += 1 if o.way != o.ways[o.turns - turns] else 0
+            o.way = 0
+        if last:
+            break
         note_event(o, m.phase)
         if o.events > MOST_EVENTS:
             return 0
-    return 0
+    if closely == 1:
+        o.amplitude = 0.5 * (o.high - o.low)
+    for j in range(3 if closely == 0 else 0):
+        o.map[0, j], o.map[1, j], o.map[2, j] = o.tangents[j, X], o.tangents[j, Y], o.tangents[j, V_Y]
+    return 1 if turns == o.turns else 0
 
 
 @kernel(float64(ORBIT_TYPE, float64, float64, float64))
@@ -262,9 +290,10 @@ def _solved(o: Any, x: float, y: float, z: float) -> tuple[float, float, float]:
 
 @kernel(int64(COEFFICIENTS, FLOW_TYPE, ORBIT_TYPE), inlined=False)
 def closed(c: Coefficients, m: Any, o: Any) -> int:
-    """Find the orbit near the last return; 0 where Newton's iteration finds none that the motion is coming to."""
+    """Find the orbit of `turns` falls near the last return; 0 where none is found that the motion comes to."""
+    s, at, k = o.returns, o.point, o.turns
     for i in range(3):
-        o.point[i] = o.returns[1, i]
+        at[i] = s[0, i]
     for _ in range(_ROUNDS):
         if _around(c, m, o, 0) == 0:
             return 0
@@ -275,15 +304,14 @@ def closed(c: Coefficients, m: Any, o: Any) -> int:
         if o.error < _CLOSED:
             break
         o.point[0], o.point[1], o.point[2] = o.point[0] + x, o.point[1] + y, o.point[2] + v_y
-    if o.error >= _CLOSED or o.way != o.last_way:
+    if o.error >= _CLOSED or o.strange > 0:
         return 0
     for i in range(3):  # does the last return follow from the one before it as M says?
-        o.kept[i] = o.returns[1, i] - o.point[i]
-        for k in range(3):
-            o.kept[i] -= o.map[i, k] * (o.returns[0, k] - o.point[k])
-    s, at = o.returns, o.point
-    was = sizes(o, s[0, 0] - at[0], s[0, 1] - at[1], s[0, 2] - at[2])
-    o.away = sizes(o, s[1, 0] - at[0], s[1, 1] - at[1], s[1, 2] - at[2])
+        o.kept[i] = s[0, i] - at[i]
+        for j in range(3):
+            o.kept[i] -= o.map[i, j] * (s[k, j] - at[j])
+    was = sizes(o, s[k, 0] - at[0], s[k, 1] - at[1], s[k, 2] - at[2])
+    o.away = sizes(o, s[0, 0] - at[0], s[0, 1] - at[1], s[0, 2] - at[2])
     if not (sizes(o, o.kept[0], o.kept[1], o.kept[2]) <= _FOLLOWS * was + 100.0 * _CLOSED and was < _REACH):
         return 0
-    return _around(c, m, o, 1)
+    return _around(c, m, o, 1) * _around(c, m, o, 1)

@@ -18,6 +18,7 @@ from brakecli.solver.schemes.piecewise_exact import look, phases
 from brakecli.solver.schemes.piecewise_exact.orbit import (
     MOST_EVENTS,
     MOST_STEPS,
+    MOST_TURNS,
     ORBIT_TYPE,
     closed,
     note_event,
@@ -60,31 +61,36 @@ def _stays_linear(m: Any, o: Any) -> int:
 
 @kernel(int64(FLOW_TYPE, ORBIT_TYPE, float64), inlined=False)
 def _returned(m: Any, o: Any, fall: float) -> int:
-    """Note a return to the section, which is in `m.at`; whether it lies close to the one before."""
-    for i in range(3):
-        o.returns[0, i] = o.returns[1, i]
-    o.returns[1, 0], o.returns[1, 1], o.returns[1, 2] = m.at[NODES, 0, X], m.at[NODES, 0, Y], m.at[NODES, 0, V_Y]
-    o.period, o.fall, o.falls = fall - o.fall, fall, o.falls + 1
-    o.amplitude, o.low = 0.5 * (o.returns[1, 0] - o.low), o.returns[1, 0]
-    o.last_way, o.way, o.events = o.way, 0, 0
-    if o.falls < max(o.next_try, 3) or not o.amplitude > 0.0:
-        return 0
+    """Note a return to the section, which is in `m.at`; whether it lies close to the one `turns` before."""
     s = o.returns
-    return 1 if sizes(o, s[1, 0] - s[0, 0], s[1, 1] - s[0, 1], s[1, 2] - s[0, 2]) < _NEAR else 0
+    for k in range(MOST_TURNS, 0, -1):
+        s[k, 0], s[k, 1], s[k, 2], o.fell[k] = s[k - 1, 0], s[k - 1, 1], s[k - 1, 2], o.fell[k - 1]
+        if k < MOST_TURNS:
+            o.lows[k], o.ways[k] = o.lows[k - 1], o.ways[k - 1]
+    s[0, 0], s[0, 1], s[0, 2] = m.at[NODES, 0, X], m.at[NODES, 0, Y], m.at[NODES, 0, V_Y]
+    o.fell[0], o.lows[0], o.ways[0], o.falls = fall, o.low, o.way, o.falls + 1
+    o.low, o.way, o.events = s[0, 0], 0, 0
+    if o.falls < max(o.next_try, 3):
+        return 0
+    low, high = o.lows[0], s[0, 0]
+    for k in range(1, min(MOST_TURNS, o.falls - 1) + 1):
+        low, high = min(low, o.lows[k - 1]), max(high, s[k - 1, 0])
+        o.period, o.amplitude, o.turns = fall - o.fell[k], 0.5 * (high - low), k
+        if sizes(o, s[0, 0] - s[k, 0], s[0, 1] - s[k, 1], s[0, 2] - s[k, 2]) < _NEAR:
+            return 1
+    return 0
 
 
 @kernel(int64(COEFFICIENTS, FLOW_TYPE, ORBIT_TYPE), inlined=False)
 def _try(c: Coefficients, m: Any, o: Any) -> int:
     """Seek an orbit near the last return. Where there is none the motion goes on as if nothing had been sought."""
-    phase, way, events, low, period, size = m.phase, o.way, o.events, o.low, o.period, o.amplitude
+    phase, way, events, low = m.phase, o.way, o.events, o.low
     for i in range(SIZE):
         o.saved[i] = m.z[i]
     found = closed(c, m, o)
     for i in range(SIZE):
         m.z[i] = o.saved[i]
-    m.phase = phase
-    if found == 0:
-        o.way, o.events, o.low, o.period, o.amplitude = way, events, low, period, size
+    m.phase, o.way, o.events, o.low = phase, way, events, low
     look(m)
     o.next_try = o.falls + 3 + (o.falls - o.next_try) // 2
     return found
@@ -126,7 +132,7 @@ def swing(c: Coefficients, m: Any, o: Any, seconds: float) -> None:
     phases.make(c, m, m.phase, o.h)
     look(m)
     o.low, o.high = min(o.low, m.z[X]), max(o.high, m.z[X])
-    for number in range(int(math.ceil(seconds / o.h))):
+    for number in range(math.ceil(seconds / o.h)):
         step(c, m, o, 0)
         if o.begin[V_X] * m.z[V_X] < 0.0:
             part = zero_of_velocity(m, o, 1.0 if o.begin[V_X] > 0.0 else -1.0)
