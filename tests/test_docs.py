@@ -14,9 +14,10 @@ from brakecli.files import fields
 from brakecli.files.field import values_of
 from brakecli.files.read import open_result
 from brakecli.runs.run import run
-from brakecli.sweeps.driver import choose_engine, sweep
 from brakecli.sweeps.plan import parse_sweep
+from brakecli.sweeps.workers.task import compute_units
 from tests.commands import ROOT
+from tests.sweeps.helpers import inline
 
 
 def test_every_name_in_a_result_is_documented(tmp_path: Path) -> None:
@@ -38,8 +39,7 @@ def test_every_name_of_a_sweep_is_documented(tmp_path: Path) -> None:
     for number, text in enumerate((f'{axis}direction = "both"\n', critical)):
         overrides = ["solver.duration=0.05"]
         loaded = parse_sweep(f'case = "case.toml"\n{text}', "sweep.toml", tmp_path, overrides)
-        with choose_engine(loaded.plan, 1) as engine:
-            report = sweep(loaded, tmp_path / f"{number}.h5", engine, force=False)
+        report = inline(loaded, tmp_path / f"{number}.h5", compute_units)
         with open_result(tmp_path / f"{number}.h5", kind="sweep") as stored:
             names = [*stored.attributes, *stored.variables("/"), *report.numbers()]
         shared = (ROOT / "docs" / "result-format.md").read_text()

@@ -98,6 +98,7 @@ class Table(BaseModel):
         frozen=True,
         extra="forbid",
         allow_inf_nan=False,
+        ser_json_inf_nan="constants",  # values of an axis, which its key then refuses
         json_schema_extra=_add_alternatives,
     )
 

@@ -73,7 +73,6 @@ def _common(version: Annotated[bool, VERSION] = False) -> None:
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)
     if limit == resource.RLIM_INFINITY:
         return
-    os.environ["OPENBLAS_NUM_THREADS"] = "1"  # otherwise it takes 80 MB more for each core
     if limit < LIBRARIES:
         limited = f"the address space is limited to {limit / 1e6:.0f} MB"
         what = f"{limited}, and the libraries need {LIBRARIES / 1e6:.0f} MB"

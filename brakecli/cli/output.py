@@ -58,11 +58,11 @@ def announce_compilation(quiet: bool) -> None:
 def progress(quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
     """Yield a function that shows on a terminal what is counted, how many are done, and how many there are.
 
-    Within, a signal raises `Interrupted`: at once, or when that function is called next.
+    Within, a signal raises `Interrupted`.
     """
-    with unwinding() as recall:
+    with unwinding():
         if quiet or sys.stderr is None or not sys.stderr.isatty():
-            yield lambda what, done, total: recall()
+            yield lambda what, done, total: None
             return
         from rich import progress as rich_progress
         from rich.console import Console
@@ -73,7 +73,6 @@ def progress(quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
             task = bar.add_task("", visible=False)
 
             def show(what: str, done: int, total: int) -> None:
-                recall()
                 bar.update(task, description=what, completed=done, total=total, visible=True)
 
             yield show

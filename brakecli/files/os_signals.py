@@ -16,7 +16,12 @@ from typing import Any
 from brakecli.errors import CannotWriteError, escaped
 from brakecli.stop import show_signals
 
-_WORDS: dict[int, str] = {signal.SIGHUP: "hung up", signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
+_WORDS: dict[int, str] = {
+    signal.SIGHUP: "hung up",
+    signal.SIGINT: "interrupted",
+    signal.SIGTERM: "terminated",
+    signal.SIGALRM: "timed out",
+}
 
 
 class Interrupted(BaseException):
@@ -48,37 +53,42 @@ def handle_signals() -> None:
 
 
 @contextmanager
-def unwinding() -> Iterator[Callable[[], None]]:
+def unwinding() -> Iterator[None]:
     """Within the block, the first signal raises `Interrupted`, so that unfinished files are removed.
 
     Later signals are ignored, as they would cut through the clean-up. The C code in front of a compiled function
-    calls back into Python, and loses exceptions or turns them into others: an interruption there waits until the
-    function that this yields is called. Whatever takes long calls it now and then.
+    calls back into Python, and loses exceptions or turns them into others: there, a timer asks again soon.
+    Whatever the block has made of it, its end is an interruption: compiled code has given up what it was doing.
     """
     arrived: list[int] = []
-
-    def recall() -> None:
-        if arrived:
-            raise Interrupted(arrived[0])
+    raised: list[Interrupted] = []
 
     def note(number: int, frame: FrameType | None) -> None:
         arrived.append(number)
         while frame is not None and frame.f_globals.get("__name__", "").split(".")[0] not in ("numba", "llvmlite"):
             frame = frame.f_back
-        if len(arrived) == 1 and frame is None:
-            recall()
+        if frame is not None:
+            signal.setitimer(signal.ITIMER_REAL, 0.01)
+        elif not raised:
+            raised.append(Interrupted(arrived[0]))
+            raise raised[0]
 
     with _handled_by(note):
         try:
-            yield recall
+            yield
         except Exception:
-            recall()
+            if arrived:
+                raise Interrupted(arrived[0]) from None
             raise
+        finally:
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+        if arrived:
+            raise Interrupted(arrived[0])
 
 
 @contextmanager
 def signals_deferred() -> Iterator[None]:
-    """Hold back Ctrl-C, SIGTERM and SIGHUP until the block has ended.
+    """Hold back Ctrl-C, SIGTERM, SIGHUP and the timer of `unwinding` until the block has ended.
 
     An exception out of a handler must not cut through HDF5, which calls back into Python, nor through a clean-up.
     """

@@ -67,7 +67,7 @@ def check(system: System, *, begin: bool = False) -> Check:
         nodes_per_wave=system.nodes / waves if system.nodes and waves > 0.0 else None,
         seconds=price.seconds,
         at_least=price.at_least,
-        memory=1.5e8 + system.table_bytes,
+        memory=2.0e8 + system.table_bytes,
         file_size=float(system.samples) * ROW_BYTES + 1e5,
         adjustments=tuple(adjustments(system)),
     )

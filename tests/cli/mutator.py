@@ -167,7 +167,7 @@ def mutated(text: str, chance: random.Random) -> bytes:
                 lines[row:] = [lines[row][: chance.randrange(len(lines[row]) + 1)]]
         text = "\n".join(lines)
     data = bytearray(text.encode("utf-8", "surrogatepass"))
-    if chance.random() < 0.05:
+    if chance.random() < 0.05 and data:
         data[chance.randrange(len(data))] = chance.randrange(256)
     return bytes(data)
 

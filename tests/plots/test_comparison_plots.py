@@ -22,6 +22,7 @@ from brakecli.files.write import FILL, new_result
 from brakecli.plots.comparison import LARGEST
 from brakecli.plots.result import draw, plot_result
 from brakecli.plots.style import applied
+from tests.campaign import campaign
 from tests.commands import TINY
 from tests.plots.helpers import drawn, legend, line
 
@@ -76,7 +77,7 @@ def write(path: Path, changed: Columns | None = None, **attributes: Any) -> Path
     return path
 
 
-@pytest.mark.parametrize("suffix", ["png", "pdf", "svg"])
+@pytest.mark.parametrize("suffix", ["png", *(pytest.param(each, marks=campaign) for each in ("pdf", "svg"))])
 def test_each_suffix_gives_a_whole_picture_and_the_same_bytes_again(suffix: str, tmp_path: Path) -> None:
     result = write(tmp_path / "r.h5")
     for name in ("a", "b"):

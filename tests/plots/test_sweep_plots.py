@@ -1,5 +1,7 @@
 """Pictures of sweeps: what they show is what the result holds, and what cannot be drawn is refused."""
 
+import math
+from collections.abc import Callable
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -16,9 +18,11 @@ from brakecli.files.write import new_result
 from brakecli.plots.result import plot_result
 from brakecli.plots.style import applied, readable
 from brakecli.plots.sweep import Axis
-from brakecli.sweeps.driver import choose_engine, sweep
 from brakecli.sweeps.plan import parse_sweep
+from brakecli.sweeps.workers.task import compute_units
+from tests.campaign import campaign
 from tests.plots.helpers import ANGLE, CRITICAL, SCHEME, SPEED, columns, drawn, gathered, write
+from tests.sweeps.helpers import inline
 
 
 def test_each_suffix_gives_a_whole_picture_and_the_same_bytes_again(tmp_path: Path) -> None:
@@ -45,7 +49,7 @@ def test_a_computed_sweep_is_drawn_with_its_own_numbers(tmp_path: Path) -> None:
         values = [0.9, 0.3, 0.6]
     """
     loaded = parse_sweep(text, "s.toml", tmp_path, ["solver.duration=0.02"])
-    sweep(loaded, tmp_path / "s.h5", choose_engine(loaded.plan, 1), force=False)
+    inline(loaded, tmp_path / "s.h5", compute_units)
     figure = drawn(tmp_path / "s.h5")
     with open_result(tmp_path / "s.h5") as result:
         amplitude = result.read("/", "amplitude")
@@ -147,17 +151,23 @@ def test_other_kinds_of_results_are_refused_and_select_is_for_sweeps(tmp_path: P
             plot_result(tmp_path / f"{kind}.h5", tmp_path / "r.png", force=False, select=select)
 
 
-def test_sweeps_of_any_values_are_drawn(tmp_path: Path) -> None:
+@pytest.mark.parametrize("every", [3, pytest.param(1, marks=campaign)])
+def test_sweeps_of_any_values_are_drawn(tmp_path: Path, every: int) -> None:
     """All missing, all zero, all the same, of very different size; one axis and two."""
-    for number, (shape, axes) in enumerate([((8,), [ANGLE]), ((7, 8), [SPEED, ANGLE])]):
-        nothing, zero = np.full(shape, np.nan), np.zeros(shape)
-        wide = np.geomspace(1e-12, 1e3, int(np.prod(shape))).reshape(shape)
-        for critical, values in product((False, True), (nothing, zero, zero + 7e6, wide)):
-            changed = columns(shape, critical=critical) | {"amplitude": values, "frequency": values}
-            if critical:
-                changed |= {"critical": values, "critical_eigenvalue": values, "critical_sustained": values}
-            table = {"axis": axes, **({"critical": CRITICAL} if critical else {})}
-            figure = drawn(write(tmp_path / f"{number}.h5", table, changed))
-            with applied():
-                figure.draw_without_rendering()
-            assert figure.axes[0].get_window_extent().width > 200
+    values: list[Callable[[int], Any]] = [
+        lambda count: np.full(count, np.nan),
+        np.zeros,
+        lambda count: np.full(count, 7e6),
+        lambda count: np.geomspace(1e-12, 1e3, count),
+    ]
+    for axes, critical, make in list(product(([ANGLE], [SPEED, ANGLE]), (False, True), values))[::every]:
+        shape = (8,) if len(axes) == 1 else (7, 8)
+        same = make(math.prod(shape)).reshape(shape)
+        changed = columns(shape, critical=critical) | {"amplitude": same, "frequency": same}
+        if critical:
+            changed |= {"critical": same, "critical_eigenvalue": same, "critical_sustained": same}
+        table = {"axis": axes, **({"critical": CRITICAL} if critical else {})}
+        figure = drawn(write(tmp_path / "r.h5", table, changed))
+        with applied():
+            figure.draw_without_rendering()
+        assert figure.axes[0].get_window_extent().width > 200

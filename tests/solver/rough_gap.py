@@ -56,9 +56,15 @@ class Gap:
 
     def value(self, xi: float, derivative: int = 0) -> float:
         """The gap or a derivative of it."""
-        g, omega, phase = self.sines
-        waves = float(np.sum(g * omega**derivative * np.sin(omega * xi + phase + 0.5 * np.pi * derivative)))
+        size, omega, phase = self._derived[derivative]
+        waves = float(size @ np.sin(omega * xi + phase))
         return waves - self.y if derivative == 0 else waves
+
+    @cached_property
+    def _derived(self) -> list[tuple[NDArray[np.float64], ...]]:
+        """The sines of the gap and of its first four derivatives."""
+        g, omega, phase = self.sines
+        return [(g * omega**n, omega, phase + 0.5 * np.pi * n) for n in range(5)]
 
     def values(self, xi: NDArray[np.float64], derivative: int = 0) -> NDArray[np.float64]:
         """The same at many places."""

@@ -2,6 +2,7 @@
 
 import os
 import random
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -9,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from brakecli.solver import implicit_step
 from tests.campaign import campaign
 
 COUNT = """
@@ -30,29 +32,35 @@ def python(program: str, cache: Path) -> str:
     return done.stdout
 
 
-def test_a_second_process_finds_the_machine_code_of_the_first(tmp_path: Path) -> None:
-    python(COUNT.format(limit=""), tmp_path)
-    stored = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.nbc")}
+@pytest.fixture(scope="module")
+def filled(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A cache that a process has left, only to be read."""
+    cache = tmp_path_factory.mktemp("filled")
+    assert python(COUNT.format(limit=""), cache).splitlines()[0] == "(2.0, 0.0, 1.0)"
+    return cache
+
+
+@pytest.fixture
+def cache(filled: Path, tmp_path: Path) -> Path:
+    """A copy of it."""
+    return shutil.copytree(filled, tmp_path / "cache")
+
+
+def test_a_second_process_finds_the_machine_code_of_the_first(cache: Path) -> None:
+    stored = {path: path.stat().st_mtime_ns for path in cache.rglob("*.nbc")}
     assert stored
-    python(COUNT.format(limit=""), tmp_path)
-    assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.nbc")} == stored
+    python(COUNT.format(limit=""), cache)
+    assert {path: path.stat().st_mtime_ns for path in cache.rglob("*.nbc")} == stored
 
 
-@pytest.mark.parametrize("limit", ["", "resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))"])
-def test_kernels_compile_without_a_cache_where_the_disk_is_full(limit: str, tmp_path: Path) -> None:
-    out = python(COUNT.format(limit=limit), tmp_path)
+def test_kernels_compile_without_a_cache_where_the_disk_is_full(tmp_path: Path) -> None:
+    out = python(COUNT.format(limit="resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))"), tmp_path)
     assert out.splitlines()[0] == "(2.0, 0.0, 1.0)"
 
 
-def test_a_kernel_for_kernels_alone_cannot_be_called_from_python(tmp_path: Path) -> None:
-    program = """
-from brakecli.solver import implicit_step
-try:
-    implicit_step._try_force(None, None, 0.0)
-except TypeError as error:
-    print(error)
-"""
-    assert "has no wrapper for calls from Python" in python(program, tmp_path)
+def test_a_kernel_for_kernels_alone_cannot_be_called_from_python() -> None:
+    with pytest.raises(TypeError, match="has no wrapper for calls from Python"):
+        implicit_step._try_force(None, None, 0.0)  # type: ignore[arg-type]
 
 
 def test_kernels_compile_where_no_cache_can_be_made(tmp_path: Path) -> None:
@@ -77,34 +85,31 @@ def noise(data: bytes) -> bytes:
         pytest.param("nbc", lambda data: b"\x80\x04K\x01.", marks=campaign),
     ],
 )
-def test_a_damaged_cache_is_compiled_anew(tmp_path: Path, ending: str, change: Callable[[bytes], bytes]) -> None:
-    python(COUNT.format(limit=""), tmp_path)
-    damaged = {path: change(path.read_bytes()) for path in tmp_path.rglob(f"*.{ending}")}
+def test_a_damaged_cache_is_compiled_anew(cache: Path, ending: str, change: Callable[[bytes], bytes]) -> None:
+    damaged = {path: change(path.read_bytes()) for path in cache.rglob(f"*.{ending}")}
     for path, contents in damaged.items():
         path.write_bytes(contents)
-    assert python(COUNT.format(limit=""), tmp_path).splitlines() == ["(2.0, 0.0, 1.0)", "False"]
+    assert python(COUNT.format(limit=""), cache).splitlines() == ["(2.0, 0.0, 1.0)", "False"]
     assert all(path.read_bytes() != contents for path, contents in damaged.items())
-    stored = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.nbc")}
-    assert python(COUNT.format(limit=""), tmp_path).splitlines() == ["(2.0, 0.0, 1.0)", "False"]
-    assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.nbc")} == stored
+    stored = {path: path.stat().st_mtime_ns for path in cache.rglob("*.nbc")}
+    assert python(COUNT.format(limit=""), cache).splitlines() == ["(2.0, 0.0, 1.0)", "False"]
+    assert {path: path.stat().st_mtime_ns for path in cache.rglob("*.nbc")} == stored
 
 
 @campaign
-def test_the_files_of_a_kernel_are_not_taken_for_those_of_another(tmp_path: Path) -> None:
-    python(COUNT.format(limit=""), tmp_path)
-    one, other = sorted(tmp_path.rglob("*.nbc"))[:2]
+def test_the_files_of_a_kernel_are_not_taken_for_those_of_another(cache: Path) -> None:
+    one, other = sorted(cache.rglob("*.nbc"))[:2]
     kept = one.read_bytes()
     one.write_bytes(other.read_bytes())
-    assert python(COUNT.format(limit=""), tmp_path).splitlines() == ["(2.0, 0.0, 1.0)", "False"]
+    assert python(COUNT.format(limit=""), cache).splitlines() == ["(2.0, 0.0, 1.0)", "False"]
     assert len(one.read_bytes()) == len(kept)
 
 
-def test_a_cache_that_others_may_write_is_not_used(tmp_path: Path) -> None:
-    python(COUNT.format(limit=""), tmp_path)
-    (folder,) = (tmp_path / "brakecli").iterdir()
+def test_a_cache_that_others_may_write_is_not_used(cache: Path, tmp_path: Path) -> None:
+    (folder,) = (cache / "brakecli").iterdir()
     assert folder.stat().st_mode & 0o077 == 0
     folder.chmod(0o777)
-    assert python(COUNT.format(limit=""), tmp_path).splitlines() == ["(2.0, 0.0, 1.0)", "True"]
+    assert python(COUNT.format(limit=""), cache).splitlines() == ["(2.0, 0.0, 1.0)", "True"]
     folder.rename(tmp_path / "elsewhere")
     folder.symlink_to(tmp_path / "elsewhere")
-    assert python(COUNT.format(limit=""), tmp_path).splitlines()[1] == "True"
+    assert python(COUNT.format(limit=""), cache).splitlines()[1] == "True"

@@ -5,16 +5,15 @@ from pathlib import Path
 
 import pytest
 
-from tests.commands import run
-from tests.sweeps.helpers import ANGLES, SLOWER, frictions, write_sweep
+from brakecli.sweeps.workers.task import compute_units
+from tests.sweeps.helpers import ANGLES, SLOWER, frictions, inline, write_sweep
 
 
 @pytest.fixture(scope="session")
 def good(compiled: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A directory with a sweep and its result, only to be read."""
     folder = tmp_path_factory.mktemp("good")
-    write_sweep(folder, frictions(40), ANGLES, case=SLOWER)
-    run("sweep", "s.toml", "--quiet", cwd=folder).told(0)
+    inline(write_sweep(folder, frictions(40), ANGLES, case=SLOWER), folder / "s.h5", compute_units)
     return folder
 
 

@@ -220,26 +220,32 @@ def memory(file: str, name: str) -> None:
             largest = max([largest, *map(peak, workers(os.getpid()))])
 
     functions: dict[str, Compute] = {"compute_units": compute_units, "quick": quick}
-    report = local(read_sweep(file), Path(file).with_suffix(".h5"), functions[name], progress=progress)
+    report = local(read_sweep(file), Path(file).with_suffix(".h5"), functions[name], 1, progress=progress)
     numbers = {"points": report.findings.points, "failed": report.findings.failed, "workers": largest}
     print(json.dumps({**numbers, "parent": peak("self"), "seconds": report.seconds}))  # noqa: T201
 
 
-def refused(file: str) -> None:
-    """Try a sweep that is too large, and print the largest memory of this process, in bytes."""
-    try:
-        local(read_sweep(file), Path(file).with_suffix(".h5"), compute_units)
-    except RefusedError:
-        print(peak("self"))  # noqa: T201
+def refused(*files: str) -> None:
+    """Try sweeps that are too large, and print the largest memory of this process, in bytes."""
+    for file in files:
+        try:
+            local(read_sweep(file), Path(file).with_suffix(".h5"), compute_units)
+        except RefusedError:
+            continue
+        raise AssertionError(file)
+    print(peak("self"))  # noqa: T201
 
 
-def on_cluster(file: str, name: str, address: str) -> None:
-    """Sweep on a cluster, with a function of this module; print what has come of it."""
+def on_cluster(file: str, address: str) -> None:
+    """Sweep on a cluster, with functions of this module; print what has come of it."""
     loaded = read_sweep(file)
     functions: dict[str, Compute] = {"deadly": deadly, "hungry": hungry}
-    with ClusterEngine(partial(functions[name], loaded.plan), address, None) as engine:
-        report = sweep(loaded, Path(file).with_suffix(".h5"), engine, force=False, task_size=5)
-    print(json.dumps({"failures": report.findings.failures, "notes": report.notes}))  # noqa: T201
+    found = {}
+    for name, function in functions.items():
+        with ClusterEngine(partial(function, loaded.plan), address, None) as engine:
+            report = sweep(loaded, Path(file).with_name(f"{name}.h5"), engine, force=False, task_size=5)
+        found[name] = {"failures": report.findings.failures, "notes": report.notes}
+    print(json.dumps(found))  # noqa: T201
 
 
 if __name__ == "__main__":

@@ -135,6 +135,6 @@ def test_an_error_bar_of_a_third_of_the_range_is_no_answer_and_says_what_to_do(t
     critical = {"parameter": "friction.coefficient", "lower": 0.0, "upper": 1.5}
     (tmp_path / "c.toml").write_text(tomli_w.dumps(tables))
     (tmp_path / "s.toml").write_text(tomli_w.dumps({"case": "c.toml", "critical": critical}))
-    printed = brakecli("sweep", "s.toml", "--json", cwd=tmp_path).json
+    printed = brakecli("sweep", "s.toml", "-j", "1", "--json", cwd=tmp_path).json
     assert printed["critical_status"] == ["undecided"]
     assert any("no critical value is decided; try" in each for each in printed["findings"])

@@ -12,7 +12,7 @@ import pytest
 from brakecli.errors import CannotWriteError
 from brakecli.sweeps.journal import identity
 from brakecli.sweeps.plan import read_sweep
-from tests.commands import left_in, shell
+from tests.commands import brakecli, left_in, shell
 from tests.sweeps.helpers import frictions, inline, interrupted, journal_size, write_sweep
 
 
@@ -26,14 +26,14 @@ def test_a_full_disk_ends_a_sweep_with_the_path_and_keeps_what_is_finished(good:
     whole = journal_bytes(here)
     kept = 0
     for limit, name in ((0, "s.h5"), (1, "s.h5"), (whole // 2048, "s.h5.partial")):
-        done = shell(f"ulimit -f {limit}; $B sweep s.toml --quiet --task-size 1", here)
+        done = shell(f"ulimit -f {limit}; $B sweep s.toml --quiet --task-size 1 -j 1", here)
         told = done.told(74, f"{name}: cannot write: ", "free some space")
         assert told.count("\n") == 1
         assert left_in(here) <= {"tiny.toml", "s.toml", "s.h5.partial"}
         assert kept <= journal_size(here) <= limit * 1024
         kept = journal_size(here)
     assert kept > 0.4 * whole
-    done = shell("$B sweep s.toml", here)  # there is room again
+    done = brakecli("sweep", "s.toml", "-j", "1", cwd=here)  # there is room again
     assert "of them are there already" in done.told(0)
     assert (here / "s.h5").read_bytes() == (good / "s.h5").read_bytes()
     assert left_in(here) == {"tiny.toml", "s.toml", "s.h5"}

@@ -222,3 +222,10 @@ def test_the_schema_of_sweep_files_accepts_what_is_accepted_here() -> None:
     for text in (GRID, CRITICAL):
         validator.validate(tomllib.loads('case = "tiny.toml"\n' + text.replace('case = "tiny.toml"\n', "")))
     assert not validator.is_valid(tomllib.loads(GRID.replace("paramter", "parameter").replace("num", "number")))
+
+
+@pytest.mark.parametrize("value", ["nan", "[inf]", "{ a = -inf }"])
+def test_values_of_an_axis_that_are_not_finite_are_told_by_their_key(value: str, tmp_path: Path) -> None:
+    text = f'case = "tiny.toml"\n[[axis]]\nparameter = "shoe.mass"\nvalues = [{value}]\n'
+    (told,) = problems(tmp_path, text)
+    assert "sweep.toml:3: shoe.mass: is not " in told

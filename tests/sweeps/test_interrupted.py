@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.campaign import campaign
-from tests.commands import QUICK, ended, left_in, run, started, wait_until
+from tests.commands import QUICK, brakecli, ended, left_in, started, wait_until
 from tests.sweeps.helpers import alive, journal_size, workers
 
 
@@ -17,10 +17,10 @@ from tests.sweeps.helpers import alive, journal_size, workers
     ("number", "group", "delay"),
     [
         (signal.SIGINT, True, 0.05),
-        (signal.SIGINT, False, 0.6),
         (signal.SIGTERM, True, 0.6),
         (signal.SIGTERM, False, 1.0),
         pytest.param(signal.SIGINT, True, 0.3, marks=campaign),
+        pytest.param(signal.SIGINT, False, 0.6, marks=campaign),
         pytest.param(signal.SIGINT, True, 1.0, marks=campaign),
         pytest.param(signal.SIGTERM, False, 0.05, marks=campaign),
     ],
@@ -45,12 +45,12 @@ def test_a_signal_ends_a_sweep_soon_and_in_one_sentence(
 
 
 def test_an_interrupted_sweep_is_resumed_by_the_same_command(good: Path, here: Path) -> None:
-    with started("sweep", "s.toml", "-q", cwd=here) as process:
+    with started("sweep", "s.toml", "-q", "-j", "1", cwd=here) as process:
         wait_until(lambda: journal_size(here) > 5000)
         process.send_signal(signal.SIGINT)
         ended(process).told(130)
     assert left_in(here) == {"tiny.toml", "s.toml", "s.h5.partial"}
-    done = run("sweep", "s.toml", "--json", cwd=here)
+    done = brakecli("sweep", "s.toml", "-j", "1", "--json", cwd=here)
     resumed = done.json["resumed_points"]
     assert 5 < resumed < 120
     assert f"; {resumed} of them are there already" in done.told(0)
@@ -58,10 +58,10 @@ def test_an_interrupted_sweep_is_resumed_by_the_same_command(good: Path, here: P
 
 
 def test_a_second_sweep_into_the_same_output_is_refused_and_names_the_first(here: Path) -> None:
-    with started("sweep", "s.toml", "-q", cwd=here) as first:
+    with started("sweep", "s.toml", "-q", "-j", "1", cwd=here) as first:
         wait_until(lambda: journal_size(here) > 2000)
         first.send_signal(signal.SIGSTOP)  # or it might be finished before the second has looked
-        second = run("sweep", "s.toml", "-q", "--force", cwd=here)
+        second = brakecli("sweep", "s.toml", "-q", "--force", cwd=here)
         second.told(2, f"s.h5: is being written by process {first.pid} on {socket.gethostname()}; wait until")
         assert first.poll() is None
         first.send_signal(signal.SIGTERM)

@@ -15,7 +15,7 @@ from brakecli.solver.compile import source_hash
 from brakecli.sweeps.journal import open_journal
 from brakecli.sweeps.plan import LoadedSweep, read_sweep
 from brakecli.sweeps.workers.task import compute_units, fingerprint
-from tests.commands import ROOT, left_in, run
+from tests.commands import ROOT, brakecli, left_in
 from tests.sweeps.helpers import frictions, inline, interrupted, write_sweep
 
 pytestmark = pytest.mark.usefixtures("compiled")
@@ -74,11 +74,11 @@ def test_the_command_names_the_key_that_has_changed_and_starts_anew_with_force(t
     loaded = write_sweep(tmp_path, frictions(20))
     interrupted(loaded, tmp_path / "s.h5", compute_units, limit=4, task_size=3)
     command = ["sweep", "s.toml", "--set", "friction.coefficient=0.5", "--set", "shoe.mass=11.0", "-j", "1"]
-    refused = run(*command, cwd=tmp_path).told(3, "s.h5.partial: holds finished points of another sweep: ")
+    refused = brakecli(*command, cwd=tmp_path).told(3, "s.h5.partial: holds finished points of another sweep: ")
     assert "friction.coefficient was 0.6, is 0.5" in refused
     assert "shoe.mass was 10.0, is 11.0" in refused
     assert refused.count("\n") == 1
-    anew = run(*command, "--force", "--json", cwd=tmp_path)
+    anew = brakecli(*command, "--force", "--json", cwd=tmp_path)
     anew.told(0)
     assert anew.json["resumed_points"] == 0
     assert left_in(tmp_path) == {"tiny.toml", "s.toml", "s.h5"}
@@ -88,7 +88,7 @@ def test_a_journal_of_the_same_sweep_is_taken_up(tmp_path: Path) -> None:
     """The control of the refusals above: without a change the very same journal is used."""
     loaded = write_sweep(tmp_path, frictions(20))
     interrupted(loaded, tmp_path / "s.h5", compute_units, limit=4, task_size=3)
-    done = run("sweep", "s.toml", "--json", "-j", "1", cwd=tmp_path)
+    done = brakecli("sweep", "s.toml", "--json", "-j", "1", cwd=tmp_path)
     assert done.told(0).endswith("; 12 of them are there already\n")
     assert done.json["resumed_points"] == 12
 

@@ -16,7 +16,7 @@ from brakecli.files.read import open_result
 from brakecli.sweeps.workers.local import LocalEngine
 from brakecli.sweeps.workers.task import Task
 from tests.campaign import campaign
-from tests.commands import LIMIT, ROOT, TINY, ended, left_in, run, shell, started, wait_until
+from tests.commands import LIMIT, ROOT, TINY, brakecli, ended, left_in, shell, started, wait_until
 from tests.sweeps.helpers import (
     PROGRAM,
     WICKED,
@@ -65,7 +65,7 @@ def test_a_killed_sweep_ends_with_the_bytes_of_an_undisturbed_one(
             wait_until(lambda crew=crew: not any(map(alive, crew)), seconds=1.0 if computing else LIMIT)  # type: ignore[misc]
         assert journal_size(here) >= size
         size = journal_size(here)
-    last = run("sweep", "s.toml", cwd=here)
+    last = brakecli("sweep", "s.toml", "-j", "1", cwd=here)
     assert re.search(r"120 points on . workers?: .*; [1-9]\d* of them are there already", last.told(0))
     assert left_in(here) == {"tiny.toml", "s.toml", "s.h5"}
     assert (here / "s.h5").read_bytes() == (good / "s.h5").read_bytes()
@@ -104,7 +104,7 @@ def test_a_point_that_ends_its_worker_is_marked_and_all_others_are_computed(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], wicked: Compute, task_size: int, reason: str
 ) -> None:
     loaded = write_sweep(tmp_path, frictions(20))
-    report = local(loaded, tmp_path / "s.h5", wicked, task_size=task_size)
+    report = local(loaded, tmp_path / "s.h5", wicked, 2 if wicked is deadly else 1, task_size=task_size)
     assert report.findings.failed == 1
     (failure,) = report.findings.failures
     assert failure["point"] == WICKED

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from brakecli.sweeps.workers.task import compute_units
-from tests.commands import left_in, run
+from tests.commands import brakecli, left_in
 from tests.sweeps.helpers import axis, frictions, inline, interrupted, local, write_sweep
 
 pytestmark = pytest.mark.usefixtures("compiled")
@@ -45,12 +45,11 @@ def test_no_way_of_computing_a_sweep_changes_a_byte(tmp_path: Path, name: str) -
         interrupted(loaded, tmp_path / "s.h5", compute_units, task_size=size, order=order, limit=1)
         assert inline(loaded, tmp_path / "s.h5", compute_units, task_size=size + 1, order=-order).resumed > 0
         same()
-    local(loaded, tmp_path / "s.h5", compute_units, 2, task_size=1)
-    same()
-    if name == "grid":
-        local(loaded, tmp_path / "s.h5", compute_units, 1, task_size=7, order=-1)
+    if name != "critical":  # as below
+        local(loaded, tmp_path / "s.h5", compute_units, 2, task_size=1)
         same()
-        run("sweep", "s.toml", "-q", "-j", "2", "--task-size", "1000", cwd=tmp_path).told(0)
+    if name == "grid":  # one task, and so one worker
+        brakecli("sweep", "s.toml", "-q", "-j", "2", "--task-size", "1000", cwd=tmp_path).told(0)
         same()
 
 

@@ -9,12 +9,13 @@ import xarray as xr
 
 from brakecli.case.case import resolved_toml
 from brakecli.case.read import parse_case
-from brakecli.sweeps.driver import TaskQueue, choose_engine, sweep
+from brakecli.sweeps.driver import TaskQueue
 from brakecli.sweeps.plan import LoadedSweep, parse_sweep, plan_of
 from brakecli.sweeps.point import Status, blank, line_points, next_start, record_type, simulate
 from brakecli.sweeps.result import SweepReport
-from brakecli.sweeps.workers.task import Task
+from brakecli.sweeps.workers.task import Task, compute_units
 from tests.commands import TINY, attributes, brakecli, left_in
+from tests.sweeps.helpers import inline
 
 CASE = TINY.replace("0.02", "0.4").replace("1e-5", "2e-5").replace("1e-4", "2e-4")
 GRID = """\
@@ -38,8 +39,7 @@ def load(folder: Path, text: str, case: str = CASE, *overrides: str) -> LoadedSw
 
 def run(folder: Path, text: str, case: str = CASE, **options: Any) -> SweepReport:
     loaded = load(folder, text, case)
-    with choose_engine(loaded.plan, 2) as engine:
-        return sweep(loaded, folder / "sweep.h5", engine, force=False, **options)
+    return inline(loaded, folder / "sweep.h5", compute_units, **options)
 
 
 def opened(path: Path) -> xr.Dataset:
@@ -110,10 +110,10 @@ def test_points_that_fail_are_listed_and_the_others_are_there(tmp_path: Path) ->
     text = 'case = "tiny.toml"\n[[axis]]\nparameter = "output.sample_interval"\nvalues = [2e-4, 1e-6, 4e-4]\n'
     (tmp_path / "tiny.toml").write_text(CASE)
     (tmp_path / "s.toml").write_text(text.replace("1e-6", "1e-4"))
-    assert brakecli("sweep", "s.toml", "-o", "right.h5", cwd=tmp_path).code == 0
+    assert brakecli("sweep", "s.toml", "-j", "1", "-o", "right.h5", cwd=tmp_path).code == 0
     text += '[[axis]]\nparameter = "solver.step"\nvalues = [2e-5, 5e-7]\n'
     (tmp_path / "s.toml").write_text(text)
-    done = brakecli("sweep", "s.toml", "--json", cwd=tmp_path)
+    done = brakecli("sweep", "s.toml", "-j", "1", "--json", cwd=tmp_path)
     done.told(
         1, "point 2 (output.sample_interval = 1e-06, solver.step = 2e-05)", "is below the time step", "1 of 6"
     )
@@ -261,10 +261,11 @@ def test_the_summary_and_the_json_carry_the_names_of_the_file(tmp_path: Path) ->
     assert done.json["regime"] == found.regime.values.tolist()
     again = brakecli("sweep", "s.toml", cwd=tmp_path)
     again.told(2, "s.h5: exists already")
-    table = brakecli("sweep", "s.toml", "--force", "--set", "solver.duration=0.1", cwd=tmp_path)
+    command = ["sweep", "s.toml", "--force", "-j", "1", "--set", "solver.duration=0.1"]
+    table = brakecli(*command, cwd=tmp_path)
     for words in ("Speed and friction", "wheel.angular_speed", "friction.coefficient", "regimes", "s.h5"):
         assert words in table.out
-    quiet = brakecli("sweep", "s.toml", "--force", "--quiet", "--set", "solver.duration=0.1", cwd=tmp_path)
+    quiet = brakecli(*command, "--quiet", cwd=tmp_path)
     assert (quiet.code, quiet.out, quiet.err) == (0, "", "")
 
 

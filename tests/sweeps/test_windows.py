@@ -71,7 +71,7 @@ def test_two_windows_of_a_passing_wave_are_found_stored_printed_and_drawn(tmp_pa
     }
     (tmp_path / "c.toml").write_text(tomli_w.dumps(TONGUES))
     (tmp_path / "s.toml").write_text(tomli_w.dumps(table))
-    printed = brakecli("sweep", tmp_path / "s.toml", "-o", tmp_path / "s.h5", "--json", cwd=tmp_path).json
+    printed = brakecli("sweep", "s.toml", "-j", "1", "--json", cwd=tmp_path).json
     with xr.open_dataset(tmp_path / "s.h5", engine="h5netcdf") as result:
         assert result.critical_windows_lower.dims == ("link1_damping", "window")
         lower, upper = result.critical_windows_lower.values, result.critical_windows_upper.values

@@ -44,26 +44,34 @@ def build_pad(k: float, half_length: float, shoe: Surface, wheel: Surface, nodes
     pad.shoe_bound, pad.wheel_bound = max(top, bottom), np.abs(wheel.g).sum()
     pad.full_up_to, pad.clear_from = -pad.wheel_bound - top, pad.wheel_bound + bottom
     pad.cell = 2.0 * half_length / max(8.0, 8.0 * half_length * max([*shoe.turns, *wheel.turns], default=0.0))
-    ss, cc, pr, pad.shoe_mean, pad.shoe_square = _products(half_length, shoe, wheel)
-    f1, sines, cosines = _node_tables(half_length, shoe, wheel, nodes)
-    tables = {
-        "gap_at": np.concatenate(
-            [wheel.g, -shoe.g, wheel.omega, shoe.omega, np.zeros(wheel.g.size), shoe.phase],
-        ),
-        "wheel_at": np.concatenate([wheel.g, wheel.omega]),
-        "full_at": 2.0 * half_length * k * wheel.g * np.sinc(wheel.omega * half_length / np.pi),
-        "ss_at": ss,
-        "cc_at": cc,
-        "pr_at": pr,
-        "nodes_at": f1,
-        "sin_at": sines,
-        "cos_at": cosines,
+    waves, cells = wheel.g.size, nodes + 2 if nodes else 0
+    shapes = {
+        "gap_at": (3 * (waves + shoe.g.size),),
+        "wheel_at": (2 * waves,),
+        "full_at": (waves,),
+        "ss_at": (waves, waves),
+        "cc_at": (waves, waves),
+        "pr_at": (2 * waves,),
+        "nodes_at": (cells,),
+        "sin_at": (waves, cells),
+        "cos_at": (waves, cells),
     }
-    place = 0
-    for name, table in tables.items():
-        pad[name] = place
-        place += table.size
-    return Pad(pad, np.concatenate([table.ravel() for table in tables.values()]))
+    # Large tables are made in their place: a copy of gigabytes would not hear a signal.
+    flat, table, place = np.empty(sum(map(math.prod, shapes.values()))), dict[str, Floats](), 0
+    for name, shape in shapes.items():
+        pad[name], size = place, math.prod(shape)
+        table[name] = flat[place : place + size].reshape(shape)
+        place += size
+    table["gap_at"][:] = np.concatenate(
+        [wheel.g, -shoe.g, wheel.omega, shoe.omega, np.zeros(waves), shoe.phase],
+    )
+    table["wheel_at"][:] = np.concatenate([wheel.g, wheel.omega])
+    table["full_at"][:] = 2.0 * half_length * k * wheel.g * np.sinc(wheel.omega * half_length / np.pi)
+    into = table["ss_at"], table["cc_at"]
+    table["pr_at"][:], pad.shoe_mean, pad.shoe_square = _products(half_length, shoe, wheel, into)
+    if nodes:
+        _node_tables(half_length, shoe, wheel, (table["nodes_at"], table["sin_at"], table["cos_at"]))
+    return Pad(pad, flat)
 
 
 def build_layer(evaluate: Any, pad: Pad) -> Layer:
@@ -85,38 +93,35 @@ def _shoe_bounds(a: float, shoe: Surface) -> tuple[float, float]:
     return min(float(f.max()) + between, crest), min(float(-f.min()) + between, crest)
 
 
-def _node_tables(a: float, shoe: Surface, wheel: Surface, nodes: int) -> tuple[Floats, Floats, Floats]:
+def _node_tables(a: float, shoe: Surface, wheel: Surface, into: tuple[Floats, Floats, Floats]) -> None:
     """Cell means of f1, and of g sin(omega xi), g cos(omega xi) for the wheel, with one cell beyond each end.
 
     The mean of a sine over a cell is its value in the middle times sinc(omega spacing/2). With means instead of
     values the midpoint sum of a fully touching pad is its integral, so `auto` may change over without a jump.
     """
-    if nodes == 0:
-        return np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0))
-    spacing = 2.0 * a / nodes
-    xi = -a + spacing * (np.arange(nodes + 2) - 0.5)
+    f1, sines, cosines = into
+    spacing = 2.0 * a / (f1.size - 2)
+    xi = -a + spacing * (np.arange(f1.size) - 0.5)
 
     def mean(f: Surface) -> Floats:
         return f.g * np.sinc(f.omega * spacing / (2.0 * np.pi))
 
-    f1, sines, cosines = np.zeros(xi.size), *np.empty((2, wheel.g.size, xi.size))
+    f1[:] = 0.0
     for g, omega, phase in zip(mean(shoe), shoe.omega, shoe.phase, strict=True):  # signals are heard between waves
         f1 += g * np.sin(omega * xi + phase)
     for i, (g, omega) in enumerate(zip(mean(wheel), wheel.omega, strict=True)):
         sines[i], cosines[i] = g * np.sin(omega * xi), g * np.cos(omega * xi)
-    return f1, sines, cosines
 
 
-def _products(a: float, shoe: Surface, wheel: Surface) -> tuple[Floats, Floats, Floats, float, float]:
+def _products(a: float, shoe: Surface, wheel: Surface, into: tuple[Floats, Floats]) -> tuple[Floats, float, float]:
     """Integrals over the pad of products of harmonics (m³), for the store of a fully touching pad.
 
-    With S = g sin(omega xi), C = g cos(omega xi) of the wheel: ∫ S S, ∫ C C, (∫ S f1, ∫ C f1), ∫ f1 (per pad
-    length), ∫ f1². ∫ S C and ∫ S are zero by symmetry.
+    With S = g sin(omega xi), C = g cos(omega xi) of the wheel: ∫ S S and ∫ C C (`into` these), (∫ S f1, ∫ C f1),
+    ∫ f1 (per pad length), ∫ f1². ∫ S C and ∫ S are zero by symmetry.
     """
 
-    def pair(f: Surface, h: Surface) -> tuple[Floats, Floats]:
+    def pair(f: Surface, h: Surface, sines: Floats, cosines: Floats) -> None:
         """∫ sin sin and ∫ cos cos."""
-        sines, cosines = np.empty((2, f.g.size, h.g.size))
         rows = 1 + PIECE // (1 + h.g.size)
         for i in range(0, f.g.size, rows):
             part = slice(i, i + rows)
@@ -124,12 +129,11 @@ def _products(a: float, shoe: Surface, wheel: Surface) -> tuple[Floats, Floats, 
             plus = np.sinc(np.add.outer(f.omega[part], h.omega) * a / np.pi)
             g = a * np.outer(f.g[part], h.g)
             sines[part], cosines[part] = g * (minus - plus), g * (minus + plus)
-        return sines, cosines
 
     sin_1, cos_1 = np.sin(shoe.phase), np.cos(shoe.phase)
-    ss, cc = pair(wheel, wheel)
-    s_f1, c_f1 = pair(wheel, shoe)
-    ss_1, cc_1 = pair(shoe, shoe)
+    pair(wheel, wheel, *into)
+    pair(wheel, shoe, *(mixed := np.empty((2, wheel.g.size, shoe.g.size))))
+    pair(shoe, shoe, *(own := np.empty((2, shoe.g.size, shoe.g.size))))
     mean = float(np.sum(shoe.g * sin_1 * np.sinc(shoe.omega * a / np.pi)))
-    square = float(cos_1 @ ss_1 @ cos_1 + sin_1 @ cc_1 @ sin_1)
-    return ss, cc, np.concatenate([s_f1 @ cos_1, c_f1 @ sin_1]), mean, square
+    square = float(cos_1 @ own[0] @ cos_1 + sin_1 @ own[1] @ sin_1)
+    return np.concatenate([mixed[0] @ cos_1, mixed[1] @ sin_1]), mean, square

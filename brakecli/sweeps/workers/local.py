@@ -16,7 +16,6 @@ from brakecli.files.os_signals import signals_deferred
 from brakecli.sweeps.workers.task import Compute, Engine, Finished, NextTask, Task, attempt
 
 _SIGNALS = (signal.SIGHUP, signal.SIGINT, signal.SIGTERM)
-_THREAD_LIMITS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 _LOOK_SECONDS = 1.0  # between two looks for signals that have arrived just before the wait for workers
 
 
@@ -113,20 +112,12 @@ def _cause_of_death(code: int) -> str:
 
 @contextmanager
 def _starting() -> Iterator[None]:
-    """Let a child start without signals and without threads of its own for linear algebra.
-
-    A signal would end Python's start in a traceback. Each core has a process already.
-    """
+    """Let a child start without signals: one would end Python's start in a traceback."""
     with signals_deferred():
-        limits = {name: os.environ[name] for name in _THREAD_LIMITS if name in os.environ}
         mask = signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
-        os.environ.update(dict.fromkeys(_THREAD_LIMITS, "1"))
         try:
             yield
         finally:
-            for name in _THREAD_LIMITS:
-                del os.environ[name]
-            os.environ.update(limits)
             signal.pthread_sigmask(signal.SIG_SETMASK, mask)
 
 

@@ -1,0 +1,89 @@
+"""Ten shoes or records like each of the named ones, drawn: what holds of the named one holds of them."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from brakecli.analysis.regime.rules import classify
+from brakecli.analysis.regime.spectra import peak, spectrum
+from brakecli.analysis.regime.verdict import Context, Excitation, Regime
+from brakecli.case.system import system_of
+from tests.analysis.histories import INTERVAL, history_of, verdict_of
+from tests.analysis.test_verdicts import DRUM
+from tests.campaign import campaign, counts
+from tests.examples import SQUEAL, make
+
+
+@pytest.mark.parametrize("draws", counts(2, 10))
+def test_no_shoe_that_sticks_after_a_hard_start_has_died_out(draws: int) -> None:
+    rng = np.random.default_rng(12)
+    for _ in range(draws):
+        changes: dict[str, Any] = {
+            "wheel__angular_speed": 10.0 ** rng.uniform(-2.7, -1.5),
+            "initial__vx": -rng.uniform(0.2, 1.0),
+            "friction__coefficient": rng.uniform(0.62, 1.0),  # sliding is unstable from 0.575 on
+        }
+        verdict = verdict_of(make(SQUEAL, **changes, solver__duration=0.5))
+        assert verdict.regime is not Regime.DAMPED, changes
+        assert "died out" not in verdict.reasons[0]
+
+
+@campaign
+def test_each_drum_that_swings_once_per_turn_is_forced_by_the_static_amount() -> None:
+    """S z = (φ, 1) 2ak g: inertia and dashpots add (4 Hz over 200 Hz)², the length of the pad takes 0.7 %."""
+    rng, turn = np.random.default_rng(13), np.linspace(0.0, 2.0 * np.pi, 10_001)
+    for _ in range(10):
+        part, high = int(rng.integers(2, 4)), 10e-6 * rng.uniform(0.5, 3.0, 2)
+        waves = {"amplitudes": high.tolist(), "wavelengths": [3.0, 3.0 / part]}
+        changes: dict[str, Any] = {
+            "wheel__angular_speed": rng.uniform(6.0, 9.0),
+            "friction__coefficient": rng.uniform(0.1, 0.4),
+            "link2__angle_deg": rng.uniform(5.0, 20.0),
+            "link1__damping": 3000.0,
+            "link2__damping": 3000.0,
+            "load__force": rng.uniform(12e3, 20e3),
+            "solver__step": 5e-5,
+        }
+        case = make(DRUM | {"roughness": {"wheel": waves}}, **changes)
+        c, k, verdict = system_of(case).coefficients, 2e7, verdict_of(case)
+        s = np.array([[c.c_xx, c.c_xy + c.phi * k], [c.c_xy, c.c_yy + k]])
+        swing = k * 0.5 * np.ptp(high[0] * np.sin(turn) + high[1] * np.sin(part * turn))
+        static = abs(float(np.linalg.solve(s, [c.phi, 1.0])[0]) * swing)
+        assert (verdict.regime, verdict.excitation) == (Regime.DAMPED, Excitation.FORCED), verdict.reasons
+        assert verdict.amplitude == pytest.approx(static, rel=0.015)
+        assert verdict.amplitude_forced == pytest.approx(static, rel=0.015)
+
+
+@pytest.mark.parametrize("draws", counts(3, 10))
+def test_the_amplitude_is_that_which_lasts_and_not_its_transient(draws: int) -> None:
+    rng, time = np.random.default_rng(15), INTERVAL * np.arange(20000)
+    for _ in range(draws):
+        frequency, depth, rate = rng.uniform(50.0, 200.0), rng.uniform(-0.05, 0.1), rng.uniform(2.0, 8.0)
+        vx = 1e-2 * (1.0 + depth * np.exp(-rate * time)) * np.sin(2 * np.pi * frequency * time)
+        motion = history_of(len(vx), vx=vx, x=np.cumsum(vx) * INTERVAL, state=np.where(vx > 0.0099, 0.0, -1.0))
+        verdict = classify(motion, Context(1e-2))
+        # The median cycle lies in the second half; fifty samples a cycle miss (π/50)²/2 of a crest.
+        left = abs(depth) * math.exp(-rate * 0.5 * time[-1]) + 2e-3
+        assert verdict.amplitude == pytest.approx(1e-2 / (2 * np.pi * frequency), rel=left)
+        assert verdict.frequency == pytest.approx(frequency, rel=1e-3)
+
+
+@pytest.mark.parametrize("draws", counts(5, 100))
+def test_each_peak_of_a_short_record_is_right_within_its_resolution_or_left_out(draws: int) -> None:
+    rng, named = np.random.default_rng(16), 0
+    for _ in range(draws):
+        cycles, frequency = 10.0 ** rng.uniform(0.0, 1.7), rng.uniform(20.0, 400.0)
+        samples = int(cycles / frequency / INTERVAL)
+        time = INTERVAL * np.arange(samples)
+        vx = np.sin(2.0 * np.pi * frequency * time + rng.uniform(0.0, 6.0))
+        lines = spectrum(history_of(samples, vx=vx), 0)
+        found = peak(lines.frequency, lines.density["vx"], samples * INTERVAL)
+        if found is not None:
+            assert found == pytest.approx(frequency, abs=float(lines.frequency[1])), (frequency, cycles)
+            assert cycles >= 4.0  # five, less half a line
+            named += 1
+        else:
+            assert cycles < 10.0, (frequency, cycles)
+    assert named >= draws // 4
