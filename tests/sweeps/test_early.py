@@ -191,15 +191,15 @@ def test_a_point_takes_less_than_200_bytes_of_journal_and_of_result(tmp_path: Pa
 def test_a_result_of_many_blocks_holds_every_point_in_its_place(tmp_path: Path, followed: str) -> None:
     """`quick` numbers points as they are computed: along the followed axis first."""
     direction = 'direction = "both"'
-    first = axis("friction.coefficient", "start=0.1", "stop=0.9", "num=150", direction * (followed == "first"))
-    last = axis("link2.angle_deg", "start=1.0", "stop=9.0", "num=130", direction * (followed == "last"))
+    first = axis("friction.coefficient", "start=0.1", "stop=0.9", "num=140", direction * (followed == "first"))
+    last = axis("link2.angle_deg", "start=1.0", "stop=9.0", "num=120", direction * (followed == "last"))
     loaded = write_sweep(tmp_path, first, last)
     inline(loaded, tmp_path / "s.h5", quick, task_size=999, order=-1)
     with h5py.File(tmp_path / "s.h5") as file:
         found = file["frequency"][...]
-    assert plan_of(loaded.plan.sweep_text, loaded.plan.case_text).points == 150 * 130
+    assert plan_of(loaded.plan.sweep_text, loaded.plan.case_text).points == 140 * 120
     expected = np.arange(found.size, dtype=float)
     if followed == "first":
-        np.testing.assert_array_equal(found, expected.reshape(2, 130, 150).transpose(0, 2, 1))
+        np.testing.assert_array_equal(found, expected.reshape(2, 120, 140).transpose(0, 2, 1))
     else:
         np.testing.assert_array_equal(found, expected.reshape(found.shape))

@@ -13,12 +13,11 @@ pytestmark = pytest.mark.usefixtures("compiled")
 
 SWEEPS = {
     "grid": (frictions(5), axis("link2.angle_deg", "values = [1.0, 5.0, 9.0]")),
-    "early": (
-        axis("solver.tolerance", "values = [1e-3]"),  # takes the place of the step
-        axis("solver.duration", "values = [0.02, 1.0]"),
-        frictions(5, 'direction = "both"'),
+    "followed": (  # the second scheme ends its points early
+        axis("solver.duration", "values = [0.6]"),
+        axis("solver.scheme", 'values = ["two-layer", "piecewise-exact"]'),
+        frictions(3, 'direction = "both"'),
     ),
-    "followed": (frictions(3, 'direction = "both"'), axis("link2.angle_deg", "values = [1.0, 5.0, 9.0]")),
     "critical": (
         axis("link2.angle_deg", "start = 1.0", "stop = 9.0", "num = 4"),
         '[critical]\nparameter = "friction.coefficient"\nlower = 0.0\nupper = 2.0\nmethod = "eigenvalue"\n',
