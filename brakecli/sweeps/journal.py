@@ -47,6 +47,7 @@ class Journal:
         self._unit_bytes = plan.unit_length * self.kind.itemsize
         self._blocks: list[tuple[int, int, int, int]] = []  # first unit, units, where their records begin and end
         self._longest = {name: 1 for name in self.kind.names or () if self.kind[name].kind == "S"}  # bytes
+        self._block = 0, b""  # read last: where it begins, and its records
         self._slab: tuple[int, int, NDArray[Any]] | None = (
             None  # lines read last: first and last, and their records
         )
@@ -110,14 +111,20 @@ class Journal:
         for begin, count, start, end in self._blocks[bisect_right(self._blocks, first, key=itemgetter(0)) - 1 :]:
             if begin >= last:
                 break
-            try:
-                data = zlib.decompress(os.pread(self._file.fileno(), end - start, start))
-            except zlib.error:
-                raise BrakecliError(f"{self.path}: was changed while in use; run the same command again") from None
+            data = self._unpacked(start, end)
             low, high = max(begin, first), min(begin + count, last)
             found = np.frombuffer(data, self.kind)[(low - begin) * length : (high - begin) * length]
             records[(low - first) * length : (high - first) * length] = found
         return records
+
+    def _unpacked(self, start: int, end: int) -> bytes:
+        """The records of a block, which may be read in pieces."""
+        if self._block[0] != start:
+            try:
+                self._block = start, zlib.decompress(os.pread(self._file.fileno(), end - start, start))
+            except zlib.error:
+                raise BrakecliError(f"{self.path}: was changed while in use; run the same command again") from None
+        return self._block[1]
 
     def discard(self) -> None:
         """Remove the file: its sweep is finished."""
