@@ -8,6 +8,8 @@ RUN_STAMP := $(VENV)/.installed-for-running
 DEV_STAMP := $(VENV)/.installed-for-development
 LOWEST := $(VENV)/lowest
 LOWEST_STAMP := $(LOWEST)/.installed
+PEERS := $(VENV)/bench
+PEERS_STAMP := $(PEERS)/.installed
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 CASES := $(sort $(wildcard cases/*.toml))
 # Two processes: one test waits for what it has started while another computes. PYTEST_ARGS=-n0 takes one alone.
@@ -18,7 +20,7 @@ PYTEST_ARGS ?=
 .DELETE_ON_ERROR:
 .NOTPARALLEL: # two installations into one .venv at a time would collide
 .PHONY: help demo test campaign lowest lint format types imports derivations tables cases check \
-    accuracy promises picture lock-in paper extremes bench-sweep clean
+    accuracy promises picture lock-in paper extremes bench bench-sweep clean
 
 help: ## list the targets (this text)
 	@echo "make TARGET, where TARGET is one of"
@@ -53,6 +55,16 @@ $(LOWEST_STAMP): $(INSTALLED_FROM)
 	@$(BIN)/python -m venv --clear $(LOWEST)
 	@$(LOWEST)/bin/python -m pip --disable-pip-version-check --quiet install uv
 	@$(LOWEST)/bin/uv pip install --quiet --python $(LOWEST)/bin/python --resolution lowest-direct --editable '.[dev]'
+	@touch $@
+
+# Peers have an environment of their own. numbalsoda is compiled there and needs a Fortran compiler: without it the
+# others are measured, and pip says why.
+$(PEERS_STAMP): $(INSTALLED_FROM)
+	@echo "installing brakecli and the solvers that it is compared with into $(PEERS) ..."
+	@$(BIN)/python -m venv --clear $(PEERS)
+	@$(PEERS)/bin/python -m pip --disable-pip-version-check --quiet install --editable '.[bench]'
+	@$(PEERS)/bin/python -m pip --disable-pip-version-check --quiet install numbalsoda \
+	    || echo "numbalsoda is not installed; it needs gfortran, and make bench again after make clean" >&2
 	@touch $@
 
 demo: $(RUN_STAMP) ## install into .venv and run one real case, cases/relaxation.toml
@@ -127,6 +139,9 @@ paper: $(DEV_STAMP) ## reproduce the paper's claims into docs/paper-claims.md, w
 
 promises: $(DEV_STAMP) ## random cases at five tolerances: the tables of docs/accuracy.md (some minutes)
 	$(BIN)/python -m benchmarks.promises
+
+bench: $(PEERS_STAMP) ## measure brakecli beside general solvers and write docs/performance.md (ten minutes)
+	$(PEERS)/bin/python -m benchmarks.performance
 
 bench-sweep: $(DEV_STAMP) ## what a sweep costs beside its points; needs two idle cores (some minutes)
 	$(BIN)/python -m benchmarks.sweep

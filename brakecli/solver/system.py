@@ -146,7 +146,7 @@ class System:
         """Natural frequencies without friction, in a contact that touches everywhere, Hz, rising."""
         return natural_frequencies(self.coefficients, self.contact_stiffness)
 
-    @property
+    @cached_property
     def per_sample(self) -> int:
         """Steps of a sample interval."""
         method = self.method

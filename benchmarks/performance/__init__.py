@@ -1,0 +1,1 @@
+"""How fast brakecli is, beside general solvers; see `__main__`."""

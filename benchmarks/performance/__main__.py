@@ -1,0 +1,288 @@
+"""Speed beside general solvers at matched errors, and what is to be reached: writes docs/performance.md.
+
+    python -m benchmarks.performance [PART ...]
+
+Needs the extra `bench`. Programs that are not installed are named on the page. Parts, by words in their names, are
+printed and leave the page alone.
+"""
+
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false")
+
+from benchmarks.performance import ensembles, in_c, page, peers, rows, taylor
+from benchmarks.performance.matching import (
+    TARGETS,
+    US,
+    Entry,
+    Floats,
+    Ladder,
+    cheapest,
+    deviation,
+    loop,
+    measure,
+    our_ladders,
+    ratio,
+    warm,
+)
+from benchmarks.performance.page import Goal, number
+from benchmarks.performance.problem import Problem
+from brakecli.runs.tolerance import certify
+from brakecli.solver.method import Method
+from brakecli.solver.system import System
+
+CASES = {"S": "smooth surfaces", "B": "rough surfaces, pad partly open", "C": "stick-slip"}
+DURATIONS = (0.02, 0.5)
+REFERENCE, LONG_REFERENCE = 1e-12, 1e-10  # tolerances, of 20 ms and of longer motions
+TURN_SECONDS = 3.0
+AGAINST_LSODA = {("S", 0.02): 5, ("B", 0.02): 3, ("C", 0.02): 5, ("S", 0.5): 12, ("B", 0.5): 3, ("C", 0.5): 10}
+AGAINST_SCIPY = {"S": 500, "B": 70, "C": 100}
+_ON_S = (
+    "S over 20 ms takes 36 µs: some 20 for the call, 4 for the matrices of the phases, 11 for 80 steps and"
+    " the events. DOP853 and heyoka.py take fewer and longer steps, and fill in the samples."
+)
+_ON_ROUGH = (
+    "B and C: the peer's steps adapt and are of high order. Ours are fixed, of second order, and take two"
+    " to three evaluations of 300 ns; an evaluation of the peers takes 115 ns, since it sums the force "
+    "alone."
+)
+REASONS = {
+    "numbalsoda LSODA: S, 0.5 s": (
+        "S over 0.5 s at 1e-2 and 1e-3: an exact motion costs the same at every error, and LSODA "
+        "gets cheaper as errors may grow."
+    ),
+    "numbalsoda LSODA: S": _ON_S,
+    "numbalsoda DOP853: S": _ON_S,
+    "heyoka.py: S": _ON_S,
+    "numbalsoda": _ON_ROUGH,
+    "SciPy": "SciPy has a compiled right-hand side and its cheapest method at each error, LSODA on S.",
+    "heyoka.py: relaxation": "relaxation.toml: a certificate takes a second run; setting up both takes a fifth.",
+    "promise": "A promise on B: each rung of the ladder doubles the nodes with the steps.",
+    "one evaluation": (
+        "One evaluation: the compiler does not know the number of waves, and each has a loop of its own."
+    ),
+    "map of regimes": (
+        "The map of regimes: half of a point are the powers that its verdict takes from 40,000 samples, "
+        "a third the two runs of 2 s for the certificate."
+    ),
+    "map on B": "The map on B: each point climbs the ladder of a promise, one case at a time.",
+    "critical": "Critical values: growth is measured by runs, one after the other.",
+}
+"""Why a goal is missed, by the beginning of its name; the first that fits."""
+
+
+@dataclass
+class Report:
+    """What has been measured so far."""
+
+    begin: float  # s
+    load: float  # of the machine at the start
+    goals: list[Goal] = field(default_factory=list)
+    motions: dict[tuple[str, float], list[Entry]] = field(default_factory=dict)
+    ensemble: list[Entry] = field(default_factory=list)  # case B for the duration of the ensembles
+    rates: list[ensembles.Rate] = field(default_factory=list)
+    single: list[in_c.Beside] = field(default_factory=list)
+    grown: list[rows.Table] = field(default_factory=list)
+    missing: str = ""
+    left: list[str] = field(default_factory=list)  # what is still to be measured
+
+    def lines(self) -> list[str]:
+        lines = page.head(self.load, (time.perf_counter() - self.begin) / 60.0)
+        if self.left:
+            lines += [f"The run was interrupted: not measured are {', '.join(self.left)}.", ""]
+        lines += ["## To reach", "", *page.goals(self.goals, REASONS)]
+        lines += ["## Motions side by side", "", *page.absent(self.motions)] if self.motions else []
+        for (name, duration), entries in self.motions.items():
+            lines += page.side_by_side(f"{name}: {CASES[name]}", duration, entries)
+        if self.rates:
+            lines += ["## Many cases", "", *page.rates(self.rates)]
+        if self.single or self.missing:
+            lines += ["## Beside C", "", *(page.in_c_rows(self.single) or [f"Not measured: {self.missing}.", ""])]
+        if self.grown:
+            lines += ["## How cost grows", "", *page.growth(self.grown)]
+        return lines
+
+
+def say(what: str) -> None:
+    print(f"# {time.strftime('%H:%M:%S')} {what}", file=sys.stderr, flush=True)
+
+
+def everyone(problem: Problem, name: str, reference: Floats) -> Iterator[Ladder]:
+    yield from our_ladders(problem.system)
+    if name == "S" and peers.found("heyoka"):
+        yield from taylor.heyoka(problem, taylor.bouncing)
+    for package, ladders in peers.PEERS.items():
+        if peers.found(package):
+            yield from ladders(problem, name == "C", reference)
+
+
+def exact(system: System, tolerance: float) -> Floats:
+    """The motion that others are compared with."""
+    scheme = "piecewise-exact" if system.smooth else "event-driven"
+    return loop(replace(system, method=Method(scheme, tolerance=tolerance)))[1]
+
+
+def motions(report: Report, name: str) -> None:
+    """A case by all programs; and case B for the time that ensembles compute."""
+    system = replace(rows.load(f"accuracy/{name}.toml"), interval=ensembles.INTERVAL, duration=max(DURATIONS))
+    reference = exact(system, LONG_REFERENCE)
+    for duration in sorted({*DURATIONS, ensembles.DURATION if name == "B" else DURATIONS[0]}):
+        say(f"{name}, {duration:g} s")
+        part = replace(system, duration=duration)
+        begin = reference[: part.samples + 1] if duration > min(DURATIONS) else exact(part, REFERENCE)
+        entries = measure(everyone(Problem(part), name, begin), begin, TURN_SECONDS)
+        if duration in DURATIONS:
+            report.motions[name, duration] = entries
+        else:
+            report.ensemble = entries
+    report.goals += motion_goals(report.motions, name)
+
+
+def motion_goals(found: dict[tuple[str, float], list[Entry]], name: str) -> list[Goal]:
+    goals: list[Goal] = []
+    for who in ("numbalsoda LSODA", "numbalsoda DOP853"):
+        for duration in DURATIONS if peers.found("numbalsoda") else ():
+            ratios = {target: ratio(found[name, duration], who, target) for target in TARGETS}
+            reached = {target: each for target, each in ratios.items() if each is not None}
+            if reached:
+                told = ", ".join(f"{number(each)} at {target:.0e}" for target, each in reached.items())
+                goal = AGAINST_LSODA[name, duration] if "LSODA" in who else 1
+                kept = min(reached.values()) >= goal
+                goals.append((f"{who}: {name}, {duration:g} s", f"≥ {goal}", told, kept))
+    for duration in DURATIONS if name == "S" and peers.found("heyoka") else ():
+        both = [ratio(found["S", duration], "heyoka.py", target) or 0.0 for target in (1e-6, 1e-7)]
+        what = f"heyoka.py: S at 1e-6 and 1e-7, {duration:g} s"
+        goals.append((what, "≥ 2", ", ".join(map(number, both)), min(both) >= 2))
+    each, goal = ratio(found[name, DURATIONS[0]], "SciPy", 1e-3) or 0.0, AGAINST_SCIPY[name]
+    what = f"SciPy: {name} at 1e-3, {DURATIONS[0]:g} s"
+    goals.append((what, f"≥ {goal}", number(each), each >= goal))
+    return goals
+
+
+def relaxation(report: Report) -> None:
+    """Two seconds of stick-slip, certified to 1e-8, beside heyoka.py at an error up to ten times that."""
+    system = rows.load("relaxation.toml", "solver={tolerance=1e-8, duration=2.0}", "output.sample_interval=1e-2")
+    reference = loop(replace(system, method=Method("piecewise-exact", share=0.3)))[1]
+    settings = {"us": Entry(US, "certified to 1e-8", lambda: certified(system), seconds=[0.0])}
+    for tolerance in (1e-8, 1e-10, 1e-12):
+        label = f"tolerance {tolerance:.0e}"
+        solve = taylor.stick_slip(Problem(system), tolerance)
+        settings[label] = Entry("heyoka.py", label, peers.timed(solve, lambda each: each), seconds=[0.0])
+    for entry in settings.values():
+        entry.error = deviation(entry.compute()[1], reference)
+    for _ in range(9):
+        for entry in settings.values():
+            entry.seconds.append(warm(entry))
+    entries = list(settings.values())
+    theirs = [entry for entry in entries if entry.who == "heyoka.py"]
+    best = min((each for each in theirs if each.error <= 1e-7), key=lambda each: each.time, default=theirs[-1])
+    times = (
+        f"{number(1e3 * entries[0].time)} ms against {number(1e3 * best.time)} ms at an error of {best.error:.0e}"
+    )
+    value = best.time / entries[0].time
+    what = "heyoka.py: relaxation.toml, 2 s at 1e-8, 200 samples"
+    report.goals.append((what, "≥ 3", f"{number(value)}: {times}", value >= 3))
+
+
+def certified(system: System) -> tuple[float, Floats]:
+    begin = time.process_time()
+    motion = certify(system).motion
+    return time.process_time() - begin, motion.rows[:, :4]
+
+
+def many(report: Report) -> None:
+    """Case B at many coefficients of friction."""
+    entries = report.ensemble
+    problem, found = ensembles.b_problem(ensembles.DURATION), report.rates
+    size = peers.scales(loop(replace(problem.system, method=rows.steps(256)))[1])
+    for who, rate in {
+        "numbalsoda LSODA": ensembles.numbalsoda,
+        "numbalsoda DOP853": ensembles.numbalsoda,
+        "diffrax": ensembles.diffrax,
+        "SciPy": ensembles.scipy,
+    }.items():
+        best = cheapest(entries, who, 1e-3)
+        if best is not None:
+            say(f"ensemble: {who}")
+            found.append(rate(problem, best, size))
+    interval = f"output.sample_interval={ensembles.INTERVAL}"
+    ours = cheapest([entry for entry in entries if entry.who == US and entry.settings["method"].step], US, 1e-3)
+    say("ensemble: ours")
+    if ours is not None:
+        method = ours.settings["method"]
+        kind = f'scheme="{method.scheme}", theta={list(method.theta)}'
+        solver = f"{{{kind}, step={method.step!r}, duration={ensembles.DURATION}}}"
+        what = f"sweep with verdicts, {ours.label}"
+        found.insert(0, ensembles.ours(200, what, f"solver={solver}", f"contact.nodes={method.nodes}", interval))
+    promised = f"solver={{tolerance=1e-3, duration={ensembles.DURATION}}}"
+    found.insert(0, ensembles.ours(2, "sweep with verdicts, `tolerance = 1e-3`", promised, interval))
+    speed = found[0].per_second
+    report.goals.append(("map on B: points/s", "≥ 2,500", number(speed), speed >= 2500))
+
+
+def maps(report: Report) -> None:
+    for points, limit, words in ((100, 6.0, "≤ 6 s"), (1000, 360.0, "≤ 6 minutes")):
+        seconds, told = rows.regimes_map(points)
+        what = f"map of regimes: {points} × {points}"
+        report.goals.append((what, words, f"{number(seconds)} s ({told})", seconds <= limit))
+
+
+def promises(report: Report) -> None:
+    for duration, entries in ((0.02, report.motions["B", 0.02]), (0.2, report.ensemble)):
+        seconds, least, _ = rows.promise(duration, entries)
+        told = f"{number(seconds / least)} ({number(1e3 * seconds)} ms against {number(1e3 * least)} ms)"
+        report.goals.append((f"promise: 1e-3 on B, {duration:g} s", "≤ 10", told, seconds <= 10 * least))
+
+
+def beside_c(report: Report) -> None:
+    report.missing = in_c.unavailable()
+    if not report.missing:
+        report.single = in_c.beside_c(rows.load("accuracy/B.toml"))
+        value = report.single[0].ours / report.single[0].theirs
+        report.goals.append(("one evaluation: 256 nodes, against C", "≤ 1.15", number(value), value <= 1.15))
+
+
+def critical_smooth(report: Report) -> None:
+    rows.critical_seconds("relaxation.toml", 2.0)  # compiles
+    seconds = rows.critical_seconds("relaxation.toml", 2.0)
+    report.goals.append(("critical: a smooth point", "≤ 20 ms", f"{number(1e3 * seconds)} ms", seconds <= 0.02))
+
+
+def critical_open(report: Report) -> None:
+    seconds = rows.critical_seconds("rough-partly-open.toml", 1.0, rows.PERIODIC)
+    what = "critical: an open point with a period of 1 s"
+    report.goals.append((what, "≤ 60 s", f"{number(seconds)} s", seconds <= 60.0))
+
+
+def growth(report: Report) -> None:
+    for table in (rows.by_duration, rows.by_nodes, rows.by_waves, rows.by_points):
+        report.grown.append(table())
+
+
+def main() -> None:
+    report = Report(time.perf_counter(), os.getloadavg()[0])
+    stages: dict[str, Callable[[Report], None]] = {f"case {name}": partial(motions, name=name) for name in "SB"}
+    if peers.found("heyoka"):
+        stages["relaxation"] = relaxation
+    stages |= {"promises": promises, "single steps": beside_c, "maps": maps, "case C": partial(motions, name="C")}
+    stages |= {"ensembles": many, "growth of cost": growth}
+    stages |= {"critical values of a smooth point": critical_smooth, "of an open point": critical_open}
+    wanted = sys.argv[1:]
+    stages = {name: stage for name, stage in stages.items() if not wanted or any(word in name for word in wanted)}
+    report.left = list(stages)
+    for name, stage in stages.items():
+        say(name)
+        stage(report)
+        report.left.remove(name)
+        if not wanted:
+            page.write(report.lines())  # an interrupted run leaves what it has found
+    print("\n".join(report.lines()))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,147 @@
+"""Single evaluations and single steps beside C, compiled on the spot by gcc."""
+
+import ctypes
+import shutil
+import subprocess
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from statistics import median
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+
+from brakecli.solver.contact import midpoint
+from brakecli.solver.contact.pad import build_layer
+from brakecli.solver.method import Method
+from brakecli.solver.motion import Stepping
+from brakecli.solver.schemes import NUMEROV
+from brakecli.solver.system import System
+
+SOURCE = Path(__file__).with_name("step.c")
+FLAGS = ("-O3", "-march=native", "-ffast-math", "-shared", "-fPIC")
+NODES, COUNT, TURNS = 256, 20_000, 15
+X, Y, TRAVEL = 1e-5, -1e-4, 0.01
+
+
+class Beside(NamedTuple):
+    """Seconds of one: ours and C's, and how far the answers of the two are apart, relative."""
+
+    what: str
+    ours: float
+    theirs: float
+    apart: float
+
+
+def unavailable() -> str:
+    return "" if shutil.which("gcc") else "gcc is not installed"
+
+
+def pointer(values: Any) -> Any:
+    return values.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
+
+
+def compiled(folder: str, waves: int) -> Any:
+    library = Path(folder) / "step.so"
+    sizes = (f"-DNODES={NODES}", f"-DWAVES={waves}")
+    subprocess.run(["gcc", *FLAGS, *sizes, str(SOURCE), "-o", str(library), "-lm"], check=True)
+    found = ctypes.CDLL(str(library))
+    found.evaluations.restype, found.steps.restype = ctypes.c_double, ctypes.c_long
+    found.evaluations.argtypes = [ctypes.c_long] + [ctypes.c_double] * 3
+    return found
+
+
+def in_turns(one: Callable[[], float], other: Callable[[], float]) -> tuple[float, float]:
+    """Median seconds of two calls, in turns."""
+    times: list[tuple[float, float]] = []
+    for _ in range(TURNS + 1):
+        begin = time.process_time()
+        one()
+        middle = time.process_time()
+        other()
+        times.append((middle - begin, time.process_time() - middle))
+    first, second = (median(column) for column in zip(*times[1:], strict=True))
+    return first, second
+
+
+@njit
+def _evaluations(count, x, y, travel, evaluate, layer, omega):  # type: ignore[no-untyped-def]
+    total = 0.0
+    for n in range(count):
+        for i in range(omega.size):
+            layer.angles[i] = -omega[i] * (travel + 1e-6 * n)
+        evaluate(x + 1e-9 * n, y, layer)
+        total += layer.contact.normal_force
+    return total
+
+
+def beside_c(system: System) -> list[Beside]:
+    """An evaluation with 256 nodes, and a step in slip with as many evaluations as Newton's iteration takes."""
+    method = Method("three-layer", NUMEROV, evaluator="midpoint", nodes=NODES, step=2.5e-5)
+    system = replace(system, method=method, interval=2.5e-5, duration=0.2)
+    pad, spacing = system.pad, 2.0 * system.half_length / NODES
+    constants, tables, columns = pad.constants, pad.tables, NODES + 2
+    parts = [
+        np.ascontiguousarray(tables[at : at + size])
+        for at, size in (
+            (constants.nodes_at, columns),
+            (constants.sin_at, columns * len(system.wheel.g)),
+            (constants.cos_at, columns * len(system.wheel.g)),
+        )
+    ]
+    omega = np.ascontiguousarray(system.wheel.omega)
+    layer, per_gap = build_layer(system.evaluate, pad), system.layer_stiffness * spacing
+    with tempfile.TemporaryDirectory() as folder:
+        library = compiled(folder, len(omega))
+        library.tables(*(pointer(part) for part in (*parts, omega)))
+        results: list[Any] = [None, None]
+
+        def ours() -> None:
+            results[0] = _evaluations(COUNT, X, Y, TRAVEL, midpoint.evaluate, layer, omega)
+
+        def theirs() -> None:
+            results[1] = library.evaluations(COUNT, X, Y, TRAVEL) * per_gap
+
+        times = in_turns(ours, theirs)  # type: ignore[arg-type]
+        found = [Beside(f"one evaluation, {NODES} nodes", times[0] / COUNT, times[1] / COUNT, _apart(*results))]
+        found.append(_steps(system, library, per_gap))
+    return found
+
+
+def _steps(system: System, library: Any, per_gap: float) -> Beside:
+    c, count = system.coefficients, system.steps
+    load = system.load_at_start
+    numbers = [*c[:7], load * c.sin_beta, load * c.cos_beta, c.phi, system.belt_speed, system.step, *NUMEROV]
+    p = np.array([*numbers, per_gap, system.layer_stiffness])
+    state, evaluated = np.zeros(5), [0]
+    begun = Stepping(system).plant.state
+    start = np.array([begun.x_old, begun.y_old, begun.x, begun.y, begun.force])
+    last: list[Any] = [None]
+
+    def theirs() -> None:
+        state[:] = start
+        evaluated[0] = library.steps(ctypes.c_long(count), pointer(p), pointer(state))
+
+    def ours() -> float:
+        stepping = Stepping(replace(system, interval=system.duration))  # one sample, at the end
+        begin = time.process_time()
+        stepping.block(count + 1)
+        seconds = time.process_time() - begin
+        last[0] = (float(stepping.plant.state.x_old), int(stepping.counts.evaluations))
+        return seconds
+
+    times = []
+    for _ in range(TURNS + 1):
+        own, begin = ours(), time.process_time()
+        theirs()
+        times.append((own, time.process_time() - begin))
+    own, alone = (median(column) for column in zip(*times[1:], strict=True))
+    what = f"one step, {NODES} nodes, {last[0][1] / count:.2f} evaluations against {evaluated[0] / count:.2f}"
+    return Beside(what, own / count, alone / count, abs(last[0][0] / state[0] - 1.0))
+
+
+def _apart(one: float, other: float) -> float:
+    return abs(one / other - 1.0)

@@ -1,0 +1,155 @@
+"""What is no motion side by side: promises, maps, searches for critical values, and how cost grows."""
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from pathlib import Path
+from statistics import median
+
+import numpy as np
+
+from benchmarks.performance import ensembles
+from benchmarks.performance.matching import Entry, cheapest, loop
+from brakecli.case.read import read_case
+from brakecli.case.system import system_of
+from brakecli.runs.tolerance import certify
+from brakecli.solver.method import Method
+from brakecli.solver.roughness import surface
+from brakecli.solver.schemes import NUMEROV
+from brakecli.solver.system import System
+from brakecli.sweeps.plan import read_sweep
+from brakecli.sweeps.point import compute
+
+CASES, RELAXATION = ensembles.CASES, ensembles.CASES / "relaxation.toml"
+REGIMES = "solver={tolerance=1e-3, duration=2.0}"
+PROBE = 20
+WHOLE_MAP = 60.0  # s, of the map of 100 x 100 points: a longer one is computed in part
+# B's waves with a common length of 2.6 m, which passes in 1 s, on a suspension that loses stability
+PERIODIC = (
+    "wheel.angular_speed=5.2",
+    "contact.stiffness=5e7",
+    "roughness.shoe.amplitudes=[30e-6,21e-6,15e-6,9e-6,6e-6]",
+    "roughness.wheel.amplitudes=[30e-6,24e-6,18e-6]",
+    "roughness.wheel.wavelengths=[0.025,0.013,0.008]",
+)
+
+
+def load(name: str, *settings: str) -> System:
+    return system_of(read_case(str(CASES / name), settings).case)
+
+
+def loop_seconds(system: System, method: Method, turns: int = 5) -> float:
+    """Median time of the loop, in one block."""
+    system = replace(system, method=method)
+    return median([loop(system)[0] for _ in range(turns + 1)][1:])
+
+
+def promise(duration: float, entries: list[Entry]) -> tuple[float, float, str]:
+    """Seconds of a certified run of B to 1e-3, of the cheapest entry that keeps it, and how it was certified."""
+    settings = (f"solver={{duration={duration}, tolerance=1e-3}}", f"output.sample_interval={ensembles.INTERVAL}")
+    system, best = load("accuracy/B.toml", *settings), cheapest(entries, "brakecli", 1e-3)
+    assert best is not None
+    begin = time.process_time()
+    found = certify(system)
+    return time.process_time() - begin, best.time, found.certificate.method
+
+
+def map_seconds(points: int) -> tuple[float, float]:
+    """The command for the map of regimes, points x points, with start-up and file; and its processor time."""
+    with tempfile.TemporaryDirectory() as name:
+        path = Path(name) / "map.toml"
+        axes = (("friction.coefficient", 0.5, 0.8), ("wheel.angular_speed", 0.04, 0.8))
+        text = "".join(
+            f'[[axis]]\nparameter = "{key}"\nstart = {low}\nstop = {high}\nnum = {points}\n'
+            for key, low, high in axes
+        )
+        path.write_text(f'case = "{RELAXATION}"\n{text}')
+        command = [sys.executable, "-m", "brakecli", "sweep", str(path), "--set", REGIMES, "--quiet"]
+        begin, before = time.perf_counter(), os.times()
+        subprocess.run([*command, "-o", str(Path(name) / "map.h5")], check=True, stdout=subprocess.DEVNULL)
+        seconds, after = time.perf_counter() - begin, os.times()
+    used = after.children_user + after.children_system - before.children_user - before.children_system
+    return seconds, used
+
+
+def regimes_map(points: int) -> tuple[float, str]:
+    """Seconds of the map, and how they were found: of a long one, a part is computed."""
+    (start, start_used), (seconds, used) = map_seconds(2), map_seconds(PROBE)
+    share = points**2 / PROBE**2
+    whole, each = start + (seconds - start) * share, 1e3 * (used - start_used) / PROBE**2
+    told = f"{each:.3g} ms of a core a point, start and end {start:.2g} s"
+    if whole < WHOLE_MAP:
+        return map_seconds(points)[0], told
+    return whole, f"extrapolated from {PROBE} × {PROBE} points in {seconds:.1f} s; {told}"
+
+
+def critical_seconds(case: str, high: float, settings: Iterable[str] = ()) -> float:
+    """A point with its critical friction and `critical_sustained`, by simulation, in this process."""
+    with tempfile.TemporaryDirectory() as name:
+        path = Path(name) / "sweep.toml"
+        axis = '[[axis]]\nparameter = "link1.damping"\nvalues = [300.0]\n'
+        critical = f'[critical]\nparameter = "friction.coefficient"\nlower = 0.0\nupper = {high}\n'
+        path.write_text(f'case = "{CASES / case}"\n{axis}{critical}')
+        loaded = read_sweep(str(path), list(settings))
+        begin = time.process_time()
+        compute(loaded.plan, 0, 1)
+        return time.process_time() - begin
+
+
+def steps(nodes: int = 0) -> Method:
+    return Method("three-layer", NUMEROV, nodes=nodes, step=2.5e-5)
+
+
+Table = tuple[str, list[str], list[list[str]]]
+"""Title, heads of columns, rows."""
+
+
+def by_duration() -> Table:
+    durations, rows = (0.02, 0.1, 0.5, 2.0), []
+    for name, method in (("S", Method("piecewise-exact")), ("B", steps(256)), ("C", steps(256))):
+        system = replace(load(f"accuracy/{name}.toml"), interval=2.5e-4)
+        times = [loop_seconds(replace(system, duration=each), method) for each in durations]
+        how = "piecewise-exact" if name == "S" else "three-layer, 256 nodes, 2.5e-5 s"
+        rows.append([name, how, *(f"{1e3 * each:.3g} ms" for each in times)])
+    return "Time of the loop by duration", ["case", "how", *(f"{each:g} s" for each in durations)], rows
+
+
+def _row(over: Iterable[int], what: Callable[[int], tuple[System, Method]]) -> list[str]:
+    found = [what(each) for each in over]
+    return [f"{1e6 * loop_seconds(*each) / replace(each[0], method=each[1]).steps:.3g} µs" for each in found]
+
+
+def by_nodes() -> Table:
+    counts, system = (64, 256, 1024, 4096), replace(load("accuracy/B.toml"), interval=2.5e-4)
+    row = _row(counts, lambda nodes: (system, steps(nodes)))
+    return "A step of B by nodes, five waves on the wheel", [f"{each} nodes" for each in counts], [row]
+
+
+def by_waves() -> Table:
+    def rough(waves: int) -> System:
+        wave = np.arange(waves)
+        amplitudes, lengths = 7.2e-5 / waves * np.ones(waves), 0.025 / (1.0 + 5.0 * wave / waves)
+        wheel = surface(amplitudes=tuple(amplitudes), wavelengths=tuple(lengths))
+        return replace(load("accuracy/B.toml"), interval=2.5e-4, wheel=wheel)
+
+    counts = (5, 50, 500)
+    row = _row(counts, lambda waves: (rough(waves), steps(256)))
+    return "A step of B by waves on the wheel, 256 nodes", [f"{each} waves" for each in counts], [row]
+
+
+def by_points() -> Table:
+    counts, rows = (40, 160, 640), []
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for workers in (1, 2):
+            row = []
+            for points in counts:
+                loaded = ensembles.our_sweep(folder, RELAXATION, points, REGIMES, low=0.5, high=0.8)
+                row.append(f"{1e3 * ensembles.swept(loaded, workers, folder) / points:.3g} ms")
+            rows.append([f"{workers}", *row])
+    title = "A point of a map of regimes (2 s of stick-slip) by points and workers"
+    return title, ["workers", *(f"{each} points" for each in counts)], rows
