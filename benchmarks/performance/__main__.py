@@ -68,7 +68,7 @@ REASONS = {
     ),
     "map of regimes": (
         "The map of regimes: a point whose verdict comes early takes half a millisecond, half of it to make its "
-        "case. Three in a hundred, beside the critical friction, run to their end, which takes thirty times as long."
+        "case. Three in a hundred, beside the critical friction, run to their end: thirty times as long."
     ),
     "map on B": "The map on B: each point climbs the ladder of a promise, one case at a time.",
     "critical: an open": "Critical values of open pads: growth is measured by runs, one after the other.",
