@@ -30,7 +30,7 @@ VERDICT = (
     Field(
         "amplitude", "m", "half of peak to peak of x: median of the cycles", at="verdict.", label="amplitude of x"
     ),
-    Field("amplitude_spread", "m", "half of the range of the middle two thirds of the cycles", at="verdict."),
+    Field("amplitude_spread", "m", "by which the amplitude varies or drifts; missing if unknown", at="verdict."),
     Field("amplitude_forced", "m", "on a rough wheel: what the roughness forces", at="verdict."),
     Field("amplitude_own", "m", "on a rough wheel: what the shoe adds", at="verdict."),
     Field("frequency_resolution", "Hz", "distance of two lines in the spectrum", at="verdict."),

@@ -79,8 +79,8 @@ def simulate(case: Case, *, whole: bool = True) -> Outcome:
             if not np.isfinite(motion.rows).all():
                 raise FloatingPointError("a force overflows")
             history = array_history(system.interval, motion.rows)
-            verdict = verdict_on(history, motion.system, motion.work.failure_sentence)
-    warnings, work = list(found.warnings), motion.work
+            verdict = verdict_on(history, system, motion.work.failure_sentence)
+    warnings, work = [*found.warnings, *verdict.reasons[1:]], motion.work
     if work.unconverged_steps and not work.failed:
         warnings.append(f"{work.unconverged_steps} of {work.steps} steps did not converge, as the case allows")
     if certificate is not None and not certificate.certified:

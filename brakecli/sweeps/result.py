@@ -177,7 +177,8 @@ def _on_hysteresis(journal: Journal, hysteresis: NDArray[Any]) -> Iterator[str]:
     if count := int(hysteresis.sum()):
         where = [_parameters(journal.plan, int(index)) for index in np.flatnonzero(hysteresis.ravel())[:3]]
         places = "; ".join(", ".join(f"{key} = {label(value)}" for key, value in each.items()) for each in where)
-        yield f"hysteresis at {count} of {hysteresis.size} points: {places}{' …' if count > 3 else ''}"
+        more = f"; and {count - 3} more" if count > 3 else ""
+        yield f"hysteresis at {count} of {hysteresis.size} points: {places}{more}"
     known = hysteresis.size - int(_unknown(journal).sum())
     if known and not count:
         those = f" at the {known} points that are decided" if known < hysteresis.size else ""

@@ -24,6 +24,8 @@ from brakecli.analysis.stability.modes import (
 from brakecli.solver.quantities import ContactState
 from brakecli.solver.system import System
 
+_BEYOND = 64.0  # times as long as the run
+_SCATTERED: Array = np.arange(1 << 14, dtype=np.float64) * 0.6180339887498949 % 1.0  # evenly, without a period
 _ROUNDING = 1e-12  # of the largest eigenvalue: what a growth rate of zero may be off
 _ROUNDING_WITH_SLOPES = 1e-9  # the same where the passing waves enter it
 
@@ -81,10 +83,19 @@ class Linear:
             position, velocity = position + turn.imag, velocity + 2.0 * math.pi * frequency * turn.real
         return position, velocity
 
-    def parts(self, x: Array, time: Array) -> tuple[float, Array, Array]:
-        """Half of peak to peak of what the waves force (m), what of x (m) the shoe adds, and the times again."""
+    def parts(self, x: Array, time: Array) -> tuple[float, Array, Array, Array]:
+        """What the waves force: half of peak to peak of x (m), beyond the run too, as waves beat.
+
+        Then, at the times given, the x that they force and that the shoe adds (m), and the times again (s).
+        """
         lasting = self.forced(time)[0][0]
-        return 0.5 * float(np.ptp(lasting)), x - self.rest[0] - lasting, time
+        later = (
+            self.forced(np.asarray(_BEYOND * time[-1] * _SCATTERED, np.float64))[0][0]
+            if len(self.waves) > 1
+            else lasting
+        )
+        size = 0.5 * float(max(lasting.max(), later.max()) - min(lasting.min(), later.min()))
+        return size, lasting, x - self.rest[0] - lasting, time
 
     def seconds_to_limit(self, time: float, state: Array) -> float:
         """How long the fastest mode grows from x, y, vx, vy at a time until stick or loss of contact."""

@@ -93,10 +93,11 @@ def modes(c: Coefficients, contact_stiffness: float, grip: float) -> list[Mode]:
     for value, vector in zip(values, vectors.T, strict=True):
         if value.imag < 0.0:
             continue
+        value += 0.0  # without -0
         moves = abs(vector[0]) > 1e-12 * abs(vector[1])
         ratio = vector[1] / vector[0] if moves else 0.0
         shape = (float(abs(ratio)), float(np.degrees(np.angle(ratio)))) if moves else (None, None)
-        damping_ratio = float(-value.real / abs(value)) if value != 0.0 else 0.0
+        damping_ratio = float(-value.real / abs(value)) + 0.0 if value != 0.0 else 0.0
         found.append(Mode(float(value.real), float(value.imag / (2.0 * math.pi)), damping_ratio, *shape))
     return sorted(found, key=lambda mode: -mode.growth)
 
