@@ -7,6 +7,7 @@ import sys
 from collections.abc import Container, Sequence
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from importlib import resources
 from pathlib import Path
 from typing import Any, TypeVar
@@ -157,6 +158,7 @@ def parse_override(override: str) -> tuple[tuple[str, ...], object]:
     raise unfit(f"the value is not valid TOML (found {printable(value)})", remedy)
 
 
+@lru_cache(maxsize=256)
 def key_path(text: str) -> tuple[str, ...]:
     """The parts of a key path as TOML writes it; none if it is not one."""
     if "\n" in text or text.count(".") >= toml_lines.MOST_PARTS:

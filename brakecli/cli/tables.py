@@ -156,10 +156,12 @@ def sweep_table(report: SweepReport) -> str:
         count, least, largest = found.critical
         span = f"{least:.6g} to {largest:.6g}, " if count else ""
         rows.append((f"critical {critical.parameter}", f"{span}found at {count} of {found.points} points"))
+    speed = report.points_per_second
+    cost = f": {speed:.3g} points/s, {report.overhead:.0%} of the workers' time not on points" if speed else ""
     rows += [
         ("note", found.sentences),
         ("failed", [f"{found.failed} points"] if found.failed else []),
-        ("time", text_of(report.seconds, "s", ".3g")),
+        ("time", text_of(report.seconds, "s", ".3g") + cost),
         ("file", str(report.output)),
     ]
     listed = _points_table(report) + "\n\n" if found.points <= MOST_LISTED_POINTS else ""

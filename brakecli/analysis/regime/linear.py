@@ -12,7 +12,15 @@ import numpy as np
 
 from brakecli.analysis.regime.slopes import growth_with_slopes
 from brakecli.analysis.regime.spectra import Array
-from brakecli.analysis.stability.modes import Complex, Mode, eigensystem, is_undamped, modes, stiffness_matrix
+from brakecli.analysis.stability.modes import (
+    Complex,
+    Mode,
+    eigensystem,
+    first_order,
+    is_undamped,
+    modes,
+    stiffness_matrix,
+)
 from brakecli.solver.quantities import ContactState
 from brakecli.solver.system import System
 
@@ -42,6 +50,17 @@ class Linear:
     slopes: Complex  # N/m, by which each wave changes the normal force with x, with its phase at t = 0
     wavenumbers: Array  # rad/m
     known_to: float = 0.0  # 1/s, by how much the growth may be off
+
+    @property
+    def sentence(self) -> str:
+        """What becomes of the shoe's own vibration, and why."""
+        mode, fate = self.mode, "it neither grows nor decays"
+        if self.direction > 0:
+            fate = f"still growing at {mode.growth:.3g} 1/s"
+        elif self.direction < 0:
+            fate = f"the shoe's own vibration decays at {-mode.growth:.3g} 1/s"
+        how = f"{mode.frequency:.4g} Hz" if mode.frequency else "without oscillation"
+        return f"full contact and slip to one side make the motion linear: {fate} ({how})"
 
     def with_slopes(self) -> "Linear":
         """The same with the growth that the passing waves leave to the mode by their slopes."""
@@ -92,17 +111,20 @@ class Linear:
 
 def linear_theory(system: System, belt: float) -> Linear | None:
     """The theory at a constant speed U (m/s); None where no rest in contact exists, or friction holds the shoe."""
-    c, stiffness, pad = system.coefficients, system.contact_stiffness, system.pad
+    c, stiffness = system.coefficients, system.contact_stiffness
     if belt == 0.0 and c.phi > 0.0:
         return None
     grip = math.copysign(c.phi, belt)
-    push, offset = np.array([grip, 1.0]), -stiffness * float(pad.constants.shoe_mean)
+    push, offset, forces = np.array([grip, 1.0]), 0.0, np.zeros(0)
+    if not system.smooth:
+        constants, tables = system.pad
+        first, offset = int(constants.full_at), -stiffness * float(constants.shoe_mean)
+        forces = tables[first : first + system.wheel.g.size]
     s, load = stiffness_matrix(c, stiffness, grip), system.load_at_start
     damping = np.array([[c.b_xx, c.b_xy], [c.b_xy, c.b_yy]])
     try:
         rest = np.linalg.solve(s, offset * push - load * np.array([c.sin_beta, c.cos_beta]))
-        first, wheel = int(pad.constants.full_at), system.wheel
-        forces, passing = pad.tables[first : first + wheel.g.size], -belt * wheel.turns
+        wheel, passing = system.wheel, -belt * system.wheel.turns
         omega = 2.0 * math.pi * passing
         responses = [np.linalg.solve(s - c.m * w * w * np.eye(2) + 1j * w * damping, push) for w in omega]
     except np.linalg.LinAlgError:
@@ -111,7 +133,6 @@ def linear_theory(system: System, belt: float) -> Linear | None:
     if not (np.isfinite(rest).all() and force > 0.0):
         return None
     phases = forces * np.exp(1j * (wheel.omega * rest[0] + wheel.phase))
-    zero, one = np.zeros((2, 2)), np.eye(2)
     waves = np.array(responses, complex).reshape(-1, 2) * phases[:, None]
     values, vectors = eigensystem(c, stiffness, grip)
     mode, known_to = modes(c, stiffness, grip)[0], 0.0 if is_undamped(c) else _ROUNDING * np.abs(values).max()
@@ -129,7 +150,7 @@ def linear_theory(system: System, belt: float) -> Linear | None:
         np.concatenate([vectors, vectors * values]),
         passing,
         waves,
-        np.block([[zero, one], [-s / c.m, -damping / c.m]]),
+        first_order(c, s / c.m),
         np.concatenate([np.zeros(2), push / c.m]),
         wheel.omega * phases,
         wheel.omega,

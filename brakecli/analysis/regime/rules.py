@@ -75,15 +75,12 @@ class _Rules(ForcedRules):
         if theory.direction != mean.direction and (theory.direction == 0 or self._swings_far(theory)):
             return self._steep(theory)
         self.theory = theory
-        how = f"{mode.frequency:.4g} Hz" if mode.frequency else "without oscillation"
-        linear = "full contact and slip to one side make the motion linear"
         if theory.direction == 0:
-            return Decision(f"{linear}: it neither grows nor decays ({how}); a dashpot would decide")
+            return Decision(f"{theory.sentence}; a dashpot would decide")
         if theory.direction > 0:
             self.evidence["seconds_to_go"] = more = theory.seconds_to_limit(*self._end()) + 3.0 / mode.growth
-            growing = f"{linear}: still growing at {mode.growth:.3g} 1/s ({how})"
-            return Decision(f"{growing}; run at least {QUARTER * (self.duration + more):.3g} s")
-        decays = f"{linear}: the shoe's own vibration decays at {-mode.growth:.3g} 1/s ({how})"
+            return Decision(f"{theory.sentence}; run at least {QUARTER * (self.duration + more):.3g} s")
+        decays = theory.sentence
         if not len(theory.waves):
             return Decision(decays, Regime.DAMPED)
         if self.duration < slow:

@@ -44,6 +44,14 @@ def stiffness_matrix(c: Coefficients, contact_stiffness: float, grip: float) -> 
     return np.array([[c.c_xx, c.c_xy + grip * contact_stiffness], [c.c_xy, c.c_yy + contact_stiffness]])
 
 
+def first_order(c: Coefficients, s: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A of ż = A z for x, y, vx, vy, from S/m."""
+    a = np.zeros((4, 4))
+    a[0, 2] = a[1, 3] = 1.0
+    a[2:, :2], a[2:, 2:] = -s, -np.array([[c.b_xx, c.b_xy], [c.b_xy, c.b_yy]]) / c.m
+    return a
+
+
 def is_undamped(c: Coefficients) -> bool:
     """Whether no dashpot acts at all: then what is stable is only marginally so."""
     return c.b_xx == 0.0 and c.b_yy == 0.0
@@ -65,8 +73,7 @@ def eigensystem(c: Coefficients, contact_stiffness: float, grip: float) -> tuple
         vectors = np.array([_null_vector(s, square) for square in squares]).T
         roots = np.sqrt(-squares)
         return np.concatenate([roots, -roots]), np.concatenate([vectors, vectors], axis=1)
-    damping = np.array([[c.b_xx, c.b_xy], [c.b_xy, c.b_yy]]) / c.m
-    values, vectors = np.linalg.eig(np.block([[np.zeros((2, 2)), np.eye(2)], [-s, -damping]]))
+    values, vectors = np.linalg.eig(first_order(c, s))
     return values.astype(complex), vectors[:2].astype(complex)
 
 
