@@ -20,7 +20,7 @@ PYTEST_ARGS ?=
 .DELETE_ON_ERROR:
 .NOTPARALLEL: # two installations into one .venv at a time would collide
 .PHONY: help demo test campaign lowest lint format types imports derivations tables cases check \
-    accuracy promises promise-cost picture lock-in paper extremes bench bench-sweep clean
+    accuracy promises promise-cost picture lock-in paper extremes bench bench-sweep bench-contact clean
 
 help: ## list the targets (this text)
 	@echo "make TARGET, where TARGET is one of"
@@ -148,6 +148,9 @@ bench: $(PEERS_STAMP) ## measure brakecli beside general solvers and write docs/
 
 bench-sweep: $(DEV_STAMP) ## what a sweep costs beside its points; needs two idle cores (some minutes)
 	$(BIN)/python -m benchmarks.sweep
+
+bench-contact: $(DEV_STAMP) ## what the contact costs, against C; needs gcc and an idle core (some minutes)
+	$(BIN)/python -m benchmarks.contact
 
 extremes: $(DEV_STAMP) ## compute the extremes of all inputs and write docs/extremes.md (a minute)
 	$(BIN)/python -m benchmarks.extremes

@@ -1,4 +1,4 @@
-"""What a sweep costs beside its points: two workers against one, and the overhead of a point.
+"""What a sweep costs: two workers against one, the overhead of a point, and points that end early.
 
     python -m benchmarks.sweep
 
@@ -42,6 +42,49 @@ def alone(loaded: LoadedSweep, chunks: int, size: int) -> float:
     return (time.perf_counter() - begin) / (chunks * size)
 
 
+MAP = f"""\
+case = "{CASE}"
+[[axis]]
+parameter = "friction.coefficient"
+start = 0.3
+stop = 0.9
+num = 100
+[[axis]]
+parameter = "wheel.angular_speed"
+start = 0.04
+stop = 2.0
+num = 100
+"""
+SEARCH = f"""\
+case = "{CASE}"
+[critical]
+parameter = "friction.coefficient"
+lower = 0.0
+upper = 2.0
+"""
+
+
+def early(folder: Path) -> None:
+    """A map of regimes and a search on smooth pads, whose verdicts are known before the runs end."""
+    (folder / "map.toml").write_text(MAP)
+    (folder / "search.toml").write_text(SEARCH)
+    overrides = ["solver={tolerance=1e-3, duration=2.0}"]
+    loaded = read_sweep(str(folder / "map.toml"), overrides)
+    for what, plan, chunks, size in (
+        ("a point of a map of regimes", loaded.plan, range(0, 10_000, 230), 50),
+        ("both critical values", read_sweep(str(folder / "search.toml"), overrides).plan, (0,), 1),
+    ):
+        times = []
+        for _ in range(5):
+            begin = time.process_time()
+            for first in chunks:
+                compute(plan, first, min(size, plan.points - first))
+            times.append((time.process_time() - begin) / (len(chunks) * size))
+        print(f"{what}: {1e3 * min(times):.2f} ms of a core (least of 5)")
+    report_seconds, size = seconds(loaded, 2, folder), (folder / "sweep.h5").stat().st_size
+    print(f"10,000 points on two workers: {report_seconds:.1f} s, {size / 10_000:.0f} bytes a point in the file")
+
+
 def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -59,6 +102,7 @@ def main() -> None:
         each, swept = alone(small, 20, 100) * 1e3, seconds(small, 1, folder) / 20_000 * 1e3
         print(f"small points: {each:.2f} ms each alone, {swept:.2f} ms in a sweep on one worker", end=": ")
         print(f"{swept - each:.2f} ms of overhead a point")
+        early(folder)
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from brakecli.analysis.regime import verdict
 from brakecli.analysis.stability.report import stability
-from brakecli.case.read import parse_case, starter_text
+from brakecli.case.read import parse_case, starters
 from brakecli.case.system import system_of
 from brakecli.comparison.compare import compare
 from brakecli.comparison.result import ComparisonReport, write
@@ -22,7 +22,7 @@ from tests.sweeps.helpers import inline
 
 def test_every_name_in_a_result_is_documented(tmp_path: Path) -> None:
     pages = "".join((ROOT / "docs" / page).read_text() for page in ("result-format.md", "regimes.md"))
-    run(parse_case(starter_text(), "starter"), tmp_path / "run.h5", force=False)
+    run(parse_case(starters()["case"], "starter"), tmp_path / "run.h5", force=False)
     with open_result(tmp_path / "run.h5") as stored:
         names = [*stored.attributes, *stored.variables("history"), *stored.variables("spectrum")]
         for group in ("regime/evidence", "regime/thresholds", "energy", "evaluators", "spectrum"):
@@ -33,7 +33,7 @@ def test_every_name_in_a_result_is_documented(tmp_path: Path) -> None:
 
 def test_every_name_of_a_sweep_is_documented(tmp_path: Path) -> None:
     page = (ROOT / "docs" / "sweeps.md").read_text()
-    (tmp_path / "case.toml").write_text(starter_text())
+    (tmp_path / "case.toml").write_text(starters()["case"])
     axis = '[[axis]]\nparameter = "friction.coefficient"\nvalues = [0.5, 0.7]\n'
     critical = '[critical]\nparameter = "friction.coefficient"\nlower = 0.0\nupper = 1.0\nmethod = "eigenvalue"\n'
     for number, text in enumerate((f'{axis}direction = "both"\n', critical)):
@@ -48,7 +48,7 @@ def test_every_name_of_a_sweep_is_documented(tmp_path: Path) -> None:
 
 def test_every_name_of_a_comparison_is_documented(tmp_path: Path) -> None:
     page = "".join((ROOT / "docs" / page).read_text() for page in ("accuracy.md", "result-format.md"))
-    loaded = parse_case(starter_text(), "starter", ["solver.duration=0.01"])
+    loaded = parse_case(starters()["case"], "starter", ["solver.duration=0.01"])
     found = compare(system_of(loaded.case), schemes=["event-driven"], budget=1.0)
     report = ComparisonReport(tmp_path / "r.h5", loaded.case.title, found, 1e-3)
     write(report.output, loaded, report, force=False)
@@ -73,7 +73,7 @@ def test_every_threshold_stands_in_the_documentation_with_its_default() -> None:
 
 def test_every_name_of_stability_is_documented() -> None:
     page = (ROOT / "docs" / "stability.md").read_text()
-    report = stability(system_of(parse_case(starter_text(), "starter").case))
+    report = stability(system_of(parse_case(starters()["case"], "starter").case))
     numbers = values_of(fields.STABILITY, report)
     objects = (numbers["discrete"], numbers["equilibrium"], numbers["modes"][0], numbers["crossings"][0])
     names = [*numbers, *(name for each in objects for name in each)]

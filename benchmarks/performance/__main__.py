@@ -67,11 +67,11 @@ REASONS = {
         "One evaluation: the compiler does not know the number of waves, and each has a loop of its own."
     ),
     "map of regimes": (
-        "The map of regimes: half of a point are the powers that its verdict takes from 40,000 samples, "
-        "a third the two runs of 2 s for the certificate."
+        "The map of regimes: a point whose verdict comes early takes half a millisecond, half of it to make its "
+        "case. Three in a hundred, beside the critical friction, run to their end: thirty times as long."
     ),
     "map on B": "The map on B: each point climbs the ladder of a promise, one case at a time.",
-    "critical": "Critical values: growth is measured by runs, one after the other.",
+    "critical: an open": "Critical values of open pads: growth is measured by runs, one after the other.",
 }
 """Why a goal is missed, by the beginning of its name; the first that fits."""
 
@@ -248,8 +248,8 @@ def beside_c(report: Report) -> None:
 
 
 def critical_smooth(report: Report) -> None:
-    rows.critical_seconds("relaxation.toml", 2.0)  # compiles
-    seconds = rows.critical_seconds("relaxation.toml", 2.0)
+    rows.critical_seconds("relaxation.toml", 2.0, [rows.REGIMES])  # compiles
+    seconds = rows.critical_seconds("relaxation.toml", 2.0, [rows.REGIMES])
     report.goals.append(("critical: a smooth point", "≤ 20 ms", f"{number(1e3 * seconds)} ms", seconds <= 0.02))
 
 

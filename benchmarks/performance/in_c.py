@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 
 from brakecli.solver.contact import midpoint
-from brakecli.solver.contact.pad import build_layer
+from brakecli.solver.contact.pad import BESIDE, TILE, build_layer
 from brakecli.solver.method import Method
 from brakecli.solver.motion import Stepping
 from brakecli.solver.schemes import NUMEROV
@@ -83,15 +83,12 @@ def beside_c(system: System) -> list[Beside]:
     method = Method("three-layer", NUMEROV, evaluator="midpoint", nodes=NODES, step=2.5e-5)
     system = replace(system, method=method, interval=2.5e-5, duration=0.2)
     pad, spacing = system.pad, 2.0 * system.half_length / NODES
-    constants, tables, columns = pad.constants, pad.tables, NODES + 2
-    parts = [
-        np.ascontiguousarray(tables[at : at + size])
-        for at, size in (
-            (constants.nodes_at, columns),
-            (constants.sin_at, columns * len(system.wheel.g)),
-            (constants.cos_at, columns * len(system.wheel.g)),
-        )
-    ]
+    tiles = -(-(NODES + 2 * BESIDE) // TILE)
+    waves = pad.tables[: 2 * len(system.wheel.g) * TILE * tiles].reshape(tiles, -1, 2, TILE)
+    waves = (
+        np.moveaxis(waves, 0, 2).swapaxes(0, 1).reshape(2, -1, TILE * tiles)[..., BESIDE - 1 : BESIDE + NODES + 1]
+    )
+    parts = [np.pad(pad.tables[pad.constants.nodes_at :][:NODES], 1), *map(np.ascontiguousarray, waves)]
     omega = np.ascontiguousarray(system.wheel.omega)
     layer, per_gap = build_layer(system.evaluate, pad), system.layer_stiffness * spacing
     with tempfile.TemporaryDirectory() as folder:

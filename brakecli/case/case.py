@@ -210,6 +210,8 @@ class Case(Table):
     of the roughness hold their values also where the file left them out.
     """
 
+    needless = ("solver", "tolerance"), (("solver", "theta"), ("solver", "iteration"), ("contact", "evaluator"))
+
     title: tables.Title = ""
     shoe: Shoe
     wheel: Wheel

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Container, Sequence
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from importlib import resources
 from pathlib import Path
 from typing import Any, TypeVar
@@ -31,9 +32,10 @@ class LoadedCase:
     resolved: str
 
 
-def starter_text() -> str:
-    """A commented case to start from, valid as it is."""
-    return resources.files("brakecli.case").joinpath("starter.toml").read_text(encoding="utf-8")
+def starters() -> dict[str, str]:
+    """Commented files to start from, valid as they are, by their names; the first line of each is its question."""
+    files = resources.files("brakecli.case").joinpath("starters").iterdir()
+    return {each.name.removesuffix(".toml"): each.read_text(encoding="utf-8") for each in sorted(files, key=str)}
 
 
 def read_case(source: str, overrides: Sequence[str] = ()) -> LoadedCase:
@@ -111,8 +113,8 @@ def put(
 ) -> list[tuple[str, ...]]:
     """Set a key in the data of a table of some kind; the paths of the tables that were created for it.
 
-    Of keys that exclude each other the ones given before are removed, unless they are to be kept. Raises
-    `CaseError` where something on the path is not a table.
+    Of keys that exclude each other the ones given before are removed, unless they are to be kept, and so are those
+    that the new one makes needless. Raises `CaseError` where something on the path is not a table.
     """
     *parents, key = path
     table: Any = data
@@ -126,10 +128,12 @@ def put(
         raise CaseError([Problem(path, f"{key_text(path[:-1])} is not a table", "set a key of a table")])
     table[key] = value
     groups = tables_within(kind).get(tuple(parents), Table).alternatives
-    if any(key in group for group in groups):
-        for other in (other for group in groups if key not in group for other in group):
-            if (*parents, other) not in kept:
-                table.pop(other, None)
+    excluded = [(*parents, other) for group in groups if key not in group for other in group]
+    needless = kind.needless[1] if path == kind.needless[0] else ()
+    for other in (*(excluded if any(key in group for group in groups) else ()), *needless):
+        place = table if other[:-1] == path[:-1] else data.get(str(other[0]))
+        if other not in kept and isinstance(place, dict):
+            place.pop(other[-1], None)
     return created
 
 
@@ -154,6 +158,7 @@ def parse_override(override: str) -> tuple[tuple[str, ...], object]:
     raise unfit(f"the value is not valid TOML (found {printable(value)})", remedy)
 
 
+@lru_cache(maxsize=256)
 def key_path(text: str) -> tuple[str, ...]:
     """The parts of a key path as TOML writes it; none if it is not one."""
     if "\n" in text or text.count(".") >= toml_lines.MOST_PARTS:

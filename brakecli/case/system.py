@@ -1,5 +1,7 @@
 """From a case to the numbers that the solver works on."""
 
+from functools import lru_cache
+
 from brakecli.case.case import Case
 from brakecli.solver.links import coefficients
 from brakecli.solver.method import Method
@@ -7,6 +9,9 @@ from brakecli.solver.roughness import surface
 from brakecli.solver.schedules import schedule
 from brakecli.solver.system import Initial, System
 
+_SMOOTH = surface()
+_shared = lru_cache(maxsize=4096)(schedule)
+"""Schedules that the points of a sweep have in common; nobody changes them."""
 EVENT_TOLERANCE = 1e-10  # of event-driven where a case gives it a step
 
 
@@ -14,7 +19,10 @@ def system_of(case: Case) -> System:
     """The system of a case, with the method that the case asks for."""
     wheel, load, initial, solver = case.wheel, case.load, case.initial, case.solver
     automatic = solver.scheme == "auto"
-    shoe, wheel_surface = surface(**dict(case.roughness.shoe or ())), surface(**dict(case.roughness.wheel or ()))
+    shoe, wheel_surface = (
+        surface(**dict(each)) if each is not None else _SMOOTH
+        for each in (case.roughness.shoe, case.roughness.wheel)
+    )
     chosen = (
         "event-driven" if shoe.g.size or wheel_surface.g.size else "piecewise-exact"
     )  # a tolerance may change it
@@ -29,8 +37,8 @@ def system_of(case: Case) -> System:
             alpha_deg=case.link2.angle_deg,
             phi=case.friction.coefficient,
         ),
-        belt=schedule(wheel.times or (0.0,), wheel.angular_speeds or (wheel.angular_speed or 0.0,), wheel.radius),
-        load=schedule(load.times or (0.0,), load.forces or (load.force or 0.0,)),
+        belt=_shared(wheel.times or (0.0,), wheel.angular_speeds or (wheel.angular_speed or 0.0,), wheel.radius),
+        load=_shared(load.times or (0.0,), load.forces or (load.force or 0.0,)),
         shoe=shoe,
         wheel=wheel_surface,
         radius=wheel.radius,

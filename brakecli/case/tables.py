@@ -104,6 +104,7 @@ class Table(BaseModel):
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = ()  # groups of keys that exclude each other
     one_is_needed: ClassVar[bool] = True  # of these groups
+    needless: ClassVar[tuple[KeyPath, tuple[KeyPath, ...]]] = (), ()  # keys that an override of one replaces
 
     def _broken_rules(self) -> Iterator[Problem]:
         """Yield a problem for every rule between keys that does not hold."""

@@ -18,7 +18,7 @@ def command(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """What moves the critical friction coefficient most, and what to change so that the shoe does not squeal."""
+    """What moves the critical friction, and what to change."""
     loaded = load_case(case, overrides)
     announce_compilation(quiet)
     from brakecli.analysis.stability.advice import KEYS as USUAL

@@ -17,7 +17,7 @@ def command(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Validate a case or a sweep; report what it would cost and which limits it meets, without computing it."""
+    """Validate a case or a sweep; estimate its cost and limits."""
     if is_sweep(file):
         sweep = load_sweep(file, overrides)
         announce_compilation(quiet)

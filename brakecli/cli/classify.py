@@ -30,7 +30,7 @@ def command(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Report the regime of the run in a result file, or of a measured signal, with the evidence."""
+    """Regime of a run or of a measured signal, with evidence."""
     reading: dict[str, Any] = {"column": column, "time_column": time_column, "sample_rate": sample_rate}
     machine: dict[str, Any] = {"belt_speed": belt_speed, "stiffness": stiffness}
     _check(quantity, {**reading, **machine})

@@ -25,7 +25,7 @@ def command(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Compare every scheme, its weights, starts and iterations by error and cost; recommend one."""
+    """Compare all schemes by error and cost; recommend one."""
     loaded = load_case(case, overrides)
     target = result_path(output, case, ending="-schemes.h5")
     announce_compilation(quiet)

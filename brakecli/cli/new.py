@@ -6,27 +6,42 @@ from typing import Annotated
 import typer
 
 from brakecli.cli.inputs import as_argument
-from brakecli.cli.options import Force, Quiet, output_option
+from brakecli.cli.options import Force, Quiet, option, output_option
 from brakecli.cli.output import show
 from brakecli.errors import UsageError
 from brakecli.files.os_signals import unwinding
 
+NAME = "Name of the file, with or without .toml; that of a starter gives this one, others the starter of a case."
+
 
 def command(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the file, with or without .toml.")] = "case",
+    name: Annotated[str, typer.Argument(metavar="NAME", help=NAME)] = "case",
+    listed: Annotated[bool, option("List the starters with their questions.", None, "--list")] = False,
     output: Annotated[Path | None, output_option("File to write", "NAME.toml")] = None,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
-    """Write a commented starter case that runs."""
-    from brakecli.case.read import starter_text
+    """Write a commented starter case or sweep that runs."""
+    from brakecli.case.read import starters
+    from brakecli.cli.tables import grid
     from brakecli.files.atomic import new_output
 
+    texts = starters()
+    if listed:
+        questions = [text.partition("\n")[0].removeprefix("# ") for text in texts.values()]
+        show(grid({"starter": [*texts], "its question": questions}))
+        return
     if not name:
         raise UsageError("the name is empty; give one, or leave it out for case.toml")
     path = output or Path(name if name.endswith(".toml") else f"{name}.toml")
-    with unwinding(), new_output(path, force=force) as file:
-        file.write(starter_text().encode())
-        file.publish()
+    text = texts.get(name.removesuffix(".toml"), texts["case"])
+    written, is_sweep = {path: text}, text.startswith("case = ", text.find("\n\n") + 2)
+    if is_sweep and not (base := path.with_name("case.toml")).exists():
+        written[base] = texts["case"]
+    for place, content in written.items():
+        with unwinding(), new_output(place, force=force) as file:
+            file.write(content.encode())
+            file.publish()
     if not quiet:
-        show(f"{path}: written; run it with: brakecli run {as_argument(path)}")
+        how = f"brakecli {'sweep' if is_sweep else 'run'} {as_argument(path)}"
+        show(f"{' and '.join(map(str, written))}: written; run it with: {how}")

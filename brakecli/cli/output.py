@@ -2,11 +2,15 @@
 
 import json
 import sys
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, TextIO, cast
 
 from brakecli.files.os_signals import Styled, unwinding
+
+FIRST_LINE, LAST_LINES = 20.0, 600.0
+"""Seconds to the first line on long work without a terminal, and between the last ones; in between they double."""
 
 
 def show(text: str) -> None:
@@ -56,13 +60,21 @@ def announce_compilation(quiet: bool) -> None:
 
 @contextmanager
 def progress(quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
-    """Yield a function that shows on a terminal what is counted, how many are done, and how many there are.
+    """Yield a function that shows what is counted, how many are done, and how many there are.
 
-    Within, a signal raises `Interrupted`.
+    Without a terminal it says so in a line, ever less often. Within, a signal raises `Interrupted`.
     """
     with unwinding():
         if quiet or sys.stderr is None or not sys.stderr.isatty():
-            yield lambda what, done, total: None
+            start, due = time.monotonic(), FIRST_LINE
+
+            def tell(what: str, done: int, total: int) -> None:
+                nonlocal due
+                if not quiet and (passed := time.monotonic() - start) >= due:
+                    due = passed + min(passed, LAST_LINES)
+                    say(f"{what} {done} of {total}, {passed:.0f} s" if total else f"{what}, {passed:.0f} s")
+
+            yield tell
             return
         from rich import progress as rich_progress
         from rich.console import Console

@@ -17,7 +17,7 @@ def command(
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
-    """Draw a run, a sweep, a comparison, or modes along a key (needs matplotlib)."""
+    """Draw a result of any kind (needs matplotlib)."""
     from brakecli.plots.result import plot_result
 
     target = output or Path(f"{result.stem}.png")

@@ -19,12 +19,12 @@ def command(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Simulate one case; write time histories, spectra, regime and energy account to an HDF5 file."""
+    """Simulate one case; write motion and regime to HDF5."""
     loaded = load_case(case, overrides)
     target = result_path(output, case)
     announce_compilation(quiet)
     from brakecli.cli.tables import run_table
-    from brakecli.runs.run import load_kernels, run
+    from brakecli.runs.run import load_kernels, origin, run
 
     load_kernels(loaded)
     with progress(quiet) as show_progress:
@@ -32,7 +32,7 @@ def command(
     if not quiet:
         say(*report.check.adjustments)
     warn(*report.warnings)
-    numbers = {"output": str(report.output), **report.numbers()}
+    numbers = {"output": str(report.output), **origin("run", report.title, loaded), **report.numbers()}
     show_result("run", numbers, run_table, report, as_json=as_json, quiet=quiet)
     if report.motion.work.failed:
         say(f"{report.output}: the history up to the failure was written")

@@ -11,7 +11,7 @@ from brakecli.errors import UsageError
 def command(
     kind: Annotated[str, typer.Argument(metavar="[case|sweep]", help="Which kind of file.")] = "case",
 ) -> None:
-    """Print the JSON Schema of case files, or of sweep files, for editors that know TOML."""
+    """Print the JSON Schema of case files or sweep files."""
     from brakecli.case.case import Case
     from brakecli.case.tables import Table, json_schema
     from brakecli.sweeps.tables import Sweep

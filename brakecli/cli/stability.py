@@ -26,7 +26,7 @@ def command(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Critical friction coefficient, eigenvalues and growth of steady sliding, without stepping in time."""
+    """Critical friction, modes and growth, without time steps."""
     axis = _parse_axis(vary) if vary is not None else None
     if output is not None and (axis is None or output.suffix.lower() not in (".h5", ".csv")):
         raise UsageError(f"{output}: holds what --vary finds; give --vary, and a name that ends in .h5 or .csv")
@@ -71,5 +71,5 @@ def _parse_axis(text: str) -> "Axis":
         different = len({*map(key_path, axis.parameter)}) == len(axis.parameter)
         if different and axis.size <= MOST_VALUES and (axis.size == 1 or axis.start != axis.stop):
             return axis
-    what = f"is not KEY=START:STOP:NUM with NUM from 1 to {MOST_VALUES}"
+    what = f"is not KEY=START:STOP:NUM with two ends, NUM from 1 to {MOST_VALUES}, and no key twice"
     raise UsageError(f"--vary {text}: {what}; write, for instance, --vary link2.angle_deg=1:10:10")

@@ -24,7 +24,7 @@ def stability_table(title: str, report: StabilityReport, found: LockIn | None) -
     sliding = f"none: {report.no_equilibrium}"
     if rest is not None:
         touching = f"{rest.contact_fraction:.1%} of the pad touches"
-        sliding = f"y = {rest.y:.5g} m, F_y = {rest.normal_force:.5g} N, {touching}"
+        sliding = f"y = {rest.y + 0.0:.5g} m, F_y = {rest.normal_force:.5g} N, {touching}"
     rows = [
         ("surface speed U", text_of(report.belt_speed, "m/s")),
         ("steady sliding", sliding),
@@ -35,7 +35,7 @@ def stability_table(title: str, report: StabilityReport, found: LockIn | None) -
         (f"at φ = {report.friction:g}", _STATE[report.stable]),
     ]
     for mode in report.modes:
-        motion = f"grows at {mode.growth:.4g} 1/s" if mode.growth > 0.0 else f"decays at {-mode.growth:.4g} 1/s"
+        motion = f"{'grows' if mode.growth > 0.0 else 'decays'} at {abs(mode.growth):.4g} 1/s"
         shape = f"y/x {mode.shape:.3g} at {mode.shape_phase:.0f}°" if mode.shape is not None else "along y alone"
         what = f"{motion}, damping ratio {mode.damping_ratio:.3g}, {shape}"
         rows.append((f"mode at {mode.frequency:.5g} Hz", what))
@@ -55,10 +55,10 @@ def _lock_in(found: LockIn) -> str:
     from brakecli.sweeps.result import unit
 
     entries, keys = found.entries, ", ".join(found.parameters)
-    values = {"value": [f"{entry['value']:.6g}" for entry in entries]}
-    varied = {field.title: [text_of(each[field.name]) for each in entries] for field in fields.VARIED}
+    columns = {"value": [f"{entry['value']:.6g}" for entry in entries]}
+    columns |= {field.title: [text_of(each[field.name]) for each in entries] for field in fields.VARIED}
     looks = (("frequency {}, Hz", 1.0, ".5g"), ("growth {}, 1/s", 1.0, ".4g"), ("damping {}, %", 100.0, ".3g"))
-    modes = {
+    columns |= {
         head.format(mode + 1): [
             text_of(None if value is None else factor * value, form=form)
             for value in (each[field.name][mode] for each in entries)
@@ -69,7 +69,7 @@ def _lock_in(found: LockIn) -> str:
     units = unit(found.parameters[0])
     critical = ", ".join(text_of(value, units.removeprefix("1"), ".7g") for value in found.critical_values)
     changes = f"Stability changes at {critical}." if critical else "Stability does not change in between."
-    return "\n\n" + "\n\n".join((f"Along {keys}:\n" + grid(values | varied), grid(values | modes), changes))
+    return "\n\n" + "\n\n".join((f"Along {keys}:\n" + grid(columns), changes))
 
 
 def _crossing(crossing: Crossing) -> str:

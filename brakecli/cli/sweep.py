@@ -30,7 +30,7 @@ def command(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Simulate a grid of cases, or search for a critical parameter at each.
+    """Simulate a grid of cases, or search for critical values.
 
     The same command continues an interrupted sweep.
     """

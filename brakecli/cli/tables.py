@@ -24,6 +24,9 @@ POINTS = named(fields.POINT, "regime", "frequency", "amplitude")
 CRITICAL_NAMES = ("critical", "critical_error", "critical_eigenvalue", "critical_sustained", "critical_status")
 CRITICAL_POINTS = (*named(fields.POINT, "regime"), *named(fields.CRITICAL, *CRITICAL_NAMES))
 IF_KNOWN = ("growth_rate", "ringing_frequency", "amplitude_spread", "amplitude_forced", "amplitude_own")
+EVIDENCE_UNITS = {"envelope_slope": "1/s", "envelope_final": "m/s", "envelope_largest": "m/s", "power_": "W"}
+EVIDENCE_UNITS |= {"amplitude_v": "m/s", "amplitude_": "m", "seconds": "s", "frequency_": "Hz", "line_freq": "Hz"}
+"""By how the names of the evidence begin; all others are pure numbers."""
 MOST_LISTED_POINTS = 30
 NARROWEST = 40  # columns of a table, whatever the terminal says: nothing can be read in fewer
 
@@ -81,8 +84,9 @@ def verdict_table(source: str, numbers: Mapping[str, Any]) -> str:
     """A verdict, from the names and values that `--json` gives."""
     rows = _verdict_rows(numbers)
     for name, value in numbers["evidence"].items():
-        shown = ", ".join(f"{item:.4g}" for item in value) or "-" if isinstance(value, list | tuple) else value
-        rows.append((name.replace("_", " "), text_of(shown)))
+        unit = next((unit for start, unit in EVIDENCE_UNITS.items() if name.startswith(start)), "")
+        shown = ", ".join(f"{each:.4g}" for each in value) if isinstance(value, list | tuple) else f"{value:.6g}"
+        rows.append((name.replace("_", " "), f"{shown} {unit}".rstrip() if shown else "-"))
     return two_columns(source, rows)
 
 
@@ -152,10 +156,12 @@ def sweep_table(report: SweepReport) -> str:
         count, least, largest = found.critical
         span = f"{least:.6g} to {largest:.6g}, " if count else ""
         rows.append((f"critical {critical.parameter}", f"{span}found at {count} of {found.points} points"))
+    speed = report.points_per_second
+    cost = f": {speed:.3g} points/s, {report.overhead:.0%} of the workers' time not on points" if speed else ""
     rows += [
         ("note", found.sentences),
         ("failed", [f"{found.failed} points"] if found.failed else []),
-        ("time", text_of(report.seconds, "s", ".3g")),
+        ("time", text_of(report.seconds, "s", ".3g") + cost),
         ("file", str(report.output)),
     ]
     listed = _points_table(report) + "\n\n" if found.points <= MOST_LISTED_POINTS else ""
@@ -173,11 +179,12 @@ def _points_table(report: SweepReport) -> str:
         columns["way"] = [("up", "down")[point // plan.points] for point in range(found.points)]
     for number, axis in enumerate(plan.sweep.axis):
         columns[axis.parameter[0]] = [label(axis.value(place[number])) for place in places]
-    for field in POINTS if found.critical is None else CRITICAL_POINTS:
+    known = POINTS if found.critical is None else CRITICAL_POINTS
+    for field in known:
         values = np.ravel(np.array((found.variables or {})[field.name], object))
         header = f"{field.title}, {field.units}" if field.units else field.title
-        columns[header] = [text_of(value, form=".5g") for value in values]
-    return grid(columns)
+        columns[header] = [text_of(value, form=".2g" if field.title == "±" else ".5g") for value in values]
+    return grid(columns, len(columns) - len(known))
 
 
 def comparison_table(report: ComparisonReport) -> str:
@@ -237,23 +244,41 @@ def two_columns(title: str, rows: Sequence[Row]) -> str:
     """Rows in two columns."""
     lines = [(label, text) for label, texts in rows for text in ([texts] if isinstance(texts, str) else texts)]
     labels, values = zip(*lines, strict=True)
-    return grid(
-        {"label": labels, "value": values}, title=escaped(title) or None, title_justify="left", show_header=False
-    )
+    return grid({"label": labels, "value": values}, title=title, show_header=False)
 
 
-def grid(columns: Mapping[str, Sequence[str]], **style: Any) -> str:
-    """Columns under their headers, as wide as the terminal."""
+def grid(columns: Mapping[str, Sequence[str]], keys: int = 1, title: str = "", show_header: bool = True) -> str:
+    """Columns under their headers, as wide as the terminal; words are kept whole up to half of that.
+
+    Columns that do not fit beside the others follow below, behind the first `keys` columns.
+    """
+    from rich.cells import cell_len
     from rich.console import Console
     from rich.table import Table
 
-    table = Table(box=None, padding=(0, 2, 0, 0), **style)
-    for header in columns:
-        table.add_column(escaped(header), overflow="fold", style="bold" if header == "label" else None)
-    for line in zip(*columns.values(), strict=True):
-        table.add_row(*map(escaped, line))
     console = Console(markup=False, emoji=False, highlight=False)  # titles and file names are not markup
-    console.width = max(console.width, NARROWEST)
+    console.width = room = max(console.width, NARROWEST)
+    texts = {escaped(header): [*map(escaped, cells)] for header, cells in columns.items()}
+    most = {header: max(map(cell_len, (header, *cells))) for header, cells in texts.items()}
+    words = {header: " ".join((header.replace(".", ". "), *cells)).split() for header, cells in texts.items()}
+    least = {header: min(max(map(cell_len, words[header])), room // 2) for header in texts}
+    names = [*texts]
+    while len(names) > keys + 1 and sum(least[name] + 2 for name in names) > room + 2:
+        names.pop()
+    table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False, show_header=show_header)
+    for cap in range(room, 0, -1):
+        widths = {name: min(most[name], max(least[name], cap)) for name in names}
+        if sum(width + 2 for width in widths.values()) <= room + 2:
+            break
+    for name, width in widths.items():
+        header = name if cell_len(name) <= width else name.replace(".", ".\n")
+        table.add_column(header, overflow="fold", width=width, style="bold" if name == "label" else None)
+    for line in zip(*map(texts.get, names), strict=True):
+        table.add_row(*line)
     with console.capture() as shown:
+        if title:
+            console.print(escaped(title), style="italic")
         console.print(table)
-    return "\n".join(line.rstrip() for line in shown.get().splitlines())
+    others = {name: texts[name] for name in (*names[:keys], *[*texts][len(names) :])}
+    below = ["", grid(others, keys)] if len(names) < len(texts) else []
+    return "\n".join([*(line.rstrip() for line in shown.get().splitlines()), *below])

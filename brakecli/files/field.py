@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, is_dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -27,11 +28,14 @@ class Field:
         """The words for the terminal."""
         return self.label or self.name.replace("_", " ")
 
+    @cached_property
+    def _path(self) -> list[str]:
+        return (self.at + self.name if self.at[-1:] in ("", ".") else self.at).split(".")
+
     def read(self, report: object) -> Any:
         """The value that a report holds, as JSON writes it."""
         value: Any = report
-        path = self.at + self.name if self.at[-1:] in ("", ".") else self.at
-        for part in path.split("."):
+        for part in self._path:
             if value is not None:
                 value = value[part] if isinstance(value, Mapping) else getattr(value, part)
                 value = value() if callable(value) else value

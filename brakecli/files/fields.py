@@ -30,7 +30,7 @@ VERDICT = (
     Field(
         "amplitude", "m", "half of peak to peak of x: median of the cycles", at="verdict.", label="amplitude of x"
     ),
-    Field("amplitude_spread", "m", "half of the range of the middle two thirds of the cycles", at="verdict."),
+    Field("amplitude_spread", "m", "by which the amplitude varies or drifts; missing if unknown", at="verdict."),
     Field("amplitude_forced", "m", "on a rough wheel: what the roughness forces", at="verdict."),
     Field("amplitude_own", "m", "on a rough wheel: what the shoe adds", at="verdict."),
     Field("frequency_resolution", "Hz", "distance of two lines in the spectrum", at="verdict."),
@@ -161,6 +161,8 @@ SWEEP = (
     Field("dimensions", "", "names of the dimensions", OBJECT, at="findings.", in_file=False),
     Field("axes", "", "parameters and values along each axis", OBJECT, in_file=False),
     Field("seconds", "s", "time of the command", in_file=False),
+    Field("points_per_second", "1/s", "points computed, over the time of the command", in_file=False),
+    ratio("overhead", "part of the workers' time that they did not spend on points", in_file=False),
     Field("findings", "", "sentences on hysteresis and on wide error bars", OBJECT, at="findings.sentences"),
     Field("warnings", "", "what a careful user should know", OBJECT, at="notes", in_file=False),
 )

@@ -3,9 +3,11 @@
 The same calls give the same bytes, however the rows of a growing variable are cut into pieces.
 """
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -101,7 +103,45 @@ class ResultFile:
             lengths = {axis: self._file[group][axis].shape[0] for axis in dims if axis != name}
             if checked.shape != tuple(lengths.get(axis, checked.size) for axis in dims):
                 raise ValueError(f"{group}/{name}: its shape {checked.shape} is not that of its axes {lengths}")
-            self._create(group, variable, checked, grows=0 in checked.shape)
+            self._create(group, variable, checked.shape, checked.dtype, grows=0 in checked.shape)[...] = checked
+
+    def begin_column(self, field: Field, dims: Sequence[str], kind: np.dtype[Any], **attributes: Any) -> None:
+        """Begin a packed variable of the root for values of a type, with as many more axes; `fill` gives them."""
+        packed: dict[str, Any] = {"shuffle": True, "compression": "gzip", "compression_opts": 1}
+        more = {"units": field.units, "long_name": field.meaning, **attributes}
+        if kind.base.kind == "S":
+            more["_Encoding"] = "utf-8"
+        elif kind.base.kind == "f":
+            more["_FillValue"] = np.array([FILL])
+        variable = _Variable(field, tuple(dims), more, np.empty(0, kind.base))
+        with self._hdf5():
+            shape = tuple(self._file[axis].shape[0] for axis in dims)
+            grid = shape[: len(shape) - kind.ndim]
+            dtype = h5py.string_dtype("utf-8", kind.itemsize) if kind.kind == "S" else kind.base
+            self._create("/", variable, shape, dtype, chunks=_chunks(grid) + shape[len(grid) :], **packed)
+
+    def blocks(self, dims: Sequence[str]) -> Iterator[tuple[int, int, tuple[slice, ...]]]:
+        """The chunks of a variable over some axes in the order of its values: first value, end, and place."""
+        with self._hdf5():
+            shape = tuple(self._file[axis].shape[0] for axis in dims)
+        chunks = _chunks(shape)
+        starts = [range(0, length, chunk) for length, chunk in zip(shape, chunks, strict=True)]
+        first = 0
+        for place in product(*starts):
+            ends = [min(start + chunk, length) for start, chunk, length in zip(place, chunks, shape, strict=True)]
+            where = tuple(slice(start, end) for start, end in zip(place, ends, strict=True))
+            last = first + math.prod(end - start for start, end in zip(place, ends, strict=True))
+            yield first, last, where
+            first = last
+
+    def fill(self, name: str, where: tuple[slice, ...], values: NDArray[Any]) -> None:
+        """Fill a chunk of a variable that was begun; a number that is missing is NaN."""
+        if values.dtype.kind == "S":
+            values = values.astype(h5py.string_dtype("utf-8", values.dtype.itemsize))
+        elif values.dtype.kind == "f":
+            values = _finite(name, np.where(np.isnan(values), FILL, values))
+        with self._hdf5():
+            self._file[name][where] = values
 
     def append(self, group: str, rows: Mapping[str, ArrayLike]) -> None:
         """Append rows to all growing variables of `group`, the growing axis among them."""
@@ -169,31 +209,35 @@ class ResultFile:
         """Write the first of the waiting rows behind those that are written."""
         rows, variable.waiting = variable.waiting[:count], variable.waiting[count:]
         if not variable.written:  # created only now, so that a short series gets a chunk of just its length
-            self._create(group, variable, rows, grows=True)
+            self._create(group, variable, rows.shape, rows.dtype, grows=True)[...] = rows
         else:
             dataset = self._file[group][variable.field.name]
             dataset.resize(variable.written + count, axis=0)
             dataset[variable.written :] = rows
         variable.written += count
 
-    def _create(self, group: str, variable: _Variable, values: NDArray[Any], *, grows: bool) -> None:
-        """Create a dataset with checksums, its attributes, axes and values."""
+    def _create(
+        self,
+        group: str,
+        variable: _Variable,
+        shape: tuple[int, ...],
+        kind: Any,
+        *,
+        grows: bool = False,
+        **how: Any,
+    ) -> Any:
+        """Create a dataset with checksums, its attributes and axes."""
         parent, name = self._file.require_group(group), variable.field.name
-        maxshape = (None,) * values.ndim if grows else None  # HDF5 takes no chunk longer than its dataset can get
-        room, chunks = _CHUNK, list[int]()  # the longest last dimensions that fit
-        for length in reversed(values.shape):
-            chunks.insert(0, max(1, min(length, room)))
-            room //= chunks[0]
-        dataset = parent.create_dataset(
-            name, values.shape, values.dtype, chunks=tuple(chunks), maxshape=maxshape, fletcher32=True
-        )
+        maxshape = (None,) * len(shape) if grows else None  # HDF5 takes no chunk longer than its dataset can get
+        options = {"chunks": _chunks(shape), "maxshape": maxshape, "fletcher32": True, **how}
+        dataset = parent.create_dataset(name, shape, kind, **options)
         _set_attributes(dataset, variable.attributes)
         if variable.dims == (name,):
             dataset.make_scale(name)
         else:
             for dimension, axis in zip(dataset.dims, variable.dims, strict=True):
                 dimension.attach_scale(parent[axis])
-        dataset[...] = values
+        return dataset
 
 
 @contextmanager
@@ -205,6 +249,15 @@ def new_result(path: Path, *, force: bool) -> Iterator[ResultFile]:
     with new_output(path, force=force) as output, closing(ResultFile(output)) as result:
         result.open()
         yield result
+
+
+def _chunks(shape: tuple[int, ...]) -> tuple[int, ...]:
+    """The chunks of a dataset: the longest last dimensions that fit."""
+    room, chunks = _CHUNK, list[int]()
+    for length in reversed(shape):
+        chunks.insert(0, max(1, min(length, room)))
+        room //= chunks[0]
+    return tuple(chunks)
 
 
 def _set_attributes(node: h5py.HLObject, attributes: Mapping[str, Any]) -> None:

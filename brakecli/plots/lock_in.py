@@ -10,7 +10,6 @@ from brakecli.files.read import StoredResult
 from brakecli.plots import style
 
 _WIDTH, _FEW = 8.8, 40  # inches; values up to which each has a marker
-_MOST_NUMBERED = 4  # critical values whose numbers fit beside their lines
 _LOOKS: tuple[dict[str, Any], ...] = (  # the wide line is seen behind the dashed one where modes have met
     {"color": "#7DB9DE", "lw": 4.0, "ls": "-", "marker": "o", "ms": 6.5, "solid_capstyle": "round"},
     {"color": style.VERMILION, "lw": 1.5, "ls": style.DASHES, "marker": "o", "ms": 3.0},
@@ -31,10 +30,9 @@ def draw(result: StoredResult) -> Figure:
     critical = np.asarray(result.attributes.get("critical_values", ()), float).ravel()
     critical = critical[np.isfinite(critical)]
     unit = units.removeprefix("1")
-    numbers = ", ".join(style.readable(float(value)) for value in critical[: 2 * _MOST_NUMBERED])
-    more = " …" if len(critical) > 2 * _MOST_NUMBERED else ""
-    said = f"stability changes at {numbers}{more} {unit}".rstrip()
-    summary = f"{len(x)} values   ·   {said if len(critical) else 'stability does not change between them'}"
+    numbers = ", ".join(style.readable(float(value)) for value in critical)
+    said = f"changes at {numbers} {unit}".rstrip() if len(critical) else "does not change in between"
+    summary = f"{len(x)} value{'s' * (len(x) > 1)}   ·   stability {said}"
     figure = style.headed(_WIDTH, 6.4, str(result.attributes.get("title", "")), summary, hspace=0.05)
     panels = figure.subplots(2, 1, sharex=True, height_ratios=[1.35, 1.0])
     for axes, values, label in zip(panels, modes, ("frequency (Hz)", "growth rate (1/s)"), strict=True):

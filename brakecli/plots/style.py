@@ -63,15 +63,22 @@ def rendered(figure: Figure, suffix: str) -> bytes:
 
 
 def headed(width: float, height: float, title: str, *lines: str, **spacing: float) -> Figure:
-    """An empty figure (inches) with a title and lines of text above its panels, each cut to the width."""
-    figure = Figure(figsize=(width, height))
+    """An empty figure (inches) with a title and lines of text above its panels.
+
+    The lines are wrapped to the width; the height counts one line for each.
+    """
     bold, plain = {"size": 13, "weight": "bold"}, {"size": 10.0, "color": "#444444"}
-    for number, line in enumerate((title, *lines)):
-        letters, below, look = (12.3, 0.24 + 0.21 * number, plain) if number else (9.4, 0.16, bold)
-        text = textwrap.shorten(line, round(letters * width), placeholder=" …")
+    wrapped = [
+        (step, text, look)
+        for line, letters, step, look in ((title, 9.4, 0.29, bold), *((line, 12.3, 0.21, plain) for line in lines))
+        for text in textwrap.wrap(line, round(letters * width), max_lines=6, placeholder=" …") or [""]
+    ]
+    height += sum(step for step, *_ in wrapped) - 0.29 - 0.21 * len(lines)
+    figure, below = Figure(figsize=(width, height)), 0.16
+    for step, text, look in wrapped:
         figure.text(0.125 / width, 1.0 - below / height, text, look, va="top", parse_math=False)
-    used = (0.546 + 0.21 * len(lines)) / height
-    rect = (0.05 / width, 0.036 / height, 1.0 - 0.1 / width, 1.0 - used)
+        below += step
+    rect = (0.05 / width, 0.036 / height, 1.0 - 0.1 / width, 1.0 - (below + 0.096) / height)
     figure.set_layout_engine("constrained", rect=rect, **spacing)
     return figure
 

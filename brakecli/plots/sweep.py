@@ -5,7 +5,6 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -199,9 +198,8 @@ class SweepPicture:
 
     def figure(self, width: float, height: float) -> Figure:
         """An empty figure (inches) below the heading; `height` is that of the part below the heading."""
-        wrap = textwrap.TextWrapper(round(12.0 * width), max_lines=2, placeholder=" …").wrap
         chosen = ["   ·   ".join(self.chosen)] if self.chosen else []
-        lines = [self.summary, *chosen, *chain.from_iterable(map(wrap, self.findings[:2]))]
+        lines = [self.summary, *chosen, *self.findings[:2]]
         return style.headed(width, height + 0.21 * len(lines), self.title, *lines)
 
 

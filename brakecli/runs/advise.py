@@ -175,6 +175,6 @@ def _checked(case: Case, best: Change, progress: Progress) -> CheckRun | None:
     system = replace(system, duration=system.duration * min(1.0, CHECK_SECONDS / max(seconds, 1e-9)))
     start = time.perf_counter()
     motion, _ = motion_of(system, lambda done: progress("steps of the check", done, system.steps))
-    verdict = verdict_on(array_history(system.interval, motion.rows), motion.system, motion.work.failure_sentence)
+    verdict = verdict_on(array_history(system.interval, motion.rows), system, motion.work.failure_sentence)
     spent = time.perf_counter() - start
     return CheckRun(best.parameter, best.to or 0.0, verdict, system.sampled_duration, spent)

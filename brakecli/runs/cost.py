@@ -12,9 +12,9 @@ from brakecli.solver.system import System
 # Seconds, measured with `make cases` on one core.
 _STEP_SECONDS = 1.5e-7
 _NODE_SECONDS = 5e-10  # per node, and again per node and wave of the wheel:
-_NODE_WAVE_SECONDS = 2e-10
-_TERM_SECONDS, _PAIR_SECONDS = 2.5e-7, 5e-9  # exact, for each wave on the pad: per harmonic, and per pair of them
-_EVALUATIONS = 3.0  # of the contact in a step
+_NODE_WAVE_SECONDS = 1.5e-10
+_TERM_SECONDS, _PAIR_SECONDS = 2.5e-8, 5e-10  # exact, for each wave on the pad: per harmonic, and per pair of them
+_EVALUATIONS = 1.5  # of the contact in a step
 _OWN_STEPS = 25.0  # in a period, of a scheme that finds them itself, at a tolerance of 1e-10
 _OWN_STEP_SECONDS = 4e-6
 _OWN_EVALUATIONS = 27.0

@@ -93,9 +93,9 @@ def run(
             if not np.isfinite(astuple(motion.energy)).all():  # compiled code overflows silently
                 raise FloatingPointError("an energy overflows")
             history = History(system.interval, result.rows("history"), partial(result.read, "history"))
-            verdict = verdict_on(history, motion.system, motion.work.failure_sentence)
+            verdict = verdict_on(history, system, motion.work.failure_sentence)
             top = _write_spectrum(result, history, verdict)
-            warnings = (*found.warnings, *_warnings(motion, certificate))
+            warnings = (*found.warnings, *_warnings(motion, certificate), *verdict.reasons[1:])
             shown = top, warnings, *modelled(motion)
             report = RunReport(loaded.case.title, output, verdict, motion, found, certificate, *shown)
             result.set_attributes(origin("run", report.title, loaded))
@@ -159,6 +159,8 @@ def _write_spectrum(result: ResultFile, history: History, verdict: Verdict) -> f
         result.variable("spectrum", fields.SPECTRUM[name], ("frequency",), density)
     result.set_attributes(values_of(fields.WELCH, lines), "spectrum")
     strongest = min(verdict.evidence["line_frequencies"][:1], default=math.inf)
+    if verdict.evidence.get("ripple_vx", 0.0) > 0.5:
+        return None
     duration = (history.samples - verdict.start) * history.interval
     return peak(lines.frequency, lines.density["vx"], duration, strongest)
 

@@ -1,13 +1,14 @@
 """One implicit step: find the normal force F with F = F_y(x(F), y(F)), where (x, y)(F) is the minimiser's answer.
 
-`newton` solves this scalar equation inside a bracket and cannot run away; `fixed-point` is the paper's iteration,
-(13) and (24), which contracts by about gain * 2ak/a22 and diverges where that exceeds one.
+`newton` solves this scalar equation inside a bracket and cannot run away. Most steps take one evaluation: where it
+proves the contact to be linear up to Newton's next force, that force is known to solve the step. `fixed-point` is
+the paper's iteration, (13) and (24), which contracts by about gain * 2ak/a22 and diverges where that exceeds one.
 """
 
 import math
 from typing import Any
 
-from numba import float64, types
+from numba import boolean, float64, types
 
 from brakecli.solver.compile import at_address, borrowed, kernel
 from brakecli.solver.friction import minimise, slopes
@@ -17,6 +18,9 @@ SOLVED, UNCONVERGED = 0, 1
 _RELATIVE = 1e-13
 """Relative change of F below which a step is solved: a few hundred roundings, so that both iterations agree to
 rounding; the gap's own rounding, times the contact's stiffness, is added to it."""
+
+_REACH = 2.0
+"""How far the gap may move in the next step, over how far it has moved in the last."""
 
 _evaluate_at = at_address(EVALUATE)
 
@@ -34,6 +38,32 @@ def _try_force(layer: Layer, problem: Any, f: float) -> tuple[float, float]:
     problem.residual = layer.contact.normal_force - f
     rounding = 4e-16 * layer.contact.stiffness * (abs(problem.y_0) + abs(problem.gain * e))
     return problem.residual, rounding
+
+
+@kernel(boolean(LAYER, PROBLEM_TYPE, float64, float64))
+def _take_unevaluated(layer: Layer, problem: Any, f: float, allowed: float) -> bool:
+    """Take the force f if the last evaluation proves that its residual is at most `allowed` (N); whether it does.
+
+    Up to f the contact is linear, but for places that begin or cease to touch, for the curvature of f2 and for the
+    error of its slope. `contact` becomes that of f.
+    """
+    pad, contact, gain = layer.pad, layer.contact, problem.gain
+    a_11, a_12, a_22, phi = problem.a_11, problem.a_12, problem.a_22, problem.phi
+    d, e, side = minimise(a_11, a_12, a_22, problem.g_1, problem.g_2 + f, phi * f, problem.belt)
+    x, y = gain * (d - problem.d), gain * (e - problem.e)
+    along, near, reach = abs(x), contact.near, contact.reach
+    move = abs(y) + pad.steep * along
+    contact.reach = max(_REACH * move, 0.5 * reach)  # of the next evaluation
+    if side != problem.side or move > reach:
+        return False
+    normal_force = contact.normal_force + contact.tangential * x - contact.stiffness * y
+    lost = near * move + (contact.blur + 0.5 * pad.curved * contact.stiffness * along) * along
+    if not abs(normal_force - f) + lost <= allowed:
+        return False
+    problem.d, problem.e, problem.normal_force, problem.residual = d, e, f, normal_force - f
+    contact.normal_force = normal_force
+    contact.store_x -= contact.tangential * y
+    return True
 
 
 @kernel(SOLVE)
@@ -74,6 +104,9 @@ def newton(layer: Layer, problem: Any, most: int) -> tuple[int, int, int]:
         # The bracket's own width says nothing: Newton's iteration may come from one side and leave the other.
         if not (low <= new <= high) or new == math.inf or abs(new - f) > 0.5 * before_last:
             new = 0.5 * (low + high) if high < math.inf else 10.0 * max(low, contact.normal_force)
+        allowed = abs(slope) * _RELATIVE * max(new, contact.normal_force) + rounding
+        if _take_unevaluated(layer, problem, new, allowed):
+            return SOLVED, evaluation, rising
         before_last, last = last, abs(new - f)
         f = new
     return UNCONVERGED, most, rising

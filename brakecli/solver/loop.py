@@ -78,6 +78,9 @@ def advance(p: Plant, rows: Floats, events: Floats, stop: int) -> int:
             travel, travel_low = integral_at(belt, t, t_low)
             wheel_angles(p.drive.wheel, travel, travel_low, layer.angles)
         prepare(c, s, state, problem)
+        if state.force > 0.0:  # the guess lies on the parabola through the last three forces
+            problem.normal_force = max(3.0 * (state.force - state.force_before) + state.force_earlier, 0.0)
+        state.force_earlier, state.force_before = state.force_before, state.force
         outcome, evaluations, rising = solve(layer, problem, grid.most)
         counts.evaluations += evaluations
         counts.most = max(counts.most, evaluations)

@@ -169,6 +169,8 @@ class Stepping:
             acceleration = _acceleration(system, (x, y), velocity, found.normal_force)
         self.scheme.begin(plant.s, plant.state, (x, y), velocity, acceleration)
         plant.state.force = plant.work.force_before = found.normal_force
+        if not system.method.own_steps:
+            plant.state.force_before = plant.state.force_earlier = found.normal_force
         plant.work.store_x_before = found.store_x
 
     def _evaluate_at(self, x: float, y: float, steps: float) -> None:

@@ -28,7 +28,8 @@ STATE = record(
     "x y",  # position at the level reached, m
     "v_x v_y",  # velocity that belongs to it or, in a scheme that lags, to the level before, m/s
     "x_old y_old",  # position at the level before, m
-    "force",  # normal force in the last step, the first guess for the next, N
+    "force",  # normal force in the last step, N
+    "force_before force_earlier",  # in the two steps before that: the guess for the next is made of all three, N
 )
 """The motion at the level of time that has been reached."""
 
@@ -56,6 +57,9 @@ CONTACT = record(
     "store store_x",  # V = k/2 ∫ max(gap, 0)² dξ, J, and ∂V/∂x, N
     kind=int,  # the evaluator that did the work, place in `contact.kinds()`
     valid=int,  # 0 where its assumptions do not hold
+    reach=float,  # given: how far the gap may move before the next evaluation, m
+    near=float,  # k (length whose gap is within reach of zero), N/m; inf where that is not known
+    blur=float,  # upper bound of the error of `tangential`, N/m
 )
 """What an evaluator finds."""
 
@@ -81,8 +85,13 @@ PAD = record(
     "half_length",  # a, m
     "full_up_to clear_from",  # heights: up to it all touches for sure, from it on nothing, m
     "shoe_bound wheel_bound",  # upper bounds of |f1| and |f2|, m
+    "steep curved",  # upper bounds of |f2'| and of |f2''|, 1/m
+    "rise_error",  # upper bound of the error of f2' by differences between nodes
     "shoe_mean shoe_square",  # means of f1 (m) and ∫ f1² dξ (m³) over the pad
     "cell",  # widest interval in which roots are sought, m
+    "crest",  # upper bound of |f2 - f1|, m
+    cells=int,  # intervals in which they are sought
+    edges_at=int,  # where in the scratch what is known of them begins
     shoe_terms=int,  # harmonics
     wheel_terms=int,
     nodes=int,  # of the midpoint rule; 0 without its tables
@@ -94,8 +103,7 @@ PAD = record(
     cc_at=int,
     pr_at=int,
     nodes_at=int,  # f1 at the nodes
-    sin_at=int,  # g sin(ωξ) and g cos(ωξ) of the wheel at the nodes
-    cos_at=int,
+    waves_at=int,  # g sin(ωξ) and g cos(ωξ) of the wheel at the nodes, tile by tile
 )
 
 KNOT = record("time value value_low slope slope_low integral integral_low")

@@ -9,10 +9,10 @@ from brakecli.case.system import system_of
 from brakecli.errors import CaseError, RefusedError
 from brakecli.runs.cost import duration_text, steps_and_seconds
 from brakecli.runs.limits import MOST_BYTES, check, refuse, within_range
+from brakecli.sweeps.early import may_be_early
 from brakecli.sweeps.growth import sliding, with_step
 from brakecli.sweeps.periodic import common_period, exponent_length
 from brakecli.sweeps.plan import Plan, Settings
-from brakecli.sweeps.point import record_type
 from brakecli.sweeps.tables import Critical
 
 MOST_POINTS = 10_000_000
@@ -31,7 +31,9 @@ _EXPONENT_RUNS = 200.0  # of as long as an exponent needs
 _EIGENVALUE_SECONDS = 0.1
 _WORKER_BYTES = 1.8e8
 _SAMPLE_BYTES = 8.0 * 24
-_POINT_BYTES = 1000.0  # in the parent, which holds each variable whole while it writes it
+_EARLY_SECONDS = 1e-3  # of a point whose verdict comes before the end of its run
+_RECORD_BYTES = 150.0  # of a point in the journal, and in the result
+_POINT_BYTES, _FOLLOWED_BYTES = 20.0, 400.0  # in the parent, which writes lines that are followed all at once
 
 
 @dataclass(frozen=True)
@@ -63,23 +65,24 @@ def estimate(plan: Plan, workers: int) -> Estimate:
             system = system_of(plan.case(plan.settings(point)))
             checked = check(system)
             refuse(checked)
-            times.append(checked.seconds)
+            times.append(_EARLY_SECONDS - _POINT_SECONDS if may_be_early(system) else checked.seconds)
+            times[-1] += 0.0 if may_be_early(system) else _SAMPLE_SECONDS * system.samples
             samples = max(samples, system.samples)
             if (critical := plan.sweep.critical) is not None and critical.method == "simulation":
                 forced = max(forced, _forced_seconds(plan, plan.settings(point), critical))
-    run = sum(times) / max(len(times), 1) + _POINT_SECONDS + _SAMPLE_SECONDS * samples
+    run = sum(times) / max(len(times), 1) + _POINT_SECONDS
     each = run
     if (critical := plan.sweep.critical) is not None:
         each += _EIGENVALUE_SECONDS
         if critical.method == "simulation":
             each += _SEARCH_RUNS * run + _SEARCH_GROWTHS * _GROWTH_SECONDS + forced
-    records = plan.passes * plan.points
+    records, in_parent = plan.passes * plan.points, _POINT_BYTES if plan.followed is None else _FOLLOWED_BYTES
     return Estimate(
         points=plan.points,
         workers=workers,
         seconds=2.0 + records * each / min(workers, records),
-        memory=_WORKER_BYTES * (workers + 1) + _SAMPLE_BYTES * samples * workers + _POINT_BYTES * records,
-        file_size=float(records * record_type(plan).itemsize) + 1e5,
+        memory=_WORKER_BYTES * (workers + 1) + _SAMPLE_BYTES * samples * workers + in_parent * records,
+        file_size=_RECORD_BYTES * records + 1e5,
         at_least=forced > 0.0,
     )
 

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from enum import StrEnum
 from functools import cache, partial
 from itertools import pairwise
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -17,10 +17,12 @@ from brakecli.analysis.stability.search import bisect
 from brakecli.case.case import Case, changed
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError
+from brakecli.runs.limits import within_range
 from brakecli.solver.system import System
+from brakecli.sweeps.early import Known, early
 from brakecli.sweeps.error_bar import left_open
 from brakecli.sweeps.floquet import Disturbances
-from brakecli.sweeps.growth import Sliding, sliding, with_step
+from brakecli.sweeps.growth import Sliding, has_exact_steps, sliding, stepped, with_step
 from brakecli.sweeps.tables import Critical
 
 WIDEST = 1.0 / 3.0  # of the range, that an error bar with an answer may have
@@ -92,32 +94,40 @@ Answer = Callable[[float], bool | None]
 
 
 def search(
-    critical: Critical, case_at: Callable[[float], Case], verdict_of: Callable[[Case], Verdict | None]
+    critical: Critical, case_at: Callable[[float], Case], verdict_of: Callable[[Case], Verdict | Known | None]
 ) -> Search:
     """Look for the critical value of the parameter that `case_at` sets; `verdict_of` runs a case."""
+    exact_steps = all(has_exact_steps(case_at, end) for end in (critical.lower, critical.upper))
 
     @cache
     def sliding_at(value: float) -> Sliding | None:
         try:
-            return sliding(with_step(system_of(case_at(value))))
+            return sliding(with_step(system_of(case_at(value)), unless=exact_steps))
         except CaseError:  # no equilibrium, or a value that no case can have, between two that it can
             return None
 
     if critical.parameter == "friction.coefficient":
-        exact = _friction_by_eigenvalues(critical, with_step(system_of(case_at(critical.lower))))
+        exact = _friction_by_eigenvalues(
+            critical, with_step(system_of(case_at(critical.lower)), unless=exact_steps)
+        )
     else:
         exact = _by_eigenvalues(critical, sliding_at)
     if critical.method == "eigenvalue":
         return exact
-    found = _by_simulation(critical, sliding_at, exact)
+    found = _bracketed(critical, exact) if exact_steps else _by_simulation(critical, sliding_at, exact)
 
     @cache
     def fades(value: float) -> bool | None:
         unstable = value >= found.upper if found.outcome is Outcome.FOUND else None
-        steady, case = sliding_at(value), _stepped(case_at(value))
+        steady, case = sliding_at(value), stepped(case_at(value))
         linear = steady is not None and not steady.opens
         # Beside stable sliding it may yet fade away, or has not yet come to where it lasts.
-        times, before = 1.0, None
+        times, before, longest = 1.0, cast("Verdict | Known | None", None), LONGER * case.solver.duration
+        with within_range():
+            known = early(system_of(changed(case, solver={"duration": longest})))
+        answer = _fades(known.verdict, longest, unstable, linear) if known is not None else None
+        if answer is not None:
+            return answer
         while times <= LONGER:
             duration = times * case.solver.duration
             verdict = verdict_of(changed(case, solver={"duration": duration}))
@@ -132,14 +142,13 @@ def search(
     return found._replace(sustained=sustained, sustained_outcome=outcome)
 
 
-def _stepped(case: Case) -> Case:
-    """The case with the step that growth is measured with, where it gives none: no run is computed twice."""
-    system = system_of(case)
-    method = with_step(system).method
-    if method == system.method:
-        return case
-    keys = ("scheme", "theta", "start", "step")
-    return changed(case, solver={**{key: getattr(method, key) for key in keys}, "tolerance": None})
+def _bracketed(critical: Critical, exact: Search) -> Search:
+    """The answer of the eigenvalues with a bracket as wide as one of runs."""
+    if exact.value is None:
+        return exact
+    half = 0.4 * critical.tolerance
+    lower, upper = max(critical.lower, exact.value - half), min(critical.upper, exact.value + half)
+    return exact._replace(lower=lower, upper=upper, error=0.5 * (upper - lower))
 
 
 def _by_eigenvalues(critical: Critical, sliding_at: SlidingAt) -> Search:
@@ -171,6 +180,8 @@ def _by_eigenvalues(critical: Critical, sliding_at: SlidingAt) -> Search:
         return _answer(critical, sliding_at, cache(unstable), values, partial(edge, unstable))
 
     exact = found(grows, SCANNED_WHERE_OPEN if opens else SCANNED_BY_EIGENVALUES)
+    if first is not None and first.system.method.own_steps:
+        return exact._replace(eigenvalue=exact.value, bias=0.0 if exact.value is not None else None)
     own = found(grows_in_steps, SCANNED_WHERE_OPEN)
     exact = exact._replace(eigenvalue=exact.value)
     if exact.value is None or own.value is None or exact.outcome is not own.outcome:
@@ -275,12 +286,14 @@ def _narrowed(at: Disturbances, low: float, high: float, critical: Critical, bia
     return Edge(value, low, high, error, not below)
 
 
-def _lasting(answer: bool, before: Verdict | None, verdict: Verdict) -> bool:
+def _lasting(answer: bool, before: Verdict | Known | None, verdict: Verdict | Known) -> bool:
     """Whether the answer of a run beside stable sliding is that of a longer one, too.
 
-    It is once the shoe has come to rest or moves by linear equations, and where the vibration is the same as in a
-    run half as long.
+    It is once the shoe has come to rest or moves by linear equations, where its orbit is known, and where the
+    vibration is the same as in a run half as long.
     """
+    if isinstance(verdict, Known):
+        return True
     if answer:
         return verdict.regime is Regime.DAMPED or verdict.stick_fraction + verdict.contact_loss_fraction == 0.0
     if before is None or before.regime is not verdict.regime:
@@ -288,7 +301,7 @@ def _lasting(answer: bool, before: Verdict | None, verdict: Verdict) -> bool:
     return abs(before.amplitude - verdict.amplitude) <= STEADY * verdict.amplitude
 
 
-def _fades(verdict: Verdict | None, duration: float, unstable: bool | None, linear: bool) -> bool | None:
+def _fades(verdict: Verdict | Known | None, duration: float, unstable: bool | None, linear: bool) -> bool | None:
     """Whether the vibration of a run dies out; None where the run does not answer that.
 
     `unstable`: what is known of steady sliding. Where it is unstable no vibration can die out. A `linear` motion

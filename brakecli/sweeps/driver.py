@@ -6,6 +6,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -37,14 +38,14 @@ class TaskQueue:
         runs = np.split(missing, np.flatnonzero(np.diff(missing) != 1) + 1)
         self._tasks = deque([Task(int(run[0]), len(run)) for run in runs if len(run)][::order])
         self._size = size
-        self._seconds, self._units = 0.0, 0
+        self.seconds, self.units = 0.0, 0  # computed so far
 
     def next_task(self) -> Task | None:
         """The next task, None where there is none now."""
         if not self._tasks:
             return None
         task = self._tasks.popleft()
-        by_time = math.ceil(min(TASK_SECONDS * self._units / max(self._seconds, 1e-9), LARGEST_TASK))
+        by_time = math.ceil(min(TASK_SECONDS * self.units / max(self.seconds, 1e-9), LARGEST_TASK))
         size = min(task.size, self._size or max(1, by_time))
         if size < task.size:
             self._tasks.appendleft(Task(task.first + size, task.size - size))
@@ -52,8 +53,8 @@ class TaskQueue:
 
     def note_time(self, task: Task, seconds: float) -> None:
         """Note how long a task has taken."""
-        self._seconds += seconds
-        self._units += task.size
+        self.seconds += seconds
+        self.units += task.size
 
     def retry(self, task: Task) -> bool:
         """Queue the units of a task that has failed once more, one by one; False if that was their last try."""
@@ -107,13 +108,14 @@ def sweep(
         with open_journal(journal_path(output), plan, force=force) as journal:
             resumed = journal.done
             begin(found, resumed)
-            notes = _compute(engine, journal, TaskQueue(journal.finished, task_size, order), progress)
-            seconds = time.perf_counter() - start
-            report = SweepReport(output, loaded, Findings(journal), seconds, resumed, notes)
+            queue = TaskQueue(journal.finished, task_size, order)
+            notes = _compute(engine, journal, queue, progress)
+            report = SweepReport(output, loaded, Findings(journal), resumed, notes, queue.units * plan.unit_length)
             write(result, report, journal)
             result.commit()
             journal.discard()
-    return report
+    seconds = time.perf_counter() - start
+    return replace(report, seconds=seconds, overhead=1.0 - queue.seconds / (seconds * engine.workers))
 
 
 def journal_path(output: Path) -> Path:

@@ -7,12 +7,17 @@ D(t₂) D(t₁)⁻¹ are those of the motion between, whatever the start put in.
 """
 
 import math
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.analysis.stability.modes import is_undamped
+from brakecli.case.case import Case, changed
+from brakecli.case.system import system_of
+from brakecli.errors import CaseError
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.motion import solve
 from brakecli.solver.quantities import HISTORY, Failure
@@ -90,16 +95,36 @@ class Sliding(SteadySliding):
         return self.stiffness < 0.999 * self.system.contact_stiffness
 
 
-def with_step(system: System) -> System:
+def with_step(system: System, *, unless: bool = False) -> System:
     """The system with the step that growth is measured with, where its method keeps a tolerance instead."""
     method = system.method
-    if not method.own_steps and method.step is not None:
+    if unless or (not method.own_steps and method.step is not None):
         return system
     passing = abs(system.belt_speed) * float(max(system.wheel.turns, default=0.0))
     fastest = max(system.natural_frequencies[1], passing)
     step = system.interval / math.ceil(system.interval * STEPS_PER_PERIOD * fastest)
     stepped = replace(method, scheme="two-layer", theta=(0.5, 0.5), start="consistent", step=step, automatic=False)
     return replace(system, method=stepped)
+
+
+def stepped(case: Case) -> Case:
+    """The case with the step that growth is measured with, where it gives none and no run of it is exact.
+
+    No run is then computed twice.
+    """
+    system = system_of(case)
+    method = with_step(system).method
+    if method == system.method or system.method.row.exact:
+        return case
+    keys = ("scheme", "theta", "start", "step")
+    return changed(case, solver={**{key: getattr(method, key) for key in keys}, "tolerance": None})
+
+
+def has_exact_steps(case_at: Callable[[float], Case], value: float) -> bool:
+    """Whether the steps of a case are exact: disturbances then grow as the eigenvalues say."""
+    with suppress(CaseError):
+        return system_of(case_at(value)).method.row.exact
+    return False
 
 
 def sliding(system: System) -> Sliding | None:

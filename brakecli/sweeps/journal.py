@@ -5,13 +5,16 @@ written at once with its checksum: whatever ends the process costs the block tha
 """
 
 import json
+import math
 import os
 import struct
 import tomllib
 import zlib
+from bisect import bisect_right, insort
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from io import FileIO
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +27,10 @@ from brakecli.sweeps.plan import Plan
 from brakecli.sweeps.point import Status, record_type
 from brakecli.sweeps.workers.task import fingerprint
 
-_PLACE = struct.Struct("<qq")  # first unit, units
-_HEAD = struct.Struct("<qqI")  # the place, checksum of the place and the records
+_PLACE = struct.Struct("<qqI")  # first unit, units, bytes of their records, which are packed
+_HEAD = struct.Struct("<qqII")  # the place, checksum of the place and the packed records
+_LEVEL = 1  # of packing: texts are alike, and numbers hardly smaller at the others
+_AT_ONCE = 1 << 14  # points read at a time
 _LONGEST_HEADER, _FIRST_KEY = 5_000_000, b"brakecli_version"
 MOST_DIFFERENCES = 5
 
@@ -40,41 +45,86 @@ class Journal:
         self.done, self.failed = 0, 0  # points
         self._file = file
         self._unit_bytes = plan.unit_length * self.kind.itemsize
-        self._blocks: list[tuple[int, int, int]] = []  # first unit, units, where their records begin
+        self._blocks: list[tuple[int, int, int, int]] = []  # first unit, units, where their records begin and end
+        self._longest = {name: 1 for name in self.kind.names or () if self.kind[name].kind == "S"}  # bytes
+        self._block = 0, b""  # read last: where it begins, and its records
+        self._slab: tuple[int, int, NDArray[Any]] | None = (
+            None  # lines read last: first and last, and their records
+        )
 
     def add(self, first: int, records: bytes) -> None:
         """Append the records of finished units."""
-        count = len(records) // self._unit_bytes
+        count, packed = len(records) // self._unit_bytes, zlib.compress(records, _LEVEL)
+        place = first, count, len(packed)
         offset = self._file.seek(0, os.SEEK_END)
         try:
             with explained(self.path):
-                self._write(_HEAD.pack(first, count, _checksum(first, count, records)) + records)
+                self._write(_HEAD.pack(*place, _checksum(place, packed)) + packed)
                 os.fsync(self._file.fileno())
         except CannotWriteError:
             with suppress(OSError):
                 os.ftruncate(self._file.fileno(), offset)
             raise
-        self._note(first, count, offset + _HEAD.size, records)
+        self._note(place, offset + _HEAD.size, records)
+
+    @property
+    def stored(self) -> np.dtype[Any]:
+        """The record of a point in a result: its texts as long as the longest of them."""
+        lengths = {name: f"S{length}" for name, length in self._longest.items()}
+        return np.dtype([(name, lengths.get(name, self.kind[name])) for name in self.kind.names or ()])
+
+    def read(self, start: int, stop: int) -> NDArray[Any]:
+        """The records of the places start … stop - 1 of the result, in its order; no unit may be missing."""
+        plan = self.plan
+        if plan.followed is None:
+            return self._units(start, stop)
+        inner = math.prod(plan.shape[plan.followed + 1 :])  # lines side by side, in as many units
+        size = inner * plan.unit_length
+        first, last = start // size * inner, -(-stop // size) * inner
+        if self._slab is None or self._slab[:2] != (first, last):
+            lines = self._units(first, last).reshape(-1, inner, plan.unit_length)
+            self._slab = first, last, np.ascontiguousarray(lines.transpose(0, 2, 1)).ravel()
+        begin = first * plan.unit_length
+        return self._slab[2][start - begin : stop - begin]
+
+    def blocks(self) -> Iterator[tuple[int, NDArray[Any]]]:
+        """All records in the order of the result, some at a time: the place of the first, and they."""
+        points = len(self.finished) * self.plan.unit_length
+        for start in range(0, points, _AT_ONCE):
+            yield start, self.read(start, min(start + _AT_ONCE, points))
 
     def column(self, name: str) -> NDArray[Any]:
         """A field of all records, in the shape of the grid; every unit has to be finished.
 
         A field of several numbers has one more dimension, as long as the record that holds most of them needs.
         """
-        kind = self.kind[name]
-        values = np.empty((len(self.finished), self.plan.unit_length), kind)
-        for first, count, offset in self._blocks:
-            data = os.pread(self._file.fileno(), count * self._unit_bytes, offset)
-            if len(data) < count * self._unit_bytes:
-                raise BrakecliError(f"{self.path}: was cut short while in use; run the same command again")
-            values[first : first + count] = np.frombuffer(data, self.kind)[name].reshape(count, -1, *kind.shape)
-        shape, followed = list(self.plan.dimensions.values()), self.plan.followed
-        along = len(shape) - 1 if followed is None else followed + self.plan.passes - 1
-        length = shape.pop(along)
-        column = np.moveaxis(values.reshape(*shape, length, *kind.shape), len(shape), along)
-        if kind.shape:
+        found = [records[name] for _, records in self.blocks()]
+        column = np.concatenate(found).reshape(*self.plan.dimensions.values(), *self.kind[name].shape)
+        if self.kind[name].shape:
             column = column[..., : max(1, int(np.isfinite(column).sum(axis=-1).max()))]
         return column
+
+    def _units(self, first: int, last: int) -> NDArray[Any]:
+        """The records of some units, in their order."""
+        length, kind = self.plan.unit_length, self.stored
+        records = np.empty((last - first) * length, kind)
+        for begin, count, start, end in self._blocks[bisect_right(self._blocks, first, key=itemgetter(0)) - 1 :]:
+            if begin >= last:
+                break
+            data = self._unpacked(start, end)
+            low, high = max(begin, first), min(begin + count, last)
+            found = np.frombuffer(data, self.kind)[(low - begin) * length : (high - begin) * length]
+            records[(low - first) * length : (high - first) * length] = found
+        return records
+
+    def _unpacked(self, start: int, end: int) -> bytes:
+        """The records of a block, which may be read in pieces."""
+        if self._block[0] != start:
+            try:
+                self._block = start, zlib.decompress(os.pread(self._file.fileno(), end - start, start))
+            except zlib.error:
+                raise BrakecliError(f"{self.path}: was changed while in use; run the same command again") from None
+        return self._block[1]
 
     def discard(self) -> None:
         """Remove the file: its sweep is finished."""
@@ -106,23 +156,27 @@ class Journal:
         """Note the blocks of a journal, and cut off one that was not finished."""
         self._file.seek(offset)
         while len(head := self._file.read(_HEAD.size)) == _HEAD.size:
-            first, count, checksum = _HEAD.unpack(head)
+            *place, checksum = _HEAD.unpack(head)
+            first, count, length = place
             if not 0 <= first < first + count <= len(self.finished):
                 break
-            records = self._file.read(count * self._unit_bytes)
-            if len(records) < count * self._unit_bytes or _checksum(first, count, records) != checksum:
+            packed = self._file.read(min(length, 2 * count * self._unit_bytes + 1000))
+            if len(packed) < length or _checksum((first, count, length), packed) != checksum:
                 break
             if not self.finished[first : first + count].any():  # a copy of a block brings nothing new
-                self._note(first, count, offset + _HEAD.size, records)
+                self._note((first, count, length), offset + _HEAD.size, zlib.decompress(packed))
             offset = self._file.tell()
         os.ftruncate(self._file.fileno(), offset)
 
-    def _note(self, first: int, count: int, offset: int, records: bytes) -> None:
-        self._blocks.append((first, count, offset))
+    def _note(self, place: tuple[int, int, int], offset: int, records: bytes) -> None:
+        first, count, length = place
+        insort(self._blocks, (first, count, offset, offset + length))
         self.finished[first : first + count] = True
-        statuses = np.frombuffer(records, self.kind)["status"]
-        self.done += len(statuses)
-        self.failed += int((statuses != Status.DONE.encode()).sum())
+        found = np.frombuffer(records, self.kind)
+        self.done += len(found)
+        self.failed += int((found["status"] != Status.DONE.encode()).sum())
+        for name in self._longest:
+            self._longest[name] = max(self._longest[name], int(np.char.str_len(found[name]).max()))
 
     def _write(self, data: bytes) -> None:
         """Write all of it: a disk that is nearly full takes a part."""
@@ -151,8 +205,8 @@ def open_journal(path: Path, plan: Plan, *, force: bool) -> Iterator[Journal]:
                 journal.discard()
 
 
-def _checksum(first: int, count: int, records: bytes) -> int:
-    return zlib.crc32(records, zlib.crc32(_PLACE.pack(first, count)))
+def _checksum(place: tuple[int, int, int], packed: bytes) -> int:
+    return zlib.crc32(packed, zlib.crc32(_PLACE.pack(*place)))
 
 
 def identity(plan: Plan) -> dict[str, Any]:

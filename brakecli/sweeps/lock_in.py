@@ -65,8 +65,8 @@ def lock_in(loaded: LoadedCase, axis: Axis, option: str, progress: Progress) -> 
     entries = []
     for value, report, pair in zip(values, reports, followed(sliding), strict=True):
         names = ("frequency", "growth", "damping_ratio")
-        columns = ([mode and getattr(mode, name) + 0.0 for mode in pair or (None, None)] for name in names)
-        found = dict(zip((field.name for field in fields.MODES), columns, strict=True))  # + 0.0: without -0
+        columns = ([mode and getattr(mode, name) for mode in pair or (None, None)] for name in names)
+        found = dict(zip((field.name for field in fields.MODES), columns, strict=True))
         entries.append({"value": value, **values_of(fields.VARIED, report), **found})
     critical = list[float]()
     turning = [

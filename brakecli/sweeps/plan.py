@@ -1,6 +1,5 @@
 """Sweep file → the case of every point of its grid, or every problem of the sweep and of its base case at once."""
 
-import copy
 import json
 import math
 import tomllib
@@ -69,7 +68,7 @@ class Plan:
 
     def case(self, settings: Settings) -> Case:
         """The base case with some values put into it; raises CaseError."""
-        data = copy.deepcopy(self.case_keys)
+        data = _tables(self.case_keys)
         for path, value in settings.items():
             put(data, path, value, Case, kept=settings)
         try:
@@ -90,6 +89,11 @@ class Plan:
         except CaseError as error:
             return error.problems
         return ()
+
+
+def _tables(data: dict[str, Any]) -> dict[str, Any]:
+    """The data of a table whose tables, but no lists, are copies."""
+    return {key: _tables(value) if isinstance(value, dict) else value for key, value in data.items()}
 
 
 def given_toml(table: Sweep | Case) -> str:

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,7 @@ from brakecli.solver.motion import Motion
 from brakecli.solver.roughness import TWO_PI, wheel_angles
 from brakecli.solver.schedules import integral_at
 from brakecli.sweeps.critical import search
+from brakecli.sweeps.early import Ending, Known, early
 from brakecli.sweeps.plan import Plan, Settings
 
 OUT_OF_MEMORY = "out of memory; sample less often, or reduce contact.nodes"
@@ -39,6 +41,7 @@ class Status(StrEnum):
     CRASHED = "crashed"
 
 
+@lru_cache(maxsize=4)
 def record_type(plan: Plan) -> np.dtype[Any]:
     """The record of a point of the sweep."""
     return np.dtype([(field.name, field.kind) for field in plan.fields])
@@ -48,9 +51,9 @@ def record_type(plan: Plan) -> np.dtype[Any]:
 class Outcome:
     """A run in memory, as far as a sweep is interested in it. `fields.POINT` says where each number is."""
 
-    verdict: Verdict
+    verdict: Verdict | Known
     case: Case
-    motion: Motion
+    motion: Motion | Ending
     certificate: Certificate | None  # where the case gives no step
     status: Status
     reason: str
@@ -58,18 +61,26 @@ class Outcome:
     warning_count: int
 
 
-def simulate(case: Case) -> Outcome:
-    """Run a case in memory; raises RefusedError, and CaseError where it has no start."""
+def simulate(case: Case, *, whole: bool = True) -> Outcome:
+    """Run a case in memory, to its end or, unless `whole`, only until its verdict is known.
+
+    Raises RefusedError, and CaseError where it has no start.
+    """
+    verdict: Verdict | Known
+    motion: Motion | Ending
     with within_range():
         system = system_of(case)
         found = check(system)
         refuse(found)
-        motion, certificate = motion_of(system)
-        if not np.isfinite(motion.rows).all():
-            raise FloatingPointError("a force overflows")
-        history = array_history(system.interval, motion.rows)
-        verdict = verdict_on(history, motion.system, motion.work.failure_sentence)
-    warnings, work = list(found.warnings), motion.work
+        if not whole and (known := early(system)) is not None:
+            verdict, motion, certificate = known
+        else:
+            motion, certificate = motion_of(system)
+            if not np.isfinite(motion.rows).all():
+                raise FloatingPointError("a force overflows")
+            history = array_history(system.interval, motion.rows)
+            verdict = verdict_on(history, system, motion.work.failure_sentence)
+    warnings, work = [*found.warnings, *verdict.reasons[1:]], motion.work
     if work.unconverged_steps and not work.failed:
         warnings.append(f"{work.unconverged_steps} of {work.steps} steps did not converge, as the case allows")
     if certificate is not None and not certificate.certified:
@@ -90,15 +101,15 @@ def compute(plan: Plan, first: int, count: int) -> NDArray[Any]:
     Along a line each point starts from the end of the one before. The wheel goes on turning: its waves keep the
     phases that they have come to.
     """
-    found = []
-    for unit in range(first, first + count):
-        records, start, outcome = dict[int, NDArray[Any]](), Settings(), None
-        for point in line_points(plan, unit):
+    found, length = np.zeros(count * plan.unit_length, record_type(plan)), plan.unit_length
+    for begin, unit in enumerate(range(first, first + count)):
+        points, start, outcome = line_points(plan, unit), Settings(), None
+        places = {point: place for place, point in enumerate(sorted(points), begin * length)}
+        for point in points:
             if outcome is not None and not outcome.motion.work.failed:
                 start = next_start(outcome)
-            records[point], outcome = _computed(plan, point, start)
-        found += [records[point] for point in sorted(records)]
-    return np.concatenate(found)
+            found[places[point]], outcome = _computed(plan, point, start)
+    return found
 
 
 def line_points(plan: Plan, line: int) -> list[int]:
@@ -131,10 +142,10 @@ def next_start(outcome: Outcome) -> Settings:
     return start
 
 
-def verdict_of(case: Case) -> Verdict | None:
-    """The verdict on a run in memory; None where it fails."""
+def verdict_of(case: Case) -> Verdict | Known | None:
+    """The verdict on a run in memory, as soon as it is known; None where the run fails."""
     with suppress(BrakecliError):
-        outcome = simulate(case)
+        outcome = simulate(case, whole=False)
         return None if outcome.motion.work.failed else outcome.verdict
     return None
 
@@ -143,7 +154,7 @@ def _computed(plan: Plan, point: int, start: Settings) -> tuple[NDArray[Any], Ou
     """The record of a point and its run, which is None where it was not possible."""
     settings = {**plan.settings(point), **start}
     try:
-        outcome = simulate(plan.case(settings))
+        outcome = simulate(plan.case(settings), whole=False)
         values = values_of(fields.POINT, outcome)
         if (critical := plan.sweep.critical) is not None:
             path = key_path(critical.parameter)
@@ -158,13 +169,16 @@ def _computed(plan: Plan, point: int, start: Settings) -> tuple[NDArray[Any], Ou
 
 def _filled(kind: np.dtype[Any], values: Mapping[str, Any]) -> NDArray[Any]:
     """A record of some values; missing numbers are NaN."""
-    record = np.zeros(1, kind)
-    for name in kind.names or ():
-        value = values.get(name)
-        if isinstance(value, str):  # as many whole characters as fit
-            record[name] = value.encode()[: kind[name].itemsize].decode(errors="ignore").encode()
-        elif isinstance(value, list):  # as many as there are, the rest missing
-            record[name] = np.resize(value + [math.nan] * kind[name].shape[0], kind[name].shape)
-        elif value is not None or kind[name].base.kind == "f":
-            record[name] = math.nan if value is None else value
-    return record
+    return np.array([tuple(_fitted(kind[name], values.get(name)) for name in kind.names or ())], kind)
+
+
+def _fitted(kind: np.dtype[Any], value: Any) -> Any:
+    """A value as its place in a record takes it."""
+    if isinstance(value, str):  # as many whole characters as fit
+        value = value.encode()
+        return value if len(value) <= kind.itemsize else value[: kind.itemsize].decode(errors="ignore").encode()
+    if isinstance(value, list):  # as many as there are, the rest missing
+        return np.resize(value + [math.nan] * kind.shape[0], kind.shape)
+    if value is None:
+        return b"" if kind.kind == "S" else math.nan if kind.base.kind == "f" else 0
+    return value

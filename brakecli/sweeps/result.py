@@ -34,19 +34,21 @@ class Findings:
 
     def __init__(self, journal: Journal) -> None:
         """Look through the variables of a sweep."""
-        plan, status = journal.plan, journal.column("status")
-        self.points, self.dimensions = status.size, tuple(journal.plan.dimensions)
-        failed = np.flatnonzero(status.ravel() != _DONE)
-        self.failed = len(failed)
-        first = failed[:MOST_FAILURES]
-        self.failures = [
-            {"point": point, "parameters": _parameters(plan, point), "reason": reason.decode()}
-            for point, reason in zip(first.tolist(), journal.column("reason").ravel()[first], strict=True)
-        ]
-        warned = np.flatnonzero(journal.column("warning_count").ravel())
-        self.warned = len(warned)
-        self.first_warning = journal.column("warning").ravel()[warned[0]].decode() if len(warned) else ""
-        regimes = Counter(journal.column("regime").ravel())
+        plan = journal.plan
+        self.points, self.dimensions = plan.passes * plan.points, tuple(plan.dimensions)
+        self.failed, self.warned, self.first_warning = 0, 0, ""
+        self.failures: list[dict[str, Any]] = []
+        regimes = Counter[bytes]()
+        for start, records in journal.blocks():
+            failed, warned = np.flatnonzero(records["status"] != _DONE), np.flatnonzero(records["warning_count"])
+            for place in failed[: MOST_FAILURES - len(self.failures)].tolist():
+                point, reason = start + place, records["reason"][place].decode()
+                self.failures.append({"point": point, "parameters": _parameters(plan, point), "reason": reason})
+            if len(warned) and not self.warned:
+                self.first_warning = records["warning"][warned[0]].decode()
+            self.failed, self.warned = self.failed + len(failed), self.warned + len(warned)
+            names, counts = np.unique(records["regime"], return_counts=True)
+            regimes.update(dict(zip(names.tolist(), counts.tolist(), strict=True)))
         self.regimes = {name.decode(): count for name, count in sorted(regimes.items())}
         self.hysteresis: NDArray[Any] | None = None
         self.critical: tuple[int, float, float] | None = None  # how many points have one, the least, the largest
@@ -63,7 +65,7 @@ class Findings:
                 journal, WIDE * (plan.sweep.critical.upper - plan.sweep.critical.lower)
             )
         self.variables: dict[str, Any] | None = None
-        if status.size <= MOST_AS_JSON:
+        if self.points <= MOST_AS_JSON:
             self.variables = {field.name: plain(journal.column(field.name)) for field in plan.fields}
 
 
@@ -74,9 +76,16 @@ class SweepReport:
     output: Path
     loaded: LoadedSweep
     findings: Findings
-    seconds: float
     resumed: int  # points that were there already
     notes: tuple[str, ...]
+    computed: int  # points that were not
+    seconds: float = 0.0  # of the command
+    overhead: float = 0.0  # part of the workers' time that they did not spend on points
+
+    @property
+    def points_per_second(self) -> float | None:
+        """How fast points were computed, start and end of the command included."""
+        return self.computed / self.seconds if self.computed and self.seconds else None
 
     @property
     def axes(self) -> dict[str, Any]:
@@ -103,18 +112,29 @@ def write(result: ResultFile, report: SweepReport, journal: Journal) -> None:
         result.variable("/", field, (axis.name,), data, parameters=list(axis.parameter))
     if not plan.sweep.axis:
         result.axis("/", fields.BASE_POINT, np.zeros(1))
+    windows = 0
     if plan.sweep.critical is not None:
-        result.axis("/", fields.WINDOW, np.arange(float(journal.column("critical_windows_lower").shape[-1])))
+        windows = journal.column("critical_windows_lower").shape[-1]
+        result.axis("/", fields.WINDOW, np.arange(float(windows)))
     for field in plan.fields:
-        attributes, critical = {}, plan.sweep.critical
+        attributes, critical, kind, dimensions = (
+            {},
+            plan.sweep.critical,
+            journal.stored[field.name],
+            found.dimensions,
+        )
         if critical is not None and field in fields.CRITICAL and "f8" in field.kind:
             attributes, field = {"parameter": critical.parameter}, replace(field, units=unit(critical.parameter))
-        data = journal.column(field.name)
-        data = np.char.decode(data, "utf-8") if data.dtype.kind == "S" else data
-        dimensions = found.dimensions
-        if field.kind == fields.WINDOWS:
-            dimensions, field = (*dimensions, fields.WINDOW.name), replace(field, kind="f8")
-        result.column(field, dimensions, data, **attributes)
+        if kind.shape:
+            dimensions = (*dimensions, fields.WINDOW.name)
+        result.begin_column(field, dimensions, kind, **attributes)
+    for first, last, where in result.blocks(found.dimensions):
+        records = journal.read(first, last)
+        shape = [each.stop - each.start for each in where]
+        for field in plan.fields:
+            values = records[field.name]
+            values = values[:, :windows] if values.ndim > 1 else values
+            result.fill(field.name, where, values.reshape(*shape, *values.shape[1:]))
     if found.hysteresis is not None:
         result.column(*fields.DIFFERENCE, found.dimensions[1:], found.hysteresis)
 
@@ -157,7 +177,8 @@ def _on_hysteresis(journal: Journal, hysteresis: NDArray[Any]) -> Iterator[str]:
     if count := int(hysteresis.sum()):
         where = [_parameters(journal.plan, int(index)) for index in np.flatnonzero(hysteresis.ravel())[:3]]
         places = "; ".join(", ".join(f"{key} = {label(value)}" for key, value in each.items()) for each in where)
-        yield f"hysteresis at {count} of {hysteresis.size} points: {places}{' …' if count > 3 else ''}"
+        more = f"; and {count - 3} more" if count > 3 else ""
+        yield f"hysteresis at {count} of {hysteresis.size} points: {places}{more}"
     known = hysteresis.size - int(_unknown(journal).sum())
     if known and not count:
         those = f" at the {known} points that are decided" if known < hysteresis.size else ""

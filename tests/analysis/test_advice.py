@@ -286,3 +286,10 @@ def test_keys_are_chosen_by_patterns() -> None:
             advised_keys(case, (wrong,))
     lower = advised(make(SQUEAL, friction__coefficient=0.7), ("friction", "coefficient"), 0.2, tell)
     assert lower.to == pytest.approx(0.57537616 / 1.2, rel=1e-7)
+
+
+def test_an_angle_that_helps_at_0_alone_is_advised_so_exactly() -> None:
+    """With a dashpot along the wheel alone the shoe is stable where nothing couples it: at 0, not near it."""
+    case = make(SQUEAL, link1__damping=0.0, link2__angle_deg=0.7)
+    found = advised(case, ("link2", "angle_deg"), 0.2, tell)
+    assert (found.to, found.rounded, found.critical_friction) == (0.0, "0", None)

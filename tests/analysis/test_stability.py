@@ -262,3 +262,16 @@ def test_modes_of_a_decoupled_shoe_have_the_ratios_of_single_oscillators() -> No
     found = modes(c, 0.0, 0.0)
     expected = sorted((300 / (2 * math.sqrt(4e7)), 200 / (2 * math.sqrt(1e8))))
     assert sorted(mode.damping_ratio for mode in found) == pytest.approx(expected, rel=1e-12)
+
+
+def test_zeros_have_no_sign() -> None:
+    """Without dashpots and beyond divergence, as the wheel turns back: two eigenvalues are real, two are not."""
+    c = Coefficients(1.0, 0.0, 0.0, 0.0, 2.0, -1.0, 2.0 - 4.0 / 3.0, 0.0, 1.0, 3.0)
+    zeros = [
+        n
+        for mode in modes(c, 4.0 / 3.0, -3.0)
+        for n in (mode.growth, mode.frequency, mode.damping_ratio)
+        if n == 0.0
+    ]
+    assert len(zeros) == 4
+    assert all(math.copysign(1.0, zero) > 0.0 for zero in zeros)

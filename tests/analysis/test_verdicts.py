@@ -153,7 +153,7 @@ def test_numbers_of_a_lasting_motion_are_medians_without_its_transient() -> None
     vx = 1e-2 * (1.0 + 0.04 * np.exp(-4.0 * time)) * np.sin(2 * np.pi * 170.0 * time)
     state = np.where(vx > 0.0099, 0.0, -1.0)
     motion = history_of(len(vx), vx=vx, x=np.cumsum(vx) * INTERVAL, state=state, friction_force=vx)
-    verdict = classify(motion, Context(1e-2))
+    verdict = classify(motion, Context(1e-2, growth=lambda: 10.0))
     assert verdict.regime is Regime.RELAXATION
     # The transient has fallen to less than e^-4 of 4 % by the middle of the settled part.
     assert verdict.amplitude == pytest.approx(1e-2 / (2 * np.pi * 170.0), rel=2e-3)

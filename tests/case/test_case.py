@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from brakecli.case.case import Case, resolved_toml
-from brakecli.case.read import parse_case, read_case, starter_text
+from brakecli.case.read import parse_case, read_case, starters
 from brakecli.case.tables import json_schema, tables_within
 from brakecli.solver.method import MOST
 from tests.case.examples import SMALL
@@ -224,7 +224,7 @@ def test_the_shipped_schema_is_the_one_the_models_give() -> None:
 
 def test_the_schema_is_valid_and_accepts_the_starter_case() -> None:
     jsonschema.Draft202012Validator.check_schema(json_schema(Case))
-    VALIDATOR.validate(tomllib.loads(starter_text()))
+    VALIDATOR.validate(tomllib.loads(starters()["case"]))
 
 
 @pytest.mark.parametrize(
@@ -241,19 +241,19 @@ def test_the_schema_is_valid_and_accepts_the_starter_case() -> None:
     ],
 )
 def test_the_schema_refuses_wrong_values(table: str, key: str, value: object) -> None:
-    document = tomllib.loads(starter_text())
+    document = tomllib.loads(starters()["case"])
     document[table][key] = value
     assert not VALIDATOR.is_valid(document)
 
 
 def test_the_schema_refuses_two_alternatives_at_once() -> None:
-    document = tomllib.loads(starter_text())
+    document = tomllib.loads(starters()["case"])
     document["load"] |= {"times": [0.0], "forces": [1.0]}
     assert not VALIDATOR.is_valid(document)
 
 
 def test_the_starter_mentions_every_key() -> None:
-    text = starter_text()
+    text = starters()["case"]
     seen = 0
     for path, table in tables_within(Case).items():
         for key in table.model_fields:
@@ -264,16 +264,16 @@ def test_the_starter_mentions_every_key() -> None:
 
 
 def test_each_alternative_of_the_starter_is_valid() -> None:
-    lines = starter_text().splitlines()
+    lines = starters()["case"].splitlines()
     roughness = [line[2:] for line in lines if line.startswith(("# [", "# amplitudes", "# wave", "# phases"))]
-    case = parse_case(starter_text() + "\n" + "\n".join(roughness), "rough").case
+    case = parse_case(starters()["case"] + "\n" + "\n".join(roughness), "rough").case
     assert case.roughness.shoe is not None
     assert case.roughness.wheel is not None
     keys = ("times", "angular_speeds", "forces", "nodes", "step", "theta", "iteration", "start")
     commented = [line[2:] for line in lines if line.startswith(tuple(f"# {key} = " for key in keys))]
     tables_of = ["wheel", "wheel", "load", "load", "contact", *["solver"] * 5]
     overrides = [f"{table}.{line}" for table, line in zip(tables_of, commented, strict=True)]
-    solver = parse_case(starter_text(), "all", [*overrides, 'solver.scheme="three-layer"']).case.solver
+    solver = parse_case(starters()["case"], "all", [*overrides, 'solver.scheme="three-layer"']).case.solver
     assert solver.theta == (0.25, 0.5, 0.25)
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from brakecli.case.read import starter_text
+from brakecli.case.read import starters
 from brakecli.cli.app import main
 from brakecli.files.os_signals import guard_streams
 from tests.campaign import campaign, counts
@@ -61,7 +61,7 @@ def test_a_file_with_mistakes_is_refused_with_a_sentence_for_each_or_valid(
         monkeypatch.setattr(sys, name, getattr(sys, name))
     guard_streams()
     chance, codes = random.Random(number), list[object]()
-    texts = (TINY, starter_text(), starter_text() + ROUGH, SWEEP)
+    texts = (TINY, starters()["case"], starters()["case"] + ROUGH, SWEEP)
     for n in range(number):
         name = f"{n}.toml"  # pipes are read once, and so is each name
         data = mutated(chance.choice(texts), chance)

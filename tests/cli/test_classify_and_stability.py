@@ -135,6 +135,6 @@ def test_stability_varies_a_key(here: Path) -> None:
     table, numbers = each(
         here, [["stability", RELAXATION, "--vary", "link2.angle_deg=-5:5:3", *more] for more in ([], ["--json"])]
     )
-    assert "critical friction of the scheme" in table.out
+    assert {"critical", "friction", "of", "the", "scheme"} <= {*table.out.partition("Along ")[2].split()}
     kinds = [entry["instability"] for entry in numbers.json["vary"]]
     assert kinds == ["divergence", None, "flutter"]

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from brakecli import __version__
-from brakecli.case.read import starter_text
+from brakecli.case.read import starters
 from brakecli.solver.quantities import HISTORY
 from tests.commands import (
     COMMAND,
@@ -202,7 +202,7 @@ def test_new_writes_a_case_that_runs(tmp_path: Path) -> None:
     options: dict[str, Any] = {"cwd": tmp_path, "env": environment(), "check": True, "timeout": LIMIT}
     made = subprocess.run([installed, "new", "my wheel"], capture_output=True, text=True, **options)
     assert "brakecli run 'my wheel.toml'" in made.stdout
-    assert (tmp_path / "my wheel.toml").read_text() == starter_text()
+    assert (tmp_path / "my wheel.toml").read_text() == starters()["case"]
     ran = subprocess.run([installed, "run", "my wheel.toml", "--json"], capture_output=True, **options)
     assert json.loads(ran.stdout)["regime"] == "relaxation"
     assert left_in(tmp_path) == {"my wheel.toml", "my wheel.h5"}

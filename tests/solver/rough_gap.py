@@ -176,13 +176,14 @@ def unfilled(evaluator: str, pad: Pad) -> Layer:
     layer = build_layer(contact.load(evaluator), pad)
     layer.scratch[:] = np.nan
     for name in layer.contact.dtype.names:
-        layer.contact[name] = -1 if name in ("kind", "valid") else np.nan
+        if name != "reach":  # which is given
+            layer.contact[name] = -1 if name in ("kind", "valid") else np.nan
     return layer
 
 
 def outputs(found: Any) -> NDArray[np.float64]:
-    """The quantities of a record of CONTACT, in their order, without kind and valid."""
-    return np.array(found.tolist()[:-2])
+    """The quantities of a record of CONTACT, in their order, without what it notes beside them."""
+    return np.array(found.tolist()[:6])
 
 
 def _surface(waves: tuple[Wave, ...]) -> Surface:

@@ -12,7 +12,8 @@ from brakecli.solver import contact
 from brakecli.solver.contact.closed_form import CLEAR, FULL, coverage
 from brakecli.solver.contact.pad import NODES_PER_WAVE, build_layer, build_pad, default_nodes
 from brakecli.solver.roughness import Surface, surface
-from tests.solver.rough_gap import EPS, EVALUATORS, Gap, Wave, gaps, outputs
+from tests.campaign import counts
+from tests.solver.rough_gap import EPS, EVALUATORS, Gap, Wave, gaps, outputs, unfilled
 
 # Case B of the roughness: five waves on each surface.
 CASE_B_SHOE = (Wave(30e-6, 0.020), Wave(21e-6, 0.011), Wave(15e-6, 0.007), Wave(9e-6, 0.005), Wave(6e-6, 0.003))
@@ -401,6 +402,41 @@ def test_exact_agrees_with_a_brute_force_scan() -> None:
         )
 
 
+@pytest.mark.parametrize("pads", counts(10, 300))
+def test_exact_finds_on_the_way_what_it_finds_from_nothing(pads: int) -> None:
+    """What is kept from one evaluation to the next, along paths of small and large moves, some past an extreme of
+    the gap by a hair, against a layer that knows nothing.
+    """
+    rng, evaluate, checked = np.random.default_rng(29), contact.load("exact"), 0
+    for _ in range(pads):
+        gap = random_gap(rng)
+        pad, levels, (steep, crest) = (
+            gap.pad(0),
+            [gap.value(xi) for xi in gap.extremes],
+            (gap.steepest(), gap.crest),
+        )
+        layer, x, y = build_layer(evaluate, pad), gap.x, 0.0
+        layer.angles[:] = gap.angles
+        scale = 2 * gap.a * gap.k * np.array([crest, 1, steep, 0, crest**2, crest * steep])
+        scale[3] = 1  # fraction
+        move, lift = 10 ** rng.uniform(-8, -3), crest * 10 ** rng.uniform(-5, -1)
+        for _ in range(60):
+            where = rng.random()
+            if where < 0.3:  # there and back, or past an extreme
+                x, y = gap.x, rng.choice(levels) + crest * 10 ** rng.uniform(-9, -2) * rng.choice([-1, 1])
+            elif where < 0.35:
+                x, y = rng.uniform(-1, 1), crest * rng.uniform(-1.2, 1.2)
+            else:
+                x, y = x + move * rng.normal(), y + lift * rng.normal()
+            fresh = unfilled("exact", pad)
+            fresh.angles[:] = layer.angles
+            for each in (layer, fresh):
+                evaluate(x, y, each)
+            assert np.all(np.abs(outputs(layer.contact) - outputs(fresh.contact)) <= 1e-11 * scale)
+            checked += 0 < fresh.contact.fraction < 1
+    assert checked > 10 * pads
+
+
 @pytest.mark.parametrize("shift", [0.0, 1e-15, 1e-12, 1e-9, 1e-6])
 def test_exact_ends_where_two_equal_profiles_meet(shift: float) -> None:
     """The gap is its own rounding all over the pad, and no cell small enough has a sign: it must not be sought."""
@@ -408,7 +444,7 @@ def test_exact_ends_where_two_equal_profiles_meet(shift: float) -> None:
     gap = Gap(profile, profile, 0.05, shift, 0.0)
     found = gap.evaluate("exact")
     highest = gap.steepest() * shift + gap.rounding
-    assert np.isfinite(found.tolist()).all()
+    assert np.isfinite(outputs(found)).all()
     assert 0.0 <= found.normal_force <= 2 * gap.a * gap.k * highest
     assert 0.0 <= found.fraction <= 1.0
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from brakecli.case.case import Case
-from brakecli.case.read import parse_case, starter_text
+from brakecli.case.read import parse_case, starters
 from brakecli.case.system import system_of
 from brakecli.case.tables import key_schema
 from brakecli.errors import CaseError
@@ -18,7 +18,7 @@ from brakecli.solver.implicit_step import SOLVED, newton
 from brakecli.solver.loop import advance
 from brakecli.solver.records import PROBLEM, WORK, Coefficients, Weights, new
 from brakecli.solver.roughness import surface
-from tests.solver.rough_gap import unfilled
+from tests.solver.rough_gap import outputs, unfilled
 
 EVALUATORS = sorted(module.name for module in pkgutil.iter_modules(contact.__path__) if module.name != "pad")
 SCHEMES = sorted(module.name for module in pkgutil.iter_modules(schemes.__path__))
@@ -48,7 +48,7 @@ def test_every_file_can_be_named_in_a_case_and_every_name_has_a_file() -> None:
 def test_a_row_added_to_a_registry_can_be_named_in_a_case_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     chosen = ['contact.evaluator="other"', 'solver.scheme="three-equal"']
     with pytest.raises(CaseError) as caught:
-        parse_case(starter_text(), "starter", chosen)
+        parse_case(starters()["case"], "starter", chosen)
     assert [str(problem) for problem in caught.value.problems] == [
         '--set contact.evaluator="other": contact.evaluator: is not one of the choices (found "other");'
         ' give one of "auto", "closed-form", "midpoint", "exact"',
@@ -58,11 +58,11 @@ def test_a_row_added_to_a_registry_can_be_named_in_a_case_at_once(monkeypatch: p
     row = replace(schemes.SCHEMES["three-layer"], theta=(0.3, 0.4, 0.3), starts=("consistent",))
     monkeypatch.setitem(schemes.SCHEMES, "three-equal", row)
     monkeypatch.setitem(contact.EVALUATORS, "other", contact.EVALUATORS["exact"])
-    method = system_of(parse_case(starter_text(), "starter", chosen).case).method
+    method = system_of(parse_case(starters()["case"], "starter", chosen).case).method
     assert (method.row, method.theta, method.evaluator) == (row, row.theta, "other")
     assert "three-equal" in key_schema(Case, ("solver", "scheme"))["enum"]
     with pytest.raises(CaseError, match="is only for the three-layer scheme"):
-        parse_case(starter_text(), "starter", [*chosen, 'solver.start="paper"'])
+        parse_case(starters()["case"], "starter", [*chosen, 'solver.start="paper"'])
 
 
 # --- evaluators ----------------------------------------------------------------------------------------------
@@ -89,7 +89,8 @@ def test_an_evaluator_fills_its_results_and_leaves_everything_else(name: str) ->
         y = rng.uniform(-1.5, 1.5) * height
         evaluate(rng.uniform(-1e-2, 1e-2), y, layer)
         filled = layer.contact
-        assert np.isfinite(filled.tolist()).all()
+        assert np.isfinite([*outputs(filled), filled.blur]).all()
+        assert filled.near >= 0.0
         assert filled.normal_force >= 0.0
         assert filled.stiffness >= 0.0
         assert 0.0 <= filled.fraction <= 1.0

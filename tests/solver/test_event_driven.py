@@ -140,7 +140,7 @@ def rough_case(rng: np.random.Generator, tolerance: float) -> tuple[dict[str, An
 @pytest.mark.parametrize("motions", counts(3, 6))
 def test_rough_motions_agree_with_an_independent_solver(motions: int) -> None:
     # scipy's error estimate is blind to kinks at certain places of a step: its tolerance of 1e-12 alone leaves
-    # errors of up to 1e-8. A longest step of 0.003/ω bounds what a kink can do there.
+    # errors of up to 1e-8. A longest step of 0.002/ω bounds what a kink can do there.
     rng = np.random.default_rng(5)
     seen: set[float] = set()
     partly = phases = 0
@@ -149,7 +149,7 @@ def test_rough_motions_agree_with_an_independent_solver(motions: int) -> None:
         result = simulate(Case.model_validate(case))
         assert result.work.failure is Failure.NONE
         assert amplification(case, result.rows) < 1e4
-        reference = SolveIvp(system_of(Case.model_validate(case)), 1e-13, 0.003 / omega)
+        reference = SolveIvp(system_of(Case.model_validate(case)), 1e-13, 0.002 / omega)
         exact = reference.run(result.rows[0, :4], result.time)
         assert error(result.rows, exact) < 1e-9
         seen |= set(result.state)

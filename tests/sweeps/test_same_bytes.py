@@ -13,7 +13,11 @@ pytestmark = pytest.mark.usefixtures("compiled")
 
 SWEEPS = {
     "grid": (frictions(5), axis("link2.angle_deg", "values = [1.0, 5.0, 9.0]")),
-    "followed": (frictions(3, 'direction = "both"'), axis("link2.angle_deg", "values = [1.0, 5.0, 9.0]")),
+    "followed": (  # the second scheme ends its points early
+        axis("solver.duration", "values = [0.6]"),
+        axis("solver.scheme", 'values = ["two-layer", "piecewise-exact"]'),
+        frictions(3, 'direction = "both"'),
+    ),
     "critical": (
         axis("link2.angle_deg", "start = 1.0", "stop = 9.0", "num = 4"),
         '[critical]\nparameter = "friction.coefficient"\nlower = 0.0\nupper = 2.0\nmethod = "eigenvalue"\n',

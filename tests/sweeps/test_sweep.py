@@ -201,7 +201,8 @@ output.sample_interval = 1e-4
 """
 
 
-def test_hysteresis_between_up_and_down_is_found_and_reported(tmp_path: Path) -> None:
+@pytest.mark.parametrize("steps", ["step = 2e-5", "tolerance = 1e-3"])
+def test_hysteresis_between_up_and_down_is_found_and_reported(tmp_path: Path, steps: str) -> None:
     """A shoe that vibrates on a stiff contact goes on doing so where one at rest on it stays at rest."""
     case = """\
 shoe.mass = 15.7
@@ -217,7 +218,7 @@ solver = { step = 2e-5, duration = 4.0 }
 output.sample_interval = 1e-4
 """
     axis = '[[axis]]\nparameter = "friction.coefficient"\nvalues = [0.2, 1.0, 2.0, 3.4]\ndirection = "both"\n'
-    report = run(tmp_path, 'case = "tiny.toml"\n' + axis, case)
+    report = run(tmp_path, 'case = "tiny.toml"\n' + axis, case.replace("step = 2e-5", steps))
     found = opened(tmp_path / "sweep.h5")
     up, down = found.sel(direction="up"), found.sel(direction="down")
     assert list(up.regime.values[:3]) == ["damped"] * 3

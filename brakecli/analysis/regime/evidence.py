@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ FEWEST_SAMPLES = 160  # of a history that has an envelope
 WINDOWS = 40
 _LAST = slice(-10, None)  # windows that give the final values
 _LONGEST = 1 << 20  # samples read at a time; cycles and lines are sought in at most so many, the last ones
-_LINE_BINS = 4  # on either side of a line: the Hann window's main lobe, and the line's drift within the record
+LINE_BINS = 4  # on either side of a line: the Hann window's main lobe, and the line's drift within the record
 _MOST_LINES = 8
 _LEAST_LINE = 1e-3  # part of the energy
 _HARMONICS = 5
@@ -130,7 +130,7 @@ class Part:
     def covered(self, lines: Sequence[float]) -> float:
         """Part of the band up to the highest frequency of note that lines (Hz) take: what chance would find."""
         frequencies, power, total = self._spectrum
-        band = 1 + int(np.searchsorted(np.cumsum(power), 0.99 * total)) + _LINE_BINS
+        band = 1 + int(np.searchsorted(np.cumsum(power), 0.99 * total)) + LINE_BINS
         return float(_near(lines, frequencies)[:band].mean()) if lines else 0.0
 
     def split(self, lines: Sequence[float]) -> tuple[float, float] | None:
@@ -144,7 +144,7 @@ class Part:
         window, middle = np.hanning(len(x)), slice(len(x) // 4, 3 * len(x) // 4)
         spectrum = np.fft.rfft(x * window)
         chosen = _near(lines, np.fft.rfftfreq(len(x), self.history.interval))
-        chosen[: _LINE_BINS // 2] = True
+        chosen[: LINE_BINS // 2] = True
         forced = np.fft.irfft(np.where(chosen, spectrum, 0.0), len(x))[middle] / window[middle]
         forced -= 0.5 * (forced.max() + forced.min())
         parts = 0.5 * float(np.ptp(forced)), 0.5 * float(np.ptp(x[middle] - forced))
@@ -156,7 +156,7 @@ class Part:
         left, found = power.copy(), list[tuple[float, float, float]]()
         while total > 0.0 and len(found) < _MOST_LINES:
             top = int(np.argmax(left))
-            near = slice(max(top - _LINE_BINS, 0), top + _LINE_BINS + 1)
+            near = slice(max(top - LINE_BINS, 0), top + LINE_BINS + 1)
             share = float(left[near].sum()) / total
             if share < _LEAST_LINE:
                 break
@@ -165,7 +165,7 @@ class Part:
                 continue  # a line of fewer cycles is not told from the drift of the mean
             frequency = interpolated(frequencies, power, top)
             distance = min((abs(line - frequency) for line in forced), default=np.inf)
-            found.append((frequency, share, float(distance <= _LINE_BINS * frequencies[1])))
+            found.append((frequency, share, float(distance <= LINE_BINS * frequencies[1])))
         names = ("line_frequencies", "line_shares", "line_forced")
         return {name: [line[i] for line in found] for i, name in enumerate(names)}
 
@@ -175,7 +175,7 @@ def _near(lines: Sequence[float], frequencies: NDArray[Any]) -> NDArray[np.bool_
     chosen = np.zeros(len(frequencies), dtype=bool)
     for line in lines:
         middle = round(line / frequencies[1])
-        chosen[max(middle - _LINE_BINS, 0) : middle + _LINE_BINS + 1] = True
+        chosen[max(middle - LINE_BINS, 0) : middle + LINE_BINS + 1] = True
     return chosen
 
 
@@ -248,8 +248,8 @@ class Cycles:
     stick_fraction: float
     contact_loss_fraction: float
     limited: float  # part of the groups of cycles in which the shoe sticks, leaves the wheel or overtakes it
-    drift: float  # by which the amplitude changes, over itself, from the first third of the cycles to the last
-    drifts: bool  # whether that is more than chance; then the spread contains it
+    drift: "Drift"  # of the amplitude
+    detuning: "Drift"  # of the period
     force_variation: float  # N, peak to peak of the friction force
 
 
@@ -295,13 +295,11 @@ def cycles_of(part: Part, slip: ContactState | None = None) -> Cycles | None:
     }
     limited = float(np.mean(shares(state != slip) > 0.0))
     sizes = swings(part, crossings)
-    drift, drifts = _drift(sizes)
+    drift, detuning = _drift(sizes), _drift(np.diff(crossings))
     force, whole = part.history.read("friction_force", part.stop - len(velocity), part.stop), crossings.astype(int)
     most, least = (each.reduceat(force[: whole[-1]], whole[:-1]) for each in (np.maximum, np.minimum))
-    size, spread = median(sizes)
-    spread += abs(drift) * size if drifts else 0.0
-    medians = size, spread, stick, loss
-    return Cycles(evidence, frequency, *medians, limited, drift, drifts, median(most - least)[0])
+    medians = *median(sizes), stick, loss
+    return Cycles(evidence, frequency, *medians, limited, drift, detuning, median(most - least)[0])
 
 
 def _beginnings(velocity: Array) -> tuple[Array, int]:
@@ -318,12 +316,19 @@ def _beginnings(velocity: Array) -> tuple[Array, int]:
     return crossings, 1
 
 
-def _drift(sizes: Array) -> tuple[float, bool]:
-    """By which the size of cycles changes, over itself, and whether that is more than chance."""
+class Drift(NamedTuple):
+    """Part of itself by which a number changes from the first third of the cycles to the last."""
+
+    part: float
+    sure: bool  # whether it is more than chance
+
+
+def _drift(sizes: Array) -> Drift:
+    """The drift of a number, one for each cycle."""
     first, *_, last = (median(third)[0] for third in np.array_split(sizes, 3) if len(third))
     groups = np.array([median(group)[0] for group in np.array_split(sizes, min(len(sizes), _GROUPS))])
     places = np.arange(len(groups)) - 0.5 * (len(groups) - 1)
     slope = float(places @ groups / (places @ places))
     rest = groups - groups.mean() - slope * places
     error = float(np.std(rest) / (np.std(places) * np.sqrt(max(len(groups) - 2, 1))))
-    return last / first - 1.0 if first > 0.0 else 0.0, abs(slope) > _TREND * error
+    return Drift(last / first - 1.0 if first > 0.0 else 0.0, abs(slope) > _TREND * error)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.analysis.regime.evidence import WINDOWS, Cycles, Envelope, Part
+from brakecli.analysis.regime.evidence import LINE_BINS, WINDOWS, Cycles, Envelope, Part
 from brakecli.analysis.regime.verdict import Context, Decision, Excitation, Feeds, Regime, Thresholds
 from brakecli.solver.history import History
 
@@ -63,6 +63,8 @@ class ForcedRules:
         self.cycles: Cycles | None = None
         # m, half of peak to peak of what is forced and what is added
         self.parts: tuple[float, float] | None = None
+        self.unseen = 0.0  # m, by which waves that beat force more at other times
+        self.rings = False  # whether what the shoe adds to a forced motion has not died away yet
         self.evidence: dict[str, Any] = {}
 
     def _slowest(self, amplitude: float) -> float:
@@ -123,7 +125,7 @@ class ForcedRules:
         what = f"{share:.0%} of the energy of vx lies on the lines of the roughness"
         if powers_of_e > _NOTHING:
             own = f"but sliding is unstable: the shoe's own vibration grows at {growth:.3g} 1/s"
-            text = f"{what}, {own}; run at least {GROWN / growth:.2g} s, or decide by {SECOND_RUN}"
+            text = f"{what}, {own}; run at least {1.01 * GROWN / growth:.3g} s, or decide by {SECOND_RUN}"
             return self.fed() or Decision(text, second_run=True)
         if feeds is Feeds.FRICTION and self.evidence["power_of_roughness"] < 0.0:
             return None
@@ -215,14 +217,54 @@ class ForcedRules:
 
     def _forced(self, text: str) -> Decision:
         """Forced, as seen in a settled part of two periods of the slowest wave."""
-        self._settle()
+        growth = self.context.growth()
+        fading = 0.25 * self.duration * growth > -_RELAXED  # too slowly to be seen within a quarter of the run
+        falls = 0.0
+        if not self._settle() and not fading:
+            falls, changes = self._changes()
+            self.settled = changes <= self.limits.settled_within
         slow = self._slowest(self.settled_part.amplitude("x"))
         if self._settled_seconds < 2.0 * slow:
             return self._too_short(slow)
-        if not self.lasts and (growth := self.context.growth()) < 0.0:
-            needed = max(QUARTER * (self.duration - 3.0 / growth), self._long_enough(slow))
+        self.rings = not self.lasts and growth < 0.0 and (fading or falls > self.limits.settled_within)
+        if self.rings:
+            if own := self._own_line():
+                ringing = f"the shoe's own vibration at {own:.4g} Hz, which decays, lies on the same lines"
+                text = f"sliding is stable, and the roughness shakes the shoe; {ringing}"
+            needed = max(QUARTER * (self.duration - self._powers_to_lose / growth), self._long_enough(slow))
             text += f"; run at least {needed:.3g} s to see the amplitude that lasts"
         return Decision(text, Regime.DAMPED, Excitation.FORCED)
+
+    @property
+    def _trend(self) -> float:
+        """Slope (1/s) of the logarithm of the envelope's second half; 0 where it is unknown or chance."""
+        slope, error = (self.evidence.get(f"envelope_slope{what}", 0.0) for what in ("", "_error"))
+        return slope if abs(slope) > self.limits.trend_errors * error else 0.0
+
+    def _changes(self) -> tuple[float, float]:
+        """By which vx or x, whichever does more so, swings less in the last quarter, and by which otherwise."""
+        before = replace(self.whole, start=self.settled_part.start, stop=3 * self.history.samples // 4)
+        sizes = [np.array([each.deviation("vx"), each.amplitude("x")]) for each in (before, self.last)]
+        parts = sizes[0] / np.maximum(sizes[1], 1e-300) - 1.0
+        return float(parts.max()), float(np.abs(parts).max())
+
+    def _own_line(self) -> float | None:
+        """Frequency (Hz) of a mode that lies on lines with more of the energy than forced motion may lack."""
+        bins = LINE_BINS / self._settled_seconds
+        for own in (mode.frequency for mode in self.context.modes() if mode.frequency > 0.0):
+            near = [line for line in self.context.forced if abs(line - own) <= 2.0 * bins]
+            if self.settled_part.share(near) > 1.0 - self.limits.forced_share:
+                return own
+        return None
+
+    @property
+    def _powers_to_lose(self) -> float:
+        """Powers of e by which what the shoe adds has to decay until the forced motion is left."""
+        lasting = self.limits.decayed_to * math.sqrt(
+            0.5 * sum((f * swing) ** 2 for f, swing in self.context.waves)
+        )
+        left = self.envelope.final / (2.0 * math.pi * lasting) if lasting > 0.0 else 1.0
+        return min(max(3.0, math.log(max(left, 1.0))), GROWN)
 
     def _settle(self) -> bool:
         """Find the settled part."""

@@ -12,10 +12,20 @@ import numpy as np
 
 from brakecli.analysis.regime.slopes import growth_with_slopes
 from brakecli.analysis.regime.spectra import Array
-from brakecli.analysis.stability.modes import Complex, Mode, eigensystem, is_undamped, modes, stiffness_matrix
+from brakecli.analysis.stability.modes import (
+    Complex,
+    Mode,
+    eigensystem,
+    first_order,
+    is_undamped,
+    modes,
+    stiffness_matrix,
+)
 from brakecli.solver.quantities import ContactState
 from brakecli.solver.system import System
 
+_BEYOND = 64.0  # times as long as the run
+_SCATTERED: Array = np.arange(1 << 14, dtype=np.float64) * 0.6180339887498949 % 1.0  # evenly, without a period
 _ROUNDING = 1e-12  # of the largest eigenvalue: what a growth rate of zero may be off
 _ROUNDING_WITH_SLOPES = 1e-9  # the same where the passing waves enter it
 
@@ -41,6 +51,17 @@ class Linear:
     wavenumbers: Array  # rad/m
     known_to: float = 0.0  # 1/s, by how much the growth may be off
 
+    @property
+    def sentence(self) -> str:
+        """What becomes of the shoe's own vibration, and why."""
+        mode, fate = self.mode, "it neither grows nor decays"
+        if self.direction > 0:
+            fate = f"still growing at {mode.growth:.3g} 1/s"
+        elif self.direction < 0:
+            fate = f"the shoe's own vibration decays at {-mode.growth:.3g} 1/s"
+        how = f"{mode.frequency:.4g} Hz" if mode.frequency else "without oscillation"
+        return f"full contact and slip to one side make the motion linear: {fate} ({how})"
+
     def with_slopes(self) -> "Linear":
         """The same with the growth that the passing waves leave to the mode by their slopes."""
         if not len(self.waves):
@@ -62,10 +83,19 @@ class Linear:
             position, velocity = position + turn.imag, velocity + 2.0 * math.pi * frequency * turn.real
         return position, velocity
 
-    def parts(self, x: Array, time: Array) -> tuple[float, Array, Array]:
-        """Half of peak to peak of what the waves force (m), what of x (m) the shoe adds, and the times again."""
+    def parts(self, x: Array, time: Array) -> tuple[float, Array, Array, Array]:
+        """What the waves force: half of peak to peak of x (m), beyond the run too, as waves beat.
+
+        Then, at the times given, the x that they force and that the shoe adds (m), and the times again (s).
+        """
         lasting = self.forced(time)[0][0]
-        return 0.5 * float(np.ptp(lasting)), x - self.rest[0] - lasting, time
+        later = (
+            self.forced(np.asarray(_BEYOND * time[-1] * _SCATTERED, np.float64))[0][0]
+            if len(self.waves) > 1
+            else lasting
+        )
+        size = 0.5 * float(max(lasting.max(), later.max()) - min(lasting.min(), later.min()))
+        return size, lasting, x - self.rest[0] - lasting, time
 
     def seconds_to_limit(self, time: float, state: Array) -> float:
         """How long the fastest mode grows from x, y, vx, vy at a time until stick or loss of contact."""
@@ -81,17 +111,20 @@ class Linear:
 
 def linear_theory(system: System, belt: float) -> Linear | None:
     """The theory at a constant speed U (m/s); None where no rest in contact exists, or friction holds the shoe."""
-    c, stiffness, pad = system.coefficients, system.contact_stiffness, system.pad
+    c, stiffness = system.coefficients, system.contact_stiffness
     if belt == 0.0 and c.phi > 0.0:
         return None
     grip = math.copysign(c.phi, belt)
-    push, offset = np.array([grip, 1.0]), -stiffness * float(pad.constants.shoe_mean)
+    push, offset, forces = np.array([grip, 1.0]), 0.0, np.zeros(0)
+    if not system.smooth:
+        constants, tables = system.pad
+        first, offset = int(constants.full_at), -stiffness * float(constants.shoe_mean)
+        forces = tables[first : first + system.wheel.g.size]
     s, load = stiffness_matrix(c, stiffness, grip), system.load_at_start
     damping = np.array([[c.b_xx, c.b_xy], [c.b_xy, c.b_yy]])
     try:
         rest = np.linalg.solve(s, offset * push - load * np.array([c.sin_beta, c.cos_beta]))
-        first, wheel = int(pad.constants.full_at), system.wheel
-        forces, passing = pad.tables[first : first + wheel.g.size], -belt * wheel.turns
+        wheel, passing = system.wheel, -belt * system.wheel.turns
         omega = 2.0 * math.pi * passing
         responses = [np.linalg.solve(s - c.m * w * w * np.eye(2) + 1j * w * damping, push) for w in omega]
     except np.linalg.LinAlgError:
@@ -100,7 +133,6 @@ def linear_theory(system: System, belt: float) -> Linear | None:
     if not (np.isfinite(rest).all() and force > 0.0):
         return None
     phases = forces * np.exp(1j * (wheel.omega * rest[0] + wheel.phase))
-    zero, one = np.zeros((2, 2)), np.eye(2)
     waves = np.array(responses, complex).reshape(-1, 2) * phases[:, None]
     values, vectors = eigensystem(c, stiffness, grip)
     mode, known_to = modes(c, stiffness, grip)[0], 0.0 if is_undamped(c) else _ROUNDING * np.abs(values).max()
@@ -118,7 +150,7 @@ def linear_theory(system: System, belt: float) -> Linear | None:
         np.concatenate([vectors, vectors * values]),
         passing,
         waves,
-        np.block([[zero, one], [-s / c.m, -damping / c.m]]),
+        first_order(c, s / c.m),
         np.concatenate([np.zeros(2), push / c.m]),
         wheel.omega * phases,
         wheel.omega,

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
@@ -13,9 +13,10 @@ import numpy as np
 from brakecli.analysis.regime.evidence import Part
 from brakecli.analysis.regime.forced import forced_lines, subharmonics
 from brakecli.analysis.regime.linear import linear_theory
+from brakecli.analysis.regime.ripple import ripple
 from brakecli.analysis.regime.rules import classify
 from brakecli.analysis.regime.verdict import Context, Excitation, Feeds, Regime, Thresholds, Verdict
-from brakecli.analysis.stability.modes import growth, is_undamped
+from brakecli.analysis.stability.modes import growth, is_undamped, modes
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError, UnreadableResultError
@@ -75,12 +76,14 @@ def context(system: System) -> Context:
     belt, c = float(value_at(system.belt, system.sampled_duration)), system.coefficients
     compression = float(np.abs(system.load["value"]).max()) / (c.c_yy + system.contact_stiffness)
 
+    grip = math.copysign(c.phi, belt) if belt else 0.0
+
     @cache
-    def growth_rate() -> float:  # by the mean stiffness of the contact
-        with suppress(CaseError):
-            stiffness = steady_sliding(system, belt=belt).stiffness
-            return growth(c, stiffness, math.copysign(c.phi, belt) if belt else 0.0)
-        return 0.0
+    def stiffness() -> float:  # in the mean
+        try:
+            return steady_sliding(system, belt=belt).stiffness
+        except CaseError:  # none: a shoe that locks itself drifts away, by what full contact makes of it
+            return system.contact_stiffness
 
     theory, turns, highest = (
         cache(partial(linear_theory, system, belt)),
@@ -101,8 +104,10 @@ def context(system: System) -> Context:
         scale=fastest,
         frictionless=c.phi == 0.0,
         undamped=is_undamped(c),
-        growth=growth_rate,
+        growth=lambda: growth(c, stiffness(), grip),
+        modes=lambda: [each for k in (stiffness(), system.contact_stiffness) for each in modes(c, k, grip)],
         linear=theory,
+        ripple=lambda part: ripple(system, belt, stiffness(), part),
         powers=partial(_powers, system, belt),
     )
 

@@ -6,7 +6,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, WINDOWS, Cycles, Envelope, cycles_of, median, swings
+from brakecli.analysis.regime.evidence import (
+    FEWEST_SAMPLES,
+    WINDOWS,
+    Cycles,
+    Drift,
+    Envelope,
+    cycles_of,
+    median,
+    swings,
+)
 from brakecli.analysis.regime.forced import GROWN, QUARTER, ForcedRules
 from brakecli.analysis.regime.spectra import segment
 from brakecli.analysis.regime.verdict import Context, Decision, Excitation, Feeds, Regime, Thresholds, Verdict
@@ -18,7 +27,9 @@ if TYPE_CHECKING:  # a measured signal needs no compiled code
 
 _NEAR = 0.3  # by which the amplitude of a motion that stick or loss of contact limits may still change
 _DRIFT = 5e-3  # by which the amplitude of a motion without stick may change where sliding is stable
+_BANDS = 0.9  # least part of the energy in three bands: chaos may have less
 _SPREAD = 0.05  # of the frequency of cycles, beyond which three bands hold no vibration
+_REST = 0.3  # of a forced motion, by which its closed form may be off
 _LONGER = 1.4  # a run whose last quarter and the window before it are settled, over what comes before
 _FAR = 0.3  # rad, of a wave, by which what the shoe adds moves it
 _DEFAULT = Thresholds()
@@ -64,15 +75,12 @@ class _Rules(ForcedRules):
         if theory.direction != mean.direction and (theory.direction == 0 or self._swings_far(theory)):
             return self._steep(theory)
         self.theory = theory
-        how = f"{mode.frequency:.4g} Hz" if mode.frequency else "without oscillation"
-        linear = "full contact and slip to one side make the motion linear"
         if theory.direction == 0:
-            return Decision(f"{linear}: it neither grows nor decays ({how}); a dashpot would decide")
+            return Decision(f"{theory.sentence}; a dashpot would decide")
         if theory.direction > 0:
             self.evidence["seconds_to_go"] = more = theory.seconds_to_limit(*self._end()) + 3.0 / mode.growth
-            growing = f"{linear}: still growing at {mode.growth:.3g} 1/s ({how})"
-            return Decision(f"{growing}; run at least {QUARTER * (self.duration + more):.3g} s")
-        decays = f"{linear}: the shoe's own vibration decays at {-mode.growth:.3g} 1/s ({how})"
+            return Decision(f"{theory.sentence}; run at least {QUARTER * (self.duration + more):.3g} s")
+        decays = theory.sentence
         if not len(theory.waves):
             return Decision(decays, Regime.DAMPED)
         if self.duration < slow:
@@ -81,7 +89,7 @@ class _Rules(ForcedRules):
 
     def _swings_far(self, theory: "Linear") -> bool:
         """Whether what the shoe adds is no longer small beside the waves, so that their slope is not linear."""
-        own = theory.parts(*self.last.places())[1]
+        own = theory.parts(*self.last.places())[2]
         return 0.5 * float(np.ptp(own)) * float(theory.wavenumbers.max()) > _FAR
 
     def _steep(self, theory: "Linear") -> Decision:
@@ -101,15 +109,18 @@ class _Rules(ForcedRules):
 
     def _shaken(self, theory: "Linear", slow: float, decays: str) -> Decision | None:
         """The forced motion that lasts, with the settled part in which the shoe's own part has gone."""
-        forced, own, time = theory.parts(*self.whole.places())
+        forced, lasting, own, time = theory.parts(*self.whole.places())
         left = np.array([0.5 * float(np.ptp(part)) for part in np.array_split(own, WINDOWS)])
         end = float(left[-10:].max())
         slope = np.polyfit(np.arange(WINDOWS // 2), np.log(np.maximum(left[WINDOWS // 2 :], 1e-300)), 1)[0]
         if slope * WINDOWS > 1.0 and end > self.limits.settled_within * forced:
             return None  # the passing waves excite what the mean stiffness damps
-        first = WINDOWS - int(np.argmin((left <= self.limits.settled_within * forced)[::-1]))
+        level, decay = self.limits.settled_within * forced, theory.mode.growth * self.duration / WINDOWS
+        if 0.25 * WINDOWS * decay < -1.0 and slope > 0.25 * decay and end < _REST * forced:
+            level = max(level, 1.2 * end)  # what does not decay is forced, and missing in the closed form
+        first = WINDOWS - int(np.argmin((left <= level)[::-1]))
         begin = max(first, 1) * self.history.samples // WINDOWS
-        wait = max(math.log(max(end / (self.limits.settled_within * forced), 1.0)) / -theory.mode.growth, 0.0)
+        wait = math.log(max(end / max(level, 1e-300), 1.0)) / -theory.mode.growth
         hint = ""
         if first <= WINDOWS - 10 and self.duration - begin * self.history.interval >= 2.0 * slow:
             self.settled_part, self.settled = replace(self.whole, start=begin), True
@@ -117,7 +128,7 @@ class _Rules(ForcedRules):
             needed = max(_LONGER * (self.duration + wait), 1.05 * (self.duration + wait + 2.0 * slow))
             hint = f"; run at least {needed:.3g} s to see only that"
         chosen = time >= self.settled_part.start * self.history.interval
-        self.parts = forced, 0.5 * float(np.ptp(own[chosen]))
+        self.parts, self.unseen = (forced, 0.5 * float(np.ptp(own[chosen]))), forced - 0.5 * float(np.ptp(lasting))
         text = f"only the roughness shakes the shoe, by {forced:.3g} m: {decays}{hint}"
         return Decision(text, Regime.DAMPED, Excitation.FORCED)
 
@@ -126,15 +137,28 @@ class _Rules(ForcedRules):
         envelope, belt = self.envelope, abs(self.context.belt_speed)
         if belt == 0.0 and self.context.growth() < 0.0:
             return Decision("the wheel stands: friction and dashpots take the energy", Regime.DAMPED)
-        small = min(envelope.largest, belt or math.inf, self.context.scale)
-        falls = self.evidence.get("envelope_slope", -1.0) < 0.0 or envelope.final <= self.context.quiet
+        kept = bool(self.context.forced) and self.context.growth() < 0.0  # up by the roughness
+        falls = self.evidence.get("envelope_slope", 0.0) < 0.0 or (kept and self._trend == 0.0)
+        falls |= envelope.final <= self.context.quiet
         ends = self.last.fraction(ContactState.STICK) == self.last.fraction(ContactState.SEPARATED) == 0.0
-        if envelope.final > max(self.limits.decayed_to * small, self.context.quiet) or not (falls and ends):
+        if envelope.final > max(self._little, self.context.quiet) or not (falls and ends):
             return None
         if self.context.growth() > 0.0:
             return None
         text = f"vx has fallen to {envelope.final / envelope.largest:.2g} of its largest amplitude"
+        if kept:
+            text = f"the shoe's own vibration has died out: {text}, and only the roughness shakes it"
+            found = self._forced(text)
+            if found.regime is Regime.DAMPED:
+                return found
+            return Decision(f"{text}; {found.reason}", Regime.DAMPED, Excitation.FORCED)
         return Decision(f"the vibration has died out: {text}", Regime.DAMPED)
+
+    @property
+    def _little(self) -> float:
+        """Standard deviation of vx (m/s) below which a vibration has died out."""
+        belt = abs(self.context.belt_speed) or math.inf
+        return self.limits.decayed_to * min(self.envelope.largest, belt, self.context.scale)
 
     def trend(self) -> Decision | None:
         """Decides where the motion still grows or decays; otherwise it finds the settled part."""
@@ -148,20 +172,18 @@ class _Rules(ForcedRules):
             )
         if self._settle():
             return None
-        slope = self.evidence.get("envelope_slope")
-        if slope is None:
+        if "envelope_slope" not in self.evidence:
             return Decision("the motion comes and goes; run longer")
-        if abs(slope) <= self.limits.trend_errors * self.evidence["envelope_slope_error"]:
+        if not (slope := self._trend):
             return None  # an amplitude that beats or wanders, without a trend
         if self.context.growth() > 0.0 and 0.5 * abs(slope) * self.duration <= _NEAR:
             return None  # a vibration that has reached its limits, cannot die out, and comes near its amplitude
         text = f"still {'growing' if slope > 0.0 else 'decaying'} at {abs(slope):.3g} 1/s"
-        lasting = self.limits.decayed_to * math.sqrt(
-            0.5 * sum((f * swing) ** 2 for f, swing in self.context.waves)
-        )
-        left = self.envelope.final / (2.0 * math.pi * lasting) if slope < 0.0 and lasting > 0.0 else 1.0
-        more = max(3.0, math.log(max(left, 1.0))) / abs(slope)
-        return Decision(f"{text}; run at least {more:.2g} s longer")
+        more = 3.0 / abs(slope)
+        if slope < 0.0:  # until what is left is forced, has died out, or lasts
+            more = max(self._powers_to_lose, math.log(max(self.envelope.final / self._little, 1.0))) / -slope
+        longer = QUARTER * (self.duration + more) - self.duration  # the last quarter is judged
+        return Decision(f"{text}; run at least {longer:.2g} s longer")
 
     def sustained(self) -> Decision:
         theory = self.context.linear() if not self.context.forced else None
@@ -183,13 +205,15 @@ class _Rules(ForcedRules):
         certain = self._larger and self.context.growth() > 0.0 and self._relaxed
         if self.context.forced and not certain and (self._feeds() is Feeds.UNKNOWN or self._doubtful):
             return self._either()
-        if found.drifts and abs(found.drift) > _DRIFT:
-            self.settled = False
-            unsure = self.context.undamped or self.context.growth() < 0.0
-            if abs(found.drift) > (_DRIFT if unsure else self.limits.settled_within):
-                text = f"the amplitude still changes by {found.drift:.1%} within the last part of the run"
-                return Decision(f"{text}; run longer")
-        own = Excitation.SELF_EXCITED, found.frequency
+        drift = abs(found.drift.part) if found.drift.sure else 0.0
+        self.settled &= max(drift, abs(found.detuning.part) if found.detuning.sure else 0.0) <= _DRIFT
+        unsure = self.context.undamped or self.context.growth() < 0.0
+        if drift > (_DRIFT if unsure else self.limits.settled_within):
+            text = f"the amplitude still changes by {found.drift.part:.1%} within the last part of the run"
+            return Decision(f"{text}; run longer")
+        own, wander = (Excitation.SELF_EXCITED, found.frequency), found.evidence["frequency_spread"]
+        if (held := self._held(wander, found.frequency, found.detuning)) is not None:
+            self.evidence["frequency_spread"] = held
         if stick >= self.limits.stick_cycles:
             text = f"sustained, with stick in {stick:.0%} of {cycles:.0f} cycles"
             return Decision(text, Regime.RELAXATION, *own)
@@ -197,8 +221,8 @@ class _Rules(ForcedRules):
         lines = f"{harmonic:.0%} of the energy of vx in one line and its harmonics"
         if harmonic < bands:
             lines = f"{bands:.0%} of the energy of vx in three narrow bands"
-        wanders = found.evidence["frequency_spread"] > _SPREAD * found.frequency
-        regular = harmonic if wanders else max(harmonic, bands)
+        wanders = wander > _SPREAD * found.frequency
+        regular = harmonic if wanders or bands < _BANDS else max(harmonic, bands)
         if stick <= 1.0 - self.limits.stick_cycles and regular >= self.limits.harmonic_share:
             how = f"with stick in only {stick:.0%} of the cycles" if stick else "without stick"
             return Decision(f"sustained {how}: {lines}", Regime.QUASI_HARMONIC, *own)
@@ -223,8 +247,8 @@ class _Rules(ForcedRules):
                 f"{text}, so that the vibration may still die out; run at least {self._relaxing:.3g} s"
             )
         sticks = found.evidence["stick_cycles"] >= self.limits.stick_cycles
-        if abs(found.drift) > (self.limits.settled_within if sticks else _DRIFT):
-            text = f"sliding is stable, and the amplitude still changes by {found.drift:.2%}"
+        if abs(found.drift.part) > (self.limits.settled_within if sticks else _DRIFT):
+            text = f"sliding is stable, and the amplitude still changes by {found.drift.part:.2%}"
             return Decision(f"{text} within the last part of the run; run longer")
         return None
 
@@ -237,17 +261,28 @@ class _Rules(ForcedRules):
         """Half of peak to peak of x (m) as a median over cycles, and its spread."""
         part = self.settled_part
         if self.cycles and decision.excitation is Excitation.SELF_EXCITED:
-            return self.cycles.amplitude, self.cycles.amplitude_spread
+            spread = self._held(self.cycles.amplitude_spread, self.cycles.amplitude, self.cycles.drift)
+            return self.cycles.amplitude, spread
         if decision.excitation is not Excitation.FORCED:
             return part.amplitude("x"), None
         if self.theory and self.parts:
-            return self.parts[0], self.parts[1] if self.settled else None
+            return self.parts[0], self.parts[1] + self.unseen if self.settled else None
         samples = len(part.last("x"))
         beats = [abs(f - g) for f, _ in self.context.waves for g, _ in self.context.waves if f != g]
         slow = max([self._slowest(0.0), *(1.0 / beat for beat in beats)])
         period = max(min(slow / self.history.interval, samples - 1), 1.0)
         edges = np.asarray(samples - period * np.arange(int(samples / period), -1, -1), np.float64)
-        return median(swings(part, edges)) if len(edges) > 1 else (part.amplitude("x"), None)
+        size, spread = median(swings(part, edges))
+        return size, None if self.rings else max(spread, part.amplitude("x") - size)
+
+    def _held(self, spread: float, value: float, drift: Drift) -> float | None:
+        """A spread with what a drift becomes until small disturbances have changed by a factor of e."""
+        if self.context.undamped:
+            return None  # there is no end to it
+        ends = min(abs(self.context.growth()) * self._settled_seconds, 1.0)
+        if self.lasts:
+            return spread + (abs(drift.part) * value if drift.sure else 0.0)
+        return min(spread + abs(drift.part) * value / max(ends, 1e-9), value)
 
 
 def classify(history: History, context: Context, thresholds: Thresholds = _DEFAULT) -> Verdict:
@@ -261,9 +296,13 @@ def classify(history: History, context: Context, thresholds: Thresholds = _DEFAU
     if belt != 0.0:
         evidence["largest_vx_over_belt_speed"] = part.extremes("vx")[int(belt > 0.0)] / belt
     evidence |= part.lines(context.forced) | (context.powers(part) if context.steady else {})
-    split = rules.parts or rules.split()
+    split = rules.parts or (None if rules.rings else rules.split())
     forced, own = split if split and not (sustained and split[0] > split[1]) else (None, None)
     amplitude, spread = rules.amplitude(decision)
+    ripple = context.ripple(part) if context.steady and not sustained else None
+    if ripple:
+        evidence |= {f"ripple_{name}": getattr(ripple, name) for name in ("x", "vx", "force")}
+        spread = spread + ripple.size if spread is not None else None
     return Verdict(
         regime=decision.regime,
         excitation=decision.excitation,
@@ -279,14 +318,14 @@ def classify(history: History, context: Context, thresholds: Thresholds = _DEFAU
         * (cycles.force_variation if sustained and cycles else torques[1] - torques[0]),
         settled_from=part.start * history.interval,
         start=part.start,
-        settled=rules.lasts and decision.regime is not Regime.UNDECIDED,
+        settled=rules.lasts and decision.regime is not Regime.UNDECIDED and not ripple,
         stick_fraction=cycles.stick_fraction if sustained and cycles else part.fraction(ContactState.STICK),
         contact_loss_fraction=(
             cycles.contact_loss_fraction if sustained and cycles else part.fraction(ContactState.SEPARATED)
         ),
         mean_friction_force=friction,
         braking_torque=context.radius * friction,
-        reasons=(decision.reason,),
+        reasons=(decision.reason, *([ripple.sentence] if ripple else [])),
         evidence=evidence,
         thresholds=thresholds,
         second_run=decision.second_run,

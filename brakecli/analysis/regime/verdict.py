@@ -10,6 +10,8 @@ from brakecli.analysis.regime.evidence import Part
 
 if TYPE_CHECKING:  # a measured signal needs no compiled code
     from brakecli.analysis.regime.linear import Linear
+    from brakecli.analysis.regime.ripple import Ripple
+    from brakecli.analysis.stability.modes import Mode
 
 
 class Regime(StrEnum):
@@ -66,7 +68,9 @@ class Context:
     frictionless: bool = False
     undamped: bool = False
     growth: Callable[[], float] = lambda: 0.0  # 1/s, of a small disturbance of steady sliding; below 0 it decays
+    modes: Callable[[], list["Mode"]] = list  # of small vibrations
     linear: Callable[[], "Linear | None"] = lambda: None  # the theory of full contact
+    ripple: Callable[[Part], "Ripple | None"] = lambda part: None  # of the quadrature nodes
     powers: Callable[[Part], dict[str, float]] = lambda part: {}  # W, what becomes of the power of the belt
     radius: float = 1.0  # R, m
     feeds: Feeds = Feeds.UNKNOWN  # what a second run has shown

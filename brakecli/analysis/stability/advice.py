@@ -213,8 +213,10 @@ def _grows(case: Case) -> bool:
 def _first(safe: Callable[[float], bool], before: float, after: float) -> float:
     """The first value that is safe on the way from one that is not to one that is."""
     if before < after:
-        return bisect(lambda x: not safe(x), before, after, halvings=45)[1]
-    return bisect(safe, after, before, halvings=45)[0]
+        to = bisect(lambda x: not safe(x), before, after, halvings=45)[1]
+    else:
+        to = bisect(safe, after, before, halvings=45)[0]
+    return 0.0 if abs(to) < 1e-6 * abs(after - before) and safe(0.0) else to  # where two links decouple
 
 
 def _ladders(case: Case, parameter: str, value: float) -> Iterator[list[float]]:

@@ -8,7 +8,6 @@ import numpy as np
 from brakecli.analysis.stability.modes import Complex, Mode
 
 Pair = tuple[Mode, Mode]
-_TIE = 1e-9  # of a cost: where modes have just met, both orders are as near
 
 
 def followed(found: Iterable[tuple[Mode, ...]]) -> Iterator[Pair | None]:
@@ -19,31 +18,33 @@ def followed(found: Iterable[tuple[Mode, ...]]) -> Iterator[Pair | None]:
     """
     before: Pair | None = None
     for modes in found:
-        pair = _two(modes) if modes else None
-        if pair and before:
-            kept, swapped = (sum(map(_distance, before, each)) for each in (pair, pair[::-1]))
-            if swapped < kept - _TIE:
-                pair = pair[1], pair[0]
-        before = pair or before
-        yield pair
+        if not modes:
+            yield None
+            continue
+        pairs = _pairs(modes)
+        if before is None or any(mode.frequency for mode in before):
+            pairs = pairs[:1]
+        pairs += [(other, one) for one, other in pairs]
+        costs = [sum(map(_distance, before, each)) if before else 0.0 for each in pairs]
+        before = pairs[np.argmin(np.round(costs, 9))]  # where modes have just met, both orders are as near
+        yield before
 
 
-def _two(modes: tuple[Mode, ...]) -> Pair:
+def _pairs(modes: tuple[Mode, ...]) -> list[Pair]:
     """One mode for each pair of eigenvalues, by frequency. Of two real ones that grow or decay it is the larger.
 
-    Of four real eigenvalues those of the same mode have the most similar shapes.
+    The largest of four real eigenvalues may belong together with any other one; the likeliest is the one with the
+    most similar shape, whose pairs come first.
     """
     real, moving = ([mode for mode in modes if (mode.frequency > 0.0) == moves] for moves in (False, True))
-    if len(real) == 4:
-        first, *others = real
-        partner = max(others, key=lambda other: _likeness(first, other))
-        others.remove(partner)
-        moving = [max(pair, key=lambda mode: mode.growth) for pair in ((first, partner), others)]
-    elif real:
-        moving.append(max(real, key=lambda mode: mode.growth))
-    scale = max(mode.frequency for mode in moving) or 1.0  # modes that have met differ in rounding
-    one, other = sorted(moving, key=lambda mode: (round(mode.frequency / scale, 9), -mode.growth))
-    return one, other
+    real.sort(key=lambda mode: -mode.growth)
+    choices = [[*moving, *real[:1]]] if len(real) < 4 else [[real[0], real[1]], [real[0], real[2]]]
+    if len(real) == 4 and max(real[1:], key=lambda other: _likeness(real[0], other)) is real[1]:
+        choices.reverse()
+    scale = max(mode.frequency for mode in modes) or 1.0  # modes that have met differ in rounding
+    for each in choices:
+        each.sort(key=lambda mode: (round(mode.frequency / scale, 9), -mode.growth))
+    return [(one, other) for one, other in choices]
 
 
 def _distance(one: Mode, other: Mode) -> float:

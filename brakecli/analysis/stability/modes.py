@@ -44,6 +44,14 @@ def stiffness_matrix(c: Coefficients, contact_stiffness: float, grip: float) -> 
     return np.array([[c.c_xx, c.c_xy + grip * contact_stiffness], [c.c_xy, c.c_yy + contact_stiffness]])
 
 
+def first_order(c: Coefficients, s: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A of ż = A z for x, y, vx, vy, from S/m."""
+    a = np.zeros((4, 4))
+    a[0, 2] = a[1, 3] = 1.0
+    a[2:, :2], a[2:, 2:] = -s, -np.array([[c.b_xx, c.b_xy], [c.b_xy, c.b_yy]]) / c.m
+    return a
+
+
 def is_undamped(c: Coefficients) -> bool:
     """Whether no dashpot acts at all: then what is stable is only marginally so."""
     return c.b_xx == 0.0 and c.b_yy == 0.0
@@ -65,8 +73,7 @@ def eigensystem(c: Coefficients, contact_stiffness: float, grip: float) -> tuple
         vectors = np.array([_null_vector(s, square) for square in squares]).T
         roots = np.sqrt(-squares)
         return np.concatenate([roots, -roots]), np.concatenate([vectors, vectors], axis=1)
-    damping = np.array([[c.b_xx, c.b_xy], [c.b_xy, c.b_yy]]) / c.m
-    values, vectors = np.linalg.eig(np.block([[np.zeros((2, 2)), np.eye(2)], [-s, -damping]]))
+    values, vectors = np.linalg.eig(first_order(c, s))
     return values.astype(complex), vectors[:2].astype(complex)
 
 
@@ -86,10 +93,11 @@ def modes(c: Coefficients, contact_stiffness: float, grip: float) -> list[Mode]:
     for value, vector in zip(values, vectors.T, strict=True):
         if value.imag < 0.0:
             continue
+        value += 0.0  # without -0
         moves = abs(vector[0]) > 1e-12 * abs(vector[1])
         ratio = vector[1] / vector[0] if moves else 0.0
         shape = (float(abs(ratio)), float(np.degrees(np.angle(ratio)))) if moves else (None, None)
-        damping_ratio = float(-value.real / abs(value)) if value != 0.0 else 0.0
+        damping_ratio = float(-value.real / abs(value)) + 0.0 if value != 0.0 else 0.0
         found.append(Mode(float(value.real), float(value.imag / (2.0 * math.pi)), damping_ratio, *shape))
     return sorted(found, key=lambda mode: -mode.growth)
 

@@ -8,6 +8,7 @@ from numba import float64, int64, void
 from brakecli.solver.compile import borrowed, kernel, stopped
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.records import CONTACT_TYPE, EVALUATE, PAD_TYPE, Layer
+from brakecli.solver.sine import sine_cosine
 
 CLEAR, PARTLY, FULL = 0, 1, 2
 
@@ -28,13 +29,12 @@ def full_contact(x: float, y: float, layer: Layer) -> None:
     k, length, n = pad.k, 2.0 * pad.half_length, pad.wheel_terms
     omega_at, full_at, ss_at, cc_at, pr_at = pad.wheel_at + n, pad.full_at, pad.ss_at, pad.cc_at, pad.pr_at
     sines, cosines = layer.scratch[:n], layer.scratch[n : 2 * n]
+    for i in range(n):
+        sines[i], cosines[i] = sine_cosine(tables[omega_at + i] * x + angles[i])
     mean_force, tangential = -k * length * pad.shoe_mean, 0.0  # k ∫ (f2 - f1) and its derivative by x
     for i in range(n):
-        omega = tables[omega_at + i]
-        psi = omega * x + angles[i]
-        sines[i], cosines[i] = math.sin(psi), math.cos(psi)
         mean_force += tables[full_at + i] * sines[i]
-        tangential += tables[full_at + i] * omega * cosines[i]
+        tangential += tables[full_at + i] * tables[omega_at + i] * cosines[i]
     square, square_x = pad.shoe_square, 0.0  # ∫ (f2 - f1)² and its derivative by x
     for i in range(n):
         if stopped(pad.signals):
@@ -54,6 +54,7 @@ def full_contact(x: float, y: float, layer: Layer) -> None:
     contact.store = 0.5 * k * (square + length * y * y) - y * mean_force
     contact.store_x = 0.5 * k * square_x - y * tangential
     contact.kind, contact.valid = CLOSED_FORM, 1
+    contact.near, contact.blur = 0.0 if y + contact.reach <= pad.full_up_to else k * length, 0.0
 
 
 @kernel(void(CONTACT_TYPE))
@@ -61,6 +62,7 @@ def clear(contact: Any) -> None:
     """The pad touches nowhere: no force, nothing stored."""
     contact.normal_force = contact.stiffness = contact.tangential = contact.fraction = 0.0
     contact.store = contact.store_x = 0.0
+    contact.near, contact.blur = math.inf, 0.0
     contact.kind, contact.valid = CLOSED_FORM, 1
 
 

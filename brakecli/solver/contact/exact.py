@@ -3,33 +3,56 @@
 No pair of roots is missed: a cell is passed only when bounds on the gap's derivatives prove that it has no root,
 or that the gap is monotone there; otherwise it is halved. A gap that is within its rounding all over a cell
 counts as touching or not by its sign in the middle, so that the walk ends also where two equal profiles meet.
+
+What is proved of a cell holds until the gap, or its slope, has moved so far that it may be otherwise. Odometers
+add up bounds of how far both move from one evaluation to the next: until a cell is due, nothing is done for it
+but to follow its root.
 """
 
 import math
 from typing import Any
 
-from numba import float64, int64, types, void
+import numpy as np
+from numba import boolean, float64, int64, types, void
 
-from brakecli.solver.compile import Floats, kernel, stopped, vector
+from brakecli.solver.compile import Floats, borrowed, kernel, stopped, vector
 from brakecli.solver.contact import EXACT
 from brakecli.solver.contact.closed_form import CLEAR, FULL, clear, coverage
-from brakecli.solver.records import CONTACT_TYPE, EVALUATE, PAD_TYPE, Layer
+from brakecli.solver.records import CONTACT_TYPE, EVALUATE, LAYER, PAD_TYPE, Layer
+from brakecli.solver.roughness import TWO_PI
+from brakecli.solver.sine import sine_cosine
 
-# `waves` holds, for every harmonic of the gap (the wheel's first, the shoe's with minus): amplitude,
-# wavenumber, phase, and for one interval the phase in its middle (sine, cosine) and the half width times omega.
-SINE, COSINE, HALF_TURN = 3, 4, 5
+# `waves` holds, for every harmonic of the gap (the wheel's first, the shoe's with minus): amplitude, wavenumber,
+# phase, and for one interval sine and cosine of the phase in its middle, the half width times omega, and sine and
+# cosine of that. Then come the numbers of the last evaluation, and those of each cell.
+_SINE, _COSINE, _HALF, _SINE_HALF, _COSINE_HALF, _LAST = 3, 4, 5, 6, 7, 8
+
+_MOVED, _TURNED, _HEIGHT, _START, _FOURTH, _ROUNDING, _CELLS = 0, 1, 2, 3, 4, 5, 6
+"""Odometers of the gap (m) and of its slope; y (m); where the interval that touches begins (m), or infinity;
+bounds of the gap's fourth derivative and of the rounding in the gap (m)."""
+
+_FREE, _MONOTONE, _PLACE, _PER_CELL = 0, 1, 2, 3
+"""Readings of the odometers up to which a cell has no root, and up to which the gap is monotone in it; the sign of
+the gap where it has no root, otherwise the root (m)."""
 
 _EPSILON = 2.220446049250313e-16
+_SURE, _ROUND, _SLACK = 0.999, 1e3, 1e-12
+"""What is taken of a bound; after how many heights of the roughness an odometer begins anew, and its rounding by
+then, over that height."""
+_NEAR = 0.5  # rad, below which the sine of a difference is not taken from sines
+_FOLLOWED = 1e-5  # a step of Halley's iteration, over the cell, after which it is exact
 
 
-@kernel(types.UniTuple(float64, 4)(float64, float64, int64, vector))
+@kernel(types.UniTuple(float64, 4)(float64, float64, int64, vector), inlined=False)
 def _gap(xi: float, y: float, n: int, waves: Floats) -> tuple[float, float, float, float]:
     """The gap f2 - f1 - y at xi, m, and its first three derivatives."""
+    sines, cosines = waves[_SINE * n : (_SINE + 1) * n], waves[_COSINE * n : (_COSINE + 1) * n]
+    for i in range(n):  # several waves at a time, whereas sums keep their order
+        sines[i], cosines[i] = sine_cosine(waves[n + i] * xi + waves[2 * n + i])
     gap, slope, second, third = -y, 0.0, 0.0, 0.0
     for i in range(n):
         omega = waves[n + i]
-        psi = omega * xi + waves[2 * n + i]
-        sine, cosine = waves[i] * math.sin(psi), waves[i] * omega * math.cos(psi)
+        sine, cosine = waves[i] * sines[i], waves[i] * omega * cosines[i]
         gap += sine
         slope += cosine
         second -= omega * omega * sine
@@ -37,7 +60,7 @@ def _gap(xi: float, y: float, n: int, waves: Floats) -> tuple[float, float, floa
     return gap, slope, second, third
 
 
-@kernel(float64(float64, float64, float64, float64, int64, vector))
+@kernel(float64(float64, float64, float64, float64, int64, vector), inlined=False)
 def _root(left: float, right: float, at_left: float, y: float, n: int, waves: Floats) -> float:
     """The root of a gap that is monotone on [left, right] and changes sign: Newton inside the bracket."""
     xi = 0.5 * (left + right)
@@ -56,40 +79,77 @@ def _root(left: float, right: float, at_left: float, y: float, n: int, waves: Fl
     return xi
 
 
+@kernel(types.UniTuple(float64, 2)(float64, float64, float64, float64, int64, vector), inlined=False)
+def _followed(left: float, right: float, xi: float, y: float, n: int, waves: Floats) -> tuple[float, float]:
+    """The root of a gap that is monotone on [left, right], by Halley's iteration from xi, and the slope there.
+
+    NaN where it does not lie inside, or is not found at once.
+    """
+    small = _FOLLOWED * (right - left)
+    for _ in range(6):
+        gap, slope, second, _ = _gap(xi, y, n, waves)
+        bent = slope * slope - 0.5 * gap * second
+        step = gap * slope / bent if bent > 0.0 else math.inf
+        xi -= step
+        if not (left < xi < right):
+            break
+        if abs(step) <= small and abs(second * step) <= _FOLLOWED * abs(slope):
+            return xi, slope
+    return math.nan, 0.0
+
+
 @kernel(float64(float64, float64))
 def _sinc_of(sine: float, z: float) -> float:
     """sin(z)/z for a sine that is already known; the quotient loses no digits, however small z is."""
     return sine / z if z != 0.0 else 1.0
 
 
-@kernel(void(float64, float64, float64, PAD_TYPE, vector, CONTACT_TYPE))
+@kernel(float64(float64))
+def _sinc_near_zero(z: float) -> float:
+    """sin(z)/z up to half a radian, by its series."""
+    q = z * z
+    series = 1.0 - q / 110.0 * (1.0 - q / 156.0)
+    return 1.0 - q / 6.0 * (1.0 - q / 20.0 * (1.0 - q / 42.0 * (1.0 - q / 72.0 * series)))
+
+
+@kernel(void(float64, float64, float64, PAD_TYPE, vector, CONTACT_TYPE), inlined=False)
 def _add_interval(left: float, right: float, y: float, pad: Any, waves: Floats, contact: Any) -> None:
     """Add the closed integrals of a touching interval, without the factor k."""
     wheel_terms, n = pad.wheel_terms, pad.wheel_terms + pad.shoe_terms
     length, middle = right - left, 0.5 * (left + right)
-    at_sine, at_cosine, at_half = SINE * n, COSINE * n, HALF_TURN * n
+    at_sine, at_cosine, at_half = _SINE * n, _COSINE * n, _HALF * n
+    sin_half, cos_half = _SINE_HALF * n, _COSINE_HALF * n
     heights, rise = 0.0, 0.0  # ∫ (f2 - f1), and f2(right) - f2(left) = ∫ f2'
     for i in range(n):
         g, omega = waves[i], waves[n + i]
-        psi, half = omega * middle + waves[2 * n + i], 0.5 * omega * length
-        sine, cosine, sine_half = math.sin(psi), math.cos(psi), math.sin(half)
+        half = 0.5 * omega * length
+        sine, cosine = sine_cosine(omega * middle + waves[2 * n + i])
+        sine_half, cosine_half = sine_cosine(half)
         waves[at_sine + i], waves[at_cosine + i], waves[at_half + i] = sine, cosine, half
+        waves[sin_half + i], waves[cos_half + i] = sine_half, cosine_half
         heights += g * length * _sinc_of(sine_half, half) * sine
         if i < wheel_terms:
             rise += 2.0 * g * cosine * sine_half
-    square, work = 0.0, 0.0  # ∫ (f2 - f1)², ∫ (f2 - f1) f2'
+    square, work = 0.0, 0.0  # ∫ (f2 - f1)², ∫ (f2 - f1) f2', over half the length
     for i in range(n):
         if stopped(pad.signals):
             return
-        for j in range(n):
-            half_i, half_j = waves[at_half + i], waves[at_half + j]
-            minus = _sinc_of(math.sin(half_i - half_j), half_i - half_j)
-            plus = _sinc_of(math.sin(half_i + half_j), half_i + half_j)
-            s_i, c_i, s_j, c_j = waves[at_sine + i], waves[at_cosine + i], waves[at_sine + j], waves[at_cosine + j]
-            g = 0.5 * length * waves[i] * waves[j]
-            square += g * (minus * (c_i * c_j + s_i * s_j) - plus * (c_i * c_j - s_i * s_j))
-            if j < wheel_terms:
-                work += g * waves[n + j] * (plus * (s_i * c_j + c_i * s_j) + minus * (s_i * c_j - c_i * s_j))
+        g_i, s_i, c_i, half_i = waves[i], waves[at_sine + i], waves[at_cosine + i], waves[at_half + i]
+        sh_i, ch_i = waves[sin_half + i], waves[cos_half + i]
+        omega_i = waves[n + i] if i < wheel_terms else 0.0
+        plus = _sinc_of(2.0 * sh_i * ch_i, 2.0 * half_i)
+        square += g_i * g_i * (1.0 - plus * (c_i * c_i - s_i * s_i))
+        work += g_i * g_i * omega_i * plus * (2.0 * s_i * c_i)
+        for j in range(i):
+            s_j, c_j, half_j = waves[at_sine + j], waves[at_cosine + j], waves[at_half + j]
+            one, other = sh_i * waves[cos_half + j], ch_i * waves[sin_half + j]
+            plus, z = _sinc_of(one + other, half_i + half_j), half_i - half_j
+            minus = _sinc_near_zero(z) if abs(z) < _NEAR else (one - other) / z
+            g, omega_j = g_i * waves[j], waves[n + j] if j < wheel_terms else 0.0
+            square += 2.0 * g * (minus * (c_i * c_j + s_i * s_j) - plus * (c_i * c_j - s_i * s_j))
+            sum_, difference = plus * (s_i * c_j + c_i * s_j), minus * (s_i * c_j - c_i * s_j)
+            work += g * (omega_j * (sum_ + difference) + omega_i * (sum_ - difference))
+    square, work = 0.5 * length * square, 0.5 * length * work
     contact.normal_force += heights - y * length
     contact.stiffness += length
     contact.tangential += rise
@@ -97,64 +157,124 @@ def _add_interval(left: float, right: float, y: float, pad: Any, waves: Floats, 
     contact.store_x += work - y * rise
 
 
-@kernel(void(float64, PAD_TYPE, vector, CONTACT_TYPE))
-def _add_touching(y: float, pad: Any, waves: Floats, contact: Any) -> None:
-    """Walk over the pad and add every interval on which the gap is positive."""
-    end, widest, n = pad.half_length, pad.cell, pad.wheel_terms + pad.shoe_terms
-    fourth, rounding = 0.0, abs(y)  # bounds of the gap's fourth derivative, and of the rounding in the gap (m)
-    for i in range(n):
-        g, omega = abs(waves[i]), waves[n + i]
-        fourth += g * (omega * omega) * (omega * omega)
-        rounding += g * (1.0 + omega * end + abs(waves[2 * n + i]))
-    rounding *= _EPSILON
-    left, width = -end, widest
-    touching, start = False, left
-    while left < end and not stopped(pad.signals):
-        right = min(left + width, end)
-        half = 0.5 * (right - left)
-        gap, slope, second, third = _gap(0.5 * (left + right), y, n, waves)
+@kernel(void(boolean, float64, float64, PAD_TYPE, vector, CONTACT_TYPE), inlined=False)
+def _turn(touches: bool, place: float, y: float, pad: Any, waves: Floats, contact: Any) -> None:
+    """From a place on the pad touches, or does not: begin an interval, or add the one that ends."""
+    at = _LAST * (pad.wheel_terms + pad.shoe_terms) + _START
+    if touches:
+        waves[at] = min(waves[at], place)
+    elif waves[at] < place:
+        _add_interval(waves[at], place, y, pad, waves, contact)
+        waves[at] = math.inf
+
+
+@kernel(void(float64, float64, int64, float64, PAD_TYPE, vector, CONTACT_TYPE), inlined=False)
+def _look(left: float, right: float, cell: int, y: float, pad: Any, waves: Floats, contact: Any) -> None:
+    """Walk over the touching intervals of a cell, and keep what is proved of the cell as a whole."""
+    n = pad.wheel_terms + pad.shoe_terms
+    moved, turned, slack = waves[_LAST * n + _MOVED], waves[_LAST * n + _TURNED], _SLACK * pad.crest
+    fourth, rounding = waves[_LAST * n + _FOURTH], waves[_LAST * n + _ROUNDING]
+    at = _LAST * n + _CELLS + _PER_CELL * cell
+    waves[at + _FREE] = waves[at + _MONOTONE] = -1.0
+    begin, width = left, right - left
+    while begin < right and not stopped(pad.signals):
+        end = min(begin + width, right)
+        whole, half = begin == left and end == right, 0.5 * (end - begin)
+        gap, slope, second, third = _gap(0.5 * (begin + end), y, n, waves)
         # Taylor: by how much the gap and its slope may differ in the cell from what they are in its middle.
         bend = half * (abs(second) + half / 2.0 * (abs(third) + half / 3.0 * fourth))
         change = half * (abs(slope) + half / 2.0 * (abs(second) + half / 3.0 * (abs(third) + half / 4.0 * fourth)))
-        if abs(gap) <= change and abs(gap) + change > rounding:
+        free = abs(gap) - change
+        if free <= 0.0 and abs(gap) + change > rounding:
             if abs(slope) <= bend:
                 width = half  # neither free of roots nor monotone for sure
                 continue
-            gap, _, _, _ = _gap(left, y, n, waves)
-            at_right, _, _, _ = _gap(right, y, n, waves)
-            if (gap > 0.0) != (at_right > 0.0):
-                root = _root(left, right, gap, y, n, waves)
-                if touching or gap > 0.0:
-                    begin = start if touching else left
-                    _add_interval(begin, root if gap > 0.0 else left, y, pad, waves, contact)
-                touching, start = at_right > 0.0, root
-                left, width = right, min(4.0 * half, widest)
+            if whole:
+                waves[at + _MONOTONE] = turned + _SURE * (abs(slope) - bend) - slack / pad.cell
+            gap, _, _, _ = _gap(begin, y, n, waves)
+            at_end, _, _, _ = _gap(end, y, n, waves)
+            if (gap > 0.0) != (at_end > 0.0):
+                chord = begin + (end - begin) * (gap / (gap - at_end))
+                root, _ = _followed(begin, end, chord, y, n, waves)
+                if math.isnan(root):
+                    root = _root(begin, end, gap, y, n, waves)
+                _turn(gap > 0.0, begin, y, pad, waves, contact)
+                _turn(at_end > 0.0, root, y, pad, waves, contact)
+                if whole:
+                    waves[at + _PLACE] = root
+                begin, width = end, 4.0 * half
                 continue
-        if gap > 0.0 and not touching:
-            touching, start = True, left
-        elif gap <= 0.0 and touching:
-            _add_interval(start, left, y, pad, waves, contact)
-            touching = False
-        left, width = right, min(4.0 * half, widest)
-    if touching:
-        _add_interval(start, end, y, pad, waves, contact)
+            free = min(abs(gap), abs(at_end))
+        _turn(gap > 0.0, begin, y, pad, waves, contact)
+        if whole:
+            waves[at + _FREE] = moved + _SURE * (free - rounding) - slack
+            waves[at + _PLACE] = 1.0 if gap > 0.0 else -1.0
+        begin, width = end, 4.0 * half
+
+
+@kernel(void(float64, PAD_TYPE, vector, CONTACT_TYPE), inlined=False)
+def _add_touching(y: float, pad: Any, waves: Floats, contact: Any) -> None:
+    """Pass over the pad and add every interval on which the gap is positive."""
+    n, end, width = pad.wheel_terms + pad.shoe_terms, pad.half_length, 2.0 * pad.half_length / pad.cells
+    moved, turned = waves[_LAST * n + _MOVED], waves[_LAST * n + _TURNED]
+    for cell in range(pad.cells):
+        at = _LAST * n + _CELLS + _PER_CELL * cell
+        left, right = -end + cell * width, -end + (cell + 1) * width if cell + 1 < pad.cells else end
+        place = waves[at + _PLACE]
+        if moved < waves[at + _FREE]:
+            _turn(place > 0.0, left, y, pad, waves, contact)
+            continue
+        if stopped(pad.signals):
+            return
+        if turned < waves[at + _MONOTONE]:
+            place = place if left < place < right else 0.5 * (left + right)
+            root, slope = _followed(left, right, place, y, n, waves)
+            if not math.isnan(root):
+                _turn(slope < 0.0, left, y, pad, waves, contact)
+                _turn(slope > 0.0, root, y, pad, waves, contact)
+                waves[at + _FREE], waves[at + _PLACE] = -1.0, root
+                continue
+        _look(left, right, cell, y, pad, waves, contact)
+    _turn(False, end, y, pad, waves, contact)
+
+
+@kernel(void(float64, float64, LAYER, vector), inlined=False)
+def _move(x: float, y: float, layer: Layer, waves: Floats) -> None:
+    """Put the waves where the shoe is, and let the odometers run."""
+    pad, tables, n = layer.pad, layer.tables, layer.pad.wheel_terms + layer.pad.shoe_terms
+    at, fourth, rounding = _LAST * n, 0.0, abs(y)
+    moved, turned = waves[at + _MOVED] + abs(y - waves[at + _HEIGHT]), waves[at + _TURNED]
+    for i in range(n):
+        g, omega, psi = tables[pad.gap_at + i], tables[pad.gap_at + n + i], tables[pad.gap_at + 2 * n + i]
+        if i < pad.wheel_terms:
+            psi = omega * x + layer.angles[i]
+            turns = (psi - waves[2 * n + i]) / TWO_PI
+            change = TWO_PI * abs(g) * abs(turns - np.floor(turns + 0.5))
+            moved, turned = moved + change, turned + omega * change
+        waves[i], waves[n + i], waves[2 * n + i] = g, omega, psi
+        fourth += abs(g) * (omega * omega) * (omega * omega)
+        rounding += abs(g) * (1.0 + omega * pad.half_length + abs(psi))
+    if not moved <= _ROUND * pad.crest:  # or there was nothing before
+        moved = turned = 0.0
+        for cell in range(pad.cells):
+            place = at + _CELLS + _PER_CELL * cell
+            waves[place + _FREE] = waves[place + _MONOTONE] = -1.0
+    waves[at + _MOVED], waves[at + _TURNED], waves[at + _HEIGHT], waves[at + _START] = moved, turned, y, math.inf
+    waves[at + _FOURTH], waves[at + _ROUNDING] = fourth, _EPSILON * rounding
 
 
 @kernel(EVALUATE)
 def evaluate(x: float, y: float, layer: Layer) -> None:
     """See the package; exact to rounding."""
-    pad, tables, contact, angles = layer.pad, layer.tables, layer.contact, layer.angles
+    layer = borrowed(layer)
+    pad, contact = layer.pad, layer.contact
     clear(contact)
     contact.kind = EXACT
     covered = coverage(y, pad)
     if covered == CLEAR:
         return
-    wheel_terms, n = pad.wheel_terms, pad.wheel_terms + pad.shoe_terms
-    waves = layer.scratch[: 6 * n]
-    for i in range(3 * n):
-        waves[i] = tables[pad.gap_at + i]
-    for i in range(wheel_terms):
-        waves[2 * n + i] = waves[n + i] * x + angles[i]
+    waves = layer.scratch[pad.edges_at :]
+    _move(x, y, layer, waves)
     if covered == FULL:
         _add_interval(-pad.half_length, pad.half_length, y, pad, waves, contact)
     else:

@@ -14,6 +14,12 @@ from brakecli.solver.compile import Floats, address
 from brakecli.solver.records import CONTACT, PAD, Layer, new
 from brakecli.solver.roughness import Surface, height
 
+TILE, BESIDE = 72, 3
+"""Nodes of a piece of the tables, and nodes beyond each end of the pad."""
+
+MOST_CELLS = 2**16
+"""Cells of the pad of which the exact contact keeps what it has found."""
+
 NODES_PER_WAVE = 16
 """Nodes per shortest wavelength that `nodes` is chosen for; measured in tests/solver/test_contact.py."""
 
@@ -43,21 +49,24 @@ def build_pad(k: float, half_length: float, shoe: Surface, wheel: Surface, nodes
     top, bottom = _shoe_bounds(half_length, shoe)
     pad.shoe_bound, pad.wheel_bound = max(top, bottom), np.abs(wheel.g).sum()
     pad.full_up_to, pad.clear_from = -pad.wheel_bound - top, pad.wheel_bound + bottom
-    pad.cell = 2.0 * half_length / max(8.0, 8.0 * half_length * max([*shoe.turns, *wheel.turns], default=0.0))
-    waves, cells = wheel.g.size, nodes + 2 if nodes else 0
+    pad.crest = pad.shoe_bound + pad.wheel_bound
+    pad.steep, pad.curved = (np.abs(wheel.g) @ wheel.omega**n for n in (1, 2))
+    cells = max(8.0, 8.0 * half_length * max([*shoe.turns, *wheel.turns], default=0.0))
+    pad.cell, pad.cells = 2.0 * half_length / cells, min(math.ceil(cells), MOST_CELLS)
+    waves, tiles = wheel.g.size, -(-(nodes + 2 * BESIDE) // TILE) if nodes else 0
+    pad.edges_at = nodes + 2 * BESIDE + TILE + 2 * (waves + 7)  # behind what the other evaluators keep
     shapes = {
+        "waves_at": (tiles, waves, 2, TILE),  # first, for its tiles must be aligned
         "gap_at": (3 * (waves + shoe.g.size),),
         "wheel_at": (2 * waves,),
         "full_at": (waves,),
         "ss_at": (waves, waves),
         "cc_at": (waves, waves),
         "pr_at": (2 * waves,),
-        "nodes_at": (cells,),
-        "sin_at": (waves, cells),
-        "cos_at": (waves, cells),
+        "nodes_at": (nodes,),
     }
     # Large tables are made in their place: a copy of gigabytes would not hear a signal.
-    flat, table, place = np.empty(sum(map(math.prod, shapes.values()))), dict[str, Floats](), 0
+    flat, table, place = _aligned(sum(map(math.prod, shapes.values()))), dict[str, Floats](), 0
     for name, shape in shapes.items():
         pad[name], size = place, math.prod(shape)
         table[name] = flat[place : place + size].reshape(shape)
@@ -70,7 +79,7 @@ def build_pad(k: float, half_length: float, shoe: Surface, wheel: Surface, nodes
     into = table["ss_at"], table["cc_at"]
     table["pr_at"][:], pad.shoe_mean, pad.shoe_square = _products(half_length, shoe, wheel, into)
     if nodes:
-        _node_tables(half_length, shoe, wheel, (table["nodes_at"], table["sin_at"], table["cos_at"]))
+        pad.rise_error = _node_tables(half_length, shoe, wheel, table["nodes_at"], table["waves_at"])
     return Pad(pad, flat)
 
 
@@ -78,8 +87,16 @@ def build_layer(evaluate: Any, pad: Pad) -> Layer:
     """What the kernel `evaluate` works on and fills for this pad."""
     constants, tables = pad
     waves = constants.shoe_terms + constants.wheel_terms
-    scratch = np.zeros(max(constants.nodes + 2, 6 * waves))
-    return Layer(address(evaluate), constants, tables, np.zeros(constants.wheel_terms), scratch, new(CONTACT))
+    scratch, found = _aligned(constants.edges_at + 8 * waves + 6 + 3 * constants.cells), new(CONTACT)
+    found.near = math.inf  # an evaluator that does not know it leaves it
+    return Layer(address(evaluate), constants, tables, np.zeros(constants.wheel_terms), scratch, found)
+
+
+def _aligned(size: int) -> Floats:
+    """Zeros that begin where a line of the cache does: reading across lines costs a loop a third of its speed."""
+    zeros = np.zeros(size + 8)
+    begin = -zeros.ctypes.data // 8 % 8
+    return zeros[begin : begin + size]
 
 
 def _shoe_bounds(a: float, shoe: Surface) -> tuple[float, float]:
@@ -93,24 +110,26 @@ def _shoe_bounds(a: float, shoe: Surface) -> tuple[float, float]:
     return min(float(f.max()) + between, crest), min(float(-f.min()) + between, crest)
 
 
-def _node_tables(a: float, shoe: Surface, wheel: Surface, into: tuple[Floats, Floats, Floats]) -> None:
-    """Cell means of f1, and of g sin(omega xi), g cos(omega xi) for the wheel, with one cell beyond each end.
+def _node_tables(a: float, shoe: Surface, wheel: Surface, f1: Floats, waves: Floats) -> float:
+    """Cell means of f1, and of g sin(omega xi), g cos(omega xi) for the wheel, with cells beyond each end: by
+    tiles, waves, sine and cosine, and nodes. A bound of the error of f2' from the neighbouring nodes.
 
     The mean of a sine over a cell is its value in the middle times sinc(omega spacing/2). With means instead of
     values the midpoint sum of a fully touching pad is its integral, so `auto` may change over without a jump.
     """
-    f1, sines, cosines = into
-    spacing = 2.0 * a / (f1.size - 2)
-    xi = -a + spacing * (np.arange(f1.size) - 0.5)
+    tiles, spacing = len(waves), 2.0 * a / f1.size
+    xi = -a + spacing * (np.arange(TILE * tiles) + 0.5 - BESIDE)
 
     def mean(f: Surface) -> Floats:
         return f.g * np.sinc(f.omega * spacing / (2.0 * np.pi))
 
-    f1[:] = 0.0
     for g, omega, phase in zip(mean(shoe), shoe.omega, shoe.phase, strict=True):  # signals are heard between waves
-        f1 += g * np.sin(omega * xi + phase)
+        f1 += g * np.sin(omega * xi[BESIDE : BESIDE + f1.size] + phase)
     for i, (g, omega) in enumerate(zip(mean(wheel), wheel.omega, strict=True)):
-        sines[i], cosines[i] = g * np.sin(omega * xi), g * np.cos(omega * xi)
+        waves[:, i, 0], waves[:, i, 1] = (g * f(omega * xi).reshape(tiles, TILE) for f in (np.sin, np.cos))
+    turns = np.sin(np.outer([1.0, 2.0, 3.0], wheel.omega * spacing))
+    differences = np.array([45.0, -9.0, 1.0]) @ turns / (30.0 * spacing)  # what they make of omega
+    return float(np.abs(wheel.g) @ np.abs(wheel.omega - differences))
 
 
 def _products(a: float, shoe: Surface, wheel: Surface, into: tuple[Floats, Floats]) -> tuple[Floats, float, float]:

@@ -38,8 +38,9 @@ from brakecli.solver.records import (
 )
 from brakecli.solver.schedules import integral_at, segment, slope_at, value_at
 from brakecli.solver.schemes.piecewise_exact import phases
-from brakecli.solver.schemes.piecewise_exact.locate import NO_EVENT, ROUNDING, first_event
-from brakecli.solver.schemes.piecewise_exact.phases import BACKWARD, FORWARD, HEIGHT, OPEN, STICK, add_works
+from brakecli.solver.schemes.piecewise_exact.locate import NO_EVENT, first_event
+from brakecli.solver.schemes.piecewise_exact.phases import OPEN, STICK, add_works
+from brakecli.solver.schemes.piecewise_exact.switch import place, switch
 
 STATE = FLOW
 LAG = 0
@@ -82,7 +83,7 @@ def _ahead(m: Any, place: int) -> float:
 
 
 @kernel(int64(FLOW_TYPE, float64), inlined=False)
-def _whole(m: Any, h: float) -> int:
+def whole(m: Any, h: float) -> int:
     """Take a whole step and return 1, unless a margin runs out in it or may do so.
 
     A margin that falls at first and rises at last is lowest inside, and not below its tangents at both ends.
@@ -107,7 +108,7 @@ def _whole(m: Any, h: float) -> int:
 
 
 @kernel(void(FLOW_TYPE), inlined=False)
-def _look(m: Any) -> None:
+def look(m: Any) -> None:
     """The margins of the motion reached, and their slopes."""
     for k in range(2 * MARGINS):
         m.before[k] = 0.0
@@ -129,49 +130,13 @@ def _pass_knot(p: Plant, t: float) -> None:
 
 
 @kernel(void(_PLANT, float64, float64), inlined=False)
-def _take_hold(p: Plant, t: float, tau: float) -> None:
-    """The phase of a touching shoe at the wheel's velocity: stick if friction can hold it, else slip, (3)-(5)."""
+def _anchor(p: Plant, t: float, tau: float) -> None:
+    """In stick, remember where the shoe holds on to the wheel."""
     m = p.state
-    phases.make(p.c, m, STICK, p.s.h)
-    for which in range(1, MARGINS):
-        total, terms = 0.0, 0.0
-        for i in range(SIZE):
-            part = m.margins[STICK, which, i] * m.z[i]
-            total, terms = total + part, terms + abs(part)
-        if total < -0.5 * ROUNDING * terms:
-            m.phase = BACKWARD if which == 1 else FORWARD
-            return
-    travel, travel_low = integral_at(p.drive.belt, t, tau)
-    m.anchor, anchor_low = two_sum(m.z[X], -travel)
-    m.anchor_low, m.z[V_X], m.phase = anchor_low - travel_low, m.z[BELT], STICK
-
-
-@kernel(void(_PLANT, float64, float64), inlined=False)
-def _land(p: Plant, t: float, tau: float) -> None:
-    """The phase of a shoe that touches, by its sliding velocity."""
-    m = p.state
-    if m.z[V_X] == m.z[BELT]:
-        _take_hold(p, t, tau)
-    else:
-        m.phase = FORWARD if m.z[V_X] > m.z[BELT] else BACKWARD
-
-
-@kernel(void(_PLANT, int64, float64, float64), inlined=False)
-def _switch(p: Plant, which: int, t: float, tau: float) -> None:
-    """Enter the phase that follows where a margin has run out."""
-    m = p.state
-    add_works(m, p.work)
-    if which == HEIGHT:
-        m.z[Y] = 0.0
-        if m.phase == OPEN:
-            _land(p, t, tau)
-        else:
-            m.phase = OPEN
-    elif m.phase == STICK:
-        m.phase = BACKWARD if which == 1 else FORWARD  # friction cannot pull that hard, or cannot push
-    else:
-        _take_hold(p, t, tau)
-    phases.make(p.c, m, m.phase, p.s.h)
+    if m.phase == STICK:
+        travel, travel_low = integral_at(p.drive.belt, t, tau)
+        m.anchor, anchor_low = two_sum(m.z[X], -travel)
+        m.anchor_low = anchor_low - travel_low
 
 
 @kernel(void(_PLANT), inlined=False)
@@ -181,12 +146,9 @@ def _start(p: Plant) -> None:
     m.stiffness = 2.0 * p.layer.pad.half_length * p.layer.pad.k
     m.z[X], m.z[Y], m.z[V_X], m.z[V_Y] = m.x, m.y, m.v_x, m.v_y
     _pass_knot(p, 0.0)
-    if m.y > 0.0 or (m.y == 0.0 and m.v_y > 0.0):
-        m.phase = OPEN
-    else:
-        _land(p, 0.0, 0.0)
-    phases.make(p.c, m, m.phase, p.s.h)
-    _look(m)
+    place(p.c, m, p.s.h)
+    _anchor(p, 0.0, 0.0)
+    look(m)
     m.started = 1
 
 
@@ -220,13 +182,15 @@ def _through(p: Plant, t: float) -> int:
             m.events += 1
             if m.events > _MOST_EVENTS:
                 return _STALLED
-            _switch(p, which, t, tau)
+            add_works(m, p.work)
+            switch(p.c, m, which, p.s.h)
+            _anchor(p, t, tau)
         elif to_knot <= h - tau:
             tau += span
             _pass_knot(p, m.knot)
         else:
             break
-    _look(m)
+    look(m)
     return _NONE
 
 
@@ -272,7 +236,7 @@ def advance(p: Plant, rows: Floats, events: Floats, stop: int) -> int:
             for column in range(rows.shape[1]):  # a slice would take seconds to compile
                 rows[row, column] = m.row[column]
             row += 1
-        if t + h < m.knot and _whole(m, h) == 1:
+        if t + h < m.knot and whole(m, h) == 1:
             _count(m, counts)
         else:
             failure = _through(p, t)

@@ -26,7 +26,7 @@ def _value(m: Any, row: int, theta: float) -> tuple[float, float]:
 
 
 @kernel(float64(FLOW_TYPE, int64, float64, float64), inlined=False)
-def _root(m: Any, row: int, left: float, right: float) -> float:
+def root(m: Any, row: int, left: float, right: float) -> float:
     """Where a polynomial falls through zero between left and right: Newton's iteration, kept in the bracket."""
     place = right
     for _ in range(200):
@@ -78,7 +78,7 @@ def first_event(m: Any) -> tuple[int, float]:
         elif m.polynomial[0, 1] < 0.0 < slope:  # it is lowest inside
             for k in range(1, TERMS):
                 m.polynomial[1, k - 1] = -k * m.polynomial[0, k]
-            place = _root(m, 1, 0.0, 1.0)
+            place = root(m, 1, 0.0, 1.0)
             right = place if _value(m, 0, place)[0] < -allowed else 0.0
         if right == 0.0:
             continue
@@ -91,7 +91,7 @@ def first_event(m: Any) -> tuple[int, float]:
                     break
             else:
                 return which, 0.0
-        root = _root(m, 0, left, right)
-        if root < first:
-            found, first = which, root
+        place = root(m, 0, left, right)
+        if place < first:
+            found, first = which, place
     return found, first

@@ -1,0 +1,69 @@
+"""How much of a motion is ripple of the quadrature nodes, under which the waves pass where a pad opens.
+
+The normal force at stored positions is computed again with more nodes. What it differs by shakes the shoe, by the
+linear equations with the mean stiffness of the contact.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from brakecli.analysis.regime.evidence import Part
+from brakecli.analysis.stability.modes import stiffness_matrix
+from brakecli.solver.contact.pad import build_layer, build_pad
+from brakecli.solver.steady_sliding import add_places
+from brakecli.solver.system import System
+
+_FINER = 4
+_MOST_SAMPLES, _MOST_WORK = 1024, 1 << 24  # samples, and values of waves at nodes
+_LEAST = 0.05  # part of a number from which on it is said
+
+
+class Ripple(NamedTuple):
+    """Parts of the deviations of x, vx and the friction force, and half of peak to peak of x (m)."""
+
+    x: float
+    vx: float
+    force: float
+    size: float
+    nodes: int
+
+    @property
+    def sentence(self) -> str:
+        """What it is, and what to do: it falls with the square of the number of nodes."""
+        parts = f"{self.x:.0%} of x, {self.vx:.0%} of vx and {self.force:.0%} of the friction force"
+        enough = self.nodes * 2 ** math.ceil(0.5 * math.log2(max(self[:3]) / _LEAST) + 0.5)
+        return f"ripple of the contact's {self.nodes} nodes is {parts}; take contact.nodes = {enough}"
+
+
+def ripple(system: System, belt: float, stiffness: float, part: Part) -> Ripple | None:
+    """The ripple in the last samples of a part, at a mean stiffness (N/m); None where it is small or not known."""
+    samples = min(part.stop - part.start, _MOST_SAMPLES)
+    end = Part(part.history, part.stop - samples, part.stop)
+    work = samples * _FINER * system.nodes * len(system.wheel.g)
+    if not 0 < work <= _MOST_WORK or system.method.step is None or end.slides(None):
+        return None
+    pad = build_pad(system.layer_stiffness, system.half_length, system.shoe, system.wheel, _FINER * system.nodes)
+    layer, waves = build_layer(system.evaluate, pad), system.wheel.waves
+    x, y, v_x, force = (part.history.read(name, end.start, end.stop) for name in ("x", "y", "vx", "normal_force"))
+    travel = belt * part.history.interval * np.arange(end.start, end.stop) - x
+    finer = np.zeros((samples, 3))
+    for i, sums in enumerate(finer):
+        add_places(y[i], travel[i : i + 1], np.ones(1), waves, layer, sums)
+    c, window = system.coefficients, np.hanning(samples)
+    omega = 2.0 * math.pi * np.fft.rfftfreq(samples, part.history.interval)
+    off, *seen = (np.fft.rfft((each - each.mean()) * window) for each in (force - finer[:, 0], x, v_x, force))
+    grip = math.copysign(c.phi, belt)
+    (s_xx, s_xy), (s_yx, s_yy) = stiffness_matrix(c, stiffness, grip)
+    a, b = s_xx - c.m * omega**2 + 1j * omega * c.b_xx, s_xy + 1j * omega * c.b_xy
+    d, e = s_yx + 1j * omega * c.b_xy, s_yy - c.m * omega**2 + 1j * omega * c.b_yy
+    shaken = (grip * e - b) / (a * e - b * d) * off
+    pressed = off - stiffness * (a - grip * d) / (a * e - b * d) * off
+    in_x, in_vx, in_force = (
+        min(float(np.linalg.norm(ours) / size), 1.0) if (size := np.linalg.norm(whole)) else 0.0
+        for ours, whole in zip((shaken, 1j * omega * shaken, pressed), seen, strict=True)
+    )
+    if max(in_x, in_vx, in_force) < _LEAST:
+        return None
+    return Ripple(in_x, in_vx, in_force, 0.5 * float(np.ptp(np.fft.irfft(shaken, samples))), system.nodes)

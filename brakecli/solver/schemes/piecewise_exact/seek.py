@@ -1,0 +1,144 @@
+"""Follow a motion on smooth pads, without samples, until it is known what becomes of it.
+
+At constant speed and load it either comes so near to steady sliding that no event can follow, or its returns to
+the section ẋ = 0 come close to one another, and `orbit` finds the limit cycle. The modes of steady sliding
+bound the first: the sum of |a_q V_q|, with the amplitudes a_q of the motion beside steady sliding along the
+eigenvectors V_q, is not reached at any later time where they decay, and it is multiplied by exp(σ_q t) where
+they grow.
+"""
+
+import math
+from typing import Any
+
+from numba import float64, int64, void
+
+from brakecli.solver.compile import kernel
+from brakecli.solver.records import COEFFICIENTS, FLOW_TYPE, NODES, SIZE, V_X, V_Y, Coefficients, X, Y
+from brakecli.solver.schemes.piecewise_exact import look, phases
+from brakecli.solver.schemes.piecewise_exact.orbit import (
+    MOST_EVENTS,
+    MOST_STEPS,
+    MOST_TURNS,
+    ORBIT_TYPE,
+    closed,
+    note_event,
+    sizes,
+    step,
+    zero_of_velocity,
+)
+from brakecli.solver.schemes.piecewise_exact.switch import place
+
+GOING_ON, LINEAR, FOUND, ENDED = range(4)
+"""What `seek` has come to: nothing yet; no event can follow; an orbit; the end of the time, or of the progress."""
+
+_NEAR = 0.02  # of the size of a cycle: distance of two returns at which an orbit is sought
+
+
+@kernel(void(FLOW_TYPE, ORBIT_TYPE, float64), inlined=False)
+def _bound(m: Any, o: Any, seconds: float) -> None:
+    """How far from steady sliding a linear motion can come within some time: the sum of its modes."""
+    for k in range(3):
+        o.bound[k] = 0.0
+    for q in range(4):
+        real, imaginary = 0.0, 0.0
+        for i in range(4):
+            real += o.into[0, q, i] * (m.z[i] - o.rest[i])
+            imaginary += o.into[1, q, i] * (m.z[i] - o.rest[i])
+        powers = max(o.growth[q], 0.0) * seconds
+        size = math.hypot(real, imaginary) * (math.exp(powers) if powers < 700.0 else math.inf)
+        for k in range(3):
+            o.bound[k] += size * o.reach[q, k]
+
+
+@kernel(int64(FLOW_TYPE, ORBIT_TYPE), inlined=False)
+def _stays_linear(m: Any, o: Any) -> int:
+    """Whether the motion slides steadily, or beside that, and no event can come before the end."""
+    if m.phase != o.sliding:
+        return 0
+    _bound(m, o, o.duration - o.time)
+    return 1 if o.bound[1] < o.room[0] and o.bound[2] < o.room[1] else 0
+
+
+@kernel(int64(FLOW_TYPE, ORBIT_TYPE, float64), inlined=False)
+def _returned(m: Any, o: Any, fall: float) -> int:
+    """Note a return to the section, which is in `m.at`; whether it lies close to the one `turns` before."""
+    s = o.returns
+    for k in range(MOST_TURNS, 0, -1):
+        s[k, 0], s[k, 1], s[k, 2], o.fell[k] = s[k - 1, 0], s[k - 1, 1], s[k - 1, 2], o.fell[k - 1]
+        if k < MOST_TURNS:
+            o.lows[k], o.ways[k] = o.lows[k - 1], o.ways[k - 1]
+    s[0, 0], s[0, 1], s[0, 2] = m.at[NODES, 0, X], m.at[NODES, 0, Y], m.at[NODES, 0, V_Y]
+    o.fell[0], o.lows[0], o.ways[0], o.falls = fall, o.low, o.way, o.falls + 1
+    o.low, o.way, o.events = s[0, 0], 0, 0
+    if o.falls < max(o.next_try, 3):
+        return 0
+    low, high = o.lows[0], s[0, 0]
+    for k in range(1, min(MOST_TURNS, o.falls - 1) + 1):
+        low, high = min(low, o.lows[k - 1]), max(high, s[k - 1, 0])
+        o.period, o.amplitude, o.turns = fall - o.fell[k], 0.5 * (high - low), k
+        if sizes(o, s[0, 0] - s[k, 0], s[0, 1] - s[k, 1], s[0, 2] - s[k, 2]) < _NEAR:
+            return 1
+    return 0
+
+
+@kernel(int64(COEFFICIENTS, FLOW_TYPE, ORBIT_TYPE), inlined=False)
+def _try(c: Coefficients, m: Any, o: Any) -> int:
+    """Seek an orbit near the last return. Where there is none the motion goes on as if nothing had been sought."""
+    phase, way, events, low = m.phase, o.way, o.events, o.low
+    for i in range(SIZE):
+        o.saved[i] = m.z[i]
+    found = closed(c, m, o)
+    for i in range(SIZE):
+        m.z[i] = o.saved[i]
+    m.phase, o.way, o.events, o.low = phase, way, events, low
+    look(m)
+    o.next_try = o.falls + 3 + (o.falls - o.next_try) // 2
+    return found
+
+
+@kernel(int64(COEFFICIENTS, FLOW_TYPE, ORBIT_TYPE))
+def seek(c: Coefficients, m: Any, o: Any) -> int:
+    """Follow the motion until something is known of all that is to come; what that is, or `GOING_ON`."""
+    if o.started == 0:
+        m.z[X], m.z[Y], m.z[V_X], m.z[V_Y], o.low = m.x, m.y, m.v_x, m.v_y, m.x
+        place(c, m, o.h)
+        look(m)
+        o.started = 1
+        if _stays_linear(m, o) == 1:
+            return LINEAR
+    for _ in range(MOST_STEPS):
+        if o.time >= o.duration or o.events > MOST_EVENTS:
+            return ENDED
+        step(c, m, o, 0)
+        o.low, near, falls = min(o.low, m.z[X]), 0, o.begin[V_X] > 0.0 >= m.z[V_X]
+        if falls:
+            near = _returned(m, o, o.time + zero_of_velocity(m, o, 1.0) * o.h)
+        o.time += o.part * o.h
+        note_event(o, m.phase)
+        if near == 1 and _try(c, m, o) == 1:
+            return FOUND
+        if falls and _stays_linear(m, o) == 1:
+            return LINEAR
+    return GOING_ON
+
+
+@kernel(void(COEFFICIENTS, FLOW_TYPE, ORBIT_TYPE, float64))
+def swing(c: Coefficients, m: Any, o: Any, seconds: float) -> None:
+    """Widen `low` and `high` to the least and largest x of a linear motion from `m.z` on, for some time.
+
+    It ends early where the modes that are left can reach no further.
+    """
+    m.phase = o.sliding
+    phases.make(c, m, m.phase, o.h)
+    look(m)
+    o.low, o.high = min(o.low, m.z[X]), max(o.high, m.z[X])
+    for number in range(math.ceil(seconds / o.h)):
+        step(c, m, o, 0)
+        if o.begin[V_X] * m.z[V_X] < 0.0:
+            part = zero_of_velocity(m, o, 1.0 if o.begin[V_X] > 0.0 else -1.0)
+            if (number + part) * o.h > seconds:
+                return
+            o.low, o.high = min(o.low, m.at[NODES, 0, X]), max(o.high, m.at[NODES, 0, X])
+            _bound(m, o, seconds)
+            if o.rest[X] + o.bound[0] <= o.high and o.rest[X] - o.bound[0] >= o.low:
+                return

@@ -1,0 +1,61 @@
+"""From one phase to the next: which one a motion is in, and which one follows where a margin has run out."""
+
+from typing import Any
+
+from numba import float64, int64, void
+
+from brakecli.solver.compile import kernel
+from brakecli.solver.records import BELT, COEFFICIENTS, FLOW_TYPE, MARGINS, SIZE, V_X, V_Y, Coefficients, Y
+from brakecli.solver.schemes.piecewise_exact import phases
+from brakecli.solver.schemes.piecewise_exact.locate import ROUNDING
+from brakecli.solver.schemes.piecewise_exact.phases import BACKWARD, FORWARD, HEIGHT, OPEN, STICK
+
+
+@kernel(void(COEFFICIENTS, FLOW_TYPE, float64), inlined=False)
+def _take_hold(c: Coefficients, m: Any, h: float) -> None:
+    """The phase of a touching shoe at the wheel's velocity: stick if friction can hold it, else slip, (3)-(5)."""
+    phases.make(c, m, STICK, h)
+    for which in range(1, MARGINS):
+        total, terms = 0.0, 0.0
+        for i in range(SIZE):
+            part = m.margins[STICK, which, i] * m.z[i]
+            total, terms = total + part, terms + abs(part)
+        if total < -0.5 * ROUNDING * terms:
+            m.phase = BACKWARD if which == 1 else FORWARD
+            return
+    m.z[V_X], m.phase = m.z[BELT], STICK
+
+
+@kernel(void(COEFFICIENTS, FLOW_TYPE, float64), inlined=False)
+def _land(c: Coefficients, m: Any, h: float) -> None:
+    """The phase of a shoe that touches, by its sliding velocity."""
+    if m.z[V_X] == m.z[BELT]:
+        _take_hold(c, m, h)
+    else:
+        m.phase = FORWARD if m.z[V_X] > m.z[BELT] else BACKWARD
+
+
+@kernel(void(COEFFICIENTS, FLOW_TYPE, float64), inlined=False)
+def place(c: Coefficients, m: Any, h: float) -> None:
+    """Find the phase of a motion."""
+    if m.z[Y] > 0.0 or (m.z[Y] == 0.0 and m.z[V_Y] > 0.0):
+        m.phase = OPEN
+    else:
+        _land(c, m, h)
+    phases.make(c, m, m.phase, h)
+
+
+@kernel(void(COEFFICIENTS, FLOW_TYPE, int64, float64), inlined=False)
+def switch(c: Coefficients, m: Any, which: int, h: float) -> None:
+    """Enter the phase that follows where a margin has run out."""
+    if which == HEIGHT:
+        m.z[Y] = 0.0
+        if m.phase == OPEN:
+            _land(c, m, h)
+        else:
+            m.phase = OPEN
+    elif m.phase == STICK:
+        m.phase = BACKWARD if which == 1 else FORWARD  # friction cannot pull that hard, or cannot push
+    else:
+        _take_hold(c, m, h)
+    phases.make(c, m, m.phase, h)

@@ -1,0 +1,179 @@
+"""What is said of the shoes of `found`, and of random ones that are run for as long as their verdict asks."""
+
+import math
+import re
+from itertools import chain
+from typing import Any
+
+import numpy as np
+import pytest
+
+from brakecli.analysis.regime.verdict import Excitation, Regime, Verdict
+from brakecli.analysis.stability.report import stability
+from brakecli.case.system import system_of
+from tests.analysis.found import SHOES
+from tests.analysis.histories import verdict_of
+from tests.analysis.shoes import Shoe, random_shoes
+from tests.campaign import campaign
+from tests.examples import SQUEAL, make
+
+
+def judged(name: str, times: float = 1.0, **changes: Any) -> Verdict:
+    """The verdict on a shoe, run for so many times as long."""
+    tables = SHOES[name]
+    return verdict_of(make(tables, solver__duration=times * tables["solver"]["duration"], **changes))
+
+
+def test_a_shoe_that_locks_itself_is_not_called_forced_while_it_drifts_away() -> None:
+    tables = SHOES["locks itself"]
+    assert stability(system_of(make(tables))).equilibrium is None
+    verdict = judged("locks itself")
+    assert verdict.regime is Regime.UNDECIDED
+    assert f"grows at {Shoe.of(tables).rate:.3g} 1/s" in verdict.reasons[0]  # in full contact
+
+
+@campaign
+@pytest.mark.parametrize("seed", range(10))
+def test_none_of_its_neighbours_is_called_forced(seed: int) -> None:
+    factors = 1.0 + np.random.default_rng(seed).uniform(-0.3, 0.3, 4)
+    tables = SHOES["locks itself"]
+    changes = {
+        "wheel__angular_speed": tables["wheel"]["angular_speed"] * factors[0],
+        "load__force": tables["load"]["force"] * factors[1],
+        "shoe__mass": tables["shoe"]["mass"] * factors[2],
+        "initial__vx": tables["initial"]["vx"] * factors[3],
+    }
+    assert stability(system_of(make(tables, **changes))).equilibrium is None
+    assert judged("locks itself", float(factors[3]), **changes).regime is not Regime.DAMPED
+
+
+@campaign
+@pytest.mark.parametrize("seed", range(10))
+def test_no_line_near_an_own_frequency_is_counted_as_forced(seed: int) -> None:
+    name, rng = "a line on its own mode, in full contact", np.random.default_rng(seed)
+    mass = SHOES[name]["shoe"]["mass"] * float(
+        rng.uniform(0.85, 1.15)
+    )  # own frequency within two bins of the line
+    verdict = judged(name, shoe__mass=mass, initial__vx=float(rng.uniform(-1e-4, 1e-4)))
+    assert "only the roughness" not in verdict.reasons[0]
+    assert (verdict.amplitude_spread, verdict.amplitude_forced) == (None, None)
+
+
+@pytest.mark.parametrize("name", ["a line on its own mode, in full contact", "a line on its own mode, open"])
+def test_a_line_at_an_own_frequency_is_not_counted_as_forced(name: str) -> None:
+    """The shoe's own vibration takes thousands of times the run, or fifty, to die."""
+    verdict, tables = judged(name), SHOES[name]
+    assert verdict.regime is Regime.DAMPED
+    told = re.search(r"own vibration at ([\d.]+) Hz.* lies on the same lines; run at least", verdict.reasons[0])
+    assert told is not None
+    assert float(told[1]) == pytest.approx(np.abs(Shoe.of(tables).modes.imag).min() / (2.0 * math.pi), rel=0.05)
+    assert (verdict.amplitude_spread, verdict.amplitude_forced, verdict.settled) == (None, None, False)
+
+
+@pytest.mark.parametrize(
+    ("name", "later"),
+    [  # amplitude (m) and frequency (Hz) eight or four times later, by another integrator
+        ("drifts, one link damped", (7.5e-5, 72.3)),
+        pytest.param("grows for ever so slowly", (1.585e-5, 34.43), marks=campaign),
+        pytest.param("its frequency drifts", (7.44e-4, 209.67), marks=campaign),
+    ],
+)
+def test_the_spread_of_what_is_not_settled_holds_what_it_becomes(name: str, later: tuple[float, float]) -> None:
+    verdict = judged(name)
+    assert verdict.excitation is Excitation.SELF_EXCITED
+    assert verdict.settled is False
+    assert verdict.amplitude_spread is not None
+    assert verdict.frequency is not None
+    assert abs(verdict.amplitude - later[0]) <= 2.0 * verdict.amplitude_spread
+    assert abs(verdict.frequency - later[1]) <= 2.0 * verdict.evidence["frequency_spread"]
+
+
+def test_chaos_with_most_of_its_energy_in_three_bands_is_irregular() -> None:
+    """Neighbouring runs part at 7.3 1/s, and the amplitude of a longer run is half, or two and a half times."""
+    verdict = judged("chaotic")
+    assert verdict.regime is Regime.UNDECIDED
+    assert "irregular" in verdict.reasons[0]
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param("ripple of 64 nodes", marks=campaign), "ripple in the force", "nothing but ripple"]
+)
+def test_ripple_of_the_nodes_is_named_and_gone_with_the_nodes_that_are_asked_for(name: str) -> None:
+    verdict = judged(name)
+    assert verdict.settled is False
+    told = re.search(r"ripple of the contact's \d+ nodes .*; take contact.nodes = (\d+)", verdict.reasons[-1])
+    assert told is not None
+    if name == "nothing but ripple":
+        assert verdict.evidence["ripple_vx"] > 0.9
+        return
+    finer = judged(name, contact__nodes=int(told[1]))
+    assert "ripple" not in finer.reasons[-1]
+    assert verdict.amplitude_spread is not None
+    assert abs(verdict.amplitude - finer.amplitude) <= 1.5 * verdict.amplitude_spread
+    # By another integrator, from the contact integral to 1e-4; peak to peak still ripples by twice `_LEAST`.
+    torque = {"ripple of 64 nodes": 0.00229, "ripple in the force": 4.835}[name]
+    assert finer.torque_variation == pytest.approx(torque, rel=0.1)
+
+
+def test_what_the_wheel_keeps_up_has_not_died_out_without_excitation() -> None:
+    verdict = judged("kept up by the wheel")
+    assert (verdict.regime, verdict.excitation) == (Regime.DAMPED, Excitation.FORCED)
+
+
+def test_waves_that_beat_more_slowly_than_the_run_force_the_sum_of_their_amplitudes() -> None:
+    waves = {"amplitudes": [1e-6, 0.7e-6], "wavelengths": [0.031, 0.0311], "phases_deg": [0.0, 180.0]}
+    changes: dict[str, Any] = {"friction__coefficient": 0.3, "wheel__angular_speed": 8.0, "solver__duration": 0.6}
+    tables = SQUEAL | {"roughness": {"wheel": waves}}
+    case = make(tables, **changes, link1__damping=3000.0, link2__damping=3000.0)
+    verdict, c = verdict_of(case), system_of(case).coefficients
+    swings = []
+    for g, length in zip(waves["amplitudes"], waves["wavelengths"], strict=True):
+        k = 2.0 * math.pi / length
+        w = 4.0 * k
+        s = np.array([[c.c_xx, c.c_xy + c.phi * 2e6], [c.c_xy, c.c_yy + 2e6]])
+        b = np.array([[c.b_xx, c.b_xy], [c.b_xy, c.b_yy]])
+        push = 2e6 * g * np.sinc(k * 0.05 / np.pi) * np.array([c.phi, 1.0])
+        swings.append(abs(np.linalg.solve(s - c.m * w * w * np.eye(2) + 1j * w * b, push)[0]))
+    assert verdict.amplitude == pytest.approx(sum(swings), rel=1e-3)
+    assert verdict.amplitude_spread is not None
+    assert verdict.amplitude_spread > 0.1 * verdict.amplitude  # by which the run itself shows less
+
+
+RATE = re.compile(r"still (?:growing|decaying) at ([\d.e+-]+) 1/s; ")
+ASKED = re.compile(r"run at least ([\d.e+-]+) s( longer)?")
+
+
+def asked(verdict: Verdict, duration: float) -> float | None:
+    """The duration (s) that an undecided verdict asks for."""
+    found = ASKED.search(verdict.reasons[0]) if verdict.regime is Regime.UNDECIDED else None
+    return float(found[1]) + (duration if found[2] else 0.0) if found else None
+
+
+def test_a_forced_motion_has_settled_after_the_time_that_is_asked_for() -> None:
+    verdict, duration = judged("forced, not yet"), SHOES["forced, not yet"]["solver"]["duration"]
+    told = ASKED.search(verdict.reasons[0])
+    assert told is not None
+    again = judged("forced, not yet", float(told[1]) / duration)
+    assert (again.excitation, ASKED.search(again.reasons[0])) == (Excitation.FORCED, None)
+    # The same four times later, by another integrator.
+    assert again.amplitude == pytest.approx(7.70e-6, rel=0.01)
+
+
+@campaign
+def test_the_time_that_a_verdict_asks_for_is_enough_or_the_new_one_has_another_reason() -> None:
+    tried, kinds = 0, [random_shoes(stratum, 5) for stratum in ("smooth", "full", "open")]
+    for tables in chain.from_iterable(zip(*kinds, strict=True)):
+        duration = tables["solver"]["duration"]
+        if duration > 2e4 * tables["solver"]["step"]:
+            continue
+        first = verdict_of(make(tables))
+        needed = asked(first, duration)
+        if needed is None or needed > 5.0 * duration:
+            continue
+        again = verdict_of(make(tables, solver__duration=needed))
+        reasons = [re.sub(r"[\d.e+-]+", "", ASKED.sub("", each.reasons[0])) for each in (first, again)]
+        slower = [float(rate[1]) for each in (first, again) if (rate := RATE.search(each.reasons[0]))]
+        explained = reasons[0] != reasons[1] or (len(slower) == 2 and slower[1] < 0.8 * slower[0])
+        assert again.regime is not Regime.UNDECIDED or explained, (tables, first.reasons, again.reasons)
+        if (tried := tried + 1) == 10:
+            return

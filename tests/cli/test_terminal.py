@@ -1,0 +1,138 @@
+"""What a terminal of 80 columns shows, what long work says without one, and the starters."""
+
+import re
+import time
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from brakecli.case.read import parse_case, starters
+from brakecli.cli import output
+from brakecli.cli.tables import grid, verdict_table
+from brakecli.sweeps.plan import parse_sweep
+from tests.commands import ROOT, attributes, brakecli, each, left_in
+
+
+@pytest.fixture(autouse=True)
+def _eighty(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+
+
+def test_each_command_says_in_a_whole_line_what_it_does(tmp_path: Path) -> None:
+    shown = brakecli("--help", cwd=tmp_path, COLUMNS="80").out
+    lines = shown.partition("Commands:\n")[2].splitlines()
+    assert len(lines) >= 10
+    assert [line for line in lines if not re.fullmatch(r"  [a-z-]+ +[A-Z].*\.", line) or line.endswith("..")] == []
+
+
+def test_no_word_of_a_table_is_broken_and_what_does_not_fit_follows_below() -> None:
+    columns = {key: ["1", "20000000"] for key in ("friction.coefficient", "wheel.angular_speed")}
+    columns |= {
+        f"critical {name}, N s/m": ["quasi-harmonic", "0.123456"] for name in ("eigenvalue", "error", "bias")
+    }
+    shown = grid(columns | {"sustained status": ["undecided", "found"]}, 2)
+    assert max(map(len, shown.splitlines())) <= 80
+    first, second = (block.split() for block in shown.split("\n\n"))
+    keys = {"friction.", "coefficient", "wheel.", "angular_speed"}
+    assert keys <= {*first}
+    assert {*columns} >= {*second} & {*columns} == {"friction.coefficient", "wheel.angular_speed"}
+    assert {"critical", "eigenvalue,", "error,", "quasi-harmonic"} <= {*first}
+    assert {"sustained", "status", "undecided", "found"} <= {*second}
+
+
+def test_a_word_of_more_than_half_a_line_is_folded() -> None:
+    path = "/".join(["directory"] * 12)
+    lines = grid({"label": ["file", "time of the loop"], "value": [path, "2 s"]}, show_header=False).splitlines()
+    assert max(map(len, lines)) <= 80
+    assert "".join(line[18:] for line in lines[:-1]) == path
+    assert lines[-1] == "time of the loop  2 s"
+
+
+def test_evidence_has_the_units_of_the_page() -> None:
+    page = (ROOT / "docs" / "regimes.md").read_text(encoding="utf-8").partition("## The evidence")[2]
+    units = dict(re.findall(r"^\| `(\w+)` \| ([^|]+) \|", page, re.MULTILINE))
+    assert len(units) > 25
+    numbers: dict[str, Any] = dict.fromkeys(("frequency", "amplitude", "stick_fraction", "contact_loss_fraction"))
+    numbers |= {
+        "regime": "damped",
+        "excitation": "none",
+        "reasons": ["so it is"],
+        "evidence": dict.fromkeys(units, 2.5),
+    }
+    numbers["evidence"]["line_frequencies"] = [100.0, 200.0]
+    shown = dict(re.split("  +", line, maxsplit=1) for line in verdict_table("f.h5", numbers).splitlines()[1:])
+    assert shown["line frequencies"] == "100, 200 Hz"
+    for name, unit in units.items():
+        if name != "line_frequencies":
+            assert shown[name.replace("_", " ")] == f"2.5 {'' if unit == '1' else unit}".rstrip(), name
+
+
+def test_long_work_without_a_terminal_says_a_line_now_and_then(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    seconds = iter([0.0, 5.0, 21.0, 30.0, 41.0, 50.0, 99.0, 101.0])
+    monkeypatch.setattr(time, "monotonic", lambda: next(seconds, 200.0))
+    with output.progress(False) as tell:
+        for done in range(6):
+            tell("steps", 10 * done, 100)
+        tell("reference", 0, 0)
+    said = ["steps 10 of 100, 21 s", "steps 40 of 100, 50 s", "reference, 101 s"]
+    assert capsys.readouterr().err.splitlines() == [f"brakecli: {line}" for line in said]
+    with output.progress(True) as tell:
+        tell("steps", 1, 2)
+    assert capsys.readouterr().err == ""
+
+
+def test_the_json_of_a_run_holds_all_that_its_file_says_of_the_case_and_the_versions(good: Path) -> None:
+    numbers = brakecli("run", "tiny.toml", "--json", "-o", "json.h5", cwd=good).json
+    stored = attributes(good / "json.h5")
+    names = [
+        "kind",
+        "title",
+        "case_toml",
+        "resolved_toml",
+        *(name for name in stored if name.endswith("_version")),
+    ]
+    assert len(names) > 9
+    assert [name for name in names if name != "format_version" and numbers[name] != stored[name]] == []
+
+
+def test_a_tolerance_that_is_set_replaces_what_a_step_needs_but_not_what_is_set_beside_it(tmp_path: Path) -> None:
+    text = starters()["case"].replace(
+        "tolerance = 1e-4", 'step = 1e-5\ntheta = [1.0, 1.0]\niteration = "fixed-point"'
+    )
+    text = text.replace('evaluator = "auto"', 'evaluator = "midpoint"')
+    case = parse_case(text, "file", ["solver.tolerance=1e-5"]).case
+    assert (case.solver.step, case.solver.tolerance, case.solver.theta) == (None, 1e-5, ())
+    assert (case.solver.iteration, case.contact.evaluator) == ("newton", "auto")
+    for key, kept in (("theta", text), ("evaluator", re.sub("theta.*\niteration.*", "", text))):
+        (tmp_path / "both.toml").write_text(kept.replace("step = 1e-5", "tolerance = 1e-5"))
+        brakecli("check", "both.toml", cwd=tmp_path).told(2, f"{key}: ")
+    (tmp_path / "step.toml").write_text(text)
+    beside = ["--set", "solver.tolerance=1e-5", "--set", "solver.theta=[1.0, 1.0]"]
+    assert (
+        brakecli("check", "step.toml", *beside, cwd=tmp_path).told(2, "solver.theta: is not used").count("\n") == 1
+    )
+
+
+def test_new_lists_a_starter_for_each_kind_of_question_and_writes_it(tmp_path: Path) -> None:
+    listed, sweep, again, named = each(
+        tmp_path, [["new", "--list"], ["new", "sweep"], ["new", "sweep"], ["new", "map", "-q"]]
+    )
+    for name, text in starters().items():
+        question, *_ = text.splitlines()
+        assert question.startswith("# ")
+        assert question.endswith("?")
+        assert f"\n{name} " in listed.out
+        assert question.split()[-1] in listed.out
+    assert sweep.out == "sweep.toml and case.toml: written; run it with: brakecli sweep sweep.toml\n"
+    again.told(2, "sweep.toml: exists already")
+    assert (named.told(0), named.out) == ("", "")
+    assert left_in(tmp_path) == {"sweep.toml", "case.toml", "map.toml"}
+    for name, text in starters().items():
+        if "case" in tomllib.loads(text):
+            assert parse_sweep(text, name, tmp_path).plan.points > 1
+        else:
+            assert parse_case(text, name).case.title.startswith("Starter")

@@ -1,0 +1,205 @@
+"""Verdicts before the end of a run are those of the whole run, and orbits are what they are said to be."""
+
+import math
+from dataclasses import replace
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+import tomli_w
+
+from brakecli.analysis.regime.verdict import Verdict
+from brakecli.case.case import Case
+from brakecli.case.read import parse_case
+from brakecli.case.system import system_of
+from brakecli.errors import BrakecliError
+from brakecli.solver.motion import solve
+from brakecli.solver.quantities import ContactState
+from brakecli.solver.system import Initial, System
+from brakecli.sweeps.driver import journal_path
+from brakecli.sweeps.early import Early, early
+from brakecli.sweeps.plan import plan_of
+from brakecli.sweeps.point import simulate
+from brakecli.sweeps.workers.task import compute_units
+from tests.analysis.shoes import random_shoes
+from tests.campaign import counts
+from tests.commands import ROOT, TINY
+from tests.sweeps.helpers import axis, frictions, inline, interrupted, quick, write_sweep
+
+RELAXATION = (ROOT / "cases" / "relaxation.toml").read_text()
+EXACT = "solver={tolerance=1e-3, duration=2.0}"
+
+
+def case_of(text: str, *overrides: str) -> Case:
+    return parse_case(text, "a case", overrides).case
+
+
+def known(case: Case) -> tuple[System, Early]:
+    system = system_of(case)
+    found = early(system)
+    assert found is not None
+    return system, found
+
+
+def compare(found: Early, case: Case) -> None:
+    """A whole run says the same, its numbers within what its samples show of them."""
+    ours, whole, system = found.verdict, simulate(case).verdict, found.motion.system
+    assert (ours.regime, ours.excitation, ours.settled) == (whole.regime, whole.excitation, whole.settled)
+    fast, interval = system.natural_frequencies[1], system.interval
+    seen = 0.5 * (math.pi * fast * interval) ** 2  # of an amplitude between two samples, at the fastest frequency
+    depth = system.load_at_start / (system.coefficients.c_yy + system.contact_stiffness)
+    if whole.frequency is None:
+        assert ours.frequency is None
+        assert ours.amplitude == pytest.approx(whole.amplitude, rel=2.0 * seen, abs=1e-12 * depth)
+        assert ours.mean_friction_force == pytest.approx(whole.mean_friction_force, rel=2e-3)  # ends of the part
+        assert (ours.stick_fraction, ours.contact_loss_fraction) == (0.0, 0.0)
+        assert ours.settled_from == whole.settled_from
+        return
+    assert isinstance(whole, Verdict)
+    assert ours.frequency == pytest.approx(whole.frequency, rel=1e-4)
+    assert ours.amplitude == pytest.approx(whole.amplitude, rel=2e-3)
+    # the mean of whole cycles and of a part of one
+    swing = whole.torque_variation / system.radius / whole.evidence["cycles"]
+    assert ours.mean_friction_force == pytest.approx(whole.mean_friction_force, abs=swing)
+    sample = interval * whole.frequency
+    assert ours.stick_fraction == pytest.approx(whole.stick_fraction, abs=sample)
+    assert ours.contact_loss_fraction == pytest.approx(whole.contact_loss_fraction, abs=sample)
+
+
+@pytest.mark.parametrize("shoes", counts(25, 1000))
+def test_an_early_verdict_is_that_of_the_whole_run(shoes: int) -> None:
+    early_ones = lasting = 0
+    for tables in islice(random_shoes("smooth", 2), shoes):
+        solver = {"tolerance": 1e-3, "duration": tables["solver"]["duration"]}
+        output = {"sample_interval": tables["output"]["sample_interval"] / 3.0}  # 60 samples of the fastest period
+        case = case_of(tomli_w.dumps({**tables, "solver": solver, "output": output}))
+        try:
+            found = early(system_of(case))
+            if found is not None:
+                compare(found, case)
+        except BrakecliError:
+            continue
+        early_ones += found is not None
+        lasting += found is not None and found.verdict.frequency is not None
+    assert early_ones > 0.25 * shoes
+    assert lasting > 0.02 * shoes
+
+
+@pytest.mark.parametrize("friction", [0.4, 0.62, 0.9])
+@pytest.mark.parametrize("speed", [-0.1, 0.08, 0.6, 2.0])
+def test_a_map_of_regimes_is_known_early(friction: float, speed: float) -> None:
+    case = case_of(RELAXATION, EXACT, f"friction.coefficient={friction}", f"wheel.angular_speed={speed}")
+    if speed < 0.0:  # the same shoe seen from behind
+        case = case_of(
+            RELAXATION,
+            EXACT,
+            f"friction.coefficient={friction}",
+            f"wheel.angular_speed={speed}",
+            "link2.angle_deg=-5.0",
+        )
+    compare(known(case)[1], case)
+
+
+ORBITS = {
+    "stick": (),
+    "stick and lift-off": ("wheel.angular_speed=0.55", "friction.coefficient=0.9"),
+    "lift-off": ("wheel.angular_speed=2.0",),
+    "backwards": ("wheel.angular_speed=-0.1", "link2.angle_deg=-5.0"),
+}
+
+
+def one_cycle(system: System, found: Early, samples: int, cycles: int = 1, moved: float = 0.0) -> Any:
+    """A run from the orbit's state on, by the scheme that keeps samples and an account of energy."""
+    x, y, v_x, v_y = found.motion.rows[-1].tolist()
+    assert found.verdict.frequency is not None
+    period = 1.0 / found.verdict.frequency
+    start = Initial(x * (1.0 + moved), y, v_x, v_y)
+    method = replace(system.method, step=period)  # its own steps are exact: no second run
+    short = replace(system, initial=start, interval=period / samples, duration=cycles * period, method=method)
+    return solve(short)
+
+
+@pytest.mark.parametrize("name", ORBITS)
+def test_an_orbit_closes_and_its_numbers_are_those_of_one_cycle(name: str) -> None:
+    system, found = known(case_of(RELAXATION, EXACT, *ORBITS[name]))
+    verdict, samples = found.verdict, 2000
+    assert (verdict.stick_fraction > 0.0) is (name != "lift-off")
+    assert (verdict.contact_loss_fraction > 0.0) is ("lift-off" in name)
+    motion = one_cycle(system, found, samples)
+    rows, period = motion.rows, 1.0 / (verdict.frequency or 0.0)
+    size = 0.5 * np.ptp(rows[:, :4], axis=0)
+    np.testing.assert_array_less(np.abs(rows[-1, :4] - rows[0, :4]), 1e-8 * size)
+    # a parabola between samples
+    assert verdict.amplitude == pytest.approx(float(size[0]), rel=0.5 * (math.pi / samples) ** 2 * 2.0)
+    # ∫ F_x U dt, which the scheme adds up exactly; what does not close is 1e-8 of the stored energy
+    mean = motion.energy.belt / (system.belt_speed * period)
+    assert verdict.mean_friction_force == pytest.approx(mean, rel=1e-7)
+    for state, part in (
+        (ContactState.STICK, verdict.stick_fraction),
+        (ContactState.SEPARATED, verdict.contact_loss_fraction),
+    ):
+        assert part == pytest.approx(float(np.mean(rows[:-1, 7] == state)), abs=2.0 / samples)
+
+
+@pytest.mark.parametrize("name", ["stick", "lift-off"])
+def test_the_largest_multiplier_is_how_neighbours_return(name: str) -> None:
+    """A disturbance that has come round some cycles is along the multiplier's direction, and shrinks by it."""
+    system, found = known(case_of(RELAXATION, EXACT, *ORBITS[name]))
+    factor, cycles = found.verdict.evidence["largest_multiplier"], 60
+    rows = one_cycle(system, found, 1, cycles, moved=1e-4).rows[:, :4]
+    steps = np.linalg.norm(np.diff(rows, axis=0) / np.array([1.0, 1.0, *[2.0 * math.pi * 174.0] * 2]), axis=1)
+    slope = np.polyfit(np.arange(cycles - 10), np.log(steps[10:]), 1)[0]  # the phase is off by more and more of it
+    assert 0.5 < factor < 1.0
+    assert math.exp(slope) == pytest.approx(factor, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        ("roughness.wheel={amplitudes=[1e-6], wavelengths=[0.01]}",),
+        ("solver={scheme='two-layer', step=1e-5, duration=2.0}",),
+        ("load={times=[0.0, 1.0], forces=[5e3, 6e3]}",),
+        ("wheel.angular_speed=0.0",),
+        ("friction.coefficient=0.0",),
+        ("output.sample_interval=5e-3",),  # a cycle in one sample: the whole run sees none
+        ("solver.duration=0.2",),  # settled too late
+    ],
+)
+def test_there_is_no_early_verdict_where_a_whole_run_may_see_something_else(changes: tuple[str, ...]) -> None:
+    assert early(system_of(case_of(RELAXATION, EXACT, *changes))) is None
+
+
+def test_a_point_takes_less_than_200_bytes_of_journal_and_of_result(tmp_path: Path) -> None:
+    case, sizes = TINY.replace("step = 1e-5, duration = 0.02", "tolerance = 1e-3, duration = 1.0"), []
+    speeds = axis("wheel.angular_speed", "start=0.1", "stop=2.0", "num=20")
+    for frictions_tried in (2, 20):
+        loaded = write_sweep(tmp_path, frictions(frictions_tried), speeds, case=case)
+        interrupted(loaded, tmp_path / "s.h5", compute_units, limit=1, task_size=39)
+        journal = journal_path(tmp_path / "s.h5").stat().st_size
+        assert inline(loaded, tmp_path / "s.h5", compute_units, task_size=39).resumed == 39
+        sizes.append((tmp_path / "s.h5").stat().st_size)
+        (tmp_path / "s.h5").unlink()
+    header = 2000  # the sweep and the versions
+    assert journal < header + 39 * 200
+    assert sizes[1] - sizes[0] < 360 * 200  # what all results have in common takes 60 kB
+
+
+@pytest.mark.parametrize("followed", ["none", "first", "last"])
+def test_a_result_of_many_blocks_holds_every_point_in_its_place(tmp_path: Path, followed: str) -> None:
+    """`quick` numbers points as they are computed: along the followed axis first."""
+    direction = 'direction = "both"'
+    first = axis("friction.coefficient", "start=0.1", "stop=0.9", "num=140", direction * (followed == "first"))
+    last = axis("link2.angle_deg", "start=1.0", "stop=9.0", "num=120", direction * (followed == "last"))
+    loaded = write_sweep(tmp_path, first, last)
+    inline(loaded, tmp_path / "s.h5", quick, task_size=999 if followed == "none" else 50, order=-1)
+    with h5py.File(tmp_path / "s.h5") as file:
+        found = file["frequency"][...]
+    assert plan_of(loaded.plan.sweep_text, loaded.plan.case_text).points == 140 * 120
+    expected = np.arange(found.size, dtype=float)
+    if followed == "first":
+        np.testing.assert_array_equal(found, expected.reshape(2, 120, 140).transpose(0, 2, 1))
+    else:
+        np.testing.assert_array_equal(found, expected.reshape(found.shape))
