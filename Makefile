@@ -20,7 +20,7 @@ PYTEST_ARGS ?=
 .DELETE_ON_ERROR:
 .NOTPARALLEL: # two installations into one .venv at a time would collide
 .PHONY: help demo test campaign lowest lint format types imports derivations tables cases check \
-    accuracy promises picture lock-in paper extremes bench bench-sweep bench-contact clean
+    accuracy promises promise-cost picture lock-in paper extremes bench bench-sweep bench-contact clean
 
 help: ## list the targets (this text)
 	@echo "make TARGET, where TARGET is one of"
@@ -139,6 +139,9 @@ paper: $(DEV_STAMP) ## reproduce the paper's claims into docs/paper-claims.md, w
 
 promises: $(DEV_STAMP) ## random cases at five tolerances: the tables of docs/accuracy.md (some minutes)
 	$(BIN)/python -m benchmarks.promises
+
+promise-cost: $(DEV_STAMP) ## a tolerance beside the cheapest entry that keeps it: a table of docs/accuracy.md (some minutes)
+	$(BIN)/python -m benchmarks.promise_cost
 
 bench: $(PEERS_STAMP) ## measure brakecli beside general solvers and write docs/performance.md (ten minutes)
 	$(PEERS)/bin/python -m benchmarks.performance

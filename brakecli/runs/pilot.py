@@ -5,7 +5,15 @@ from time import process_time
 from typing import NamedTuple
 
 from brakecli.runs.cost import evaluation_seconds, start_seconds
-from brakecli.runs.tolerance import EVENT_RATIO, LAYERED_FROM, SHORTER, coarsest_step, first_event_tolerance
+from brakecli.runs.tolerance import (
+    EVENT_RATIO,
+    LAYERED,
+    LAYERED_FROM,
+    SHORTER,
+    first_event_tolerance,
+    first_nodes,
+    first_steps,
+)
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.motion import Stepping
 from brakecli.solver.system import System
@@ -15,7 +23,7 @@ SECONDS = 0.15
 MOST_EVALUATION, MOST_AT_NODES = 0.02, 2e-3
 """Guessed time (s) of an evaluation of the contact, exact and by nodes, beyond which no step is tried."""
 SECOND_RUN = EVENT_RATIO**-0.125  # what the second of two event-driven runs costs over the first
-RUNGS = 5.0  # two runs of a ladder, of steps and nodes, over the first
+FINER, RUNGS = 4, 15.0  # steps of the last run of a ladder, and time of all of its runs, over the first one's
 FEW = 20  # steps, the first of which are shorter than those that follow
 SLOWER = 2.0  # pace of the latter half of a pilot run over the mean pace, beyond which the rest may be slower yet
 
@@ -45,14 +53,15 @@ def measured(system: System) -> Price | None:
     events = Price(int(events.steps * SECOND_RUN), events.seconds * (1.0 + SECOND_RUN), events.at_least)
     if not method.automatic or method.tolerance < LAYERED_FROM or system.smooth:
         return events
-    ladder = _ladder(replace(system, method=replace(method, scheme="two-layer", theta=(0.5, 0.5))))
+    ladder = _ladder(replace(system, method=replace(method, **LAYERED[0])))
     return ladder if ladder.seconds < events.seconds else events._replace(at_least=True)
 
 
 def _ladder(system: System) -> Price:
-    """Two runs of a ladder of steps at least."""
-    found = _begun(replace(system, method=replace(system.method, step=coarsest_step(system), nodes=0)))
-    return Price(2 * found.steps, RUNGS * found.seconds, at_least=True)
+    """A ladder of steps and nodes, each refined twice at least."""
+    first = replace(system.method, step=first_steps(system)[0], nodes=first_nodes(system))
+    found = _begun(replace(system, method=first))
+    return Price(FINER * found.steps, RUNGS * found.seconds, at_least=True)
 
 
 def _begun(system: System) -> Price:

@@ -1,13 +1,13 @@
 """Choose scheme, nodes and step so that the error of the histories stays below the requested tolerance.
 
-The error is never taken from one run: two runs of different fineness are compared, and the finer one is the
-answer. What they differ by is the error of the coarser one, so the answer is better than it is said to be.
+The error is never taken from one run: runs of different fineness are compared, and the finest one is the answer.
+What two of them differ by is the error of the coarser one, so the answer is better than it is said to be.
 """
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,20 +16,32 @@ from brakecli.runs.cost import evaluation_seconds
 from brakecli.solver.contact import EVALUATORS
 from brakecli.solver.contact.pad import default_nodes
 from brakecli.solver.motion import Motion, Progress, solve
-from brakecli.solver.quantities import HISTORY
+from brakecli.solver.schemes import HALF, NUMEROV
 from brakecli.solver.system import System
 
 FIRST_EVENT_TOLERANCE, LEAST_EVENT_TOLERANCE = 1e-6, 1e-13
 EVENT_RATIO = 1e-2  # from one tolerance of the event-driven scheme to the next: its errors fall by about as much
 EVENT_MARGIN = 1e-3  # largest first tolerance over the requested one: no event may be missed twice
-LAYERED_FROM = 3e-4  # the layered schemes are cheaper from here on, where surfaces open: docs/accuracy.md
-FIRST_STEPS = 40  # per period of the fastest motion, and per passing wave: a ladder of steps begins with them
-MOST_RUNGS = 12
+LAYERED: tuple[dict[str, Any], ...] = (  # cheapest by compare-schemes: in slip, and where friction turns
+    {"scheme": "three-layer", "theta": NUMEROV},
+    {"scheme": "two-layer", "theta": HALF},
+)
+LAYERED_FROM = 1e-5  # tolerance from which on a ladder may be cheaper than events, where surfaces open
+FIRST_TURN = (
+    15.0  # square of the turn (rad) of the fastest motion in a first step, over the tolerance: two halvings
+)
+# leave an error of a sixth of the tolerance, as (1/12, 10/12, 1/12) takes a sixth of that square off a velocity
+LONGEST_TURN = 0.4  # rad, in a first step
+FIRST_PER_WAVE = 8.0  # first steps to a passing wave, at least
+FINEST_FIRST = 4e-4  # tolerance from which on a quarter of the usual nodes is enough to begin with
+MOST_SPARSE = 4  # halvings of a first step before it has reached the sample interval, at most
+MOST_DOUBLINGS = 12  # of steps and nodes each
 STEPS_BETWEEN_KNOTS = 4  # of speed or load, at least: with fewer, no run sees what happens there
-WORTH_A_PILOT = 0.2  # guessed time (s) of the next run from which on it is weighed against event-driven runs
+JUMPS = 3.0  # what the estimate of steps is multiplied by where friction turns, or speed or load have knots
+WORTH_A_PILOT = 1.0  # guessed time (s) of the next runs from which on they are weighed against event-driven ones
 PILOT = 32  # duration of the case over that of the event-driven pilot run, which counts the work of such runs
 # Time is guessed from counted work, not measured, so that a case gives the same bytes wherever it runs.
-EVEN_CHANCE = 0.5  # beyond this part of the time of event-driven runs, a next run is likely not to be the last one
+FIRST_BLOCK = 5e-3  # guessed time (s) of the first block of a run whose steps take one evaluation of the contact
 MOST_SECONDS = 900.0  # time of the loop after which no finer run is begun
 SHORTER = 0.7  # step of the second of two piecewise-exact runs over that of the first
 ROUNDING_MARGIN = 4.0  # the error of such a run over what two of them differ by, at most
@@ -66,68 +78,70 @@ def certify(system: System, progress: Progress = lambda samples: None) -> Certif
 
     Smooth surfaces go to the piecewise-exact scheme, rough ones that touch everywhere to the event-driven one, as
     their cost hardly depends on the error. Where surfaces open, the latter needs the exact contact integral, which
-    is expensive: while friction does not jump, a ladder of steps and nodes of the two-layer scheme may be cheaper
-    down to `LAYERED_FROM`. It is left where its next run takes long beside all the event-driven ones.
+    is expensive: a ladder of steps and nodes is cheaper there, unless it takes long beside event-driven runs, or
+    speed and load change with time, as steps would have to be short beside what they do.
     """
-    method = system.method
+    method, spent = system.method, 0.0
     if not method.own_steps:
         return _by_steps(system, progress)
     if method.row.exact:
         return _by_phases(system, progress)
-    layered = replace(system, method=replace(method, scheme="two-layer", theta=(0.5, 0.5)))
-    if not method.automatic or method.tolerance < LAYERED_FROM or not _opens_and_slides(layered, progress):
-        return _by_events(system, progress)
-    found = _by_steps(layered, progress, slower_than_events(system, progress))
-    spent = found.motion.work.solve_seconds
-    if found.certificate.certified or spent >= MOST_SECONDS:
-        return found
-    again = _by_events(system, progress)
-    spent += again.motion.work.solve_seconds
-    found = min(found, again, key=lambda each: each.certificate.estimated_error)
-    found.motion.work.solve_seconds = spent
-    return found
+    found, changing = list[Certified](), len(system.belt) > 1 or len(system.load) > 1
+    is_left = partial(_is_left, too_slow=slower_than_events(system, progress))
+    for changes in LAYERED if method.automatic and method.tolerance >= LAYERED_FROM and not changing else ():
+        found = [_by_steps(replace(system, method=replace(method, **changes)), progress, is_left)]
+        motion, certificate = found[0]
+        spent += motion.work.solve_seconds
+        if certificate.certified or not motion.work.turns:
+            break
+    if not found or (not found[0].certificate.certified and spent < MOST_SECONDS):
+        found.insert(0, _by_events(system, progress))
+        spent += found[0].motion.work.solve_seconds
+    best = min(found, key=lambda each: each.certificate.estimated_error)
+    best.motion.work.solve_seconds = spent
+    return best
 
 
 def _run(system: System, progress: Progress, **changes: Any) -> Motion:
     """The motion by the system's method with these changes."""
     system = replace(system, method=replace(system.method, **changes))
-    per_sample = system.per_sample
-    return solve(system, progress=lambda steps: progress(steps // per_sample))
+    per_sample, each = system.per_sample, evaluation_seconds(system) + 1e-6
+    block = 1 if system.method.own_steps else 1 + int(FIRST_BLOCK / each)
+    return solve(system, progress=lambda steps: progress(steps // per_sample), first_block=block)
 
 
-def _opens_and_slides(system: System, progress: Progress) -> bool:
-    """Whether the surfaces are rough and touch in part now and then, and friction never jumps, by a coarse run.
-
-    Not where speed or load change with time, as steps would have to be short beside what they do.
-    """
-    if system.smooth or len(system.belt) > 1 or len(system.load) > 1:
-        return False
-    work = _run(system, lambda samples: progress(0), step=coarsest_step(system), nodes=0).work
-    return set(work.evaluators) != {"closed-form"} and not work.turns
+def _is_left(run: Motion, more: float, *, too_slow: Callable[[Motion, float], bool]) -> bool:
+    """Whether the tolerance is kept by events, after this run and before others of so many times its work."""
+    unsure = run.work.turns > 0 and run.system.method.scheme == "three-layer"  # velocities about a kink are off
+    return unsure or not _opens(run) or too_slow(run, more)
 
 
-def slower_than_events(system: System, progress: Progress) -> Callable[[float], bool]:
-    """A test whether a run of so many seconds takes too long beside two event-driven ones.
+def _opens(run: Motion) -> bool:
+    return set(run.work.evaluators) != {"closed-form"}
 
-    A part of such a run is made when the test is first needed.
+
+def slower_than_events(system: System, progress: Progress) -> Callable[[Motion, float], bool]:
+    """A test whether runs of so many times the work of this one take longer than two event-driven ones.
+
+    A part of such a run is made when the test is first needed: it has as many steps as the others. How often the
+    contact is open in part, this run knows; beside its evaluations then, others cost nothing.
     """
 
     @cache
-    def events() -> float:
+    def evaluations() -> float:
         samples = max(1, system.samples // PILOT)
         part, tolerance = replace(system, duration=samples * system.interval), first_event_tolerance(system)
-        found = _run(part, lambda samples: progress(0), tolerance=tolerance)
-        seconds = _guessed_seconds(found) * system.samples / samples * (1.0 + EVENT_RATIO**-0.125)
-        return math.inf if found.work.failed else seconds
+        work = _run(part, lambda samples: progress(0), tolerance=tolerance).work
+        number = work.contact_evaluations * system.samples / samples * (1.0 + EVENT_RATIO**-0.125)
+        return math.inf if work.failed else number
 
-    return lambda seconds: seconds > WORTH_A_PILOT and seconds > EVEN_CHANCE * events()
+    def too_slow(run: Motion, more: float) -> bool:
+        taken = run.work.evaluators
+        part = 1.0 - taken.get("closed-form", 0) / max(sum(taken.values()), 1)
+        seconds = part * more * run.work.contact_evaluations * evaluation_seconds(run.system)
+        return seconds > WORTH_A_PILOT and seconds > part * evaluations() * evaluation_seconds(system)
 
-
-def _guessed_seconds(motion: Motion) -> float:
-    """Time of the evaluations of a contact that is open in part; beside these, others cost nothing."""
-    taken = motion.work.evaluators
-    part = 1.0 - taken.get("closed-form", 0) / max(sum(taken.values()), 1)
-    return float(part * motion.work.contact_evaluations * evaluation_seconds(motion.system))
+    return too_slow
 
 
 def first_event_tolerance(system: System) -> float:
@@ -148,7 +162,7 @@ def _by_phases(system: System, progress: Progress) -> Certified:
     sparse = replace(system, interval=every * system.interval, duration=system.sampled_duration)
     other = _run(sparse, lambda samples: None, share=SHORTER * share)
     run.work.solve_seconds += other.work.solve_seconds
-    until, difference = _compare(replace(run, rows=run.rows[::every]), other, wanted / ROUNDING_MARGIN)
+    until, difference = _compare(run, other, wanted / ROUNDING_MARGIN)
     error, failed = ROUNDING_MARGIN * difference, run.work.failed or other.work.failed
     how = f"piecewise-exact runs with steps of {run.system.step:.3g} and {other.system.step:.3g} s"
     return Certified(run, Certificate(wanted, error <= wanted and not failed, error, until, how))
@@ -170,41 +184,73 @@ def _by_events(system: System, progress: Progress) -> Certified:
     return Certified(run, Certificate(wanted, error <= wanted and not failed, error, until, how))
 
 
-def _by_steps(
-    system: System, progress: Progress, too_slow: Callable[[float], bool] = lambda seconds: False
-) -> Certified:
-    """Runs with steps half as long, and twice as many nodes, as those before.
+@dataclass
+class _Axis:
+    """How often steps were halved, or nodes doubled, and what the last two times changed."""
 
-    Differences that fall by a factor r from rung to rung leave an error of the last one over r - 1. Thrice that is
-    the estimate, and at least thrice the last difference and three quarters of the one before: kinks and jumps
-    make differences fall unevenly, and one that is small by luck must not pass. Nor must differences of runs that
-    all step over what speed or load do between two knots.
+    doublings: int = 0
+    before: float = math.inf
+    last: float = math.inf
+
+    @property
+    def error(self) -> float:
+        """Thrice the error that is left.
+
+        Differences that fall by a factor r leave the last one over r - 1. They fall unevenly, and one that is
+        small by luck must not pass: no less is left than second order makes of each of the last two. A single one
+        says nothing: where no edge of a patch crosses the middle of a cell, twice the nodes give the same force.
+        """
+        if max(self.before, self.last) <= ROUNDING:
+            return self.last
+        if math.isinf(self.before) or self.last >= self.before:
+            return math.inf
+        return max(self.last, 3.0 * self.last / (self.before / self.last - 1.0), self.before / 4.0)
+
+    def more(self, tolerance: float) -> float:
+        """By how much the work is likely to grow until the error is below the tolerance."""
+        return math.sqrt(max(1.0, self.last / tolerance)) if self.last < math.inf else 2.0
+
+
+def _by_steps(
+    system: System, progress: Progress, is_left: Callable[[Motion, float], bool] = lambda run, more: False
+) -> Certified:
+    """Runs with steps half as long, or twice as many nodes, as those before, whichever is needed more.
+
+    The errors of steps and of nodes add up, and each is estimated apart. The first steps may pass over samples,
+    the last ones may not, nor over what speed or load do between two knots, as no run would see it.
     """
-    method, wanted, step = system.method, system.method.tolerance, coarsest_step(system)
-    longest = _shortest_span(system) / STEPS_BETWEEN_KNOTS * (1.0 + 1e-9)
-    nodes = 0 if system.smooth else default_nodes(system.half_length, system.shoe, system.wheel)
-    before: Motion | None = None
-    last, seconds = math.inf, 0.0
-    for rung in range(MOST_RUNGS):
-        finer = nodes * 2**rung if EVALUATORS[method.evaluator].needs_nodes else 0
-        run = _run(system, progress, step=step / 2**rung, nodes=finer)
-        spent = run.work.solve_seconds
+    wanted, (first, every) = system.method.tolerance, first_steps(system)
+    longest = min(_shortest_span(system) / STEPS_BETWEEN_KNOTS, system.interval) * (1.0 + 1e-9)
+    nodes, steps, quadrature = first_nodes(system), _Axis(), _Axis()
+    before, finer, seconds = None, steps, 0.0
+    while True:
+        sampled = replace(system, interval=max(1, every >> steps.doublings) * system.interval)
+        run = _run(sampled, progress, step=first / 2**steps.doublings, nodes=nodes << quadrature.doublings)
+        spent, failed = run.work.solve_seconds, run.work.failed
         run.work.solve_seconds = seconds = seconds + spent
-        if before is not None and not run.work.failed and not before.work.failed:
-            until, difference = _compare(before, run, wanted)
-            error = max(_remaining(last, difference), _jump_error(run)) if run.system.step <= longest else math.inf
-            last = difference
-            if error <= wanted:
-                how = f"{method.scheme} runs of {run.system.step * 2:.3g} and half of that"
-                return Certified(run, Certificate(wanted, True, error, until, how))
-            slower = spent * (4.5 if nodes else 2.2)
-            if seconds + slower > MOST_SECONDS or too_slow(4.0 * _guessed_seconds(run)):
-                break
-        before = run
-    seen = math.isfinite(last) and run.system.step <= longest
-    error = max(3.0 * last, _jump_error(run), wanted * 1.0000001) if seen else 1.0
-    how = f"the finest of {rung + 1} runs, with steps of {run.system.step:.3g} s,"
-    return Certified(run, Certificate(wanted, False, error, 0.0, how))
+        if before is not None and not failed:
+            finer.before, finer.last = finer.last, _compare(before, run, wanted)[1]
+        before = before if failed else run
+        used = quadrature if nodes and _opens(run) else _Axis(0, 0.0, 0.0)
+        margin = JUMPS if run.work.turns or len(system.belt) + len(system.load) > 2 else 1.0
+        jump = _jump_error(run)
+        error = math.inf if failed else margin * steps.error + used.error + jump
+        short = run.system.step <= longest
+        if certified := short and error <= wanted:
+            break
+        coarse = failed or not short or jump > 0.5 * wanted
+        finer = steps if coarse or margin * steps.error >= used.error else quadrature
+        late = run.system.interval == system.interval and seconds + 2.2 * spent > MOST_SECONDS
+        more = 2.0 * steps.more(0.5 * wanted / margin) * used.more(0.5 * wanted)
+        if finer.doublings == MOST_DOUBLINGS or late or is_left(run, more):
+            break
+        finer.doublings += 1
+    until = system.sampled_duration if certified else 0.0
+    if not certified:
+        error = max(error, wanted * 1.0000001) if short and error < math.inf else 1.0
+    with_nodes = f" and {run.system.nodes} nodes" if used is quadrature else ""
+    how = f"{system.method.scheme} runs down to steps of {run.system.step:.3g} s{with_nodes}"
+    return Certified(run, Certificate(wanted, certified, error, until, how))
 
 
 def _shortest_span(system: System) -> float:
@@ -213,23 +259,14 @@ def _shortest_span(system: System) -> float:
 
 
 def _jump_error(run: Motion) -> float:
-    """By how much ẋ may be off, relative to its largest value, as steps do not know when in them friction jumps.
+    """By how much ẋ may be off, relative to its largest value, as steps do not know when in them friction turns.
 
-    Where a jump falls right behind a time that all rungs step on, they agree on what is wrong by up to this.
+    Where it turns right behind a time that all rungs step on, they agree on what is wrong by up to this. A shoe
+    that sticks for more than a step has the velocity of the wheel then, whenever in a step it began.
     """
-    if not run.work.turns:
-        return 0.0
-    c, columns = run.system.coefficients, dict(zip(HISTORY, run.rows.T, strict=True))
-    fastest = float(np.abs(columns["vx"]).max())
-    jump = 2.0 * c.phi * float(columns["normal_force"].max()) * run.system.step / c.m
-    return jump / fastest if fastest > 0.0 else math.inf
-
-
-def _remaining(before: float, last: float) -> float:
-    """The error that is left after two differences in a row."""
-    if not math.isfinite(before) or last >= before:
-        return math.inf
-    return 3.0 * max(last, last / (before / last - 1.0), before / 4.0) if last > 0.0 else ROUNDING
+    jump = 2.0 * run.system.coefficients.phi * run.work.crossing * run.system.step / run.system.coefficients.m
+    fastest = float(np.abs(run.rows[:, 2]).max(initial=0.0))
+    return jump / fastest if fastest > 0.0 else math.inf if jump > 0.0 else 0.0
 
 
 def _compare(coarse: Motion, fine: Motion, tolerance: float) -> tuple[float, float]:
@@ -237,10 +274,12 @@ def _compare(coarse: Motion, fine: Motion, tolerance: float) -> tuple[float, flo
 
     What never exceeds the rounding of the motion does not count, as velocities of a shoe that stays where it is.
     """
-    count, system = len(fine.rows), fine.system
-    if len(coarse.rows) < count:
+    system = max(coarse.system, fine.system, key=lambda each: each.interval)
+    one, other = (each.rows[:: round(system.interval / each.system.interval), :4] for each in (coarse, fine))
+    count = len(other)
+    if len(one) < count:
         return 0.0, 1.0
-    one, other = coarse.rows[:count, :4], fine.rows[:, :4]  # x, y, vx, vy
+    one = one[:count]  # x, y, vx, vy
     largest = np.abs(other).max(axis=0)
     rate = 2.0 * math.pi * system.natural_frequencies[1]
     rounding = ROUNDING * largest[:2].max() * np.array([1.0, 1.0, rate, rate])
@@ -251,9 +290,22 @@ def _compare(coarse: Motion, fine: Motion, tolerance: float) -> tuple[float, flo
     return max(until, 0.0), max(float(apart.max()), ROUNDING)
 
 
-def coarsest_step(system: System) -> float:
-    """The step (s) that a ladder begins with: a whole part of the sample interval."""
-    interval = system.interval
-    wanted = 1.0 / (FIRST_STEPS * max(system.natural_frequencies[1], system.passing_frequency, 1e-300))
-    wanted = min(wanted, max(_shortest_span(system) / STEPS_BETWEEN_KNOTS, wanted / 2**MOST_RUNGS))
-    return float(interval / max(1, math.ceil(interval / wanted)))
+def first_steps(system: System) -> tuple[float, int]:
+    """The steps (s) that a ladder begins with, and how many samples each passes over, a power of two."""
+    interval, fastest = system.interval, 2.0 * math.pi * max(system.natural_frequencies[1], 1e-300)
+    wanted = min(LONGEST_TURN, math.sqrt(FIRST_TURN * system.method.tolerance)) / fastest
+    wanted = min(wanted, 1.0 / (FIRST_PER_WAVE * max(system.passing_frequency, 1e-300)))
+    wanted = min(wanted, max(_shortest_span(system) / STEPS_BETWEEN_KNOTS, wanted / 2**MOST_DOUBLINGS))
+    if interval > wanted:
+        return float(interval / math.ceil(interval / wanted)), 1
+    every = 2 ** int(min(MOST_SPARSE, math.log2(min(wanted / interval, system.samples))))
+    return every * interval, every
+
+
+def first_nodes(system: System) -> int:
+    """The nodes that a ladder begins with, which hardly resolve the shortest wave; 0 where none are needed."""
+    if system.smooth or not EVALUATORS[system.method.evaluator].needs_nodes:
+        return 0
+    usual = default_nodes(system.half_length, system.shoe, system.wheel)
+    finer = max(0, int(0.5 * math.log2(FINEST_FIRST / system.method.tolerance)))
+    return max(64, usual // 4) << finer

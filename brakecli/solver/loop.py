@@ -97,8 +97,15 @@ def advance(p: Plant, rows: Floats, events: Floats, stop: int) -> int:
             return _NOT_CLOSED
         before = state.v_x - belt_now
         finish(c, s, state, problem, layer.contact, p.work)
-        if before * (state.v_x - belt_next) <= 0.0 and problem.normal_force > 0.0:
+        after = state.v_x - belt_next
+        if before * after <= 0.0 and problem.normal_force > 0.0:
             counts.turns += 1
+        if after == 0.0:
+            counts.held += 1
+        else:
+            if counts.held <= 1 and after * counts.side < 0.0:  # turned, with a step in stick at most
+                counts.crossing = max(counts.crossing, problem.normal_force)
+            counts.side, counts.held = math.copysign(1.0, after), 0
         if not abs(state.x) + abs(state.y) + abs(state.v_x) + abs(state.v_y) < BOUND:
             return _DIVERGED
         counts.kinds[layer.contact.kind] += 1

@@ -43,6 +43,7 @@ class Work:
     non_unique_steps: int = 0
     most_evaluations: int = 0  # of one step
     turns: int = 0  # steps after which friction points the other way, or holds
+    crossing: float = 0.0  # largest contact force (N) as friction turned within a step, without a stick
     evaluators: dict[str, int] = field(default_factory=dict)  # steps that each evaluator took
     solve_seconds: float = 0.0
     unconverged: Floats = field(default_factory=lambda: np.zeros((0, 2)))  # time (s), residual (N)
@@ -193,7 +194,7 @@ class Stepping:
         work.unconverged_steps = int(counts.unconverged)
         work.non_unique_steps = int(counts.rising)
         work.most_evaluations = int(counts.most)
-        work.turns = int(counts.turns)
+        work.turns, work.crossing = int(counts.turns), float(counts.crossing)
         work.evaluators = {kind: int(n) for kind, n in zip(contact.kinds(), counts.kinds, strict=False) if n}
         work.unconverged = self.events[: min(work.unconverged_steps, EVENTS)].copy()
 

@@ -69,6 +69,8 @@ WORK = record(
 )
 
 COUNTS = record(
+    "side crossing",  # sign of the last sliding velocity; largest contact force (N) as it turned within a step
+    held=int,  # steps that the shoe has stuck for since
     level=int,  # level of time that has been reached; of a scheme with steps of its own the sample
     evaluations=int,  # of the contact
     unconverged=int,  # steps whose iteration did not converge

@@ -1,6 +1,7 @@
 """A tolerance is a promise: what is certified is true, and what is not true is not certified."""
 
 import math
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -10,15 +11,18 @@ import pytest
 from brakecli.case.case import Case, changed
 from brakecli.case.system import system_of
 from brakecli.comparison.compare import errors
+from brakecli.errors import CaseError
 from brakecli.runs import tolerance as module
 from brakecli.runs.modelled import modelled
 from brakecli.runs.tolerance import Certified, certify
+from brakecli.solver.motion import solve
 from brakecli.solver.quantities import HISTORY
 from tests.campaign import campaign, counts
 from tests.commands import TINY, attributes, brakecli
 from tests.examples import COULOMB, ROUGH, SQUEAL, make, simulate
 from tests.solver.test_event_driven import flat_case
 
+promises: Any = import_module("benchmarks.promises")  # benchmarks are not type-checked
 FULL = {"amplitudes": [1e-6, 7e-7], "wavelengths": [0.02, 0.011]}
 
 
@@ -34,10 +38,10 @@ def truth(case: Case, tolerance: float = 1e-12) -> np.ndarray[Any, Any]:
     return simulate(exact).rows
 
 
-def kept(found: Certified, case: Case) -> float:
+def kept(found: Certified, case: Case, tolerance: float = 1e-12) -> float:
     """The true error of an answer, which must not be above the estimate."""
-    error = errors(found.motion.rows, truth(case)).error
-    assert error <= found.certificate.estimated_error + 1e-11  # what the truth itself may be off
+    error = errors(found.motion.rows, truth(case, tolerance)).error
+    assert error <= found.certificate.estimated_error + 10.0 * tolerance  # what the truth itself may be off
     return error
 
 
@@ -92,28 +96,71 @@ def test_rough_surfaces_in_full_contact_never_see_a_quadrature() -> None:
     assert any("quadrature" in sentence for sentence in modelled(found.motion)[1])
 
 
-@pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-5])
+OPEN = {**ROUGH, "contact": {"half_length": 0.05, "stiffness": 5e7}}
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-5, pytest.param(1e-7, marks=campaign)])
 def test_surfaces_that_open_keep_their_tolerance_too(tolerance: float) -> None:
-    rough = {**ROUGH, "contact": {"half_length": 0.05, "stiffness": 5e7}}
-    case = promised(rough, tolerance, solver__duration=0.004)
+    case = promised(OPEN, tolerance, solver__duration=0.004)
     found = certify(system_of(case))
     assert found.certificate.certified
-    assert kept(found, case) <= tolerance
+    assert kept(found, case, 1e-4 * tolerance) <= tolerance
     layered = tolerance >= module.LAYERED_FROM
-    assert found.motion.system.method.scheme == ("two-layer" if layered else "event-driven")
+    assert found.motion.system.method.scheme == ("three-layer" if layered else "event-driven")
+
+
+def test_nodes_that_agree_by_luck_are_doubled_again() -> None:
+    """No edge of a patch lies where 128 nodes see more of it than 64, and the motion is off by a hundredth."""
+    lucky = {"wheel": {"amplitudes": [4.37e-4], "wavelengths": [0.00941]}}
+    case = promised({**OPEN, "roughness": lucky}, 1e-3, solver__duration=1e-4, output__sample_interval=4e-6)
+    method = {"scheme": "two-layer", "theta": (0.5, 0.5), "tolerance": None, "step": 4e-6}
+    few, more, most = (simulate(changed(case, solver=method, contact={"nodes": n})) for n in (64, 128, 4096))
+    assert errors(few.rows, more.rows).error < 1e-9 < 1e-2 < errors(more.rows, most.rows).error
+    found = certify(system_of(case))
+    assert found.certificate.certified
+    assert kept(found, case, 1e-9) <= 1e-3
+
+
+@pytest.mark.parametrize("interval", [2e-6, 1e-4 / 3.0, 4e-4])
+def test_samples_of_any_interval_keep_their_tolerance(interval: float) -> None:
+    case = promised(OPEN, 1e-2, solver__duration=0.004, output__sample_interval=interval)
+    found = certify(system_of(case))
+    assert found.certificate.certified
+    assert len(found.motion.rows) == system_of(case).samples + 1
+    assert kept(found, case, 1e-6) <= 1e-2
 
 
 def test_a_ladder_that_grows_slow_beside_events_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
-    case = promised({**ROUGH, "contact": {"half_length": 0.05, "stiffness": 5e7}}, 1e-3, solver__duration=0.004)
+    case = promised(OPEN, 1e-3, solver__duration=0.004)
+    run = solve(system_of(make(OPEN, solver__step=1e-4, solver__duration=0.004)))
     monkeypatch.setattr(module, "WORTH_A_PILOT", 0.0)
     too_slow = module.slower_than_events(system_of(case), lambda samples: None)
-    assert not too_slow(1e-6)
-    assert too_slow(1e6)
-    monkeypatch.setattr(module, "EVEN_CHANCE", 0.0)  # so any finer run is too slow
+    assert not too_slow(run, 1e-6)
+    assert too_slow(run, 1e6)
+    monkeypatch.setattr(module, "slower_than_events", lambda *_: lambda run, more: True)
     found = certify(system_of(case))
     assert found.motion.system.method.scheme == "event-driven"
     assert found.certificate.certified
-    assert kept(found, case) <= 1e-3
+    assert kept(found, case, 1e-9) <= 1e-3
+
+
+@pytest.mark.parametrize("many", counts(2, 60))
+def test_no_certificate_of_random_shoes_is_broken(many: int) -> None:
+    rng, schemes, drawn = np.random.default_rng(3), set[str](), 0
+    while drawn < many:
+        case = promises.random_case(rng, promises.KINDS[-1 - drawn % len(promises.KINDS)])
+        try:
+            exact = truth(case, 1e-9)
+        except CaseError:  # self-locking
+            continue
+        drawn += 1
+        for tolerance in (1e-2, 1e-3, 1e-4):
+            found = certify(system_of(changed(case, solver={"tolerance": tolerance})))
+            error = errors(found.motion.rows, exact).error
+            assert found.certificate.certified
+            assert error <= found.certificate.estimated_error + 1e-7  # what the truth itself may be off
+            schemes.add(found.motion.system.method.scheme)
+    assert many < 10 or schemes == {"two-layer", "three-layer", "event-driven", "piecewise-exact"}
 
 
 WAVE = {  # a shoe that opens over a long wave of the wheel
@@ -158,7 +205,7 @@ def test_what_happens_between_two_steps_is_not_overlooked(scheme: str, changes: 
 
 
 def test_what_no_step_can_follow_is_not_certified(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "MOST_RUNGS", 4)
+    monkeypatch.setattr(module, "MOST_DOUBLINGS", 4)
     case = promised({**WAVE, "load": PULSE}, 1e-2, solver__scheme="two-layer")
     found = certify(system_of(case))
     assert not found.certificate.certified
@@ -209,7 +256,7 @@ def test_no_run_is_compared_with_itself() -> None:
 
 
 def test_steps_that_do_not_get_there_are_not_certified(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "MOST_RUNGS", 4)
+    monkeypatch.setattr(module, "MOST_DOUBLINGS", 4)
     found = certify(system_of(promised(SQUEAL, 1e-8, solver__scheme="two-layer", solver__duration=0.05)))
     assert not found.certificate.certified
     assert found.certificate.estimated_error > 1e-8
@@ -252,3 +299,22 @@ def test_the_coulomb_oscillator_ends_where_it_must() -> None:
     start = system_of(case)
     assert start.samples == len(found.motion.rows) - 1
     assert found.motion.rows[-1, 0] == pytest.approx(15.0 - 205.0**0.5, abs=1e-8 * 15.0)
+
+
+def test_a_shoe_that_sticks_does_not_turn_within_a_step() -> None:
+    work = simulate(make(SQUEAL, friction__coefficient=0.7, solver__scheme="two-layer", solver__duration=0.3)).work
+    assert work.turns > 100
+    assert work.crossing == 0.0
+
+
+@pytest.mark.parametrize("later", [0.0, 1e-9, 0.3, 0.9])
+def test_friction_that_turns_at_a_time_that_all_steps_share_is_not_overlooked(later: float) -> None:
+    """The oscillator turns at atan(6/11) + π, so much of a sample interval behind a sample."""
+    interval = (math.atan(6.0 / 11.0) + math.pi) / (64.0 + later)
+    case = promised(
+        COULOMB, 1e-3, solver__duration=5.0, solver__scheme="two-layer", output__sample_interval=interval
+    )
+    found = certify(system_of(case))
+    assert found.motion.work.crossing > 0.0
+    assert found.certificate.certified
+    assert kept(found, case) <= 1e-3
