@@ -64,7 +64,11 @@ class ResultFile:
         for each in fields:
             if each.in_file and each.name in values:
                 found = values[each.name] if each.group else {each.name: values[each.name]}
-                present = {name: value for name, value in found.items() if value is not None and value != []}
+                present = {
+                    name: value
+                    for name, value in found.items()
+                    if value is not None and not (isinstance(value, list) and not value)
+                }
                 self.set_attributes(present, each.group or "/")
 
     def axis(self, group: str, field: Field, values: ArrayLike | None = None) -> None:

@@ -227,3 +227,20 @@ def test_bands_whose_frequency_wanders_hold_no_vibration() -> None:
         frequency = 150.0 * np.interp(TIME, np.linspace(0.0, TIME[-1], 20), drawn)
         verdict = classify(made(np.sin(2 * np.pi * np.cumsum(frequency) * INTERVAL)), Context(2.0))
         assert verdict.regime is regime, verdict.reasons
+
+
+@pytest.mark.parametrize("samples_per_cycle", [9.45, 10.4, 11.4, 12.45, 13.0, 16.0, 24.0])
+def test_cycles_of_few_samples_have_the_right_length_and_honest_spreads(samples_per_cycle: float) -> None:
+    """A cycle need not take whole samples, and where it does, all cycles are sampled at the same places."""
+    phase = (np.arange(4000) / samples_per_cycle + 0.013) % 1.0
+    sticks = phase < 0.1
+    slip = (phase - 0.1) / 0.9
+    vx = np.where(sticks, 0.01, 0.01 * np.cos(2.0 * np.pi * slip) - 0.004 * np.sin(4.0 * np.pi * slip))
+    motion = history_of(4000, vx=vx, x=np.cumsum(vx) * INTERVAL, state=np.where(sticks, 0.0, -1.0))
+    verdict = classify(motion, Context(0.01))
+    assert verdict.frequency == pytest.approx(1.0 / (samples_per_cycle * INTERVAL), rel=1e-4)
+    spread = verdict.evidence["stick_spread"]
+    assert isinstance(spread, float)
+    assert verdict.stick_fraction == pytest.approx(0.1, abs=1.001 * spread + 1.0 / 4000)
+    if samples_per_cycle == 9.45:  # places a twentieth of a sample apart
+        assert spread < 0.03

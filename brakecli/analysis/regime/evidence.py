@@ -30,6 +30,7 @@ _MOST_COVERED = 0.2  # part of the band on lines, beyond which they are not told
 _LEAST_FORCED = 0.02  # of what lies beside the lines: that much of a decaying motion leaks onto them
 _MIDDLE = np.array([1.0 / 6.0, 0.5, 5.0 / 6.0])  # quantiles
 _TREND = 3.0  # standard errors of the slope of ten medians, beyond which an amplitude drifts
+_BETWEEN = 1e-3  # of the energy of vx, between the lines of one rise, that makes a cycle of several
 _SAME = 0.02  # squared difference, over twice the variance, between one period of vx and the next
 
 
@@ -260,7 +261,7 @@ def cycles_of(part: Part, slip: ContactState | None = None) -> Cycles | None:
     matter how samples fall into each cycle.
     """
     velocity = part.last("vx")
-    crossings, rises = _beginnings(velocity)
+    crossings, rises = _beginnings(part, velocity)
     if len(crossings) < 4:
         return None
     cycles = len(crossings) - 1
@@ -277,7 +278,16 @@ def cycles_of(part: Part, slip: ContactState | None = None) -> Cycles | None:
         count = np.concatenate([[0], np.cumsum(found)])
         return np.asarray((count[end] - count[begin]) / (end - begin))
 
-    (stick, stick_spread), (loss, loss_spread) = (median(shares(state == which)) for which in _ENDS)
+    places = np.sort(crossings % 1.0)  # within their samples: where cycles last whole samples, all at one
+    unseen = float(np.diff(places, append=places[0] + 1.0).max())
+
+    def time_in(which: ContactState) -> tuple[float, float]:
+        """Part of a cycle, and its spread, with the part of a sample that no cycle has seen."""
+        there = state == which
+        middle, spread = median(shares(there))
+        return middle, max(spread, unseen * float(np.sum(there[1:] & ~there[:-1])) / cycles / period)
+
+    (stick, stick_spread), (loss, loss_spread) = (time_in(which) for which in _ENDS)
     frequency = 1.0 / (period * part.history.interval)
     first, *higher = (part.share([n * frequency]) for n in range(1, _HARMONICS + 1))
     evidence = {
@@ -298,12 +308,14 @@ def cycles_of(part: Part, slip: ContactState | None = None) -> Cycles | None:
     drift, detuning = _drift(sizes), _drift(np.diff(crossings))
     force, whole = part.history.read("friction_force", part.stop - len(velocity), part.stop), crossings.astype(int)
     most, least = (each.reduceat(force[: whole[-1]], whole[:-1]) for each in (np.maximum, np.minimum))
-    medians = *median(sizes), stick, loss
+    amplitude, spread = median(sizes)
+    missed = 3.0 / 128.0 * (2.0 * np.pi / period) ** 4 * amplitude  # of a crest between two samples: parabola
+    medians = amplitude, max(spread, unseen * missed), stick, loss
     return Cycles(evidence, frequency, *medians, limited, drift, detuning, median(most - least)[0])
 
 
-def _beginnings(velocity: Array) -> tuple[Array, int]:
-    """Where cycles begin, and how many rises of the velocity each holds."""
+def _beginnings(part: Part, velocity: Array) -> tuple[Array, int]:
+    """Where cycles begin, and how many rises each holds: one, unless lines lie between those of one."""
     crossings = upward_crossings(velocity, 0.3 * float(velocity.std()))
     if len(crossings) < 2:
         return crossings, 1
@@ -312,7 +324,9 @@ def _beginnings(velocity: Array) -> tuple[Array, int]:
     for rises in range(1, _MOST_RISES_PER_CYCLE + 1):  # after which the motion repeats
         shift = round(rises * period)
         if 0 < shift < len(velocity) // 2 and np.mean((velocity[shift:] - velocity[:-shift]) ** 2) <= close:
-            return crossings[::rises], rises
+            longest = 1.0 / (rises * period * part.history.interval)
+            between = part.share([n * longest for n in range(1, _HARMONICS * rises) if n % rises])
+            return (crossings[::rises], rises) if between > _BETWEEN else (crossings, 1)
     return crossings, 1
 
 
