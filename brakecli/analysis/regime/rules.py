@@ -273,7 +273,7 @@ class _Rules(ForcedRules):
         period = max(min(slow / self.history.interval, samples - 1), 1.0)
         edges = np.asarray(samples - period * np.arange(int(samples / period), -1, -1), np.float64)
         size, spread = median(swings(part, edges))
-        return size, None if self.rings else max(spread, part.amplitude("x") - size)
+        return size, None if self.rings or len(edges) < 3 else max(spread, part.amplitude("x") - size)
 
     def _held(self, spread: float, value: float, drift: Drift) -> float | None:
         """A spread with what a drift becomes until small disturbances have changed by a factor of e."""
