@@ -25,7 +25,14 @@ CRITICAL_NAMES = ("critical", "critical_error", "critical_eigenvalue", "critical
 CRITICAL_POINTS = (*named(fields.POINT, "regime"), *named(fields.CRITICAL, *CRITICAL_NAMES))
 IF_KNOWN = ("growth_rate", "ringing_frequency", "amplitude_spread", "amplitude_forced", "amplitude_own")
 EVIDENCE_UNITS = {"envelope_slope": "1/s", "envelope_final": "m/s", "envelope_largest": "m/s", "power_": "W"}
-EVIDENCE_UNITS |= {"amplitude_v": "m/s", "amplitude_": "m", "seconds": "s", "frequency_": "Hz", "line_freq": "Hz"}
+EVIDENCE_UNITS |= {
+    "amplitude_v": "m/s",
+    "amplitude_": "m",
+    "seconds": "s",
+    "frequency_": "Hz",
+    "line_freq": "Hz",
+    "force_": "N",
+}
 """By how the names of the evidence begin; all others are pure numbers."""
 MOST_LISTED_POINTS = 30
 NARROWEST = 40  # columns of a table, whatever the terminal says: nothing can be read in fewer

@@ -244,3 +244,17 @@ def test_cycles_of_few_samples_have_the_right_length_and_honest_spreads(samples_
     assert verdict.stick_fraction == pytest.approx(0.1, abs=1.001 * spread + 1.0 / 4000)
     if samples_per_cycle == 9.45:  # places a twentieth of a sample apart
         assert spread < 0.03
+
+
+@pytest.mark.parametrize(("width", "told"), [(0.02, True), (0.5, False)])
+def test_impacts_that_samples_miss_are_told(width: float, told: bool) -> None:
+    """A pulse of the friction force for a fiftieth of a cycle of 13.3 samples is seen in one of four cycles."""
+    phase = (np.arange(4000) / 13.3 + 0.013) % 1.0
+    vx = 0.01 * np.cos(2.0 * np.pi * phase)
+    columns = {"vx": vx, "x": np.cumsum(vx) * INTERVAL, "friction_force": np.where(phase < width, 900.0, 100.0)}
+    verdict = classify(
+        history_of(4000, state=np.where(vx > 0.008, 0.0, -1.0), **columns), Context(0.01, growth=lambda: 100.0)
+    )
+    assert verdict.settled
+    assert any("up to 800 N" in reason for reason in verdict.reasons[1:]) == told
+    assert verdict.evidence["force_variation_largest"] == 800.0

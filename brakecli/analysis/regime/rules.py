@@ -32,6 +32,7 @@ _SPREAD = 0.05  # of the frequency of cycles, beyond which three bands hold no v
 _REST = 0.3  # of a forced motion, by which its closed form may be off
 _LONGER = 1.4  # a run whose last quarter and the window before it are settled, over what comes before
 _FAR = 0.3  # rad, of a wave, by which what the shoe adds moves it
+_ALIKE = 1.25  # largest swing of the friction force in a cycle over the median, beyond which samples miss impacts
 _DEFAULT = Thresholds()
 
 
@@ -303,6 +304,16 @@ def classify(history: History, context: Context, thresholds: Thresholds = _DEFAU
     if ripple:
         evidence |= {f"ripple_{name}": getattr(ripple, name) for name in ("x", "vx", "force")}
         spread = spread + ripple.size if spread is not None else None
+    reasons = [decision.reason, *([ripple.sentence] if ripple else [])]
+    if sustained and cycles and rules.lasts:
+        largest = cycles.evidence["force_variation_largest"]
+        if largest > _ALIKE * cycles.force_variation:
+            swings_to = (
+                f"swings by {cycles.force_variation:.4g} N in the median cycle and by up to {largest:.4g} N"
+            )
+            reasons.append(
+                f"the friction force {swings_to}: give a shorter output.sample_interval for its impacts"
+            )
     return Verdict(
         regime=decision.regime,
         excitation=decision.excitation,
@@ -325,7 +336,7 @@ def classify(history: History, context: Context, thresholds: Thresholds = _DEFAU
         ),
         mean_friction_force=friction,
         braking_torque=context.radius * friction,
-        reasons=(decision.reason, *([ripple.sentence] if ripple else [])),
+        reasons=tuple(reasons),
         evidence=evidence,
         thresholds=thresholds,
         second_run=decision.second_run,
