@@ -22,6 +22,9 @@ WIDTHS = (1e-3, 1e-4, 1e-5, 1e-6)
 NODES = (64, 256, 1024)
 MOST_STEPS = 1_000_000
 
+MOST_PARTS = 500
+"""Events of a motion that SciPy computes, beyond which it does not get on."""
+
 
 def found(package: str) -> bool:
     return find_spec(package) is not None
@@ -246,7 +249,7 @@ class StickSlip:
         ends.terminal, ends.direction = True, -1.0  # type: ignore[attr-defined]
         times, belt, parts = self.problem.times, self.problem.belt, list[Floats]()
         t, u, side = 0.0, self.problem.start, -float(np.sign(belt))
-        while True:
+        while len(parts) < MOST_PARTS:
             due = times[np.searchsorted(times, t, "right" if parts else "left") :]
             part = solve_ivp(self.rates, (t, times[-1]), u, t_eval=due, events=ends, args=(side,), **options)
             parts.append(np.reshape(part.y, (4, -1)).T)  # a list where no sample is due
@@ -257,6 +260,7 @@ class StickSlip:
                 u[2] = belt
             sticks = side != 0.0 and self.margin(t, u, 0.0) > 0.0
             side = 0.0 if sticks else -float(np.sign(self.needed(u)))
+        return np.empty((0, 4))  # it meets the same event again and again
 
 
 PEERS: dict[str, Callable[[Problem, bool, Floats], Iterator[Ladder]]] = {
