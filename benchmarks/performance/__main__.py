@@ -60,6 +60,7 @@ REASONS = {
     "heyoka.py: S": _ON_S,
     "numbalsoda": _ON_ROUGH,
     "SciPy": "SciPy has a compiled right-hand side and its cheapest method at each error, LSODA on S.",
+    "critical: a smooth point": "Critical values: making cases and finding limit cycles takes most of the time.",
     "heyoka.py: relaxation": "relaxation.toml: a certificate takes a second run; setting up both takes a fifth.",
     "promise": (
         "A promise on B: two differences of steps and two of nodes take five runs; making them takes milliseconds."
