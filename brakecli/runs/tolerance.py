@@ -27,10 +27,8 @@ LAYERED: tuple[dict[str, Any], ...] = (  # cheapest by compare-schemes: in slip,
     {"scheme": "two-layer", "theta": HALF},
 )
 LAYERED_FROM = 1e-5  # tolerance from which on a ladder may be cheaper than events, where surfaces open
-FIRST_TURN = (
-    15.0  # square of the turn (rad) of the fastest motion in a first step, over the tolerance: two halvings
-)
-# leave an error of a sixth of the tolerance, as (1/12, 10/12, 1/12) takes a sixth of that square off a velocity
+FIRST_TURN = 15.0  # square of the turn (rad) of the fastest motion in a first step, over the tolerance
+# Two halvings leave a sixth of the tolerance: (1/12, 10/12, 1/12) takes a sixth of that square off a velocity.
 LONGEST_TURN = 0.4  # rad, in a first step
 FIRST_PER_WAVE = 8.0  # first steps to a passing wave, at least
 FINEST_FIRST = 4e-4  # tolerance from which on a quarter of the usual nodes is enough to begin with

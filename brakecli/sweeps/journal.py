@@ -48,9 +48,8 @@ class Journal:
         self._blocks: list[tuple[int, int, int, int]] = []  # first unit, units, where their records begin and end
         self._longest = {name: 1 for name in self.kind.names or () if self.kind[name].kind == "S"}  # bytes
         self._block = 0, b""  # read last: where it begins, and its records
-        self._slab: tuple[int, int, NDArray[Any]] | None = (
-            None  # lines read last: first and last, and their records
-        )
+        # Lines read last: the first and the last, and their records.
+        self._slab: tuple[int, int, NDArray[Any]] | None = None
 
     def add(self, first: int, records: bytes) -> None:
         """Append the records of finished units."""
