@@ -246,15 +246,15 @@ def test_cycles_of_few_samples_have_the_right_length_and_honest_spreads(samples_
         assert spread < 0.03
 
 
-@pytest.mark.parametrize(("width", "told"), [(0.02, True), (0.5, False)])
-def test_impacts_that_samples_miss_are_told(width: float, told: bool) -> None:
+@pytest.mark.parametrize(("width", "start", "told"), [(0.02, 0.0, True), (0.5, 0.0, False), (0.5, 2.0, False)])
+def test_impacts_that_samples_miss_are_told(width: float, start: float, told: bool) -> None:
     """A pulse of 600 N on a swing of 200 N, for a quarter of a sample, is seen in one of four cycles."""
     phase = (np.arange(4000) / 13.3 + 0.013) % 1.0
-    vx = 0.01 * np.cos(2.0 * np.pi * phase)
+    vx, fade = 0.01 * np.cos(2.0 * np.pi * phase), 1.0 + start * np.exp(-np.arange(4000) / 200.0)
     columns = {
         "vx": vx,
         "x": np.cumsum(vx) * INTERVAL,
-        "friction_force": 1e4 * vx + np.where(phase < width, 600.0, 0.0),
+        "friction_force": fade * (1e4 * vx + np.where(phase < width, 600.0, 0.0)),
     }
     verdict = classify(
         history_of(4000, state=np.where(vx > 0.008, 0.0, -1.0), **columns), Context(0.01, growth=lambda: 100.0)

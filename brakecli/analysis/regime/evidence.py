@@ -311,7 +311,9 @@ def cycles_of(part: Part, slip: ContactState | None = None) -> Cycles | None:
     amplitude, spread = median(sizes)
     missed = 3.0 / 128.0 * (2.0 * np.pi / period) ** 4 * amplitude  # of a crest between two samples: parabola
     medians = amplitude, max(spread, unseen * missed), stick, loss
-    evidence["force_variation_largest"] = float((most - least).max())
+    evidence["force_variation_largest"] = float(
+        (most - least)[2 * cycles // 3 :].max()
+    )  # the start has gone there
     return Cycles(evidence, frequency, *medians, limited, drift, detuning, median(most - least)[0])
 
 
