@@ -96,7 +96,7 @@ def test_no_control_character_of_a_file_a_name_or_a_title_reaches_the_terminal(g
     assert done.json["source"] == f"{ODD}.h5"
 
 
-@pytest.mark.parametrize("kilobytes", [100_000, 300_000, 400_000])
+@pytest.mark.parametrize("kilobytes", [100_000, 400_000, 700_000])
 def test_an_address_space_too_small_for_the_libraries_is_told_before_they_are_loaded(
     here: Path, kilobytes: int
 ) -> None:
@@ -108,4 +108,4 @@ def test_an_address_space_too_small_for_the_libraries_is_told_before_they_are_lo
 @campaign
 def test_an_address_space_that_is_just_large_enough_is(here: Path) -> None:
     for command in ("run tiny.toml", "compare-schemes tiny.toml --budget 1"):  # the second compiles every scheme
-        shell(f"ulimit -v 600000; $B {command} -q", here, XDG_CACHE_HOME=str(here)).told(0)
+        shell(f"ulimit -v 735000; $B {command} -q", here, XDG_CACHE_HOME=str(here)).told(0)
