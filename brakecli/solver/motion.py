@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from brakecli.solver import contact
-from brakecli.solver.compile import Floats, address
+from brakecli.solver.compile import LARGEST, Floats, address
 from brakecli.solver.contact.pad import build_layer
 from brakecli.solver.energy import OPEN_ACCOUNT, EnergyAccount, account
 from brakecli.solver.friction import minimise
@@ -115,6 +115,9 @@ class Stepping:
             work=new(WORK),
             counts=self.counts,
         )
+        self._memory = np.zeros(LARGEST, np.int8)
+        self._plant_at = self._memory.ctypes.data
+        self.scheme.hold(self.plant, self._plant_at)
         self._begin()
         self._start_energy = self._energy()
 
@@ -149,7 +152,7 @@ class Stepping:
         system, lag, per_sample = self.system, self.scheme.LAG, self.system.per_sample
         first = int(self.counts.level) - lag
         rows = np.zeros((-(-(stop - lag) // per_sample) + (-first // per_sample), len(HISTORY)))
-        self.work.failure = Failure(self.scheme.advance(self.plant, rows, self.events, stop))
+        self.work.failure = Failure(self.scheme.advance(self._plant_at, rows, self.events, stop))
         done = int(self.counts.level) - lag
         if self.work.failed:
             self.work.failure_time = system.step * done

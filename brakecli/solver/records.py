@@ -155,6 +155,10 @@ BELT, BELT_SLOPE, LOAD, LOAD_SLOPE = range(4, 8)
 
 SIZE, PHASES, MARGINS, WORKS, TERMS, NODES = 8, 4, 3, 4, 18, 6
 """Its components, phases, margins of a phase, works, terms of its series, nodes of its quadrature."""
+PAIRS = SIZE * (SIZE + 1) // 2
+"""Products of two components; pairs of different ones stand for both orders."""
+AHEAD = 4 + 2 * MARGINS + 2
+"""What a step computes: x, y, v_x and v_y, the margins, their slopes times the step, and 2 that fill up vectors."""
 
 FLOW = record(
     "x y v_x v_y",  # motion at the level reached, m and m/s
@@ -169,9 +173,8 @@ FLOW = record(
     made=(int, PHASES),  # 1 where the matrices of a phase are made
     row=(float, 8),  # the sample at the level reached
     z=(float, SIZE),  # motion reached
-    end=(float, 4),  # x, y, v_x and v_y at the end of a whole step
-    before=(float, 2 * MARGINS),  # margins of the motion reached, and their slopes times the step
-    after=(float, 2 * MARGINS),  # those at the end
+    before=(float, AHEAD),  # the motion reached with its margins
+    after=(float, AHEAD),  # that at the end of a step
     needed=(float, SIZE),  # row whose product with z is the friction force that stick takes, N
     generator=(float, (PHASES, SIZE, SIZE)),  # A
     friction=(float, (PHASES, SIZE)),  # row of the friction force, N
@@ -179,9 +182,10 @@ FLOW = record(
         float,
         (PHASES, 2 * MARGINS, SIZE),
     ),  # rows of what is positive while the phase lasts, and of `before`
-    step=(float, (PHASES, 4 + 2 * MARGINS, SIZE)),  # rows of exp(A h) for x, y, v_x and v_y, and of `after`
-    works=(float, (PHASES, WORKS, SIZE, SIZE)),  # forms in z that are the works of a step from z on, J
-    sums=(float, (SIZE, SIZE)),  # sum of z zᵀ over the steps whose works wait to be added up
+    step=(float, (PHASES, SIZE, AHEAD)),  # columns of exp(A h) for x, y, v_x and v_y, and for the rest of `after`
+    now=(float, (SIZE, AHEAD)),  # those of the present phase: at a fixed place, the compiler makes vectors of them
+    works=(float, (PHASES, WORKS, PAIRS)),  # forms in z that are the works of a step from z on, J
+    sums=(float, PAIRS),  # sums of products of components of z over the steps whose works wait to be added up
     series=(float, (TERMS, SIZE)),  # of the motion over the span of a step
     pull=(float, (NODES + 1, SIZE)),  # friction force in `at`, N
     at=(float, (NODES + 1, SIZE, SIZE)),  # motions at the nodes of Gauss' rule, and at the end of the step

@@ -10,13 +10,14 @@ from typing import Any
 
 from numba import float64, int64, void
 
-from brakecli.solver.compile import Floats, borrowed, kernel
+from brakecli.solver.compile import Floats, in_memory, kernel
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.double_double import two_sum
 from brakecli.solver.energy import energy_at_level
 from brakecli.solver.friction import observed
 from brakecli.solver.quantities import BOUND, Failure
 from brakecli.solver.records import (
+    AHEAD,
     BELT,
     BELT_SLOPE,
     COUNTS_TYPE,
@@ -52,6 +53,7 @@ _MOST_EVENTS, _NO_PROGRESS = 1000, 1e-6  # a run ends after so many events withi
 _KEPT = 4096  # levels from one sum of the works to the next, so that rounding does not add up
 
 _PLANT = plant_type(FLOW)
+hold, _plant_at = in_memory(_PLANT)
 _NONE, _, _DIVERGED, _, _, _STALLED = (int(failure) for failure in Failure)
 
 
@@ -71,15 +73,15 @@ def begin(s: Weights, state: Any, position: Pair, velocity: Pair, acceleration: 
     state.v_x, state.v_y = velocity
 
 
-@kernel(float64(FLOW_TYPE, int64))
-def _ahead(m: Any, place: int) -> float:
-    """A row of the matrix of a step times the motion; a tree of sums has less latency than a loop."""
-    a, z, phase = m.step, m.z, m.phase
-    one = a[phase, place, 0] * z[0] + a[phase, place, 1] * z[1]
-    two = a[phase, place, 2] * z[2] + a[phase, place, 3] * z[3]
-    three = a[phase, place, 4] * z[4] + a[phase, place, 5] * z[5]
-    four = a[phase, place, 6] * z[6] + a[phase, place, 7] * z[7]
-    return (one + two) + (three + four)  # type: ignore[no-any-return]
+@kernel(void(FLOW_TYPE))
+def _ahead(m: Any) -> None:
+    """The matrix of a step times the motion, in `after`; a tree of sums has less latency than a loop."""
+    a, z = m.now, m.z
+    z_0, z_1, z_2, z_3, z_4, z_5, z_6, z_7 = z[0], z[1], z[2], z[3], z[4], z[5], z[6], z[7]
+    for k in range(AHEAD):
+        one, two = a[0, k] * z_0 + a[1, k] * z_1, a[2, k] * z_2 + a[3, k] * z_3
+        three, four = a[4, k] * z_4 + a[5, k] * z_5, a[6, k] * z_6 + a[7, k] * z_7
+        m.after[k] = (one + two) + (three + four)
 
 
 @kernel(int64(FLOW_TYPE, float64), inlined=False)
@@ -88,32 +90,34 @@ def whole(m: Any, h: float) -> int:
 
     A margin that falls at first and rises at last is lowest inside, and not below its tangents at both ends.
     """
-    for k in range(2 * MARGINS):
-        m.after[k] = _ahead(m, 4 + k)
-    for k in range(MARGINS):
+    _ahead(m)
+    for k in range(4, 4 + MARGINS):
         fall, rise = m.before[MARGINS + k], m.after[MARGINS + k]
         if m.after[k] < 0.0 or (fall < 0.0 < rise and min(m.before[k] + fall, m.after[k] - rise) < 0.0):
             return 0
-    for i in range(4):
-        m.end[i] = _ahead(m, i)
+    pair = 0
     for i in range(SIZE):
-        for j in range(SIZE):
-            m.sums[i, j] += m.z[i] * m.z[j]
+        for j in range(i + 1):
+            m.sums[pair] += m.z[i] * m.z[j]
+            pair += 1
     for i in range(4):
-        m.z[i] = m.end[i]
+        m.z[i] = m.after[i]
     m.z[BELT], m.z[LOAD] = m.z[BELT] + h * m.z[BELT_SLOPE], m.z[LOAD] + h * m.z[LOAD_SLOPE]
-    for k in range(2 * MARGINS):
+    for k in range(AHEAD):
         m.before[k] = m.after[k]
     return 1
 
 
 @kernel(void(FLOW_TYPE), inlined=False)
 def look(m: Any) -> None:
-    """The margins of the motion reached, and their slopes."""
+    """The matrix of the phase, the margins of the motion reached, and their slopes."""
+    for i in range(SIZE):
+        for k in range(AHEAD):
+            m.now[i, k] = m.step[m.phase, i, k]
     for k in range(2 * MARGINS):
-        m.before[k] = 0.0
+        m.before[4 + k] = 0.0
         for i in range(SIZE):
-            m.before[k] += m.margins[m.phase, k, i] * m.z[i]
+            m.before[4 + k] += m.margins[m.phase, k, i] * m.z[i]
 
 
 @kernel(void(_PLANT, float64), inlined=False)
@@ -217,10 +221,10 @@ def sample(p: Plant, row: Floats) -> None:
     row[:] = p.state.row
 
 
-@kernel(int64(_PLANT, float64[:, ::1], float64[:, ::1], int64))
-def advance(p: Plant, rows: Floats, events: Floats, stop: int) -> int:
+@kernel(int64(int64, float64[:, ::1], float64[:, ::1], int64))
+def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
     """Step from the level reached to `stop`, filling `rows` with the samples before each step; a `Failure`."""
-    p = borrowed(p)
+    p: Plant = _plant_at(address)
     m, counts, grid, h, row = p.state, p.counts, p.grid, p.s.h, 0
     if m.started == 0:
         _start(p)

@@ -160,16 +160,16 @@ def _carry(m: Any, o: Any, part: float) -> None:
     for j in range(3):
         if whole_step:
             for i in range(4):
-                m.end[i] = 0.0
+                m.at[NODES, 0, i] = 0.0
                 for k in range(4):
-                    m.end[i] += m.step[o.old, i, k] * o.tangents[j, k]
+                    m.at[NODES, 0, i] += m.step[o.old, k, i] * o.tangents[j, k]
         else:
             for i in range(SIZE):
                 m.series[0, i] = o.tangents[j, i] if i < 4 else 0.0
             phases.expand(m, o.old, o.h)
             _take(m, o, part)
         for i in range(4):
-            o.tangents[j, i] = m.end[i] if whole_step else m.at[NODES, 0, i]
+            o.tangents[j, i] = m.at[NODES, 0, i]
 
 
 @kernel(float64(FLOW_TYPE, ORBIT_TYPE, int64, int64))

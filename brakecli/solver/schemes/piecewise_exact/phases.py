@@ -19,6 +19,7 @@ from brakecli.solver.records import (
     LOAD_SLOPE,
     MARGINS,
     NODES,
+    PAIRS,
     PHASES,
     SIZE,
     TERMS,
@@ -135,16 +136,18 @@ def make(c: Coefficients, m: Any, phase: int, h: float) -> None:
             reach(m, phase, _NODES[node] if node < NODES else 1.0, node, j)
         for i in range(SIZE):
             if i <= V_Y:
-                step[i, j] = m.at[NODES, j, i]
+                step[j, i] = m.at[NODES, j, i]
             for k in range(2 * MARGINS):
-                step[4 + k, j] += margins[k, i] * m.at[NODES, j, i]
+                step[j, 4 + k] += margins[k, i] * m.at[NODES, j, i]
     for node in range(NODES):
+        pair = 0
         for i in range(SIZE):
             for j in range(i + 1):
-                share = h * _SHARES[node] * (1.0 if i == j else 2.0)  # pairs count twice
+                share = h * _SHARES[node] * (1.0 if i == j else 2.0)
                 belt, heat, dashpots, load = _powers(c, m, phase, node, i, j)
-                works[0, i, j], works[1, i, j] = works[0, i, j] + share * belt, works[1, i, j] + share * heat
-                works[2, i, j], works[3, i, j] = works[2, i, j] + share * dashpots, works[3, i, j] + share * load
+                works[0, pair], works[1, pair] = works[0, pair] + share * belt, works[1, pair] + share * heat
+                works[2, pair], works[3, pair] = works[2, pair] + share * dashpots, works[3, pair] + share * load
+                pair += 1
 
 
 @kernel(void(COEFFICIENTS, FLOW_TYPE, WORK_TYPE, float64, float64), inlined=False)
@@ -164,15 +167,10 @@ def take_part(c: Coefficients, m: Any, work: Any, span: float, theta: float) -> 
 @kernel(void(FLOW_TYPE, WORK_TYPE), inlined=False)
 def add_works(m: Any, work: Any) -> None:
     """Add up the works of the whole steps that wait for it, all of the present phase."""
-    belt, heat, dashpots, load = 0.0, 0.0, 0.0, 0.0
-    for i in range(SIZE):
-        for j in range(SIZE):
-            belt, heat = (
-                belt + m.works[m.phase, 0, i, j] * m.sums[i, j],
-                heat + m.works[m.phase, 1, i, j] * m.sums[i, j],
-            )
-            dashpots += m.works[m.phase, 2, i, j] * m.sums[i, j]
-            load += m.works[m.phase, 3, i, j] * m.sums[i, j]
-            m.sums[i, j] = 0.0
+    works, sums, belt, heat, dashpots, load = m.works[m.phase], m.sums, 0.0, 0.0, 0.0, 0.0
+    for pair in range(PAIRS):
+        belt, heat = belt + works[0, pair] * sums[pair], heat + works[1, pair] * sums[pair]
+        dashpots, load = dashpots + works[2, pair] * sums[pair], load + works[3, pair] * sums[pair]
+        sums[pair] = 0.0
     work.belt, work.friction = work.belt + belt, work.friction + heat
     work.dashpots, work.load = work.dashpots + dashpots, work.load + load
