@@ -11,6 +11,7 @@ import stat
 import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -140,6 +141,7 @@ def kernel(signature: Any, *, fastmath: frozenset[str] = frozenset(), inlined: b
 _functions: list[Any] = []  # interpreted kernels, found by their number
 
 
+@cache
 def address(function: Any) -> int:
     """Where the machine code of a kernel is. An interpreted one gets a number instead."""
     if config.DISABLE_JIT:

@@ -46,6 +46,7 @@ class Work:
     crossing: float = 0.0  # largest contact force (N) as friction turned within a step, without a stick
     evaluators: dict[str, int] = field(default_factory=dict)  # steps that each evaluator took
     solve_seconds: float = 0.0
+    rounding: tuple[Floats, Floats] | None = None  # of exact steps: largest x, y, vx and vy and their errors by it
     unconverged: Floats = field(default_factory=lambda: np.zeros((0, 2)))  # time (s), residual (N)
 
     @property
@@ -126,7 +127,7 @@ class Stepping:
     ) -> Motion:
         """Step to the end or to a failure; the arguments are those of `solve`."""
         lag, work, kept = self.scheme.LAG, self.work, [np.zeros((0, len(HISTORY)))]
-        sink = sink or (lambda rows: kept.append(rows.copy()))
+        sink = sink or kept.append
         last, most = self.system.steps + lag, BLOCK_ROWS * self.system.per_sample
         size = min(EXACT_BLOCK if self.system.method.row.exact else first_block, most)
         while not work.failed and self.counts.level < last:
@@ -193,6 +194,8 @@ class Stepping:
     def _count(self) -> None:
         counts, work = self.counts, self.work
         work.steps = int(counts.kinds.sum())
+        if self.system.method.row.exact:
+            work.rounding = self.plant.state.largest.copy(), self.plant.state.worst.copy()
         work.contact_evaluations = int(counts.evaluations)
         work.unconverged_steps = int(counts.unconverged)
         work.non_unique_steps = int(counts.rising)

@@ -13,10 +13,24 @@ from brakecli.solver.contact import MOST_KINDS
 Pair = tuple[float, float]
 
 
+class Record(np.void):
+    """A record whose fields are attributes; those of `numpy.record` take three times as long."""
+
+    def __getattr__(self, name: str) -> Any:
+        """A field."""
+        if name not in (self.dtype.names or ()):
+            raise AttributeError(name)
+        return self[name]
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Change a field."""
+        self[name] = value
+
+
 def record(*floats: str, **others: Any) -> np.dtype[Any]:
     """A type of record: the names of its doubles, several in a text, then its other fields of 8 bytes each."""
     fields = [(name, float) for names in floats for name in names.split()]
-    return np.dtype((np.record, np.dtype([*fields, *others.items()], align=True)))
+    return np.dtype((Record, np.dtype([*fields, *others.items()], align=True)))
 
 
 def new(type_: np.dtype[Any]) -> Any:
@@ -173,6 +187,9 @@ FLOW = record(
     made=(int, PHASES),  # 1 where the matrices of a phase are made
     row=(float, 8),  # the sample at the level reached
     z=(float, SIZE),  # motion reached
+    error=(float, 4),  # of x, y, v_x and v_y by the rounding of all steps so far
+    worst=(float, 4),  # its largest size at a sample
+    largest=(float, 4),  # that of the motion
     before=(float, AHEAD),  # the motion reached with its margins
     after=(float, AHEAD),  # that at the end of a step
     needed=(float, SIZE),  # row whose product with z is the friction force that stick takes, N

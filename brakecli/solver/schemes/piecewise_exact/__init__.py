@@ -50,6 +50,8 @@ VELOCITIES = ("v_x", "v_y")
 mechanical_energy = energy_at_level
 
 _MOST_EVENTS, _NO_PROGRESS = 1000, 1e-6  # a run ends after so many events within that part of a step
+_ROUNDING = 4.0 * 2.220446049250313e-16  # of a step, beside the motion
+_ERROR_TERMS = 9  # of the series of an error, which is known to a few digits only
 _KEPT = 4096  # levels from one sum of the works to the next, so that rounding does not add up
 
 _PLANT = plant_type(FLOW)
@@ -84,6 +86,22 @@ def _ahead(m: Any) -> None:
         m.after[k] = (one + two) + (three + four)
 
 
+@kernel(void(FLOW_TYPE))
+def _round(m: Any) -> None:
+    """Add the rounding of a step to the error, with the signs with which it does most harm."""
+    for i in range(4):
+        m.error[i] += math.copysign(_ROUNDING * m.z[i], m.error[i])
+
+
+@kernel(void(FLOW_TYPE))
+def _carry(m: Any) -> None:
+    """Move the error along a whole step, which has a rounding error of its own."""
+    a, x, y, v_x, v_y = m.now, m.error[X], m.error[Y], m.error[V_X], m.error[V_Y]
+    for i in range(4):
+        m.error[i] = (a[0, i] * x + a[1, i] * y) + (a[2, i] * v_x + a[3, i] * v_y)
+    _round(m)
+
+
 @kernel(int64(FLOW_TYPE, float64), inlined=False)
 def whole(m: Any, h: float) -> int:
     """Take a whole step and return 1, unless a margin runs out in it or may do so.
@@ -102,10 +120,26 @@ def whole(m: Any, h: float) -> int:
             pair += 1
     for i in range(4):
         m.z[i] = m.after[i]
+    _carry(m)
     m.z[BELT], m.z[LOAD] = m.z[BELT] + h * m.z[BELT_SLOPE], m.z[LOAD] + h * m.z[LOAD_SLOPE]
     for k in range(AHEAD):
         m.before[k] = m.after[k]
     return 1
+
+
+@kernel(void(FLOW_TYPE, float64), inlined=False)
+def _carry_part(m: Any, seconds: float) -> None:
+    """The same along a part of a step, at whose end the motion is."""
+    a, phase, x, y, v_x, v_y = m.generator, m.phase, m.error[X], m.error[Y], m.error[V_X], m.error[V_Y]
+    moved_x, moved_y, moved_v_x, moved_v_y = x, y, v_x, v_y
+    for k in range(1, _ERROR_TERMS):
+        a_x = (a[phase, V_X, X] * x + a[phase, V_X, Y] * y) + (a[phase, V_X, V_X] * v_x + a[phase, V_X, V_Y] * v_y)
+        a_y = (a[phase, V_Y, X] * x + a[phase, V_Y, Y] * y) + (a[phase, V_Y, V_X] * v_x + a[phase, V_Y, V_Y] * v_y)
+        part = seconds / k
+        x, y, v_x, v_y = part * v_x, part * v_y, part * a_x, part * a_y
+        moved_x, moved_y, moved_v_x, moved_v_y = moved_x + x, moved_y + y, moved_v_x + v_x, moved_v_y + v_y
+    m.error[X], m.error[Y], m.error[V_X], m.error[V_Y] = moved_x, moved_y, moved_v_x, moved_v_y
+    _round(m)
 
 
 @kernel(void(FLOW_TYPE), inlined=False)
@@ -179,6 +213,7 @@ def _through(p: Plant, t: float) -> int:
         if theta > 0.0:
             phases.take_part(p.c, m, p.work, span, theta)
             _count(m, p.counts)
+            _carry_part(m, theta * span)
         if which != NO_EVENT:
             tau += theta * span
             if t + tau - m.events_time > _NO_PROGRESS * h:
@@ -189,6 +224,8 @@ def _through(p: Plant, t: float) -> int:
             add_works(m, p.work)
             switch(p.c, m, which, p.s.h)
             _anchor(p, t, tau)
+            if m.phase == STICK:
+                m.error[V_X] = 0.0
         elif to_knot <= h - tau:
             tau += span
             _pass_knot(p, m.knot)
@@ -206,6 +243,9 @@ def _sample(p: Plant, t: float) -> None:
         travel, travel_low = integral_at(belt, t, 0.0)
         z[BELT] = z[V_X] = value_at(belt, t)
         z[X] = (m.anchor + travel) + (m.anchor_low + travel_low)
+        m.error[V_X] = 0.0
+    for i in range(4):
+        m.worst[i], m.largest[i] = max(m.worst[i], abs(m.error[i])), max(m.largest[i], abs(z[i]))
     normal = max(-m.stiffness * z[Y], 0.0) if m.phase != OPEN else 0.0
     needed = 0.0
     for i in range(SIZE):
