@@ -207,7 +207,7 @@ def _through(p: Plant, t: float) -> int:
         to_knot = m.knot - t - tau
         span = max(min(h - tau, to_knot), 0.0)
         for i in range(SIZE):
-            m.series[0, i] = m.z[i]
+            m.series[i, 0] = m.z[i]
         phases.expand(m, m.phase, span)
         which, theta = first_event(m)
         if theta > 0.0:

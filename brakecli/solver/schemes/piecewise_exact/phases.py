@@ -47,8 +47,8 @@ _SHARES = 0.5 * np.polynomial.legendre.leggauss(NODES)[1]
 def expand(m: Any, phase: int, span: float) -> None:
     """The series of the motion over a span (s), from its first coefficient on: (A span)^k z / k!."""
     a, z = m.generator, m.series
-    x, y, v_x, v_y, belt, load = z[0, X], z[0, Y], z[0, V_X], z[0, V_Y], z[0, BELT], z[0, LOAD]
-    belt_slope, load_slope = z[0, BELT_SLOPE], z[0, LOAD_SLOPE]
+    x, y, v_x, v_y, load, belt_slope = z[X, 0], z[Y, 0], z[V_X, 0], z[V_Y, 0], z[LOAD, 0], z[BELT_SLOPE, 0]
+    z[BELT, 1], z[LOAD, 1] = span * z[BELT_SLOPE, 0], span * z[LOAD_SLOPE, 0]  # further terms are 0
     for k in range(1, TERMS):
         part = span / k
         a_x = (a[phase, V_X, X] * x + a[phase, V_X, Y] * y) + (a[phase, V_X, V_X] * v_x + a[phase, V_X, V_Y] * v_y)
@@ -56,21 +56,20 @@ def expand(m: Any, phase: int, span: float) -> None:
         a_x += a[phase, V_X, LOAD] * load + a[phase, V_X, BELT_SLOPE] * belt_slope
         a_y += a[phase, V_Y, LOAD] * load
         x, y, v_x, v_y = part * v_x, part * v_y, part * a_x, part * a_y
-        belt, load, belt_slope, load_slope = part * belt_slope, part * load_slope, 0.0, 0.0
-        z[k, X], z[k, Y], z[k, V_X], z[k, V_Y], z[k, BELT], z[k, LOAD] = x, y, v_x, v_y, belt, load
-        z[k, BELT_SLOPE] = z[k, LOAD_SLOPE] = 0.0
+        load, belt_slope = z[LOAD, 1] if k == 1 else 0.0, 0.0
+        z[X, k], z[Y, k], z[V_X, k], z[V_Y, k] = x, y, v_x, v_y
 
 
 @kernel(void(FLOW_TYPE, int64, float64, int64, int64))
 def reach(m: Any, phase: int, theta: float, node: int, column: int) -> None:
     """Put the motion at a part of the span of the series into `m.at[node, column]`, with its friction force."""
     z, last, at = m.series, TERMS - 1, m.at
-    x, y, v_x, v_y = z[last, X], z[last, Y], z[last, V_X], z[last, V_Y]
+    x, y, v_x, v_y = z[X, last], z[Y, last], z[V_X, last], z[V_Y, last]
     for k in range(TERMS - 2, -1, -1):
-        x, y, v_x, v_y = x * theta + z[k, X], y * theta + z[k, Y], v_x * theta + z[k, V_X], v_y * theta + z[k, V_Y]
+        x, y, v_x, v_y = x * theta + z[X, k], y * theta + z[Y, k], v_x * theta + z[V_X, k], v_y * theta + z[V_Y, k]
     at[node, column, X], at[node, column, Y], at[node, column, V_X], at[node, column, V_Y] = x, y, v_x, v_y
-    at[node, column, BELT], at[node, column, BELT_SLOPE] = z[0, BELT] + theta * z[1, BELT], z[0, BELT_SLOPE]
-    at[node, column, LOAD], at[node, column, LOAD_SLOPE] = z[0, LOAD] + theta * z[1, LOAD], z[0, LOAD_SLOPE]
+    at[node, column, BELT], at[node, column, BELT_SLOPE] = z[BELT, 0] + theta * z[BELT, 1], z[BELT_SLOPE, 0]
+    at[node, column, LOAD], at[node, column, LOAD_SLOPE] = z[LOAD, 0] + theta * z[LOAD, 1], z[LOAD_SLOPE, 0]
     m.pull[node, column] = 0.0
     for i in range(SIZE):
         m.pull[node, column] += m.friction[phase, i] * at[node, column, i]
@@ -130,7 +129,7 @@ def make(c: Coefficients, m: Any, phase: int, h: float) -> None:
                 margins[MARGINS + k, j] += h * margins[k, i] * a[i, j]
     for j in range(SIZE):
         for i in range(SIZE):
-            m.series[0, i] = 1.0 if i == j else 0.0
+            m.series[i, 0] = 1.0 if i == j else 0.0
         expand(m, phase, h)
         for node in range(NODES + 1):
             reach(m, phase, _NODES[node] if node < NODES else 1.0, node, j)
