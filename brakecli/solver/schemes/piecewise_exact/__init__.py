@@ -50,6 +50,7 @@ VELOCITIES = ("v_x", "v_y")
 mechanical_energy = energy_at_level
 
 _MOST_EVENTS, _NO_PROGRESS = 1000, 1e-6  # a run ends after so many events within that part of a step
+_FLAT = 1e-12  # fall of a margin over its rise, by which it dips by 1e-18 of this at most
 _ROUNDING = 4.0 * 2.220446049250313e-16  # of a step, beside the motion
 _ERROR_TERMS = 9  # of the series of an error, which is known to a few digits only
 _KEPT = 4096  # levels from one sum of the works to the next, so that rounding does not add up
@@ -106,12 +107,13 @@ def _carry(m: Any) -> None:
 def whole(m: Any, h: float) -> int:
     """Take a whole step and return 1, unless a margin runs out in it or may do so.
 
-    A margin that falls at first and rises at last is lowest inside, and not below its tangents at both ends.
+    A margin that falls at first and rises at last is lowest inside, and not below its tangents at both ends. It
+    does not fall but by rounding where a shoe breaks loose: then it begins at zero, and without a slope.
     """
     _ahead(m)
     for k in range(4, 4 + MARGINS):
         fall, rise = m.before[MARGINS + k], m.after[MARGINS + k]
-        if m.after[k] < 0.0 or (fall < 0.0 < rise and min(m.before[k] + fall, m.after[k] - rise) < 0.0):
+        if m.after[k] < 0.0 or (fall < -_FLAT * rise < 0.0 and min(m.before[k] + fall, m.after[k] - rise) < 0.0):
             return 0
     pair = 0
     for i in range(SIZE):
@@ -199,13 +201,20 @@ def _count(m: Any, counts: Any) -> None:
         counts.most = 1
 
 
-@kernel(int64(_PLANT, float64), inlined=False)
-def _through(p: Plant, t: float) -> int:
-    """Take the step that begins at time t, through all its events and knots; a `Failure`."""
-    m, h, tau = p.state, p.s.h, 0.0
-    while True:
-        to_knot = m.knot - t - tau
-        span = max(min(h - tau, to_knot), 0.0)
+@kernel(int64(_PLANT, float64, int64), inlined=False)
+def _through(p: Plant, t: float, to_sample: int) -> int:
+    """Step on beyond the level behind time t, through all events and knots; a `Failure`.
+
+    Whole steps go on from an event, so that motion is late at the levels that follow, until the next sample.
+    """
+    m, h, tau = p.state, p.s.h, p.state.late
+    while tau < h:
+        to_knot, fits = m.knot - t - tau, to_sample == 0 or tau == 0.0
+        if fits and h < to_knot and min(m.before[4], m.before[5], m.before[6]) >= 0.0 and whole(m, h) == 1:
+            _count(m, p.counts)
+            tau += h
+            continue
+        span = max(min(h - tau if to_sample == 1 else h, to_knot), 0.0)
         for i in range(SIZE):
             m.series[i, 0] = m.z[i]
         phases.expand(m, m.phase, span)
@@ -214,8 +223,8 @@ def _through(p: Plant, t: float) -> int:
             phases.take_part(p.c, m, p.work, span, theta)
             _count(m, p.counts)
             _carry_part(m, theta * span)
+        tau += theta * span
         if which != NO_EVENT:
-            tau += theta * span
             if t + tau - m.events_time > _NO_PROGRESS * h:
                 m.events_time, m.events = t + tau, 0
             m.events += 1
@@ -226,12 +235,12 @@ def _through(p: Plant, t: float) -> int:
             _anchor(p, t, tau)
             if m.phase == STICK:
                 m.error[V_X] = 0.0
-        elif to_knot <= h - tau:
-            tau += span
+        elif to_knot <= span:
             _pass_knot(p, m.knot)
-        else:
-            break
-    look(m)
+        elif to_sample == 1:
+            tau = h
+        look(m)
+    m.late = tau - h if to_sample == 0 else 0.0
     return _NONE
 
 
@@ -280,10 +289,10 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
             for column in range(rows.shape[1]):  # a slice would take seconds to compile
                 rows[row, column] = m.row[column]
             row += 1
-        if t + h < m.knot and whole(m, h) == 1:
+        if m.late == 0.0 and t + h < m.knot and whole(m, h) == 1:
             _count(m, counts)
         else:
-            failure = _through(p, t)
+            failure = _through(p, t, int(part + 1 == grid.per_sample))
         if not abs(m.z[X]) + abs(m.z[Y]) + abs(m.z[V_X]) + abs(m.z[V_Y]) < BOUND:
             failure = _DIVERGED
         if failure == _NONE:

@@ -18,17 +18,19 @@ _LOOKS = 12  # how often a margin that begins at zero is sought above it, each t
 @kernel(types.UniTuple(float64, 2)(FLOW_TYPE, int64, float64))
 def _value(m: Any, row: int, theta: float) -> tuple[float, float]:
     """A polynomial and its slope at a part of the span."""
-    value, slope = 0.0, 0.0
-    for k in range(TERMS - 1, -1, -1):
-        slope = slope * theta + value
-        value = value * theta + m.polynomial[row, k]
-    return value, slope
+    of, q, value, slope, odd, odd_slope = m.polynomial, theta * theta, 0.0, 0.0, 0.0, 0.0
+    for k in range(TERMS - 2, -1, -2):  # even and odd powers apart, which do not wait for each other
+        slope, odd_slope = slope * q + value, odd_slope * q + odd
+        value, odd = value * q + of[row, k], odd * q + of[row, k + 1]
+    return value + theta * odd, odd + 2.0 * theta * (slope + theta * odd_slope)
 
 
 @kernel(float64(FLOW_TYPE, int64, float64, float64), inlined=False)
 def root(m: Any, row: int, left: float, right: float) -> float:
     """Where a polynomial falls through zero between left and right: Newton's iteration, kept in the bracket."""
-    place = right
+    place, (first, _), (last, _) = right, _value(m, row, left), _value(m, row, right)
+    if first > 0.0 > last:
+        place = left + (right - left) * first / (first - last)
     for _ in range(200):
         value, slope = _value(m, row, place)
         if value > 0.0:

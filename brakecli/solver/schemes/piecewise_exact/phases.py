@@ -63,10 +63,11 @@ def expand(m: Any, phase: int, span: float) -> None:
 @kernel(void(FLOW_TYPE, int64, float64, int64, int64))
 def reach(m: Any, phase: int, theta: float, node: int, column: int) -> None:
     """Put the motion at a part of the span of the series into `m.at[node, column]`, with its friction force."""
-    z, last, at = m.series, TERMS - 1, m.at
-    x, y, v_x, v_y = z[X, last], z[Y, last], z[V_X, last], z[V_Y, last]
-    for k in range(TERMS - 2, -1, -1):
-        x, y, v_x, v_y = x * theta + z[X, k], y * theta + z[Y, k], v_x * theta + z[V_X, k], v_y * theta + z[V_Y, k]
+    z, at, q = m.series, m.at, theta * theta
+    x = y = v_x = v_y = 0.0
+    for k in range(TERMS - 2, -1, -2):  # in pairs, which wait for each other half as long
+        x, y = x * q + (z[X, k + 1] * theta + z[X, k]), y * q + (z[Y, k + 1] * theta + z[Y, k])
+        v_x, v_y = v_x * q + (z[V_X, k + 1] * theta + z[V_X, k]), v_y * q + (z[V_Y, k + 1] * theta + z[V_Y, k])
     at[node, column, X], at[node, column, Y], at[node, column, V_X], at[node, column, V_Y] = x, y, v_x, v_y
     at[node, column, BELT], at[node, column, BELT_SLOPE] = z[BELT, 0] + theta * z[BELT, 1], z[BELT_SLOPE, 0]
     at[node, column, LOAD], at[node, column, LOAD_SLOPE] = z[LOAD, 0] + theta * z[LOAD, 1], z[LOAD_SLOPE, 0]
