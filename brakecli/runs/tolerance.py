@@ -44,7 +44,7 @@ PILOT = 32  # duration of the case over that of the event-driven pilot run, whic
 FIRST_BLOCK = 5e-3  # guessed time (s) of the first block of a run whose steps take one evaluation of the contact
 MOST_SECONDS = 900.0  # time of the loop after which no finer run is begun
 SHORTER = 0.7  # step of the second of two piecewise-exact runs over that of the first
-ROUNDED_MARGIN = 10.0  # the error of a piecewise-exact run over the rounding that it has carried along, at most
+ROUNDED_MARGIN = 20.0  # the error of a piecewise-exact run over the rounding that it has carried along, at most
 ROUNDING_MARGIN = 4.0  # the error of such a run over what two of them differ by, at most
 ROUNDING = 1e-12  # least estimate: runs that share their rounding agree better than they are right
 
@@ -105,7 +105,7 @@ def certify(system: System, progress: Progress = lambda samples: None) -> Certif
 
 def _run(system: System, progress: Progress, **changes: Any) -> Motion:
     """The motion by the system's method with these changes."""
-    system = replace(system, method=replace(system.method, **changes))
+    system = replace(system, method=replace(system.method, **changes)) if changes else system
     per_sample, each = system.per_sample, evaluation_seconds(system) + 1e-6
     block = 1 if system.method.own_steps else 1 + int(FIRST_BLOCK / each)
     return solve(system, progress=lambda steps: progress(steps // per_sample), first_block=block)

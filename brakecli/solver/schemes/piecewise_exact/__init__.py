@@ -89,9 +89,12 @@ def _ahead(m: Any) -> None:
 
 @kernel(void(FLOW_TYPE))
 def _round(m: Any) -> None:
-    """Add the rounding of a step to the error, with the signs with which it does most harm."""
+    """Add a bound of the rounding of a step to the error, with the signs with which it does most harm."""
+    a, x, y, v_x, v_y, belt, load = m.now, m.z[X], m.z[Y], m.z[V_X], m.z[V_Y], m.z[BELT], m.z[LOAD]
     for i in range(4):
-        m.error[i] += math.copysign(_ROUNDING * m.z[i], m.error[i])
+        place = (abs(a[X, i] * x) + abs(a[Y, i] * y)) + (abs(a[V_X, i] * v_x) + abs(a[V_Y, i] * v_y))
+        drive = abs(a[BELT, i] * belt) + abs(a[LOAD, i] * load)
+        m.error[i] += math.copysign(_ROUNDING * (place + drive), m.error[i])
 
 
 @kernel(void(FLOW_TYPE))
@@ -122,7 +125,6 @@ def whole(m: Any, h: float) -> int:
             pair += 1
     for i in range(4):
         m.z[i] = m.after[i]
-    _carry(m)
     m.z[BELT], m.z[LOAD] = m.z[BELT] + h * m.z[BELT_SLOPE], m.z[LOAD] + h * m.z[LOAD_SLOPE]
     for k in range(AHEAD):
         m.before[k] = m.after[k]
@@ -212,6 +214,7 @@ def _through(p: Plant, t: float, to_sample: int) -> int:
         to_knot, fits = m.knot - t - tau, to_sample == 0 or tau == 0.0
         if fits and h < to_knot and min(m.before[4], m.before[5], m.before[6]) >= 0.0 and whole(m, h) == 1:
             _count(m, p.counts)
+            _carry(m)
             tau += h
             continue
         span = max(min(h - tau if to_sample == 1 else h, to_knot), 0.0)
@@ -291,6 +294,7 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
             row += 1
         if m.late == 0.0 and t + h < m.knot and whole(m, h) == 1:
             _count(m, counts)
+            _carry(m)
         else:
             failure = _through(p, t, int(part + 1 == grid.per_sample))
         if not abs(m.z[X]) + abs(m.z[Y]) + abs(m.z[V_X]) + abs(m.z[V_Y]) < BOUND:

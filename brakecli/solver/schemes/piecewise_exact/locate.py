@@ -28,9 +28,9 @@ def _value(m: Any, row: int, theta: float) -> tuple[float, float]:
 @kernel(float64(FLOW_TYPE, int64, float64, float64), inlined=False)
 def root(m: Any, row: int, left: float, right: float) -> float:
     """Where a polynomial falls through zero between left and right: Newton's iteration, kept in the bracket."""
-    place, (first, _), (last, _) = right, _value(m, row, left), _value(m, row, right)
-    if first > 0.0 > last:
-        place = left + (right - left) * first / (first - last)
+    first = m.polynomial[row, 0] if left == 0.0 else _value(m, row, left)[0]
+    last = _value(m, row, right)[0]
+    place = left + (right - left) * first / (first - last) if first > 0.0 > last else right
     for _ in range(200):
         value, slope = _value(m, row, place)
         if value > 0.0:
