@@ -287,14 +287,15 @@ def _compare(coarse: Motion, fine: Motion, tolerance: float) -> tuple[float, flo
     if len(one) < count:
         return 0.0, 1.0
     one = one[:count]  # x, y, vx, vy
-    apart = (np.abs(one - other) / _sizes(system, *(np.abs(rows).max(axis=0) for rows in (one, other)))).max(axis=1)
+    sizes = _sizes(system, *(np.abs(rows).max(axis=0) for rows in (one, other)))
+    apart = (np.abs(one - other) / sizes).max(axis=1)
     late = np.flatnonzero(apart > tolerance)
     until: float = (int(late[0]) - 1 if len(late) else count - 1) * system.interval
     return max(until, 0.0), max(float(apart.max()), ROUNDING)
 
 
 def _sizes(system: System, one: Floats, other: Floats) -> Floats:
-    """The largest x, y, vx and vy of the latter of two runs; infinite where both are rounding, as of a shoe at rest."""
+    """The largest x, y, vx and vy of the latter of two runs; infinite where both are rounding, as at rest."""
     rate = 2.0 * math.pi * system.natural_frequencies[1]
     rounding = ROUNDING * other[:2].max() * np.array([1.0, 1.0, rate, rate])
     return np.where(np.maximum(one, other) > rounding, np.maximum(other, rounding), math.inf)

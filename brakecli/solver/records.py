@@ -13,7 +13,7 @@ from brakecli.solver.contact import MOST_KINDS
 Pair = tuple[float, float]
 
 
-class Record(np.void):
+class Record(np.void):  # type: ignore[misc]  # numpy.record is a class of this kind, too
     """A record whose fields are attributes; those of `numpy.record` take three times as long."""
 
     def __getattr__(self, name: str) -> Any:
@@ -172,7 +172,7 @@ SIZE, PHASES, MARGINS, WORKS, TERMS, NODES = 8, 4, 3, 4, 18, 6
 PAIRS = SIZE * (SIZE + 1) // 2
 """Products of two components; pairs of different ones stand for both orders."""
 AHEAD = 4 + 2 * MARGINS + 2
-"""What a step computes: x, y, v_x and v_y, the margins, their slopes times the step, and 2 that fill up vectors."""
+"""What a step computes: x, y, v_x and v_y, the margins, their slopes times the step, and 2 to fill up vectors."""
 
 FLOW = record(
     "x y v_x v_y",  # motion at the level reached, m and m/s
