@@ -18,9 +18,10 @@ class Record(np.void):  # type: ignore[misc]  # numpy.record is a class of this 
 
     def __getattr__(self, name: str) -> Any:
         """A field."""
-        if name not in (self.dtype.names or ()):
-            raise AttributeError(name)
-        return self[name]
+        try:
+            return self[name]
+        except ValueError:
+            raise AttributeError(name) from None
 
     def __setattr__(self, name: str, value: Any) -> None:
         """Change a field."""
