@@ -111,8 +111,8 @@ derivations: $(DEV_STAMP) ## derive every formula of the documentation again, wi
 tables: $(DEV_STAMP) ## write the tables of the documentation that list what a result holds
 	$(BIN)/python docs/tables.py
 
-docs: $(DOCS_STAMP) ## run the tutorial and make the site of the documentation in docs/_site; a warning fails
-	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet docs docs/_site
+docs: $(DOCS_STAMP) ## run the tutorial and make the site of the documentation in docs/_site/html; a warning fails
+	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet docs docs/_site/html
 
 cases: $(RUN_STAMP) ## run every sample case into results/; one that fails, fails all
 	@mkdir -p results
