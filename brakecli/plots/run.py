@@ -94,7 +94,7 @@ class RunPicture:
             tuple(sorted(fastest * system.wheel.turns)) if steady and fastest else ()
         )  # Hz, of its waves
         self.modes = _mode_frequencies(system)
-        self.stop = Stop(result, system) if result.variables("spectrogram") else None
+        self.stop = Stop(result, system) if "spectrogram" in result.file else None
 
 
 def _mode_frequencies(system: System) -> list[float]:
@@ -189,7 +189,7 @@ def draw(picture: RunPicture) -> Figure:
         axes.set_xlabel(style.labelled("time", unit))
         if time[-1] > time[0]:
             axes.set_xlim(time[0], time[-1])
-        if axes in panels[:2] and axes.get_legend_handles_labels()[1]:  # with room for the legend above the data
+        if axes in panels[:2, 0] and axes.get_legend_handles_labels()[1]:  # with room for the legend above the data
             low, high = axes.get_ylim()
             axes.set_ylim(low, high + 0.14 * (high - low))
             axes.legend(loc="upper right", ncols=3)
