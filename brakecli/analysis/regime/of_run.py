@@ -61,9 +61,10 @@ def verdict_on(
     failure: str | None,
     limits: Thresholds | None = None,
     feeds: Feeds = Feeds.UNKNOWN,
+    sticks: float = 0.0,
 ) -> Verdict:
-    """The verdict on the motion of a system; a run that has failed has none. `feeds` is what is known already."""
-    verdict = classify(history, replace(context(system), feeds=feeds), limits or Thresholds())
+    """The verdict on a motion; a run that has failed has none. `feeds`, `sticks`: what a second run has shown."""
+    verdict = classify(history, replace(context(system), feeds=feeds, sticks=sticks), limits or Thresholds())
     if not failure:
         return verdict
     verdict = replace(verdict, growth_rate=None, ringing_frequency=None, frequency=None, settled=False)

@@ -224,10 +224,12 @@ class _Rules(ForcedRules):
             lines = f"{bands:.0%} of the energy of vx in three narrow bands"
         wanders = wander > _SPREAD * found.frequency
         regular = harmonic if wanders or bands < _BANDS else max(harmonic, bands)
-        if stick <= 1.0 - self.limits.stick_cycles and regular >= self.limits.harmonic_share:
+        slips = max(stick, self.context.sticks) <= 1.0 - self.limits.stick_cycles
+        if slips and regular >= self.limits.harmonic_share:
             how = f"with stick in only {stick:.0%} of the cycles" if stick else "without stick"
             return Decision(f"sustained {how}: {lines}", Regime.QUASI_HARMONIC, *own)
-        irregular = f"irregular: stick in {stick:.0%} of the cycles, {lines}"
+        without = f" ({self.context.sticks:.0%} without the roughness)" if self.context.sticks else ""
+        irregular = f"irregular: stick in {stick:.0%} of the cycles{without}, {lines}"
         irregular += ", but the frequency wanders" if wanders else ""
         return Decision(f"{irregular}; run longer, or look at the spectrum")
 

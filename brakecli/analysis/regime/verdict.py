@@ -74,6 +74,7 @@ class Context:
     powers: Callable[[Part], dict[str, float]] = lambda part: {}  # W, what becomes of the power of the belt
     radius: float = 1.0  # R, m
     feeds: Feeds = Feeds.UNKNOWN  # what a second run has shown
+    sticks: float = 0.0  # part of the cycles that stick in a second run without roughness
 
 
 class Decision(NamedTuple):
