@@ -115,6 +115,12 @@ def test_ripple_of_the_nodes_is_named_and_gone_with_the_nodes_that_are_asked_for
     assert finer.torque_variation == pytest.approx(torque, rel=0.1)
 
 
+def test_an_impact_between_the_samples_of_most_cycles_counts_for_the_torque() -> None:
+    verdict = judged("impacts of less than a sample")
+    assert verdict.settled
+    assert verdict.torque_variation == pytest.approx(31630.0, rel=0.05)  # by another integrator, of finer samples
+
+
 def test_what_the_wheel_keeps_up_has_not_died_out_without_excitation() -> None:
     verdict = judged("kept up by the wheel")
     assert (verdict.regime, verdict.excitation) == (Regime.DAMPED, Excitation.FORCED)

@@ -6,16 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from brakecli.analysis.regime.evidence import (
-    FEWEST_SAMPLES,
-    WINDOWS,
-    Cycles,
-    Drift,
-    Envelope,
-    cycles_of,
-    median,
-    swings,
-)
+from brakecli.analysis.regime.cycles import Cycles, Drift, cycles_of, median, swings
+from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, WINDOWS, Envelope
 from brakecli.analysis.regime.forced import GROWN, QUARTER, ForcedRules
 from brakecli.analysis.regime.spectra import segment
 from brakecli.analysis.regime.verdict import Context, Decision, Excitation, Feeds, Regime, Thresholds, Verdict
@@ -32,7 +24,6 @@ _SPREAD = 0.05  # of the frequency of cycles, beyond which three bands hold no v
 _REST = 0.3  # of a forced motion, by which its closed form may be off
 _LONGER = 1.4  # a run whose last quarter and the window before it are settled, over what comes before
 _FAR = 0.3  # rad, of a wave, by which what the shoe adds moves it
-_ALIKE = 1.25  # largest swing of the friction force in a cycle over the median, beyond which samples miss impacts
 _DEFAULT = Thresholds()
 
 
@@ -307,15 +298,12 @@ def classify(history: History, context: Context, thresholds: Thresholds = _DEFAU
         evidence |= {f"ripple_{name}": getattr(ripple, name) for name in ("x", "vx", "force")}
         spread = spread + ripple.size if spread is not None else None
     reasons = [decision.reason, *([ripple.sentence] if ripple else [])]
-    if sustained and cycles and rules.lasts:
-        largest = cycles.evidence["force_variation_largest"]
-        if largest > _ALIKE * cycles.force_variation:
-            swings_to = (
-                f"swings by {cycles.force_variation:.4g} N in the median cycle and by up to {largest:.4g} N"
-            )
-            reasons.append(
-                f"the friction force {swings_to}: give a shorter output.sample_interval for its impacts"
-            )
+    torque: float | None = context.radius * (torques[1] - torques[0])
+    if sustained and cycles:
+        torque = context.radius * cycles.force_variation if cycles.force_variation is not None else None
+    if torque is None:
+        finer = f"give an output.sample_interval of {0.25 * history.interval:.2g} s"
+        reasons.append(f"samples miss impacts of the friction force, and torque_variation is missing: {finer}")
     return Verdict(
         regime=decision.regime,
         excitation=decision.excitation,
@@ -327,8 +315,7 @@ def classify(history: History, context: Context, thresholds: Thresholds = _DEFAU
         growth_rate=rules.theory.mode.growth if rules.theory else None,
         ringing_frequency=rules.theory.mode.frequency if rules.theory else None,
         frequency_resolution=1.0 / (segment(part.stop - part.start) * history.interval),
-        torque_variation=context.radius
-        * (cycles.force_variation if sustained and cycles else torques[1] - torques[0]),
+        torque_variation=torque,
         settled_from=part.start * history.interval,
         start=part.start,
         settled=rules.lasts and decision.regime is not Regime.UNDECIDED and not ripple,

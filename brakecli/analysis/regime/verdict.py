@@ -102,7 +102,7 @@ class Verdict:
     growth_rate: float | None  # 1/s, of the slowest mode where the motion is linear
     ringing_frequency: float | None  # Hz, of that mode
     frequency_resolution: float  # Hz, to which a line of the spectrum is known
-    torque_variation: float  # N m, peak to peak
+    torque_variation: float | None  # N m, peak to peak
     settled_from: float  # s; the middle where no settled part was found
     start: int  # the sample there
     settled: bool  # whether a settled part was found
