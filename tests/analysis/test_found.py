@@ -145,6 +145,22 @@ def test_waves_that_beat_more_slowly_than_the_run_force_the_sum_of_their_amplitu
     assert verdict.amplitude_spread > 0.1 * verdict.amplitude  # by which the run itself shows less
 
 
+def test_the_spread_of_a_motion_under_an_opening_pad_knows_that_three_waves_beat_more_slowly_than_the_run() -> (
+    None
+):
+    verdict = judged("three waves that beat, open")
+    assert verdict.excitation is Excitation.FORCED
+    assert verdict.amplitude_spread is not None
+    assert verdict.amplitude <= 2.41e-7 <= verdict.amplitude + verdict.amplitude_spread  # thirty times as long
+
+
+def test_a_dozen_cycles_that_have_not_settled_are_no_vibration() -> None:
+    """Twelve cycles of nearly the same amplitude; four times later it is six times larger, and grows."""
+    verdict = judged("a hop")
+    assert verdict.regime is Regime.UNDECIDED
+    assert "only 12 cycles in the second half" in verdict.reasons[0]
+
+
 RATE = re.compile(r"still (?:growing|decaying) at ([\d.e+-]+) 1/s; ")
 ASKED = re.compile(r"run at least ([\d.e+-]+) s( longer)?")
 

@@ -23,6 +23,8 @@ _BANDS = 0.9  # least part of the energy in three bands: chaos may have less
 _SPREAD = 0.05  # of the frequency of cycles, beyond which three bands hold no vibration
 _REST = 0.3  # of a forced motion, by which its closed form may be off
 _LONGER = 1.4  # a run whose last quarter and the window before it are settled, over what comes before
+_SPARSE = 8  # of the places at which a forced motion is computed, one of so many suffices
+_UNSETTLED = 1.5  # times as many cycles where nothing has settled: a hop may look like a vibration
 _FAR = 0.3  # rad, of a wave, by which what the shoe adds moves it
 _DEFAULT = Thresholds()
 
@@ -182,8 +184,10 @@ class _Rules(ForcedRules):
         self.cycles = found = cycles_of(self.settled_part, theory.slip if theory else None)
         cycles = found.evidence["cycles"] if found else 0.0
         self.evidence |= found.evidence if found else {}
-        if not found or cycles < self.limits.fewest_cycles:
-            return Decision(f"only {cycles:.0f} cycles in the settled part; run longer")
+        if not found or cycles < (1.0 if self.settled else _UNSETTLED) * self.limits.fewest_cycles:
+            return Decision(
+                f"only {cycles:.0f} cycles in the {'settled part' if self.settled else 'second half'}; run longer"
+            )
         period, stick, harmonic = (
             found.evidence[name] for name in ("samples_per_cycle", "stick_cycles", "harmonic_share")
         )
@@ -267,7 +271,16 @@ class _Rules(ForcedRules):
         period = max(min(slow / self.history.interval, samples - 1), 1.0)
         edges = np.asarray(samples - period * np.arange(int(samples / period), -1, -1), np.float64)
         size, spread = median(swings(part, edges))
-        return size, None if self.rings or len(edges) < 3 else max(spread, part.amplitude("x") - size)
+        if self.rings or len(edges) < 3:
+            return size, None
+        return size, max(spread, self._beating() * part.amplitude("x") - size)
+
+    def _beating(self) -> float:
+        """Amplitude of a longer motion over that of the settled part, as waves beat that force a linear one."""
+        if not (theory := self.context.linear()):
+            return 1.0
+        forced, lasting, *_ = theory.parts(*(each[::_SPARSE] for each in self.settled_part.places()))
+        return 2.0 * forced / max(float(np.ptp(lasting)), 1e-300)
 
     def _held(self, spread: float, value: float, drift: Drift) -> float | None:
         """A spread with what a drift becomes until small disturbances have changed by a factor of e."""
