@@ -199,3 +199,19 @@ def test_the_time_that_a_verdict_asks_for_is_enough_or_the_new_one_has_another_r
         assert again.regime is not Regime.UNDECIDED or explained, (tables, first.reasons, again.reasons)
         if (tried := tried + 1) == 10:
             return
+
+
+@pytest.mark.parametrize(
+    ("name", "amplitude", "frequency", "stick"),
+    [("impacts of 70 steps", 1.1894e-5, 402.1, 0.1304), ("impacts of 14 steps", 4.455e-5, 1469.1, 0.232)],
+)
+def test_the_spreads_of_impacts_hold_what_shorter_steps_and_another_integrator_change(
+    name: str, amplitude: float, frequency: float, stick: float
+) -> None:
+    verdict = judged(name)
+    assert verdict.settled
+    assert verdict.amplitude_spread is not None
+    assert verdict.frequency is not None
+    assert abs(verdict.amplitude - amplitude) <= verdict.amplitude_spread
+    assert abs(verdict.frequency - frequency) <= verdict.evidence["frequency_spread"]
+    assert abs(verdict.stick_fraction - stick) <= verdict.evidence["stick_spread"]

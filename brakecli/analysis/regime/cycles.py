@@ -18,6 +18,7 @@ _MIDDLE = np.array([1.0 / 6.0, 0.5, 5.0 / 6.0])  # quantiles
 _TREND = 3.0  # standard errors of the slope of ten medians, beyond which an amplitude drifts
 _BETWEEN = 1e-3  # of the energy of vx, between the lines of one rise, that makes a cycle of several
 _SEEN = 0.85  # least part of a force's swing in every other sample that all samples see
+SIZE_OFF, _PERIOD_OFF = 3.0, 0.2  # of an amplitude and a period, per step in a contact: most that impacts were off
 _SAME = 0.02  # squared difference, over twice the variance, between one period of vx and the next
 
 
@@ -50,6 +51,7 @@ class Cycles:
 
     evidence: dict[str, Any]
     frequency: float  # Hz
+    frequency_off: float  # Hz, what the step may change
     amplitude: float  # m
     amplitude_spread: float
     stick_fraction: float
@@ -60,11 +62,12 @@ class Cycles:
     force_variation: float | None  # N, peak to peak of the friction force
 
 
-def cycles_of(part: Part, slip: ContactState | None = None) -> Cycles | None:
+def cycles_of(part: Part, slip: ContactState | None = None, step: float = 0.0) -> Cycles | None:
     """The cycles of a part; None if there are none. `slip` is the side to which the shoe slips in steady sliding.
 
-    Stick, loss of contact and frequency are medians of ten groups of neighbouring cycles, so that it does not
-    matter how samples fall into each cycle.
+    The spreads hold what a step (s) may change, with which the motion was computed. Stick, loss of contact and
+    frequency are medians of ten groups of neighbouring cycles, so that it does not matter how samples fall into
+    each cycle.
     """
     velocity = part.last("vx")
     crossings, rises = _beginnings(part, velocity)
@@ -85,13 +88,14 @@ def cycles_of(part: Part, slip: ContactState | None = None) -> Cycles | None:
         return np.asarray((count[end] - count[begin]) / (end - begin))
 
     places = np.sort(crossings % 1.0)  # within their samples: where cycles last whole samples, all at one
-    unseen = float(np.diff(places, append=places[0] + 1.0).max())
+    unseen, step = float(np.diff(places, append=places[0] + 1.0).max()), step / part.history.interval
+    turn, impact = 2.0 * np.pi * step / period, step / contact_length(part)
 
     def time_in(which: ContactState) -> tuple[float, float]:
-        """Part of a cycle, and its spread, with the part of a sample that no cycle has seen."""
+        """Part of a cycle, and its spread, with the step, and the part of a sample that no cycle has seen."""
         there = state == which
         middle, spread = median(shares(there))
-        return middle, max(spread, unseen * float(np.sum(there[1:] & ~there[:-1])) / cycles / period)
+        return middle, max(spread, (unseen + step) * float(np.sum(there[1:] & ~there[:-1])) / cycles / period)
 
     (stick, stick_spread), (loss, loss_spread) = (time_in(which) for which in _ENDS)
     frequency = 1.0 / (period * part.history.interval)
@@ -115,9 +119,18 @@ def cycles_of(part: Part, slip: ContactState | None = None) -> Cycles | None:
     force = part.history.read("friction_force", part.stop - len(velocity), part.stop)
     amplitude, spread = median(sizes)
     missed = 3.0 / 128.0 * (2.0 * np.pi / period) ** 4 * amplitude  # of a crest between two samples: parabola
-    medians = amplitude, max(spread, unseen * missed), stick, loss
+    spread = max(spread, unseen * missed) + (0.25 * turn**2 + SIZE_OFF * impact) * amplitude
+    medians = amplitude, spread, stick, loss
     varies = _force_variation(force, crossings, groups, alike=unseen > 0.5)
-    return Cycles(evidence, frequency, *medians, limited, drift, detuning, varies)
+    off = frequency * (turn**2 / 8.0 + _PERIOD_OFF * impact)
+    return Cycles(evidence, frequency, off, *medians, limited, drift, detuning, varies)
+
+
+def contact_length(part: Part) -> float:
+    """How many samples a contact with the wheel takes, in the mean; infinity where it is never lost."""
+    away = ContactState.SEPARATED
+    begins = sum(np.count_nonzero((piece[:-1] == away) & (piece[1:] != away)) for piece in part.pieces("state"))
+    return (1.0 - part.fraction(away)) * (part.stop - part.start) / begins if begins else np.inf
 
 
 def _force_variation(force: Array, crossings: Array, groups: Array, alike: bool) -> float | None:

@@ -97,6 +97,7 @@ def context(system: System) -> Context:
     return Context(
         belt,
         radius=system.radius,
+        step=0.0 if system.method.own_steps or system.method.step is None else system.step,
         steady=len(system.belt) == 1 and len(system.load) == 1,
         forced=forced_lines(belt, turns, highest),
         subharmonics=subharmonics(belt, turns, highest),

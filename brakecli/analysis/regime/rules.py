@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from brakecli.analysis.regime.cycles import Cycles, Drift, cycles_of, median, swings
+from brakecli.analysis.regime.cycles import SIZE_OFF, Cycles, Drift, contact_length, cycles_of, median, swings
 from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, WINDOWS, Envelope
 from brakecli.analysis.regime.forced import GROWN, QUARTER, ForcedRules
 from brakecli.analysis.regime.spectra import segment
@@ -181,7 +181,7 @@ class _Rules(ForcedRules):
 
     def sustained(self) -> Decision:
         theory = self.context.linear() if not self.context.forced else None
-        self.cycles = found = cycles_of(self.settled_part, theory.slip if theory else None)
+        self.cycles = found = cycles_of(self.settled_part, theory.slip if theory else None, self.context.step)
         cycles = found.evidence["cycles"] if found else 0.0
         self.evidence |= found.evidence if found else {}
         if not found or cycles < (1.0 if self.settled else _UNSETTLED) * self.limits.fewest_cycles:
@@ -208,8 +208,8 @@ class _Rules(ForcedRules):
             text = f"the amplitude still changes by {found.drift.part:.1%} within the last part of the run"
             return Decision(f"{text}; run longer")
         own, wander = (Excitation.SELF_EXCITED, found.frequency), found.evidence["frequency_spread"]
-        if (held := self._held(wander, found.frequency, found.detuning)) is not None:
-            self.evidence["frequency_spread"] = held
+        held = self._held(wander, found.frequency, found.detuning)
+        self.evidence["frequency_spread"] = (wander if held is None else held) + found.frequency_off
         if stick >= self.limits.stick_cycles:
             text = f"sustained, with stick in {stick:.0%} of {cycles:.0f} cycles"
             return Decision(text, Regime.RELAXATION, *own)
@@ -273,7 +273,8 @@ class _Rules(ForcedRules):
         size, spread = median(swings(part, edges))
         if self.rings or len(edges) < 3:
             return size, None
-        return size, max(spread, self._beating() * part.amplitude("x") - size)
+        off = SIZE_OFF * size * self.context.step / self.history.interval / contact_length(part)
+        return size, off + max(spread, self._beating() * part.amplitude("x") - size)
 
     def _beating(self) -> float:
         """Amplitude of a longer motion over that of the settled part, as waves beat that force a linear one."""

@@ -73,6 +73,7 @@ class Context:
     ripple: Callable[[Part], "Ripple | None"] = lambda part: None  # of the quadrature nodes
     powers: Callable[[Part], dict[str, float]] = lambda part: {}  # W, what becomes of the power of the belt
     radius: float = 1.0  # R, m
+    step: float = 0.0  # s; 0 where steps are chosen to keep an error
     feeds: Feeds = Feeds.UNKNOWN  # what a second run has shown
     sticks: float = 0.0  # part of the cycles that stick in a second run without roughness
 
