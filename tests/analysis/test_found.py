@@ -2,6 +2,7 @@
 
 import math
 import re
+from dataclasses import replace
 from itertools import chain
 from typing import Any
 
@@ -11,6 +12,8 @@ import pytest
 from brakecli.analysis.regime.verdict import Excitation, Regime, Verdict
 from brakecli.analysis.stability.report import stability
 from brakecli.case.system import system_of
+from brakecli.solver.motion import solve
+from brakecli.solver.quantities import HISTORY, ContactState
 from tests.analysis.found import SHOES
 from tests.analysis.histories import verdict_of
 from tests.analysis.shoes import Shoe, random_shoes
@@ -159,6 +162,20 @@ def test_a_dozen_cycles_that_have_not_settled_are_no_vibration() -> None:
     verdict = judged("a hop")
     assert verdict.regime is Regime.UNDECIDED
     assert "only 12 cycles in the second half" in verdict.reasons[0]
+
+
+def test_a_motion_that_can_neither_stick_nor_open_any_more_is_linear_before_its_last_quarter_is() -> None:
+    name = "has just ceased to stick"
+    tables = SHOES[name]
+    verdict, system = judged(name), system_of(make(tables))
+    assert verdict.regime is Regime.DAMPED
+    assert verdict.growth_rate == pytest.approx(Shoe.of(tables).rate, rel=1e-9)
+    later = solve(replace(system, duration=8.0 * system.duration)).rows
+    first = len(later) // 8
+    states, fractions = (later[:, list(HISTORY).index(each)] for each in ("state", "contact_fraction"))
+    assert (states[3 * first // 4 : first] == ContactState.STICK).any()
+    assert (states[first:] == states[-1]).all()
+    assert (fractions[first:] == 1.0).all()
 
 
 RATE = re.compile(r"still (?:growing|decaying) at ([\d.e+-]+) 1/s; ")

@@ -62,7 +62,9 @@ class _Rules(ForcedRules):
         """Theory decides where the shoe has long been sliding in full contact, to one side."""
         theory, slow = self.context.linear(), self._slowest(0.0)
         start = max(min(self.last.start, self.history.samples - int(slow / self.history.interval)), 0)
-        if theory is None or not replace(self.last, start=start).slides(theory.slip):
+        if theory is None:
+            return None
+        if not replace(self.last, start=start).slides(theory.slip) and not theory.stays(*self._end()):
             return None
         mean, theory = theory, theory.with_slopes()
         mode = theory.mode
