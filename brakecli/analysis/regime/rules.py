@@ -64,7 +64,7 @@ class _Rules(ForcedRules):
         start = max(min(self.last.start, self.history.samples - int(slow / self.history.interval)), 0)
         if theory is None:
             return None
-        if not replace(self.last, start=start).slides(theory.slip) and not theory.stays(*self._end()):
+        if not replace(self.last, start=start).slides(theory.slip) and not theory.stays(self._end()[1]):
             return None
         mean, theory = theory, theory.with_slopes()
         mode = theory.mode
