@@ -35,7 +35,10 @@ VERDICT = (
     Field("amplitude_own", "m", "on a rough wheel: what the shoe adds", at="verdict."),
     Field("frequency_resolution", "Hz", "distance of two lines in the spectrum", at="verdict."),
     Field(
-        "torque_variation", "N m", "braking torque, peak to peak; a median where the motion lasts", at="verdict."
+        "torque_variation",
+        "N m",
+        "braking torque, peak to peak; missing if samples miss impacts",
+        at="verdict.",
     ),
     integer("settled", "whether a settled part was found (0, 1); otherwise the second half is judged", "verdict."),
     Field("settled_from", "s", "start of the settled part, or of the second half", at="verdict."),

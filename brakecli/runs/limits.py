@@ -13,7 +13,7 @@ from brakecli.analysis.stability.discrete import RESOLVED, StepLimits, amplifica
 from brakecli.analysis.stability.modes import eigensystem
 from brakecli.analysis.stability.search import bisect
 from brakecli.errors import RefusedError
-from brakecli.runs.cost import duration_text, steps_and_seconds
+from brakecli.runs.cost import duration_text, stability_seconds, steps_and_seconds
 from brakecli.runs.pilot import Price, measured
 from brakecli.solver.contact.pad import NODES_PER_WAVE
 from brakecli.solver.history import ROW_BYTES
@@ -25,6 +25,7 @@ MOST_STEPS = 1e11
 MOST_SECONDS = 24 * 3600.0
 MOST_BYTES = 1e11
 UNSTABLE = 1e-5  # growth per step that no rounding of the eigenvalues explains
+_WORTH_SAYING = 5.0  # s, of work before which its time is said
 _COARSE_NODES = NODES_PER_WAVE / 2
 _TAKEN = 0.01  # part of the fastest motion that a scheme may take out of a run unsaid
 _ROUNDING = 1e-8  # of the factors of a step
@@ -98,6 +99,15 @@ def refuse(found: Check, free_bytes: float = math.inf) -> None:
         what = f"it multiplies disturbances by {growth:.6g} in each of {found.steps} steps"
         remedy = f"{shorter}, {system.method.row.unstable}"
         raise RefusedError(f"solver.theta: at this step the scheme is unstable: {what}; {remedy}")
+
+
+def sliding_text(system: System) -> str | None:
+    """How long `stability` will take, where the pad opens; raises RefusedError where that is too long."""
+    seconds = stability_seconds(system)
+    text = f"steady sliding on a pad that opens takes about {duration_text(seconds)}"
+    if seconds > MOST_SECONDS:
+        raise RefusedError(f"{text}; reduce contact.nodes, or the number of waves in roughness")
+    return text if seconds > _WORTH_SAYING else None
 
 
 def _blows_up(growth: float, steps: float) -> bool:
