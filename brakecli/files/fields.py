@@ -97,7 +97,7 @@ RUN = (
     Field("energy", "", "the account of energies", OBJECT, "motion.", group="energy", rows=ENERGY),
     Field("modelled", "", "parts of the model that the run has used", OBJECT),
     Field("left_out", "", "parts of the model that the run has left out, and why this is safe", OBJECT),
-    Field("adjustments", "", "how step and duration were made to fit", OBJECT, at="check."),
+    Field("adjustments", "", "how step, duration and measured profiles were made to fit", OBJECT, at="check."),
     Field("warnings", "", "what a careful user should know", OBJECT),
     Field("solve_seconds", "s", "time of the loop", at="motion.work.solve_seconds", in_file=False),
 )
