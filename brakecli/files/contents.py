@@ -18,13 +18,10 @@ _BLOCK = 1 << 20  # rows read at a time
 
 
 def contents(result: StoredResult) -> dict[str, Any]:
-    """What `fields.INFO` declares; of a file that another program has changed all values are read, too."""
+    """What `fields.INFO` declares."""
     held = []
     for group in result.groups():
         for name, each in result.variables(group).items():
-            if not result.sealed:
-                for _ in _blocks(result, group, name, each.shape[0]):
-                    pass
             about = {key: each.attributes.get(there, "") for key, there in _ABOUT.items()}
             held.append({"group": group, "name": name, "dims": each.dims, "shape": each.shape, **about})
     attributes = result.attributes
@@ -112,7 +109,12 @@ def _changed(a: dict[str, Any], b: dict[str, Any]) -> Iterator[dict[str, Any]]:
 
 def _variables(a: StoredResult, b: StoredResult, group: str) -> Iterator[dict[str, Any]]:
     """The variables of a group that differ; of two lengths the first rows are compared."""
-    known = [each.variables(group) if group in each.groups() else {} for each in (a, b)]
+    known = [
+        {name: each for name, each in result.variables(group).items() if "units" in each.attributes}
+        if group in result.groups()
+        else {}
+        for result in (a, b)  # what other programs have added need not have units
+    ]
     for name in dict.fromkeys([*known[0], *known[1]]):
         shapes = [list(each[name].shape) if name in each else [] for each in known]
         compared = different = 0

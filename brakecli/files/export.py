@@ -63,40 +63,51 @@ def export(
 def _rows(result: StoredResult, group: str, names: Sequence[str]) -> Iterator[list[Sequence[Any]]]:
     """The header and blocks of rows of a table: one row for each place along the axes of the group."""
     known = result.variables(group)
-    axes = [_AXES[group]] if group != "/" else [*_main(known)]
-    there = sorted(known, key=lambda name: _ORDER.index(name) if name in _ORDER else len(_ORDER))
-    chosen = [*_checked(names, [name for name in there if known[name].dims != (name,)], result)]
-    shape = tuple(known[axis].shape[0] for axis in axes if axis in known)
-    if len(shape) < len(axes) or any(known[name].shape[: len(axes)] != shape for name in chosen):
-        raise UnreadableResultError(
-            f"{result.path}: {group} has variables that lie on other axes; compute it again"
-        )
-    header, columns = [_head(axis, known[axis]) for axis in axes], [result.read(group, axis) for axis in axes]
-    if group != "/":
-        yield [[*header, *(_head(name, known[name]) for name in chosen)]]
-        for start in range(0, shape[0], _BLOCK):
-            stop = start + _BLOCK
-            block = [columns[0][start:stop], *(result.read(group, name, start, stop) for name in chosen)]
-            yield [*zip(*(each.tolist() for each in block), strict=True)]
-        return
-    columns = [each.ravel() for each in np.meshgrid(*columns, indexing="ij")]
-    for name in chosen:
-        values = result.read("/", name).reshape(len(columns[0]), -1)
+    axes = (_AXES[group],) if group != "/" else _main(known)
+    if not axes or any(axis not in known for axis in axes):
+        raise UnreadableResultError(f"{result.path}: {group} lacks its axes; name an intact result file")
+    shape = tuple(known[axis].shape[0] for axis in axes)
+    ordered = sorted(known, key=lambda name: _ORDER.index(name) if name in _ORDER else len(_ORDER))
+    there = [name for name in ordered if known[name].dims != (name,) and _lies_along(known[name], axes, shape)]
+    chosen = {name: _kept(result, group, name, len(axes)) for name in _checked(names, there, result)}
+    header = [_head(axis, known[axis]) for axis in axes]
+    for name, kept in chosen.items():
         inner = known[name].dims[len(axes) :]
-        for number in range(values.shape[1]):
-            column = values[:, number]
-            if inner and column.dtype.kind == "f" and (column == FILL).all():
-                continue  # of the windows of instability there are as many columns as the point with most has
-            header.append(_head(f"{name} of {inner[0]} {number + 1}" if inner else name, known[name]))
-            columns.append(column)
+        header += [_head(f"{name} of {inner[0]} {number + 1}" if inner else name, known[name]) for number in kept]
     yield [header]
-    yield [*zip(*([None if value == FILL else value for value in each.tolist()] for each in columns), strict=True)]
+    places = [result.read(group, axis) for axis in axes]
+    rows = max(1, _BLOCK // math.prod(shape[1:]))
+    for start in range(0, shape[0], rows):
+        part = places[0][start : start + rows]
+        columns = [each.ravel() for each in np.meshgrid(part, *places[1:], indexing="ij")]
+        for name, kept in chosen.items():
+            if known[name].shape == shape[1:] != shape[:1]:  # alike in both directions
+                values = np.broadcast_to(result.read(group, name), (len(part), *shape[1:]))
+            else:
+                values = result.read(group, name, start, start + rows)
+            columns += [*values.reshape(len(columns[0]), -1).T[kept]]
+        lists = ([None if value == FILL else value for value in each.tolist()] for each in columns)
+        yield [*zip(*lists, strict=True)]
+
+
+def _lies_along(variable: Variable, axes: tuple[str, ...], shape: tuple[int, ...]) -> bool:
+    """Whether a variable has a value, or several, at each place, or at each of both directions of a sweep."""
+    return variable.shape[: len(axes)] == shape or (axes[0] == "direction" and variable.dims == axes[1:])
+
+
+def _kept(result: StoredResult, group: str, name: str, axes: int) -> list[int]:
+    """Which values at a place have a column: of the windows of instability as many as the point with most has."""
+    inner = result.variables(group)[name].shape[axes:]
+    if not inner:
+        return [0]
+    values = result.read(group, name).reshape(-1, math.prod(inner))
+    return [number for number, column in enumerate(values.T) if column.dtype.kind != "f" or (column != FILL).any()]
 
 
 def _main(known: dict[str, Variable]) -> tuple[str, ...]:
     """The axes that all numbers of a sweep, of stability or of a comparison have in common."""
     dims = [each.dims for name, each in known.items() if each.dims != (name,)]
-    return min(dims, key=len, default=()) if "status" not in known else known["status"].dims
+    return known["status"].dims if "status" in known else min(dims, key=len, default=())
 
 
 def _checked(names: Sequence[str], there: Sequence[str], result: StoredResult) -> Sequence[str]:
