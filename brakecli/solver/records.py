@@ -182,7 +182,7 @@ FLOW = record(
     "anchor anchor_low",  # x - travel in stick, a sum of two doubles, m
     "knot",  # time from which on speed or load change otherwise, s
     "events_time",  # since which `events` are counted, s
-    "late",  # by which the motion is ahead of the level reached, s; 0 at samples
+    "beyond",  # time that the motion is beyond the level reached, s; 0 at samples
     phase=int,
     started=int,  # 0 before the phase of the start is known
     events=int,  # events without progress
