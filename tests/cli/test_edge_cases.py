@@ -211,7 +211,10 @@ def test_signals_of_nothing_and_next_to_nothing_have_finite_spectra(here: Path) 
     with h5py.File(here / "0.h5") as file:
         assert not np.any(file["history/x"][:])
         assert not np.any(file["spectrum/vx"][:])
-    assert done[0].json["spectrum_peak"] is None
+    assert (done[0].json["spectrum_peak"], done[1].json["spectrum_peak"]) == (
+        None,
+        None,
+    )  # of rounding there is none
     assert done[1].json["regime"] == "damped"
 
 
