@@ -19,7 +19,7 @@ _EVALUATIONS = 1.5  # of the contact in a step
 _OWN_STEPS = 25.0  # in a period, of a scheme that finds them itself, at a tolerance of 1e-10
 _OWN_STEP_SECONDS = 4e-6
 _OWN_EVALUATIONS = 27.0
-_EXACT_STEP_SECONDS = 2e-7  # events included
+_EXACT_STEP_SECONDS = 1e-7  # events included
 _START_EVALUATIONS = 6.0  # at each place of the wheel
 
 
@@ -33,7 +33,7 @@ def steps_and_seconds(system: System) -> tuple[int, float]:
         return system.steps, system.steps * each
     c, alone = system.coefficients, method.step is not None
     if method.row.exact:
-        return system.steps, (1.0 if alone else 2.4) * system.steps * _EXACT_STEP_SECONDS
+        return system.steps, system.steps * _EXACT_STEP_SECONDS
     tolerance = method.tolerance if alone else max(min(1e-5 * method.tolerance, 1e-8), 1e-13)
     fastest, start = system.natural_frequencies[1], system.initial
     bound = c.c_xx + c.c_yy + 2.0 * abs(c.c_xy) + (1.0 + c.phi) * system.contact_stiffness  # as a step is limited

@@ -128,8 +128,8 @@ def _longest_stable_step(system: System) -> float | None:
 
 
 def adjustments(system: System) -> list[str]:
-    """Sentences on how a run differs from what the case asks for: the grid of time, and nodes."""
-    method, interval, asked, found = system.method, system.interval, system.method.step, list[str]()
+    """Sentences on how a run differs from what the case asks for: surfaces, the grid of time, and nodes."""
+    method, interval, asked, found = system.method, system.interval, system.method.step, [*system.notes]
     if method.own_steps and asked is not None:
         kept = "which are exact" if method.row.exact else f"to a tolerance of {method.tolerance:g}"
         found.append(f"solver.step: not used, {method.scheme} finds its steps itself, {kept}")
