@@ -52,3 +52,9 @@ def load(name: str) -> Any:
     if len(kinds()) > MOST_KINDS:
         raise ValueError(f"EVALUATORS has {len(kinds())} kinds, a run can count {MOST_KINDS}; increase MOST_KINDS")
     return import_module(EVALUATORS[name].module).evaluate
+
+
+def load_press(name: str) -> Any:
+    """What finds the force alone: the kernel `press` of an evaluator, or `evaluate` where it has none."""
+    module = import_module(EVALUATORS[name].module)
+    return getattr(module, "press", module.evaluate)

@@ -83,13 +83,13 @@ def build_pad(k: float, half_length: float, shoe: Surface, wheel: Surface, nodes
     return Pad(pad, flat)
 
 
-def build_layer(evaluate: Any, pad: Pad) -> Layer:
-    """What the kernel `evaluate` works on and fills for this pad."""
+def build_layer(evaluate: Any, pad: Pad, press: Any = None) -> Layer:
+    """What the kernel `evaluate`, or `press` where the force is enough, works on and fills for this pad."""
     constants, tables = pad
     waves = constants.shoe_terms + constants.wheel_terms
     scratch, found = _aligned(constants.edges_at + 8 * waves + 6 + 3 * constants.cells), new(CONTACT)
     found.near = math.inf  # an evaluator that does not know it leaves it
-    return Layer(address(evaluate), constants, tables, np.zeros(constants.wheel_terms), scratch, found)
+    return Layer(address(evaluate), address(press or evaluate), constants, tables, np.zeros(constants.wheel_terms), scratch, found)
 
 
 def _aligned(size: int) -> Floats:
