@@ -78,7 +78,7 @@ def arrive(p: Shoe, drive: Drive) -> None:
         m.x, m.v_x = (m.anchor + m.travel) + (m.anchor_low + m.travel_low), m.belt
 
 
-@kernel(float64(SHOE, float64, float64, int64), inlined=False)
+@kernel(float64(SHOE, float64, float64, int64))
 def press(p: Shoe, x: float, y: float, touching: int) -> float:
     """F_y (N) in the phase and the rest of `contact`; the closed form while a bound proves full contact.
 
@@ -104,7 +104,7 @@ def press(p: Shoe, x: float, y: float, touching: int) -> float:
     return contact.normal_force  # type: ignore[no-any-return]
 
 
-@kernel(void(SHOE, int64, float64, float64, float64, float64, float64), inlined=False)
+@kernel(void(SHOE, int64, float64, float64, float64, float64, float64))
 def find_slopes(p: Shoe, stage: int, since: float, x: float, y: float, v_x: float, v_y: float) -> None:
     """(6)-(7) as equations of first order, and the powers of the energy account, `since` the begin of the step.
 
