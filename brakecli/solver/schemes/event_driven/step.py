@@ -62,8 +62,9 @@ def _longest(p: Shoe, duration: float) -> float:
     if pad.wheel_terms > 0 and m.touching != 0 and m.side != 0.0:
         # A fourth of the shortest wave, so that no patch comes and goes unseen.
         slide = abs(m.v_x - m.belt) + abs(m.slopes[0, V_X] - m.belt_slope) * m.step
-        if slide * longest > pad.cell:
-            longest = pad.cell / slide
+        wave = pad.cell if m.light == 0 else 4.0 * pad.cell
+        if slide * longest > wave:
+            longest = wave / slide
     return longest
 
 
