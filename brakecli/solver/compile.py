@@ -170,6 +170,40 @@ def at_address(signature: Any) -> Any:
     return _functions.__getitem__ if config.DISABLE_JIT else callable_at
 
 
+HELD = 512
+"""Doubles of memory in which `hold` finds room."""
+
+
+@intrinsic
+def _hold(typing: Any, value: Any, address: Any) -> Any:
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        value = _without_counts(context, builder, signature.args[0], arguments[0])
+        if context.get_abi_sizeof(value.type) > 8 * HELD:
+            raise ValueError("HELD is too small")
+        builder.store(value, builder.inttoptr(arguments[1], value.type.as_pointer()))
+        return context.get_dummy_value()
+
+    return types.void(value, types.int64), codegen
+
+
+def held_at(type_: Any) -> Any:
+    """What gives kernels the value of a type that `hold` has put at an address; its arrays are `borrowed`."""
+
+    @intrinsic
+    def value_at(typing: Any, address: Any) -> Any:
+        def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            return builder.load(builder.inttoptr(arguments[0], context.get_value_type(type_).as_pointer()))
+
+        return type_(types.int64), codegen
+
+    return _held.__getitem__ if config.DISABLE_JIT else value_at
+
+
+_held: dict[int, Any] = {}  # what interpreted kernels hold
+hold: Any = (lambda value, address: _held.update({address: value})) if config.DISABLE_JIT else _hold
+"""Put a value into memory: each conversion of a large tuple for compiled code takes 10 µs."""
+
+
 @intrinsic
 def _byte_at(typing: Any, address: Any) -> Any:
     """The byte at an address, read anew each time."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from brakecli.solver import contact
-from brakecli.solver.compile import Floats, address
+from brakecli.solver.compile import HELD, Floats, address
 from brakecli.solver.contact.pad import build_layer
 from brakecli.solver.energy import OPEN_ACCOUNT, EnergyAccount, account
 from brakecli.solver.friction import minimise
@@ -115,6 +115,9 @@ class Stepping:
             work=new(WORK),
             counts=self.counts,
         )
+        self._memory = np.zeros(HELD)
+        self._address = self._memory.ctypes.data
+        self.scheme.keep(self.plant, self._address)
         self._begin()
         self._start_energy = self._energy()
 
@@ -152,7 +155,7 @@ class Stepping:
         system, lag, per_sample = self.system, self.scheme.LAG, self.system.per_sample
         first = int(self.counts.level) - lag
         rows = np.zeros((-(-(stop - lag) // per_sample) + (-first // per_sample), len(HISTORY)))
-        self.work.failure = Failure(self.scheme.advance(self.plant, rows, self.events, stop))
+        self.work.failure = Failure(self.scheme.advance(self._address, rows, self.events, stop))
         done = int(self.counts.level) - lag
         if self.work.failed:
             self.work.failure_time = system.step * done

@@ -10,7 +10,7 @@ from typing import Any
 
 from numba import float64, int64, void
 
-from brakecli.solver.compile import Floats, borrowed, kernel
+from brakecli.solver.compile import Floats, held_at, hold, kernel
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.double_double import two_sum
 from brakecli.solver.energy import energy_at_level
@@ -52,6 +52,7 @@ _MOST_EVENTS, _NO_PROGRESS = 1000, 1e-6  # a run ends after so many events withi
 _KEPT = 4096  # levels from one sum of the works to the next, so that rounding does not add up
 
 _PLANT = plant_type(FLOW)
+_plant_at = held_at(_PLANT)
 _NONE, _, _DIVERGED, _, _, _STALLED = (int(failure) for failure in Failure)
 
 
@@ -217,10 +218,16 @@ def sample(p: Plant, row: Floats) -> None:
     row[:] = p.state.row
 
 
-@kernel(int64(_PLANT, float64[:, ::1], float64[:, ::1], int64))
-def advance(p: Plant, rows: Floats, events: Floats, stop: int) -> int:
+@kernel(void(_PLANT, int64))
+def keep(p: Plant, address: int) -> None:
+    """Put what `advance` works with into memory."""
+    hold(p, address)
+
+
+@kernel(int64(int64, float64[:, ::1], float64[:, ::1], int64))
+def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
     """Step from the level reached to `stop`, filling `rows` with the samples before each step; a `Failure`."""
-    p = borrowed(p)
+    p = _plant_at(address)
     m, counts, grid, h, row = p.state, p.counts, p.grid, p.s.h, 0
     if m.started == 0:
         _start(p)
