@@ -28,10 +28,10 @@ _RADIANS = 2.0
 _DECAY = 4.0
 """Largest step times decay rate: steps are stable up to 6, but inaccurate beyond 4."""
 _FIRST = 0.05
-"""The first step over the longest."""
+"""The first step over the longest; on nodes five times that."""
 _MOST_SWITCHES, _MOST_EVENTS, _NO_PROGRESS = 60, 1000, 1e-6
 """A run ends after so many phases that end at once, or so many events within a part of the longest step."""
-_LOOSE = 1e-5
+_LOOSE = 2e-5
 """Tolerance from which on steps of order five are cheaper, where the contact is that of nodes."""
 _TINY = 1e-300  # no division by zero where nothing moves
 
@@ -60,9 +60,9 @@ def _longest(p: Shoe, duration: float) -> float:
     if rate * longest > _DECAY:
         longest = _DECAY / rate
     if pad.wheel_terms > 0 and m.touching != 0 and m.side != 0.0:
-        # A fourth of the shortest wave, so that no patch comes and goes unseen.
+        # A fourth of the shortest wave, so that no patch comes and goes unseen; on nodes half of it.
         slide = abs(m.v_x - m.belt) + abs(m.slopes[0, V_X] - m.belt_slope) * m.step
-        wave = pad.cell if m.light == 0 else 4.0 * pad.cell
+        wave = pad.cell if m.light == 0 else 2.0 * pad.cell
         if slide * longest > wave:
             longest = wave / slide
     return longest
@@ -84,7 +84,7 @@ def first_step(p: Shoe, drive: Drive, grid: Grid) -> None:
     else:
         m.side = 1.0 if m.v_x > m.belt else -1.0
     phases.find_slopes(p, 0, 0.0, m.x, m.y, m.v_x, m.v_y)
-    m.step = _FIRST * _longest(p, grid.samples * grid.interval)
+    m.step = (_FIRST if m.light == 0 else 5.0 * _FIRST) * _longest(p, grid.samples * grid.interval)
 
 
 @kernel(float64(SHOE, float64), inlined=False)
