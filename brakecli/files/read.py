@@ -51,6 +51,7 @@ class Variable:
     dims: tuple[str, ...]
     shape: tuple[int, ...]
     attributes: dict[str, Any]
+    kind: str  # of its values, as NumPy names it
 
 
 @dataclass
@@ -82,7 +83,9 @@ class StoredResult:
             for name in parent:
                 node = member(parent, name)
                 if isinstance(node, h5py.Dataset):
-                    found[name] = Variable(axes_of(node, name), node.shape, attributes_of(node, ""))
+                    found[name] = Variable(
+                        axes_of(node, name), node.shape, attributes_of(node, ""), node.dtype.kind
+                    )
         return found
 
     def read(self, group: str, name: str, start: int = 0, stop: int | None = None) -> NDArray[Any]:

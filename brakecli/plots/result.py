@@ -13,12 +13,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def plot_result(result: Path, target: Path, *, force: bool, select: Sequence[str] = ()) -> None:
+def plot_result(
+    result: Path, target: Path, *, force: bool, select: Sequence[str] = (), variable: str = ""
+) -> None:
     """Draw a result of any kind into a PNG, PDF or SVG file; the suffix of `target` says which.
 
-    `select` holds `KEY=VALUE` for axes of a sweep of which one value is to be drawn. Raises UsageError for another
-    suffix, for an existing target without `force`, for what cannot be drawn or selected, and where matplotlib is
-    missing; UnreadableResultError; CannotWriteError.
+    `select` holds `KEY=VALUE` for axes of a sweep of which one value is to be drawn; `variable` names a number of
+    a sweep or a quantity of a run. Raises UsageError for another suffix, for an existing target without `force`,
+    for what cannot be drawn or selected, and where matplotlib is missing; UnreadableResultError; CannotWriteError.
     """
     suffix = target.suffix.lower()
     if suffix not in (".pdf", ".png", ".svg"):
@@ -35,17 +37,17 @@ def plot_result(result: Path, target: Path, *, force: bool, select: Sequence[str
     from brakecli.plots import style
 
     with open_result(result) as stored, new_output(target, force=force) as file, style.applied():
-        file.write(style.rendered(draw(stored, select), suffix))
+        file.write(style.rendered(draw(stored, select, variable), suffix))
         file.publish()
 
 
-def draw(result: StoredResult, select: Sequence[str] = ()) -> "Figure":
+def draw(result: StoredResult, select: Sequence[str] = (), variable: str = "") -> "Figure":
     """The picture of an open result, drawn with the style that is set."""
     from brakecli.plots import comparison, curves, lock_in, maps, run, sweep
 
     kind = result.attributes.get("kind")
     if kind == "sweep":
-        picture = sweep.gather(result, select)
+        picture = sweep.gather(result, select, variable)
         return curves.draw(picture) if len(picture.axes) == 1 else maps.draw(picture)
     if kind not in ("run", "comparison", "stability"):
         known = "a run, of a sweep, of a comparison or of stability"
@@ -53,5 +55,7 @@ def draw(result: StoredResult, select: Sequence[str] = ()) -> "Figure":
     if select:
         raise UsageError(f"{result.path}: --select is for sweeps (found {select[0]!r}); leave it out for a {kind}")
     if kind == "run":
-        return run.draw(run.RunPicture(result))
+        return run.draw(run.RunPicture(result, variable or "vx"))
+    if variable:
+        raise UsageError(f"{result.path}: --variable is for runs and sweeps (found {variable!r}); leave it out")
     return comparison.draw(result) if kind == "comparison" else lock_in.draw(result)
