@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -107,8 +107,9 @@ def _opens(run: Motion) -> bool:
 def slower_than_events(system: System, progress: Progress) -> Callable[[Motion, float], bool]:
     """A test whether runs of so many times the work of this one take longer than two with the exact contact.
 
-    They do not where the pad does not open. A part of such a run is made when the test is first needed: it has as many steps as the others. How often the
-    contact is open in part, this run knows; beside its evaluations then, others cost nothing.
+    They do where the pad does not open. A part of such a run is made when the test is first needed: it has as many
+    steps as the others. How often the contact is open in part, this run knows; beside its evaluations then, others
+    cost nothing.
     """
 
     @cache
@@ -174,6 +175,7 @@ def _by_events(system: System, progress: Progress) -> Certified:
 class _Axis:
     """How often steps were halved, or nodes doubled, and what the last two times changed."""
 
+    growth: ClassVar[float] = 0.5  # power of the error's fall with which the work grows
     doublings: int = 0
     before: float = math.inf
     last: float = math.inf
@@ -194,12 +196,14 @@ class _Axis:
 
     def more(self, tolerance: float) -> float:
         """By how much the work is likely to grow until the error is below the tolerance."""
-        return math.sqrt(max(1.0, self.last / tolerance)) if self.last < math.inf else 2.0
+        return max(1.0, self.last / tolerance) ** self.growth if self.last < math.inf else 2.0
 
 
 @dataclass
 class _Tolerances(_Axis):
     """Of steps that are found: local tolerances, each a tenth of the one before."""
+
+    growth: ClassVar[float] = 0.2
 
     @property
     def error(self) -> float:
@@ -216,15 +220,14 @@ def _by_steps(
     the last ones may not, nor over what speed or load do between two knots, as no run would see it.
     """
     wanted, events = system.method.tolerance, system.method.own_steps
-    first, every = (FIRST_ON_NODES * wanted, 1) if events else first_steps(system)
+    (first, every), fineness = first_rung(system), "tolerance" if events else "step"
     longest = min(_shortest_span(system) / STEPS_BETWEEN_KNOTS, system.interval) * (1.0 + 1e-9)
     nodes, steps, quadrature = first_nodes(system), _Tolerances() if events else _Axis(), _Axis()
     before, finer, seconds = None, steps, 0.0
     while True:
         sampled = replace(system, interval=max(1, every >> steps.doublings) * system.interval)
         at = first * (NODES_RATIO if events else 0.5) ** steps.doublings
-        fineness = {"tolerance" if events else "step": at, "nodes": nodes << quadrature.doublings}
-        run = _run(sampled, progress, **fineness)
+        run = _run(sampled, progress, nodes=nodes << quadrature.doublings, **{fineness: at})
         spent, failed = run.work.solve_seconds, run.work.failed
         run.work.solve_seconds = seconds = seconds + spent
         if before is not None and not failed:
@@ -290,8 +293,13 @@ def _compare(coarse: Motion, fine: Motion, tolerance: float) -> tuple[float, flo
     return max(until, 0.0), max(float(apart.max()), ROUNDING)
 
 
-def first_steps(system: System) -> tuple[float, int]:
-    """The steps (s) that a ladder begins with, and how many samples each passes over, a power of two."""
+def first_rung(system: System) -> tuple[float, int]:
+    """The steps (s) that a ladder begins with, and how many samples each passes over, a power of two.
+
+    Where steps are found it is the local tolerance that the ladder begins with.
+    """
+    if system.method.own_steps:
+        return FIRST_ON_NODES * system.method.tolerance, 1
     interval, fastest = system.interval, 2.0 * math.pi * max(system.natural_frequencies[1], 1e-300)
     wanted = min(LONGEST_TURN, math.sqrt(FIRST_TURN * system.method.tolerance)) / fastest
     wanted = min(wanted, 1.0 / (FIRST_PER_WAVE * max(system.passing_frequency, 1e-300)))

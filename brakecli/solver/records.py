@@ -241,7 +241,7 @@ class Layer(NamedTuple):
     """The springs between shoe and wheel: how their force is computed, and the force found last."""
 
     evaluate: int  # address of the evaluator
-    press: int  # address of what finds normal force, stiffness and fraction alone; of the evaluator where nothing does
+    press: int  # address of what finds normal force, stiffness and fraction alone, or of the evaluator
     pad: Any
     tables: Floats
     angles: Floats  # phases of the wheel's harmonics, rad

@@ -105,8 +105,7 @@ def test_surfaces_that_open_keep_their_tolerance_too(tolerance: float) -> None:
     found = certify(system_of(case))
     assert found.certificate.certified
     assert kept(found, case, 1e-4 * tolerance) <= tolerance
-    layered = tolerance >= module.LAYERED_FROM
-    assert found.motion.system.method.scheme == ("three-layer" if layered else "event-driven")
+    assert found.motion.system.evaluator == ("midpoint" if tolerance >= module.NODES_FROM else "exact")
 
 
 def test_nodes_that_agree_by_luck_are_doubled_again() -> None:
@@ -139,7 +138,7 @@ def test_a_ladder_that_grows_slow_beside_events_is_left(monkeypatch: pytest.Monk
     assert too_slow(run, 1e6)
     monkeypatch.setattr(module, "slower_than_events", lambda *_: lambda run, more: True)
     found = certify(system_of(case))
-    assert found.motion.system.method.scheme == "event-driven"
+    assert found.motion.system.evaluator == "exact"
     assert found.certificate.certified
     assert kept(found, case, 1e-9) <= 1e-3
 

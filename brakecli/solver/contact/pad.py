@@ -90,7 +90,15 @@ def build_layer(evaluate: Any, pad: Pad, press: Any = None) -> Layer:
     waves = constants.shoe_terms + constants.wheel_terms
     scratch, found = _aligned(constants.edges_at + 8 * waves + 6 + 3 * constants.cells), new(CONTACT)
     found.near = math.inf  # an evaluator that does not know it leaves it
-    return Layer(address(evaluate), address(press or evaluate), constants, tables, np.zeros(constants.wheel_terms), scratch, found)
+    return Layer(
+        address(evaluate),
+        address(press or evaluate),
+        constants,
+        tables,
+        np.zeros(constants.wheel_terms),
+        scratch,
+        found,
+    )
 
 
 def _aligned(size: int) -> Floats:

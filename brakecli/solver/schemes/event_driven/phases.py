@@ -126,7 +126,7 @@ def find_slopes(p: Shoe, stage: int, since: float, x: float, y: float, v_x: floa
     m.work_rates[stage, 1] = -friction * sliding
     m.work_rates[stage, 2] = c.b_xx * v_x * v_x + 2.0 * c.b_xy * v_x * v_y + c.b_yy * v_y * v_y
     m.work_rates[stage, 3] = load * (c.sin_beta * v_x + c.cos_beta * v_y)
-    # Where the store is not followed: what the pad does on it, which its change adds up with to that of the roughness
+    # Where the store is not followed: what the pad does to it. The rest of its change is the roughness's work.
     m.work_rates[stage, 4] = p.layer.contact.store_x * sliding if m.light == 0 else normal * v_y
 
 

@@ -1,9 +1,9 @@
 """Two Runge-Kutta methods with an error estimate and a continuous solution: DOP853 of order eight, DOPRI5 of five.
 
 Coefficients: E. Hairer, S. P. Nørsett and G. Wanner, Solving Ordinary Differential Equations I, 2nd edition,
-sections II.5 and II.6, and their programs dop853.f and dopri5.f. Arrays have DOP853 first. Stage `END_STAGE` is the
-slope at the end of the step, which is the first of the next; the three behind it serve the continuous solution of
-DOP853 alone. DOPRI5 has no stages from 6 to 11.
+sections II.5 and II.6, and their programs dop853.f and dopri5.f. Arrays have DOP853 first. Stage `END_STAGE` is
+the slope at the end of the step, which is the first of the next; the three behind it serve the continuous solution
+of DOP853 alone. DOPRI5 has no stages from 6 to 11.
 """
 
 import math
@@ -149,7 +149,9 @@ def interpolated(m: Any, component: int, theta: float) -> float:
 @kernel(float64(MOTION_TYPE, int64))
 def reach(m: Any, component: int) -> float:
     """A bound of how far one component of the continuous solution gets from the begin of its step."""
-    far = abs(m.powers[0, component]) + abs(m.powers[1, component]) / 4.0 + abs(m.powers[2, component]) * 4.0 / 27.0
+    far = (
+        abs(m.powers[0, component]) + abs(m.powers[1, component]) / 4.0 + abs(m.powers[2, component]) * 4.0 / 27.0
+    )
     for p in range(3, TERMS[m.pair]):
         far += abs(m.powers[p, component]) / 16.0
     return far  # type: ignore[no-any-return]

@@ -11,9 +11,9 @@ from brakecli.solver.quantities import BOUND, Failure
 from brakecli.solver.records import DRIVE, GRID, KNOTS, MOTION_TYPE, POWERED, STAGES, V_X, V_Y, Drive, Grid, X, Y
 from brakecli.solver.schedules import Schedule, segment
 from brakecli.solver.schemes.event_driven import phases, runge_kutta
-from brakecli.solver.schemes.event_driven.runge_kutta import END_STAGE, NODES, ORDER, USED, A
 from brakecli.solver.schemes.event_driven.locate import NONE, first_event
 from brakecli.solver.schemes.event_driven.phases import EPSILON, SHOE, Shoe
+from brakecli.solver.schemes.event_driven.runge_kutta import END_STAGE, NODES, ORDER, USED, A
 
 _LOCAL = 0.05
 """Error of a step over the tolerance of the histories, to which the errors of all steps add up."""
