@@ -167,7 +167,7 @@ def test_a_ladder_that_grows_slow_beside_events_is_left(monkeypatch: pytest.Monk
 
 @pytest.mark.parametrize("many", counts(2, 60))
 def test_no_certificate_of_random_shoes_is_broken(many: int) -> None:
-    rng, schemes, drawn = np.random.default_rng(3), set[str](), 0
+    rng, ways, drawn = np.random.default_rng(3), set[str](), 0
     while drawn < many:
         case = promises.random_case(rng, promises.KINDS[-1 - drawn % len(promises.KINDS)])
         try:
@@ -180,8 +180,9 @@ def test_no_certificate_of_random_shoes_is_broken(many: int) -> None:
             error = errors(found.motion.rows, exact).error
             assert found.certificate.certified
             assert error <= found.certificate.estimated_error + 1e-7  # what the truth itself may be off
-            schemes.add(found.motion.system.method.scheme)
-    assert many < 10 or schemes == {"two-layer", "three-layer", "event-driven", "piecewise-exact"}
+            ways.add(f"{found.motion.system.method.scheme}, {found.motion.system.evaluator}")
+    everything = {"event-driven, exact", "event-driven, midpoint", "piecewise-exact, closed-form"}
+    assert many < 10 or ways == everything
 
 
 WAVE = {  # a shoe that opens over a long wave of the wheel
