@@ -24,7 +24,7 @@ _PANELS = (  # column, factor, title and label of the work
 )
 _MARKERS = {"0.5, 0.5": "o", "1, 0.5": "^", "0.5, 1": "v", "1, 1": "s"}  # by weights: of two layers
 _MARKERS |= {"0.25, 0.5, 0.25": "o", "0.0833333, 0.833333, 0.0833333": "D", "": "*"}  # of three, and none
-_EXACT, _OTHER_NODES = "#CC79A7", "#56B4E9"  # colours of the exact contact force, of less usual numbers of nodes
+_EXACT, _OTHER_NODES = "#CC79A7", "#56B4E9"  # colours of the exact contact force, of entries on nodes alone
 _NODE_MARKERS = "<>ph"  # markers of the same weights with other numbers of nodes
 
 
@@ -113,8 +113,9 @@ def _draw_errors(axes: Axes, columns: Columns, work: style.Array) -> None:
         marker = _MARKERS.get(entry["theta"], "P")
         if entry["evaluator"] == "exact" and not own:
             colour = _EXACT
-        elif entry["evaluator"] == "midpoint" and entry["nodes"] in others:
-            colour, marker = _OTHER_NODES, _NODE_MARKERS[others.index(entry["nodes"]) % len(_NODE_MARKERS)]
+        elif entry["evaluator"] == "midpoint":
+            place = others.index(entry["nodes"]) % len(_NODE_MARKERS) if entry["nodes"] in others else -1
+            colour, marker = _OTHER_NODES, _NODE_MARKERS[place] if place >= 0 else "X"
         size, width, above = (9.0, 2.0, 3.0) if own else (5.0, 1.1, 2.0)
         face = "white" if entry["start"] == "paper" else colour
         dashes = (0, (2, 1.5)) if entry["iteration"] == "fixed-point" else "-"

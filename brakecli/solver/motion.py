@@ -109,7 +109,7 @@ class Stepping:
             s=system.weights,
             grid=system.grid,
             drive=Drive(system.belt, system.load, system.wheel.waves),
-            layer=build_layer(system.evaluate, system.pad),
+            layer=build_layer(system.evaluate, system.pad, contact.load_press(system.evaluator)),
             plug=_plugged_in(system),
             state=new(self.scheme.STATE),
             problem=new(PROBLEM),
@@ -143,7 +143,10 @@ class Stepping:
             self.scheme.sample(self.plant, row)
             sink(row[None, :])
         self._count()
-        energy = account(self._start_energy, self._energy(), self.plant.work)
+        end = self._energy()
+        if self.system.method.own_steps and self.system.nodes:  # see `phases.find_slopes`
+            self.plant.work.roughness += end[2] - self._start_energy[2]
+        energy = account(self._start_energy, end, self.plant.work)
         if not work.failed and not abs(energy.relative_closing_error) <= OPEN_ACCOUNT:
             work.failure = Failure.UNBALANCED
         return Motion(self.system, np.concatenate(kept), work, energy)
