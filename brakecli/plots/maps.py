@@ -29,7 +29,7 @@ from brakecli.plots.sweep import (
 
 _LONG_TITLE = 34  # characters of a panel's title from which on it takes two lines
 _MAP_WIDTH, _PANEL_WIDTH = 10.4, 3.0  # inches, of a figure with two columns of maps, and of each of more maps
-_MOST_NUMBERS = 80
+_MOST_NUMBERS, _LEAST_CELL = 80, 0.5  # cells with a number, and how wide they must be (inches)
 _ALIKE = 1e-6  # relative difference of numbers from which on they have different colours
 _MOST_DRAWN = 4096  # cells up to which each cell of a map is a shape of its own in a PDF or SVG file
 
@@ -58,9 +58,9 @@ def draw(picture: SweepPicture) -> Figure:
     else:
         pieces = [(f" on the way {way}" if way else "", picture.towards(way)) for way in picture.directions]
         width, height = (WIDTH, 5.8) if critical else (_MAP_WIDTH, 1.0 + 3.9 * len(pieces))
-    figure = picture.figure(width, height)
     shape = (len(layers), len(pieces)) if sliced else (len(pieces), len(layers))
-    panels = figure.subplots(*shape, sharex=True, sharey=True, squeeze=False)
+    figure = picture.figure(width, height, shape[1])
+    panels = style.panels(figure, *shape, sharex=True, sharey=True)
     for row, (name, piece) in zip(panels.T if sliced else panels, pieces, strict=True):
         for axes, (layer, draw_layer) in zip(row, layers.items(), strict=True):
             mesh = draw_layer(axes, piece, scale)
@@ -154,7 +154,9 @@ def _draw_critical(axes: Axes, picture: SweepPicture, scale: Scale) -> ScalarMap
     numeric = all(axis.texts is None and len(axis.values) >= 3 for axis in picture.axes)
     if numeric and np.mean(areas) > 0.3:
         _draw_contours(axes, picture, values, scale.norm)
-    elif values.size <= _MOST_NUMBERS:
+    elif values.size <= _MOST_NUMBERS and axes.get_window_extent().width > _LEAST_CELL * axes.figure.dpi * len(
+        values
+    ):
         for i, j in np.argwhere(known):
             x, y, value = picture.axes[0].values[i], picture.axes[1].values[j], values[i, j]
             colour = "white" if scale.norm(value) < 0.6 else "black"

@@ -168,8 +168,8 @@ def _summary(attributes: dict[str, Any]) -> str:
 
 def draw(picture: RunPicture) -> Figure:
     """The figure with its four panels."""
-    figure = style.headed(10.4, 7.2, picture.title, picture.summary, wspace=0.05, hspace=0.06)
-    panels = figure.subplots(2, 2, width_ratios=(1.55, 1.0))
+    figure = style.headed(10.4, 7.2, picture.title, picture.summary, columns=2, wspace=0.05, hspace=0.06)
+    panels = style.panels(figure, 2, 2, width_ratios=(1.55, 1.0))
     drawing = (_draw_detail, _draw_portrait, _draw_history, _draw_spectrum)
     for axes, draw_panel in zip(panels.flat, drawing, strict=True):
         draw_panel(axes, picture)

@@ -133,11 +133,11 @@ class SweepPicture:
         yield sign(several, "several windows of instability", "+", style.DARK, style.DARK)
         yield self.failed()
 
-    def figure(self, width: float, height: float) -> Figure:
+    def figure(self, width: float, height: float, columns: int = 1) -> Figure:
         """An empty figure (inches) below the heading; `height` is that of the part below the heading."""
         chosen = ["   ·   ".join(self.chosen)] if self.chosen else []
         lines = [self.summary, *chosen, *self.findings[:2]]
-        return style.headed(width, height + 0.21 * len(lines), self.title, *lines)
+        return style.headed(width, height + 0.21 * len(lines), self.title, *lines, columns=columns)
 
 
 def sign(where: style.Array, label: str, marker: str, colour: str, face: str) -> Sign:
@@ -166,8 +166,10 @@ def add_legend(figure: Figure) -> None:
     engine.set(rect=(left, bottom, wide, high - taken))
 
 
-def gather(result: StoredResult, select: Sequence[str] = (), shown: str = "") -> SweepPicture:
-    """Read from a result what its picture shows: of its variables the one that is `shown`, if it is named.
+def gather(
+    result: StoredResult, select: Sequence[str] = (), shown: str = "", more: Sequence[str] = ()
+) -> SweepPicture:
+    """Read from a result what its picture shows: the variable that is `shown`, if it is named, and `more` of them.
 
     `select` holds `KEY=VALUE`; axes of a single value are selected anyway. Raises UnreadableResultError where
     something is missing, UsageError where there is no such key, value or variable.
@@ -191,7 +193,7 @@ def gather(result: StoredResult, select: Sequence[str] = (), shown: str = "") ->
         variables[name] = (
             style.read_column(result, name)[... if both else np.newaxis] if there else np.full(shape, np.nan)
         )
-    if shown and shown not in (able := _numeric(result)):
+    if shown and shown not in (able := numeric(result)):
         problem = f"--variable {shown}: no number of its points has this name"
         raise UsageError(f"{result.path}: {problem}; give one of {', '.join(able)}")
     base = str(result.attributes.get("resolved_toml", ""))
@@ -202,9 +204,10 @@ def gather(result: StoredResult, select: Sequence[str] = (), shown: str = "") ->
         variables[MARGIN] = np.broadcast_to(
             margin.reshape(variables["status"].shape[1:]), variables["status"].shape
         )
-    if shown:
-        values = style.read_column(result, shown).astype(float)[... if both else np.newaxis]
-        variables[shown] = np.where(variables["status"] == Status.DONE, values, np.nan)
+    for name in {shown, *more} - {"", *variables}:
+        values = style.read_column(result, name)[... if both else np.newaxis]
+        nothing = np.nan if values.dtype.kind in "if" else ""
+        variables[name] = np.where(variables["status"] == Status.DONE, values, nothing)
     for name in ("regime", "excitation"):  # those of points that failed mean nothing
         variables[name] = np.where(variables["status"] == Status.DONE, variables[name], "")
     differ = result.read("/", "hysteresis") == 1 if both and "hysteresis" in known else False
@@ -236,7 +239,7 @@ def gather(result: StoredResult, select: Sequence[str] = (), shown: str = "") ->
     return picture
 
 
-def _numeric(result: StoredResult) -> list[str]:
+def numeric(result: StoredResult) -> list[str]:
     """The variables of a sweep that hold a number for each point."""
     known = result.variables("/")
     dims = known["status"].dims

@@ -1,0 +1,138 @@
+"""The map of a sweep on a page: cells in colour, and the values of each point for pointer and keyboard."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.colors import to_hex
+
+from brakecli.analysis.regime.verdict import Regime
+from brakecli.plots import style
+from brakecli.plots.axis import Axis
+from brakecli.plots.sweep import REGIMES, SweepPicture
+from brakecli.reports.blocks import shown
+
+MOST = 10_000  # points whose values are on the page
+WIDTH, HEIGHT = 400.0, 260.0  # of the cells, in units of the drawing; a row alone is lower
+_TICKS, _SHADES = 7, 32
+_LETTERS = {
+    Regime.RELAXATION: "R",
+    Regime.QUASI_HARMONIC: "Q",
+    Regime.UNDECIDED: "?",
+}  # in grey, colours are alike
+_LEAST_LETTER = 11.0  # of a cell that holds a letter
+
+
+@dataclass(frozen=True)
+class Side:
+    """An axis of the map: the edges of its cells and the names of their values; some of them stand at ticks."""
+
+    label: str
+    edges: list[float]
+    values: list[str]
+
+    @property
+    def ticks(self) -> list[tuple[float, str]]:
+        """Places of ticks and what stands there."""
+        step = -(-len(self.values) // _TICKS)
+        middles = [0.5 * (low + high) for low, high in zip(self.edges, self.edges[1:], strict=False)]
+        return list(zip(middles, self.values, strict=True))[::step]
+
+
+@dataclass(frozen=True)
+class Map:
+    """Cells in rows and columns; `data` is what the page's script reads."""
+
+    title: str
+    x: Side
+    y: Side
+    cells: list[tuple[str, str]]  # colour and path of all cells that have it
+    letters: list[tuple[float, float, str]]
+    legend: list[tuple[str, str]]
+    data: dict[str, Any]
+    kind = "map"
+
+
+def maps(picture: SweepPicture, names: list[str]) -> Iterator[Map]:
+    """A map of the first two axes for each direction and each value of a third one."""
+    size = sum(picture["status"].shape) and picture["status"].size
+    if size > MOST:
+        return
+    for way in picture.directions:
+        piece = picture.towards(way)
+        places = [range(len(axis.values)) for axis in piece.axes[2:]]
+        for place in product(*places):
+            part, titles = piece, [f"on the way {way}"] * bool(way)
+            for at in place:
+                titles.append(part.axes[2].named(at))
+                part = part.at(2, at)
+            yield _map(part, names, ", ".join(titles))
+
+
+def _map(picture: SweepPicture, names: list[str], title: str) -> Map:
+    x = _side(picture.axes[0], WIDTH)
+    flat = len(picture.axes) == 1
+    y = Side("", [0.0, 40.0], [""]) if flat else _side(picture.axes[1], HEIGHT, upwards=True)
+    shape = len(x.values), len(y.values)
+    colours, legend = _colours(picture)
+    found: dict[str, list[str]] = {}
+    letters = []
+    for i, j in product(*map(range, shape)):
+        left, right, one, other = *x.edges[i : i + 2], *y.edges[j : j + 2]
+        low, high = min(one, other), max(one, other)
+        found.setdefault(colours.reshape(shape)[i, j], []).append(
+            f"M{left:.4g} {low:.4g}H{right:.4g}V{high:.4g}H{left:.4g}z"
+        )
+        letter = _LETTERS.get(picture["regime"].reshape(shape)[i, j], "") if picture.critical is None else ""
+        if letter and right - left > _LEAST_LETTER < high - low:
+            letters.append((0.5 * (left + right), 0.5 * (low + high) + 4.0, letter))
+    columns = {}
+    for name in names:
+        values, unit = picture[name].reshape(shape), picture.units.get(name, "")
+        columns[name.replace("_", " ")] = [[_text(value, unit) for value in row] for row in values.tolist()]
+    data = {
+        "x": x.edges,
+        "y": y.edges,
+        "xs": x.values,
+        "ys": y.values,
+        "names": [x.label, y.label],
+        "columns": columns,
+    }
+    return Map(title, x, y, [(colour, "".join(paths)) for colour, paths in found.items()], letters, legend, data)
+
+
+def _side(axis: Axis, length: float, upwards: bool = False) -> Side:
+    """The cells of an axis from 0 to a length; upwards the first one is at the bottom."""
+    edges = np.log(axis.edges) if axis.logarithmic else axis.edges
+    edges = length * (edges - edges[0]) / (edges[-1] - edges[0])
+    edges = length - edges if upwards else edges
+    factor, unit = style.prefixed(style.largest(axis.values), axis.units)
+    texts = list(axis.texts or (style.readable(factor * float(value)) for value in axis.values))
+    return Side(style.labelled(axis.key, unit), [round(float(edge), 2) for edge in edges], texts)
+
+
+def _colours(picture: SweepPicture) -> tuple[style.Array, list[tuple[str, str]]]:
+    """The colour of every point, and what colours mean."""
+    if picture.critical is None:
+        known = {str(regime): colour for regime, (colour, _) in REGIMES.items()} | {"": "#ffffff"}
+        regimes = picture["regime"].astype(str)
+        present = [name for name in known if (regimes == name).any()]
+        return np.vectorize(known.get, otypes=[object])(regimes), [
+            (known[name], name or "failed") for name in present
+        ]
+    values = picture["critical"]
+    low, high = (float(end(values, initial=0.0, where=np.isfinite(values))) for end in (np.min, np.max))
+    low = float(np.nanmin(values)) if np.isfinite(values).any() else low
+    level = np.round(np.nan_to_num((values - low) / ((high - low) or 1.0)) * (_SHADES - 1)) / (_SHADES - 1)
+    shades = np.vectorize(lambda each: to_hex(colormaps["cividis"](each)), otypes=[object])(level)
+    ends = [(to_hex(colormaps["cividis"](end)), shown(value)) for end, value in ((0.0, low), (1.0, high))]
+    return np.where(np.isfinite(values), shades, "#ffffff"), [*ends, ("#ffffff", "none")]
+
+
+def _text(value: Any, unit: str) -> str:
+    if isinstance(value, float):
+        return shown(float(f"{value:.5g}"), unit) if np.isfinite(value) else "–"
+    return shown(value, unit)
