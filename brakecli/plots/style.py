@@ -59,7 +59,7 @@ def applied(narrow: bool = False) -> Iterator[None]:
         yield
 
 
-def rendered(figure: Figure, suffix: str) -> bytes:
+def rendered(figure: Figure, suffix: str, dpi: int = 150) -> bytes:
     """The figure as a file of this suffix; its bytes do not depend on the time or the machine."""
     figure.draw_without_rendering()
     for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)):
@@ -68,7 +68,7 @@ def rendered(figure: Figure, suffix: str) -> bytes:
     for axes in figure.axes:  # the layout's last digits depend on the order in which it solved for them
         axes.set_position(tuple(round(bound, 6) for bound in axes.get_position().bounds))
     stream = BytesIO()
-    figure.savefig(stream, format=suffix[1:], dpi=150, metadata=_UNDATED.get(suffix))
+    figure.savefig(stream, format=suffix[1:], dpi=dpi, metadata=_UNDATED.get(suffix))
     return stream.getvalue()
 
 

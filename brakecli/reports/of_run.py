@@ -16,7 +16,7 @@ from brakecli.analysis.stability.modes import modes
 from brakecli.case.case import Case
 from brakecli.case.read import LoadedCase, key_path, parse_case
 from brakecli.case.tables import key_schema
-from brakecli.errors import CaseError
+from brakecli.errors import CaseError, escaped
 from brakecli.files import fields
 from brakecli.files.field import named
 from brakecli.files.read import StoredResult
@@ -27,9 +27,11 @@ from brakecli.runs.advise import AdviceReport, advise
 from brakecli.sweeps.result import unit
 
 QUESTION = "Will this shoe vibrate, in which way, at which frequency, and what should be changed?"
+PICTURE = "The motion in detail, its phase portrait, the whole history, and the spectrum of the velocity"
 MARGIN = 0.2  # of the friction, that advice aims at
 VALUES = 121  # of the friction in the lock-in diagram
 MOST_SENSITIVE = 6
+_IDLE = ("initial.", "solver.", "output.")  # keys that stand below the others
 _WORDS = {
     Regime.RELAXATION: "It vibrates, with stick in every cycle or nearly (relaxation)",
     Regime.QUASI_HARMONIC: "It vibrates, without stick (quasi-harmonic)",
@@ -47,20 +49,19 @@ def part_of_run(result: StoredResult, progress: Progress) -> Part:
     """What the page says of a run. Raises UnreadableResultError."""
     found, loaded = result.attributes, case_of(result)
     advice = advise(loaded, KEYS, MARGIN, progress)
-    again = f"brakecli run {shlex.quote(result.path.name)} -o again.h5"
+    again = f"brakecli run {escaped(shlex.quote(result.path.name))} -o again.h5"
     sections = [
         Section("Case", case_blocks(loaded)),
         Section("Stability of steady sliding", [*_stability(advice)]),
         Section("Regime, and its evidence", _regime(result)),
-        Section("Pictures", [picture(f"Motion and spectrum: {_sentence(found)}", partial(draw, result))]),
+        Section("Pictures", [picture(PICTURE, partial(draw, result))]),
         Section("Accuracy", _accuracy(result)),
         Section("Warnings", [Texts(_warnings(found, advice))]),
         Section("How to repeat it", repeat(result, again, result.text("case_toml"))),
     ]
     answer = [_sentence(found), f"By theory: {advice.conclusion()}."]
-    return Part(
-        result.path.name, loaded.case.title or "Case without a title", QUESTION, answer, sections, versions(found)
-    )
+    name, title = escaped(result.path.name), loaded.case.title or "Case without a title"
+    return Part(name, title, QUESTION, answer, sections, versions(found))
 
 
 def case_of(result: StoredResult) -> LoadedCase:
@@ -73,16 +74,16 @@ def case_of(result: StoredResult) -> LoadedCase:
 
 def case_blocks(loaded: LoadedCase) -> list[Any]:
     """Every key of a case with its value and unit, and the text to copy."""
-    rows = [
-        (key, shown(value, unit(key)), _meaning(key)) for key, value in _keys(loaded.case.model_dump(mode="json"))
-    ]
-    table = Table(rows, ("key", "value", "meaning"))
-    return [table, Code(loaded.resolved, "The same as a file, with every default filled in")]
+    keys = _keys(loaded.case.model_dump(mode="json"))
+    rows = [(key, shown(value, unit(key)), _meaning(key)) for key, value in keys]
+    idle, head = [row for row in rows if row[0].startswith(_IDLE)], ("key", "value", "meaning")
+    shoe = Table([row for row in rows if row not in idle], head)
+    return [shoe, Table(idle, head, "Start, solver and output"), Code(loaded.resolved, "The whole case as a file")]
 
 
 def repeat(result: StoredResult, again: str, given: str) -> list[Any]:
     """The commands that give the result, and this page, again; and the file that it was computed from."""
-    report = f"brakecli report {shlex.quote(result.path.name)} -o report.html"
+    report = f"brakecli report {escaped(shlex.quote(result.path.name))} -o report.html"
     exactly = "The same version on the same machine gives the same numbers, to the last bit."
     return [Code(f"{again}\n{report}"), Texts([exactly]), Code(given, "The file as it was given")]
 
@@ -99,7 +100,7 @@ def _sentence(found: Mapping[str, Any]) -> str:
         return f"The run failed: {found.get('failure', '')}."
     regime, numbers = found.get("regime"), []
     reasons = "; ".join(map(str, found.get("reasons", ())))
-    words = _WORDS.get(regime, "") if isinstance(regime, str) else ""
+    words = {str(name): words for name, words in _WORDS.items()}.get(str(regime), "")
     if regime == Regime.DAMPED and found.get("excitation") == Excitation.FORCED:
         words = "It does not vibrate by itself: only the roughness of the wheel shakes it (damped, forced)"
     if not words:
@@ -116,33 +117,28 @@ def _sentence(found: Mapping[str, Any]) -> str:
 
 def _stability(advice: AdviceReport) -> Iterator[Any]:
     report = advice.stability
-    found = [
-        (
-            f"stability {'lost' if each.lost else 'regained'} by {each.instability}",
-            f"φ = {each.friction:.6g}",
-            f"{each.frequency:.5g} Hz",
+    rows = [("steady sliding", "none", report.no_equilibrium or "")] if report.equilibrium is None else []
+    for each in report.crossings:
+        change = f"stability {'lost' if each.lost else 'regained'}"
+        rows.append(
+            (change, f"at φ = {each.friction:.6g}", f"by {each.instability}, {shown(each.frequency, 'Hz')}")
         )
-        for each in report.crossings
-    ]
-    turning = [
-        (
-            f"mode at φ = {report.friction:g}",
-            f"{mode.frequency:.5g} Hz",
-            f"{'grows' if mode.growth > 0.0 else 'decays'} at {abs(mode.growth):.4g} 1/s, damping ratio {mode.damping_ratio:.3g}",
-        )
-        for mode in report.modes
-    ]
-    yield Table([*found, *turning] or [("steady sliding", "none", report.no_equilibrium or "")])
+    for mode in report.modes:
+        growth = f"{'grows' if mode.growth > 0.0 else 'decays'} at {abs(mode.growth):.4g} 1/s"
+        ratio = style.readable(float(f"{mode.damping_ratio:.3g}"))
+        name = f"mode at φ = {report.friction:g}"
+        rows.append((name, shown(mode.frequency, "Hz"), f"{growth}, damping ratio {ratio}"))
+    yield Table(rows)
     if report.equilibrium is not None and report.belt_speed:
         words = "Lock-in diagram: frequencies and growth rates of both modes over the friction coefficient"
         yield picture(words, partial(_diagram, advice))
     if advice.advice:
-        rows = [
+        changes = [
             (
                 each.parameter,
-                shown(each.start),
-                each.rounded,
-                "–" if each.critical_friction is None else f"{each.critical_friction:.4g}",
+                shown(each.start, unit(each.parameter)),
+                "no help" if each.to is None else shown(float(each.rounded), unit(each.parameter)),
+                shown(each.critical_friction and float(f"{each.critical_friction:.4g}")),
             )
             for each in advice.advice
         ]
@@ -152,11 +148,11 @@ def _stability(advice: AdviceReport) -> Iterator[Any]:
             f"to, for a margin of {advice.wanted_margin:.0%}",
             "critical friction then",
         )
-        yield Table(rows, head)
+        yield Table(changes, head)
     known = [each for each in advice.sensitivities if each.elasticity][:MOST_SENSITIVE]
     if known:
-        rows_ = [(each.parameter, f"{each.elasticity:+.3g} %") for each in known]
-        yield Table(rows_, ("what moves it most", "critical friction for 1 % more"))
+        moves = [(each.parameter, f"{each.elasticity:+.3g}\u00a0%".replace("-", "−")) for each in known]
+        yield Table(moves, ("what moves it most", "critical friction for 1 % more"))
     if check := advice.check:
         what = f"A run of the case with {check.parameter} = {check.value:.6g}, {check.duration:.3g} s of motion"
         yield Texts([f"{what}: {check.verdict.regime}: {'; '.join(check.verdict.reasons)}."])
@@ -195,7 +191,7 @@ def _regime(result: StoredResult) -> list[Any]:
         (name.replace("_", " "), shown(value, fields.evidence_unit(name)))
         for name, value in sorted(evidence.items())
     ]
-    reasons = Texts([f"{reason}." for reason in found.get("reasons", ())])
+    reasons = Texts([f"{reason[:1].upper()}{reason[1:]}." for reason in map(str, found.get("reasons", ()))])
     return [reasons, Table(rows), Table(proof, ("evidence", "value"), "All numbers by which the rules decided")]
 
 

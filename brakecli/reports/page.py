@@ -61,6 +61,7 @@ def write_report(results: Sequence[Path], target: Path, *, force: bool, progress
         environment = jinja2.Environment(
             autoescape=True, undefined=jinja2.StrictUndefined, loader=loader, trim_blocks=True, lstrip_blocks=True
         )
+        environment.policies["json.dumps_kwargs"] = {"ensure_ascii": False}  # in order, and short
         digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
         page = environment.get_template("report.html").render(
             parts=parts, script=script, digest=digest, version=__version__

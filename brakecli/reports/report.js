@@ -15,7 +15,7 @@ for (const figure of document.querySelectorAll("figure.map")) {
     output.replaceChildren(...values.filter(([name, value]) => name && value).map(([name, value]) => {
       const item = document.createElement("span"), bold = document.createElement("b");
       bold.textContent = `${name} `;
-      item.append(bold, value);
+      item.append(bold, value, " ");
       return item;
     }));
   };

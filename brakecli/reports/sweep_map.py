@@ -17,7 +17,7 @@ from brakecli.reports.blocks import shown
 
 MOST = 10_000  # points whose values are on the page
 WIDTH, HEIGHT = 400.0, 260.0  # of the cells, in units of the drawing; a row alone is lower
-_TICKS, _SHADES = 7, 32
+_TICKS, _SHADES, _NONE = 7, 32, "#f2f2f2"
 _LETTERS = {
     Regime.RELAXATION: "R",
     Regime.QUASI_HARMONIC: "Q",
@@ -28,18 +28,19 @@ _LEAST_LETTER = 11.0  # of a cell that holds a letter
 
 @dataclass(frozen=True)
 class Side:
-    """An axis of the map: the edges of its cells and the names of their values; some of them stand at ticks."""
+    """An axis of the map: the edges of its cells and the names of their values, in short for ticks."""
 
     label: str
     edges: list[float]
     values: list[str]
+    short: list[str]
 
     @property
     def ticks(self) -> list[tuple[float, str]]:
         """Places of ticks and what stands there."""
         step = -(-len(self.values) // _TICKS)
         middles = [0.5 * (low + high) for low, high in zip(self.edges, self.edges[1:], strict=False)]
-        return list(zip(middles, self.values, strict=True))[::step]
+        return list(zip(middles, self.short, strict=True))[::step]
 
 
 @dataclass(frozen=True)
@@ -58,8 +59,7 @@ class Map:
 
 def maps(picture: SweepPicture, names: list[str]) -> Iterator[Map]:
     """A map of the first two axes for each direction and each value of a third one."""
-    size = sum(picture["status"].shape) and picture["status"].size
-    if size > MOST:
+    if picture["status"].size > MOST:
         return
     for way in picture.directions:
         piece = picture.towards(way)
@@ -75,7 +75,7 @@ def maps(picture: SweepPicture, names: list[str]) -> Iterator[Map]:
 def _map(picture: SweepPicture, names: list[str], title: str) -> Map:
     x = _side(picture.axes[0], WIDTH)
     flat = len(picture.axes) == 1
-    y = Side("", [0.0, 40.0], [""]) if flat else _side(picture.axes[1], HEIGHT, upwards=True)
+    y = Side("", [0.0, 40.0], [""], [""]) if flat else _side(picture.axes[1], HEIGHT, upwards=True)
     shape = len(x.values), len(y.values)
     colours, legend = _colours(picture)
     found: dict[str, list[str]] = {}
@@ -111,25 +111,27 @@ def _side(axis: Axis, length: float, upwards: bool = False) -> Side:
     edges = length - edges if upwards else edges
     factor, unit = style.prefixed(style.largest(axis.values), axis.units)
     texts = list(axis.texts or (style.readable(factor * float(value)) for value in axis.values))
-    return Side(style.labelled(axis.key, unit), [round(float(edge), 2) for edge in edges], texts)
+    short = list(axis.texts or (style.readable(float(f"{factor * value:.3g}")) for value in axis.values))
+    return Side(style.labelled(axis.key, unit), [round(float(edge), 2) for edge in edges], texts, short)
 
 
 def _colours(picture: SweepPicture) -> tuple[style.Array, list[tuple[str, str]]]:
     """The colour of every point, and what colours mean."""
     if picture.critical is None:
-        known = {str(regime): colour for regime, (colour, _) in REGIMES.items()} | {"": "#ffffff"}
+        known = {str(regime): colour for regime, (colour, _) in REGIMES.items()} | {"": _NONE}
         regimes = picture["regime"].astype(str)
         present = [name for name in known if (regimes == name).any()]
         return np.vectorize(known.get, otypes=[object])(regimes), [
             (known[name], name or "failed") for name in present
         ]
-    values = picture["critical"]
-    low, high = (float(end(values, initial=0.0, where=np.isfinite(values))) for end in (np.min, np.max))
-    low = float(np.nanmin(values)) if np.isfinite(values).any() else low
+    values, shades = picture["critical"], colormaps["cividis"]
+    there = values[np.isfinite(values)]
+    low, high = (float(there.min()), float(there.max())) if there.size else (0.0, 1.0)
     level = np.round(np.nan_to_num((values - low) / ((high - low) or 1.0)) * (_SHADES - 1)) / (_SHADES - 1)
-    shades = np.vectorize(lambda each: to_hex(colormaps["cividis"](each)), otypes=[object])(level)
-    ends = [(to_hex(colormaps["cividis"](end)), shown(value)) for end, value in ((0.0, low), (1.0, high))]
-    return np.where(np.isfinite(values), shades, "#ffffff"), [*ends, ("#ffffff", "none")]
+    colours = np.vectorize(lambda each: to_hex(shades(float(each))), otypes=[object])(level)
+    unit = picture.units["critical"]
+    ends = [(to_hex(shades(end)), shown(float(f"{value:.4g}"), unit)) for end, value in ((0.0, low), (1.0, high))]
+    return np.where(np.isfinite(values), colours, _NONE), [*ends, (_NONE, "none found")]
 
 
 def _text(value: Any, unit: str) -> str:

@@ -75,7 +75,10 @@ class Browser:
             method, given = event.get("method"), event.get("params", {})
             if method in ("Runtime.exceptionThrown", "Log.entryAdded", "Runtime.consoleAPICalled"):
                 wrong.append(given)
-            elif method == "Network.requestWillBeSent" and given["request"]["url"].split(":")[0] not in ("file", "data"):
+            elif method == "Network.requestWillBeSent" and given["request"]["url"].split(":")[0] not in (
+                "file",
+                "data",
+            ):
                 wrong.append(given["request"]["url"])
         return wrong
 
@@ -95,7 +98,16 @@ def browser() -> Iterator[Browser]:
     with TemporaryDirectory() as profile:
         flags = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run"]
         shell = f'exec "$@" 3<&{their_reads} 4>&{their_writes}'
-        command = ["bash", "-c", shell, "bash", program, *flags, "--remote-debugging-pipe", f"--user-data-dir={profile}"]
+        command = [
+            "bash",
+            "-c",
+            shell,
+            "bash",
+            program,
+            *flags,
+            "--remote-debugging-pipe",
+            f"--user-data-dir={profile}",
+        ]
         process = subprocess.Popen(
             command, pass_fds=(their_reads, their_writes), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
         )
