@@ -53,7 +53,7 @@ def draw(picture: SweepPicture) -> Figure:
     layers = {"" if critical else shown.replace("_", " ").capitalize(): draw_shown}
     layers = layers if critical else {"Regime": _draw_regimes, **layers}
     if sliced:
-        pieces = _slices(picture)
+        pieces = slices(picture)
         width, height = max(_MAP_WIDTH, 1.2 + _PANEL_WIDTH * len(pieces)), 4.6 if critical else 7.2
     else:
         pieces = [(f" on the way {way}" if way else "", picture.towards(way)) for way in picture.directions]
@@ -77,7 +77,7 @@ def draw(picture: SweepPicture) -> Figure:
     return figure
 
 
-def _slices(picture: SweepPicture) -> list[tuple[str, SweepPicture]]:
+def slices(picture: SweepPicture) -> list[tuple[str, SweepPicture]]:
     """Title and picture for each value of the shortest axis, or of an axis of texts if there is one."""
     lengths = [len(axis.values) for axis in picture.axes]
     short = [number for number in range(3) if lengths[number] <= MOST_PANELS]

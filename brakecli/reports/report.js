@@ -11,7 +11,10 @@ for (const figure of document.querySelectorAll("figure.map")) {
     for (const [name, value] of Object.entries(box)) cursor.setAttribute(name, value);
     cursor.setAttribute("visibility", "visible");
     const values = [[data.names[0], data.xs[at[0]]], [data.names[1], data.ys[at[1]]]];
-    for (const [name, column] of Object.entries(data.columns)) values.push([name, column[at[0]][at[1]]]);
+    for (const [name, column] of Object.entries(data.columns)) {
+      const value = column.values[at[0]][at[1]];
+      values.push([name, value === null ? "–" : column.texts ? column.texts[value] : `${value} ${column.unit}`.trim()]);
+    }
     output.replaceChildren(...values.filter(([name, value]) => name && value).map(([name, value]) => {
       const item = document.createElement("span"), bold = document.createElement("b");
       bold.textContent = `${name} `;

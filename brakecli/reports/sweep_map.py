@@ -12,10 +12,12 @@ from matplotlib.colors import to_hex
 from brakecli.analysis.regime.verdict import Regime
 from brakecli.plots import style
 from brakecli.plots.axis import Axis
+from brakecli.plots.maps import slices
 from brakecli.plots.sweep import REGIMES, SweepPicture
 from brakecli.reports.blocks import shown
 
 MOST = 10_000  # points whose values are on the page
+_WORDY = 2000  # up to here with the reasons, and with five digits
 WIDTH, HEIGHT = 400.0, 260.0  # of the cells, in units of the drawing; a row alone is lower
 _TICKS, _SHADES, _NONE = 7, 32, "#f2f2f2"
 _LETTERS = {
@@ -58,17 +60,13 @@ class Map:
 
 
 def maps(picture: SweepPicture, names: list[str]) -> Iterator[Map]:
-    """A map of the first two axes for each direction and each value of a third one."""
-    if picture["status"].size > MOST:
-        return
-    for way in picture.directions:
+    """A map for each direction and each value of a third axis; none where there are too many points."""
+    size = picture["status"].size
+    names = names if size <= _WORDY else [name for name in names if name != "reason"]
+    for way in picture.directions if size <= MOST else ():
         piece = picture.towards(way)
-        places = [range(len(axis.values)) for axis in piece.axes[2:]]
-        for place in product(*places):
-            part, titles = piece, [f"on the way {way}"] * bool(way)
-            for at in place:
-                titles.append(part.axes[2].named(at))
-                part = part.at(2, at)
+        for title, part in slices(piece) if len(piece.axes) == 3 else [("", piece)]:
+            titles = [f"on the way {way}"] * bool(way) + [title] * bool(title)
             yield _map(part, names, ", ".join(titles))
 
 
@@ -92,7 +90,7 @@ def _map(picture: SweepPicture, names: list[str], title: str) -> Map:
     columns = {}
     for name in names:
         values, unit = picture[name].reshape(shape), picture.units.get(name, "")
-        columns[name.replace("_", " ")] = [[_text(value, unit) for value in row] for row in values.tolist()]
+        columns[name.replace("_", " ")] = _numbers(values, unit) if values.dtype.kind in "iuf" else _texts(values)
     data = {
         "x": x.edges,
         "y": y.edges,
@@ -134,7 +132,17 @@ def _colours(picture: SweepPicture) -> tuple[style.Array, list[tuple[str, str]]]
     return np.where(np.isfinite(values), colours, _NONE), [*ends, (_NONE, "none found")]
 
 
-def _text(value: Any, unit: str) -> str:
-    if isinstance(value, float):
-        return shown(float(f"{value:.5g}"), unit) if np.isfinite(value) else "–"
-    return shown(value, unit)
+def _numbers(values: style.Array, unit: str) -> dict[str, Any]:
+    """Numbers in the unit of the largest, with the digits that a reader needs; null where there is none."""
+    factor, unit = style.prefixed(style.largest(values), unit)
+    digits = 5 if values.size <= _WORDY else 4
+    kept = [
+        [float(f"{factor * x:.{digits}g}") if np.isfinite(x) else None for x in row] for row in values.tolist()
+    ]
+    return {"unit": unit, "values": kept}
+
+
+def _texts(values: style.Array) -> dict[str, Any]:
+    """Texts, each of them once, and the number of the text of each point."""
+    texts, places = np.unique(values, return_inverse=True)
+    return {"texts": texts.tolist(), "values": places.reshape(values.shape).tolist()}
