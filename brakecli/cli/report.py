@@ -11,7 +11,7 @@ def command(
     results: Annotated[
         list[Path], source_argument("FILE.h5…", "Results of runs, sweeps, comparisons or stability.")
     ],
-    output: Annotated[Path, output_option("Page", "report.html, here")] = Path("report.html"),
+    output: Annotated[Path | None, output_option("Page", "report.html, here")] = None,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
@@ -20,7 +20,8 @@ def command(
     from brakecli.reports.page import write_report
     from brakecli.runs.limits import within_range
 
+    target = output or Path("report.html")
     with progress(quiet) as show_progress, within_range():
-        write_report(results, output, force=force, progress=show_progress)
+        write_report(results, target, force=force, progress=show_progress)
     if not quiet:
-        show(f"{output}: written")
+        show(f"{target}: written")
