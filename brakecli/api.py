@@ -65,7 +65,8 @@ def run(
 
     Args:
         case: path of a case file or of a result, or what `load` gave.
-        settings: keys of the case to change, as `{"friction.coefficient": 0.4}`.
+        settings: keys of the case to change, as `{"friction.coefficient": 0.4}`; a table as
+            `{"solver": {"tolerance": 1e-4}}` replaces the one that the case has.
         output: a result file to keep; none if left out.
         force: replace that file if it exists.
 
@@ -265,16 +266,16 @@ def _case(source: "Source | LoadedSweep", settings: "Settings | None") -> "Loade
 
 
 def _overrides(settings: "Settings | None") -> list[str]:
-    """Settings as `--set` has them; those of a table are set one by one."""
+    """Settings as `--set` has them; a table replaces the one that the case has."""
+    return [f"{key}={_toml(value)}" for key, value in (settings or {}).items()]
+
+
+def _toml(value: Any) -> str:
     import tomli_w
 
-    found = list[str]()
-    for key, value in (settings or {}).items():
-        if isinstance(value, Mapping):
-            found += _overrides({f"{key}.{name}": each for name, each in value.items()})
-        else:
-            found.append(f"{key}={tomli_w.dumps({'value': _plain(value)}).removeprefix('value = ').strip()}")
-    return found
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{key} = {_toml(each)}" for key, each in value.items()) + "}"
+    return tomli_w.dumps({"value": _plain(value)}).removeprefix("value = ").strip()
 
 
 def _axis(vary: "Mapping[str | tuple[str, ...], Iterable[float]]") -> "Axis":

@@ -21,7 +21,7 @@ from tests.commands import brakecli as command
 
 HERE = Path()
 CASE = str(ROOT / "cases" / "relaxation.toml")
-SHORT = {"solver": {"duration": 0.2}, "output.sample_interval": 5e-5}
+SHORT = {"solver.duration": 0.2, "output.sample_interval": 5e-5}
 SET = ("--set", "solver.duration=0.2", "--set", "output.sample_interval=5e-5")
 
 
@@ -113,6 +113,8 @@ def test_a_signal_is_classified(tmp_path: Path) -> None:
 def test_errors_are_those_of_the_commands(tmp_path: Path) -> None:
     with pytest.raises(CaseError, match=r"friction\.coefficient: is out of range"):
         brakecli.run(CASE, {"friction.coefficient": -1})
+    with pytest.raises(CaseError, match=r"link2\.stiffness: is missing"):
+        brakecli.run(CASE, {"link2": {"angle_deg": 5}})
     with pytest.raises(CaseError, match="link3: is unknown"):
         brakecli.sweep(CASE, axes={"link3.angle_deg": [1.0]})
     with pytest.raises(CaseError, match="cannot be read"):
@@ -130,7 +132,10 @@ def test_errors_are_those_of_the_commands(tmp_path: Path) -> None:
 
 def test_a_run_that_fails_raises_and_keeps_its_history(tmp_path: Path) -> None:
     (tmp_path / "tiny.toml").write_text(TINY)
-    with pytest.warns(UserWarning), pytest.raises(BrakecliError, match="grew beyond all bounds"):
+    with (
+        pytest.warns(UserWarning, match="not resolved"),
+        pytest.raises(BrakecliError, match="grew beyond all bounds"),
+    ):
         brakecli.run(tmp_path / "tiny.toml", {"load.force": 1e25}, output=tmp_path / "r.h5")
     assert brakecli.load(tmp_path / "r.h5").attrs["status"] == "failed"
 

@@ -85,10 +85,27 @@ ENERGY = (
     Field("closing_error", "J", "sum that the other items leave, 0 for an exact account"),
     ratio("relative_closing_error", "closing error over the largest item, `stored` included"),
 )
+VIBRATION = (
+    Field("start", "s", "start of an interval of vibration"),
+    Field("end", "s", "its end"),
+    Field("frequency", "Hz", "frequency where vx is largest"),
+    Field("amplitude", "m", "half of peak to peak of x there"),
+    Field("speed", "m/s", "speed of the wheel's surface there"),
+)
+VIBRATIONS = Field(
+    "vibrations",
+    "",
+    "where speed or load change: the intervals in which it vibrates",
+    OBJECT,
+    at="over_time.vibrations",
+    in_file=False,
+    rows=VIBRATION,
+)
 RUN = (
     Field("status", "", "how the run has ended: done or failed", TEXT),
     Field("failure", "", "time and reason of a failure", TEXT, at="motion.work.failure_sentence"),
     *VERDICT,
+    VIBRATIONS,
     Field(
         "spectrum_peak",
         "Hz",
@@ -138,6 +155,18 @@ UNCONVERGED = (
     Field("time", "s", "time of an unconverged step"),
     Field("residual", "N", "residual of an unconverged step"),
 )
+
+INTERVAL = integer("interval", "interval of vibration, from 0")
+WINDOW_TIME = Field("time", "s", "middle of a window of time")
+OVER_TIME = (
+    Field("speed", "m/s", "speed of the wheel's surface"),
+    Field("load", "N", "pressing force"),
+    Field("frequency", "Hz", "frequency of the highest peak of vx; missing where it does not vibrate"),
+    Field("amplitude", "m", "half of peak to peak of x, without its trend"),
+    ratio("stick_fraction", "part of the time in stick"),
+    Field("braking_torque", "N m", "mean torque of the friction force"),
+)
+SHORT_TIME = Field("vx", "(m/s)2 Hz-1", "power spectral density of vx in each window", "(1,)f8", at="density")
 
 # A sweep
 

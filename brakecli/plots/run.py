@@ -20,6 +20,7 @@ from brakecli.errors import CaseError, UsageError
 from brakecli.files.read import StoredResult
 from brakecli.plots import style
 from brakecli.plots.quantities import VARIABLES, Scaled, scaled
+from brakecli.plots.stop import Stop, draw_amplitude, draw_spectrogram
 from brakecli.solver.quantities import ContactState
 from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import System
@@ -93,6 +94,7 @@ class RunPicture:
             tuple(sorted(fastest * system.wheel.turns)) if steady and fastest else ()
         )  # Hz, of its waves
         self.modes = _mode_frequencies(system)
+        self.stop = Stop(result, system) if "spectrogram" in result.file else None
 
 
 def _mode_frequencies(system: System) -> list[float]:
@@ -167,23 +169,28 @@ def _summary(attributes: dict[str, Any]) -> str:
 
 
 def draw(picture: RunPicture) -> Figure:
-    """The figure with its four panels."""
-    figure = style.headed(10.4, 7.2, picture.title, picture.summary, columns=2, wspace=0.05, hspace=0.06)
-    panels = style.panels(figure, 2, 2, width_ratios=(1.55, 1.0))
+    """The figure with its four panels; two more where speed or load change."""
+    rows = 3 if picture.stop else 2
+    lines = picture.title, picture.summary
+    figure = style.headed(10.4, 3.6 * rows, *lines, columns=2, wspace=0.05, hspace=0.06)
+    panels = style.panels(figure, rows, 2, width_ratios=(1.55, 1.0))
     drawing = (_draw_detail, _draw_portrait, _draw_history, _draw_spectrum)
-    for axes, draw_panel in zip(panels.flat, drawing, strict=True):
+    for axes, draw_panel in zip(panels[:2].flat, drawing, strict=True):
         draw_panel(axes, picture)
+    if picture.stop:
+        draw_spectrogram(panels[2, 0], picture.stop, picture.modes)
+        draw_amplitude(panels[2, 1], picture.stop)
     apart = {"vx": panels[0], "x": panels[0, 1:]}.get(picture.variable, ()) if not picture.near else ()
     for axes in apart:
         note = f"U = {picture.detail['belt'][-1]:.4g} m/s, off the scale"
         axes.set_title(note, loc="right", size=8.5, color=style.VERMILION)
-    spans: tuple[Any, ...] = (picture.detail["time"], picture.span)
-    for axes, time in zip(panels[:, 0], spans, strict=True):
+    spans: tuple[Any, ...] = (picture.detail["time"], picture.span, picture.span)
+    for axes, time in zip(panels[:, 0], spans, strict=False):
         unit = style.set_ticks(axes.xaxis, float(time[0]), float(time[-1]), "s")
         axes.set_xlabel(style.labelled("time", unit))
         if time[-1] > time[0]:
             axes.set_xlim(time[0], time[-1])
-        if axes.get_legend_handles_labels()[1]:  # with room for the legend above the data
+        if axes in panels[:2, 0] and axes.get_legend_handles_labels()[1]:  # with room for the legend above the data
             low, high = axes.get_ylim()
             axes.set_ylim(low, high + 0.14 * (high - low))
             axes.legend(loc="upper right", ncols=3)

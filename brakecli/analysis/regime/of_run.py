@@ -13,6 +13,7 @@ import numpy as np
 from brakecli.analysis.regime.evidence import Part
 from brakecli.analysis.regime.forced import forced_lines, subharmonics
 from brakecli.analysis.regime.linear import linear_theory
+from brakecli.analysis.regime.over_time import over_time
 from brakecli.analysis.regime.ripple import ripple
 from brakecli.analysis.regime.rules import classify
 from brakecli.analysis.regime.verdict import Context, Excitation, Feeds, Regime, Thresholds, Verdict
@@ -32,7 +33,9 @@ from brakecli.solver.system import System
 def classify_result(path: Path, thresholds: Thresholds) -> dict[str, Any]:
     """Names and values of the verdict on a stored run; raises UnreadableResultError for anything else."""
     with stored_run(path) as (system, history, failure):
-        return numbers_of(verdict_on(history, system, failure, thresholds), failure)
+        found = {"over_time": None if failure else over_time(history, system)}
+        verdict = verdict_on(history, system, failure, thresholds)
+        return {**numbers_of(verdict, failure), "vibrations": fields.VIBRATIONS.read(found)}
 
 
 @contextmanager
