@@ -35,7 +35,10 @@ VERDICT = (
     Field("amplitude_own", "m", "on a rough wheel: what the shoe adds", at="verdict."),
     Field("frequency_resolution", "Hz", "distance of two lines in the spectrum", at="verdict."),
     Field(
-        "torque_variation", "N m", "braking torque, peak to peak; a median where the motion lasts", at="verdict."
+        "torque_variation",
+        "N m",
+        "braking torque, peak to peak; missing if samples miss impacts",
+        at="verdict.",
     ),
     integer("settled", "whether a settled part was found (0, 1); otherwise the second half is judged", "verdict."),
     Field("settled_from", "s", "start of the settled part, or of the second half", at="verdict."),
@@ -131,7 +134,7 @@ RUN = (
     Field("energy", "", "the account of energies", OBJECT, "motion.", group="energy", rows=ENERGY),
     Field("modelled", "", "parts of the model that the run has used", OBJECT),
     Field("left_out", "", "parts of the model that the run has left out, and why this is safe", OBJECT),
-    Field("adjustments", "", "how step and duration were made to fit", OBJECT, at="check."),
+    Field("adjustments", "", "how step, duration and measured profiles were made to fit", OBJECT, at="check."),
     Field("warnings", "", "what a careful user should know", OBJECT),
     Field("solve_seconds", "s", "time of the loop", at="motion.work.solve_seconds", in_file=False),
 )
@@ -340,4 +343,46 @@ ADVICE = (
     Field("check", "", "a run of the case with the first advice followed", OBJECT, rows=CHECK_RUN),
     Field("notes", "", "what the answer rests on", OBJECT),
     Field("conclusion", "", "the answer in a sentence", TEXT),
+)
+
+# What a file holds, and how two differ, in JSON alone
+
+HELD = (
+    Field("group", "", "group of the file", TEXT),
+    Field("name", "", "name of the variable", TEXT),
+    Field("dims", "", "names of its axes", OBJECT),
+    Field("shape", "1", "their lengths", OBJECT),
+    Field("units", "", "its unit", TEXT),
+    Field("meaning", "", "what it is", TEXT),
+)
+INFO = (
+    Field("file", "", "the file", TEXT, at="path"),
+    *named(RUN, "status"),
+    Field("kind", "", "run, sweep, comparison or stability", TEXT),
+    Field("title", "", "title of the case or of the sweep", TEXT),
+    Field("whole", "", "whether every byte is as it was written; false where another program has changed it", "?"),
+    integer("bytes", "size of the file"),
+    integer("format_version", "version of the form of the file"),
+    Field("versions", "", "versions of brakecli and of the libraries that made it", OBJECT),
+    Field("variables", "", "all variables", OBJECT, rows=HELD),
+)
+DIFFERENT_VALUE = (
+    Field("name", "", "key of the case, or name of the number with its group", TEXT),
+    Field("a", "", "value in the first file; null where there is none", OBJECT),
+    Field("b", "", "value in the second file; null where there is none", OBJECT),
+)
+DIFFERENT_VARIABLE = (
+    *HELD[:2],
+    Field("shapes", "1", "lengths of its axes in both files; null where it is missing", OBJECT),
+    integer("compared", "number of values that are in both"),
+    integer("different", "number of those that differ"),
+    Field("largest", "of the variable", "largest difference of two values; null for texts"),
+    ratio("relative", "that over the largest value in both; null where that is 0"),
+)
+DIFFERENCE_OF_TWO = (
+    Field("same", "", "whether case, numbers and variables are the same", "?"),
+    Field("case", "", "keys of the case and of the sweep that differ", OBJECT, rows=DIFFERENT_VALUE),
+    Field("numbers", "", "attributes that differ", OBJECT, rows=DIFFERENT_VALUE),
+    Field("variables", "", "variables that differ", OBJECT, rows=DIFFERENT_VARIABLE),
+    Field("versions", "", "versions that differ", OBJECT, rows=DIFFERENT_VALUE),
 )

@@ -190,7 +190,9 @@ def draw(picture: RunPicture) -> Figure:
         axes.set_xlabel(style.labelled("time", unit))
         if time[-1] > time[0]:
             axes.set_xlim(time[0], time[-1])
-        if axes in panels[:2, 0] and axes.get_legend_handles_labels()[1]:  # with room for the legend above the data
+        if (
+            axes in panels[:2, 0] and axes.get_legend_handles_labels()[1]
+        ):  # with room for the legend above the data
             low, high = axes.get_ylim()
             axes.set_ylim(low, high + 0.14 * (high - low))
             axes.legend(loc="upper right", ncols=3)

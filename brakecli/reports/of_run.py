@@ -31,6 +31,7 @@ PICTURE = "The motion in detail, its phase portrait, the whole history, and the 
 MARGIN = 0.2  # of the friction, that advice aims at
 VALUES = 121  # of the friction in the lock-in diagram
 MOST_SENSITIVE = 6
+_UNITS = [each.units for each in fields.VIBRATION]
 _IDLE = ("initial.", "solver.", "output.")  # keys that stand below the others
 _WORDS = {
     Regime.RELAXATION: "It vibrates, with stick in every cycle or nearly (relaxation)",
@@ -59,7 +60,11 @@ def part_of_run(result: StoredResult, progress: Progress) -> Part:
         Section("Warnings", [Texts(_warnings(found, advice))]),
         Section("How to repeat it", repeat(result, again, result.text("case_toml"))),
     ]
-    answer = [_sentence(found), f"By theory: {advice.conclusion()}."]
+    stretches = [
+        f"It vibrates from {shown(start, 's')} to {shown(end, 's')}: {shown(frequency, 'Hz')} at {shown(speed, 'm/s')}."
+        for start, end, frequency, _, speed in _vibrations(result)
+    ]
+    answer = [_sentence(found), *stretches, f"By theory: {advice.conclusion()}."]
     name, title = escaped(result.path.name), loaded.case.title or "Case without a title"
     return Part(name, title, QUESTION, answer, sections, versions(found))
 
@@ -192,7 +197,22 @@ def _regime(result: StoredResult) -> list[Any]:
         for name, value in sorted(evidence.items())
     ]
     reasons = Texts([f"{reason[:1].upper()}{reason[1:]}." for reason in map(str, found.get("reasons", ()))])
-    return [reasons, Table(rows), Table(proof, ("evidence", "value"), "All numbers by which the rules decided")]
+    intervals, head = _vibrations(result), [each.meaning for each in fields.VIBRATION]
+    beats = [Table([[shown(*each) for each in zip(row, _UNITS, strict=True)] for row in intervals], head)]
+    return [
+        reasons,
+        *beats * bool(intervals),
+        Table(rows),
+        Table(proof, ("evidence", "value"), "All numbers by which the rules decided"),
+    ]
+
+
+def _vibrations(result: StoredResult) -> list[list[float]]:
+    """Where speed or load change: start, end, frequency, amplitude and speed of each interval of vibration."""
+    if "vibrations" not in result.file:
+        return []
+    columns = [result.read("vibrations", each.name) for each in fields.VIBRATION]
+    return [[float(f"{value:.4g}") for value in row] for row in zip(*columns, strict=True)]
 
 
 def _accuracy(result: StoredResult) -> list[Any]:

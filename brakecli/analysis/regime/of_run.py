@@ -64,9 +64,10 @@ def verdict_on(
     failure: str | None,
     limits: Thresholds | None = None,
     feeds: Feeds = Feeds.UNKNOWN,
+    sticks: float = 0.0,
 ) -> Verdict:
-    """The verdict on the motion of a system; a run that has failed has none. `feeds` is what is known already."""
-    verdict = classify(history, replace(context(system), feeds=feeds), limits or Thresholds())
+    """The verdict on a motion; a run that has failed has none. `feeds`, `sticks`: what a second run has shown."""
+    verdict = classify(history, replace(context(system), feeds=feeds, sticks=sticks), limits or Thresholds())
     if not failure:
         return verdict
     verdict = replace(verdict, growth_rate=None, ringing_frequency=None, frequency=None, settled=False)
@@ -99,6 +100,7 @@ def context(system: System) -> Context:
     return Context(
         belt,
         radius=system.radius,
+        step=0.0 if system.method.own_steps or system.method.step is None else system.step,
         steady=len(system.belt) == 1 and len(system.load) == 1,
         forced=forced_lines(belt, turns, highest),
         subharmonics=subharmonics(belt, turns, highest),
