@@ -61,10 +61,10 @@ def part_of_run(result: StoredResult, progress: Progress) -> Part:
         Section("How to repeat it", repeat(result, again, result.text("case_toml"))),
     ]
     stretches = [
-        f"It vibrates from {shown(start, 's')} to {shown(end, 's')}: {shown(frequency, 'Hz')} at {shown(speed, 'm/s')}."
-        for start, end, frequency, _, speed in _vibrations(result)
+        f"It vibrates from {shown(start, 's')} to {shown(end, 's')}: {shown(rate, 'Hz')} at {shown(speed, 'm/s')}."
+        for start, end, rate, _, speed in _vibrations(result)
     ]
-    answer = [_sentence(found), *stretches, f"By theory: {advice.conclusion()}."]
+    answer = [*stretches, _sentence(found), f"By theory: {advice.conclusion()}."]
     name, title = escaped(result.path.name), loaded.case.title or "Case without a title"
     return Part(name, title, QUESTION, answer, sections, versions(found))
 
