@@ -114,10 +114,11 @@ def _scale(picture: SweepPicture, name: str) -> Scale:
 
 def _draw_regimes(axes: Axes, picture: SweepPicture, _: Scale) -> ScalarMappable:
     codes = np.full(picture["regime"].shape, np.nan)
-    for code, (regime, (colour, _marker)) in enumerate(REGIMES.items()):
+    for code, (regime, (colour, _)) in enumerate(REGIMES.items()):
+        marker = "X" if regime == Regime.UNDECIDED else "s"  # its cells have a cross
         if (where := picture["regime"] == regime).any():
             codes[where] = code
-            axes.plot([], [], "s", ms=9, mfc=colour, mec="none", label=str(regime))
+            axes.plot([], [], marker, ms=9, mfc=colour, mec="none", label=str(regime))
     colours = ListedColormap([colour for colour, _marker in REGIMES.values()])
     shaken = {"marker": "o", "color": style.DARK, "mec": "white", "label": FORCED}
     different = {"marker": "$≠$", "color": style.DARK, "label": DIFFERENT}
