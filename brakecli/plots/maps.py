@@ -114,7 +114,7 @@ def _scale(picture: SweepPicture, name: str) -> Scale:
 
 def _draw_regimes(axes: Axes, picture: SweepPicture, _: Scale) -> ScalarMappable:
     codes = np.full(picture["regime"].shape, np.nan)
-    for code, (regime, (colour, _)) in enumerate(REGIMES.items()):
+    for code, (regime, (colour, _marker)) in enumerate(REGIMES.items()):
         marker = "X" if regime == Regime.UNDECIDED else "s"  # its cells have a cross
         if (where := picture["regime"] == regime).any():
             codes[where] = code

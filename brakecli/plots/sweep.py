@@ -178,6 +178,38 @@ def gather(
         sweep = parse_table(Sweep, str(result.attributes.get("resolved_sweep_toml", "")), "its resolved sweep")
     except CaseError as error:
         raise style.unreadable(result, f"the sweep in it is not valid: {error.problems[0]}") from error
+    known, variables = result.variables("/"), _variables(result, sweep, shown, more)
+    dims = known["status"].dims
+    both = dims[:1] == ("direction",)
+    units = {name: str(each.attributes.get("units", "")) for name, each in known.items()}
+    units = {name: unit if unit != "1" else "" for name, unit in units.items()}
+    long_names = {name: str(each.attributes.get("long_name", "")) for name, each in known.items()}
+    axes = []
+    for number, dimension in enumerate(dims[both:], start=1):
+        values = result.read("/", dimension)
+        texts = tuple(values.tolist()) if values.dtype.kind == "U" else None
+        order = np.arange(len(values)) if texts else np.argsort(values, kind="stable")
+        places = (order if texts else values[order]).astype(np.float64)
+        axes.append(Axis(dimension, long_names[dimension], units[dimension], places, texts))
+        variables = {name: np.take(values, order, number) for name, values in variables.items()}
+    title = str(result.attributes.get("title", "")) or "Sweep without a title"
+    findings = tuple(map(str, result.attributes.get("findings", ())))
+    way = next((axis.direction for axis in sweep.axis if axis.direction), "")
+    ways = ("up", "down") if both else (way,)
+    picture = SweepPicture(
+        title, findings, (), ways, tuple(axes), variables, units, long_names, sweep.critical, shown
+    )
+    for wanted in select:  # findings about the whole sweep need not hold for a part of it
+        picture = replace(_selected(picture, wanted, result), findings=())
+    for axis in picture.axes:
+        if len(axis.values) == 1:
+            picture = picture.at(picture.axes.index(axis), 0)
+    _check_drawable(picture, result)
+    return picture
+
+
+def _variables(result: StoredResult, sweep: Sweep, shown: str, more: Sequence[str]) -> dict[str, style.Array]:
+    """What is drawn of the points, over the directions and the axes as they lie in the file."""
     known = result.variables("/")
     names = _NEEDED + (_CRITICAL if sweep.critical is not None else ())
     if missing := [name for name in names if name not in known]:
@@ -212,31 +244,7 @@ def gather(
         variables[name] = np.where(variables["status"] == Status.DONE, variables[name], "")
     differ = result.read("/", "hysteresis") == 1 if both and "hysteresis" in known else False
     variables["hysteresis"] = np.broadcast_to(differ, variables["status"].shape)
-    units = {name: str(each.attributes.get("units", "")) for name, each in known.items()}
-    units = {name: unit if unit != "1" else "" for name, unit in units.items()}
-    long_names = {name: str(each.attributes.get("long_name", "")) for name, each in known.items()}
-    axes = []
-    for number, dimension in enumerate(dims[both:], start=1):
-        values = result.read("/", dimension)
-        texts = tuple(values.tolist()) if values.dtype.kind == "U" else None
-        order = np.arange(len(values)) if texts else np.argsort(values, kind="stable")
-        places = (order if texts else values[order]).astype(np.float64)
-        axes.append(Axis(dimension, long_names[dimension], units[dimension], places, texts))
-        variables = {name: np.take(values, order, number) for name, values in variables.items()}
-    title = str(result.attributes.get("title", "")) or "Sweep without a title"
-    findings = tuple(map(str, result.attributes.get("findings", ())))
-    way = next((axis.direction for axis in sweep.axis if axis.direction), "")
-    ways = ("up", "down") if both else (way,)
-    picture = SweepPicture(
-        title, findings, (), ways, tuple(axes), variables, units, long_names, sweep.critical, shown
-    )
-    for wanted in select:  # findings about the whole sweep need not hold for a part of it
-        picture = replace(_selected(picture, wanted, result), findings=())
-    for axis in picture.axes:
-        if len(axis.values) == 1:
-            picture = picture.at(picture.axes.index(axis), 0)
-    _check_drawable(picture, result)
-    return picture
+    return variables
 
 
 def numeric(result: StoredResult) -> list[str]:
