@@ -11,7 +11,7 @@ from brakecli.analysis.regime.spectra import Array, line_share, rises
 CERTAIN = 15.0  # a line's power over the mean of the noise, which reaches it in one bin of three million
 _RIPPLE = 0.3  # ripple within this part of the mean size of the velocity does not count as a cycle
 _SPIKES = (8.0, 0.35)  # deviations, and part of the signal's range, by which a spike leaves its neighbours' median
-_NOISE_SHARE = 0.6
+NOISE_SHARE = 0.6
 _SMOOTHED_AWAY = 0.15
 _QUIET = 0.02
 _DRIFT_CYCLES = 8.0
@@ -56,7 +56,7 @@ class Velocity:
         found, most = [], 0.0
         for m in (1 << k for k in range(max(1, len(self.values) // 100).bit_length())):
             variance = float(self.thinned(m).var())
-            if self.noise_at(m) >= _NOISE_SHARE * variance:  # little but noise
+            if self.noise_at(m) >= NOISE_SHARE * variance:  # little but noise
                 continue
             most = max(most, variance - self.noise_at(m))
             if variance - self.noise_at(m) < _SMOOTHED_AWAY * most:
@@ -86,35 +86,39 @@ class Velocity:
         ratio = float(envelope[-third:].mean()) / max(float(envelope[:third].mean()), 1e-300)
         return envelope, ratio, float(np.corrcoef(ranks, np.arange(windows))[0, 1])
 
-    def denoised(self) -> tuple[Array, Array]:
+    def denoised(self, *, hann: bool = False) -> tuple[Array, Array]:
         """The velocity made of those lines only that stand out of the noise, and their power over rfft's bins."""
         values = _handy(self.values)
-        spectrum = np.fft.rfft(values)
+        window = np.hanning(len(values)) if hann else np.ones(1)
+        spectrum = np.fft.rfft(values * window)
         turn = np.linspace(0.0, np.pi, len(spectrum))
         gain = np.ones(len(turn)) if self.measured else 2.0 - 2.0 * np.cos(turn)
         power = np.abs(spectrum) ** 2
-        lines = (power > CERTAIN * len(values) * self.noise**2 * gain) & (turn > 0.0)
+        lines = (power > CERTAIN * len(values) * np.mean(window**2) * self.noise**2 * gain) & (turn > 0.0)
         return np.fft.irfft(np.where(lines, spectrum, 0.0), len(values)), np.where(lines, power, 0.0)
 
 
 def cleaned(values: Array, is_velocity: bool) -> tuple[Velocity, list[str]]:
-    """The velocity of a signal without its gaps, spikes and drift; notes report each of them."""
+    """The velocity of a signal without its gaps and spikes; notes report each of them."""
     notes: list[str] = []
     if len(values) >= _SHORTEST and not np.isfinite(values).all():
         cycle = _cycle(_velocity(_bridged(values), is_velocity))
         values = _bridged(_longest_piece(values, max(1.0, 0.25 * cycle), notes))
     if len(values) < _SHORTEST:
         return _velocity(values, is_velocity), notes
-    values = _without_spikes(values, is_velocity, notes)
-    velocity = _velocity(values, is_velocity)
-    width = int(_DRIFT_CYCLES * _cycle(velocity))
-    if 2 * width < len(values):
-        drift, m = uniform_filter1d(velocity.values, width), velocity.quiet
-        variance = float(velocity.thinned(m).var()) - velocity.noise_at(m)
-        if float(drift.std()) > 0.1 * float(np.sqrt(max(variance, 0.0))):
-            notes.append("drift removed")
-        velocity = replace(velocity, values=velocity.values - drift)
-    return velocity, notes
+    return _velocity(_without_spikes(values, is_velocity, notes), is_velocity), notes
+
+
+def without_drift(velocity: Velocity, cycle: float, notes: list[str]) -> Velocity:
+    """The velocity without what is slower than some cycles, which have at least so many samples."""
+    width = int(_DRIFT_CYCLES * max(cycle, _cycle(velocity))) if len(velocity.values) >= _SHORTEST else 0
+    if not 0 < 2 * width <= len(velocity.values):
+        return velocity
+    drift, m = uniform_filter1d(velocity.values, width), velocity.quiet
+    variance = float(velocity.thinned(m).var()) - velocity.noise_at(m)
+    if float(drift.std()) > 0.1 * float(np.sqrt(max(variance, 0.0))):
+        notes.append("drift removed")
+    return replace(velocity, values=velocity.values - drift)
 
 
 def _velocity(values: Array, is_velocity: bool) -> Velocity:

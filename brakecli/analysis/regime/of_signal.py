@@ -10,14 +10,14 @@ from itertools import product
 
 import numpy as np
 
-from brakecli.analysis.regime.cleaning import CERTAIN, Velocity, cleaned
-from brakecli.analysis.regime.spectra import Array, line_share, rises
+from brakecli.analysis.regime.cleaning import CERTAIN, Velocity, cleaned, without_drift
+from brakecli.analysis.regime.spectra import Array, line_share
+from brakecli.analysis.regime.stick import Slips, seek
 from brakecli.analysis.regime.verdict import Decision, Excitation, Regime
 
 _FINE = 1000.0  # samples of a cycle, after interpolation, among which a plateau is sought
 _PLATEAU_SAMPLES = 1 << 20  # most samples in which a plateau is sought
 _SHORTEST_PLATEAU = 0.03  # of the time
-_PARTS = 7
 _FEWEST_SAMPLES = 64
 
 
@@ -52,6 +52,7 @@ class SignalThresholds:
     skewness_unlikely: float = 0.3  # of the velocity; up to here no stick, except a short one at the belt's speed
     skewness_certain: float = 0.9  # from here there is stick; two lines in step reach 0.816 and no more
     overtones: float = 0.03  # between the two: part of the energy in the third to eighth multiple that shows stick
+    beyond_lines: float = 0.003  # and above: part of the energy that three lines leave
     plateau: float = 2.6  # time at the belt's speed, over that next to it, that shows stick; a sine reaches 2.41
     line_share: float = 0.7  # part of the velocity's energy in three narrow bands in quasi-harmonic vibration
 
@@ -89,7 +90,12 @@ def classify_signal(
         metres *= signal.interval
     else:
         belt *= signal.interval
-    rules = _Rules(velocity, signal.interval, belt / (size or 1.0), thresholds)
+    slips = seek(velocity, thresholds.skewness_certain) if len(velocity.values) >= _FEWEST_SAMPLES else Slips()
+    certain = slips.skewness >= thresholds.skewness_certain and slips.stick_slip
+    velocity = without_drift(velocity, slips.period if certain else 0.0, notes)
+    if not certain and len(velocity.values) >= _FEWEST_SAMPLES:
+        slips = seek(velocity, thresholds.skewness_certain)  # drift may have hidden them
+    rules = _Rules(velocity, slips, signal.interval, belt / (size or 1.0), thresholds)
     decision = rules.short() or rules.unsettled() or rules.sticking() or rules.without_stick()
     amplitude = metres * velocity.amplitude(rules.start, rules.windows) if rules.above_noise else np.nan
     return SignalVerdict(
@@ -107,27 +113,27 @@ def classify_signal(
 class _Rules:
     """The rules on one velocity, in their order. They gather evidence until one of them decides."""
 
-    def __init__(self, velocity: Velocity, interval: float, belt: float, limits: SignalThresholds) -> None:
+    def __init__(self, velocity: Velocity, slips: Slips, interval: float, belt: float, limits: SignalThresholds) -> None:
         self.velocity, self.interval, self.limits, self.count = velocity, interval, limits, len(velocity.values)
+        self.slips = slips
         self.belt = belt  # the belt's speed, as the velocity would show it; NaN where it is not known
         self.duration, self.start, self.windows = self.count * interval, 0, 1
-        self.above_noise = self.count >= _FEWEST_SAMPLES and bool(velocity.variances)
+        self.certain = slips.skewness >= limits.skewness_certain and slips.stick_slip
+        self.above_noise = self.count >= _FEWEST_SAMPLES and (self.certain or bool(velocity.variances))
         self.evidence: dict[str, float] = {}
 
     def short(self) -> Decision | None:
         velocity, limits = self.velocity, self.limits
         if self.count < _FEWEST_SAMPLES:
             return Decision(f"only {self.count} samples without a gap; measure longer")
-        self._seek_stick()
         self.clean, self.power = velocity.denoised()
-        self.evidence |= {"samples": float(self.count), "skewness": self.skewness}
-        self.evidence |= {"smoothed_over": float(velocity.quiet), "events": float(self.events)}
+        self.evidence |= {"samples": float(self.count), "skewness": self.slips.skewness}
+        self.evidence |= {"smoothed_over": float(velocity.quiet), "events": float(self.slips.count)}
         if not self.above_noise:
             return Decision("the vibration is hidden by noise; measure closer to the shoe, or with less noise")
         self.strongest = strongest = int(np.argmax(self.power))
-        certain = self.skewness >= limits.skewness_certain and self.events >= limits.fewest_cycles
-        if certain or self.power[strongest] == 0.0:
-            cycles, self.frequency = float(self.events), max(self.events, 1) / self.duration
+        if self.certain or self.power[strongest] == 0.0:
+            cycles, self.frequency = float(self.slips.count), max(self.slips.count, 1) / self.duration
         else:
             length = len(self.clean) * self.interval
             cycles, self.frequency = strongest * self.duration / length, max(strongest, 1) / length
@@ -164,24 +170,29 @@ class _Rules:
     def sticking(self) -> Decision | None:
         """Decides where stick has skewed the velocity; undecided if noise hides whether two lines in step did."""
         limits, velocity, total = self.limits, self.velocity, float(self.power.sum())
-        if self.events < limits.fewest_cycles or self.skewness < limits.skewness_unlikely:
+        slips, hidden = self.slips, "stick, or lines in phase, have skewed the velocity, and noise hides which of them"
+        few = slips.count < limits.fewest_cycles or slips.skewness < limits.skewness_unlikely
+        if few or (slips.skewness >= limits.skewness_certain and not self.certain):
             return None
-        if self.skewness < limits.skewness_certain:
+        if not self.certain:
             bands = [
                 slice(int(0.97 * n * self.strongest), int(1.03 * n * self.strongest) + 2) for n in range(3, 9)
             ]
-            overtones = sum(float(self.power[band].sum()) for band in bands) / total
-            self.evidence |= {"overtones": overtones}
-            if overtones <= limits.overtones:
-                turn = 2.0 * np.pi * min(4.0 * self.frequency * self.interval, 0.5)
-                gain = 1.0 if velocity.measured else 2.0 - 2.0 * np.cos(turn)
-                if CERTAIN * self.count * velocity.noise**2 * gain <= limits.overtones / 3.0 * total:
-                    return None
-                what = "stick, or two lines in phase, have skewed the velocity, and noise hides which of them"
-                return Decision(f"{what}; measure with less noise, or for longer")
-        reason = f"{self.events} events of stick and slip: skewness of the velocity {self.skewness:.2g}"
-        often = self.events / self.duration
-        return Decision(reason, Regime.RELAXATION, frequency=often, stick_fraction=self.stick)
+            found, least = sum(float(self.power[band].sum()) for band in bands) / total, limits.overtones
+            self.evidence |= {"overtones": found}
+        else:
+            power = velocity.denoised(hann=True)[1]
+            found, least = 1.0 - line_share(power), limits.beyond_lines
+            self.evidence |= {"beyond_lines": found}
+        if found <= least:
+            turn = 2.0 * np.pi * min(4.0 * self.frequency * self.interval, 0.5)
+            gain = 1.0 if velocity.measured else 2.0 - 2.0 * np.cos(turn)
+            if CERTAIN * self.count * velocity.noise**2 * gain <= least / 3.0 * total:
+                return None
+            return Decision(f"{hidden}; measure with less noise, or for longer")
+        reason = f"{self.slips.count} events of stick and slip: skewness of the velocity {self.slips.skewness:.2g}"
+        often = self.slips.count / self.duration
+        return Decision(reason, Regime.RELAXATION, frequency=often, stick_fraction=self.slips.stick)
 
     def without_stick(self) -> Decision:
         top, beside = self._plateau()
@@ -206,26 +217,6 @@ class _Rules:
             return Decision(f"irregular without stick: {share:.0%} of the energy in three lines; measure longer")
         reason = f"sustained without stick: {share:.0%} of the energy of the velocity in at most three lines"
         return Decision(reason, Regime.QUASI_HARMONIC, frequency=self.frequency, stick_fraction=0.0)
-
-    def _seek_stick(self) -> None:
-        """Find the skewness, at the smoothing that shows it best, the events of slip, and the part of stick."""
-        velocity, sign, scale = self.velocity, 1.0, self.velocity.quiet
-        self.skewness, self.events, self.stick = 0.0, 0, 0.0
-        for m, _ in velocity.variances:
-            parts = [part - part.mean() for part in np.array_split(velocity.thinned(m), _PARTS)]
-            each = [np.mean(p * p * p) / max(float(np.mean(p * p)), 1e-100) ** 1.5 for p in parts]
-            skewness = float(np.median(each))  # a single jump does not change it
-            if abs(skewness) > max(self.skewness, 4.0 * np.sqrt(6.0 * m / self.count)):
-                self.skewness, sign, scale = abs(skewness), -np.sign(skewness), m
-        if self.skewness < self.limits.skewness_certain:
-            scale = velocity.quiet
-        values = sign * velocity.smoothed(scale)
-        values = values - values.mean()
-        bulk = values[values > 0.0]
-        if len(bulk):
-            middle, noise = float(np.median(bulk)), float(np.sqrt(velocity.noise_at(scale)))
-            self.events = len(rises(-values, -0.25 * middle, max(0.5 * middle, 4.0 * noise)))
-            self.stick = float(np.mean(values > -0.5 * middle))
 
     def _plateau(self) -> tuple[float, float]:
         """Part of the time at the belt's speed (or an extreme velocity), and part of the time next to it."""

@@ -1,0 +1,146 @@
+"""Slips in a velocity: how much they skew it, where they are, and whether they are those of stick-slip.
+
+Stick skews the distribution of the velocity: it stays long at the belt's, and is then short and fast in the other
+direction. Smoothing over the m = 1, 2, 4 … samples that show this best serves any sampling rate and noise. Impacts and
+spikes skew it as well, but a slip lasts until the belt has loaded the spring again, and nothing swings back after it.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+
+from brakecli.analysis.regime.cleaning import NOISE_SHARE, Velocity
+from brakecli.analysis.regime.spectra import Array, rises
+
+_PARTS = 7
+_SLOWEST = 60  # parts of the record over which is smoothed at most
+_MOVES = 0.15  # of the largest change of displacement over m samples: what is less has been smoothed away
+_BULK = 3.0  # robust deviations that a slip leaves the velocity in stick by
+_FEWEST = 10
+_STRONG = 0.4  # of the tenth largest slip: the shape of smaller ones is not looked at
+_MOST = 512  # slips whose shape is averaged
+_LASTS, _RETURNS = 0.3, 0.35
+_NARROW = 2  # samples of a pulse of velocity that may be a spike
+_REGULAR = 0.3  # of the median: quartiles of the times between pulses that spikes do not keep
+_LOADED = (0.4, 2.5)  # correlation of a slip with the time before or after it, and that times √n
+
+
+@dataclass(frozen=True)
+class Slips:
+    """What skews a velocity most."""
+
+    skewness: float = 0.0
+    count: int = 0
+    stick: float = 0.0  # part of the time between slips
+    lasts: float = 1.0  # part of a slip that is left a quarter of a cycle later; 0 for a ring-down, or a spike of x
+    returns: float = 0.0  # what swings back at once, over the slip; 0 for stick, nearly 1 for a ring-down
+    loaded: bool = True  # whether slips go with the time that has loaded them; random spikes do not
+
+    period: float = 0.0  # samples from one to the next, in the mean
+
+    @property
+    def stick_slip(self) -> bool:
+        """Whether they can be slips between sticks."""
+        return self.count >= _FEWEST and self.lasts >= _LASTS and self.returns <= _RETURNS and self.loaded
+
+
+def seek(velocity: Velocity, certain: float) -> Slips:
+    """The slips at the smoothing that shows them best, if the skewness is `certain`; otherwise at a quiet one."""
+    found, sign, scale, chosen = 0.0, 1.0, velocity.quiet, velocity
+    for candidate, least in [(velocity, 1), (_filtered(velocity), 8)][: 1 if velocity.measured else 2]:
+        for m in _scales(candidate, least):
+            skewness = _skewness(candidate.thinned(m))
+            if abs(skewness) > max(found, 4.0 * np.sqrt(6.0 * m / len(velocity.values))):
+                found, sign, scale, chosen = abs(skewness), -np.sign(skewness), m, candidate
+    if found < certain:
+        scale, chosen = velocity.quiet, velocity
+    values = sign * chosen.smoothed(scale)
+    values = values - values.mean()
+    bulk = values[values > 0.0]
+    if not len(bulk):
+        return Slips(found)
+    middle, noise = float(np.median(bulk)), float(np.sqrt(velocity.noise_at(scale)))
+    spread = middle + _BULK * 1.4826 * float(np.median(np.abs(bulk - middle))) if found >= certain else 0.0
+    places = rises(-values, -0.25 * middle, max(0.5 * middle, 4.0 * noise, spread))
+    slips = Slips(found, len(places), float(np.mean(values > -0.5 * middle)))
+    slips = replace(slips, period=len(values) / max(1, len(places)))
+    if len(places) < _FEWEST:
+        return slips
+    return replace(slips, **_shape(replace(chosen, values=sign * chosen.values), places, scale))
+
+
+def _filtered(velocity: Velocity) -> Velocity:
+    """The velocity of a displacement after a median of five, which takes impulses and leaves slips."""
+    displacement = np.concatenate([[0.0], np.cumsum(velocity.values)])
+    return replace(velocity, values=np.diff(median_filter(displacement, 5, mode="nearest")))
+
+
+def _scales(velocity: Velocity, least: int) -> list[int]:
+    """Smoothings at which the velocity exceeds its noise, and the motion is not smoothed away."""
+    every = [1 << k for k in range(max(1, len(velocity.values) // _SLOWEST).bit_length())]
+    sizes = {m: float(velocity.thinned(m).var()) for m in every}
+    moved = _MOVES**2 * max(m * m * variance for m, variance in sizes.items())
+    clear = {m: v for m, v in sizes.items() if m >= least and velocity.noise_at(m) < NOISE_SHARE * v}
+    return [m for m, v in clear.items() if m * m * v >= moved]
+
+
+def _skewness(values: Array) -> float:
+    """Median of the parts of the record, which a single jump does not change."""
+    parts = [part - part.mean() for part in np.array_split(values, _PARTS)]
+    return float(np.median([np.mean(p * p * p) / max(float(np.mean(p * p)), 1e-100) ** 1.5 for p in parts]))
+
+
+def _shape(velocity: Velocity, places: NDArray[np.intp], scale: int) -> dict[str, float]:
+    """What is left of the strong slips, what swings back at once, and whether time has loaded them."""
+    x = np.concatenate([[0.0], np.cumsum(velocity.values)])
+    fine, reach = min(velocity.quiet, scale), 5 * scale
+    near = sliding_window_view((x[fine:] - x[:-fine]) / fine, reach)
+    falls = sliding_window_view(x[:-scale] - x[scale:], reach)
+    places = places[places < min(len(near), len(falls))]
+    if len(places) < _FEWEST:
+        return {"lasts": 0.0}
+    starts, depths = places + falls[places].argmax(axis=1), falls[places].max(axis=1)
+    strong = depths >= _STRONG * max(float(np.sort(depths)[-_FEWEST]), 0.0)
+    if not strong.any():
+        return {"lasts": 0.0}
+    anywhere, slips = near[:: max(1, len(near) // 4096)], near[places[strong][:: max(1, len(places) // 4096)]]
+    down = float(np.median(anywhere.min(axis=1)) - np.median(slips.min(axis=1)))
+    up = float(np.median(slips.max(axis=1)) - np.median(anywhere.max(axis=1)))
+    seen = max(down, 0.25 * float(np.median(anywhere) - np.median(anywhere.min(axis=1))), 1e-300)
+    loaded = velocity.measured and _loaded(velocity.values, starts, depths)
+    starts, depths = starts[strong], depths[strong]
+    return {
+        "lasts": _lasting(x, starts, scale) / max(float(depths.mean()), 1e-300),
+        "returns": up / seen,
+        "loaded": not velocity.measured or loaded,
+    }
+
+
+def _lasting(x: Array, starts: NDArray[np.intp], scale: int) -> float:
+    """Mean fall of the displacement over slips, beside a common slope, from a quarter of a cycle to either side."""
+    wide = int(max(3 * scale, 0.25 * len(x) / len(starts)))
+    inside = starts[(starts >= wide) & (starts + scale + wide < len(x))]
+    if not len(inside):
+        return 0.0
+    time = np.arange(-wide, scale + wide + 1)
+    mean = np.mean([x[i + time] for i in inside[:: max(1, len(inside) // _MOST)]], axis=0)
+    away = (time <= -(scale // 2)) | (time >= scale + scale // 2)
+    terms = np.stack([np.ones(len(time)), time, time > 0.5 * scale], axis=1).astype(np.float64)
+    return -float(np.linalg.lstsq(terms[away], mean[away] - mean[0], rcond=None)[0][2])
+
+
+def _loaded(values: Array, starts: NDArray[np.intp], depths: Array) -> bool:
+    """Whether pulses are wider than spikes, or come regularly, or go with the time before or after them."""
+    pulses = sliding_window_view(values, 3 * _NARROW)[np.minimum(starts, len(values) - 3 * _NARROW)]
+    low, waits = pulses.min(axis=1, keepdims=True), np.diff(starts)
+    first, median, last = np.quantile(waits, [0.25, 0.5, 0.75]) if len(waits) else (0.0, 1.0, 0.0)
+    if np.median((pulses < 0.5 * low).sum(axis=1)) > _NARROW or last - first < _REGULAR * median:
+        return True
+    rows = np.stack([depths[1:], depths[:-1]]) - depths.mean()
+    waits = waits - waits.mean()
+    size = np.sqrt(np.sum(rows**2, axis=1) * np.sum(waits**2))
+    best = float(np.max(rows @ waits / np.maximum(size, 1e-300)))
+    return best >= max(_LOADED[0], _LOADED[1] / np.sqrt(len(waits)))
