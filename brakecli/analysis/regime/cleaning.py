@@ -70,16 +70,16 @@ class Velocity:
         parts = [(self.noise_at(m) / variance, m) for m, variance in self.variances]
         return next((m for part, m in parts if part <= _QUIET), min(parts, default=(1.0, 1))[1])
 
-    def amplitude(self, start: int, windows: int) -> float:
-        """Half of peak to peak of the displacement from a sample on, drift removed: median of equal windows."""
-        m, c = self.quiet, self._primitive
+    def amplitude(self, m: int, start: int, windows: int) -> float:
+        """Half of peak to peak of the displacement, smoothed over m samples, from a sample on: median of windows."""
+        c = self._primitive
         x = c if self.measured else (c[m:] - c[:-m]) / m
         return 0.5 * float(np.median([np.ptp(part) for part in np.array_split(x[start:], windows)]))
 
-    def trend(self, start: int, windows: int) -> tuple[Array, float, float]:
+    def trend(self, m: int, start: int, windows: int) -> tuple[Array, float, float]:
         """Envelope from a sample on, without noise, last third over first, and rank correlation with time."""
-        parts = np.array_split(self.smoothed(self.quiet)[start:], windows)
-        envelope = np.sqrt(np.maximum([float(p.var()) - self.noise_at(self.quiet) for p in parts], 0.0))
+        parts = np.array_split(self.smoothed(m)[start:], windows)
+        envelope = np.sqrt(np.maximum([float(p.var()) - self.noise_at(m) for p in parts], 0.0))
         if float(np.ptp(envelope)) == 0.0:
             return envelope, 1.0, 0.0
         third, ranks = max(1, windows // 3), np.argsort(np.argsort(envelope)).astype(float)

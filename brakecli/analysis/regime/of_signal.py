@@ -4,6 +4,7 @@ Stick skews the distribution of the velocity: it stays long at the belt's, and i
 direction. Smoothing over the m = 1, 2, 4 … samples that show this best serves any sampling rate and noise.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import product
@@ -51,6 +52,7 @@ class SignalThresholds:
     trend_ratio_large: float = 4.0
     skewness_unlikely: float = 0.3  # of the velocity; up to here no stick, except a short one at the belt's speed
     skewness_certain: float = 0.9  # from here there is stick; two lines in step reach 0.816 and no more
+    skewness_lines: float = 1.5  # three lines in step reach 1.4 and no more
     overtones: float = 0.03  # between the two: part of the energy in the third to eighth multiple that shows stick
     beyond_lines: float = 0.003  # and above: part of the energy that three lines leave
     plateau: float = 2.6  # time at the belt's speed, over that next to it, that shows stick; a sine reaches 2.41
@@ -91,13 +93,13 @@ def classify_signal(
     else:
         belt *= signal.interval
     slips = seek(velocity, thresholds.skewness_certain) if len(velocity.values) >= _FEWEST_SAMPLES else Slips()
-    certain = slips.skewness >= thresholds.skewness_certain and slips.stick_slip
-    velocity = without_drift(velocity, slips.period if certain else 0.0, notes)
+    certain = slips.skewness >= thresholds.skewness_certain and slips.enough
+    velocity = without_drift(velocity, slips.period if certain and slips.stick_slip else 0.0, notes)
     if not certain and len(velocity.values) >= _FEWEST_SAMPLES:
         slips = seek(velocity, thresholds.skewness_certain)  # drift may have hidden them
     rules = _Rules(velocity, slips, signal.interval, belt / (size or 1.0), thresholds)
     decision = rules.short() or rules.unsettled() or rules.sticking() or rules.without_stick()
-    amplitude = metres * velocity.amplitude(rules.start, rules.windows) if rules.above_noise else np.nan
+    amplitude = metres * velocity.amplitude(rules.smoothing, rules.start, rules.windows) if rules.above_noise else np.nan
     return SignalVerdict(
         regime=decision.regime,
         reasons=(decision.reason,),
@@ -119,6 +121,7 @@ class _Rules:
         self.belt = belt  # the belt's speed, as the velocity would show it; NaN where it is not known
         self.duration, self.start, self.windows = self.count * interval, 0, 1
         self.certain = slips.skewness >= limits.skewness_certain and slips.stick_slip
+        self.smoothing = slips.scale if self.certain else velocity.quiet
         self.above_noise = self.count >= _FEWEST_SAMPLES and (self.certain or bool(velocity.variances))
         self.evidence: dict[str, float] = {}
 
@@ -128,11 +131,11 @@ class _Rules:
             return Decision(f"only {self.count} samples without a gap; measure longer")
         self.clean, self.power = velocity.denoised()
         self.evidence |= {"samples": float(self.count), "skewness": self.slips.skewness}
-        self.evidence |= {"smoothed_over": float(velocity.quiet), "events": float(self.slips.count)}
-        if not self.above_noise:
+        self.evidence |= {"smoothed_over": float(self.smoothing), "events": float(self.slips.count)}
+        if not self.above_noise or not (self.certain or self.power.any()):
             return Decision("the vibration is hidden by noise; measure closer to the shoe, or with less noise")
         self.strongest = strongest = int(np.argmax(self.power))
-        if self.certain or self.power[strongest] == 0.0:
+        if self.certain:
             cycles, self.frequency = float(self.slips.count), max(self.slips.count, 1) / self.duration
         else:
             length = len(self.clean) * self.interval
@@ -149,15 +152,15 @@ class _Rules:
     def unsettled(self) -> Decision | None:
         """Decides where the motion has died out, still grows or decays; moves the start behind a transient."""
         limits, velocity, windows = self.limits, self.velocity, max(self.windows, 4)
-        envelope, ratio, order = velocity.trend(0, windows)
+        envelope, ratio, order = velocity.trend(self.smoothing, 0, windows)
         last, largest = float(envelope[-max(1, windows // 4) :].mean()), float(np.sort(envelope)[-3])
-        died_to, floor = last / max(largest, 1e-300), np.sqrt(velocity.noise_at(velocity.quiet))
+        died_to, floor = last / max(largest, 1e-300), np.sqrt(velocity.noise_at(self.smoothing))
         self.evidence |= {"envelope_ratio": ratio, "envelope_order": order, "died_to": died_to}
         faded = last <= max(limits.decayed_to * largest, min(0.2 * largest, 0.5 * floor))
         if faded and envelope[: windows // 2].max() >= largest:
             return Decision(f"the vibration has died out: down to {died_to:.2g} of its largest", Regime.DAMPED)
         for start in (0, self.count // 4, self.count // 2):
-            _, ratio, order = velocity.trend(start, windows)
+            _, ratio, order = velocity.trend(self.smoothing, start, windows)
             change = max(ratio, 1.0 / max(ratio, 1e-9))
             slow = change > limits.trend_ratio and abs(order) > limits.trend_order
             fast = change > limits.trend_ratio_large and abs(order) > limits.trend_order_large
@@ -171,28 +174,31 @@ class _Rules:
         """Decides where stick has skewed the velocity; undecided if noise hides whether two lines in step did."""
         limits, velocity, total = self.limits, self.velocity, float(self.power.sum())
         slips, hidden = self.slips, "stick, or lines in phase, have skewed the velocity, and noise hides which of them"
-        few = slips.count < limits.fewest_cycles or slips.skewness < limits.skewness_unlikely
-        if few or (slips.skewness >= limits.skewness_certain and not self.certain):
+        if slips.count < limits.fewest_cycles or slips.skewness < limits.skewness_unlikely:
             return None
-        if not self.certain:
-            bands = [
-                slice(int(0.97 * n * self.strongest), int(1.03 * n * self.strongest) + 2) for n in range(3, 9)
-            ]
-            found, least = sum(float(self.power[band].sum()) for band in bands) / total, limits.overtones
-            self.evidence |= {"overtones": found}
-        else:
-            power = velocity.denoised(hann=True)[1]
-            found, least = 1.0 - line_share(power), limits.beyond_lines
-            self.evidence |= {"beyond_lines": found}
-        if found <= least:
-            turn = 2.0 * np.pi * min(4.0 * self.frequency * self.interval, 0.5)
-            gain = 1.0 if velocity.measured else 2.0 - 2.0 * np.cos(turn)
-            if CERTAIN * self.count * velocity.noise**2 * gain <= least / 3.0 * total:
+        if not slips.stick_slip and (slips.skewness >= limits.skewness_certain or slips.swings_back):
+            return None
+        turn = 2.0 * np.pi * min(4.0 * self.frequency * self.interval, 0.5)
+        gain = 1.0 if velocity.measured else 2.0 - 2.0 * np.cos(turn)
+        for name, found, least in self._overtones(total):
+            self.evidence |= {name: found}
+            if found <= least and CERTAIN * self.count * velocity.noise**2 * gain > least / 3.0 * total:
+                return Decision(f"{hidden}; measure with less noise, or for longer")
+            if found <= least:
                 return None
-            return Decision(f"{hidden}; measure with less noise, or for longer")
         reason = f"{self.slips.count} events of stick and slip: skewness of the velocity {self.slips.skewness:.2g}"
         often = self.slips.count / self.duration
         return Decision(reason, Regime.RELAXATION, frequency=often, stick_fraction=self.slips.stick)
+
+    def _overtones(self, total: float) -> Iterator[tuple[str, float, float]]:
+        """What lines in step lack: a name, part of the energy, and how much of it shows stick."""
+        limits, power = self.limits, self.power
+        if not self.certain:
+            places = [(int(0.97 * n * self.strongest), int(1.03 * n * self.strongest) + 2) for n in range(3, 9)]
+            yield "overtones", sum(float(power[i:j].sum()) for i, j in places) / total, limits.overtones
+        if self.slips.skewness < limits.skewness_lines:
+            beyond = 1.0 - line_share(self.velocity.denoised(hann=True)[1])
+            yield "beyond_lines", beyond, limits.beyond_lines
 
     def without_stick(self) -> Decision:
         top, beside = self._plateau()

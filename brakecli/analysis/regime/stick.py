@@ -33,6 +33,7 @@ class Slips:
     """What skews a velocity most."""
 
     skewness: float = 0.0
+    scale: int = 1  # samples over which the velocity is smoothed to see them
     count: int = 0
     stick: float = 0.0  # part of the time between slips
     lasts: float = 1.0  # part of a slip that is left a quarter of a cycle later; 0 for a ring-down, or a spike of x
@@ -42,9 +43,19 @@ class Slips:
     period: float = 0.0  # samples from one to the next, in the mean
 
     @property
+    def enough(self) -> bool:
+        """Whether they are enough to look at their shape."""
+        return self.count >= _FEWEST
+
+    @property
+    def swings_back(self) -> bool:
+        """Whether the velocity swings back after them, as after an impact."""
+        return self.returns > _RETURNS
+
+    @property
     def stick_slip(self) -> bool:
         """Whether they can be slips between sticks."""
-        return self.count >= _FEWEST and self.lasts >= _LASTS and self.returns <= _RETURNS and self.loaded
+        return self.enough and self.lasts >= _LASTS and not self.swings_back and self.loaded
 
 
 def seek(velocity: Velocity, certain: float) -> Slips:
@@ -65,7 +76,7 @@ def seek(velocity: Velocity, certain: float) -> Slips:
     middle, noise = float(np.median(bulk)), float(np.sqrt(velocity.noise_at(scale)))
     spread = middle + _BULK * 1.4826 * float(np.median(np.abs(bulk - middle))) if found >= certain else 0.0
     places = rises(-values, -0.25 * middle, max(0.5 * middle, 4.0 * noise, spread))
-    slips = Slips(found, len(places), float(np.mean(values > -0.5 * middle)))
+    slips = Slips(found, scale, len(places), float(np.mean(values > -0.5 * middle)))
     slips = replace(slips, period=len(values) / max(1, len(places)))
     if len(places) < _FEWEST:
         return slips
@@ -96,27 +107,34 @@ def _skewness(values: Array) -> float:
 def _shape(velocity: Velocity, places: NDArray[np.intp], scale: int) -> dict[str, float]:
     """What is left of the strong slips, what swings back at once, and whether time has loaded them."""
     x = np.concatenate([[0.0], np.cumsum(velocity.values)])
-    fine, reach = min(velocity.quiet, scale), 5 * scale
-    near = sliding_window_view((x[fine:] - x[:-fine]) / fine, reach)
-    falls = sliding_window_view(x[:-scale] - x[scale:], reach)
-    places = places[places < min(len(near), len(falls))]
-    if len(places) < _FEWEST:
-        return {"lasts": 0.0}
+    falls = sliding_window_view(x[:-scale] - x[scale:], 5 * scale)
+    places = places[places < len(falls)]
     starts, depths = places + falls[places].argmax(axis=1), falls[places].max(axis=1)
-    strong = depths >= _STRONG * max(float(np.sort(depths)[-_FEWEST]), 0.0)
-    if not strong.any():
+    strong = depths >= _STRONG * max(float(np.sort(depths)[-_FEWEST:][0]), 0.0) if len(places) else places > 0
+    if np.sum(strong) < 3:
         return {"lasts": 0.0}
-    anywhere, slips = near[:: max(1, len(near) // 4096)], near[places[strong][:: max(1, len(places) // 4096)]]
-    down = float(np.median(anywhere.min(axis=1)) - np.median(slips.min(axis=1)))
-    up = float(np.median(slips.max(axis=1)) - np.median(anywhere.max(axis=1)))
-    seen = max(down, 0.25 * float(np.median(anywhere) - np.median(anywhere.min(axis=1))), 1e-300)
-    loaded = velocity.measured and _loaded(velocity.values, starts, depths)
+    loaded = not velocity.measured or _loaded(velocity.values, starts, depths, scale)
     starts, depths = starts[strong], depths[strong]
-    return {
-        "lasts": _lasting(x, starts, scale) / max(float(depths.mean()), 1e-300),
-        "returns": up / seen,
-        "loaded": not velocity.measured or loaded,
-    }
+    lasts = _lasting(x, starts, scale) / max(float(depths.mean()), 1e-300)
+    return {"lasts": lasts, "returns": _returning(x, starts, min(velocity.quiet, scale), scale), "loaded": loaded}
+
+
+def _returning(x: Array, starts: NDArray[np.intp], fine: int, scale: int) -> float:
+    """How far the velocity swings the other way after slips, over them; both beyond what it does between slips."""
+    near, waits = (x[fine:] - x[:-fine]) / fine, np.diff(starts)
+    wide = int(min(max(5 * scale, 0.125 * len(x) / len(starts)), 0.4 * np.median(waits))) + 1
+    long = waits >= np.median(waits)
+    between = starts[:-1][long] + waits[long] // 2
+    exact = sliding_window_view(near, 2 * scale)
+    starts = starts + exact[np.minimum(starts, len(exact) - 1)].argmin(axis=1)
+    (low, high), (least, most) = (
+        (np.median(part.min(axis=1)), np.median(part.max(axis=1)))
+        for part in (
+            sliding_window_view(near, wide)[np.clip(i - wide // 4, 0, len(near) - wide)[:: 1 + len(i) // _MOST]]
+            for i in (starts, between)
+        )
+    )
+    return float((high - most) / max(least - low, 0.25 * (most - least), 1e-300))
 
 
 def _lasting(x: Array, starts: NDArray[np.intp], scale: int) -> float:
@@ -132,15 +150,16 @@ def _lasting(x: Array, starts: NDArray[np.intp], scale: int) -> float:
     return -float(np.linalg.lstsq(terms[away], mean[away] - mean[0], rcond=None)[0][2])
 
 
-def _loaded(values: Array, starts: NDArray[np.intp], depths: Array) -> bool:
+def _loaded(values: Array, starts: NDArray[np.intp], depths: Array, scale: int) -> bool:
     """Whether pulses are wider than spikes, or come regularly, or go with the time before or after them."""
-    pulses = sliding_window_view(values, 3 * _NARROW)[np.minimum(starts, len(values) - 3 * _NARROW)]
-    low, waits = pulses.min(axis=1, keepdims=True), np.diff(starts)
-    first, median, last = np.quantile(waits, [0.25, 0.5, 0.75]) if len(waits) else (0.0, 1.0, 0.0)
-    if np.median((pulses < 0.5 * low).sum(axis=1)) > _NARROW or last - first < _REGULAR * median:
+    wide = scale + 2 * _NARROW
+    pulses = sliding_window_view(values, wide)[np.minimum(starts, len(values) - wide)]
+    waits = np.diff(starts)
+    first, median, last = np.quantile(waits, [0.25, 0.5, 0.75])
+    width = np.median((pulses < 0.5 * pulses.min(axis=1, keepdims=True)).sum(axis=1))
+    if width > _NARROW or last - first < _REGULAR * median:
         return True
-    rows = np.stack([depths[1:], depths[:-1]]) - depths.mean()
-    waits = waits - waits.mean()
+    rows, waits = np.stack([depths[1:], depths[:-1]]) - depths.mean(), waits - waits.mean()
     size = np.sqrt(np.sum(rows**2, axis=1) * np.sum(waits**2))
     best = float(np.max(rows @ waits / np.maximum(size, 1e-300)))
     return best >= max(_LOADED[0], _LOADED[1] / np.sqrt(len(waits)))
