@@ -71,7 +71,7 @@ class Velocity:
         return next((m for part, m in parts if part <= _QUIET), min(parts, default=(1.0, 1))[1])
 
     def amplitude(self, m: int, start: int, windows: int) -> float:
-        """Half of peak to peak of the displacement, smoothed over m samples, from a sample on: median of windows."""
+        """Half of peak to peak of the displacement, smoothed over m samples: median of windows."""
         c = self._primitive
         x = c if self.measured else (c[m:] - c[:-m]) / m
         return 0.5 * float(np.median([np.ptp(part) for part in np.array_split(x[start:], windows)]))

@@ -99,7 +99,9 @@ def classify_signal(
         slips = seek(velocity, thresholds.skewness_certain)  # drift may have hidden them
     rules = _Rules(velocity, slips, signal.interval, belt / (size or 1.0), thresholds)
     decision = rules.short() or rules.unsettled() or rules.sticking() or rules.without_stick()
-    amplitude = metres * velocity.amplitude(rules.smoothing, rules.start, rules.windows) if rules.above_noise else np.nan
+    amplitude = (
+        metres * velocity.amplitude(rules.smoothing, rules.start, rules.windows) if rules.above_noise else np.nan
+    )
     return SignalVerdict(
         regime=decision.regime,
         reasons=(decision.reason,),
@@ -115,7 +117,9 @@ def classify_signal(
 class _Rules:
     """The rules on one velocity, in their order. They gather evidence until one of them decides."""
 
-    def __init__(self, velocity: Velocity, slips: Slips, interval: float, belt: float, limits: SignalThresholds) -> None:
+    def __init__(
+        self, velocity: Velocity, slips: Slips, interval: float, belt: float, limits: SignalThresholds
+    ) -> None:
         self.velocity, self.interval, self.limits, self.count = velocity, interval, limits, len(velocity.values)
         self.slips = slips
         self.belt = belt  # the belt's speed, as the velocity would show it; NaN where it is not known
@@ -132,6 +136,7 @@ class _Rules:
         self.clean, self.power = velocity.denoised()
         self.evidence |= {"samples": float(self.count), "skewness": self.slips.skewness}
         self.evidence |= {"smoothed_over": float(self.smoothing), "events": float(self.slips.count)}
+        self.evidence |= {"slip_lasts": self.slips.lasts, "slip_returns": self.slips.returns}
         if not self.above_noise or not (self.certain or self.power.any()):
             return Decision("the vibration is hidden by noise; measure closer to the shoe, or with less noise")
         self.strongest = strongest = int(np.argmax(self.power))
@@ -173,7 +178,10 @@ class _Rules:
     def sticking(self) -> Decision | None:
         """Decides where stick has skewed the velocity; undecided if noise hides whether two lines in step did."""
         limits, velocity, total = self.limits, self.velocity, float(self.power.sum())
-        slips, hidden = self.slips, "stick, or lines in phase, have skewed the velocity, and noise hides which of them"
+        slips, hidden = (
+            self.slips,
+            "stick, or lines in phase, have skewed the velocity, and noise hides which of them",
+        )
         if slips.count < limits.fewest_cycles or slips.skewness < limits.skewness_unlikely:
             return None
         if not slips.stick_slip and (slips.skewness >= limits.skewness_certain or slips.swings_back):
@@ -222,7 +230,10 @@ class _Rules:
         if share < self.limits.line_share:
             return Decision(f"irregular without stick: {share:.0%} of the energy in three lines; measure longer")
         reason = f"sustained without stick: {share:.0%} of the energy of the velocity in at most three lines"
-        return Decision(reason, Regime.QUASI_HARMONIC, frequency=self.frequency, stick_fraction=0.0)
+        known = np.isfinite(self.belt)  # otherwise stick may be too short to be seen
+        reason += "" if known else "; short stick would show only by --belt-speed"
+        none = 0.0 if known else None
+        return Decision(reason, Regime.QUASI_HARMONIC, frequency=self.frequency, stick_fraction=none)
 
     def _plateau(self) -> tuple[float, float]:
         """Part of the time at the belt's speed (or an extreme velocity), and part of the time next to it."""

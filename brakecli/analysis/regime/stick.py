@@ -1,8 +1,8 @@
 """Slips in a velocity: how much they skew it, where they are, and whether they are those of stick-slip.
 
 Stick skews the distribution of the velocity: it stays long at the belt's, and is then short and fast in the other
-direction. Smoothing over the m = 1, 2, 4 … samples that show this best serves any sampling rate and noise. Impacts and
-spikes skew it as well, but a slip lasts until the belt has loaded the spring again, and nothing swings back after it.
+direction. Smoothing over the m = 1, 2, 4 … samples that show this best serves any sampling rate and noise. Impacts
+and spikes skew it as well, but a slip lasts until the belt has loaded the spring again, and nothing swings back.
 """
 
 from dataclasses import dataclass, replace
@@ -22,10 +22,11 @@ _BULK = 3.0  # robust deviations that a slip leaves the velocity in stick by
 _FEWEST = 10
 _STRONG = 0.4  # of the tenth largest slip: the shape of smaller ones is not looked at
 _MOST = 512  # slips whose shape is averaged
-_LASTS, _RETURNS = 0.3, 0.35
+_LASTS, _RETURNS = 0.4, 0.2
 _NARROW = 2  # samples of a pulse of velocity that may be a spike
 _REGULAR = 0.3  # of the median: quartiles of the times between pulses that spikes do not keep
-_LOADED = (0.4, 2.5)  # correlation of a slip with the time before or after it, and that times √n
+_LOADED = (0.4, 2.5)  # correlation of slips with the time before or after them, and that times √n
+_SLOPE = 0.2  # of that, where 1 is proportional
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,9 @@ class Slips:
     scale: int = 1  # samples over which the velocity is smoothed to see them
     count: int = 0
     stick: float = 0.0  # part of the time between slips
-    lasts: float = 1.0  # part of a slip that is left a quarter of a cycle later; 0 for a ring-down, or a spike of x
+    lasts: float = (
+        1.0  # part of a slip that is left a quarter of a cycle later; 0 for a ring-down, or a spike of x
+    )
     returns: float = 0.0  # what swings back at once, over the slip; 0 for stick, nearly 1 for a ring-down
     loaded: bool = True  # whether slips go with the time that has loaded them; random spikes do not
 
@@ -75,12 +78,13 @@ def seek(velocity: Velocity, certain: float) -> Slips:
         return Slips(found)
     middle, noise = float(np.median(bulk)), float(np.sqrt(velocity.noise_at(scale)))
     spread = middle + _BULK * 1.4826 * float(np.median(np.abs(bulk - middle))) if found >= certain else 0.0
-    places = rises(-values, -0.25 * middle, max(0.5 * middle, 4.0 * noise, spread))
-    slips = Slips(found, scale, len(places), float(np.mean(values > -0.5 * middle)))
+    high = max(0.5 * middle, 4.0 * noise, spread)
+    places = rises(-values, -0.25 * middle, high)
+    slips = Slips(found, scale, len(places), float(np.mean(values > -high)))
     slips = replace(slips, period=len(values) / max(1, len(places)))
     if len(places) < _FEWEST:
         return slips
-    return replace(slips, **_shape(replace(chosen, values=sign * chosen.values), places, scale))
+    return _shaped(slips, replace(chosen, values=sign * chosen.values), places)
 
 
 def _filtered(velocity: Velocity) -> Velocity:
@@ -104,19 +108,21 @@ def _skewness(values: Array) -> float:
     return float(np.median([np.mean(p * p * p) / max(float(np.mean(p * p)), 1e-100) ** 1.5 for p in parts]))
 
 
-def _shape(velocity: Velocity, places: NDArray[np.intp], scale: int) -> dict[str, float]:
+def _shaped(slips: Slips, velocity: Velocity, places: NDArray[np.intp]) -> Slips:
     """What is left of the strong slips, what swings back at once, and whether time has loaded them."""
+    scale = slips.scale
     x = np.concatenate([[0.0], np.cumsum(velocity.values)])
     falls = sliding_window_view(x[:-scale] - x[scale:], 5 * scale)
     places = places[places < len(falls)]
     starts, depths = places + falls[places].argmax(axis=1), falls[places].max(axis=1)
     strong = depths >= _STRONG * max(float(np.sort(depths)[-_FEWEST:][0]), 0.0) if len(places) else places > 0
     if np.sum(strong) < 3:
-        return {"lasts": 0.0}
+        return replace(slips, lasts=0.0)
     loaded = not velocity.measured or _loaded(velocity.values, starts, depths, scale)
     starts, depths = starts[strong], depths[strong]
     lasts = _lasting(x, starts, scale) / max(float(depths.mean()), 1e-300)
-    return {"lasts": lasts, "returns": _returning(x, starts, min(velocity.quiet, scale), scale), "loaded": loaded}
+    returns = _returning(x, starts, min(velocity.quiet, scale), scale)
+    return replace(slips, lasts=lasts, returns=returns, loaded=loaded)
 
 
 def _returning(x: Array, starts: NDArray[np.intp], fine: int, scale: int) -> float:
@@ -138,7 +144,7 @@ def _returning(x: Array, starts: NDArray[np.intp], fine: int, scale: int) -> flo
 
 
 def _lasting(x: Array, starts: NDArray[np.intp], scale: int) -> float:
-    """Mean fall of the displacement over slips, beside a common slope, from a quarter of a cycle to either side."""
+    """Mean fall of the displacement over slips, beside a common slope, seen from a quarter of a cycle around."""
     wide = int(max(3 * scale, 0.25 * len(x) / len(starts)))
     inside = starts[(starts >= wide) & (starts + scale + wide < len(x))]
     if not len(inside):
@@ -159,7 +165,10 @@ def _loaded(values: Array, starts: NDArray[np.intp], depths: Array, scale: int) 
     width = np.median((pulses < 0.5 * pulses.min(axis=1, keepdims=True)).sum(axis=1))
     if width > _NARROW or last - first < _REGULAR * median:
         return True
-    rows, waits = np.stack([depths[1:], depths[:-1]]) - depths.mean(), waits - waits.mean()
-    size = np.sqrt(np.sum(rows**2, axis=1) * np.sum(waits**2))
-    best = float(np.max(rows @ waits / np.maximum(size, 1e-300)))
-    return best >= max(_LOADED[0], _LOADED[1] / np.sqrt(len(waits)))
+    rows, mean = np.stack([depths[1:], depths[:-1]]), waits.mean()
+    rows, waits = rows / depths.mean() - 1.0, waits / mean - 1.0
+    spread = max(float(waits.std()), 1e-300)
+    slopes = np.mean(rows * waits, axis=1) / spread**2  # 1 if a slip is what the time has loaded
+    along = slopes * spread / np.maximum(rows.std(axis=1), 1e-300)  # correlation
+    enough = max(_LOADED[0], _LOADED[1] / np.sqrt(len(waits)))
+    return bool(np.any((along >= enough) & (slopes >= _SLOPE)))
