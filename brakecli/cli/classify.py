@@ -50,7 +50,7 @@ def command(
             remedy = "for a measured signal, state with --quantity what was measured"
             raise UnreadableResultError(f"{error}; {remedy}") from error
     else:
-        from brakecli.analysis.regime.of_signal import Measurand, SignalThresholds, classify_signal
+        from brakecli.analysis.regime.of_signal import Measurand, classify_signal
         from brakecli.analysis.regime.signal_file import read_signal
 
         if quantity not in set(Measurand):

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from brakecli.analysis.regime.of_signal import Measurand, Signal, SignalThresholds, SignalVerdict, classify_signal
+from brakecli.analysis.regime.of_signal import Measurand, Signal, SignalVerdict, classify_signal
+from brakecli.analysis.regime.signal_rules import SignalThresholds
 from brakecli.analysis.regime.verdict import Excitation, Regime
 from tests.analysis.measured_signals import (
     Array,
@@ -26,7 +27,7 @@ IN_DOUBT = {  # at 20 dB and worse
 
 
 @pytest.mark.parametrize("per_cycle", [10, 50, *(pytest.param(n, marks=campaign) for n in (20, 200, 1000))])
-@pytest.mark.parametrize("quantity", list(Measurand))
+@pytest.mark.parametrize("quantity", [Measurand.DISPLACEMENT, Measurand.VELOCITY, Measurand.FORCE])
 def test_no_motion_is_mistaken_for_another(per_cycle: int, quantity: Measurand) -> None:
     checked = 0
     for motion in motions(per_cycle, 100):

@@ -98,15 +98,24 @@ class Velocity:
         return np.fft.irfft(np.where(lines, spectrum, 0.0), len(values)), np.where(lines, power, 0.0)
 
 
-def cleaned(values: Array, is_velocity: bool) -> tuple[Velocity, list[str]]:
-    """The velocity of a signal without its gaps and spikes; notes report each of them."""
+def cleaned(values: Array, order: int) -> tuple[Velocity, list[str]]:
+    """The velocity of a signal without its gaps and spikes; notes report each of them.
+
+    `order` says of which derivative of the displacement the values are: 0, 1 or 2.
+    """
     notes: list[str] = []
     if len(values) >= _SHORTEST and not np.isfinite(values).all():
-        cycle = _cycle(_velocity(_bridged(values), is_velocity))
+        cycle = _cycle(_velocity(_bridged(values), order > 0))
         values = _bridged(_longest_piece(values, max(1.0, 0.25 * cycle), notes))
-    if len(values) < _SHORTEST:
-        return _velocity(values, is_velocity), notes
-    return _velocity(_without_spikes(values, is_velocity, notes), is_velocity), notes
+    if len(values) >= _SHORTEST:
+        values = _without_spikes(values, order > 0, notes)
+    found = _velocity(values, order > 0)
+    if order < 2 or not found.variances:  # the sum of noise would not look like noise
+        return found, notes
+    values = np.cumsum(found.values)
+    width = int(_DRIFT_CYCLES * _cycle(found))
+    slow = uniform_filter1d(values, width) if 2 * width <= len(values) else 0.0
+    return _velocity(values - slow, True), notes
 
 
 def without_drift(velocity: Velocity, cycle: float, notes: list[str]) -> Velocity:

@@ -1,0 +1,96 @@
+"""Bursts: when a tone stands out of a measured signal, at which frequency and how strongly."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from brakecli.analysis.regime.spectra import Array, interpolated
+
+_FRAMES = 64  # parts of the record, half of which overlap; each holds
+_CYCLES = 8  # cycles of its strongest line at least
+_SHORTEST = 64
+_STANDS_OUT = 20.0  # power of a tone's bin over the mean of the noise, which reaches it in one bin of 5e8
+_SHARE = 0.3  # part of the energy of a frame in its tone
+_FAINT = 1e-3  # part of the power of the strongest tone
+_SAME = 0.06  # part of its frequency by which a tone may move from frame to frame
+_EDGE, _FOOT = 0.5, 0.15  # parts of its amplitude that end a burst, and to which it has then soon fallen
+_STEEP = 1.5
+_MOST = 32
+
+
+@dataclass(frozen=True)
+class Burst:
+    """A tone that stands out for a while."""
+
+    start: float  # s
+    end: float  # s
+    frequency: float  # Hz, its peak
+    level: float  # RMS, in the unit of the quantity
+    steep: bool = field(default=False, repr=False)  # it begins and ends soon; otherwise it rings down, or grows
+
+
+def bursts(values: Array, interval: float) -> list[Burst]:
+    """The bursts of a signal without gaps."""
+    if len(values) < 4 * _SHORTEST or not np.ptp(values):
+        return []
+    whole = np.abs(np.fft.rfft(np.diff(values) * np.hanning(len(values) - 1)))  # differences, as drift is slow
+    period = len(values) / max(5 + int(np.argmax(whole[5:])), 1)
+    wanted = max(len(values) / _FRAMES, _CYCLES * period, _SHORTEST)
+    size = 1 << int(min(np.ceil(np.log2(wanted)), np.log2(len(values) / 4)))
+    found = sorted(_tones(values, size), key=lambda tone: tone[0])
+    strongest = max((power for _, _, power in found), default=0.0)
+    groups: list[list[tuple[int, float, float]]] = []
+    for tone in (tone for tone in found if tone[2] >= _FAINT * strongest):
+        last = groups[-1][-1] if groups else (-size, 0.0, 0.0)
+        near = tone[0] - last[0] <= size // 2 and abs(tone[1] - last[1]) <= max(_SAME * tone[1], 1.0 / size)
+        groups = [*groups[:-1], [*groups[-1], tone]] if near else [*groups, [tone]]
+    groups = sorted(groups, key=lambda group: -sum(power for *_, power in group))[:_MOST]
+    results = (_burst(values, interval, size, group) for group in groups)
+    return sorted((burst for burst in results if burst), key=lambda burst: burst.start)
+
+
+def _tones(values: Array, size: int) -> Iterator[tuple[int, float, float]]:
+    """First sample, frequency (1/sample) and power of the tone of each frame in which one stands out."""
+    window, frequencies, ramp = np.hanning(size), np.fft.rfftfreq(size), np.linspace(0.0, 1.0, size)
+    for first in range(0, len(values) - size + 1, size // 2):
+        part = values[first : first + size]
+        level = part - part[0] - (part[-1] - part[0]) * ramp
+        power = np.abs(np.fft.rfft((level - level.mean()) * window)) ** 2
+        power[:3] = 0.0
+        i = int(np.argmax(power))
+        tone = float(power[max(i - 2, 0) : i + 3].sum())
+        if power[i] > _STANDS_OUT * float(np.median(power[3:])) / np.log(2.0) and tone >= _SHARE * power.sum():
+            yield first, interpolated(frequencies, power, i), tone
+
+
+def _burst(values: Array, interval: float, size: int, group: list[tuple[int, float, float]]) -> Burst | None:
+    """The burst of neighbouring frames, with its ends where the tone's amplitude is half."""
+    begin, end = group[0][0], group[-1][0] + size
+    weights = np.array([power for *_, power in group])
+    frequency = float(np.average([f for _, f, _ in group], weights=weights))
+    around = max(2 * size, end - begin)
+    low, high = max(0, begin - around), min(len(values), end + around)
+    piece = values[low:high] - np.linspace(values[low], values[high - 1], high - low)
+    lines, half = np.fft.fftfreq(len(piece)), max(_SAME * frequency, 4.0 / size)
+    tone = np.fft.ifft(np.where(np.abs(lines - frequency) <= half, np.fft.fft(piece), 0.0))
+    amplitude = uniform_filter1d(2.0 * np.abs(tone), max(1, min(size // 4, int(2 / frequency))))
+    centre = int(np.argmax(amplitude[begin - low : end - low])) + begin - low
+    top = float(np.quantile(amplitude[begin - low : end - low], 0.8))
+    (first, last), (foot, toe) = (_around(amplitude >= part * top, centre) for part in (_EDGE, _FOOT))
+    if (last - first) * frequency < _CYCLES / 2 or top <= 0.0:
+        return None
+    turn = np.angle(np.vdot(tone[first : last - 1], tone[first + 1 : last]))
+    level = float(np.sqrt(0.5 * np.mean(amplitude[first:last] ** 2)))
+    steep = toe - foot <= _STEEP * (last - first)
+    return Burst(
+        (low + first) * interval, (low + last) * interval, float(turn) / (2.0 * np.pi * interval), level, steep
+    )
+
+
+def _around(above: Array, place: int) -> tuple[int, int]:
+    """First sample, and the one after the last, of the run of true ones around a place."""
+    below = np.flatnonzero(~above)
+    i = int(np.searchsorted(below, place))
+    return (int(below[i - 1]) + 1 if i else 0), (int(below[i]) if i < len(below) else len(above))
