@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
-from brakecli.analysis.regime.of_signal import Signal
+from brakecli.analysis.regime.of_signal import Measurand, Signal
 from brakecli.analysis.regime.signal_file import read_signal
 from brakecli.errors import UnreadableResultError, UsageError
 
@@ -14,7 +14,7 @@ from brakecli.errors import UnreadableResultError, UsageError
 def read(
     path: Path | str, column: str | None = None, time: str | None = None, rate: float | None = None
 ) -> Signal:
-    return read_signal(str(path), column=column, time_column=time, sample_rate=rate)
+    return read_signal(str(path), Measurand.DISPLACEMENT, column=column, time_column=time, sample_rate=rate)
 
 
 def written(tmp_path: Path, content: str | bytes) -> Path:
@@ -30,7 +30,7 @@ LAYOUTS = {
     "tab": "t\tx\n0\t1\n0.1\t2.5\n0.2\t4\n",
     "spaces": "t x\n0 1\n0.1  2.5\n0.2 4\n",
     "comments": "# made up\n% twice\nt,x\n0,1\n0.1,2.5\n0.2,4\n",
-    "units": "t,x\ns,mm\n0,1\n0.1,2.5\n0.2,4\n",
+    "units": "t,x\ns,m\n0,1\n0.1,2.5\n0.2,4\n",
     "quotes": '"t","x"\n"0","1"\n"0.1","2.5"\n"0.2","4"\n',
     "byte order mark, CRLF": "\ufefft,x\r\n0,1\r\n0.1,2.5\r\n0.2,4\r\n",
     "trailing separator": "t,x,\n0,1,\n0.1,2.5,\n0.2,4,\n",

@@ -1,9 +1,10 @@
 """Bursts: when a tone stands out of a measured signal, at which frequency and how strongly."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from brakecli.analysis.regime.spectra import Array, interpolated
@@ -28,7 +29,11 @@ class Burst:
     end: float  # s
     frequency: float  # Hz, its peak
     level: float  # RMS, in the unit of the quantity
-    steep: bool = field(default=False, repr=False)  # it begins and ends soon; otherwise it rings down, or grows
+    steep: bool  # it begins and ends soon; otherwise it rings down, or grows
+
+    def numbers(self) -> dict[str, float]:
+        """By the names of `--json`."""
+        return {"start": self.start, "end": self.end, "frequency": self.frequency, "level": self.level}
 
 
 def bursts(values: Array, interval: float) -> list[Burst]:
@@ -53,7 +58,11 @@ def bursts(values: Array, interval: float) -> list[Burst]:
 
 def _tones(values: Array, size: int) -> Iterator[tuple[int, float, float]]:
     """First sample, frequency (1/sample) and power of the tone of each frame in which one stands out."""
-    window, frequencies, ramp = np.hanning(size), np.fft.rfftfreq(size), np.linspace(0.0, 1.0, size)
+    window, frequencies, ramp = (
+        np.hanning(size),
+        np.fft.rfftfreq(size).astype(np.float64),
+        np.linspace(0.0, 1.0, size),
+    )
     for first in range(0, len(values) - size + 1, size // 2):
         part = values[first : first + size]
         level = part - part[0] - (part[-1] - part[0]) * ramp
@@ -89,7 +98,7 @@ def _burst(values: Array, interval: float, size: int, group: list[tuple[int, flo
     )
 
 
-def _around(above: Array, place: int) -> tuple[int, int]:
+def _around(above: NDArray[np.bool_], place: int) -> tuple[int, int]:
     """First sample, and the one after the last, of the run of true ones around a place."""
     below = np.flatnonzero(~above)
     i = int(np.searchsorted(below, place))

@@ -132,6 +132,7 @@ def _judge(
     if enough and not certain:
         slips = seek(velocity, thresholds.skewness_certain)  # drift may have hidden them
     rules = SignalRules(velocity, slips, step, belt, thresholds)
+    rules.has_belt = quantity is not Measurand.PRESSURE
     decision = rules.short() or rules.unsettled() or rules.sticking() or rules.without_stick()
     amplitude = np.nan
     if rules.above_noise:

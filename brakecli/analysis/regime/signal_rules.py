@@ -45,6 +45,7 @@ class SignalRules:
     ) -> None:
         self.velocity, self.interval, self.limits, self.count = velocity, interval, limits, len(velocity.values)
         self.slips = slips
+        self.has_belt = True  # whether its speed can be given
         self.belt = belt  # the belt's speed, as the velocity would show it; NaN where it is not known
         self.duration, self.start, self.windows = self.count * interval, 0, 1
         self.certain = slips.skewness >= limits.skewness_certain and slips.stick_slip
@@ -143,7 +144,8 @@ class SignalRules:
         self.evidence |= {"line_share": share}
         if flat:
             return Decision(
-                "the velocity has a plateau on one side, which short stick can cause; give --belt-speed"
+                "the velocity has a plateau on one side, which short stick can cause"
+                + "; give --belt-speed" * self.has_belt
             )
         least, most = np.quantile(self.clean + self.velocity.raw.mean(), [0.01, 0.99])
         if any(0.95 * self.belt <= v <= 1.2 * self.belt for v in (-least, most)):
@@ -154,7 +156,7 @@ class SignalRules:
             return Decision(f"irregular without stick: {share:.0%} of the energy in three lines; measure longer")
         reason = f"sustained without stick: {share:.0%} of the energy of the velocity in at most three lines"
         known = np.isfinite(self.belt)  # otherwise stick may be too short to be seen
-        reason += "" if known else "; short stick would show only by --belt-speed"
+        reason += "" if known or not self.has_belt else "; short stick would show only by --belt-speed"
         none = 0.0 if known else None
         return Decision(reason, Regime.QUASI_HARMONIC, frequency=self.frequency, stick_fraction=none)
 
