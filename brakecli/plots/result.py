@@ -12,6 +12,8 @@ from brakecli.files.read import StoredResult, open_result
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from brakecli.analysis.regime.of_signal import SignalLook
+
 
 def plot_result(result: Path, target: Path, *, force: bool, select: Sequence[str] = ()) -> None:
     """Draw a result of any kind into a PNG, PDF or SVG file; the suffix of `target` says which.
@@ -20,23 +22,39 @@ def plot_result(result: Path, target: Path, *, force: bool, select: Sequence[str
     suffix, for an existing target without `force`, for what cannot be drawn or selected, and where matplotlib is
     missing; UnreadableResultError; CannotWriteError.
     """
+    suffix = _suffix(target, result)
+    from brakecli.plots import style
+
+    with open_result(result) as stored, new_output(target, force=force) as file, style.applied():
+        file.write(style.rendered(draw(stored, select), suffix))
+        file.publish()
+
+
+def plot_signal(look: "SignalLook", source: str, target: Path, *, force: bool) -> None:
+    """Draw a measured signal as `plot_result` draws a result."""
+    suffix = _suffix(target, Path(source))
+    from brakecli.plots import signal, style
+
+    with new_output(target, force=force) as file, style.applied():
+        file.write(style.rendered(signal.draw(look, source), suffix))
+        file.publish()
+
+
+def _suffix(target: Path, source: Path) -> str:
+    """The kind of picture; raises UsageError for another, where it is the source, and without matplotlib."""
     suffix = target.suffix.lower()
     if suffix not in (".pdf", ".png", ".svg"):
         problem = f"its suffix does not name a kind of picture (found {target.suffix!r})"
         raise UsageError(f"{target}: {problem}; name a file that ends in .pdf, .png or .svg with -o")
     with suppress(OSError, ValueError):  # one of them does not exist, or cannot
-        if target.samefile(result):
+        if target.samefile(source):
             raise UsageError(f"{target}: this is the result itself; choose another output with -o")
     try:
         import matplotlib.figure  # noqa: F401
     except ImportError as error:
         problem = f"matplotlib cannot be imported ({error})"
         raise UsageError(f"{problem}; install it with: python -m pip install matplotlib") from error
-    from brakecli.plots import style
-
-    with open_result(result) as stored, new_output(target, force=force) as file, style.applied():
-        file.write(style.rendered(draw(stored, select), suffix))
-        file.publish()
+    return suffix
 
 
 def draw(result: StoredResult, select: Sequence[str] = ()) -> "Figure":

@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from brakecli.analysis.regime.spectra import Array, interpolated
@@ -16,8 +15,7 @@ _STANDS_OUT = 20.0  # power of a tone's bin over the mean of the noise, which re
 _SHARE = 0.3  # part of the energy of a frame in its tone
 _FAINT = 1e-3  # part of the power of the strongest tone
 _SAME = 0.06  # part of its frequency by which a tone may move from frame to frame
-_EDGE, _FOOT = 0.5, 0.15  # parts of its amplitude that end a burst, and to which it has then soon fallen
-_STEEP = 1.5
+_STEEP = 0.4  # of its mean amplitude, in its first and last fifth: otherwise it rings down, or grows
 _MOST = 32
 
 
@@ -65,12 +63,15 @@ def _tones(values: Array, size: int) -> Iterator[tuple[int, float, float]]:
     )
     for first in range(0, len(values) - size + 1, size // 2):
         part = values[first : first + size]
-        level = part - part[0] - (part[-1] - part[0]) * ramp
-        power = np.abs(np.fft.rfft((level - level.mean()) * window)) ** 2
-        power[:3] = 0.0
+        flat = part - part[0] - (part[-1] - part[0]) * ramp
+        power = np.abs(np.fft.rfft((flat - flat.mean()) * window)) ** 2
+        power[: _CYCLES - 2] = 0.0  # drift
         i = int(np.argmax(power))
         tone = float(power[max(i - 2, 0) : i + 3].sum())
-        if power[i] > _STANDS_OUT * float(np.median(power[3:])) / np.log(2.0) and tone >= _SHARE * power.sum():
+        near = slice(max(_CYCLES - 2, i // 2), max(2 * i, 4 * _CYCLES))
+        level = power[near] * frequencies[near] ** 2  # of the derivative: drift has a slope, but no line
+        clear = power[i] * frequencies[i] ** 2 > _STANDS_OUT * float(np.median(level)) / np.log(2.0)
+        if clear and tone >= _SHARE * power.sum():
             yield first, interpolated(frequencies, power, i), tone
 
 
@@ -79,27 +80,24 @@ def _burst(values: Array, interval: float, size: int, group: list[tuple[int, flo
     begin, end = group[0][0], group[-1][0] + size
     weights = np.array([power for *_, power in group])
     frequency = float(np.average([f for _, f, _ in group], weights=weights))
-    around = max(2 * size, end - begin)
-    low, high = max(0, begin - around), min(len(values), end + around)
+    low, high = max(0, begin - size), min(len(values), end + size)
     piece = values[low:high] - np.linspace(values[low], values[high - 1], high - low)
     lines, half = np.fft.fftfreq(len(piece)), max(_SAME * frequency, 4.0 / size)
     tone = np.fft.ifft(np.where(np.abs(lines - frequency) <= half, np.fft.fft(piece), 0.0))
     amplitude = uniform_filter1d(2.0 * np.abs(tone), max(1, min(size // 4, int(2 / frequency))))
-    centre = int(np.argmax(amplitude[begin - low : end - low])) + begin - low
-    top = float(np.quantile(amplitude[begin - low : end - low], 0.8))
-    (first, last), (foot, toe) = (_around(amplitude >= part * top, centre) for part in (_EDGE, _FOOT))
-    if (last - first) * frequency < _CYCLES / 2 or top <= 0.0:
+    first, last = begin - low, end - low
+    first, last = first + _edge(amplitude[first : first + size]), last - _edge(amplitude[last - size : last][::-1])
+    if (last - first) * frequency < _CYCLES / 2:
         return None
+    amplitude = amplitude[first:last]
+    fifth = max(1, len(amplitude) // 5)
+    steep = min(amplitude[:fifth].mean(), amplitude[-fifth:].mean()) >= _STEEP * amplitude.mean()
     turn = np.angle(np.vdot(tone[first : last - 1], tone[first + 1 : last]))
-    level = float(np.sqrt(0.5 * np.mean(amplitude[first:last] ** 2)))
-    steep = toe - foot <= _STEEP * (last - first)
-    return Burst(
-        (low + first) * interval, (low + last) * interval, float(turn) / (2.0 * np.pi * interval), level, steep
-    )
+    level = float(np.sqrt(0.5 * np.mean(amplitude**2)))
+    times = (low + first) * interval, (low + last) * interval
+    return Burst(*times, float(turn) / (2.0 * np.pi * interval), level, bool(steep))
 
 
-def _around(above: NDArray[np.bool_], place: int) -> tuple[int, int]:
-    """First sample, and the one after the last, of the run of true ones around a place."""
-    below = np.flatnonzero(~above)
-    i = int(np.searchsorted(below, place))
-    return (int(below[i - 1]) + 1 if i else 0), (int(below[i]) if i < len(below) else len(above))
+def _edge(amplitude: Array) -> int:
+    """The first sample of a frame at which the tone has half of the amplitude that it comes to in it."""
+    return int(np.argmax(amplitude >= 0.5 * amplitude.max()))

@@ -28,6 +28,7 @@ class Velocity:
     raw: Array  # the same with its mean and drift
     noise: float  # standard deviation of one sample of the signal
     measured: bool  # otherwise it is the difference of what was measured
+    first: int = 0  # of its samples in the record, of which gaps may have left a part
 
     @cached_property
     def _primitive(self) -> Array:
@@ -104,18 +105,20 @@ def cleaned(values: Array, order: int) -> tuple[Velocity, list[str]]:
     `order` says of which derivative of the displacement the values are: 0, 1 or 2.
     """
     notes: list[str] = []
+    first = 0
     if len(values) >= _SHORTEST and not np.isfinite(values).all():
         cycle = _cycle(_velocity(_bridged(values), order > 0))
-        values = _bridged(_longest_piece(values, max(1.0, 0.25 * cycle), notes))
+        values, first = _longest_piece(values, max(1.0, 0.25 * cycle), notes)
+        values = _bridged(values)
     if len(values) >= _SHORTEST:
         values = _without_spikes(values, order > 0, notes)
-    found = _velocity(values, order > 0)
+    found = replace(_velocity(values, order > 0), first=first)
     if order < 2 or not found.variances:  # the sum of noise would not look like noise
         return found, notes
     values = np.cumsum(found.values)
     width = int(_DRIFT_CYCLES * _cycle(found))
     slow = uniform_filter1d(values, width) if 2 * width <= len(values) else 0.0
-    return _velocity(values - slow, True), notes
+    return replace(_velocity(values - slow, True), first=first), notes
 
 
 def without_drift(velocity: Velocity, cycle: float, notes: list[str]) -> Velocity:
@@ -166,20 +169,20 @@ def _bridged(values: Array) -> Array:
     return values if good.all() else np.interp(places, places[good], values[good])
 
 
-def _longest_piece(values: Array, longest_gap: float, notes: list[str]) -> Array:
-    """The longest part without a gap of more samples than `longest_gap`."""
+def _longest_piece(values: Array, longest_gap: float, notes: list[str]) -> tuple[Array, int]:
+    """The longest part without a gap of more samples than `longest_gap`, and its first sample."""
     bad = np.concatenate([[False], ~np.isfinite(values), [False]])
     gaps = np.flatnonzero(bad[1:] != bad[:-1]).reshape(-1, 2)
     cuts = gaps[np.diff(gaps)[:, 0] > longest_gap]
     if len(cuts) < len(gaps):
         notes.append(f"{len(gaps) - len(cuts)} short gaps bridged")
     if not len(cuts):
-        return values
+        return values, 0
     pieces = np.array([0, *cuts.flat, len(values)]).reshape(-1, 2)
     begin, end = pieces[np.argmax(np.diff(pieces))]
     used = f"{end - begin} of {len(values)} samples"
     notes.append(f"{len(cuts)} long gaps: only the longest piece is used, {used}")
-    return values[begin:end]
+    return values[begin:end], int(begin)
 
 
 def _without_spikes(values: Array, is_velocity: bool, notes: list[str]) -> Array:

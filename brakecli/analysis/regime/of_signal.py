@@ -15,6 +15,7 @@ from brakecli.analysis.regime.verdict import Excitation, Regime
 _MOST_OF_IT = 0.9  # of the record: a burst that fills as much is the record
 _INSIDE = 0.05  # of a burst, left out at either end
 _LEVEL = 1.33  # its last third over its first, or the reverse; a ring-down that is cut at half has 1.5
+_DEFAULT = SignalThresholds()
 _SUSTAINED = (Regime.RELAXATION, Regime.QUASI_HARMONIC)
 
 
@@ -67,6 +68,8 @@ class SignalLook:
     """A verdict with what it was found from, for pictures."""
 
     verdict: SignalVerdict
+    signal: Signal
+    quantity: Measurand
     velocity: Velocity
     slips: Slips
     smoothing: int  # samples
@@ -78,7 +81,7 @@ def classify_signal(
     quantity: Measurand,
     belt_speed: float | None = None,
     stiffness: float | None = None,
-    thresholds: SignalThresholds = SignalThresholds(),
+    thresholds: SignalThresholds = _DEFAULT,
 ) -> SignalVerdict:
     """The regime of a measured signal; `belt_speed` in m/s, `stiffness` in N/m (of a force) where known."""
     return look(signal, quantity, belt_speed, stiffness, thresholds).verdict
@@ -89,24 +92,27 @@ def look(
     quantity: Measurand,
     belt_speed: float | None = None,
     stiffness: float | None = None,
-    thresholds: SignalThresholds = SignalThresholds(),
+    thresholds: SignalThresholds = _DEFAULT,
 ) -> SignalLook:
     """The verdict with the velocity that it rests on; that of the longest burst where all else is silence."""
     step, good = signal.interval, np.flatnonzero(np.isfinite(signal.values))
     found = _judge(signal, quantity, belt_speed, stiffness, thresholds)
     filled = np.interp(np.arange(len(signal.values)), good, signal.values[good]) if len(good) else signal.values
     tones = tuple(bursts(filled, step))
-    steep = [tone for tone in tones if tone.steep and tone.end - tone.start < _MOST_OF_IT * len(filled) * step]
     verdict = replace(found.verdict, bursts=tones)
-    if steep and verdict.regime not in _SUSTAINED:
-        burst = max(steep, key=lambda tone: tone.level**2 * (tone.end - tone.start))
-        begin, end = (int(time / step) for time in (burst.start, burst.end))
-        margin = int(_INSIDE * (end - begin))
-        part = replace(signal, values=signal.values[begin + margin : end - margin])
+    steep = [tone for tone in tones if tone.steep and tone.end - tone.start < _MOST_OF_IT * len(filled) * step]
+    if not steep or verdict.regime in _SUSTAINED:
+        return replace(found, verdict=verdict)
+    burst = max(steep, key=lambda tone: tone.level**2 * (tone.end - tone.start))
+    begin, end = (int(time / step) for time in (burst.start, burst.end))
+    margin = int(_INSIDE * (end - begin))
+    part = replace(signal, values=signal.values[begin + margin : end - margin])
+    if np.isfinite(part.values).sum() >= FEWEST_SAMPLES:
         inside = _judge(part, quantity, belt_speed, stiffness, thresholds).verdict
         if inside.regime in _SUSTAINED and 1.0 / _LEVEL < inside.evidence["envelope_ratio"] < _LEVEL:
             when = f"in a burst from {burst.start:.4g} to {burst.end:.4g} s: {inside.reasons[0]}"
-            verdict = replace(inside, reasons=(when,), bursts=tones, warnings=verdict.warnings)
+            line = burst.frequency if inside.regime is Regime.QUASI_HARMONIC else inside.frequency
+            verdict = replace(inside, reasons=(when,), frequency=line, bursts=tones, warnings=verdict.warnings)
     return replace(found, verdict=verdict)
 
 
@@ -149,4 +155,4 @@ def _judge(
         warnings=(*signal.notes, *notes),
         thresholds=thresholds,
     )
-    return SignalLook(verdict, velocity, slips, rules.smoothing)
+    return SignalLook(verdict, signal, quantity, velocity, slips, rules.smoothing)

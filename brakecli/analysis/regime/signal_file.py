@@ -142,7 +142,7 @@ def _sound(path: Path, column: str | None, sample_rate: float | None) -> tuple[A
 
 
 def _dataset(path: Path, inside: str) -> tuple[Array, str]:
-    """A one-dimensional dataset of numbers with its attribute `units`; whatever h5py raises on damage is reported."""
+    """A row of numbers with its attribute `units`; whatever h5py raises on damage is reported."""
     import h5py
 
     from brakecli.files.valid import check_size, member

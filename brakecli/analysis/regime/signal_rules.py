@@ -43,10 +43,11 @@ class SignalRules:
     def __init__(
         self, velocity: Velocity, slips: Slips, interval: float, belt: float, limits: SignalThresholds
     ) -> None:
+        """The belt's speed as the velocity would show it; NaN where it is not known."""
         self.velocity, self.interval, self.limits, self.count = velocity, interval, limits, len(velocity.values)
         self.slips = slips
         self.has_belt = True  # whether its speed can be given
-        self.belt = belt  # the belt's speed, as the velocity would show it; NaN where it is not known
+        self.belt = belt
         self.duration, self.start, self.windows = self.count * interval, 0, 1
         self.certain = slips.skewness >= limits.skewness_certain and slips.stick_slip
         self.smoothing = slips.scale if self.certain else velocity.quiet
@@ -54,6 +55,7 @@ class SignalRules:
         self.evidence: dict[str, float] = {}
 
     def short(self) -> Decision | None:
+        """Decides where cycles or samples are too few, or nothing rises above the noise."""
         velocity, limits = self.velocity, self.limits
         if self.count < FEWEST_SAMPLES:
             return Decision(f"only {self.count} samples without a gap; measure longer")
@@ -133,6 +135,7 @@ class SignalRules:
             yield "beyond_lines", beyond, limits.beyond_lines
 
     def without_stick(self) -> Decision:
+        """Decides by a plateau at the belt's speed, and by the lines of the spectrum."""
         top, beside = self._plateau()
         self.evidence |= {"plateau": top / max(beside, 1e-9), "plateau_time": top}
         flat = top > self.limits.plateau * beside

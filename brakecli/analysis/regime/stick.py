@@ -5,7 +5,7 @@ direction. Smoothing over the m = 1, 2, 4 … samples that show this best serves
 and spikes skew it as well, but a slip lasts until the belt has loaded the spring again, and nothing swings back.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -35,7 +35,7 @@ class Slips:
 
     skewness: float = 0.0
     scale: int = 1  # samples over which the velocity is smoothed to see them
-    count: int = 0
+    places: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, np.intp), repr=False)  # the last before
     stick: float = 0.0  # part of the time between slips
     lasts: float = (
         1.0  # part of a slip that is left a quarter of a cycle later; 0 for a ring-down, or a spike of x
@@ -44,6 +44,11 @@ class Slips:
     loaded: bool = True  # whether slips go with the time that has loaded them; random spikes do not
 
     period: float = 0.0  # samples from one to the next, in the mean
+
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return len(self.places)
 
     @property
     def enough(self) -> bool:
@@ -80,7 +85,7 @@ def seek(velocity: Velocity, certain: float) -> Slips:
     spread = middle + _BULK * 1.4826 * float(np.median(np.abs(bulk - middle))) if found >= certain else 0.0
     high = max(0.5 * middle, 4.0 * noise, spread)
     places = rises(-values, -0.25 * middle, high)
-    slips = Slips(found, scale, len(places), float(np.mean(values > -high)))
+    slips = Slips(found, scale, places, stick=float(np.mean(values > -high)))
     slips = replace(slips, period=len(values) / max(1, len(places)))
     if len(places) < _FEWEST:
         return slips
