@@ -79,7 +79,7 @@ def _draw_velocity(axes: Axes, look: SignalLook) -> None:
     offset = velocity.first + (0.5 * m if velocity.measured else m)
     frequency = look.verdict.frequency
     wanted = int(min(CYCLES / (frequency * step) if frequency else FEW, MOST_DETAIL, len(values)))
-    tones = sorted(look.verdict.bursts, key=lambda tone: tone.level**2 * (tone.end - tone.start))
+    tones = sorted(look.verdict.bursts, key=lambda tone: tone.energy)
     slips = look.verdict.regime == "relaxation"
     middle = 0.5 * len(values)
     if tones and not slips:

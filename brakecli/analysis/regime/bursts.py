@@ -29,6 +29,11 @@ class Burst:
     level: float  # RMS, in the unit of the quantity
     steep: bool  # it begins and ends soon; otherwise it rings down, or grows
 
+    @property
+    def energy(self) -> float:
+        """Level squared times length."""
+        return self.level**2 * (self.end - self.start)
+
     def numbers(self) -> dict[str, float]:
         """By the names of `--json`."""
         return {"start": self.start, "end": self.end, "frequency": self.frequency, "level": self.level}

@@ -13,6 +13,7 @@ from brakecli.analysis.regime.stick import Slips, seek
 from brakecli.analysis.regime.verdict import Excitation, Regime
 
 _MOST_OF_IT = 0.9  # of the record: a burst that fills as much is the record
+_MOST_ENERGY = 0.5  # of all bursts in one that speaks for the record
 _INSIDE = 0.05  # of a burst, left out at either end
 _LEVEL = 1.33  # its last third over its first, or the reverse; a ring-down that is cut at half has 1.5
 _DEFAULT = SignalThresholds()
@@ -101,9 +102,10 @@ def look(
     tones = tuple(bursts(filled, step))
     verdict = replace(found.verdict, bursts=tones)
     steep = [tone for tone in tones if tone.steep and tone.end - tone.start < _MOST_OF_IT * len(filled) * step]
-    if not steep or verdict.regime in _SUSTAINED:
+    burst = max(steep, key=lambda tone: tone.energy, default=None)
+    rare = burst and burst.energy >= _MOST_ENERGY * sum(tone.energy for tone in tones)
+    if not burst or not rare or verdict.regime in _SUSTAINED:
         return replace(found, verdict=verdict)
-    burst = max(steep, key=lambda tone: tone.level**2 * (tone.end - tone.start))
     begin, end = (int(time / step) for time in (burst.start, burst.end))
     margin = int(_INSIDE * (end - begin))
     part = replace(signal, values=signal.values[begin + margin : end - margin])
