@@ -32,7 +32,7 @@ THRESHOLD = option("Change a threshold of the rules; repeatable.", "NAME=VALUE",
 
 
 def command(
-    sources: Annotated[list[str], source_argument("FILE...", SOURCES)],
+    sources: Annotated[list[str], source_argument("FILE", SOURCES)],
     quantity: Quantity = None,
     column: Column = None,
     time_column: TimeColumn = None,
