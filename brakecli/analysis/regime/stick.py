@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
+from scipy.ndimage import median_filter, uniform_filter1d
 
 from brakecli.analysis.regime.cleaning import NOISE_SHARE, Velocity
 from brakecli.analysis.regime.spectra import Array, rises
@@ -22,7 +22,7 @@ _BULK = 3.0  # robust deviations that a slip leaves the velocity in stick by
 _FEWEST = 10
 _STRONG = 0.4  # of the tenth largest slip: the shape of smaller ones is not looked at
 _MOST = 512  # slips whose shape is averaged
-_LASTS, _RETURNS = 0.4, 0.2
+_LASTS, _RETURNS = 0.55, 0.2
 _NARROW = 2  # samples of a pulse of velocity that may be a spike
 _REGULAR = 0.3  # of the median: quartiles of the times between pulses that spikes do not keep
 _LOADED = (0.4, 2.5)  # correlation of slips with the time before or after them, and that times √n
@@ -117,17 +117,24 @@ def _shaped(slips: Slips, velocity: Velocity, places: NDArray[np.intp]) -> Slips
     """What is left of the strong slips, what swings back at once, and whether time has loaded them."""
     scale = slips.scale
     x = np.concatenate([[0.0], np.cumsum(velocity.values)])
-    falls = sliding_window_view(x[:-scale] - x[scale:], 5 * scale)
-    places = places[places < len(falls)]
-    starts, depths = places + falls[places].argmax(axis=1), falls[places].max(axis=1)
-    strong = depths >= _STRONG * max(float(np.sort(depths)[-_FEWEST:][0]), 0.0) if len(places) else places > 0
-    if np.sum(strong) < 3:
+    starts, depths, strong = _falls(x, places, scale)
+    # Where impulses and noise make the largest falls, a smoothed displacement shows where slips are.
+    calm_starts, calm_depths, calm = _falls(uniform_filter1d(x, 1 + scale // 2), places, scale)
+    if min(strong.sum(), calm.sum()) < 3:
         return replace(slips, lasts=0.0)
+    lasts = _lasting(x, calm_starts[calm], scale) / max(float(calm_depths[calm].mean()), 1e-300)
+    returns = _returning(x, starts[strong], min(velocity.quiet, scale), scale)
     loaded = not velocity.measured or _loaded(velocity.values, starts, depths, scale)
-    starts, depths = starts[strong], depths[strong]
-    lasts = _lasting(x, starts, scale) / max(float(depths.mean()), 1e-300)
-    returns = _returning(x, starts, min(velocity.quiet, scale), scale)
     return replace(slips, lasts=lasts, returns=returns, loaded=loaded)
+
+
+def _falls(x: Array, places: NDArray[np.intp], scale: int) -> tuple[NDArray[np.intp], Array, NDArray[np.bool_]]:
+    """Where the displacement falls most behind each place, by how much, and which falls are strong."""
+    falls = sliding_window_view(x[:-scale] - x[scale:], 5 * scale)
+    near = falls[places[places < len(falls)]]
+    starts, depths = places[: len(near)] + near.argmax(axis=1), near.max(axis=1)
+    tenth = float(np.sort(depths)[-_FEWEST:][0]) if len(depths) else 0.0
+    return starts, depths, depths >= _STRONG * max(tenth, 0.0)
 
 
 def _returning(x: Array, starts: NDArray[np.intp], fine: int, scale: int) -> float:
