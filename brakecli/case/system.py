@@ -20,7 +20,7 @@ def system_of(case: Case) -> System:
     wheel, load, initial, solver = case.wheel, case.load, case.initial, case.solver
     automatic = solver.scheme == "auto"
     shoe, wheel_surface = (
-        surface(**dict(each)) if each is not None else _SMOOTH
+        surface(**each.sines(), radius=wheel.radius) if each is not None else _SMOOTH
         for each in (case.roughness.shoe, case.roughness.wheel)
     )
     chosen = (
@@ -59,4 +59,5 @@ def system_of(case: Case) -> System:
             allow_unconverged=solver.allow_unconverged,
             automatic=automatic,
         ),
+        notes=tuple(f"roughness.{side}: {each.note}" for side, each in case.roughness if each and each.note),
     )

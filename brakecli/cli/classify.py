@@ -96,7 +96,7 @@ class _Options:
         else:
             from brakecli.analysis.regime.signal_rules import SignalThresholds
 
-            limits = _changed(SignalThresholds, self.thresholds)
+            limits = changed(SignalThresholds, self.thresholds)
             found = look_at(source, quantity, self.reading, self.machine, limits).verdict
             numbers = {**dataclasses.asdict(found), "bursts": [tone.numbers() for tone in found.bursts]}
             numbers["quantity"] = quantity
@@ -108,7 +108,7 @@ class _Options:
         from brakecli.analysis.regime.verdict import Thresholds
 
         try:
-            limits = _changed(Thresholds, self.thresholds)
+            limits = changed(Thresholds, self.thresholds)
             return _twice(source, limits, self.quiet) if self.second_run else classify_result(Path(source), limits)
         except UnreadableResultError as error:
             remedy = "for a measured signal, state with --quantity what was measured"
@@ -123,7 +123,7 @@ def _twice(source: str, limits: Any, quiet: bool) -> dict[str, Any]:
         return classify_twice(Path(source), limits, lambda text: None if quiet else say(text), show_progress)
 
 
-def _changed(thresholds: type[Any], changes: list[str] | None) -> Any:
+def changed(thresholds: type[Any], changes: list[str] | None) -> Any:
     """Thresholds with the values of NAME=VALUE; raises UsageError for what is not one of them."""
     names = [field.name for field in dataclasses.fields(thresholds)]
     found: dict[str, float] = {}

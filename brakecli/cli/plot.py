@@ -28,7 +28,10 @@ def command(
     result: Annotated[str, source_argument("FILE", SOURCE)],
     output: Annotated[Path | None, output_option("Picture", "FILE.png, here")] = None,
     select: Annotated[
-        list[str] | None, option("Draw one value of a sweep's axis; repeatable.", "KEY=VALUE")
+        list[str] | None, option("Draw the nearest value of a sweep's axis; repeatable.", "KEY=VALUE")
+    ] = None,
+    variable: Annotated[
+        str | None, option("A number of the sweep; of a run, what to draw in place of vx.", "NAME")
     ] = None,
     quantity: Quantity = None,
     column: Column = None,
@@ -49,8 +52,8 @@ def command(
     check(quantity, {**reading, **machine})
     target = output or Path(f"{Path(result).stem}.png")
     if quantity is not None:
-        if select:
-            raise UsageError(f"--select: is for sweeps (found {select[0]!r}); leave it out for a signal")
+        if select or variable:
+            raise UsageError("--select and --variable: are for results; leave them out for a measured signal")
         from brakecli.plots.result import plot_signal
 
         look = look_at(result, quantity, reading, machine)
@@ -61,6 +64,6 @@ def command(
         from brakecli.plots.result import plot_result
 
         with unwinding():
-            plot_result(Path(result), target, force=force, select=select or ())
+            plot_result(Path(result), target, force=force, select=select or (), variable=variable or "")
     if not quiet:
         show(f"{target}: written")

@@ -102,8 +102,10 @@ def _scales(velocity: Velocity, least: int) -> list[int]:
     """Smoothings at which the velocity exceeds its noise, and the motion is not smoothed away."""
     every = [1 << k for k in range(max(1, len(velocity.values) // _SLOWEST).bit_length())]
     sizes = {m: float(velocity.thinned(m).var()) for m in every}
-    moved = _MOVES**2 * max(m * m * variance for m, variance in sizes.items())
     clear = {m: v for m, v in sizes.items() if m >= least and velocity.noise_at(m) < NOISE_SHARE * v}
+    if velocity.measured:  # otherwise noise of high frequencies would hide what a displacement shows
+        return [m for m, v in clear.items() if v >= _MOVES * max(clear.values())]
+    moved = _MOVES**2 * max(m * m * v for m, v in sizes.items())
     return [m for m, v in clear.items() if m * m * v >= moved]
 
 
