@@ -111,10 +111,11 @@ def _draw_spectrum(axes: Axes, look: SignalLook) -> None:
     axes.loglog(frequencies[shown], density[shown], color=style.BLUE, lw=1.0)
     unit = _UNITS[look.quantity]
     unit = f"({unit})²/Hz" if "/" in unit else f"{unit}²/Hz"
-    axes.set(title=f"Spectrum of the {look.quantity}", xlabel="frequency (Hz)")
+    axes.set_title(f"Spectrum of the {look.quantity}")
     axes.set_ylabel(f"power spectral density ({unit})")
-    if shown.any():
-        style.set_ticks(axes.xaxis, *(float(frequencies[shown][i]) for i in (0, -1)))
+    low, high = (float(frequencies[shown][i]) for i in (0, -1)) if shown.any() else (1.0, 1.0)
+    hertz = style.set_ticks(axes.xaxis, low, high, "Hz")
+    axes.set_xlabel(f"frequency ({hertz})")
     if frequency is not None:
         label = f"{'events' if look.verdict.regime == 'relaxation' else 'line'} {frequency:.4g} Hz"
         axes.axvline(frequency, color=style.GREEN, ls=style.DOTS, lw=1.4, zorder=0.9, label=label)
