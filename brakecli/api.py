@@ -3,13 +3,15 @@
 Everything large is imported on the first call.
 """
 
+import json
+import multiprocessing
 import signal
 import tempfile
 import threading
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict
+from itertools import pairwise
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -103,7 +105,7 @@ def stability(
 
     Returns:
         A variable for each number that `brakecli stability --json` prints, NaN or an empty text if there is none;
-        lists and objects as attributes. With `vary` the lock-in diagram.
+        lists as attributes, and objects, as JSON. With `vary` the lock-in diagram.
 
     Raises:
         CaseError, UsageError, RefusedError: as `brakecli stability`.
@@ -154,6 +156,10 @@ def sweep(
     Raises:
         CaseError, UsageError, RefusedError, CannotWriteError: as `brakecli sweep`.
     """
+    if jobs is not None and not (isinstance(jobs, int) and 1 <= jobs <= 4096):
+        raise UsageError(f"jobs {jobs}: is no number of workers from 1 to 4096")
+    if getattr(multiprocessing.current_process(), "_inheriting", False):  # a worker that is being started
+        raise UsageError('brakecli.sweep: in a script, call it below  if __name__ == "__main__":')
     with _interruptible(), _target(output) as path:
         from brakecli.sweeps.driver import choose_engine, sweep
         from brakecli.sweeps.plan import LoadedSweep, sweep_of
@@ -187,6 +193,7 @@ def classify(
     belt_speed: float | None = None,
     stiffness: float | None = None,
     thresholds: "Mapping[str, float] | None" = None,
+    second_run: bool = False,
     **reading: Any,
 ) -> "xr.Dataset":
     """Regime of a stored run, or of a measured signal, with evidence.
@@ -197,39 +204,28 @@ def classify(
         belt_speed: speed of the wheel's surface (m/s), if known.
         stiffness: stiffness behind a measured force (N/m), if known.
         thresholds: limits of the rules to change.
+        second_run: where friction or roughness may keep a vibration up, run the case once more to decide.
         reading: how a file is read: `column`, `time_column`, `sample_rate` (Hz), `unit`, `time_unit`.
 
     Returns:
-        A variable for each number that `brakecli classify --json` prints, evidence and reasons as attributes.
+        A variable for each number that `brakecli classify --json` prints; lists and objects (JSON) as attributes.
 
     Raises:
         UsageError, UnreadableResultError: as `brakecli classify`.
     """
-    from brakecli.cli.classify import changed
+    from brakecli.cli.classify import Options
     from brakecli.files.fields import VERDICT
 
+    how = dict.fromkeys(("column", "time_column", "sample_rate", "unit", "time_unit"))
+    if unknown := sorted(reading.keys() - how.keys()):
+        raise UsageError(f"classify: there is no argument {unknown[0]}; give one of {', '.join(how)}")
     changes = [f"{name}={value}" for name, value in (thresholds or {}).items()]
+    machine = {"belt_speed": belt_speed, "stiffness": stiffness}
     with _interruptible():
-        if quantity is None:
-            from brakecli.analysis.regime.of_run import classify_result
-            from brakecli.analysis.regime.verdict import Thresholds
-
-            return _dataset(VERDICT, classify_result(Path(source), changed(Thresholds, changes)))
-        from brakecli.analysis.regime.of_signal import Measurand, classify_signal
-        from brakecli.analysis.regime.signal_file import read_signal
-        from brakecli.analysis.regime.signal_rules import SignalThresholds
-
-        if quantity not in set(Measurand):
-            raise UsageError(f"quantity {quantity}: is not known; give one of {', '.join(Measurand)}")
-        verdict = classify_signal(
-            read_signal(str(source), Measurand(quantity), **reading),
-            quantity=Measurand(quantity),
-            belt_speed=belt_speed,
-            stiffness=stiffness,
-            thresholds=changed(SignalThresholds, changes),
-        )
-        _warn(verdict.warnings)
-        return _dataset(VERDICT, asdict(verdict))
+        judging = Options(quantity, how | reading, machine, changes, second_run, quiet=True)
+        numbers = judging.verdict(str(source))
+    _warn(numbers.get("warnings", ()))
+    return _dataset(VERDICT, numbers)
 
 
 @contextmanager
@@ -263,20 +259,32 @@ def _case(source: "Source | LoadedSweep", settings: "Settings | None") -> "Loade
 
     if isinstance(source, LoadedCase):
         return parse_case(source.resolved, "the case", _overrides(settings)) if settings else source
+    if resolved := getattr(source, "attrs", {}).get("resolved_toml"):  # a result
+        return parse_case(str(resolved), "its case", _overrides(settings))
+    if not isinstance(source, str | PathLike):
+        raise UsageError(
+            f"{type(source).__name__}: is no case; give a path, or what brakecli.load returns for one"
+        )
     return load_case(str(source), _overrides(settings))
 
 
 def _overrides(settings: "Settings | None") -> list[str]:
     """Settings as `--set` has them; a table replaces the one that the case has."""
-    return [f"{key}={_toml(value)}" for key, value in (settings or {}).items()]
+    if not isinstance(settings, Mapping | None):
+        raise UsageError("settings: are no mapping; write them as {'friction.coefficient': 0.4}")
+    return [f"{key}={_toml(value, key)}" for key, value in (settings or {}).items()]
 
 
-def _toml(value: Any) -> str:
+def _toml(value: Any, key: str) -> str:
     import tomli_w
 
     if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{key} = {_toml(each)}" for key, each in value.items()) + "}"
-    return tomli_w.dumps({"value": _plain(value)}).removeprefix("value = ").strip()
+        return "{" + ", ".join(f"{name} = {_toml(each, f'{key}.{name}')}" for name, each in value.items()) + "}"
+    try:
+        return tomli_w.dumps({"value": _plain(value)}).removeprefix("value = ").strip()
+    except TypeError:
+        what = f"{key}: cannot be set to {type(value).__name__}"
+        raise UsageError(f"{what}; give a number, a text, a list or a table") from None
 
 
 def _axis(vary: "Mapping[str | tuple[str, ...], Iterable[float]]") -> "Axis":
@@ -288,16 +296,23 @@ def _axis(vary: "Mapping[str | tuple[str, ...], Iterable[float]]") -> "Axis":
     if len(vary) != 1:
         raise UsageError("vary: takes one key with its values, or one tuple of keys; give the others as settings")
     [(keys, values)] = vary.items()
-    return parse_table(Axis, tomli_w.dumps({"parameter": keys, "values": _plain(values)}), "vary")
+    axis = parse_table(Axis, tomli_w.dumps({"parameter": keys, "values": _plain(values)}), "vary")
+    steps = [after - before for before, after in pairwise(axis.values or ()) if axis.numeric]
+    if not axis.numeric or min(steps, default=1) * max(steps, default=1) <= 0:
+        raise UsageError("vary: modes are followed along numbers that rise or fall; sort them, each once")
+    return axis
 
 
 def _plain(value: Any) -> Any:
     """A value without NumPy or xarray, as TOML holds it."""
+    value = value.to_numpy() if hasattr(value, "to_numpy") else value
     if hasattr(value, "tolist"):
         return value.tolist()
-    return (
-        [_plain(each) for each in value] if isinstance(value, Iterable) and not isinstance(value, str) else value
-    )
+    if isinstance(value, Mapping):
+        return {name: _plain(each) for name, each in value.items()}
+    if isinstance(value, Iterable) and not isinstance(value, str):
+        return [_plain(each) for each in value]
+    return str(value) if isinstance(value, PathLike) else value
 
 
 def _opened(path: Path) -> "xr.DataTree":
@@ -313,18 +328,19 @@ def _opened(path: Path) -> "xr.DataTree":
 
 
 def _dataset(declared: "Iterable[Field]", numbers: Mapping[str, Any]) -> "xr.Dataset":
-    """Numbers and texts as variables with their units; lists and objects as attributes."""
+    """Numbers and texts as variables with their units; lists as attributes, and objects, as JSON."""
     import xarray as xr
 
-    found = xr.Dataset()
-    for field in declared:
-        value = numbers.get(field.name)
+    found, known = xr.Dataset(), {field.name: field for field in declared}
+    for name, value in numbers.items():
+        field = known.get(name)
         if isinstance(value, list | tuple | dict):
-            found.attrs[field.name] = value
-        elif field.kind != "O":
+            flat = not isinstance(value, dict) and all(isinstance(each, str | int | float) for each in value)
+            found.attrs[name] = list(value) if flat else json.dumps(value)
+        elif field and field.kind != "O":
             missing = "" if field.kind.startswith("S") else float("nan")
             about = {"units": field.units, "long_name": field.meaning}
-            found[field.name] = ((), missing if value is None else value, about)
+            found[name] = ((), missing if value is None else value, about)
     return found
 
 

@@ -47,7 +47,8 @@ def test_a_run_is_that_of_the_command(tmp_path: Path) -> None:
     verdict = brakecli.classify(tmp_path / "r.h5", thresholds={"stick_cycles": 0.9})
     assert verdict.regime == printed["regime"]
     assert float(verdict.frequency) == printed["frequency"]
-    assert verdict.attrs["thresholds"]["stick_cycles"] == 0.9
+    assert json.loads(verdict.attrs["thresholds"])["stick_cycles"] == 0.9
+    verdict.to_netcdf(tmp_path / "v.nc", engine="h5netcdf")
 
 
 def test_outputs_stay_only_where_they_are_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -69,12 +70,20 @@ def test_stability_is_that_of_the_command() -> None:
     assert {*printed} == {*found.data_vars, *found.attrs}
     for name, value in printed.items():
         if name in found.attrs:
-            assert found.attrs[name] == value
+            held = found.attrs[name]
+            assert (json.loads(held) if isinstance(held, str) else held) == value
         elif value is None:
             assert found[name].item() == "" or math.isnan(found[name].item())
         else:
             assert found[name].item() == value
     assert found.critical_frequency.attrs["units"] == "Hz"
+
+
+def test_what_one_function_returns_the_next_takes() -> None:
+    found = brakecli.stability(CASE)
+    less = brakecli.run(CASE, {**SHORT, "friction.coefficient": 0.5 * found.critical_friction})
+    assert less.attrs["regime"] == "damped"
+    assert brakecli.run(less)["history"].to_dataset().identical(less["history"].to_dataset())
 
 
 def test_modes_follow_a_key_as_in_the_command() -> None:
@@ -126,6 +135,21 @@ def test_errors_are_those_of_the_commands(tmp_path: Path) -> None:
         brakecli.load(tmp_path / "broken.h5", SHORT)
     with pytest.raises(UsageError, match="noise: is not known"):
         brakecli.classify(CASE, "noise")
+    for jobs in (0, -1, 1.5, "2"):
+        with pytest.raises(UsageError, match="is no number of workers"):
+            brakecli.sweep(CASE, axes={"shoe.mass": [1.0]}, jobs=jobs)  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match=r"shoe\.mass: cannot be set to NoneType"):
+        brakecli.run(CASE, {"shoe.mass": None})
+    with pytest.raises(UsageError, match="are no mapping"):
+        brakecli.run(CASE, ["shoe.mass=1"])  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match="rise or fall"):
+        brakecli.stability(CASE, vary={"shoe.mass": [1.0, 3.0, 2.0]})
+    with pytest.raises(UsageError, match="only for a measured signal"):
+        brakecli.classify(tmp_path / "broken.h5", belt_speed=3.0)
+    with pytest.raises(UsageError, match="no argument columns"):
+        brakecli.classify(tmp_path / "broken.h5", columns=3)
+    with pytest.raises(UsageError, match="is no case"):
+        brakecli.run(3)  # type: ignore[arg-type]
     with pytest.raises(UsageError, match="no threshold few"):
         brakecli.classify(tmp_path / "broken.h5", thresholds={"few": 1})
 

@@ -50,11 +50,12 @@ def command(
     reading = {"column": column, "time_column": time_column, "sample_rate": sample_rate}
     reading |= {"unit": unit, "time_unit": time_unit}
     machine = {"belt_speed": belt_speed, "stiffness": stiffness}
-    options = _Options(quantity, reading, machine, thresholds, second_run, quiet)
+    options = Options(quantity, reading, machine, thresholds, second_run, quiet)
     if len(sources) == 1:
         from brakecli.cli.tables import verdict_table
 
         source, numbers = sources[0], options.verdict(sources[0])
+        warn(*numbers.get("warnings", ()))
         shown = {"source": source, **numbers}
         show_result("classify", shown, verdict_table, source, numbers, as_json=as_json, quiet=quiet)
         return
@@ -64,6 +65,7 @@ def command(
     for source in sources:  # one that cannot be read does not keep the others from being judged
         try:
             results.append({"source": source, **options.verdict(source)})
+            warn(*results[-1].get("warnings", ()))
         except (UnreadableResultError, UsageError) as error:
             failures.append(error)
             results.append({"source": source, "error": str(error)})
@@ -74,7 +76,7 @@ def command(
 
 
 @dataclasses.dataclass(frozen=True)
-class _Options:
+class Options:
     """How to judge a file."""
 
     quantity: str | None
@@ -85,7 +87,7 @@ class _Options:
     quiet: bool
 
     def verdict(self, source: str) -> dict[str, Any]:
-        """The verdict on one file, by the names of `--json`; prints its warnings."""
+        """The verdict on one file, by the names of `--json`."""
         quantity = quantity_of(source, self.quantity)
         check(quantity, {**self.reading, **self.machine})
         if self.second_run and quantity is not None:
@@ -100,7 +102,6 @@ class _Options:
             found = look_at(source, quantity, self.reading, self.machine, limits).verdict
             numbers = {**dataclasses.asdict(found), "bursts": [tone.numbers() for tone in found.bursts]}
             numbers["quantity"] = quantity
-        warn(*numbers.get("warnings", ()))
         return numbers
 
     def _of_result(self, source: str) -> dict[str, Any]:

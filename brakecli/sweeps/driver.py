@@ -25,19 +25,21 @@ from brakecli.sweeps.result import Findings, SweepReport, write
 from brakecli.sweeps.workers.local import LocalEngine
 from brakecli.sweeps.workers.task import Engine, Task, compute_units
 
-TASK_SECONDS = 0.2  # of work in a task, so that handing it out costs little
-LARGEST_TASK = 1000
+TASK_SECONDS = 0.2  # of work in a task, so that handing it out costs little,
+TASKS_A_SECOND = (
+    100.0  # and longer where many workers would ask for more tasks than this: a scheduler hands out some
+)
+LARGEST_TASK = 10_000
 
 
 class TaskQueue:
     """Cuts what is not finished into tasks, of a size by the time that units have taken so far."""
 
-    def __init__(self, finished: NDArray[np.bool_], size: int | None, order: int = 1) -> None:
+    def __init__(self, finished: NDArray[np.bool_], size: int | None, order: int = 1, workers: int = 1) -> None:
         """Queue what is not finished; `size` fixes that of the tasks, `order` = -1 begins at the end."""
-        missing = np.flatnonzero(~finished)
-        runs = np.split(missing, np.flatnonzero(np.diff(missing) != 1) + 1)
-        self._tasks = deque([Task(int(run[0]), len(run)) for run in runs if len(run)][::order])
-        self._size = size
+        edges = np.flatnonzero(np.diff(finished, prepend=True, append=True)).reshape(-1, 2).tolist()
+        self._tasks = deque([Task(first, end - first) for first, end in edges][::order])
+        self._size, self._task_seconds = size, max(TASK_SECONDS, workers / TASKS_A_SECOND)
         self.seconds, self.units = 0.0, 0  # computed so far
 
     def next_task(self) -> Task | None:
@@ -45,7 +47,7 @@ class TaskQueue:
         if not self._tasks:
             return None
         task = self._tasks.popleft()
-        by_time = math.ceil(min(TASK_SECONDS * self.units / max(self.seconds, 1e-9), LARGEST_TASK))
+        by_time = math.ceil(min(self._task_seconds * self.units / max(self.seconds, 1e-9), LARGEST_TASK))
         size = min(task.size, self._size or max(1, by_time))
         if size < task.size:
             self._tasks.appendleft(Task(task.first + size, task.size - size))
@@ -108,7 +110,7 @@ def sweep(
         with open_journal(journal_path(output), plan, force=force) as journal:
             resumed = journal.done
             begin(found, resumed)
-            queue = TaskQueue(journal.finished, task_size, order)
+            queue = TaskQueue(journal.finished, task_size, order, engine.workers)
             notes = _compute(engine, journal, queue, progress)
             report = SweepReport(output, loaded, Findings(journal), resumed, notes, queue.units * plan.unit_length)
             write(result, report, journal)

@@ -306,6 +306,12 @@ def test_tasks_are_as_long_as_their_work_is_short() -> None:
     assert queue.next_task() == Task(51, 1)
 
 
+def test_a_thousand_workers_ask_for_no_more_tasks_than_a_scheduler_hands_out() -> None:
+    queue = TaskQueue(np.zeros(10**6, dtype=bool), None, workers=1000)
+    queue.note_time(Task(0, 1000), 2.0)
+    assert queue.next_task() == Task(0, 5000)  # 10 s of 2 ms each: a hundred tasks a second
+
+
 def test_only_what_is_missing_is_queued_and_lost_units_come_again_one_by_one() -> None:
     finished = np.zeros(10, dtype=bool)
     finished[[0, 4, 5]] = True
