@@ -157,6 +157,19 @@ def test_the_spread_of_a_motion_under_an_opening_pad_knows_that_three_waves_beat
     assert verdict.amplitude <= 2.41e-7 <= verdict.amplitude + verdict.amplitude_spread  # thirty times as long
 
 
+def test_a_vibration_that_is_locked_to_the_waves_is_not_called_forced() -> None:
+    """Without the roughness it goes on for good: 0.37 m/s beside 0.32 m/s, after 64 times as long."""
+    for times in (1.0, 4.0):
+        verdict = judged("locked to the waves", times)
+        assert (verdict.regime, verdict.second_run) == ("undecided", True)
+
+
+def test_a_shoe_that_bounces_off_the_wheel_for_good_is_not_called_forced() -> None:
+    """From twice the duration on it hangs on its links: what the waves force has no energy, and then ends."""
+    assert judged("bounces, and leaves the wheel").regime == "undecided"
+    assert "has left the wheel" in judged("bounces, and leaves the wheel", 2.0).reasons[0]
+
+
 def test_a_dozen_cycles_that_have_not_settled_are_no_vibration() -> None:
     """Twelve cycles of nearly the same amplitude; four times later it is six times larger, and grows."""
     verdict = judged("a hop")

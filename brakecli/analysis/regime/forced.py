@@ -12,6 +12,7 @@ from brakecli.analysis.regime.cycles import Cycles
 from brakecli.analysis.regime.evidence import LINE_BINS, WINDOWS, Envelope, Part
 from brakecli.analysis.regime.verdict import Context, Decision, Excitation, Feeds, Regime, Thresholds
 from brakecli.solver.history import History
+from brakecli.solver.quantities import ContactState
 
 if TYPE_CHECKING:  # a measured signal needs no compiled code
     from brakecli.analysis.regime.linear import Linear
@@ -24,6 +25,7 @@ _RELAXED = 1.0  # within a settled part, from which on what it shows does last
 QUARTER = 4.0 / 3.0  # a run whose last quarter is settled, over what comes before
 _ERRORS = 2.0  # standard errors of a mean power
 _LARGER = 5.0  # times what the waves force in full contact: a larger motion needs more proof that it is forced
+_TRACE = 0.01  # part of the energy of vx on the lines themselves, without which nothing is their subharmonic
 _MOST_COMBINED = 6  # waves whose frequencies are combined by threes
 _FOLLOWS = 0.1  # part of the energy of vx and vy in which a motion differs that comes back with the waves
 _PROBES, _MOST_RETURNS, _APART = 400, 1 << 14, 5  # times compared, among how many, so many cycles of vx apart
@@ -110,12 +112,15 @@ class ForcedRules:
             text = f"{share:.0%} of the energy of vx lies on the lines of the roughness"
             return Decision(f"{text}, but no dashpot damps what the shoe adds; a dashpot would decide")
         if growth < 0.0 and not self._unstable_in_full_contact and not self._larger and self._follows():
+            if self._feeds() is Feeds.FRICTION or self._locked:
+                return self._either()
             text = "the motion comes back wherever the waves of the wheel do, and sliding is stable"
             return self._forced(f"only the roughness shakes the shoe: {text}")
         if share < self.limits.forced_share:
             lines = tuple({*self.context.forced, *self.context.subharmonics})
+            trace = share
             share, dense = self._share(lines, 0.3)
-            if growth >= 0.0 or dense or share < self.limits.forced_share:
+            if growth >= 0.0 or dense or share < self.limits.forced_share or trace < _TRACE:
                 return None
         powers_of_e = growth * self.duration
         if powers_of_e > GROWN:
@@ -130,7 +135,7 @@ class ForcedRules:
             return self.fed() or Decision(text, second_run=True)
         if feeds is Feeds.FRICTION and self.evidence["power_of_roughness"] < 0.0:
             return None
-        doubtful = larger or self._unstable_in_full_contact
+        doubtful = larger or self._unstable_in_full_contact or self._locked
         if feeds is Feeds.FRICTION or (doubtful and feeds is Feeds.UNKNOWN):
             return self._either()
         if dense:
@@ -150,6 +155,16 @@ class ForcedRules:
         """Whether friction can keep up only a large vibration, which no second run has shown."""
         stable = self.context.growth() < 0.0 and not self._unstable_in_full_contact
         return stable and self.context.feeds is not Feeds.FRICTION
+
+    @property
+    def _locked(self) -> bool:
+        """Whether a vibration that friction keeps up may be locked to the waves, and go on without them.
+
+        It sticks or leaves the wheel, and gets more from friction than from the roughness, as far as samples show.
+        """
+        states = (ContactState.STICK, ContactState.SEPARATED)
+        limited = any(self.settled_part.fraction(state) > 0.0 for state in states)
+        return limited and self.evidence["power_of_friction"] > max(self.evidence["power_of_roughness"], 0.0)
 
     @property
     def _relaxed(self) -> bool:

@@ -38,6 +38,8 @@ class _Rules(ForcedRules):
             never = self.whole.fraction(ContactState.SEPARATED) == 1.0
             text = "never touched the wheel" if never else "lost contact for good"
             return Decision(f"the shoe has {text}; check the sign and size of load.force")
+        if self.last.fraction(ContactState.SEPARATED) == 1.0:
+            return Decision("the shoe has left the wheel; run longer, to see whether it comes back")
         if (self.last if standing else self.settled_part).fraction(ContactState.STICK) < 1.0:
             return None
         if standing:
