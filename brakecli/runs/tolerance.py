@@ -5,7 +5,8 @@ What two of them differ by is the error of the coarser one, so the answer is bet
 """
 
 import math
-from collections.abc import Callable
+from collections import defaultdict
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import Any, NamedTuple
@@ -15,6 +16,7 @@ import numpy as np
 from brakecli.runs.cost import evaluation_seconds
 from brakecli.solver.contact import EVALUATORS
 from brakecli.solver.contact.pad import default_nodes
+from brakecli.solver.ensemble import fits, run_together
 from brakecli.solver.motion import Motion, Progress, solve
 from brakecli.solver.schemes import HALF, NUMEROV
 from brakecli.solver.system import System
@@ -84,9 +86,9 @@ def certify(system: System, progress: Progress = lambda samples: None) -> Certif
         return _by_steps(system, progress)
     if method.row.exact:
         return _by_phases(system, progress)
-    found, changing = list[Certified](), len(system.belt) > 1 or len(system.load) > 1
+    found = list[Certified]()
     is_left = partial(_is_left, too_slow=slower_than_events(system, progress))
-    for changes in LAYERED if method.automatic and method.tolerance >= LAYERED_FROM and not changing else ():
+    for changes in LAYERED if _begins_with_steps(system) else ():
         found = [_by_steps(replace(system, method=replace(method, **changes)), progress, is_left)]
         motion, certificate = found[0]
         spent += motion.work.solve_seconds
@@ -100,9 +102,47 @@ def certify(system: System, progress: Progress = lambda samples: None) -> Certif
     return best
 
 
+def _begins_with_steps(system: System) -> bool:
+    """Whether `certify` tries the schemes of `LAYERED` first."""
+    method, changing = system.method, len(system.belt) > 1 or len(system.load) > 1
+    chosen = method.automatic and method.own_steps and not method.row.exact
+    return chosen and method.tolerance >= LAYERED_FROM and not changing
+
+
+def certify_together(systems: Sequence[System]) -> list[Certified | None]:
+    """What `certify` finds for each system, with ladders that are climbed side by side.
+
+    None where that is not certain, or cannot be computed in a lane: such a system has to be certified alone.
+    """
+    found: list[Certified | None] = [None] * len(systems)
+    ladders, rungs = {}, {}
+    for i, system in enumerate(systems):
+        if _begins_with_steps(system):
+            is_left = partial(_is_left, too_slow=slower_than_events(system, lambda samples: None))
+            ladders[i] = ladder(replace(system, method=replace(system.method, **LAYERED[0])), is_left)
+            rungs[i] = next(ladders[i])
+    while rungs:
+        alike, ready = defaultdict[Any, list[int]](list), rungs
+        for i, rung in ready.items():
+            if (key := fits(rung)) is not None:
+                alike[key].append(i)
+        rungs = {}
+        for members in alike.values():
+            for i, motion in zip(members, run_together([ready[i] for i in members]), strict=True):
+                try:
+                    if motion is not None:
+                        rungs[i] = ladders[i].send(motion)
+                except StopIteration as end:
+                    found[i] = end.value if end.value.certificate.certified else None
+    return found
+
+
 def _run(system: System, progress: Progress, **changes: Any) -> Motion:
     """The motion by the system's method with these changes."""
-    system = replace(system, method=replace(system.method, **changes))
+    return _solved(replace(system, method=replace(system.method, **changes)), progress)
+
+
+def _solved(system: System, progress: Progress) -> Motion:
     per_sample, each = system.per_sample, evaluation_seconds(system) + 1e-6
     block = 1 if system.method.own_steps else 1 + int(FIRST_BLOCK / each)
     return solve(system, progress=lambda steps: progress(steps // per_sample), first_block=block)
@@ -212,10 +252,24 @@ class _Axis:
 def _by_steps(
     system: System, progress: Progress, is_left: Callable[[Motion, float], bool] = lambda run, more: False
 ) -> Certified:
+    """The runs of a ladder, one after the other."""
+    runs = ladder(system, is_left)
+    rung = next(runs)
+    while True:
+        try:
+            rung = runs.send(_solved(rung, progress))
+        except StopIteration as end:
+            return end.value  # type: ignore[no-any-return]
+
+
+def ladder(
+    system: System, is_left: Callable[[Motion, float], bool] = lambda run, more: False
+) -> Generator[System, Motion, Certified]:
     """Runs with steps half as long, or twice as many nodes, as those before, whichever is needed more.
 
-    The errors of steps and of nodes add up, and each is estimated apart. The first steps may pass over samples,
-    the last ones may not, nor over what speed or load do between two knots, as no run would see it.
+    It yields what is to be run, receives its motion, and returns the last one with its certificate. The errors of
+    steps and of nodes add up, and each is estimated apart. The first steps may pass over samples, the last ones may
+    not, nor over what speed or load do between two knots, as no run would see it.
     """
     wanted, (first, every) = system.method.tolerance, first_steps(system)
     longest = min(_shortest_span(system) / STEPS_BETWEEN_KNOTS, system.interval) * (1.0 + 1e-9)
@@ -223,7 +277,8 @@ def _by_steps(
     before, finer, seconds = None, steps, 0.0
     while True:
         sampled = replace(system, interval=max(1, every >> steps.doublings) * system.interval)
-        run = _run(sampled, progress, step=first / 2**steps.doublings, nodes=nodes << quadrature.doublings)
+        finest = {"step": first / 2**steps.doublings, "nodes": nodes << quadrature.doublings}
+        run = yield replace(sampled, method=replace(sampled.method, **finest))
         spent, failed = run.work.solve_seconds, run.work.failed
         run.work.solve_seconds = seconds = seconds + spent
         if before is not None and not failed:
