@@ -28,7 +28,7 @@ from brakecli.solver.friction import observed
 from brakecli.solver.motion import Motion, Work
 from brakecli.solver.quantities import BOUND, HISTORY
 from brakecli.solver.records import Coefficients, record
-from brakecli.solver.roughness import TWO_PI
+from brakecli.solver.roughness import TWO_PI, Surface
 from brakecli.solver.schemes import NUMEROV
 from brakecli.solver.sine import sine_cosine
 from brakecli.solver.steady_sliding import steady_sliding
@@ -248,7 +248,7 @@ def advance(o: Any, shared: Shared, rows: NDArray[np.float64]) -> None:
 
 def fits(system: System) -> Hashable | None:
     """What runs have in common that may be computed together; None where a run may not."""
-    method, wheel, shoe = system.method, system.wheel, system.shoe
+    method, wheel = system.method, system.wheel
     changing = len(system.belt) > 1 or len(system.load) > 1
     ours = (method.scheme, method.theta, method.start, method.iteration) == (
         "three-layer",
@@ -261,8 +261,7 @@ def fits(system: System) -> Hashable | None:
     sliding, passed = system.initial.vx - system.belt_speed, system.passing_frequency * system.sampled_duration
     if sliding == 0.0 or passed > _MOST_PASSED or system.samples > _MOST_SAMPLES or not _contraction(system) < _CONTRACTION:
         return None
-    surfaces = tuple(each.tobytes() for profile in (shoe, wheel) for each in profile)
-    return surfaces, system.half_length, system.nodes, system.interval, system.per_sample, system.samples
+    return system.shoe, wheel, system.half_length, system.nodes, system.interval, system.per_sample, system.samples
 
 
 def _inverse(system: System) -> tuple[float, float, float]:
@@ -288,12 +287,11 @@ def _contraction(system: System) -> float:
     return 2.0 * _THETA_1 * system.step * system.contact_stiffness * moves
 
 
-@lru_cache(maxsize=8)
-def _shared(key: Any, pad_of: "_Pad") -> Shared:
-    """Tables are the same for all runs that fit together."""
-    system = pad_of.system
-    pad, tables = build_pad(1.0, system.half_length, system.shoe, system.wheel, system.nodes)
-    waves, wheel, nodes = np.zeros((WAVES, 3)), system.wheel, int(pad.nodes)
+@lru_cache(maxsize=4)
+def _tables(half_length: float, shoe: Surface, wheel: Surface, nodes: int) -> tuple[tuple[float, ...], Floats, Floats]:
+    """What `Shared` holds from `length` to `table`."""
+    pad, tables = build_pad(1.0, half_length, shoe, wheel, nodes)
+    waves = np.zeros((WAVES, 3))
     own, full_at, waves_at = len(wheel.g), int(pad.full_at), int(pad.waves_at)
     waves[:own] = np.stack([wheel.omega, wheel.phase, tables[full_at : full_at + own]], axis=1)
     tiles = -(-(nodes + 2 * BESIDE) // TILE)
@@ -302,21 +300,8 @@ def _shared(key: Any, pad_of: "_Pad") -> Shared:
     table[:, 0] = tables[pad.nodes_at : pad.nodes_at + nodes]
     for wave, function in np.ndindex(own, 2):
         table[:, 1 + function * WAVES + wave] = by_wave[:, wave, function].ravel()[BESIDE : BESIDE + nodes]
-    lengths = (2.0 * system.half_length, *(float(pad[name]) for name in ("full_up_to", "clear_from", "shoe_mean")))
-    grid = system.step, system.interval, system.per_sample, nodes
-    return Shared(*grid, *lengths, waves.ravel(), table.ravel(), int(pad.signals))
-
-
-class _Pad(NamedTuple):
-    """A system that is like any other in what `fits` says of it."""
-
-    system: System
-
-    def __eq__(self, other: object) -> bool:
-        return True
-
-    def __hash__(self) -> int:
-        return 0
+    lengths = (2.0 * half_length, *(float(pad[name]) for name in ("full_up_to", "clear_from", "shoe_mean")))
+    return lengths, waves.ravel(), table.ravel()
 
 
 def run_together(systems: Sequence[System]) -> list[Motion | None]:
@@ -332,7 +317,9 @@ def run_together(systems: Sequence[System]) -> list[Motion | None]:
 
 def _run_lanes(systems: Sequence[System]) -> list[Motion | None]:
     begin, alike = time.perf_counter(), systems[0]
-    shared = _shared(fits(alike), _Pad(alike))
+    lengths, waves, table = _tables(alike.half_length, alike.shoe, alike.wheel, alike.nodes)
+    grid, signals = (alike.step, alike.interval, alike.per_sample, alike.nodes), np.frombuffer(stop.memory, np.uint8)
+    shared = Shared(*grid, *lengths, waves, table, signals.ctypes.data)
     o, number = aligned(LANE.itemsize // 8).view(LANE)[0], len(systems)
     for n in range(LANES):
         _fill(o, n, systems[min(n, number - 1)])

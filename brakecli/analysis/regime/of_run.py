@@ -98,7 +98,7 @@ def context(system: System) -> Context:
         radius=system.radius,
         steady=len(system.belt) == 1 and len(system.load) == 1,
         forced=forced_lines(belt, turns, highest),
-        subharmonics=subharmonics(belt, turns, highest),
+        subharmonics=partial(subharmonics, belt, turns, highest),
         waves=waves if belt else (),
         quiet=1e-9 * fastest,
         scale=fastest,

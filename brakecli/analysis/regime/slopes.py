@@ -5,8 +5,9 @@ of the wheel's surface, as the pad feels it. The coefficients of the linear equa
 ż = (A + K s(t) P) z. A solution is e^{λt} times terms e^{iΩt} of all sums Ω of their frequencies, which is an
 eigenvalue problem for λ. Sums of a few frequencies are kept.
 
-P acts on x alone. So each sum enters by one number, how x answers a force there, and the sums beside 0 add a stiffness
-to the mean one, T(λ): where they do not come near a mode, a few steps of λ = eigenvalue of A + T(λ) P find it.
+P acts on x alone. So each sum enters by one number, how x answers a force there, and the sums beside 0 add
+a stiffness to the mean one, T(λ): where they do not come near a mode, a few steps of λ = eigenvalue of A + T(λ) P
+find it.
 """
 
 import math
@@ -49,7 +50,7 @@ def growth_with_slopes(
     steepest = np.argsort(-effects)
     few = min(len(steepest), _MOST_WAVES)
     kept, left = steepest[:few], float(effects[steepest[few:]].sum())
-    order = next(n for n in range(_HIGHEST, 0, -1) if len(_sums(few, n)) <= _MOST_SUMS)
+    order = _order(few)
     omega, bends = frequencies[kept], bends[np.ix_(kept, kept)]
     moved = [0.5 * slopes[kept], *(0.25 * slopes[kept] * each for each in bends.T)]  # cos(θ + δ) = cos θ - δ sin θ
     parts = np.concatenate([*moved, *(-0.25 * slopes[kept] * each for each in bends.conj().T)])
@@ -57,6 +58,12 @@ def growth_with_slopes(
     coarse, fine = (_fastest(a, p, omega, parts, n, answer) for n in (order - 1, order))
     bent = float(np.abs(bends).sum(axis=1).max())
     return fine, left + abs(fine - coarse) + bent * abs(fine - plain)
+
+
+@cache
+def _order(waves: int) -> int:
+    """How many frequencies a sum may have."""
+    return next(n for n in range(_HIGHEST, 0, -1) if len(_sums(waves, n)) <= _MOST_SUMS)
 
 
 def _sums(waves: int, order: int) -> list[Sum]:
@@ -106,8 +113,8 @@ def _fastest(a: Any, p: Any, omega: Any, parts: Complex, order: int, answer: Any
 def _beside(a: Any, p: Any, turns: Any, coupling: Any, values: Complex, residues: Complex) -> float:
     """The same from each mode of A on; NaN where a mode is not alone, so that all eigenvalues are needed.
 
-    x answers a force e^{μt} by Σ residues/(values - μ). The part of an eigenvector at the sum 0 is 1/(1 - f') where
-    λ = f(λ).
+    x answers a force e^{μt} by Σ residues/(values - μ). The part of an eigenvector at the sum 0 is 1/(1 - f')
+    where λ = f(λ).
     """
     own, exact = len(turns) // 2, _EXACT * np.abs(values).max()
     others = np.arange(len(turns)) != own
