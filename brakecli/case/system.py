@@ -25,8 +25,7 @@ def system_of(case: Case) -> System:
     wheel, load, initial, solver = case.wheel, case.load, case.initial, case.solver
     automatic = solver.scheme == "auto"
     shoe, wheel_surface = (
-        _surface_of(each) if each is not None else _SMOOTH
-        for each in (case.roughness.shoe, case.roughness.wheel)
+        _surface_of(each) if each is not None else _SMOOTH for each in (case.roughness.shoe, case.roughness.wheel)
     )
     chosen = (
         "event-driven" if shoe.g.size or wheel_surface.g.size else "piecewise-exact"

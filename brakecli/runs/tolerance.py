@@ -5,8 +5,7 @@ What two of them differ by is the error of the coarser one, so the answer is bet
 """
 
 import math
-from collections import defaultdict
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import Any, NamedTuple
@@ -16,7 +15,6 @@ import numpy as np
 from brakecli.runs.cost import evaluation_seconds
 from brakecli.solver.contact import EVALUATORS
 from brakecli.solver.contact.pad import default_nodes
-from brakecli.solver.ensemble import fits, run_together
 from brakecli.solver.motion import Motion, Progress, solve
 from brakecli.solver.schemes import HALF, NUMEROV
 from brakecli.solver.system import System
@@ -87,8 +85,8 @@ def certify(system: System, progress: Progress = lambda samples: None) -> Certif
     if method.row.exact:
         return _by_phases(system, progress)
     found = list[Certified]()
-    is_left = partial(_is_left, too_slow=slower_than_events(system, progress))
-    for changes in LAYERED if _begins_with_steps(system) else ():
+    is_left = partial(is_left_for_events, too_slow=slower_than_events(system, progress))
+    for changes in LAYERED if begins_with_steps(system) else ():
         found = [_by_steps(replace(system, method=replace(method, **changes)), progress, is_left)]
         motion, certificate = found[0]
         spent += motion.work.solve_seconds
@@ -102,39 +100,11 @@ def certify(system: System, progress: Progress = lambda samples: None) -> Certif
     return best
 
 
-def _begins_with_steps(system: System) -> bool:
+def begins_with_steps(system: System) -> bool:
     """Whether `certify` tries the schemes of `LAYERED` first."""
     method, changing = system.method, len(system.belt) > 1 or len(system.load) > 1
     chosen = method.automatic and method.own_steps and not method.row.exact
     return chosen and method.tolerance >= LAYERED_FROM and not changing
-
-
-def certify_together(systems: Sequence[System]) -> list[Certified | None]:
-    """What `certify` finds for each system, with ladders that are climbed side by side.
-
-    None where that is not certain, or cannot be computed in a lane: such a system has to be certified alone.
-    """
-    found: list[Certified | None] = [None] * len(systems)
-    ladders, rungs = {}, {}
-    for i, system in enumerate(systems):
-        if _begins_with_steps(system):
-            is_left = partial(_is_left, too_slow=slower_than_events(system, lambda samples: None))
-            ladders[i] = ladder(replace(system, method=replace(system.method, **LAYERED[0])), is_left)
-            rungs[i] = next(ladders[i])
-    while rungs:
-        alike, ready = defaultdict[Any, list[int]](list), rungs
-        for i, rung in ready.items():
-            if (key := fits(rung)) is not None:
-                alike[key].append(i)
-        rungs = {}
-        for members in alike.values():
-            for i, motion in zip(members, run_together([ready[i] for i in members]), strict=True):
-                try:
-                    if motion is not None:
-                        rungs[i] = ladders[i].send(motion)
-                except StopIteration as end:
-                    found[i] = end.value if end.value.certificate.certified else None
-    return found
 
 
 def _run(system: System, progress: Progress, **changes: Any) -> Motion:
@@ -148,7 +118,7 @@ def _solved(system: System, progress: Progress) -> Motion:
     return solve(system, progress=lambda steps: progress(steps // per_sample), first_block=block)
 
 
-def _is_left(run: Motion, more: float, *, too_slow: Callable[[Motion, float], bool]) -> bool:
+def is_left_for_events(run: Motion, more: float, *, too_slow: Callable[[Motion, float], bool]) -> bool:
     """Whether the tolerance is kept by events, after this run and before others of so many times its work."""
     unsure = run.work.turns > 0 and run.system.method.scheme == "three-layer"  # velocities about a kink are off
     return unsure or not _opens(run) or too_slow(run, more)
@@ -268,8 +238,8 @@ def ladder(
     """Runs with steps half as long, or twice as many nodes, as those before, whichever is needed more.
 
     It yields what is to be run, receives its motion, and returns the last one with its certificate. The errors of
-    steps and of nodes add up, and each is estimated apart. The first steps may pass over samples, the last ones may
-    not, nor over what speed or load do between two knots, as no run would see it.
+    steps and of nodes add up, and each is estimated apart. The first steps may pass over samples, the last ones
+    may not, nor over what speed or load do between two knots, as no run would see it.
     """
     wanted, (first, every) = system.method.tolerance, first_steps(system)
     longest = min(_shortest_span(system) / STEPS_BETWEEN_KNOTS, system.interval) * (1.0 + 1e-9)

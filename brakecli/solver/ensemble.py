@@ -3,9 +3,9 @@
 Every number of a run has neighbours, those of `LANES` - 1 other runs, so that one instruction computes several. In
 all else they are strangers: what the other lanes hold does not change a bit of a run.
 
-A lane knows slip to one side at constant speed and load, and the paper's iteration, (13), from a guess that is good
-enough for most steps. A run that sticks or turns, blows up or needs many evaluations leaves its lane without a
-result: `motion.solve` computes it.
+A lane knows slip to one side at constant speed and load, and the paper's iteration, (13), from a guess that is
+good enough for most steps. A run that sticks or turns, blows up or needs many evaluations leaves its lane without
+a result: `motion.solve` computes it.
 """
 
 import math
@@ -38,10 +38,11 @@ LANES, WAVES = 16, 5
 """Runs side by side, and waves of the wheel, at most."""
 LEFT = 1e-4
 """What the iteration may leave of the force of a step, over the load and the tolerance."""
+MOST_SAMPLES = 1 << 14
+"""Of a run in a lane, so that the histories of all lanes take little memory."""
 
 _MOST = 8  # evaluations of the contact in a step
 _CONTRACTION = 0.1  # of the iteration, at most
-_MOST_SAMPLES = 1 << 14  # so that the histories of all lanes take little memory
 _MOST_PASSED = 1e6  # waves, beyond which their phase needs more than 16 digits
 _THETA_1, _THETA_2, _THETA_3 = NUMEROV
 _FAST = frozenset({"reassoc", "contract", "nsz"})
@@ -103,7 +104,14 @@ def _add_nodes(o: Any, shared: Shared) -> None:
     for n in range(LANES):
         o.found[n] = o.touches[n] = 0.0
     for _ in range(shared.nodes):
-        f1, s_0, s_1, s_2, s_3, s_4 = table[at], table[at + 1], table[at + 2], table[at + 3], table[at + 4], table[at + 5]
+        f1, s_0, s_1, s_2, s_3, s_4 = (
+            table[at],
+            table[at + 1],
+            table[at + 2],
+            table[at + 3],
+            table[at + 4],
+            table[at + 5],
+        )
         c_0, c_1, c_2, c_3, c_4 = table[at + 6], table[at + 7], table[at + 8], table[at + 9], table[at + 10]
         at += 11
         for n in range(LANES):
@@ -116,7 +124,7 @@ def _add_nodes(o: Any, shared: Shared) -> None:
 
 @kernel(void(_LANE, _SHARED, float64), fastmath=_FAST, inlined=False)
 def _touch(o: Any, shared: Shared, t: float) -> None:
-    """The normal force, (2), and the part that touches: in closed form where that is certain, otherwise by nodes."""
+    """The normal force, (2), and the part that touches: in closed form where a bound proves it, or by nodes."""
     shared = borrowed(shared)
     waves, length, full, clear = shared.waves, shared.length, shared.full_up_to, shared.clear_from
     for i in range(WAVES):
@@ -130,7 +138,9 @@ def _touch(o: Any, shared: Shared, t: float) -> None:
     g_0, g_1, g_2, g_3, g_4 = waves[2], waves[5], waves[8], waves[11], waves[14]
     spacing, part = length / shared.nodes, 1.0 / shared.nodes
     for n in range(LANES):
-        mean = g_0 * o.sine[0, n] + g_1 * o.sine[1, n] + g_2 * o.sine[2, n] + g_3 * o.sine[3, n] + g_4 * o.sine[4, n]
+        mean = (
+            g_0 * o.sine[0, n] + g_1 * o.sine[1, n] + g_2 * o.sine[2, n] + g_3 * o.sine[3, n] + g_4 * o.sine[4, n]
+        )
         mean -= length * (o.at_y[n] + shared.shoe_mean)
         closed = mean if mean > 0.0 and o.at_y[n] <= full else 0.0
         o.found[n] = o.k[n] * (spacing * o.found[n] if o.partly[n] > 0.0 else closed)
@@ -196,7 +206,7 @@ def _iterate(o: Any, shared: Shared, t: float) -> None:
 
 @kernel(void(_LANE, _SHARED))
 def _finish(o: Any, shared: Shared) -> None:
-    """The next level; a lane is out where the shoe does not slip to its side any more, or (13) did not converge."""
+    """The next level; a lane is out where the shoe slips to its side no more, or (13) did not converge."""
     h = shared.h
     for n in range(LANES):
         f_x, f_y = o.g_1[n] + o.grip[n] * o.guess[n], o.g_2[n] + o.guess[n]
@@ -248,60 +258,35 @@ def advance(o: Any, shared: Shared, rows: NDArray[np.float64]) -> None:
 
 def fits(system: System) -> Hashable | None:
     """What runs have in common that may be computed together; None where a run may not."""
-    method, wheel = system.method, system.wheel
-    changing = len(system.belt) > 1 or len(system.load) > 1
-    ours = (method.scheme, method.theta, method.start, method.iteration) == (
-        "three-layer",
-        NUMEROV,
-        "consistent",
-        "newton",
-    )
-    if not ours or changing or system.evaluator != "auto" or not 0 < len(wheel.g) <= WAVES:
+    method, wheel, sliding = system.method, system.wheel, system.initial.vx - system.belt_speed
+    kind = method.scheme, method.theta, method.start, method.iteration, system.evaluator
+    if kind != ("three-layer", NUMEROV, "consistent", "newton", "auto") or not 0 < len(wheel.g) <= WAVES:
         return None
-    sliding, passed = system.initial.vx - system.belt_speed, system.passing_frequency * system.sampled_duration
-    if sliding == 0.0 or passed > _MOST_PASSED or system.samples > _MOST_SAMPLES or not _contraction(system) < _CONTRACTION:
+    if len(system.belt) > 1 or len(system.load) > 1 or sliding == 0.0 or system.samples > MOST_SAMPLES:
         return None
-    return system.shoe, wheel, system.half_length, system.nodes, system.interval, system.per_sample, system.samples
-
-
-def _inverse(system: System) -> tuple[float, float, float]:
-    """The inverse of a in (14), s/kg."""
-    c, h = system.coefficients, system.step
-    a_11, a_12, a_22 = (
-        inertia + b + 2.0 * k * h * _THETA_1
-        for inertia, b, k in ((2.0 * c.m / h, c.b_xx, c.c_xx), (0.0, c.b_xy, c.c_xy), (2.0 * c.m / h, c.b_yy, c.c_yy))
-    )
-    a = a_11 * a_22 - a_12 * a_12
-    return a_22 / a, -a_12 / a, a_11 / a
-
-
-def _grip(system: System) -> float:
-    """F_x over F_y."""
-    return -math.copysign(system.coefficients.phi, system.initial.vx - system.belt_speed)
-
-
-def _contraction(system: System) -> float:
-    """By how much an error of the force at least shrinks in an iteration, whichever part of the pad touches."""
-    (i_11, i_12, i_22), grip = _inverse(system), _grip(system)
-    moves = abs(i_12 * grip + i_22) + float(np.abs(system.wheel.g) @ system.wheel.omega) * abs(i_11 * grip + i_12)
-    return 2.0 * _THETA_1 * system.step * system.contact_stiffness * moves
+    if system.passing_frequency * system.sampled_duration > _MOST_PASSED:
+        return None
+    return system.half_length, system.shoe, wheel, system.nodes, system.interval, system.per_sample, system.samples
 
 
 @lru_cache(maxsize=4)
-def _tables(half_length: float, shoe: Surface, wheel: Surface, nodes: int) -> tuple[tuple[float, ...], Floats, Floats]:
+def _tables(half_length: float, shoe: Surface, wheel: Surface, nodes: int) -> tuple[Any, ...]:
     """What `Shared` holds from `length` to `table`."""
     pad, tables = build_pad(1.0, half_length, shoe, wheel, nodes)
-    waves = np.zeros((WAVES, 3))
-    own, full_at, waves_at = len(wheel.g), int(pad.full_at), int(pad.waves_at)
+    waves, table = np.zeros((WAVES, 3)), aligned(nodes * (1 + 2 * WAVES)).reshape(nodes, -1)
+    own, full_at, waves_at, tiles = (
+        len(wheel.g),
+        int(pad.full_at),
+        int(pad.waves_at),
+        -(-(nodes + 2 * BESIDE) // TILE),
+    )
     waves[:own] = np.stack([wheel.omega, wheel.phase, tables[full_at : full_at + own]], axis=1)
-    tiles = -(-(nodes + 2 * BESIDE) // TILE)
-    by_wave = tables[waves_at : waves_at + tiles * own * 2 * TILE].reshape(tiles, own, 2, TILE)
-    table = aligned(nodes * (1 + 2 * WAVES)).reshape(nodes, -1)
+    by_tiles = tables[waves_at : waves_at + tiles * own * 2 * TILE].reshape(tiles, own, 2, TILE)
     table[:, 0] = tables[pad.nodes_at : pad.nodes_at + nodes]
     for wave, function in np.ndindex(own, 2):
-        table[:, 1 + function * WAVES + wave] = by_wave[:, wave, function].ravel()[BESIDE : BESIDE + nodes]
-    lengths = (2.0 * half_length, *(float(pad[name]) for name in ("full_up_to", "clear_from", "shoe_mean")))
-    return lengths, waves.ravel(), table.ravel()
+        table[:, 1 + function * WAVES + wave] = by_tiles[:, wave, function].ravel()[BESIDE : BESIDE + nodes]
+    heights = (float(pad[name]) for name in ("full_up_to", "clear_from", "shoe_mean"))
+    return 2.0 * half_length, *heights, waves.ravel(), table.ravel()
 
 
 def run_together(systems: Sequence[System]) -> list[Motion | None]:
@@ -311,50 +296,63 @@ def run_together(systems: Sequence[System]) -> list[Motion | None]:
     """
     found: list[Motion | None] = []
     for first in range(0, len(systems), LANES):
-        found += _run_lanes(systems[first : first + LANES])
+        found += _run_lanes(list(systems[first : first + LANES]))
     return found
 
 
-def _run_lanes(systems: Sequence[System]) -> list[Motion | None]:
-    begin, alike = time.perf_counter(), systems[0]
-    lengths, waves, table = _tables(alike.half_length, alike.shoe, alike.wheel, alike.nodes)
-    grid, signals = (alike.step, alike.interval, alike.per_sample, alike.nodes), np.frombuffer(stop.memory, np.uint8)
-    shared = Shared(*grid, *lengths, waves, table, signals.ctypes.data)
-    o, number = aligned(LANE.itemsize // 8).view(LANE)[0], len(systems)
-    for n in range(LANES):
-        _fill(o, n, systems[min(n, number - 1)])
+def _run_lanes(systems: list[System]) -> list[Motion | None]:
+    begin, alike, number = time.perf_counter(), systems[0], len(systems)
+    signals = np.frombuffer(stop.memory, np.uint8).ctypes.data
+    surfaces = _tables(alike.half_length, alike.shoe, alike.wheel, alike.nodes)
+    o = _filled([*systems, *systems[-1:] * (LANES - number)])
     rows = np.zeros((LANES, alike.samples + 1, len(HISTORY)))
-    advance(o, shared, rows)
-    seconds = (time.perf_counter() - begin) / number
-    motions: list[Motion | None] = []
+    grid = alike.step, alike.interval, alike.per_sample, alike.nodes
+    advance(o, Shared._make((*grid, *surfaces, signals)), rows)
+    seconds, motions = (time.perf_counter() - begin) / number, list[Motion | None]()
     for n, system in enumerate(systems):
-        closed = int(o.closed[n])
-        kinds = {"closed-form": closed, "midpoint": system.steps - closed}
+        steps, closed = system.steps, int(o.closed[n])
+        kinds = {kind: count for kind, count in (("closed-form", closed), ("midpoint", steps - closed)) if count}
         work = Work(
-            steps=system.steps,
-            contact_evaluations=int(o.evaluations[n]),
-            evaluators={kind: steps for kind, steps in kinds.items() if steps},
-            solve_seconds=seconds,
+            steps=steps, contact_evaluations=int(o.evaluations[n]), evaluators=kinds, solve_seconds=seconds
         )
         motions.append(Motion(system, rows[n], work, NOT_KEPT) if o.out[n] == 0.0 else None)
     return motions
 
 
-def _fill(o: Any, n: int, system: System) -> None:
-    """Put a system into a lane; one without a start is out."""
-    c, initial, rest = system.coefficients, system.initial, (0.0, 0.0)
+def _filled(systems: Sequence[System]) -> Any:
+    """Systems in their lanes; one without a start, or that (13) contracts too little for, is out."""
+    c = Coefficients(*np.array([each.coefficients for each in systems]).T)
+    start, h, wheel = np.array([_start(each) for each in systems]).T, systems[0].step, systems[0].wheel
+    given = [(each.load_at_start, each.belt_speed, each.layer_stiffness) for each in systems]
+    load, belt, k = np.array(given).T
+    side = np.sign(start[2] - belt)
+    grip = -side * c.phi
+    a_11 = 2.0 * c.m / h + c.b_xx + 2.0 * _THETA_1 * h * c.c_xx  # Eq. (14)
+    a_12 = c.b_xy + 2.0 * _THETA_1 * h * c.c_xy
+    a_22 = 2.0 * c.m / h + c.b_yy + 2.0 * _THETA_1 * h * c.c_yy
+    a = a_11 * a_22 - a_12 * a_12
+    steep = float(np.abs(wheel.g) @ wheel.omega)
+    moves = np.abs(a_11 - a_12 * grip) + steep * np.abs(a_22 * grip - a_12)  # y and x by the force, over a
+    factor = 2.0 * _THETA_1 * h * 2.0 * systems[0].half_length * k * moves / a  # whichever part touches
+    allowed = LEFT * np.array([each.method.tolerance for each in systems]) * np.abs(load)
+    o = aligned(LANE.itemsize // 8).view(LANE)[0]
+    values = {**c._asdict(), "load": load, "belt": belt, "k": k, "side": side, "grip": grip}
+    values |= {"i_11": a_22 / a, "i_12": -a_12 / a, "i_22": a_11 / a, "limit": allowed * (1.0 - factor) / factor}
+    values |= dict(zip(("x_old", "y_old", "d", "e"), start, strict=True))
+    values["out"] = ~(factor < _CONTRACTION) | np.isnan(start[0])
+    for name, value in values.items():
+        o[name] = value
+    o.rate[: len(wheel.g)] = np.outer(wheel.turns, belt)
+    return o
+
+
+def _start(system: System) -> tuple[float, float, float, float]:
+    """x, y, vx and vy at t = 0; NaN where there is no steady sliding to start from."""
+    initial, x, y = system.initial, 0.0, 0.0
     if initial.from_equilibrium:
         try:
-            found = steady_sliding(system)
-            rest = found.x, found.y
+            rest = steady_sliding(system)
+            x, y = rest.x, rest.y
         except CaseError:
-            o.out[n] = 1.0
-    grip, contraction = _grip(system), _contraction(system)
-    given = dict(c._asdict(), load=system.load_at_start, belt=system.belt_speed, k=system.layer_stiffness, grip=grip)
-    given |= dict(zip(("i_11", "i_12", "i_22"), _inverse(system), strict=True))
-    given |= {"x_old": initial.x + rest[0], "y_old": initial.y + rest[1], "d": initial.vx, "e": initial.vy}
-    given["side"] = math.copysign(1.0, initial.vx - system.belt_speed)
-    given["limit"] = LEFT * system.method.tolerance * abs(system.load_at_start) * (1.0 - contraction) / contraction
-    for name, value in given.items():
-        o[name][n] = value
-    o.rate[: len(system.wheel.g), n] = system.belt_speed * system.wheel.turns
+            x = math.nan
+    return initial.x + x, initial.y + y, initial.vx, initial.vy

@@ -21,7 +21,8 @@ from brakecli.files import fields
 from brakecli.files.field import values_of
 from brakecli.runs.limits import Check, check, refuse, within_range
 from brakecli.runs.run import motion_of
-from brakecli.runs.tolerance import Certificate, Certified, certify_together
+from brakecli.runs.together import certify_together
+from brakecli.runs.tolerance import Certificate, Certified
 from brakecli.solver.history import array_history
 from brakecli.solver.motion import Motion
 from brakecli.solver.roughness import TWO_PI, wheel_angles
@@ -121,7 +122,9 @@ def compute(plan: Plan, first: int, count: int) -> NDArray[Any]:
         points = [_begun(plan, plan.settings(each)) for each in range(start, min(start + TOGETHER, first + count))]
         ready = [each for each in points if isinstance(each, Begun)]
         with within_range():
-            certified = dict(zip(map(id, ready), certify_together([each.check.system for each in ready]), strict=True))
+            certified = dict(
+                zip(map(id, ready), certify_together([each.check.system for each in ready]), strict=True)
+            )
         records += [_computed(plan, each, certified.get(id(each)))[0] for each in points]
     return np.concatenate(records)
 
@@ -129,8 +132,8 @@ def compute(plan: Plan, first: int, count: int) -> NDArray[Any]:
 def _line(plan: Plan, unit: int) -> NDArray[Any]:
     """The records of a line.
 
-    Each point starts from the end of the one before. The wheel goes on turning: its waves keep the phases that they
-    have come to.
+    Each point starts from the end of the one before. The wheel goes on turning: its waves keep the phases that
+    they have come to.
     """
     points, start, outcome = line_points(plan, unit), Settings(), None
     found = np.zeros(len(points), record_type(plan))

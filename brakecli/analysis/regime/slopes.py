@@ -119,7 +119,7 @@ def _beside(a: Any, p: Any, turns: Any, coupling: Any, values: Complex, residues
     own, exact = len(turns) // 2, _EXACT * np.abs(values).max()
     others = np.arange(len(turns)) != own
     block, out, back = coupling[np.ix_(others, others)], coupling[own, others], coupling[others, own]
-    now, before, after = values[values.imag >= 0.0], np.zeros(0), np.zeros(0)
+    now, before, after = values[values.imag >= 0.0], np.zeros(0, complex), np.zeros(0, complex)
     for _ in range(_MOST_STEPS):
         distance = values - (now[:, None, None] + turns[others][None, :, None])
         if not distance.all():

@@ -1,0 +1,45 @@
+"""The promises of many cases at once: their ladders of runs are climbed side by side, in lanes."""
+
+from collections import defaultdict
+from collections.abc import Hashable, Sequence
+from dataclasses import replace
+from functools import partial
+
+from brakecli.runs.tolerance import (
+    LAYERED,
+    Certified,
+    begins_with_steps,
+    is_left_for_events,
+    ladder,
+    slower_than_events,
+)
+from brakecli.solver.ensemble import fits, run_together
+from brakecli.solver.system import System
+
+
+def certify_together(systems: Sequence[System]) -> list[Certified | None]:
+    """What `certify` finds for each system, with ladders that are climbed side by side.
+
+    None where that is not certain, or cannot be computed in a lane: such a system has to be certified alone.
+    """
+    found: list[Certified | None] = [None] * len(systems)
+    ladders, rungs = {}, {}
+    for i, system in enumerate(systems):
+        if begins_with_steps(system):
+            is_left = partial(is_left_for_events, too_slow=slower_than_events(system, lambda samples: None))
+            ladders[i] = ladder(replace(system, method=replace(system.method, **LAYERED[0])), is_left)
+            rungs[i] = next(ladders[i])
+    while rungs:
+        alike, ready = defaultdict[Hashable, list[int]](list), rungs
+        for i, rung in ready.items():
+            if (key := fits(rung)) is not None:
+                alike[key].append(i)
+        rungs = {}
+        for members in alike.values():
+            for i, motion in zip(members, run_together([ready[i] for i in members]), strict=True):
+                try:
+                    if motion is not None:
+                        rungs[i] = ladders[i].send(motion)
+                except StopIteration as end:
+                    found[i] = end.value if end.value.certificate.certified else None
+    return found
