@@ -298,19 +298,22 @@ def _compare(coarse: Motion, fine: Motion, tolerance: float) -> tuple[float, flo
     What never exceeds the rounding of the motion does not count, as velocities of a shoe that stays where it is.
     """
     system = max(coarse.system, fine.system, key=lambda each: each.interval)
-    one, other = (each.rows[:: round(system.interval / each.system.interval), :4] for each in (coarse, fine))
-    count = len(other)
-    if len(one) < count:
+    one, other = (
+        each.rows[:: round(system.interval / each.system.interval), :4].T.copy() for each in (coarse, fine)
+    )
+    count = other.shape[1]
+    if one.shape[1] < count:
         return 0.0, 1.0
-    one = one[:count]  # x, y, vx, vy
-    largest = np.abs(other).max(axis=0)
+    one = one[:, :count]  # x, y, vx, vy
+    largest = np.abs(other).max(axis=1)
     rate = 2.0 * math.pi * system.natural_frequencies[1]
     rounding = ROUNDING * largest[:2].max() * np.array([1.0, 1.0, rate, rate])
-    moves = np.maximum(np.abs(one).max(axis=0), largest) > rounding
-    apart = (np.abs(one - other) / np.where(moves, np.maximum(largest, rounding), math.inf)).max(axis=1)
-    late = np.flatnonzero(apart > tolerance)
+    moves = np.maximum(np.abs(one).max(axis=1), largest) > rounding
+    apart, scale = np.abs(one - other), np.where(moves, np.maximum(largest, rounding), math.inf)
+    error = float((apart.max(axis=1) / scale).max())
+    late = np.flatnonzero((tolerance * scale < apart.T).any(axis=1)) if error > tolerance else np.zeros(0)
     until: float = (int(late[0]) - 1 if len(late) else count - 1) * system.interval
-    return max(until, 0.0), max(float(apart.max()), ROUNDING)
+    return max(until, 0.0), max(error, ROUNDING)
 
 
 def first_steps(system: System) -> tuple[float, int]:

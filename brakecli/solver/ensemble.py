@@ -168,11 +168,11 @@ def _prepare(o: Any, shared: Shared) -> None:
     """(14), as in `schemes.three_layer`, and the guess of the force as in `loop.advance`."""
     h = shared.h
     for n in range(LANES):
-        inertia, x_old, y_old = 2.0 * o.m[n] / h, o.x_old[n], o.y_old[n]
+        inertia, x_old, y_old = o.m[n] * (2.0 / (h * h)), o.x_old[n], o.y_old[n]
         x = _THETA_2 * o.x[n] + (_THETA_3 + _THETA_1) * x_old
         y = _THETA_2 * o.y[n] + (_THETA_3 + _THETA_1) * y_old
-        o.g_1[n] = inertia * ((o.x[n] - x_old) / h) - o.c_xx[n] * x - o.c_xy[n] * y - o.load[n] * o.sin_beta[n]
-        o.g_2[n] = inertia * ((o.y[n] - y_old) / h) - o.c_yy[n] * y - o.c_xy[n] * x - o.load[n] * o.cos_beta[n]
+        o.g_1[n] = inertia * (o.x[n] - x_old) - o.c_xx[n] * x - o.c_xy[n] * y - o.load[n] * o.sin_beta[n]
+        o.g_2[n] = inertia * (o.y[n] - y_old) - o.c_yy[n] * y - o.c_xy[n] * x - o.load[n] * o.cos_beta[n]
         o.x_0[n], o.y_0[n] = x, y
         force = 3.0 * (o.force[n] - o.before[n]) + o.earlier[n]
         force = force if force > 0.0 else 0.0
@@ -232,7 +232,7 @@ def _sample(o: Any, shared: Shared, rows: NDArray[np.float64], number: int) -> N
         needed += o.load[n] * o.sin_beta[n]  # Eq. (6)
         holds = abs(sliding) <= shared.h * bound / o.m[n] and abs(needed) <= bound
         side, friction = observed(sliding, holds, needed, normal, bound)
-        row = rows[n, number]
+        row = rows[n, :, number]
         row[0], row[1], row[2], row[3] = o.at_x[n], o.at_y[n], o.d[n], v_y
         row[4], row[5], row[6], row[7] = friction, normal, o.touches[n], side
         o.evaluations[n] += 1.0
@@ -240,15 +240,15 @@ def _sample(o: Any, shared: Shared, rows: NDArray[np.float64], number: int) -> N
 
 @kernel(void(_LANE, _SHARED, float64[:, :, ::1]))
 def advance(o: Any, shared: Shared, rows: NDArray[np.float64]) -> None:
-    """Run all lanes; `rows` gets the samples of each."""
+    """Run all lanes; `rows` gets the samples of each, variable by variable."""
     shared = borrowed(shared)
     _begin(o, shared)
-    for number in range(rows.shape[1]):
+    for number in range(rows.shape[2]):
         _sample(o, shared, rows, number)
         left = 0.0
         for n in range(LANES):
             left += 1.0 - o.out[n]
-        if number == rows.shape[1] - 1 or left == 0.0 or stopped(shared.signals):
+        if number == rows.shape[2] - 1 or left == 0.0 or stopped(shared.signals):
             return
         for step in range(shared.per_sample):
             _prepare(o, shared)
@@ -305,7 +305,7 @@ def _run_lanes(systems: list[System]) -> list[Motion | None]:
     signals = np.frombuffer(stop.memory, np.uint8).ctypes.data
     surfaces = _tables(alike.half_length, alike.shoe, alike.wheel, alike.nodes)
     o = _filled([*systems, *systems[-1:] * (LANES - number)])
-    rows = np.zeros((LANES, alike.samples + 1, len(HISTORY)))
+    rows = np.zeros((LANES, len(HISTORY), alike.samples + 1))
     grid = alike.step, alike.interval, alike.per_sample, alike.nodes
     advance(o, Shared._make((*grid, *surfaces, signals)), rows)
     seconds, motions = (time.perf_counter() - begin) / number, list[Motion | None]()
@@ -315,7 +315,7 @@ def _run_lanes(systems: list[System]) -> list[Motion | None]:
         work = Work(
             steps=steps, contact_evaluations=int(o.evaluations[n]), evaluators=kinds, solve_seconds=seconds
         )
-        motions.append(Motion(system, rows[n], work, NOT_KEPT) if o.out[n] == 0.0 else None)
+        motions.append(Motion(system, rows[n].T, work, NOT_KEPT) if o.out[n] == 0.0 else None)
     return motions
 
 

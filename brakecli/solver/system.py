@@ -21,7 +21,7 @@ MOST_TABLE_BYTES = 4e9
 WHOLE = 1e-9
 """A ratio this close to a whole number is whole."""
 _SMALL_TABLES = 1e6
-_build_small = lru_cache(maxsize=4)(build_pad)
+_build_small = lru_cache(maxsize=8)(build_pad)
 """Pads that points of a sweep have in common; nobody changes them."""
 RADIANS = 0.8
 """Largest angle that the fastest motion turns by in an exact step: so small that a margin is lowest in it once at
@@ -64,7 +64,7 @@ class System:
     def pad(self) -> Pad:
         """Constants and tables of the contact."""
         self.refuse_tables()
-        build = _build_small if not self.nodes and self.table_bytes < _SMALL_TABLES else build_pad
+        build = _build_small if self.table_bytes < _SMALL_TABLES else build_pad
         return build(self.layer_stiffness, self.half_length, self.shoe, self.wheel, self.nodes)
 
     @property

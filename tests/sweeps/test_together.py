@@ -23,13 +23,13 @@ from tests.sweeps.helpers import axis, inline, interrupted, local, write_sweep
 pytestmark = pytest.mark.usefixtures("compiled")
 
 TOLERANCE = 1e-3
-PROMISED: dict[str, Any] = ROUGH | {"solver": {"tolerance": TOLERANCE, "duration": 0.03}}
+PROMISED: dict[str, Any] = ROUGH | {"solver": {"tolerance": TOLERANCE, "duration": 0.02}}
 PROMISED["output"] = {"sample_interval": 2.5e-4}
 
 
 def rough(folder: Path, num: int) -> LoadedSweep:
-    """Speeds of the wheel: at the least one the shoe sticks, and leaves its lane; at the first it has none."""
-    speeds = axis("wheel.angular_speed", f"values = {[0.0, 0.02, *np.linspace(0.5, 8.0, num - 2).tolist()]}")
+    """Speeds of the wheel: at the least one the shoe sticks, and leaves its lane."""
+    speeds = axis("wheel.angular_speed", f"values = {[0.02, *np.linspace(0.5, 8.0, num - 1).tolist()]}")
     return write_sweep(folder, speeds, case=tomli_w.dumps(PROMISED))
 
 
@@ -37,11 +37,11 @@ def test_no_way_of_computing_them_changes_a_byte(tmp_path: Path) -> None:
     loaded = rough(tmp_path, TOGETHER + 3)
     inline(loaded, tmp_path / "s.h5", compute_units)
     expected = (tmp_path / "s.h5").read_bytes()
-    for size, order in ((1, 1), (TOGETHER - 1, -1), (1000, 1)):
+    for size, order in ((9, -1), (1000, 1)):
         inline(loaded, tmp_path / "s.h5", compute_units, task_size=size, order=order, force=True)
         assert (tmp_path / "s.h5").read_bytes() == expected
     (tmp_path / "s.h5").unlink()
-    interrupted(loaded, tmp_path / "s.h5", compute_units, task_size=5, order=1, limit=3)
+    interrupted(loaded, tmp_path / "s.h5", compute_units, task_size=15, order=1, limit=1)
     assert inline(loaded, tmp_path / "s.h5", compute_units, task_size=TOGETHER, order=-1).resumed > 0
     assert (tmp_path / "s.h5").read_bytes() == expected
     (tmp_path / "s.h5").unlink()

@@ -137,14 +137,15 @@ def linear_theory(system: System, belt: float) -> Linear | None:
         rest = np.linalg.solve(s, offset * push - load * np.array([c.sin_beta, c.cos_beta]))
         wheel, passing = system.wheel, -belt * system.wheel.turns
         omega = 2.0 * math.pi * passing
-        responses = [np.linalg.solve(s - c.m * w * w * np.eye(2) + 1j * w * damping, push) for w in omega]
+        at = omega[:, None, None]
+        responses = np.linalg.solve(s - c.m * at * at * np.eye(2) + 1j * at * damping, push[:, None])
     except np.linalg.LinAlgError:
         return None
     force = offset - stiffness * rest[1]
     if not (np.isfinite(rest).all() and force > 0.0):
         return None
     phases = forces * np.exp(1j * (wheel.omega * rest[0] + wheel.phase))
-    waves = np.array(responses, complex).reshape(-1, 2) * phases[:, None]
+    waves = responses.reshape(-1, 2) * phases[:, None]
     values, vectors = eigensystem(c, stiffness, grip)
     mode, known_to = modes(c, stiffness, grip)[0], 0.0 if is_undamped(c) else _ROUNDING * np.abs(values).max()
     direction = int(np.sign(mode.growth)) if abs(mode.growth) > known_to else 0

@@ -24,7 +24,7 @@ _OWN = 0.2  # least part of an eigenvector at the sum 0: others are copies, move
 _NEGLIGIBLE = 1e-3  # part of the growth rate
 _DEFECTIVE = 1e8  # condition of eigenvectors that hardly differ
 _ALONE = 0.05  # by which the part at the sum 0 may differ from 1 where no other sum comes near a mode
-_MOST_STEPS, _EXACT = 12, 1e-13  # of the iteration, and the part of the largest eigenvalue at which it ends
+_MOST_STEPS, _EXACT = 12, 1e-11  # of the iteration, and the part of the largest eigenvalue at which it ends
 
 Complex = NDArray[np.complex128]
 Floats = NDArray[np.float64]
@@ -55,7 +55,9 @@ def growth_with_slopes(
     moved = [0.5 * slopes[kept], *(0.25 * slopes[kept] * each for each in bends.T)]  # cos(θ + δ) = cos θ - δ sin θ
     parts = np.concatenate([*moved, *(-0.25 * slopes[kept] * each for each in bends.conj().T)])
     answer = (values, vectors[0] * np.linalg.solve(vectors, p[:, 0])) if modal else None
-    coarse, fine = (_fastest(a, p, omega, parts, n, answer) for n in (order - 1, order))
+    begin = values[values.imag >= 0.0]
+    coarse, begin = _fastest(a, p, omega, parts, order - 1, answer, begin)
+    fine, _ = _fastest(a, p, omega, parts, order, answer, begin)
     bent = float(np.abs(bends).sum(axis=1).max())
     return fine, left + abs(fine - coarse) + bent * abs(fine - plain)
 
@@ -89,15 +91,17 @@ def _pattern(waves: int, order: int) -> tuple[Any, Any, Any]:
     return sums, where.ravel(), np.array(between)
 
 
-def _fastest(a: Any, p: Any, omega: Any, parts: Complex, order: int, answer: Any) -> float:
-    """Growth rate (1/s) with sums of at most so many frequencies."""
+def _fastest(
+    a: Any, p: Any, omega: Any, parts: Complex, order: int, answer: tuple[Any, Any] | None, begin: Complex
+) -> tuple[float, Complex]:
+    """Growth rate (1/s) with sums of at most so many frequencies; the modes, with which the next order begins."""
     sums, where, between = _pattern(len(omega), order)
     amounts = np.zeros(between.max() + 1, complex)
     np.add.at(amounts, where, np.concatenate([parts, parts.conj()]))
     coupling, turns = amounts[between], 1j * (sums @ omega)
     with suppress(np.linalg.LinAlgError):
-        if answer is not None and not math.isnan(found := _beside(a, p, turns, coupling, *answer)):
-            return found
+        if answer is not None and (found := _beside(a, p, turns, coupling, *answer, begin)) is not None:
+            return float(found.real.max()), found
     size = len(sums)
     matrix = np.kron(coupling, p) + np.kron(np.eye(size), a) - np.kron(np.diag(turns), np.eye(4))
     values, vectors = np.linalg.eig(matrix)
@@ -105,13 +109,15 @@ def _fastest(a: Any, p: Any, omega: Any, parts: Complex, order: int, answer: Any
     try:
         share = np.abs(np.sum(vectors[own] * np.linalg.inv(vectors)[:, own].T, axis=0))
     except np.linalg.LinAlgError:
-        return math.nan
+        return math.nan, begin
     near = np.argsort(share)
-    return float(values[(share >= _OWN) | (share >= share[near[-4]])].real.max())
+    return float(values[(share >= _OWN) | (share >= share[near[-4]])].real.max()), begin
 
 
-def _beside(a: Any, p: Any, turns: Any, coupling: Any, values: Complex, residues: Complex) -> float:
-    """The same from each mode of A on; NaN where a mode is not alone, so that all eigenvalues are needed.
+def _beside(
+    a: Any, p: Any, turns: Any, coupling: Any, values: Complex, residues: Complex, now: Complex
+) -> Complex | None:
+    """The modes, from what they are nearly; None where one is not alone, so that all eigenvalues are needed.
 
     x answers a force e^{μt} by Σ residues/(values - μ). The part of an eigenvector at the sum 0 is 1/(1 - f')
     where λ = f(λ).
@@ -119,11 +125,11 @@ def _beside(a: Any, p: Any, turns: Any, coupling: Any, values: Complex, residues
     own, exact = len(turns) // 2, _EXACT * np.abs(values).max()
     others = np.arange(len(turns)) != own
     block, out, back = coupling[np.ix_(others, others)], coupling[own, others], coupling[others, own]
-    now, before, after = values[values.imag >= 0.0], np.zeros(0, complex), np.zeros(0, complex)
+    before, after = np.zeros(0, complex), np.zeros(0, complex)
     for _ in range(_MOST_STEPS):
         distance = values - (now[:, None, None] + turns[others][None, :, None])
         if not distance.all():
-            return math.nan
+            return None
         response = (residues / distance).sum(axis=-1)
         inner = np.eye(len(back)) + response[:, :, None] * block
         stiffness = coupling[own, own] - np.linalg.solve(inner, (response * back)[:, :, None])[:, :, 0] @ out
@@ -131,9 +137,10 @@ def _beside(a: Any, p: Any, turns: Any, coupling: Any, values: Complex, residues
         new = np.take_along_axis(all_values, np.abs(all_values - now[:, None]).argmin(axis=1)[:, None], 1)[:, 0]
         if len(before):
             moved = np.where(np.abs(now - before) > exact, now - before, math.inf)
-            if not np.abs((new - after) / moved).max() <= _ALONE:
-                return math.nan
-            if np.abs(new - now).max() <= exact:
-                return float(new.real.max())
+            slope = np.abs((new - after) / moved).max()
+            if not slope <= _ALONE:
+                return None
+            if (slope + 1e-3) * np.abs(new - now).max() <= exact:
+                return new
         before, after, now = now, new, new
-    return math.nan
+    return None
