@@ -1,10 +1,11 @@
 """The promises of many cases at once: their ladders of runs are climbed side by side, in lanes."""
 
 from collections import defaultdict
-from collections.abc import Hashable, Sequence
+from collections.abc import Generator, Hashable, Sequence
 from dataclasses import replace
 from functools import partial
 
+from brakecli.runs.pilot import RUNGS
 from brakecli.runs.tolerance import (
     LAYERED,
     Certified,
@@ -14,7 +15,25 @@ from brakecli.runs.tolerance import (
     slower_than_events,
 )
 from brakecli.solver.ensemble import fits, run_together
+from brakecli.solver.motion import Motion
 from brakecli.solver.system import System
+
+TOGETHER = 32
+"""Cases that are certified side by side."""
+LANE_STEP_SECONDS = 3e-8
+"""Of a step of the first rung or of another, in lanes that are full; a rough guess."""
+
+
+def _ladder(system: System) -> Generator[System, Motion, Certified]:
+    is_left = partial(is_left_for_events, too_slow=slower_than_events(system, lambda samples: None))
+    return ladder(replace(system, method=replace(system.method, **LAYERED[0])), is_left)
+
+
+def seconds_together(system: System) -> float | None:
+    """A rough guess at the time that a case takes among others; None where it has to be certified alone."""
+    if not begins_with_steps(system) or fits(first := next(_ladder(system))) is None:
+        return None
+    return RUNGS * first.steps * LANE_STEP_SECONDS
 
 
 def certify_together(systems: Sequence[System]) -> list[Certified | None]:
@@ -23,12 +42,8 @@ def certify_together(systems: Sequence[System]) -> list[Certified | None]:
     None where that is not certain, or cannot be computed in a lane: such a system has to be certified alone.
     """
     found: list[Certified | None] = [None] * len(systems)
-    ladders, rungs = {}, {}
-    for i, system in enumerate(systems):
-        if begins_with_steps(system):
-            is_left = partial(is_left_for_events, too_slow=slower_than_events(system, lambda samples: None))
-            ladders[i] = ladder(replace(system, method=replace(system.method, **LAYERED[0])), is_left)
-            rungs[i] = next(ladders[i])
+    ladders = {i: _ladder(system) for i, system in enumerate(systems) if begins_with_steps(system)}
+    rungs = {i: next(runs) for i, runs in ladders.items()}
     while rungs:
         alike, ready = defaultdict[Hashable, list[int]](list), rungs
         for i, rung in ready.items():

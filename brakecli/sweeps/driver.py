@@ -32,12 +32,15 @@ LARGEST_TASK = 1000
 class TaskQueue:
     """Cuts what is not finished into tasks, of a size by the time that units have taken so far."""
 
-    def __init__(self, finished: NDArray[np.bool_], size: int | None, order: int = 1) -> None:
-        """Queue what is not finished; `size` fixes that of the tasks, `order` = -1 begins at the end."""
+    def __init__(self, finished: NDArray[np.bool_], size: int | None, order: int = 1, least: int = 1) -> None:
+        """Queue what is not finished; `size` fixes that of the tasks, `order` = -1 begins at the end.
+
+        Units that are computed side by side come `least` at a time: fewer would take as long.
+        """
         missing = np.flatnonzero(~finished)
         runs = np.split(missing, np.flatnonzero(np.diff(missing) != 1) + 1)
         self._tasks = deque([Task(int(run[0]), len(run)) for run in runs if len(run)][::order])
-        self._size = size
+        self._size, self._least = size, least
         self.seconds, self.units = 0.0, 0  # computed so far
 
     def next_task(self) -> Task | None:
@@ -46,7 +49,7 @@ class TaskQueue:
             return None
         task = self._tasks.popleft()
         by_time = math.ceil(min(TASK_SECONDS * self.units / max(self.seconds, 1e-9), LARGEST_TASK))
-        size = min(task.size, self._size or max(1, by_time))
+        size = min(task.size, self._size or max(self._least, by_time))
         if size < task.size:
             self._tasks.appendleft(Task(task.first + size, task.size - size))
         return task._replace(size=size)
@@ -108,7 +111,7 @@ def sweep(
         with open_journal(journal_path(output), plan, force=force) as journal:
             resumed = journal.done
             begin(found, resumed)
-            queue = TaskQueue(journal.finished, task_size, order)
+            queue = TaskQueue(journal.finished, task_size, order, found.together)
             notes = _compute(engine, journal, queue, progress)
             report = SweepReport(output, loaded, Findings(journal), resumed, notes, queue.units * plan.unit_length)
             write(result, report, journal)

@@ -21,7 +21,7 @@ from brakecli.files import fields
 from brakecli.files.field import values_of
 from brakecli.runs.limits import Check, check, refuse, within_range
 from brakecli.runs.run import motion_of
-from brakecli.runs.together import certify_together
+from brakecli.runs.together import TOGETHER, certify_together
 from brakecli.runs.tolerance import Certificate, Certified
 from brakecli.solver.history import array_history
 from brakecli.solver.motion import Motion
@@ -31,7 +31,6 @@ from brakecli.sweeps.critical import search
 from brakecli.sweeps.early import Ending, Known, early
 from brakecli.sweeps.plan import Plan, Settings
 
-TOGETHER = 32  # points whose runs are computed side by side
 OUT_OF_MEMORY = "out of memory; sample less often, or reduce contact.nodes"
 _FAULTS = (BrakecliError, FloatingPointError, MemoryError)
 

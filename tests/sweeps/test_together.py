@@ -9,12 +9,12 @@ import pytest
 import tomli_w
 
 from brakecli.case.system import system_of
-from brakecli.runs.together import certify_together
+from brakecli.runs.together import TOGETHER, certify_together
 from brakecli.runs.tolerance import certify
 from brakecli.solver.method import Method
 from brakecli.solver.motion import solve
 from brakecli.sweeps.plan import LoadedSweep
-from brakecli.sweeps.point import TOGETHER, simulate
+from brakecli.sweeps.point import simulate
 from brakecli.sweeps.workers.task import compute_units
 from tests.campaign import counts
 from tests.examples import ROUGH, make
