@@ -6,6 +6,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 RUN_STAMP := $(VENV)/.installed-for-running
 DEV_STAMP := $(VENV)/.installed-for-development
+DOCS_STAMP := $(VENV)/.installed-for-docs
 LOWEST := $(VENV)/lowest
 LOWEST_STAMP := $(LOWEST)/.installed
 PEERS := $(VENV)/bench
@@ -19,7 +20,7 @@ PYTEST_ARGS ?=
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .NOTPARALLEL: # two installations into one .venv at a time would collide
-.PHONY: help demo test campaign lowest lint format types imports derivations tables cases check \
+.PHONY: help demo test campaign lowest lint format types imports derivations tables docs cases check \
     accuracy promises promise-cost picture lock-in paper extremes bench bench-sweep bench-contact clean
 
 help: ## list the targets (this text)
@@ -49,6 +50,10 @@ $(DEV_STAMP): $(INSTALLED_FROM)
 	@echo "installing brakecli and its development tools into $(VENV) ..."
 	@$(PIP) install --editable '.[dev]'
 	@touch $@ $(RUN_STAMP)
+
+$(DOCS_STAMP): $(DEV_STAMP)
+	@$(PIP) install --editable '.[docs]'
+	@touch $@
 
 $(LOWEST_STAMP): $(INSTALLED_FROM)
 	@echo "installing brakecli with the lowest versions that it declares into $(LOWEST) ..."
@@ -106,6 +111,9 @@ derivations: $(DEV_STAMP) ## derive every formula of the documentation again, wi
 tables: $(DEV_STAMP) ## write the tables of the documentation that list what a result holds
 	$(BIN)/python docs/tables.py
 
+docs: $(DOCS_STAMP) ## run the tutorial and make the site of the documentation in docs/_site/html; a warning fails
+	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet docs docs/_site/html
+
 cases: $(RUN_STAMP) ## run every sample case into results/; one that fails, fails all
 	@mkdir -p results
 	@failed=; \
@@ -158,5 +166,5 @@ extremes: $(DEV_STAMP) ## compute the extremes of all inputs and write docs/extr
 check: lint types imports derivations cases test ## all that must hold before a change is handed in
 
 clean: ## remove .venv, results and caches
-	rm -rf $(VENV) results build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) docs/_site docs/generated results build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

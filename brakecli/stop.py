@@ -7,6 +7,8 @@ into a file that kernels see as memory. Only the standard library is imported he
 import mmap
 import os
 import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 try:
     _file = os.memfd_create("signals")
@@ -22,3 +24,16 @@ def show_signals() -> None:
     """Show kernels the signals that come from now on."""
     if _file >= 0:
         signal.set_wakeup_fd(_file, warn_on_full_buffer=False)
+
+
+@contextmanager
+def signals_shown() -> Iterator[None]:
+    """Show kernels the signals that come within the block, in a program that goes on afterwards."""
+    before = signal.set_wakeup_fd(_file, warn_on_full_buffer=False)
+    try:
+        yield
+    finally:
+        signal.set_wakeup_fd(before)
+        memory[:8] = bytes(8)
+        if _file >= 0:
+            os.lseek(_file, 0, os.SEEK_SET)

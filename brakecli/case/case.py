@@ -5,14 +5,16 @@ The tables and keys are those of the case file, version 1. `brakecli.case.read` 
 
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
-from typing import Annotated, Literal
+from pathlib import Path
+from typing import Annotated, ClassVar, Literal
 
 import tomli_w
 from pydantic import Field
 
 from brakecli.case import tables
+from brakecli.case.roughness import NEEDLESS, Roughness
 from brakecli.case.tables import NonNegative, Number, Positive, Schedule, Table, described, one_of, quantity
-from brakecli.errors import Problem, found
+from brakecli.errors import BrakecliError, Problem, found
 from brakecli.solver.contact import EVALUATORS
 from brakecli.solver.method import MOST
 from brakecli.solver.schemes import SCHEMES, Scheme
@@ -88,33 +90,6 @@ class Contact(Table):
     nodes: Annotated[int, Field(ge=2, le=10_000_000)] | None = described(
         'quadrature nodes of "midpoint", chosen from the shortest wavelength if left out', None
     )
-
-
-class Profile(Table):
-    """A rough surface as a sum of sines; empty lists are a smooth surface."""
-
-    alternatives = (("wavelengths",), ("wavenumbers",))
-
-    amplitudes: tables.Series = quantity("m", "amplitude of each sine")
-    wavelengths: tables.Lengths | None = quantity("m", "wavelength of each sine", None)
-    wavenumbers: tables.Lengths | None = quantity("rad/m", "wavenumber of each sine", None)
-    phases_deg: tables.Series = quantity("deg", "phase of each sine, 0 if left out", default_factory=tuple)
-
-    def _fill(self) -> None:
-        if "phases_deg" not in self.model_fields_set:
-            self.__dict__["phases_deg"] = (0.0,) * len(self.amplitudes)
-
-    def _broken_rules(self) -> Iterator[Problem]:
-        yield from super()._broken_rules()
-        for key in ("phases_deg", "wavelengths", "wavenumbers"):
-            yield from self.different_lengths(key, "amplitudes")
-
-
-class Roughness(Table):
-    """The profiles of both surfaces; a surface without one is smooth."""
-
-    shoe: Profile | None = described("profile f1 of the shoe", None)
-    wheel: Profile | None = described("profile f2 of the wheel", None)
 
 
 class Initial(Table):
@@ -210,7 +185,14 @@ class Case(Table):
     of the roughness hold their values also where the file left them out.
     """
 
-    needless = ("solver", "tolerance"), (("solver", "theta"), ("solver", "iteration"), ("contact", "evaluator"))
+    needless: ClassVar = {
+        ("solver", "tolerance"): (("solver", "theta"), ("solver", "iteration"), ("contact", "evaluator")),
+        **{
+            ("roughness", side, key): tuple(("roughness", side, other) for other in needless)
+            for side in ("shoe", "wheel")
+            for key, needless in NEEDLESS.items()
+        },
+    }
 
     title: tables.Title = ""
     shoe: Shoe
@@ -229,7 +211,27 @@ class Case(Table):
         if "sample_interval" not in self.output.model_fields_set and self.solver.step is not None:
             self.__dict__["output"] = Output(sample_interval=self.solver.step)
 
+    def _put_sines(self) -> Iterator[Problem]:
+        """Put sines in the place of measured profiles; yield a problem for each that cannot be used."""
+        for side, given in self.roughness:
+            if given is None or given.profile is None:
+                continue
+            from brakecli.case.profile import sines_of
+
+            pad = self.contact.half_length if side == "shoe" else None
+            error = 0.01 if given.profile_error is None else given.profile_error
+            try:
+                sines = sines_of(Path(given.profile), error, self.wheel.radius, pad)
+                self.__dict__["roughness"] = self.roughness.model_copy(update={side: type(given)(**sines)})
+            except OSError as failure:
+                what = f"cannot be read: {(failure.strerror or str(failure)).lower()}"
+                yield self.wrong(f"roughness.{side}.profile", what, "name a CSV file")
+            except BrakecliError as failure:
+                what, _, remedy = str(failure).rpartition("; ")
+                yield self.wrong(f"roughness.{side}.profile", what, remedy)
+
     def _broken_rules(self) -> Iterator[Problem]:
+        yield from self._put_sines()
         step = self.solver.step
         if step is None and "sample_interval" not in self.output.model_fields_set:
             what = f"{tables.MISSING}, and there is no solver.step to use instead"
@@ -243,7 +245,7 @@ class Case(Table):
             name = self.solver.scheme if self.solver.row.exact else "event-driven"
             what = f"has no effect: {name} needs no nodes, and with a tolerance the program chooses them"
             yield self.wrong("contact.evaluator", what, "leave evaluator out")
-        rough = [name for name, profile in self.roughness if profile and any(profile.amplitudes)]
+        rough = [name for name, profile in self.roughness if profile and profile.is_rough]
         if self.solver.row.exact and rough:
             what = f"is for smooth surfaces, but roughness.{rough[0]} is given"
             yield self.wrong("solver.scheme", what, 'set scheme to "event-driven", or leave the roughness out')
@@ -260,5 +262,12 @@ def changed(case: Case, **tables: Mapping[str, object]) -> Case:
 
 
 def resolved_toml(case: Case) -> str:
-    """The case as TOML with every default filled in; reading it gives an equal case, to the last bit."""
-    return tomli_w.dumps(case.model_dump(mode="json", exclude_none=True))
+    """The case as TOML with every default filled in, and all surfaces as sines.
+
+    Reading it gives an equal case, to the last bit.
+    """
+    data = case.model_dump(mode="json", exclude_none=True)
+    for side, profile in case.roughness:
+        if profile is not None and profile.spectrum is not None:
+            data["roughness"][side] = {**profile.sines(), **({"note": profile.note} if profile.note else {})}
+    return tomli_w.dumps(data)

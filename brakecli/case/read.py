@@ -87,6 +87,10 @@ def parse_table(
         data, problems = located.data, located.problems or [*error.problems]
     all_is_readable, twice = all(problem.path for problem in problems), {problem.path for problem in problems}
     sources, set_by = [label], dict[KeyPath, str]()
+    roughness = data.get("roughness")
+    for surface in roughness.values() if isinstance(roughness, dict) else ():
+        if isinstance(surface, dict) and isinstance(profile := surface.get("profile"), str) and profile:
+            surface["profile"] = str(Path(label).parent / profile)  # those of overrides are seen from here
     for override in overrides:
         sources.append(by := f"{option} {printable(override)}")
         try:
@@ -128,9 +132,9 @@ def put(
         raise CaseError([Problem(path, f"{key_text(path[:-1])} is not a table", "set a key of a table")])
     table[key] = value
     groups = tables_within(kind).get(tuple(parents), Table).alternatives
-    excluded = [(*parents, other) for group in groups if key not in group for other in group]
-    needless = kind.needless[1] if path == kind.needless[0] else ()
-    for other in (*(excluded if any(key in group for group in groups) else ()), *needless):
+    beside = {other for group in groups if key in group for other in group}
+    excluded = [(*parents, other) for group in groups for other in group if beside and other not in beside]
+    for other in (*excluded, *kind.needless.get(path, ())):
         place = table if other[:-1] == path[:-1] else data.get(str(other[0]))
         if other not in kept and isinstance(place, dict):
             place.pop(other[-1], None)

@@ -2,7 +2,8 @@
 
 from functools import lru_cache
 
-from brakecli.case.case import Case, Profile
+from brakecli.case.case import Case
+from brakecli.case.roughness import Profile
 from brakecli.solver.links import coefficients
 from brakecli.solver.method import Method
 from brakecli.solver.roughness import Surface, surface
@@ -16,8 +17,8 @@ EVENT_TOLERANCE = 1e-10  # of event-driven where a case gives it a step
 
 
 @lru_cache(maxsize=16)
-def _surface_of(profile: Profile) -> Surface:
-    return surface(**dict(profile))
+def _surface_of(profile: Profile, radius: float) -> Surface:
+    return surface(**profile.sines(), radius=radius)
 
 
 def system_of(case: Case) -> System:
@@ -25,7 +26,8 @@ def system_of(case: Case) -> System:
     wheel, load, initial, solver = case.wheel, case.load, case.initial, case.solver
     automatic = solver.scheme == "auto"
     shoe, wheel_surface = (
-        _surface_of(each) if each is not None else _SMOOTH for each in (case.roughness.shoe, case.roughness.wheel)
+        _surface_of(each, wheel.radius) if each is not None else _SMOOTH
+        for each in (case.roughness.shoe, case.roughness.wheel)
     )
     chosen = (
         "event-driven" if shoe.g.size or wheel_surface.g.size else "piecewise-exact"
@@ -63,4 +65,5 @@ def system_of(case: Case) -> System:
             allow_unconverged=solver.allow_unconverged,
             automatic=automatic,
         ),
+        notes=tuple(f"roughness.{side}: {each.note}" for side, each in case.roughness if each and each.note),
     )

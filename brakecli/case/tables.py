@@ -26,6 +26,7 @@ from brakecli.solver.schemes import SCHEMES
 
 SMALLEST, LARGEST = 1e-100, 1e100  # magnitudes of all numbers but 0, so that products neither vanish nor overflow
 MOST_WRONG_ENTRIES = 20  # of one list that are reported
+MOST_SINES = 2000  # of a surface that is not given as sines: a resolved case must not be larger than a case may be
 MISSING = "is missing"
 
 
@@ -76,11 +77,13 @@ Number = Annotated[float, _scaled]
 Positive = Annotated[float, Field(gt=0), _scaled]
 NonNegative = Annotated[float, Field(ge=0), _scaled]
 Angle = Annotated[float, Field(ge=-90, le=90), _scaled]
+Whole = Annotated[float, Field(ge=1, multiple_of=1), _scaled]
 Tolerance = Annotated[float, Field(ge=1e-13, le=1e-2)]
 Weight = Annotated[float, Field(ge=0, le=1), _scaled]
 Weights = Annotated[tuple[Weight, ...], *from_list]
 Series = Annotated[tuple[Number, ...], *from_list]
 Lengths = Annotated[tuple[Positive, ...], *from_list]
+Wholes = Annotated[tuple[Whole, ...], *from_list]
 Schedule = Annotated[tuple[Number, ...], Field(min_length=1), *from_list]
 Title = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f-\x9f]*$", description="one line for people to read")]
 
@@ -104,21 +107,25 @@ class Table(BaseModel):
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = ()  # groups of keys that exclude each other
     one_is_needed: ClassVar[bool] = True  # of these groups
-    needless: ClassVar[tuple[KeyPath, tuple[KeyPath, ...]]] = (), ()  # keys that an override of one replaces
+    needless: ClassVar[dict[KeyPath, tuple[KeyPath, ...]]] = {}  # keys that an override of one replaces
 
     def _broken_rules(self) -> Iterator[Problem]:
         """Yield a problem for every rule between keys that does not hold."""
-        given = [group for group in self.alternatives if any(getattr(self, key) is not None for key in group)]
-        if len(given) > 1:
-            key = next(key for key in given[1] if getattr(self, key) is not None)
-            yield self.wrong(key, f"is given together with {' and '.join(given[0])}", "keep one of the two")
-        elif given:
-            for key in given[0]:
-                if getattr(self, key) is None:
-                    yield Problem((key,), MISSING, f"give {' and '.join(given[0])} together")
-        elif self.alternatives and self.one_is_needed:
-            choices = ", or ".join(" and ".join(group) for group in self.alternatives)
-            yield Problem((self.alternatives[0][0],), MISSING, f"give {choices}")
+        groups = self.alternatives if self.one_is_needed else ((), *self.alternatives)
+        given = [key for key in dict.fromkeys(sum(groups, ())) if getattr(self, key) is not None]
+        missing = [[key for key in group if key not in given] for group in groups if {*given} <= {*group}]
+        if given and not missing:
+            # the first that is given completely, otherwise in part
+            kept = max(self.alternatives, key=lambda group: ({*group} <= {*given}) + bool({*group} & {*given}))
+            key = next(key for key in given if key not in kept)
+            others = " and ".join(other for other in kept if other in given)
+            yield self.wrong(key, f"is given together with {others}", "keep one of the two")
+        elif len(missing) == 1:
+            for key in missing[0]:
+                yield Problem((key,), MISSING, f"give {' and '.join((*given, *missing[0]))} together")
+        elif missing and all(missing):
+            choices = ", or ".join(" and ".join(group) for group in missing)
+            yield Problem((missing[0][0],), MISSING, f"give {choices}")
 
     def different_lengths(self, key: str, other: str) -> Iterator[Problem]:
         """Yield a problem if a list is not as long as another one; either may be absent."""

@@ -13,7 +13,7 @@ from brakecli.errors import KeyPath, Problem, found, key_text
 
 _WHAT = {
     "float_type": "is not a number",
-    "int_type": "is not a whole number",
+    **dict.fromkeys(("int_type", "multiple_of"), "is not a whole number"),
     "bool_type": "is neither true nor false",
     "string_type": "is not a text",
     "string_pattern_mismatch": "holds a line break or a control character",
@@ -123,7 +123,7 @@ def _expected(path: KeyPath, kind: type[Table]) -> str:
 
 
 def _value(node: dict[str, Any]) -> str:
-    text = _KINDS.get(node.get("type", ""), "a value")
+    text = _KINDS.get("integer" if "multipleOf" in node else node.get("type", ""), "a value")
     if "exclusiveMinimum" in node:
         return f"{text} above {node['exclusiveMinimum']:.9g}"
     if "maximum" in node:

@@ -12,14 +12,28 @@ from typing import Annotated
 import typer
 
 from brakecli import __version__
-from brakecli.cli import advise, check, classify, compare_schemes, new, plot, run, schema, stability, sweep
+from brakecli.cli import (
+    advise,
+    check,
+    classify,
+    compare_schemes,
+    diff,
+    export,
+    info,
+    new,
+    plot,
+    run,
+    schema,
+    stability,
+    sweep,
+)
 from brakecli.cli.inputs import as_argument
 from brakecli.cli.options import option
 from brakecli.cli.output import say, show
 from brakecli.errors import BrakecliError, RefusedError
 from brakecli.files.os_signals import Interrupted
 
-COMMANDS = (run, sweep, classify, compare_schemes, stability, advise, check, new, schema, plot)
+COMMANDS = (run, sweep, classify, compare_schemes, stability, advise, check, new, schema, plot, info, diff, export)
 """The files of the commands, in the order in which `--help` lists them."""
 
 LIBRARIES = 750_000_000

@@ -44,7 +44,7 @@ def command(
         from brakecli.analysis.regime.verdict import Thresholds
 
         try:
-            limits = _changed(Thresholds, thresholds)
+            limits = changed(Thresholds, thresholds)
             numbers = _twice(source, limits, quiet) if second_run else classify_result(Path(source), limits)
         except UnreadableResultError as error:
             remedy = "for a measured signal, state with --quantity what was measured"
@@ -55,7 +55,7 @@ def command(
 
         if quantity not in set(Measurand):
             raise UsageError(f"--quantity {quantity}: is not known; give one of {', '.join(Measurand)}")
-        signal, machine["thresholds"] = read_signal(source, **reading), _changed(SignalThresholds, thresholds)
+        signal, machine["thresholds"] = read_signal(source, **reading), changed(SignalThresholds, thresholds)
         numbers = dataclasses.asdict(classify_signal(signal, quantity=Measurand(quantity), **machine))
     warn(*numbers.get("warnings", ()))
     shown = {"source": source, **numbers}
@@ -82,7 +82,7 @@ def _check(quantity: str | None, given: Mapping[str, Any]) -> None:
             raise UsageError(f"{where} {value}: is not a number; give one in SI units")
 
 
-def _changed(thresholds: type[Any], changes: list[str] | None) -> Any:
+def changed(thresholds: type[Any], changes: list[str] | None) -> Any:
     """Thresholds with the values of NAME=VALUE; raises UsageError for what is not one of them."""
     names = [field.name for field in dataclasses.fields(thresholds)]
     found: dict[str, float] = {}

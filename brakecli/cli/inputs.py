@@ -19,7 +19,7 @@ def load_case(source: str, overrides: list[str] | None) -> "LoadedCase":
     """The case of a case file, or the one that a result file holds."""
     from brakecli.case.read import parse_case
 
-    if not _is_result(source):
+    if not is_result(source):
         text = _text(source)
         try:
             return parse_case(*text, overrides or ())
@@ -60,7 +60,7 @@ def is_sweep(source: str) -> bool:
     """Whether a file is meant to be a sweep."""
     from brakecli.sweeps.plan import kind_of
 
-    return not _is_result(source) and kind_of(_text(source)[0]) == "sweep"
+    return not is_result(source) and kind_of(_text(source)[0]) == "sweep"
 
 
 def as_argument(path: str | Path) -> str:
@@ -83,14 +83,14 @@ def result_path(output: Path | None, source: str, kind: str = "case", ending: st
     Raises UsageError if that is the source itself; a result file may be replaced by the same run again.
     """
     target = output or Path((kind if source == "-" else Path(source).stem) + ending)
-    if source != "-" and not _is_result(source):
+    if source != "-" and not is_result(source):
         with suppress(OSError, ValueError):  # one of them does not exist, or cannot
             if target.samefile(source):
                 raise UsageError(f"{target}: this is the {kind} itself; choose another output with -o")
     return target
 
 
-def _is_result(source: str) -> bool:
+def is_result(source: str) -> bool:
     """Whether this is a result file, or was one: by its name, or by its content."""
     if source == "-" or Path(source).suffix == ".toml":
         return False

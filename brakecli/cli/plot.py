@@ -12,7 +12,10 @@ def command(
     result: Annotated[Path, source_argument("FILE.h5", "Result of a run, a sweep, a comparison or stability.")],
     output: Annotated[Path | None, output_option("Picture", "FILE.png, here")] = None,
     select: Annotated[
-        list[str] | None, option("Draw one value of a sweep's axis; repeatable.", "KEY=VALUE")
+        list[str] | None, option("Draw the nearest value of a sweep's axis; repeatable.", "KEY=VALUE")
+    ] = None,
+    variable: Annotated[
+        str | None, option("A number of the sweep; of a run, what to draw in place of vx.", "NAME")
     ] = None,
     force: Force = False,
     quiet: Quiet = False,
@@ -22,6 +25,6 @@ def command(
 
     target = output or Path(f"{result.stem}.png")
     with unwinding():
-        plot_result(result, target, force=force, select=select or ())
+        plot_result(result, target, force=force, select=select or (), variable=variable or "")
     if not quiet:
         show(f"{target}: written")

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from brakecli.cli.inputs import load_case, result_path
 from brakecli.cli.options import AsJson, CaseArgument, Force, Overrides, Quiet, option, output_option
-from brakecli.cli.output import announce_compilation, progress, show_result
+from brakecli.cli.output import announce_compilation, progress, say, show_result
 from brakecli.errors import UsageError
 
 if TYPE_CHECKING:
@@ -38,10 +38,12 @@ def command(
     from brakecli.cli.stability_tables import stability_table
     from brakecli.files.field import values_of
     from brakecli.files.fields import LOCK_IN, STABILITY
-    from brakecli.runs.limits import within_range
+    from brakecli.runs.limits import sliding_text, within_range
 
     with progress(quiet) as show_progress, within_range():
-        report, found = stability(system_of(loaded.case)), None
+        if (text := sliding_text(system := system_of(loaded.case))) and not quiet:
+            say(text)
+        report, found = stability(system), None
         if axis:
             from brakecli.files.atomic import new_output
             from brakecli.sweeps.lock_in import lock_in, write

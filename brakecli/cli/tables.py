@@ -104,7 +104,14 @@ def _verdict_rows(numbers: Mapping[str, Any]) -> list[Row]:
         ("because", "; ".join(numbers["reasons"])),
         *_rows(fields.VERDICT, numbers, "frequency", "amplitude", "stick_fraction", "contact_loss_fraction"),
         *_rows(fields.VERDICT, numbers, *(name for name in IF_KNOWN if numbers.get(name) is not None)),
+        ("vibrates", [_interval(each) for each in numbers.get("vibrations") or ()]),
     ]
+
+
+def _interval(found: Mapping[str, Any]) -> str:
+    when = f"{found['start']:.4g} to {found['end']:.4g} s, most at {found['speed']:.3g} m/s"
+    tone = "" if found["frequency"] is None else f": {found['frequency']:.4g} Hz"
+    return f"{when}{tone}, {found['amplitude']:.3g} m"
 
 
 def check_table(title: str, found: Check) -> str:

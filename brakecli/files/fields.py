@@ -35,7 +35,10 @@ VERDICT = (
     Field("amplitude_own", "m", "on a rough wheel: what the shoe adds", at="verdict."),
     Field("frequency_resolution", "Hz", "distance of two lines in the spectrum", at="verdict."),
     Field(
-        "torque_variation", "N m", "braking torque, peak to peak; a median where the motion lasts", at="verdict."
+        "torque_variation",
+        "N m",
+        "braking torque, peak to peak; missing if samples miss impacts",
+        at="verdict.",
     ),
     integer("settled", "whether a settled part was found (0, 1); otherwise the second half is judged", "verdict."),
     Field("settled_from", "s", "start of the settled part, or of the second half", at="verdict."),
@@ -68,10 +71,27 @@ ENERGY = (
     Field("closing_error", "J", "sum that the other items leave, 0 for an exact account"),
     ratio("relative_closing_error", "closing error over the largest item, `stored` included"),
 )
+VIBRATION = (
+    Field("start", "s", "start of an interval of vibration"),
+    Field("end", "s", "its end"),
+    Field("frequency", "Hz", "frequency where vx is largest"),
+    Field("amplitude", "m", "half of peak to peak of x there"),
+    Field("speed", "m/s", "speed of the wheel's surface there"),
+)
+VIBRATIONS = Field(
+    "vibrations",
+    "",
+    "where speed or load change: the intervals in which it vibrates",
+    OBJECT,
+    at="over_time.vibrations",
+    in_file=False,
+    rows=VIBRATION,
+)
 RUN = (
     Field("status", "", "how the run has ended: done or failed", TEXT),
     Field("failure", "", "time and reason of a failure", TEXT, at="motion.work.failure_sentence"),
     *VERDICT,
+    VIBRATIONS,
     Field(
         "spectrum_peak",
         "Hz",
@@ -97,7 +117,7 @@ RUN = (
     Field("energy", "", "the account of energies", OBJECT, "motion.", group="energy", rows=ENERGY),
     Field("modelled", "", "parts of the model that the run has used", OBJECT),
     Field("left_out", "", "parts of the model that the run has left out, and why this is safe", OBJECT),
-    Field("adjustments", "", "how step and duration were made to fit", OBJECT, at="check."),
+    Field("adjustments", "", "how step, duration and measured profiles were made to fit", OBJECT, at="check."),
     Field("warnings", "", "what a careful user should know", OBJECT),
     Field("solve_seconds", "s", "time of the loop", at="motion.work.solve_seconds", in_file=False),
 )
@@ -121,6 +141,18 @@ UNCONVERGED = (
     Field("time", "s", "time of an unconverged step"),
     Field("residual", "N", "residual of an unconverged step"),
 )
+
+INTERVAL = integer("interval", "interval of vibration, from 0")
+WINDOW_TIME = Field("time", "s", "middle of a window of time")
+OVER_TIME = (
+    Field("speed", "m/s", "speed of the wheel's surface"),
+    Field("load", "N", "pressing force"),
+    Field("frequency", "Hz", "frequency of the highest peak of vx; missing where it does not vibrate"),
+    Field("amplitude", "m", "half of peak to peak of x, without its trend"),
+    ratio("stick_fraction", "part of the time in stick"),
+    Field("braking_torque", "N m", "mean torque of the friction force"),
+)
+SHORT_TIME = Field("vx", "(m/s)2 Hz-1", "power spectral density of vx in each window", "(1,)f8", at="density")
 
 # A sweep
 
@@ -294,4 +326,46 @@ ADVICE = (
     Field("check", "", "a run of the case with the first advice followed", OBJECT, rows=CHECK_RUN),
     Field("notes", "", "what the answer rests on", OBJECT),
     Field("conclusion", "", "the answer in a sentence", TEXT),
+)
+
+# What a file holds, and how two differ, in JSON alone
+
+HELD = (
+    Field("group", "", "group of the file", TEXT),
+    Field("name", "", "name of the variable", TEXT),
+    Field("dims", "", "names of its axes", OBJECT),
+    Field("shape", "1", "their lengths", OBJECT),
+    Field("units", "", "its unit", TEXT),
+    Field("meaning", "", "what it is", TEXT),
+)
+INFO = (
+    Field("file", "", "the file", TEXT, at="path"),
+    *named(RUN, "status"),
+    Field("kind", "", "run, sweep, comparison or stability", TEXT),
+    Field("title", "", "title of the case or of the sweep", TEXT),
+    Field("whole", "", "whether every byte is as it was written; false where another program has changed it", "?"),
+    integer("bytes", "size of the file"),
+    integer("format_version", "version of the form of the file"),
+    Field("versions", "", "versions of brakecli and of the libraries that made it", OBJECT),
+    Field("variables", "", "all variables", OBJECT, rows=HELD),
+)
+DIFFERENT_VALUE = (
+    Field("name", "", "key of the case, or name of the number with its group", TEXT),
+    Field("a", "", "value in the first file; null where there is none", OBJECT),
+    Field("b", "", "value in the second file; null where there is none", OBJECT),
+)
+DIFFERENT_VARIABLE = (
+    *HELD[:2],
+    Field("shapes", "1", "lengths of its axes in both files; null where it is missing", OBJECT),
+    integer("compared", "number of values that are in both"),
+    integer("different", "number of those that differ"),
+    Field("largest", "of the variable", "largest difference of two values; null for texts"),
+    ratio("relative", "that over the largest value in both; null where that is 0"),
+)
+DIFFERENCE_OF_TWO = (
+    Field("same", "", "whether case, numbers and variables are the same", "?"),
+    Field("case", "", "keys of the case and of the sweep that differ", OBJECT, rows=DIFFERENT_VALUE),
+    Field("numbers", "", "attributes that differ", OBJECT, rows=DIFFERENT_VALUE),
+    Field("variables", "", "variables that differ", OBJECT, rows=DIFFERENT_VARIABLE),
+    Field("versions", "", "versions that differ", OBJECT, rows=DIFFERENT_VALUE),
 )

@@ -51,6 +51,7 @@ class Variable:
     dims: tuple[str, ...]
     shape: tuple[int, ...]
     attributes: dict[str, Any]
+    kind: str  # of its values, as NumPy names it
 
 
 @dataclass
@@ -61,6 +62,14 @@ class StoredResult:
     file: h5py.File
     attributes: dict[str, Any]
     length: int  # bytes
+    sealed: bool  # whether the whole file is as it was written, by its digest
+
+    def groups(self) -> list[str]:
+        """All groups, the root first."""
+        with _explained(self.path):
+            names = ["/"]
+            self.file.visit(names.append)
+            return [name for name in names if isinstance(member(self.file, name), h5py.Group)]
 
     def group_attributes(self, group: str) -> dict[str, Any]:
         """The attributes of a group."""
@@ -82,7 +91,9 @@ class StoredResult:
             for name in parent:
                 node = member(parent, name)
                 if isinstance(node, h5py.Dataset):
-                    found[name] = Variable(axes_of(node, name), node.shape, attributes_of(node, ""))
+                    found[name] = Variable(
+                        axes_of(node, name), node.shape, attributes_of(node, ""), node.dtype.kind
+                    )
         return found
 
     def read(self, group: str, name: str, start: int = 0, stop: int | None = None) -> NDArray[Any]:
@@ -120,7 +131,7 @@ def open_result(path: Path, kind: str | None = None) -> Iterator[StoredResult]:
             if not stat.S_ISREG(path.stat().st_mode):  # a pipe would block forever
                 raise ValueError("this is not a regular file")
             stream = stack.enter_context(path.open("rb", buffering=0))
-            if not _has_digest(stream):
+            if not (sealed := _has_digest(stream)):
                 _try_out(path)
             # h5py gets the very file that was verified, and does without the file locks of HDF5
             file = stack.enter_context(h5py.File(stream, "r"))
@@ -138,7 +149,7 @@ def open_result(path: Path, kind: str | None = None) -> Iterator[StoredResult]:
                 raise ValueError(f"it holds a result of kind {attributes.get('kind')!r}, and {kind!r} is needed")
             length = path.stat().st_size
             check_variables(file, its_kind, length)
-        yield StoredResult(path, file, attributes, length)
+        yield StoredResult(path, file, attributes, length, sealed)
 
 
 def is_hdf5(path: Path) -> bool:

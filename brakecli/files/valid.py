@@ -30,6 +30,9 @@ _VARIABLES = {  # the first of a kind, of a sweep its status, has the length of 
     ("run", "history"): fields.HISTORY,
     ("run", "spectrum"): (fields.FREQUENCY, *fields.SPECTRUM.values()),
     ("run", "unconverged"): fields.UNCONVERGED,
+    ("run", "over_time"): (fields.WINDOW_TIME, *fields.OVER_TIME),
+    ("run", "spectrogram"): (fields.WINDOW_TIME, fields.FREQUENCY, fields.SHORT_TIME),
+    ("run", "vibrations"): (fields.INTERVAL, *fields.VIBRATION),
     ("sweep", "/"): (*fields.POINT, *fields.CRITICAL, *fields.DIFFERENCE, fields.DIRECTION),
     ("comparison", "/"): (fields.ENTRY_PLACE, *fields.ENTRY),
     ("stability", "/"): (*fields.VARIED, *fields.MODES),
@@ -58,12 +61,12 @@ def check_variables(file: h5py.File, kind: str, length: int) -> None:
                 raise ValueError(f"{where} is not what belongs there: {field.meaning}")
             check_size(node, length, where)
             axis = declared[0].name if kind != "sweep" else "status"
-            shape = found[axis][1].shape if axis in found else node.shape
+            shape = found[axis][1].shape if axis in found and field is not fields.FREQUENCY else node.shape
             if kind == "sweep" and field in (fields.DIRECTION, *fields.DIFFERENCE):
                 shape = shape[1:] if field is not fields.DIRECTION else shape[:1]
             if node.shape[: node.ndim - field.kind.startswith("(")] != shape:
                 raise ValueError(f"{where} has the shape {node.shape}, and {axis} has {shape}")
-            if kind == "run" and name in _RISING:
+            if kind == "run" and name in _RISING and field not in fields.OVER_TIME:
                 _check_rising(node, where)
 
 

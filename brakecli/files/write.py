@@ -75,13 +75,15 @@ class ResultFile:
         """Make a dimension of this name in `group`, with numbers or texts along it; without `values` it grows."""
         self.variable(group, field, (field.name,), values)
 
-    def column(self, field: Field, dims: Sequence[str], values: ArrayLike, **attributes: Any) -> None:
-        """Write a variable of the root whose numbers may be missing: None or NaN."""
+    def column(
+        self, field: Field, dims: Sequence[str], values: ArrayLike, group: str = "/", **attributes: Any
+    ) -> None:
+        """Write a variable whose numbers may be missing: None or NaN."""
         if field.kind == "f8":
             numbers = np.asarray(values, dtype=np.float64)
             values = np.where(np.isnan(numbers), FILL, numbers)
             attributes = {"_FillValue": np.array([FILL]), **attributes}
-        self.variable("/", field, dims, values, **attributes)
+        self.variable(group, field, dims, values, **attributes)
 
     def variable(
         self, group: str, field: Field, dims: Sequence[str], values: ArrayLike | None = None, **attributes: Any

@@ -1,6 +1,6 @@
 """The picture of a sweep over one axis: curves of critical values, or of amplitude and frequency."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from typing import Any
 
@@ -10,7 +10,18 @@ from matplotlib.figure import Figure
 
 from brakecli.analysis.regime.verdict import Excitation
 from brakecli.plots import style
-from brakecli.plots.sweep import DIFFERENT, FORCED, REGIMES, WIDTH, Sign, SweepPicture, add_legend, sign
+from brakecli.plots.sweep import (
+    CRITICAL_LINE,
+    DIFFERENT,
+    FORCED,
+    MARGIN,
+    REGIMES,
+    WIDTH,
+    Sign,
+    SweepPicture,
+    add_legend,
+    sign,
+)
 from brakecli.sweeps.critical import Outcome
 
 _FEW = 60  # points up to which each has a marker of full size
@@ -22,7 +33,9 @@ def draw(picture: SweepPicture) -> Figure:
     """The figure of a sweep over one axis: one panel, or two above each other."""
     panels: dict[Callable[[Axes, SweepPicture], None], float]  # with their heights
     panels = {partial(_draw_motion, name="amplitude"): 1.5, partial(_draw_motion, name="frequency"): 1.0}
-    if picture.critical is not None:
+    if picture.shown:
+        panels = {partial(_draw_motion, name=picture.shown): 1.0}
+    elif picture.critical is not None:
         panels = {_draw_critical: 3.2}
         compared = np.isfinite(picture["critical"] - picture["critical_eigenvalue"]).any()
         if compared and picture.critical.method == "simulation":
@@ -62,12 +75,13 @@ def _draw_critical(axes: Axes, picture: SweepPicture) -> None:
         axes.vlines(x[apart], sustained[apart], value[apart], color=style.VERMILION, lw=1.0, ls=style.DOTS)
         label = "vibration lasts from here on, from the case's own start"
         axes.plot(x[apart], sustained[apart], "v", ms=size, color=style.VERMILION, label=label)
-    axes.set_ylabel(style.labelled(f"critical {critical.parameter}", picture.units["critical"]), parse_math=False)
     ends = np.concatenate([low.ravel(), high.ravel()])
     within = ends[(ends > critical.lower) & (ends < critical.upper)]  # not those that a bound cuts
     error = np.nan_to_num(picture["critical_error"][0])
     drawn = np.concatenate([value - error, value + error, eigenvalue, sustained, within])
-    style.set_ticks(axes.yaxis, 0.0, style.largest(drawn) or max(abs(critical.lower), abs(critical.upper)))
+    highest = style.largest(drawn) or max(abs(critical.lower), abs(critical.upper))
+    unit = style.set_ticks(axes.yaxis, 0.0, highest, picture.units["critical"])
+    axes.set_ylabel(style.labelled(f"critical {critical.parameter}", unit), parse_math=False)
     if np.isfinite(drawn).any():
         _widen(axes, drawn)
     else:
@@ -81,15 +95,15 @@ def _draw_difference(axes: Axes, picture: SweepPicture) -> None:
     error = np.where(np.isfinite(difference), picture["critical_error"][0], np.nan)
     axes.axhline(0.0, color=style.DARK, lw=1.1)
     axes.errorbar(x, difference, error, **_bars(_size(x)))
-    style.set_ticks(axes.yaxis, 0.0, style.largest(np.abs(difference) + error))
+    unit = style.set_ticks(axes.yaxis, 0.0, style.largest(np.abs(difference) + error), picture.units["critical"])
     axes.margins(y=0.15)
-    axes.set_ylabel(style.labelled("simulation\nless eigenvalue", picture.units["critical"]), parse_math=False)
+    axes.set_ylabel(style.labelled("simulation\nless eigenvalue", unit), parse_math=False)
 
 
 def _draw_motion(axes: Axes, picture: SweepPicture, name: str) -> None:
     """Amplitude or frequency; points have the colour of their regime, and are arrows if it was followed."""
     axis, values, unit = picture.axes[0], picture[name], picture.units[name]
-    factor, unit = style.prefixed(style.largest(values), unit) if unit == "m" else (1.0, unit)
+    factor, unit = style.prefixed(style.largest(values), unit)
     lasting, _, wide = picture.lasting_amplitudes()
     wide = wide and name == "amplitude"  # drawn on a logarithmic axis
     least = max(lasting / 30.0, float(values[values > 0.0].min())) if wide else 0.0
@@ -115,13 +129,16 @@ def _draw_motion(axes: Axes, picture: SweepPicture, name: str) -> None:
     for place in np.flatnonzero(picture["hysteresis"][0]):  # `style.labels` names the first alone
         span = axis.edges[place : place + 2]
         axes.axvspan(*span, color=style.GREEN, alpha=0.16, lw=0, zorder=0.5, label=DIFFERENT)
-    words = picture.long_names[name]
-    axes.set(ylabel=style.labelled(name, unit), title=words[:1].upper() + words[1:])
+    for crossing in _crossings(axis.values, picture[MARGIN][0] if MARGIN in picture.variables else np.zeros(0)):
+        axes.axvline(crossing, color=style.DARK, lw=1.1, ls=style.DASHES, zorder=0.7, label=CRITICAL_LINE)
+    words = picture.long_names[name].replace("`", "")
+    axes.set(ylabel=style.labelled(name.replace("_", " "), unit), title=words[:1].upper() + words[1:])
     floor, highest = factor * least, factor * float(np.nanmax(values, initial=0.0))
     if not np.isfinite(values).any():
         axes.set_yticks([])
-        axes.text(0.5, 0.5, "no sustained vibration", transform=axes.transAxes, ha="center", color="#666666")
-    elif name == "frequency":
+        nothing = "no sustained vibration" if name in ("amplitude", "frequency") else "no values"
+        axes.text(0.5, 0.5, nothing, transform=axes.transAxes, ha="center", color="#666666")
+    elif name != "amplitude":
         _widen(axes, factor * values)
     elif wide:
         axes.set(yscale="log", ylim=(0.5 * floor, 2.0 * highest))
@@ -129,6 +146,15 @@ def _draw_motion(axes: Axes, picture: SweepPicture, name: str) -> None:
     else:
         axes.set_ylim(-0.03 * (highest or 1.0), 1.08 * (highest or 1.0))
     _mark(axes, x, [sign(small, "smaller than drawn", "v", style.DARK, "white"), picture.failed()])
+
+
+def _crossings(x: style.Array, margin: style.Array) -> Iterator[float]:
+    """Where the margin in friction passes zero, between neighbours along a straight line."""
+    for place in (
+        np.flatnonzero(np.diff(np.sign(margin)) * np.isfinite(margin[:-1] + margin[1:])) if len(margin) else ()
+    ):
+        low, high = margin[place : place + 2]
+        yield float(x[place] - low * (x[place + 1] - x[place]) / (high - low))
 
 
 def _widen(axes: Axes, values: style.Array) -> None:

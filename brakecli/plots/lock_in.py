@@ -29,25 +29,27 @@ def draw(result: StoredResult) -> Figure:
         raise UsageError(f"{result.path}: there is no steady sliding at any value, so there is nothing to draw")
     critical = np.asarray(result.attributes.get("critical_values", ()), float).ravel()
     critical = critical[np.isfinite(critical)]
-    unit = units.removeprefix("1")
-    numbers = ", ".join(style.readable(float(value)) for value in critical)
+    factor, unit = style.prefixed(style.largest(x), units.removeprefix("1"))
+    numbers = ", ".join(style.readable(factor * float(value)) for value in critical)
     said = f"changes at {numbers} {unit}".rstrip() if len(critical) else "does not change in between"
     summary = f"{len(x)} value{'s' * (len(x) > 1)}   ·   stability {said}"
     figure = style.headed(_WIDTH, 6.4, str(result.attributes.get("title", "")), summary, hspace=0.05)
     panels = figure.subplots(2, 1, sharex=True, height_ratios=[1.35, 1.0])
-    for axes, values, label in zip(panels, modes, ("frequency (Hz)", "growth rate (1/s)"), strict=True):
+    turning = 2.0 * np.pi * style.largest(modes[0])  # rad/s: of its rounding is that of a growth rate
+    for axes, values, label in zip(panels, modes, ("frequency", "growth rate"), strict=True):
         for mode, look in enumerate(_LOOKS):
             shown = look if len(x) <= _FEW else {**look, "marker": None}
             axes.plot(x, values[:, mode], label=f"mode {mode + 1}", **shown)
-        axes.set_ylabel(label)
         axes.margins(y=0.08)
         for number, value in enumerate(critical):
             look = {"label": "stability changes"} if number == 0 else {}
             axes.axvline(value, color=style.DARK, lw=1.1, ls=style.DOTS, zorder=1.6, **look)
-        style.set_ticks(axes.yaxis, 0.0, style.largest(values))
+        style.keep_flat(axes, values, turning if label == "growth rate" else 0.0)
+        unit = style.set_ticks(axes.yaxis, 0.0, style.largest(values), "Hz" if label == "frequency" else "1/s")
+        axes.set_ylabel(style.labelled(label, unit))
     panels[1].axhline(0.0, color=style.DARK, lw=1.0, zorder=1.5)
+    unit = style.set_ticks(panels[1].xaxis, float(x.min()), float(x.max()), units.removeprefix("1"))
     panels[1].set_xlabel(style.labelled(key, unit), parse_math=False)
-    style.set_ticks(panels[1].xaxis, float(x.min()), float(x.max()))
     figure.align_ylabels()
     panels[0].legend(loc="best")
     return figure

@@ -1,6 +1,7 @@
 """The picture of a sweep over two axes, or over three: maps, the first axis along x, the second along y."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,13 +12,25 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
-from brakecli.analysis.regime.verdict import Excitation
+from brakecli.analysis.regime.verdict import Excitation, Regime
 from brakecli.plots import style
-from brakecli.plots.sweep import DIFFERENT, FORCED, MOST_PANELS, REGIMES, WIDTH, Sign, SweepPicture, add_legend
+from brakecli.plots.sweep import (
+    CRITICAL_LINE,
+    DIFFERENT,
+    FORCED,
+    MARGIN,
+    MOST_PANELS,
+    REGIMES,
+    WIDTH,
+    Sign,
+    SweepPicture,
+    add_legend,
+)
 
 _LONG_TITLE = 34  # characters of a panel's title from which on it takes two lines
 _MAP_WIDTH, _PANEL_WIDTH = 10.4, 3.0  # inches, of a figure with two columns of maps, and of each of more maps
 _MOST_NUMBERS = 80
+_ALIKE = 1e-6  # relative difference of numbers from which on they have different colours
 _MOST_DRAWN = 4096  # cells up to which each cell of a map is a shape of its own in a PDF or SVG file
 
 
@@ -33,11 +46,12 @@ class Scale(NamedTuple):
 def draw(picture: SweepPicture) -> Figure:
     """The figure of a sweep over two axes, or over three: then a column of maps for each value of one of them."""
     critical, sliced = picture.critical is not None, len(picture.axes) == 3
+    shown = picture.shown or ("critical" if critical else "amplitude")
+    scale = _amplitude_scale(picture) if shown == "amplitude" else _scale(picture, shown)
+    draw_shown = _draw_critical if shown == "critical" else partial(_draw_numbers, name=shown)
     layers: dict[str, Callable[[Axes, SweepPicture, Scale], ScalarMappable]]
-    if critical:
-        scale, layers = _critical_scale(picture), {"": _draw_critical}
-    else:
-        scale, layers = _amplitude_scale(picture), {"Regime": _draw_regimes, "Amplitude": _draw_amplitude}
+    layers = {"" if critical else shown.replace("_", " ").capitalize(): draw_shown}
+    layers = layers if critical else {"Regime": _draw_regimes, **layers}
     if sliced:
         pieces = _slices(picture)
         width, height = max(_MAP_WIDTH, 1.2 + _PANEL_WIDTH * len(pieces)), 4.6 if critical else 7.2
@@ -54,7 +68,8 @@ def draw(picture: SweepPicture) -> Figure:
             if not sliced or axes is row[0]:
                 axes.set_title(name if sliced else layer + name, parse_math=False)
     bar = figure.colorbar(mesh, ax=panels[-1] if sliced else panels, extend=scale.extend, aspect=30, pad=0.015)
-    style.set_ticks(bar.ax.yaxis, *(value or 0.0 for value in mesh.get_clim()))
+    low, high = (value or 0.0 for value in mesh.get_clim())
+    style.set_ticks(bar.ax.yaxis, low, high)
     bar.minorticks_off()
     bar.set_label(scale.label, parse_math=False)
     bar.outline.set_visible(False)
@@ -82,14 +97,19 @@ def _amplitude_scale(picture: SweepPicture) -> Scale:
     return Scale(f"amplitude ({unit})", norm, factor, ("neither", "min", "max", "both")[beyond])
 
 
-def _critical_scale(picture: SweepPicture) -> Scale:
-    critical, values = picture.critical, picture["critical"][np.isfinite(picture["critical"])]
-    assert critical is not None
-    low, high = (float(values.min()), float(values.max())) if values.size else (critical.lower, critical.upper)
-    least = 0.01 * max(abs(low), abs(high))
-    if values.size and high - low <= least:
-        low, high = low - (least or 1.0), high + (least or 1.0)
-    return Scale(style.labelled(f"critical {critical.parameter}", picture.units["critical"]), Normalize(low, high))
+def _scale(picture: SweepPicture, name: str) -> Scale:
+    """Colours from the least to the greatest number; numbers that hardly differ have one colour."""
+    critical, values, unit = picture.critical, picture[name][np.isfinite(picture[name])], picture.units[name]
+    words = name.replace("_", " ")
+    low, high = (float(values.min()), float(values.max())) if values.size else (0.0, 1.0)
+    if name == "critical" and critical is not None:
+        words = f"critical {critical.parameter}"
+        low, high = (low, high) if values.size else (critical.lower, critical.upper)
+    largest = max(abs(low), abs(high))
+    if high - low <= (1e-2 if name == "critical" else _ALIKE) * largest:
+        low, high = low - (0.01 * largest or 1.0), high + (0.01 * largest or 1.0)
+    factor, unit = style.prefixed(largest, unit)
+    return Scale(style.labelled(words, unit), Normalize(factor * low, factor * high), factor)
 
 
 def _draw_regimes(axes: Axes, picture: SweepPicture, _: Scale) -> ScalarMappable:
@@ -101,12 +121,24 @@ def _draw_regimes(axes: Axes, picture: SweepPicture, _: Scale) -> ScalarMappable
     colours = ListedColormap([colour for colour, _marker in REGIMES.values()])
     shaken = {"marker": "o", "color": style.DARK, "mec": "white", "label": FORCED}
     different = {"marker": "$≠$", "color": style.DARK, "label": DIFFERENT}
-    signs = (picture["excitation"] == Excitation.FORCED, shaken), (picture["hysteresis"], different)
-    return _mesh(axes, picture, codes, *signs, picture.failed(), cmap=colours, vmin=-0.5, vmax=len(REGIMES) - 0.5)
+    open_ = {"marker": "x", "color": style.DARK, "label": "_"}  # in grey its colour is that of relaxation
+    signs = [(picture["excitation"] == Excitation.FORCED, shaken), (picture["hysteresis"], different)]
+    signs += [(picture["regime"] == Regime.UNDECIDED, open_), picture.failed()]
+    look: dict[str, Any] = {"cmap": colours, "vmin": -0.5, "vmax": len(REGIMES) - 0.5}
+    mesh = _mesh(axes, picture, codes, *signs, **look)
+    x, y = picture.axes
+    if MARGIN in picture.variables and min(map(len, (x.values, y.values))) > 1 and not (x.texts or y.texts):
+        margin = np.ma.masked_invalid(picture[MARGIN][0].T)
+        if margin.min() < 0.0 < margin.max():
+            axes.contour(
+                x.values, y.values, margin, [0.0], colors="black", linewidths=1.8, linestyles=[style.DASHES]
+            )
+            axes.plot([], [], color="black", lw=1.8, ls=style.DASHES, label=CRITICAL_LINE)
+    return mesh
 
 
-def _draw_amplitude(axes: Axes, picture: SweepPicture, scale: Scale) -> ScalarMappable:
-    values = scale.factor * picture["amplitude"]
+def _draw_numbers(axes: Axes, picture: SweepPicture, scale: Scale, name: str) -> ScalarMappable:
+    values = scale.factor * picture[name]
     return _mesh(axes, picture, values, picture.failed(), cmap="viridis", norm=scale.norm)
 
 
@@ -115,8 +147,8 @@ def _draw_critical(axes: Axes, picture: SweepPicture, scale: Scale) -> ScalarMap
     label = "vibration lasts elsewhere, from the case's own start"
     elsewhere = {"marker": "d", "color": style.VERMILION, "mec": "white", "label": label}
     signs = (picture.differs(), elsewhere), *picture.missing()
-    mesh = _mesh(axes, picture, picture["critical"], *signs, cmap="cividis", norm=scale.norm)
-    values = picture["critical"][0]
+    mesh = _mesh(axes, picture, scale.factor * picture["critical"], *signs, cmap="cividis", norm=scale.norm)
+    values = scale.factor * picture["critical"][0]
     known = np.isfinite(values)
     areas = known[1:, 1:] & known[:-1, 1:] & known[1:, :-1] & known[:-1, :-1]
     numeric = all(axis.texts is None and len(axis.values) >= 3 for axis in picture.axes)

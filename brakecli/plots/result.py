@@ -1,7 +1,7 @@
 """Draw any result: read its file, choose the picture of its kind, write the file of the picture."""
 
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,20 +13,40 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def plot_result(result: Path, target: Path, *, force: bool, select: Sequence[str] = ()) -> None:
+def plot_result(
+    result: Path, target: Path, *, force: bool, select: Sequence[str] = (), variable: str = ""
+) -> None:
     """Draw a result of any kind into a PNG, PDF or SVG file; the suffix of `target` says which.
 
-    `select` holds `KEY=VALUE` for axes of a sweep of which one value is to be drawn. Raises UsageError for another
-    suffix, for an existing target without `force`, for what cannot be drawn or selected, and where matplotlib is
-    missing; UnreadableResultError; CannotWriteError.
+    `select` holds `KEY=VALUE` for axes of a sweep of which one value is to be drawn; `variable` names a number of
+    a sweep or a quantity of a run. Raises UsageError for another suffix, for an existing target without `force`,
+    for what cannot be drawn or selected, and where matplotlib is missing; UnreadableResultError; CannotWriteError.
     """
+    with _opened(target, result, force=force) as (write, stored):
+        write(draw(stored[0], select, variable))
+
+
+def plot_two(first: Path, second: Path, target: Path, *, force: bool, variable: str = "") -> None:
+    """Draw the curves of two results of one kind over each other; raises what `plot_result` raises."""
+    with _opened(target, first, second, force=force) as (write, stored):
+        from brakecli.plots import two
+
+        write(two.draw((stored[0], stored[1]), variable))
+
+
+@contextmanager
+def _opened(
+    target: Path, *results: Path, force: bool
+) -> Iterator[tuple[Callable[["Figure"], None], list[StoredResult]]]:
+    """Results for a picture, and what writes it."""
     suffix = target.suffix.lower()
     if suffix not in (".pdf", ".png", ".svg"):
         problem = f"its suffix does not name a kind of picture (found {target.suffix!r})"
         raise UsageError(f"{target}: {problem}; name a file that ends in .pdf, .png or .svg with -o")
-    with suppress(OSError, ValueError):  # one of them does not exist, or cannot
-        if target.samefile(result):
-            raise UsageError(f"{target}: this is the result itself; choose another output with -o")
+    for result in results:
+        with suppress(OSError, ValueError):  # one of them does not exist, or cannot
+            if target.samefile(result):
+                raise UsageError(f"{target}: this is the result itself; choose another output with -o")
     try:
         import matplotlib.figure  # noqa: F401
     except ImportError as error:
@@ -34,18 +54,25 @@ def plot_result(result: Path, target: Path, *, force: bool, select: Sequence[str
         raise UsageError(f"{problem}; install it with: python -m pip install matplotlib") from error
     from brakecli.plots import style
 
-    with open_result(result) as stored, new_output(target, force=force) as file, style.applied():
-        file.write(style.rendered(draw(stored, select), suffix))
-        file.publish()
+    with ExitStack() as stack:
+        stored = [stack.enter_context(open_result(result)) for result in results]
+        file = stack.enter_context(new_output(target, force=force))
+        stack.enter_context(style.applied())
+
+        def write(figure: "Figure") -> None:
+            file.write(style.rendered(figure, suffix))
+            file.publish()
+
+        yield write, stored
 
 
-def draw(result: StoredResult, select: Sequence[str] = ()) -> "Figure":
+def draw(result: StoredResult, select: Sequence[str] = (), variable: str = "") -> "Figure":
     """The picture of an open result, drawn with the style that is set."""
     from brakecli.plots import comparison, curves, lock_in, maps, run, sweep
 
     kind = result.attributes.get("kind")
     if kind == "sweep":
-        picture = sweep.gather(result, select)
+        picture = sweep.gather(result, select, variable)
         return curves.draw(picture) if len(picture.axes) == 1 else maps.draw(picture)
     if kind not in ("run", "comparison", "stability"):
         known = "a run, of a sweep, of a comparison or of stability"
@@ -53,5 +80,7 @@ def draw(result: StoredResult, select: Sequence[str] = ()) -> "Figure":
     if select:
         raise UsageError(f"{result.path}: --select is for sweeps (found {select[0]!r}); leave it out for a {kind}")
     if kind == "run":
-        return run.draw(run.RunPicture(result))
+        return run.draw(run.RunPicture(result, variable or "vx"))
+    if variable:
+        raise UsageError(f"{result.path}: --variable is for runs and sweeps (found {variable!r}); leave it out")
     return comparison.draw(result) if kind == "comparison" else lock_in.draw(result)

@@ -1,10 +1,11 @@
-"""The picture of a run: motion in detail, whole history, phase portrait and spectrum.
+"""The picture of a run: a quantity in detail, whole history, phase portrait and spectrum.
 
 The history is read in pieces: a run of 10^8 samples takes no more memory than a short one.
 """
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from typing import Any
 
@@ -12,18 +13,24 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from brakecli.analysis.stability.modes import modes
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
-from brakecli.errors import CaseError
+from brakecli.errors import CaseError, UsageError
 from brakecli.files.read import StoredResult
 from brakecli.plots import style
+from brakecli.plots.quantities import VARIABLES, Scaled, scaled
+from brakecli.plots.stop import Stop, draw_amplitude, draw_spectrogram
 from brakecli.solver.quantities import ContactState
+from brakecli.solver.steady_sliding import steady_sliding
+from brakecli.solver.system import System
 
 CYCLES = 12  # drawn in detail
 MOST_DETAIL = 100_000  # samples drawn one by one
 FEW = 4000  # samples of the detail where no frequency says how long a cycle is
 COLUMNS = 1200  # columns of the envelope: about the width of its panel in pixels
 BLOCK = 1 << 20  # samples read at a time
+FEW_LINES = 5  # waves of the wheel that have a line each in the spectrum; more have a tick each
 _SHADES = ((ContactState.STICK, style.ORANGE, "stick"), (ContactState.SEPARATED, style.GREY, "no contact"))
 _BELT: dict[str, Any] = {"color": style.VERMILION, "ls": style.DASHES}
 
@@ -31,12 +38,19 @@ _BELT: dict[str, Any] = {"color": style.VERMILION, "ls": style.DASHES}
 class RunPicture:
     """Everything that is drawn of a run, in SI units.
 
-    `detail` holds the samples that are drawn one by one: time, x, vx, state and belt (U); `part` names them.
+    `detail` holds the samples that are drawn one by one: time, x, state, belt (U), the variable, and what is drawn
+    against x, the `ordinate`; `part` names them.
     """
 
-    def __init__(self, result: StoredResult) -> None:
-        """Read it from a result; raises UnreadableResultError where it is not there."""
-        variables, needed = result.variables("history"), ("time", "x", "vx", "state")
+    def __init__(self, result: StoredResult, variable: str = "vx") -> None:
+        """Read it from a result; raises UnreadableResultError, or UsageError where no variable has this name."""
+        if variable not in VARIABLES:
+            problem = f"--variable {variable}: a run has no such quantity"
+            raise UsageError(f"{result.path}: {problem}; give one of {', '.join(VARIABLES)}")
+        self.variable, self.ordinate = variable, "vx" if variable == "x" else variable
+        self.whole = "x" if variable == "vx" else variable
+        stored = {name: "friction_force" if name == "torque" else name for name in ("x", self.ordinate, variable)}
+        variables, needed = result.variables("history"), ("time", "state", *stored.values())
         shapes = {variables[name].shape if name in variables else (0,) for name in needed}
         if len(shapes) != 1 or not (samples := max(shapes)[0]):
             raise style.unreadable(result, f"its history has no {', '.join(needed)} of equal length above 0")
@@ -44,26 +58,53 @@ class RunPicture:
             case = parse_case(str(result.attributes.get("resolved_toml", "")), "its resolved case").case
         except CaseError as error:
             raise style.unreadable(result, f"the case in it is not valid: {error.problems[0]}") from error
-        system, read = system_of(case), partial(result.read, "history")
+        system, lever = system_of(case), {"torque": case.wheel.radius}
+
+        def read(name: str, first: int, stop: int) -> style.Array:
+            return lever.get(name, 1.0) * result.read("history", stored.get(name, name), first, stop)
+
         self.title, self.summary = case.title or "Case without a title", _summary(result.attributes)
         start, end = (float(read("time", i, i + 1)[0]) for i in (0, samples - 1))
         self.span = start, end  # s, of the whole run
         self.interval = (end - start) / (samples - 1) if samples > 1 else case.output.sample_interval
         self.part, first, stop = _detail(result, samples, self.interval)
-        self.detail = {name: read(name, first, stop) for name in needed}
+        self.detail = {name: read(name, first, stop) for name in ("time", "state", *stored)}
         self.detail["belt"] = np.interp(self.detail["time"], system.belt["time"], system.belt["value"])
-        fastest, moving = style.largest(self.detail["belt"]), style.largest(self.detail["vx"])
-        self.near = moving == 0.0 or fastest <= 4.0 * moving  # U fits beside the motion without flattening it
-        self.velocity_unit = style.prefixed(max(moving, fastest if self.near else 0.0), "m/s")
-        places, lowest, highest = envelope(partial(read, "x"), samples)
-        self.envelope = start + self.interval * places, lowest, highest
+        wholes = {name: envelope(partial(read, name), samples) for name in {**stored, self.whole: ""}}
+        self.envelope = start + self.interval * wholes["x"][0], *wholes[self.whole][1:]
+        fastest, moving = style.largest(self.detail["belt"]), style.largest(self.detail[self.ordinate])
+        speed = fastest if self.ordinate == "vx" else 0.0
+        self.near = self.ordinate == "vx" and (moving == 0.0 or fastest <= 4.0 * moving)  # U does not flatten it
+        ends = {name: np.array(found[1:]) for name, found in wholes.items()}
+        self.axes = {
+            name: scaled(name, self.detail[name], ends[name], speed * (name == "vx" and self.near))
+            for name in stored
+        }
+        if speed and style.largest(ends[self.ordinate]) <= style.ROUNDING * speed:
+            self.axes["vx"] = scaled("vx", 0.0 * self.detail["vx"], np.zeros(1), speed)
+        self.whole_axis = scaled(self.whole, ends[self.whole], ends[self.whole])
         settled = start + self.interval * float(result.group_attributes("spectrum").get("first_sample", 0))
-        self.spectrum = settled, result.read("spectrum", "frequency"), result.read("spectrum", "vx")
+        density = lever.get(variable, 1.0) ** 2 * result.read("spectrum", stored[variable])
+        self.spectrum = settled, result.read("spectrum", "frequency"), density
         fundamental, peak = (result.attributes.get(name) for name in ("frequency", "spectrum_peak"))
         self.line = ("fundamental", fundamental) if fundamental else ("highest peak", peak)  # Hz
         self.resolution = result.attributes.get("frequency_resolution")  # Hz, not in older files
-        steady, speed = np.ptp(system.belt["value"]) == 0.0, system.fastest_belt
-        self.passing = tuple(sorted(speed * system.wheel.turns)) if steady and speed else ()  # Hz, of its waves
+        steady, fastest = np.ptp(system.belt["value"]) == 0.0, system.fastest_belt
+        self.passing = (
+            tuple(sorted(fastest * system.wheel.turns)) if steady and fastest else ()
+        )  # Hz, of its waves
+        self.modes = _mode_frequencies(system)
+        self.stop = Stop(result, system) if "spectrogram" in result.file else None
+
+
+def _mode_frequencies(system: System) -> list[float]:
+    """Frequencies (Hz) of the modes of steady sliding, as far as they turn."""
+    stiffness = system.contact_stiffness
+    with suppress(CaseError):
+        stiffness = steady_sliding(system).stiffness
+    belt, phi = system.belt_speed, system.coefficients.phi
+    found = modes(system.coefficients, stiffness, math.copysign(phi, belt) if belt else 0.0)
+    return sorted(mode.frequency for mode in found if mode.frequency > 0.0)
 
 
 def envelope(read: Callable[[int, int], style.Array], samples: int, columns: int = COLUMNS) -> list[style.Array]:
@@ -128,20 +169,29 @@ def _summary(attributes: dict[str, Any]) -> str:
 
 
 def draw(picture: RunPicture) -> Figure:
-    """The figure with its four panels."""
-    figure = style.headed(10.4, 7.2, picture.title, picture.summary, wspace=0.05, hspace=0.06)
-    panels = figure.subplots(2, 2, width_ratios=(1.55, 1.0))
+    """The figure with its four panels; two more where speed or load change."""
+    rows = 3 if picture.stop else 2
+    figure = style.headed(10.4, 3.6 * rows, picture.title, picture.summary, wspace=0.05, hspace=0.06)
+    panels = figure.subplots(rows, 2, width_ratios=(1.55, 1.0))
     drawing = (_draw_detail, _draw_portrait, _draw_history, _draw_spectrum)
-    for axes, draw_panel in zip(panels.flat, drawing, strict=True):
+    for axes, draw_panel in zip(panels[:2].flat, drawing, strict=True):
         draw_panel(axes, picture)
-    for axes in panels[0] if not picture.near else ():
+    if picture.stop:
+        draw_spectrogram(panels[2, 0], picture.stop, picture.modes)
+        draw_amplitude(panels[2, 1], picture.stop)
+    apart = {"vx": panels[0], "x": panels[0, 1:]}.get(picture.variable, ()) if not picture.near else ()
+    for axes in apart:
         note = f"U = {picture.detail['belt'][-1]:.4g} m/s, off the scale"
         axes.set_title(note, loc="right", size=8.5, color=style.VERMILION)
-    spans: tuple[Any, ...] = (picture.detail["time"], picture.span)
-    for axes, time in zip(panels[:, 0], spans, strict=True):
+    spans: tuple[Any, ...] = (picture.detail["time"], picture.span, picture.span)
+    for axes, time in zip(panels[:, 0], spans, strict=False):
+        unit = style.set_ticks(axes.xaxis, float(time[0]), float(time[-1]), "s")
+        axes.set_xlabel(style.labelled("time", unit))
         if time[-1] > time[0]:
             axes.set_xlim(time[0], time[-1])
-        if axes.get_legend_handles_labels()[1]:  # with room for the legend above the data
+        if (
+            axes in panels[:2, 0] and axes.get_legend_handles_labels()[1]
+        ):  # with room for the legend above the data
             low, high = axes.get_ylim()
             axes.set_ylim(low, high + 0.14 * (high - low))
             axes.legend(loc="upper right", ncols=3)
@@ -150,84 +200,102 @@ def draw(picture: RunPicture) -> Figure:
 
 def _draw_detail(axes: Axes, picture: RunPicture) -> None:
     time, belt, interval = picture.detail["time"], picture.detail["belt"], picture.interval
-    factor, unit = picture.velocity_unit
-    axes.plot(time, factor * picture.detail["vx"], color=style.BLUE, marker=_marker(time))
+    look_of = picture.axes[picture.variable]
+    axes.plot(time, look_of(picture.detail[picture.variable]), color=style.BLUE, marker=_marker(time))
     look: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "alpha": 0.3, "lw": 0, "zorder": 0.5}
     for state, colour, label in _SHADES:
         found = episodes(picture.detail["state"], state)
         spans = [(time[first] - 0.5 * interval, (last - first + 1) * interval) for first, last in found]
         if spans:
             axes.broken_barh(spans, (0, 1), color=colour, label=label, **look)
-    if picture.near:
-        label = f"U = {factor * belt[-1]:.4g} {unit}" if np.ptp(belt) == 0.0 else "U"
-        axes.plot(time, factor * belt, lw=1.1, label=label, **_BELT)
-    axes.set(title=f"{picture.part}: tangential velocity", xlabel="time (s)", ylabel=f"velocity ẋ ({unit})")
+    if picture.near and picture.variable == "vx":
+        label = f"U = {look_of.factor * belt[-1]:.4g} {look_of.unit}" if np.ptp(belt) == 0.0 else "U"
+        axes.plot(time, look_of(belt), lw=1.1, label=label, **_BELT)
+    axes.set(title=f"{picture.part}: {VARIABLES[picture.variable][0]}", ylabel=look_of.label)
+    _limit(axes, look_of)
 
 
 def _draw_portrait(axes: Axes, picture: RunPicture) -> None:
-    detail, centre = picture.detail, _centre(picture.detail["x"])
-    x_factor, x_unit = style.prefixed(style.largest(detail["x"] - centre), "m")
-    factor, unit = picture.velocity_unit
-    x, vx = x_factor * (detail["x"] - centre), factor * detail["vx"]
-    axes.plot(x, vx, color=style.BLUE, lw=0.9, marker=_marker(x))
-    stick = detail["state"] == ContactState.STICK
-    axes.plot(x[stick], vx[stick], color=style.ORANGE, ls="none", marker="o", ms=3.0)
-    for speed in np.unique([detail["belt"].min(), detail["belt"].max()]) if picture.near else ():
-        axes.axhline(factor * speed, lw=1.1, **_BELT)
+    along, up = picture.axes["x"], picture.axes[picture.ordinate]
+    x, y = along(picture.detail["x"]), up(picture.detail[picture.ordinate])
+    marker = "o" if along.limits and up.limits else _marker(x)  # of a point
+    axes.plot(x, y, color=style.BLUE, lw=0.9, marker=marker)
+    stick = picture.detail["state"] == ContactState.STICK
+    axes.plot(x[stick], y[stick], color=style.ORANGE, ls="none", marker="o", ms=3.0)
+    belt = picture.detail["belt"]
+    for speed in np.unique([belt.min(), belt.max()]) if picture.near else ():
+        axes.axhline(up.factor * speed, lw=1.1, **_BELT)
     axes.locator_params(axis="x", nbins=6)
-    about = f" − ({centre:.12g} m)".replace("-", "−") if centre else ""
-    axes.set(title="Phase portrait", xlabel=f"displacement x{about} ({x_unit})", ylabel=f"velocity ẋ ({unit})")
+    title = "Phase portrait" if picture.ordinate == "vx" else "Against the displacement"
+    axes.set(title=title, xlabel=along.label, ylabel=up.label)
+    _limit(axes, up)
+    if along.limits:
+        axes.set_xlim(along.limits)
+
+
+def _limit(axes: Axes, look: Scaled) -> None:
+    if look.limits:
+        low, high = axes.get_ylim()
+        axes.set_ylim(min(low, look.limits[0]), max(high, look.limits[1]))
 
 
 def _draw_history(axes: Axes, picture: RunPicture) -> None:
-    time, lowest, highest = picture.envelope
-    factor, unit = style.prefixed(max(style.largest(lowest), style.largest(highest)), "m")
-    axes.fill_between(time, factor * lowest, factor * highest, color=style.BLUE, lw=0.9)
+    time, *ends = picture.envelope
+    look = picture.whole_axis
+    lowest, highest = map(look, ends)
+    axes.fill_between(time, lowest, highest, color=style.BLUE, lw=0.9)
     if len(time) < 3:
-        axes.plot(time, factor * lowest, color=style.BLUE, marker="o", ms=4.0)
+        axes.plot(time, lowest, color=style.BLUE, marker="o", ms=4.0)
     first, last = picture.detail["time"][[0, -1]]
     if first < last < first + 0.9 * (picture.span[1] - picture.span[0]):
         axes.axvspan(first, last, color=style.GREEN, alpha=0.25, lw=0, zorder=0.5, label="drawn above")
-    axes.set(title="Whole run: tangential displacement", xlabel="time (s)", ylabel=f"displacement x ({unit})")
+    axes.set(title=f"Whole run: {VARIABLES[picture.whole][0]}", ylabel=look.label)
+    _limit(axes, look)
 
 
 def _draw_spectrum(axes: Axes, picture: RunPicture) -> None:
     start, frequency, density = picture.spectrum
-    axes.set(title=f"Spectrum of ẋ from {start:.4g} s on", xlabel="frequency (Hz)")
-    axes.set_ylabel("power spectral density ((m/s)²/Hz)")
+    _, _, symbol, unit = VARIABLES[picture.variable]
+    factor, unit = style.prefixed(float(np.sqrt(density.max(initial=0.0) * frequency[1:2].max(initial=1.0))), unit)
+    squared = f"({unit})²" if set(unit) & {"/", " "} else f"{unit}²" if unit else "1"
+    axes.set(title=f"Spectrum of {symbol} from {start:.4g} s on", ylabel=f"power spectral density ({squared}/Hz)")
     shown = density > 0.0
     shown[:1] = False  # the mean was removed
     if not shown.any():
-        axes.set(xticks=[], yticks=[])
+        axes.set(xticks=[], yticks=[], xlabel="frequency")
         axes.text(0.5, 0.5, "no motion", transform=axes.transAxes, ha="center", color="#666666")
         return
-    name, line = picture.line
-    highest = min(frequency[-1], max([6.5 * (line or np.inf), *(1.3 * f for f in picture.passing)]))
+    kind, line = picture.line
+    few = picture.passing if len(picture.passing) <= FEW_LINES else ()
+    highest = min(frequency[-1], max([6.5 * (line or np.inf), *(1.3 * f for f in few)]))
     near = shown & (frequency <= highest)
     near = near if near.any() else shown
-    frequency, density = frequency[near], density[near]
+    frequency, density = frequency[near], factor**2 * density[near]
     lowest = max(0.3 * float(density.min()), 1e-10 * float(density.max()))
     axes.semilogy(frequency, density, color=style.BLUE, lw=1.0, marker=_marker(frequency))
-    axes.set_ylim(lowest, 30.0 * float(density.max()))
-    axes.set_xlim(0.0, min(highest, max(1.3 * float(frequency[density > lowest][-1]), 2.0 * (line or 0.0))))
-    for number, wave in enumerate(picture.passing):
+    right = min(highest, max(1.3 * float(frequency[density > lowest][-1]), 2.0 * (line or 0.0)))
+    axes.set_xlim(0.0, right)
+    axes.set_xlabel(style.labelled("frequency", style.set_ticks(axes.xaxis, 0.0, right, "Hz")))
+    for number, wave in enumerate(few):
         axes.axvline(wave, lw=0.9, zorder=0.8, label="" if number else "waves of the wheel pass", **_BELT)
+    if picture.passing and not few:
+        ticks: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "ls": "none", "marker": "|", "ms": 14.0}
+        label = f"{len(picture.passing)} waves of the wheel pass"
+        axes.plot(picture.passing, 0.0 * np.array(picture.passing), color=style.VERMILION, label=label, **ticks)
     if line:
-        known = f" ± {picture.resolution:.2g}" if picture.resolution and name != "fundamental" else ""
-        label = f"{name} {line:.4g}{known} Hz"
+        known = f" ± {picture.resolution:.2g}" if picture.resolution and kind != "fundamental" else ""
+        label = f"{kind} {line:.4g}{known} Hz"
         axes.axvline(line, color=style.GREEN, ls=style.DOTS, lw=1.4, zorder=0.9, label=label)
-    if picture.passing or line:
+    turning = [mode for mode in picture.modes if mode <= right]
+    texts = dict.fromkeys(f"{mode:.4g}" for mode in turning)
+    for mode in turning:
+        label = f"mode{'s' * (len(texts) > 1)} {' and '.join(texts)} Hz" if mode == turning[0] else ""
+        axes.axvline(mode, color=style.DARK, ls="-.", lw=0.9, zorder=0.7, label=label)
+    entries = len(axes.get_legend_handles_labels()[1])
+    axes.set_ylim(lowest, 10.0 ** (0.5 + 0.9 * entries) * float(density.max()))
+    if entries:
         axes.legend(loc="upper right")
 
 
 def _marker(values: style.Array) -> str:
     return "." if len(values) < 40 else ""  # a line alone would not show so few samples
-
-
-def _centre(values: style.Array) -> float:
-    """What to subtract from values that differ too little for readable ticks, in round numbers; otherwise 0."""
-    middle, width = 0.5 * float(values.min() + values.max()), float(np.ptp(values))
-    if not 0.0 < width < 0.1 * abs(middle):
-        return 0.0
-    digits = math.ceil(math.log10(abs(middle) / width))
-    return float(f"{middle:.{digits}e}")

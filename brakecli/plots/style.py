@@ -5,13 +5,15 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from io import BytesIO
+from itertools import pairwise
 from typing import Any
 
 import matplotlib.style
 import numpy as np
-from matplotlib.axis import Axis
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis, XAxis, YAxis
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullLocator
+from matplotlib.ticker import FixedFormatter, LogLocator, NullLocator
 from numpy.typing import NDArray
 
 from brakecli.errors import UnreadableResultError
@@ -24,6 +26,7 @@ Array = NDArray[Any]
 BLUE, ORANGE, VERMILION, GREEN, GREY = "#0072B2", "#E69F00", "#D55E00", "#009E73", "#9A9A9A"
 DARK = "#333333"
 DASHES, DOTS = (0, (5, 3)), (0, (1, 1.5))
+ROUNDING = 1e-12  # relative difference below which numbers of a computation are the same
 WIDE = 300.0  # ratio of the ends of a logarithmic axis from which on only powers of ten have a number
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _LOOK: tuple[tuple[str, dict[str, Any]], ...] = (
@@ -54,6 +57,8 @@ def applied() -> Iterator[None]:
 def rendered(figure: Figure, suffix: str) -> bytes:
     """The figure as a file of this suffix; its bytes do not depend on the time or the machine."""
     figure.draw_without_rendering()
+    for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)):
+        thin_ticks(axis, figure)
     figure.set_layout_engine("none")
     for axes in figure.axes:  # the layout's last digits depend on the order in which it solved for them
         axes.set_position(tuple(round(bound, 6) for bound in axes.get_position().bounds))
@@ -109,9 +114,17 @@ def largest(values: Array) -> float:
 
 
 def prefixed(magnitude: float, unit: str) -> tuple[float, str]:
-    """The factor for values up to this magnitude that makes them easy to read, and the unit with its SI prefix."""
-    for exponent, prefix in ((3, "k"), (0, ""), (-3, "m"), (-6, "µ"), (-9, "n"), (-12, "p")):
-        if 10.0**exponent <= magnitude < 1e6:
+    """The factor for values up to this magnitude that makes them easy to read, and the unit with its SI prefix.
+
+    Prefixes are those that engineers use: no km/s, kHz from ten of them on, none for angles and pure numbers.
+    """
+    large, small = (
+        (unit == "Hz" and magnitude >= 1e4) or unit[:1] in "NJWP",
+        unit in ("m", "m/s", "s") or unit[:1] in "NJWP",
+    )
+    for exponent, prefix in ((9, "G"), (6, "M"), (3, "k"), (0, ""), (-3, "m"), (-6, "µ"), (-9, "n"), (-12, "p")):
+        wanted = unit and (large if exponent > 0 else small or exponent == 0)
+        if wanted and 10.0**exponent <= magnitude < 1e12:
             return 10.0**-exponent, prefix + unit
     return 1.0, unit
 
@@ -131,15 +144,53 @@ def labelled(name: str, units: str) -> str:
     return f"{name} ({units})" if units else name
 
 
-def set_ticks(axis: Axis, low: float, high: float) -> None:
-    """Write each tick of an axis from `low` to `high` in full, without a power of ten at the end of the axis."""
+def set_ticks(axis: Axis, low: float, high: float, unit: str = "") -> str:
+    """Write each tick of an axis from `low` to `high` in full, without a power of ten at the end of the axis.
+
+    Returns the unit of the numbers at the ticks: with a prefix where values of `unit` need one.
+    """
+    factor, unit = prefixed(max(abs(low), abs(high)), unit)
     if axis.get_scale() == "log":
         axis.set_major_locator(log_locator(high / low))
         if high / low < WIDE:
             axis.set_minor_locator(NullLocator())
-    elif 1e-2 <= max(abs(low), abs(high)) < 1e5:
-        return
-    axis.set_major_formatter(lambda value, _: readable(value))
+    elif factor == 1.0 and 1e-2 <= max(abs(low), abs(high)) < 1e5:
+        return unit
+    axis.set_major_formatter(lambda value, _: readable(factor * value))
+    return unit
+
+
+def is_constant(values: Array, scale: float = 0.0) -> bool:
+    """Whether values differ by their rounding only, that of numbers as large as they are, or as `scale`."""
+    known = values[np.isfinite(values)]
+    return known.size == 0 or float(np.ptp(known)) <= ROUNDING * max(largest(known), scale)
+
+
+def keep_flat(axes: Axes, values: Array, scale: float = 0.0) -> None:
+    """Draw values that are constant as a line in the middle, and not their rounding from bottom to top."""
+    known = values[np.isfinite(values)]
+    if known.size and is_constant(known, scale):
+        middle, half = float(np.median(known)), 0.05 * (max(largest(known), scale) or 1.0)
+        axes.set_ylim(middle - half, middle + half)
+
+
+def thin_ticks(axis: XAxis | YAxis, figure: Figure) -> None:
+    """Leave out every second tick until the numbers stand apart; the figure has been laid out."""
+    while len(places := axis.get_majorticklocs()) > 2:
+        side = 0 if axis.axis_name == "x" else 1
+        low, high = sorted(axis.get_view_interval())
+        boxes = [
+            tick.label1.get_window_extent().get_points()[:, side]
+            for place, tick in zip(places, axis.get_major_ticks(), strict=False)
+            if low <= place <= high and tick.label1.get_visible() and tick.label1.get_rotation() == 0.0
+        ]
+        gap = 4.0 if side == 0 else 0.0
+        if all(after[0] - before[1] >= gap for before, after in pairwise(sorted(boxes, key=lambda box: box[0]))):
+            return
+        fixed = isinstance(axis.get_major_formatter(), FixedFormatter)
+        texts = [text.get_text() for text in axis.get_majorticklabels()][::2] if fixed else None
+        axis.set_ticks(places[::2], labels=texts)
+        figure.draw_without_rendering()
 
 
 def log_locator(ratio: float) -> LogLocator:

@@ -1,6 +1,5 @@
 """What curves and maps of a sweep share: numbers over rising axes, missing ones as NaN; heading, legend, looks."""
 
-import math
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -8,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from matplotlib.axis import XAxis, YAxis
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
@@ -18,8 +16,10 @@ from brakecli.errors import CaseError, UsageError
 from brakecli.files import fields
 from brakecli.files.read import StoredResult
 from brakecli.plots import style
+from brakecli.plots.axis import Axis
 from brakecli.sweeps.critical import Outcome
-from brakecli.sweeps.plan import label
+from brakecli.sweeps.margin import margins
+from brakecli.sweeps.plan import Plan, given_toml, label
 from brakecli.sweeps.point import Status
 from brakecli.sweeps.tables import Critical, Sweep
 
@@ -29,7 +29,9 @@ REGIMES = {  # colour and marker
     Regime.QUASI_HARMONIC: (style.BLUE, "D"),
     Regime.UNDECIDED: (style.GREY, "X"),
 }
+MARGIN = "margin"  # critical friction less friction, where the picture shows its zero
 FORCED, DIFFERENT = "forced by the wheel's waves", "up and down differ"
+CRITICAL_LINE = "critical friction"
 WIDTH = 8.8  # inches, of a figure with one column of panels
 MOST_PANELS = 5  # values of a third axis: its maps stand side by side
 _NEEDED = ("status", "regime", "excitation", "amplitude", "frequency")
@@ -39,75 +41,9 @@ _CRITICAL = (
 )
 _WINDOWS = ("critical_windows_lower", "critical_windows_upper")
 _FIRST = (*map(str, REGIMES), "by simulation", "by eigenvalues")  # in the legend
-_LONGEST_KEY, _MOST_TEXTS, _MOST_CHARACTERS = 45, 30, 70
-_FEW = 6  # values of an axis up to which each has its tick
-_LEAST_LOG = 5.0  # ratio of the ends of a logarithmic axis; below it, linear ticks are easier to read
 _WIDE = 20.0  # ratio of lasting amplitudes from which on their scale is logarithmic
 
 Sign = tuple[style.Array, dict[str, Any]]  # points without a value that could be drawn, the look of their marker
-
-
-@dataclass(frozen=True)
-class Axis:
-    """An axis of the grid. `values` are the places along it: numbers in rising order, or 0, 1 … for texts."""
-
-    dimension: str
-    key: str
-    units: str
-    values: style.Array
-    texts: tuple[str, ...] | None = None
-
-    @property
-    def logarithmic(self) -> bool:
-        """Whether the ratios of neighbours are more alike than their distances."""
-        values = self.values
-        if self.texts is not None or len(values) < 3 or values[0] <= 0.0 or values[-1] < _LEAST_LOG * values[0]:
-            return False
-        steps, ratios = np.diff(values), np.diff(np.log(values))
-        return bool(np.std(ratios) / np.mean(ratios) < 0.999 * np.std(steps) / np.mean(steps))
-
-    @property
-    def edges(self) -> style.Array:
-        """The limits of the cells around the values: half way between neighbours."""
-        places = np.log(self.values) if self.logarithmic else self.values
-        middles = 0.5 * (places[1:] + places[:-1])
-        edges = np.concatenate([[2.0 * places[0] - middles[0]], middles, [2.0 * places[-1] - middles[-1]]])
-        return np.exp(edges) if self.logarithmic else edges
-
-    def named(self, place: int) -> str:
-        """The value at a place, with its key and unit."""
-        value = self.texts[place] if self.texts else style.readable(float(self.values[place]))
-        return f"{self.key} = {value} {self.units}".rstrip()
-
-    def place(self, value: str) -> int | None:
-        """Where a value stands on the axis, compared in the six digits that a picture shows; None if nowhere."""
-        with suppress(ValueError):
-            if self.texts is not None:
-                return self.texts.index(value)
-            nearest = int(np.argmin(np.abs(self.values - float(value))))
-            near = 1e-9 * style.largest(self.values)
-            if math.isclose(self.values[nearest], float(value), rel_tol=1e-5, abs_tol=near):
-                return nearest
-        return None
-
-    def apply_to(self, axis: XAxis | YAxis) -> None:
-        """Set scale, ticks and label of an axis of a panel."""
-        side, values, texts = axis.axis_name, self.values, self.texts
-        key = textwrap.shorten(self.key, _LONGEST_KEY, placeholder=" …")
-        axis.set_label_text(style.labelled(key, self.units), parse_math=False)
-        if texts is not None:
-            step = -(-len(texts) // _MOST_TEXTS)
-            slanted = side == "x" and sum(map(len, texts)) > _MOST_CHARACTERS
-            turned: dict[str, Any] = {"rotation": 30, "ha": "right", "rotation_mode": "anchor"} if slanted else {}
-            axis.set_ticks(values[::step], labels=texts[::step], parse_math=False, **turned)
-            axis.axes.set(**{f"{side}lim": (-0.5, len(texts) - 0.5)})
-            axis.grid(False)
-        elif not self.logarithmic and len(values) <= _FEW and np.diff(values).min() > 0.1 * np.ptp(values):
-            axis.set_ticks(values, labels=[style.readable(float(value)) for value in values])
-        else:
-            if self.logarithmic:
-                axis.axes.set(**{f"{side}scale": "log"})
-            style.set_ticks(axis, values[0], values[-1])
 
 
 @dataclass(frozen=True)
@@ -127,6 +63,7 @@ class SweepPicture:
     units: Mapping[str, str]
     long_names: Mapping[str, str]
     critical: Critical | None
+    shown: str = ""  # the variable that is asked for
 
     def __getitem__(self, name: str) -> style.Array:
         """A variable."""
@@ -229,11 +166,11 @@ def add_legend(figure: Figure) -> None:
     engine.set(rect=(left, bottom, wide, high - taken))
 
 
-def gather(result: StoredResult, select: Sequence[str] = ()) -> SweepPicture:
-    """Read from a result what its picture shows.
+def gather(result: StoredResult, select: Sequence[str] = (), shown: str = "") -> SweepPicture:
+    """Read from a result what its picture shows: of its variables the one that is `shown`, if it is named.
 
     `select` holds `KEY=VALUE`; axes of a single value are selected anyway. Raises UnreadableResultError where
-    something is missing, UsageError where there is no such key or value.
+    something is missing, UsageError where there is no such key, value or variable.
     """
     try:
         sweep = parse_table(Sweep, str(result.attributes.get("resolved_sweep_toml", "")), "its resolved sweep")
@@ -254,6 +191,20 @@ def gather(result: StoredResult, select: Sequence[str] = ()) -> SweepPicture:
         variables[name] = (
             style.read_column(result, name)[... if both else np.newaxis] if there else np.full(shape, np.nan)
         )
+    if shown and shown not in (able := _numeric(result)):
+        problem = f"--variable {shown}: no number of its points has this name"
+        raise UsageError(f"{result.path}: {problem}; give one of {', '.join(able)}")
+    base = str(result.attributes.get("resolved_toml", ""))
+    margin = None
+    with suppress(CaseError):  # of older results, and of forged ones
+        margin = margins(Plan(given_toml(sweep), base)) if sweep.critical is None else None
+    if margin is not None and margin.size == np.prod(variables["status"].shape[1:]):
+        variables[MARGIN] = np.broadcast_to(
+            margin.reshape(variables["status"].shape[1:]), variables["status"].shape
+        )
+    if shown:
+        values = style.read_column(result, shown).astype(float)[... if both else np.newaxis]
+        variables[shown] = np.where(variables["status"] == Status.DONE, values, np.nan)
     for name in ("regime", "excitation"):  # those of points that failed mean nothing
         variables[name] = np.where(variables["status"] == Status.DONE, variables[name], "")
     differ = result.read("/", "hysteresis") == 1 if both and "hysteresis" in known else False
@@ -273,7 +224,9 @@ def gather(result: StoredResult, select: Sequence[str] = ()) -> SweepPicture:
     findings = tuple(map(str, result.attributes.get("findings", ())))
     way = next((axis.direction for axis in sweep.axis if axis.direction), "")
     ways = ("up", "down") if both else (way,)
-    picture = SweepPicture(title, findings, (), ways, tuple(axes), variables, units, long_names, sweep.critical)
+    picture = SweepPicture(
+        title, findings, (), ways, tuple(axes), variables, units, long_names, sweep.critical, shown
+    )
     for wanted in select:  # findings about the whole sweep need not hold for a part of it
         picture = replace(_selected(picture, wanted, result), findings=())
     for axis in picture.axes:
@@ -281,6 +234,13 @@ def gather(result: StoredResult, select: Sequence[str] = ()) -> SweepPicture:
             picture = picture.at(picture.axes.index(axis), 0)
     _check_drawable(picture, result)
     return picture
+
+
+def _numeric(result: StoredResult) -> list[str]:
+    """The variables of a sweep that hold a number for each point."""
+    known = result.variables("/")
+    dims = known["status"].dims
+    return [name for name, each in known.items() if each.dims == dims and name not in dims and each.kind in "if"]
 
 
 def _selected(picture: SweepPicture, wanted: str, result: StoredResult) -> SweepPicture:
@@ -294,7 +254,10 @@ def _selected(picture: SweepPicture, wanted: str, result: StoredResult) -> Sweep
     for number, axis in enumerate(picture.axes):
         if key in (axis.dimension, *axis.key.split(", ")):
             if (place := axis.place(value)) is not None:
-                return picture.at(number, place)
+                picture = picture.at(number, place)
+                same = axis.texts or style.readable(float(axis.values[place])) == style.readable(float(value))
+                note = "" if same else f" (nearest to {value})"
+                return replace(picture, chosen=(*picture.chosen[:-1], picture.chosen[-1] + note))
             problem, choices = "no point has this value", [*(axis.texts or map(label, axis.values.tolist()))]
     some = textwrap.shorten(", ".join(choices), 120, placeholder=" …")
     remedy = f"give one of {some}, as KEY=VALUE" if choices else "leave it out"

@@ -5,8 +5,9 @@ from contextlib import suppress
 
 import numpy as np
 
+from brakecli.analysis.stability.report import LARGEST_FRICTION
 from brakecli.errors import CaseError
-from brakecli.solver.steady_sliding import PLACES, steady_sliding
+from brakecli.solver.steady_sliding import PLACES, TABLE, steady_sliding
 from brakecli.solver.system import System
 
 # Seconds, measured with `make cases` on one core.
@@ -18,7 +19,7 @@ _EVALUATIONS = 1.5  # of the contact in a step
 _OWN_STEPS = 25.0  # in a period, of a scheme that finds them itself, at a tolerance of 1e-10
 _OWN_STEP_SECONDS = 4e-6
 _OWN_EVALUATIONS = 27.0
-_EXACT_STEP_SECONDS = 2e-7  # events included
+_EXACT_STEP_SECONDS = 1e-7  # events included
 _START_EVALUATIONS = 6.0  # at each place of the wheel
 
 
@@ -32,7 +33,7 @@ def steps_and_seconds(system: System) -> tuple[int, float]:
         return system.steps, system.steps * each
     c, alone = system.coefficients, method.step is not None
     if method.row.exact:
-        return system.steps, (1.0 if alone else 2.4) * system.steps * _EXACT_STEP_SECONDS
+        return system.steps, system.steps * _EXACT_STEP_SECONDS
     tolerance = method.tolerance if alone else max(min(1e-5 * method.tolerance, 1e-8), 1e-13)
     fastest, start = system.natural_frequencies[1], system.initial
     bound = c.c_xx + c.c_yy + 2.0 * abs(c.c_xy) + (1.0 + c.phi) * system.contact_stiffness  # as a step is limited
@@ -53,8 +54,28 @@ def steps_and_seconds(system: System) -> tuple[int, float]:
 
 def start_seconds(system: System) -> float:
     """A rough guess at the time to find steady sliding, where the case starts from it on a pad that opens."""
-    if not system.initial.from_equilibrium or system.smooth:
+    if not system.initial.from_equilibrium or not _opens(system, system.coefficients.phi):
         return 0.0
+    return _START_EVALUATIONS * _average_seconds(system)
+
+
+def stability_seconds(system: System) -> float:
+    """A rough guess at the time to find steady sliding at every friction coefficient of `stability`."""
+    tried = np.linspace(0.0, LARGEST_FRICTION, 41).tolist()
+    if system.belt_speed == 0.0 or not any(_opens(system, phi) for phi in tried):
+        return 0.0
+    return (TABLE + _START_EVALUATIONS) * _average_seconds(system)
+
+
+def _average_seconds(system: System) -> float:
+    """Of the mean contact at one height."""
+    return (PLACES if len(system.wheel.g) else 1) * evaluation_seconds(system)
+
+
+def _opens(system: System, phi: float) -> bool:
+    """Whether the pad may touch in part in steady sliding."""
+    if system.smooth:
+        return False
     pad, opens = system.pad.constants, False
 
     def mean(y: float) -> tuple[float, float, float]:
@@ -63,9 +84,8 @@ def start_seconds(system: System) -> float:
         return max(-system.contact_stiffness * (y + pad.shoe_mean), 0.0), 0.0, 0.0
 
     with suppress(CaseError):
-        steady_sliding(system, mean=mean)
-    places = PLACES if len(system.wheel.g) else 1
-    return float(_START_EVALUATIONS * places * evaluation_seconds(system)) if opens else 0.0
+        steady_sliding(system, phi=phi, mean=mean)
+    return opens
 
 
 def evaluation_seconds(system: System) -> float:

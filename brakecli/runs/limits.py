@@ -13,7 +13,7 @@ from brakecli.analysis.stability.discrete import RESOLVED, StepLimits, amplifica
 from brakecli.analysis.stability.modes import eigensystem
 from brakecli.analysis.stability.search import bisect
 from brakecli.errors import RefusedError
-from brakecli.runs.cost import duration_text, steps_and_seconds
+from brakecli.runs.cost import duration_text, stability_seconds, steps_and_seconds
 from brakecli.runs.pilot import Price, measured
 from brakecli.solver.contact.pad import NODES_PER_WAVE
 from brakecli.solver.history import ROW_BYTES
@@ -25,6 +25,7 @@ MOST_STEPS = 1e11
 MOST_SECONDS = 24 * 3600.0
 MOST_BYTES = 1e11
 UNSTABLE = 1e-5  # growth per step that no rounding of the eigenvalues explains
+_WORTH_SAYING = 5.0  # s, of work before which its time is said
 _COARSE_NODES = NODES_PER_WAVE / 2
 _TAKEN = 0.01  # part of the fastest motion that a scheme may take out of a run unsaid
 _ROUNDING = 1e-8  # of the factors of a step
@@ -100,6 +101,15 @@ def refuse(found: Check, free_bytes: float = math.inf) -> None:
         raise RefusedError(f"solver.theta: at this step the scheme is unstable: {what}; {remedy}")
 
 
+def sliding_text(system: System) -> str | None:
+    """How long `stability` will take, where the pad opens; raises RefusedError where that is too long."""
+    seconds = stability_seconds(system)
+    text = f"steady sliding on a pad that opens takes about {duration_text(seconds)}"
+    if seconds > MOST_SECONDS:
+        raise RefusedError(f"{text}; reduce contact.nodes, or the number of waves in roughness")
+    return text if seconds > _WORTH_SAYING else None
+
+
 def _blows_up(growth: float, steps: float) -> bool:
     return growth > 1.0 + UNSTABLE and (growth - 1.0) * steps > 1.0
 
@@ -118,8 +128,8 @@ def _longest_stable_step(system: System) -> float | None:
 
 
 def adjustments(system: System) -> list[str]:
-    """Sentences on how a run differs from what the case asks for: the grid of time, and nodes."""
-    method, interval, asked, found = system.method, system.interval, system.method.step, list[str]()
+    """Sentences on how a run differs from what the case asks for: surfaces, the grid of time, and nodes."""
+    method, interval, asked, found = system.method, system.interval, system.method.step, [*system.notes]
     if method.own_steps and asked is not None:
         kept = "which are exact" if method.row.exact else f"to a tolerance of {method.tolerance:g}"
         found.append(f"solver.step: not used, {method.scheme} finds its steps itself, {kept}")

@@ -9,7 +9,6 @@ from brakecli.runs.tolerance import (
     EVENT_RATIO,
     LAYERED,
     LAYERED_FROM,
-    SHORTER,
     first_event_tolerance,
     first_nodes,
     first_steps,
@@ -41,11 +40,8 @@ def measured(system: System) -> Price | None:
     if evaluation_seconds(system) > (MOST_EVALUATION if system.finds_patches else MOST_AT_NODES):
         return None
     method = system.method
-    if method.step is not None:
+    if method.step is not None or method.row.exact:
         return _begun(system)
-    if method.row.exact:
-        found = _begun(system)
-        return found._replace(seconds=found.seconds * (1.0 + 1.0 / SHORTER))
     if not method.own_steps:
         return _ladder(system)
     first = replace(system, method=replace(method, tolerance=first_event_tolerance(system)))

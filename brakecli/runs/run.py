@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from brakecli import __version__
 from brakecli.analysis.regime.of_run import verdict_on
+from brakecli.analysis.regime.over_time import OverTime, over_time
 from brakecli.analysis.regime.spectra import peak, spectrum
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.case.read import LoadedCase
@@ -41,6 +42,7 @@ class RunReport:
     motion: Motion
     check: Check
     certificate: Certificate | None  # where the case gives no step
+    over_time: OverTime | None  # where speed or load change
     spectrum_peak: float | None  # Hz, of vx
     warnings: tuple[str, ...]
     modelled: list[str]
@@ -95,8 +97,11 @@ def run(
             history = History(system.interval, result.rows("history"), partial(result.read, "history"))
             verdict = verdict_on(history, system, motion.work.failure_sentence)
             top = _write_spectrum(result, history, verdict)
+            changing = None if motion.work.failed else over_time(history, system)
+            if changing:
+                _write_over_time(result, changing)
             warnings = (*found.warnings, *_warnings(motion, certificate), *verdict.reasons[1:])
-            shown = top, warnings, *modelled(motion)
+            shown = changing, top, warnings, *modelled(motion)
             report = RunReport(loaded.case.title, output, verdict, motion, found, certificate, *shown)
             result.set_attributes(origin("run", report.title, loaded))
             result.set_fields(fields.RUN, report.numbers())
@@ -163,6 +168,19 @@ def _write_spectrum(result: ResultFile, history: History, verdict: Verdict) -> f
         return None
     duration = (history.samples - verdict.start) * history.interval
     return peak(lines.frequency, lines.density["vx"], duration, strongest)
+
+
+def _write_over_time(result: ResultFile, found: OverTime) -> None:
+    """Write the numbers of each window, the short-time spectra, and the intervals of vibration."""
+    for group in ("over_time", "spectrogram"):
+        result.axis(group, fields.WINDOW_TIME, found.time)
+    for field in fields.OVER_TIME:
+        result.column(field, ("time",), field.read(found), "over_time")
+    result.axis("spectrogram", fields.FREQUENCY, found.lines)
+    result.variable("spectrogram", replace(fields.SHORT_TIME, kind="f8"), ("time", "frequency"), found.density)
+    result.axis("vibrations", fields.INTERVAL, np.arange(len(found.vibrations)))
+    for field in fields.VIBRATION:
+        result.column(field, ("interval",), [field.read(each) for each in found.vibrations], "vibrations")
 
 
 def _write_unconverged(result: ResultFile, events: NDArray[np.float64]) -> None:

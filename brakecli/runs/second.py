@@ -53,8 +53,8 @@ def classify_twice(
             remedy = "run the case with a shorter solver.duration or a larger output.sample_interval"
             raise RefusedError(f"--second-run: its history would take {size / 1e9:.3g} GB of memory; {remedy}")
         say(f"second run, {second.change}, four times as long: about {duration_text(found.seconds)}")
-        feeds, shown = compared(second, history, lambda done: progress("steps", done, second.system.steps))
-        verdict = verdict_on(history, system, failure, thresholds, feeds)
+        feeds, sticks, shown = compared(second, history, lambda done: progress("steps", done, second.system.steps))
+        verdict = verdict_on(history, system, failure, thresholds, feeds, sticks)
         return numbers_of(replace(verdict, reasons=(*verdict.reasons, shown)), failure)
 
 
@@ -84,11 +84,13 @@ def second_system(system: System, history: History) -> Second:
     )
 
 
-def compared(second: Second, history: History, progress: Progress = lambda steps: None) -> tuple[Feeds, str]:
-    """Run it in memory; who keeps the vibration of the first run up, and what shows that."""
+def compared(
+    second: Second, history: History, progress: Progress = lambda steps: None
+) -> tuple[Feeds, float, str]:
+    """Run it in memory; who keeps the vibration up, in which part of the cycles it sticks, and what shows that."""
     motion, _ = motion_of(second.system, progress)
     if motion.work.failed:
-        return Feeds.UNKNOWN, f"the second run failed: {motion.work.failure_sentence}"
+        return Feeds.UNKNOWN, 0.0, f"the second run failed: {motion.work.failure_sentence}"
     again = array_history(second.system.interval, motion.rows)
     part = level(again) / level(history)
     text = f"in the second run, {second.change}, vx has {part:.2g} times the level"
@@ -97,11 +99,12 @@ def compared(second: Second, history: History, progress: Progress = lambda steps
         lost = -context(second.system).growth() * second.system.duration > _LOST  # what is left of the start
         lost &= verdict.excitation is not Excitation.SELF_EXCITED
         remains = part >= _REMAINS and (lost or verdict.excitation is Excitation.FORCED)
-        return Feeds.ROUGHNESS if remains else Feeds.FRICTION if part <= _VANISHES else Feeds.UNKNOWN, text
+        return Feeds.ROUGHNESS if remains else Feeds.FRICTION if part <= _VANISHES else Feeds.UNKNOWN, 0.0, text
     if verdict.regime is Regime.DAMPED:
-        return Feeds.ROUGHNESS, f"{text}: {verdict.reasons[0]}"
+        return Feeds.ROUGHNESS, 0.0, f"{text}: {verdict.reasons[0]}"
     lasts = verdict.settled and verdict.excitation is Excitation.SELF_EXCITED and part >= _REMAINS
-    return Feeds.FRICTION if lasts else Feeds.UNKNOWN, f"{text}: {verdict.reasons[0]}"
+    sticks = verdict.evidence.get("stick_cycles", 0.0)
+    return Feeds.FRICTION if lasts else Feeds.UNKNOWN, sticks, f"{text}: {verdict.reasons[0]}"
 
 
 def level(history: History) -> float:

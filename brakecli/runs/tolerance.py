@@ -1,7 +1,8 @@
 """Choose scheme, nodes and step so that the error of the histories stays below the requested tolerance.
 
-The error is never taken from one run: runs of different fineness are compared, and the finest one is the answer.
-What two of them differ by is the error of the coarser one, so the answer is better than it is said to be.
+Runs of different fineness are compared, and the finest one is the answer. What two of them differ by is the error
+of the coarser one, so the answer is better than it is said to be. Only a run whose steps are exact knows its own
+error, which is rounding.
 """
 
 import math
@@ -13,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from brakecli.runs.cost import evaluation_seconds
+from brakecli.solver.compile import Floats
 from brakecli.solver.contact import EVALUATORS
 from brakecli.solver.contact.pad import default_nodes
 from brakecli.solver.motion import Motion, Progress, solve
@@ -42,6 +44,7 @@ PILOT = 32  # duration of the case over that of the event-driven pilot run, whic
 FIRST_BLOCK = 5e-3  # guessed time (s) of the first block of a run whose steps take one evaluation of the contact
 MOST_SECONDS = 900.0  # time of the loop after which no finer run is begun
 SHORTER = 0.7  # step of the second of two piecewise-exact runs over that of the first
+ROUNDED_MARGIN = 20.0  # the error of a piecewise-exact run over the rounding that it has carried along, at most
 ROUNDING_MARGIN = 4.0  # the error of such a run over what two of them differ by, at most
 ROUNDING = 1e-12  # least estimate: runs that share their rounding agree better than they are right
 
@@ -109,7 +112,7 @@ def begins_with_steps(system: System) -> bool:
 
 def _run(system: System, progress: Progress, **changes: Any) -> Motion:
     """The motion by the system's method with these changes."""
-    return _solved(replace(system, method=replace(system.method, **changes)), progress)
+    return _solved(replace(system, method=replace(system.method, **changes)) if changes else system, progress)
 
 
 def _solved(system: System, progress: Progress) -> Motion:
@@ -160,11 +163,17 @@ def first_event_tolerance(system: System) -> float:
 
 
 def _by_phases(system: System, progress: Progress) -> Certified:
-    """Two piecewise-exact runs with different steps: they differ by what the motion makes of rounding.
+    """A piecewise-exact run, whose only error is rounding: each step adds some to what it carries along.
 
-    Where samples are close, a step of the second run passes over several of them.
+    Where that may be too much, a second run with other steps shows what the motion makes of it. Where samples are
+    close, a step of this run passes over several of them.
     """
     wanted, run, longest = system.method.tolerance, _run(system, progress), SHORTER * system.longest_step
+    largest, carried = run.work.rounding or (np.zeros(4), np.zeros(4))
+    error = max(ROUNDED_MARGIN * float((carried / _sizes(system, largest, largest)).max()), ROUNDING)
+    if error <= wanted and not run.work.failed:
+        how = f"the rounding of piecewise-exact steps of {run.system.step:.3g} s"
+        return Certified(run, Certificate(wanted, True, error, system.sampled_duration, how))
     every = max(n for n in range(1, 1 + max(1, int(longest / system.interval))) if system.samples % n == 0)
     share = min(1.0, run.system.step / system.longest_step) if every == 1 else 1.0
     sparse = replace(system, interval=every * system.interval, duration=system.sampled_duration)
@@ -305,15 +314,18 @@ def _compare(coarse: Motion, fine: Motion, tolerance: float) -> tuple[float, flo
     if one.shape[1] < count:
         return 0.0, 1.0
     one = one[:, :count]  # x, y, vx, vy
-    largest = np.abs(other).max(axis=1)
-    rate = 2.0 * math.pi * system.natural_frequencies[1]
-    rounding = ROUNDING * largest[:2].max() * np.array([1.0, 1.0, rate, rate])
-    moves = np.maximum(np.abs(one).max(axis=1), largest) > rounding
-    apart, scale = np.abs(one - other), np.where(moves, np.maximum(largest, rounding), math.inf)
-    error = float((apart.max(axis=1) / scale).max())
-    late = np.flatnonzero((tolerance * scale < apart.T).any(axis=1)) if error > tolerance else np.zeros(0)
+    sizes, apart = _sizes(system, *(np.abs(each).max(axis=1) for each in (one, other))), np.abs(one - other)
+    error = float((apart.max(axis=1) / sizes).max())
+    late = np.flatnonzero((tolerance * sizes < apart.T).any(axis=1)) if error > tolerance else np.zeros(0)
     until: float = (int(late[0]) - 1 if len(late) else count - 1) * system.interval
     return max(until, 0.0), max(error, ROUNDING)
+
+
+def _sizes(system: System, one: Floats, other: Floats) -> Floats:
+    """The largest x, y, vx and vy of the latter of two runs; infinite where both are rounding, as at rest."""
+    rate = 2.0 * math.pi * system.natural_frequencies[1]
+    rounding = ROUNDING * other[:2].max() * np.array([1.0, 1.0, rate, rate])
+    return np.where(np.maximum(one, other) > rounding, np.maximum(other, rounding), math.inf)
 
 
 def first_steps(system: System) -> tuple[float, int]:

@@ -11,6 +11,7 @@ import stat
 import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -140,6 +141,7 @@ def kernel(signature: Any, *, fastmath: frozenset[str] = frozenset(), inlined: b
 _functions: list[Any] = []  # interpreted kernels, found by their number
 
 
+@cache
 def address(function: Any) -> int:
     """Where the machine code of a kernel is. An interpreted one gets a number instead."""
     if config.DISABLE_JIT:
@@ -218,3 +220,43 @@ def _borrowed(typing: Any, value: Any) -> Any:
 
 borrowed: Any = (lambda value: value) if config.DISABLE_JIT else _borrowed
 """A tuple whose arrays have no reference counts, which cost a kernel 10 ns for each array that it passes on."""
+
+
+LARGEST = 2048
+"""Bytes that a tuple in memory may take."""
+_tuples: dict[int, Any] = {}  # interpreted: those in memory, by their address
+
+
+@intrinsic
+def _put(typing: Any, value: Any, address: Any) -> Any:
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        kind = arguments[0].type
+        assert context.get_abi_sizeof(kind) <= LARGEST
+        builder.store(arguments[0], builder.inttoptr(arguments[1], kind.as_pointer()))
+        return context.get_dummy_value()
+
+    return types.void(value, types.int64), codegen
+
+
+_kept: Any = (lambda value, address: _tuples.update({address: value})) if config.DISABLE_JIT else _put
+
+
+def in_memory(type_: Any) -> tuple[Any, Any]:
+    """Kernels that put a tuple of this type into memory, and take it from there; the former for Python.
+
+    A call from Python converts every member of a tuple that it hands over, which takes 14 µs for a `Plant`.
+    """
+
+    @kernel(types.void(type_, int64))
+    def hold(value: Any, address: int) -> None:
+        _kept(borrowed(value), address)
+
+    @intrinsic
+    def taken(typing: Any, address: Any) -> Any:
+        def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            place = context.get_value_type(type_).as_pointer()
+            return builder.load(builder.inttoptr(arguments[0], place))
+
+        return type_(types.int64), codegen
+
+    return hold, _tuples.__getitem__ if config.DISABLE_JIT else taken

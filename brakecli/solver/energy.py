@@ -1,7 +1,7 @@
 """The energy account of a run: what came in, what went out, what is stored, and what does not add up."""
 
 import math
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 from brakecli.solver.records import Coefficients, Weights
@@ -47,7 +47,7 @@ class EnergyAccount:
     @property
     def relative_closing_error(self) -> float:
         """Closing error over the largest item of the account, the store included; 0 where all are zero."""
-        largest = max(abs(item) for item in astuple(self))
+        largest = max(map(abs, vars(self).values()))
         return self.closing_error / largest if largest > 0.0 else 0.0
 
 

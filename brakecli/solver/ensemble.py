@@ -32,7 +32,7 @@ from brakecli.solver.roughness import TWO_PI, Surface
 from brakecli.solver.schemes import NUMEROV
 from brakecli.solver.sine import sine_cosine
 from brakecli.solver.steady_sliding import steady_sliding
-from brakecli.solver.system import System
+from brakecli.solver.system import Initial, System
 
 LANES, WAVES = 16, 5
 """Runs side by side, and waves of the wheel, at most."""
@@ -294,10 +294,8 @@ def run_together(systems: Sequence[System]) -> list[Motion | None]:
 
     Their energy is not accounted for.
     """
-    found: list[Motion | None] = []
-    for first in range(0, len(systems), LANES):
-        found += _run_lanes(list(systems[first : first + LANES]))
-    return found
+    firsts = range(0, len(systems), LANES)
+    return [found for first in firsts for found in _run_lanes(list(systems[first : first + LANES]))]
 
 
 def _run_lanes(systems: list[System]) -> list[Motion | None]:
@@ -348,11 +346,9 @@ def _filled(systems: Sequence[System]) -> Any:
 
 def _start(system: System) -> tuple[float, float, float, float]:
     """x, y, vx and vy at t = 0; NaN where there is no steady sliding to start from."""
-    initial, x, y = system.initial, 0.0, 0.0
-    if initial.from_equilibrium:
-        try:
-            rest = steady_sliding(system)
-            x, y = rest.x, rest.y
-        except CaseError:
-            x = math.nan
-    return initial.x + x, initial.y + y, initial.vx, initial.vy
+    initial = system.initial
+    try:
+        rest = steady_sliding(system) if initial.from_equilibrium else Initial()
+    except CaseError:
+        rest = Initial(math.nan)
+    return initial.x + rest.x, initial.y + rest.y, initial.vx, initial.vy

@@ -4,7 +4,7 @@ import math
 
 from numba import float64, int64, void
 
-from brakecli.solver.compile import Floats, at_address, borrowed, kernel, stopped, vector
+from brakecli.solver.compile import Floats, at_address, borrowed, in_memory, kernel, stopped, vector
 from brakecli.solver.friction import observed
 from brakecli.solver.implicit_step import SOLVED
 from brakecli.solver.quantities import BOUND, Failure
@@ -17,6 +17,7 @@ _NONE, _UNCONVERGED, _DIVERGED, _NOT_CLOSED = (int(failure) for failure in tuple
 _evaluate_at, _prepare_at, _finish_at, _solve_at = (
     at_address(signature) for signature in (EVALUATE, PREPARE, FINISH, SOLVE)
 )
+hold, _plant_at = in_memory(PLANT)
 
 
 @kernel(void(PLANT, vector))
@@ -51,13 +52,13 @@ def sample(p: Plant, row: Floats) -> None:
     row[4], row[5], row[6], row[7] = friction, normal, contact.fraction, side
 
 
-@kernel(int64(PLANT, float64[:, ::1], float64[:, ::1], int64))
-def advance(p: Plant, rows: Floats, events: Floats, stop: int) -> int:
+@kernel(int64(int64, float64[:, ::1], float64[:, ::1], int64))
+def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
     """Step from the level reached to `stop`, filling `rows` with the samples before each step; a `Failure`.
 
     A failure leaves the state at the last good level. `events` gets time and residual of unconverged steps.
     """
-    p = borrowed(p)
+    p: Plant = _plant_at(address)
     c, s, grid, layer, state, problem, counts = p.c, p.s, p.grid, p.layer, p.state, p.problem, p.counts
     prepare, finish = _prepare_at(p.plug.prepare), _finish_at(p.plug.finish)
     solve, belt = _solve_at(p.plug.solve), p.drive.belt

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from brakecli.solver import contact
-from brakecli.solver.compile import Floats, address
+from brakecli.solver.compile import LARGEST, Floats, address
 from brakecli.solver.contact.pad import build_layer
 from brakecli.solver.energy import OPEN_ACCOUNT, EnergyAccount, account
 from brakecli.solver.friction import minimise
@@ -46,6 +46,7 @@ class Work:
     crossing: float = 0.0  # largest contact force (N) as friction turned within a step, without a stick
     evaluators: dict[str, int] = field(default_factory=dict)  # steps that each evaluator took
     solve_seconds: float = 0.0
+    rounding: tuple[Floats, Floats] | None = None  # of exact steps: largest x, y, vx and vy and their errors by it
     unconverged: Floats = field(default_factory=lambda: np.zeros((0, 2)))  # time (s), residual (N)
 
     @property
@@ -115,6 +116,9 @@ class Stepping:
             work=new(WORK),
             counts=self.counts,
         )
+        self._memory = np.zeros(LARGEST, np.int8)
+        self._plant_at = self._memory.ctypes.data
+        self.scheme.hold(self.plant, self._plant_at)
         self._begin()
         self._start_energy = self._energy()
 
@@ -123,7 +127,7 @@ class Stepping:
     ) -> Motion:
         """Step to the end or to a failure; the arguments are those of `solve`."""
         lag, work, kept = self.scheme.LAG, self.work, [np.zeros((0, len(HISTORY)))]
-        sink = sink or (lambda rows: kept.append(rows.copy()))
+        sink = sink or kept.append
         last, most = self.system.steps + lag, BLOCK_ROWS * self.system.per_sample
         size = min(EXACT_BLOCK if self.system.method.row.exact else first_block, most)
         while not work.failed and self.counts.level < last:
@@ -149,7 +153,7 @@ class Stepping:
         system, lag, per_sample = self.system, self.scheme.LAG, self.system.per_sample
         first = int(self.counts.level) - lag
         rows = np.zeros((-(-(stop - lag) // per_sample) + (-first // per_sample), len(HISTORY)))
-        self.work.failure = Failure(self.scheme.advance(self.plant, rows, self.events, stop))
+        self.work.failure = Failure(self.scheme.advance(self._plant_at, rows, self.events, stop))
         done = int(self.counts.level) - lag
         if self.work.failed:
             self.work.failure_time = system.step * done
@@ -190,6 +194,8 @@ class Stepping:
     def _count(self) -> None:
         counts, work = self.counts, self.work
         work.steps = int(counts.kinds.sum())
+        if self.system.method.row.exact:
+            work.rounding = self.plant.state.largest.copy(), self.plant.state.worst.copy()
         work.contact_evaluations = int(counts.evaluations)
         work.unconverged_steps = int(counts.unconverged)
         work.non_unique_steps = int(counts.rising)

@@ -13,10 +13,24 @@ from brakecli.solver.contact import MOST_KINDS
 Pair = tuple[float, float]
 
 
+class Record(np.void):  # type: ignore[misc]  # numpy.record is a class of this kind, too
+    """A record whose fields are attributes; those of `numpy.record` take three times as long."""
+
+    def __getattr__(self, name: str) -> Any:
+        """A field."""
+        if name not in (self.dtype.names or ()):
+            raise AttributeError(name)
+        return self[name]
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Change a field."""
+        self[name] = value
+
+
 def record(*floats: str, **others: Any) -> np.dtype[Any]:
     """A type of record: the names of its doubles, several in a text, then its other fields of 8 bytes each."""
     fields = [(name, float) for names in floats for name in names.split()]
-    return np.dtype((np.record, np.dtype([*fields, *others.items()], align=True)))
+    return np.dtype((Record, np.dtype([*fields, *others.items()], align=True)))
 
 
 def new(type_: np.dtype[Any]) -> Any:
@@ -155,6 +169,10 @@ BELT, BELT_SLOPE, LOAD, LOAD_SLOPE = range(4, 8)
 
 SIZE, PHASES, MARGINS, WORKS, TERMS, NODES = 8, 4, 3, 4, 18, 6
 """Its components, phases, margins of a phase, works, terms of its series, nodes of its quadrature."""
+PAIRS = SIZE * (SIZE + 1) // 2
+"""Products of two components; pairs of different ones stand for both orders."""
+AHEAD = 4 + 2 * MARGINS + 2
+"""What a step computes: x, y, v_x and v_y, the margins, their slopes times the step, and 2 to fill up vectors."""
 
 FLOW = record(
     "x y v_x v_y",  # motion at the level reached, m and m/s
@@ -163,15 +181,18 @@ FLOW = record(
     "anchor anchor_low",  # x - travel in stick, a sum of two doubles, m
     "knot",  # time from which on speed or load change otherwise, s
     "events_time",  # since which `events` are counted, s
+    "late",  # by which the motion is ahead of the level reached, s; 0 at samples
     phase=int,
     started=int,  # 0 before the phase of the start is known
     events=int,  # events without progress
     made=(int, PHASES),  # 1 where the matrices of a phase are made
     row=(float, 8),  # the sample at the level reached
     z=(float, SIZE),  # motion reached
-    end=(float, 4),  # x, y, v_x and v_y at the end of a whole step
-    before=(float, 2 * MARGINS),  # margins of the motion reached, and their slopes times the step
-    after=(float, 2 * MARGINS),  # those at the end
+    error=(float, 4),  # of x, y, v_x and v_y by the rounding of all steps so far
+    worst=(float, 4),  # its largest size at a sample
+    largest=(float, 4),  # that of the motion
+    before=(float, AHEAD),  # the motion reached with its margins
+    after=(float, AHEAD),  # that at the end of a step
     needed=(float, SIZE),  # row whose product with z is the friction force that stick takes, N
     generator=(float, (PHASES, SIZE, SIZE)),  # A
     friction=(float, (PHASES, SIZE)),  # row of the friction force, N
@@ -179,10 +200,11 @@ FLOW = record(
         float,
         (PHASES, 2 * MARGINS, SIZE),
     ),  # rows of what is positive while the phase lasts, and of `before`
-    step=(float, (PHASES, 4 + 2 * MARGINS, SIZE)),  # rows of exp(A h) for x, y, v_x and v_y, and of `after`
-    works=(float, (PHASES, WORKS, SIZE, SIZE)),  # forms in z that are the works of a step from z on, J
-    sums=(float, (SIZE, SIZE)),  # sum of z zᵀ over the steps whose works wait to be added up
-    series=(float, (TERMS, SIZE)),  # of the motion over the span of a step
+    step=(float, (PHASES, SIZE, AHEAD)),  # columns of exp(A h) for x, y, v_x and v_y, and for the rest of `after`
+    now=(float, (SIZE, AHEAD)),  # those of the present phase: at a fixed place, the compiler makes vectors of them
+    works=(float, (PHASES, WORKS, PAIRS)),  # forms in z that are the works of a step from z on, J
+    sums=(float, PAIRS),  # sums of products of components of z over the steps whose works wait to be added up
+    series=(float, (SIZE, TERMS)),  # of each component over the span of a step
     pull=(float, (NODES + 1, SIZE)),  # friction force in `at`, N
     at=(float, (NODES + 1, SIZE, SIZE)),  # motions at the nodes of Gauss' rule, and at the end of the step
     polynomial=(float, (2, TERMS)),  # a margin on it, and the margin's slope, negative

@@ -52,11 +52,18 @@ def surface(
     *,
     wavelengths: Sequence[float] | None = None,
     wavenumbers: Sequence[float] | None = None,
+    orders: Sequence[float] | None = None,
+    radius: float = 1.0,
     phases_deg: Sequence[float] | None = None,
 ) -> Surface:
-    """Surface from lists of equal length; a term of no amplitude is left out, and none at all is smooth."""
+    """Surface from lists of equal length; a term of no amplitude is left out, and none at all is smooth.
+
+    Orders are waves along the circumference of this radius (m).
+    """
     if wavelengths is not None:
         turns = [1 / Fraction(length) for length in wavelengths]
+    elif orders is not None:
+        turns = [Fraction(order) / (2 * PI * Fraction(radius)) for order in orders]
     else:
         turns = [Fraction(number) / (2 * PI) for number in wavenumbers or ()]
     phases = phases_deg or [0.0] * len(turns)

@@ -59,6 +59,7 @@ class System:
     interval: float
     duration: float
     method: Method
+    notes: tuple[str, ...] = ()  # where surfaces come from
 
     @cached_property
     def pad(self) -> Pad:

@@ -136,7 +136,17 @@ def parse_sweep(text: str, name: str, folder: Path, overrides: Sequence[str] = (
     own = [each for each in overrides if key_path(each.partition("=")[0])[:1] in (("case",), ("critical",))]
     sweep = parse_table(Sweep, text, name, own)
     others = [override for override in overrides if override not in own]
-    base = parse_case(*read_text(str(folder / sweep.case)), others)
+    return _checked(sweep, text, name, parse_case(*read_text(str(folder / sweep.case)), others))
+
+
+def sweep_of(tables: dict[str, Any], base: LoadedCase) -> LoadedSweep:
+    """The sweep of the tables that its file would have, over a case at hand. Raises `CaseError`."""
+    text, name = tomli_w.dumps(tables), "the sweep"
+    return _checked(parse_table(Sweep, text, name), text, name, base)
+
+
+def _checked(sweep: Sweep, text: str, name: str, base: LoadedCase) -> LoadedSweep:
+    """A sweep over a case; raises `CaseError` where its axes do not fit."""
     plan = Plan(given_toml(sweep), given_toml(base.case))
     if problems := _wrong_values(plan, text, name):
         raise CaseError(problems)

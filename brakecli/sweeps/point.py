@@ -169,7 +169,7 @@ def next_start(outcome: Outcome) -> Settings:
         angles = np.zeros(system.wheel.g.size)
         wheel_angles(system.wheel.waves, *integral_at(system.belt, system.sampled_duration, 0.0), angles)
         phases = iter(angles)  # a wave without amplitude has no phase
-        turned = [math.degrees(next(phases) % TWO_PI) if g else 0.0 for g in wheel.amplitudes]
+        turned = [math.degrees(next(phases) % TWO_PI) if g else 0.0 for g in wheel.sines()["amplitudes"]]
         start["roughness", "wheel", "phases_deg"] = turned
     return start
 

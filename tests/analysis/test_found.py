@@ -2,6 +2,7 @@
 
 import math
 import re
+from dataclasses import replace
 from itertools import chain
 from typing import Any
 
@@ -11,6 +12,8 @@ import pytest
 from brakecli.analysis.regime.verdict import Excitation, Regime, Verdict
 from brakecli.analysis.stability.report import stability
 from brakecli.case.system import system_of
+from brakecli.solver.motion import solve
+from brakecli.solver.quantities import HISTORY, ContactState
 from tests.analysis.found import SHOES
 from tests.analysis.histories import verdict_of
 from tests.analysis.shoes import Shoe, random_shoes
@@ -115,6 +118,12 @@ def test_ripple_of_the_nodes_is_named_and_gone_with_the_nodes_that_are_asked_for
     assert finer.torque_variation == pytest.approx(torque, rel=0.1)
 
 
+def test_an_impact_between_the_samples_of_most_cycles_counts_for_the_torque() -> None:
+    verdict = judged("impacts of less than a sample")
+    assert verdict.settled
+    assert verdict.torque_variation == pytest.approx(31630.0, rel=0.05)  # by another integrator, of finer samples
+
+
 def test_what_the_wheel_keeps_up_has_not_died_out_without_excitation() -> None:
     verdict = judged("kept up by the wheel")
     assert (verdict.regime, verdict.excitation) == (Regime.DAMPED, Excitation.FORCED)
@@ -137,6 +146,36 @@ def test_waves_that_beat_more_slowly_than_the_run_force_the_sum_of_their_amplitu
     assert verdict.amplitude == pytest.approx(sum(swings), rel=1e-3)
     assert verdict.amplitude_spread is not None
     assert verdict.amplitude_spread > 0.1 * verdict.amplitude  # by which the run itself shows less
+
+
+def test_the_spread_of_a_motion_under_an_opening_pad_knows_that_three_waves_beat_more_slowly_than_the_run() -> (
+    None
+):
+    verdict = judged("three waves that beat, open")
+    assert verdict.excitation is Excitation.FORCED
+    assert verdict.amplitude_spread is not None
+    assert verdict.amplitude <= 2.41e-7 <= verdict.amplitude + verdict.amplitude_spread  # thirty times as long
+
+
+def test_a_dozen_cycles_that_have_not_settled_are_no_vibration() -> None:
+    """Twelve cycles of nearly the same amplitude; four times later it is six times larger, and grows."""
+    verdict = judged("a hop")
+    assert verdict.regime is Regime.UNDECIDED
+    assert "only 12 cycles in the second half" in verdict.reasons[0]
+
+
+def test_a_motion_that_can_neither_stick_nor_open_any_more_is_linear_before_its_last_quarter_is() -> None:
+    name = "has just ceased to stick"
+    tables = SHOES[name]
+    verdict, system = judged(name), system_of(make(tables))
+    assert verdict.regime is Regime.DAMPED
+    assert verdict.growth_rate == pytest.approx(Shoe.of(tables).rate, rel=1e-9)
+    later = solve(replace(system, duration=8.0 * system.duration)).rows
+    first = len(later) // 8
+    states, fractions = (later[:, list(HISTORY).index(each)] for each in ("state", "contact_fraction"))
+    assert (states[3 * first // 4 : first] == ContactState.STICK).any()
+    assert (states[first:] == states[-1]).all()
+    assert (fractions[first:] == 1.0).all()
 
 
 RATE = re.compile(r"still (?:growing|decaying) at ([\d.e+-]+) 1/s; ")
@@ -177,3 +216,19 @@ def test_the_time_that_a_verdict_asks_for_is_enough_or_the_new_one_has_another_r
         assert again.regime is not Regime.UNDECIDED or explained, (tables, first.reasons, again.reasons)
         if (tried := tried + 1) == 10:
             return
+
+
+@pytest.mark.parametrize(
+    ("name", "amplitude", "frequency", "stick"),
+    [("impacts of 70 steps", 1.1894e-5, 402.1, 0.1304), ("impacts of 14 steps", 4.455e-5, 1469.1, 0.232)],
+)
+def test_the_spreads_of_impacts_hold_what_shorter_steps_and_another_integrator_change(
+    name: str, amplitude: float, frequency: float, stick: float
+) -> None:
+    verdict = judged(name)
+    assert verdict.settled
+    assert verdict.amplitude_spread is not None
+    assert verdict.frequency is not None
+    assert abs(verdict.amplitude - amplitude) <= verdict.amplitude_spread
+    assert abs(verdict.frequency - frequency) <= verdict.evidence["frequency_spread"]
+    assert abs(verdict.stick_fraction - stick) <= verdict.evidence["stick_spread"]

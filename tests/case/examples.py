@@ -77,6 +77,31 @@ EVENT_DRIVEN = (
 )
 
 
+def change(text: str, *pairs: tuple[str, str]) -> str:
+    for old, new in pairs:
+        assert text.count(old) == 1
+        text = text.replace(old, new)
+    return text
+
+
+SINES = "amplitudes = [1e-6, 8e-7]\nwavenumbers = [300.0, 500.0]\nphases_deg = [0.0, 90.0]\n"
+ORDERS = change(
+    CONSTANT, (SINES, SINES.replace("wavenumbers = [300.0, 500.0]", "orders = [1, 2]") + 'note = "n"\n')
+)
+SPECTRUM = "\nrms = 1e-6\nhurst = 0.8\nshortest = 1e-3\nlongest = 0.1\nterms = 50\nseed = 1\n"
+SPECTRA = change(
+    change(CONSTANT, ("[roughness.wheel]\n" + SINES, "[roughness.wheel.spectrum]" + SPECTRUM)),
+    ("[roughness.shoe]\n", '[roughness.shoe]\nnote = "n"\n'),
+)
+SPECTRA_OF_SHOES = change(
+    CONSTANT,
+    (
+        CONSTANT[CONSTANT.index("[roughness.shoe]") : CONSTANT.index("[roughness.wheel]")],
+        "[roughness.shoe.spectrum]" + SPECTRUM,
+    ),
+)
+
+
 def problems(text: str, *overrides: str) -> tuple[Problem, ...]:
     with pytest.raises(CaseError) as caught:
         parse_case(text, "case.toml", overrides)
@@ -99,23 +124,16 @@ def where(text: str, *overrides: str) -> list[tuple[str, str]]:
 def put(key: str, value: str) -> tuple[str, int]:
     """A case with a value written into one of its fields, and the line of that field."""
     table, _, name = key.rpartition(".")
-    for text in (CONSTANT, VARYING, EVENT_DRIVEN):
+    for text in (CONSTANT, VARYING, EVENT_DRIVEN, ORDERS, SPECTRA, SPECTRA_OF_SHOES):
         lines = text.splitlines()
-        first = lines.index(f"[{table}]") if table else -1
-        for index in range(first + 1, len(lines)):
+        first = lines.index(f"[{table}]") if f"[{table}]" in lines else -1
+        for index in range(first + 1, len(lines) if first >= 0 or not table else 0):
             if lines[index].startswith("["):
                 break
             if lines[index].startswith(f"{name} = "):
                 lines[index] = f"{name} = {value}"
                 return "\n".join(lines), index + 1
     raise AssertionError(f"no such field: {key}")
-
-
-def change(text: str, *pairs: tuple[str, str]) -> str:
-    for old, new in pairs:
-        assert text.count(old) == 1
-        text = text.replace(old, new)
-    return text
 
 
 def lines_of(text: str, *starts: str) -> list[str]:

@@ -265,7 +265,11 @@ def test_the_starter_mentions_every_key() -> None:
 
 def test_each_alternative_of_the_starter_is_valid() -> None:
     lines = starters()["case"].splitlines()
-    roughness = [line[2:] for line in lines if line.startswith(("# [", "# amplitudes", "# wave", "# phases"))]
+    roughness = [
+        line[2:]
+        for line in lines
+        if line.startswith(("# [roughness.shoe]", "# [roughness.wheel]", "# ampl", "# wave", "# phases"))
+    ]
     case = parse_case(starters()["case"] + "\n" + "\n".join(roughness), "rough").case
     assert case.roughness.shoe is not None
     assert case.roughness.wheel is not None

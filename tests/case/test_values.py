@@ -12,17 +12,27 @@ VALUES = ("nan", "inf", "-1", "0", "1e999", "1e-320", '"text"', "true", "2020-01
 
 NUMBER, NON_NEGATIVE, POSITIVE, LIST = {"-1", "0"}, {"0"}, set[str](), {"[1, 2]"}
 ROUGHNESS = {"amplitudes": NUMBER, "wavelengths": POSITIVE, "wavenumbers": POSITIVE, "phases_deg": NUMBER}
+SURFACES = [f"roughness.{side}" for side in ("shoe", "wheel")]
 ALLOWED_IN_LIST = {
     "wheel.times": POSITIVE,  # times increase, and the first is 0
     "wheel.angular_speeds": NUMBER,
     "load.times": POSITIVE,
     "load.forces": NUMBER,
-    **{f"roughness.{side}.{key}": allowed for side in ("shoe", "wheel") for key, allowed in ROUGHNESS.items()},
+    **{f"{surface}.{key}": allowed for surface in SURFACES for key, allowed in ROUGHNESS.items()},
+    "roughness.wheel.orders": POSITIVE,
     "solver.theta": NON_NEGATIVE,
 }
 """Which of `VALUES` the contract allows in each list."""
 GROUPS: list[tuple[set[str], str]] = [
-    ({'"text"'}, "title"),
+    ({'"text"'}, "title roughness.shoe.note roughness.wheel.note"),
+    (
+        NON_NEGATIVE,
+        " ".join(f"{surface}.spectrum.{key}" for surface in SURFACES for key in ("rms", "hurst", "seed")),
+    ),
+    (
+        POSITIVE,
+        " ".join(f"{surface}.spectrum.{key}" for surface in SURFACES for key in ("shortest", "longest", "terms")),
+    ),
     ({"true"}, "solver.allow_unconverged"),
     (POSITIVE, "shoe.mass wheel.radius contact.half_length contact.stiffness"),
     (POSITIVE, "solver.step solver.duration output.sample_interval"),
@@ -51,7 +61,8 @@ def test_the_table_of_allowed_values_has_every_field() -> None:
         for key in table.model_fields
         if (*path, key) not in inner
     }
-    assert fields == set(ALLOWED)
+    of_files = {f"{surface}.{key}" for surface in SURFACES for key in ("profile", "profile_error")}
+    assert fields - of_files == set(ALLOWED)  # tests/case/test_profile.py reads files
 
 
 @pytest.mark.parametrize("value", VALUES)
@@ -74,7 +85,8 @@ def test_every_field_takes_what_the_contract_allows_and_nothing_else(key: str, v
 @pytest.mark.parametrize("value", VALUES)
 @pytest.mark.parametrize("key", ALLOWED_IN_LIST)
 def test_every_list_takes_what_the_contract_allows_and_nothing_else(key: str, value: str) -> None:
-    text, line = put(key, f"[0.0, {value}]" if key.endswith("times") else f"[0.5, {value}]")
+    start = {"times": "0.0", "orders": "1"}.get(key.rpartition(".")[2], "0.5")
+    text, line = put(key, f"[{start}, {value}]")
     if value in ALLOWED_IN_LIST[key]:
         parse_case(text, "case.toml")
         return

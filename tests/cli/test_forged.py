@@ -24,6 +24,7 @@ values = [0.3, 0.6]
 parameter = "shoe.mass"
 values = [8.0, 10.0, 12.0]
 """
+LOOKS = [["info"], ["diff", "f.h5", "--json"], ["export", "-o", "o.csv", "--force", "-q"]]
 COMMANDS = {
     "run": [
         ["classify"],
@@ -31,10 +32,11 @@ COMMANDS = {
         ["classify"],
         ["run", "-o", "o.h5", "--force", "-q"],
         ["plot", "-q"],
+        *LOOKS,
     ],
-    "sweep": [["plot", "-q"], ["classify"], ["run", "-o", "o.h5"]],
-    "comparison": [["plot", "-q"], ["classify"]],
-    "stability": [["plot", "-q"], ["classify"]],
+    "sweep": [["plot", "-q"], ["classify"], ["run", "-o", "o.h5"], *LOOKS],
+    "comparison": [["plot", "-q"], ["classify"], *LOOKS],
+    "stability": [["plot", "-q"], ["classify"], *LOOKS],
 }
 
 

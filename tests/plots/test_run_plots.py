@@ -19,11 +19,14 @@ from brakecli.case.read import parse_case
 from brakecli.cli import app as cli
 from brakecli.errors import BrakecliError, UnreadableResultError, UsageError
 from brakecli.files.field import Field
+from brakecli.files.fields import SPECTRUM
 from brakecli.files.read import open_result
 from brakecli.files.write import new_result
-from brakecli.plots import run
+from brakecli.plots import run, style
+from brakecli.plots.quantities import VARIABLES
 from brakecli.plots.result import plot_result
 from brakecli.plots.run import RunPicture, draw, envelope, episodes
+from brakecli.plots.style import applied
 from brakecli.solver.quantities import HISTORY, ContactState
 from tests.campaign import campaign
 
@@ -64,9 +67,10 @@ def write(path: Path, moved: Samples, *overrides: str, **attributes: Any) -> Pat
         result.axis("spectrum", Field("frequency", "Hz", "frequency"), np.linspace(0.0, 50.0, 1 + samples // 2))
         density = np.zeros(1 + samples // 2)
         density[len(density) // 50 + 1 :: len(density) // 50 + 1] = 1.0
-        result.variable(
-            "spectrum", Field("vx", "1", "density"), ("frequency",), density if samples > 3 else 0 * density
-        )
+        for name in SPECTRUM:
+            result.variable(
+                "spectrum", Field(name, "1", "density"), ("frequency",), density if samples > 3 else 0 * density
+            )
         result.set_attributes({"first_sample": 0, "segments": 1}, "spectrum")
         result.commit()
     return path
@@ -202,6 +206,65 @@ def test_lines_stand_where_the_waves_of_a_steady_wheel_pass(tmp_path: Path) -> N
     assert gathered(tmp_path / "r.h5", sine(500), numbers).passing == pytest.approx((1.0,))
     changing = "wheel={radius=0.5, times=[1.0, 3.0], angular_speeds=[2.0, 0.0]}"
     assert gathered(tmp_path / "r.h5", sine(500), waves, changing).passing == ()
+
+
+def test_each_quantity_of_the_history_can_be_drawn(tmp_path: Path) -> None:
+    assert {*VARIABLES} == {*HISTORY} - {"state"} | {"torque"}
+    rng = np.random.default_rng(1)
+    moved = sine(500) | {name: rng.normal(3.0, 1.0, 500) for name in HISTORY if name not in ("x", "vx", "state")}
+    result = write(tmp_path / "r.h5", moved, frequency=1.0)
+    units = {"friction_force": "(N)", "torque": "(N m)", "vy": "(m/s)", "contact_fraction": "touching"}
+    for name in VARIABLES:
+        with open_result(result) as stored, applied():
+            figure = draw(RunPicture(stored, name))
+        curve = np.asarray(figure.axes[0].get_lines()[0].get_ydata(), float)
+        values = 0.5 * moved["friction_force"] if name == "torque" else moved[name]  # a radius of 0.5 m
+        np.testing.assert_allclose(curve, values[-len(curve) :], rtol=1e-12)
+        assert units.get(name, "") in figure.axes[0].get_ylabel()
+        ordinate = "vx" if name == "x" else name
+        lines = figure.axes[1].get_lines()[0]
+        np.testing.assert_allclose(np.asarray(lines.get_xdata()), moved["x"][-len(curve) :], rtol=1e-12)
+        if ordinate in moved:
+            np.testing.assert_allclose(np.asarray(lines.get_ydata()), moved[ordinate][-len(curve) :], rtol=1e-12)
+    with pytest.raises(UsageError, match="give one of x, y, vx"):
+        plot_result(result, tmp_path / "r.png", force=False, variable="state")
+
+
+def test_modes_of_the_case_stand_in_the_spectrum(tmp_path: Path) -> None:
+    """Upright links couple nothing: the modes are those of one spring, and of the other with the contact's 2ak."""
+    picture = gathered(tmp_path / "r.h5", sine(500))
+    expected = np.sqrt([1.0, 1.0 + 2e6]) / (2.0 * np.pi)
+    assert picture.modes == pytest.approx(expected, rel=1e-12)
+    assert f"mode {expected[0]:.4g} Hz" in drawn_labels(picture)
+
+
+def drawn_labels(picture: RunPicture) -> list[str]:
+    return [str(each) for each in draw(picture).axes[3].get_legend_handles_labels()[1]]
+
+
+def test_few_waves_have_lines_in_the_spectrum_and_many_have_ticks(tmp_path: Path) -> None:
+    for count, words in ((5, "waves of the wheel pass"), (6, "6 waves of the wheel pass")):
+        lengths = [0.1 * (1 + number) for number in range(count)]
+        waves = f"roughness.wheel={{amplitudes={[1e-6] * count}, wavelengths={lengths}}}"
+        axes = draw(picture := gathered(tmp_path / "r.h5", sine(500), waves)).axes[3]
+        lines = [each for each in axes.get_lines() if each.get_color() == style.VERMILION]
+        assert len(lines) == (5 if count == 5 else 1)
+        assert words in drawn_labels(picture)
+        places = np.concatenate([np.unique(np.asarray(each.get_xdata(), float)) for each in lines])
+        np.testing.assert_allclose(np.sort(places), picture.passing)
+
+
+@pytest.mark.parametrize("level", [0.0, 3.0])
+def test_rounding_is_drawn_as_a_line_and_not_from_bottom_to_top(level: float, tmp_path: Path) -> None:
+    noise = 1e-16 * np.random.default_rng(2).normal(size=500)
+    moved = {"x": level * (1.0 + noise), "vx": noise, "normal_force": 5.0 + noise, "state": np.ones(500)}
+    for name in ("vx", "x", "normal_force"):
+        with open_result(write(tmp_path / "r.h5", moved)) as stored, applied():
+            figure = draw(RunPicture(stored, name))
+        for axes in figure.axes[:3]:
+            for line in axes.get_lines()[:1]:
+                low, high = axes.get_ylim()
+                assert np.ptp(np.asarray(line.get_ydata(), float)) < 1e-6 * (high - low)
 
 
 def test_a_damaged_result_ends_in_exit_4_without_a_picture(tmp_path: Path, run_command: Any) -> None:

@@ -2,26 +2,28 @@
 
 import math
 from collections.abc import Callable
-from itertools import product
+from itertools import pairwise, product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import tomli_w
+from matplotlib.contour import ContourSet
 from matplotlib.image import imread
 from numpy.typing import NDArray
 
+from brakecli.case.read import parse_case
 from brakecli.errors import UnreadableResultError, UsageError
 from brakecli.files.read import open_result
 from brakecli.files.write import new_result
-from brakecli.plots.result import plot_result
-from brakecli.plots.style import applied, readable
-from brakecli.plots.sweep import Axis
+from brakecli.plots.axis import Axis
+from brakecli.plots.result import draw, plot_result
+from brakecli.plots.style import applied, prefixed, readable, rendered
 from brakecli.sweeps.plan import parse_sweep
 from brakecli.sweeps.workers.task import compute_units
 from tests.campaign import campaign
-from tests.plots.helpers import ANGLE, CRITICAL, SCHEME, SPEED, columns, drawn, gathered, write
+from tests.plots.helpers import ANGLE, CRITICAL, SCHEME, SPEED, columns, drawn, gathered, legend, line, write
 from tests.sweeps.helpers import inline
 
 
@@ -105,7 +107,7 @@ def test_an_axis_of_one_value_is_named_and_not_drawn(tmp_path: Path) -> None:
             ["link2.angle=2"],
             "give one of link2.angle_deg",
         ),
-        ({"axis": [ANGLE, SPEED]}, ["link2.angle_deg=2.5"], "give one of 1, 2, 3, 4, 5, 6, 7, 8"),
+        ({"axis": [ANGLE, SPEED]}, ["link2.angle_deg=8.6"], "give one of 1, 2, 3, 4, 5, 6, 7, 8"),
         ({"axis": [ANGLE, SPEED]}, ["link2.angle_deg=nan"], "no point has this value"),
         ({"axis": [SCHEME, ANGLE]}, ["solver.scheme"], "give one of two-layer, three-layer"),
         ({"axis": [{**ANGLE, "direction": "both"}]}, ["direction=left"], "give one of up, down"),
@@ -138,6 +140,98 @@ def test_a_result_without_what_is_drawn_is_unreadable(tmp_path: Path) -> None:
         gathered(tmp_path / "b.h5")
 
 
+def test_select_takes_the_nearest_value_and_says_so(tmp_path: Path) -> None:
+    result = write(tmp_path / "r.h5", {"axis": [ANGLE, SPEED]})
+    for value, place, words in (
+        ("2.4", 1, "2 deg (nearest to 2.4)"),
+        ("8.49", 7, "8 deg (nearest to 8.49)"),
+        ("3", 2, "3 deg"),
+    ):
+        picture = gathered(result, [f"link2.angle_deg={value}"])
+        np.testing.assert_array_equal(picture["amplitude"][0], columns((8, 7), critical=False)["amplitude"][place])
+        assert picture.chosen == (f"link2.angle_deg = {words}",)
+
+
+def test_units_are_those_that_a_person_would_choose() -> None:
+    expected = {
+        (2e7, "N/m"): (1e-6, "MN/m"),
+        (5e3, "N"): (1e-3, "kN"),
+        (0.05, "m/s"): (1e3, "mm/s"),
+        (3e3, "m/s"): (1.0, "m/s"),
+        (1100.0, "Hz"): (1.0, "Hz"),
+        (22e3, "Hz"): (1e-3, "kHz"),
+        (0.02, "s"): (1e3, "ms"),
+        (2.0, "rad/s"): (1.0, "rad/s"),
+        (1e-5, "deg"): (1.0, "deg"),
+        (1e-5, ""): (1.0, ""),
+        (0.0, "m"): (1.0, "m"),
+    }
+    for given, wanted in expected.items():
+        factor, unit = prefixed(*given)
+        assert (round(factor, 12), unit) == wanted
+    stiff = Axis("link2_stiffness", "link2.stiffness", "N/m", np.geomspace(4e6, 4e7, 8))
+    assert stiff.named(7) == "link2.stiffness = 40 MN/m"
+
+
+def test_numbers_at_ticks_stand_apart(tmp_path: Path) -> None:
+    long = {"parameter": "friction.coefficient", "values": [0.123456 + 0.1 * place for place in range(6)]}
+    five = {"parameter": "wheel.radius", "values": [0.1, 0.2, 0.3, 0.4, 0.5]}
+    figure = drawn(write(tmp_path / "r.h5", {"axis": [long, ANGLE, five]}))
+    with applied():
+        rendered(figure, ".png")
+        figure.draw_without_rendering()
+    checked = 0
+    for axes in figure.axes:
+        shown = [tick.label1 for tick in axes.xaxis.get_major_ticks() if tick.label1.get_visible()]
+        boxes = [text.get_window_extent() for text in shown if text.get_text()]
+        for before, after in pairwise(sorted(boxes, key=lambda box: box.x0)):
+            assert before.x1 < after.x0
+            checked += 1
+    assert checked >= 5
+
+
+def test_any_number_of_a_sweep_is_drawn(tmp_path: Path) -> None:
+    values = columns((8, 7), critical=True)
+    values["steps"] = np.arange(56).reshape(8, 7)
+    for critical in ({}, {"critical": CRITICAL}):
+        result = write(tmp_path / "m.h5", {"axis": [ANGLE, SPEED], **critical}, values)
+        for name in ("steps", "frequency", *(["critical_eigenvalue"] if critical else [])):
+            with open_result(result) as stored, applied():
+                figure = draw(stored, variable=name)
+            mesh = figure.axes[0 if critical else 1].collections[0]
+            shown = np.ma.filled(mesh.get_array().reshape(7, 8).T.astype(float), np.nan)  # type: ignore[union-attr]
+            np.testing.assert_allclose(shown, values[name])
+            assert name.replace("_", " ") in figure.axes[-1].get_ylabel()
+        with pytest.raises(UsageError, match="give one of amplitude, braking_torque"):
+            plot_result(result, tmp_path / "r.png", force=False, variable="regime")
+
+
+def test_the_line_of_critical_friction_is_the_closed_form(tmp_path: Path) -> None:
+    """Flutter of the undamped shoe at |cxy|/K + (cxx - cyy - K)²/(4 |cxy| K), at every stiffness of link 2."""
+    case = (Path(__file__).parents[2] / "cases" / "relaxation.toml").read_text()
+    resolved = parse_case(case, "case", ["link1.damping=0", "link2.damping=0"]).resolved
+    friction = {"parameter": "friction.coefficient", "start": 0.0, "stop": 2.0, "num": 5}
+    stiffness = {"parameter": "link2.stiffness", "values": [1.15e7, 1.2e7, 1.25e7]}
+    result = write(tmp_path / "r.h5", {"axis": [friction, stiffness]}, resolved_toml=resolved)
+    k, c1, angle = 2e6, 1e7, np.radians(5.0)
+    c2 = np.array(stiffness["values"])
+    cxy, difference = c2 * np.sin(angle) * np.cos(angle), c2 * np.cos(2.0 * angle) - c1 - k
+    expected = cxy / k + difference**2 / (4.0 * cxy * k)
+    (line,) = [each for each in drawn(result).axes[0].collections if isinstance(each, ContourSet)]
+    points = np.concatenate([path.vertices for path in line.get_paths()])
+    for place, phi in zip(c2, expected, strict=True):
+        on_it = points[np.abs(points[:, 1] - place) < 1.0]
+        assert on_it[:, 0] == pytest.approx(phi, rel=1e-6)
+        assert len(on_it)
+    assert "critical friction" in legend(drawn(result))
+    along = drawn(result, ["link2.stiffness=1.2e7"]).axes[0]
+    assert line_at(along, "critical friction") == pytest.approx(expected[1], rel=1e-6)
+
+
+def line_at(axes: Any, label: str) -> float:
+    return float(line(axes, label).get_xdata()[0])
+
+
 def test_other_kinds_of_results_are_refused_and_select_is_for_sweeps(tmp_path: Path) -> None:
     refused: tuple[tuple[str, list[str], str], ...] = (
         ("other", [], "a run, of a sweep, of a comparison or of stability"),
@@ -149,6 +243,11 @@ def test_other_kinds_of_results_are_refused_and_select_is_for_sweeps(tmp_path: P
             result.commit()
         with pytest.raises(UsageError, match=words):
             plot_result(tmp_path / f"{kind}.h5", tmp_path / "r.png", force=False, select=select)
+    with new_result(tmp_path / "modes.h5", force=False) as result:
+        result.set_attributes({"kind": "stability"})
+        result.commit()
+    with pytest.raises(UsageError, match="for runs and sweeps"):
+        plot_result(tmp_path / "modes.h5", tmp_path / "r.png", force=False, variable="x")
 
 
 @pytest.mark.parametrize("every", [3, pytest.param(1, marks=campaign)])

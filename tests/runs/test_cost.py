@@ -5,11 +5,15 @@ import os
 import random
 import resource
 import time
+from typing import Any
+
+import pytest
 
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
-from brakecli.errors import CaseError
-from brakecli.runs.limits import check
+from brakecli.errors import CaseError, RefusedError
+from brakecli.runs.cost import stability_seconds
+from brakecli.runs.limits import check, sliding_text
 from brakecli.runs.pilot import measured
 from brakecli.runs.run import motion_of
 from brakecli.solver.system import System
@@ -75,6 +79,22 @@ def case(seed: int, duration: float) -> System:
         text += f'[initial]\nat = "{r.choice(["rest", "equilibrium"])}"\n{moved}\n'
     text += f"[solver]\nduration = {duration}\n{method}\n"
     return system_of(parse_case(text, "case").case)
+
+
+def test_stability_costs_averages_of_the_contact_only_where_the_pad_opens_and_is_refused_if_they_take_days(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def waved(count: int, size: float) -> System:
+        waves: dict[str, Any] = {"amplitudes": [size / count] * count, "wavelengths": [0.01] * count}
+        return system_of(make(SQUEAL | {"roughness": {"wheel": waves}}))
+
+    assert stability_seconds(system_of(make(SQUEAL))) == stability_seconds(waved(10, 1e-9)) == 0.0
+    few, many = (stability_seconds(waved(count, 1e-3)) for count in (10, 100))
+    assert many > 5.0 * few > 0.0
+    assert sliding_text(waved(10, 1e-3)) is None
+    monkeypatch.setattr("brakecli.runs.limits.MOST_SECONDS", few)
+    with pytest.raises(RefusedError, match=r"pad that opens takes about .*; reduce contact\.nodes"):
+        sliding_text(waved(100, 1e-3))
 
 
 def spent(system: System, most: float) -> float:

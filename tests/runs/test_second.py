@@ -6,12 +6,14 @@ from typing import Any
 import pytest
 import tomli_w
 
-from brakecli.analysis.regime.of_run import context
+from brakecli.analysis.regime.of_run import context, verdict_on
+from brakecli.analysis.regime.verdict import Feeds, Regime
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
 from brakecli.runs.second import compared, second_system
 from brakecli.solver.history import array_history
 from brakecli.solver.motion import solve
+from tests.analysis.found import SHOES
 from tests.commands import brakecli, each
 
 FORCED: dict[str, Any] = {  # sliding is stable; the record is too short for its lines
@@ -93,3 +95,13 @@ def test_friction_of_the_second_run_cannot_feed_a_vibration(tables: dict[str, An
     assert second.system.wheel.g.size == (0 if second.smooth else 1)
     again = compared(second, history)
     assert again == compared(second, history)
+
+
+def test_no_motion_is_called_quasi_harmonic_that_sticks_without_the_roughness() -> None:
+    """Eight times later it sticks in 99 % of the cycles, by another integrator."""
+    system = system_of(parse_case(tomli_w.dumps(SHOES["sticks without the roughness"]), "case").case)
+    history = array_history(system.interval, solve(system).rows)
+    feeds, sticks, _ = compared(second_system(system, history), history)
+    assert (feeds, sticks > 0.9) == (Feeds.FRICTION, True)
+    assert verdict_on(history, system, None, None, feeds).regime is Regime.QUASI_HARMONIC
+    assert verdict_on(history, system, None, None, feeds, sticks).regime is Regime.UNDECIDED

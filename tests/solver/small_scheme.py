@@ -8,7 +8,7 @@ from brakecli.solver.energy import energy_at_level
 from brakecli.solver.records import Coefficients, Pair, Weights
 
 STATE = records.STATE
-advance, sample = loop.advance, loop.sample
+hold, advance, sample = loop.hold, loop.advance, loop.sample
 LAG = 0
 MEMORY, VELOCITIES = ("x", "y", "v_x", "v_y"), ("v_x", "v_y")
 mechanical_energy = energy_at_level

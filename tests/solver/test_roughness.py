@@ -41,7 +41,8 @@ def test_a_profile_is_the_sum_of_its_sines(
 ) -> None:
     g, length, phase = (list(column) for column in zip(*terms, strict=True))
     numbers = [2 * math.pi / each for each in length]
-    f = surface(g, phases_deg=phase, **({"wavenumbers": numbers} if by_number else {"wavelengths": length}))
+    waves: dict[str, Any] = {"wavenumbers": numbers} if by_number else {"wavelengths": length}
+    f = surface(g, phases_deg=phase, **waves)
     expected = sum(
         mpf(a)
         * mpmath.sin(

@@ -62,6 +62,7 @@ def compare(found: Early, case: Case) -> None:
     assert ours.frequency == pytest.approx(whole.frequency, rel=1e-4)
     assert ours.amplitude == pytest.approx(whole.amplitude, rel=2e-3)
     # the mean of whole cycles and of a part of one
+    assert whole.torque_variation is not None
     swing = whole.torque_variation / system.radius / whole.evidence["cycles"]
     assert ours.mean_friction_force == pytest.approx(whole.mean_friction_force, abs=swing)
     sample = interval * whole.frequency

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.analysis.regime.evidence import LINE_BINS, WINDOWS, Cycles, Envelope, Part
+from brakecli.analysis.regime.cycles import Cycles
+from brakecli.analysis.regime.evidence import LINE_BINS, WINDOWS, Envelope, Part
 from brakecli.analysis.regime.verdict import Context, Decision, Excitation, Feeds, Regime, Thresholds
 from brakecli.solver.history import History
 

@@ -50,6 +50,7 @@ class Linear:
     push: Array  # the same of a normal force of 1 N
     slopes: Complex  # N/m, by which each wave changes the normal force with x, with its phase at t = 0
     wavenumbers: Array  # rad/m
+    heights: float  # m, by which a rough shoe may part from a smooth wheel that touches it in the mean
     known_to: float = 0.0  # 1/s, by how much the growth may be off
 
     @property
@@ -100,6 +101,17 @@ class Linear:
         later = self._forced_x(_BEYOND * time[-1] * _SCATTERED) if len(self.waves) > 1 else lasting
         size = 0.5 * float(max(lasting.max(), later.max()) - min(lasting.min(), later.min()))
         return size, lasting, x - self.rest[0] - lasting, time
+
+    def stays(self, state: Array) -> bool:
+        """Whether a motion on a smooth wheel that decays can neither stick nor open any more.
+
+        Its modes only decay, so that the sum of their sizes bounds all that follows.
+        """
+        away = state - np.concatenate([self.rest, np.zeros(2)])
+        parts = np.linalg.lstsq(self.vectors, away.astype(complex), rcond=None)[0]
+        _, y, vx, _ = np.abs(self.vectors) @ np.abs(parts)
+        slips = self.slip is None or vx < abs(self.belt)
+        return bool(self.direction < 0 and not len(self.waves) and slips and y < self.depth - self.heights)
 
     def seconds_to_limit(self, time: float, state: Array) -> float:
         """How long the fastest mode grows from x, y, vx, vy at a time until stick or loss of contact."""
@@ -166,4 +178,5 @@ def linear_theory(system: System, belt: float) -> Linear | None:
         np.concatenate([np.zeros(2), push / c.m]),
         wheel.omega * phases,
         wheel.omega,
+        2.0 * float(np.abs(system.shoe.g).sum()),
     )

@@ -13,6 +13,7 @@ import numpy as np
 from brakecli.analysis.regime.evidence import Part
 from brakecli.analysis.regime.forced import forced_lines, subharmonics
 from brakecli.analysis.regime.linear import linear_theory
+from brakecli.analysis.regime.over_time import over_time
 from brakecli.analysis.regime.ripple import ripple
 from brakecli.analysis.regime.rules import classify
 from brakecli.analysis.regime.verdict import Context, Excitation, Feeds, Regime, Thresholds, Verdict
@@ -32,7 +33,9 @@ from brakecli.solver.system import System
 def classify_result(path: Path, thresholds: Thresholds) -> dict[str, Any]:
     """Names and values of the verdict on a stored run; raises UnreadableResultError for anything else."""
     with stored_run(path) as (system, history, failure):
-        return numbers_of(verdict_on(history, system, failure, thresholds), failure)
+        found = {"over_time": None if failure else over_time(history, system)}
+        verdict = verdict_on(history, system, failure, thresholds)
+        return {**numbers_of(verdict, failure), "vibrations": fields.VIBRATIONS.read(found)}
 
 
 @contextmanager
@@ -61,9 +64,10 @@ def verdict_on(
     failure: str | None,
     limits: Thresholds | None = None,
     feeds: Feeds = Feeds.UNKNOWN,
+    sticks: float = 0.0,
 ) -> Verdict:
-    """The verdict on the motion of a system; a run that has failed has none. `feeds` is what is known already."""
-    verdict = classify(history, replace(context(system), feeds=feeds), limits or Thresholds())
+    """The verdict on a motion; a run that has failed has none. `feeds`, `sticks`: what a second run has shown."""
+    verdict = classify(history, replace(context(system), feeds=feeds, sticks=sticks), limits or Thresholds())
     if not failure:
         return verdict
     verdict = replace(verdict, growth_rate=None, ringing_frequency=None, frequency=None, settled=False)
@@ -98,6 +102,7 @@ def context(system: System) -> Context:
     return Context(
         belt,
         radius=system.radius,
+        step=0.0 if system.method.own_steps or system.method.step is None else system.step,
         steady=len(system.belt) == 1 and len(system.load) == 1,
         forced=forced_lines(belt, turns, highest),
         subharmonics=partial(subharmonics, belt, turns, highest),

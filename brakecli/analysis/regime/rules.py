@@ -6,17 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from brakecli.analysis.regime.evidence import (
-    FEWEST_SAMPLES,
-    WINDOWS,
-    Cycles,
-    Drift,
-    Envelope,
-    cycles_of,
-    line,
-    median,
-    swings,
-)
+from brakecli.analysis.regime.cycles import SIZE_OFF, Cycles, Drift, contact_length, cycles_of, median, swings
+from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, WINDOWS, Envelope, line
 from brakecli.analysis.regime.forced import GROWN, QUARTER, ForcedRules
 from brakecli.analysis.regime.spectra import segment
 from brakecli.analysis.regime.verdict import Context, Decision, Excitation, Feeds, Regime, Thresholds, Verdict
@@ -32,8 +23,9 @@ _BANDS = 0.9  # least part of the energy in three bands: chaos may have less
 _SPREAD = 0.05  # of the frequency of cycles, beyond which three bands hold no vibration
 _REST = 0.3  # of a forced motion, by which its closed form may be off
 _LONGER = 1.4  # a run whose last quarter and the window before it are settled, over what comes before
+_SPARSE = 8  # of the places at which a forced motion is computed, one of so many suffices
+_UNSETTLED = 1.5  # times as many cycles where nothing has settled: a hop may look like a vibration
 _FAR = 0.3  # rad, of a wave, by which what the shoe adds moves it
-_ALIKE = 1.25  # largest swing of the friction force in a cycle over the median, beyond which samples miss impacts
 _DEFAULT = Thresholds()
 
 
@@ -70,7 +62,9 @@ class _Rules(ForcedRules):
         """Theory decides where the shoe has long been sliding in full contact, to one side."""
         theory, slow = self.context.linear(), self._slowest(0.0)
         start = max(min(self.last.start, self.history.samples - int(slow / self.history.interval)), 0)
-        if theory is None or not replace(self.last, start=start).slides(theory.slip):
+        if theory is None:
+            return None
+        if not replace(self.last, start=start).slides(theory.slip) and not theory.stays(self._end()[1]):
             return None
         mean, theory = theory, theory.with_slopes()
         mode = theory.mode
@@ -190,11 +184,13 @@ class _Rules(ForcedRules):
 
     def sustained(self) -> Decision:
         theory = self.context.linear() if not self.context.forced else None
-        self.cycles = found = cycles_of(self.settled_part, theory.slip if theory else None)
+        self.cycles = found = cycles_of(self.settled_part, theory.slip if theory else None, self.context.step)
         cycles = found.evidence["cycles"] if found else 0.0
         self.evidence |= found.evidence if found else {}
-        if not found or cycles < self.limits.fewest_cycles:
-            return Decision(f"only {cycles:.0f} cycles in the settled part; run longer")
+        if not found or cycles < (1.0 if self.settled else _UNSETTLED) * self.limits.fewest_cycles:
+            return Decision(
+                f"only {cycles:.0f} cycles in the {'settled part' if self.settled else 'second half'}; run longer"
+            )
         period, stick, harmonic = (
             found.evidence[name] for name in ("samples_per_cycle", "stick_cycles", "harmonic_share")
         )
@@ -215,8 +211,8 @@ class _Rules(ForcedRules):
             text = f"the amplitude still changes by {found.drift.part:.1%} within the last part of the run"
             return Decision(f"{text}; run longer")
         own, wander = (Excitation.SELF_EXCITED, found.frequency), found.evidence["frequency_spread"]
-        if (held := self._held(wander, found.frequency, found.detuning)) is not None:
-            self.evidence["frequency_spread"] = held
+        held = self._held(wander, found.frequency, found.detuning)
+        self.evidence["frequency_spread"] = (wander if held is None else held) + found.frequency_off
         if stick >= self.limits.stick_cycles:
             text = f"sustained, with stick in {stick:.0%} of {cycles:.0f} cycles"
             return Decision(text, Regime.RELAXATION, *own)
@@ -226,10 +222,12 @@ class _Rules(ForcedRules):
             lines = f"{bands:.0%} of the energy of vx in three narrow bands"
         wanders = wander > _SPREAD * found.frequency
         regular = harmonic if wanders or bands < _BANDS else max(harmonic, bands)
-        if stick <= 1.0 - self.limits.stick_cycles and regular >= self.limits.harmonic_share:
+        slips = max(stick, self.context.sticks) <= 1.0 - self.limits.stick_cycles
+        if slips and regular >= self.limits.harmonic_share:
             how = f"with stick in only {stick:.0%} of the cycles" if stick else "without stick"
             return Decision(f"sustained {how}: {lines}", Regime.QUASI_HARMONIC, *own)
-        irregular = f"irregular: stick in {stick:.0%} of the cycles, {lines}"
+        without = f" ({self.context.sticks:.0%} without the roughness)" if self.context.sticks else ""
+        irregular = f"irregular: stick in {stick:.0%} of the cycles{without}, {lines}"
         irregular += ", but the frequency wanders" if wanders else ""
         return Decision(f"{irregular}; run longer, or look at the spectrum")
 
@@ -276,7 +274,17 @@ class _Rules(ForcedRules):
         period = max(min(slow / self.history.interval, samples - 1), 1.0)
         edges = np.asarray(samples - period * np.arange(int(samples / period), -1, -1), np.float64)
         size, spread = median(swings(part, edges))
-        return size, None if self.rings or len(edges) < 3 else max(spread, part.amplitude("x") - size)
+        if self.rings or len(edges) < 3:
+            return size, None
+        off = SIZE_OFF * size * self.context.step / self.history.interval / contact_length(part)
+        return size, off + max(spread, self._beating() * part.amplitude("x") - size)
+
+    def _beating(self) -> float:
+        """Amplitude of a longer motion over that of the settled part, as waves beat that force a linear one."""
+        if not (theory := self.context.linear()):
+            return 1.0
+        forced, lasting, *_ = theory.parts(*(each[::_SPARSE] for each in self.settled_part.places()))
+        return 2.0 * forced / max(float(np.ptp(lasting)), 1e-300)
 
     def _held(self, spread: float, value: float, drift: Drift) -> float | None:
         """A spread with what a drift becomes until small disturbances have changed by a factor of e."""
@@ -307,15 +315,12 @@ def classify(history: History, context: Context, thresholds: Thresholds = _DEFAU
         evidence |= {f"ripple_{name}": getattr(ripple, name) for name in ("x", "vx", "force")}
         spread = spread + ripple.size if spread is not None else None
     reasons = [decision.reason, *([ripple.sentence] if ripple else [])]
-    if sustained and cycles and rules.lasts:
-        largest = cycles.evidence["force_variation_largest"]
-        if largest > _ALIKE * cycles.force_variation:
-            swings_to = (
-                f"swings by {cycles.force_variation:.4g} N in the median cycle and by up to {largest:.4g} N"
-            )
-            reasons.append(
-                f"the friction force {swings_to}: give a shorter output.sample_interval for its impacts"
-            )
+    torque: float | None = context.radius * (torques[1] - torques[0])
+    if sustained and cycles:
+        torque = context.radius * cycles.force_variation if cycles.force_variation is not None else None
+    if torque is None:
+        finer = f"give an output.sample_interval of {0.25 * history.interval:.2g} s"
+        reasons.append(f"samples miss impacts of the friction force, and torque_variation is missing: {finer}")
     return Verdict(
         regime=decision.regime,
         excitation=decision.excitation,
@@ -327,8 +332,7 @@ def classify(history: History, context: Context, thresholds: Thresholds = _DEFAU
         growth_rate=rules.theory.mode.growth if rules.theory else None,
         ringing_frequency=rules.theory.mode.frequency if rules.theory else None,
         frequency_resolution=1.0 / (segment(part.stop - part.start) * history.interval),
-        torque_variation=context.radius
-        * (cycles.force_variation if sustained and cycles else torques[1] - torques[0]),
+        torque_variation=torque,
         settled_from=part.start * history.interval,
         start=part.start,
         settled=rules.lasts and decision.regime is not Regime.UNDECIDED and not ripple,

@@ -5,9 +5,6 @@ Columns are named as in the header, or counted from 1. Whatever is wrong in the 
 
 import re
 import stat
-import warnings
-from contextlib import suppress
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -15,9 +12,9 @@ import numpy as np
 from brakecli.analysis.regime.of_signal import Signal
 from brakecli.analysis.regime.spectra import Array
 from brakecli.errors import UnreadableResultError, UsageError
+from brakecli.files.table import TextTable
+from brakecli.files.table import require as _require
 
-_COMMENTS = ("#", "%")
-_HEAD = 1 << 16  # bytes of a text file from which its layout is found
 _UNEVEN = 0.01  # part of the step by which steps may differ before the signal is resampled
 _GAP = 1.5  # steps of this many times the usual one are gaps
 _LONGEST = 10.0  # gaps may make a signal so many times as long; a record with longer gaps is mostly gap
@@ -38,7 +35,7 @@ def read_signal(source: str, *, column: str | None, time_column: str | None, sam
         _require(stat.S_ISREG(path.stat().st_mode), "this is not a regular file; name a file")
         if inside is not None and (column is not None or time_column is not None):
             raise UsageError("a dataset has no columns; leave out --column, and give --sample-rate HZ")
-        values, *times = [_dataset(path, inside)] if inside else _TextFile(path).columns_of(column, time_column)
+        values, *times = [_dataset(path, inside)] if inside else TextTable(path).columns_of(column, time_column)
         values = _numbers(values)
         return Signal(values, 1.0 / sample_rate) if sample_rate is not None else _evenly(values, *times)
     except (UsageError, UnreadableResultError) as error:
@@ -46,11 +43,6 @@ def read_signal(source: str, *, column: str | None, time_column: str | None, sam
     except OSError as error:
         what = (error.strerror or str(error)).lower()
         raise UnreadableResultError(f"{source}: {what}; name a readable file") from error
-
-
-def _require(good: bool | np.bool_, problem: str) -> None:
-    if not good:
-        raise UnreadableResultError(problem)
 
 
 def _dataset(path: Path, inside: str) -> Array:
@@ -74,82 +66,6 @@ def _dataset(path: Path, inside: str) -> Array:
     except Exception as error:
         what = f"cannot be read: {' '.join(str(error).split())}"
         raise UnreadableResultError(f"{what}; name an intact HDF5 file and a dataset in it") from error
-
-
-class _TextFile:
-    """A text file of columns. Its first lines show separator, decimal sign and header."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        with path.open("rb") as file:
-            head = file.read(_HEAD)
-        _require(head.strip() != b"", "the file is empty; name a file with numbers")
-        _require(b"\0" not in head, "this is not text; name a CSV file, or FILE.h5:/path of an HDF5 file")
-        lines = head.decode("utf-8-sig", errors="replace").splitlines()
-        lines = lines[:-1] if len(head) == _HEAD and len(lines) > 1 else lines
-        self.names: list[str] = []
-        for self.skip, line in enumerate(lines):
-            if not line.strip() or line.lstrip().startswith(_COMMENTS):
-                continue
-            self.separator = next((s for s in (";", "\t", ",") if s in line), None)  # None: white space
-            self.decimal_comma = self.separator != "," and "," in line
-            cells = [cell.strip().strip('"') for cell in line.split(self.separator)]
-            numbers = [_is_number(cell, self.decimal_comma) for cell in cells]
-            self.columns, names_fit = len(cells), len(self.names) == len(cells)
-            if any(numbers) and all(good or not cell for good, cell in zip(numbers, cells, strict=True)):
-                near = lines[self.skip : self.skip + 100]
-                self.decimal_comma |= self.separator != "," and any("," in text for text in near)
-                self.names = self.names if names_fit else []
-                return
-            self.names = self.names if names_fit else cells  # a second line of names is that of the units
-        raise UnreadableResultError("no line of numbers was found at its start; name a file of columns of numbers")
-
-    def columns_of(self, column: str | None, time_column: str | None) -> list[Array]:
-        """The chosen column, and the times where they are in a column."""
-        there = ", ".join(self.names) or f"columns 1 to {self.columns}, without names"
-        times = [] if time_column is None else [self._index(time_column, "--time-column", there)]
-        others = [i for i in range(self.columns) if i not in times]
-        values = others if column is None else [self._index(column, "--column", there)]
-        if len(values) != 1:
-            raise UsageError(f"which column is the signal? give --column; there are {there}")
-        chosen, last = [*values, *times], self.columns - 1
-        table = self._read(chosen if last in chosen else [*chosen, last])  # the last shows that rows are whole
-        return list(table.T[: len(chosen)])
-
-    def _index(self, wanted: str, option: str, there: str) -> int:
-        """Place of a column; a name comes before a number."""
-        if self.names.count(wanted) > 1:
-            raise UsageError(f"{option}: several columns are named {wanted}; give its number, from 1")
-        if wanted in self.names:
-            return self.names.index(wanted)
-        number = int(wanted) if wanted.isascii() and wanted.isdigit() else 0
-        _require(1 <= number <= self.columns, f"{option}: there is no column {wanted}; there are {there}")
-        return number - 1
-
-    def _read(self, columns: list[int]) -> Array:
-        """Some columns, by numpy's own reader; empty cells and decimal commas take it longer."""
-        load = partial(np.loadtxt, comments=_COMMENTS, delimiter=self.separator, usecols=columns, ndmin=2)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            if not self.decimal_comma:
-                with suppress(ValueError, IndexError):  # perhaps because of an empty cell
-                    return load(self.path, skiprows=self.skip, encoding="utf-8-sig")
-            text = self.path.read_text(encoding="utf-8-sig", errors="replace")
-            lines = (text.replace(",", ".") if self.decimal_comma else text).split("\n")
-            try:
-                return load(lines[self.skip :], converters=lambda cell: float(cell.strip().strip('"') or "nan"))
-            except (ValueError, IndexError) as error:
-                what = f"from line {self.skip + 1} on: {' '.join(str(error).split())}"
-                remedy = "give every row the same columns, and every cell a number, nothing or nan"
-                raise UnreadableResultError(f"{what}; {remedy}") from error
-
-
-def _is_number(cell: str, decimal_comma: bool) -> bool:
-    try:
-        float(cell.replace(",", ".") if decimal_comma else cell)
-    except ValueError:
-        return False
-    return True
 
 
 def _numbers(values: Array) -> Array:

@@ -73,7 +73,9 @@ class Context:
     ripple: Callable[[Part], "Ripple | None"] = lambda part: None  # of the quadrature nodes
     powers: Callable[[Part], dict[str, float]] = lambda part: {}  # W, what becomes of the power of the belt
     radius: float = 1.0  # R, m
+    step: float = 0.0  # s; 0 where steps are chosen to keep an error
     feeds: Feeds = Feeds.UNKNOWN  # what a second run has shown
+    sticks: float = 0.0  # part of the cycles that stick in a second run without roughness
 
 
 class Decision(NamedTuple):
@@ -101,7 +103,7 @@ class Verdict:
     growth_rate: float | None  # 1/s, of the slowest mode where the motion is linear
     ringing_frequency: float | None  # Hz, of that mode
     frequency_resolution: float  # Hz, to which a line of the spectrum is known
-    torque_variation: float  # N m, peak to peak
+    torque_variation: float | None  # N m, peak to peak
     settled_from: float  # s; the middle where no settled part was found
     start: int  # the sample there
     settled: bool  # whether a settled part was found

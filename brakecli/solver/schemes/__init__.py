@@ -10,8 +10,8 @@ Contract of every scheme module:
 - `order(weights, start)`: its order of accuracy on smooth motion;
 - `begin(...)`: fills the state from which the loop starts, at level `LAG`;
 - `mechanical_energy(...)`: kinetic energy and energy of the links that the scheme keeps;
-- `advance`, a kernel, and `sample`: those of `solver.loop`, or its own, with the same arguments, where its
-  steps are its own, held to a tolerance, on the grid of samples alone, or exact, on a grid between them;
+- `hold` and `advance`, kernels, and `sample`: those of `solver.loop`, or its own, with the same arguments, where
+  its steps are its own, held to a tolerance, on the grid of samples alone, or exact, on a grid between them;
 - in the first case kernels `prepare` and `finish`, of the signatures in `solver.records`: the minimisation that a
   step comes down to, and the new state with the works of the step; where steps are its own and not exact `solve`,
   the kernel of one step, which `advance` calls at the address in `plug.solve`.

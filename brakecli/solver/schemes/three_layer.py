@@ -8,7 +8,7 @@ from brakecli.solver.energy import Mechanical, links_energy
 from brakecli.solver.records import Coefficients, Pair, Weights
 
 STATE = records.STATE
-advance, sample = loop.advance, loop.sample
+hold, advance, sample = loop.hold, loop.advance, loop.sample
 LAG = 1
 MEMORY = ("x", "y", "x_old", "y_old")
 VELOCITIES: tuple[str, ...] = ()

@@ -8,7 +8,7 @@ from typing import Any
 
 from numba import float64, int64, void
 
-from brakecli.solver.compile import Floats, at_address, borrowed, kernel
+from brakecli.solver.compile import Floats, at_address, in_memory, kernel
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.energy import energy_at_level
 from brakecli.solver.friction import observed
@@ -26,6 +26,7 @@ VELOCITIES = ("v_x", "v_y")
 mechanical_energy = energy_at_level
 
 _PLANT = plant_type(MOTION)
+hold, _plant_at = in_memory(_PLANT)
 _step_at = at_address(STEP)  # compiled in its own place: otherwise `advance` would compile it again
 
 _BUDGET, _EXACT = 4096, 64
@@ -83,13 +84,13 @@ def sample(p: Plant, row: Floats) -> None:
     row[:] = p.state.row
 
 
-@kernel(int64(_PLANT, float64[:, ::1], float64[:, ::1], int64))
-def advance(p: Plant, rows: Floats, events: Floats, stop: int) -> int:
+@kernel(int64(int64, float64[:, ::1], float64[:, ::1], int64))
+def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
     """Step until the sample `stop` is reached, or until the budget of a call is spent; a `Failure`.
 
     `rows` gets the samples before that of counts.level, which waits in the state; a failure adds it.
     """
-    p = borrowed(p)
+    p: Plant = _plant_at(address)
     m, counts, drive, grid, row, steps = p.state, p.counts, p.drive, p.grid, 0, 0
     waves = p.layer.pad.shoe_terms + p.layer.pad.wheel_terms
     shoe = Shoe(p.c, p.layer, m, p.work, counts)

@@ -10,13 +10,14 @@ from typing import Any
 
 from numba import float64, int64, void
 
-from brakecli.solver.compile import Floats, borrowed, kernel
+from brakecli.solver.compile import Floats, in_memory, kernel
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.double_double import two_sum
 from brakecli.solver.energy import energy_at_level
 from brakecli.solver.friction import observed
 from brakecli.solver.quantities import BOUND, Failure
 from brakecli.solver.records import (
+    AHEAD,
     BELT,
     BELT_SLOPE,
     COUNTS_TYPE,
@@ -49,9 +50,13 @@ VELOCITIES = ("v_x", "v_y")
 mechanical_energy = energy_at_level
 
 _MOST_EVENTS, _NO_PROGRESS = 1000, 1e-6  # a run ends after so many events within that part of a step
+_FLAT = 1e-12  # fall of a margin over its rise, by which it dips by 1e-18 of this at most
+_ROUNDING = 4.0 * 2.220446049250313e-16  # of a step, beside the motion
+_ERROR_TERMS = 9  # of the series of an error, which is known to a few digits only
 _KEPT = 4096  # levels from one sum of the works to the next, so that rounding does not add up
 
 _PLANT = plant_type(FLOW)
+hold, _plant_at = in_memory(_PLANT)
 _NONE, _, _DIVERGED, _, _, _STALLED = (int(failure) for failure in Failure)
 
 
@@ -71,49 +76,86 @@ def begin(s: Weights, state: Any, position: Pair, velocity: Pair, acceleration: 
     state.v_x, state.v_y = velocity
 
 
-@kernel(float64(FLOW_TYPE, int64))
-def _ahead(m: Any, place: int) -> float:
-    """A row of the matrix of a step times the motion; a tree of sums has less latency than a loop."""
-    a, z, phase = m.step, m.z, m.phase
-    one = a[phase, place, 0] * z[0] + a[phase, place, 1] * z[1]
-    two = a[phase, place, 2] * z[2] + a[phase, place, 3] * z[3]
-    three = a[phase, place, 4] * z[4] + a[phase, place, 5] * z[5]
-    four = a[phase, place, 6] * z[6] + a[phase, place, 7] * z[7]
-    return (one + two) + (three + four)  # type: ignore[no-any-return]
+@kernel(void(FLOW_TYPE))
+def _ahead(m: Any) -> None:
+    """The matrix of a step times the motion, in `after`; a tree of sums has less latency than a loop."""
+    a, z = m.now, m.z
+    z_0, z_1, z_2, z_3, z_4, z_5, z_6, z_7 = z[0], z[1], z[2], z[3], z[4], z[5], z[6], z[7]
+    for k in range(AHEAD):
+        one, two = a[0, k] * z_0 + a[1, k] * z_1, a[2, k] * z_2 + a[3, k] * z_3
+        three, four = a[4, k] * z_4 + a[5, k] * z_5, a[6, k] * z_6 + a[7, k] * z_7
+        m.after[k] = (one + two) + (three + four)
+
+
+@kernel(void(FLOW_TYPE))
+def _round(m: Any) -> None:
+    """Add a bound of the rounding of a step to the error, with the signs with which it does most harm."""
+    a, x, y, v_x, v_y, belt, load = m.now, m.z[X], m.z[Y], m.z[V_X], m.z[V_Y], m.z[BELT], m.z[LOAD]
+    for i in range(4):
+        place = (abs(a[X, i] * x) + abs(a[Y, i] * y)) + (abs(a[V_X, i] * v_x) + abs(a[V_Y, i] * v_y))
+        drive = abs(a[BELT, i] * belt) + abs(a[LOAD, i] * load)
+        m.error[i] += math.copysign(_ROUNDING * (place + drive), m.error[i])
+
+
+@kernel(void(FLOW_TYPE))
+def _carry(m: Any) -> None:
+    """Move the error along a whole step, which has a rounding error of its own."""
+    a, x, y, v_x, v_y = m.now, m.error[X], m.error[Y], m.error[V_X], m.error[V_Y]
+    for i in range(4):
+        m.error[i] = (a[0, i] * x + a[1, i] * y) + (a[2, i] * v_x + a[3, i] * v_y)
+    _round(m)
 
 
 @kernel(int64(FLOW_TYPE, float64), inlined=False)
 def whole(m: Any, h: float) -> int:
     """Take a whole step and return 1, unless a margin runs out in it or may do so.
 
-    A margin that falls at first and rises at last is lowest inside, and not below its tangents at both ends.
+    A margin that falls at first and rises at last is lowest inside, and not below its tangents at both ends. It
+    does not fall but by rounding where a shoe breaks loose: then it begins at zero, and without a slope.
     """
-    for k in range(2 * MARGINS):
-        m.after[k] = _ahead(m, 4 + k)
-    for k in range(MARGINS):
+    _ahead(m)
+    for k in range(4, 4 + MARGINS):
         fall, rise = m.before[MARGINS + k], m.after[MARGINS + k]
-        if m.after[k] < 0.0 or (fall < 0.0 < rise and min(m.before[k] + fall, m.after[k] - rise) < 0.0):
+        if m.after[k] < 0.0 or (fall < -_FLAT * rise < 0.0 and min(m.before[k] + fall, m.after[k] - rise) < 0.0):
             return 0
-    for i in range(4):
-        m.end[i] = _ahead(m, i)
+    pair = 0
     for i in range(SIZE):
-        for j in range(SIZE):
-            m.sums[i, j] += m.z[i] * m.z[j]
+        for j in range(i + 1):
+            m.sums[pair] += m.z[i] * m.z[j]
+            pair += 1
     for i in range(4):
-        m.z[i] = m.end[i]
+        m.z[i] = m.after[i]
     m.z[BELT], m.z[LOAD] = m.z[BELT] + h * m.z[BELT_SLOPE], m.z[LOAD] + h * m.z[LOAD_SLOPE]
-    for k in range(2 * MARGINS):
+    for k in range(AHEAD):
         m.before[k] = m.after[k]
     return 1
 
 
+@kernel(void(FLOW_TYPE, float64), inlined=False)
+def _carry_part(m: Any, seconds: float) -> None:
+    """The same along a part of a step, at whose end the motion is."""
+    a, phase, x, y, v_x, v_y = m.generator, m.phase, m.error[X], m.error[Y], m.error[V_X], m.error[V_Y]
+    moved_x, moved_y, moved_v_x, moved_v_y = x, y, v_x, v_y
+    for k in range(1, _ERROR_TERMS):
+        a_x = (a[phase, V_X, X] * x + a[phase, V_X, Y] * y) + (a[phase, V_X, V_X] * v_x + a[phase, V_X, V_Y] * v_y)
+        a_y = (a[phase, V_Y, X] * x + a[phase, V_Y, Y] * y) + (a[phase, V_Y, V_X] * v_x + a[phase, V_Y, V_Y] * v_y)
+        part = seconds / k
+        x, y, v_x, v_y = part * v_x, part * v_y, part * a_x, part * a_y
+        moved_x, moved_y, moved_v_x, moved_v_y = moved_x + x, moved_y + y, moved_v_x + v_x, moved_v_y + v_y
+    m.error[X], m.error[Y], m.error[V_X], m.error[V_Y] = moved_x, moved_y, moved_v_x, moved_v_y
+    _round(m)
+
+
 @kernel(void(FLOW_TYPE), inlined=False)
 def look(m: Any) -> None:
-    """The margins of the motion reached, and their slopes."""
+    """The matrix of the phase, the margins of the motion reached, and their slopes."""
+    for i in range(SIZE):
+        for k in range(AHEAD):
+            m.now[i, k] = m.step[m.phase, i, k]
     for k in range(2 * MARGINS):
-        m.before[k] = 0.0
+        m.before[4 + k] = 0.0
         for i in range(SIZE):
-            m.before[k] += m.margins[m.phase, k, i] * m.z[i]
+            m.before[4 + k] += m.margins[m.phase, k, i] * m.z[i]
 
 
 @kernel(void(_PLANT, float64), inlined=False)
@@ -161,22 +203,31 @@ def _count(m: Any, counts: Any) -> None:
         counts.most = 1
 
 
-@kernel(int64(_PLANT, float64), inlined=False)
-def _through(p: Plant, t: float) -> int:
-    """Take the step that begins at time t, through all its events and knots; a `Failure`."""
-    m, h, tau = p.state, p.s.h, 0.0
-    while True:
-        to_knot = m.knot - t - tau
-        span = max(min(h - tau, to_knot), 0.0)
+@kernel(int64(_PLANT, float64, int64), inlined=False)
+def _through(p: Plant, t: float, to_sample: int) -> int:
+    """Step on beyond the level behind time t, through all events and knots; a `Failure`.
+
+    Whole steps go on from an event, so that motion is late at the levels that follow, until the next sample.
+    """
+    m, h, tau = p.state, p.s.h, p.state.late
+    while tau < h:
+        to_knot, fits = m.knot - t - tau, to_sample == 0 or tau == 0.0
+        if fits and h < to_knot and min(m.before[4], m.before[5], m.before[6]) >= 0.0 and whole(m, h) == 1:
+            _count(m, p.counts)
+            _carry(m)
+            tau += h
+            continue
+        span = max(min(h - tau if to_sample == 1 else h, to_knot), 0.0)
         for i in range(SIZE):
-            m.series[0, i] = m.z[i]
+            m.series[i, 0] = m.z[i]
         phases.expand(m, m.phase, span)
         which, theta = first_event(m)
         if theta > 0.0:
             phases.take_part(p.c, m, p.work, span, theta)
             _count(m, p.counts)
+            _carry_part(m, theta * span)
+        tau += theta * span
         if which != NO_EVENT:
-            tau += theta * span
             if t + tau - m.events_time > _NO_PROGRESS * h:
                 m.events_time, m.events = t + tau, 0
             m.events += 1
@@ -185,12 +236,14 @@ def _through(p: Plant, t: float) -> int:
             add_works(m, p.work)
             switch(p.c, m, which, p.s.h)
             _anchor(p, t, tau)
-        elif to_knot <= h - tau:
-            tau += span
+            if m.phase == STICK:
+                m.error[V_X] = 0.0
+        elif to_knot <= span:
             _pass_knot(p, m.knot)
-        else:
-            break
-    look(m)
+        elif to_sample == 1:
+            tau = h
+        look(m)
+    m.late = tau - h if to_sample == 0 else 0.0
     return _NONE
 
 
@@ -202,6 +255,9 @@ def _sample(p: Plant, t: float) -> None:
         travel, travel_low = integral_at(belt, t, 0.0)
         z[BELT] = z[V_X] = value_at(belt, t)
         z[X] = (m.anchor + travel) + (m.anchor_low + travel_low)
+        m.error[V_X] = 0.0
+    for i in range(4):
+        m.worst[i], m.largest[i] = max(m.worst[i], abs(m.error[i])), max(m.largest[i], abs(z[i]))
     normal = max(-m.stiffness * z[Y], 0.0) if m.phase != OPEN else 0.0
     needed = 0.0
     for i in range(SIZE):
@@ -217,10 +273,10 @@ def sample(p: Plant, row: Floats) -> None:
     row[:] = p.state.row
 
 
-@kernel(int64(_PLANT, float64[:, ::1], float64[:, ::1], int64))
-def advance(p: Plant, rows: Floats, events: Floats, stop: int) -> int:
+@kernel(int64(int64, float64[:, ::1], float64[:, ::1], int64))
+def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
     """Step from the level reached to `stop`, filling `rows` with the samples before each step; a `Failure`."""
-    p = borrowed(p)
+    p: Plant = _plant_at(address)
     m, counts, grid, h, row = p.state, p.counts, p.grid, p.s.h, 0
     if m.started == 0:
         _start(p)
@@ -236,10 +292,11 @@ def advance(p: Plant, rows: Floats, events: Floats, stop: int) -> int:
             for column in range(rows.shape[1]):  # a slice would take seconds to compile
                 rows[row, column] = m.row[column]
             row += 1
-        if t + h < m.knot and whole(m, h) == 1:
+        if m.late == 0.0 and t + h < m.knot and whole(m, h) == 1:
             _count(m, counts)
+            _carry(m)
         else:
-            failure = _through(p, t)
+            failure = _through(p, t, int(part + 1 == grid.per_sample))
         if not abs(m.z[X]) + abs(m.z[Y]) + abs(m.z[V_X]) + abs(m.z[V_Y]) < BOUND:
             failure = _DIVERGED
         if failure == _NONE:

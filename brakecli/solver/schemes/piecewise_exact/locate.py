@@ -5,7 +5,7 @@ from typing import Any
 from numba import float64, int64, types
 
 from brakecli.solver.compile import kernel
-from brakecli.solver.records import FLOW_TYPE, MARGINS, SIZE, TERMS
+from brakecli.solver.records import BELT, FLOW_TYPE, LOAD, MARGINS, SIZE, TERMS, V_X, V_Y, X, Y
 from brakecli.solver.schemes.piecewise_exact.phases import STICK
 
 NO_EVENT = -1
@@ -18,17 +18,19 @@ _LOOKS = 12  # how often a margin that begins at zero is sought above it, each t
 @kernel(types.UniTuple(float64, 2)(FLOW_TYPE, int64, float64))
 def _value(m: Any, row: int, theta: float) -> tuple[float, float]:
     """A polynomial and its slope at a part of the span."""
-    value, slope = 0.0, 0.0
-    for k in range(TERMS - 1, -1, -1):
-        slope = slope * theta + value
-        value = value * theta + m.polynomial[row, k]
-    return value, slope
+    of, q, value, slope, odd, odd_slope = m.polynomial, theta * theta, 0.0, 0.0, 0.0, 0.0
+    for k in range(TERMS - 2, -1, -2):  # even and odd powers apart, which do not wait for each other
+        slope, odd_slope = slope * q + value, odd_slope * q + odd
+        value, odd = value * q + of[row, k], odd * q + of[row, k + 1]
+    return value + theta * odd, odd + 2.0 * theta * (slope + theta * odd_slope)
 
 
 @kernel(float64(FLOW_TYPE, int64, float64, float64), inlined=False)
 def root(m: Any, row: int, left: float, right: float) -> float:
     """Where a polynomial falls through zero between left and right: Newton's iteration, kept in the bracket."""
-    place = right
+    first = m.polynomial[row, 0] if left == 0.0 else _value(m, row, left)[0]
+    last = _value(m, row, right)[0]
+    place = left + (right - left) * first / (first - last) if first > 0.0 > last else right
     for _ in range(200):
         value, slope = _value(m, row, place)
         if value > 0.0:
@@ -49,18 +51,18 @@ def root(m: Any, row: int, left: float, right: float) -> float:
 @kernel(types.UniTuple(float64, 3)(FLOW_TYPE, int64), inlined=False)
 def _follow(m: Any, which: int) -> tuple[float, float, float]:
     """A margin on the series as a polynomial: its value and slope at the end, and what rounding does to it."""
+    row, z, of = m.margins[m.phase, which], m.series, m.polynomial
+    x, y, v_x, v_y = row[X], row[Y], row[V_X], row[V_Y]
+    for k in range(TERMS):
+        of[0, k] = (x * z[X, k] + y * z[Y, k]) + (v_x * z[V_X, k] + v_y * z[V_Y, k])
+    of[0, 1] += row[BELT] * z[BELT, 1] + row[LOAD] * z[LOAD, 1]
     terms, value, slope = 0.0, 0.0, 0.0
-    for k in range(TERMS):
-        m.polynomial[0, k] = 0.0
     for i in range(SIZE):
-        row = m.margins[m.phase, which, i]
-        if row != 0.0:
-            terms += abs(row * m.series[0, i])
-            for k in range(TERMS):
-                m.polynomial[0, k] += row * m.series[k, i]
-    for k in range(TERMS):
-        value, slope = value + m.polynomial[0, k], slope + k * m.polynomial[0, k]
-        terms += abs(m.polynomial[0, k])
+        terms += abs(row[i] * z[i, 0])
+        if i > V_Y:
+            of[0, 0] += row[i] * z[i, 0]
+    for k in range(TERMS - 1, -1, -1):
+        value, slope, terms = value + of[0, k], slope + k * of[0, k], terms + abs(of[0, k])
     return value, slope, ROUNDING * terms
 
 

@@ -4,6 +4,7 @@ A phase is a side of the friction law, or a pad that is clear of the wheel. With
 components, the motion is z' = A z in each, what keeps the phase up is linear in z, and powers are quadratic in z.
 """
 
+import math
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from brakecli.solver.records import (
     LOAD_SLOPE,
     MARGINS,
     NODES,
+    PAIRS,
     PHASES,
     SIZE,
     TERMS,
@@ -46,8 +48,8 @@ _SHARES = 0.5 * np.polynomial.legendre.leggauss(NODES)[1]
 def expand(m: Any, phase: int, span: float) -> None:
     """The series of the motion over a span (s), from its first coefficient on: (A span)^k z / k!."""
     a, z = m.generator, m.series
-    x, y, v_x, v_y, belt, load = z[0, X], z[0, Y], z[0, V_X], z[0, V_Y], z[0, BELT], z[0, LOAD]
-    belt_slope, load_slope = z[0, BELT_SLOPE], z[0, LOAD_SLOPE]
+    x, y, v_x, v_y, load, belt_slope = z[X, 0], z[Y, 0], z[V_X, 0], z[V_Y, 0], z[LOAD, 0], z[BELT_SLOPE, 0]
+    z[BELT, 1], z[LOAD, 1] = span * z[BELT_SLOPE, 0], span * z[LOAD_SLOPE, 0]  # further terms are 0
     for k in range(1, TERMS):
         part = span / k
         a_x = (a[phase, V_X, X] * x + a[phase, V_X, Y] * y) + (a[phase, V_X, V_X] * v_x + a[phase, V_X, V_Y] * v_y)
@@ -55,21 +57,21 @@ def expand(m: Any, phase: int, span: float) -> None:
         a_x += a[phase, V_X, LOAD] * load + a[phase, V_X, BELT_SLOPE] * belt_slope
         a_y += a[phase, V_Y, LOAD] * load
         x, y, v_x, v_y = part * v_x, part * v_y, part * a_x, part * a_y
-        belt, load, belt_slope, load_slope = part * belt_slope, part * load_slope, 0.0, 0.0
-        z[k, X], z[k, Y], z[k, V_X], z[k, V_Y], z[k, BELT], z[k, LOAD] = x, y, v_x, v_y, belt, load
-        z[k, BELT_SLOPE] = z[k, LOAD_SLOPE] = 0.0
+        load, belt_slope = z[LOAD, 1] if k == 1 else 0.0, 0.0
+        z[X, k], z[Y, k], z[V_X, k], z[V_Y, k] = x, y, v_x, v_y
 
 
 @kernel(void(FLOW_TYPE, int64, float64, int64, int64))
 def reach(m: Any, phase: int, theta: float, node: int, column: int) -> None:
     """Put the motion at a part of the span of the series into `m.at[node, column]`, with its friction force."""
-    z, last, at = m.series, TERMS - 1, m.at
-    x, y, v_x, v_y = z[last, X], z[last, Y], z[last, V_X], z[last, V_Y]
-    for k in range(TERMS - 2, -1, -1):
-        x, y, v_x, v_y = x * theta + z[k, X], y * theta + z[k, Y], v_x * theta + z[k, V_X], v_y * theta + z[k, V_Y]
+    z, at, q = m.series, m.at, theta * theta
+    x = y = v_x = v_y = 0.0
+    for k in range(TERMS - 2, -1, -2):  # in pairs, which wait for each other half as long
+        x, y = x * q + (z[X, k + 1] * theta + z[X, k]), y * q + (z[Y, k + 1] * theta + z[Y, k])
+        v_x, v_y = v_x * q + (z[V_X, k + 1] * theta + z[V_X, k]), v_y * q + (z[V_Y, k + 1] * theta + z[V_Y, k])
     at[node, column, X], at[node, column, Y], at[node, column, V_X], at[node, column, V_Y] = x, y, v_x, v_y
-    at[node, column, BELT], at[node, column, BELT_SLOPE] = z[0, BELT] + theta * z[1, BELT], z[0, BELT_SLOPE]
-    at[node, column, LOAD], at[node, column, LOAD_SLOPE] = z[0, LOAD] + theta * z[1, LOAD], z[0, LOAD_SLOPE]
+    at[node, column, BELT], at[node, column, BELT_SLOPE] = z[BELT, 0] + theta * z[BELT, 1], z[BELT_SLOPE, 0]
+    at[node, column, LOAD], at[node, column, LOAD_SLOPE] = z[LOAD, 0] + theta * z[LOAD, 1], z[LOAD_SLOPE, 0]
     m.pull[node, column] = 0.0
     for i in range(SIZE):
         m.pull[node, column] += m.friction[phase, i] * at[node, column, i]
@@ -127,24 +129,32 @@ def make(c: Coefficients, m: Any, phase: int, h: float) -> None:
         for i in range(SIZE):
             for j in range(SIZE):
                 margins[MARGINS + k, j] += h * margins[k, i] * a[i, j]
+    still = m.knot == math.inf and m.z[BELT_SLOPE] == 0.0 and m.z[LOAD_SLOPE] == 0.0  # slopes stay zero
     for j in range(SIZE):
+        if still and j in (BELT_SLOPE, LOAD_SLOPE):
+            continue
         for i in range(SIZE):
-            m.series[0, i] = 1.0 if i == j else 0.0
+            m.series[i, 0] = 1.0 if i == j else 0.0
         expand(m, phase, h)
         for node in range(NODES + 1):
             reach(m, phase, _NODES[node] if node < NODES else 1.0, node, j)
         for i in range(SIZE):
             if i <= V_Y:
-                step[i, j] = m.at[NODES, j, i]
+                step[j, i] = m.at[NODES, j, i]
             for k in range(2 * MARGINS):
-                step[4 + k, j] += margins[k, i] * m.at[NODES, j, i]
+                step[j, 4 + k] += margins[k, i] * m.at[NODES, j, i]
     for node in range(NODES):
+        pair = 0
         for i in range(SIZE):
             for j in range(i + 1):
-                share = h * _SHARES[node] * (1.0 if i == j else 2.0)  # pairs count twice
+                if still and (i in (BELT_SLOPE, LOAD_SLOPE) or j == BELT_SLOPE):
+                    pair += 1
+                    continue
+                share = h * _SHARES[node] * (1.0 if i == j else 2.0)
                 belt, heat, dashpots, load = _powers(c, m, phase, node, i, j)
-                works[0, i, j], works[1, i, j] = works[0, i, j] + share * belt, works[1, i, j] + share * heat
-                works[2, i, j], works[3, i, j] = works[2, i, j] + share * dashpots, works[3, i, j] + share * load
+                works[0, pair], works[1, pair] = works[0, pair] + share * belt, works[1, pair] + share * heat
+                works[2, pair], works[3, pair] = works[2, pair] + share * dashpots, works[3, pair] + share * load
+                pair += 1
 
 
 @kernel(void(COEFFICIENTS, FLOW_TYPE, WORK_TYPE, float64, float64), inlined=False)
@@ -164,15 +174,10 @@ def take_part(c: Coefficients, m: Any, work: Any, span: float, theta: float) -> 
 @kernel(void(FLOW_TYPE, WORK_TYPE), inlined=False)
 def add_works(m: Any, work: Any) -> None:
     """Add up the works of the whole steps that wait for it, all of the present phase."""
-    belt, heat, dashpots, load = 0.0, 0.0, 0.0, 0.0
-    for i in range(SIZE):
-        for j in range(SIZE):
-            belt, heat = (
-                belt + m.works[m.phase, 0, i, j] * m.sums[i, j],
-                heat + m.works[m.phase, 1, i, j] * m.sums[i, j],
-            )
-            dashpots += m.works[m.phase, 2, i, j] * m.sums[i, j]
-            load += m.works[m.phase, 3, i, j] * m.sums[i, j]
-            m.sums[i, j] = 0.0
+    works, sums, belt, heat, dashpots, load = m.works[m.phase], m.sums, 0.0, 0.0, 0.0, 0.0
+    for pair in range(PAIRS):
+        belt, heat = belt + works[0, pair] * sums[pair], heat + works[1, pair] * sums[pair]
+        dashpots, load = dashpots + works[2, pair] * sums[pair], load + works[3, pair] * sums[pair]
+        sums[pair] = 0.0
     work.belt, work.friction = work.belt + belt, work.friction + heat
     work.dashpots, work.load = work.dashpots + dashpots, work.load + load

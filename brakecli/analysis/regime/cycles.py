@@ -1,0 +1,181 @@
+"""What the cycles of a vibration show: amplitude, frequency, stick, force, and how far they drift."""
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brakecli.analysis.regime.evidence import Part
+from brakecli.analysis.regime.spectra import Array, upward_crossings
+from brakecli.solver.quantities import ContactState
+
+_HARMONICS = 5
+_MOST_RISES_PER_CYCLE = 4
+_GROUPS = 10  # of neighbouring cycles, of which a median is taken
+_ENDS = (ContactState.STICK, ContactState.SEPARATED)
+_MIDDLE = np.array([1.0 / 6.0, 0.5, 5.0 / 6.0])  # quantiles
+_TREND = 3.0  # standard errors of the slope of ten medians, beyond which an amplitude drifts
+_BETWEEN = 1e-3  # of the energy of vx, between the lines of one rise, that makes a cycle of several
+_SEEN = 0.85  # least part of a force's swing in every other sample that all samples see
+SIZE_OFF, _PERIOD_OFF = 3.0, 0.2  # of an amplitude and a period, per step in a contact: most that impacts were off
+_SAME = 0.02  # squared difference, over twice the variance, between one period of vx and the next
+
+
+def median(values: Array) -> tuple[float, float]:
+    """Median, and half of the range of the middle two thirds."""
+    last = len(values) - 1
+    low, middle, high = np.interp(last * _MIDDLE, np.arange(last + 1), np.sort(values)).tolist()
+    return middle, 0.5 * (high - low)
+
+
+def swings(part: Part, edges: Array) -> Array:
+    """Half of peak to peak of x (m) in each cycle; `edges` part the last samples.
+
+    Between samples an extreme value is that of a parabola.
+    """
+    x = part.last("x")
+    inner, before, after = x[1:-1], x[:-2], x[2:]
+    bend, tops = 2.0 * inner - before - after, []
+    for sign in (1.0, -1.0):
+        extreme = (sign * inner >= sign * before) & (sign * inner > sign * after)
+        refined = sign * x
+        refined[1:-1][extreme] += (sign * (after - before) ** 2 / (8.0 * np.where(bend, bend, 1.0)))[extreme]
+        tops.append(np.maximum.reduceat(refined[: int(edges[-1])], np.asarray(edges[:-1], int)))
+    return np.asarray(0.5 * (tops[0] + tops[1]))
+
+
+@dataclass(frozen=True)
+class Cycles:
+    """What the cycles of vx show, which are counted by its rises through the mean; medians with their spread."""
+
+    evidence: dict[str, Any]
+    frequency: float  # Hz
+    frequency_off: float  # Hz, what the step may change
+    amplitude: float  # m
+    amplitude_spread: float
+    stick_fraction: float
+    contact_loss_fraction: float
+    limited: float  # part of the groups of cycles in which the shoe sticks, leaves the wheel or overtakes it
+    drift: "Drift"  # of the amplitude
+    detuning: "Drift"  # of the period
+    force_variation: float | None  # N, peak to peak of the friction force
+
+
+def cycles_of(part: Part, slip: ContactState | None = None, step: float = 0.0) -> Cycles | None:
+    """The cycles of a part; None if there are none. `slip` is the side to which the shoe slips in steady sliding.
+
+    The spreads hold what a step (s) may change, with which the motion was computed. Stick, loss of contact and
+    frequency are medians of ten groups of neighbouring cycles, so that it does not matter how samples fall into
+    each cycle.
+    """
+    velocity = part.last("vx")
+    crossings, rises = _beginnings(part, velocity)
+    if len(crossings) < 4:
+        return None
+    cycles = len(crossings) - 1
+    edges = np.linspace(0, cycles, min(cycles, _GROUPS) + 1).astype(int)
+    groups = crossings[edges]
+    period, period_spread = median(np.diff(groups) / np.diff(edges))
+    state = part.history.read("state", part.stop - len(velocity), part.stop)
+    sticks = np.flatnonzero((state[1:] == ContactState.STICK) & (state[:-1] != ContactState.STICK)) + 1
+    per_cycle = np.histogram(sticks, crossings)[0]
+    begin, end = groups[:-1].astype(int), groups[1:].astype(int) + 1
+
+    def shares(found: NDArray[np.bool_]) -> Array:
+        """Part of the samples of each group."""
+        count = np.concatenate([[0], np.cumsum(found)])
+        return np.asarray((count[end] - count[begin]) / (end - begin))
+
+    places = np.sort(crossings % 1.0)  # within their samples: where cycles last whole samples, all at one
+    unseen, step = float(np.diff(places, append=places[0] + 1.0).max()), step / part.history.interval
+    turn, impact = 2.0 * np.pi * step / period, step / contact_length(part)
+
+    def time_in(which: ContactState) -> tuple[float, float]:
+        """Part of a cycle, and its spread, with the step, and the part of a sample that no cycle has seen."""
+        there = state == which
+        middle, spread = median(shares(there))
+        return middle, max(spread, (unseen + step) * float(np.sum(there[1:] & ~there[:-1])) / cycles / period)
+
+    (stick, stick_spread), (loss, loss_spread) = (time_in(which) for which in _ENDS)
+    frequency = 1.0 / (period * part.history.interval)
+    first, *higher = (part.share([n * frequency]) for n in range(1, _HARMONICS + 1))
+    evidence = {
+        "cycles": float(cycles),
+        "samples_per_cycle": period,
+        "rises_per_cycle": float(rises),
+        "fundamental_share": first,
+        "harmonic_share": part.share([n * frequency for n in range(1, 1 + int(0.5 * period))]),
+        "harmonics": [float(np.sqrt(share / first)) for share in higher if first > 0.0],
+        "stick_cycles": float(np.mean(per_cycle > 0)),
+        "stick_episodes_per_cycle": float(np.mean(per_cycle)),
+        "frequency_spread": frequency * period_spread / period,
+        "stick_spread": stick_spread,
+        "contact_loss_spread": loss_spread,
+    }
+    limited = float(np.mean(shares(state != slip) > 0.0))
+    sizes = swings(part, crossings)
+    drift, detuning = _drift(sizes), _drift(np.diff(crossings))
+    force = part.history.read("friction_force", part.stop - len(velocity), part.stop)
+    amplitude, spread = median(sizes)
+    missed = 3.0 / 128.0 * (2.0 * np.pi / period) ** 4 * amplitude  # of a crest between two samples: parabola
+    spread = max(spread, unseen * missed) + (0.25 * turn**2 + SIZE_OFF * impact) * amplitude
+    medians = amplitude, spread, stick, loss
+    varies = _force_variation(force, crossings, groups, alike=unseen > 0.5)
+    off = frequency * (turn**2 / 8.0 + _PERIOD_OFF * impact)
+    return Cycles(evidence, frequency, off, *medians, limited, drift, detuning, varies)
+
+
+def contact_length(part: Part) -> float:
+    """How many samples a contact with the wheel takes, in the mean; infinity where it is never lost."""
+    away = ContactState.SEPARATED
+    begins = sum(np.count_nonzero((piece[:-1] == away) & (piece[1:] != away)) for piece in part.pieces("state"))
+    return (1.0 - part.fraction(away)) * (part.stop - part.start) / begins if begins else np.inf
+
+
+def _force_variation(force: Array, crossings: Array, groups: Array, alike: bool) -> float | None:
+    """Peak to peak (N) in groups of cycles, as a median: an impact of less than a sample is seen in one of them.
+
+    None where every other sample shows much less, so that all of them may miss some. Where cycles are sampled
+    alike, those are every other one of each cycle.
+    """
+    edges, begin = crossings.astype(int), groups[:-1].astype(int) - int(crossings[0])
+    force, place = force[edges[0] : edges[-1]], np.arange(edges[-1] - edges[0])
+    odd = (place - (np.repeat(edges[:-1], np.diff(edges)) if alike else 0)) % 2 == 1
+    seen = [force, np.where(odd, force, np.nan), np.where(odd, np.nan, force)]
+    swings = [median(np.fmax.reduceat(each, begin) - np.fmin.reduceat(each, begin))[0] for each in seen]
+    return swings[0] if min(swings) >= _SEEN * swings[0] else None
+
+
+def _beginnings(part: Part, velocity: Array) -> tuple[Array, int]:
+    """Where cycles begin, and how many rises each holds: one, unless lines lie between those of one."""
+    crossings = upward_crossings(velocity, 0.3 * float(velocity.std()))
+    if len(crossings) < 2:
+        return crossings, 1
+    period = float(crossings[-1] - crossings[0]) / (len(crossings) - 1)
+    close = 2.0 * _SAME * float(velocity.var())
+    for rises in range(1, _MOST_RISES_PER_CYCLE + 1):  # after which the motion repeats
+        shift = round(rises * period)
+        if 0 < shift < len(velocity) // 2 and np.mean((velocity[shift:] - velocity[:-shift]) ** 2) <= close:
+            longest = 1.0 / (rises * period * part.history.interval)
+            between = part.share([n * longest for n in range(1, _HARMONICS * rises) if n % rises])
+            return (crossings[::rises], rises) if between > _BETWEEN else (crossings, 1)
+    return crossings, 1
+
+
+class Drift(NamedTuple):
+    """Part of itself by which a number changes from the first third of the cycles to the last."""
+
+    part: float
+    sure: bool  # whether it is more than chance
+
+
+def _drift(sizes: Array) -> Drift:
+    """The drift of a number, one for each cycle."""
+    first, *_, last = (median(third)[0] for third in np.array_split(sizes, 3) if len(third))
+    groups = np.array([median(group)[0] for group in np.array_split(sizes, min(len(sizes), _GROUPS))])
+    places = np.arange(len(groups)) - 0.5 * (len(groups) - 1)
+    slope = float(places @ groups / (places @ places))
+    rest = groups - groups.mean() - slope * places
+    error = float(np.std(rest) / (np.std(places) * np.sqrt(max(len(groups) - 2, 1))))
+    return Drift(last / first - 1.0 if first > 0.0 else 0.0, abs(slope) > _TREND * error)

@@ -1,0 +1,129 @@
+"""A motion under changing speed or load, window by window: short-time spectra, and when it vibrates."""
+
+import math
+from dataclasses import dataclass
+from itertools import groupby, pairwise
+
+import numpy as np
+
+from brakecli.analysis.regime.spectra import Array, peak
+from brakecli.solver.history import History
+from brakecli.solver.quantities import ContactState
+from brakecli.solver.schedules import value_at
+from brakecli.solver.system import System
+
+CYCLES = 20.0  # of the lower natural frequency in a window
+FEWEST_WINDOWS, MOST_WINDOWS = 8, 100  # without overlap; windows overlap by three quarters
+HIGHEST = 10.0  # times the higher natural frequency: up to here spectra are kept
+LINES = 1024  # most of a short-time spectrum; neighbours are averaged
+LOUD = 0.05  # part of the largest amplitude of vx from which it vibrates
+QUIET = 0.01  # part of the wheel's largest speed below which the largest amplitude of vx is no vibration
+_HOPS = 4  # in a window
+_AT_ONCE = 16  # windows, so that memory does not grow with the run
+
+
+@dataclass(frozen=True)
+class Vibration:
+    """An interval (s) in which the shoe vibrates; Hz, m and m/s where vx is largest."""
+
+    start: float
+    end: float
+    frequency: float | None
+    amplitude: float
+    speed: float
+
+
+@dataclass(frozen=True, eq=False)
+class OverTime:
+    """Numbers of each window, at its middle (SI units), and the power spectral density of vx in each."""
+
+    time: Array
+    speed: Array
+    load: Array
+    frequency: Array  # NaN where it does not vibrate, or no line is resolved
+    amplitude: Array  # half of peak to peak of x, without its trend
+    stick_fraction: Array
+    braking_torque: Array
+    lines: Array  # Hz
+    density: Array  # windows × lines, (m/s)²/Hz
+    vibrations: list[Vibration]
+
+
+def changes(system: System) -> bool:
+    """Whether speed or load change."""
+    return len(system.belt) > 1 or len(system.load) > 1
+
+
+def over_time(history: History, system: System) -> OverTime | None:
+    """What the windows of a history show; None where speed and load are constant, or samples are too few."""
+    lowest, highest = system.natural_frequencies
+    duration = history.samples * history.interval
+    window = min(max(CYCLES / max(lowest, 1e-9), duration / MOST_WINDOWS), duration / FEWEST_WINDOWS)
+    hop = round(window / (_HOPS * history.interval))
+    count = history.samples // max(hop, 1) - _HOPS + 1
+    if not changes(system) or hop < _HOPS or count < 1:
+        return None
+    frequency, density = _spectra(history, hop, count)
+    middles = (np.arange(count) + _HOPS / 2).astype(np.float64) * hop * history.interval
+    speed, load = (np.array([value_at(s, t) for t in middles]) for s in (system.belt, system.load))
+    amplitude, swing, stick, friction = _statistics(history, hop, count)
+    loud = (swing >= LOUD * swing.max()) & (swing.max() > QUIET * system.fastest_belt)
+    length = _HOPS * hop * history.interval
+    peaks = [peak(frequency, row, length) if on else None for row, on in zip(density, loud, strict=True)]
+    tones = np.array([math.nan if tone is None else tone for tone in peaks])
+    kept = frequency <= HIGHEST * highest
+    group = math.ceil(kept.sum() / LINES)
+    whole = kept.sum() // group * group
+    lines = frequency[:whole].reshape(-1, group).mean(axis=1)
+    shown = density[:, :whole].reshape(count, -1, group).mean(axis=2)
+    edges = np.array([0.0, *(middles[:-1] + 0.5 * hop * history.interval), duration])
+    vibrations = []
+    for is_loud, places in groupby(range(count), lambda place: bool(loud[place])):
+        if is_loud:
+            part = [*places]
+            most = max(part, key=lambda place: float(swing[place]))
+            loudest = peaks[most], float(amplitude[most]), float(speed[most])
+            vibrations.append(Vibration(float(edges[part[0]]), float(edges[part[-1] + 1]), *loudest))
+    torque = system.radius * friction
+    return OverTime(middles, speed, load, tones, amplitude, stick, torque, lines, shown, vibrations)
+
+
+def _spectra(history: History, hop: int, count: int) -> tuple[Array, Array]:
+    """Frequencies (Hz) and power spectral densities of vx, a row for each window."""
+    from scipy.signal import ShortTimeFFT
+
+    transform = ShortTimeFFT.from_window(
+        "hann", 1.0 / history.interval, _HOPS * hop, (_HOPS - 1) * hop, fft_mode="onesided", scale_to="psd"
+    )
+    rows = []
+    for first in range(0, count, _AT_ONCE):
+        windows = min(_AT_ONCE, count - first)
+        block = history.read("vx", first * hop, (first + windows + _HOPS - 1) * hop)
+        rows.append(transform.spectrogram(block, detr="constant", p0=_HOPS // 2, p1=_HOPS // 2 + windows).T)
+    density = np.concatenate(rows)
+    density[:, 1:-1] *= 2.0  # one-sided: the other side's power belongs to it
+    return np.asarray(transform.f), density
+
+
+def _statistics(history: History, hop: int, count: int) -> list[Array]:
+    """Of the middle of each window: amplitude of x and of vx without their trends, stick, and mean friction force.
+
+    These parts lie side by side; the first and the last reach to the ends of the history.
+    """
+    inner = [round((place + 0.5 * (_HOPS + 1)) * hop) for place in range(count - 1)]
+    parts = [*pairwise([0, *inner, history.samples])]
+    means = {
+        name: np.array([history.read(name, *part).mean() for part in parts])
+        for name in ("x", "vx", "friction_force")
+    }
+
+    def swing(name: str) -> Array:
+        """Half of peak to peak about the trend that the means of the neighbours show."""
+        middles = np.array([0.5 * sum(part) for part in parts])
+        trend = np.gradient(means[name], middles) if count > 1 else np.zeros(1)
+        blocks = (history.read(name, *part) for part in parts)
+        spans = [np.ptp(block - k * np.arange(len(block))) for block, k in zip(blocks, trend, strict=True)]
+        return 0.5 * np.array(spans)
+
+    stick = [np.mean(history.read("state", *part) == ContactState.STICK) for part in parts]
+    return [swing("x"), swing("vx"), np.array(stick), means["friction_force"]]

@@ -1,0 +1,332 @@
+"""`import brakecli`: cases in, xarray objects out. Names, units and errors are those of the command line.
+
+Everything large is imported on the first call.
+"""
+
+import signal
+import tempfile
+import threading
+import warnings
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from brakecli.errors import BrakecliError, UsageError
+from brakecli.files.os_signals import Interrupted, unwinding
+from brakecli.stop import signals_shown
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from brakecli.case.read import LoadedCase
+    from brakecli.files.field import Field
+    from brakecli.sweeps.plan import LoadedSweep
+    from brakecli.sweeps.tables import Axis
+
+    Source = str | PathLike[str] | LoadedCase
+    Settings = Mapping[str, Any]
+
+
+def load(source: "str | PathLike[str]", settings: "Settings | None" = None) -> Any:
+    """What a file holds: a case or a sweep, for the other functions, or a result as an `xarray.DataTree`.
+
+    Args:
+        source: path of a case file, a sweep file, or a result file.
+        settings: keys of the case to change, as `{"friction.coefficient": 0.4}`; of a result none.
+
+    Raises:
+        CaseError: the case or a setting is wrong; holds every problem.
+        UnreadableResultError: the result is damaged or of another program.
+    """
+    from brakecli.cli.inputs import is_result, is_sweep, load_case, load_sweep
+
+    name = str(source)
+    if is_result(name):
+        if settings:
+            raise UsageError(f"{name}: holds a result, which has no settings; give them to brakecli.run")
+        return _opened(Path(name))
+    return (load_sweep if is_sweep(name) else load_case)(name, _overrides(settings))
+
+
+def run(
+    case: "Source",
+    settings: "Settings | None" = None,
+    *,
+    output: "str | PathLike[str] | None" = None,
+    force: bool = False,
+) -> "xr.DataTree":
+    """Simulate one case: the result as a tree of datasets.
+
+    Groups `history` (dimension `time`, s) and `spectrum` (dimension `frequency`, Hz) hold the motion; attributes
+    of the root are regime, frequency (Hz), amplitude (m) and all else that `docs/result-format.md` names.
+
+    Args:
+        case: path of a case file or of a result, or what `load` gave.
+        settings: keys of the case to change, as `{"friction.coefficient": 0.4}`; a table as
+            `{"solver": {"tolerance": 1e-4}}` replaces the one that the case has.
+        output: a result file to keep; none if left out.
+        force: replace that file if it exists.
+
+    Raises:
+        CaseError, UsageError, RefusedError, CannotWriteError: as `brakecli run`; nothing is left behind.
+        BrakecliError: the run has failed; `output` is written up to there.
+
+    A run that is not sure to keep its tolerance warns, as all that `brakecli run` warns of is a `UserWarning`.
+    """
+    with _interruptible(), _target(output) as path:
+        loaded = _case(case, settings)
+        from brakecli.runs.run import run
+
+        report = run(loaded, path, force=force)
+        _warn(report.warnings)
+        if report.motion.work.failed:
+            raise BrakecliError(str(report.motion.work.failure_sentence))
+        return _opened(path)
+
+
+def stability(
+    case: "Source",
+    settings: "Settings | None" = None,
+    *,
+    vary: "Mapping[str | tuple[str, ...], Iterable[float]] | None" = None,
+) -> "xr.Dataset":
+    """Critical friction, modes and growth of steady sliding, without time steps.
+
+    Args:
+        case: path of a case file or of a result, or what `load` gave.
+        settings: keys of the case to change.
+        vary: one key, or several that take the same value, with values that rise or fall, as
+            `{"friction.coefficient": np.linspace(0, 1, 101)}`: follows both modes along them.
+
+    Returns:
+        A variable for each number that `brakecli stability --json` prints, NaN or an empty text if there is none;
+        lists and objects as attributes. With `vary` the lock-in diagram.
+
+    Raises:
+        CaseError, UsageError, RefusedError: as `brakecli stability`.
+    """
+    with _interruptible():
+        loaded = _case(case, settings)
+        from brakecli.files.field import values_of
+        from brakecli.files.fields import STABILITY
+
+        if vary is None:
+            from brakecli.analysis.stability.report import stability
+            from brakecli.case.system import system_of
+            from brakecli.runs.limits import within_range
+
+            with within_range():
+                return _dataset(STABILITY, values_of(STABILITY, stability(system_of(loaded.case))))
+        from brakecli.sweeps.lock_in import lock_in, write
+
+        with _target(None) as path:
+            found = lock_in(loaded, _axis(vary), "vary", lambda what, done, total: None)
+            write(path, loaded, found, force=False)
+            return _opened(path).to_dataset()
+
+
+def sweep(
+    source: "Source | LoadedSweep",
+    settings: "Settings | None" = None,
+    *,
+    axes: "Mapping[str | tuple[str, ...], Iterable[Any]] | None" = None,
+    critical: "Settings | None" = None,
+    output: "str | PathLike[str] | None" = None,
+    jobs: int | None = None,
+    force: bool = False,
+) -> "xr.Dataset":
+    """Simulate a grid of cases, or search for critical values: a dataset with a dimension for each axis.
+
+    A script that calls this needs `if __name__ == "__main__":` around its work, as workers are new processes.
+
+    Args:
+        source: path of a sweep file, or what `load` gave; with `axes` or `critical` a case.
+        settings: keys of the base case to change.
+        axes: values of each key, as `{"friction.coefficient": [0.3, 0.5]}`; a tuple of keys takes the same values.
+        critical: the keys of `[critical]`, as `{"parameter": "friction.coefficient", "lower": 0, "upper": 2}`.
+        output: a result file to keep; with it, an interrupted sweep goes on where it was.
+        jobs: worker processes; one for each core if left out.
+        force: replace that file if it exists.
+
+    Raises:
+        CaseError, UsageError, RefusedError, CannotWriteError: as `brakecli sweep`.
+    """
+    with _interruptible(), _target(output) as path:
+        from brakecli.sweeps.driver import choose_engine, sweep
+        from brakecli.sweeps.plan import LoadedSweep, sweep_of
+
+        if axes is not None or critical is not None:
+            tables = [{"parameter": keys, "values": _plain(values)} for keys, values in (axes or {}).items()]
+            given = {"case": "-", "axis": tables, "critical": critical}
+            loaded = sweep_of({name: each for name, each in given.items() if each}, _case(source, settings))
+        elif isinstance(source, LoadedSweep):
+            loaded = source
+        else:
+            from brakecli.cli.inputs import load_sweep
+
+            loaded = load_sweep(str(source), _overrides(settings))
+        from brakecli.runs.run import load_kernels
+
+        load_kernels(loaded.base)
+        with choose_engine(loaded.plan, jobs) as engine:
+            report = sweep(loaded, path, engine, force=force)
+        _warn(report.notes)
+        if found := report.findings.failures:
+            failed = f"{report.findings.failed} of {report.findings.points} points failed"
+            _warn([f"{failed}, the first: {found[0]['reason']}"])
+        return _opened(path).to_dataset()
+
+
+def classify(
+    source: "str | PathLike[str]",
+    quantity: str | None = None,
+    *,
+    belt_speed: float | None = None,
+    stiffness: float | None = None,
+    thresholds: "Mapping[str, float] | None" = None,
+    **reading: Any,
+) -> "xr.Dataset":
+    """Regime of a stored run, or of a measured signal, with evidence.
+
+    Args:
+        source: path of a result, or of a measured signal.
+        quantity: what was measured, as `brakecli classify --quantity` has it; None for a result.
+        belt_speed: speed of the wheel's surface (m/s), if known.
+        stiffness: stiffness behind a measured force (N/m), if known.
+        thresholds: limits of the rules to change.
+        reading: how a file is read: `column`, `time_column`, `sample_rate` (Hz).
+
+    Returns:
+        A variable for each number that `brakecli classify --json` prints, evidence and reasons as attributes.
+
+    Raises:
+        UsageError, UnreadableResultError: as `brakecli classify`.
+    """
+    from brakecli.cli.classify import changed
+    from brakecli.files.fields import VERDICT
+
+    changes = [f"{name}={value}" for name, value in (thresholds or {}).items()]
+    with _interruptible():
+        if quantity is None:
+            from brakecli.analysis.regime.of_run import classify_result
+            from brakecli.analysis.regime.verdict import Thresholds
+
+            return _dataset(VERDICT, classify_result(Path(source), changed(Thresholds, changes)))
+        from brakecli.analysis.regime.of_signal import Measurand, SignalThresholds, classify_signal
+        from brakecli.analysis.regime.signal_file import read_signal
+
+        if quantity not in set(Measurand):
+            raise UsageError(f"quantity {quantity}: is not known; give one of {', '.join(Measurand)}")
+        verdict = classify_signal(
+            read_signal(str(source), **(dict.fromkeys(("column", "time_column", "sample_rate")) | reading)),
+            quantity=Measurand(quantity),
+            belt_speed=belt_speed,
+            stiffness=stiffness,
+            thresholds=changed(SignalThresholds, changes),
+        )
+        _warn(verdict.warnings)
+        return _dataset(VERDICT, asdict(verdict))
+
+
+@contextmanager
+def _interruptible() -> Iterator[None]:
+    """Let Ctrl-C end compiled code, too, and remove unfinished files; other threads hear no signals."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    try:
+        with signals_shown(), unwinding():
+            yield
+    except Interrupted as error:
+        if error.exit_code == 128 + signal.SIGINT:
+            raise KeyboardInterrupt from None
+        raise SystemExit(error.exit_code) from None
+
+
+@contextmanager
+def _target(output: "str | PathLike[str] | None") -> Iterator[Path]:
+    """Where a result goes: to a file that stays, or to one that does not."""
+    if output is not None:
+        yield Path(output)
+        return
+    with tempfile.TemporaryDirectory(prefix="brakecli-") as folder:
+        yield Path(folder) / "result.h5"
+
+
+def _case(source: "Source | LoadedSweep", settings: "Settings | None") -> "LoadedCase":
+    from brakecli.case.read import LoadedCase, parse_case
+    from brakecli.cli.inputs import load_case
+
+    if isinstance(source, LoadedCase):
+        return parse_case(source.resolved, "the case", _overrides(settings)) if settings else source
+    return load_case(str(source), _overrides(settings))
+
+
+def _overrides(settings: "Settings | None") -> list[str]:
+    """Settings as `--set` has them; a table replaces the one that the case has."""
+    return [f"{key}={_toml(value)}" for key, value in (settings or {}).items()]
+
+
+def _toml(value: Any) -> str:
+    import tomli_w
+
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{key} = {_toml(each)}" for key, each in value.items()) + "}"
+    return tomli_w.dumps({"value": _plain(value)}).removeprefix("value = ").strip()
+
+
+def _axis(vary: "Mapping[str | tuple[str, ...], Iterable[float]]") -> "Axis":
+    import tomli_w
+
+    from brakecli.case.read import parse_table
+    from brakecli.sweeps.tables import Axis
+
+    if len(vary) != 1:
+        raise UsageError("vary: takes one key with its values, or one tuple of keys; give the others as settings")
+    [(keys, values)] = vary.items()
+    return parse_table(Axis, tomli_w.dumps({"parameter": keys, "values": _plain(values)}), "vary")
+
+
+def _plain(value: Any) -> Any:
+    """A value without NumPy or xarray, as TOML holds it."""
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    return (
+        [_plain(each) for each in value] if isinstance(value, Iterable) and not isinstance(value, str) else value
+    )
+
+
+def _opened(path: Path) -> "xr.DataTree":
+    """A result file in memory, checked."""
+    import xarray as xr
+
+    from brakecli.files.read import open_result
+
+    with open_result(path):
+        pass
+    with xr.open_datatree(path, engine="h5netcdf") as tree:
+        return tree.load()
+
+
+def _dataset(declared: "Iterable[Field]", numbers: Mapping[str, Any]) -> "xr.Dataset":
+    """Numbers and texts as variables with their units; lists and objects as attributes."""
+    import xarray as xr
+
+    found = xr.Dataset()
+    for field in declared:
+        value = numbers.get(field.name)
+        if isinstance(value, list | tuple | dict):
+            found.attrs[field.name] = value
+        elif field.kind != "O":
+            missing = "" if field.kind.startswith("S") else float("nan")
+            about = {"units": field.units, "long_name": field.meaning}
+            found[field.name] = ((), missing if value is None else value, about)
+    return found
+
+
+def _warn(texts: Iterable[str]) -> None:
+    for text in texts:
+        warnings.warn(text, stacklevel=3)

@@ -1,0 +1,113 @@
+"""A measured profile as a sum of sines."""
+
+import math
+import stat
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from brakecli.case.tables import MOST_SINES
+from brakecli.errors import UsageError, printable
+from brakecli.files.table import Array, TextTable, require
+
+_ROUNDING = 1e-12  # of heights, relative to their root mean square
+_FITS = 0.005  # part of a turn by which a record may miss a whole number of turns
+
+
+def sines_of(path: Path, error: float, radius: float, pad: float | None) -> dict[str, Any]:
+    """The keys of a surface that leaves out a part `error` of the RMS of a measured profile.
+
+    `radius` (m) makes angles lengths. `pad` is the half length of a shoe (m); without one it is the profile of a
+    wheel, of which whole turns are averaged. Otherwise the profile is repeated beyond what was measured. Raises
+    UnreadableResultError, UsageError and OSError.
+    """
+    place, height = _read(path, radius)
+    turn, step = 2.0 * math.pi * radius, float(np.median(np.diff(place)))
+    turns, around = _turns(place, step, turn) if pad is None else (0, 0.0)
+    if turns:
+        count = round(around / step)
+        inside = place - place[0] < turns * around - 0.5 * step  # the last value may repeat the first
+        grid = np.arange(turns * count) * (around / count)
+        rows = np.interp(grid, (place - place[0])[inside], height[inside], period=turns * around)
+        rows = rows.reshape(turns, count)
+        found = rows.mean(axis=0) - rows.mean()
+        spread = float(np.sqrt(np.mean((rows - rows.mean(axis=0)) ** 2)))
+        how = f", mean of {turns} turns, which differ from it by {spread:.3g} m (RMS)" * (turns > 1)
+        length = turn
+    else:
+        span = float(place[-1] - place[0])
+        count = min(round(span / step) + 1, 10 * len(place))
+        grid = np.linspace(0.0, span, count)
+        found = np.interp(grid, place - place[0], height)
+        found -= np.polyval(np.polyfit(grid, found, 1), grid)
+        length = span * count / (count - 1)
+        how = f", over {length:.4g} m, beyond which it repeats; a straight line was removed"
+        if pad is not None and (place[0] > -pad + step or place[-1] < pad - step):
+            how += f"; the pad from {-pad:g} to {pad:g} m reaches beyond {place[0]:.4g} to {place[-1]:.4g} m"
+    chosen, amplitudes, phases, lost = _strongest(found, error)
+    phases = (phases - 360.0 * (chosen * place[0] / length % 1.0)) % 360.0
+    rms = float(np.sqrt(np.mean(found**2)))
+    note = f"{len(chosen)} of {count // 2} sines leave out {100.0 * lost:.2g} % of the RMS of {rms:.3g} m{how}"
+    waves = {"orders": chosen.astype(float).tolist()} if turns else {"wavelengths": (length / chosen).tolist()}
+    note = f"{printable(path.name)}: {note}"
+    return {"amplitudes": amplitudes.tolist(), **waves, "phases_deg": phases.tolist(), "note": note}
+
+
+def _read(path: Path, radius: float) -> tuple[Array, Array]:
+    """Places along the surface, rising, and heights there, m."""
+    require(stat.S_ISREG(path.stat().st_mode), "this is not a regular file; name a CSV file")
+    table = TextTable(path)
+    require(table.columns == 2, f"has {table.columns} columns; give two: position or angle, and height")
+    lines = [line for line in table.header if line.strip()]
+    unnamed = "its first lines do not name both columns; separate names and numbers alike, or remove these lines"
+    require(table.names or not lines, unnamed)
+    along, up = table.unit(0, "meter", "radian"), table.unit(1, "meter")
+    bare = along is None and table.names and "angle" in table.names[0].lower()
+    require(not bare, f"column {table.names[0] if bare else ''}: has no unit; name it angle_deg or angle_rad")
+    place, height = (
+        values * (unit or (1.0, "meter"))[0] for values, unit in zip(table.numbers(), (along, up), strict=True)
+    )
+    require(np.isfinite(place).all() and np.isfinite(height).all(), "a cell is empty or no number; fill it")
+    if place[-1] < place[0]:
+        place, height = place[::-1], height[::-1]
+    steps = np.diff(place)
+    require(len(place) > 3, f"has {len(place)} rows; measure four places or more")
+    row = int(np.argmin(steps > 0.0)) + 2
+    require(
+        steps.min() > 0.0, f"its places do not rise or fall throughout, see row {row} of numbers; sort the rows"
+    )
+    require(np.ptp(height) > 0.0, "all heights are equal; leave the surface out, which is smooth")
+    return place * (radius if along and along[1] == "radian" else 1.0), height
+
+
+def _turns(place: Array, step: float, turn: float) -> tuple[int, float]:
+    """Whole turns in a record, and the length of each; a record that nearly is so many turns has their length."""
+    span = float(place[-1] - place[0])
+    turns = math.floor((span + step) / turn + _FITS)
+    length = min(
+        (span + step, span), key=lambda length: abs(length - turns * turn)
+    )  # the end may repeat the start
+    fits = turns and abs(length - turns * turn) <= _FITS * turn
+    return turns, length / turns if fits else turn
+
+
+def _strongest(height: Array, error: float) -> tuple[Array, Array, Array, float]:
+    """The fewest sines that leave out a part `error` of the RMS, and the part that they leave out.
+
+    They are given as waves in the record, amplitudes and phases (deg).
+    """
+    count = len(height)
+    waves = np.fft.rfft(height)[1:] / count
+    twice = np.where(np.arange(1, len(waves) + 1) == 0.5 * count, 1.0, 2.0)  # the shortest wave stands alone
+    power = twice * np.abs(waves) ** 2  # Parseval: these add up to the mean square
+    order = np.argsort(-power, kind="stable")
+    left = np.append(np.cumsum(power[order][::-1])[::-1], 0.0)
+    left = np.sqrt(left / left[0])
+    needed = int(np.argmax(left <= max(error, _ROUNDING)))
+    if needed > MOST_SINES:
+        what = f"needs {needed} sines to leave out {error:g} of its RMS, and {MOST_SINES} is the most"
+        raise UsageError(f"{what}; set profile_error to {math.ceil(1e3 * left[MOST_SINES]) / 1e3:g}")
+    chosen = np.sort(order[:needed])
+    phases = np.degrees(np.angle(waves[chosen])) + 90.0
+    return chosen + 1, (twice * np.abs(waves))[chosen], phases, float(left[needed])

@@ -1,0 +1,119 @@
+"""Rough surfaces as users know them: sines, orders of a turn, or a self-affine spectrum."""
+
+from collections.abc import Iterator
+from typing import Annotated, Any, ClassVar
+
+from pydantic import Field
+
+from brakecli.case import tables
+from brakecli.case.tables import MOST_SINES, SMALLEST, NonNegative, Positive, Table, Weight, described, quantity
+from brakecli.errors import Problem
+
+NEEDLESS = {
+    **dict.fromkeys(("amplitudes", "wavelengths", "wavenumbers", "orders"), ("note",)),
+    **dict.fromkeys(("profile", "spectrum"), ("note", "phases_deg")),
+}
+"""Keys of a surface that an override of one replaces, beside those that exclude each other."""
+_SINES = ("amplitudes", "wavelengths", "wavenumbers", "orders", "phases_deg")
+
+
+class Spectrum(Table):
+    """A self-affine surface: its power spectral density falls as q^(-1 - 2 hurst) between two wavelengths."""
+
+    rms: NonNegative = quantity("m", "root of the mean square of the heights")
+    hurst: Weight = quantity("1", "Hurst exponent: 0 is roughest, 1 smoothest")
+    shortest: Positive = quantity("m", "shortest wavelength")
+    longest: Positive = quantity("m", "longest wavelength")
+    terms: Annotated[int, Field(ge=2, le=MOST_SINES)] = described(
+        "number of sines, at equal steps of 1/wavelength", 100
+    )
+    seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = described("seed of the random phases", 0)
+
+    def _broken_rules(self) -> Iterator[Problem]:
+        if self.shortest >= self.longest:
+            yield self.wrong("shortest", "is not below longest", "give a range of wavelengths")
+
+    def sines(self) -> dict[str, Any]:
+        """The lists of its sines, the longest wave first; the sum of their mean squares is that of the heights."""
+        import numpy as np
+
+        count = np.linspace(1.0, self.longest / self.shortest, self.terms)  # of waves in the longest wavelength
+        shape = count ** (-0.5 - self.hurst)  # the square is the density, as steps are equal
+        amplitudes = self.rms * np.sqrt(2.0 / np.sum(shape**2)) * shape
+        phases = np.random.default_rng(self.seed).uniform(0.0, 360.0, self.terms)
+        return {
+            "amplitudes": np.where(amplitudes < SMALLEST, 0.0, amplitudes).tolist(),
+            "wavelengths": np.clip(self.longest / count, self.shortest, self.longest).tolist(),
+            "phases_deg": phases.tolist(),
+        }
+
+
+class Profile(Table):
+    """A rough surface as a sum of sines, however that is given; empty lists are a smooth surface."""
+
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (
+        ("amplitudes", "wavelengths"),
+        ("amplitudes", "wavenumbers"),
+        ("profile",),
+        ("spectrum",),
+    )
+
+    amplitudes: tables.Series | None = quantity("m", "amplitude of each sine", None)
+    wavelengths: tables.Lengths | None = quantity("m", "wavelength of each sine", None)
+    wavenumbers: tables.Lengths | None = quantity("rad/m", "wavenumber of each sine", None)
+    phases_deg: tables.Series | None = quantity(
+        "deg", "phase of each sine, 0 if left out; in a spectrum in place of random ones", None
+    )
+    profile: Annotated[str, Field(min_length=1)] | None = described(
+        "CSV file with two columns, position or angle and height; seen from the file of the case", None
+    )
+    profile_error: Weight | None = quantity(
+        "1", "part of the RMS that its sines may leave out, 0.01 if left out", None
+    )
+    spectrum: Spectrum | None = described("a self-affine surface of random phases", None)
+    note: tables.Title | None = described("one line for people to read: where the sines come from", None)
+
+    def _fill(self) -> None:
+        if self.phases_deg is None and self.amplitudes is not None:
+            self.__dict__["phases_deg"] = (0.0,) * len(self.amplitudes)
+
+    def _broken_rules(self) -> Iterator[Problem]:
+        yield from super()._broken_rules()
+        for key in ("phases_deg", "wavelengths", "wavenumbers"):
+            yield from self.different_lengths(key, "amplitudes")
+        if self.profile is not None and self.phases_deg is not None:
+            yield self.wrong("phases_deg", "is given together with profile", "leave it out")
+        if self.profile is None and self.profile_error is not None:
+            yield self.wrong("profile_error", "is only for a profile", "leave it out")
+        if self.spectrum and self.phases_deg is not None and len(self.phases_deg) != self.spectrum.terms:
+            what = f"has {tables.entries(self.phases_deg)}, but spectrum.terms is {self.spectrum.terms}"
+            yield self.wrong("phases_deg", what, "give one value for each term, or leave phases_deg out")
+
+    @property
+    def is_rough(self) -> bool:
+        """Whether a sine has an amplitude."""
+        return bool(self.spectrum.rms) if self.spectrum else any(self.amplitudes or ())
+
+    def sines(self) -> dict[str, Any]:
+        """The lists of its sines, by the names of their keys."""
+        known = {key: value for key in _SINES if (value := getattr(self, key, None)) is not None}
+        return {**self.spectrum.sines(), **known} if self.spectrum else known
+
+
+class WheelProfile(Profile):
+    """The rough surface of the wheel, which has a circumference."""
+
+    alternatives = (*Profile.alternatives[:2], ("amplitudes", "orders"), *Profile.alternatives[2:])
+
+    orders: tables.Wholes | None = quantity("1", "waves per turn of each sine", None)
+
+    def _broken_rules(self) -> Iterator[Problem]:
+        yield from super()._broken_rules()
+        yield from self.different_lengths("orders", "amplitudes")
+
+
+class Roughness(Table):
+    """The profiles of both surfaces; a surface without one is smooth."""
+
+    shoe: Profile | None = described("profile f1 of the shoe", None)
+    wheel: WheelProfile | None = described("profile f2 of the wheel", None)

@@ -1,0 +1,31 @@
+"""`brakecli export`."""
+
+from pathlib import Path
+from typing import Annotated
+
+from brakecli.cli.inputs import result_path
+from brakecli.cli.options import Force, Quiet, option, output_option, source_argument
+from brakecli.cli.output import show, warn
+from brakecli.files.os_signals import unwinding
+
+VARIABLE = "Variable to export, of a table repeatable; all of them, or vx for sound, if left out."
+
+
+def command(
+    result: Annotated[Path, source_argument("FILE.h5", "Result of a run, a sweep, a comparison or stability.")],
+    output: Annotated[Path | None, output_option("File, .csv or .wav", "FILE.csv, here")] = None,
+    variables: Annotated[list[str] | None, option(VARIABLE, "NAME", "--variable")] = None,
+    group: Annotated[str | None, option("What of a run: history (default) or spectrum.", "GROUP")] = None,
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Write numbers as CSV, or a motion as sound."""
+    from brakecli.files.export import export
+    from brakecli.files.read import open_result
+
+    target = result_path(output, str(result), ending=".csv")
+    with unwinding(), open_result(result) as stored:
+        notes = export(stored, target, group, variables or (), force=force)
+    warn(*notes)
+    if not quiet:
+        show(f"{target}: written")

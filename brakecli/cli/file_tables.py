@@ -1,0 +1,65 @@
+"""What result files hold and how two differ, as tables for people."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from brakecli.cli.tables import grid, text_of, two_columns
+from brakecli.errors import value_text
+
+_ASIDE = ("regime/", "adjustments", "reasons", "warnings", "modelled", "left_out")  # long, and in --json
+
+
+def info_table(numbers: Mapping[str, Any]) -> str:
+    """Contents of a file, a row for each group of variables."""
+    groups: dict[str, list[str]] = {}
+    for each in numbers["variables"]:
+        sizes = " x ".join(f"{name} {size}" for name, size in zip(each["dims"], each["shape"], strict=True))
+        groups.setdefault(f"{each['group']}: {sizes}", []).append(each["name"])
+    changed = "complete, but another program has changed it"
+    made = ", ".join(f"{name} {version}" for name, version in numbers["versions"].items())
+    rows = [
+        ("kind", str(numbers["kind"]) + (f", {numbers['status']}" if numbers["status"] else "")),
+        ("title", numbers["title"] or "-"),
+        ("whole", "yes, every byte is as it was written" if numbers["whole"] else changed),
+        ("size", f"{numbers['bytes'] / 1e6:.3g} MB"),
+        ("made by", made),
+        *((where, ", ".join(names)) for where, names in groups.items()),
+    ]
+    return two_columns(numbers["file"], rows)
+
+
+def diff_table(files: Mapping[str, str], numbers: Mapping[str, Any]) -> str:
+    """Keys, numbers and variables that differ, each side by side."""
+    parts = []
+    for title, name in (("case", "case"), ("numbers", "numbers"), ("versions", "versions")):
+        shown = [each for each in numbers[name] if not each["name"].startswith(_ASIDE)]
+        if shown:
+            columns = {title: [each["name"] for each in shown]}
+            columns |= {files[side]: [_text(each[side]) for each in shown] for side in ("a", "b")}
+            parts.append(grid(columns))
+        if more := len(numbers[name]) - len(shown):
+            parts.append(f"{more} more with reasons and evidence differ; --json lists them")
+    if variables := numbers["variables"]:
+        columns = {
+            "variable": [f"{each['group']}/{each['name']}".replace("//", "") for each in variables],
+            "differ": [f"{each['different']} of {each['compared']}" for each in variables],
+            "by at most": [text_of(each["largest"], form=".3g") for each in variables],
+            "of the largest": [text_of(each["relative"], form=".2%") for each in variables],
+            "shapes": [" and ".join(map(_shape, each["shapes"])) for each in variables],
+        }
+        if all(each["shapes"][0] == each["shapes"][1] for each in variables):
+            del columns["shapes"]
+        parts.append(grid(columns))
+    if numbers["same"]:
+        parts.append("no difference in case, numbers and variables")
+    if files["output"]:
+        parts.append(f"{files['output']}: written")
+    return "\n\n".join(parts)
+
+
+def _text(value: Any) -> str:
+    return "-" if value is None else f"{value:.6g}" if isinstance(value, float) else value_text(value).strip('"')
+
+
+def _shape(shape: Any) -> str:
+    return "-" if shape is None else " x ".join(map(str, shape))

@@ -1,0 +1,23 @@
+"""`brakecli info`."""
+
+from pathlib import Path
+from typing import Annotated
+
+from brakecli.cli.options import AsJson, source_argument
+from brakecli.cli.output import show_result
+
+
+def command(
+    result: Annotated[Path, source_argument("FILE.h5", "Result of any kind.")],
+    as_json: AsJson = False,
+) -> None:
+    """What a result holds, whether it is whole, what made it."""
+    from brakecli.cli.file_tables import info_table
+    from brakecli.files import fields
+    from brakecli.files.contents import contents
+    from brakecli.files.field import values_of
+    from brakecli.files.read import open_result
+
+    with open_result(result) as stored:
+        numbers = values_of(fields.INFO, contents(stored))
+    show_result("info", numbers, info_table, numbers, as_json=as_json, quiet=False)

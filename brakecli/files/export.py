@@ -1,0 +1,162 @@
+"""Numbers of a result for other programs: tables as CSV, a motion as sound."""
+
+import csv
+import io
+import math
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from brakecli.errors import UnreadableResultError, UsageError
+from brakecli.files import fields
+from brakecli.files.atomic import new_output
+from brakecli.files.read import StoredResult, Variable
+from brakecli.files.write import FILL
+
+RATE = 44_100  # samples of sound per second
+PEAK = 10.0 ** (-3.0 / 20.0)  # -3 dB of full scale
+_BLOCK = 1 << 16  # rows read at a time
+_LONGEST = 3600.0  # s of sound
+_QUIET = 1e-3  # part of the power that may be left out unsaid
+_HEARD = 20.0  # Hz
+_TABLES = (fields.HISTORY, fields.POINT, fields.CRITICAL, fields.VARIED, fields.MODES, fields.ENTRY)
+_ORDER = [field.name for rows in _TABLES for field in rows]  # of columns
+_AXES = {"history": "time", "spectrum": "frequency"}
+
+
+def export(
+    result: StoredResult, target: Path, group: str | None, names: Sequence[str], *, force: bool
+) -> list[str]:
+    """Write numbers of a result as CSV, or one variable of a run as WAV; sentences on what was left out.
+
+    Raises UsageError for what the result does not have, UnreadableResultError and CannotWriteError.
+    """
+    suffix, kind = target.suffix.lower(), result.attributes.get("kind")
+    if suffix not in (".csv", ".wav"):
+        raise UsageError(f"{target}: its suffix does not name a kind of file; name one that ends in .csv or .wav")
+    if kind != "run" and (group or suffix == ".wav"):
+        what = f"--group {group}" if group else str(target)
+        raise UsageError(f"{what}: is for runs, and {result.path} is a {kind}; export it as .csv without --group")
+    if group not in (None, *_AXES):
+        raise UsageError(f"--group {group}: there is none; give {' or '.join(_AXES)}")
+    if suffix == ".wav" and (group == "spectrum" or len(names) > 1):
+        raise UsageError(
+            f"{target}: a sound is one variable of the history; give one --variable and no other group"
+        )
+    with new_output(target, force=force) as file:
+        notes = list[str]()
+        if suffix == ".wav":
+            sound, notes = _sound(result, names[0] if names else "vx")
+            file.write(sound)
+        else:
+            for rows in _rows(result, (group or "history") if kind == "run" else "/", names):
+                stream = io.StringIO()
+                csv.writer(stream, lineterminator="\n").writerows(rows)
+                file.write(stream.getvalue().encode())
+        file.publish()
+    return notes
+
+
+def _rows(result: StoredResult, group: str, names: Sequence[str]) -> Iterator[list[Sequence[Any]]]:
+    """The header and blocks of rows of a table: one row for each place along the axes of the group."""
+    known = result.variables(group)
+    axes = (_AXES[group],) if group != "/" else _main(known)
+    if not axes or any(axis not in known for axis in axes):
+        raise UnreadableResultError(f"{result.path}: {group} lacks its axes; name an intact result file")
+    shape = tuple(known[axis].shape[0] for axis in axes)
+    ordered = sorted(known, key=lambda name: _ORDER.index(name) if name in _ORDER else len(_ORDER))
+    there = [name for name in ordered if known[name].dims != (name,) and _lies_along(known[name], axes, shape)]
+    chosen = {name: _kept(result, group, name, len(axes)) for name in _checked(names, there, result)}
+    header = [_head(axis, known[axis]) for axis in axes]
+    for name, kept in chosen.items():
+        inner = known[name].dims[len(axes) :]
+        header += [_head(f"{name} of {inner[0]} {number + 1}" if inner else name, known[name]) for number in kept]
+    yield [header]
+    places = [result.read(group, axis) for axis in axes]
+    rows = max(1, _BLOCK // math.prod(shape[1:]))
+    for start in range(0, shape[0], rows):
+        part = places[0][start : start + rows]
+        columns = [each.ravel() for each in np.meshgrid(part, *places[1:], indexing="ij")]
+        for name, kept in chosen.items():
+            if known[name].shape == shape[1:] != shape[:1]:  # alike in both directions
+                values = np.broadcast_to(result.read(group, name), (len(part), *shape[1:]))
+            else:
+                values = result.read(group, name, start, start + rows)
+            columns += [*values.reshape(len(columns[0]), -1).T[kept]]
+        lists = ([None if value == FILL else value for value in each.tolist()] for each in columns)
+        yield [*zip(*lists, strict=True)]
+
+
+def _lies_along(variable: Variable, axes: tuple[str, ...], shape: tuple[int, ...]) -> bool:
+    """Whether a variable has a value, or several, at each place, or at each of both directions of a sweep."""
+    return variable.shape[: len(axes)] == shape or (axes[0] == "direction" and variable.dims == axes[1:])
+
+
+def _kept(result: StoredResult, group: str, name: str, axes: int) -> list[int]:
+    """Which values at a place have a column: of the windows of instability as many as the point with most has."""
+    inner = result.variables(group)[name].shape[axes:]
+    if not inner:
+        return [0]
+    values = result.read(group, name).reshape(-1, math.prod(inner))
+    return [number for number, column in enumerate(values.T) if column.dtype.kind != "f" or (column != FILL).any()]
+
+
+def _main(known: dict[str, Variable]) -> tuple[str, ...]:
+    """The axes that all numbers of a sweep, of stability or of a comparison have in common."""
+    dims = [each.dims for name, each in known.items() if each.dims != (name,)]
+    return known["status"].dims if "status" in known else min(dims, key=len, default=())
+
+
+def _checked(names: Sequence[str], there: Sequence[str], result: StoredResult) -> Sequence[str]:
+    """The wanted names, or all there are; raises UsageError for one that is not there."""
+    for name in names:
+        if name not in there:
+            raise UsageError(f"--variable {name}: {result.path} has none; give one of {', '.join(there)}")
+    return names or there
+
+
+def _head(name: str, variable: Variable) -> str:
+    units = str(variable.attributes.get("units", ""))
+    return name if units in ("", "1") else f"{name} ({units})"
+
+
+def _sound(result: StoredResult, name: str) -> tuple[bytes, list[str]]:
+    """A variable of a history as a WAV file of 16 bits, without its mean; what cannot be heard of it."""
+    from scipy.io import wavfile
+    from scipy.signal import resample_poly
+
+    known = result.variables("history")
+    _checked([name], [each for each in known if each not in ("time", "state")], result)
+    ends = result.read("history", "time", 0, 2)
+    values = np.zeros(0) if len(ends) < 2 else result.read("history", name)
+    duration = float(ends[1] - ends[0]) * len(values) if len(values) else 0.0
+    if duration > _LONGEST:
+        raise UsageError(
+            f"{result.path}: {duration:.4g} s are too long for a sound; run a case of an hour at most"
+        )
+    values = values - np.mean(values) if len(values) else values
+    if not np.any(values):
+        raise UsageError(
+            f"{result.path}: {name} does not change, there is nothing to hear; name another --variable"
+        )
+    rate, notes = len(values) / duration, list[str]()
+    if rate > RATE:
+        power, frequency = np.abs(np.fft.rfft(values)) ** 2, np.fft.rfftfreq(len(values), 1.0 / rate)
+        lost = float(power[frequency > 0.5 * RATE].sum() / power.sum())
+        if lost > _QUIET:
+            notes.append(f"{lost:.2%} of the power of {name} is above {0.5 * RATE:g} Hz and not in the sound")
+    ratio = Fraction(RATE / rate).limit_denominator(10_000)
+    sound = resample_poly(values, ratio.numerator, ratio.denominator)
+    if not (peak := float(np.abs(sound).max())) > 1e-6 * float(np.abs(values).max()):
+        raise UsageError(
+            f"{result.path}: all of {name} is above {0.5 * RATE:g} Hz, no sound holds it; export .csv"
+        )
+    tone = result.attributes.get("frequency") or math.nan
+    if tone < _HEARD or tone > 0.5 * RATE:
+        notes.append(f"the vibration at {tone:.4g} Hz cannot be heard")
+    stream = io.BytesIO()
+    wavfile.write(stream, RATE, np.round(sound * (PEAK * 32767.0 / peak)).astype(np.int16))
+    return stream.getvalue(), notes

@@ -1,0 +1,147 @@
+"""Two results of one kind, their curves over each other."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from brakecli.errors import UsageError
+from brakecli.files.read import StoredResult
+from brakecli.plots import style
+from brakecli.plots.quantities import VARIABLES, scaled
+from brakecli.plots.run import RunPicture
+
+_WIDTH, _COLUMNS = 9.4, 100  # inches; of an envelope
+_LOOKS: tuple[dict[str, Any], ...] = (  # the wide line is seen behind the thin dashed one, also in grey
+    {"color": "#7DB9DE", "lw": 3.2, "ls": "-"},
+    {"color": style.VERMILION, "lw": 1.2, "ls": style.DASHES},
+)
+_SHOWN = {"stability": ("frequencies", "growth_rates"), "sweep": ("amplitude", "frequency")}
+
+
+def draw(results: tuple[StoredResult, StoredResult], variable: str) -> Figure:
+    """The figure of two results; raises UsageError where their kind has no curves."""
+    a, b = results
+    kind = str(a.attributes.get("kind"))
+    if kind != b.attributes.get("kind") or kind not in ("run", *_SHOWN):
+        raise UsageError(
+            f"{a.path}: only two runs, two sweeps, or two results of stability have curves to compare"
+        )
+    return _runs(results, variable or "vx") if kind == "run" else _curves(results, kind, variable)
+
+
+def _runs(results: tuple[StoredResult, StoredResult], variable: str) -> Figure:
+    pictures = [RunPicture(result, variable) for result in results]
+    lines = [f"{result.path.name}: {picture.summary}" for result, picture in zip(results, pictures, strict=True)]
+    title = pictures[0].title if pictures[0].title == pictures[1].title else "Two runs"
+    figure = style.headed(_WIDTH, 8.6, title, *lines, hspace=0.06)
+    panels = figure.subplots(3, 1)
+    same_end = len({picture.detail["time"][-1] for picture in pictures}) == 1
+    details = [picture.detail[variable] for picture in pictures]
+    look = scaled(variable, np.concatenate(details), np.concatenate(details))
+    envelopes = [_wider(*picture.envelope) for picture in pictures]
+    whole = np.concatenate([end for envelope in envelopes for end in envelope[1:]])
+    name = pictures[0].whole
+    whole_look = scaled(name, whole, whole)
+    times = [picture.detail["time"] for picture in pictures]
+    times = [time - (0.0 if same_end else time[-1]) for time in times]
+    for number, (result, picture, curve) in enumerate(zip(results, pictures, _LOOKS, strict=True)):
+        panels[0].plot(times[number], look(picture.detail[variable]), label=result.path.name, **curve)
+        time, lowest, highest = envelopes[number][0], *map(whole_look, envelopes[number][1:])
+        if number == 0:
+            panels[1].fill_between(time, lowest, highest, color=curve["color"], lw=1.5)
+        else:
+            panels[1].plot(time, lowest, time, highest, **curve)
+        _, frequency, density = picture.spectrum
+        panels[2].semilogy(frequency[1:], np.where(density > 0.0, density, np.nan)[1:], **curve)
+    ends = [min(float(time[0]) for time in times), max(float(time[-1]) for time in times)]
+    _along(panels[0], "time" if same_end else "time before the end of each part", ends, "s")
+    part = pictures[0].part if pictures[0].part == pictures[1].part else "Last part of each"
+    panels[0].set(title=f"{part}: {VARIABLES[variable][0]}", ylabel=look.label)
+    low, high = panels[0].get_ylim()
+    panels[0].set_ylim(low, high + 0.2 * (high - low))  # room for the legend above the data
+    panels[0].legend(loc="upper right", ncols=2)
+    spans = [edge for picture in pictures for edge in picture.span]
+    _along(panels[1], "time", [min(spans), max(spans)], "s")
+    panels[1].set(title=f"Whole runs: {VARIABLES[name][0]}, least and largest", ylabel=whole_look.label)
+    _spectra(panels[2], pictures, variable)
+    figure.align_ylabels()
+    return figure
+
+
+def _wider(time: style.Array, lowest: style.Array, highest: style.Array) -> list[style.Array]:
+    """An envelope of fewer columns, so that each holds a cycle or more."""
+    first = np.arange(0, len(time), max(1, len(time) // _COLUMNS))
+    return [time[first], np.minimum.reduceat(lowest, first), np.maximum.reduceat(highest, first)]
+
+
+def _spectra(axes: Axes, pictures: list[RunPicture], variable: str) -> None:
+    """Limits and labels of the spectra, by the lines that both runs have."""
+    lines = [6.5 * line for picture in pictures if (line := picture.line[1])]
+    highest = min(max(picture.spectrum[1][-1] for picture in pictures), max(lines, default=np.inf))
+    most = max(float(picture.spectrum[2].max(initial=0.0)) for picture in pictures)
+    if most:
+        axes.set_ylim(1e-10 * most, 10.0 * most)
+    _along(axes, "frequency", [0.0, float(highest)], "Hz")
+    unit = VARIABLES[variable][3]
+    squared = f"({unit})²" if set(unit) & {"/", " "} else f"{unit}²" if unit else "1"
+    axes.set(title=f"Spectra of {VARIABLES[variable][2]}", ylabel=f"power spectral density ({squared}/Hz)")
+
+
+def _along(axes: Axes, name: str, ends: list[float], unit: str) -> None:
+    low, high = ends
+    if low < high:
+        axes.set_xlim(low, high)
+    axes.set_xlabel(style.labelled(name, style.set_ticks(axes.xaxis, low, high, unit)))
+
+
+def _curves(results: tuple[StoredResult, StoredResult], kind: str, variable: str) -> Figure:
+    """Numbers along the one axis that both results have."""
+    known = results[0].variables("/")
+    critical = kind == "sweep" and all("critical" in result.variables("/") for result in results)
+    names = (variable,) if variable else ("critical",) if critical else _SHOWN[kind]
+    axis = _axis_of(results, names)
+    units = {name: str(known[name].attributes.get("units", "")) for name in (axis, *names)}
+    units = {name: "" if unit == "1" else unit for name, unit in units.items()}
+    title = str(results[0].attributes.get("title", "")) or "Two results"
+    files = " and ".join(result.path.name for result in results)
+    figure = style.headed(_WIDTH, 2.6 + 2.2 * len(names), title, files)
+    panels = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
+    places = [style.read_column(result, axis) for result in results]
+    for axes, name in zip(panels, names, strict=True):
+        columns = [style.read_column(result, name) for result in results]
+        for result, x, values, look in zip(results, places, columns, _LOOKS, strict=True):
+            order = np.argsort(x, kind="stable")
+            for number, line in enumerate(values[order].reshape(len(x), -1).T):
+                label = result.path.name if number == 0 else None
+                axes.plot(x[order], line, marker="o", ms=3.0 + look["lw"], label=label, **look)
+        unit = style.set_ticks(axes.yaxis, 0.0, max(map(style.largest, columns)), units[name])
+        axes.set_ylabel(style.labelled(str(name).replace("_", " "), unit))
+    both = np.concatenate(places)
+    unit = style.set_ticks(panels[-1].xaxis, float(both.min()), float(both.max()), units[axis])
+    words = str(known[axis].attributes.get("long_name", axis))
+    panels[-1].set_xlabel(style.labelled(words, unit), parse_math=False)
+    panels[0].legend(loc="best")
+    figure.align_ylabels()
+    return figure
+
+
+def _axis_of(results: tuple[StoredResult, StoredResult], names: tuple[str, ...]) -> str:
+    """The one axis of numbers along which both results have these numbers; raises UsageError without one."""
+    known = [result.variables("/") for result in results]
+    files = f"{results[0].path} and {results[1].path}"
+    for name in names:
+        dims = [each[name].dims if name in each else () for each in known]
+        if not dims[0] or dims[0] != dims[1] or any(_is_text(result, name) for result in results):
+            problem = f"{name} is not a number along the same axes in both"
+            raise UsageError(f"{files}: {problem}; name another --variable, or leave -o out")
+    axes = [dim for dim in known[0][names[0]].dims if dim != "mode"]
+    if len(axes) != 1 or any(_is_text(result, axes[0]) for result in results):
+        remedy = "draw each of them with brakecli plot, and leave -o out"
+        raise UsageError(f"{files}: only numbers along one axis of numbers are curves; {remedy}")
+    return axes[0]
+
+
+def _is_text(result: StoredResult, name: str) -> bool:
+    return result.read("/", name, 0, 1).dtype.kind == "U"

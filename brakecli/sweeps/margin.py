@@ -1,0 +1,43 @@
+"""How far the friction at each point of a sweep is from the critical one: in a map its zero is a line."""
+
+from math import prod
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brakecli.analysis.stability.report import LARGEST_FRICTION, changes, mean_stiffness
+from brakecli.case.system import system_of
+from brakecli.errors import CaseError
+from brakecli.sweeps.plan import Plan
+
+MOST, MOST_ROUGH = 2500, 64
+"""Cases whose critical friction is looked for, smooth and rough ones; a sweep that needs more gets no line."""
+_FRICTION = ("friction", "coefficient")
+
+
+def margins(plan: Plan) -> NDArray[np.float64] | None:
+    """Critical friction less friction at every point of the grid, by eigenvalues; None where it would take long.
+
+    What no friction makes unstable is critical at the largest friction searched; with a wheel at rest it is NaN.
+    """
+    settings = [plan.settings(point) for point in range(prod(plan.shape))] if plan.points <= 10**5 else []
+    others = {tuple(value for path, value in each.items() if path != _FRICTION): each for each in settings}
+    try:
+        rough = not all(system_of(plan.case(each)).smooth for each in settings[:: max(1, len(settings) - 1)])
+        if not others or len(others) > (MOST_ROUGH if rough else MOST):
+            return None
+        known = {key: _critical(plan, each) for key, each in others.items()}
+        own = plan.case({}).friction.coefficient
+    except CaseError:
+        return None
+    critical = [known[tuple(value for path, value in each.items() if path != _FRICTION)] for each in settings]
+    friction = [each.get(_FRICTION, own) for each in settings]
+    return np.reshape(np.array(critical) - np.array(friction, float), plan.shape)
+
+
+def _critical(plan: Plan, settings: dict[tuple[str, ...], object]) -> float:
+    system = system_of(plan.case(settings))
+    if system.belt_speed == 0.0:
+        return np.nan
+    found = changes(system, mean_stiffness(system, system.contact_stiffness))
+    return next((each.friction for each in found if each.lost), LARGEST_FRICTION)

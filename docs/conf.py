@@ -1,0 +1,45 @@
+"""How Sphinx makes the site of these pages: `make docs`."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+from sphinx.application import Sphinx
+
+import brakecli
+from brakecli.cli import app
+
+HERE = Path(__file__).parent
+COMMANDS = [module.__name__.rpartition(".")[2].replace("_", "-") for module in app.COMMANDS]
+
+project, author, release = "brakecli", "the authors of brakecli", brakecli.__version__
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+exclude_patterns = ["_site", "generated", "*.template.md"]
+source_suffix = {".md": "myst-nb"}
+html_theme = "pydata_sphinx_theme"
+html_theme_options = {"show_prev_next": False, "secondary_sidebar_items": ["page-toc"]}
+html_copy_source = False
+myst_enable_extensions = ["dollarmath", "colon_fence"]
+myst_heading_anchors = 4
+math_number_all = True
+nb_execution_mode = "force"
+nb_execution_timeout = 300
+nb_execution_raise_on_error = True
+nb_merge_streams = True
+autodoc_typehints = "description"
+
+
+def write_commands(site: Sphinx) -> None:
+    """Write the help of every command, as the program prints it."""
+    parts, terminal = list[str](), {"COLUMNS": "80", "LANG": "C.UTF-8"}
+    for name in ("", *COMMANDS):
+        line = [sys.executable, "-m", "brakecli", *name.split(), "--help"]
+        done = subprocess.run(line, capture_output=True, text=True, check=True, env=terminal)
+        parts.append(f"## {name or 'brakecli'}\n\n```text\n{done.stdout.strip()}\n```\n")
+    (HERE / "generated").mkdir(exist_ok=True)
+    (HERE / "generated" / "commands.md").write_text("\n".join(parts))
+
+
+def setup(site: Sphinx) -> None:
+    """Have the generated pages written before any is read."""
+    site.connect("builder-inited", write_commands)

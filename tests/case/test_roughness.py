@@ -1,0 +1,267 @@
+"""Surfaces given as orders of a turn, as a self-affine spectrum, or as a measured profile."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from brakecli.case.read import LoadedCase, parse_case, read_case
+from brakecli.case.system import system_of
+from brakecli.runs.limits import adjustments
+from brakecli.solver import roughness
+from brakecli.solver.roughness import Surface
+from tests.case.examples import ORDERS, SMALL, SPECTRA, messages
+
+RADIUS = 0.5  # m, of the wheel of SMALL
+TURN = 2.0 * math.pi * RADIUS
+ROUNDING = 1e-12
+SPECTRUM = {"rms": 2e-6, "hurst": 0.7, "shortest": 1e-3, "longest": 0.1, "terms": 100, "seed": 7}
+
+
+def height(surface: Surface, places: Any) -> Any:
+    return roughness.height(surface, np.asarray(places))
+
+
+def wheel(*overrides: str) -> Surface:
+    return system_of(parse_case(SMALL, "small", overrides).case).wheel
+
+
+def spectrum(**changes: float) -> Surface:
+    text = ", ".join(f"{key}={value!r}" for key, value in (SPECTRUM | changes).items())
+    return wheel(f"roughness.wheel.spectrum={{{text}}}")
+
+
+def saved(path: Path, header: str, *columns: Any, separator: str = ",") -> str:
+    np.savetxt(path, np.transpose(columns), "%.15g", separator, header=header, comments="")
+    return f'roughness.wheel.profile="{path}"'
+
+
+def loaded(*overrides: str) -> LoadedCase:
+    return parse_case(SMALL, "small", overrides)
+
+
+def test_orders_are_waves_around_the_wheel() -> None:
+    found = wheel("roughness.wheel={amplitudes=[1e-6, 2e-6, 3e-6], orders=[1, 2, 7], phases_deg=[0, 90, 180]}")
+    np.testing.assert_allclose(found.turns, np.array([1, 2, 7]) / TURN, rtol=ROUNDING)
+    around = height(found, np.array([0.1, 0.1 + TURN]))  # the turn closes
+    assert around[0] == pytest.approx(around[1], abs=1e-6 * ROUNDING * 1e6)
+    higher = system_of(loaded("wheel.radius=0.25", "roughness.wheel={amplitudes=[1.0], orders=[3]}").case)
+    assert higher.wheel.turns[0] * higher.fastest_belt == pytest.approx(3 * 4 / (2 * math.pi))  # order x rotation
+
+
+def test_orders_are_whole_and_belong_to_the_wheel_alone() -> None:
+    (line,) = messages(ORDERS, "roughness.wheel.orders=[1, 1.5]")
+    assert (
+        "roughness.wheel.orders[1]: is not a whole number (found 1.5); give a whole number of at least 1" in line
+    )
+    line, _ = messages(SMALL, "roughness.shoe={amplitudes=[1e-6], orders=[1]}")
+    assert "roughness.shoe.orders: is unknown" in line
+    line, *_ = messages(ORDERS, "roughness.wheel={amplitudes=[1e-6], orders=[1], wavelengths=[1.0]}")
+    assert "orders: is given together with amplitudes and wavelengths" in line
+
+
+@pytest.mark.parametrize("hurst", [0.0, 0.5, 1.0])
+def test_the_density_of_a_self_affine_surface_falls_as_its_exponent_says(hurst: float) -> None:
+    found = spectrum(hurst=hurst, terms=100)  # harmonics of the longest wave: one period shows them apart
+    points = np.arange(1024) * (SPECTRUM["longest"] / 1024)
+    heights = height(found, points)
+    assert math.sqrt(np.mean(heights**2)) == pytest.approx(SPECTRUM["rms"], rel=1e-10)
+    density = np.abs(np.fft.rfft(heights))[1:101] ** 2
+    slope, _ = np.polyfit(np.log(np.arange(1, 101)), np.log(density), 1)
+    assert slope == pytest.approx(-1.0 - 2.0 * hurst, abs=1e-6)
+    assert np.abs(np.fft.rfft(heights))[101:].max() < 1e-9 * np.abs(np.fft.rfft(heights)).max()
+
+
+def test_the_waves_of_a_spectrum_reach_from_the_longest_to_the_shortest() -> None:
+    found = spectrum(terms=37)
+    assert (found.turns[0], found.turns[-1]) == pytest.approx((10.0, 1000.0))
+    np.testing.assert_allclose(np.diff(found.turns), 990.0 / 36.0)
+    assert math.sqrt(0.5 * np.sum(found.g**2)) == pytest.approx(SPECTRUM["rms"], rel=1e-14)
+
+
+def test_the_phases_of_a_spectrum_are_those_of_its_seed() -> None:
+    expected = np.random.default_rng(7).uniform(0.0, 2.0 * math.pi, 100)
+    np.testing.assert_allclose(spectrum().phase, expected, rtol=1e-14)
+    assert not np.allclose(spectrum(seed=8).phase, expected)
+
+
+def test_the_resolved_case_of_a_spectrum_holds_its_sines_to_the_last_bit() -> None:
+    first = parse_case(SPECTRA, "case.toml")
+    again = parse_case(first.resolved, "resolved")
+    assert again.case.roughness.wheel is not None
+    assert again.case.roughness.wheel.spectrum is None
+    assert again.resolved == first.resolved
+    for one, other in zip(system_of(first.case).wheel, system_of(again.case).wheel, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize(
+    ("change", "what"),
+    [
+        ("shortest=0.1", "shortest: is not below longest (found 0.1)"),
+        ("hurst=1.1", "hurst: is out of range (found 1.1); give a number from 0 to 1"),
+        ("terms=2001", "terms: is out of range (found 2001); give a whole number from 2 to 2000"),
+        ("seed=1.5", "seed: is not a whole number (found 1.5)"),
+        ("rms=-1", "rms: is out of range"),
+    ],
+)
+def test_a_wrong_spectrum_is_reported_at_its_key(change: str, what: str) -> None:
+    (line,) = messages(SPECTRA, f"roughness.wheel.spectrum.{change}")
+    assert f"roughness.wheel.spectrum.{what}" in line
+
+
+def test_an_override_of_a_spectrum_or_of_sines_takes_the_place_of_the_other() -> None:
+    resolved = parse_case(SPECTRA, "case.toml").resolved
+    text = ", ".join(f"{key}={value!r}" for key, value in SPECTRUM.items())
+    case = parse_case(resolved, "r", [f"roughness.wheel.spectrum={{{text}}}"]).case.roughness.wheel
+    assert case is not None
+    assert (case.amplitudes, case.wavelengths, case.phases_deg) == (None, None, None)
+    sines = ["roughness.wheel.amplitudes=[1e-6]", "roughness.wheel.orders=[4]"]
+    other = parse_case(SPECTRA, "case.toml", sines).case.roughness.wheel
+    assert other is not None
+    assert (other.spectrum, other.orders, other.phases_deg) == (None, (4.0,), (0.0,))
+
+
+ANGLES = np.arange(0.0, 360.0, 2.0)
+RUNOUT = 30.0 + 20.0 * np.sin(np.radians(ANGLES + 25.0)) + 4.0 * np.sin(np.radians(9.0 * ANGLES - 70.0))  # um
+FILES = {  # the same runout as laboratories write it
+    "names": ("angle_deg,height_um", ANGLES, RUNOUT, ","),
+    "row of units": ("angle;runout\n°;mm", ANGLES, 1e-3 * RUNOUT, ";"),
+    "brackets": ("angle [rad]\theight (µm)", np.radians(ANGLES), RUNOUT, "\t"),
+    "comment": ("# phi_mrad, z_nm", 1e3 * np.radians(ANGLES), 1e3 * RUNOUT, ","),
+    "position": ("s_mm,h_mm", 1e3 * RADIUS * np.radians(ANGLES), 1e-3 * RUNOUT, ","),
+    "metres": ("s,h", RADIUS * np.radians(ANGLES), 1e-6 * RUNOUT, ","),
+    "no names": ("", RADIUS * np.radians(ANGLES), 1e-6 * RUNOUT, " "),
+    "last repeats first": ("deg,um", np.append(ANGLES, 360.0), np.append(RUNOUT, RUNOUT[0]), ","),
+    "backwards": ("angle_deg,height_um", ANGLES[::-1], RUNOUT[::-1], ","),
+    "from elsewhere": ("angle_deg,height_um", ANGLES + 360.0, RUNOUT, ","),
+}
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_runout_becomes_the_orders_that_it_was_made_of(tmp_path: Path, name: str) -> None:
+    header, places, heights, separator = FILES[name]
+    case = loaded(saved(tmp_path / "runout.csv", header, places, heights, separator=separator)).case
+    found = case.roughness.wheel
+    assert found is not None
+    assert found.orders == (1.0, 9.0)
+    assert found.amplitudes == pytest.approx([20e-6, 4e-6], rel=1e-9)
+    assert found.phases_deg == pytest.approx([25.0, 290.0], abs=1e-6)
+
+
+def test_turns_are_averaged_and_what_is_left_of_one_is_not_used(tmp_path: Path) -> None:
+    angles = np.arange(0.0, 3.25 * 360.0, 2.0)
+    wobble = 3.0 * np.sin(np.radians(angles / 3.0))  # not of the wheel: gone in the mean of three turns
+    heights = np.interp(angles, ANGLES, RUNOUT, period=360.0) + wobble
+    found = loaded(saved(tmp_path / "turns.csv", "angle_deg,height_um", angles, heights)).case.roughness.wheel
+    assert found is not None
+    assert found.orders is not None
+    by_order = dict(zip(found.orders, found.amplitudes or (), strict=True))
+    assert by_order[9.0] == pytest.approx(4e-6, rel=0.05)
+    assert max(found.orders) < 180
+    assert "mean of 3 turns, which differ from it by 2.12e-06 m (RMS)" in (found.note or "")  # 3 / sqrt(2) um
+
+
+def test_a_profile_of_the_shoe_loses_its_line_and_repeats_beyond_its_length(tmp_path: Path) -> None:
+    x = (np.arange(200) - 99.5) * 1e-3  # m; cosines about the middle have no part of a line in them
+    heights = 5e-6 * np.cos(2.0 * math.pi * 6.0 * x / 0.2) + 1e-3 * x + 4e-4
+    path = tmp_path / "shoe.csv"
+    saved(path, "x_m,z_m", x, heights)
+    case = loaded(f'roughness.shoe.profile="{path}"').case
+    assert case.roughness.shoe is not None
+    assert case.roughness.shoe.wavelengths == pytest.approx([0.2 / 6.0])
+    surface = system_of(case).shoe
+    np.testing.assert_allclose(height(surface, x), 5e-6 * np.cos(2.0 * math.pi * 6.0 * x / 0.2), atol=1e-15)
+    assert "reaches beyond" not in (case.roughness.shoe.note or "")
+    saved(path, "x_m,z_m", x - x[0], heights)
+    assert "the pad from -0.05 to 0.05 m reaches beyond 0 to 0.199 m" in str(
+        adjustments(system_of(loaded(f'roughness.shoe.profile="{path}"').case))
+    )
+
+
+@pytest.mark.parametrize("error", [0.5, 0.1, 0.01])
+def test_no_fewer_sines_leave_out_so_little_of_a_profile(tmp_path: Path, error: float) -> None:
+    heights = np.random.default_rng(3).normal(size=400)
+    override = saved(tmp_path / "noise.csv", "angle_deg,height_um", np.arange(400) * 0.9, heights)
+    surface = system_of(loaded(override, f"roughness.wheel.profile_error={error}").case).wheel
+    heights = 1e-6 * (heights - heights.mean())
+    left = heights - height(surface, np.arange(400) * (TURN / 400))
+    total = np.mean(heights**2)
+    assert math.sqrt(np.mean(left**2) / total) <= error
+    assert math.sqrt((np.mean(left**2) + 0.5 * np.min(surface.g) ** 2) / total) > error
+
+
+def test_a_result_repeats_without_the_profile_and_tells_what_was_lost(tmp_path: Path) -> None:
+    (tmp_path / "sub").mkdir()
+    saved(tmp_path / "sub" / "runout.csv", "angle_deg,height_um", ANGLES, RUNOUT)
+    (tmp_path / "sub" / "case.toml").write_text(SMALL + '\nroughness.wheel.profile = "runout.csv"\n')
+    first = read_case(str(tmp_path / "sub" / "case.toml"))  # the profile lies beside the case
+    (tmp_path / "sub" / "runout.csv").unlink()
+    again = parse_case(first.resolved, "resolved")
+    assert again.case == first.case
+    assert again.resolved == first.resolved
+    assert str(tmp_path) not in first.resolved
+    (note,) = adjustments(system_of(again.case))
+    assert note.startswith("roughness.wheel: runout.csv: 2 of 90 sines leave out ")
+    assert note.endswith(" % of the RMS of 1.44e-05 m")  # sqrt((20^2 + 4^2) / 2) um
+
+
+WRONG = {
+    "a;b\n1;2\n2;3\n": "has 2 rows; measure four places or more",
+    "": "the file is empty",
+    "1,2,3\n4,5,6\n": "has 3 columns; give two: position or angle, and height",
+    "angle,um\n0,1\n1,2\n2,1\n3,5\n": "column angle: has no unit; name it angle_deg or angle_rad",
+    "x_mm,z_V\n0,1\n1,2\n2,1\n3,5\n": "not meter; correct the unit",
+    "x_mm,z_mV\n0,1\n1,2\n2,1\n3,5\n": "column z_mV: mV is",
+    "x (mm),z (qq)\n0,1\n1,2\n2,1\n3,5\n": "column z (qq): there is no unit qq",
+    "x_mm,z_mm\nmm,um\n0,1\n1,2\n2,1\n3,5\n": "column z_mm: has the units um and mm; keep one",
+    "position (mm) height (um)\n0 1\n1 2\n2 1\n3 5\n": "its first lines do not name both columns",
+    "0,1\n1,\n2,1\n3,5\n": "a cell is empty or no number",
+    "0,1\n1,nan\n2,1\n3,5\n": "a cell is empty or no number",
+    "0,1\n1,2\n1,3\n3,5\n": "see row 3 of numbers; sort the rows",
+    "0,1\n1,1\n2,1\n3,1\n": "all heights are equal",
+    "\0\0": "this is not text",
+}
+
+
+@pytest.mark.parametrize("text", WRONG)
+def test_a_profile_that_cannot_be_used_is_reported_at_its_key(tmp_path: Path, text: str) -> None:
+    (tmp_path / "p.csv").write_text(text)
+    (line,) = messages(SMALL, f'roughness.wheel.profile="{tmp_path}/p.csv"')
+    assert ": roughness.wheel.profile: " in line
+    assert all(part in line for part in WRONG[text].split("; "))
+
+
+def test_a_profile_that_is_not_there_or_not_a_file_is_reported_with_all_other_problems(tmp_path: Path) -> None:
+    for place, what in (
+        (tmp_path / "absent.csv", "cannot be read: no such file"),
+        (tmp_path, "not a regular file"),
+    ):
+        found = messages(SMALL, f'roughness.wheel.profile="{place}"', "shoe.mass=-1")
+        assert len(found) == 2
+        assert what in found[0]
+
+
+def test_more_sines_than_a_case_may_hold_are_refused_with_the_error_that_fits(tmp_path: Path) -> None:
+    heights = np.random.default_rng(0).normal(size=8000)
+    override = saved(tmp_path / "noise.csv", "x_mm,z_um", np.arange(8000) * 0.01, heights)
+    (line,) = messages(SMALL, override)
+    assert "needs " in line
+    assert "2000 is the most" in line
+    error = line.rpartition(" ")[2]
+    assert loaded(override, f"roughness.wheel.profile_error={error}").case.roughness.wheel is not None
+
+
+def test_keys_that_belong_to_a_profile_or_exclude_it_are_reported(tmp_path: Path) -> None:
+    override = saved(tmp_path / "p.csv", "angle_deg,height_um", ANGLES, RUNOUT)
+    (line,) = messages(SMALL, override, "roughness.wheel.phases_deg=[1]")
+    assert "phases_deg: is given together with profile" in line
+    (line,) = messages(ORDERS, "roughness.wheel.profile_error=0.1")
+    assert "profile_error: is only for a profile" in line
+    (line,) = messages(SMALL, "roughness.wheel={}")
+    assert (
+        "give amplitudes and wavelengths, or amplitudes and wavenumbers, or amplitudes and orders, or profile"
+        in line
+    )

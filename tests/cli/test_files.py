@@ -1,0 +1,283 @@
+"""What a result holds, how two of them differ, and numbers for other programs."""
+
+import wave
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from brakecli import __version__
+from brakecli.files import fields
+from tests.commands import TINY, attributes, brakecli, each, left_in
+
+pandas = import_module("pandas")
+pytestmark = pytest.mark.usefixtures("compiled")
+
+SQUEAL = TINY.replace("duration = 0.02", "duration = 0.5")
+GRID = """
+case = "tiny.toml"
+[[axis]]
+parameter = "link2.angle_deg"
+values = [3.0, 6.0]
+[[axis]]
+parameter = "shoe.mass"
+values = [8.0, 10.0, 12.0]
+[critical]
+parameter = "friction.coefficient"
+lower = 0.0
+upper = 1.0
+method = "eigenvalue"
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(compiled: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two runs that differ in one key, and two results along a key; only to be read."""
+    place = tmp_path_factory.mktemp("files")
+    (place / "tiny.toml").write_text(SQUEAL)
+    vary = ["stability", "tiny.toml", "-q", "--vary", "link2.angle_deg=1:10:4", "-o"]
+    commands = [
+        ["run", "tiny.toml", "-q", "-o", "a.h5"],
+        ["run", "tiny.toml", "-q", "-o", "b.h5", "--set", "friction.coefficient=0.7"],
+        ["run", "tiny.toml", "-q", "-o", "short.h5", "--set", "solver.duration=0.25"],
+        [*vary, "modes.h5"],
+        [*vary, "other.h5", "--set", "link2.damping=900"],
+    ]
+    for done in each(place, commands):
+        done.told(0)
+    return place
+
+
+def history(path: Path, name: str, group: str = "history") -> Any:
+    with h5py.File(path) as file:
+        return file[group][name][:]
+
+
+# export
+
+
+def test_a_history_as_csv_is_the_history_to_the_last_bit(folder: Path, tmp_path: Path) -> None:
+    done = brakecli("export", folder / "a.h5", cwd=tmp_path)
+    assert (done.told(0), done.out) == ("", "a.csv: written\n")
+    table = pandas.read_csv(tmp_path / "a.csv")
+    units = {field.name: f" ({field.units})" if field.units != "1" else "" for field in fields.HISTORY}
+    assert [*table.columns] == [name + unit for name, unit in units.items()]
+    for name, unit in units.items():
+        np.testing.assert_array_equal(table[name + unit], history(folder / "a.h5", name))
+
+
+def test_what_is_exported_can_be_classified_by_its_names_and_units(folder: Path, tmp_path: Path) -> None:
+    export = ["export", folder / "b.h5", "-o", "v.csv", "--variable", "vx", "-q"]
+    columns = [
+        "--time-column",
+        "time (s)",
+        "--column",
+        "vx (m/s)",
+        "--quantity",
+        "velocity",
+        "--belt-speed",
+        "0.05",
+    ]
+    done, verdict = (brakecli(*line, cwd=tmp_path) for line in (export, ["classify", "v.csv", *columns, "--json"]))
+    assert (done.told(0), done.out) == ("", "")
+    assert verdict.json["frequency"] == pytest.approx(attributes(folder / "b.h5")["frequency"], rel=1e-3)
+
+
+def test_spectra_and_chosen_variables_are_exported(folder: Path, tmp_path: Path) -> None:
+    chosen = ["--group", "spectrum", "--variable", "y", "--variable", "vx"]
+    brakecli("export", folder / "a.h5", *chosen, "-o", "s.csv", cwd=tmp_path).told(0)
+    table = pandas.read_csv(tmp_path / "s.csv")
+    assert [*table.columns] == ["frequency (Hz)", "y ((m)2 Hz-1)", "vx ((m/s)2 Hz-1)"]
+    np.testing.assert_array_equal(table["vx ((m/s)2 Hz-1)"], history(folder / "a.h5", "vx", "spectrum"))
+
+
+def test_a_sweep_and_modes_are_a_row_for_each_point(folder: Path, tmp_path: Path) -> None:
+    (tmp_path / "tiny.toml").write_text(TINY)
+    (tmp_path / "grid.toml").write_text(GRID)
+    brakecli("sweep", "grid.toml", "-q", "-j", "1", cwd=tmp_path).told(0)
+    brakecli("export", "grid.h5", cwd=tmp_path).told(0)
+    table = pandas.read_csv(tmp_path / "grid.csv")
+    assert table["link2_angle_deg (deg)"].tolist() == [3.0] * 3 + [6.0] * 3
+    assert table["shoe_mass (kg)"].tolist() == [8.0, 10.0, 12.0] * 2
+    assert [*table.columns[2:5]] == ["status", "reason", "warning"]
+    with h5py.File(tmp_path / "grid.h5") as file:
+        np.testing.assert_array_equal(table["critical"], file["critical"][:].ravel())
+        np.testing.assert_array_equal(
+            table["critical_windows_lower of window 1"], file["critical_windows_lower"][..., 0].ravel()
+        )
+        assert table["frequency (Hz)"].isna().sum() == (file["frequency"][:] > 1e30).sum()
+        assert table["regime"].tolist() == [text.decode() for text in file["regime"][:].ravel()]
+    brakecli("export", folder / "modes.h5", cwd=tmp_path).told(0)
+    modes = pandas.read_csv(tmp_path / "modes.csv")
+    np.testing.assert_array_equal(
+        modes[["frequencies of mode 1 (Hz)", "frequencies of mode 2 (Hz)"]],
+        history(folder / "modes.h5", "frequencies", "/"),
+    )
+
+
+def sound(path: Path) -> Any:
+    with wave.open(str(path)) as file:
+        assert (file.getframerate(), file.getsampwidth(), file.getnchannels()) == (44100, 2, 1)
+        return np.frombuffer(file.readframes(file.getnframes()), np.int16)
+
+
+@pytest.mark.parametrize("interval", ["1e-5", "3e-4"])
+def test_a_sound_has_the_frequency_of_the_verdict_and_a_peak_of_minus_3_db(tmp_path: Path, interval: str) -> None:
+    (tmp_path / "tiny.toml").write_text(SQUEAL)
+    run = ["run", "tiny.toml", "-o", "r.h5", "--json", "--set", f"output.sample_interval={interval}"]
+    done, written = each(tmp_path, [run, ["export", "r.h5", "-o", "r.wav"]])
+    assert written.told(0) == ""
+    samples = sound(tmp_path / "r.wav")
+    assert len(samples) == pytest.approx(44100 * 0.5, abs=2 * 44100 * float(interval) + 1)
+    assert 20.0 * np.log10(np.abs(samples).max() / 32767) == pytest.approx(-3.0, abs=1e-3)
+    late = samples[len(samples) // 2 :].astype(float)
+    rises = np.flatnonzero((late[:-1] < 0) & (late[1:] >= 0))
+    places = rises - late[rises] / (late[rises + 1] - late[rises])  # of zeros, between two samples
+    frequency = 44100 * (len(places) - 1) / (places[-1] - places[0])
+    assert frequency == pytest.approx(done.json["frequency"], rel=1e-3)
+
+
+def test_a_sound_tells_what_cannot_be_heard(tmp_path: Path) -> None:
+    light = TINY.replace("mass = 10.0", "mass = 2e-4").replace("step = 1e-5", "step = 2e-7")
+    (tmp_path / "tiny.toml").write_text(light.replace("interval = 1e-4", "interval = 1e-6"))  # rings at 39 kHz
+    start = ["--set", "initial.x=1e-6", "--set", "wheel.angular_speed=10", "--set", "friction.coefficient=0"]
+    damped = ["--set", "link1.damping=0.1", "--set", "link2.damping=0.1"]
+    brakecli("run", "tiny.toml", "-q", *start, *damped, cwd=tmp_path).told(0)
+    done = brakecli("export", "tiny.h5", "-o", "t.wav", cwd=tmp_path)
+    assert "of the power of vx is above 22050 Hz and not in the sound" in done.told(0)
+
+
+ERRORS = [
+    (
+        ["a.h5", "-o", "a.txt"],
+        "a.txt: its suffix does not name a kind of file; name one that ends in .csv or .wav",
+    ),
+    (["modes.h5", "-o", "a.wav"], "a.wav: is for runs, and modes.h5 is a stability"),
+    (["modes.h5", "-o", "m.csv", "--group", "history"], "--group history: is for runs"),
+    (["a.h5", "-o", "a.csv", "--group", "energy"], "--group energy: there is none; give history or spectrum"),
+    (["a.h5", "-o", "a.wav", "--group", "spectrum"], "a.wav: a sound is one variable of the history"),
+    (["a.h5", "-o", "a.wav", "--variable", "x", "--variable", "y"], "a sound is one variable"),
+    (["a.h5", "-o", "a.wav", "--variable", "state"], "--variable state: a.h5 has none; give one of"),
+    (["a.h5", "-o", "a.csv", "--variable", "time"], "--variable time: a.h5 has none"),
+    (["tiny.toml", "-o", "a.csv"], "this is not an HDF5 file"),
+    (["a.h5", "-o", "a.h5"], "its suffix does not name"),
+]
+
+
+@pytest.mark.parametrize(("words", "what"), ERRORS)
+def test_what_cannot_be_exported_is_refused(folder: Path, words: list[str], what: str) -> None:
+    before = left_in(folder)
+    done = brakecli("export", *words, cwd=folder)
+    done.told(4 if "HDF5" in what else 2, what)
+    assert left_in(folder) == before
+
+
+def test_a_shoe_that_does_not_move_makes_no_sound(tmp_path: Path) -> None:
+    (tmp_path / "tiny.toml").write_text(TINY)
+    still = ["--set", "load.force=0", "--set", "friction.coefficient=0"]
+    brakecli("run", "tiny.toml", "-q", *still, cwd=tmp_path).told(0)
+    done = brakecli("export", "tiny.h5", "-o", "t.wav", cwd=tmp_path)
+    done.told(2, "vx does not change, there is nothing to hear")
+
+
+def test_an_export_is_replaced_only_by_force(folder: Path, tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("mine")
+    brakecli("export", folder / "a.h5", cwd=tmp_path).told(2, "a.csv: exists already")
+    assert (tmp_path / "a.csv").read_text() == "mine"
+    brakecli("export", folder / "a.h5", "--force", cwd=tmp_path).told(0)
+    assert len((tmp_path / "a.csv").read_text()) > 100_000
+
+
+# info
+
+
+def test_info_tells_what_a_file_holds_and_what_made_it(folder: Path) -> None:
+    found = brakecli("info", "a.h5", "--json", cwd=folder).json
+    assert [*found] == ["command", *(field.name for field in fields.INFO)]
+    assert (found["kind"], found["status"], found["title"], found["whole"]) == ("run", "done", "Tiny", True)
+    assert found["bytes"] == (folder / "a.h5").stat().st_size
+    assert found["versions"]["brakecli"] == __version__
+    assert found["versions"]["numpy"] == np.__version__
+    x = next(each for each in found["variables"] if (each["group"], each["name"]) == ("history", "x"))
+    assert (x["dims"], x["shape"], x["units"]) == (["time"], [5001], "m")
+    shown = brakecli("info", "modes.h5", cwd=folder)
+    assert shown.told(0) == ""
+    assert "link2_angle_deg 4 x mode 2" in " ".join(shown.out.split())
+
+
+def test_info_knows_a_file_that_another_program_has_changed_and_refuses_a_damaged_one(
+    folder: Path, tmp_path: Path
+) -> None:
+    data = (folder / "a.h5").read_bytes()
+    (tmp_path / "cut.h5").write_bytes(data[:-40])
+    (tmp_path / "flipped.h5").write_bytes(data[:9000] + bytes([data[9000] ^ 1]) + data[9001:])
+    (tmp_path / "changed.h5").write_bytes(data)
+    with h5py.File(tmp_path / "changed.h5", "r+") as file:
+        file.attrs["note"] = "seen"
+    assert brakecli("info", "changed.h5", "--json", cwd=tmp_path).json["whole"] is False
+    for name in ("cut.h5", "flipped.h5", "absent.h5"):
+        brakecli("info", name, cwd=tmp_path).told(4, "cannot be read as a result")
+
+
+# diff
+
+
+def test_a_result_is_the_same_as_itself_and_as_its_repetition(folder: Path, tmp_path: Path) -> None:
+    brakecli("run", folder / "a.h5", "-q", "-o", "again.h5", cwd=tmp_path).told(0)
+    for other in (folder / "a.h5", tmp_path / "again.h5"):
+        found = brakecli("diff", folder / "a.h5", other, "--json", cwd=tmp_path)
+        assert found.code == 0
+        assert found.json["same"] is True
+        assert [found.json[name] for name in ("case", "numbers", "variables", "versions")] == [[]] * 4
+    assert "no difference" in brakecli("diff", folder / "a.h5", folder / "a.h5", cwd=tmp_path).out
+
+
+def test_two_runs_differ_in_the_key_that_was_changed_and_in_what_follows(folder: Path) -> None:
+    done = brakecli("diff", "a.h5", "b.h5", "--json", cwd=folder)
+    assert (done.code, done.json["same"]) == (0, False)
+    assert done.json["case"] == [{"name": "friction.coefficient", "a": 0.6, "b": 0.7}]
+    numbers = {each["name"]: (each["a"], each["b"]) for each in done.json["numbers"]}
+    first, second = (attributes(folder / name) for name in ("a.h5", "b.h5"))
+    assert numbers["braking_torque"] == (first["braking_torque"], second["braking_torque"])
+    assert "energy/belt" in numbers
+    assert "title" not in numbers
+    variables = {(each["group"], each["name"]): each for each in done.json["variables"]}
+    assert ("history", "time") not in variables
+    a, b = (history(folder / name, "vx") for name in ("a.h5", "b.h5"))
+    vx = variables["history", "vx"]
+    assert vx["largest"] == np.abs(a - b).max()
+    assert vx["relative"] == vx["largest"] / max(np.abs(a).max(), np.abs(b).max())
+    assert (vx["compared"], vx["different"]) == (len(a), (a != b).sum())
+    shown = brakecli("diff", "a.h5", "b.h5", cwd=folder).out
+    assert "friction.coefficient  0.6   0.7" in shown
+    assert brakecli("diff", "a.h5", "b.h5", "-q", cwd=folder).out == ""
+
+
+def test_of_two_lengths_the_first_samples_are_compared(folder: Path) -> None:
+    found = brakecli("diff", "a.h5", "short.h5", "--json", cwd=folder).json
+    time = next(each for each in found["variables"] if (each["group"], each["name"]) == ("history", "time"))
+    assert (time["shapes"], time["compared"], time["different"]) == ([[5001], [2501]], 2501, 0)
+
+
+def test_results_of_two_kinds_are_not_compared(folder: Path) -> None:
+    brakecli("diff", "a.h5", "modes.h5", cwd=folder).told(2, "a.h5 is a run, and modes.h5 a stability")
+
+
+@pytest.mark.parametrize("names", [("modes.h5", "other.h5"), ("b.h5", "short.h5")])
+def test_two_results_are_drawn_over_each_other(folder: Path, tmp_path: Path, names: tuple[str, str]) -> None:
+    done = brakecli("diff", *(folder / name for name in names), "-o", "d.png", "--json", cwd=tmp_path)
+    assert done.json["output"] == "d.png"
+    assert (tmp_path / "d.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_what_has_no_curves_is_refused_and_leaves_no_picture(folder: Path, tmp_path: Path) -> None:
+    names = [folder / "modes.h5", folder / "other.h5"]
+    for words, what in (
+        (["-o", "d.png", "--variable", "instability"], "instability is not a number along the same axes"),
+        (["-o", "d.txt"], "its suffix does not name a kind of picture"),
+    ):
+        brakecli("diff", *names, *words, cwd=tmp_path).told(2, what)
+    assert left_in(tmp_path) == set()

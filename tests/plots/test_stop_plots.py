@@ -1,0 +1,57 @@
+"""Where speed or load change, the picture shows the spectrogram and the amplitude against the speed."""
+
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from brakecli.case.read import read_case
+from brakecli.errors import UnreadableResultError
+from brakecli.files.read import open_result
+from brakecli.plots import style
+from brakecli.plots.run import RunPicture, draw
+from brakecli.runs.run import run
+from tests.commands import ROOT
+
+
+@pytest.fixture(scope="module")
+def stop(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("stop") / "stop.h5"
+    run(read_case(str(ROOT / "cases" / "brake-stop.toml")), path, force=False)
+    return path
+
+
+def test_the_spectrogram_has_the_waves_both_modes_and_the_vibration(stop: Path) -> None:
+    with open_result(stop) as stored, style.applied():
+        figure = draw(picture := RunPicture(stored))
+    axes = figure.axes[4]
+    shown: dict[str, Any] = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
+    assert {*shown} == {"waves of the wheel pass", "modes", "vibrates"}
+    wave = shown["waves of the wheel pass"]
+    # the longest wave, 0.03 m, at 4 m/s until 0.5 s and at rest from 4 s on
+    times = np.asarray(wave.get_xdata(), float)
+    np.testing.assert_allclose(wave.get_ydata(), np.interp(times, [0.5, 4.0], [4.0 / 0.03, 0.0]), atol=1e-9)
+    assert shown["modes"].get_ydata()[0] == pytest.approx(picture.modes[0])
+    [mesh] = [each for each in axes.collections if hasattr(each, "get_coordinates")]
+    levels = np.asarray(mesh.get_array())
+    with h5py.File(stop) as file:
+        density, amplitude = file["spectrogram/vx"][:], file["over_time/amplitude"][:]
+    assert levels.shape == density.T.shape
+    assert levels.max() == 0.0
+    where = np.unravel_index(np.argmax(levels), levels.shape)
+    assert where[::-1] == np.unravel_index(np.argmax(density), density.shape)
+    curve = figure.axes[5].get_lines()[0]
+    np.testing.assert_allclose(np.asarray(curve.get_ydata(), float), 1e6 * amplitude)
+
+
+def test_a_spectrogram_that_does_not_fit_is_refused(stop: Path, tmp_path: Path) -> None:
+    data = bytearray(stop.read_bytes()[:-32])  # without its digest
+    (tmp_path / "s.h5").write_bytes(data)
+    with h5py.File(tmp_path / "s.h5", "r+") as file:
+        times = file["spectrogram/time"][:]
+        del file["spectrogram/frequency"]
+        file["spectrogram"].create_dataset("frequency", data=times, chunks=times.shape, fletcher32=True)
+    with open_result(tmp_path / "s.h5") as stored, pytest.raises(UnreadableResultError, match="does not fit"):
+        RunPicture(stored)

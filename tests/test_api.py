@@ -1,0 +1,167 @@
+"""The functions of `import brakecli`: what they return is what the commands write and print."""
+
+import json
+import math
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import brakecli
+from brakecli.errors import BrakecliError, CaseError, UnreadableResultError, UsageError
+from tests.commands import QUICK, ROOT, TINY
+from tests.commands import brakecli as command
+
+HERE = Path()
+CASE = str(ROOT / "cases" / "relaxation.toml")
+SHORT = {"solver.duration": 0.2, "output.sample_interval": 5e-5}
+SET = ("--set", "solver.duration=0.2", "--set", "output.sample_interval=5e-5")
+
+
+def test_importing_takes_nothing_large() -> None:
+    large = "{'numpy', 'xarray', 'numba', 'pydantic', 'typer'}"
+    code = f"import sys, brakecli, brakecli.api; print({large} & {{*sys.modules}})"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "set()\n"
+    assert {"load", "run", "stability", "sweep", "classify"} == {*brakecli.__all__}
+    with pytest.raises(AttributeError, match="has no attribute 'ran'"):
+        _ = brakecli.ran
+
+
+def test_a_run_is_that_of_the_command(tmp_path: Path) -> None:
+    printed = command("run", CASE, *SET, "-o", "r.h5", "--json", cwd=tmp_path).json
+    tree = brakecli.run(CASE, SHORT)
+    with xr.open_datatree(tmp_path / "r.h5", engine="h5netcdf") as stored:
+        assert tree.identical(stored.load())
+    assert (tree.attrs["regime"], tree.attrs["frequency"]) == (printed["regime"], printed["frequency"])
+    assert tree["history"].vx.attrs["units"] == "m/s"
+    assert brakecli.load(tmp_path / "r.h5").identical(tree)
+    assert brakecli.run(tmp_path / "r.h5").attrs["resolved_toml"] == tree.attrs["resolved_toml"]
+    verdict = brakecli.classify(tmp_path / "r.h5", thresholds={"stick_cycles": 0.9})
+    assert verdict.regime == printed["regime"]
+    assert float(verdict.frequency) == printed["frequency"]
+    assert verdict.attrs["thresholds"]["stick_cycles"] == 0.9
+
+
+def test_outputs_stay_only_where_they_are_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    brakecli.run(CASE, SHORT)
+    assert not [*tmp_path.iterdir()]
+    brakecli.run(CASE, SHORT, output="kept.h5")
+    with pytest.raises(UsageError, match="exists"):
+        brakecli.run(CASE, SHORT, output="kept.h5")
+    brakecli.run(CASE, SHORT, output="kept.h5", force=True)
+    assert [each.name for each in tmp_path.iterdir()] == ["kept.h5"]
+
+
+def test_stability_is_that_of_the_command() -> None:
+    printed = command("stability", CASE, "--set", "friction.coefficient=0.4", "--json", cwd=HERE).json
+    found = brakecli.stability(CASE, {"friction": {"coefficient": np.float64(0.4)}})
+    del printed["command"]
+    assert {*printed} == {*found.data_vars, *found.attrs}
+    for name, value in printed.items():
+        if name in found.attrs:
+            assert found.attrs[name] == value
+        elif value is None:
+            assert found[name].item() == "" or math.isnan(found[name].item())
+        else:
+            assert found[name].item() == value
+    assert found.critical_frequency.attrs["units"] == "Hz"
+
+
+def test_modes_follow_a_key_as_in_the_command() -> None:
+    printed = command("stability", CASE, "--vary", "link2.angle_deg=1:10:4", "--json", cwd=HERE).json
+    found = brakecli.stability(CASE, vary={"link2.angle_deg": np.linspace(1, 10, 4)})
+    assert found.sizes == {"link2_angle_deg": 4, "mode": 2}
+    assert found.frequencies.values.tolist() == [each["frequencies"] for each in printed["vary"]]
+    with pytest.raises(UsageError, match="one key"):
+        brakecli.stability(CASE, vary={})
+
+
+def test_a_sweep_is_that_of_its_file(tmp_path: Path) -> None:
+    critical = {"parameter": "friction.coefficient", "lower": 0.0, "upper": 3.0, "method": "eigenvalue"}
+    file = tmp_path / "angles.toml"
+    given = "\n".join(f"{key} = {json.dumps(value)}" for key, value in critical.items())
+    axis = '[[axis]]\nparameter = "link2.angle_deg"\nvalues = [5.0, 10.0, 20.0]\n'
+    file.write_text(f"case = {json.dumps(CASE)}\n{axis}[critical]\n{given}\n")
+    of_file = brakecli.sweep(file, jobs=1)
+    found = brakecli.sweep(CASE, axes={"link2.angle_deg": np.array([5.0, 10, 20])}, critical=critical, jobs=1)
+    assert found.critical.identical(of_file.critical)
+    again = brakecli.sweep(brakecli.load(file), jobs=1)
+    assert again.identical(of_file)
+    exact = [brakecli.stability(CASE, {"link2.angle_deg": angle}).critical_friction for angle in (5.0, 10.0, 20.0)]
+    np.testing.assert_allclose(found.critical, exact, rtol=1e-9)
+
+
+def test_a_signal_is_classified(tmp_path: Path) -> None:
+    time_axis = np.arange(4000) / 2e4
+    rows = "\n".join(f"{t},{math.sin(2 * math.pi * 400.0 * t)}" for t in time_axis)
+    (tmp_path / "s.csv").write_text(f"t,v\n{rows}\n")
+    verdict = brakecli.classify(tmp_path / "s.csv", "velocity", column="v", time_column="t")
+    assert verdict.regime == "quasi-harmonic"
+    assert abs(float(verdict.frequency) - 400.0) < 0.5  # a tenth of the distance of two lines, 1 / 0.2 s
+
+
+def test_errors_are_those_of_the_commands(tmp_path: Path) -> None:
+    with pytest.raises(CaseError, match=r"friction\.coefficient: is out of range"):
+        brakecli.run(CASE, {"friction.coefficient": -1})
+    with pytest.raises(CaseError, match=r"link2\.stiffness: is missing"):
+        brakecli.run(CASE, {"link2": {"angle_deg": 5}})
+    with pytest.raises(CaseError, match="link3: is unknown"):
+        brakecli.sweep(CASE, axes={"link3.angle_deg": [1.0]})
+    with pytest.raises(CaseError, match="cannot be read"):
+        brakecli.load(tmp_path / "none.toml")
+    (tmp_path / "broken.h5").write_bytes(b"\x89HDF\r\n\x1a\n")
+    with pytest.raises(UnreadableResultError):
+        brakecli.load(tmp_path / "broken.h5")
+    with pytest.raises(UsageError, match="no settings"):
+        brakecli.load(tmp_path / "broken.h5", SHORT)
+    with pytest.raises(UsageError, match="noise: is not known"):
+        brakecli.classify(CASE, "noise")
+    with pytest.raises(UsageError, match="no threshold few"):
+        brakecli.classify(tmp_path / "broken.h5", thresholds={"few": 1})
+
+
+def test_a_run_that_fails_raises_and_keeps_its_history(tmp_path: Path) -> None:
+    (tmp_path / "tiny.toml").write_text(TINY)
+    with (
+        pytest.warns(UserWarning, match="not resolved"),
+        pytest.raises(BrakecliError, match="grew beyond all bounds"),
+    ):
+        brakecli.run(tmp_path / "tiny.toml", {"load.force": 1e25}, output=tmp_path / "r.h5")
+    assert brakecli.load(tmp_path / "r.h5").attrs["status"] == "failed"
+
+
+def test_warnings_are_those_of_the_command(tmp_path: Path) -> None:
+    steep = {**SHORT, "friction.coefficient": 1e9}
+    with pytest.warns(UserWarning, match="stick and slip are not resolved"):
+        brakecli.run(CASE, steep)
+
+
+def test_other_threads_compute_as_well() -> None:
+    found = list[Any]()
+    thread = threading.Thread(target=lambda: found.append(brakecli.run(CASE, SHORT)))
+    thread.start()
+    thread.join()
+    assert found[0].identical(brakecli.run(CASE, SHORT))
+
+
+def test_an_interrupted_run_ends_soon_and_the_next_one_is_whole() -> None:
+    before = brakecli.run(CASE, SHORT)
+    main = threading.get_ident()
+    timer = threading.Timer(1.0, lambda: signal.pthread_kill(main, signal.SIGINT))
+    timer.start()
+    start = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        brakecli.run(CASE, {"solver.duration": 500.0, "output.sample_interval": 0.1})  # half a minute
+    assert time.monotonic() - start < 1.0 + QUICK
+    timer.join()
+    assert brakecli.run(CASE, SHORT).identical(before)
