@@ -5,6 +5,9 @@ from collections.abc import Generator, Hashable, Sequence
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
+
+from brakecli.errors import BrakecliError
 from brakecli.runs.pilot import RUNGS
 from brakecli.runs.tolerance import (
     LAYERED,
@@ -43,7 +46,19 @@ def certify_together(systems: Sequence[System]) -> list[Certified | None]:
     """
     found: list[Certified | None] = [None] * len(systems)
     ladders = {i: _ladder(system) for i, system in enumerate(systems) if begins_with_steps(system)}
-    rungs = {i: next(runs) for i, runs in ladders.items()}
+    rungs = dict[int, System]()
+
+    def climb(i: int, motion: Motion | None) -> None:
+        """To the next rung. Numbers that no brake has end a ladder, and concern none of the others."""
+        try:
+            rungs[i] = next(ladders[i]) if motion is None else ladders[i].send(motion)
+        except StopIteration as end:
+            found[i] = end.value if end.value.certificate.certified else None
+        except (BrakecliError, ArithmeticError, np.linalg.LinAlgError):
+            pass
+
+    for i in ladders:
+        climb(i, None)
     while rungs:
         alike, ready = defaultdict[Hashable, list[int]](list), rungs
         for i, rung in ready.items():
@@ -51,10 +66,9 @@ def certify_together(systems: Sequence[System]) -> list[Certified | None]:
                 alike[key].append(i)
         rungs = {}
         for members in alike.values():
-            for i, motion in zip(members, run_together([ready[i] for i in members]), strict=True):
-                try:
-                    if motion is not None:
-                        rungs[i] = ladders[i].send(motion)
-                except StopIteration as end:
-                    found[i] = end.value if end.value.certificate.certified else None
+            with np.errstate(all="ignore"):  # of a lane, which is left then
+                motions = run_together([ready[i] for i in members])
+            for i, motion in zip(members, motions, strict=True):
+                if motion is not None:
+                    climb(i, motion)
     return found

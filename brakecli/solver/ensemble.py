@@ -43,6 +43,7 @@ MOST_SAMPLES = 1 << 14
 
 _MOST = 8  # evaluations of the contact in a step
 _CONTRACTION = 0.1  # of the iteration, at most
+_MOST_BYTES, _MOST_STEPS = 1e8, 1e9  # of the tables at the nodes, and between two samples
 _MOST_PASSED = 1e6  # waves, beyond which their phase needs more than 16 digits
 _THETA_1, _THETA_2, _THETA_3 = NUMEROV
 _FAST = frozenset({"reassoc", "contract", "nsz"})
@@ -55,8 +56,7 @@ def _lanes(names: str) -> dict[str, Any]:
 LANE = record(
     **_lanes(" ".join(Coefficients._fields) + " load belt"),  # given: Q, N, and U, m/s
     **_lanes("side grip k"),  # sign of the sliding velocity, F_x/F_y, stiffness of the layer, N/m²
-    **_lanes("i_11 i_12 i_22"),  # inverse of a, s/kg
-    **_lanes("limit"),  # change of the force (N) from which on the iteration goes on
+    **_lanes("i_11 i_12 i_22 limit"),  # inverse of a, s/kg; change of the force (N) at which (13) goes on
     **_lanes("x y x_old y_old d e force before earlier"),  # the motion, as in `records.STATE`
     **_lanes("g_1 g_2 x_0 y_0"),  # a step, as in `records.PROBLEM`
     **_lanes("at_x at_y found touches partly"),  # where the contact is evaluated, its force, the part that touches
@@ -262,9 +262,9 @@ def fits(system: System) -> Hashable | None:
     kind = method.scheme, method.theta, method.start, method.iteration, system.evaluator
     if kind != ("three-layer", NUMEROV, "consistent", "newton", "auto") or not 0 < len(wheel.g) <= WAVES:
         return None
-    if len(system.belt) > 1 or len(system.load) > 1 or sliding == 0.0 or system.samples > MOST_SAMPLES:
-        return None
-    if system.passing_frequency * system.sampled_duration > _MOST_PASSED:
+    changing, passed = len(system.belt) + len(system.load) > 2, system.passing_frequency * system.sampled_duration
+    large = system.samples > MOST_SAMPLES or system.table_bytes > _MOST_BYTES or system.per_sample > _MOST_STEPS
+    if changing or sliding == 0.0 or large or passed > _MOST_PASSED:
         return None
     return system.half_length, system.shoe, wheel, system.nodes, system.interval, system.per_sample, system.samples
 
@@ -321,16 +321,15 @@ def _filled(systems: Sequence[System]) -> Any:
     """Systems in their lanes; one without a start, or that (13) contracts too little for, is out."""
     c = Coefficients(*np.array([each.coefficients for each in systems]).T)
     start, h, wheel = np.array([_start(each) for each in systems]).T, systems[0].step, systems[0].wheel
-    given = [(each.load_at_start, each.belt_speed, each.layer_stiffness) for each in systems]
-    load, belt, k = np.array(given).T
+    load, belt, k = np.array([(each.load_at_start, each.belt_speed, each.layer_stiffness) for each in systems]).T
     side = np.sign(start[2] - belt)
     grip = -side * c.phi
     a_11 = 2.0 * c.m / h + c.b_xx + 2.0 * _THETA_1 * h * c.c_xx  # Eq. (14)
     a_12 = c.b_xy + 2.0 * _THETA_1 * h * c.c_xy
     a_22 = 2.0 * c.m / h + c.b_yy + 2.0 * _THETA_1 * h * c.c_yy
     a = a_11 * a_22 - a_12 * a_12
-    steep = float(np.abs(wheel.g) @ wheel.omega)
-    moves = np.abs(a_11 - a_12 * grip) + steep * np.abs(a_22 * grip - a_12)  # y and x by the force, over a
+    moves = np.abs(a_11 - a_12 * grip)  # y by the force, over a; then x by it, on the steepest slope
+    moves += float(np.abs(wheel.g) @ wheel.omega) * np.abs(a_22 * grip - a_12)
     factor = 2.0 * _THETA_1 * h * 2.0 * systems[0].half_length * k * moves / a  # whichever part touches
     allowed = LEFT * np.array([each.method.tolerance for each in systems]) * np.abs(load)
     o = aligned(LANE.itemsize // 8).view(LANE)[0]

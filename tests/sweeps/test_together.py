@@ -76,6 +76,17 @@ def test_one_that_leaves_its_lane_is_certified_alone() -> None:
     assert found.certificate.estimated_error == pytest.approx(alone.certificate.estimated_error, rel=1e-3)
 
 
+def test_numbers_that_no_brake_has_concern_no_other_point(tmp_path: Path) -> None:
+    masses = axis("shoe.mass", "values = [10.0, 1e90, 1e60, 11.0]")
+    loaded = write_sweep(tmp_path, masses, case=tomli_w.dumps(PROMISED))
+    inline(loaded, tmp_path / "four.h5", compute_units, task_size=4)
+    inline(loaded, tmp_path / "one.h5", compute_units, task_size=1)
+    assert (tmp_path / "four.h5").read_bytes() == (tmp_path / "one.h5").read_bytes()
+    with h5py.File(tmp_path / "one.h5") as file:
+        assert file["status"][[0, 3]].tolist() == [b"done", b"done"]
+        assert b"crashed" not in file["status"][:].tolist()
+
+
 @pytest.mark.parametrize("shoes", counts(3, 60))
 def test_their_promises_are_kept(shoes: int) -> None:
     """Beside event-driven runs of random shoes whose pads open in part; a shoe that sticks has left its lane."""
