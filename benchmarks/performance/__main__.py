@@ -47,8 +47,8 @@ _ON_S = (
     " and the events. DOP853 and heyoka.py take fewer and longer steps, and fill in the samples."
 )
 _ON_ROUGH = (
-    "B and C: the peer's steps adapt and are of high order. Ours are fixed and of second order. An"
-    " evaluation of the peers takes 115 ns, since it sums the force alone; ours takes 170."
+    "B and C: steps of both adapt, an evaluation of both takes 115 ns with 256 nodes and a third of that in full"
+    " contact in closed form, but a step of ours ends at events, and at no more than half a passing wave."
 )
 REASONS = {
     "numbalsoda LSODA: S, 0.5 s": (

@@ -22,6 +22,7 @@ from brakecli.cli import (
     info,
     new,
     plot,
+    report,
     run,
     schema,
     stability,
@@ -33,7 +34,22 @@ from brakecli.cli.output import say, show
 from brakecli.errors import BrakecliError, RefusedError
 from brakecli.files.os_signals import Interrupted
 
-COMMANDS = (run, sweep, classify, compare_schemes, stability, advise, check, new, schema, plot, info, diff, export)
+COMMANDS = (
+    run,
+    sweep,
+    classify,
+    compare_schemes,
+    stability,
+    advise,
+    check,
+    new,
+    schema,
+    plot,
+    report,
+    info,
+    diff,
+    export,
+)
 """The files of the commands, in the order in which `--help` lists them."""
 
 LIBRARIES = 750_000_000

@@ -7,6 +7,10 @@ from brakecli.cli.options import Force, Quiet, option, output_option, source_arg
 from brakecli.cli.output import show
 from brakecli.files.os_signals import unwinding
 
+VARIABLE = (
+    "Draw this number of a sweep; of a run x, y, vx, vy, friction_force, normal_force, torque or contact_fraction."
+)
+
 
 def command(
     result: Annotated[Path, source_argument("FILE.h5", "Result of a run, a sweep, a comparison or stability.")],
@@ -14,9 +18,7 @@ def command(
     select: Annotated[
         list[str] | None, option("Draw the nearest value of a sweep's axis; repeatable.", "KEY=VALUE")
     ] = None,
-    variable: Annotated[
-        str | None, option("A number of the sweep; of a run, what to draw in place of vx.", "NAME")
-    ] = None,
+    variable: Annotated[str | None, option(VARIABLE, "NAME")] = None,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:

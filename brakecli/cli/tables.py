@@ -24,16 +24,6 @@ POINTS = named(fields.POINT, "regime", "frequency", "amplitude")
 CRITICAL_NAMES = ("critical", "critical_error", "critical_eigenvalue", "critical_sustained", "critical_status")
 CRITICAL_POINTS = (*named(fields.POINT, "regime"), *named(fields.CRITICAL, *CRITICAL_NAMES))
 IF_KNOWN = ("growth_rate", "ringing_frequency", "amplitude_spread", "amplitude_forced", "amplitude_own")
-EVIDENCE_UNITS = {"envelope_slope": "1/s", "envelope_final": "m/s", "envelope_largest": "m/s", "power_": "W"}
-EVIDENCE_UNITS |= {
-    "amplitude_v": "m/s",
-    "amplitude_": "m",
-    "seconds": "s",
-    "frequency_": "Hz",
-    "line_freq": "Hz",
-    "force_": "N",
-}
-"""By how the names of the evidence begin; all others are pure numbers."""
 MOST_LISTED_POINTS = 30
 NARROWEST = 40  # columns of a table, whatever the terminal says: nothing can be read in fewer
 
@@ -91,7 +81,7 @@ def verdict_table(source: str, numbers: Mapping[str, Any]) -> str:
     """A verdict, from the names and values that `--json` gives."""
     rows = _verdict_rows(numbers)
     for name, value in numbers["evidence"].items():
-        unit = next((unit for start, unit in EVIDENCE_UNITS.items() if name.startswith(start)), "")
+        unit = fields.evidence_unit(name)
         shown = ", ".join(f"{each:.4g}" for each in value) if isinstance(value, list | tuple) else f"{value:.6g}"
         rows.append((name.replace("_", " "), f"{shown} {unit}".rstrip() if shown else "-"))
     return two_columns(source, rows)

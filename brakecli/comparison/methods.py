@@ -5,12 +5,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from brakecli.errors import UsageError
+from brakecli.solver.contact.pad import default_nodes
 from brakecli.solver.method import Method
 from brakecli.solver.schemes import SCHEMES
 from brakecli.solver.system import System
 
 COARSEST, RUNGS = 16, 7  # steps per period of the fastest motion that a ladder begins with; steps on it
 TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
+ON_NODES = (1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5, 1e-6)
 NODE_FACTORS = (0.25, 0.5, 2.0, 4.0)
 
 
@@ -29,7 +31,8 @@ def kinds(system: System, wanted: Sequence[str] = ()) -> list[Method]:
     """The methods that are compared on a system, the cheapest of a scheme first; `wanted` names schemes."""
     moving = system.initial.vx != 0.0 or system.initial.vy != 0.0
     usual = "closed-form" if system.smooth else "auto"
-    counts = [max(2, round(system.nodes * factor)) for factor in NODE_FACTORS]
+    nodes = system.nodes or default_nodes(system.half_length, system.shoe, system.wheel)
+    counts = [max(2, round(nodes * factor)) for factor in NODE_FACTORS]
     found = []
     for name, scheme in SCHEMES.items():
         if scheme.exact and not system.smooth:
@@ -40,8 +43,9 @@ def kinds(system: System, wanted: Sequence[str] = ()) -> list[Method]:
             kind = Method(name, trial.theta, trial.start, trial.iteration)
             found.append(kind if scheme.own_steps else replace(kind, evaluator=usual, nodes=system.nodes))
             if trial.contacts and not system.smooth:
-                found += [replace(kind, evaluator="midpoint", nodes=count) for count in counts]
-                found.append(replace(kind, evaluator="exact"))
+                counted = (nodes, *counts) if scheme.own_steps else counts
+                found += [replace(kind, evaluator="midpoint", nodes=count) for count in counted]
+                found += [] if scheme.own_steps else [replace(kind, evaluator="exact")]
     return sorted(found, key=lambda kind: (kind.own_steps, kind.evaluator != usual))
 
 
@@ -58,7 +62,7 @@ def rungs(kind: Method, steps: Sequence[float]) -> list[Method]:
     if kind.row.exact:
         return [kind]
     if kind.own_steps:
-        return [replace(kind, tolerance=tolerance) for tolerance in TOLERANCES]
+        return [replace(kind, tolerance=tolerance) for tolerance in (ON_NODES if kind.nodes else TOLERANCES)]
     return [replace(kind, step=step) for step in steps]
 
 

@@ -37,7 +37,7 @@ class Field:
         value: Any = report
         for part in self._path:
             if value is not None:
-                value = value[part] if isinstance(value, Mapping) else getattr(value, part)
+                value = value[part] if isinstance(value, dict) else getattr(value, part)
                 value = value() if callable(value) else value
         if value is None:
             return self.missing
@@ -71,6 +71,8 @@ def named(fields: Iterable[Field], *names: str) -> tuple[Field, ...]:
 
 def plain(value: Any) -> Any:
     """A value as JSON holds it: enumerations are texts, complex numbers pairs, NaN in an array is None."""
+    if type(value) is float or value is None:  # most of them
+        return value
     if isinstance(value, str):
         return str(value)
     if isinstance(value, complex):

@@ -57,6 +57,23 @@ VERDICT = (
     Field("evidence", "", "numbers by which the rules decided", OBJECT, "verdict.", group="regime/evidence"),
     Field("thresholds", "", "limits of the rules", OBJECT, "verdict.", group="regime/thresholds"),
 )
+EVIDENCE_UNITS = {"envelope_slope": "1/s", "envelope_final": "m/s", "envelope_largest": "m/s", "power_": "W"}
+EVIDENCE_UNITS |= {
+    "amplitude_v": "m/s",
+    "amplitude_": "m",
+    "seconds": "s",
+    "frequency_": "Hz",
+    "line_freq": "Hz",
+    "force_": "N",
+}
+"""By how the names of the evidence begin; all others are pure numbers."""
+
+
+def evidence_unit(name: str) -> str:
+    """The unit of a number of the evidence; empty for a pure number."""
+    return next((unit for start, unit in EVIDENCE_UNITS.items() if name.startswith(start)), "")
+
+
 ENERGY = (
     Field("kinetic", "J", "change of the kinetic energy from the start to the end"),
     Field("links", "J", "change of the energy stored in the links"),

@@ -24,7 +24,7 @@ _PANELS = (  # column, factor, title and label of the work
 )
 _MARKERS = {"0.5, 0.5": "o", "1, 0.5": "^", "0.5, 1": "v", "1, 1": "s"}  # by weights: of two layers
 _MARKERS |= {"0.25, 0.5, 0.25": "o", "0.0833333, 0.833333, 0.0833333": "D", "": "*"}  # of three, and none
-_EXACT, _OTHER_NODES = "#CC79A7", "#56B4E9"  # colours of the exact contact force, of less usual numbers of nodes
+_EXACT, _OTHER_NODES = "#CC79A7", "#56B4E9"  # colours of the exact contact force, of entries on nodes alone
 _NODE_MARKERS = "<>ph"  # markers of the same weights with other numbers of nodes
 
 
@@ -39,13 +39,13 @@ def draw(result: StoredResult) -> Figure:
     best = result.attributes.get("recommended")
     if best is not None and not (isinstance(best, int) and 0 <= best < len(columns["error"])):
         raise style.unreadable(result, "it recommends an entry that it does not hold")
-    title, lines = str(result.attributes.get("title", "")), _lines(result.attributes, columns, best)
+    heading, lines = str(result.attributes.get("title", "")), _lines(result.attributes, columns, best)
     target, floor = (float(result.attributes.get(name, 0.0)) for name in ("target_error", "reference_error"))
-    figure = style.headed(12.4, 6.6, title, *lines, wspace=0.04)
     drawn = (columns["error"] > 0.0) & (columns["error"] <= LARGEST)
     errors, columns["error"] = columns["error"], np.where(drawn, columns["error"], np.nan)
     rows = _PANELS if np.isfinite(columns["wall_seconds"]).any() else _PANELS[1:]
-    panels = figure.subplots(1, len(rows), sharey=True, squeeze=False)[0]
+    figure = style.headed(12.4, 6.6, heading, *lines, columns=len(rows), wspace=0.04)
+    panels = style.panels(figure, 1, len(rows), sharey=True)[0]
     for axes, (name, factor, title, label) in zip(panels, rows, strict=True):
         work = np.where(drawn & (columns[name] > 0.0), factor * columns[name], np.nan)
         _draw_errors(axes, columns, work)
@@ -73,7 +73,12 @@ def draw(result: StoredResult) -> Figure:
             axes.axhspan(low, floor, label="within the reference's error", **band)
     found = style.labels(figure)
     look: dict[str, Any] = {"frameon": False, "handlelength": 2.6, "labelspacing": 0.6}
-    figure.legend(found.values(), found.keys(), loc="outside right center", **look)
+    figure.legend(
+        found.values(),
+        found.keys(),
+        loc="outside lower left" if style.is_narrow() else "outside right center",
+        **look,
+    )
     return figure
 
 
@@ -113,8 +118,9 @@ def _draw_errors(axes: Axes, columns: Columns, work: style.Array) -> None:
         marker = _MARKERS.get(entry["theta"], "P")
         if entry["evaluator"] == "exact" and not own:
             colour = _EXACT
-        elif entry["evaluator"] == "midpoint" and entry["nodes"] in others:
-            colour, marker = _OTHER_NODES, _NODE_MARKERS[others.index(entry["nodes"]) % len(_NODE_MARKERS)]
+        elif entry["evaluator"] == "midpoint":
+            place = others.index(entry["nodes"]) % len(_NODE_MARKERS) if entry["nodes"] in others else -1
+            colour, marker = _OTHER_NODES, _NODE_MARKERS[place] if place >= 0 else "X"
         size, width, above = (9.0, 2.0, 3.0) if own else (5.0, 1.1, 2.0)
         face = "white" if entry["start"] == "paper" else colour
         dashes = (0, (2, 1.5)) if entry["iteration"] == "fixed-point" else "-"

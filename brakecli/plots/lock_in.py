@@ -1,5 +1,6 @@
 """The lock-in diagram: frequencies of both modes along a key of the case, and their growth below."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -28,12 +29,18 @@ def draw(result: StoredResult) -> Figure:
     if not np.isfinite(modes[0]).any():
         raise UsageError(f"{result.path}: there is no steady sliding at any value, so there is nothing to draw")
     critical = np.asarray(result.attributes.get("critical_values", ()), float).ravel()
-    critical = critical[np.isfinite(critical)]
+    return diagram(str(result.attributes.get("title", "")), key, units, x, modes, critical[np.isfinite(critical)])
+
+
+def diagram(
+    title: str, key: str, units: str, x: style.Array, modes: Sequence[style.Array], critical: style.Array
+) -> Figure:
+    """The figure of both modes, their frequencies (Hz) and growth rates (1/s), along a key of the case."""
     factor, unit = style.prefixed(style.largest(x), units.removeprefix("1"))
     numbers = ", ".join(style.readable(factor * float(value)) for value in critical)
     said = f"changes at {numbers} {unit}".rstrip() if len(critical) else "does not change in between"
     summary = f"{len(x)} value{'s' * (len(x) > 1)}   ·   stability {said}"
-    figure = style.headed(_WIDTH, 6.4, str(result.attributes.get("title", "")), summary, hspace=0.05)
+    figure = style.headed(_WIDTH, 6.4, title, summary, hspace=0.05)
     panels = figure.subplots(2, 1, sharex=True, height_ratios=[1.35, 1.0])
     turning = 2.0 * np.pi * style.largest(modes[0])  # rad/s: of its rounding is that of a growth rate
     for axes, values, label in zip(panels, modes, ("frequency", "growth rate"), strict=True):

@@ -29,7 +29,7 @@ from brakecli.plots.sweep import (
 
 _LONG_TITLE = 34  # characters of a panel's title from which on it takes two lines
 _MAP_WIDTH, _PANEL_WIDTH = 10.4, 3.0  # inches, of a figure with two columns of maps, and of each of more maps
-_MOST_NUMBERS = 80
+_MOST_NUMBERS, _LEAST_CELL = 80, 0.5  # cells with a number, and how wide they must be (inches)
 _ALIKE = 1e-6  # relative difference of numbers from which on they have different colours
 _MOST_DRAWN = 4096  # cells up to which each cell of a map is a shape of its own in a PDF or SVG file
 
@@ -53,14 +53,14 @@ def draw(picture: SweepPicture) -> Figure:
     layers = {"" if critical else shown.replace("_", " ").capitalize(): draw_shown}
     layers = layers if critical else {"Regime": _draw_regimes, **layers}
     if sliced:
-        pieces = _slices(picture)
+        pieces = slices(picture)
         width, height = max(_MAP_WIDTH, 1.2 + _PANEL_WIDTH * len(pieces)), 4.6 if critical else 7.2
     else:
         pieces = [(f" on the way {way}" if way else "", picture.towards(way)) for way in picture.directions]
         width, height = (WIDTH, 5.8) if critical else (_MAP_WIDTH, 1.0 + 3.9 * len(pieces))
-    figure = picture.figure(width, height)
     shape = (len(layers), len(pieces)) if sliced else (len(pieces), len(layers))
-    panels = figure.subplots(*shape, sharex=True, sharey=True, squeeze=False)
+    figure = picture.figure(width, height, shape[1])
+    panels = style.panels(figure, *shape, sharex=True, sharey=True)
     for row, (name, piece) in zip(panels.T if sliced else panels, pieces, strict=True):
         for axes, (layer, draw_layer) in zip(row, layers.items(), strict=True):
             mesh = draw_layer(axes, piece, scale)
@@ -77,7 +77,7 @@ def draw(picture: SweepPicture) -> Figure:
     return figure
 
 
-def _slices(picture: SweepPicture) -> list[tuple[str, SweepPicture]]:
+def slices(picture: SweepPicture) -> list[tuple[str, SweepPicture]]:
     """Title and picture for each value of the shortest axis, or of an axis of texts if there is one."""
     lengths = [len(axis.values) for axis in picture.axes]
     short = [number for number in range(3) if lengths[number] <= MOST_PANELS]
@@ -115,9 +115,10 @@ def _scale(picture: SweepPicture, name: str) -> Scale:
 def _draw_regimes(axes: Axes, picture: SweepPicture, _: Scale) -> ScalarMappable:
     codes = np.full(picture["regime"].shape, np.nan)
     for code, (regime, (colour, _marker)) in enumerate(REGIMES.items()):
+        marker = "X" if regime == Regime.UNDECIDED else "s"  # its cells have a cross
         if (where := picture["regime"] == regime).any():
             codes[where] = code
-            axes.plot([], [], "s", ms=9, mfc=colour, mec="none", label=str(regime))
+            axes.plot([], [], marker, ms=9, mfc=colour, mec="none", label=str(regime))
     colours = ListedColormap([colour for colour, _marker in REGIMES.values()])
     shaken = {"marker": "o", "color": style.DARK, "mec": "white", "label": FORCED}
     different = {"marker": "$≠$", "color": style.DARK, "label": DIFFERENT}
@@ -154,7 +155,9 @@ def _draw_critical(axes: Axes, picture: SweepPicture, scale: Scale) -> ScalarMap
     numeric = all(axis.texts is None and len(axis.values) >= 3 for axis in picture.axes)
     if numeric and np.mean(areas) > 0.3:
         _draw_contours(axes, picture, values, scale.norm)
-    elif values.size <= _MOST_NUMBERS:
+    elif values.size <= _MOST_NUMBERS and axes.get_window_extent().width > _LEAST_CELL * axes.figure.dpi * len(
+        values
+    ):
         for i, j in np.argwhere(known):
             x, y, value = picture.axes[0].values[i], picture.axes[1].values[j], values[i, j]
             colour = "white" if scale.norm(value) < 0.6 else "black"

@@ -171,8 +171,9 @@ def _summary(attributes: dict[str, Any]) -> str:
 def draw(picture: RunPicture) -> Figure:
     """The figure with its four panels; two more where speed or load change."""
     rows = 3 if picture.stop else 2
-    figure = style.headed(10.4, 3.6 * rows, picture.title, picture.summary, wspace=0.05, hspace=0.06)
-    panels = figure.subplots(rows, 2, width_ratios=(1.55, 1.0))
+    lines = picture.title, picture.summary
+    figure = style.headed(10.4, 3.6 * rows, *lines, columns=2, wspace=0.05, hspace=0.06)
+    panels = style.panels(figure, rows, 2, width_ratios=(1.55, 1.0))
     drawing = (_draw_detail, _draw_portrait, _draw_history, _draw_spectrum)
     for axes, draw_panel in zip(panels[:2].flat, drawing, strict=True):
         draw_panel(axes, picture)

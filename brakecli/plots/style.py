@@ -25,6 +25,7 @@ Array = NDArray[Any]
 # The colours of Okabe and Ito, which people who do not see red or green can tell apart.
 BLUE, ORANGE, VERMILION, GREEN, GREY = "#0072B2", "#E69F00", "#D55E00", "#009E73", "#9A9A9A"
 DARK = "#333333"
+NARROW = 5.2  # inches
 DASHES, DOTS = (0, (5, 3)), (0, (1, 1.5))
 ROUNDING = 1e-12  # relative difference below which numbers of a computation are the same
 WIDE = 300.0  # ratio of the ends of a logarithmic axis from which on only powers of ten have a number
@@ -46,15 +47,19 @@ _UNDATED = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
 
 
 @contextmanager
-def applied() -> Iterator[None]:
-    """Draw with this style, not the user's own; do not warn of glyphs that the font lacks."""
+def applied(narrow: bool = False) -> Iterator[None]:
+    """Draw with this style, not the user's own; do not warn of glyphs that the font lacks.
+
+    Figures that are `narrow` have a single column of panels and no title, for a page on a small screen.
+    """
     look = {f"{group}.{key}": value for group, values in _LOOK for key, value in values.items()}
+    look |= {"figure.figsize": (NARROW, NARROW)} if narrow else {}
     with matplotlib.style.context(["default", look]), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         yield
 
 
-def rendered(figure: Figure, suffix: str) -> bytes:
+def rendered(figure: Figure, suffix: str, dpi: int = 150) -> bytes:
     """The figure as a file of this suffix; its bytes do not depend on the time or the machine."""
     figure.draw_without_rendering()
     for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)):
@@ -63,19 +68,24 @@ def rendered(figure: Figure, suffix: str) -> bytes:
     for axes in figure.axes:  # the layout's last digits depend on the order in which it solved for them
         axes.set_position(tuple(round(bound, 6) for bound in axes.get_position().bounds))
     stream = BytesIO()
-    figure.savefig(stream, format=suffix[1:], dpi=150, metadata=_UNDATED.get(suffix))
+    figure.savefig(stream, format=suffix[1:], dpi=dpi, metadata=_UNDATED.get(suffix))
     return stream.getvalue()
 
 
-def headed(width: float, height: float, title: str, *lines: str, **spacing: float) -> Figure:
-    """An empty figure (inches) with a title and lines of text above its panels.
+def headed(width: float, height: float, title: str, *lines: str, columns: int = 1, **spacing: float) -> Figure:
+    """An empty figure (inches) with a title and lines of text above its panels, which stand in some columns.
 
     The lines are wrapped to the width; the height counts one line for each.
     """
+    if is_narrow():
+        width, height, title = NARROW, 0.85 * height * columns, ""
     bold, plain = {"size": 13, "weight": "bold"}, {"size": 10.0, "color": "#444444"}
     wrapped = [
         (step, text, look)
-        for line, letters, step, look in ((title, 9.4, 0.29, bold), *((line, 12.3, 0.21, plain) for line in lines))
+        for line, letters, step, look in (
+            *(((title, 9.4, 0.29, bold),) if title else ()),
+            *((line, 12.3, 0.21, plain) for line in lines),
+        )
         for text in textwrap.wrap(line, round(letters * width), max_lines=6, placeholder=" …") or [""]
     ]
     height += sum(step for step, *_ in wrapped) - 0.29 - 0.21 * len(lines)
@@ -86,6 +96,19 @@ def headed(width: float, height: float, title: str, *lines: str, **spacing: floa
     rect = (0.05 / width, 0.036 / height, 1.0 - 0.1 / width, 1.0 - (below + 0.096) / height)
     figure.set_layout_engine("constrained", rect=rect, **spacing)
     return figure
+
+
+def is_narrow() -> bool:
+    """Whether figures have a single column."""
+    return bool(matplotlib.rcParams["figure.figsize"][0] == NARROW)
+
+
+def panels(figure: Figure, rows: int, columns: int, **options: Any) -> Array:
+    """Panels in rows and columns; in a narrow figure all below each other, but in an array of this shape."""
+    if is_narrow():
+        options.pop("width_ratios", None)
+        return np.asarray(figure.subplots(rows * columns, 1, squeeze=False, **options)).reshape(rows, columns)
+    return np.asarray(figure.subplots(rows, columns, squeeze=False, **options))
 
 
 def labels(figure: Figure) -> dict[str, Any]:

@@ -133,11 +133,11 @@ class SweepPicture:
         yield sign(several, "several windows of instability", "+", style.DARK, style.DARK)
         yield self.failed()
 
-    def figure(self, width: float, height: float) -> Figure:
+    def figure(self, width: float, height: float, columns: int = 1) -> Figure:
         """An empty figure (inches) below the heading; `height` is that of the part below the heading."""
         chosen = ["   ·   ".join(self.chosen)] if self.chosen else []
         lines = [self.summary, *chosen, *self.findings[:2]]
-        return style.headed(width, height + 0.21 * len(lines), self.title, *lines)
+        return style.headed(width, height + 0.21 * len(lines), self.title, *lines, columns=columns)
 
 
 def sign(where: style.Array, label: str, marker: str, colour: str, face: str) -> Sign:
@@ -166,8 +166,10 @@ def add_legend(figure: Figure) -> None:
     engine.set(rect=(left, bottom, wide, high - taken))
 
 
-def gather(result: StoredResult, select: Sequence[str] = (), shown: str = "") -> SweepPicture:
-    """Read from a result what its picture shows: of its variables the one that is `shown`, if it is named.
+def gather(
+    result: StoredResult, select: Sequence[str] = (), shown: str = "", more: Sequence[str] = ()
+) -> SweepPicture:
+    """Read from a result what its picture shows: the variable that is `shown`, if it is named, and `more` of them.
 
     `select` holds `KEY=VALUE`; axes of a single value are selected anyway. Raises UnreadableResultError where
     something is missing, UsageError where there is no such key, value or variable.
@@ -176,39 +178,9 @@ def gather(result: StoredResult, select: Sequence[str] = (), shown: str = "") ->
         sweep = parse_table(Sweep, str(result.attributes.get("resolved_sweep_toml", "")), "its resolved sweep")
     except CaseError as error:
         raise style.unreadable(result, f"the sweep in it is not valid: {error.problems[0]}") from error
-    known = result.variables("/")
-    names = _NEEDED + (_CRITICAL if sweep.critical is not None else ())
-    if missing := [name for name in names if name not in known]:
-        raise style.unreadable(result, f"it has no variable {missing[0]}")
-    if len({(known[name].dims, known[name].shape) for name in names}) != 1:
-        raise style.unreadable(result, "its variables do not lie on the same axes")
+    known, variables = result.variables("/"), _variables(result, sweep, shown, more)
     dims = known["status"].dims
     both = dims[:1] == ("direction",)
-    variables = {name: style.read_column(result, name)[... if both else np.newaxis] for name in names}
-    for name in _WINDOWS if sweep.critical is not None else ():  # older results have none
-        shape = (*variables["status"].shape, 1)
-        there = name in known and known[name].dims == (*dims, fields.WINDOW.name)
-        variables[name] = (
-            style.read_column(result, name)[... if both else np.newaxis] if there else np.full(shape, np.nan)
-        )
-    if shown and shown not in (able := _numeric(result)):
-        problem = f"--variable {shown}: no number of its points has this name"
-        raise UsageError(f"{result.path}: {problem}; give one of {', '.join(able)}")
-    base = str(result.attributes.get("resolved_toml", ""))
-    margin = None
-    with suppress(CaseError):  # of older results, and of forged ones
-        margin = margins(Plan(given_toml(sweep), base)) if sweep.critical is None else None
-    if margin is not None and margin.size == np.prod(variables["status"].shape[1:]):
-        variables[MARGIN] = np.broadcast_to(
-            margin.reshape(variables["status"].shape[1:]), variables["status"].shape
-        )
-    if shown:
-        values = style.read_column(result, shown).astype(float)[... if both else np.newaxis]
-        variables[shown] = np.where(variables["status"] == Status.DONE, values, np.nan)
-    for name in ("regime", "excitation"):  # those of points that failed mean nothing
-        variables[name] = np.where(variables["status"] == Status.DONE, variables[name], "")
-    differ = result.read("/", "hysteresis") == 1 if both and "hysteresis" in known else False
-    variables["hysteresis"] = np.broadcast_to(differ, variables["status"].shape)
     units = {name: str(each.attributes.get("units", "")) for name, each in known.items()}
     units = {name: unit if unit != "1" else "" for name, unit in units.items()}
     long_names = {name: str(each.attributes.get("long_name", "")) for name, each in known.items()}
@@ -236,7 +208,46 @@ def gather(result: StoredResult, select: Sequence[str] = (), shown: str = "") ->
     return picture
 
 
-def _numeric(result: StoredResult) -> list[str]:
+def _variables(result: StoredResult, sweep: Sweep, shown: str, more: Sequence[str]) -> dict[str, style.Array]:
+    """What is drawn of the points, over the directions and the axes as they lie in the file."""
+    known = result.variables("/")
+    names = _NEEDED + (_CRITICAL if sweep.critical is not None else ())
+    if missing := [name for name in names if name not in known]:
+        raise style.unreadable(result, f"it has no variable {missing[0]}")
+    if len({(known[name].dims, known[name].shape) for name in names}) != 1:
+        raise style.unreadable(result, "its variables do not lie on the same axes")
+    dims = known["status"].dims
+    both = dims[:1] == ("direction",)
+    variables = {name: style.read_column(result, name)[... if both else np.newaxis] for name in names}
+    for name in _WINDOWS if sweep.critical is not None else ():  # older results have none
+        shape = (*variables["status"].shape, 1)
+        there = name in known and known[name].dims == (*dims, fields.WINDOW.name)
+        variables[name] = (
+            style.read_column(result, name)[... if both else np.newaxis] if there else np.full(shape, np.nan)
+        )
+    if shown and shown not in (able := numeric(result)):
+        problem = f"--variable {shown}: no number of its points has this name"
+        raise UsageError(f"{result.path}: {problem}; give one of {', '.join(able)}")
+    base = str(result.attributes.get("resolved_toml", ""))
+    margin = None
+    with suppress(CaseError):  # of older results, and of forged ones
+        margin = margins(Plan(given_toml(sweep), base)) if sweep.critical is None else None
+    if margin is not None and margin.size == np.prod(variables["status"].shape[1:]):
+        variables[MARGIN] = np.broadcast_to(
+            margin.reshape(variables["status"].shape[1:]), variables["status"].shape
+        )
+    for name in {shown, *more} - {"", *variables}:
+        values = style.read_column(result, name)[... if both else np.newaxis]
+        nothing = np.nan if values.dtype.kind in "if" else ""
+        variables[name] = np.where(variables["status"] == Status.DONE, values, nothing)
+    for name in ("regime", "excitation"):  # those of points that failed mean nothing
+        variables[name] = np.where(variables["status"] == Status.DONE, variables[name], "")
+    differ = result.read("/", "hysteresis") == 1 if both and "hysteresis" in known else False
+    variables["hysteresis"] = np.broadcast_to(differ, variables["status"].shape)
+    return variables
+
+
+def numeric(result: StoredResult) -> list[str]:
     """The variables of a sweep that hold a number for each point."""
     known = result.variables("/")
     dims = known["status"].dims

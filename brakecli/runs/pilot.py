@@ -7,11 +7,10 @@ from typing import NamedTuple
 from brakecli.runs.cost import evaluation_seconds, start_seconds
 from brakecli.runs.tolerance import (
     EVENT_RATIO,
-    LAYERED,
-    LAYERED_FROM,
+    NODES_FROM,
     first_event_tolerance,
     first_nodes,
-    first_steps,
+    first_rung,
 )
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.motion import Stepping
@@ -23,6 +22,7 @@ MOST_EVALUATION, MOST_AT_NODES = 0.02, 2e-3
 """Guessed time (s) of an evaluation of the contact, exact and by nodes, beyond which no step is tried."""
 SECOND_RUN = EVENT_RATIO**-0.125  # what the second of two event-driven runs costs over the first
 FINER, RUNGS = 4, 15.0  # steps of the last run of a ladder, and time of all of its runs, over the first one's
+FINER_FOUND, RUNGS_FOUND = 2, 8.0  # the same where steps are found
 FEW = 20  # steps, the first of which are shorter than those that follow
 SLOWER = 2.0  # pace of the latter half of a pilot run over the mean pace, beyond which the rest may be slower yet
 
@@ -47,17 +47,20 @@ def measured(system: System) -> Price | None:
     first = replace(system, method=replace(method, tolerance=first_event_tolerance(system)))
     events = _begun(first)
     events = Price(int(events.steps * SECOND_RUN), events.seconds * (1.0 + SECOND_RUN), events.at_least)
-    if not method.automatic or method.tolerance < LAYERED_FROM or system.smooth:
+    if not method.automatic or method.tolerance < NODES_FROM or system.smooth:
         return events
-    ladder = _ladder(replace(system, method=replace(method, **LAYERED[0])))
+    ladder = _ladder(replace(system, method=replace(method, evaluator="midpoint")))
     return ladder if ladder.seconds < events.seconds else events._replace(at_least=True)
 
 
 def _ladder(system: System) -> Price:
     """A ladder of steps and nodes, each refined twice at least."""
-    first = replace(system.method, step=first_steps(system)[0], nodes=first_nodes(system))
-    found = _begun(replace(system, method=first))
-    return Price(FINER * found.steps, RUNGS * found.seconds, at_least=True)
+    found_steps, first = system.method.own_steps, first_rung(system)[0]
+    method = replace(system.method, nodes=first_nodes(system))
+    method = replace(method, tolerance=first) if found_steps else replace(method, step=first)
+    found = _begun(replace(system, method=method))
+    finer, rungs = (FINER_FOUND, RUNGS_FOUND) if found_steps else (FINER, RUNGS)
+    return Price(finer * found.steps, rungs * found.seconds, at_least=True)
 
 
 def _begun(system: System) -> Price:

@@ -1,6 +1,5 @@
 """One run, from a case to a finished result file: what `brakecli run` does."""
 
-import math
 from collections.abc import Callable, Iterator
 from dataclasses import astuple, dataclass, replace
 from functools import partial
@@ -163,11 +162,11 @@ def _write_spectrum(result: ResultFile, history: History, verdict: Verdict) -> f
     for name, density in lines.density.items():
         result.variable("spectrum", fields.SPECTRUM[name], ("frequency",), density)
     result.set_attributes(values_of(fields.WELCH, lines), "spectrum")
-    strongest = min(verdict.evidence["line_frequencies"][:1], default=math.inf)
-    if verdict.evidence.get("ripple_vx", 0.0) > 0.5:
+    strongest = verdict.evidence["line_frequencies"][:1]
+    if verdict.evidence.get("ripple_vx", 0.0) > 0.5 or not strongest:
         return None
     duration = (history.samples - verdict.start) * history.interval
-    return peak(lines.frequency, lines.density["vx"], duration, strongest)
+    return peak(lines.frequency, lines.density["vx"], duration, *strongest)
 
 
 def _write_over_time(result: ResultFile, found: OverTime) -> None:

@@ -3,22 +3,20 @@
 from collections import defaultdict
 from collections.abc import Generator, Hashable, Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
 from brakecli.errors import BrakecliError
 from brakecli.runs.pilot import RUNGS
 from brakecli.runs.tolerance import (
-    LAYERED,
     Certified,
     begins_with_steps,
-    is_left_for_events,
     ladder,
     slower_than_events,
 )
 from brakecli.solver.ensemble import fits, run_together
 from brakecli.solver.motion import Motion
+from brakecli.solver.schemes import NUMEROV
 from brakecli.solver.system import System
 
 TOGETHER = 32
@@ -28,8 +26,8 @@ LANE_STEP_SECONDS = 3e-8
 
 
 def _ladder(system: System) -> Generator[System, Motion, Certified]:
-    is_left = partial(is_left_for_events, too_slow=slower_than_events(system, lambda samples: None))
-    return ladder(replace(system, method=replace(system.method, **LAYERED[0])), is_left)
+    method = replace(system.method, scheme="three-layer", theta=NUMEROV)
+    return ladder(replace(system, method=method), slower_than_events(system, lambda samples: None))
 
 
 def seconds_together(system: System) -> float | None:

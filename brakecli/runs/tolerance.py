@@ -8,8 +8,8 @@ error, which is rounding.
 import math
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
-from functools import cache, partial
-from typing import Any, NamedTuple
+from functools import cache
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -18,17 +18,13 @@ from brakecli.solver.compile import Floats
 from brakecli.solver.contact import EVALUATORS
 from brakecli.solver.contact.pad import default_nodes
 from brakecli.solver.motion import Motion, Progress, solve
-from brakecli.solver.schemes import HALF, NUMEROV
 from brakecli.solver.system import System
 
 FIRST_EVENT_TOLERANCE, LEAST_EVENT_TOLERANCE = 1e-6, 1e-13
 EVENT_RATIO = 1e-2  # from one tolerance of the event-driven scheme to the next: its errors fall by about as much
 EVENT_MARGIN = 1e-3  # largest first tolerance over the requested one: no event may be missed twice
-LAYERED: tuple[dict[str, Any], ...] = (  # cheapest by compare-schemes: in slip, and where friction turns
-    {"scheme": "three-layer", "theta": NUMEROV},
-    {"scheme": "two-layer", "theta": HALF},
-)
-LAYERED_FROM = 1e-5  # tolerance from which on a ladder may be cheaper than events, where surfaces open
+NODES_FROM = 1e-5  # tolerance from which on events with nodes may be cheaper than with the exact contact
+FIRST_ON_NODES, NODES_RATIO = 0.2, 0.1  # first tolerance there over the requested one; from one to the next
 FIRST_TURN = 15.0  # square of the turn (rad) of the fastest motion in a first step, over the tolerance
 # Two halvings leave a sixth of the tolerance: (1/12, 10/12, 1/12) takes a sixth of that square off a velocity.
 LONGEST_TURN = 0.4  # rad, in a first step
@@ -79,8 +75,7 @@ def certify(system: System, progress: Progress = lambda samples: None) -> Certif
 
     Smooth surfaces go to the piecewise-exact scheme, rough ones that touch everywhere to the event-driven one, as
     their cost hardly depends on the error. Where surfaces open, the latter needs the exact contact integral, which
-    is expensive: a ladder of steps and nodes is cheaper there, unless it takes long beside event-driven runs, or
-    speed and load change with time, as steps would have to be short beside what they do.
+    is expensive: nodes and local tolerances that are refined apart are cheaper there, unless that takes long, too.
     """
     method, spent = system.method, 0.0
     if not method.own_steps:
@@ -88,13 +83,10 @@ def certify(system: System, progress: Progress = lambda samples: None) -> Certif
     if method.row.exact:
         return _by_phases(system, progress)
     found = list[Certified]()
-    is_left = partial(is_left_for_events, too_slow=slower_than_events(system, progress))
-    for changes in LAYERED if begins_with_steps(system) else ():
-        found = [_by_steps(replace(system, method=replace(method, **changes)), progress, is_left)]
-        motion, certificate = found[0]
-        spent += motion.work.solve_seconds
-        if certificate.certified or not motion.work.turns:
-            break
+    if method.automatic and method.tolerance >= NODES_FROM:
+        is_left, on_nodes = slower_than_events(system, progress), replace(method, evaluator="midpoint")
+        found = [_by_steps(replace(system, method=on_nodes), progress, is_left)]
+        spent = found[0].motion.work.solve_seconds
     if not found or (not found[0].certificate.certified and spent < MOST_SECONDS):
         found.insert(0, _by_events(system, progress))
         spent += found[0].motion.work.solve_seconds
@@ -104,10 +96,10 @@ def certify(system: System, progress: Progress = lambda samples: None) -> Certif
 
 
 def begins_with_steps(system: System) -> bool:
-    """Whether `certify` tries the schemes of `LAYERED` first."""
+    """Whether steps and nodes that are refined apart may keep the tolerance."""
     method, changing = system.method, len(system.belt) > 1 or len(system.load) > 1
     chosen = method.automatic and method.own_steps and not method.row.exact
-    return chosen and method.tolerance >= LAYERED_FROM and not changing
+    return chosen and method.tolerance >= NODES_FROM and not changing
 
 
 def _run(system: System, progress: Progress, **changes: Any) -> Motion:
@@ -117,14 +109,8 @@ def _run(system: System, progress: Progress, **changes: Any) -> Motion:
 
 def _solved(system: System, progress: Progress) -> Motion:
     per_sample, each = system.per_sample, evaluation_seconds(system) + 1e-6
-    block = 1 if system.method.own_steps else 1 + int(FIRST_BLOCK / each)
+    block = 1 if system.method.own_steps and not system.nodes else 1 + int(FIRST_BLOCK / each)
     return solve(system, progress=lambda steps: progress(steps // per_sample), first_block=block)
-
-
-def is_left_for_events(run: Motion, more: float, *, too_slow: Callable[[Motion, float], bool]) -> bool:
-    """Whether the tolerance is kept by events, after this run and before others of so many times its work."""
-    unsure = run.work.turns > 0 and run.system.method.scheme == "three-layer"  # velocities about a kink are off
-    return unsure or not _opens(run) or too_slow(run, more)
 
 
 def _opens(run: Motion) -> bool:
@@ -132,10 +118,11 @@ def _opens(run: Motion) -> bool:
 
 
 def slower_than_events(system: System, progress: Progress) -> Callable[[Motion, float], bool]:
-    """A test whether runs of so many times the work of this one take longer than two event-driven ones.
+    """A test whether runs of so many times the work of this one take longer than two with the exact contact.
 
-    A part of such a run is made when the test is first needed: it has as many steps as the others. How often the
-    contact is open in part, this run knows; beside its evaluations then, others cost nothing.
+    They do where the pad does not open. A part of such a run is made when the test is first needed: it has as many
+    steps as the others. How often the contact is open in part, this run knows; beside its evaluations then, others
+    cost nothing.
     """
 
     @cache
@@ -149,6 +136,8 @@ def slower_than_events(system: System, progress: Progress) -> Callable[[Motion, 
     def too_slow(run: Motion, more: float) -> bool:
         taken = run.work.evaluators
         part = 1.0 - taken.get("closed-form", 0) / max(sum(taken.values()), 1)
+        if part == 0.0:
+            return True
         seconds = part * more * run.work.contact_evaluations * evaluation_seconds(run.system)
         return seconds > WORTH_A_PILOT and seconds > part * evaluations() * evaluation_seconds(system)
 
@@ -205,6 +194,7 @@ def _by_events(system: System, progress: Progress) -> Certified:
 class _Axis:
     """How often steps were halved, or nodes doubled, and what the last two times changed."""
 
+    growth: ClassVar[float] = 0.5  # power of the error's fall with which the work grows
     doublings: int = 0
     before: float = math.inf
     last: float = math.inf
@@ -225,7 +215,19 @@ class _Axis:
 
     def more(self, tolerance: float) -> float:
         """By how much the work is likely to grow until the error is below the tolerance."""
-        return math.sqrt(max(1.0, self.last / tolerance)) if self.last < math.inf else 2.0
+        return max(1.0, self.last / tolerance) ** self.growth if self.last < math.inf else 2.0
+
+
+@dataclass
+class _Tolerances(_Axis):
+    """Of steps that are found: local tolerances, each a tenth of the one before."""
+
+    growth: ClassVar[float] = 0.2
+
+    @property
+    def error(self) -> float:
+        """What the last two runs differ by, which is the error of the coarser one."""
+        return self.last
 
 
 def _by_steps(
@@ -244,30 +246,32 @@ def _by_steps(
 def ladder(
     system: System, is_left: Callable[[Motion, float], bool] = lambda run, more: False
 ) -> Generator[System, Motion, Certified]:
-    """Runs with steps half as long, or twice as many nodes, as those before, whichever is needed more.
+    """Runs with steps half as long, or a tenth of the local tolerance, or twice the nodes: what is needed more.
 
     It yields what is to be run, receives its motion, and returns the last one with its certificate. The errors of
     steps and of nodes add up, and each is estimated apart. The first steps may pass over samples, the last ones
     may not, nor over what speed or load do between two knots, as no run would see it.
     """
-    wanted, (first, every) = system.method.tolerance, first_steps(system)
+    wanted, events = system.method.tolerance, system.method.own_steps
+    (first, every), fineness = first_rung(system), "tolerance" if events else "step"
     longest = min(_shortest_span(system) / STEPS_BETWEEN_KNOTS, system.interval) * (1.0 + 1e-9)
-    nodes, steps, quadrature = first_nodes(system), _Axis(), _Axis()
+    nodes, steps, quadrature = first_nodes(system), _Tolerances() if events else _Axis(), _Axis()
     before, finer, seconds = None, steps, 0.0
     while True:
         sampled = replace(system, interval=max(1, every >> steps.doublings) * system.interval)
-        finest = {"step": first / 2**steps.doublings, "nodes": nodes << quadrature.doublings}
-        run = yield replace(sampled, method=replace(sampled.method, **finest))
+        at = first * (NODES_RATIO if events else 0.5) ** steps.doublings
+        changes: dict[str, Any] = {"nodes": nodes << quadrature.doublings, fineness: at}
+        run = yield replace(sampled, method=replace(sampled.method, **changes))
         spent, failed = run.work.solve_seconds, run.work.failed
         run.work.solve_seconds = seconds = seconds + spent
         if before is not None and not failed:
             finer.before, finer.last = finer.last, _compare(before, run, wanted)[1]
         before = before if failed else run
         used = quadrature if nodes and _opens(run) else _Axis(0, 0.0, 0.0)
-        margin = JUMPS if run.work.turns or len(system.belt) + len(system.load) > 2 else 1.0
+        margin = JUMPS if not events and (run.work.turns or len(system.belt) + len(system.load) > 2) else 1.0
         jump = _jump_error(run)
         error = math.inf if failed else margin * steps.error + used.error + jump
-        short = run.system.step <= longest
+        short = events or run.system.step <= longest
         if certified := short and error <= wanted:
             break
         coarse = failed or not short or jump > 0.5 * wanted
@@ -281,7 +285,8 @@ def ladder(
     if not certified:
         error = max(error, wanted * 1.0000001) if short and error < math.inf else 1.0
     with_nodes = f" and {run.system.nodes} nodes" if used is quadrature else ""
-    how = f"{system.method.scheme} runs down to steps of {run.system.step:.3g} s{with_nodes}"
+    finest = f"local tolerances of {at:.0e}" if events else f"steps of {run.system.step:.3g} s"
+    how = f"{system.method.scheme} runs down to {finest}{with_nodes}"
     return Certified(run, Certificate(wanted, certified, error, until, how))
 
 
@@ -328,8 +333,13 @@ def _sizes(system: System, one: Floats, other: Floats) -> Floats:
     return np.where(np.maximum(one, other) > rounding, np.maximum(other, rounding), math.inf)
 
 
-def first_steps(system: System) -> tuple[float, int]:
-    """The steps (s) that a ladder begins with, and how many samples each passes over, a power of two."""
+def first_rung(system: System) -> tuple[float, int]:
+    """The steps (s) that a ladder begins with, and how many samples each passes over, a power of two.
+
+    Where steps are found it is the local tolerance that the ladder begins with.
+    """
+    if system.method.own_steps:
+        return FIRST_ON_NODES * system.method.tolerance, 1
     interval, fastest = system.interval, 2.0 * math.pi * max(system.natural_frequencies[1], 1e-300)
     wanted = min(LONGEST_TURN, math.sqrt(FIRST_TURN * system.method.tolerance)) / fastest
     wanted = min(wanted, 1.0 / (FIRST_PER_WAVE * max(system.passing_frequency, 1e-300)))

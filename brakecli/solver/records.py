@@ -18,9 +18,10 @@ class Record(np.void):  # type: ignore[misc]  # numpy.record is a class of this 
 
     def __getattr__(self, name: str) -> Any:
         """A field."""
-        if name not in (self.dtype.names or ()):
-            raise AttributeError(name)
-        return self[name]
+        try:
+            return self[name]
+        except ValueError:
+            raise AttributeError(name) from None
 
     def __setattr__(self, name: str, value: Any) -> None:
         """Change a field."""
@@ -149,6 +150,8 @@ MOTION = record(
     "step_done time_done tau_done side_done",  # the step of the continuous solution, its begin and its phase
     touching_done=int,
     touching=int,  # 0 where the pad is clear of the wheel for sure
+    pair=int,  # 0: steps of order eight, 1: of order five
+    light=int,  # 1 where the contact finds the force alone
     started=int,  # 0 before the phase of the start is known
     level=int,  # number of the sample interval that has been reached
     switches=int,  # changes of phase without a step in between
@@ -181,7 +184,7 @@ FLOW = record(
     "anchor anchor_low",  # x - travel in stick, a sum of two doubles, m
     "knot",  # time from which on speed or load change otherwise, s
     "events_time",  # since which `events` are counted, s
-    "late",  # by which the motion is ahead of the level reached, s; 0 at samples
+    "beyond",  # time that the motion is beyond the level reached, s; 0 at samples
     phase=int,
     started=int,  # 0 before the phase of the start is known
     events=int,  # events without progress
@@ -261,6 +264,7 @@ class Layer(NamedTuple):
     """The springs between shoe and wheel: how their force is computed, and the force found last."""
 
     evaluate: int  # address of the evaluator
+    press: int  # address of what finds normal force, stiffness and fraction alone, or of the evaluator
     pad: Any
     tables: Floats
     angles: Floats  # phases of the wheel's harmonics, rad
@@ -300,7 +304,7 @@ COEFFICIENTS = types.NamedUniTuple(float64, len(Coefficients._fields), Coefficie
 WEIGHTS = types.NamedUniTuple(float64, len(Weights._fields), Weights)
 GRID = types.NamedTuple([float64, int64, float64, int64, int64, int64, int64, float64], Grid)
 DRIVE = types.NamedTuple([KNOTS, KNOTS, WAVES], Drive)
-LAYER = types.NamedTuple([int64, PAD_TYPE, vector, vector, vector, CONTACT_TYPE], Layer)
+LAYER = types.NamedTuple([int64, int64, PAD_TYPE, vector, vector, vector, CONTACT_TYPE], Layer)
 PLUG = types.NamedUniTuple(int64, 3, Plug)
 
 

@@ -31,6 +31,7 @@ SCANNED_BY_EIGENVALUES = 129
 SCANNED_WHERE_OPEN = 17  # by eigenvalues where surfaces open: their mean stiffness takes time
 GALLOP = 4.0  # factor from one stride to the next in looking for the end of sustained vibration
 LONGER = 8.0  # durations of the case that vibration beside stable sliding has to last
+PATIENT = 128.0  # durations that it may take to die out on smooth surfaces; on rough ones twice `LONGER`
 STEADY = 0.01  # relative change of the amplitude in a run twice as long that shows that a vibration lasts
 
 
@@ -128,11 +129,12 @@ def search(
         answer = _fades(known.verdict, longest, unstable, linear) if known is not None else None
         if answer is not None:
             return answer
-        while times <= LONGER:
+        patience, answer = PATIENT if system_of(case).smooth else 2.0 * LONGER, None
+        while times <= LONGER or (answer is None and times <= patience):
             duration = times * case.solver.duration
             verdict = verdict_of(changed(case, solver={"duration": duration}))
             answer = _fades(verdict, duration, unstable, linear)
-            last = times == LONGER or unstable is not False
+            last = times >= LONGER or unstable is not False
             if verdict is not None and answer is not None and (last or _lasting(answer, before, verdict)):
                 return answer
             times, before = 2.0 * times, verdict
@@ -306,7 +308,7 @@ def _fades(verdict: Verdict | Known | None, duration: float, unstable: bool | No
 
     `unstable`: what is known of steady sliding. Where it is unstable no vibration can die out. A `linear` motion
     that neither sticks nor lifts off is on its way by the same equations: it lasts if sliding is unstable. One
-    that does is on its way to a limit cycle if it fades by less than a factor e in all its `duration` (s).
+    that does fades if it loses a factor e in its `duration` (s); as long as it loses less, nobody knows.
     """
     if verdict is None or verdict.contact_loss_fraction == 1.0 or verdict.stick_fraction == 1.0:
         return None
@@ -315,10 +317,12 @@ def _fades(verdict: Verdict | Known | None, duration: float, unstable: bool | No
         return not unstable
     if verdict.regime is not Regime.UNDECIDED:
         return verdict.regime is Regime.DAMPED
-    slope = verdict.evidence.get("envelope_slope")
+    if isinstance(verdict, Verdict) and verdict.second_run:  # the roughness may keep it up as well
+        return None
+    slope, error = verdict.evidence.get("envelope_slope"), verdict.evidence.get("envelope_slope_error", 0.0)
     if limited:
-        return slope is not None and slope * duration <= -1.0
-    error = verdict.evidence.get("envelope_slope_error", 0.0)
+        falls = slope if slope is not None and slope < -3.0 * error else 0.0
+        return None if -1.0 < falls * duration < 0.0 else falls < 0.0
     return bool(slope <= 0.0) if slope is not None and abs(slope) > 3.0 * error else None
 
 
@@ -331,12 +335,15 @@ def _sustained(critical: Critical, fades: Answer, found: Search) -> tuple[float 
     if found.outcome is Outcome.FOUND:
         low, high = max(low, found.lower), min(high, found.upper)
         stride = tolerance
-        while fades(low) is False and low > critical.lower:
-            low, high = max(critical.lower, low - stride), low
+        while not fades(low) and low > critical.lower:
+            low, high = max(critical.lower, low - stride), low if fades(low) is False else high
             stride *= GALLOP
     if fades(low) is None or fades(high) is None:
         return None, Outcome.UNDECIDED
     if not fades(low) or fades(high):
         return None, Outcome.DAMPED if fades(low) else Outcome.SUSTAINED
-    low, high = bisect(fades, low, high, width=tolerance)
-    return (None, Outcome.UNDECIDED) if high - low > tolerance else (0.5 * (low + high), Outcome.FOUND)
+    # Right beside the value sought a vibration dies out, or settles, too slowly to be decided.
+    fading, _ = bisect(lambda value: fades(value) is True, low, high, width=tolerance)
+    _, lasting = bisect(lambda value: fades(value) is not False, fading, high, width=tolerance)
+    known = lasting - fading <= 2.0 * tolerance
+    return (0.5 * (fading + lasting), Outcome.FOUND) if known else (None, Outcome.UNDECIDED)

@@ -6,7 +6,7 @@ The motion is stable while all its multipliers lie inside the unit circle; `peri
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 import numpy as np
 
@@ -22,6 +22,8 @@ SCANNED = 9  # values of the parameter, both ends among them, between which a ch
 PARTS = 4  # of each interval between them, where surfaces open in a run
 REFINED = 3  # times that values are added beside one at which stability is nearly lost or regained
 MOST_RESONANCES, HALVINGS = 32, 12  # places where values are put, and how exactly
+BESIDE = 0.01  # of a frequency: how far beside such a place others are put
+STRONGEST = 6  # waves of the wheel of which two may act together
 NEUTRAL = (
     1e-5  # damping ratio, of the slowest motion, that would stop a growth which counts as none without dashpots
 )
@@ -88,39 +90,51 @@ class Disturbances:
         return values
 
     def resonances(self, values: list[float]) -> list[float]:
-        """Between the values: where a wave of the wheel, or half of it, passes at twice a natural frequency, or at
-        the sum or the difference of both. There it may feed a vibration, in a narrow range of the parameter.
+        """Between the values: where a wave of the wheel, its second or third harmonic, or the sum or difference of
+        two waves passes at twice a natural frequency, or at the sum or the difference of both.
+
+        There it may feed a vibration, in a narrow range of the parameter. An opening pad makes the harmonics, and
+        its stiffness is not quite the mean one: where there are few such places, those beside them are added.
         """
 
-        count = max((found.system.wheel.turns.size for found in map(self.sliding_at, values) if found), default=0)
-
-        def away(value: float) -> Floats:
+        def away(value: float) -> Floats | None:
+            """Ratios, less one: of the waves first, of what two of the strongest make, of third harmonics."""
             if (found := self.sliding_at(value)) is None:
-                return np.full(8 * count, np.nan)
-            exact = sorted(
-                mode.frequency for mode in modes(found.system.coefficients, found.stiffness, found.grip)
-            )
-            turned = (
-                math.pi * found.system.step
-            )  # the schemes vibrate a little too slowly, by the trapezoidal rule
+                return None
+            known = modes(found.system.coefficients, found.stiffness, found.grip)
+            exact = sorted(mode.frequency for mode in known)
+            turned = math.pi * found.system.step  # the schemes vibrate too slowly, by the trapezoidal rule
             first, second = np.arctan(turned * np.array(exact[-2:])) / turned
-            passing = abs(found.system.belt_speed) * found.system.wheel.turns
+            wheel, speed = found.system.wheel, abs(found.system.belt_speed)
+            strongest = speed * wheel.turns[np.argsort(-np.abs(wheel.g))[:STRONGEST]]
+            pairs = [made for a, b in combinations(strongest, 2) for made in (a + b, abs(a - b))]
+            drives = [*np.outer([1.0, 2.0], speed * wheel.turns).ravel(), *pairs, *(3.0 * speed * wheel.turns)]
             vibrating = np.array([2.0 * first, 2.0 * second, first + second, second - first])
-            distances: Floats = np.subtract.outer(np.outer([1.0, 2.0], passing), vibrating).ravel()
-            return distances
+            ratios: Floats = np.outer(drives, 1.0 / np.maximum(vibrating, 1e-9)).ravel() - 1.0
+            return ratios
 
         rows = [away(value) for value in values]
-        changes = [
-            (low, high, int(which))
-            for (low, high), (before, after) in zip(pairwise(values), pairwise(rows), strict=True)
-            for which in np.flatnonzero(before * after < 0.0)
-        ]
-        found = []
-        for low, high, which in changes[:MOST_RESONANCES]:
-            side = away(low)[which] > 0.0
-            ends = bisect(lambda v: (away(v)[which] > 0.0) == side, low, high, halvings=HALVINGS)  # noqa: B023 - used at once
-            found.append(0.5 * sum(ends))
-        return found
+
+        def places(beside: float) -> list[float]:
+            changes = [
+                (int(which), low, high)
+                for (low, high), (before, after) in zip(pairwise(values), pairwise(rows), strict=True)
+                if before is not None and after is not None and before.size == after.size
+                for which in np.flatnonzero((before - beside) * (after - beside) < 0.0)
+            ]
+            found = []
+            for which, low, high in sorted(changes)[:MOST_RESONANCES]:
+
+                def above(value: float, which: int = which) -> bool | None:
+                    return None if (there := away(value)) is None else bool(there[which] > beside)
+
+                rising = above(low) is False
+                ends = bisect(lambda v: (above(v) is False) == rising, low, high, halvings=HALVINGS)  # noqa: B023
+                found.append(0.5 * sum(ends))
+            return found
+
+        found = places(0.0)
+        return found if 3 * len(found) > MOST_RESONANCES else [*found, *places(-BESIDE), *places(BESIDE)]
 
     def _measured(self, value: float, found: Sliding) -> Growth | None:
         smooth, periodic = found.system.wheel.g.size == 0, bool(self.orbits) or found.modulated

@@ -12,6 +12,7 @@ from brakecli.case.system import system_of
 from brakecli.runs.limits import adjustments
 from brakecli.solver import roughness
 from brakecli.solver.roughness import Surface
+from brakecli.sweeps.plan import parse_sweep
 from tests.case.examples import ORDERS, SMALL, SPECTRA, messages
 
 RADIUS = 0.5  # m, of the wheel of SMALL
@@ -265,3 +266,34 @@ def test_keys_that_belong_to_a_profile_or_exclude_it_are_reported(tmp_path: Path
         "give amplitudes and wavelengths, or amplitudes and wavenumbers, or amplitudes and orders, or profile"
         in line
     )
+
+
+def test_phases_beside_a_spectrum_take_the_place_of_random_ones() -> None:
+    phases = [float(place) for place in range(50)]
+    found = system_of(parse_case(SPECTRA, "case.toml", [f"roughness.wheel.phases_deg={phases}"]).case).wheel
+    np.testing.assert_allclose(np.degrees(found.phase), phases)
+    (line,) = messages(SPECTRA, "roughness.wheel.phases_deg=[1, 2]")
+    assert "phases_deg: has 2 entries, but spectrum.terms is 50" in line
+
+
+def test_a_sweep_varies_a_spectrum_and_the_radius_of_orders(tmp_path: Path) -> None:
+    (tmp_path / "case.toml").write_text(SPECTRA)
+    axes = "".join(
+        f"[[axis]]\nparameter = '{key}'\nvalues = {values}\n"
+        for key, values in (
+            ("roughness.wheel.spectrum.seed", [1, 2]),
+            ("roughness.wheel.spectrum.rms", [1e-6, 2e-6]),
+        )
+    )
+    plan = parse_sweep(f"case = 'case.toml'\n{axes}", "sweep.toml", tmp_path).plan
+    waves = [system_of(plan.case(plan.settings(point))).wheel for point in range(4)]
+    assert [math.sqrt(0.5 * np.sum(each.g**2)) for each in waves] == pytest.approx([1e-6, 2e-6, 1e-6, 2e-6])
+    np.testing.assert_array_equal(waves[0].phase, waves[1].phase)
+    assert not np.allclose(waves[0].phase, waves[2].phase)
+    saved(tmp_path / "runout.csv", "angle_deg,height_um", ANGLES, RUNOUT)
+    (tmp_path / "case.toml").write_text(SMALL + '\nroughness.wheel.profile = "runout.csv"\n')
+    radius = "case = 'case.toml'\n[[axis]]\nparameter = 'wheel.radius'\nvalues = [0.25, 0.5]\n"
+    plan = parse_sweep(radius, "sweep.toml", tmp_path).plan
+    (tmp_path / "runout.csv").unlink()  # its sines are in the plan
+    turns = [system_of(plan.case(plan.settings(point))).wheel.turns[1] for point in range(2)]
+    assert turns == pytest.approx([9 / (math.pi * 0.5), 9 / (math.pi * 1.0)])

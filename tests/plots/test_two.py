@@ -1,10 +1,10 @@
 """The picture of two results shows the curves of both."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 from brakecli.case.read import parse_case
 from brakecli.errors import UsageError
@@ -15,8 +15,8 @@ from tests.commands import TINY
 from tests.plots.helpers import ANGLE, CRITICAL, SPEED, columns, write
 
 
-def picture(a: Path, b: Path, variable: str = "") -> Figure:
-    with style.applied(), open_result(a) as first, open_result(b) as second:
+def picture(names: list[Path], variable: str = "") -> Any:
+    with style.applied(), open_result(names[0]) as first, open_result(names[1]) as second:
         figure = two.draw((first, second), variable)
         style.rendered(figure, ".png")
         return figure
@@ -29,7 +29,7 @@ def test_the_last_cycles_of_both_runs_are_drawn_as_they_are_stored(tmp_path: Pat
         run(parse_case(TINY, "tiny", [f"friction.coefficient={friction}"]), name, force=False)
         with open_result(name) as result:
             stored.append((result.read("history", "time"), result.read("history", "vx")))
-    detail, whole, spectra = picture(*names).axes
+    detail, whole, spectra = picture(names).axes
     assert [text.get_text() for text in detail.get_legend().get_texts()] == ["a.h5", "b.h5"]
     for line, (time, vx) in zip(detail.get_lines(), stored, strict=True):
         np.testing.assert_allclose(line.get_xdata(), time[-len(line.get_xdata()) :])
@@ -43,7 +43,7 @@ def test_the_critical_values_of_two_sweeps_are_drawn_along_their_axis(tmp_path: 
     table = {"axis": [ANGLE], "critical": CRITICAL}
     values = columns((8,), critical=True)["critical"]
     names = [write(tmp_path / f"{n}.h5", table, {"critical": values * (1 + n)}) for n in (0, 1)]
-    (axes,) = picture(*names).axes
+    (axes,) = picture(names).axes
     assert [text.get_text() for text in axes.get_legend().get_texts()] == ["0.h5", "1.h5"]
     for number, line in enumerate(axes.get_lines()):
         np.testing.assert_array_equal(line.get_xdata(), np.arange(1.0, 9.0))
@@ -53,8 +53,8 @@ def test_the_critical_values_of_two_sweeps_are_drawn_along_their_axis(tmp_path: 
 
 def test_without_critical_values_amplitude_and_frequency_are_drawn_or_what_is_named(tmp_path: Path) -> None:
     names = [write(tmp_path / f"{n}.h5", {"axis": [SPEED]}) for n in (0, 1)]
-    assert [axes.get_ylabel() for axes in picture(*names).axes] == ["amplitude (µm)", "frequency (Hz)"]
-    (axes,) = picture(*names, "steps").axes
+    assert [axes.get_ylabel() for axes in picture(names).axes] == ["amplitude (µm)", "frequency (Hz)"]
+    (axes,) = picture(names, "steps").axes
     assert axes.get_ylabel() == "steps"
 
 
@@ -62,8 +62,8 @@ def test_results_over_several_axes_or_over_different_ones_have_no_curves(tmp_pat
     tables = ({"axis": [ANGLE]}, {"axis": [SPEED]}, {"axis": [ANGLE, SPEED]})
     one, other, several = (write(tmp_path / f"{n}.h5", table) for n, table in enumerate(tables))
     with pytest.raises(UsageError, match="only numbers along one axis"):
-        picture(several, several)
+        picture([several, several])
     with pytest.raises(UsageError, match="amplitude is not a number along the same axes in both"):
-        picture(one, other)
+        picture([one, other])
     with pytest.raises(UsageError, match="regime is not a number"):
-        picture(one, one, "regime")
+        picture([one, one], "regime")

@@ -127,8 +127,7 @@ def test_surfaces_that_open_keep_their_tolerance_too(tolerance: float) -> None:
     found = certify(system_of(case))
     assert found.certificate.certified
     assert kept(found, case, 1e-4 * tolerance) <= tolerance
-    layered = tolerance >= module.LAYERED_FROM
-    assert found.motion.system.method.scheme == ("three-layer" if layered else "event-driven")
+    assert found.motion.system.evaluator == ("midpoint" if tolerance >= module.NODES_FROM else "exact")
 
 
 def test_nodes_that_agree_by_luck_are_doubled_again() -> None:
@@ -161,14 +160,14 @@ def test_a_ladder_that_grows_slow_beside_events_is_left(monkeypatch: pytest.Monk
     assert too_slow(run, 1e6)
     monkeypatch.setattr(module, "slower_than_events", lambda *_: lambda run, more: True)
     found = certify(system_of(case))
-    assert found.motion.system.method.scheme == "event-driven"
+    assert found.motion.system.evaluator == "exact"
     assert found.certificate.certified
     assert kept(found, case, 1e-9) <= 1e-3
 
 
 @pytest.mark.parametrize("many", counts(2, 60))
 def test_no_certificate_of_random_shoes_is_broken(many: int) -> None:
-    rng, schemes, drawn = np.random.default_rng(3), set[str](), 0
+    rng, ways, drawn = np.random.default_rng(3), set[str](), 0
     while drawn < many:
         case = promises.random_case(rng, promises.KINDS[-1 - drawn % len(promises.KINDS)])
         try:
@@ -181,8 +180,9 @@ def test_no_certificate_of_random_shoes_is_broken(many: int) -> None:
             error = errors(found.motion.rows, exact).error
             assert found.certificate.certified
             assert error <= found.certificate.estimated_error + 1e-7  # what the truth itself may be off
-            schemes.add(found.motion.system.method.scheme)
-    assert many < 10 or schemes == {"two-layer", "three-layer", "event-driven", "piecewise-exact"}
+            ways.add(f"{found.motion.system.method.scheme}, {found.motion.system.evaluator}")
+    everything = {"event-driven, exact", "event-driven, midpoint", "piecewise-exact, closed-form"}
+    assert many < 10 or ways == everything
 
 
 WAVE = {  # a shoe that opens over a long wave of the wheel

@@ -9,7 +9,7 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from brakecli.solver import contact
-from brakecli.solver.contact.closed_form import CLEAR, FULL, coverage
+from brakecli.solver.contact.closed_form import CLEAR, FULL, coverage, full_contact, full_press
 from brakecli.solver.contact.pad import NODES_PER_WAVE, build_layer, build_pad, default_nodes
 from brakecli.solver.roughness import Surface, surface
 from tests.campaign import counts
@@ -540,3 +540,29 @@ def test_waves_of_almost_equal_length_lose_no_digits(apart: float) -> None:
     for evaluator in ("closed-form", "exact"):
         found = full.evaluate(evaluator)
         assert found.store == pytest.approx(expected, rel=0, abs=2 * full.a * full.k * 1.2e-4 * full.rounding)
+
+
+@pytest.mark.parametrize("waves", [1, 5, 7])
+def test_the_force_alone_is_that_of_the_whole_evaluation(waves: int) -> None:
+    """Of nodes, whatever is open, and of the closed form; sums in another order differ by their rounding."""
+    rng = np.random.default_rng(41)
+    shoe, wheel = ((*each, Wave(4e-6, 0.0031), Wave(3e-6, 0.0027))[:waves] for each in (CASE_B_SHOE, CASE_B_WHEEL))
+    gap = Gap(shoe, wheel, 0.05, 0.0, 0.0, 0.0, 5e7)
+    pad = gap.pad(128)
+    pairs = {
+        "midpoint": (contact.load("midpoint"), contact.load_press("midpoint")),
+        "closed-form": (full_contact, full_press),
+    }
+    for name, (whole, alone) in pairs.items():
+        layers = [build_layer(each, pad) for each in (whole, alone)]
+        for _ in range(50):
+            x, y = rng.uniform(-0.02, 0.02), gap.crest * (rng.uniform(-1, 1) if name == "midpoint" else -2.0)
+            for evaluate, layer in zip((whole, alone), layers, strict=True):
+                layer.angles[:] = gap.angles
+                evaluate(x, y, layer)
+            one, other = (layer.contact for layer in layers)
+            rounding = 128 * EPS * 2 * gap.a * gap.k * gap.crest
+            assert other.normal_force == pytest.approx(one.normal_force, rel=0, abs=4.0 * rounding)
+            assert (other.stiffness, other.fraction) == (one.stiffness, one.fraction)
+            assert (other.kind, other.valid) == (one.kind, one.valid)
+    assert contact.load_press("exact") is contact.load("exact")

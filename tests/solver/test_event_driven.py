@@ -1,20 +1,23 @@
 """The event-driven scheme against two independent references, exact solutions and identities."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.integrate import RK45
 from scipy.integrate._ivp import dop853_coefficients as scipy
 
 from brakecli.analysis.stability.report import stability
 from brakecli.case.case import Case
 from brakecli.case.system import system_of
 from brakecli.runs.limits import check
-from brakecli.solver.motion import Stepping
+from brakecli.solver.method import Method
+from brakecli.solver.motion import Motion, Stepping, solve
 from brakecli.solver.quantities import ContactState, Failure
-from brakecli.solver.schemes.event_driven.dop853 import DENSE, END_STAGE, FIFTH, NODES, THIRD, A
+from brakecli.solver.schemes.event_driven.runge_kutta import DENSE, END_STAGE, FIFTH, NODES, THIRD, USED, A
 from tests.campaign import counts
 from tests.examples import COULOMB, MODE_COUPLING, ROUGH, SQUEAL, Result, make, simulate
 from tests.solver.piecewise_exact import PiecewiseExact
@@ -415,31 +418,89 @@ def test_no_step_limits_or_biases_the_scheme() -> None:
     assert found.steps == pytest.approx(simulate(event_driven(SQUEAL)).work.steps, rel=2.0)
 
 
-def test_the_tableau_meets_the_order_conditions_of_quadrature() -> None:
+OPEN = {**ROUGH, "contact": {"half_length": 0.05, "stiffness": 5e7}}
+SMALL = {"amplitudes": [1e-6, 7e-7], "wavelengths": [0.02, 0.011]}
+"""A pad that opens and closes."""
+
+
+def on_nodes(case: Case, tolerance: float, nodes: int = 256) -> Motion:
+    """The motion of a case by steps on nodes instead of the exact contact."""
+    return solve(system_of(case), Method("event-driven", evaluator="midpoint", nodes=nodes, tolerance=tolerance))
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-4, 1e-6])
+@pytest.mark.parametrize("base", [OPEN, {**OPEN, "wheel": {"radius": 0.5, "angular_speed": 0.1}}])
+def test_steps_on_nodes_keep_their_tolerance(base: dict[str, Any], tolerance: float) -> None:
+    """Of both orders, in slip and in stick-slip, beside the same nodes at a tolerance that leaves no error.
+
+    The motion may amplify the errors of steps, as in every run of this scheme: twice the tolerance is allowed.
+    """
+    case = event_driven(base, solver__duration=0.01, output__sample_interval=1e-4)
+    fine, found = on_nodes(case, 1e-11), on_nodes(case, tolerance)
+    assert error(found.rows, fine.rows) <= 2.0 * tolerance
+    assert found.work.evaluators["midpoint"] > 5
+    assert abs(found.energy.relative_closing_error) <= tolerance
+
+
+def test_nodes_come_to_the_exact_contact_as_their_number_grows() -> None:
+    """With the square of their spacing at least: sixteen times the nodes leave far less than a hundredth."""
+    case = event_driven(OPEN, solver__duration=0.005, output__sample_interval=1e-4)
+    exact = simulate(case).rows
+    few, many = (error(on_nodes(case, 1e-10, nodes).rows, exact) for nodes in (256, 4096))
+    assert many <= few / 100.0
+    assert few <= 1e-2
+
+
+def test_nodes_that_all_touch_make_the_motion_of_the_exact_contact() -> None:
+    """Cell means: the closed form is the sum over the nodes. Both methods have errors of 1e-10 at most."""
+    case = event_driven(
+        {**SQUEAL, "initial": {"at": "equilibrium", "y": -1e-4}}, roughness__shoe=SMALL, roughness__wheel=SMALL
+    )
+    exact, found = simulate(case), on_nodes(case, 1e-10, 64)
+    assert set(found.work.evaluators) == set(exact.work.evaluators) == {"closed-form"}
+    assert error(found.rows, exact.rows) <= 2e-9
+    for item in ("belt", "friction", "roughness"):  # the account finds the last in another way
+        apart = getattr(found.energy, item) - getattr(exact.energy, item)
+        assert abs(apart) <= 1e-6 * exact.energy.stored  # works are not held to the tolerance
+
+
+def test_a_run_on_nodes_may_be_cut_into_blocks_anywhere() -> None:
+    case = event_driven(OPEN, solver__duration=0.002)
+    system = replace(
+        system_of(case), method=Method("event-driven", evaluator="midpoint", nodes=64, tolerance=1e-3)
+    )
+    whole, part = Stepping(system).run(first_block=10**6), Stepping(system).run(first_block=1)
+    np.testing.assert_array_equal(whole.rows, part.rows)
+
+
+@pytest.mark.parametrize(("pair", "order", "errors"), [(0, 8, ((THIRD, 3), (FIFTH, 5))), (1, 5, ((FIFTH, 4),))])
+def test_the_tableaus_meet_the_order_conditions_of_quadrature(pair: int, order: int, errors: Any) -> None:
     """Σ b c^q = 1/(q + 1) and Σ a = c; the errors of lower orders vanish below these; t^q is continued exactly."""
-    b = A[END_STAGE, :END_STAGE]
-    c = NODES[:END_STAGE]
-    for power in range(8):
-        assert b @ c**power == pytest.approx(1.0 / (power + 1), abs=2e-15)
-    np.testing.assert_allclose(A.sum(axis=1), NODES, atol=2e-15)
-    for weights, order in ((THIRD, 3), (FIFTH, 5)):
-        for power in range(order):
-            assert weights[:END_STAGE] @ c**power == pytest.approx(0.0, abs=2e-15)
+    b, c, upper = A[pair, END_STAGE, : USED[pair]], NODES[pair], DENSE[pair]
+    for power in range(order):
+        assert b @ c[: USED[pair]] ** power == pytest.approx(1.0 / (power + 1), abs=2e-15)
+    np.testing.assert_allclose(A[pair].sum(axis=1), c, atol=2e-15)
+    for weights, least in errors:
+        for power in range(least):
+            assert weights[pair] @ c**power == pytest.approx(0.0, abs=2e-15)
     # The continuous solution of y' = q t^(q-1) is t^q, up to its order.
-    for power in range(1, 8):
-        k = power * NODES ** (power - 1)
-        upper = DENSE @ k
+    for power in range(1, order):
+        k = power * c ** (power - 1)
         for t in (0.2, 0.5, 0.9):
             r = 1.0 - t
             first, last = (1.0 if power == 1 else 0.0), float(power)
-            rows = [1.0, first - 1.0, 2.0 - (first + last), *upper]
+            rows = [1.0, first - 1.0, 2.0 - (first + last), *(upper @ k)]
             value = 0.0
             for p in range(6, -1, -1):
                 value = (value + rows[p]) * (t if p % 2 == 0 else r)
             assert value == pytest.approx(t**power, abs=1e-13)
 
 
-def test_the_tableau_is_that_of_scipy() -> None:
+def test_the_tableaus_are_those_of_scipy() -> None:
     """Not imported from there: that takes 0.3 s."""
     for ours, theirs in ((A, scipy.A), (NODES, scipy.C), (THIRD, scipy.E3), (FIFTH, scipy.E5), (DENSE, scipy.D)):
-        np.testing.assert_array_equal(ours, theirs)
+        np.testing.assert_array_equal(ours[0, ..., : theirs.shape[-1]], theirs)
+    np.testing.assert_array_equal(A[1, :6, :5], RK45.A)
+    np.testing.assert_array_equal(A[1, END_STAGE, :6], RK45.B)
+    np.testing.assert_array_equal(NODES[1, :6], RK45.C)
+    np.testing.assert_array_equal(FIFTH[1, [*range(6), END_STAGE]], -RK45.E)

@@ -72,8 +72,9 @@ def test_one_that_leaves_its_lane_is_certified_alone() -> None:
     assert left is None
     alone = certify(slides)
     assert found.certificate.certified
-    assert found.certificate.method == alone.certificate.method
-    assert found.certificate.estimated_error == pytest.approx(alone.certificate.estimated_error, rel=1e-3)
+    one, other = (each.motion.rows[:, :4] for each in (found, alone))
+    apart = np.abs(one - other).max(axis=0) / np.abs(other).max(axis=0)
+    assert apart.max() <= found.certificate.estimated_error + alone.certificate.estimated_error <= 2.0 * TOLERANCE
 
 
 def test_numbers_that_no_brake_has_concern_no_other_point(tmp_path: Path) -> None:

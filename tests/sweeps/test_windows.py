@@ -17,6 +17,7 @@ from brakecli.case.system import system_of
 from tests.commands import brakecli
 from tests.examples import make
 from tests.plots.helpers import drawn
+from tests.sweeps.test_critical import found
 
 TONGUES: dict[str, Any] = {  # a wave of the wheel, whose slope feeds vibration near two speeds
     "shoe": {"mass": 28.0},
@@ -75,8 +76,8 @@ def test_two_windows_of_a_passing_wave_are_found_stored_printed_and_drawn(tmp_pa
     with xr.open_dataset(tmp_path / "s.h5", engine="h5netcdf") as result:
         assert result.critical_windows_lower.dims == ("link1_damping", "window")
         lower, upper = result.critical_windows_lower.values, result.critical_windows_upper.values
-    for found, name in ((lower, "critical_windows_lower"), (upper, "critical_windows_upper")):
-        assert printed[name] == [[None if math.isnan(value) else value for value in row] for row in found]
+    for stored, name in ((lower, "critical_windows_lower"), (upper, "critical_windows_upper")):
+        assert printed[name] == [[None if math.isnan(value) else value for value in row] for row in stored]
     np.testing.assert_array_equal(np.isnan(lower), [[False, False], [False, True]])
     assert lower[0, 0] == -18.08
     lost = [(31.2, lower[0, 1]), (300.0, lower[1, 0])]
@@ -92,3 +93,24 @@ def test_two_windows_of_a_passing_wave_are_found_stored_printed_and_drawn(tmp_pa
     segments = segments[np.isfinite(segments).all(axis=1)]
     np.testing.assert_allclose(segments[:, 0], lower[np.isfinite(lower)])
     np.testing.assert_allclose(segments[:, -1], upper[np.isfinite(upper)])
+
+
+def test_the_third_harmonic_of_a_wave_under_an_opening_pad_is_found() -> None:
+    """Multipliers of another integrator pass -1 at 6.2833 and at 6.3431 rad/s, where 3 waves pass in 2 cycles."""
+    tables: dict[str, Any] = {
+        "shoe": {"mass": 50.12},
+        "wheel": {"radius": 0.33, "angular_speed": 7.828},
+        "link1": {"stiffness": 3039000.0, "damping": 37.17},
+        "link2": {"stiffness": 3442000.0, "damping": 61.76, "angle_deg": 32.63},
+        "load": {"force": 821.5},
+        "friction": {"coefficient": 2.38},
+        "contact": {"half_length": 0.025, "stiffness": 22090000.0},
+        "roughness": {"wheel": {"amplitudes": [0.0001216], "wavelengths": [0.076]}},
+        "output": {"sample_interval": 0.001},
+        "solver": {"duration": 1.2},
+    }
+    answer = found(tables, 6.262, 6.5, "wheel__angular_speed", tolerance=0.003523)
+    assert answer.value is not None
+    assert abs(answer.value - 6.2833) < (answer.error or 0.0)
+    [window] = answer.windows
+    assert abs(window[1] - 6.3431) < (answer.error or 0.0)

@@ -144,10 +144,14 @@ class Part:
         parts = 0.5 * float(np.ptp(forced)), 0.5 * float(np.ptp(x[middle] - forced))
         return parts if parts[0] > _LEAST_FORCED * parts[1] else None
 
-    def lines(self, forced: Sequence[float]) -> dict[str, list[float]]:
-        """The strongest lines of vx: frequencies (Hz), parts of the energy, and 1 where roughness acts there."""
+    def lines(self, forced: Sequence[float], quiet: float = 0.0) -> dict[str, list[float]]:
+        """The strongest lines of vx: frequencies (Hz), parts of the energy, and 1 where roughness acts there.
+
+        None where vx (m/s) is quiet: that is rounding.
+        """
         frequencies, power, total = self._spectrum
         left, found, places = power.copy(), list[tuple[float, float, float]](), np.array(forced)
+        total = total if self.amplitude("vx") > quiet else 0.0
         while total > 0.0 and len(found) < _MOST_LINES:
             top = int(np.argmax(left))
             near = slice(max(top - LINE_BINS, 0), top + LINE_BINS + 1)

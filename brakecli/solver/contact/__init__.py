@@ -7,7 +7,8 @@ Contract of an evaluator module: `evaluate(x, y, layer)`, a kernel of the signat
 harmonics (`roughness.wheel_angles`). It takes constants and tables from `layer.pad` and `layer.tables`, changes
 nothing but the contact and `layer.scratch`, and notes its place in `kinds()`. With `near` and `blur` it says how
 far F_y can be from linear nearby, which may save an evaluation; both may be left as they are. What it keeps in the
-scratch may save work, and change results by rounding alone. One whose work is small begins with
+scratch may save work, and change results by rounding alone. A kernel `press` of the same signature may find normal
+force, stiffness, fraction, kind and validity alone, for event-driven runs. One whose work is small begins with
 `layer = borrowed(layer)`: reference counts would cost a third of a step.
 """
 
@@ -52,3 +53,9 @@ def load(name: str) -> Any:
     if len(kinds()) > MOST_KINDS:
         raise ValueError(f"EVALUATORS has {len(kinds())} kinds, a run can count {MOST_KINDS}; increase MOST_KINDS")
     return import_module(EVALUATORS[name].module).evaluate
+
+
+def load_press(name: str) -> Any:
+    """What finds the force alone: the kernel `press` of an evaluator, or `evaluate` where it has none."""
+    module = import_module(EVALUATORS[name].module)
+    return getattr(module, "press", module.evaluate)

@@ -57,6 +57,24 @@ def full_contact(x: float, y: float, layer: Layer) -> None:
     contact.near, contact.blur = 0.0 if y + contact.reach <= pad.full_up_to else k * length, 0.0
 
 
+@kernel(EVALUATE)
+def full_press(x: float, y: float, layer: Layer) -> None:
+    """`full_contact` for a run that takes no derivatives by x: normal force, stiffness and fraction."""
+    layer = borrowed(layer)
+    pad, tables, contact, angles = layer.pad, layer.tables, layer.contact, layer.angles
+    length, n, omega_at = 2.0 * pad.half_length, pad.wheel_terms, pad.wheel_at + pad.wheel_terms
+    eights, height = (n + 7) // 8 * 8, -pad.k * length * (pad.shoe_mean + y)
+    sines = layer.scratch[:eights]
+    for i in range(n):
+        sines[i] = tables[omega_at + i] * x + angles[i]
+    for i in range(eights):
+        sines[i], _ = sine_cosine(sines[i])
+    for i in range(n):
+        height += tables[pad.full_at + i] * sines[i]
+    contact.normal_force, contact.stiffness, contact.fraction = max(height, 0.0), pad.k * length, 1.0  # Eq. (2)
+    contact.kind, contact.valid = CLOSED_FORM, 1
+
+
 @kernel(void(CONTACT_TYPE))
 def clear(contact: Any) -> None:
     """The pad touches nowhere: no force, nothing stored."""

@@ -10,7 +10,7 @@ from numba import float64, types, void
 from brakecli.solver.compile import Floats, borrowed, kernel, stopped, vector
 from brakecli.solver.contact import MIDPOINT
 from brakecli.solver.contact.pad import BESIDE, TILE
-from brakecli.solver.records import EVALUATE, Layer
+from brakecli.solver.records import EVALUATE, LAYER, Layer
 from brakecli.solver.sine import sine_cosine
 
 _FAST = frozenset({"reassoc", "contract", "nsz"})
@@ -59,13 +59,23 @@ def _add_five(f2: Floats, table: Floats, s: Floats, c: Floats) -> None:
         f2[j] += one + two + c_4 * table[j + 8 * TILE] + s_4 * table[j + 9 * TILE]
 
 
-@kernel(EVALUATE)
-def evaluate(x: float, y: float, layer: Layer) -> None:
-    """See the package. The error falls with the square of the spacing, by its kinks at the edges of patches;
-    ∂F_y/∂x and ∂V/∂x take the rise of f2 from the neighbouring nodes.
-    """
-    layer = borrowed(layer)
-    pad, tables, contact, angles = layer.pad, layer.tables, layer.contact, layer.angles
+@kernel(types.UniTuple(float64, 2)(float64, vector, vector), fastmath=_FAST)
+def _pressed(y: float, f1: Floats, f2: Floats) -> tuple[float, float]:
+    """Sums over the touching nodes of: gap, 1."""
+    force, touching = 0.0, 0.0
+    for j in range(f1.size):
+        gap = f2[j + 3] - f1[j] - y
+        touch = 1.0 if gap > 0.0 else 0.0
+        gap = gap if gap > 0.0 else 0.0
+        force += gap
+        touching += touch
+    return force, touching
+
+
+@kernel(types.UniTuple(vector, 2)(float64, LAYER))
+def _profiles(x: float, layer: Layer) -> tuple[Floats, Floats]:
+    """f1 at the nodes, and f2 with those beside them; empty where the process is to end."""
+    pad, tables, angles = layer.pad, layer.tables, layer.angles
     n, waves, omega_at, at = pad.nodes, pad.wheel_terms, pad.wheel_at + pad.wheel_terms, pad.waves_at
     columns = n + 2 * BESIDE + TILE
     eights = (waves + 7) // 8 * 8  # sines come eight at a time
@@ -77,7 +87,7 @@ def evaluate(x: float, y: float, layer: Layer) -> None:
         sines[i], cosines[i] = sine_cosine(sines[i])
     for begin in range(0, n + 2 * BESIDE, TILE):
         if stopped(pad.signals):
-            return
+            return f2[:0], f2[:0]
         tile, i = f2[begin : begin + TILE], 0
         for j in range(TILE):
             tile[j] = 0.0
@@ -87,7 +97,30 @@ def evaluate(x: float, y: float, layer: Layer) -> None:
         while i < waves:
             _add_wave(tile, tables[at : at + 2 * TILE], sines[i], cosines[i])
             i, at = i + 1, at + 2 * TILE
-    f1 = tables[pad.nodes_at : pad.nodes_at + n]
+    return tables[pad.nodes_at : pad.nodes_at + n], f2
+
+
+@kernel(EVALUATE)
+def press(x: float, y: float, layer: Layer) -> None:
+    """`evaluate` where normal force, stiffness and fraction are enough."""
+    layer = borrowed(layer)
+    pad, contact = layer.pad, layer.contact
+    force, touching = _pressed(y, *_profiles(x, layer))
+    spacing = 2.0 * pad.half_length / pad.nodes
+    contact.normal_force = pad.k * spacing * force  # Eq. (2)
+    contact.stiffness = pad.k * spacing * touching
+    contact.fraction = touching / pad.nodes
+    contact.kind, contact.valid = MIDPOINT, 1
+
+
+@kernel(EVALUATE)
+def evaluate(x: float, y: float, layer: Layer) -> None:
+    """See the package. The error falls with the square of the spacing, by its kinks at the edges of patches;
+    ∂F_y/∂x and ∂V/∂x take the rise of f2 from the neighbouring nodes.
+    """
+    layer = borrowed(layer)
+    pad, contact, n = layer.pad, layer.contact, layer.pad.nodes
+    f1, f2 = _profiles(x, layer)
     force, touching, rise, square, work, near = _sums(y, contact.reach, f1, f2)
     k, spacing = pad.k, 2.0 * pad.half_length / n
     contact.normal_force = k * spacing * force  # Eq. (2)

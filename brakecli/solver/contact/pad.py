@@ -5,6 +5,7 @@ One buffer because every array that an evaluator receives costs time on each of 
 """
 
 import math
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -46,7 +47,7 @@ def build_pad(k: float, half_length: float, shoe: Surface, wheel: Surface, nodes
     pad.k, pad.half_length, pad.nodes = k, half_length, nodes
     pad.shoe_terms, pad.wheel_terms = shoe.g.size, wheel.g.size
     pad.signals = np.frombuffer(stop.memory, np.uint8).ctypes.data
-    top, bottom = _shoe_bounds(half_length, shoe)
+    top, bottom = _shoe_bounds(half_length, *(each.tobytes() for each in shoe))
     pad.shoe_bound, pad.wheel_bound = max(top, bottom), np.abs(wheel.g).sum()
     pad.full_up_to, pad.clear_from = -pad.wheel_bound - top, pad.wheel_bound + bottom
     pad.crest = pad.shoe_bound + pad.wheel_bound
@@ -83,13 +84,21 @@ def build_pad(k: float, half_length: float, shoe: Surface, wheel: Surface, nodes
     return Pad(pad, flat)
 
 
-def build_layer(evaluate: Any, pad: Pad) -> Layer:
-    """What the kernel `evaluate` works on and fills for this pad."""
+def build_layer(evaluate: Any, pad: Pad, press: Any = None) -> Layer:
+    """What the kernel `evaluate`, or `press` where the force is enough, works on and fills for this pad."""
     constants, tables = pad
     waves = constants.shoe_terms + constants.wheel_terms
     scratch, found = aligned(constants.edges_at + 8 * waves + 6 + 3 * constants.cells), new(CONTACT)
     found.near = math.inf  # an evaluator that does not know it leaves it
-    return Layer(address(evaluate), constants, tables, np.zeros(constants.wheel_terms), scratch, found)
+    return Layer(
+        address(evaluate),
+        address(press or evaluate),
+        constants,
+        tables,
+        np.zeros(constants.wheel_terms),
+        scratch,
+        found,
+    )
 
 
 def aligned(size: int) -> Floats:
@@ -99,8 +108,13 @@ def aligned(size: int) -> Floats:
     return zeros[begin : begin + size]
 
 
-def _shoe_bounds(a: float, shoe: Surface) -> tuple[float, float]:
-    """Upper bounds (m) of f1 and of -f1 on the pad: a fine grid and what curvature can add between its points."""
+@lru_cache(maxsize=64)
+def _shoe_bounds(a: float, *profile: bytes) -> tuple[float, float]:
+    """Upper bounds (m) of f1 and of -f1 on the pad: a fine grid and what curvature can add between its points.
+
+    They take as long as a short run, and are those of other nodes as well.
+    """
+    shoe = Surface(*(np.frombuffer(each) for each in profile))
     if shoe.g.size == 0:
         return 0.0, 0.0
     xi = np.linspace(-a, a, min(1 + 64 * max(1, math.ceil(2.0 * a * max(shoe.turns))), 10**6))

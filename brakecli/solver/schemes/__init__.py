@@ -84,7 +84,9 @@ SCHEMES: dict[str, Scheme] = {
         starts=("consistent", "paper"),
         unstable="or take theta = [0.25, 0.5, 0.25]",
     ),
-    "event-driven": Scheme("brakecli.solver.schemes.event_driven", (Trial(),), colour="#222222", own_steps=True),
+    "event-driven": Scheme(
+        "brakecli.solver.schemes.event_driven", (Trial(contacts=True),), colour="#222222", own_steps=True
+    ),
     "piecewise-exact": Scheme(
         "brakecli.solver.schemes.piecewise_exact", (Trial(),), colour="#6A3D9A", own_steps=True, exact=True
     ),

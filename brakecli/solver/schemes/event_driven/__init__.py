@@ -15,8 +15,8 @@ from brakecli.solver.friction import observed
 from brakecli.solver.quantities import Failure
 from brakecli.solver.records import DRIVE, MOTION, V_X, V_Y, Drive, Pair, Plant, Weights, X, Y, plant_type
 from brakecli.solver.schedules import integral_at, slope_at, value_at
-from brakecli.solver.schemes.event_driven.dop853 import interpolated
 from brakecli.solver.schemes.event_driven.phases import SHOE, Shoe, press, resistance
+from brakecli.solver.schemes.event_driven.runge_kutta import interpolated
 from brakecli.solver.schemes.event_driven.step import STEP, first_step, step
 
 STATE, solve = MOTION, step

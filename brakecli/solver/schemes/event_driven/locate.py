@@ -5,7 +5,9 @@ import math
 from numba import float64, int64, types
 
 from brakecli.solver.compile import kernel
+from brakecli.solver.records import V_X, Y
 from brakecli.solver.schemes.event_driven.phases import EPSILON, SHOE, Shoe, margins, rounding
+from brakecli.solver.schemes.event_driven.runge_kutta import reach
 
 NONE = -1
 LOOKS = 8
@@ -81,8 +83,13 @@ def _lowest(p: Shoe, which: int, h: float, left: float, right: float) -> tuple[f
 def first_event(p: Shoe, h: float) -> tuple[int, float]:
     """The margin that runs out first and the part of the step at which it does; 0 where it never was positive.
 
-    Between three places a margin may also dip below zero: it is followed down where a parabola says that it may.
+    None does where the continuous solution cannot get that far from the begin of the step. Between three places a
+    margin may also dip below zero: it is followed down where a parabola says that it may.
     """
+    m, sliding = p.motion, p.motion.side * (p.motion.begin[V_X] - p.motion.belt)
+    stays = abs(m.begin[Y] - p.layer.pad.clear_from) > reach(m, Y)
+    if m.side != 0.0 and stays and sliding > reach(m, V_X) + abs(m.belt_slope) * h:
+        return NONE, 1.0
     allowed = _allowances(p)
     before_last = last = margins(p, h, 0.0)
     for look in range(1, LOOKS + 1):

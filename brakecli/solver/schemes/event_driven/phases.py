@@ -13,12 +13,12 @@ from numba import float64, int64, types, void
 from brakecli.solver import records
 from brakecli.solver.compile import at_address, kernel
 from brakecli.solver.contact import CLOSED_FORM
-from brakecli.solver.contact.closed_form import FULL, clear, coverage, full_contact
+from brakecli.solver.contact.closed_form import FULL, clear, coverage, full_contact, full_press
 from brakecli.solver.double_double import two_sum
 from brakecli.solver.records import COEFFICIENTS, V_X, V_Y, Coefficients, Drive, Layer, Y
 from brakecli.solver.roughness import wheel_angles
 from brakecli.solver.schedules import integral_at, slope_at, value_at
-from brakecli.solver.schemes.event_driven.dop853 import END_STAGE, interpolated
+from brakecli.solver.schemes.event_driven.runge_kutta import END_STAGE, interpolated
 
 EPSILON = 2.220446049250313e-16
 
@@ -78,7 +78,7 @@ def arrive(p: Shoe, drive: Drive) -> None:
         m.x, m.v_x = (m.anchor + m.travel) + (m.anchor_low + m.travel_low), m.belt
 
 
-@kernel(float64(SHOE, float64, float64, int64), inlined=False)
+@kernel(float64(SHOE, float64, float64, int64))
 def press(p: Shoe, x: float, y: float, touching: int) -> float:
     """F_y (N) in the phase and the rest of `contact`; the closed form while a bound proves full contact.
 
@@ -95,13 +95,16 @@ def press(p: Shoe, x: float, y: float, touching: int) -> float:
         contact.fraction = 1.0 if y < 0.0 else 0.0
         contact.store_x, contact.kind, contact.valid = 0.0, CLOSED_FORM, 1
     elif coverage(y, pad) == FULL:
-        full_contact(x, y, p.layer)
+        if p.motion.light == 1:
+            full_press(x, y, p.layer)
+        else:
+            full_contact(x, y, p.layer)
     else:
-        _evaluate_at(p.layer.evaluate)(x, y, p.layer)
+        _evaluate_at(p.layer.press if p.motion.light == 1 else p.layer.evaluate)(x, y, p.layer)
     return contact.normal_force  # type: ignore[no-any-return]
 
 
-@kernel(void(SHOE, int64, float64, float64, float64, float64, float64), inlined=False)
+@kernel(void(SHOE, int64, float64, float64, float64, float64, float64))
 def find_slopes(p: Shoe, stage: int, since: float, x: float, y: float, v_x: float, v_y: float) -> None:
     """(6)-(7) as equations of first order, and the powers of the energy account, `since` the begin of the step.
 
@@ -123,7 +126,8 @@ def find_slopes(p: Shoe, stage: int, since: float, x: float, y: float, v_x: floa
     m.work_rates[stage, 1] = -friction * sliding
     m.work_rates[stage, 2] = c.b_xx * v_x * v_x + 2.0 * c.b_xy * v_x * v_y + c.b_yy * v_y * v_y
     m.work_rates[stage, 3] = load * (c.sin_beta * v_x + c.cos_beta * v_y)
-    m.work_rates[stage, 4] = p.layer.contact.store_x * sliding
+    # Where the store is not followed: what the pad does to it. The rest of its change is the roughness's work.
+    m.work_rates[stage, 4] = p.layer.contact.store_x * sliding if m.light == 0 else normal * v_y
 
 
 @kernel(_TRIPLE(SHOE, float64, float64), inlined=False)

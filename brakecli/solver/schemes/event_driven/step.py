@@ -10,10 +10,10 @@ from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.quantities import BOUND, Failure
 from brakecli.solver.records import DRIVE, GRID, KNOTS, MOTION_TYPE, POWERED, STAGES, V_X, V_Y, Drive, Grid, X, Y
 from brakecli.solver.schedules import Schedule, segment
-from brakecli.solver.schemes.event_driven import dop853, phases
-from brakecli.solver.schemes.event_driven.dop853 import END_STAGE, NODES, A
+from brakecli.solver.schemes.event_driven import phases, runge_kutta
 from brakecli.solver.schemes.event_driven.locate import NONE, first_event
 from brakecli.solver.schemes.event_driven.phases import EPSILON, SHOE, Shoe
+from brakecli.solver.schemes.event_driven.runge_kutta import END_STAGE, NODES, ORDER, USED, A
 
 _LOCAL = 0.05
 """Error of a step over the tolerance of the histories, to which the errors of all steps add up."""
@@ -28,9 +28,11 @@ _RADIANS = 2.0
 _DECAY = 4.0
 """Largest step times decay rate: steps are stable up to 6, but inaccurate beyond 4."""
 _FIRST = 0.05
-"""The first step over the longest."""
+"""The first step over the longest; on nodes five times that."""
 _MOST_SWITCHES, _MOST_EVENTS, _NO_PROGRESS = 60, 1000, 1e-6
 """A run ends after so many phases that end at once, or so many events within a part of the longest step."""
+_LOOSE = 2e-5
+"""Tolerance from which on steps of order five are cheaper, where the contact is that of nodes."""
 _TINY = 1e-300  # no division by zero where nothing moves
 
 STEP = int64(SHOE, DRIVE, GRID)
@@ -58,10 +60,11 @@ def _longest(p: Shoe, duration: float) -> float:
     if rate * longest > _DECAY:
         longest = _DECAY / rate
     if pad.wheel_terms > 0 and m.touching != 0 and m.side != 0.0:
-        # A fourth of the shortest wave, so that no patch comes and goes unseen.
+        # A fourth of the shortest wave, so that no patch comes and goes unseen; on nodes half of it.
         slide = abs(m.v_x - m.belt) + abs(m.slopes[0, V_X] - m.belt_slope) * m.step
-        if slide * longest > pad.cell:
-            longest = pad.cell / slide
+        wave = pad.cell if m.light == 0 else 2.0 * pad.cell
+        if slide * longest > wave:
+            longest = wave / slide
     return longest
 
 
@@ -70,6 +73,8 @@ def first_step(p: Shoe, drive: Drive, grid: Grid) -> None:
     """Find the phase of the initial state, and a step to begin with."""
     m = p.motion
     m.tolerance = _LOCAL * grid.tolerance
+    m.light = 1 if p.layer.pad.nodes > 0 else 0
+    m.pair = 1 if m.light == 1 and grid.tolerance >= _LOOSE else 0
     phases.arrive(p, drive)
     m.largest[X], m.largest[Y], m.largest[V_X], m.largest[V_Y] = abs(m.x), abs(m.y), abs(m.v_x), abs(m.v_y)
     height = m.y - p.layer.pad.clear_from
@@ -79,7 +84,7 @@ def first_step(p: Shoe, drive: Drive, grid: Grid) -> None:
     else:
         m.side = 1.0 if m.v_x > m.belt else -1.0
     phases.find_slopes(p, 0, 0.0, m.x, m.y, m.v_x, m.v_y)
-    m.step = _FIRST * _longest(p, grid.samples * grid.interval)
+    m.step = (_FIRST if m.light == 0 else 5.0 * _FIRST) * _longest(p, grid.samples * grid.interval)
 
 
 @kernel(float64(SHOE, float64), inlined=False)
@@ -91,13 +96,13 @@ def _defect(p: Shoe, h: float) -> float:
     m, worst = p.motion, 0.0
     along, across = phases.rounding(p)
     for theta in (_EARLY, _LATE):
-        x, y = dop853.interpolated(m, X, theta), dop853.interpolated(m, Y, theta)
-        v_x, v_y = dop853.interpolated(m, V_X, theta), dop853.interpolated(m, V_Y, theta)
+        x, y = runge_kutta.interpolated(m, X, theta), runge_kutta.interpolated(m, Y, theta)
+        v_x, v_y = runge_kutta.interpolated(m, V_X, theta), runge_kutta.interpolated(m, V_Y, theta)
         phases.find_slopes(p, STAGES - 1, theta * h, x, y, v_x, v_y)
         for i in (V_X, V_Y):
             if m.side == 0.0 and i == V_X:
                 continue
-            defect = abs(dop853.interpolated_slope(m, i, theta) - h * m.slopes[STAGES - 1, i])
+            defect = abs(runge_kutta.interpolated_slope(m, i, theta) - h * m.slopes[STAGES - 1, i])
             noise = _DENSE_ROUNDING * h * (along if i == V_X else across) / p.c.m
             largest = max(m.largest[i], abs(m.end[i]))
             worst = max(worst, defect / (_DEFECT * m.tolerance * largest + noise + _TINY))
@@ -111,9 +116,11 @@ def _try(p: Shoe, h: float, allowed: float) -> float:
     The error is that of the worst component over what the tolerance and rounding leave it.
     """
     m = p.motion
-    worst = 0.0
+    worst, used = 0.0, USED[m.pair]
     m.begin[X], m.begin[Y], m.begin[V_X], m.begin[V_Y] = m.x, m.y, m.v_x, m.v_y
     for stage in range(1, STAGES):
+        if used <= stage < END_STAGE:
+            continue
         if stage == END_STAGE + 1:
             along, across = phases.rounding(p)
             for i in range(4):
@@ -124,21 +131,23 @@ def _try(p: Shoe, h: float, allowed: float) -> float:
                 floor = noise if i >= V_X else h * noise
                 floor += 4.0 * EPSILON * max(abs(m.begin[i]), abs(m.end[i]))
                 largest = max(m.largest[i], abs(m.end[i]))
-                error = h * dop853.local_error(m, i) / (m.tolerance * largest + floor + _TINY)
+                error = h * runge_kutta.local_error(m, i) / (m.tolerance * largest + floor + _TINY)
                 if not error < math.inf:
                     return math.inf
                 worst = max(worst, error)
             if worst > allowed:
                 return worst
-        x, y, v_x, v_y = dop853.combined(m, stage)
+            if m.pair == 1:
+                break
+        x, y, v_x, v_y = runge_kutta.combined(m, stage)
         x, y = m.begin[X] + h * x, m.begin[Y] + h * y
         v_x, v_y = m.begin[V_X] + h * v_x, m.begin[V_Y] + h * v_y
-        phases.find_slopes(p, stage, NODES[stage] * h, x, y, v_x, v_y)
+        phases.find_slopes(p, stage, NODES[m.pair, stage] * h, x, y, v_x, v_y)
         if stage == END_STAGE:
             m.end[X], m.end[Y], m.end[V_X], m.end[V_Y] = x, y, v_x, v_y
             if p.layer.contact.valid == 0:
                 return math.inf
-    dop853.make_continuous(m, h)
+    runge_kutta.make_continuous(m, h)
     m.step_done = h
     return worst if p.layer.contact.kind == CLOSED_FORM else max(worst, _defect(p, h))
 
@@ -166,8 +175,8 @@ def _to_event(p: Shoe, which: int, h: float) -> float:
 def _passed(m: Any, item: int) -> float:
     """A work of the step that has been made, over its length."""
     total = 0.0
-    for stage in range(END_STAGE):
-        total += A[END_STAGE, stage] * m.work_rates[stage, item]
+    for stage in range(USED[m.pair]):
+        total += A[m.pair, END_STAGE, stage] * m.work_rates[stage, item]
     return total
 
 
@@ -226,7 +235,7 @@ def step(p: Shoe, drive: Drive, grid: Grid) -> int:
         if h < limit:
             last = 0
         error = _try(p, h, 1.0)
-        factor = max(_LEAST, min(growth, _SAFETY * error**-0.125)) if error > 0.0 else growth
+        factor = max(_LEAST, min(growth, _SAFETY * error ** (-1.0 / ORDER[m.pair]))) if error > 0.0 else growth
         if error <= 1.0:
             break
         h, growth = h * factor, 1.0

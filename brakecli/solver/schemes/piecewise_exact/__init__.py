@@ -125,6 +125,7 @@ def whole(m: Any, h: float) -> int:
             pair += 1
     for i in range(4):
         m.z[i] = m.after[i]
+    _carry(m)
     m.z[BELT], m.z[LOAD] = m.z[BELT] + h * m.z[BELT_SLOPE], m.z[LOAD] + h * m.z[LOAD_SLOPE]
     for k in range(AHEAD):
         m.before[k] = m.after[k]
@@ -207,14 +208,13 @@ def _count(m: Any, counts: Any) -> None:
 def _through(p: Plant, t: float, to_sample: int) -> int:
     """Step on beyond the level behind time t, through all events and knots; a `Failure`.
 
-    Whole steps go on from an event, so that motion is late at the levels that follow, until the next sample.
+    Whole steps go on from an event, so that the motion is beyond the levels that follow, until the next sample.
     """
-    m, h, tau = p.state, p.s.h, p.state.late
+    m, h, tau = p.state, p.s.h, p.state.beyond
     while tau < h:
         to_knot, fits = m.knot - t - tau, to_sample == 0 or tau == 0.0
         if fits and h < to_knot and min(m.before[4], m.before[5], m.before[6]) >= 0.0 and whole(m, h) == 1:
             _count(m, p.counts)
-            _carry(m)
             tau += h
             continue
         span = max(min(h - tau if to_sample == 1 else h, to_knot), 0.0)
@@ -243,7 +243,7 @@ def _through(p: Plant, t: float, to_sample: int) -> int:
         elif to_sample == 1:
             tau = h
         look(m)
-    m.late = tau - h if to_sample == 0 else 0.0
+    m.beyond = tau - h if to_sample == 0 else 0.0
     return _NONE
 
 
@@ -292,9 +292,8 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
             for column in range(rows.shape[1]):  # a slice would take seconds to compile
                 rows[row, column] = m.row[column]
             row += 1
-        if m.late == 0.0 and t + h < m.knot and whole(m, h) == 1:
+        if m.beyond == 0.0 and t + h < m.knot and whole(m, h) == 1:
             _count(m, counts)
-            _carry(m)
         else:
             failure = _through(p, t, int(part + 1 == grid.per_sample))
         if not abs(m.z[X]) + abs(m.z[Y]) + abs(m.z[V_X]) + abs(m.z[V_Y]) < BOUND:

@@ -13,8 +13,12 @@ from brakecli.solver.schemes.piecewise_exact.phases import BACKWARD, FORWARD, HE
 
 @kernel(void(COEFFICIENTS, FLOW_TYPE, float64), inlined=False)
 def _take_hold(c: Coefficients, m: Any, h: float) -> None:
-    """The phase of a touching shoe at the wheel's velocity: stick if friction can hold it, else slip, (3)-(5)."""
+    """The phase of a touching shoe at the wheel's velocity: stick if friction can hold it, else slip, (3)-(5).
+
+    It has this velocity exactly: what rounding leaves of an event may be more than a short rest of a step allows.
+    """
     phases.make(c, m, STICK, h)
+    m.z[V_X] = m.z[BELT]
     for which in range(1, MARGINS):
         total, terms = 0.0, 0.0
         for i in range(SIZE):
@@ -23,7 +27,7 @@ def _take_hold(c: Coefficients, m: Any, h: float) -> None:
         if total < -0.5 * ROUNDING * terms:
             m.phase = BACKWARD if which == 1 else FORWARD
             return
-    m.z[V_X], m.phase = m.z[BELT], STICK
+    m.phase = STICK
 
 
 @kernel(void(COEFFICIENTS, FLOW_TYPE, float64), inlined=False)

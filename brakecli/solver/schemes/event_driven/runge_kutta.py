@@ -1,8 +1,9 @@
-"""A Runge-Kutta method of order eight with an error estimate and a continuous solution of order seven: DOP853.
+"""Two Runge-Kutta methods with an error estimate and a continuous solution: DOP853 of order eight, DOPRI5 of five.
 
 Coefficients: E. Hairer, S. P. Nørsett and G. Wanner, Solving Ordinary Differential Equations I, 2nd edition,
-section II.5, and their program dop853.f. The thirteenth stage is the slope at the end of the step, which is the
-first of the next; the last three serve the continuous solution alone.
+sections II.5 and II.6, and their programs dop853.f and dopri5.f. Arrays have DOP853 first. Stage `END_STAGE` is
+the slope at the end of the step, which is the first of the next; the three behind it serve the continuous solution
+of DOP853 alone. DOPRI5 has no stages from 6 to 11.
 """
 
 import math
@@ -15,21 +16,24 @@ from brakecli.solver.compile import Floats, kernel
 from brakecli.solver.records import MOTION_TYPE, POWERS, STAGES
 
 END_STAGE = 12
+USED, LAST, TERMS, ORDER = np.array([[12, 6], [16, 13], [7, 4], [8, 5]])
+"""Stages before the end, stages in all, coefficients of the continuous solution, and the order."""
 
 
 def _numbers(text: str) -> Floats:
     return np.array([float(word) for word in text.split()])
 
 
-NODES = _numbers("""
+_EIGHTH = _numbers("""
     0 0.05260015195876773 0.0789002279381516 0.1183503419072274 0.2816496580927726 0.3333333333333333 0.25
     0.3076923076923077 0.6512820512820513 0.6 0.8571428571428571 1 1 0.1 0.2 0.7777777777777778
 """)
+NODES = np.array([_EIGHTH, [*_numbers("0 0.2 0.3 0.8"), 8 / 9, 1, *[0] * 6, 1, 0, 0, 0]])
 """When each stage is, in steps."""
 
-A = np.zeros((STAGES, STAGES))
-"""Weights of the slopes so far; the thirteenth row is the step itself."""
-A[np.tril_indices(STAGES, -1)] = _numbers("""
+A = np.zeros((2, STAGES, STAGES))
+"""Weights of the slopes so far; those of `END_STAGE` are the step itself."""
+A[0][np.tril_indices(STAGES, -1)] = _numbers("""
     0.05260015195876773 0.0197250569845379 0.0591751709536137 0.02958758547680685 0 0.08876275643042054
     0.2413651341592667 0 -0.8845494793282861 0.924834003261792 0.037037037037037035 0 0 0.17082860872947386
     0.12546768756682242 0.037109375 0 0 0.17025221101954405 0.06021653898045596 -0.017578125 0.03709200011850479 0
@@ -48,18 +52,26 @@ A[np.tril_indices(STAGES, -1)] = _numbers("""
     -4.697621415361164 7.683421196062599 4.06898981839711 0.3567271874552811 0 0 0 -0.0013990241651590145
     2.9475147891527724 -9.15095847217987
 """)
+A[1, 1, 0] = 1 / 5
+A[1, 2, :2] = 3 / 40, 9 / 40
+A[1, 3, :3] = 44 / 45, -56 / 15, 32 / 9
+A[1, 4, :4] = 19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729
+A[1, 5, :5] = 9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656
+A[1, END_STAGE, :6] = 35 / 384, 0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84
 
-THIRD = _numbers("""
+THIRD, FIFTH, DENSE = np.zeros((2, STAGES)), np.zeros((2, STAGES)), np.zeros((2, POWERS - 3, STAGES))
+THIRD[0, : END_STAGE + 1] = _numbers("""
     -0.18980075407240762 0 0 0 0 4.450312892752409 1.8915178993145003 -5.801203960010585 -0.4226823213237919
     -0.1521609496625161 0.20136540080403034 0.02265179219836082 0
 """)
-FIFTH = _numbers("""
+FIFTH[0, : END_STAGE + 1] = _numbers("""
     0.01312004499419488 0 0 0 0 -1.2251564463762044 -0.4957589496572502 1.6643771824549864 -0.35032884874997366
     0.3341791187130175 0.08192320648511571 -0.022355307863886294 0
 """)
-"""What the step differs by from formulas of order three and five."""
+FIFTH[1, :6], FIFTH[1, END_STAGE] = (71 / 57600, 0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525), -1 / 40
+"""What the step differs by from formulas of order three and five, of DOPRI5 from one of order four."""
 
-DENSE = _numbers("""
+DENSE[0] = _numbers("""
     -8.428938276109013 0 0 0 0 0.5667149535193777 -3.0689499459498917 2.38466765651207 2.117034582445028
     -0.871391583777973 2.2404374302607883 0.6315787787694688 -0.08899033645133331 18.148505520854727
     -9.194632392478356 -4.436036387594894 10.427508642579134 0 0 0 0 242.28349177525817 165.20045171727028
@@ -70,6 +82,14 @@ DENSE = _numbers("""
     0 0 0 0 -154.18974869023643 -231.5293791760455 357.6391179106141 93.40532418362432 -37.45832313645163
     104.0996495089623 29.8402934266605 -43.53345659001114 96.32455395918828 -39.17726167561544 -149.72683625798564
 """).reshape(POWERS - 3, STAGES)
+DENSE[1, 0, [0, 2, 3, 4, 5, END_STAGE]] = (
+    -12715105075 / 11282082432,
+    87487479700 / 32700410799,
+    -10690763975 / 1880347072,
+    701980252875 / 199316789632,
+    -1453857185 / 822651844,
+    69997945 / 29380423,
+)
 """The upper coefficients of the continuous solution."""
 
 
@@ -77,8 +97,9 @@ DENSE = _numbers("""
 def combined(m: Any, stage: int) -> tuple[float, float, float, float]:
     """Σ A[stage, j] k_j of every component: what the step so far advances by, over the step."""
     x, y, v_x, v_y = 0.0, 0.0, 0.0, 0.0
-    for j in range(stage):
-        weight = A[stage, j]
+    pair = m.pair
+    for j in range(stage if pair == 0 else min(stage, USED[pair])):
+        weight = A[pair, stage, j]
         x += weight * m.slopes[j, 0]
         y += weight * m.slopes[j, 1]
         v_x += weight * m.slopes[j, 2]
@@ -89,10 +110,12 @@ def combined(m: Any, stage: int) -> tuple[float, float, float, float]:
 @kernel(float64(MOTION_TYPE, int64))
 def local_error(m: Any, component: int) -> float:
     """The error of one component in a step, over the step: of order seven, from those of order three and five."""
-    third, fifth = 0.0, 0.0
-    for j in range(END_STAGE):
-        third += THIRD[j] * m.slopes[j, component]
-        fifth += FIFTH[j] * m.slopes[j, component]
+    third, fifth, pair = 0.0, 0.0, m.pair
+    for j in range(USED[pair]):
+        third += THIRD[pair, j] * m.slopes[j, component]
+        fifth += FIFTH[pair, j] * m.slopes[j, component]
+    if pair == 1:
+        return abs(fifth + FIFTH[1, END_STAGE] * m.slopes[END_STAGE, component])  # type: ignore[no-any-return]
     size = math.sqrt(fifth * fifth + 0.01 * third * third)
     return fifth * fifth / size if size > 0.0 else 0.0
 
@@ -100,16 +123,17 @@ def local_error(m: Any, component: int) -> float:
 @kernel(void(MOTION_TYPE, float64))
 def make_continuous(m: Any, h: float) -> None:
     """Coefficients of the continuous solution, from the slopes and both ends of a step h."""
+    pair = m.pair
     for i in range(4):
         first, last = h * m.slopes[0, i], h * m.slopes[END_STAGE, i]
         change = m.end[i] - m.begin[i]
         m.powers[0, i] = change
         m.powers[1, i] = first - change
         m.powers[2, i] = 2.0 * change - (first + last)
-        for p in range(POWERS - 3):
+        for p in range(TERMS[pair] - 3):
             total = 0.0
-            for j in range(STAGES):
-                total += DENSE[p, j] * m.slopes[j, i]
+            for j in range(LAST[pair]):
+                total += DENSE[pair, p, j] * m.slopes[j, i]
             m.powers[p + 3, i] = h * total
 
 
@@ -117,16 +141,27 @@ def make_continuous(m: Any, h: float) -> None:
 def interpolated(m: Any, component: int, theta: float) -> float:
     """One component at the part theta of the step that the continuous solution belongs to."""
     total, rest = 0.0, 1.0 - theta
-    for p in range(POWERS - 1, -1, -1):
+    for p in range(TERMS[m.pair] - 1, -1, -1):
         total = (total + m.powers[p, component]) * (theta if p % 2 == 0 else rest)
     return m.begin[component] + total  # type: ignore[no-any-return]
+
+
+@kernel(float64(MOTION_TYPE, int64))
+def reach(m: Any, component: int) -> float:
+    """A bound of how far one component of the continuous solution gets from the begin of its step."""
+    far = (
+        abs(m.powers[0, component]) + abs(m.powers[1, component]) / 4.0 + abs(m.powers[2, component]) * 4.0 / 27.0
+    )
+    for p in range(3, TERMS[m.pair]):
+        far += abs(m.powers[p, component]) / 16.0
+    return far  # type: ignore[no-any-return]
 
 
 @kernel(float64(MOTION_TYPE, int64, float64))
 def interpolated_slope(m: Any, component: int, theta: float) -> float:
     """Derivative of `interpolated` by theta."""
     total, slope, rest = 0.0, 0.0, 1.0 - theta
-    for p in range(POWERS - 1, -1, -1):
+    for p in range(TERMS[m.pair] - 1, -1, -1):
         total += m.powers[p, component]
         if p % 2 == 0:
             total, slope = total * theta, slope * theta + total

@@ -1,0 +1,27 @@
+"""`brakecli report`."""
+
+from pathlib import Path
+from typing import Annotated
+
+from brakecli.cli.options import Force, Quiet, output_option, source_argument
+from brakecli.cli.output import announce_compilation, progress, show
+
+
+def command(
+    results: Annotated[
+        list[Path], source_argument("FILE.h5…", "Results of runs, sweeps, comparisons or stability.")
+    ],
+    output: Annotated[Path | None, output_option("Page", "report.html, here")] = None,
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Write a page about results: answer, evidence, pictures (needs matplotlib and jinja2)."""
+    announce_compilation(quiet)
+    from brakecli.reports.page import write_report
+    from brakecli.runs.limits import within_range
+
+    target = output or Path("report.html")
+    with progress(quiet) as show_progress, within_range():
+        write_report(results, target, force=force, progress=show_progress)
+    if not quiet:
+        show(f"{target}: written")

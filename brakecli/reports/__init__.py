@@ -1,0 +1,1 @@
+"""Results as a page to read, to print and to send."""

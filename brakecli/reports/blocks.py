@@ -1,0 +1,119 @@
+"""What a page is made of: sections with tables, pictures and texts, which the template `report.html` writes."""
+
+import base64
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from PIL import Image
+
+from brakecli.files.field import Field
+from brakecli.plots import style
+
+_MOST_VALUES = 8  # of a list that are written
+_COLOURS, _DPI = 64, 120  # of a picture: a fifth of the bytes, and no difference that could be seen
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of texts, with a header or without; one that is `folded` under its title opens on demand."""
+
+    rows: Sequence[Sequence[str]]
+    head: Sequence[str] = ()
+    folded: str = ""
+    kind = "table"
+
+
+@dataclass(frozen=True)
+class Texts:
+    """Sentences."""
+
+    lines: Sequence[str]
+    kind = "texts"
+
+
+@dataclass(frozen=True)
+class Code:
+    """A text to be copied, folded under a title if there is one."""
+
+    text: str
+    folded: str = ""
+    kind = "code"
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture for wide and for narrow screens, with the words for those who do not see it."""
+
+    words: str
+    wide: str
+    narrow: str
+    kind = "picture"
+
+
+@dataclass(frozen=True)
+class Section:
+    """A headline with what stands below it."""
+
+    title: str
+    blocks: Sequence[Any]
+
+
+@dataclass(frozen=True)
+class Part:
+    """What the page says of one result."""
+
+    name: str
+    title: str
+    question: str
+    answer: Sequence[str]
+    sections: Sequence[Section]
+    versions: Mapping[str, str] = field(default_factory=dict)
+
+
+def picture(words: str, draw: Callable[[], Figure]) -> Picture:
+    """The picture that a function draws, for both widths."""
+    images = []
+    for narrow in (False, True):
+        with style.applied(narrow):
+            png = style.rendered(draw(), ".png", _DPI)
+        stream = BytesIO()
+        Image.open(BytesIO(png)).convert("RGB").quantize(_COLOURS, dither=Image.Dither.NONE).save(
+            stream, "png", optimize=True
+        )
+        images.append("data:image/png;base64," + base64.b64encode(stream.getvalue()).decode())
+    return Picture(words, images[0], images[1])
+
+
+def shown(value: Any, unit: str = "") -> str:
+    """A value as people write it, with its unit: a prefix where it needs one."""
+    unit = unit if unit != "1" else ""
+    if isinstance(value, str) or value is None:
+        return value or "–"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, int | np.integer) and not unit:
+        return f"{int(value):,}".replace(",", "\u202f").replace("-", "−")
+    if isinstance(value, Mapping):
+        return ", ".join(f"{name} {shown(each)}" for name, each in value.items())
+    if hasattr(value, "__len__"):
+        more = f" … ({len(value)} values)" * (len(value) > _MOST_VALUES)
+        texts = [shown(each, unit) for each in value[:_MOST_VALUES]]
+        return (", ".join(texts) or "none") + more
+    factor, unit = style.prefixed(abs(float(value)), unit)
+    return f"{style.readable(factor * float(value))}\u00a0{unit}".rstrip()
+
+
+def rows_of(known: Iterable[Field], values: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    """A row for each field that has a value: its name, value and meaning."""
+    rows = []
+    for each in known:
+        if (value := values.get(each.name)) is not None:
+            value = bool(value) if "(0, 1)" in each.meaning else value
+            rows.append(
+                (each.title, shown(value, each.units), each.meaning.replace("`", "").replace(" (0, 1)", ""))
+            )
+    return rows

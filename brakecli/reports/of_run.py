@@ -1,0 +1,243 @@
+"""The part of a page about a run: whether the shoe vibrates, why, what to change, and how sure that is."""
+
+import math
+import shlex
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from brakecli.analysis.regime.verdict import Excitation, Regime
+from brakecli.analysis.stability.advice import KEYS
+from brakecli.analysis.stability.follow import followed
+from brakecli.analysis.stability.modes import modes
+from brakecli.case.case import Case
+from brakecli.case.read import LoadedCase, key_path, parse_case
+from brakecli.case.tables import key_schema
+from brakecli.errors import CaseError, escaped
+from brakecli.files import fields
+from brakecli.files.field import named
+from brakecli.files.read import StoredResult
+from brakecli.plots import lock_in, style
+from brakecli.plots.result import draw
+from brakecli.reports.blocks import Code, Part, Section, Table, Texts, picture, rows_of, shown
+from brakecli.runs.advise import AdviceReport, advise
+from brakecli.sweeps.result import unit
+
+QUESTION = "Will this shoe vibrate, in which way, at which frequency, and what should be changed?"
+PICTURE = "The motion in detail, its phase portrait, the whole history, and the spectrum of the velocity"
+MARGIN = 0.2  # of the friction, that advice aims at
+VALUES = 121  # of the friction in the lock-in diagram
+MOST_SENSITIVE = 6
+_UNITS = [each.units for each in fields.VIBRATION]
+_IDLE = ("initial.", "solver.", "output.")  # keys that stand below the others
+_WORDS = {
+    Regime.RELAXATION: "It vibrates, with stick in every cycle or nearly (relaxation)",
+    Regime.QUASI_HARMONIC: "It vibrates, without stick (quasi-harmonic)",
+    Regime.DAMPED: "It does not vibrate by itself: what moves it dies away (damped)",
+}
+_ACCURACY = (
+    *("scheme", "theta", "iteration", "step", "tolerance", "certified", "estimated_error", "certified_until"),
+    *("certified_by", "nodes", "steps", "contact_evaluations", "unconverged_steps", "non_unique_steps"),
+)
+
+Progress = Callable[[str, int, int], None]
+
+
+def part_of_run(result: StoredResult, progress: Progress) -> Part:
+    """What the page says of a run. Raises UnreadableResultError."""
+    found, loaded = result.attributes, case_of(result)
+    advice = advise(loaded, KEYS, MARGIN, progress)
+    again = f"brakecli run {escaped(shlex.quote(result.path.name))} -o again.h5"
+    sections = [
+        Section("Case", case_blocks(loaded)),
+        Section("Stability of steady sliding", [*_stability(advice)]),
+        Section("Regime, and its evidence", _regime(result)),
+        Section("Pictures", [picture(PICTURE, partial(draw, result))]),
+        Section("Accuracy", _accuracy(result)),
+        Section("Warnings", [Texts(_warnings(found, advice))]),
+        Section("How to repeat it", repeat(result, again, result.text("case_toml"))),
+    ]
+    stretches = [
+        f"It vibrates from {shown(start, 's')} to {shown(end, 's')}: {shown(rate, 'Hz')} at {shown(speed, 'm/s')}."
+        for start, end, rate, _, speed in _vibrations(result)
+    ]
+    answer = [*stretches, _sentence(found), f"By theory: {advice.conclusion()}."]
+    name, title = escaped(result.path.name), loaded.case.title or "Case without a title"
+    return Part(name, title, QUESTION, answer, sections, versions(found))
+
+
+def case_of(result: StoredResult) -> LoadedCase:
+    """The case that a result holds."""
+    try:
+        return parse_case(result.text("resolved_toml"), "its resolved case")
+    except CaseError as error:
+        raise style.unreadable(result, f"the case in it is not valid: {error.problems[0]}") from error
+
+
+def case_blocks(loaded: LoadedCase) -> list[Any]:
+    """Every key of a case with its value and unit, and the text to copy."""
+    keys = _keys(loaded.case.model_dump(mode="json"))
+    rows = [(key, shown(value, unit(key)), _meaning(key)) for key, value in keys]
+    idle, head = [row for row in rows if row[0].startswith(_IDLE)], ("key", "value", "meaning")
+    shoe = Table([row for row in rows if row not in idle], head)
+    return [shoe, Table(idle, head, "Start, solver and output"), Code(loaded.resolved, "The whole case as a file")]
+
+
+def repeat(result: StoredResult, again: str, given: str) -> list[Any]:
+    """The commands that give the result, and this page, again; and the file that it was computed from."""
+    report = f"brakecli report {escaped(shlex.quote(result.path.name))} -o report.html"
+    exactly = "The same version on the same machine gives the same numbers, to the last bit."
+    return [Code(f"{again}\n{report}"), Texts([exactly]), Code(given, "The file as it was given")]
+
+
+def versions(found: Mapping[str, Any]) -> dict[str, str]:
+    """Program and libraries by which a result was made."""
+    names = [name for name in found if name.endswith("_version") and name != "format_version"]
+    return {name.removesuffix("_version"): str(found[name]) for name in names}
+
+
+def _sentence(found: Mapping[str, Any]) -> str:
+    """What the run has shown."""
+    if found.get("status") == "failed":
+        return f"The run failed: {found.get('failure', '')}."
+    regime, numbers = found.get("regime"), []
+    reasons = "; ".join(map(str, found.get("reasons", ())))
+    words = {str(name): words for name, words in _WORDS.items()}.get(str(regime), "")
+    if regime == Regime.DAMPED and found.get("excitation") == Excitation.FORCED:
+        words = "It does not vibrate by itself: only the roughness of the wheel shakes it (damped, forced)"
+    if not words:
+        return f"The run does not decide it: {reasons}."
+    if (frequency := found.get("frequency")) is not None:
+        numbers.append(f"at {frequency:.4g} Hz")
+    if (amplitude := found.get("amplitude")) is not None and numbers:
+        numbers.append(f"amplitude along the wheel {shown(float(f'{amplitude:.3g}'), 'm')}")
+    for name, what in (("stick_fraction", "stick"), ("contact_loss_fraction", "no contact")):
+        if numbers and (share := found.get(name)):
+            numbers.append(f"{what} {share:.1%} of the time")
+    return f"{', '.join([words, *numbers])}: {reasons}."
+
+
+def _stability(advice: AdviceReport) -> Iterator[Any]:
+    report = advice.stability
+    rows = [("steady sliding", "none", report.no_equilibrium or "")] if report.equilibrium is None else []
+    for each in report.crossings:
+        change = f"stability {'lost' if each.lost else 'regained'}"
+        rows.append(
+            (change, f"at φ = {each.friction:.6g}", f"by {each.instability}, {shown(each.frequency, 'Hz')}")
+        )
+    for mode in report.modes:
+        growth = f"{'grows' if mode.growth > 0.0 else 'decays'} at {abs(mode.growth):.4g} 1/s"
+        ratio = style.readable(float(f"{mode.damping_ratio:.3g}"))
+        name = f"mode at φ = {report.friction:g}"
+        rows.append((name, shown(mode.frequency, "Hz"), f"{growth}, damping ratio {ratio}"))
+    yield Table(rows)
+    if report.equilibrium is not None and report.belt_speed:
+        words = "Lock-in diagram: frequencies and growth rates of both modes over the friction coefficient"
+        yield picture(words, partial(_diagram, advice))
+    if advice.advice:
+        changes = [
+            (
+                each.parameter,
+                shown(each.start, unit(each.parameter)),
+                "no help" if each.to is None else shown(float(each.rounded), unit(each.parameter)),
+                shown(each.critical_friction and float(f"{each.critical_friction:.4g}")),
+            )
+            for each in advice.advice
+        ]
+        head = (
+            "what to change",
+            "from",
+            f"to, for a margin of {advice.wanted_margin:.0%}",
+            "critical friction then",
+        )
+        yield Table(changes, head)
+    known = [each for each in advice.sensitivities if each.elasticity][:MOST_SENSITIVE]
+    if known:
+        moves = [(each.parameter, f"{each.elasticity:+.3g}\u00a0%".replace("-", "−")) for each in known]
+        yield Table(moves, ("what moves it most", "critical friction for 1 % more"))
+    if check := advice.check:
+        what = f"A run of the case with {check.parameter} = {check.value:.6g}, {check.duration:.3g} s of motion"
+        yield Texts([f"{what}: {check.verdict.regime}: {'; '.join(check.verdict.reasons)}."])
+
+
+def _diagram(advice: AdviceReport) -> Figure:
+    """Modes over the friction coefficient, to half more than what matters."""
+    report, c = advice.stability, advice.system.coefficients
+    highest = 1.5 * max(report.friction, advice.critical_friction or 0.0) or 1.0
+    if highest > 4.0 * report.friction > 0.0:
+        highest = 4.0 * report.friction
+    phi = np.linspace(0.0, highest, VALUES)
+    stiffness = [report.stiffness_at(float(each)) for each in phi]
+    pairs = followed(
+        tuple(modes(c._replace(phi=float(each)), k, math.copysign(float(each), report.belt_speed)))
+        if k > 0.0
+        else ()
+        for each, k in zip(phi, stiffness, strict=True)
+    )
+    found = np.array(
+        [[(mode.frequency, mode.growth) for mode in pair] if pair else np.full((2, 2), np.nan) for pair in pairs]
+    )
+    ends = np.array([each.friction for each in report.crossings if each.friction <= highest])
+    figure = lock_in.diagram("", "friction coefficient φ", "", phi, (found[..., 0], found[..., 1]), ends)
+    for axes in figure.axes:
+        axes.axvline(report.friction, color=style.GREEN, lw=1.3, ls=style.DASHES, label="this case")
+    figure.axes[0].legend(loc="best")
+    return figure
+
+
+def _regime(result: StoredResult) -> list[Any]:
+    found = result.attributes
+    rows = rows_of((each for each in fields.VERDICT if each.kind != fields.OBJECT), found)
+    evidence = result.group_attributes("regime/evidence")
+    proof = [
+        (name.replace("_", " "), shown(value, fields.evidence_unit(name)))
+        for name, value in sorted(evidence.items())
+    ]
+    reasons = Texts([f"{reason[:1].upper()}{reason[1:]}." for reason in map(str, found.get("reasons", ()))])
+    intervals, head = _vibrations(result), [each.meaning for each in fields.VIBRATION]
+    beats = [Table([[shown(*each) for each in zip(row, _UNITS, strict=True)] for row in intervals], head)]
+    return [
+        reasons,
+        *beats * bool(intervals),
+        Table(rows),
+        Table(proof, ("evidence", "value"), "All numbers by which the rules decided"),
+    ]
+
+
+def _vibrations(result: StoredResult) -> list[list[float]]:
+    """Where speed or load change: start, end, frequency, amplitude and speed of each interval of vibration."""
+    if "vibrations" not in result.file:
+        return []
+    columns = [result.read("vibrations", each.name) for each in fields.VIBRATION]
+    return [[float(f"{value:.4g}") for value in row] for row in zip(*columns, strict=True)]
+
+
+def _accuracy(result: StoredResult) -> list[Any]:
+    energy = result.group_attributes("energy")
+    closing = (
+        "energy account",
+        f"{abs(float(energy.get('relative_closing_error', math.nan))):.1e}",
+        "what it does not account for, over its largest item",
+    )
+    return [Table([*rows_of(named(fields.RUN, *_ACCURACY), result.attributes), closing])]
+
+
+def _warnings(found: Mapping[str, Any], advice: AdviceReport) -> list[str]:
+    lines = [str(each) for name in ("warnings", "adjustments") for each in found.get(name, ())]
+    lines += [f"left out: {each}" for each in found.get("left_out", ())] + advice.notes()
+    return [f"{line[:1].upper()}{line[1:]}." for line in lines] or ["There are none."]
+
+
+def _keys(table: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, Any]]:
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            yield from _keys(value, f"{path}{key}.")
+        elif value is not None and path:
+            yield f"{path}{key}", value
+
+
+def _meaning(key: str) -> str:
+    return str(key_schema(Case, key_path(key)).get("description", ""))

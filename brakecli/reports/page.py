@@ -1,0 +1,78 @@
+"""Results → one page: a single HTML file that needs no network, no mouse and no other file."""
+
+import base64
+import hashlib
+from collections.abc import Sequence
+from contextlib import suppress
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from brakecli import __version__
+from brakecli.errors import UsageError
+from brakecli.files.atomic import new_output
+from brakecli.files.read import StoredResult, open_result
+
+if TYPE_CHECKING:
+    from brakecli.reports.blocks import Part
+    from brakecli.reports.of_run import Progress
+
+LARGEST = 3_000_000  # bytes
+
+
+def write_report(results: Sequence[Path], target: Path, *, force: bool, progress: "Progress") -> None:
+    """Write the page of some results.
+
+    Raises UsageError for another suffix, an existing target without `force`, a page that would be too large, and
+    where a library is missing; UnreadableResultError; CannotWriteError.
+    """
+    if target.suffix.lower() not in (".html", ".htm"):
+        problem = f"its suffix does not name a page (found {target.suffix!r})"
+        raise UsageError(f"{target}: {problem}; name a file that ends in .html with -o")
+    for result in results:
+        with suppress(OSError, ValueError):
+            if target.samefile(result):
+                raise UsageError(f"{target}: this is a result itself; choose another output with -o")
+    try:
+        import jinja2
+        import matplotlib.figure  # noqa: F401
+    except ImportError as error:
+        problem = f"{error.name or 'a library'} cannot be imported ({error})"
+        raise UsageError(f"{problem}; install it with: python -m pip install matplotlib jinja2") from error
+    from brakecli.reports.of_run import part_of_run
+    from brakecli.reports.of_sweep import part_of_other, part_of_sweep
+
+    def part(stored: StoredResult) -> "Part":
+        kind = str(stored.attributes.get("kind"))
+        if kind == "run":
+            return part_of_run(stored, progress)
+        if kind not in ("sweep", "comparison", "stability"):
+            raise UsageError(f"{stored.path}: holds a result of kind {kind!r}, of which there is no report")
+        return part_of_sweep(stored) if kind == "sweep" else part_of_other(stored)
+
+    with new_output(target, force=force) as file:
+        parts = []
+        for number, result in enumerate(results):
+            progress("results", number, len(results))
+            with open_result(result) as stored:
+                parts.append(part(stored))
+        script = _file("report.js")
+        loader = jinja2.FunctionLoader(_file)
+        environment = jinja2.Environment(
+            autoescape=True, undefined=jinja2.StrictUndefined, loader=loader, trim_blocks=True, lstrip_blocks=True
+        )
+        environment.policies["json.dumps_kwargs"] = {"ensure_ascii": False}  # in order, and short
+        digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+        page = environment.get_template("report.html").render(
+            parts=parts, script=script, digest=digest, version=__version__
+        )
+        data = page.encode()
+        if len(data) >= LARGEST:
+            problem = f"the page would have {len(data) / 1e6:.1f} MB, and {LARGEST / 1e6:.0f} MB are the limit"
+            raise UsageError(f"{target}: {problem}; name fewer results, and write several pages")
+        file.write(data)
+        file.publish()
+
+
+def _file(name: str) -> str:
+    return resources.files("brakecli.reports").joinpath(name).read_text(encoding="utf-8")
