@@ -197,7 +197,7 @@ def classify(
         belt_speed: speed of the wheel's surface (m/s), if known.
         stiffness: stiffness behind a measured force (N/m), if known.
         thresholds: limits of the rules to change.
-        reading: how a file is read: `column`, `time_column`, `sample_rate` (Hz).
+        reading: how a file is read: `column`, `time_column`, `sample_rate` (Hz), `unit`, `time_unit`.
 
     Returns:
         A variable for each number that `brakecli classify --json` prints, evidence and reasons as attributes.
@@ -215,13 +215,14 @@ def classify(
             from brakecli.analysis.regime.verdict import Thresholds
 
             return _dataset(VERDICT, classify_result(Path(source), changed(Thresholds, changes)))
-        from brakecli.analysis.regime.of_signal import Measurand, SignalThresholds, classify_signal
+        from brakecli.analysis.regime.of_signal import Measurand, classify_signal
         from brakecli.analysis.regime.signal_file import read_signal
+        from brakecli.analysis.regime.signal_rules import SignalThresholds
 
         if quantity not in set(Measurand):
             raise UsageError(f"quantity {quantity}: is not known; give one of {', '.join(Measurand)}")
         verdict = classify_signal(
-            read_signal(str(source), **(dict.fromkeys(("column", "time_column", "sample_rate")) | reading)),
+            read_signal(str(source), Measurand(quantity), **reading),
             quantity=Measurand(quantity),
             belt_speed=belt_speed,
             stiffness=stiffness,

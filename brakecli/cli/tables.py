@@ -24,7 +24,8 @@ POINTS = named(fields.POINT, "regime", "frequency", "amplitude")
 CRITICAL_NAMES = ("critical", "critical_error", "critical_eigenvalue", "critical_sustained", "critical_status")
 CRITICAL_POINTS = (*named(fields.POINT, "regime"), *named(fields.CRITICAL, *CRITICAL_NAMES))
 IF_KNOWN = ("growth_rate", "ringing_frequency", "amplitude_spread", "amplitude_forced", "amplitude_own")
-MOST_LISTED_POINTS = 30
+MOST_LISTED_POINTS, MOST_LISTED_BURSTS = 30, 12
+SI_UNITS = {"displacement": "m", "velocity": "m/s", "force": "N", "acceleration": "m/s²", "pressure": "Pa"}
 NARROWEST = 40  # columns of a table, whatever the terminal says: nothing can be read in fewer
 
 Row = tuple[str, str | Sequence[str]]
@@ -80,11 +81,30 @@ def run_table(report: RunReport) -> str:
 def verdict_table(source: str, numbers: Mapping[str, Any]) -> str:
     """A verdict, from the names and values that `--json` gives."""
     rows = _verdict_rows(numbers)
+    si_unit = SI_UNITS.get(numbers.get("quantity", ""), "")
+    tones = numbers.get("bursts", ())
+    for tone in tones[:MOST_LISTED_BURSTS]:
+        when, level = f"{tone['start']:.4g} to {tone['end']:.4g} s", f"{tone['level']:.3g} {si_unit}"
+        rows.append(("burst", f"{when}: {tone['frequency']:.6g} Hz, {level}"))
+    if len(tones) > MOST_LISTED_BURSTS:
+        rows.append(("bursts", f"{len(tones) - MOST_LISTED_BURSTS} more, see --json"))
     for name, value in numbers["evidence"].items():
-        unit = fields.evidence_unit(name)
+        unit = si_unit if name == "noise" else fields.evidence_unit(name)
         shown = ", ".join(f"{each:.4g}" for each in value) if isinstance(value, list | tuple) else f"{value:.6g}"
         rows.append((name.replace("_", " "), f"{shown} {unit}".rstrip() if shown else "-"))
     return two_columns(source, rows)
+
+
+def verdicts_table(results: Sequence[Mapping[str, Any]]) -> str:
+    """The verdicts on several files, one in a row."""
+    found = [(each, each.get("frequency")) for each in results]
+    columns = {
+        "file": [each["source"] for each, _ in found],
+        "regime": [each.get("regime", "unreadable") for each, _ in found],
+        "Hz": ["-" if frequency is None else f"{frequency:.6g}" for _, frequency in found],
+        "because": [each.get("error") or "; ".join(each["reasons"]) for each, _ in found],
+    }
+    return grid(columns)
 
 
 def _verdict_rows(numbers: Mapping[str, Any]) -> list[Row]:

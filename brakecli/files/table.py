@@ -45,6 +45,7 @@ class TextTable:
         self.names: list[str] = []
         self.units: list[str] = []  # as they are written in a line of their own
         self.header: list[str] = []  # the lines before the numbers
+        self.places: list[int] = []  # the columns that were read last
         for self.skip, line in enumerate(lines):
             if not line.strip() or line.lstrip().startswith(_COMMENTS):
                 self.header.append(line)
@@ -86,7 +87,8 @@ class TextTable:
         values = others if column is None else [self._index(column, "--column", there)]
         if len(values) != 1:
             raise UsageError(f"which column is the signal? give --column; there are {there}")
-        chosen, last = [*values, *times], self.columns - 1
+        self.places = chosen = [*values, *times]
+        last = self.columns - 1
         table = self._read(chosen if last in chosen else [*chosen, last])  # the last shows that rows are whole
         return list(table.T[: len(chosen)])
 
@@ -113,7 +115,7 @@ class TextTable:
             for text in (end, name)
             if (size := si(text)) and (size[1] in wanted or (text == end and (len(text) > 1 or text in "NV")))
         )
-        known = {text.strip(): si(text.strip()) for text in given if text.strip() not in ("", "-")}
+        known = {text.strip(): si(text.strip()) for text in given if text.strip() not in ("", "-", "1")}
         for text, base in known.items():
             require(base, f"column {name}: there is no unit {printable(text)}; give one as in mm, um or m/s^2")
             if base and base[1] not in wanted:

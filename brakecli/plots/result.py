@@ -12,6 +12,8 @@ from brakecli.files.read import StoredResult, open_result
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from brakecli.analysis.regime.of_signal import SignalLook
+
 
 def plot_result(
     result: Path, target: Path, *, force: bool, select: Sequence[str] = (), variable: str = ""
@@ -32,6 +34,14 @@ def plot_two(first: Path, second: Path, target: Path, *, force: bool, variable: 
         from brakecli.plots import two
 
         write(two.draw((stored[0], stored[1]), variable))
+
+
+def plot_signal(look: "SignalLook", source: str, target: Path, *, force: bool) -> None:
+    """Draw a measured signal as `plot_result` draws a result."""
+    with _opened(target, force=force) as (write, _):
+        from brakecli.plots import signal
+
+        write(signal.draw(look, source))
 
 
 @contextmanager

@@ -70,6 +70,8 @@ def measured(displacement: Array, per_cycle: int, quantity: Measurand, decibels:
     values = displacement
     if quantity == Measurand.VELOCITY:
         values = per_cycle * np.diff(displacement, prepend=2.0 * displacement[0] - displacement[1])
+    if quantity == Measurand.ACCELERATION:
+        values = per_cycle**2 * np.diff(displacement, 2, prepend=displacement[0], append=displacement[-1])
     noise = np.random.default_rng(seed).normal(0.0, 1.0, len(values))
     noisy: Array = values + 10.0 ** (-decibels / 20.0) * values.std() * noise
     return noisy

@@ -1,12 +1,14 @@
 """Reading a measured signal: every usual layout is read, every broken file is a named error."""
 
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
 import pytest
+from scipy.io import wavfile
 
-from brakecli.analysis.regime.of_signal import Signal
+from brakecli.analysis.regime.of_signal import Measurand, Signal, classify_signal
 from brakecli.analysis.regime.signal_file import read_signal
 from brakecli.errors import UnreadableResultError, UsageError
 
@@ -14,7 +16,7 @@ from brakecli.errors import UnreadableResultError, UsageError
 def read(
     path: Path | str, column: str | None = None, time: str | None = None, rate: float | None = None
 ) -> Signal:
-    return read_signal(str(path), column=column, time_column=time, sample_rate=rate)
+    return read_signal(str(path), Measurand.DISPLACEMENT, column=column, time_column=time, sample_rate=rate)
 
 
 def written(tmp_path: Path, content: str | bytes) -> Path:
@@ -30,7 +32,7 @@ LAYOUTS = {
     "tab": "t\tx\n0\t1\n0.1\t2.5\n0.2\t4\n",
     "spaces": "t x\n0 1\n0.1  2.5\n0.2 4\n",
     "comments": "# made up\n% twice\nt,x\n0,1\n0.1,2.5\n0.2,4\n",
-    "units": "t,x\ns,mm\n0,1\n0.1,2.5\n0.2,4\n",
+    "units": "t,x\ns,m\n0,1\n0.1,2.5\n0.2,4\n",
     "quotes": '"t","x"\n"0","1"\n"0.1","2.5"\n"0.2","4"\n',
     "byte order mark, CRLF": "\ufefft,x\r\n0,1\r\n0.1,2.5\r\n0.2,4\r\n",
     "trailing separator": "t,x,\n0,1,\n0.1,2.5,\n0.2,4,\n",
@@ -141,3 +143,100 @@ def test_what_is_no_file_is_unreadable(tmp_path: Path) -> None:
     for source in (tmp_path, tmp_path / "none.csv", f"{tmp_path / 'none.h5'}:/x"):
         with pytest.raises(UnreadableResultError):
             read(source, rate=1.0)
+
+
+SINE = np.sin(2.0 * np.pi * 1870.0 * np.arange(4000) / 40000.0)  # 0.1 s
+
+
+@pytest.mark.parametrize(
+    ("header", "options"),
+    [
+        ("t,v\nms,mm/s", {}),
+        ("t_ms,v_mm/s", {}),
+        ("t (ms),v [mm/s]", {}),
+        ("t,v", {"unit": "mm/s", "time_unit": "ms"}),
+        ("t_ms,v", {"unit": "mm/s"}),
+        ("t,v\nms,mm/s", {"unit": "mm/s", "time_unit": "ms"}),
+    ],
+)
+def test_units_come_from_the_file_or_from_options(header: str, options: dict[str, Any], tmp_path: Path) -> None:
+    rows = "\n".join(f"{0.025 * i:.6f},{3.0 * value:.9g}" for i, value in enumerate(SINE))
+    path = written(tmp_path, f"{header}\n{rows}\n")
+    signal = read_signal(str(path), Measurand.VELOCITY, column="2", time_column="1", **options)
+    assert signal.interval == pytest.approx(1.0 / 40000.0)
+    np.testing.assert_allclose(signal.values, 3e-3 * SINE, atol=1e-11)
+    assert classify_signal(signal, quantity=Measurand.VELOCITY).frequency == pytest.approx(1870.0, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("header", "quantity", "options", "word"),
+    [
+        ("t,v\nms,mm/s", "velocity", {"unit": "m/s"}, "another unit"),
+        ("t,v\nms,mm/s", "velocity", {"time_unit": "s"}, "another unit"),
+        ("t,v\nms,mm/s", "acceleration", {}, "not meter / second"),
+        ("t,v\nmm,mm/s", "velocity", {}, "not second"),
+        ("t_ms,v\ns,mm/s", "velocity", {}, "keep one"),
+        ("t,v", "velocity", {"unit": "mm"}, "is meter, not"),
+        ("t,v", "velocity", {"unit": "furlongs per nothing"}, "no such unit"),
+        ("t,v", "acceleration", {"unit": "kg"}, "not in kilograms"),
+    ],
+)
+def test_units_that_contradict_are_refused_and_never_ignored(
+    header: str, quantity: str, options: dict[str, Any], word: str, tmp_path: Path
+) -> None:
+    path = written(tmp_path, f"{header}\n0,1\n1,2\n2,4\n")
+    with pytest.raises((UsageError, UnreadableResultError), match=word):
+        read_signal(str(path), Measurand(quantity), column="2", time_column="1", **options)
+
+
+@pytest.mark.parametrize(
+    ("quantity", "unit", "size"),
+    [("force", "kN", 1e3), ("acceleration", "g", 9.80665), ("pressure", "bar", 1e5), ("displacement", "um", 1e-6)],
+)
+def test_every_quantity_has_its_units(quantity: str, unit: str, size: float, tmp_path: Path) -> None:
+    path = written(tmp_path, "1\n2\n4\n")
+    signal = read_signal(str(path), Measurand(quantity), sample_rate=1.0, unit=unit)
+    np.testing.assert_allclose(signal.values, np.array([1.0, 2.0, 4.0]) * size, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("kind", "largest"), [("u1", 128), ("i2", 1 << 15), ("i4", 1 << 31), ("f4", 1)])
+def test_a_sound_file_gives_its_rate_and_numbers_up_to_one(kind: str, largest: int, tmp_path: Path) -> None:
+    path, wave = str(tmp_path / "squeal.wav"), 0.5 * SINE
+    stored = wave * largest + (128.0 if kind == "u1" else 0.0)
+    wavfile.write(path, 40000, (stored if kind == "f4" else np.round(stored)).astype(kind))
+    signal = read_signal(path, Measurand.PRESSURE, sample_rate=40000.0)
+    assert signal.interval == 1.0 / 40000.0
+    np.testing.assert_allclose(signal.values, wave, atol=0.6 / largest + 1e-7)  # half of a step
+    with pytest.raises(UsageError, match="the file has 40000 Hz"):
+        read_signal(path, Measurand.PRESSURE, sample_rate=44100.0)
+
+
+def test_a_channel_is_chosen_and_a_damaged_sound_file_is_unreadable(tmp_path: Path) -> None:
+    path = tmp_path / "two.wav"
+    wavfile.write(path, 8000, np.stack([SINE, 2.0 * SINE], axis=1).astype(np.float32))
+    signal = read_signal(str(path), Measurand.PRESSURE, column="2")
+    np.testing.assert_allclose(signal.values, 2.0 * SINE, atol=1e-6)
+    with pytest.raises(UsageError, match="which channel"):
+        read_signal(str(path), Measurand.PRESSURE)
+    path.write_bytes(path.read_bytes()[:30])
+    with pytest.raises(UnreadableResultError, match="intact WAV file"):
+        read_signal(str(path), Measurand.PRESSURE, column="1")
+
+
+def test_the_unit_of_a_dataset_counts(tmp_path: Path) -> None:
+    path = tmp_path / "some.h5"
+    with h5py.File(path, "w") as file:
+        file["x"] = np.arange(5.0)
+        file["x"].attrs["units"] = "mm"
+        file["odd"] = np.arange(5.0)
+        file["odd"].attrs["units"] = "blips"
+    signal = read_signal(f"{path}:/x", Measurand.DISPLACEMENT, sample_rate=1.0)
+    np.testing.assert_allclose(signal.values, 1e-3 * np.arange(5.0))
+    for name, quantity, unit, word in (
+        ("x", "velocity", None, "correct --quantity"),
+        ("x", "displacement", "m", "another unit"),
+        ("odd", "displacement", None, "say with --unit"),
+    ):
+        with pytest.raises((UsageError, UnreadableResultError), match=word):
+            read_signal(f"{path}:/{name}", Measurand(quantity), sample_rate=1.0, unit=unit)
+    read_signal(f"{path}:/odd", Measurand.DISPLACEMENT, sample_rate=1.0, unit="mm")

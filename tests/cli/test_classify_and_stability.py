@@ -1,10 +1,12 @@
 """`classify` and `stability`, as their users meet them."""
 
+import json
 import math
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.io import wavfile
 
 from tests.commands import ROOT, brakecli, each
 
@@ -71,6 +73,58 @@ def test_a_measured_signal_is_classified(here: Path) -> None:
     table, known = each(here, [["classify", "saw.csv", *options], [*inside, "--belt-speed", "0.05", "--json"]])
     assert "relaxation" in table.out
     assert known.json["regime"] == "relaxation"
+
+
+def _squeal(path: Path, start: float, end: float) -> None:
+    time = np.arange(16000) / 16000.0
+    tone = np.where((start <= time) & (time < end), np.sin(2.0 * np.pi * 1500.0 * time), 0.0)
+    noise = np.random.default_rng(1).normal(0.0, 1e-3, len(time))
+    wavfile.write(path, 16000, np.round(2e4 * (0.5 * tone + noise)).astype(np.int16))
+
+
+def test_many_files_give_a_verdict_each_and_one_that_cannot_be_read_does_not_stop_the_others(here: Path) -> None:
+    _squeal(here / "a.wav", 0.2, 0.6)
+    _squeal(here / "b.wav", 0.0, 1.0)
+    (here / "c.wav").write_bytes(b"RIFF")
+    one, both, broken = each(
+        here,
+        [
+            ["classify", "a.wav", "--json"],
+            ["classify", "a.wav", "b.wav"],
+            ["classify", "c.wav", "a.wav", "b.wav", "--json"],
+        ],
+    )
+    (burst,) = one.json["bursts"]
+    assert sorted(burst) == ["end", "frequency", "level", "start"]
+    assert (burst["start"], burst["end"]) == pytest.approx((0.2, 0.6), abs=0.005)
+    assert burst["frequency"] == pytest.approx(1500.0, rel=1e-3)
+    assert burst["level"] == pytest.approx(2e4 / 2**15 * 0.5 / np.sqrt(2.0), rel=0.02)
+    assert both.out.count("quasi-harmonic") == 2
+    assert "b.wav" in both.out
+    broken.told(4, "intact WAV file")
+    results = json.loads(broken.out)["results"]
+    assert [found.get("regime") for found in results] == [None, "quasi-harmonic", "quasi-harmonic"]
+
+
+def test_a_measured_signal_is_drawn_as_it_is_classified(here: Path) -> None:
+    _squeal(here / "a.wav", 0.2, 0.6)
+    options = ["--quantity", "force", "--time-column", "t", "--column", "force"]
+    sound, text, again, wrong = each(
+        here,
+        [
+            ["plot", "a.wav"],
+            ["plot", "saw.csv", *options, "-o", "saw.svg"],
+            ["plot", "a.wav"],
+            ["plot", "saw.csv", "--unit", "mm"],
+        ],
+    )
+    assert (sound.out, text.out) == ("a.png: written\n", "saw.svg: written\n")
+    drawn = (here / "saw.svg").read_text()
+    assert all(
+        f"<!-- {word}" in drawn for word in ("Record", "events found", "Spectrum of the force", "relaxation")
+    )
+    again.told(2, "--force")
+    wrong.told(2, "--quantity")
 
 
 def test_options_that_do_not_fit_are_bad_usage(here: Path) -> None:

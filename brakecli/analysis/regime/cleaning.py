@@ -11,7 +11,7 @@ from brakecli.analysis.regime.spectra import Array, line_share, rises
 CERTAIN = 15.0  # a line's power over the mean of the noise, which reaches it in one bin of three million
 _RIPPLE = 0.3  # ripple within this part of the mean size of the velocity does not count as a cycle
 _SPIKES = (8.0, 0.35)  # deviations, and part of the signal's range, by which a spike leaves its neighbours' median
-_NOISE_SHARE = 0.6
+NOISE_SHARE = 0.6
 _SMOOTHED_AWAY = 0.15
 _QUIET = 0.02
 _DRIFT_CYCLES = 8.0
@@ -28,6 +28,7 @@ class Velocity:
     raw: Array  # the same with its mean and drift
     noise: float  # standard deviation of one sample of the signal
     measured: bool  # otherwise it is the difference of what was measured
+    first: int = 0  # of its samples in the record, of which gaps may have left a part
 
     @cached_property
     def _primitive(self) -> Array:
@@ -56,7 +57,7 @@ class Velocity:
         found, most = [], 0.0
         for m in (1 << k for k in range(max(1, len(self.values) // 100).bit_length())):
             variance = float(self.thinned(m).var())
-            if self.noise_at(m) >= _NOISE_SHARE * variance:  # little but noise
+            if self.noise_at(m) >= NOISE_SHARE * variance:  # little but noise
                 continue
             most = max(most, variance - self.noise_at(m))
             if variance - self.noise_at(m) < _SMOOTHED_AWAY * most:
@@ -70,51 +71,66 @@ class Velocity:
         parts = [(self.noise_at(m) / variance, m) for m, variance in self.variances]
         return next((m for part, m in parts if part <= _QUIET), min(parts, default=(1.0, 1))[1])
 
-    def amplitude(self, start: int, windows: int) -> float:
-        """Half of peak to peak of the displacement from a sample on, drift removed: median of equal windows."""
-        m, c = self.quiet, self._primitive
+    def amplitude(self, m: int, start: int, windows: int) -> float:
+        """Half of peak to peak of the displacement, smoothed over m samples: median of windows."""
+        c = self._primitive
         x = c if self.measured else (c[m:] - c[:-m]) / m
         return 0.5 * float(np.median([np.ptp(part) for part in np.array_split(x[start:], windows)]))
 
-    def trend(self, start: int, windows: int) -> tuple[Array, float, float]:
+    def trend(self, m: int, start: int, windows: int) -> tuple[Array, float, float]:
         """Envelope from a sample on, without noise, last third over first, and rank correlation with time."""
-        parts = np.array_split(self.smoothed(self.quiet)[start:], windows)
-        envelope = np.sqrt(np.maximum([float(p.var()) - self.noise_at(self.quiet) for p in parts], 0.0))
+        parts = np.array_split(self.smoothed(m)[start:], windows)
+        envelope = np.sqrt(np.maximum([float(p.var()) - self.noise_at(m) for p in parts], 0.0))
         if float(np.ptp(envelope)) == 0.0:
             return envelope, 1.0, 0.0
         third, ranks = max(1, windows // 3), np.argsort(np.argsort(envelope)).astype(float)
         ratio = float(envelope[-third:].mean()) / max(float(envelope[:third].mean()), 1e-300)
         return envelope, ratio, float(np.corrcoef(ranks, np.arange(windows))[0, 1])
 
-    def denoised(self) -> tuple[Array, Array]:
+    def denoised(self, *, hann: bool = False) -> tuple[Array, Array]:
         """The velocity made of those lines only that stand out of the noise, and their power over rfft's bins."""
         values = _handy(self.values)
-        spectrum = np.fft.rfft(values)
+        window = np.hanning(len(values)) if hann else np.ones(1)
+        spectrum = np.fft.rfft(values * window)
         turn = np.linspace(0.0, np.pi, len(spectrum))
         gain = np.ones(len(turn)) if self.measured else 2.0 - 2.0 * np.cos(turn)
         power = np.abs(spectrum) ** 2
-        lines = (power > CERTAIN * len(values) * self.noise**2 * gain) & (turn > 0.0)
+        lines = (power > CERTAIN * len(values) * np.mean(window**2) * self.noise**2 * gain) & (turn > 0.0)
         return np.fft.irfft(np.where(lines, spectrum, 0.0), len(values)), np.where(lines, power, 0.0)
 
 
-def cleaned(values: Array, is_velocity: bool) -> tuple[Velocity, list[str]]:
-    """The velocity of a signal without its gaps, spikes and drift; notes report each of them."""
+def cleaned(values: Array, order: int) -> tuple[Velocity, list[str]]:
+    """The velocity of a signal without its gaps and spikes; notes report each of them.
+
+    `order` says of which derivative of the displacement the values are: 0, 1 or 2.
+    """
     notes: list[str] = []
+    first = 0
     if len(values) >= _SHORTEST and not np.isfinite(values).all():
-        cycle = _cycle(_velocity(_bridged(values), is_velocity))
-        values = _bridged(_longest_piece(values, max(1.0, 0.25 * cycle), notes))
-    if len(values) < _SHORTEST:
-        return _velocity(values, is_velocity), notes
-    values = _without_spikes(values, is_velocity, notes)
-    velocity = _velocity(values, is_velocity)
-    width = int(_DRIFT_CYCLES * _cycle(velocity))
-    if 2 * width < len(values):
-        drift, m = uniform_filter1d(velocity.values, width), velocity.quiet
-        variance = float(velocity.thinned(m).var()) - velocity.noise_at(m)
-        if float(drift.std()) > 0.1 * float(np.sqrt(max(variance, 0.0))):
-            notes.append("drift removed")
-        velocity = replace(velocity, values=velocity.values - drift)
-    return velocity, notes
+        cycle = _cycle(_velocity(_bridged(values), order > 0))
+        values, first = _longest_piece(values, max(1.0, 0.25 * cycle), notes)
+        values = _bridged(values)
+    if len(values) >= _SHORTEST:
+        values = _without_spikes(values, order > 0, notes)
+    found = replace(_velocity(values, order > 0), first=first)
+    if order < 2 or not found.variances:  # the sum of noise would not look like noise
+        return found, notes
+    values = np.cumsum(found.values)
+    width = int(_DRIFT_CYCLES * _cycle(found))
+    slow = uniform_filter1d(values, width) if 2 * width <= len(values) else 0.0
+    return replace(_velocity(values - slow, True), first=first), notes
+
+
+def without_drift(velocity: Velocity, cycle: float, notes: list[str]) -> Velocity:
+    """The velocity without what is slower than some cycles, which have at least so many samples."""
+    width = int(_DRIFT_CYCLES * max(cycle, _cycle(velocity))) if len(velocity.values) >= _SHORTEST else 0
+    if not 0 < 2 * width <= len(velocity.values):
+        return velocity
+    drift, m = uniform_filter1d(velocity.values, width), velocity.quiet
+    variance = float(velocity.thinned(m).var()) - velocity.noise_at(m)
+    if float(drift.std()) > 0.1 * float(np.sqrt(max(variance, 0.0))):
+        notes.append("drift removed")
+    return replace(velocity, values=velocity.values - drift)
 
 
 def _velocity(values: Array, is_velocity: bool) -> Velocity:
@@ -153,20 +169,20 @@ def _bridged(values: Array) -> Array:
     return values if good.all() else np.interp(places, places[good], values[good])
 
 
-def _longest_piece(values: Array, longest_gap: float, notes: list[str]) -> Array:
-    """The longest part without a gap of more samples than `longest_gap`."""
+def _longest_piece(values: Array, longest_gap: float, notes: list[str]) -> tuple[Array, int]:
+    """The longest part without a gap of more samples than `longest_gap`, and its first sample."""
     bad = np.concatenate([[False], ~np.isfinite(values), [False]])
     gaps = np.flatnonzero(bad[1:] != bad[:-1]).reshape(-1, 2)
     cuts = gaps[np.diff(gaps)[:, 0] > longest_gap]
     if len(cuts) < len(gaps):
         notes.append(f"{len(gaps) - len(cuts)} short gaps bridged")
     if not len(cuts):
-        return values
+        return values, 0
     pieces = np.array([0, *cuts.flat, len(values)]).reshape(-1, 2)
     begin, end = pieces[np.argmax(np.diff(pieces))]
     used = f"{end - begin} of {len(values)} samples"
     notes.append(f"{len(cuts)} long gaps: only the longest piece is used, {used}")
-    return values[begin:end]
+    return values[begin:end], int(begin)
 
 
 def _without_spikes(values: Array, is_velocity: bool, notes: list[str]) -> Array:

@@ -1,32 +1,41 @@
-"""The regime of a measured signal, which carries no flags: see docs/measured-signals.md.
+"""The regime of a measured signal, which carries no flags: see docs/measured-signals.md."""
 
-Stick skews the distribution of the velocity: it stays long at the belt's, and is then short and fast in the other
-direction. Smoothing over the m = 1, 2, 4 … samples that show this best serves any sampling rate and noise.
-"""
-
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
-from itertools import product
 
 import numpy as np
 
-from brakecli.analysis.regime.cleaning import CERTAIN, Velocity, cleaned
-from brakecli.analysis.regime.spectra import Array, line_share, rises
-from brakecli.analysis.regime.verdict import Decision, Excitation, Regime
+from brakecli.analysis.regime.bursts import Burst, bursts
+from brakecli.analysis.regime.cleaning import Velocity, cleaned, without_drift
+from brakecli.analysis.regime.signal_rules import FEWEST_SAMPLES, SignalRules, SignalThresholds
+from brakecli.analysis.regime.spectra import Array
+from brakecli.analysis.regime.stick import Slips, seek
+from brakecli.analysis.regime.verdict import Excitation, Regime
 
-_FINE = 1000.0  # samples of a cycle, after interpolation, among which a plateau is sought
-_PLATEAU_SAMPLES = 1 << 20  # most samples in which a plateau is sought
-_SHORTEST_PLATEAU = 0.03  # of the time
-_PARTS = 7
-_FEWEST_SAMPLES = 64
+_MOST_OF_IT = 0.9  # of the record: a burst that fills as much is the record
+_MOST_ENERGY = 0.5  # of all bursts in one that speaks for the record
+_INSIDE = 0.05  # of a burst, left out at either end
+_LEVEL = 1.33  # its last third over its first, or the reverse; a ring-down that is cut at half has 1.5
+_DEFAULT = SignalThresholds()
+_SUSTAINED = (Regime.RELAXATION, Regime.QUASI_HARMONIC)
 
 
 class Measurand(StrEnum):
-    """What was measured; a force is that of a spring between the belt's friction and the frame."""
+    """What was measured.
+
+    A force is that of a spring between the belt's friction and the frame, a pressure that of the sound nearby.
+    """
 
     DISPLACEMENT = "displacement"
     VELOCITY = "velocity"
     FORCE = "force"
+    ACCELERATION = "acceleration"
+    PRESSURE = "pressure"
+
+    @property
+    def order(self) -> int:
+        """How often it must be integrated to give a displacement; a sound goes with the velocity."""
+        return {Measurand.VELOCITY: 1, Measurand.PRESSURE: 1, Measurand.ACCELERATION: 2}.get(self, 0)
 
 
 @dataclass(frozen=True)
@@ -39,24 +48,6 @@ class Signal:
 
 
 @dataclass(frozen=True)
-class SignalThresholds:
-    """Where the rules draw their lines; every verdict carries them."""
-
-    fewest_cycles: float = 10.0
-    samples_per_cycle: float = 8.0
-    decayed_to: float = 0.05  # part of its largest to which the velocity of a motion that has died out has fallen
-    trend_order: float = 0.85  # rank correlation of the envelope with time from which it may grow or decay,
-    trend_ratio: float = 1.25  # and does if also its last third is so many times its first third, or the reverse
-    trend_order_large: float = 0.6  # the rank correlation that suffices for a change by `trend_ratio_large`
-    trend_ratio_large: float = 4.0
-    skewness_unlikely: float = 0.3  # of the velocity; up to here no stick, except a short one at the belt's speed
-    skewness_certain: float = 0.9  # from here there is stick; two lines in step reach 0.816 and no more
-    overtones: float = 0.03  # between the two: part of the energy in the third to eighth multiple that shows stick
-    plateau: float = 2.6  # time at the belt's speed, over that next to it, that shows stick; a sine reaches 2.41
-    line_share: float = 0.7  # part of the velocity's energy in three narrow bands in quasi-harmonic vibration
-
-
-@dataclass(frozen=True)
 class SignalVerdict:
     """The regime of a measured signal, its numbers (SI units), and the reasons in plain words."""
 
@@ -65,11 +56,24 @@ class SignalVerdict:
     frequency: float | None  # Hz: strongest line, or events of stick per second
     amplitude: float | None  # m, half of peak to peak of x
     stick_fraction: float | None
+    bursts: tuple[Burst, ...]  # when a tone stands out
     evidence: dict[str, float]
     warnings: tuple[str, ...]
     thresholds: SignalThresholds
     excitation: Excitation = Excitation.NONE  # a measurement does not show where the energy comes from,
     contact_loss_fraction: None = None  # nor whether contact was lost
+
+
+@dataclass(frozen=True)
+class SignalLook:
+    """A verdict with what it was found from, for pictures."""
+
+    verdict: SignalVerdict
+    signal: Signal
+    quantity: Measurand
+    velocity: Velocity
+    slips: Slips
+    smoothing: int  # samples
 
 
 def classify_signal(
@@ -78,172 +82,79 @@ def classify_signal(
     quantity: Measurand,
     belt_speed: float | None = None,
     stiffness: float | None = None,
-    thresholds: SignalThresholds = SignalThresholds(),
+    thresholds: SignalThresholds = _DEFAULT,
 ) -> SignalVerdict:
     """The regime of a measured signal; `belt_speed` in m/s, `stiffness` in N/m (of a force) where known."""
-    size = float(np.nanmax(np.abs(signal.values), initial=0.0))  # squares of the smallest numbers must not vanish
-    velocity, notes = cleaned(signal.values / (size or 1.0), quantity == Measurand.VELOCITY)
-    spring = 1.0 if quantity != Measurand.FORCE else np.nan if stiffness is None else stiffness
-    metres, belt = size / spring, np.nan if belt_speed is None else abs(belt_speed) * spring
-    if quantity == Measurand.VELOCITY:
-        metres *= signal.interval
-    else:
-        belt *= signal.interval
-    rules = _Rules(velocity, signal.interval, belt / (size or 1.0), thresholds)
+    return look(signal, quantity, belt_speed, stiffness, thresholds).verdict
+
+
+def look(
+    signal: Signal,
+    quantity: Measurand,
+    belt_speed: float | None = None,
+    stiffness: float | None = None,
+    thresholds: SignalThresholds = _DEFAULT,
+) -> SignalLook:
+    """The verdict with the velocity that it rests on; that of the longest burst where all else is silence."""
+    step, good = signal.interval, np.flatnonzero(np.isfinite(signal.values))
+    found = _judge(signal, quantity, belt_speed, stiffness, thresholds)
+    filled = np.interp(np.arange(len(signal.values)), good, signal.values[good]) if len(good) else signal.values
+    tones = tuple(bursts(filled, step))
+    verdict = replace(found.verdict, bursts=tones)
+    steep = [tone for tone in tones if tone.steep and tone.end - tone.start < _MOST_OF_IT * len(filled) * step]
+    burst = max(steep, key=lambda tone: tone.energy, default=None)
+    rare = burst and burst.energy >= _MOST_ENERGY * sum(tone.energy for tone in tones)
+    if not burst or not rare or verdict.regime in _SUSTAINED:
+        return replace(found, verdict=verdict)
+    begin, end = (int(time / step) for time in (burst.start, burst.end))
+    margin = int(_INSIDE * (end - begin))
+    part = replace(signal, values=signal.values[begin + margin : end - margin])
+    if np.isfinite(part.values).sum() >= FEWEST_SAMPLES:
+        inside = _judge(part, quantity, belt_speed, stiffness, thresholds).verdict
+        if inside.regime in _SUSTAINED and 1.0 / _LEVEL < inside.evidence["envelope_ratio"] < _LEVEL:
+            when = f"in a burst from {burst.start:.4g} to {burst.end:.4g} s: {inside.reasons[0]}"
+            line = burst.frequency if inside.regime is Regime.QUASI_HARMONIC else inside.frequency
+            verdict = replace(inside, reasons=(when,), frequency=line, bursts=tones, warnings=verdict.warnings)
+    return replace(found, verdict=verdict)
+
+
+def _judge(
+    signal: Signal,
+    quantity: Measurand,
+    belt_speed: float | None,
+    stiffness: float | None,
+    thresholds: SignalThresholds,
+) -> SignalLook:
+    """The verdict on a whole signal."""
+    size = float(np.nanmax(np.abs(signal.values), initial=0.0)) or 1.0  # squares of the smallest must not vanish
+    order, step = quantity.order, signal.interval
+    velocity, notes = cleaned(signal.values / size, order)
+    spring = np.nan if quantity is Measurand.PRESSURE else 1.0
+    if quantity is Measurand.FORCE:
+        spring = np.nan if stiffness is None else stiffness
+    belt = np.nan if belt_speed is None else abs(belt_speed) * spring * step ** (1 - order) / size
+    enough = len(velocity.values) >= FEWEST_SAMPLES
+    slips = seek(velocity, thresholds.skewness_certain) if enough else Slips()
+    certain = slips.skewness >= thresholds.skewness_certain and slips.enough
+    velocity = without_drift(velocity, slips.period if certain and slips.stick_slip else 0.0, notes)
+    if enough and not certain:
+        slips = seek(velocity, thresholds.skewness_certain)  # drift may have hidden them
+    rules = SignalRules(velocity, slips, step, belt, thresholds)
+    rules.has_belt = quantity is not Measurand.PRESSURE
     decision = rules.short() or rules.unsettled() or rules.sticking() or rules.without_stick()
-    amplitude = metres * velocity.amplitude(rules.start, rules.windows) if rules.above_noise else np.nan
-    return SignalVerdict(
+    amplitude = np.nan
+    if rules.above_noise:
+        moved = velocity.amplitude(rules.smoothing, rules.start, rules.windows)
+        amplitude = moved * size * step**order / spring
+    verdict = SignalVerdict(
         regime=decision.regime,
         reasons=(decision.reason,),
         frequency=decision.frequency,
         amplitude=amplitude if np.isfinite(amplitude) else None,
         stick_fraction=decision.stick_fraction,
-        evidence={**rules.evidence, "noise": size * velocity.noise},
+        bursts=(),
+        evidence={**rules.evidence, "noise": size * step ** max(order - 1, 0) * velocity.noise},
         warnings=(*signal.notes, *notes),
         thresholds=thresholds,
     )
-
-
-class _Rules:
-    """The rules on one velocity, in their order. They gather evidence until one of them decides."""
-
-    def __init__(self, velocity: Velocity, interval: float, belt: float, limits: SignalThresholds) -> None:
-        self.velocity, self.interval, self.limits, self.count = velocity, interval, limits, len(velocity.values)
-        self.belt = belt  # the belt's speed, as the velocity would show it; NaN where it is not known
-        self.duration, self.start, self.windows = self.count * interval, 0, 1
-        self.above_noise = self.count >= _FEWEST_SAMPLES and bool(velocity.variances)
-        self.evidence: dict[str, float] = {}
-
-    def short(self) -> Decision | None:
-        velocity, limits = self.velocity, self.limits
-        if self.count < _FEWEST_SAMPLES:
-            return Decision(f"only {self.count} samples without a gap; measure longer")
-        self._seek_stick()
-        self.clean, self.power = velocity.denoised()
-        self.evidence |= {"samples": float(self.count), "skewness": self.skewness}
-        self.evidence |= {"smoothed_over": float(velocity.quiet), "events": float(self.events)}
-        if not self.above_noise:
-            return Decision("the vibration is hidden by noise; measure closer to the shoe, or with less noise")
-        self.strongest = strongest = int(np.argmax(self.power))
-        certain = self.skewness >= limits.skewness_certain and self.events >= limits.fewest_cycles
-        if certain or self.power[strongest] == 0.0:
-            cycles, self.frequency = float(self.events), max(self.events, 1) / self.duration
-        else:
-            length = len(self.clean) * self.interval
-            cycles, self.frequency = strongest * self.duration / length, max(strongest, 1) / length
-        self.windows = int(np.clip(cycles / 3.0, 1, 40))
-        period = 1.0 / (self.frequency * self.interval)
-        self.evidence |= {"cycles": cycles, "samples_per_cycle": period}
-        if cycles < limits.fewest_cycles:
-            return Decision(f"only {cycles:.0f} cycles; measure longer")
-        if period < limits.samples_per_cycle:
-            return Decision(f"only {period:.1f} samples a cycle; measure at a higher rate")
-        return None
-
-    def unsettled(self) -> Decision | None:
-        """Decides where the motion has died out, still grows or decays; moves the start behind a transient."""
-        limits, velocity, windows = self.limits, self.velocity, max(self.windows, 4)
-        envelope, ratio, order = velocity.trend(0, windows)
-        last, largest = float(envelope[-max(1, windows // 4) :].mean()), float(np.sort(envelope)[-3])
-        died_to, floor = last / max(largest, 1e-300), np.sqrt(velocity.noise_at(velocity.quiet))
-        self.evidence |= {"envelope_ratio": ratio, "envelope_order": order, "died_to": died_to}
-        faded = last <= max(limits.decayed_to * largest, min(0.2 * largest, 0.5 * floor))
-        if faded and envelope[: windows // 2].max() >= largest:
-            return Decision(f"the vibration has died out: down to {died_to:.2g} of its largest", Regime.DAMPED)
-        for start in (0, self.count // 4, self.count // 2):
-            _, ratio, order = velocity.trend(start, windows)
-            change = max(ratio, 1.0 / max(ratio, 1e-9))
-            slow = change > limits.trend_ratio and abs(order) > limits.trend_order
-            fast = change > limits.trend_ratio_large and abs(order) > limits.trend_order_large
-            if not slow and not fast:
-                self.start = start
-                return None
-        word, end = ("growing", "settled") if ratio > 1.0 else ("decaying", "died out")
-        return Decision(f"still {word}; measure longer, until it has {end}")
-
-    def sticking(self) -> Decision | None:
-        """Decides where stick has skewed the velocity; undecided if noise hides whether two lines in step did."""
-        limits, velocity, total = self.limits, self.velocity, float(self.power.sum())
-        if self.events < limits.fewest_cycles or self.skewness < limits.skewness_unlikely:
-            return None
-        if self.skewness < limits.skewness_certain:
-            bands = [
-                slice(int(0.97 * n * self.strongest), int(1.03 * n * self.strongest) + 2) for n in range(3, 9)
-            ]
-            overtones = sum(float(self.power[band].sum()) for band in bands) / total
-            self.evidence |= {"overtones": overtones}
-            if overtones <= limits.overtones:
-                turn = 2.0 * np.pi * min(4.0 * self.frequency * self.interval, 0.5)
-                gain = 1.0 if velocity.measured else 2.0 - 2.0 * np.cos(turn)
-                if CERTAIN * self.count * velocity.noise**2 * gain <= limits.overtones / 3.0 * total:
-                    return None
-                what = "stick, or two lines in phase, have skewed the velocity, and noise hides which of them"
-                return Decision(f"{what}; measure with less noise, or for longer")
-        reason = f"{self.events} events of stick and slip: skewness of the velocity {self.skewness:.2g}"
-        often = self.events / self.duration
-        return Decision(reason, Regime.RELAXATION, frequency=often, stick_fraction=self.stick)
-
-    def without_stick(self) -> Decision:
-        top, beside = self._plateau()
-        self.evidence |= {"plateau": top / max(beside, 1e-9), "plateau_time": top}
-        flat = top > self.limits.plateau * beside
-        if flat and np.isfinite(self.belt):
-            stick = max(0.0, top - 0.5 * beside)
-            reason = f"the velocity is that of the belt for {stick:.0%} of the time, in most cycles or in all"
-            return Decision(reason, Regime.RELAXATION, frequency=self.frequency, stick_fraction=stick)
-        share = line_share(self.power)
-        self.evidence |= {"line_share": share}
-        if flat:
-            return Decision(
-                "the velocity has a plateau on one side, which short stick can cause; give --belt-speed"
-            )
-        least, most = np.quantile(self.clean + self.velocity.raw.mean(), [0.01, 0.99])
-        if any(0.95 * self.belt <= v <= 1.2 * self.belt for v in (-least, most)):
-            return Decision(
-                "the velocity just reaches that of the belt; with less noise it would show whether it stays"
-            )
-        if share < self.limits.line_share:
-            return Decision(f"irregular without stick: {share:.0%} of the energy in three lines; measure longer")
-        reason = f"sustained without stick: {share:.0%} of the energy of the velocity in at most three lines"
-        return Decision(reason, Regime.QUASI_HARMONIC, frequency=self.frequency, stick_fraction=0.0)
-
-    def _seek_stick(self) -> None:
-        """Find the skewness, at the smoothing that shows it best, the events of slip, and the part of stick."""
-        velocity, sign, scale = self.velocity, 1.0, self.velocity.quiet
-        self.skewness, self.events, self.stick = 0.0, 0, 0.0
-        for m, _ in velocity.variances:
-            parts = [part - part.mean() for part in np.array_split(velocity.thinned(m), _PARTS)]
-            each = [np.mean(p * p * p) / max(float(np.mean(p * p)), 1e-100) ** 1.5 for p in parts]
-            skewness = float(np.median(each))  # a single jump does not change it
-            if abs(skewness) > max(self.skewness, 4.0 * np.sqrt(6.0 * m / self.count)):
-                self.skewness, sign, scale = abs(skewness), -np.sign(skewness), m
-        if self.skewness < self.limits.skewness_certain:
-            scale = velocity.quiet
-        values = sign * velocity.smoothed(scale)
-        values = values - values.mean()
-        bulk = values[values > 0.0]
-        if len(bulk):
-            middle, noise = float(np.median(bulk)), float(np.sqrt(velocity.noise_at(scale)))
-            self.events = len(rises(-values, -0.25 * middle, max(0.5 * middle, 4.0 * noise)))
-            self.stick = float(np.mean(values > -0.5 * middle))
-
-    def _plateau(self) -> tuple[float, float]:
-        """Part of the time at the belt's speed (or an extreme velocity), and part of the time next to it."""
-        finer = int(np.ceil(_FINE / self.evidence["samples_per_cycle"]))
-        clean = self.clean[: _PLATEAU_SAMPLES // finer]
-        clean = finer * np.fft.irfft(np.fft.rfft(clean), finer * len(clean))
-        absolute = clean + self.velocity.raw.mean()
-        reach = 0.5 * float(np.ptp(np.quantile(clean, [0.01, 0.99])))
-        levels = [self.belt, -self.belt]
-        if not np.isfinite(self.belt):
-            # the most frequent values of the lower and of the upper quarter of the range
-            edges = np.arange(absolute.min(), absolute.max() + 0.01 * reach, 0.01 * reach)
-            counts, quarter = np.histogram(absolute, edges)[0], max(1, len(edges) // 4)
-            places = np.argmax(counts[:quarter]), len(counts) - quarter + np.argmax(counts[-quarter:])
-            levels = [float(0.5 * (edges[i] + edges[i + 1])) for i in places]
-        results = [(0.0, 1.0)]
-        for level, width in product(levels, (0.02, 0.01, 0.005)):
-            away = np.abs(absolute - level) / reach
-            if (at := float(np.mean(away <= width))) >= _SHORTEST_PLATEAU:
-                results.append((at, float(np.mean((away > width) & (away <= 3.0 * width)))))
-        return max(results, key=lambda r: r[0] / max(r[1], 1e-9))
+    return SignalLook(verdict, signal, quantity, velocity, slips, rules.smoothing)

@@ -1,42 +1,78 @@
-"""Reading a measured signal from a text file of columns, or from a dataset of any HDF5 file.
+"""Reading a measured signal from a text file of columns, a sound file, or a dataset of any HDF5 file.
 
 Columns are named as in the header, or counted from 1. Whatever is wrong in the file is an UnreadableResultError.
 """
 
 import re
 import stat
+import warnings
 from pathlib import Path
 
 import numpy as np
 
-from brakecli.analysis.regime.of_signal import Signal
+from brakecli.analysis.regime.of_signal import Measurand, Signal
 from brakecli.analysis.regime.spectra import Array
-from brakecli.errors import UnreadableResultError, UsageError
-from brakecli.files.table import TextTable
+from brakecli.errors import UnreadableResultError, UsageError, printable
+from brakecli.files.table import TextTable, si
 from brakecli.files.table import require as _require
 
+_SI = {
+    Measurand.DISPLACEMENT: ("meter",),
+    Measurand.VELOCITY: ("meter / second",),
+    Measurand.FORCE: ("kilogram * meter / second ** 2",),
+    Measurand.ACCELERATION: ("meter / second ** 2", "kilogram"),  # g, a gram to pint, is taken for gravity
+    Measurand.PRESSURE: ("kilogram / meter / second ** 2",),
+}
+_GRAVITY = 9.80665e3  # m/s² over the gram's size in kg
 _UNEVEN = 0.01  # part of the step by which steps may differ before the signal is resampled
 _GAP = 1.5  # steps of this many times the usual one are gaps
 _LONGEST = 10.0  # gaps may make a signal so many times as long; a record with longer gaps is mostly gap
 
 
-def read_signal(source: str, *, column: str | None, time_column: str | None, sample_rate: float | None) -> Signal:
-    """The signal of a text file, or of ``FILE.h5:/path``; raises UnreadableResultError and UsageError."""
-    if sample_rate is not None and not (np.isfinite(sample_rate) and sample_rate > 0.0):
-        raise UsageError(f"--sample-rate: must be above 0 Hz, found {sample_rate}; give samples per second")
+def read_signal(
+    source: str,
+    quantity: Measurand,
+    *,
+    column: str | None = None,
+    time_column: str | None = None,
+    sample_rate: float | None = None,
+    unit: str | None = None,
+    time_unit: str | None = None,
+) -> Signal:
+    """The signal of a text file, a WAV file, or of ``FILE.h5:/path``, in SI units.
+
+    Units come from the file and from `unit` and `time_unit`. Raises UnreadableResultError and UsageError.
+    """
+    if sample_rate is not None and not 0.0 < sample_rate < np.inf:
+        raise UsageError(f"--sample-rate {sample_rate}: is not a number above 0 Hz; give samples per second")
     path, inside = Path(source), None
     if not path.exists() and (found := re.fullmatch(r"(.+?):(/.*)", source)):
         path, inside = Path(found[1]), found[2]
     try:
+        _require(stat.S_ISREG(path.stat().st_mode), "this is not a regular file; name a file")
+        if time_unit is not None and time_column is None:
+            raise UsageError("--time-unit: is for a column of times; leave it out, or name one with --time-column")
+        if path.suffix.lower() in (".wav", ".wave") and inside is None:
+            if time_column is not None:
+                raise UsageError("--time-column: a sound file has no column of times; leave it out")
+            values, sample_rate = _sound(path, column, sample_rate)
+            return Signal(_numbers(values) * _size(None, unit, *_SI[quantity]), 1.0 / sample_rate)
         if (sample_rate is None) == (time_column is None):
             raise UsageError(
                 "the times of the samples are needed once; give either --sample-rate HZ or --time-column"
             )
-        _require(stat.S_ISREG(path.stat().st_mode), "this is not a regular file; name a file")
-        if inside is not None and (column is not None or time_column is not None):
-            raise UsageError("a dataset has no columns; leave out --column, and give --sample-rate HZ")
-        values, *times = [_dataset(path, inside)] if inside else TextTable(path).columns_of(column, time_column)
-        values = _numbers(values)
+        if inside is not None:
+            if column is not None or time_column is not None:
+                raise UsageError("a dataset has no columns; leave out --column, and give --sample-rate HZ")
+            values, written = _dataset(path, inside)
+            times, size = [], _size(_written(written, unit, quantity), unit, *_SI[quantity])
+        else:
+            table = TextTable(path)
+            values, *times = table.columns_of(column, time_column)
+            place, *clock = table.places
+            size = _size(table.unit(place, *_SI[quantity]), unit, *_SI[quantity])
+            times = [time * _size(table.unit(clock[0], "second"), time_unit, "second") for time in times]
+        values = _numbers(values) * size
         return Signal(values, 1.0 / sample_rate) if sample_rate is not None else _evenly(values, *times)
     except (UsageError, UnreadableResultError) as error:
         raise type(error)(f"{source}: {error}") from error
@@ -45,8 +81,68 @@ def read_signal(source: str, *, column: str | None, time_column: str | None, sam
         raise UnreadableResultError(f"{source}: {what}; name a readable file") from error
 
 
-def _dataset(path: Path, inside: str) -> Array:
-    """A one-dimensional dataset of numbers; whatever h5py raises on damage is reported."""
+def _size(found: tuple[float, str] | None, option: str | None, *wanted: str) -> float:
+    """Size of the unit that the file or an option gives; raises UsageError where they contradict each other."""
+    name = f"--{'time-' if 'second' in wanted else ''}unit {printable(option or '')}"
+    if option is not None:
+        given = (1.0, "") if option == "1" else si(option)
+        if given is None:
+            raise UsageError(f"{name}: there is no such unit; give one as in mm, um or m/s^2")
+        if given[1] not in ("", *wanted):
+            raise UsageError(f"{name}: is {given[1]}, not {' or '.join(wanted)}; correct the unit, or --quantity")
+        if found not in (None, given):
+            raise UsageError(
+                f"{name}: the file gives another unit, of {found[0]:g} {found[1]}; leave the option out"
+            )
+        found = given
+    size, base = found or (1.0, "")
+    if base == "kilogram" and size > 1e-3:
+        raise UsageError("acceleration is in m/s^2 or g, not in kilograms; correct the unit, or --quantity")
+    return size * _GRAVITY if base == "kilogram" else size
+
+
+def _written(text: str, option: str | None, quantity: Measurand) -> tuple[float, str] | None:
+    """The unit that a dataset says it has."""
+    text = text.partition(":")[0].strip()  # what follows explains
+    if text in ("", "-", "1") or (option is not None and si(text) is None):
+        return None
+    found = si(text)
+    _require(found is not None, f"there is no unit {printable(text)}; say with --unit what it means")
+    _require(
+        found and found[1] in _SI[quantity], f"its unit {printable(text)} is no {quantity}; correct --quantity"
+    )
+    return found
+
+
+def _sound(path: Path, column: str | None, sample_rate: float | None) -> tuple[Array, float]:
+    """A channel of a WAV file, whole numbers over the largest, and its samples per second."""
+    from scipy.io import wavfile
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # chunks that it does not know
+            rate, values = wavfile.read(path)
+    except Exception as error:
+        what = f"cannot be read: {' '.join(str(error).split())}"
+        raise UnreadableResultError(f"{what}; name an intact WAV file") from error
+    _require(rate > 0, "it has no sampling rate; name an intact WAV file")
+    if sample_rate not in (None, rate):
+        raise UsageError(f"--sample-rate {sample_rate:g}: the file has {rate} Hz; leave the option out")
+    channels = 1 if values.ndim == 1 else values.shape[1]
+    number = int(column) if column is not None and column.isascii() and column.isdigit() else 0
+    if column is None and channels == 1:
+        number = 1
+    if not 1 <= number <= channels:
+        raise UsageError(f"which channel is the signal? give --column NUMBER; there are {channels}, from 1")
+    chosen = values if values.ndim == 1 else values[:, number - 1]
+    if values.dtype.kind == "f":
+        return chosen.astype(np.float64), float(rate)
+    middle = 128.0 if values.dtype.kind == "u" else 0.0
+    return (chosen - middle) / (128.0 if middle else -float(np.iinfo(values.dtype).min)), float(rate)
+
+
+def _dataset(path: Path, inside: str) -> tuple[Array, str]:
+    """A row of numbers with its attribute `units`; whatever h5py raises on damage is reported."""
     import h5py
 
     from brakecli.files.valid import check_size, member
@@ -62,7 +158,8 @@ def _dataset(path: Path, inside: str) -> Array:
             if node.ndim != 1 or node.dtype.kind not in "iuf":
                 raise ValueError(f"{inside} is not a row of numbers, found shape {node.shape}, {node.dtype}")
             check_size(node, path.stat().st_size, f"dataset {inside}")  # HDF5 crashes on a virtual one of itself
-            return np.asarray(node[:], dtype=np.float64)
+            units = node.attrs.get("units", "")
+            return np.asarray(node[:], dtype=np.float64), units if isinstance(units, str) else ""
     except Exception as error:
         what = f"cannot be read: {' '.join(str(error).split())}"
         raise UnreadableResultError(f"{what}; name an intact HDF5 file and a dataset in it") from error

@@ -1,0 +1,188 @@
+"""Slips in a velocity: how much they skew it, where they are, and whether they are those of stick-slip.
+
+Stick skews the distribution of the velocity: it stays long at the belt's, and is then short and fast in the other
+direction. Smoothing over the m = 1, 2, 4 … samples that show this best serves any sampling rate and noise. Impacts
+and spikes skew it as well, but a slip lasts until the belt has loaded the spring again, and nothing swings back.
+"""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter, uniform_filter1d
+
+from brakecli.analysis.regime.cleaning import NOISE_SHARE, Velocity
+from brakecli.analysis.regime.spectra import Array, rises
+
+_PARTS = 7
+_SLOWEST = 60  # parts of the record over which is smoothed at most
+_MOVES = 0.15  # of the largest change of displacement over m samples: what is less has been smoothed away
+_BULK = 3.0  # robust deviations that a slip leaves the velocity in stick by
+_FEWEST = 10
+_STRONG = 0.4  # of the tenth largest slip: the shape of smaller ones is not looked at
+_MOST = 512  # slips whose shape is averaged
+_LASTS, _RETURNS = 0.55, 0.2
+_NARROW = 2  # samples of a pulse of velocity that may be a spike
+_REGULAR = 0.3  # of the median: quartiles of the times between pulses that spikes do not keep
+_LOADED = (0.4, 2.5)  # correlation of slips with the time before or after them, and that times √n
+_SLOPE = 0.2  # of that, where 1 is proportional
+
+
+@dataclass(frozen=True)
+class Slips:
+    """What skews a velocity most."""
+
+    skewness: float = 0.0
+    scale: int = 1  # samples over which the velocity is smoothed to see them
+    places: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, np.intp), repr=False)  # the last before
+    stick: float = 0.0  # part of the time between slips
+    lasts: float = (
+        1.0  # part of a slip that is left a quarter of a cycle later; 0 for a ring-down, or a spike of x
+    )
+    returns: float = 0.0  # what swings back at once, over the slip; 0 for stick, nearly 1 for a ring-down
+    loaded: bool = True  # whether slips go with the time that has loaded them; random spikes do not
+
+    period: float = 0.0  # samples from one to the next, in the mean
+
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return len(self.places)
+
+    @property
+    def enough(self) -> bool:
+        """Whether they are enough to look at their shape."""
+        return self.count >= _FEWEST
+
+    @property
+    def swings_back(self) -> bool:
+        """Whether the velocity swings back after them, as after an impact."""
+        return self.returns > _RETURNS
+
+    @property
+    def stick_slip(self) -> bool:
+        """Whether they can be slips between sticks."""
+        return self.enough and self.lasts >= _LASTS and not self.swings_back and self.loaded
+
+
+def seek(velocity: Velocity, certain: float) -> Slips:
+    """The slips at the smoothing that shows them best, if the skewness is `certain`; otherwise at a quiet one."""
+    found, sign, scale, chosen = 0.0, 1.0, velocity.quiet, velocity
+    for candidate, least in [(velocity, 1), (_filtered(velocity), 8)][: 1 if velocity.measured else 2]:
+        for m in _scales(candidate, least):
+            skewness = _skewness(candidate.thinned(m))
+            if abs(skewness) > max(found, 4.0 * np.sqrt(6.0 * m / len(velocity.values))):
+                found, sign, scale, chosen = abs(skewness), -np.sign(skewness), m, candidate
+    if found < certain:
+        scale, chosen = velocity.quiet, velocity
+    values = sign * chosen.smoothed(scale)
+    values = values - values.mean()
+    bulk = values[values > 0.0]
+    if not len(bulk):
+        return Slips(found)
+    middle, noise = float(np.median(bulk)), float(np.sqrt(velocity.noise_at(scale)))
+    spread = middle + _BULK * 1.4826 * float(np.median(np.abs(bulk - middle))) if found >= certain else 0.0
+    high = max(0.5 * middle, 4.0 * noise, spread)
+    places = rises(-values, -0.25 * middle, high)
+    slips = Slips(found, scale, places, stick=float(np.mean(values > -high)))
+    slips = replace(slips, period=len(values) / max(1, len(places)))
+    if len(places) < _FEWEST:
+        return slips
+    return _shaped(slips, replace(chosen, values=sign * chosen.values), places)
+
+
+def _filtered(velocity: Velocity) -> Velocity:
+    """The velocity of a displacement after a median of five, which takes impulses and leaves slips."""
+    displacement = np.concatenate([[0.0], np.cumsum(velocity.values)])
+    return replace(velocity, values=np.diff(median_filter(displacement, 5, mode="nearest")))
+
+
+def _scales(velocity: Velocity, least: int) -> list[int]:
+    """Smoothings at which the velocity exceeds its noise, and the motion is not smoothed away."""
+    every = [1 << k for k in range(max(1, len(velocity.values) // _SLOWEST).bit_length())]
+    sizes = {m: float(velocity.thinned(m).var()) for m in every}
+    clear = {m: v for m, v in sizes.items() if m >= least and velocity.noise_at(m) < NOISE_SHARE * v}
+    if velocity.measured:  # otherwise noise of high frequencies would hide what a displacement shows
+        return [m for m, v in clear.items() if v >= _MOVES * max(clear.values())]
+    moved = _MOVES**2 * max(m * m * v for m, v in sizes.items())
+    return [m for m, v in clear.items() if m * m * v >= moved]
+
+
+def _skewness(values: Array) -> float:
+    """Median of the parts of the record, which a single jump does not change."""
+    parts = [part - part.mean() for part in np.array_split(values, _PARTS)]
+    return float(np.median([np.mean(p * p * p) / max(float(np.mean(p * p)), 1e-100) ** 1.5 for p in parts]))
+
+
+def _shaped(slips: Slips, velocity: Velocity, places: NDArray[np.intp]) -> Slips:
+    """What is left of the strong slips, what swings back at once, and whether time has loaded them."""
+    scale = slips.scale
+    x = np.concatenate([[0.0], np.cumsum(velocity.values)])
+    starts, depths, strong = _falls(x, places, scale)
+    # Where impulses and noise make the largest falls, a smoothed displacement shows where slips are.
+    calm_starts, calm_depths, calm = _falls(uniform_filter1d(x, 1 + scale // 2), places, scale)
+    if min(strong.sum(), calm.sum()) < 3:
+        return replace(slips, lasts=0.0)
+    lasts = _lasting(x, calm_starts[calm], scale) / max(float(calm_depths[calm].mean()), 1e-300)
+    returns = _returning(x, starts[strong], min(velocity.quiet, scale), scale)
+    loaded = not velocity.measured or _loaded(velocity.values, starts, depths, scale)
+    return replace(slips, lasts=lasts, returns=returns, loaded=loaded)
+
+
+def _falls(x: Array, places: NDArray[np.intp], scale: int) -> tuple[NDArray[np.intp], Array, NDArray[np.bool_]]:
+    """Where the displacement falls most behind each place, by how much, and which falls are strong."""
+    falls = sliding_window_view(x[:-scale] - x[scale:], 5 * scale)
+    near = falls[places[places < len(falls)]]
+    starts, depths = places[: len(near)] + near.argmax(axis=1), near.max(axis=1)
+    tenth = float(np.sort(depths)[-_FEWEST:][0]) if len(depths) else 0.0
+    return starts, depths, depths >= _STRONG * max(tenth, 0.0)
+
+
+def _returning(x: Array, starts: NDArray[np.intp], fine: int, scale: int) -> float:
+    """How far the velocity swings the other way after slips, over them; both beyond what it does between slips."""
+    near, waits = (x[fine:] - x[:-fine]) / fine, np.diff(starts)
+    wide = int(min(max(5 * scale, 0.125 * len(x) / len(starts)), 0.4 * np.median(waits))) + 1
+    long = waits >= np.median(waits)
+    between = starts[:-1][long] + waits[long] // 2
+    exact = sliding_window_view(near, 2 * scale)
+    starts = starts + exact[np.minimum(starts, len(exact) - 1)].argmin(axis=1)
+    (low, high), (least, most) = (
+        (np.median(part.min(axis=1)), np.median(part.max(axis=1)))
+        for part in (
+            sliding_window_view(near, wide)[np.clip(i - wide // 4, 0, len(near) - wide)[:: 1 + len(i) // _MOST]]
+            for i in (starts, between)
+        )
+    )
+    return float((high - most) / max(least - low, 0.25 * (most - least), 1e-300))
+
+
+def _lasting(x: Array, starts: NDArray[np.intp], scale: int) -> float:
+    """Mean fall of the displacement over slips, beside a common slope, seen from a quarter of a cycle around."""
+    wide = int(max(3 * scale, 0.25 * len(x) / len(starts)))
+    inside = starts[(starts >= wide) & (starts + scale + wide < len(x))]
+    if not len(inside):
+        return 0.0
+    time = np.arange(-wide, scale + wide + 1)
+    mean = np.mean([x[i + time] for i in inside[:: max(1, len(inside) // _MOST)]], axis=0)
+    away = (time <= -(scale // 2)) | (time >= scale + scale // 2)
+    terms = np.stack([np.ones(len(time)), time, time > 0.5 * scale], axis=1).astype(np.float64)
+    return -float(np.linalg.lstsq(terms[away], mean[away] - mean[0], rcond=None)[0][2])
+
+
+def _loaded(values: Array, starts: NDArray[np.intp], depths: Array, scale: int) -> bool:
+    """Whether pulses are wider than spikes, or come regularly, or go with the time before or after them."""
+    wide = scale + 2 * _NARROW
+    pulses = sliding_window_view(values, wide)[np.minimum(starts, len(values) - wide)]
+    waits = np.diff(starts)
+    first, median, last = np.quantile(waits, [0.25, 0.5, 0.75])
+    width = np.median((pulses < 0.5 * pulses.min(axis=1, keepdims=True)).sum(axis=1))
+    if width > _NARROW or last - first < _REGULAR * median:
+        return True
+    rows, mean = np.stack([depths[1:], depths[:-1]]), waits.mean()
+    rows, waits = rows / depths.mean() - 1.0, waits / mean - 1.0
+    spread = max(float(waits.std()), 1e-300)
+    slopes = np.mean(rows * waits, axis=1) / spread**2  # 1 if a slip is what the time has loaded
+    along = slopes * spread / np.maximum(rows.std(axis=1), 1e-300)  # correlation
+    enough = max(_LOADED[0], _LOADED[1] / np.sqrt(len(waits)))
+    return bool(np.any((along >= enough) & (slopes >= _SLOPE)))

@@ -1,0 +1,122 @@
+"""The picture of a measured signal: the record, its smoothed velocity with the events found, and its spectrum."""
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from brakecli.analysis.regime.of_signal import Measurand, SignalLook
+from brakecli.analysis.regime.spectra import segment
+from brakecli.plots import style
+from brakecli.plots.run import COLUMNS, CYCLES, FEW, MOST_DETAIL, envelope
+
+_UNITS = {
+    Measurand.DISPLACEMENT: "m",
+    Measurand.VELOCITY: "m/s",
+    Measurand.FORCE: "N",
+    Measurand.ACCELERATION: "m/s²",
+    Measurand.PRESSURE: "Pa",
+}
+_VELOCITY = {Measurand.FORCE: ("rate of the force", "N/s"), Measurand.PRESSURE: ("pressure", "Pa")}
+_LABELLED = 4  # bursts whose frequency is written into the record
+
+
+def draw(look: SignalLook, source: str) -> Figure:
+    """The figure with its three panels."""
+    verdict = look.verdict
+    parts = [str(verdict.regime) + f": {'; '.join(verdict.reasons)}" * (verdict.frequency is None)]
+    if verdict.frequency is not None:
+        parts.append(f"{verdict.frequency:.4g} Hz")
+    if verdict.stick_fraction:
+        parts.append(f"stick {verdict.stick_fraction:.1%} of the time")
+    figure = style.headed(10.4, 7.2, _title(source), "   ·   ".join(parts), wspace=0.05, hspace=0.06)
+    panels = figure.subplot_mosaic([["record", "record"], ["velocity", "spectrum"]])
+    _draw_record(panels["record"], look)
+    _draw_velocity(panels["velocity"], look)
+    _draw_spectrum(panels["spectrum"], look)
+    return figure
+
+
+def _title(source: str) -> str:
+    """The name of the file, and of the dataset in it."""
+    file, separator, inside = source.partition(":/")
+    return Path(file).name + separator + inside
+
+
+def _draw_record(axes: Axes, look: SignalLook) -> None:
+    values, step = look.signal.values, look.signal.interval
+    factor, unit = style.prefixed(style.largest(values), _UNITS[look.quantity])
+    if len(values) > 2 * COLUMNS:
+        gaps = np.isnan(values)
+        filled = np.where(gaps, np.nan, values)
+        places, low, high = envelope(lambda begin, end: filled[begin:end], len(filled))
+        axes.fill_between(step * places, factor * low, factor * high, color=style.BLUE, lw=0.6)
+    else:
+        axes.plot(step * np.arange(len(values)), factor * values, color=style.BLUE, lw=0.9)
+    for i, tone in enumerate(sorted(look.verdict.bursts, key=lambda tone: -tone.level)):
+        axes.axvspan(tone.start, tone.end, color=style.ORANGE, alpha=0.25, lw=0, zorder=0.5)
+        if i < _LABELLED:
+            centre, where = 0.5 * (tone.start + tone.end), axes.get_xaxis_transform()
+            axes.text(centre, 1.0, f"{tone.frequency:.4g} Hz", transform=where, ha="center", va="bottom", size=8)
+    words = ", where a tone stands out shaded" if look.verdict.bursts else ""
+    axes.set_title(f"Record{words}", pad=14.0)
+    axes.set(xlabel="time (s)", ylabel=style.labelled(str(look.quantity), unit), xlim=(0.0, step * len(values)))
+
+
+def _draw_velocity(axes: Axes, look: SignalLook) -> None:
+    """Some cycles in the middle of the record, or of the burst that the verdict is about."""
+    velocity, m, step = look.velocity, look.smoothing, look.signal.interval
+    name, unit = _VELOCITY.get(look.quantity, ("velocity", "m/s"))
+    smoothed = f", smoothed over {m} samples" * (m > 1)
+    axes.set(title=f"{name.capitalize()}{smoothed}", xlabel="time (s)")
+    if len(velocity.values) < 3 * m:
+        axes.set(xticks=[], yticks=[])
+        return
+    size = style.largest(look.signal.values) / (step if look.quantity.order == 0 else 1.0)
+    size *= step if look.quantity is Measurand.ACCELERATION else 1.0
+    values = size * velocity.smoothed(m)
+    offset = velocity.first + (0.5 * m if velocity.measured else m)
+    frequency = look.verdict.frequency
+    wanted = int(min(CYCLES / (frequency * step) if frequency else FEW, MOST_DETAIL, len(values)))
+    tones = sorted(look.verdict.bursts, key=lambda tone: tone.energy)
+    slips = look.verdict.regime == "relaxation"
+    middle = 0.5 * len(values)
+    if tones and not slips:
+        middle = 0.5 * (tones[-1].start + tones[-1].end) / step - offset
+    first = int(np.clip(middle - 0.5 * wanted, 0, len(values) - wanted))
+    factor, unit = style.prefixed(style.largest(values[first : first + wanted]), unit)
+    time = step * (offset + np.arange(first, first + wanted))
+    axes.plot(time, factor * values[first : first + wanted], color=style.BLUE)
+    places = look.slips.places
+    places = places[(places >= first) & (places < first + wanted)]
+    reach = int(min(4 * m, 0.5 * look.slips.period)) + 1  # in which a slip is fastest
+    places = np.array([place + int(np.argmax(np.abs(values[place : place + reach]))) for place in places], int)
+    if len(places):
+        there = step * (offset + places), factor * values[places]
+        axes.plot(*there, ls="none", marker="v", color=style.VERMILION, label="events found")
+        axes.legend(loc="upper right")
+    axes.set(xlim=(time[0], time[-1]), ylabel=f"{name} ({unit})")
+
+
+def _draw_spectrum(axes: Axes, look: SignalLook) -> None:
+    from scipy.signal import welch
+
+    values, frequency = look.signal.values, look.verdict.frequency
+    good = np.flatnonzero(np.isfinite(values))
+    filled = np.interp(np.arange(len(values)), good, values[good])
+    size = segment(len(filled))
+    frequencies, density = welch(filled, 1.0 / look.signal.interval, nperseg=size, detrend="constant")
+    shown = (frequencies > 0.0) & (density > 0.0)
+    axes.loglog(frequencies[shown], density[shown], color=style.BLUE, lw=1.0)
+    unit = _UNITS[look.quantity]
+    unit = f"({unit})²/Hz" if "/" in unit else f"{unit}²/Hz"
+    axes.set_title(f"Spectrum of the {look.quantity}")
+    axes.set_ylabel(f"power spectral density ({unit})")
+    low, high = (float(frequencies[shown][i]) for i in (0, -1)) if shown.any() else (1.0, 1.0)
+    hertz = style.set_ticks(axes.xaxis, low, high, "Hz")
+    axes.set_xlabel(f"frequency ({hertz})")
+    if frequency is not None:
+        label = f"{'events' if look.verdict.regime == 'relaxation' else 'line'} {frequency:.4g} Hz"
+        axes.axvline(frequency, color=style.GREEN, ls=style.DOTS, lw=1.4, zorder=0.9, label=label)
+        axes.legend(loc="best")
