@@ -74,7 +74,10 @@ REASONS = {
         "The map of regimes: a point whose verdict comes early takes 0.35 ms, half of it to make its case. "
         "Three in a hundred, beside the critical friction, run to their end: twenty times as long."
     ),
-    "map on B": "The map on B: each point climbs the ladder of a promise, one case at a time.",
+    "map on B": (
+        "The map on B: a point takes some 3.5 ms of a core. Its promise takes five runs of 48,000 steps together,"
+        " at 30 ns a step in lanes; then comes the verdict, one point at a time."
+    ),
     "critical: an open": "Critical values of open pads: growth is measured by runs, one after the other.",
 }
 """Why a goal is missed, by the beginning of its name; the first that fits."""
@@ -224,7 +227,7 @@ def many(report: Report) -> None:
         what = f"sweep with verdicts, {ours.label}"
         found.insert(0, ensembles.ours(200, what, f"solver={solver}", f"contact.nodes={method.nodes}", interval))
     promised = f"solver={{tolerance=1e-3, duration={ensembles.DURATION}}}"
-    found.insert(0, ensembles.ours(2, "sweep with verdicts, `tolerance = 1e-3`", promised, interval))
+    found.insert(0, ensembles.ours(1000, "sweep with verdicts, `tolerance = 1e-3`", promised, interval))
     speed = found[0].per_second
     report.goals.append(("map on B: points/s", "≥ 2,500", number(speed), speed >= 2500))
 

@@ -3,16 +3,22 @@
 from functools import lru_cache
 
 from brakecli.case.case import Case
+from brakecli.case.roughness import Profile
 from brakecli.solver.links import coefficients
 from brakecli.solver.method import Method
-from brakecli.solver.roughness import surface
+from brakecli.solver.roughness import Surface, surface
 from brakecli.solver.schedules import schedule
 from brakecli.solver.system import Initial, System
 
 _SMOOTH = surface()
 _shared = lru_cache(maxsize=4096)(schedule)
-"""Schedules that the points of a sweep have in common; nobody changes them."""
+"""Schedules that the points of a sweep have in common; nobody changes them, nor surfaces."""
 EVENT_TOLERANCE = 1e-10  # of event-driven where a case gives it a step
+
+
+@lru_cache(maxsize=16)
+def _surface_of(profile: Profile, radius: float) -> Surface:
+    return surface(**profile.sines(), radius=radius)
 
 
 def system_of(case: Case) -> System:
@@ -20,7 +26,7 @@ def system_of(case: Case) -> System:
     wheel, load, initial, solver = case.wheel, case.load, case.initial, case.solver
     automatic = solver.scheme == "auto"
     shoe, wheel_surface = (
-        surface(**each.sines(), radius=wheel.radius) if each is not None else _SMOOTH
+        _surface_of(each, wheel.radius) if each is not None else _SMOOTH
         for each in (case.roughness.shoe, case.roughness.wheel)
     )
     chosen = (

@@ -6,7 +6,7 @@ error, which is rounding.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any, ClassVar, NamedTuple
@@ -95,9 +95,19 @@ def certify(system: System, progress: Progress = lambda samples: None) -> Certif
     return best
 
 
+def begins_with_steps(system: System) -> bool:
+    """Whether steps and nodes that are refined apart may keep the tolerance."""
+    method, changing = system.method, len(system.belt) > 1 or len(system.load) > 1
+    chosen = method.automatic and method.own_steps and not method.row.exact
+    return chosen and method.tolerance >= NODES_FROM and not changing
+
+
 def _run(system: System, progress: Progress, **changes: Any) -> Motion:
     """The motion by the system's method with these changes."""
-    system = replace(system, method=replace(system.method, **changes)) if changes else system
+    return _solved(replace(system, method=replace(system.method, **changes)) if changes else system, progress)
+
+
+def _solved(system: System, progress: Progress) -> Motion:
     per_sample, each = system.per_sample, evaluation_seconds(system) + 1e-6
     block = 1 if system.method.own_steps and not system.nodes else 1 + int(FIRST_BLOCK / each)
     return solve(system, progress=lambda steps: progress(steps // per_sample), first_block=block)
@@ -223,10 +233,24 @@ class _Tolerances(_Axis):
 def _by_steps(
     system: System, progress: Progress, is_left: Callable[[Motion, float], bool] = lambda run, more: False
 ) -> Certified:
+    """The runs of a ladder, one after the other."""
+    runs = ladder(system, is_left)
+    rung = next(runs)
+    while True:
+        try:
+            rung = runs.send(_solved(rung, progress))
+        except StopIteration as end:
+            return end.value  # type: ignore[no-any-return]
+
+
+def ladder(
+    system: System, is_left: Callable[[Motion, float], bool] = lambda run, more: False
+) -> Generator[System, Motion, Certified]:
     """Runs with steps half as long, or a tenth of the local tolerance, or twice the nodes: what is needed more.
 
-    The errors of steps and of nodes add up, and each is estimated apart. The first steps may pass over samples,
-    the last ones may not, nor over what speed or load do between two knots, as no run would see it.
+    It yields what is to be run, receives its motion, and returns the last one with its certificate. The errors of
+    steps and of nodes add up, and each is estimated apart. The first steps may pass over samples, the last ones
+    may not, nor over what speed or load do between two knots, as no run would see it.
     """
     wanted, events = system.method.tolerance, system.method.own_steps
     (first, every), fineness = first_rung(system), "tolerance" if events else "step"
@@ -236,7 +260,8 @@ def _by_steps(
     while True:
         sampled = replace(system, interval=max(1, every >> steps.doublings) * system.interval)
         at = first * (NODES_RATIO if events else 0.5) ** steps.doublings
-        run = _run(sampled, progress, nodes=nodes << quadrature.doublings, **{fineness: at})
+        changes: dict[str, Any] = {"nodes": nodes << quadrature.doublings, fineness: at}
+        run = yield replace(sampled, method=replace(sampled.method, **changes))
         spent, failed = run.work.solve_seconds, run.work.failed
         run.work.solve_seconds = seconds = seconds + spent
         if before is not None and not failed:
@@ -287,16 +312,18 @@ def _compare(coarse: Motion, fine: Motion, tolerance: float) -> tuple[float, flo
     What never exceeds the rounding of the motion does not count, as velocities of a shoe that stays where it is.
     """
     system = max(coarse.system, fine.system, key=lambda each: each.interval)
-    one, other = (each.rows[:: round(system.interval / each.system.interval), :4] for each in (coarse, fine))
-    count = len(other)
-    if len(one) < count:
+    one, other = (
+        each.rows[:: round(system.interval / each.system.interval), :4].T.copy() for each in (coarse, fine)
+    )
+    count = other.shape[1]
+    if one.shape[1] < count:
         return 0.0, 1.0
-    one = one[:count]  # x, y, vx, vy
-    sizes = _sizes(system, *(np.abs(rows).max(axis=0) for rows in (one, other)))
-    apart = (np.abs(one - other) / sizes).max(axis=1)
-    late = np.flatnonzero(apart > tolerance)
+    one = one[:, :count]  # x, y, vx, vy
+    sizes, apart = _sizes(system, *(np.abs(each).max(axis=1) for each in (one, other))), np.abs(one - other)
+    error = float((apart.max(axis=1) / sizes).max())
+    late = np.flatnonzero((tolerance * sizes < apart.T).any(axis=1)) if error > tolerance else np.zeros(0)
     until: float = (int(late[0]) - 1 if len(late) else count - 1) * system.interval
-    return max(until, 0.0), max(float(apart.max()), ROUNDING)
+    return max(until, 0.0), max(error, ROUNDING)
 
 
 def _sizes(system: System, one: Floats, other: Floats) -> Floats:

@@ -1,5 +1,6 @@
 """The energy account of a run: what came in, what went out, what is stored, and what does not add up."""
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -67,3 +68,7 @@ def account(start: tuple[float, float, float], end: tuple[float, float, float], 
     passed = [float(work[name]) for name in ("belt", "friction", "dashpots", "load", "roughness", "scheme")]
     items = [*changes, *passed, max(sum(start), sum(end))]
     return EnergyAccount(*items)
+
+
+NOT_KEPT = EnergyAccount(*[math.nan] * 10)
+"""Of a run that has no account."""

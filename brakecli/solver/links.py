@@ -33,7 +33,7 @@ def coefficients(
     return Coefficients(mass, *tensor(b_1, b_2), *tensor(c_1, c_2), sin_beta, cos_beta, phi)
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=256)  # the points of a block are asked for again and again
 def natural_frequencies(c: Coefficients, contact_stiffness: float) -> tuple[float, float]:
     """Undamped natural frequencies (Hz, rising) of the shoe on its links and a contact stiffness (N/m)."""
     stiffness = np.array([[c.c_xx, c.c_xy], [c.c_xy, c.c_yy + contact_stiffness]])

@@ -29,6 +29,18 @@ class Surface(NamedTuple):
     turns: Floats
     turns_low: Floats
 
+    def __eq__(self, other: object) -> bool:
+        """Whether the numbers are the same."""
+        return isinstance(other, Surface) and self._bytes == other._bytes
+
+    def __hash__(self) -> int:
+        """By the numbers, so that what is made of a surface can be kept for all that are like it."""
+        return hash(self._bytes)
+
+    @property
+    def _bytes(self) -> tuple[bytes, ...]:
+        return tuple(each.tobytes() for each in self)
+
     @property
     def waves(self) -> NDArray[Any]:
         """What `wheel_angles` needs, as records of `WAVE`."""

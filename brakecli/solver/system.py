@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from types import ModuleType
 from typing import Any
 
@@ -20,6 +20,9 @@ from brakecli.solver.schedules import Schedule, value_at
 MOST_TABLE_BYTES = 4e9
 WHOLE = 1e-9
 """A ratio this close to a whole number is whole."""
+_SMALL_TABLES = 1e6
+_build_small = lru_cache(maxsize=8)(build_pad)
+"""Pads that points of a sweep have in common; nobody changes them."""
 RADIANS = 0.8
 """Largest angle that the fastest motion turns by in an exact step: so small that a margin is lowest in it once at
 most, and that the series of the step need few terms."""
@@ -62,7 +65,8 @@ class System:
     def pad(self) -> Pad:
         """Constants and tables of the contact."""
         self.refuse_tables()
-        return build_pad(self.layer_stiffness, self.half_length, self.shoe, self.wheel, self.nodes)
+        build = _build_small if self.table_bytes < _SMALL_TABLES else build_pad
+        return build(self.layer_stiffness, self.half_length, self.shoe, self.wheel, self.nodes)
 
     @property
     def table_bytes(self) -> float:

@@ -9,6 +9,7 @@ from brakecli.case.system import system_of
 from brakecli.errors import CaseError, RefusedError
 from brakecli.runs.cost import duration_text, steps_and_seconds
 from brakecli.runs.limits import MOST_BYTES, check, refuse, within_range
+from brakecli.runs.together import TOGETHER, seconds_together
 from brakecli.sweeps.early import may_be_early
 from brakecli.sweeps.growth import sliding, with_step
 from brakecli.sweeps.periodic import common_period, exponent_length
@@ -46,6 +47,7 @@ class Estimate:
     memory: float
     file_size: float
     at_least: bool = False  # motions may have to be looked for many times
+    together: int = 1  # points that a task should hold, as they are computed side by side
 
     def sentence(self) -> str:
         """The estimate in words."""
@@ -59,14 +61,21 @@ class Estimate:
 
 def estimate(plan: Plan, workers: int) -> Estimate:
     """Estimate a sweep by two corners of its grid."""
-    times, samples, forced = [], 0, 0.0
+    times, samples, forced, together = [], 0, 0.0, 1
     for point in sorted({0, plan.points - 1}):
         with suppress(CaseError, RefusedError), within_range():  # the point fails when its turn comes
             system = system_of(plan.case(plan.settings(point)))
             checked = check(system)
             refuse(checked)
-            times.append(_EARLY_SECONDS - _POINT_SECONDS if may_be_early(system) else checked.seconds)
-            times[-1] += 0.0 if may_be_early(system) else _SAMPLE_SECONDS * system.samples
+            in_lanes = seconds_together(system) if plan.followed is None else None
+            if may_be_early(system):
+                times.append(_EARLY_SECONDS - _POINT_SECONDS)
+            else:
+                times.append(
+                    (checked.seconds if in_lanes is None else in_lanes) + _SAMPLE_SECONDS * system.samples
+                )
+            if in_lanes is not None:
+                together = max(1, min(TOGETHER, plan.units // workers))
             samples = max(samples, system.samples)
             if (critical := plan.sweep.critical) is not None and critical.method == "simulation":
                 forced = max(forced, _forced_seconds(plan, plan.settings(point), critical))
@@ -81,9 +90,10 @@ def estimate(plan: Plan, workers: int) -> Estimate:
         points=plan.points,
         workers=workers,
         seconds=2.0 + records * each / min(workers, records),
-        memory=_WORKER_BYTES * (workers + 1) + _SAMPLE_BYTES * samples * workers + in_parent * records,
+        memory=_WORKER_BYTES * (workers + 1) + _SAMPLE_BYTES * samples * workers * together + in_parent * records,
         file_size=_RECORD_BYTES * records + 1e5,
         at_least=forced > 0.0,
+        together=together,
     )
 
 

@@ -35,11 +35,16 @@ LARGEST_TASK = 10_000
 class TaskQueue:
     """Cuts what is not finished into tasks, of a size by the time that units have taken so far."""
 
-    def __init__(self, finished: NDArray[np.bool_], size: int | None, order: int = 1, workers: int = 1) -> None:
-        """Queue what is not finished; `size` fixes that of the tasks, `order` = -1 begins at the end."""
+    def __init__(
+        self, finished: NDArray[np.bool_], size: int | None, order: int = 1, workers: int = 1, least: int = 1
+    ) -> None:
+        """Queue what is not finished; `size` fixes that of the tasks, `order` = -1 begins at the end.
+
+        Units that are computed side by side come `least` at a time: fewer would take as long.
+        """
         edges = np.flatnonzero(np.diff(finished, prepend=True, append=True)).reshape(-1, 2).tolist()
         self._tasks = deque([Task(first, end - first) for first, end in edges][::order])
-        self._size, self._task_seconds = size, max(TASK_SECONDS, workers / TASKS_A_SECOND)
+        self._size, self._least, self._task_seconds = size, least, max(TASK_SECONDS, workers / TASKS_A_SECOND)
         self.seconds, self.units = 0.0, 0  # computed so far
 
     def next_task(self) -> Task | None:
@@ -48,7 +53,7 @@ class TaskQueue:
             return None
         task = self._tasks.popleft()
         by_time = math.ceil(min(self._task_seconds * self.units / max(self.seconds, 1e-9), LARGEST_TASK))
-        size = min(task.size, self._size or max(1, by_time))
+        size = min(task.size, self._size or max(self._least, by_time))
         if size < task.size:
             self._tasks.appendleft(Task(task.first + size, task.size - size))
         return task._replace(size=size)
@@ -110,7 +115,7 @@ def sweep(
         with open_journal(journal_path(output), plan, force=force) as journal:
             resumed = journal.done
             begin(found, resumed)
-            queue = TaskQueue(journal.finished, task_size, order, engine.workers)
+            queue = TaskQueue(journal.finished, task_size, order, engine.workers, found.together)
             notes = _compute(engine, journal, queue, progress)
             report = SweepReport(output, loaded, Findings(journal), resumed, notes, queue.units * plan.unit_length)
             write(result, report, journal)

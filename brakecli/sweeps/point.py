@@ -6,7 +6,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +19,10 @@ from brakecli.case.system import system_of
 from brakecli.errors import BrakecliError
 from brakecli.files import fields
 from brakecli.files.field import values_of
-from brakecli.runs.limits import check, refuse, within_range
+from brakecli.runs.limits import Check, check, refuse, within_range
 from brakecli.runs.run import motion_of
-from brakecli.runs.tolerance import Certificate
+from brakecli.runs.together import TOGETHER, certify_together
+from brakecli.runs.tolerance import Certificate, Certified
 from brakecli.solver.history import array_history
 from brakecli.solver.motion import Motion
 from brakecli.solver.roughness import TWO_PI, wheel_angles
@@ -31,6 +32,7 @@ from brakecli.sweeps.early import Ending, Known, early
 from brakecli.sweeps.plan import Plan, Settings
 
 OUT_OF_MEMORY = "out of memory; sample less often, or reduce contact.nodes"
+_FAULTS = (BrakecliError, FloatingPointError, MemoryError)
 
 
 class Status(StrEnum):
@@ -66,16 +68,27 @@ def simulate(case: Case, *, whole: bool = True) -> Outcome:
 
     Raises RefusedError, and CaseError where it has no start.
     """
+    return _judged(case, checked(case), None, whole=whole)
+
+
+def checked(case: Case) -> Check:
+    """What is known of a case before it runs; raises RefusedError where it should not."""
+    with within_range():
+        found = check(system_of(case))
+        refuse(found)
+    return found
+
+
+def _judged(case: Case, found: Check, certified: Certified | None, *, whole: bool) -> Outcome:
+    """The end of `simulate`, by a motion that is known already or by one that is computed."""
     verdict: Verdict | Known
     motion: Motion | Ending
+    system = found.system
     with within_range():
-        system = system_of(case)
-        found = check(system)
-        refuse(found)
-        if not whole and (known := early(system)) is not None:
+        if certified is None and not whole and (known := early(system)) is not None:
             verdict, motion, certificate = known
         else:
-            motion, certificate = motion_of(system)
+            motion, certificate = certified or motion_of(system)
             if not np.isfinite(motion.rows).all():
                 raise FloatingPointError("a force overflows")
             history = array_history(system.interval, motion.rows)
@@ -98,17 +111,36 @@ def blank(kind: np.dtype[Any], status: Status, reason: str) -> NDArray[Any]:
 def compute(plan: Plan, first: int, count: int) -> NDArray[Any]:
     """The records of some neighbouring units; those of a line stand in the order of the grid.
 
-    Along a line each point starts from the end of the one before. The wheel goes on turning: its waves keep the
-    phases that they have come to.
+    Points that do not follow one another are computed side by side as far as they can be, which changes none of
+    their numbers.
     """
-    found, length = np.zeros(count * plan.unit_length, record_type(plan)), plan.unit_length
-    for begin, unit in enumerate(range(first, first + count)):
-        points, start, outcome = line_points(plan, unit), Settings(), None
-        places = {point: place for place, point in enumerate(sorted(points), begin * length)}
-        for point in points:
-            if outcome is not None and not outcome.motion.work.failed:
-                start = next_start(outcome)
-            found[places[point]], outcome = _computed(plan, point, start)
+    if plan.followed is not None:
+        return np.concatenate([_line(plan, unit) for unit in range(first, first + count)])
+    records = list[NDArray[Any]]()
+    for start in range(first, first + count, TOGETHER):
+        points = [_begun(plan, plan.settings(each)) for each in range(start, min(start + TOGETHER, first + count))]
+        ready = [each for each in points if isinstance(each, Begun)]
+        with within_range():
+            certified = dict(
+                zip(map(id, ready), certify_together([each.check.system for each in ready]), strict=True)
+            )
+        records += [_computed(plan, each, certified.get(id(each)))[0] for each in points]
+    return np.concatenate(records)
+
+
+def _line(plan: Plan, unit: int) -> NDArray[Any]:
+    """The records of a line.
+
+    Each point starts from the end of the one before. The wheel goes on turning: its waves keep the phases that
+    they have come to.
+    """
+    points, start, outcome = line_points(plan, unit), Settings(), None
+    found = np.zeros(len(points), record_type(plan))
+    places = {point: place for place, point in enumerate(sorted(points))}
+    for point in points:
+        if outcome is not None and not outcome.motion.work.failed:
+            start = next_start(outcome)
+        found[places[point]], outcome = _computed(plan, _begun(plan, {**plan.settings(point), **start}))
     return found
 
 
@@ -150,18 +182,38 @@ def verdict_of(case: Case) -> Verdict | Known | None:
     return None
 
 
-def _computed(plan: Plan, point: int, start: Settings) -> tuple[NDArray[Any], Outcome | None]:
-    """The record of a point and its run, which is None where it was not possible."""
-    settings = {**plan.settings(point), **start}
+class Begun(NamedTuple):
+    """A point that may be computed: what is set there, its case, and what is known of it."""
+
+    settings: Settings
+    case: Case
+    check: Check
+
+
+def _begun(plan: Plan, settings: Settings) -> Begun | Exception:
+    """A point, or why it cannot be computed."""
     try:
-        outcome = simulate(plan.case(settings), whole=False)
+        case = plan.case(settings)
+        return Begun(settings, case, checked(case))
+    except _FAULTS as error:
+        return error
+
+
+def _computed(
+    plan: Plan, point: Begun | Exception, certified: Certified | None = None
+) -> tuple[NDArray[Any], Outcome | None]:
+    """The record of a point and its run, which is None where it was not possible."""
+    try:
+        if isinstance(point, Exception):
+            raise point
+        outcome = _judged(point.case, point.check, certified, whole=False)
         values = values_of(fields.POINT, outcome)
         if (critical := plan.sweep.critical) is not None:
             path = key_path(critical.parameter)
             with within_range():
-                found = search(critical, lambda value: plan.case({**settings, path: value}), verdict_of)
+                found = search(critical, lambda value: plan.case({**point.settings, path: value}), verdict_of)
             values |= values_of(fields.CRITICAL, found)
-    except (BrakecliError, FloatingPointError, MemoryError) as error:
+    except _FAULTS as error:
         reason = OUT_OF_MEMORY if isinstance(error, MemoryError) else "; ".join(str(error).splitlines())
         return blank(record_type(plan), Status.FAILED, reason), None
     return _filled(record_type(plan), values), outcome

@@ -304,6 +304,8 @@ def test_tasks_are_as_long_as_their_work_is_short() -> None:
     assert queue.next_task() == Task(1, 50)  # 0.2 s of 4 ms each
     queue.note_time(Task(1, 50), 49.0)
     assert queue.next_task() == Task(51, 1)
+    together = TaskQueue(np.zeros(40, dtype=bool), None, least=32)  # as long for fewer
+    assert [together.next_task() for _ in range(3)] == [Task(0, 32), Task(32, 8), None]
 
 
 def test_a_thousand_workers_ask_for_no_more_tasks_than_a_scheduler_hands_out() -> None:

@@ -1,5 +1,6 @@
 """What the rules of the regimes go by: envelope, stick, lines and powers of a history."""
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -149,7 +150,7 @@ class Part:
         None where vx (m/s) is quiet: that is rounding.
         """
         frequencies, power, total = self._spectrum
-        left, found = power.copy(), list[tuple[float, float, float]]()
+        left, found, places = power.copy(), list[tuple[float, float, float]](), np.array(forced)
         total = total if self.amplitude("vx") > quiet else 0.0
         while total > 0.0 and len(found) < _MOST_LINES:
             top = int(np.argmax(left))
@@ -161,7 +162,7 @@ class Part:
             if top < FEWEST_CYCLES:
                 continue  # a line of fewer cycles is not told from the drift of the mean
             frequency = interpolated(frequencies, power, top)
-            distance = min((abs(line - frequency) for line in forced), default=np.inf)
+            distance = np.abs(places - frequency).min(initial=np.inf)
             found.append((frequency, share, float(distance <= LINE_BINS * frequencies[1])))
         names = ("line_frequencies", "line_shares", "line_forced")
         return {name: [line[i] for line in found] for i, name in enumerate(names)}
@@ -174,6 +175,14 @@ def _near(lines: Sequence[float], frequencies: NDArray[Any]) -> NDArray[np.bool_
         middle = round(line / frequencies[1])
         chosen[max(middle - LINE_BINS, 0) : middle + LINE_BINS + 1] = True
     return chosen
+
+
+def line(x: Array, y: Array) -> tuple[float, float]:
+    """Slope of the line through some points, by least squares, and its standard error."""
+    away, rest = x - x.mean(), y - y.mean()
+    slope = float(away @ rest / (away @ away))
+    rest = rest - slope * away
+    return slope, math.sqrt(float(rest @ rest / (away @ away)) / (len(x) - 2))
 
 
 class Envelope:
@@ -196,9 +205,8 @@ class Envelope:
         self.evidence = {"envelope_final": self.final, "envelope_largest": self.largest}
         half, centres = slice(WINDOWS // 2, None), np.array(0.5 * (edges[:-1] + edges[1:]) * history.interval)
         if self.vx[half].min() > 0.0:
-            (slope, _), covariance = np.polyfit(centres[half], np.log(self.vx[half]), 1, cov=True)
-            self.evidence["envelope_slope"] = float(slope)
-            self.evidence["envelope_slope_error"] = float(np.sqrt(max(covariance[0, 0], 0.0)))
+            slope, error = line(centres[half], np.log(self.vx[half]))
+            self.evidence |= {"envelope_slope": slope, "envelope_slope_error": error}
 
     def settled_window(self, within: float, reach: float) -> int | None:
         """The window, never the first, from which on all are settled; None if fewer than ten are."""

@@ -117,7 +117,7 @@ class ForcedRules:
             text = "the motion comes back wherever the waves of the wheel do, and sliding is stable"
             return self._forced(f"only the roughness shakes the shoe: {text}")
         if share < self.limits.forced_share:
-            lines = tuple({*self.context.forced, *self.context.subharmonics})
+            lines = tuple({*self.context.forced, *self.context.subharmonics()})
             trace = share
             share, dense = self._share(lines, 0.3)
             if growth >= 0.0 or dense or share < self.limits.forced_share or trace < _TRACE:

@@ -7,6 +7,7 @@ in that phase changes f by the slope of the surface times that motion: `slopes` 
 
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -78,23 +79,26 @@ class Linear:
 
     def forced(self, time: Array) -> tuple[Array, Array]:
         """Positions and velocities (rows x, y) that the waves force."""
-        position, velocity = np.zeros((2, time.size)), np.zeros((2, time.size))
-        for frequency, wave in zip(self.passing, self.waves, strict=True):
-            turn = wave[:, None] * np.exp(2j * math.pi * (frequency * time % 1.0))
-            position, velocity = position + turn.imag, velocity + 2.0 * math.pi * frequency * turn.real
+        position, velocity, at = np.zeros((2, time.size)), np.zeros((2, time.size)), time.tobytes()
+        for frequency, wave in zip(self.passing.tolist(), self.waves, strict=True):
+            turn, speed = _turn(frequency, at), 2.0 * math.pi * frequency
+            position += np.stack([wave.real, wave.imag], axis=1) @ turn
+            velocity += np.stack([-speed * wave.imag, speed * wave.real], axis=1) @ turn
         return position, velocity
+
+    def _forced_x(self, time: Array) -> Array:
+        x, at = np.zeros(time.size), time.tobytes()
+        for frequency, wave in zip(self.passing.tolist(), self.waves[:, 0], strict=True):
+            x += np.array([wave.real, wave.imag]) @ _turn(frequency, at)
+        return x
 
     def parts(self, x: Array, time: Array) -> tuple[float, Array, Array, Array]:
         """What the waves force: half of peak to peak of x (m), beyond the run too, as waves beat.
 
         Then, at the times given, the x that they force and that the shoe adds (m), and the times again (s).
         """
-        lasting = self.forced(time)[0][0]
-        later = (
-            self.forced(np.asarray(_BEYOND * time[-1] * _SCATTERED, np.float64))[0][0]
-            if len(self.waves) > 1
-            else lasting
-        )
+        lasting = self._forced_x(time)
+        later = self._forced_x(_BEYOND * time[-1] * _SCATTERED) if len(self.waves) > 1 else lasting
         size = 0.5 * float(max(lasting.max(), later.max()) - min(lasting.min(), later.min()))
         return size, lasting, x - self.rest[0] - lasting, time
 
@@ -121,6 +125,13 @@ class Linear:
         return max(math.log(min(bounds, default=1.0)), 0.0) / self.mode.growth
 
 
+@lru_cache(maxsize=16)  # the points of a sweep ask for the same ones
+def _turn(frequency: float, time: bytes) -> Array:
+    """Sine and cosine of a wave (Hz) at times (s)."""
+    angle = 2.0 * math.pi * (frequency * np.frombuffer(time) % 1.0)
+    return np.stack([np.sin(angle), np.cos(angle)])
+
+
 def linear_theory(system: System, belt: float) -> Linear | None:
     """The theory at a constant speed U (m/s); None where no rest in contact exists, or friction holds the shoe."""
     c, stiffness = system.coefficients, system.contact_stiffness
@@ -138,14 +149,15 @@ def linear_theory(system: System, belt: float) -> Linear | None:
         rest = np.linalg.solve(s, offset * push - load * np.array([c.sin_beta, c.cos_beta]))
         wheel, passing = system.wheel, -belt * system.wheel.turns
         omega = 2.0 * math.pi * passing
-        responses = [np.linalg.solve(s - c.m * w * w * np.eye(2) + 1j * w * damping, push) for w in omega]
+        at = omega[:, None, None]
+        responses = np.linalg.solve(s - c.m * at * at * np.eye(2) + 1j * at * damping, push[:, None])
     except np.linalg.LinAlgError:
         return None
     force = offset - stiffness * rest[1]
     if not (np.isfinite(rest).all() and force > 0.0):
         return None
     phases = forces * np.exp(1j * (wheel.omega * rest[0] + wheel.phase))
-    waves = np.array(responses, complex).reshape(-1, 2) * phases[:, None]
+    waves = responses.reshape(-1, 2) * phases[:, None]
     values, vectors = eigensystem(c, stiffness, grip)
     mode, known_to = modes(c, stiffness, grip)[0], 0.0 if is_undamped(c) else _ROUNDING * np.abs(values).max()
     direction = int(np.sign(mode.growth)) if abs(mode.growth) > known_to else 0

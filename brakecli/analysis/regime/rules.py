@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from brakecli.analysis.regime.cycles import SIZE_OFF, Cycles, Drift, contact_length, cycles_of, median, swings
-from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, WINDOWS, Envelope
+from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, WINDOWS, Envelope, line
 from brakecli.analysis.regime.forced import GROWN, QUARTER, ForcedRules
 from brakecli.analysis.regime.spectra import segment
 from brakecli.analysis.regime.verdict import Context, Decision, Excitation, Feeds, Regime, Thresholds, Verdict
@@ -108,9 +108,10 @@ class _Rules(ForcedRules):
     def _shaken(self, theory: "Linear", slow: float, decays: str) -> Decision | None:
         """The forced motion that lasts, with the settled part in which the shoe's own part has gone."""
         forced, lasting, own, time = theory.parts(*self.whole.places())
-        left = np.array([0.5 * float(np.ptp(part)) for part in np.array_split(own, WINDOWS)])
+        starts = -(-len(own) * np.arange(WINDOWS) // WINDOWS)
+        left = 0.5 * (np.maximum.reduceat(own, starts) - np.minimum.reduceat(own, starts))
         end = float(left[-10:].max())
-        slope = np.polyfit(np.arange(WINDOWS // 2), np.log(np.maximum(left[WINDOWS // 2 :], 1e-300)), 1)[0]
+        slope = line(np.arange(0.5 * WINDOWS), np.log(np.maximum(left[WINDOWS // 2 :], 1e-300)))[0]
         if slope * WINDOWS > 1.0 and end > self.limits.settled_within * forced:
             return None  # the passing waves excite what the mean stiffness damps
         level, decay = self.limits.settled_within * forced, theory.mode.growth * self.duration / WINDOWS

@@ -4,9 +4,15 @@ A small motion δx changes the phase of each wave, and with it the normal force 
 of the wheel's surface, as the pad feels it. The coefficients of the linear equations then repeat with the waves:
 ż = (A + K s(t) P) z. A solution is e^{λt} times terms e^{iΩt} of all sums Ω of their frequencies, which is an
 eigenvalue problem for λ. Sums of a few frequencies are kept.
+
+P acts on x alone. So each sum enters by one number, how x answers a force there, and the sums beside 0 add
+a stiffness to the mean one, T(λ): where they do not come near a mode, a few steps of λ = eigenvalue of A + T(λ) P
+find it.
 """
 
 import math
+from contextlib import suppress
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -17,6 +23,8 @@ _HIGHEST = 4  # frequencies in a sum
 _OWN = 0.2  # least part of an eigenvector at the sum 0: others are copies, moved by a frequency and cut off
 _NEGLIGIBLE = 1e-3  # part of the growth rate
 _DEFECTIVE = 1e8  # condition of eigenvectors that hardly differ
+_ALONE = 0.05  # by which the part at the sum 0 may differ from 1 where no other sum comes near a mode
+_MOST_STEPS, _EXACT = 12, 1e-11  # of the iteration, and the part of the largest eigenvalue at which it ends
 
 Complex = NDArray[np.complex128]
 Floats = NDArray[np.float64]
@@ -29,7 +37,7 @@ def growth_with_slopes(
     """Growth rate (1/s) of the fastest solution of ż = (A + K s(t) P) z, and how far it may be off.
 
     Each wave passes at a frequency (rad/s). Its `slopes` (N/m) are K s = Re Σ slopes e^{iΩt} at rest; the forced
-    motion x = Im Σ X e^{iΩt} moves its phase by `bends` = ω X.
+    motion x = Im Σ X e^{iΩt} moves its phase by `bends` = ω X. Of P, only the column of x is not zero.
     """
     scale = np.repeat([float(np.abs(np.linalg.eigvals(a)).max()) or 1.0, 1.0], 2)  # of position beside velocity
     a, p = (scale[:, None] * each / scale for each in (a, p))
@@ -42,12 +50,22 @@ def growth_with_slopes(
     steepest = np.argsort(-effects)
     few = min(len(steepest), _MOST_WAVES)
     kept, left = steepest[:few], float(effects[steepest[few:]].sum())
-    order = next(n for n in range(_HIGHEST, 0, -1) if len(_sums(few, n)) <= _MOST_SUMS)
-    terms = _terms(slopes[kept], bends[np.ix_(kept, kept)])
-    omega = frequencies[kept]
-    coarse, fine = (_fastest(a, p, omega, terms, n) for n in (order - 1, order))
-    bent = float(np.abs(bends[np.ix_(kept, kept)]).sum(axis=1).max())
+    order = _order(few)
+    omega, bends = frequencies[kept], bends[np.ix_(kept, kept)]
+    moved = [0.5 * slopes[kept], *(0.25 * slopes[kept] * each for each in bends.T)]  # cos(θ + δ) = cos θ - δ sin θ
+    parts = np.concatenate([*moved, *(-0.25 * slopes[kept] * each for each in bends.conj().T)])
+    answer = (values, vectors[0] * np.linalg.solve(vectors, p[:, 0])) if modal else None
+    begin = values[values.imag >= 0.0]
+    coarse, begin = _fastest(a, p, omega, parts, order - 1, answer, begin)
+    fine, _ = _fastest(a, p, omega, parts, order, answer, begin)
+    bent = float(np.abs(bends).sum(axis=1).max())
     return fine, left + abs(fine - coarse) + bent * abs(fine - plain)
+
+
+@cache
+def _order(waves: int) -> int:
+    """How many frequencies a sum may have."""
+    return next(n for n in range(_HIGHEST, 0, -1) if len(_sums(waves, n)) <= _MOST_SUMS)
 
 
 def _sums(waves: int, order: int) -> list[Sum]:
@@ -57,38 +75,72 @@ def _sums(waves: int, order: int) -> list[Sum]:
     return [(n, *rest) for n in range(-order, order + 1) for rest in _sums(waves - 1, order - abs(n))]
 
 
-def _terms(slopes: Complex, bends: Complex) -> dict[Sum, complex]:
-    """K s(t) as a sum over e^{iΩt}, up to products of two waves: cos(θ + δ) = cos θ - δ sin θ."""
-    terms, unit = dict[Sum, complex](), np.eye(len(slopes), dtype=int)
+@cache
+def _pattern(waves: int, order: int) -> tuple[Any, Any, Any]:
+    """The sums; to which change of sums each part of K s(t) and its conjugate belong; the change between two sums.
 
-    def add(where: Any, amount: complex) -> None:
-        for each, part in ((where, amount), (-where, np.conj(amount))):
-            terms[tuple(each.tolist())] = terms.get(tuple(each.tolist()), 0.0) + part
+    The parts are one for each wave, then products of two, up to which K s(t) is a sum over e^{iΩt}.
+    """
+    unit = np.eye(waves, dtype=int)
+    pairs = [(unit + sign * unit[k]) for sign in (1, -1) for k in range(waves)]
+    changes = np.concatenate([unit, *pairs])
+    known, where = np.unique(np.concatenate([changes, -changes]), axis=0, return_inverse=True)
+    place = {tuple(each): i for i, each in enumerate(known.tolist())}
+    sums = np.array(_sums(waves, order)).reshape(-1, waves)
+    between = [[place.get(tuple(each), len(known)) for each in (one - sums).tolist()] for one in sums]
+    return sums, where.ravel(), np.array(between)
 
-    for j, slope in enumerate(slopes):
-        add(unit[j], 0.5 * slope)
-        for k, bend in enumerate(bends[j]):
-            add(unit[j] + unit[k], 0.25 * slope * bend)
-            add(unit[j] - unit[k], -0.25 * slope * np.conj(bend))
-    return terms
 
-
-def _fastest(a: Any, p: Any, omega: Any, terms: dict[Sum, complex], order: int) -> float:
-    """Growth rate (1/s) with sums of at most so many frequencies."""
-    sums = _sums(len(omega), order)
-    where = {each: i for i, each in enumerate(sums)}
-    matrix = np.zeros((len(sums), 4, len(sums), 4), complex)
-    for each, i in where.items():
-        matrix[i, :, i] += a - 1j * float(np.dot(each, omega)) * np.eye(4)
-        for change, amount in terms.items():
-            j = where.get(tuple(n - m for n, m in zip(each, change, strict=True)))
-            if j is not None:
-                matrix[i, :, j] += amount * p
-    values, vectors = np.linalg.eig(matrix.reshape(4 * len(sums), -1))
-    own = slice(4 * where[(0,) * len(omega)], 4 * where[(0,) * len(omega)] + 4)
+def _fastest(
+    a: Any, p: Any, omega: Any, parts: Complex, order: int, answer: tuple[Any, Any] | None, begin: Complex
+) -> tuple[float, Complex]:
+    """Growth rate (1/s) with sums of at most so many frequencies; the modes, with which the next order begins."""
+    sums, where, between = _pattern(len(omega), order)
+    amounts = np.zeros(between.max() + 1, complex)
+    np.add.at(amounts, where, np.concatenate([parts, parts.conj()]))
+    coupling, turns = amounts[between], 1j * (sums @ omega)
+    with suppress(np.linalg.LinAlgError):
+        if answer is not None and (found := _beside(a, p, turns, coupling, *answer, begin)) is not None:
+            return float(found.real.max()), found
+    size = len(sums)
+    matrix = np.kron(coupling, p) + np.kron(np.eye(size), a) - np.kron(np.diag(turns), np.eye(4))
+    values, vectors = np.linalg.eig(matrix)
+    own = slice(4 * (size // 2), 4 * (size // 2) + 4)
     try:
         share = np.abs(np.sum(vectors[own] * np.linalg.inv(vectors)[:, own].T, axis=0))
     except np.linalg.LinAlgError:
-        return math.nan
+        return math.nan, begin
     near = np.argsort(share)
-    return float(values[(share >= _OWN) | (share >= share[near[-4]])].real.max())
+    return float(values[(share >= _OWN) | (share >= share[near[-4]])].real.max()), begin
+
+
+def _beside(
+    a: Any, p: Any, turns: Any, coupling: Any, values: Complex, residues: Complex, now: Complex
+) -> Complex | None:
+    """The modes, from what they are nearly; None where one is not alone, so that all eigenvalues are needed.
+
+    x answers a force e^{μt} by Σ residues/(values - μ). The part of an eigenvector at the sum 0 is 1/(1 - f')
+    where λ = f(λ).
+    """
+    own, exact = len(turns) // 2, _EXACT * np.abs(values).max()
+    others = np.arange(len(turns)) != own
+    block, out, back = coupling[np.ix_(others, others)], coupling[own, others], coupling[others, own]
+    before, after = np.zeros(0, complex), np.zeros(0, complex)
+    for _ in range(_MOST_STEPS):
+        distance = values - (now[:, None, None] + turns[others][None, :, None])
+        if not distance.all():
+            return None
+        response = (residues / distance).sum(axis=-1)
+        inner = np.eye(len(back)) + response[:, :, None] * block
+        stiffness = coupling[own, own] - np.linalg.solve(inner, (response * back)[:, :, None])[:, :, 0] @ out
+        all_values = np.linalg.eigvals(a + stiffness[:, None, None] * p)
+        new = np.take_along_axis(all_values, np.abs(all_values - now[:, None]).argmin(axis=1)[:, None], 1)[:, 0]
+        if len(before):
+            moved = np.where(np.abs(now - before) > exact, now - before, math.inf)
+            slope = np.abs((new - after) / moved).max()
+            if not slope <= _ALONE:
+                return None
+            if (slope + 1e-3) * np.abs(new - now).max() <= exact:
+                return new
+        before, after, now = now, new, new
+    return None

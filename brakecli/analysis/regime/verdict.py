@@ -61,7 +61,7 @@ class Context:
     belt_speed: float  # U, m/s
     steady: bool = True  # whether U and Q are constant
     forced: tuple[float, ...] = ()  # Hz, lines of the roughness
-    subharmonics: tuple[float, ...] = ()  # Hz, further lines that a pad that opens may add
+    subharmonics: Callable[[], tuple[float, ...]] = tuple  # Hz, further lines that a pad that opens may add
     waves: tuple[tuple[float, float], ...] = ()  # Hz and m: passing frequency, and the swing of x that it forces
     quiet: float = 0.0  # m/s, size of vx that may come from rounding
     scale: float = math.inf  # m/s, of a motion that would open the contact

@@ -67,7 +67,7 @@ def build_pad(k: float, half_length: float, shoe: Surface, wheel: Surface, nodes
         "nodes_at": (nodes,),
     }
     # Large tables are made in their place: a copy of gigabytes would not hear a signal.
-    flat, table, place = _aligned(sum(map(math.prod, shapes.values()))), dict[str, Floats](), 0
+    flat, table, place = aligned(sum(map(math.prod, shapes.values()))), dict[str, Floats](), 0
     for name, shape in shapes.items():
         pad[name], size = place, math.prod(shape)
         table[name] = flat[place : place + size].reshape(shape)
@@ -88,7 +88,7 @@ def build_layer(evaluate: Any, pad: Pad, press: Any = None) -> Layer:
     """What the kernel `evaluate`, or `press` where the force is enough, works on and fills for this pad."""
     constants, tables = pad
     waves = constants.shoe_terms + constants.wheel_terms
-    scratch, found = _aligned(constants.edges_at + 8 * waves + 6 + 3 * constants.cells), new(CONTACT)
+    scratch, found = aligned(constants.edges_at + 8 * waves + 6 + 3 * constants.cells), new(CONTACT)
     found.near = math.inf  # an evaluator that does not know it leaves it
     return Layer(
         address(evaluate),
@@ -101,7 +101,7 @@ def build_layer(evaluate: Any, pad: Pad, press: Any = None) -> Layer:
     )
 
 
-def _aligned(size: int) -> Floats:
+def aligned(size: int) -> Floats:
     """Zeros that begin where a line of the cache does: reading across lines costs a loop a third of its speed."""
     zeros = np.zeros(size + 8)
     begin = -zeros.ctypes.data // 8 % 8

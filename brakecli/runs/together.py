@@ -1,0 +1,72 @@
+"""The promises of many cases at once: their ladders of runs are climbed side by side, in lanes."""
+
+from collections import defaultdict
+from collections.abc import Generator, Hashable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from brakecli.errors import BrakecliError
+from brakecli.runs.pilot import RUNGS
+from brakecli.runs.tolerance import (
+    Certified,
+    begins_with_steps,
+    ladder,
+    slower_than_events,
+)
+from brakecli.solver.ensemble import fits, run_together
+from brakecli.solver.motion import Motion
+from brakecli.solver.schemes import NUMEROV
+from brakecli.solver.system import System
+
+TOGETHER = 32
+"""Cases that are certified side by side."""
+LANE_STEP_SECONDS = 3e-8
+"""Of a step of the first rung or of another, in lanes that are full; a rough guess."""
+
+
+def _ladder(system: System) -> Generator[System, Motion, Certified]:
+    method = replace(system.method, scheme="three-layer", theta=NUMEROV)
+    return ladder(replace(system, method=method), slower_than_events(system, lambda samples: None))
+
+
+def seconds_together(system: System) -> float | None:
+    """A rough guess at the time that a case takes among others; None where it has to be certified alone."""
+    if not begins_with_steps(system) or fits(first := next(_ladder(system))) is None:
+        return None
+    return RUNGS * first.steps * LANE_STEP_SECONDS
+
+
+def certify_together(systems: Sequence[System]) -> list[Certified | None]:
+    """What `certify` finds for each system, with ladders that are climbed side by side.
+
+    None where that is not certain, or cannot be computed in a lane: such a system has to be certified alone.
+    """
+    found: list[Certified | None] = [None] * len(systems)
+    ladders = {i: _ladder(system) for i, system in enumerate(systems) if begins_with_steps(system)}
+    rungs = dict[int, System]()
+
+    def climb(i: int, motion: Motion | None) -> None:
+        """To the next rung. Numbers that no brake has end a ladder, and concern none of the others."""
+        try:
+            rungs[i] = next(ladders[i]) if motion is None else ladders[i].send(motion)
+        except StopIteration as end:
+            found[i] = end.value if end.value.certificate.certified else None
+        except (BrakecliError, ArithmeticError, np.linalg.LinAlgError):
+            pass
+
+    for i in ladders:
+        climb(i, None)
+    while rungs:
+        alike, ready = defaultdict[Hashable, list[int]](list), rungs
+        for i, rung in ready.items():
+            if (key := fits(rung)) is not None:
+                alike[key].append(i)
+        rungs = {}
+        for members in alike.values():
+            with np.errstate(all="ignore"):  # of a lane, which is left then
+                motions = run_together([ready[i] for i in members])
+            for i, motion in zip(members, motions, strict=True):
+                if motion is not None:
+                    climb(i, motion)
+    return found

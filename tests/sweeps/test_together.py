@@ -1,0 +1,114 @@
+"""Points on rough pads whose runs are computed side by side."""
+
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+import tomli_w
+
+from brakecli.case.system import system_of
+from brakecli.runs.together import TOGETHER, certify_together
+from brakecli.runs.tolerance import certify
+from brakecli.solver.method import Method
+from brakecli.solver.motion import solve
+from brakecli.sweeps.plan import LoadedSweep
+from brakecli.sweeps.point import simulate
+from brakecli.sweeps.workers.task import compute_units
+from tests.campaign import counts
+from tests.examples import ROUGH, make
+from tests.sweeps.helpers import axis, inline, interrupted, local, write_sweep
+
+pytestmark = pytest.mark.usefixtures("compiled")
+
+TOLERANCE = 1e-3
+PROMISED: dict[str, Any] = ROUGH | {"solver": {"tolerance": TOLERANCE, "duration": 0.02}}
+PROMISED["output"] = {"sample_interval": 2.5e-4}
+
+
+def rough(folder: Path, num: int) -> LoadedSweep:
+    """Speeds of the wheel: at the least one the shoe sticks, and leaves its lane."""
+    speeds = axis("wheel.angular_speed", f"values = {[0.02, *np.linspace(0.5, 8.0, num - 1).tolist()]}")
+    return write_sweep(folder, speeds, case=tomli_w.dumps(PROMISED))
+
+
+def test_no_way_of_computing_them_changes_a_byte(tmp_path: Path) -> None:
+    loaded = rough(tmp_path, TOGETHER + 3)
+    inline(loaded, tmp_path / "s.h5", compute_units)
+    expected = (tmp_path / "s.h5").read_bytes()
+    for size, order in ((9, -1), (1000, 1)):
+        inline(loaded, tmp_path / "s.h5", compute_units, task_size=size, order=order, force=True)
+        assert (tmp_path / "s.h5").read_bytes() == expected
+    (tmp_path / "s.h5").unlink()
+    interrupted(loaded, tmp_path / "s.h5", compute_units, task_size=15, order=1, limit=1)
+    assert inline(loaded, tmp_path / "s.h5", compute_units, task_size=TOGETHER, order=-1).resumed > 0
+    assert (tmp_path / "s.h5").read_bytes() == expected
+    (tmp_path / "s.h5").unlink()
+    local(loaded, tmp_path / "s.h5", compute_units, 2)
+    assert (tmp_path / "s.h5").read_bytes() == expected
+
+
+@pytest.mark.parametrize("num", counts(5, 60))
+def test_their_numbers_are_those_of_runs_alone(tmp_path: Path, num: int) -> None:
+    loaded = rough(tmp_path, num)
+    inline(loaded, tmp_path / "s.h5", compute_units)
+    with h5py.File(tmp_path / "s.h5") as file:
+        found = {
+            name: file[name][:].ravel() for name in ("regime", "amplitude", "braking_torque", "estimated_error")
+        }
+    for point in range(loaded.plan.points):
+        whole = simulate(loaded.plan.case(loaded.plan.settings(point)))
+        assert found["regime"][point].decode() == whole.verdict.regime
+        assert found["estimated_error"][point] <= TOLERANCE
+        assert found["amplitude"][point] == pytest.approx(whole.verdict.amplitude, rel=2.0 * TOLERANCE)
+        assert found["braking_torque"][point] == pytest.approx(whole.verdict.braking_torque, rel=2.0 * TOLERANCE)
+
+
+def test_one_that_leaves_its_lane_is_certified_alone() -> None:
+    slides, sticks = (system_of(make(PROMISED, wheel__angular_speed=speed)) for speed in (4.0, 0.02))
+    found, left = certify_together([slides, sticks])
+    assert found is not None
+    assert left is None
+    alone = certify(slides)
+    assert found.certificate.certified
+    one, other = (each.motion.rows[:, :4] for each in (found, alone))
+    apart = np.abs(one - other).max(axis=0) / np.abs(other).max(axis=0)
+    assert apart.max() <= found.certificate.estimated_error + alone.certificate.estimated_error <= 2.0 * TOLERANCE
+
+
+def test_numbers_that_no_brake_has_concern_no_other_point(tmp_path: Path) -> None:
+    masses = axis("shoe.mass", "values = [10.0, 1e90, 1e60, 11.0]")
+    loaded = write_sweep(tmp_path, masses, case=tomli_w.dumps(PROMISED))
+    inline(loaded, tmp_path / "four.h5", compute_units, task_size=4)
+    inline(loaded, tmp_path / "one.h5", compute_units, task_size=1)
+    assert (tmp_path / "four.h5").read_bytes() == (tmp_path / "one.h5").read_bytes()
+    with h5py.File(tmp_path / "one.h5") as file:
+        assert file["status"][[0, 3]].tolist() == [b"done", b"done"]
+        assert b"crashed" not in file["status"][:].tolist()
+
+
+@pytest.mark.parametrize("shoes", counts(3, 60))
+def test_their_promises_are_kept(shoes: int) -> None:
+    """Beside event-driven runs of random shoes whose pads open in part; a shoe that sticks has left its lane."""
+    rng, kept = np.random.default_rng(8), 0
+    systems = [
+        system_of(
+            make(
+                PROMISED,
+                shoe__mass=rng.uniform(5.0, 20.0),
+                load__force=rng.uniform(500.0, 5000.0),
+                friction__coefficient=rng.uniform(0.05, 0.5),
+                wheel__angular_speed=rng.choice([-1.0, 1.0]) * rng.uniform(2.0, 12.0),
+                link2__angle_deg=rng.uniform(-20.0, 40.0),
+            )
+        )
+        for _ in range(shoes)
+    ]
+    for system, found in zip(systems, certify_together(systems), strict=True):
+        if found is not None:
+            exact = solve(system, Method("event-driven", tolerance=1e-8)).rows[:, :4]
+            apart = np.abs(found.motion.rows[:, :4] - exact).max(axis=0) / np.abs(exact).max(axis=0)
+            assert apart.max() <= found.certificate.estimated_error <= TOLERANCE
+            kept += 1
+    assert kept > 0.7 * shoes
