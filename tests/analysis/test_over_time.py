@@ -94,6 +94,9 @@ def test_constant_speed_or_few_samples_have_no_windows() -> None:
     steady = system_of(read_case(str(ROOT / "cases" / "relaxation.toml")).case)
     assert over_time(burst(0.0, 4.0), steady) is None
     assert over_time(burst(0.0, 0.01, samples=100), SYSTEM) is None
+    # 64 cycles of the lower natural frequency, 165 Hz, take 0.39 s
+    assert over_time(burst(0.0, 0.3, samples=3000), SYSTEM) is None
+    assert over_time(burst(0.0, 0.4, samples=4000), SYSTEM) is not None
 
 
 def test_a_stop_is_analysed_in_its_file_in_json_and_by_classify(tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ from brakecli.solver.schedules import value_at
 from brakecli.solver.system import System
 
 CYCLES = 20.0  # of the lower natural frequency in a window
+SHORTEST = 2.0  # cycles in a quarter of a window, without which nothing is said
 FEWEST_WINDOWS, MOST_WINDOWS = 8, 100  # without overlap; windows overlap by three quarters
 HIGHEST = 10.0  # times the higher natural frequency: up to here spectra are kept
 LINES = 1024  # most of a short-time spectrum; neighbours are averaged
@@ -61,7 +62,8 @@ def over_time(history: History, system: System) -> OverTime | None:
     window = min(max(CYCLES / max(lowest, 1e-9), duration / MOST_WINDOWS), duration / FEWEST_WINDOWS)
     hop = round(window / (_HOPS * history.interval))
     count = history.samples // max(hop, 1) - _HOPS + 1
-    if not changes(system) or hop < _HOPS or count < 1:
+    few = hop < _HOPS or hop * history.interval * lowest < SHORTEST
+    if not changes(system) or few or count < 1:
         return None
     frequency, density = _spectra(history, hop, count)
     middles = (np.arange(count) + _HOPS / 2).astype(np.float64) * hop * history.interval
