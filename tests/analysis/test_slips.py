@@ -74,21 +74,22 @@ def test_an_oscillation_whose_amplitude_wanders_is_quasi_harmonic(cases: int) ->
         assert found.stick_fraction is None  # nothing shows that there is no short stick
 
 
-@pytest.mark.parametrize("cases", counts(4, 40))
+@pytest.mark.parametrize("cases", counts(8, 100))
 def test_ring_downs_after_impacts_are_never_stick_slip(cases: int) -> None:
     for seed in range(cases):
         random = np.random.default_rng(seed)
-        turn, damping = 2.0 * np.pi * random.uniform(0.01, 0.1), random.uniform(0.025, 0.15)
+        turn, damping = 2.0 * np.pi * random.uniform(0.01, 0.1), 10.0 ** random.uniform(-2.7, -0.82)
         wait = 2.0 * np.pi / turn * random.uniform(6.0, 40.0)
         begins = np.cumsum(np.full(40, wait) if seed % 2 else wait * random.uniform(0.5, 1.5, 40))
         time = np.arange(int(begins[-1] + wait))
         values, ring = np.zeros(len(time)), np.sin if seed % 4 > 1 else np.cos
         for begin in begins.astype(int):
-            since = time[begin:] - begin
-            values[begin:] += random.lognormal(0.0, 0.3) * np.exp(-damping * turn * since) * ring(turn * since)
+            since, sign = time[begin:] - begin, random.choice([-1.0, 1.0]) if seed % 8 > 3 else 1.0
+            size = sign * random.lognormal(0.0, 0.3)
+            values[begin:] += size * np.exp(-damping * turn * since) * ring(turn * since)
         values += 0.03 * values.std() * random.normal(size=len(values))
         for quantity in BOTH:
-            assert judged(values, quantity).regime != Regime.RELAXATION, quantity
+            assert judged(values, quantity).regime != Regime.RELAXATION, (seed, quantity)
 
 
 @pytest.mark.parametrize("second", [0.3, 0.5, 0.8])

@@ -63,6 +63,7 @@ class SignalRules:
         self.evidence |= {"samples": float(self.count), "skewness": self.slips.skewness}
         self.evidence |= {"smoothed_over": float(self.smoothing), "events": float(self.slips.count)}
         self.evidence |= {"slip_lasts": self.slips.lasts, "slip_returns": self.slips.returns}
+        self.evidence |= {"slip_swings": self.slips.swings}
         if not self.above_noise or not (self.certain or self.power.any()):
             return Decision("the vibration is hidden by noise; measure closer to the shoe, or with less noise")
         self.strongest = strongest = int(np.argmax(self.power))
@@ -120,6 +121,8 @@ class SignalRules:
                 return Decision(f"{hidden}; measure with less noise, or for longer")
             if found <= least:
                 return None
+        if not slips.stick_slip:
+            return None
         reason = f"{self.slips.count} events of stick and slip: skewness of the velocity {self.slips.skewness:.2g}"
         often = self.slips.count / self.duration
         return Decision(reason, Regime.RELAXATION, frequency=often, stick_fraction=self.slips.stick)

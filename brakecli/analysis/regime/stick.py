@@ -22,7 +22,8 @@ _BULK = 3.0  # robust deviations that a slip leaves the velocity in stick by
 _FEWEST = 10
 _STRONG = 0.4  # of the tenth largest slip: the shape of smaller ones is not looked at
 _MOST = 512  # slips whose shape is averaged
-_LASTS, _RETURNS = 0.55, 0.2
+_LASTS, _RETURNS, _SWINGS = 0.55, (-0.4, 0.2), 0.45
+_AROUND = 5  # widths of a slip in which it would swing
 _NARROW = 2  # samples of a pulse of velocity that may be a spike
 _REGULAR = 0.3  # of the median: quartiles of the times between pulses that spikes do not keep
 _LOADED = (0.4, 2.5)  # correlation of slips with the time before or after them, and that times √n
@@ -41,6 +42,7 @@ class Slips:
         1.0  # part of a slip that is left a quarter of a cycle later; 0 for a ring-down, or a spike of x
     )
     returns: float = 0.0  # what swings back at once, over the slip; 0 for stick, nearly 1 for a ring-down
+    swings: float = 0.0  # the largest velocity the other way around the mean slip, over that in the slip
     loaded: bool = True  # whether slips go with the time that has loaded them; random spikes do not
 
     period: float = 0.0  # samples from one to the next, in the mean
@@ -57,8 +59,8 @@ class Slips:
 
     @property
     def swings_back(self) -> bool:
-        """Whether the velocity swings back after them, as after an impact."""
-        return self.returns > _RETURNS
+        """Whether the velocity swings as far the other way beside them, or between them, as after an impact."""
+        return not _RETURNS[0] <= self.returns <= _RETURNS[1] or self.swings > _SWINGS
 
     @property
     def stick_slip(self) -> bool:
@@ -127,7 +129,8 @@ def _shaped(slips: Slips, velocity: Velocity, places: NDArray[np.intp]) -> Slips
     lasts = _lasting(x, calm_starts[calm], scale) / max(float(calm_depths[calm].mean()), 1e-300)
     returns = _returning(x, starts[strong], min(velocity.quiet, scale), scale)
     loaded = not velocity.measured or _loaded(velocity.values, starts, depths, scale)
-    return replace(slips, lasts=lasts, returns=returns, loaded=loaded)
+    swings = _swinging(velocity.smoothed(scale), starts[strong])
+    return replace(slips, lasts=lasts, returns=returns, swings=swings, loaded=loaded)
 
 
 def _falls(x: Array, places: NDArray[np.intp], scale: int) -> tuple[NDArray[np.intp], Array, NDArray[np.bool_]]:
@@ -155,6 +158,21 @@ def _returning(x: Array, starts: NDArray[np.intp], fine: int, scale: int) -> flo
         )
     )
     return float((high - most) / max(least - low, 0.25 * (most - least), 1e-300))
+
+
+def _swinging(values: Array, starts: NDArray[np.intp]) -> float:
+    """The largest velocity the other way around the mean slip, in which hum and noise cancel, over that in it."""
+    wide, starts = 1, starts[:: 1 + len(starts) // _MOST]
+    while True:
+        inside = starts[(starts >= wide) & (starts + wide < len(values))]
+        if not len(inside):
+            return 0.0
+        mean = np.mean([values[i - wide : i + wide + 1] for i in inside], axis=0)
+        mean -= np.median(mean)
+        deepest = float(-mean.min())
+        if wide >= _AROUND * np.sum(mean < -0.5 * deepest):
+            return float(mean.max()) / max(deepest, 1e-300)
+        wide *= 2
 
 
 def _lasting(x: Array, starts: NDArray[np.intp], scale: int) -> float:
