@@ -21,7 +21,7 @@ PYTEST_ARGS ?=
 .DELETE_ON_ERROR:
 .NOTPARALLEL: # two installations into one .venv at a time would collide
 .PHONY: help demo test campaign lowest lint format types imports derivations tables docs cases check \
-    accuracy promises promise-cost picture lock-in paper extremes bench bench-sweep bench-contact clean
+    accuracy promises promise-cost picture lock-in paper extremes bench bench-sweep bench-million bench-contact clean
 
 help: ## list the targets (this text)
 	@echo "make TARGET, where TARGET is one of"
@@ -156,6 +156,9 @@ bench: $(PEERS_STAMP) ## measure brakecli beside general solvers and write docs/
 
 bench-sweep: $(DEV_STAMP) ## what a sweep costs beside its points; needs two idle cores (some minutes)
 	$(BIN)/python -m benchmarks.sweep
+
+bench-million: $(DEV_STAMP) ## a million made-up points over two dask workers: what handing out and writing cost (two minutes)
+	$(BIN)/python -m benchmarks.million
 
 bench-contact: $(DEV_STAMP) ## what the contact costs, against C; needs gcc and an idle core (some minutes)
 	$(BIN)/python -m benchmarks.contact
