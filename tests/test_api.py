@@ -63,6 +63,13 @@ def test_outputs_stay_only_where_they_are_asked_for(tmp_path: Path, monkeypatch:
     assert [each.name for each in tmp_path.iterdir()] == ["kept.h5"]
 
 
+def test_a_file_that_was_changed_is_read_again(tmp_path: Path) -> None:
+    file = tmp_path / "c.toml"
+    for load in (5000.0, 4000.0):
+        file.write_text(TINY.replace("load.force = 5000.0", f"load.force = {load}"))
+        assert brakecli.load(file).case.load.force == load
+
+
 def test_stability_is_that_of_the_command() -> None:
     printed = command("stability", CASE, "--set", "friction.coefficient=0.4", "--json", cwd=HERE).json
     found = brakecli.stability(CASE, {"friction": {"coefficient": np.float64(0.4)}})

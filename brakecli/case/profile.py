@@ -12,6 +12,7 @@ from brakecli.errors import UsageError, printable
 from brakecli.files.table import Array, TextTable, require
 
 _ROUNDING = 1e-12  # of heights, relative to their root mean square
+_GAP = 4.0  # median steps between two places from which on nothing was measured there
 _FITS = 0.005  # part of a turn by which a record may miss a whole number of turns
 
 
@@ -45,6 +46,8 @@ def sines_of(path: Path, error: float, radius: float, pad: float | None) -> dict
         how = f", over {length:.4g} m, beyond which it repeats; a straight line was removed"
         if pad is not None and (place[0] > -pad + step or place[-1] < pad - step):
             how += f"; the pad from {-pad:g} to {pad:g} m reaches beyond {place[0]:.4g} to {place[-1]:.4g} m"
+    widest = float(np.diff(place).max())
+    how += f"; a straight line bridges a gap of {widest:.3g} m" * (widest > _GAP * step)
     chosen, amplitudes, phases, lost = _strongest(found, error)
     phases = (phases - 360.0 * (chosen * place[0] / length % 1.0)) % 360.0
     rms = float(np.sqrt(np.mean(found**2)))
@@ -63,7 +66,8 @@ def _read(path: Path, radius: float) -> tuple[Array, Array]:
     unnamed = "its first lines do not name both columns; separate names and numbers alike, or remove these lines"
     require(table.names or not lines, unnamed)
     along, up = table.unit(0, "meter", "radian"), table.unit(1, "meter")
-    bare = along is None and table.names and "angle" in table.names[0].lower()
+    angles = ("angle", "theta", "phi", "θ", "φ")
+    bare = along is None and table.names and any(word in table.names[0].lower() for word in angles)
     require(not bare, f"column {table.names[0] if bare else ''}: has no unit; name it angle_deg or angle_rad")
     place, height = (
         values * (unit or (1.0, "meter"))[0] for values, unit in zip(table.numbers(), (along, up), strict=True)

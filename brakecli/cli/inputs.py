@@ -69,9 +69,15 @@ def as_argument(path: str | Path) -> str:
     return shlex.quote(f"./{text}" if text.startswith("-") and text != "-" else text)
 
 
-@cache
 def _text(source: str) -> tuple[str, str]:
     """The text of a source and its name; a pipe can be read only once."""
+    from brakecli.case.read import read_text
+
+    return read_text(source) if os.path.isfile(source) else _of_pipe(source)  # noqa: PTH113 - pathlib's may raise
+
+
+@cache
+def _of_pipe(source: str) -> tuple[str, str]:
     from brakecli.case.read import read_text
 
     return read_text(source)

@@ -45,7 +45,7 @@ def command(
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
-    """Draw a result of any kind, or a measured signal (needs matplotlib)."""
+    """Draw a result, or a measured signal (needs matplotlib)."""
     reading = {"column": column, "time_column": time_column, "sample_rate": sample_rate}
     reading |= {"unit": unit, "time_unit": time_unit}
     machine = {"belt_speed": belt_speed, "stiffness": stiffness}

@@ -15,7 +15,7 @@ def command(
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
-    """Write a page about results: answer, evidence, pictures (needs matplotlib and jinja2)."""
+    """Put results on one page, answer first (needs jinja2)."""
     announce_compilation(quiet)
     from brakecli.reports.page import write_report
     from brakecli.runs.limits import within_range

@@ -24,7 +24,7 @@ _QUIET = 1e-3  # part of the power that may be left out unsaid
 _HEARD = 20.0  # Hz
 _TABLES = (fields.HISTORY, fields.POINT, fields.CRITICAL, fields.VARIED, fields.MODES, fields.ENTRY)
 _ORDER = [field.name for rows in _TABLES for field in rows]  # of columns
-_AXES = {"history": "time", "spectrum": "frequency"}
+_AXES = {"history": "time", "spectrum": "frequency", "over_time": "time", "vibrations": "interval"}
 
 
 def export(
@@ -42,7 +42,9 @@ def export(
         raise UsageError(f"{what}: is for runs, and {result.path} is a {kind}; export it as .csv without --group")
     if group not in (None, *_AXES):
         raise UsageError(f"--group {group}: there is none; give {' or '.join(_AXES)}")
-    if suffix == ".wav" and (group == "spectrum" or len(names) > 1):
+    if group and group not in result.file:
+        raise UsageError(f"--group {group}: this run has none; it has one where speed or load change")
+    if suffix == ".wav" and (group not in (None, "history") or len(names) > 1):
         raise UsageError(
             f"{target}: a sound is one variable of the history; give one --variable and no other group"
         )

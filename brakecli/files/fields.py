@@ -163,7 +163,7 @@ INTERVAL = integer("interval", "interval of vibration, from 0")
 WINDOW_TIME = Field("time", "s", "middle of a window of time")
 OVER_TIME = (
     Field("speed", "m/s", "speed of the wheel's surface"),
-    Field("load", "N", "pressing force"),
+    Field("load_force", "N", "pressing force", at="load"),
     Field("frequency", "Hz", "frequency of the highest peak of vx; missing where it does not vibrate"),
     Field("amplitude", "m", "half of peak to peak of x, without its trend"),
     ratio("stick_fraction", "part of the time in stick"),

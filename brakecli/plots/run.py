@@ -182,7 +182,9 @@ def draw(picture: RunPicture) -> Figure:
         draw_amplitude(panels[2, 1], picture.stop)
     apart = {"vx": panels[0], "x": panels[0, 1:]}.get(picture.variable, ()) if not picture.near else ()
     for axes in apart:
-        note = f"U = {picture.detail['belt'][-1]:.4g} m/s, off the scale"
+        belt = picture.detail["belt"]
+        steady = f"U = {belt[-1]:.4g} m/s" if np.ptp(belt) == 0.0 else f"U up to {style.largest(belt):.4g} m/s"
+        note = f"{steady}, off the scale"
         axes.set_title(note, loc="right", size=8.5, color=style.VERMILION)
     spans: tuple[Any, ...] = (picture.detail["time"], picture.span, picture.span)
     for axes, time in zip(panels[:, 0], spans, strict=False):

@@ -22,8 +22,8 @@ class Stop:
         """Read it; raises UnreadableResultError where its parts do not fit."""
         self.time, self.lines = (result.read("spectrogram", name) for name in ("time", "frequency"))
         self.density = result.read("spectrogram", "vx")
-        names = ("speed", "amplitude", "stick_fraction")
-        self.speed, self.amplitude, self.stick = (result.read("over_time", name) for name in names)
+        names = ("speed", "load_force", "amplitude", "stick_fraction")
+        self.speed, self.load, self.amplitude, self.stick = (result.read("over_time", name) for name in names)
         if self.density.shape != (len(self.time), len(self.lines)) or self.speed.shape != self.time.shape:
             raise style.unreadable(result, "its spectrogram does not fit its axes")
         starts, ends = (result.read("vibrations", name) for name in ("start", "end"))
@@ -63,21 +63,17 @@ def _highest(stop: Stop, modes: list[float]) -> float:
 
 
 def draw_amplitude(axes: Axes, stop: Stop) -> None:
-    """Amplitude of x against the wheel's speed; windows with stick are marked."""
+    """Amplitude of x against the wheel's speed, or the load where that alone changes; stick is marked."""
     factor, unit = style.prefixed(style.largest(stop.amplitude), "m")
-    axes.plot(stop.speed, factor * stop.amplitude, color=style.BLUE, lw=0.8, marker=".")
+    along, name, its_unit = stop.speed, "speed", "m/s"
+    if np.ptp(along) <= 1e-9 * style.largest(along):
+        along, name, its_unit = stop.load, "load", "N"
+    axes.plot(along, factor * stop.amplitude, color=style.BLUE, lw=0.8, marker=".")
     stuck = stop.stick > 0.0
-    axes.plot(
-        stop.speed[stuck],
-        factor * stop.amplitude[stuck],
-        ls="none",
-        marker="s",
-        ms=4.0,
-        color=style.ORANGE,
-        label="with stick",
-    )
-    axes.set(title="Amplitude of x against speed", ylabel=style.labelled("amplitude", unit))
-    low, high = float(stop.speed.min()), float(stop.speed.max())
-    axes.set_xlabel(style.labelled("speed of the wheel's surface", style.set_ticks(axes.xaxis, low, high, "m/s")))
+    look: dict[str, Any] = {"ls": "none", "marker": "s", "ms": 4.0, "color": style.ORANGE, "label": "with stick"}
+    axes.plot(along[stuck], factor * stop.amplitude[stuck], **look)
+    axes.set(title=f"Amplitude of x against {name}", ylabel=style.labelled("amplitude", unit))
+    unit = style.set_ticks(axes.xaxis, float(along.min()), float(along.max()), its_unit)
+    axes.set_xlabel(style.labelled({"speed": "speed of the wheel's surface", "load": "load"}[name], unit))
     if stuck.any():
         axes.legend(loc="best")

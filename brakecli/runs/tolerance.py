@@ -195,6 +195,7 @@ class _Axis:
     """How often steps were halved, or nodes doubled, and what the last two times changed."""
 
     growth: ClassVar[float] = 0.5  # power of the error's fall with which the work grows
+    margin: ClassVar[float] = 1.0
     doublings: int = 0
     before: float = math.inf
     last: float = math.inf
@@ -211,11 +212,19 @@ class _Axis:
             return self.last
         if math.isinf(self.before) or self.last >= self.before:
             return math.inf
-        return max(self.last, 3.0 * self.last / (self.before / self.last - 1.0), self.before / 4.0)
+        left = max(self.last, 3.0 * self.last / (self.before / self.last - 1.0), self.before / 4.0)
+        return self.margin * left
 
     def more(self, tolerance: float) -> float:
         """By how much the work is likely to grow until the error is below the tolerance."""
         return max(1.0, self.last / tolerance) ** self.growth if self.last < math.inf else 2.0
+
+
+@dataclass
+class _Nodes(_Axis):
+    """Of quadrature nodes: where the edges of patches hardly move, no sum over many positions evens errors out."""
+
+    margin: ClassVar[float] = 2.0
 
 
 @dataclass
@@ -255,7 +264,7 @@ def ladder(
     wanted, events = system.method.tolerance, system.method.own_steps
     (first, every), fineness = first_rung(system), "tolerance" if events else "step"
     longest = min(_shortest_span(system) / STEPS_BETWEEN_KNOTS, system.interval) * (1.0 + 1e-9)
-    nodes, steps, quadrature = first_nodes(system), _Tolerances() if events else _Axis(), _Axis()
+    nodes, steps, quadrature = first_nodes(system), _Tolerances() if events else _Axis(), _Nodes()
     before, finer, seconds = None, steps, 0.0
     while True:
         sampled = replace(system, interval=max(1, every >> steps.doublings) * system.interval)

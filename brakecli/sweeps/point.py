@@ -93,7 +93,8 @@ def _judged(case: Case, found: Check, certified: Certified | None, *, whole: boo
                 raise FloatingPointError("a force overflows")
             history = array_history(system.interval, motion.rows)
             verdict = verdict_on(history, system, motion.work.failure_sentence)
-    warnings, work = [*found.warnings, *verdict.reasons[1:]], motion.work
+    told = (text for text in verdict.reasons[1:] if "torque_variation" not in text)  # no number of a sweep
+    warnings, work = [*found.warnings, *told], motion.work
     if work.unconverged_steps and not work.failed:
         warnings.append(f"{work.unconverged_steps} of {work.steps} steps did not converge, as the case allows")
     if certificate is not None and not certificate.certified:

@@ -14,6 +14,7 @@ from brakecli.case.system import system_of
 from brakecli.files.read import open_result
 from brakecli.solver.history import History, array_history
 from brakecli.solver.quantities import HISTORY, ContactState
+from brakecli.solver.schedules import schedule
 from tests.commands import ROOT, brakecli
 
 SYSTEM = replace(system_of(read_case(str(ROOT / "cases" / "brake-stop.toml")).case), interval=1e-4)
@@ -74,17 +75,28 @@ def test_two_bursts_are_two_intervals_and_what_is_faint_is_none() -> None:
 
 
 def test_a_shoe_that_hardly_moves_does_not_vibrate() -> None:
-    # 1 % of the wheel's 4 m/s is 0.04 m/s
-    for amplitude, count in ((0.9 * 0.04 / (500.0 * math.pi), 0), (1.1 * 0.04 / (500.0 * math.pi), 1)):
-        found = over_time(burst(1.0, 2.0, amplitude=amplitude), SYSTEM)
+    # the static compression is 5000 N over c_yy + 2ak, with c_yy = 1e7 + 1.2e7 sin² 5° and 2ak = 2e6 N/m
+    pressed = 5000.0 / (1.2e7 + 1.2e7 * math.sin(math.radians(5.0)) ** 2)
+    for part, count in ((0.009, 0), (0.011, 1)):
+        found = over_time(burst(1.0, 2.0, amplitude=part * pressed), SYSTEM)
         assert found is not None
         assert len(found.vibrations) == count
+
+
+def test_a_fast_wheel_hides_no_vibration() -> None:
+    fast = replace(SYSTEM, belt=schedule([0.0, 0.5, 4.0], [100.0, 100.0, 0.0]))
+    found = over_time(burst(1.0, 2.0), fast)
+    assert found is not None
+    assert len(found.vibrations) == 1
 
 
 def test_constant_speed_or_few_samples_have_no_windows() -> None:
     steady = system_of(read_case(str(ROOT / "cases" / "relaxation.toml")).case)
     assert over_time(burst(0.0, 4.0), steady) is None
     assert over_time(burst(0.0, 0.01, samples=100), SYSTEM) is None
+    # 64 cycles of the lower natural frequency, 165 Hz, take 0.39 s
+    assert over_time(burst(0.0, 0.3, samples=3000), SYSTEM) is None
+    assert over_time(burst(0.0, 0.4, samples=4000), SYSTEM) is not None
 
 
 def test_a_stop_is_analysed_in_its_file_in_json_and_by_classify(tmp_path: Path) -> None:

@@ -182,6 +182,13 @@ def test_a_profile_of_the_shoe_loses_its_line_and_repeats_beyond_its_length(tmp_
     )
 
 
+def test_a_gap_in_a_profile_is_told(tmp_path: Path) -> None:
+    places = np.arange(0.0, TURN, TURN / 360)
+    places = places[(places < 0.5) | (places > 0.7)]
+    case = loaded(saved(tmp_path / "p.csv", "m,um", places, np.sin(2 * np.pi * places / TURN)))
+    assert "a straight line bridges a gap of 0.20" in case.resolved
+
+
 @pytest.mark.parametrize("error", [0.5, 0.1, 0.01])
 def test_no_fewer_sines_leave_out_so_little_of_a_profile(tmp_path: Path, error: float) -> None:
     heights = np.random.default_rng(3).normal(size=400)
@@ -214,6 +221,7 @@ WRONG = {
     "": "the file is empty",
     "1,2,3\n4,5,6\n": "has 3 columns; give two: position or angle, and height",
     "angle,um\n0,1\n1,2\n2,1\n3,5\n": "column angle: has no unit; name it angle_deg or angle_rad",
+    "theta,um\n0,1\n1,2\n2,1\n3,5\n": "column theta: has no unit; name it angle_deg or angle_rad",
     "x_mm,z_V\n0,1\n1,2\n2,1\n3,5\n": "not meter; correct the unit",
     "x_mm,z_mV\n0,1\n1,2\n2,1\n3,5\n": "column z_mV: mV is",
     "x (mm),z (qq)\n0,1\n1,2\n2,1\n3,5\n": "column z (qq): there is no unit qq",

@@ -25,7 +25,8 @@ _RELAXED = 1.0  # within a settled part, from which on what it shows does last
 QUARTER = 4.0 / 3.0  # a run whose last quarter is settled, over what comes before
 _ERRORS = 2.0  # standard errors of a mean power
 _LARGER = 5.0  # times what the waves force in full contact: a larger motion needs more proof that it is forced
-_TRACE = 0.01  # part of the energy of vx on the lines themselves, without which nothing is their subharmonic
+_OFTEN = 0.1  # part of the time that shows that stick or flight holds a vibration within its limits
+_TRACE = 0.1  # part of the energy of vx on the lines themselves, without which nothing is their subharmonic
 _MOST_COMBINED = 6  # waves whose frequencies are combined by threes
 _FOLLOWS = 0.1  # part of the energy of vx and vy in which a motion differs that comes back with the waves
 _PROBES, _MOST_RETURNS, _APART = 400, 1 << 14, 5  # times compared, among how many, so many cycles of vx apart
@@ -112,7 +113,8 @@ class ForcedRules:
             text = f"{share:.0%} of the energy of vx lies on the lines of the roughness"
             return Decision(f"{text}, but no dashpot damps what the shoe adds; a dashpot would decide")
         if growth < 0.0 and not self._unstable_in_full_contact and not self._larger and self._follows():
-            if self._feeds() is Feeds.FRICTION or self._locked:
+            self._feeds()
+            if self._locked:
                 return self._either()
             text = "the motion comes back wherever the waves of the wheel do, and sliding is stable"
             return self._forced(f"only the roughness shakes the shoe: {text}")
@@ -160,10 +162,11 @@ class ForcedRules:
     def _locked(self) -> bool:
         """Whether a vibration that friction keeps up may be locked to the waves, and go on without them.
 
-        It sticks or leaves the wheel, and gets more from friction than from the roughness, as far as samples show.
+        It often sticks or leaves the wheel, and gets more from friction than from the roughness, as far as samples
+        show.
         """
         states = (ContactState.STICK, ContactState.SEPARATED)
-        limited = any(self.settled_part.fraction(state) > 0.0 for state in states)
+        limited = sum(self.settled_part.fraction(state) for state in states) >= _OFTEN
         return limited and self.evidence["power_of_friction"] > max(self.evidence["power_of_roughness"], 0.0)
 
     @property

@@ -13,11 +13,12 @@ from brakecli.solver.schedules import value_at
 from brakecli.solver.system import System
 
 CYCLES = 20.0  # of the lower natural frequency in a window
+SHORTEST = 2.0  # cycles in a quarter of a window, without which nothing is said
 FEWEST_WINDOWS, MOST_WINDOWS = 8, 100  # without overlap; windows overlap by three quarters
 HIGHEST = 10.0  # times the higher natural frequency: up to here spectra are kept
 LINES = 1024  # most of a short-time spectrum; neighbours are averaged
 LOUD = 0.05  # part of the largest amplitude of vx from which it vibrates
-QUIET = 0.01  # part of the wheel's largest speed below which the largest amplitude of vx is no vibration
+QUIET = 0.01  # part of the static compression below which the largest amplitude of x is no vibration
 _HOPS = 4  # in a window
 _AT_ONCE = 16  # windows, so that memory does not grow with the run
 
@@ -57,17 +58,19 @@ def changes(system: System) -> bool:
 def over_time(history: History, system: System) -> OverTime | None:
     """What the windows of a history show; None where speed and load are constant, or samples are too few."""
     lowest, highest = system.natural_frequencies
-    duration = history.samples * history.interval
+    duration = (history.samples - 1) * history.interval
     window = min(max(CYCLES / max(lowest, 1e-9), duration / MOST_WINDOWS), duration / FEWEST_WINDOWS)
     hop = round(window / (_HOPS * history.interval))
     count = history.samples // max(hop, 1) - _HOPS + 1
-    if not changes(system) or hop < _HOPS or count < 1:
+    few = hop < _HOPS or hop * history.interval * lowest < SHORTEST
+    if not changes(system) or few or count < 1:
         return None
     frequency, density = _spectra(history, hop, count)
     middles = (np.arange(count) + _HOPS / 2).astype(np.float64) * hop * history.interval
     speed, load = (np.array([value_at(s, t) for t in middles]) for s in (system.belt, system.load))
     amplitude, swing, stick, friction = _statistics(history, hop, count)
-    loud = (swing >= LOUD * swing.max()) & (swing.max() > QUIET * system.fastest_belt)
+    pressed = float(np.abs(system.load["value"]).max()) / (system.coefficients.c_yy + system.contact_stiffness)
+    loud = (swing >= LOUD * swing.max()) & (amplitude.max() > QUIET * pressed)
     length = _HOPS * hop * history.interval
     peaks = [peak(frequency, row, length) if on else None for row, on in zip(density, loud, strict=True)]
     tones = np.array([math.nan if tone is None else tone for tone in peaks])
