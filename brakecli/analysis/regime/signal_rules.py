@@ -111,7 +111,7 @@ class SignalRules:
         )
         if slips.count < limits.fewest_cycles or slips.skewness < limits.skewness_unlikely:
             return None
-        if not slips.stick_slip and (slips.skewness >= limits.skewness_certain or slips.swings_back):
+        if not slips.stick_slip and slips.skewness >= limits.skewness_certain:
             return None
         turn = 2.0 * np.pi * min(4.0 * self.frequency * self.interval, 0.5)
         gain = 1.0 if velocity.measured else 2.0 - 2.0 * np.cos(turn)

@@ -22,7 +22,7 @@ _BULK = 3.0  # robust deviations that a slip leaves the velocity in stick by
 _FEWEST = 10
 _STRONG = 0.4  # of the tenth largest slip: the shape of smaller ones is not looked at
 _MOST = 512  # slips whose shape is averaged
-_LASTS, _RETURNS, _SWINGS = 0.55, (-0.4, 0.2), 0.45
+_LASTS, _RETURNS, _SWINGS = 0.55, (-1.0, -0.4, 0.2), (0.2, 0.45)
 _AROUND = 5  # widths of a slip in which it would swing
 _NARROW = 2  # samples of a pulse of velocity that may be a spike
 _REGULAR = 0.3  # of the median: quartiles of the times between pulses that spikes do not keep
@@ -60,7 +60,8 @@ class Slips:
     @property
     def swings_back(self) -> bool:
         """Whether the velocity swings as far the other way beside them, or between them, as after an impact."""
-        return not _RETURNS[0] <= self.returns <= _RETURNS[1] or self.swings > _SWINGS
+        least, low, most = _RETURNS
+        return not least <= self.returns <= most or self.swings > _SWINGS[self.returns >= low]
 
     @property
     def stick_slip(self) -> bool:
