@@ -8,7 +8,9 @@ import sys
 from pathlib import Path
 
 import h5py
+import numpy as np
 import pytest
+from scipy.io import wavfile
 
 from tests.campaign import campaign
 from tests.commands import ROOT, brakecli, environment
@@ -28,8 +30,10 @@ def prepare(folder: Path, text: str) -> None:
     """Give a page the files that it speaks of and does not make."""
     (folder / "cases").symlink_to(ROOT / "cases")
     (folder / "signal.csv").write_text(signal())
+    tone = np.sin(0.08 * math.pi * np.arange(10_000))
+    wavfile.write(folder / "brake.wav", 10_000, (10_000 * tone).astype(np.int16))
     with h5py.File(folder / "recorder.h5", "w") as file:
-        file["run3/position"] = [1e-6 * math.sin(0.08 * math.pi * n) for n in range(10_000)]
+        file["run3/position"] = 1e-6 * tone
     given = [] if "brakecli new squeal" in text else [("new", "squeal"), ("run", "squeal.toml")]
     given += [("run", "cases/relaxation.toml")] if '"relaxation.h5"' in text else []
     for line in given:

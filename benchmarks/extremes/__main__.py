@@ -38,7 +38,7 @@ from benchmarks.extremes.points import DRAWN, POINTS, Family, campaign, drawn, t
 PAGE = Path(__file__).parents[2] / "docs" / "extremes.md"
 INTRODUCTION = """# The extremes
 
-`make extremes` writes this page; all its numbers come from [benchmarks/extremes](../benchmarks/extremes).
+`make extremes` writes this page; all its numbers come from `benchmarks/extremes`.
 One quantity at a time is varied far beyond the range of any brake, in both directions. The base case is a shoe
 that sticks, slips and vibrates on a smooth wheel, or one on a rough wheel whose pad opens in part. Each scheme
 computes each point from rest, over {periods:g} periods of the fastest motion with {steps} steps per period, except

@@ -22,6 +22,7 @@ IN_DOUBT = {  # at 20 dB and worse
     "two lines in step": "noise hides the overtones that tell stick from two lines",
     "stick-slip 0.3": "noise hides the overtones, 1 % of the energy, that tell stick from three lines in step",
     "irregular stick-slip lognormal 0.3": "the same: a long slip among noise",
+    "irregular stick-slip lognormal 0.02": "few samples, in which noise hides that a slip goes one way only",
     "irregular stick-slip decade 0.3": "few samples, in which noise hides that slips go with the time before them",
 }
 
