@@ -164,6 +164,19 @@ def test_a_vibration_that_is_locked_to_the_waves_is_not_called_forced() -> None:
         assert (verdict.regime, verdict.second_run) == ("undecided", True)
 
 
+def test_a_cycle_is_not_doubled_because_its_samples_repeat_after_two() -> None:
+    """Half its frequency has 3e-9 of the energy by another integrator; the cycle itself has two rises."""
+    verdict = judged("fourteen and a half samples")
+    assert verdict.frequency == pytest.approx(47.74, abs=0.61)
+    assert verdict.evidence["rises_per_cycle"] == 2.0
+
+
+def test_a_forced_motion_on_a_pad_that_is_stable_where_it_opens_is_not_called_self_excited() -> None:
+    """At a fifth of the critical friction it swings by 0.72 of this, by another integrator."""
+    verdict = judged("forced, and unstable in full contact alone")
+    assert (verdict.regime, verdict.second_run) == ("undecided", True)
+
+
 def test_a_shoe_that_bounces_off_the_wheel_for_good_is_not_called_forced() -> None:
     """From twice the duration on it hangs on its links: what the waves force has no energy, and then ends."""
     assert judged("bounces, and leaves the wheel").regime == "undecided"

@@ -154,8 +154,12 @@ class ForcedRules:
 
     @property
     def _doubtful(self) -> bool:
-        """Whether friction can keep up only a large vibration, which no second run has shown."""
-        stable = self.context.growth() < 0.0 and not self._unstable_in_full_contact
+        """Whether friction can keep up only a large vibration, which no second run has shown.
+
+        Full contact says nothing of a pad that opens and moves as the waves do.
+        """
+        on_lines = self.evidence.get("forced_share", 0.0) >= self.limits.forced_share
+        stable = self.context.growth() < 0.0 and (on_lines or not self._unstable_in_full_contact)
         return stable and self.context.feeds is not Feeds.FRICTION
 
     @property
