@@ -29,7 +29,7 @@ TASK_SECONDS = 0.2  # of work in a task, so that handing it out costs little,
 TASKS_A_SECOND = (
     100.0  # and longer where many workers would ask for more tasks than this: a scheduler hands out some
 )
-LARGEST_TASK = 10_000
+LARGEST_TASK = 1000  # points, for up to a hundred workers; in proportion for more
 
 
 class TaskQueue:
@@ -45,6 +45,7 @@ class TaskQueue:
         edges = np.flatnonzero(np.diff(finished, prepend=True, append=True)).reshape(-1, 2).tolist()
         self._tasks = deque([Task(first, end - first) for first, end in edges][::order])
         self._size, self._least, self._task_seconds = size, least, max(TASK_SECONDS, workers / TASKS_A_SECOND)
+        self._most = max(LARGEST_TASK, LARGEST_TASK * workers // 100)
         self.seconds, self.units = 0.0, 0  # computed so far
 
     def next_task(self) -> Task | None:
@@ -52,7 +53,7 @@ class TaskQueue:
         if not self._tasks:
             return None
         task = self._tasks.popleft()
-        by_time = math.ceil(min(self._task_seconds * self.units / max(self.seconds, 1e-9), LARGEST_TASK))
+        by_time = math.ceil(min(self._task_seconds * self.units / max(self.seconds, 1e-9), self._most))
         size = min(task.size, self._size or max(self._least, by_time))
         if size < task.size:
             self._tasks.appendleft(Task(task.first + size, task.size - size))
