@@ -158,9 +158,8 @@ def _beginnings(part: Part, velocity: Array) -> tuple[Array, int]:
         shift = round(rises * period)
         if 0 < shift < len(velocity) // 2 and np.mean((velocity[shift:] - velocity[:-shift]) ** 2) <= close:
             longest = 1.0 / (rises * period * part.history.interval)
-            for fewer in (
-                each for each in range(1, rises) if rises % each == 0
-            ):  # as samples repeat later than it
+            divisors = [each for each in range(1, rises) if rises % each == 0]
+            for fewer in divisors:  # samples may repeat only after several cycles
                 most = _HARMONICS if fewer == 1 else 2  # further up there is what samples make of jumps
                 lines = [n * longest for n in range(1, most * rises) if n % (rises // fewer)]
                 if part.share(lines) <= _BETWEEN:
