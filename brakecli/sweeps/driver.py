@@ -26,9 +26,7 @@ from brakecli.sweeps.workers.local import LocalEngine
 from brakecli.sweeps.workers.task import Engine, Task, compute_units
 
 TASK_SECONDS = 0.2  # of work in a task, so that handing it out costs little,
-TASKS_A_SECOND = (
-    100.0  # and more where workers would ask for more tasks than this; a scheduler hands out 500
-)
+TASKS_A_SECOND = 100.0  # and more where workers would ask for more tasks than this; a scheduler hands out 500
 LARGEST_TASK = 1000  # points, for up to a hundred workers; in proportion for more
 
 
