@@ -26,6 +26,7 @@ QUARTER = 4.0 / 3.0  # a run whose last quarter is settled, over what comes befo
 _ERRORS = 2.0  # standard errors of a mean power
 _LARGER = 5.0  # times what the waves force in full contact: a larger motion needs more proof that it is forced
 _OFTEN = 0.1  # part of the time that shows that stick or flight holds a vibration within its limits
+_RING_DOWN = 0.5  # of the own vibration's decay, and of what dashpots take, that is kept up by nothing
 _TRACE = 0.1  # part of the energy of vx on the lines themselves, without which nothing is their subharmonic
 _MOST_COMBINED = 6  # waves whose frequencies are combined by threes
 _FOLLOWS = 0.1  # part of the energy of vx and vy in which a motion differs that comes back with the waves
@@ -101,12 +102,15 @@ class ForcedRules:
             return self._too_short(slow)
         growth = self.context.growth()
         if self.context.frictionless:
-            text = "without friction nothing but the roughness shakes the shoe"
-            return self._forced(text) if growth < 0.0 else Decision(f"{text}, but no dashpot damps it")
+            text = "without friction nothing else excites it"
+            return self._forced(text) if growth < 0.0 else Decision(f"{text}, but no dashpot damps the shoe")
         if self.context.feeds is Feeds.ROUGHNESS:
-            return self._forced("only the roughness shakes the shoe, as a second run shows")
+            return self._forced("a second run shows it")
         if self.context.feeds is Feeds.FRICTION:
             return None
+        if not self.context.touches():
+            text = "sliding steadily the shoe would not touch the wheel: it bounces, and may leave it for good"
+            return Decision(f"{text}; check the sign and size of load.force")
         share, dense = self._share(self.context.forced, 0.5)
         self.evidence["forced_share"] = share
         if share >= self.limits.forced_share and self.context.undamped and growth <= 0.0:
@@ -116,8 +120,7 @@ class ForcedRules:
             self._feeds()
             if self._locked:
                 return self._either()
-            text = "the motion comes back wherever the waves of the wheel do, and sliding is stable"
-            return self._forced(f"only the roughness shakes the shoe: {text}")
+            return self._forced("the motion comes back wherever the waves of the wheel do, and sliding is stable")
         if share < self.limits.forced_share:
             lines = tuple({*self.context.forced, *self.context.subharmonics()})
             trace = share
@@ -145,7 +148,7 @@ class ForcedRules:
                 f"{what}, which lie too close to be told from others; run twice as long, or decide by {SECOND_RUN}"
             )
             return self.fed() or Decision(text, second_run=True)
-        return self._forced(f"only the roughness shakes the shoe: {what}")
+        return self._forced(what)
 
     @property
     def _unstable_in_full_contact(self) -> bool:
@@ -158,9 +161,12 @@ class ForcedRules:
 
         Full contact says nothing of a pad that opens and moves as the waves do.
         """
-        on_lines = self.evidence.get("forced_share", 0.0) >= self.limits.forced_share
-        stable = self.context.growth() < 0.0 and (on_lines or not self._unstable_in_full_contact)
-        return stable and self.context.feeds is not Feeds.FRICTION
+        if self.context.feeds is Feeds.FRICTION:
+            return False
+        stable = self.context.growth() < 0.0
+        if self.evidence.get("forced_share", 0.0) >= self.limits.forced_share:
+            return stable or self._follows()
+        return stable and not self._unstable_in_full_contact
 
     @property
     def _locked(self) -> bool:
@@ -238,8 +244,8 @@ class ForcedRules:
         clear = [share for share, dense in shares if not dense and share >= self.limits.forced_share]
         return (max(clear), False) if clear else max(shares)
 
-    def _forced(self, text: str) -> Decision:
-        """Forced, as seen in a settled part of two periods of the slowest wave."""
+    def _forced(self, what: str) -> Decision:
+        """Forced, as seen in a settled part of two periods of the slowest wave, and as `what` shows."""
         growth = self.context.growth()
         fading = 0.25 * self.duration * growth > -_RELAXED  # too slowly to be seen within a quarter of the run
         falls = 0.0
@@ -250,13 +256,21 @@ class ForcedRules:
         if self._settled_seconds < 2.0 * slow:
             return self._too_short(slow)
         self.rings = not self.lasts and growth < 0.0 and (fading or falls > self.limits.settled_within)
-        if self.rings:
-            if own := self._own_line():
-                ringing = f"the shoe's own vibration at {own:.4g} Hz, which decays, lies on the same lines"
-                text = f"sliding is stable, and the roughness shakes the shoe; {ringing}"
-            needed = max(QUARTER * (self.duration - self._powers_to_lose / growth), self._long_enough(slow))
-            text += f"; run at least {needed:.3g} s to see the amplitude that lasts"
-        return Decision(text, Regime.DAMPED, Excitation.FORCED)
+        if not self.rings:
+            return Decision(f"only the roughness shakes the shoe: {what}", Regime.DAMPED, Excitation.FORCED)
+        needed = max(QUARTER * (self.duration - self._powers_to_lose / growth), self._long_enough(slow))
+        hint = f"; run at least {needed:.3g} s to see the amplitude that lasts"
+        if self._trend < _RING_DOWN * growth and self._open:
+            text = f"still decaying at {-self._trend:.3g} 1/s; the shoe's own vibration decays at {-growth:.3g} 1/s"
+            return Decision(f"{text}{hint}, or decide by {SECOND_RUN}", second_run=True)
+        own = f" at {line:.4g} Hz on the same lines" if (line := self._own_line()) else ""
+        text = f"the roughness shakes the shoe beside its own vibration{own}, which decays at {-growth:.3g} 1/s"
+        return Decision(f"{text}: {what}{hint}", Regime.DAMPED, Excitation.FORCED)
+
+    @property
+    def _open(self) -> bool:
+        """Whether neither theory nor a second run has shown that what does not decay is forced."""
+        return not self.context.frictionless and self.context.feeds is Feeds.UNKNOWN
 
     @property
     def _trend(self) -> float:
@@ -313,10 +327,9 @@ class ForcedRules:
         open_by = abs(friction + roughness - lost)
         error = _ERRORS * max(math.hypot(off, off_too), open_by)
         stable = self.context.growth() < 0.0 and not self._unstable_in_full_contact
-        if stable and roughness - 2.0 * max(friction, 0.0) > error:
-            return Feeds.ROUGHNESS
         takes = self.context.growth() < 0.0 and friction + _ERRORS * max(off, open_by) < 0.0
-        if takes and roughness > -0.5 * friction:
+        shakes = stable and roughness - 2.0 * max(friction, 0.0) > error
+        if (shakes or (takes and roughness > -0.5 * friction)) and friction + roughness > _RING_DOWN * lost:
             return Feeds.ROUGHNESS
         if friction > error and (roughness + error < 0.0 or friction > (2.0 if stable else 1.0) * roughness):
             return Feeds.FRICTION
@@ -326,7 +339,7 @@ class ForcedRules:
         """On a rough wheel: forced where it is the roughness that feeds the vibration."""
         if not self.context.forced or self._feeds() is not Feeds.ROUGHNESS:
             return None
-        return self._forced(f"only the roughness shakes the shoe: {self._powers}")
+        return self._forced(self._powers)
 
     def _either(self) -> Decision:
         text = f"{self._powers}, so that either may keep it up"

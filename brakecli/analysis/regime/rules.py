@@ -146,10 +146,10 @@ class _Rules(ForcedRules):
             return None
         text = f"vx has fallen to {envelope.final / envelope.largest:.2g} of its largest amplitude"
         if kept:
-            text = f"the shoe's own vibration has died out: {text}, and only the roughness shakes it"
             found = self._forced(text)
             if found.regime is Regime.DAMPED:
                 return found
+            text = f"the shoe's own vibration has died out: {text}"
             return Decision(f"{text}; {found.reason}", Regime.DAMPED, Excitation.FORCED)
         return Decision(f"the vibration has died out: {text}", Regime.DAMPED)
 
