@@ -6,10 +6,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brakecli.analysis.regime.cycles import Cycles
-from brakecli.analysis.regime.evidence import LINE_BINS, WINDOWS, Envelope, Part
+from brakecli.analysis.regime.evidence import LINE_BINS, WINDOWS, Envelope, Part, follows
 from brakecli.analysis.regime.verdict import Context, Decision, Excitation, Feeds, Regime, Thresholds
 from brakecli.solver.history import History
 from brakecli.solver.quantities import ContactState
@@ -29,8 +28,6 @@ _OFTEN = 0.1  # part of the time that shows that stick or flight holds a vibrati
 _RING_DOWN = 0.5  # of the own vibration's decay, and of what dashpots take, that is kept up by nothing
 _TRACE = 0.1  # part of the energy of vx on the lines themselves, without which nothing is their subharmonic
 _MOST_COMBINED = 6  # waves whose frequencies are combined by threes
-_FOLLOWS = 0.1  # part of the energy of vx and vy in which a motion differs that comes back with the waves
-_PROBES, _MOST_RETURNS, _APART = 400, 1 << 14, 5  # times compared, among how many, so many cycles of vx apart
 SECOND_RUN = "a second run: brakecli classify RESULT.h5 --second-run"
 _COMBINATIONS = [(i, j, k) for i in range(-2, 3) for j in range(-2, 3) for k in (-1, 0, 1)]
 
@@ -77,6 +74,14 @@ class ForcedRules:
         least = max([amplitude, *(swing for _, swing in self.context.waves)]) if self.context.waves else 0.0
         counts = [f for f, swing in self.context.waves if swing >= self.limits.settled_within * least]
         return 1.0 / min(counts) if counts else 0.0
+
+    @property
+    def _beat(self) -> float:
+        """Period (s) of the slowest wave, or of the slowest beat of one that counts with a multiple of another."""
+        slow, most = self._slowest(0.0), max((swing for _, swing in self.context.waves), default=0.0)
+        counts = [f for f, swing in self.context.waves if swing >= self.limits.settled_within * most]
+        beats = [abs(f - n * g) for f in counts for g in counts for n in range(1, 11)]
+        return max([slow, *(1.0 / beat for beat in beats if beat * slow > _NOTHING)])
 
     def _long_enough(self, slow: float) -> float:
         """Duration (s) of a run whose settled part holds two periods."""
@@ -204,32 +209,7 @@ class ForcedRules:
         return math.sqrt(0.5 * sum(swing**2 for _, swing in self.context.waves))
 
     def _follows(self) -> bool:
-        """Whether vx and vy come back, at times far from one another, wherever all waves have the same phase."""
-        from scipy.spatial import cKDTree
-
-        speeds = np.array([frequency * swing for frequency, swing in self.context.waves])
-        for part in (self.settled_part, self.last):
-            velocity = np.stack([part.last("vx"), part.last("vy")], axis=1)
-            rises = np.count_nonzero((velocity[:-1, 0] < 0.0) & (velocity[1:, 0] >= 0.0))
-            size = velocity.std(axis=0)
-            if rises <= 2 * _APART or not size.all():
-                continue
-            stride = -(-len(velocity) // _MOST_RETURNS)
-            places: NDArray[np.intp] = np.arange(0, len(velocity), stride)
-            turns = np.outer(places * part.history.interval, [frequency for frequency, _ in self.context.waves])
-            waves = speeds / speeds.max() * np.exp(2j * math.pi * turns)
-            points = np.concatenate([waves.real, waves.imag], axis=1)
-            probes = np.linspace(0, len(places) - 1, _PROBES).astype(int)
-            near = np.asarray(cKDTree(points).query(points[probes], k=min(_PROBES, len(places)))[1])
-            far = np.abs(near - probes[:, None]) * stride > _APART * len(velocity) / rises
-            found = far.any(axis=1)
-            if np.count_nonzero(found) < _PROBES // 2:
-                continue
-            pairs = probes[found], near[found, far[found].argmax(axis=1)]
-            apart = np.subtract(*(velocity[places[each]] / size for each in pairs))
-            if float(np.mean(apart**2)) <= 2.0 * _FOLLOWS:
-                return True
-        return False
+        return any(follows(part, self.context.waves) for part in (self.settled_part, self.last))
 
     def _share(self, lines: Sequence[float], most: float) -> tuple[float, bool]:
         """Part of the energy of vx on lines, in the second half or in the last quarter, where it is more.
@@ -257,11 +237,13 @@ class ForcedRules:
             return self._too_short(slow)
         self.rings = not self.lasts and growth < 0.0 and (fading or falls > self.limits.settled_within)
         if not self.rings:
+            if self._settled_seconds < self._beat:
+                self.settled, what = False, f"{what}; the waves beat every {self._beat:.3g} s"
             return Decision(f"only the roughness shakes the shoe: {what}", Regime.DAMPED, Excitation.FORCED)
         needed = max(QUARTER * (self.duration - self._powers_to_lose / growth), self._long_enough(slow))
         hint = f"; run at least {needed:.3g} s to see the amplitude that lasts"
         if self._trend < _RING_DOWN * growth and self._open:
-            text = f"still decaying at {-self._trend:.3g} 1/s; the shoe's own vibration decays at {-growth:.3g} 1/s"
+            text = f"still decaying at {-self._trend:.3g} 1/s; its own vibration decays at {-growth:.3g} 1/s"
             return Decision(f"{text}{hint}, or decide by {SECOND_RUN}", second_run=True)
         own = f" at {line:.4g} Hz on the same lines" if (line := self._own_line()) else ""
         text = f"the roughness shakes the shoe beside its own vibration{own}, which decays at {-growth:.3g} 1/s"
