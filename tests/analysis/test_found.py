@@ -285,12 +285,12 @@ def test_powers_that_do_not_make_up_for_the_dashpots_show_no_forced_vibration() 
     assert (verdict.regime, verdict.excitation) == (Regime.UNDECIDED, Excitation.NONE)
 
 
-@pytest.mark.parametrize("times", [1.0, 4.0])
-def test_a_shoe_that_the_load_pulls_off_the_wheel_is_not_called_forced(times: float) -> None:
-    """Without roughness it rests 0.17 mm off the wheel; in 16 times as long it has left it for good."""
-    verdict = judged("hangs off the wheel", times)
+def test_a_shoe_that_the_load_pulls_off_the_wheel_is_not_called_forced() -> None:
+    """Without roughness it rests off the wheel; in 16 times as long it has left it for good."""
+    verdict = judged("hangs off the wheel")
     assert verdict.regime is Regime.UNDECIDED
     assert "would not touch the wheel" in verdict.reasons[0]
+    assert judged("hangs off the wheel", 4.0).regime is Regime.UNDECIDED
 
 
 def test_a_trace_that_fades_makes_no_cycle_of_three_rises() -> None:

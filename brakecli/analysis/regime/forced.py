@@ -113,9 +113,6 @@ class ForcedRules:
             return self._forced("a second run shows it")
         if self.context.feeds is Feeds.FRICTION:
             return None
-        if not self.context.touches():
-            text = "sliding steadily the shoe would not touch the wheel: it bounces, and may leave it for good"
-            return Decision(f"{text}; check the sign and size of load.force")
         share, dense = self._share(self.context.forced, 0.5)
         self.evidence["forced_share"] = share
         if share >= self.limits.forced_share and self.context.undamped and growth <= 0.0:
@@ -226,6 +223,9 @@ class ForcedRules:
 
     def _forced(self, what: str) -> Decision:
         """Forced, as seen in a settled part of two periods of the slowest wave, and as `what` shows."""
+        if self._open and not self.context.touches():
+            text = "sliding steadily the shoe would not touch the wheel: it bounces, and may leave it for good"
+            return Decision(f"{text}; check the sign and size of load.force")
         growth = self.context.growth()
         fading = 0.25 * self.duration * growth > -_RELAXED  # too slowly to be seen within a quarter of the run
         falls = 0.0
@@ -242,11 +242,12 @@ class ForcedRules:
             return Decision(f"only the roughness shakes the shoe: {what}", Regime.DAMPED, Excitation.FORCED)
         needed = max(QUARTER * (self.duration - self._powers_to_lose / growth), self._long_enough(slow))
         hint = f"; run at least {needed:.3g} s to see the amplitude that lasts"
+        rate = f"decays at {-growth:.3g} 1/s"
         if self._trend < _RING_DOWN * growth and self._open:
-            text = f"still decaying at {-self._trend:.3g} 1/s; its own vibration decays at {-growth:.3g} 1/s"
+            text = f"still decaying at {-self._trend:.3g} 1/s; the shoe's own vibration {rate}"
             return Decision(f"{text}{hint}, or decide by {SECOND_RUN}", second_run=True)
         own = f" at {line:.4g} Hz on the same lines" if (line := self._own_line()) else ""
-        text = f"the roughness shakes the shoe beside its own vibration{own}, which decays at {-growth:.3g} 1/s"
+        text = f"the roughness shakes the shoe beside its own vibration{own}, which {rate}"
         return Decision(f"{text}: {what}{hint}", Regime.DAMPED, Excitation.FORCED)
 
     @property
