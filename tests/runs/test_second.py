@@ -115,3 +115,12 @@ def test_a_second_run_shows_that_the_roughness_forces_what_lasts(name: str) -> N
     feeds, *_ = compared(second_system(system, history), history)
     assert verdict_on(history, system, None).regime is Regime.UNDECIDED
     assert verdict_on(history, system, None, None, feeds).excitation is Excitation.FORCED
+
+
+def test_what_falls_as_friction_does_is_not_shown_to_be_self_excited() -> None:
+    """By another integrator the level rises smoothly from a third of the critical friction through it."""
+    system = system_of(
+        parse_case(tomli_w.dumps(SHOES["grows with friction, without a critical value"]), "case").case
+    )
+    history = array_history(system.interval, solve(system).rows)
+    assert compared(second_system(system, history), history)[0] is Feeds.UNKNOWN
