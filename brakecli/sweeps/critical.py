@@ -318,13 +318,13 @@ def _fades(verdict: Verdict | Known | None, duration: float, unstable: bool | No
         return not unstable
     if verdict.regime is not Regime.UNDECIDED:
         return verdict.regime is Regime.DAMPED
+    slope, error = (verdict.evidence.get(f"envelope_slope{what}", 0.0) for what in ("", "_error"))
+    slope = slope if abs(slope) > 3.0 * error else 0.0
     if isinstance(verdict, Verdict) and verdict.second_run:  # the roughness may keep it up as well
-        return None
-    slope, error = verdict.evidence.get("envelope_slope"), verdict.evidence.get("envelope_slope_error", 0.0)
+        return True if slope < 0.0 and not limited else None
     if limited:
-        falls = slope if slope is not None and slope < -3.0 * error else 0.0
-        return None if -1.0 < falls * duration < 0.0 else falls < 0.0
-    return bool(slope <= 0.0) if slope is not None and abs(slope) > 3.0 * error else None
+        return None if -1.0 < slope * duration < 0.0 else slope < 0.0
+    return slope < 0.0 if slope else None
 
 
 def _sustained(critical: Critical, fades: Answer, found: Search) -> tuple[float | None, Outcome]:
