@@ -11,6 +11,7 @@ import threading
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from itertools import pairwise
 from os import PathLike
 from pathlib import Path
@@ -254,13 +255,15 @@ def _target(output: "str | PathLike[str] | None") -> Iterator[Path]:
 
 
 def _case(source: "Source | LoadedSweep", settings: "Settings | None") -> "LoadedCase":
-    from brakecli.case.read import LoadedCase, parse_case
+    from brakecli.case.case import given_toml
+    from brakecli.case.read import LoadedCase, parse_case, parse_resolved
     from brakecli.cli.inputs import load_case
 
     if isinstance(source, LoadedCase):
-        return parse_case(source.resolved, "the case", _overrides(settings)) if settings else source
+        changed = parse_case(given_toml(source.case), "the case", _overrides(settings)) if settings else source
+        return replace(changed, text=source.text)
     if resolved := getattr(source, "attrs", {}).get("resolved_toml"):  # a result
-        return parse_case(str(resolved), "its case", _overrides(settings))
+        return parse_resolved(str(resolved), "its case", _overrides(settings))
     if not isinstance(source, str | PathLike):
         raise UsageError(
             f"{type(source).__name__}: is no case; give a path, or what brakecli.load returns for one"

@@ -63,6 +63,16 @@ def test_outputs_stay_only_where_they_are_asked_for(tmp_path: Path, monkeypatch:
     assert [each.name for each in tmp_path.iterdir()] == ["kept.h5"]
 
 
+def test_settings_lead_to_the_same_run_whether_the_case_was_loaded_before_or_not(tmp_path: Path) -> None:
+    places = np.linspace(0.0, np.pi, 180, endpoint=False)  # m; a turn of a wheel of 0.5 m
+    heights = 1e-6 * np.sin(2.0 * places)
+    np.savetxt(tmp_path / "runout.csv", np.transpose([places, heights]), delimiter=",")
+    (tmp_path / "c.toml").write_text(f'{TINY}\nroughness.wheel.profile = "runout.csv"\n')
+    for settings in ({"wheel.radius": 0.6}, {"roughness.wheel.profile_error": 0.5}, {"solver.step": 5e-5}, {}):
+        loaded = brakecli.load(tmp_path / "c.toml")
+        assert brakecli.run(loaded, settings).identical(brakecli.run(tmp_path / "c.toml", settings)), settings
+
+
 def test_a_file_that_was_changed_is_read_again(tmp_path: Path) -> None:
     file = tmp_path / "c.toml"
     for load in (5000.0, 4000.0):

@@ -2,6 +2,7 @@
 
 import math
 import stat
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,9 @@ def sines_of(path: Path, error: float, radius: float, pad: float | None) -> dict
     wheel, of which whole turns are averaged. Otherwise the profile is repeated beyond what was measured. Raises
     UnreadableResultError, UsageError and OSError.
     """
-    place, height = _read(path, radius)
+    status = path.stat()
+    place, height, is_angle = _read(path, (status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns))
+    place = place * radius if is_angle else place
     turn, step = 2.0 * math.pi * radius, float(np.median(np.diff(place)))
     turns, around = _turns(place, step, turn) if pad is None else (0, 0.0)
     if turns:
@@ -57,8 +60,12 @@ def sines_of(path: Path, error: float, radius: float, pad: float | None) -> dict
     return {"amplitudes": amplitudes.tolist(), **waves, "phases_deg": phases.tolist(), "note": note}
 
 
-def _read(path: Path, radius: float) -> tuple[Array, Array]:
-    """Places along the surface, rising, and heights there, m."""
+@lru_cache(maxsize=2)
+def _read(path: Path, stamp: tuple[int, ...]) -> tuple[Array, Array, bool]:
+    """Places along the surface, rising, and heights there, m; whether the places are angles, rad.
+
+    The same file serves all points of a sweep; `stamp` tells when it has changed.
+    """
     require(stat.S_ISREG(path.stat().st_mode), "this is not a regular file; name a CSV file")
     table = TextTable(path)
     require(table.columns == 2, f"has {table.columns} columns; give two: position or angle, and height")
@@ -82,7 +89,7 @@ def _read(path: Path, radius: float) -> tuple[Array, Array]:
         steps.min() > 0.0, f"its places do not rise or fall throughout, see row {row} of numbers; sort the rows"
     )
     require(np.ptp(height) > 0.0, "all heights are equal; leave the surface out, which is smooth")
-    return place * (radius if along and along[1] == "radian" else 1.0), height
+    return place, height, bool(along and along[1] == "radian")
 
 
 def _turns(place: Array, step: float, turn: float) -> tuple[int, float]:

@@ -210,8 +210,10 @@ def _checksum(place: tuple[int, int, int], packed: bytes) -> int:
 
 def identity(plan: Plan) -> dict[str, Any]:
     """What makes a sweep this one: every key of the sweep and its case, and the versions it is computed with."""
-    sweep = tomllib.loads(plan.sweep_text)
-    return {**fingerprint(), **dict(_flat(plan.case_keys, "", "")), **dict(_flat(sweep, "sweep ", ""))}
+    sweep, case = tomllib.loads(plan.sweep_text), dict(_flat(plan.case_keys, "", ""))
+    profiles = [Path(text) for key, text in case.items() if key.endswith(".profile")]
+    measured = {f"checksum of {path.name}": zlib.crc32(path.read_bytes()) for path in profiles}
+    return {**fingerprint(), **case, **measured, **dict(_flat(sweep, "sweep ", ""))}
 
 
 def _flat(value: Any, path: str, dot: str = ".") -> Iterator[tuple[str, Any]]:
