@@ -262,6 +262,38 @@ def test_of_two_lengths_the_first_samples_are_compared(folder: Path) -> None:
     assert (time["shapes"], time["compared"], time["different"]) == ([[5001], [2501]], 2501, 0)
 
 
+@pytest.mark.parametrize("interval", ["2e-4", "1.37e-4"])
+def test_samples_are_compared_at_the_same_time_and_lines_at_the_same_frequency(
+    folder: Path, interval: str
+) -> None:
+    change = ["--set", f"output.sample_interval={interval}", "--set", "solver.duration=0.45"]
+    coarse, fine = tmp_path / "coarse.h5", folder / "a.h5"
+    brakecli("run", "tiny.toml", "-q", "-o", coarse, *change, cwd=folder).told(0)
+    for names, swap in (((fine, coarse), 1), ((coarse, fine), -1)):
+        found = brakecli("diff", *names, "--json", cwd=folder).json
+        variables = {(each["group"], each["name"]): each for each in found["variables"]}
+        times = history(coarse, "time")
+        for name, unit in (("vx", "m/s"), ("y", "m")):
+            expected = np.interp(times, history(fine, "time"), history(fine, name))
+            apart = np.abs(history(coarse, name) - expected).max()
+            each_ = variables["history", name]
+            assert each_["largest"] == pytest.approx(apart, rel=1e-9, abs=1e-15)
+            assert (
+                each_["relative"] < 0.02
+            )  # linear interpolation: (2 pi 174 Hz x 1e-4 s)^2 / 8 is 0.15 %, and kinks
+            assert (each_["compared"], each_["units"], each_["interpolated"]) == (len(times), unit, "time")
+            assert each_["shapes"][::swap] == [[5001], [len(times)]]
+        assert variables["history", "time"]["different"] == 0
+        lines, there = (history(path, "frequency", "spectrum") for path in (coarse, fine))
+        common = lines[lines <= there[-1]] if len(lines) < len(there) else there[there <= lines[-1]]
+        assert variables["spectrum", "vx"]["compared"] == len(common)
+        assert variables["spectrum", "vx"]["interpolated"] == "frequency"
+    numbers = {each["name"]: each.get("units") for each in found["numbers"]}
+    assert numbers["amplitude"] == "m"
+    shown = " ".join(brakecli("diff", fine, coarse, cwd=folder).out.split())
+    assert "compared at equal time and frequency; the finer result is interpolated" in shown
+
+
 def test_results_of_two_kinds_are_not_compared(folder: Path) -> None:
     brakecli("diff", "a.h5", "modes.h5", cwd=folder).told(2, "a.h5 is a run, and modes.h5 a stability")
 
