@@ -264,7 +264,7 @@ def test_of_two_lengths_the_first_samples_are_compared(folder: Path) -> None:
 
 @pytest.mark.parametrize("interval", ["2e-4", "1.37e-4"])
 def test_samples_are_compared_at_the_same_time_and_lines_at_the_same_frequency(
-    folder: Path, interval: str
+    folder: Path, tmp_path: Path, interval: str
 ) -> None:
     change = ["--set", f"output.sample_interval={interval}", "--set", "solver.duration=0.45"]
     coarse, fine = tmp_path / "coarse.h5", folder / "a.h5"
