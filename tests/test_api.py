@@ -171,6 +171,40 @@ def test_errors_are_those_of_the_commands(tmp_path: Path) -> None:
         brakecli.classify(tmp_path / "broken.h5", thresholds={"few": 1})
 
 
+SAID = [
+    (lambda: brakecli.run("none.toml"), "no such file or directory; name a TOML file$"),
+    (lambda: brakecli.load("none.toml"), "no such file or directory; name a TOML file$"),
+    (lambda: brakecli.run(CASE, {"shoe.mas": 3}), r"^setting shoe\.mas=3: shoe\.mas: is unknown"),
+    (lambda: brakecli.run(CASE, {"wheel.times": [1.0, -math.inf]}), r"^setting wheel\.times=\[1\.0, -inf\]: "),
+    (
+        lambda: brakecli.run(CASE, SHORT, output="kept"),
+        "replace it with force=True, or choose another output with output$",
+    ),
+    (lambda: brakecli.classify("kept", "velocity"), "give either sample_rate HZ or time_column$"),
+    (lambda: brakecli.classify("kept", belt_speed=3.0), "^belt_speed: is only .* state with quantity what was"),
+    (lambda: brakecli.classify("kept.h5", thresholds={"few": 1}), "^thresholds few=1: there is no threshold few"),
+    (lambda: brakecli.sweep(CASE), "simulate it with: brakecli.run$"),
+]
+
+
+@pytest.mark.parametrize(("call", "words"), SAID)
+def test_errors_name_arguments_and_no_options(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: Any, words: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("kept", "kept.h5"):
+        (tmp_path / name).write_text("1,2\n3,4\n5,6\n7,8\n")
+    with pytest.raises(BrakecliError, match=words) as caught:
+        call()
+    assert "--" not in str(caught.value)
+
+
+def test_a_netcdf_copy_of_a_result_is_refused_with_its_reason(tmp_path: Path) -> None:
+    brakecli.run(CASE, SHORT).to_netcdf(tmp_path / "copy.nc", engine="h5netcdf")
+    with pytest.raises(UnreadableResultError, match="a copy that xarray writes has another form"):
+        brakecli.load(tmp_path / "copy.nc")
+
+
 def test_a_run_that_fails_raises_and_keeps_its_history(tmp_path: Path) -> None:
     (tmp_path / "tiny.toml").write_text(TINY)
     with (
