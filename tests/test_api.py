@@ -127,6 +127,16 @@ def test_a_sweep_is_that_of_its_file(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.critical, exact, rtol=1e-9)
 
 
+def test_whole_numbers_along_an_axis_stay_whole_where_their_key_is(tmp_path: Path) -> None:
+    (tmp_path / "t.toml").write_text(TINY)
+    seeds = [2**60 + 1, 2**60 + 3]
+    spectrum = {"rms": 1e-7, "hurst": 0.8, "shortest": 0.01, "longest": 0.07, "terms": 5}
+    axes: dict[str | tuple[str, ...], Any] = {"roughness.wheel.spectrum.seed": seeds, "shoe.mass": [9, 10]}
+    found = brakecli.sweep(tmp_path / "t.toml", {"roughness.wheel": {"spectrum": spectrum}}, axes=axes, jobs=1)
+    assert found.roughness_wheel_spectrum_seed.values.tolist() == seeds
+    assert (found.roughness_wheel_spectrum_seed.dtype.kind, found.shoe_mass.dtype.kind) == ("i", "f")
+
+
 def test_a_signal_is_classified(tmp_path: Path) -> None:
     time_axis = np.arange(4000) / 2e4
     rows = "\n".join(f"{t},{math.sin(2 * math.pi * 400.0 * t)}" for t in time_axis)

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from brakecli.errors import UsageError
 from brakecli.files.read import StoredResult
 from brakecli.plots import style
-from brakecli.plots.quantities import VARIABLES, scaled
+from brakecli.plots.quantities import VARIABLES, Scaled, scaled
 from brakecli.plots.run import RunPicture
 
 _WIDTH, _COLUMNS = 9.4, 100  # inches; of an envelope
@@ -54,7 +54,7 @@ def _runs(results: tuple[StoredResult, StoredResult], variable: str) -> Figure:
         else:
             panels[1].plot(time, lowest, time, highest, **curve)
         _, frequency, density = picture.spectrum
-        panels[2].semilogy(frequency[1:], np.where(density > 0.0, density, np.nan)[1:], **curve)
+        panels[2].semilogy(frequency[1:], np.where(density > 0.0, look.factor**2 * density, np.nan)[1:], **curve)
     ends = [min(float(time[0]) for time in times), max(float(time[-1]) for time in times)]
     _along(panels[0], "time" if same_end else "time before the end of each part", ends, "s")
     part = pictures[0].part if pictures[0].part == pictures[1].part else "Last part of each"
@@ -65,7 +65,7 @@ def _runs(results: tuple[StoredResult, StoredResult], variable: str) -> Figure:
     spans = [edge for picture in pictures for edge in picture.span]
     _along(panels[1], "time", [min(spans), max(spans)], "s")
     panels[1].set(title=f"Whole runs: {VARIABLES[name][0]}, least and largest", ylabel=whole_look.label)
-    _spectra(panels[2], pictures, variable)
+    _spectra(panels[2], pictures, variable, look)
     figure.align_ylabels()
     return figure
 
@@ -73,18 +73,22 @@ def _runs(results: tuple[StoredResult, StoredResult], variable: str) -> Figure:
 def _wider(time: style.Array, lowest: style.Array, highest: style.Array) -> list[style.Array]:
     """An envelope of fewer columns, so that each holds a cycle or more."""
     first = np.arange(0, len(time), max(1, len(time) // _COLUMNS))
-    return [time[first], np.minimum.reduceat(lowest, first), np.maximum.reduceat(highest, first)]
+    ends = [np.minimum.reduceat(lowest, first), np.maximum.reduceat(highest, first)]
+    return [
+        np.append(each[:], last)
+        for each, last in zip((time[first], *ends), (time[-1], *(end[-1] for end in ends)), strict=True)
+    ]
 
 
-def _spectra(axes: Axes, pictures: list[RunPicture], variable: str) -> None:
+def _spectra(axes: Axes, pictures: list[RunPicture], variable: str, look: Scaled) -> None:
     """Limits and labels of the spectra, by the lines that both runs have."""
     lines = [6.5 * line for picture in pictures if (line := picture.line[1])]
     highest = min(max(picture.spectrum[1][-1] for picture in pictures), max(lines, default=np.inf))
-    most = max(float(picture.spectrum[2].max(initial=0.0)) for picture in pictures)
+    most = look.factor**2 * max(float(picture.spectrum[2].max(initial=0.0)) for picture in pictures)
     if most:
         axes.set_ylim(1e-10 * most, 10.0 * most)
     _along(axes, "frequency", [0.0, float(highest)], "Hz")
-    unit = VARIABLES[variable][3]
+    unit = look.unit
     squared = f"({unit})²" if set(unit) & {"/", " "} else f"{unit}²" if unit else "1"
     axes.set(title=f"Spectra of {VARIABLES[variable][2]}", ylabel=f"power spectral density ({squared}/Hz)")
 

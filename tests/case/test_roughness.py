@@ -196,6 +196,19 @@ def test_a_gap_in_a_profile_is_told(tmp_path: Path) -> None:
     assert "a straight line bridges a gap of 0.20" in case.resolved
 
 
+@pytest.mark.parametrize("turns", [1, 2])
+@pytest.mark.parametrize("missed", [0.0, 0.001, -0.001])
+def test_a_record_that_misses_a_turn_by_a_little_tells_that_it_was_stretched(
+    tmp_path: Path, turns: int, missed: float
+) -> None:
+    angles = (
+        np.arange(180 * turns) * 2.0 * (1.0 - missed / turns)
+    )  # its end misses a whole number of turns so much
+    note = loaded(saved(tmp_path / "p.csv", "angle_deg,um", angles, np.cos(np.radians(angles)))).resolved
+    assert (f"the record was stretched by {'-' * (missed < 0)}" in note) == (missed != 0.0)
+    assert f"{100.0 * abs(missed) / turns:.1g} % to whole turns" in note or not missed
+
+
 @pytest.mark.parametrize("error", [0.5, 0.1, 0.01])
 def test_no_fewer_sines_leave_out_so_little_of_a_profile(tmp_path: Path, error: float) -> None:
     heights = np.random.default_rng(3).normal(size=400)
@@ -239,6 +252,8 @@ WRONG = {
     "0,1\n1,nan\n2,1\n3,5\n": "a cell is empty or no number",
     "0,1\n1,2\n1,3\n3,5\n": "see row 3 of numbers; sort the rows",
     "0,1\n1,1\n2,1\n3,1\n": "all heights are equal",
+    "\n".join(f"{0.001 * i},{0.3 * i}" for i in range(300)): "its heights lie on a straight line",
+    "1\n2\n3\n4\n": "has 1 column (found",
     "\0\0": "this is not text",
 }
 

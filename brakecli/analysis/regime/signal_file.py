@@ -73,7 +73,7 @@ def read_signal(
             values, written = _dataset(path, inside)
             times, size, name = [], _size(_written(written, unit, quantity), unit, *_SI[quantity]), inside
         else:
-            table = TextTable(path)
+            table = TextTable(path, "a CSV file, or FILE.h5:/path of an HDF5 file")
             values, *times = table.columns_of(column, time_column)
             place, *clock = table.places
             size = _size(table.unit(place, *_SI[quantity]), unit, *_SI[quantity])
