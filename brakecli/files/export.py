@@ -12,7 +12,7 @@ import numpy as np
 
 from brakecli.errors import UnreadableResultError, UsageError
 from brakecli.files import fields
-from brakecli.files.atomic import new_output
+from brakecli.files.atomic import check_target, new_output
 from brakecli.files.read import StoredResult, Variable
 from brakecli.files.write import FILL
 
@@ -41,9 +41,8 @@ def export(
 
     Raises UsageError for what the result does not have, UnreadableResultError and CannotWriteError.
     """
+    check_target(target, "a kind of file", (".csv", ".wav"), [result.path])
     suffix, kind = target.suffix.lower(), result.attributes.get("kind")
-    if suffix not in (".csv", ".wav"):
-        raise UsageError(f"{target}: its suffix does not name a kind of file; name one that ends in .csv or .wav")
     if kind != "run" and (group or suffix == ".wav"):
         what = f"--group {group}" if group else str(target)
         raise UsageError(f"{what}: is for runs, and {result.path} is a {kind}; export it as .csv without --group")

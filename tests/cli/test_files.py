@@ -205,7 +205,7 @@ def test_samples_that_are_not_equally_spaced_make_no_sound(folder: Path, tmp_pat
 ERRORS = [
     (
         ["a.h5", "-o", "a.txt"],
-        "a.txt: its suffix does not name a kind of file; name one that ends in .csv or .wav",
+        "its suffix does not name a kind of file (found '.txt'); name a file that ends in .csv or .wav with -o",
     ),
     (["modes.h5", "-o", "a.wav"], "a.wav: is for runs, and modes.h5 is a stability"),
     (["modes.h5", "-o", "m.csv", "--group", "history"], "--group history: is for runs"),
