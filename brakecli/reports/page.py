@@ -25,7 +25,7 @@ def write_report(results: Sequence[Path], target: Path, *, force: bool, progress
     Raises UsageError for another suffix, an existing target without `force`, a page that would be too large, and
     where a library is missing; UnreadableResultError; CannotWriteError.
     """
-    check_target(target, "a page", (".htm", ".html"), results)
+    check_target(target, "a page", (".html", ".htm"), results)
     try:
         import jinja2
         import matplotlib.figure  # noqa: F401
