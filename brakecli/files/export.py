@@ -3,6 +3,7 @@
 import csv
 import io
 import math
+import re
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from pathlib import Path
@@ -127,7 +128,8 @@ def _checked(names: Sequence[str], there: Sequence[str], result: StoredResult) -
 
 
 def _head(name: str, variable: Variable) -> str:
-    units = str(variable.attributes.get("units", ""))
+    units = re.sub(r"^\(([^/ ]*)\)2 Hz-1", r"\1^2/Hz", str(variable.attributes.get("units", "")))
+    units = units.replace("2 Hz-1", "^2/Hz")
     return name if units in ("", "1") else f"{name} ({units})"
 
 

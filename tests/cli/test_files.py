@@ -94,8 +94,8 @@ def test_spectra_and_chosen_variables_are_exported(folder: Path, tmp_path: Path)
     chosen = ["--group", "spectrum", "--variable", "y", "--variable", "vx"]
     brakecli("export", folder / "a.h5", *chosen, "-o", "s.csv", cwd=tmp_path).told(0)
     table = pandas.read_csv(tmp_path / "s.csv")
-    assert [*table.columns] == ["frequency (Hz)", "y ((m)2 Hz-1)", "vx ((m/s)2 Hz-1)"]
-    np.testing.assert_array_equal(table["vx ((m/s)2 Hz-1)"], history(folder / "a.h5", "vx", "spectrum"))
+    assert [*table.columns] == ["frequency (Hz)", "y (m^2/Hz)", "vx ((m/s)^2/Hz)"]
+    np.testing.assert_array_equal(table["vx ((m/s)^2/Hz)"], history(folder / "a.h5", "vx", "spectrum"))
 
 
 def test_the_windows_of_a_stop_are_exported(tmp_path: Path) -> None:
