@@ -322,6 +322,9 @@ def classify(history: History, context: Context, thresholds: Thresholds = _DEFAU
     if torque is None:
         finer = f"give an output.sample_interval of {0.25 * history.interval:.2g} s"
         reasons.append(f"samples miss impacts of the friction force, and torque_variation is missing: {finer}")
+    short = (part.stop - part.start) * history.interval < 0.999 * context.pattern
+    if short and context.steady and not sustained and decision.regime is not Regime.UNDECIDED:
+        reasons.append(f"torque_variation needs {context.pattern:.3g} s, until the waves repeat: run longer")
     return Verdict(
         regime=decision.regime,
         excitation=decision.excitation,
