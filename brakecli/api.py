@@ -1,7 +1,4 @@
-"""`import brakecli`: cases in, xarray objects out. Names, units and errors are those of the command line.
-
-Everything large is imported on the first call.
-"""
+"""`import brakecli`: cases in, xarray objects out, as on the command line. Large imports wait for a call."""
 
 import json
 import multiprocessing
@@ -163,6 +160,8 @@ def sweep(
     if getattr(multiprocessing.current_process(), "_inheriting", False):  # a worker that is being started
         raise UsageError('brakecli.sweep: in a script, call it below  if __name__ == "__main__":')
     with _interruptible(), _target(output) as path:
+        from brakecli.cli.inputs import load_sweep
+        from brakecli.runs.run import load_kernels
         from brakecli.sweeps.driver import choose_engine, sweep
         from brakecli.sweeps.plan import LoadedSweep, sweep_of
 
@@ -173,11 +172,7 @@ def sweep(
         elif isinstance(source, LoadedSweep):
             loaded = source
         else:
-            from brakecli.cli.inputs import load_sweep
-
             loaded = load_sweep(str(source), _overrides(settings))
-        from brakecli.runs.run import load_kernels
-
         load_kernels(loaded.base)
         with choose_engine(loaded.plan, jobs) as engine:
             report = sweep(loaded, path, engine, force=force)
@@ -267,9 +262,7 @@ def _case(source: "Source | LoadedSweep", settings: "Settings | None") -> "Loade
     if resolved := getattr(source, "attrs", {}).get("resolved_toml"):  # a result
         return parse_resolved(str(resolved), "its case", _overrides(settings))
     if not isinstance(source, str | PathLike):
-        raise UsageError(
-            f"{type(source).__name__}: is no case; give a path, or what brakecli.load returns for one"
-        )
+        raise UsageError(f"{type(source).__name__}: is no case; give a path, or a case from brakecli.load")
     return load_case(str(source), _overrides(settings))
 
 
@@ -291,8 +284,8 @@ def _toml(value: Any, key: str) -> str:
     try:
         return tomli_w.dumps({"value": value}).removeprefix("value = ").strip()
     except TypeError:
-        what = f"{key}: cannot be set to {type(value).__name__}"
-        raise UsageError(f"{what}; give a number, a text, a list or a table") from None
+        kind = type(value).__name__
+        raise UsageError(f"{key}: cannot be set to {kind}; give a number, a text, a list or a table") from None
 
 
 def _axis(vary: "Mapping[str | tuple[str, ...], Iterable[float]]") -> "Axis":
