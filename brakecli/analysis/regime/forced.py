@@ -61,8 +61,8 @@ class ForcedRules:
         self.history, self.context, self.limits = history, context, limits
         self.duration = history.samples * history.interval
         self.whole = Part(history, 0, history.samples)
-        self.last = replace(self.whole, start=history.samples * (WINDOWS - 10) // WINDOWS)
-        self.settled_part, self.settled = replace(self.whole, start=history.samples // 2), False
+        self.last = Part(history, history.samples * (WINDOWS - 10) // WINDOWS, history.samples)
+        self.settled_part, self.settled = Part(history, history.samples // 2, history.samples), False
         self.theory: Linear | None = None  # where the motion is linear
         self.cycles: Cycles | None = None
         # m, half of peak to peak of what is forced and what is added

@@ -68,9 +68,8 @@ class Linear:
         """The same with the growth that the passing waves leave to the mode by their slopes."""
         if not len(self.waves):
             return self
-        p = np.outer(self.push, [1.0, 0.0, 0.0, 0.0])
         bends = np.outer(self.wavenumbers, self.waves[:, 0])
-        rate, off = growth_with_slopes(self.matrix, p, 2.0 * math.pi * self.passing, self.slopes, bends)
+        rate, off = growth_with_slopes(self.matrix, self.push, 2.0 * math.pi * self.passing, self.slopes, bends)
         off += _ROUNDING_WITH_SLOPES * float(np.abs(self.values).max())
         if not abs(rate) < math.inf:
             return replace(self, direction=0, known_to=math.inf)
