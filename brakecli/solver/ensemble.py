@@ -42,9 +42,10 @@ def fits(system: System) -> Hashable | None:
     kind = method.scheme, method.theta, method.start, method.iteration, system.evaluator
     if kind != ("three-layer", NUMEROV, "consistent", "newton", "auto") or not 0 < len(wheel.g) <= WAVES:
         return None
-    changing, passed = len(system.belt) + len(system.load) > 2, system.passing_frequency * system.sampled_duration
     large = system.samples > MOST_SAMPLES or system.table_bytes > _MOST_BYTES or system.per_sample > _MOST_STEPS
-    if changing or sliding == 0.0 or large or passed > _MOST_PASSED:
+    if len(system.belt) + len(system.load) > 2 or sliding == 0.0 or large:
+        return None
+    if system.passing_frequency * system.sampled_duration > _MOST_PASSED:
         return None
     return system.half_length, system.shoe, wheel, system.nodes, system.interval, system.per_sample, system.samples
 

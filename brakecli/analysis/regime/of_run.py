@@ -65,9 +65,12 @@ def verdict_on(
     limits: Thresholds | None = None,
     feeds: Feeds = Feeds.UNKNOWN,
     sticks: float = 0.0,
+    *,
+    in_full: bool = True,
 ) -> Verdict:
     """The verdict on a motion; a run that has failed has none. `feeds`, `sticks`: what a second run has shown."""
-    verdict = classify(history, replace(context(system), feeds=feeds, sticks=sticks), limits or Thresholds())
+    known = replace(context(system), feeds=feeds, sticks=sticks)
+    verdict = classify(history, known, limits or Thresholds(), in_full=in_full)
     if not failure:
         return verdict
     verdict = replace(verdict, growth_rate=None, ringing_frequency=None, frequency=None, settled=False)

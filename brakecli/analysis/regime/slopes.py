@@ -37,7 +37,7 @@ def growth_with_slopes(
     """Growth rate (1/s) of the fastest solution of ż = (A + K s(t) P) z, and how far it may be off.
 
     Each wave passes at a frequency (rad/s). Its `slopes` (N/m) are K s = Re Σ slopes e^{iΩt} at rest; the forced
-    motion x = Im Σ X e^{iΩt} moves its phase by `bends` = ω X. Of P, which acts on x alone, `p` is the first column.
+    motion x = Im Σ X e^{iΩt} moves its phase by `bends` = ω X. `p` is the first column of P.
     """
     scale = np.repeat([float(np.abs(np.linalg.eigvals(a)).max()) or 1.0, 1.0], 2)  # of position beside velocity
     a, p = scale[:, None] * a / scale, scale * p / scale[0]
@@ -49,7 +49,9 @@ def growth_with_slopes(
             residues = inverse @ p
     size = np.linalg.norm(p) if residues is None else np.linalg.norm(residues) * np.linalg.norm(vectors[0])
     effects = np.abs(slopes) * size
-    if residues is not None and float(effects.sum()) <= _NEGLIGIBLE * abs(plain):  # a bound of what the waves change
+    if residues is not None and float(effects.sum()) <= _NEGLIGIBLE * abs(
+        plain
+    ):  # a bound of what the waves change
         return plain, float(effects.sum())
     steepest = np.argsort(-effects)
     few = min(len(steepest), _MOST_WAVES)
@@ -106,7 +108,11 @@ def _fastest(
         if answer is not None and (found := _beside(a, p, turns, coupling, *answer, begin)) is not None:
             return float(found.real.max()), found
     size = len(sums)
-    matrix = np.kron(coupling, np.outer(p, [1.0, 0.0, 0.0, 0.0])) + np.kron(np.eye(size), a) - np.kron(np.diag(turns), np.eye(4))
+    matrix = (
+        np.kron(coupling, np.outer(p, [1.0, 0.0, 0.0, 0.0]))
+        + np.kron(np.eye(size), a)
+        - np.kron(np.diag(turns), np.eye(4))
+    )
     values, vectors = np.linalg.eig(matrix)
     own = slice(4 * (size // 2), 4 * (size // 2) + 4)
     try:
@@ -122,8 +128,8 @@ def _beside(
 ) -> Complex | None:
     """The modes, from what they are nearly; None where one is not alone, so that all eigenvalues are needed.
 
-    x answers a force e^{μt} by Σ residues/(values - μ), so that λ = value + T residue/(1 - T Σ'), where T is the
-    stiffness and Σ' the sum of residues/(λ - values) over the other values. The part of an eigenvector at the sum 0
+    x answers a force e^{μt} by Σ residues/(values - μ), so that λ = value + T residue/(1 - T Σ') with the stiffness
+    T, where Σ' is the sum of residues/(λ - values) over the other values. The part of an eigenvector at the sum 0
     is 1/(1 - f') where λ = f(λ).
     """
     own, exact = len(turns) // 2, _EXACT * np.abs(values).max()
@@ -150,6 +156,6 @@ def _beside(
             if not slope <= _ALONE:
                 return None
             if (slope + 1e-3) * np.abs(new - now).max() <= exact:
-                return new
+                return np.asarray(new)
         before, after, now = now, new, new
     return None
