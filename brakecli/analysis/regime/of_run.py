@@ -96,7 +96,7 @@ def context(system: System) -> Context:
 
     theory, turns, highest = (
         cache(partial(linear_theory, system, belt)),
-        system.wheel.turns.tolist(),
+        tuple(system.wheel.turns.tolist()),
         0.5 / system.interval,
     )
     swings = np.abs(known.waves[:, 0]) if turns and (known := theory()) else np.ones(len(turns))

@@ -128,9 +128,9 @@ def _beside(
 ) -> Complex | None:
     """The modes, from what they are nearly; None where one is not alone, so that all eigenvalues are needed.
 
-    x answers a force e^{μt} by Σ residues/(values - μ), so that λ = value + T residue/(1 - T Σ') with the stiffness
-    T, where Σ' is the sum of residues/(λ - values) over the other values. The part of an eigenvector at the sum 0
-    is 1/(1 - f') where λ = f(λ).
+    x answers a force e^{μt} by Σ residues/(values - μ). So λ = value + T residue/(1 - T Σ') with the stiffness T,
+    where Σ' is the sum of residues/(λ - values) over the other values. The part of an eigenvector at the sum 0 is
+    1/(1 - f') where λ = f(λ).
     """
     own, exact = len(turns) // 2, _EXACT * np.abs(values).max()
     others = np.arange(1, len(turns))
