@@ -54,7 +54,7 @@ def by_events(system: System, tolerance: float) -> Motion:
     return solve(system, Method("event-driven", evaluator="midpoint", nodes=system.nodes, tolerance=tolerance))
 
 
-@pytest.mark.parametrize("lanes", counts(6, 200))
+@pytest.mark.parametrize("lanes", counts(12, 200))
 def test_a_lane_gives_the_motion_on_its_nodes(lanes: int) -> None:
     """To what half a step leaves of the error; the iteration leaves less than 5e-6.
 
