@@ -64,7 +64,7 @@ class Outcome:
 
 
 def simulate(case: Case, *, whole: bool = True) -> Outcome:
-    """Run a case in memory, to its end or, unless `whole`, only until its verdict is known.
+    """Run a case in memory, to its end or, unless `whole`, only until what a sweep keeps is known.
 
     Raises RefusedError, and CaseError where it has no start.
     """
@@ -92,7 +92,7 @@ def _judged(case: Case, found: Check, certified: Certified | None, *, whole: boo
             if not np.isfinite(motion.rows).all():
                 raise FloatingPointError("a force overflows")
             history = array_history(system.interval, motion.rows)
-            verdict = verdict_on(history, system, motion.work.failure_sentence)
+            verdict = verdict_on(history, system, motion.work.failure_sentence, in_full=whole)
     told = (text for text in verdict.reasons[1:] if "torque_variation" not in text)  # no number of a sweep
     warnings, work = [*found.warnings, *told], motion.work
     if work.unconverged_steps and not work.failed:

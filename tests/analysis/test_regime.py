@@ -103,7 +103,7 @@ def test_stick_in_some_cycles_only_is_irregular() -> None:
 
 
 def test_a_line_of_the_roughness_is_forced_and_another_is_not() -> None:
-    lines = forced_lines(2.0, [1.0 / 0.02], 5000.0)
+    lines = forced_lines(2.0, (1.0 / 0.02,), 5000.0)
     assert lines[0] == pytest.approx(100.0)
     assert len(lines) == 10
     forced = classify(shaken(np.sin(2 * np.pi * 100.0 * TIME)), Context(2.0, True, lines))
@@ -126,7 +126,7 @@ def test_where_sliding_is_unstable_a_motion_is_not_forced(
 ) -> None:
     """By its growth over the whole run: none, none but rounding, too little to see, and enough from any start."""
     duration = len(TIME) * (TIME[1] - TIME[0])
-    lines = forced_lines(2.0, [1.0 / 0.02], 5000.0)
+    lines = forced_lines(2.0, (1.0 / 0.02,), 5000.0)
     known = Context(2.0, True, lines, growth=lambda: powers_of_e / duration)
     motion = shaken if regime is Regime.DAMPED else made
     verdict = classify(motion(np.sin(2 * np.pi * 100.0 * TIME)), known)
@@ -204,7 +204,7 @@ def test_evidence_names_lines_harmonics_and_powers() -> None:
 
 
 def test_lines_of_the_roughness_are_distinguished_from_others() -> None:
-    lines = forced_lines(2.0, [1.0 / 0.02], 5000.0)
+    lines = forced_lines(2.0, (1.0 / 0.02,), 5000.0)
     both = np.sin(2 * np.pi * 100.0 * TIME) + np.sin(2 * np.pi * 151.0 * TIME + 1.0)
     evidence = classify(made(both), Context(2.0, True, lines)).evidence
     found = dict(zip(evidence["line_frequencies"], evidence["line_forced"], strict=True))
