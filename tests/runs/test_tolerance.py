@@ -13,9 +13,11 @@ from brakecli.case.case import Case, changed
 from brakecli.case.system import system_of
 from brakecli.comparison.compare import errors
 from brakecli.errors import CaseError
+from brakecli.runs import ladder
 from brakecli.runs import tolerance as module
+from brakecli.runs.certificate import Certified
 from brakecli.runs.modelled import modelled
-from brakecli.runs.tolerance import Certified, certify
+from brakecli.runs.tolerance import certify
 from brakecli.solver.motion import solve
 from brakecli.solver.quantities import HISTORY
 from tests.campaign import campaign, counts
@@ -261,7 +263,7 @@ def test_what_happens_between_two_steps_is_not_overlooked(scheme: str, changes: 
 
 
 def test_what_no_step_can_follow_is_not_certified(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "MOST_DOUBLINGS", 4)
+    monkeypatch.setattr(ladder, "MOST_DOUBLINGS", 4)
     case = promised({**WAVE, "load": PULSE}, 1e-2, solver__scheme="two-layer")
     found = certify(system_of(case))
     assert not found.certificate.certified
@@ -312,7 +314,7 @@ def test_no_run_is_compared_with_itself() -> None:
 
 
 def test_steps_that_do_not_get_there_are_not_certified(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "MOST_DOUBLINGS", 4)
+    monkeypatch.setattr(ladder, "MOST_DOUBLINGS", 4)
     found = certify(system_of(promised(SQUEAL, 1e-8, solver__scheme="two-layer", solver__duration=0.05)))
     assert not found.certificate.certified
     assert found.certificate.estimated_error > 1e-8
