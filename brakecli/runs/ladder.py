@@ -90,10 +90,10 @@ def ladder(
     nodes, steps, quadrature = first_nodes(system), _Tolerances() if events else _Axis(), _Nodes()
     before, finer, seconds = None, steps, 0.0
     while True:
-        sampled = replace(system, interval=max(1, every >> steps.doublings) * system.interval)
         at = first * (NODES_RATIO if events else 0.5) ** steps.doublings
         changes: dict[str, Any] = {"nodes": nodes << quadrature.doublings, fineness: at}
-        run = yield replace(sampled, method=replace(sampled.method, **changes))
+        interval = max(1, every >> steps.doublings) * system.interval
+        run = yield replace(system, interval=interval, method=replace(system.method, **changes))
         spent, failed = run.work.solve_seconds, run.work.failed
         run.work.solve_seconds = seconds = seconds + spent
         if before is not None and not failed:
