@@ -49,8 +49,8 @@ _ON_S = (
 _ON_ROUGH = (
     "B and C: the error decides on the steps, which are of order five: B takes 500 evaluations in 20 ms at 1e-3, a"
     " sixth of them at samples, whose forces peers leave out. An evaluation takes 95 ns with 256 nodes, and 30 in"
-    " full contact; half of the time goes into the rest of a step: stages, powers, the angles of the waves, events."
-    " Steps of two passing waves instead of half of one would save at most 5 %."
+    " full contact; half of the time goes into the rest of a step: stages, powers, the angles of the waves,"
+    " events. Steps of two passing waves instead of half of one would save at most 5 %."
 )
 REASONS = {
     "numbalsoda LSODA: S, 0.5 s": (
@@ -67,8 +67,8 @@ REASONS = {
         "relaxation.toml: 694 events and 4,400 steps take 0.6 ms, setting up and closing the account 0.2 to 0.4."
     ),
     "promise": (
-        "A promise on B: a difference of tolerances and two of nodes take four runs, together eight times as long as"
-        " the cheapest over 20 ms; making, closing and comparing takes 0.2 ms for each."
+        "A promise on B: a difference of tolerances and two of nodes take four runs, together eight times as long"
+        " as the cheapest over 20 ms; making, closing and comparing takes 0.2 ms for each."
     ),
     "one evaluation": (
         "One evaluation: the compiler does not know the number of waves, and each has a loop of its own."
