@@ -71,8 +71,11 @@ class _Tolerances(_Axis):
 
     @property
     def error(self) -> float:
-        """What the last two runs differ by, which is the error of the coarser one."""
-        return self.last
+        """What the last two runs differ by, which is the error of the coarser one.
+
+        Two may agree by luck: no less is left than a twentieth of what the two before differed by.
+        """
+        return max(self.last, self.before / 20.0) if self.before < math.inf else self.last
 
 
 def ladder(

@@ -144,6 +144,21 @@ def test_nodes_that_agree_by_luck_are_doubled_again() -> None:
     assert kept(found, case, 1e-9) <= 1e-3
 
 
+def test_tolerances_that_agree_by_luck_leave_a_part_of_what_they_differed_by_before() -> None:
+    system = system_of(promised(OPEN, 1e-4, solver__duration=0.001))
+    on_nodes = replace(system, method=replace(system.method, evaluator="midpoint"))
+    motion = solve(replace(on_nodes, method=replace(on_nodes.method, nodes=64, tolerance=1e-3)))
+    closed, found = replace(motion.work, evaluators={"closed-form": 1}), list[Certified]()
+    runs = ladder.ladder(on_nodes)
+    rung = next(runs)
+    for scale in (1.002, 1.001, 1.0009999):
+        try:
+            rung = runs.send(replace(motion, system=rung, rows=scale * motion.rows, work=replace(closed)))
+        except StopIteration as end:
+            found.append(end.value)
+    assert found[0].certificate.estimated_error == pytest.approx(1e-3 / 20.0, rel=0.01)
+
+
 def test_the_edges_of_patches_that_hardly_move_do_not_break_a_certificate() -> None:
     """The wheel moves by 1 µm: the error of a sum over nodes is that of one position, and falls unevenly."""
     tables: dict[str, Any] = {
