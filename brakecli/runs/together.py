@@ -7,14 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from brakecli.errors import BrakecliError
+from brakecli.runs.certificate import Certified
+from brakecli.runs.ladder import InLanes, ladder
 from brakecli.runs.pilot import RUNGS
-from brakecli.runs.tolerance import (
-    Certified,
-    InLanes,
-    begins_with_steps,
-    ladder,
-    slower_than_events,
-)
+from brakecli.runs.tolerance import begins_with_steps, slower_than_events
 from brakecli.solver.ensemble import fits, run_together
 from brakecli.solver.motion import Motion
 from brakecli.solver.schemes import NUMEROV

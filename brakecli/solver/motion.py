@@ -88,7 +88,7 @@ def solve(
     `first_block` (steps) is 1 where it is not known what a step costs; each block adds some 0.1 ms of its own to
     `solve_seconds`.
     """
-    return Stepping(replace(system, method=method or system.method)).run(sink, progress, first_block)
+    return Stepping(replace(system, method=method) if method else system).run(sink, progress, first_block)
 
 
 class Stepping:

@@ -117,6 +117,7 @@ PAD = record(
     ss_at=int,  # integrals of products, see `contact.pad`
     cc_at=int,
     pr_at=int,
+    opposite_at=int,  # f1 at the nodes of one half and at those opposite, tile by tile
     nodes_at=int,  # f1 at the nodes
     waves_at=int,  # g sin(ωξ) and g cos(ωξ) of the wheel at the nodes, tile by tile
 )
@@ -145,9 +146,11 @@ MOTION = record(
     "load load_slope",  # Q, N, and its slope, N/s
     "anchor anchor_low",  # x - travel in stick, a sum of two doubles, m
     "tolerance",  # of a step
+    "pressed_x pressed_y pressed",  # where full contact has been computed in this step, and its force, N
     "step",  # to try next, s
     "events_time",  # since which `events` are counted, s
-    "step_done time_done tau_done side_done",  # the step of the continuous solution, its begin and its phase
+    "step_done time_done tau_done side_done",  # the step of the continuous solution, its begin and its phase,
+    "belt_done belt_slope_done load_done load_slope_done",  # and what acted from outside at its begin
     touching_done=int,
     touching=int,  # 0 where the pad is clear of the wheel for sure
     pair=int,  # 0: steps of order eight, 1: of order five

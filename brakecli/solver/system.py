@@ -72,7 +72,7 @@ class System:
     def table_bytes(self) -> float:
         """Memory that `pad` takes while it is made: values at nodes, and two numbers for each pair of waves."""
         terms, nodes = len(self.shoe.g) + len(self.wheel.g), self.nodes
-        return 8.0 * (nodes * (2.0 * len(self.wheel.g) + 2.0) + 2.0 * terms**2)
+        return 8.0 * (nodes * (2.0 * len(self.wheel.g) + 3.0) + 2.0 * terms**2)
 
     def refuse_tables(self) -> None:
         """Raise RefusedError where the tables of the contact would be too large."""

@@ -22,7 +22,7 @@ from brakecli.analysis.regime.forced import QUARTER
 from brakecli.analysis.regime.linear import Linear, linear_theory
 from brakecli.analysis.regime.verdict import Excitation, Regime
 from brakecli.analysis.stability.modes import is_undamped
-from brakecli.runs.tolerance import ROUNDING, Certificate
+from brakecli.runs.certificate import ROUNDING, Certificate
 from brakecli.solver.compile import Floats
 from brakecli.solver.motion import Work
 from brakecli.solver.records import BELT, FLOW, LOAD, new

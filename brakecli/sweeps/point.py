@@ -19,10 +19,10 @@ from brakecli.case.system import system_of
 from brakecli.errors import BrakecliError
 from brakecli.files import fields
 from brakecli.files.field import values_of
+from brakecli.runs.certificate import Certificate, Certified
 from brakecli.runs.limits import Check, check, refuse, within_range
 from brakecli.runs.run import motion_of
 from brakecli.runs.together import TOGETHER, certify_together
-from brakecli.runs.tolerance import Certificate, Certified
 from brakecli.solver.history import array_history
 from brakecli.solver.motion import Motion
 from brakecli.solver.roughness import TWO_PI, wheel_angles

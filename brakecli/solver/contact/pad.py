@@ -55,7 +55,7 @@ def build_pad(k: float, half_length: float, shoe: Surface, wheel: Surface, nodes
     cells = max(8.0, 8.0 * half_length * max([*shoe.turns, *wheel.turns], default=0.0))
     pad.cell, pad.cells = 2.0 * half_length / cells, min(math.ceil(cells), MOST_CELLS)
     waves, tiles = wheel.g.size, -(-(nodes + 2 * BESIDE) // TILE) if nodes else 0
-    pad.edges_at = nodes + 2 * BESIDE + TILE + 2 * (waves + 7)  # behind what the other evaluators keep
+    pad.edges_at = nodes + 2 * BESIDE + 2 * TILE + 2 * (waves + 7)  # behind what the other evaluators keep
     shapes = {
         "waves_at": (tiles, waves, 2, TILE),  # first, for its tiles must be aligned
         "gap_at": (3 * (waves + shoe.g.size),),
@@ -64,6 +64,7 @@ def build_pad(k: float, half_length: float, shoe: Surface, wheel: Surface, nodes
         "ss_at": (waves, waves),
         "cc_at": (waves, waves),
         "pr_at": (2 * waves,),
+        "opposite_at": (-(-tiles // 2), 2, TILE),
         "nodes_at": (nodes,),
     }
     # Large tables are made in their place: a copy of gigabytes would not hear a signal.
@@ -81,6 +82,7 @@ def build_pad(k: float, half_length: float, shoe: Surface, wheel: Surface, nodes
     table["pr_at"][:], pad.shoe_mean, pad.shoe_square = _products(half_length, shoe, wheel, into)
     if nodes:
         pad.rise_error = _node_tables(half_length, shoe, wheel, table["nodes_at"], table["waves_at"])
+        table["opposite_at"][:] = _opposite(table["nodes_at"], -(-tiles // 2))
     return Pad(pad, flat)
 
 
@@ -144,6 +146,14 @@ def _node_tables(a: float, shoe: Surface, wheel: Surface, f1: Floats, waves: Flo
     turns = np.sin(np.outer([1.0, 2.0, 3.0], wheel.omega * spacing))
     differences = np.array([45.0, -9.0, 1.0]) @ turns / (30.0 * spacing)  # what they make of omega
     return float(np.abs(wheel.g) @ np.abs(wheel.omega - differences))
+
+
+def _opposite(f1: Floats, tiles: int) -> Floats:
+    """f1 by tiles as in `_node_tables` at the nodes of one half, and at those opposite; elsewhere no gap opens."""
+    half, found = f1.size // 2, np.full((2, tiles * TILE), 1e300)
+    found[0, BESIDE : BESIDE + f1.size - half] = f1[: f1.size - half]
+    found[1, BESIDE : BESIDE + half] = f1[: f1.size - half - 1 : -1]
+    return found.reshape(2, tiles, TILE).swapaxes(0, 1)
 
 
 def _products(a: float, shoe: Surface, wheel: Surface, into: tuple[Floats, Floats]) -> tuple[Floats, float, float]:
