@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from brakecli import stop
 from brakecli.errors import CaseError
-from brakecli.solver.compile import Floats, borrowed, kernel, stopped, vector
+from brakecli.solver.compile import FAST, Floats, borrowed, kernel, stopped, vector
 from brakecli.solver.contact.pad import BESIDE, TILE, aligned, build_pad
 from brakecli.solver.energy import NOT_KEPT
 from brakecli.solver.friction import observed
@@ -46,7 +46,6 @@ _CONTRACTION = 0.1  # of the iteration, at most
 _MOST_BYTES, _MOST_STEPS = 1e8, 1e9  # of the tables at the nodes, and between two samples
 _MOST_PASSED = 1e6  # waves, beyond which their phase needs more than 16 digits
 _THETA_1, _THETA_2, _THETA_3 = NUMEROV
-_FAST = frozenset({"reassoc", "contract", "nsz"})
 
 
 def _lanes(names: str) -> dict[str, Any]:
@@ -87,7 +86,7 @@ class Shared(NamedTuple):
 _SHARED = types.NamedTuple([float64, float64, int64, int64, *[float64] * 4, vector, vector, int64], Shared)
 
 
-@kernel(void(_LANE, _SHARED, int64, float64), fastmath=_FAST)
+@kernel(void(_LANE, _SHARED, int64, float64), fastmath=FAST)
 def _pass(o: Any, shared: Shared, i: int, t: float) -> None:
     """Sine and cosine of a wave of the wheel."""
     omega, phase = shared.waves[3 * i], shared.waves[3 * i + 1]
@@ -97,7 +96,7 @@ def _pass(o: Any, shared: Shared, i: int, t: float) -> None:
         o.sine[i, n], o.cosine[i, n] = sine_cosine(angle)
 
 
-@kernel(void(_LANE, _SHARED), fastmath=_FAST)
+@kernel(void(_LANE, _SHARED), fastmath=FAST)
 def _add_nodes(o: Any, shared: Shared) -> None:
     """The midpoint sum of the gaps (m), and how many nodes touch."""
     table, at = shared.table, 0
@@ -122,7 +121,7 @@ def _add_nodes(o: Any, shared: Shared) -> None:
             o.touches[n] += 1.0 if gap > 0.0 else 0.0
 
 
-@kernel(void(_LANE, _SHARED, float64), fastmath=_FAST, inlined=False)
+@kernel(void(_LANE, _SHARED, float64), fastmath=FAST, inlined=False)
 def _touch(o: Any, shared: Shared, t: float) -> None:
     """The normal force, (2), and the part that touches: in closed form where a bound proves it, or by nodes."""
     shared = borrowed(shared)
@@ -163,7 +162,7 @@ def _begin(o: Any, shared: Shared) -> None:
         o.force[n] = o.before[n] = o.earlier[n] = force
 
 
-@kernel(void(_LANE, _SHARED), fastmath=_FAST)
+@kernel(void(_LANE, _SHARED), fastmath=FAST)
 def _prepare(o: Any, shared: Shared) -> None:
     """(14), as in `schemes.three_layer`, and the guess of the force as in `loop.advance`."""
     h = shared.h
@@ -181,7 +180,7 @@ def _prepare(o: Any, shared: Shared) -> None:
         o.done[n] = o.out[n]
 
 
-@kernel(void(_LANE, _SHARED, float64), fastmath=_FAST)
+@kernel(void(_LANE, _SHARED, float64), fastmath=FAST)
 def _iterate(o: Any, shared: Shared, t: float) -> None:
     """The force of the step in `guess`: (13), until what is left is below the bound."""
     gain = 2.0 * _THETA_1 * shared.h

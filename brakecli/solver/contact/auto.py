@@ -10,7 +10,7 @@ from brakecli.solver.records import EVALUATE, Layer
 def evaluate(x: float, y: float, layer: Layer) -> None:
     """Closed form where a bound proves the pad to touch everywhere or nowhere, otherwise the midpoint rule."""
     covered = coverage(y, layer.pad)
-    if covered == FULL:
+    if covered == FULL and layer.window.rows == 0:
         full_contact(x, y, layer)
     elif covered == CLEAR:
         clear(layer.contact)

@@ -12,11 +12,16 @@ import numpy as np
 
 from brakecli import stop
 from brakecli.solver.compile import Floats, address
-from brakecli.solver.records import CONTACT, PAD, Layer, new
+from brakecli.solver.records import CONTACT, PAD, WINDOW, Layer, new
 from brakecli.solver.roughness import Surface, height
 
 TILE, BESIDE = 72, 3
 """Nodes of a piece of the tables, and nodes beyond each end of the pad."""
+
+MOST_SUMMED = 10
+"""Waves of the wheel up to which their sums at all nodes are as fast as a window."""
+POINTS, MOST_ROWS, INTERPOLATION = 12, 16, 1e-15
+"""Points that a height is interpolated from, the finest grid to a node, and the error over the sum of amplitudes."""
 
 MOST_CELLS = 2**16
 """Cells of the pad of which the exact contact keeps what it has found."""
@@ -65,6 +70,7 @@ def build_pad(k: float, half_length: float, shoe: Surface, wheel: Surface, nodes
         "cc_at": (waves, waves),
         "pr_at": (2 * waves,),
         "nodes_at": (nodes,),
+        "turns_at": (3 * waves,),
     }
     # Large tables are made in their place: a copy of gigabytes would not hear a signal.
     flat, table, place = aligned(sum(map(math.prod, shapes.values()))), dict[str, Floats](), 0
@@ -75,20 +81,45 @@ def build_pad(k: float, half_length: float, shoe: Surface, wheel: Surface, nodes
     table["gap_at"][:] = np.concatenate(
         [wheel.g, -shoe.g, wheel.omega, shoe.omega, np.zeros(waves), shoe.phase],
     )
+    table["turns_at"][:] = wheel.waves
     table["wheel_at"][:] = np.concatenate([wheel.g, wheel.omega])
     table["full_at"][:] = 2.0 * half_length * k * wheel.g * np.sinc(wheel.omega * half_length / np.pi)
     into = table["ss_at"], table["cc_at"]
     table["pr_at"][:], pad.shoe_mean, pad.shoe_square = _products(half_length, shoe, wheel, into)
     if nodes:
+        pad.rows = rows_of_window(wheel, 2.0 * half_length / nodes)
         pad.rise_error = _node_tables(half_length, shoe, wheel, table["nodes_at"], table["waves_at"])
     return Pad(pad, flat)
 
 
-def build_layer(evaluate: Any, pad: Pad, press: Any = None) -> Layer:
-    """What the kernel `evaluate`, or `press` where the force is enough, works on and fills for this pad."""
+def rows_of_window(wheel: Surface, spacing: float) -> int:
+    """Points of a window's grid to a node of this spacing (m), a power of two; 0 where there is to be no window.
+
+    Between the middle ones of 2n points with the spacing h, a polynomial through them misses a sine by at most
+    (ωh)^2n/(2n)! times the product of 1/4, 9/4, … (n - 1/2)², the remainder of Lagrange.
+    """
+    middle = math.prod((i + 0.5) ** 2 for i in range(POINTS // 2)) / math.factorial(POINTS)
+    for rows in (1, 2, 4, 8, 16) if wheel.g.size > MOST_SUMMED else ():
+        if middle * (np.abs(wheel.g) @ (wheel.omega * spacing / rows) ** POINTS) <= INTERPOLATION * np.abs(wheel.g).sum():
+            return rows
+    return 0
+
+
+def build_layer(evaluate: Any, pad: Pad, press: Any = None, *, moving: bool = False) -> Layer:
+    """What the kernel `evaluate`, or `press` where the force is enough, works on and fills for this pad.
+
+    A `moving` one may have a window: places that follow each other are near each other.
+    """
     constants, tables = pad
     waves = constants.shoe_terms + constants.wheel_terms
-    scratch, found = aligned(constants.edges_at + 8 * waves + 6 + 3 * constants.cells), new(CONTACT)
+    found, window, size = new(CONTACT), new(WINDOW), int(constants.edges_at + 8 * waves + 6 + 3 * constants.cells)
+    if moving and constants.rows:
+        window.rows, window.shift = constants.rows, int(constants.rows).bit_length() - 1
+        window.spacing = 2.0 * constants.half_length / constants.nodes / constants.rows
+        window.width = 3 * TILE * (-(-(constants.nodes + 2 * BESIDE + POINTS) // TILE) + 1)
+        window.at = -(-(size + POINTS) // 8) * 8
+        size = int(window.at + window.rows * window.width)
+    scratch = aligned(size)
     found.near = math.inf  # an evaluator that does not know it leaves it
     return Layer(
         address(evaluate),
@@ -97,6 +128,7 @@ def build_layer(evaluate: Any, pad: Pad, press: Any = None) -> Layer:
         tables,
         np.zeros(constants.wheel_terms),
         scratch,
+        window,
         found,
     )
 

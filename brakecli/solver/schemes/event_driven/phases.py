@@ -16,7 +16,7 @@ from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.contact.closed_form import FULL, clear, coverage, full_contact, full_press
 from brakecli.solver.double_double import two_sum
 from brakecli.solver.records import COEFFICIENTS, V_X, V_Y, Coefficients, Drive, Layer, Y
-from brakecli.solver.roughness import wheel_angles
+from brakecli.solver.roughness import turn
 from brakecli.solver.schedules import integral_at, slope_at, value_at
 from brakecli.solver.schemes.event_driven.runge_kutta import END_STAGE, interpolated
 
@@ -72,8 +72,8 @@ def arrive(p: Shoe, drive: Drive) -> None:
     m.belt, m.belt_slope = value_at(drive.belt, t + tau), slope_at(drive.belt, after)
     m.load, m.load_slope = value_at(drive.load, t + tau), slope_at(drive.load, after)
     m.travel, m.travel_low = integral_at(drive.belt, t, tau)
-    if drive.wheel.size > 0:
-        wheel_angles(drive.wheel, m.travel, m.travel_low, p.layer.angles)
+    if p.layer.pad.wheel_terms > 0:
+        turn(m.travel, m.travel_low, p.layer)
     if m.started != 0 and m.side == 0.0:  # no drift can build up
         m.x, m.v_x = (m.anchor + m.travel) + (m.anchor_low + m.travel_low), m.belt
 
@@ -94,7 +94,7 @@ def press(p: Shoe, x: float, y: float, touching: int) -> float:
         contact.normal_force = -contact.stiffness * y  # Eq. (2), continued: an event ends the phase at y = 0
         contact.fraction = 1.0 if y < 0.0 else 0.0
         contact.store_x, contact.kind, contact.valid = 0.0, CLOSED_FORM, 1
-    elif coverage(y, pad) == FULL:
+    elif coverage(y, pad) == FULL and p.layer.window.rows == 0:
         if p.motion.light == 1:
             full_press(x, y, p.layer)
         else:
