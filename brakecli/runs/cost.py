@@ -14,6 +14,7 @@ from brakecli.solver.system import System
 _STEP_SECONDS = 1.5e-7
 _NODE_SECONDS = 5e-10  # per node, and again per node and wave of the wheel:
 _NODE_WAVE_SECONDS = 1.5e-10
+_WINDOW_WAVES, _POINT_WAVE_SECONDS = 3, 3e-10  # with a window: as many waves; to fill it, per point and wave
 _TERM_SECONDS, _PAIR_SECONDS = 2.5e-8, 5e-10  # exact, for each wave on the pad: per harmonic, and per pair of them
 _EVALUATIONS = 1.5  # of the contact in a step
 _OWN_STEPS = 25.0  # in a period, of a scheme that finds them itself, at a tolerance of 1e-10
@@ -30,7 +31,7 @@ def steps_and_seconds(system: System) -> tuple[int, float]:
         each = _STEP_SECONDS * (1.0 + pairs / 20.0)
         if system.finds_patches or system.nodes:
             each = _STEP_SECONDS + _EVALUATIONS * evaluation_seconds(system)
-        return system.steps, system.steps * each
+        return system.steps, system.steps * each + _window_seconds(system)
     c, alone = system.coefficients, method.step is not None
     if method.row.exact:
         return system.steps, system.steps * _EXACT_STEP_SECONDS
@@ -93,7 +94,15 @@ def evaluation_seconds(system: System) -> float:
     if system.finds_patches:
         terms, waves = len(system.shoe.g) + len(system.wheel.g), 1.0 + 2.0 * system.half_length * system.most_turns
         return waves * terms * (_TERM_SECONDS + _PAIR_SECONDS * terms)
-    return system.nodes * (_NODE_SECONDS + _NODE_WAVE_SECONDS * len(system.wheel.g))
+    waves = _WINDOW_WAVES if system.window_rows else len(system.wheel.g)
+    return system.nodes * (_NODE_SECONDS + _NODE_WAVE_SECONDS * waves)
+
+
+def _window_seconds(system: System) -> float:
+    """A rough guess at the time to fill the window of the wheel's surface during a run."""
+    length = 2.0 * system.half_length
+    points = system.nodes * system.window_rows * (1.0 + system.sampled_duration * system.fastest_belt / length)
+    return points * len(system.wheel.g) * _POINT_WAVE_SECONDS
 
 
 def duration_text(seconds: float) -> str:

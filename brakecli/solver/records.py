@@ -129,12 +129,12 @@ WINDOW = record(
     rows=int,  # points to a node; 0 where there is no window
     shift=int,  # their binary logarithm
     width=int,  # nodes, in whole tiles
-    at=int,  # where in the scratch it begins: row by row, one for each point between two nodes
+    at=int,  # where in the scratch it begins, row by row; weights lie before it
     origin=int,  # its first tile
     first=int,  # the tiles that are filled, from this one on
     end=int,
 )
-"""The wheel's surface below the pad and ahead of it, see `contact.heights`."""
+"""The wheel's surface below the pad and ahead of it, see `solver.heights`."""
 
 KNOT = record("time value value_low slope slope_low integral integral_low")
 """A piecewise linear function of time, at one of its knots (s). Value, slope after it and integral from t = 0 are

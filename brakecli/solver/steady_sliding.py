@@ -66,7 +66,8 @@ def mean_contact(system: System, y: float) -> tuple[float, float, float]:
     places = np.zeros(1) if wheel.g.size == 0 else 50.0 / wheel.turns.min() * (np.arange(PLACES) + 0.5) / PLACES
     weights = np.ones(1) if wheel.g.size == 0 else 2.0 * np.sin(np.pi * (np.arange(PLACES) + 0.5) / PLACES) ** 2
     found = np.zeros(3)
-    add_places(y, places, weights, build_layer(system.evaluate, system.pad), found)
+    near = pad.rows * places[-1] < len(places) * length  # a window is filled sooner than each place is summed
+    add_places(y, places, weights, build_layer(system.evaluate, system.pad, moving=near), found)
     force, stiffness, fraction = found / len(places)
     return float(force), float(stiffness), float(fraction)
 

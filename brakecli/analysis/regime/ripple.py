@@ -45,7 +45,7 @@ def ripple(system: System, belt: float, stiffness: float, part: Part) -> Ripple 
     if not 0 < work <= _MOST_WORK or system.method.step is None or end.slides(None):
         return None
     pad = build_pad(system.layer_stiffness, system.half_length, system.shoe, system.wheel, _FINER * system.nodes)
-    layer = build_layer(system.evaluate, pad)
+    layer = build_layer(system.evaluate, pad, moving=True)
     x, y, v_x, force = (part.history.read(name, end.start, end.stop) for name in ("x", "y", "vx", "normal_force"))
     travel = belt * part.history.interval * np.arange(end.start, end.stop) - x
     finer = np.zeros((samples, 3))

@@ -5,11 +5,11 @@ without a loop. Reassociation lets it keep several partial sums side by side; no
 zeros or on the order of additions. Both together make it about as fast as C for one number of waves and nodes.
 """
 
-from numba import float64, types, void
+from numba import float64, types
 
 from brakecli.solver.compile import FAST, Floats, borrowed, kernel, vector
 from brakecli.solver.contact import MIDPOINT
-from brakecli.solver.contact.heights import profiles
+from brakecli.solver.heights import profiles
 from brakecli.solver.records import EVALUATE, Layer
 
 

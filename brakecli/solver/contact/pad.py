@@ -20,8 +20,9 @@ TILE, BESIDE = 72, 3
 
 MOST_SUMMED = 10
 """Waves of the wheel up to which their sums at all nodes are as fast as a window."""
-POINTS, MOST_ROWS, INTERPOLATION = 12, 16, 1e-15
-"""Points that a height is interpolated from, the finest grid to a node, and the error over the sum of amplitudes."""
+ROWS, POINTS, INTERPOLATED = (1, 2, 4, 8, 16), 12, 1e-15
+"""Of windows: points of the grid to a node; points that a height is interpolated from; the largest error of that
+over the sum of amplitudes, which is rounding."""
 
 MOST_CELLS = 2**16
 """Cells of the pad of which the exact contact keeps what it has found."""
@@ -87,22 +88,31 @@ def build_pad(k: float, half_length: float, shoe: Surface, wheel: Surface, nodes
     into = table["ss_at"], table["cc_at"]
     table["pr_at"][:], pad.shoe_mean, pad.shoe_square = _products(half_length, shoe, wheel, into)
     if nodes:
-        pad.rows = rows_of_window(wheel, 2.0 * half_length / nodes)
+        pad.rows = window_rows(wheel, 2.0 * half_length / nodes)
         pad.rise_error = _node_tables(half_length, shoe, wheel, table["nodes_at"], table["waves_at"])
     return Pad(pad, flat)
 
 
-def rows_of_window(wheel: Surface, spacing: float) -> int:
-    """Points of a window's grid to a node of this spacing (m), a power of two; 0 where there is to be no window.
+def interpolation_error(wheel: Surface, spacing: float) -> float:
+    """Upper bound (m) of the error of heights that are interpolated from a grid of this spacing (m).
 
-    Between the middle ones of 2n points with the spacing h, a polynomial through them misses a sine by at most
-    (ωh)^2n/(2n)! times the product of 1/4, 9/4, … (n - 1/2)², the remainder of Lagrange.
+    Between the middle ones of 2n points a polynomial through all of them misses a sine by at most (ω spacing)^2n /
+    (2n)! times the product of 1/4, 9/4, …, (n - 1/2)²: Lagrange's remainder.
     """
-    middle = math.prod((i + 0.5) ** 2 for i in range(POINTS // 2)) / math.factorial(POINTS)
-    for rows in (1, 2, 4, 8, 16) if wheel.g.size > MOST_SUMMED else ():
-        if middle * (np.abs(wheel.g) @ (wheel.omega * spacing / rows) ** POINTS) <= INTERPOLATION * np.abs(wheel.g).sum():
-            return rows
-    return 0
+    middle = math.prod((i + 0.5) ** 2 for i in range(POINTS // 2))
+    return float(np.abs(wheel.g) @ (wheel.omega * spacing) ** POINTS) * middle / math.factorial(POINTS)
+
+
+def window_rows(wheel: Surface, spacing: float) -> int:
+    """Points of a window's grid to a node of this spacing (m); 0 without window: few waves, or too short ones."""
+    allowed, many = INTERPOLATED * float(np.abs(wheel.g).sum()), wheel.g.size > MOST_SUMMED
+    found = (rows for rows in ROWS if many and interpolation_error(wheel, spacing / rows) <= allowed)
+    return next(found, 0)
+
+
+def window_width(nodes: int) -> int:
+    """Nodes of a window, in whole tiles: three times as many as are needed at once."""
+    return 3 * TILE * (-(-(nodes + 2 * BESIDE + POINTS) // TILE) + 1)
 
 
 def build_layer(evaluate: Any, pad: Pad, press: Any = None, *, moving: bool = False) -> Layer:
@@ -112,13 +122,13 @@ def build_layer(evaluate: Any, pad: Pad, press: Any = None, *, moving: bool = Fa
     """
     constants, tables = pad
     waves = constants.shoe_terms + constants.wheel_terms
-    found, window, size = new(CONTACT), new(WINDOW), int(constants.edges_at + 8 * waves + 6 + 3 * constants.cells)
-    if moving and constants.rows:
-        window.rows, window.shift = constants.rows, int(constants.rows).bit_length() - 1
-        window.spacing = 2.0 * constants.half_length / constants.nodes / constants.rows
-        window.width = 3 * TILE * (-(-(constants.nodes + 2 * BESIDE + POINTS) // TILE) + 1)
-        window.at = -(-(size + POINTS) // 8) * 8
-        size = int(window.at + window.rows * window.width)
+    found, window, rows = new(CONTACT), new(WINDOW), int(constants.rows) if moving else 0
+    size = int(constants.edges_at + 8 * waves + 6 + 3 * constants.cells)
+    if rows:
+        window.rows, window.shift, window.width = rows, rows.bit_length() - 1, window_width(constants.nodes)
+        window.spacing = 2.0 * constants.half_length / constants.nodes / rows
+        window.at = (size + POINTS + 7) // 8 * 8
+        size = int(window.at + rows * window.width)
     scratch = aligned(size)
     found.near = math.inf  # an evaluator that does not know it leaves it
     return Layer(

@@ -92,7 +92,7 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
     """
     p: Plant = _plant_at(address)
     m, counts, drive, grid, row, steps = p.state, p.counts, p.drive, p.grid, 0, 0
-    waves = p.layer.pad.shoe_terms + p.layer.pad.wheel_terms
+    waves = p.layer.pad.shoe_terms + p.layer.pad.wheel_terms if p.layer.window.rows == 0 else 0
     shoe = Shoe(p.c, p.layer, m, p.work, counts)
     if m.started == 0:
         first_step(shoe, drive, grid)

@@ -94,13 +94,17 @@ def press(p: Shoe, x: float, y: float, touching: int) -> float:
         contact.normal_force = -contact.stiffness * y  # Eq. (2), continued: an event ends the phase at y = 0
         contact.fraction = 1.0 if y < 0.0 else 0.0
         contact.store_x, contact.kind, contact.valid = 0.0, CLOSED_FORM, 1
-    elif coverage(y, pad) == FULL and p.layer.window.rows == 0:
+        return contact.normal_force  # type: ignore[no-any-return]
+    full = coverage(y, pad) == FULL
+    if full and p.layer.window.rows == 0:
         if p.motion.light == 1:
             full_press(x, y, p.layer)
         else:
             full_contact(x, y, p.layer)
     else:
         _evaluate_at(p.layer.press if p.motion.light == 1 else p.layer.evaluate)(x, y, p.layer)
+        if full:  # the sum over nodes is the closed form
+            contact.kind = CLOSED_FORM
     return contact.normal_force  # type: ignore[no-any-return]
 
 

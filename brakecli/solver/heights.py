@@ -1,10 +1,10 @@
 """The heights of both surfaces at the nodes: of few waves by sums, of many from a window of the wheel.
 
 The nodes are equally spaced, so that on a grid that divides their spacing all of them lie at one place between two
-points: each height is a sum of `POINTS` heights on the grid, with weights that all nodes share (Lagrange's). The
-window holds the grid below the pad and ahead of it. It is filled by sums of waves, once for each point that passes,
-so that the number of waves hardly matters, nor how long the run lasts, and does not depend on what was evaluated
-before. `pad.rows_of_window` bounds the error.
+points: each height is a sum of `POINTS` heights on the grid, with weights that all nodes share (Lagrange's).
+The window holds the grid below the pad and ahead of it. Sums of waves fill it, once for each point that passes, so
+that their number hardly matters, nor how long a run lasts; a height does not depend on what was evaluated before.
+`contact.pad.interpolation_error` bounds the error.
 """
 
 import math
@@ -21,7 +21,8 @@ from brakecli.solver.sine import sine_cosine
 
 FARTHEST = 4e18
 """Points of the grid up to which they are numbered; a motion that runs away passes it."""
-WEIGHTS = np.array([(-1.0) ** (POINTS - 1 - i) / (math.factorial(i) * math.factorial(POINTS - 1 - i)) for i in range(POINTS)])
+WEIGHTS = np.array([-((-1.0) ** i) * math.comb(POINTS - 1, i) / math.factorial(POINTS - 1) for i in range(POINTS)])
+"""Lagrange's, without what depends on the place."""
 
 
 @kernel(void(vector, vector, float64, float64), fastmath=FAST)
@@ -49,12 +50,12 @@ def _add_five(f2: Floats, table: Floats, s: Floats, c: Floats) -> None:
 
 @kernel(void(float64, vector, LAYER))
 def _sum_waves(x: float, f2: Floats, layer: Layer) -> None:
-    """f2 where the shoe is at x, from the first node on: whole tiles."""
+    """f2 where the shoe is at x, in whole tiles."""
     pad, tables, angles = layer.pad, layer.tables, layer.angles
     waves, omega_at, at = pad.wheel_terms, pad.wheel_at + pad.wheel_terms, pad.waves_at
-    columns = pad.nodes + 2 * BESIDE + TILE
-    eights = (waves + 7) // 8 * 8  # sines come eight at a time
-    sines, cosines = layer.scratch[columns : columns + eights], layer.scratch[columns + eights : columns + 2 * eights]
+    columns, eights = pad.nodes + 2 * BESIDE + TILE, (waves + 7) // 8 * 8  # sines come eight at a time
+    sines = layer.scratch[columns : columns + eights]
+    cosines = layer.scratch[columns + eights : columns + 2 * eights]
     for i in range(waves):
         sines[i] = tables[omega_at + i] * x + angles[i]
     for i in range(eights):
@@ -103,45 +104,54 @@ def _cover(low: int, high: int, layer: Layer) -> None:
 
 @kernel(vector(int64, int64, LAYER))
 def _row(point: int, size: int, layer: Layer) -> Floats:
-    """The heights on every so manieth point of the grid, from this one on."""
+    """The heights at a point of the grid and, a node's spacing further each, at the points that follow."""
     window = layer.window
     column = (point >> window.shift) - TILE * window.origin
     begin = window.at + (point & (window.rows - 1)) * window.width + column
     return layer.scratch[begin : begin + size]
 
 
-@kernel(void(vector, float64, vector, vector, vector, vector, vector, vector, vector), fastmath=FAST)
-def _add_rows(
-    f2: Floats, old: float, w: Floats, r_0: Floats, r_1: Floats, r_2: Floats, r_3: Floats, r_4: Floats, r_5: Floats
-) -> None:
-    """Add six rows of the window, with their weights, to `old` times f2."""
+@kernel(void(float64, vector), fastmath=FAST)
+def _weigh(part: float, weights: Floats) -> None:
+    """Lagrange's weights of the points, this part of the way from the last one of the first half to the next."""
+    product = 1.0
+    for i in range(POINTS // 2):
+        product *= (part + i) * (part - 1.0 - i)
+    for i in range(POINTS):
+        weights[i] = product * WEIGHTS[i] / (part - (i - POINTS // 2 + 1))
+
+
+@kernel(void(int64, vector, vector, LAYER), fastmath=FAST)
+def _add_rows(begin: int, w: Floats, f2: Floats, layer: Layer) -> None:
+    """f2 as the weighted sum of `POINTS` heights, the first at a point of the grid."""
+    size = f2.size
+    r_0, r_1, r_2 = _row(begin, size, layer), _row(begin + 1, size, layer), _row(begin + 2, size, layer)
+    r_3, r_4, r_5 = _row(begin + 3, size, layer), _row(begin + 4, size, layer), _row(begin + 5, size, layer)
+    r_6, r_7, r_8 = _row(begin + 6, size, layer), _row(begin + 7, size, layer), _row(begin + 8, size, layer)
+    r_9, r_10, r_11 = _row(begin + 9, size, layer), _row(begin + 10, size, layer), _row(begin + 11, size, layer)
     w_0, w_1, w_2, w_3, w_4, w_5 = w[0], w[1], w[2], w[3], w[4], w[5]
-    for j in range(f2.size):
-        one, two = w_0 * r_0[j] + w_1 * r_1[j] + w_2 * r_2[j], w_3 * r_3[j] + w_4 * r_4[j] + w_5 * r_5[j]
-        f2[j] = old * f2[j] + one + two
+    w_6, w_7, w_8, w_9, w_10, w_11 = w[6], w[7], w[8], w[9], w[10], w[11]
+    for j in range(size):
+        one = w_0 * r_0[j] + w_1 * r_1[j] + w_2 * r_2[j]
+        two = w_3 * r_3[j] + w_4 * r_4[j] + w_5 * r_5[j]
+        three = w_6 * r_6[j] + w_7 * r_7[j] + w_8 * r_8[j]
+        four = w_9 * r_9[j] + w_10 * r_10[j] + w_11 * r_11[j]
+        f2[j] = one + two + three + four
 
 
 @kernel(void(float64, vector, LAYER))
 def _interpolate(x: float, f2: Floats, layer: Layer) -> None:
     """f2 where the shoe is at x, from the window."""
-    window, size = layer.window, f2.size
+    window, shift = layer.window, layer.window.shift
     place = (x - window.travel) / window.spacing
     whole = math.floor(place)
-    part, point = place - whole, whole - window.points
+    point = whole - window.points
     begin = (int(point) if abs(point) < FARTHEST else 0) - POINTS // 2 + 1
-    last = begin + POINTS - 1
-    _cover((begin >> window.shift) // TILE, ((last >> window.shift) + size - 1) // TILE, layer)
+    last = (begin + POINTS - 1 >> shift) + f2.size - 1
+    _cover((begin >> shift) // TILE, last // TILE, layer)
     weights = layer.scratch[window.at - POINTS : window.at]
-    product, part = 1.0, max(part, 1e-200)  # never zero
-    for i in range(POINTS // 2):
-        product *= (part + i) * (part - 1.0 - i)
-    for i in range(POINTS):
-        weights[i] = product * WEIGHTS[i] / (part - (i - POINTS // 2 + 1))
-    for i in range(0, POINTS, 6):
-        g = begin + i
-        r_0, r_1, r_2 = _row(g, size, layer), _row(g + 1, size, layer), _row(g + 2, size, layer)
-        r_3, r_4, r_5 = _row(g + 3, size, layer), _row(g + 4, size, layer), _row(g + 5, size, layer)
-        _add_rows(f2, 1.0 if i else 0.0, weights[i : i + 6], r_0, r_1, r_2, r_3, r_4, r_5)
+    _weigh(max(place - whole, 1e-200), weights)  # at no point, where it would divide by zero
+    _add_rows(begin, weights, f2, layer)
 
 
 @kernel(types.UniTuple(vector, 2)(float64, LAYER))
