@@ -144,7 +144,7 @@ def _interpolate(x: float, f2: Floats, layer: Layer) -> None:
     """f2 where the shoe is at x, from the window."""
     window, shift = layer.window, layer.window.shift
     place = (x - window.travel) / window.spacing
-    whole = math.floor(place)
+    whole = np.floor(place)
     point = whole - window.points
     begin = (int(point) if abs(point) < FARTHEST else 0) - POINTS // 2 + 1
     last = (begin + POINTS - 1 >> shift) + f2.size - 1

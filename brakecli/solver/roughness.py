@@ -107,6 +107,6 @@ def turn(travel: float, travel_low: float, layer: Layer) -> None:
     if window.rows == 0:
         wheel_angles(layer.tables[at : at + 3 * n], travel, travel_low, layer.angles)
         return
-    points = math.floor(travel / window.spacing + 0.5)
+    points = np.floor(travel / window.spacing + 0.5)
     grid, grid_low = two_product(points, window.spacing)
     window.points, window.travel = points, (travel - grid) + (travel_low - grid_low)

@@ -19,7 +19,7 @@ from brakecli.solver.compile import config
 SCHEMES = ("two-layer", "three-layer", "event-driven")
 EVALUATORS = ("closed-form", "midpoint", "exact", "auto")
 PAIRS = [pair for pair in product(SCHEMES, EVALUATORS) if pair != ("event-driven", "midpoint")]
-PAIRS.append(("piecewise-exact", "closed-form"))
+PAIRS += [("piecewise-exact", "closed-form"), ("two-layer", "window")]
 STEPS = {"two-layer": 50, "three-layer": 50, "event-driven": 20, "piecewise-exact": 50}
 """Samples; interpreted, the exact contact of the event-driven scheme takes 50 ms for each."""
 
@@ -28,6 +28,9 @@ def case(scheme: str, evaluator: str) -> dict[str, Any]:
     """A rough pad that bounces off a slow wheel and is caught by it; wholly in contact for the closed form."""
     smooth = scheme == "piecewise-exact"
     full = evaluator == "closed-form" and not smooth
+    wheel: dict[str, Any] = {"amplitudes": [2e-5, 1e-5], "wavelengths": [0.013, 0.004]}
+    if evaluator == "window":  # many waves
+        wheel, evaluator = {"amplitudes": [2.5e-6] * 12, "wavelengths": [0.001 * n for n in range(4, 16)]}, "auto"
     return {
         "shoe": {"mass": 0.1},
         "wheel": {"radius": 0.5, "times": [0.0, 5e-4], "angular_speeds": [0.1, 0.3]},
@@ -45,7 +48,7 @@ def case(scheme: str, evaluator: str) -> dict[str, Any]:
         if smooth
         else {
             "shoe": {"amplitudes": [3e-5, 1e-5], "wavelengths": [0.011, 0.005], "phases_deg": [0.0, 60.0]},
-            "wheel": {"amplitudes": [2e-5, 1e-5], "wavelengths": [0.013, 0.004]},
+            "wheel": wheel,
         },
         "initial": {"at": "equilibrium", "vx": 0.3} if full else {"x": -2e-5, "y": 4e-5, "vx": 0.2},
         "solver": {
