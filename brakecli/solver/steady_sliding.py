@@ -18,6 +18,7 @@ from brakecli.solver.system import System
 
 PLACES = 1024
 """Positions of the wheel that an average takes, over 50 of its longest waves."""
+_LONGEST = 50.0
 TABLE = 129
 
 _evaluate_at = at_address(EVALUATE)
@@ -50,6 +51,16 @@ def add_places(y: float, places: Floats, weights: Floats, layer: Layer, sums: Fl
         sums[2] += weights[i] * contact.fraction
 
 
+def averaged_length(system: System) -> float:
+    """Travel of the wheel (m) that an average is taken over."""
+    return _LONGEST / float(system.wheel.turns.min()) if len(system.wheel.g) else 0.0
+
+
+def fills_window(system: System) -> bool:
+    """Whether the places are so near each other that a window is filled sooner than each of them is summed."""
+    return 0.0 < system.window_rows * averaged_length(system) < PLACES * 2.0 * system.half_length
+
+
 def mean_contact(system: System, y: float) -> tuple[float, float, float]:
     """Force (N), stiffness (N/m) and touching part at a height y (m), averaged over the travel of the wheel.
 
@@ -63,11 +74,11 @@ def mean_contact(system: System, y: float) -> tuple[float, float, float]:
         return 0.0, 0.0, 0.0
     if covered == FULL:
         return -pad.k * length * (y + pad.shoe_mean), pad.k * length, 1.0
-    places = np.zeros(1) if wheel.g.size == 0 else 50.0 / wheel.turns.min() * (np.arange(PLACES) + 0.5) / PLACES
+    places = np.zeros(1) if wheel.g.size == 0 else averaged_length(system) * (np.arange(PLACES) + 0.5) / PLACES
     weights = np.ones(1) if wheel.g.size == 0 else 2.0 * np.sin(np.pi * (np.arange(PLACES) + 0.5) / PLACES) ** 2
     found = np.zeros(3)
-    near = pad.rows * places[-1] < len(places) * length  # a window is filled sooner than each place is summed
-    add_places(y, places, weights, build_layer(system.evaluate, system.pad, moving=near), found)
+    layer = build_layer(system.evaluate, system.pad, moving=fills_window(system))
+    add_places(y, places, weights, layer, found)
     force, stiffness, fraction = found / len(places)
     return float(force), float(stiffness), float(fraction)
 

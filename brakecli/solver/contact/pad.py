@@ -105,9 +105,10 @@ def interpolation_error(wheel: Surface, spacing: float) -> float:
 
 def window_rows(wheel: Surface, spacing: float) -> int:
     """Points of a window's grid to a node of this spacing (m); 0 without window: few waves, or too short ones."""
-    allowed, many = INTERPOLATED * float(np.abs(wheel.g).sum()), wheel.g.size > MOST_SUMMED
-    found = (rows for rows in ROWS if many and interpolation_error(wheel, spacing / rows) <= allowed)
-    return next(found, 0)
+    if wheel.g.size <= MOST_SUMMED:
+        return 0
+    allowed = INTERPOLATED * float(np.abs(wheel.g).sum())
+    return next((rows for rows in ROWS if interpolation_error(wheel, spacing / rows) <= allowed), 0)
 
 
 def window_width(nodes: int) -> int:
