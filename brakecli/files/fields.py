@@ -190,8 +190,10 @@ CRITICAL = (
     Field("critical_error", "", "error bar of the critical value, bias included", at="error", label="±"),
     Field("critical_bias", "", "critical value of the scheme at its step less the exact one", at="bias"),
     Field("critical_eigenvalue", "", "critical value by eigenvalues", at="eigenvalue"),
-    Field("critical_windows_lower", "", "where each interval of instability begins", WINDOWS, at="windows_lower"),
-    Field("critical_windows_upper", "", "where each interval of instability ends", WINDOWS, at="windows_upper"),
+    Field("critical_windows_lower", "", "where each interval of instability begins", WINDOWS, at="columns.lower"),
+    Field("critical_windows_upper", "", "where each interval of instability ends", WINDOWS, at="columns.upper"),
+    Field("critical_windows_lower_error", "", "error bars of these beginnings", WINDOWS, at="columns.lower_error"),
+    Field("critical_windows_upper_error", "", "error bars of these ends", WINDOWS, at="columns.upper_error"),
     Field("critical_sustained", "", "least value at which vibration lasts from the case's start", at="sustained"),
     Field("sustained_status", "", "how the search for that value has ended", "S24", at="sustained_outcome"),
 )
@@ -371,6 +373,7 @@ DIFFERENT_VALUE = (
     Field("a", "", "value in the first file; null where there is none", OBJECT),
     Field("b", "", "value in the second file; null where there is none", OBJECT),
 )
+DIFFERENT_NUMBER = (*DIFFERENT_VALUE, Field("units", "", "unit of both values", TEXT))
 DIFFERENT_VARIABLE = (
     *HELD[:2],
     Field("shapes", "1", "lengths of its axes in both files; null where it is missing", OBJECT),
@@ -378,11 +381,13 @@ DIFFERENT_VARIABLE = (
     integer("different", "number of those that differ"),
     Field("largest", "of the variable", "largest difference of two values; null for texts"),
     ratio("relative", "that over the largest value in both; null where that is 0"),
+    Field("units", "", "unit of the variable", TEXT),
+    Field("interpolated", "", "the axis, time or frequency, where its values differ; null otherwise", TEXT),
 )
 DIFFERENCE_OF_TWO = (
     Field("same", "", "whether case, numbers and variables are the same", "?"),
     Field("case", "", "keys of the case and of the sweep that differ", OBJECT, rows=DIFFERENT_VALUE),
-    Field("numbers", "", "attributes that differ", OBJECT, rows=DIFFERENT_VALUE),
+    Field("numbers", "", "attributes that differ", OBJECT, rows=DIFFERENT_NUMBER),
     Field("variables", "", "variables that differ", OBJECT, rows=DIFFERENT_VARIABLE),
     Field("versions", "", "versions that differ", OBJECT, rows=DIFFERENT_VALUE),
 )

@@ -171,7 +171,10 @@ def next_start(outcome: Outcome) -> Settings:
         wheel_angles(system.wheel.waves, *integral_at(system.belt, system.sampled_duration, 0.0), angles)
         phases = iter(angles)  # a wave without amplitude has no phase
         turned = [math.degrees(next(phases) % TWO_PI) if g else 0.0 for g in wheel.sines()["amplitudes"]]
-        start["roughness", "wheel", "phases_deg"] = turned
+        if wheel.profile is None:
+            start["roughness", "wheel", "phases_deg"] = turned
+        else:
+            start["roughness", "wheel"] = {**wheel.sines(), "phases_deg": turned}
     return start
 
 

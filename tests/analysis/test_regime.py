@@ -267,3 +267,29 @@ def test_impacts_of_less_than_a_sample_show_in_some_cycles_or_are_missed(
         assert verdict.torque_variation is None
     else:
         assert verdict.torque_variation == pytest.approx(800.0, rel=0.03)  # (π/13)²/2
+
+
+@pytest.mark.parametrize(
+    ("waves", "turns"),
+    [
+        ([1, 7], 1.0),
+        ([2, 3], 1.0),
+        ([4, 6], 0.5),
+        ([6.0], 1 / 6),
+        ([0.5, 2.5], 2.0),
+        ([2.5], 0.4),
+        ([1.3, 4], 1 / 1.3),
+    ],
+)
+def test_the_variation_of_the_torque_needs_the_time_in_which_the_waves_repeat(
+    waves: list[float], turns: float
+) -> None:
+    turn = 2.0 * np.pi * 0.4 / 3.0  # s, at 3 m/s
+    passing = tuple((wave / turn, 1e-6) for wave in waves)
+    context = Context(-3.0, radius=0.4, waves=(*passing, (0.01, 1e-12)))  # a weak wave is not waited for
+    assert context.pattern == pytest.approx(turns * turn)
+    history = history_of(len(TIME), state=-1.0)  # damped
+    reasons = classify(history, Context(3.0, waves=((0.9 / TIME[-1], 1e-6),))).reasons
+    assert any("torque_variation needs" in each for each in reasons)
+    reasons = classify(history, Context(3.0, waves=((60.0, 1e-6),))).reasons
+    assert not any("torque_variation needs" in each for each in reasons)

@@ -67,6 +67,7 @@ class Context:
     scale: float = math.inf  # m/s, of a motion that would open the contact
     frictionless: bool = False
     undamped: bool = False
+    touches: Callable[[], bool] = lambda: True  # whether the shoe touches the wheel where it slides steadily
     growth: Callable[[], float] = lambda: 0.0  # 1/s, of a small disturbance of steady sliding; below 0 it decays
     modes: Callable[[], list["Mode"]] = list  # of small vibrations
     linear: Callable[[], "Linear | None"] = lambda: None  # the theory of full contact
@@ -76,6 +77,17 @@ class Context:
     step: float = 0.0  # s; 0 where steps are chosen to keep an error
     feeds: Feeds = Feeds.UNKNOWN  # what a second run has shown
     sticks: float = 0.0  # part of the cycles that stick in a second run without roughness
+
+    @property
+    def pattern(self) -> float:
+        """Time (s) until the strong waves repeat: a turn or a part of it if they are orders, or the longest."""
+        strong = 0.01 * max((swing for _, swing in self.waves), default=0.0)
+        passing = [frequency for frequency, swing in self.waves if swing > strong]
+        turns = abs(self.belt_speed) / (2.0 * math.pi * self.radius)
+        orders = [round(each / turns) for each in passing]
+        whole = all(math.isclose(each, order * turns) for each, order in zip(passing, orders, strict=True))
+        slowest = turns * math.gcd(*orders) if whole else min(passing)
+        return 1.0 / slowest if passing else 0.0
 
 
 class Decision(NamedTuple):
