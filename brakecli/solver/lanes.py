@@ -15,7 +15,7 @@ import numpy as np
 from numba import float64, int64, types, void
 from numpy.typing import NDArray
 
-from brakecli.solver.compile import Floats, borrowed, kernel, stopped, vector
+from brakecli.solver.compile import FAST, Floats, borrowed, kernel, stopped, vector
 from brakecli.solver.friction import observed
 from brakecli.solver.quantities import BOUND
 from brakecli.solver.records import Coefficients, record
@@ -28,7 +28,6 @@ LANES, WAVES = 16, 5
 THETA_1, THETA_2, THETA_3 = NUMEROV
 
 _MOST = 8  # evaluations of the contact in a step
-_FAST = frozenset({"reassoc", "contract", "nsz"})
 
 
 def _lanes(names: str) -> dict[str, Any]:
@@ -73,7 +72,7 @@ class Shared(NamedTuple):
 _SHARED = types.NamedTuple([float64, float64, int64, int64, *[float64] * 4, vector, vector, int64], Shared)
 
 
-@kernel(void(_LANE, _SHARED, int64, float64), fastmath=_FAST)
+@kernel(void(_LANE, _SHARED, int64, float64), fastmath=FAST)
 def _pass(o: Any, shared: Shared, i: int, t: float) -> None:
     """Sine and cosine of a wave of the wheel."""
     omega, phase = shared.waves[3 * i], shared.waves[3 * i + 1]
@@ -83,7 +82,7 @@ def _pass(o: Any, shared: Shared, i: int, t: float) -> None:
         o.sine[i, n], o.cosine[i, n] = sine_cosine(angle)
 
 
-@kernel(void(_LANE, _SHARED), fastmath=_FAST)
+@kernel(void(_LANE, _SHARED), fastmath=FAST)
 def _add_nodes(o: Any, shared: Shared) -> None:
     """The midpoint sum of the gaps (m), and how many nodes touch."""
     table, at = shared.table, 0
@@ -102,7 +101,7 @@ def _add_nodes(o: Any, shared: Shared) -> None:
             o.touches[n] += 1.0 if gap > 0.0 else 0.0
 
 
-@kernel(void(_LANE, _SHARED, float64), fastmath=_FAST, inlined=False)
+@kernel(void(_LANE, _SHARED, float64), fastmath=FAST, inlined=False)
 def _touch(o: Any, shared: Shared, t: float) -> None:
     """The normal force, (2), and the part that touches: in closed form where a bound proves it, or by nodes."""
     shared = borrowed(shared)
@@ -158,7 +157,7 @@ def _begin(o: Any, shared: Shared) -> None:
         o.earlier[n] = 2.0 * o.before[n] - o.force[n]
 
 
-@kernel(void(_LANE, _SHARED), fastmath=_FAST)
+@kernel(void(_LANE, _SHARED), fastmath=FAST)
 def _prepare(o: Any, shared: Shared) -> None:
     """The known part of (6) and (7) over three levels, and the guess of the force as in `loop.advance`.
 
@@ -182,7 +181,7 @@ def _prepare(o: Any, shared: Shared) -> None:
         o.done[n] = o.out[n]
 
 
-@kernel(void(_LANE, _SHARED, float64), fastmath=_FAST)
+@kernel(void(_LANE, _SHARED, float64), fastmath=FAST)
 def _iterate(o: Any, shared: Shared, t: float) -> None:
     """The force of the next level in `guess`: as (13), until what is left is below the bound."""
     h = shared.h
@@ -222,7 +221,7 @@ def _finish(o: Any, shared: Shared) -> None:
         o.closed[n] += 1.0 - o.partly[n]
 
 
-@kernel(void(_LANE, _SHARED, float64[:, :, ::1], int64), fastmath=_FAST)
+@kernel(void(_LANE, _SHARED, float64[:, :, ::1], int64), fastmath=FAST)
 def _sample(o: Any, shared: Shared, rows: NDArray[np.float64], number: int) -> None:
     """The sample at the older level, as `loop.sample` has it; d without h²/6 of its second derivative."""
     h = shared.h

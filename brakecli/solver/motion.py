@@ -14,7 +14,7 @@ from brakecli.solver.friction import minimise
 from brakecli.solver.method import Method
 from brakecli.solver.quantities import HISTORY, Failure
 from brakecli.solver.records import COUNTS, PROBLEM, WORK, Drive, Pair, Plant, Plug, new
-from brakecli.solver.roughness import wheel_angles
+from brakecli.solver.roughness import turn
 from brakecli.solver.schedules import integral_at, slope_at
 from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import System
@@ -108,8 +108,8 @@ class Stepping:
             c=system.coefficients,
             s=system.weights,
             grid=system.grid,
-            drive=Drive(system.belt, system.load, system.wheel.waves),
-            layer=build_layer(system.evaluate, system.pad, contact.load_press(system.evaluator)),
+            drive=Drive(system.belt, system.load),
+            layer=build_layer(system.evaluate, system.pad, contact.load_press(system.evaluator), moving=True),
             plug=_plugged_in(system),
             state=new(self.scheme.STATE),
             problem=new(PROBLEM),
@@ -184,7 +184,7 @@ class Stepping:
         """Evaluate the contact, `steps` steps after t = 0."""
         t, part = divmod(steps, self.system.per_sample)
         travel = integral_at(self.system.belt, t * self.system.interval, part * self.system.step)
-        wheel_angles(self.plant.drive.wheel, *travel, self.plant.layer.angles)
+        turn(*travel, self.plant.layer)
         self.system.evaluate(x, y, self.plant.layer)
 
     def _energy(self) -> tuple[float, float, float]:

@@ -120,14 +120,26 @@ PAD = record(
     opposite_at=int,  # f1 at the nodes of one half and at those opposite, tile by tile
     nodes_at=int,  # f1 at the nodes
     waves_at=int,  # g sin(ωξ) and g cos(ωξ) of the wheel at the nodes, tile by tile
+    turns_at=int,  # phases (rad) and waves per metre of the wheel, the latter as sums of two doubles
+    rows=int,  # points of a window's grid to a node, a power of two; 0 where sums of waves are as fast
 )
+
+WINDOW = record(
+    "spacing",  # of the grid, m
+    "points travel",  # that the wheel has travelled: points of the grid, a whole number, and the rest, m
+    rows=int,  # points to a node; 0 where there is no window
+    shift=int,  # their binary logarithm
+    width=int,  # nodes, in whole tiles
+    at=int,  # where in the scratch it begins, row by row; weights lie before it
+    origin=int,  # its first tile
+    first=int,  # the tiles that are filled, from this one on
+    end=int,
+)
+"""The wheel's surface below the pad and ahead of it, see `solver.heights`."""
 
 KNOT = record("time value value_low slope slope_low integral integral_low")
 """A piecewise linear function of time, at one of its knots (s). Value, slope after it and integral from t = 0 are
 sums of two doubles, to 32 digits."""
-
-WAVE = record("phase turns turns_low")
-"""A harmonic of the wheel: its phase (rad) and its exact number of waves per metre, a sum of two doubles."""
 
 
 X, Y, V_X, V_Y = range(4)
@@ -256,11 +268,10 @@ class Grid(NamedTuple):
 
 
 class Drive(NamedTuple):
-    """What acts from outside: the speed U of the wheel's surface (m/s), the load Q (N), the wheel's profile."""
+    """What acts from outside: the speed U of the wheel's surface (m/s) and the load Q (N)."""
 
     belt: NDArray[Any]
     load: NDArray[Any]
-    wheel: NDArray[Any]
 
 
 class Layer(NamedTuple):
@@ -272,6 +283,7 @@ class Layer(NamedTuple):
     tables: Floats
     angles: Floats  # phases of the wheel's harmonics, rad
     scratch: Floats
+    window: Any
     contact: Any
 
 
@@ -298,16 +310,15 @@ class Plant(NamedTuple):
     counts: Any
 
 
-STATE_TYPE, MOTION_TYPE, FLOW_TYPE, PROBLEM_TYPE, CONTACT_TYPE, WORK_TYPE, COUNTS_TYPE, PAD_TYPE = (
-    numba.from_dtype(each) for each in (STATE, MOTION, FLOW, PROBLEM, CONTACT, WORK, COUNTS, PAD)
+STATE_TYPE, MOTION_TYPE, FLOW_TYPE, PROBLEM_TYPE, CONTACT_TYPE, WORK_TYPE, COUNTS_TYPE, PAD_TYPE, WINDOW_TYPE = (
+    numba.from_dtype(each) for each in (STATE, MOTION, FLOW, PROBLEM, CONTACT, WORK, COUNTS, PAD, WINDOW)
 )
 KNOTS = types.Array(numba.from_dtype(KNOT), 1, "C")
-WAVES = types.Array(numba.from_dtype(WAVE), 1, "C")
 COEFFICIENTS = types.NamedUniTuple(float64, len(Coefficients._fields), Coefficients)
 WEIGHTS = types.NamedUniTuple(float64, len(Weights._fields), Weights)
 GRID = types.NamedTuple([float64, int64, float64, int64, int64, int64, int64, float64], Grid)
-DRIVE = types.NamedTuple([KNOTS, KNOTS, WAVES], Drive)
-LAYER = types.NamedTuple([int64, int64, PAD_TYPE, vector, vector, vector, CONTACT_TYPE], Layer)
+DRIVE = types.NamedUniTuple(KNOTS, len(Drive._fields), Drive)
+LAYER = types.NamedTuple([int64, int64, PAD_TYPE, vector, vector, vector, WINDOW_TYPE, CONTACT_TYPE], Layer)
 PLUG = types.NamedUniTuple(int64, 3, Plug)
 
 

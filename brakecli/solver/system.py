@@ -10,7 +10,7 @@ import numpy as np
 
 from brakecli.errors import RefusedError
 from brakecli.solver import contact, schemes
-from brakecli.solver.contact.pad import Pad, build_pad, default_nodes
+from brakecli.solver.contact.pad import Pad, build_pad, default_nodes, window_rows, window_width
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.method import MOST, Method
 from brakecli.solver.records import Coefficients, Grid, Weights
@@ -70,9 +70,15 @@ class System:
 
     @cached_property
     def table_bytes(self) -> float:
-        """Memory that `pad` takes while it is made: values at nodes, and two numbers for each pair of waves."""
+        """Memory of the contact: values at nodes, a window, two numbers for each pair of waves."""
         terms, nodes = len(self.shoe.g) + len(self.wheel.g), self.nodes
-        return 8.0 * (nodes * (2.0 * len(self.wheel.g) + 3.0) + 2.0 * terms**2)
+        at_nodes = nodes * (2.0 * len(self.wheel.g) + 3.0) + self.window_rows * window_width(nodes)
+        return 8.0 * (at_nodes + 2.0 * terms**2)
+
+    @property
+    def window_rows(self) -> int:
+        """Points of the grid of a window to a node, see `solver.heights`; 0 without one."""
+        return window_rows(self.wheel, 2.0 * self.half_length / self.nodes) if self.nodes else 0
 
     def refuse_tables(self) -> None:
         """Raise RefusedError where the tables of the contact would be too large."""

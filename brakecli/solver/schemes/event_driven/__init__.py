@@ -62,7 +62,7 @@ def _sample(p: Shoe, interval: float, level: int) -> None:
     if m.level > level or m.tau > 4.0 * EPSILON * t:
         side, touching = m.side_done, m.touching_done
         since = (t - m.time_done) - m.tau_done
-        theta, rest, belt_slope = since / m.step_done, m.step_done - since, m.belt_slope_done
+        theta, rest, belt_slope = since / m.step_done, (m.time - t) + m.tau, m.belt_slope_done
         belt, load = m.belt_done + belt_slope * since, m.load_done + m.load_slope_done * since
         passed = -(belt + 0.5 * belt_slope * rest) * rest  # by the wheel since the end of the step
         x, y = interpolated(m, X, theta), interpolated(m, Y, theta)
@@ -93,7 +93,7 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
     """
     p: Plant = _plant_at(address)
     m, counts, drive, grid, row, steps = p.state, p.counts, p.drive, p.grid, 0, 0
-    waves = p.layer.pad.shoe_terms + p.layer.pad.wheel_terms
+    waves = p.layer.pad.shoe_terms + p.layer.pad.wheel_terms if p.layer.window.rows == 0 else 0
     shoe = Shoe(p.c, p.layer, m, p.work, counts)
     if m.started == 0:
         first_step(shoe, drive, grid)
