@@ -123,7 +123,7 @@ def whole(m: Any, h: float) -> int:
         for j in range(i + 1):
             m.sums[pair] += m.z[i] * m.z[j]
             pair += 1
-    m.waiting += 1
+    m.waiting = 1
     for i in range(4):
         m.z[i] = m.after[i]
     _carry(m)
