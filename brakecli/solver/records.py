@@ -189,7 +189,6 @@ FLOW = record(
     started=int,  # 0 before the phase of the start is known
     events=int,  # events without progress
     made=(int, PHASES),  # 1 where the matrices of a phase are made, 2 where the forms of its works are, too
-    waiting=int,  # 1 where works of whole steps are not added up yet
     row=(float, 8),  # the sample at the level reached
     z=(float, SIZE),  # motion reached
     error=(float, 4),  # of x, y, v_x and v_y by the rounding of all steps so far
@@ -200,7 +199,10 @@ FLOW = record(
     needed=(float, SIZE),  # row whose product with z is the friction force that stick takes, N
     generator=(float, (PHASES, SIZE, SIZE)),  # A
     friction=(float, (PHASES, SIZE)),  # row of the friction force, N
-    margins=(float, (PHASES, SIZE, AHEAD)),  # columns of `before`: first z, then what is positive while a phase lasts
+    margins=(
+        float,
+        (PHASES, SIZE, AHEAD),
+    ),  # columns of `before`: z, then what is positive in a phase
     step=(float, (PHASES, SIZE, AHEAD)),  # the same times exp(A h), which give `after`
     now=(float, (SIZE, AHEAD)),  # those of the present phase: at a fixed place, the compiler makes vectors of them
     works=(float, (PHASES, WORKS, SIZE, SIZE)),  # forms in z that are the works of a step from z on, J
@@ -211,6 +213,7 @@ FLOW = record(
     rows=(float, (4, SIZE)),  # those of exp(A t) at the end of a step, or at a node of Gauss' rule
     at=(float, SIZE),  # the motion at a part of the span
     polynomial=(float, (2, TERMS)),  # a margin on it, and the margin's slope, negative
+    waiting=int,  # 1 where works of whole steps do; further up, it would push vectors across lines of the cache
 )
 """A piecewise-exact motion with the matrices of its phases."""
 

@@ -170,13 +170,14 @@ def _cycle(system: System, theory: Linear, flow: Any, o: Any, seen: bool) -> tup
     part, growth = end - start, abs(theory.mode.growth)
     stick, clear = float(o.spent[STICK]), float(o.spent[OPEN])
     limited = period - float(o.spent[o.sliding])
-    if rate * part < _POWERS or seen and (
+    hidden = (
         part < _SETTLED_PART * end
         or end < _CYCLES * WINDOWS * period
         or period < _SAMPLES * interval
         or min(limited, stick or limited, clear or limited) < _SEEN * interval
         or o.beaten.tolist() != [1, 1]
-    ):
+    )
+    if rate * part < _POWERS or (seen and hidden):
         return None
     undamped = is_undamped(system.coefficients)
     lasts = growth * (part - _WINDOW * end) >= 1.0 and not undamped

@@ -78,8 +78,9 @@ class Plan:
             put(data, path, value, Case, kept=settings)
         touched = {path[0] for path in settings}
         same = [name for name in _ALONE if name not in touched and data.get(name) == self.case_keys.get(name)]
+        data |= {name: self._valid[name] for name in same if name in self._valid}
         try:
-            case = Case.model_validate({**data, **{name: self._valid[name] for name in same if name in self._valid}})
+            case = Case.model_validate(data)
             self._valid |= {name: getattr(case, name) for name in same}
             return case
         except ValidationError as error:

@@ -19,14 +19,12 @@ from brakecli.solver.records import (
     LOAD_SLOPE,
     MARGINS,
     NODES,
-    AHEAD,
     PHASES,
     SIZE,
     TERMS,
     V_X,
     V_Y,
     WORK_TYPE,
-    WORKS,
     Coefficients,
     X,
     Y,
@@ -77,14 +75,12 @@ def reach(m: Any, theta: float) -> None:
 
 @kernel(void(COEFFICIENTS, FLOW_TYPE, int64), inlined=False)
 def _describe(c: Coefficients, m: Any, phase: int) -> None:
-    """The generator of a phase, its friction force, margins and powers."""
-    a, force, needed = m.generator[phase], m.friction[phase], m.needed
-    margin_all = m.margins[phase]
-    margin = margin_all[:, 4:]
+    """The generator of a phase, its friction force and margins."""
+    a, force, needed, margin = m.generator[phase], m.friction[phase], m.needed, m.margins[phase, :, 4:]
     pressed = m.stiffness if phase != OPEN else 0.0  # F_y = -pressed y, Eq. (2)
     side = phase - STICK if phase != OPEN else 0
     for j in range(4):
-        margin_all[j, j] = 1.0
+        m.margins[phase, j, j] = 1.0
     # Eq. (6) with the velocity and the acceleration of the wheel
     needed[X], needed[Y], needed[V_Y], needed[LOAD] = c.c_xx, c.c_xy, c.b_xy, c.sin_beta
     needed[BELT], needed[BELT_SLOPE] = c.b_xx, c.m
@@ -107,7 +103,10 @@ def _describe(c: Coefficients, m: Any, phase: int) -> None:
 
 @kernel(void(FLOW_TYPE, int64, float64), inlined=False)
 def _unroll(m: Any, phase: int, h: float) -> None:
-    """The series of exp(A h): the rows for x, y, v_x and v_y of (A h)^k / k!, two terms at once."""
+    """The series of exp(A h): the rows for x, y, v_x and v_y of (A h)^k / k!.
+
+    Two terms in one loop make it large enough for the compiler to take vectors; a short one it unrolls instead.
+    """
     a, f = m.generator, m.flow
     for i in range(4):
         for j in range(SIZE):
@@ -148,8 +147,8 @@ def _sum_up(m: Any, node: int) -> None:
 
 @kernel(float64(types.Array(float64, 1, "A"), int64, float64))
 def _driven(row: Floats, j: int, time: float) -> float:
-    """What a component of z is worth in a row after a time by U, Q and their slopes, of which U and Q are integrals."""
-    return (row[j] if j > V_Y else 0.0) + (time * row[j - 1] if j == BELT_SLOPE or j == LOAD_SLOPE else 0.0)
+    """What one of U, Q and their slopes is worth in a row after a time: U and Q are integrals of slopes."""
+    return (row[j] if j > V_Y else 0.0) + (time * row[j - 1] if j in (BELT_SLOPE, LOAD_SLOPE) else 0.0)
 
 
 @kernel(void(COEFFICIENTS, FLOW_TYPE, int64, float64), inlined=False)
