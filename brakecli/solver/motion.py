@@ -157,7 +157,7 @@ class Stepping:
         """Step to level `stop`; the samples on the way."""
         system, lag, per_sample = self.system, self.scheme.LAG, self.system.per_sample
         first = self._level.item() - lag
-        rows = np.zeros((-(-(stop - lag) // per_sample) + (-first // per_sample), len(HISTORY)))
+        rows = np.empty((-(-(stop - lag) // per_sample) + (-first // per_sample), len(HISTORY)))
         failure, done = self.scheme.advance(self._plant_at, rows, self.events, stop), self._level.item() - lag
         if failure:
             self.work.failure, self.work.failure_time = Failure(failure), system.step * done

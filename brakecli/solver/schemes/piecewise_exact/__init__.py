@@ -263,7 +263,7 @@ def _sample(p: Plant, t: float) -> None:
         m.worst[i], m.largest[i] = max(m.worst[i], abs(m.error[i])), max(m.largest[i], abs(z[i]))
     normal = max(-m.stiffness * z[Y], 0.0) if m.phase != OPEN else 0.0
     needed = 0.0
-    for i in range(SIZE):
+    for i in range(SIZE if m.phase == STICK else 0):
         needed += m.needed[i] * z[i]
     holds = m.phase == STICK and abs(needed) <= c.phi * normal * (1.0 + 1e-12)  # by the rounding it still sticks
     state, friction = observed(float(m.phase - STICK), holds, needed, normal, c.phi * normal)
@@ -292,7 +292,7 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
         if counts.level == stop:
             break
         if part == 0:
-            for column in range(rows.shape[1]):  # a slice would take seconds to compile
+            for column in range(8):  # a slice would take seconds to compile
                 rows[row, column] = m.row[column]
             row += 1
         if m.beyond == 0.0 and t + h < m.knot and whole(m, h) == 1:
