@@ -1,10 +1,14 @@
 """How Sphinx makes the site of these pages: `make docs`."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
 
+from docutils.nodes import Element, SkipNode
+from latex2mathml.converter import convert
 from sphinx.application import Sphinx
+from sphinx.writers.html5 import HTML5Translator
 
 import brakecli
 from brakecli.cli import app
@@ -16,12 +20,14 @@ project, author, release = "brakecli", "the authors of brakecli", brakecli.__ver
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 exclude_patterns = ["_site", "generated", "*.template.md"]
 source_suffix = {".md": "myst-nb"}
+html_title = "brakecli"  # a longer one makes pages wider than a telephone
+html_math_renderer = "mathml"
 html_theme = "pydata_sphinx_theme"
 html_theme_options = {"show_prev_next": False, "secondary_sidebar_items": ["page-toc"]}
+html_context = {"default_mode": "auto"}
 html_copy_source = False
 myst_enable_extensions = ["dollarmath", "colon_fence"]
 myst_heading_anchors = 4
-math_number_all = True
 nb_execution_mode = "force"
 nb_execution_timeout = 300
 nb_execution_raise_on_error = True
@@ -40,6 +46,16 @@ def write_commands(site: Sphinx) -> None:
     (HERE / "generated" / "commands.md").write_text("\n".join(parts))
 
 
+def write_math(page: HTML5Translator, node: Element) -> None:
+    """Write a formula as MathML, which browsers show without a network."""
+    alone = node.tagname == "math_block"
+    found = convert(node.astext(), display="block" if alone else "inline")
+    found = re.sub(r"<mi>([a-z]{2,})</mi>", r'<mo form="prefix" lspace=".17em" rspace=".17em">\1</mo>', found)
+    page.body.append(f'<div style="overflow: auto; padding: 0.5rem 0">{found}</div>' if alone else found)
+    raise SkipNode
+
+
 def setup(site: Sphinx) -> None:
     """Have the generated pages written before any is read."""
+    site.add_html_math_renderer("mathml", (write_math, None), (write_math, None))
     site.connect("builder-inited", write_commands)

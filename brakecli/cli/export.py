@@ -15,7 +15,9 @@ def command(
     result: Annotated[Path, source_argument("FILE.h5", "Result of a run, a sweep, a comparison or stability.")],
     output: Annotated[Path | None, output_option("File, .csv or .wav", "FILE.csv, here")] = None,
     variables: Annotated[list[str] | None, option(VARIABLE, "NAME", "--variable")] = None,
-    group: Annotated[str | None, option("What of a run: history (default) or spectrum.", "GROUP")] = None,
+    group: Annotated[
+        str | None, option("What of a run: history (default), spectrum, over_time or vibrations.", "GROUP")
+    ] = None,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:

@@ -1,10 +1,12 @@
 """What a command prints: results on standard output; warnings, progress and failures on standard error."""
 
 import json
+import shutil
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from textwrap import wrap
 from typing import Any, TextIO, cast
 
 from brakecli.files.os_signals import Styled, unwinding
@@ -35,9 +37,14 @@ def show_result(
 
 
 def say(*lines: str) -> None:
-    """Print lines on standard error."""
+    """Print lines on standard error; a terminal, which would break them within words, gets shorter ones."""
     for line in lines:
-        print(f"brakecli: {line}", file=sys.stderr, flush=True)  # noqa: T201
+        text = f"brakecli: {line}"
+        if sys.stderr is not None and sys.stderr.isatty():
+            width = shutil.get_terminal_size().columns
+            pieces = wrap(text, width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
+            text = "\n".join(pieces)
+        print(text, file=sys.stderr, flush=True)  # noqa: T201
 
 
 def warn(*warnings: str) -> None:

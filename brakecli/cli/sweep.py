@@ -58,7 +58,7 @@ def command(
     found = report.findings
     warn(*report.notes)
     if found.warned:
-        warn(f"{found.warned} points ran with warnings, the first: {found.first_warning}")
+        warn(f"points that ran with warnings: {found.warned}, the first: {found.first_warning}")
     numbers = {"output": str(report.output), **report.numbers()}
     show_result("sweep", numbers, sweep_table, report, as_json=as_json, quiet=quiet)
     for failure in found.failures:

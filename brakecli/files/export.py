@@ -3,6 +3,7 @@
 import csv
 import io
 import math
+import re
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from pathlib import Path
@@ -41,7 +42,7 @@ def export(
         what = f"--group {group}" if group else str(target)
         raise UsageError(f"{what}: is for runs, and {result.path} is a {kind}; export it as .csv without --group")
     if group not in (None, *_AXES):
-        raise UsageError(f"--group {group}: there is none; give {' or '.join(_AXES)}")
+        raise UsageError(f"--group {group}: there is none; give one of {', '.join(_AXES)}")
     if group and group not in result.file:
         raise UsageError(f"--group {group}: this run has none; it has one where speed or load change")
     if suffix == ".wav" and (group not in (None, "history") or len(names) > 1):
@@ -121,7 +122,8 @@ def _checked(names: Sequence[str], there: Sequence[str], result: StoredResult) -
 
 
 def _head(name: str, variable: Variable) -> str:
-    units = str(variable.attributes.get("units", ""))
+    units = re.sub(r"^\(([^/ ]*)\)2 Hz-1", r"\1^2/Hz", str(variable.attributes.get("units", "")))
+    units = units.replace("2 Hz-1", "^2/Hz")
     return name if units in ("", "1") else f"{name} ({units})"
 
 

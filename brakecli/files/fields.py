@@ -190,8 +190,10 @@ CRITICAL = (
     Field("critical_error", "", "error bar of the critical value, bias included", at="error", label="±"),
     Field("critical_bias", "", "critical value of the scheme at its step less the exact one", at="bias"),
     Field("critical_eigenvalue", "", "critical value by eigenvalues", at="eigenvalue"),
-    Field("critical_windows_lower", "", "where each interval of instability begins", WINDOWS, at="windows_lower"),
-    Field("critical_windows_upper", "", "where each interval of instability ends", WINDOWS, at="windows_upper"),
+    Field("critical_windows_lower", "", "where each interval of instability begins", WINDOWS, at="columns.lower"),
+    Field("critical_windows_upper", "", "where each interval of instability ends", WINDOWS, at="columns.upper"),
+    Field("critical_windows_lower_error", "", "error bars of these beginnings", WINDOWS, at="columns.lower_error"),
+    Field("critical_windows_upper_error", "", "error bars of these ends", WINDOWS, at="columns.upper_error"),
     Field("critical_sustained", "", "least value at which vibration lasts from the case's start", at="sustained"),
     Field("sustained_status", "", "how the search for that value has ended", "S24", at="sustained_outcome"),
 )

@@ -42,10 +42,18 @@ class Axis:
         edges = np.concatenate([[2.0 * places[0] - middles[0]], middles, [2.0 * places[-1] - middles[-1]]])
         return np.exp(edges) if self.logarithmic else edges
 
+    @property
+    def digits(self) -> int:
+        """Digits that tell neighbours apart."""
+        steps = np.diff(self.values)
+        return style.digits_of(style.largest(self.values), float(steps.min()) if len(steps) else 0.0)
+
     def named(self, place: int) -> str:
         """The value at a place, with its key and unit."""
         factor, units = style.prefixed(style.largest(self.values), self.units)
-        value = self.texts[place] if self.texts else style.readable(factor * float(self.values[place]))
+        value = (
+            self.texts[place] if self.texts else style.readable(factor * float(self.values[place]), self.digits)
+        )
         return f"{self.key} = {value} {units}".rstrip()
 
     def place(self, value: str) -> int | None:
@@ -71,7 +79,7 @@ class Axis:
             axis.axes.set(**{f"{side}lim": (-0.5, len(texts) - 0.5)})
             axis.grid(False)
         elif not self.logarithmic and len(values) <= _FEW and np.diff(values).min() > 0.1 * np.ptp(values):
-            axis.set_ticks(values, labels=[style.readable(factor * float(value)) for value in values])
+            axis.set_ticks(values, labels=[style.readable(factor * float(value), self.digits) for value in values])
         else:
             if self.logarithmic:
                 axis.axes.set(**{f"{side}scale": "log"})

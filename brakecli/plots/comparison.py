@@ -57,7 +57,8 @@ def draw(result: StoredResult) -> Figure:
             axes.plot(factor * columns[name][best], errors[best], "o", label="recommended", **ring)
         (_draw_front if name == "wall_seconds" else _draw_slopes)(axes, columns, work)
         axes.set(title=title, xlabel=label)
-        axes.label_outer()
+        if not style.is_narrow():
+            axes.label_outer()
         left, right = axes.get_xlim()
         axes.xaxis.set_major_locator(style.log_locator(right / left))
         axes.xaxis.set_minor_formatter(NullFormatter())

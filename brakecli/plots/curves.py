@@ -26,7 +26,6 @@ from brakecli.sweeps.critical import Outcome
 
 _FEW = 60  # points up to which each has a marker of full size
 _DIRECTIONS = {"": ("", "-"), "up": (">", "-"), "down": ("<", style.DASHES)}  # marker and dashes of curves
-_ALIKE = 0.02  # values whose relative difference is smaller do not fill the axis from bottom to top
 
 
 def draw(picture: SweepPicture) -> Figure:
@@ -83,7 +82,7 @@ def _draw_critical(axes: Axes, picture: SweepPicture) -> None:
     unit = style.set_ticks(axes.yaxis, 0.0, highest, picture.units["critical"])
     axes.set_ylabel(style.labelled(f"critical {critical.parameter}", unit), parse_math=False)
     if np.isfinite(drawn).any():
-        _widen(axes, drawn)
+        style.widen(axes, drawn)
     else:
         axes.set_ylim(critical.lower, critical.upper)
     _mark(axes, x, picture.missing())
@@ -139,7 +138,7 @@ def _draw_motion(axes: Axes, picture: SweepPicture, name: str) -> None:
         nothing = "no sustained vibration" if name in ("amplitude", "frequency") else "no values"
         axes.text(0.5, 0.5, nothing, transform=axes.transAxes, ha="center", color="#666666")
     elif name != "amplitude":
-        _widen(axes, factor * values)
+        style.widen(axes, factor * values)
     elif wide:
         axes.set(yscale="log", ylim=(0.5 * floor, 2.0 * highest))
         style.set_ticks(axes.yaxis, 0.5 * floor, 2.0 * highest)
@@ -155,17 +154,6 @@ def _crossings(x: style.Array, margin: style.Array) -> Iterator[float]:
     ):
         low, high = margin[place : place + 2]
         yield float(x[place] - low * (x[place + 1] - x[place]) / (high - low))
-
-
-def _widen(axes: Axes, values: style.Array) -> None:
-    """Fit the axis to the values, and keep those that differ too little in its middle."""
-    low, high = np.nanmin(values), np.nanmax(values)
-    if high - low < _ALIKE * abs(high + low) / 2.0:
-        middle, half = 0.5 * (high + low), 0.25 * _ALIKE * abs(high + low)
-        axes.set_ylim(middle - half, middle + half)
-    else:
-        room = 0.08 * (high - low)
-        axes.set_ylim(low - room, high + room)
 
 
 def _mark(axes: Axes, x: style.Array, signs: Iterable[Sign]) -> None:

@@ -10,7 +10,7 @@ from brakecli.errors import UsageError
 from brakecli.files.read import StoredResult
 from brakecli.plots import style
 
-_WIDTH, _FEW = 8.8, 40  # inches; values up to which each has a marker
+_WIDTH, FEW = 8.8, 40  # inches; values up to which each has a marker
 _LOOKS: tuple[dict[str, Any], ...] = (  # the wide line is seen behind the dashed one where modes have met
     {"color": "#7DB9DE", "lw": 4.0, "ls": "-", "marker": "o", "ms": 6.5, "solid_capstyle": "round"},
     {"color": style.VERMILION, "lw": 1.5, "ls": style.DASHES, "marker": "o", "ms": 3.0},
@@ -45,7 +45,7 @@ def diagram(
     turning = 2.0 * np.pi * style.largest(modes[0])  # rad/s: of its rounding is that of a growth rate
     for axes, values, label in zip(panels, modes, ("frequency", "growth rate"), strict=True):
         for mode, look in enumerate(_LOOKS):
-            shown = look if len(x) <= _FEW else {**look, "marker": None}
+            shown = look if len(x) <= FEW else {**look, "marker": None}
             axes.plot(x, values[:, mode], label=f"mode {mode + 1}", **shown)
         axes.margins(y=0.08)
         for number, value in enumerate(critical):

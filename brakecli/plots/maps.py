@@ -26,6 +26,7 @@ from brakecli.plots.sweep import (
     SweepPicture,
     add_legend,
 )
+from brakecli.sweeps.point import Status
 
 _LONG_TITLE = 34  # characters of a panel's title from which on it takes two lines
 _MAP_WIDTH, _PANEL_WIDTH = 10.4, 3.0  # inches, of a figure with two columns of maps, and of each of more maps
@@ -140,7 +141,9 @@ def _draw_regimes(axes: Axes, picture: SweepPicture, _: Scale) -> ScalarMappable
 
 def _draw_numbers(axes: Axes, picture: SweepPicture, scale: Scale, name: str) -> ScalarMappable:
     values = scale.factor * picture[name]
-    return _mesh(axes, picture, values, picture.failed(), cmap="viridis", norm=scale.norm)
+    empty = {"marker": ".", "color": style.GREY, "label": "no value"}
+    nothing = np.isnan(values) & (picture["status"] == Status.DONE)
+    return _mesh(axes, picture, values, (nothing, empty), picture.failed(), cmap="viridis", norm=scale.norm)
 
 
 def _draw_critical(axes: Axes, picture: SweepPicture, scale: Scale) -> ScalarMappable:

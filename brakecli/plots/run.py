@@ -181,10 +181,11 @@ def draw(picture: RunPicture) -> Figure:
         draw_spectrogram(panels[2, 0], picture.stop, picture.modes)
         draw_amplitude(panels[2, 1], picture.stop)
     apart = {"vx": panels[0], "x": panels[0, 1:]}.get(picture.variable, ()) if not picture.near else ()
-    for axes in apart:
+    for axes in apart[-1:] if style.is_narrow() else apart:  # where its title leaves room
         belt = picture.detail["belt"]
-        steady = f"U = {belt[-1]:.4g} m/s" if np.ptp(belt) == 0.0 else f"U up to {style.largest(belt):.4g} m/s"
-        note = f"{steady}, off the scale"
+        factor, unit = style.prefixed(style.largest(belt), "m/s")
+        size = f"= {factor * belt[-1]:.4g}" if np.ptp(belt) == 0.0 else f"up to {factor * style.largest(belt):.4g}"
+        note = f"U {size} {unit}, off the scale"
         axes.set_title(note, loc="right", size=8.5, color=style.VERMILION)
     spans: tuple[Any, ...] = (picture.detail["time"], picture.span, picture.span)
     for axes, time in zip(panels[:, 0], spans, strict=False):
@@ -195,8 +196,7 @@ def draw(picture: RunPicture) -> Figure:
         if (
             axes in panels[:2, 0] and axes.get_legend_handles_labels()[1]
         ):  # with room for the legend above the data
-            low, high = axes.get_ylim()
-            axes.set_ylim(low, high + 0.14 * (high - low))
+            style.make_room(axes)
             axes.legend(loc="upper right", ncols=3)
     return figure
 
@@ -259,21 +259,21 @@ def _draw_history(axes: Axes, picture: RunPicture) -> None:
 def _draw_spectrum(axes: Axes, picture: RunPicture) -> None:
     start, frequency, density = picture.spectrum
     _, _, symbol, unit = VARIABLES[picture.variable]
-    factor, unit = style.prefixed(float(np.sqrt(density.max(initial=0.0) * frequency[1:2].max(initial=1.0))), unit)
-    squared = f"({unit})²" if set(unit) & {"/", " "} else f"{unit}²" if unit else "1"
-    axes.set(title=f"Spectrum of {symbol} from {start:.4g} s on", ylabel=f"power spectral density ({squared}/Hz)")
+    factor, label = style.density(density, frequency, unit)
+    axes.set(title=f"Spectrum of {symbol} from {start:.4g} s on", ylabel=label)
     shown = density > 0.0
     shown[:1] = False  # the mean was removed
     if not shown.any():
         axes.set(xticks=[], yticks=[], xlabel="frequency")
-        axes.text(0.5, 0.5, "no motion", transform=axes.transAxes, ha="center", color="#666666")
+        words = "no motion" if len(frequency) > 1 else "too few samples"
+        axes.text(0.5, 0.5, words, transform=axes.transAxes, ha="center", color="#666666")
         return
     kind, line = picture.line
     few = picture.passing if len(picture.passing) <= FEW_LINES else ()
     highest = min(frequency[-1], max([6.5 * (line or np.inf), *(1.3 * f for f in few)]))
     near = shown & (frequency <= highest)
     near = near if near.any() else shown
-    frequency, density = frequency[near], factor**2 * density[near]
+    frequency, density = frequency[near], factor * density[near]
     lowest = max(0.3 * float(density.min()), 1e-10 * float(density.max()))
     axes.semilogy(frequency, density, color=style.BLUE, lw=1.0, marker=_marker(frequency))
     right = min(highest, max(1.3 * float(frequency[density > lowest][-1]), 2.0 * (line or 0.0)))

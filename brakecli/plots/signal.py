@@ -61,7 +61,8 @@ def _draw_record(axes: Axes, look: SignalLook) -> None:
             axes.text(centre, 1.0, f"{tone.frequency:.4g} Hz", transform=where, ha="center", va="bottom", size=8)
     words = ", where a tone stands out shaded" if look.verdict.bursts else ""
     axes.set_title(f"Record{words}", pad=14.0)
-    axes.set(xlabel="time (s)", ylabel=style.labelled(str(look.quantity), unit), xlim=(0.0, step * len(values)))
+    axes.set(ylabel=style.labelled(str(look.quantity), unit), xlim=(0.0, step * len(values)))
+    axes.set_xlabel(style.labelled("time", style.set_ticks(axes.xaxis, 0.0, step * len(values), "s")))
 
 
 def _draw_velocity(axes: Axes, look: SignalLook) -> None:
@@ -69,7 +70,7 @@ def _draw_velocity(axes: Axes, look: SignalLook) -> None:
     velocity, m, step = look.velocity, look.smoothing, look.signal.interval
     name, unit = _VELOCITY.get(look.quantity, ("velocity", "m/s"))
     smoothed = f", smoothed over {m} samples" * (m > 1)
-    axes.set(title=f"{name.capitalize()}{smoothed}", xlabel="time (s)")
+    axes.set_title(f"{name.capitalize()}{smoothed}")
     if len(velocity.values) < 3 * m:
         axes.set(xticks=[], yticks=[])
         return
@@ -78,7 +79,9 @@ def _draw_velocity(axes: Axes, look: SignalLook) -> None:
     values = size * velocity.smoothed(m)
     offset = velocity.first + (0.5 * m if velocity.measured else m)
     frequency = look.verdict.frequency
-    wanted = int(min(CYCLES / (frequency * step) if frequency else FEW, MOST_DETAIL, len(values)))
+    gap = float(np.median(np.diff(look.slips.places))) if look.slips.count > 1 else 0.0
+    cycle = 1.0 / (frequency * step) if frequency else gap
+    wanted = int(min(CYCLES * cycle or FEW, MOST_DETAIL, len(values)))
     tones = sorted(look.verdict.bursts, key=lambda tone: tone.energy)
     slips = look.verdict.regime == "relaxation"
     middle = 0.5 * len(values)
@@ -90,13 +93,15 @@ def _draw_velocity(axes: Axes, look: SignalLook) -> None:
     axes.plot(time, factor * values[first : first + wanted], color=style.BLUE)
     places = look.slips.places
     places = places[(places >= first) & (places < first + wanted)]
-    reach = int(min(4 * m, 0.5 * look.slips.period)) + 1  # in which a slip is fastest
+    reach = int(0.5 * gap) + 1  # in which a slip is fastest
     places = np.array([place + int(np.argmax(np.abs(values[place : place + reach]))) for place in places], int)
     if len(places):
         there = step * (offset + places), factor * values[places]
         axes.plot(*there, ls="none", marker="v", color=style.VERMILION, label="events found")
+        style.make_room(axes)
         axes.legend(loc="upper right")
     axes.set(xlim=(time[0], time[-1]), ylabel=f"{name} ({unit})")
+    axes.set_xlabel(style.labelled("time", style.set_ticks(axes.xaxis, time[0], time[-1], "s")))
 
 
 def _draw_spectrum(axes: Axes, look: SignalLook) -> None:
@@ -108,11 +113,12 @@ def _draw_spectrum(axes: Axes, look: SignalLook) -> None:
     size = segment(len(filled))
     frequencies, density = welch(filled, 1.0 / look.signal.interval, nperseg=size, detrend="constant")
     shown = (frequencies > 0.0) & (density > 0.0)
+    scale, label = style.density(density, frequencies, _UNITS[look.quantity])
+    density *= scale
     axes.loglog(frequencies[shown], density[shown], color=style.BLUE, lw=1.0)
-    unit = _UNITS[look.quantity]
-    unit = f"({unit})²/Hz" if "/" in unit else f"{unit}²/Hz"
-    axes.set_title(f"Spectrum of the {look.quantity}")
-    axes.set_ylabel(f"power spectral density ({unit})")
+    axes.set(title=f"Spectrum of the {look.quantity}", ylabel=label)
+    if shown.any() and style.largest(density) < style.WIDE * density[shown].min():
+        style.set_ticks(axes.yaxis, *axes.get_ylim())
     low, high = (float(frequencies[shown][i]) for i in (0, -1)) if shown.any() else (1.0, 1.0)
     hertz = style.set_ticks(axes.xaxis, low, high, "Hz")
     axes.set_xlabel(f"frequency ({hertz})")

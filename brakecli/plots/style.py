@@ -1,5 +1,6 @@
 """The look that all pictures share: colours, heading, units, ticks, and the bytes of a picture's file."""
 
+import math
 import textwrap
 import warnings
 from collections.abc import Iterator
@@ -25,10 +26,11 @@ Array = NDArray[Any]
 # The colours of Okabe and Ito, which people who do not see red or green can tell apart.
 BLUE, ORANGE, VERMILION, GREEN, GREY = "#0072B2", "#E69F00", "#D55E00", "#009E73", "#9A9A9A"
 DARK = "#333333"
-NARROW = 5.2  # inches
+NARROW = 4.6  # inches
 DASHES, DOTS = (0, (5, 3)), (0, (1, 1.5))
 ROUNDING = 1e-12  # relative difference below which numbers of a computation are the same
 WIDE = 300.0  # ratio of the ends of a logarithmic axis from which on only powers of ten have a number
+_ALIKE = 0.02  # values whose relative difference is smaller do not fill the axis from bottom to top
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _LOOK: tuple[tuple[str, dict[str, Any]], ...] = (
     ("font", {"size": 9.5}),
@@ -63,6 +65,9 @@ def rendered(figure: Figure, suffix: str, dpi: int = 150) -> bytes:
     """The figure as a file of this suffix; its bytes do not depend on the time or the machine."""
     figure.draw_without_rendering()
     for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)):
+        if axis.get_offset_text().get_text():  # a power of ten, where another text may stand
+            axis.set_major_formatter(lambda value, _: readable(value))
+            figure.draw_without_rendering()
         thin_ticks(axis, figure)
     figure.set_layout_engine("none")
     for axes in figure.axes:  # the layout's last digits depend on the order in which it solved for them
@@ -91,6 +96,7 @@ def headed(width: float, height: float, title: str, *lines: str, columns: int = 
     height += sum(step for step, *_ in wrapped) - 0.29 - 0.21 * len(lines)
     figure, below = Figure(figsize=(width, height)), 0.16
     for step, text, look in wrapped:
+        text = text.strip(" ·")  # what stands between two parts does not end a line
         figure.text(0.125 / width, 1.0 - below / height, text, look, va="top", parse_math=False)
         below += step
     rect = (0.05 / width, 0.036 / height, 1.0 - 0.1 / width, 1.0 - (below + 0.096) / height)
@@ -143,7 +149,7 @@ def prefixed(magnitude: float, unit: str) -> tuple[float, str]:
     """
     large, small = (
         (unit == "Hz" and magnitude >= 1e4) or unit[:1] in "NJWP",
-        unit in ("m", "m/s", "s") or unit[:1] in "NJWP",
+        unit in ("m", "m/s", "m/s²", "s") or unit[:1] in "NJWP",
     )
     for exponent, prefix in ((9, "G"), (6, "M"), (3, "k"), (0, ""), (-3, "m"), (-6, "µ"), (-9, "n"), (-12, "p")):
         wanted = unit and (large if exponent > 0 else small or exponent == 0)
@@ -152,14 +158,27 @@ def prefixed(magnitude: float, unit: str) -> tuple[float, str]:
     return 1.0, unit
 
 
-def readable(value: float) -> str:
-    """A number to six digits, with a power of ten where it is large or small."""
+def readable(value: float, digits: int = 6) -> str:
+    """A number to some digits, with a power of ten where it is large or small."""
     if value == 0.0 or 1e-3 <= abs(value) < 1e5:
-        return f"{value:.6g}".replace("-", "−")
-    mantissa, _, exponent = f"{value:.5e}".partition("e")
-    digits = mantissa.rstrip("0").rstrip(".").replace("-", "−")
+        return f"{value:.{digits}g}".replace("-", "−")
+    mantissa, _, exponent = f"{value:.{digits - 1}e}".partition("e")
+    factor = mantissa.rstrip("0").rstrip(".").replace("-", "−")
     power = "10" + str(int(exponent)).translate(_RAISED)
-    return {"1": power, "−1": f"−{power}"}.get(digits, f"{digits}·{power}")
+    return {"1": power, "−1": f"−{power}"}.get(factor, f"{factor}·{power}")
+
+
+def digits_of(largest: float, apart: float) -> int:
+    """Digits of numbers up to a largest magnitude that tell apart those that differ by so much: 6 at least."""
+    return int(np.clip(math.ceil(math.log10(largest / apart)) + 1, 6, 15)) if 0.0 < apart < largest else 6
+
+
+def density(values: Array, frequency: Array, unit: str) -> tuple[float, str]:
+    """The factor of power spectral densities of a quantity in this unit, and what stands at their axis."""
+    size = float(np.sqrt(values.max(initial=0.0) * frequency[1:2].max(initial=1.0)))
+    factor, unit = prefixed(size, unit)
+    squared = f"({unit})²" if set(unit) & {"/", " "} else f"{unit}²" if unit else "1"
+    return factor**2, f"power spectral density ({squared}/Hz)"
 
 
 def labelled(name: str, units: str) -> str:
@@ -172,14 +191,16 @@ def set_ticks(axis: Axis, low: float, high: float, unit: str = "") -> str:
 
     Returns the unit of the numbers at the ticks: with a prefix where values of `unit` need one.
     """
-    factor, unit = prefixed(max(abs(low), abs(high)), unit)
-    if axis.get_scale() == "log":
+    logarithmic = axis.get_scale() == "log"
+    largest, digits = max(abs(low), abs(high)), digits_of(max(abs(low), abs(high)), 0.1 * (high - low))
+    factor, unit = (1.0, unit) if logarithmic and unit == "Hz" else prefixed(largest, unit)
+    if logarithmic:
         axis.set_major_locator(log_locator(high / low))
         if high / low < WIDE:
             axis.set_minor_locator(NullLocator())
-    elif factor == 1.0 and 1e-2 <= max(abs(low), abs(high)) < 1e5:
+    elif factor == 1.0 and 1e-2 <= largest < 1e5:
         return unit
-    axis.set_major_formatter(lambda value, _: readable(factor * value))
+    axis.set_major_formatter(lambda value, _: readable(factor * value, digits))
     return unit
 
 
@@ -187,6 +208,23 @@ def is_constant(values: Array, scale: float = 0.0) -> bool:
     """Whether values differ by their rounding only, that of numbers as large as they are, or as `scale`."""
     known = values[np.isfinite(values)]
     return known.size == 0 or float(np.ptp(known)) <= ROUNDING * max(largest(known), scale)
+
+
+def widen(axes: Axes, values: Array) -> None:
+    """Fit the axis to the values, and keep those that differ too little in its middle."""
+    low, high = np.nanmin(values), np.nanmax(values)
+    if high - low < _ALIKE * abs(high + low) / 2.0:
+        middle, half = 0.5 * (high + low), 0.25 * _ALIKE * abs(high + low)
+        axes.set_ylim(middle - half, middle + half)
+    else:
+        room = 0.08 * (high - low)
+        axes.set_ylim(low - room, high + room)
+
+
+def make_room(axes: Axes, part: float = 0.14) -> None:
+    """Leave room for a legend above what is drawn."""
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high + part * (high - low))
 
 
 def keep_flat(axes: Axes, values: Array, scale: float = 0.0) -> None:

@@ -27,7 +27,7 @@ REGIMES = {  # colour and marker
     Regime.DAMPED: ("#BFDDF0", "o"),
     Regime.RELAXATION: (style.ORANGE, "s"),
     Regime.QUASI_HARMONIC: (style.BLUE, "D"),
-    Regime.UNDECIDED: (style.GREY, "X"),
+    Regime.UNDECIDED: ("#7A7A7A", "X"),  # in grey, between orange and blue
 }
 MARGIN = "margin"  # critical friction less friction, where the picture shows its zero
 FORCED, DIFFERENT = "forced by the wheel's waves", "up and down differ"

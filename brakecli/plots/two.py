@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from brakecli.errors import UsageError
 from brakecli.files.read import StoredResult
 from brakecli.plots import style
+from brakecli.plots.lock_in import FEW
 from brakecli.plots.quantities import VARIABLES, scaled
 from brakecli.plots.run import RunPicture
 
@@ -46,6 +47,8 @@ def _runs(results: tuple[StoredResult, StoredResult], variable: str) -> Figure:
     whole_look = scaled(name, whole, whole)
     times = [picture.detail["time"] for picture in pictures]
     times = [time - (0.0 if same_end else time[-1]) for time in times]
+    highest = max((picture.spectrum[2] for picture in pictures), key=style.largest)
+    scale, label = style.density(highest, pictures[0].spectrum[1], VARIABLES[variable][3])
     for number, (result, picture, curve) in enumerate(zip(results, pictures, _LOOKS, strict=True)):
         panels[0].plot(times[number], look(picture.detail[variable]), label=result.path.name, **curve)
         time, lowest, highest = envelopes[number][0], *map(whole_look, envelopes[number][1:])
@@ -54,18 +57,17 @@ def _runs(results: tuple[StoredResult, StoredResult], variable: str) -> Figure:
         else:
             panels[1].plot(time, lowest, time, highest, **curve)
         _, frequency, density = picture.spectrum
-        panels[2].semilogy(frequency[1:], np.where(density > 0.0, density, np.nan)[1:], **curve)
+        panels[2].semilogy(frequency[1:], scale * np.where(density > 0.0, density, np.nan)[1:], **curve)
     ends = [min(float(time[0]) for time in times), max(float(time[-1]) for time in times)]
     _along(panels[0], "time" if same_end else "time before the end of each part", ends, "s")
     part = pictures[0].part if pictures[0].part == pictures[1].part else "Last part of each"
     panels[0].set(title=f"{part}: {VARIABLES[variable][0]}", ylabel=look.label)
-    low, high = panels[0].get_ylim()
-    panels[0].set_ylim(low, high + 0.2 * (high - low))  # room for the legend above the data
+    style.make_room(panels[0], 0.2)
     panels[0].legend(loc="upper right", ncols=2)
     spans = [edge for picture in pictures for edge in picture.span]
     _along(panels[1], "time", [min(spans), max(spans)], "s")
     panels[1].set(title=f"Whole runs: {VARIABLES[name][0]}, least and largest", ylabel=whole_look.label)
-    _spectra(panels[2], pictures, variable)
+    _spectra(panels[2], pictures, variable, scale, label)
     figure.align_ylabels()
     return figure
 
@@ -76,17 +78,15 @@ def _wider(time: style.Array, lowest: style.Array, highest: style.Array) -> list
     return [time[first], np.minimum.reduceat(lowest, first), np.maximum.reduceat(highest, first)]
 
 
-def _spectra(axes: Axes, pictures: list[RunPicture], variable: str) -> None:
+def _spectra(axes: Axes, pictures: list[RunPicture], variable: str, scale: float, label: str) -> None:
     """Limits and labels of the spectra, by the lines that both runs have."""
     lines = [6.5 * line for picture in pictures if (line := picture.line[1])]
     highest = min(max(picture.spectrum[1][-1] for picture in pictures), max(lines, default=np.inf))
-    most = max(float(picture.spectrum[2].max(initial=0.0)) for picture in pictures)
+    most = scale * max(style.largest(picture.spectrum[2]) for picture in pictures)
     if most:
         axes.set_ylim(1e-10 * most, 10.0 * most)
     _along(axes, "frequency", [0.0, float(highest)], "Hz")
-    unit = VARIABLES[variable][3]
-    squared = f"({unit})²" if set(unit) & {"/", " "} else f"{unit}²" if unit else "1"
-    axes.set(title=f"Spectra of {VARIABLES[variable][2]}", ylabel=f"power spectral density ({squared}/Hz)")
+    axes.set(title=f"Spectra of {VARIABLES[variable][2]}", ylabel=label)
 
 
 def _along(axes: Axes, name: str, ends: list[float], unit: str) -> None:
@@ -115,7 +115,11 @@ def _curves(results: tuple[StoredResult, StoredResult], kind: str, variable: str
             order = np.argsort(x, kind="stable")
             for number, line in enumerate(values[order].reshape(len(x), -1).T):
                 label = result.path.name if number == 0 else None
-                axes.plot(x[order], line, marker="o", ms=3.0 + look["lw"], label=label, **look)
+                marker = "o" if len(x) <= FEW else ""
+                axes.plot(x[order], line, marker=marker, ms=3.0 + look["lw"], label=label, **look)
+        drawn = np.concatenate([values.ravel() for values in columns])
+        if name == "frequency" and np.isfinite(drawn).any():
+            style.widen(axes, drawn)
         unit = style.set_ticks(axes.yaxis, 0.0, max(map(style.largest, columns)), units[name])
         axes.set_ylabel(style.labelled(str(name).replace("_", " "), unit))
     both = np.concatenate(places)

@@ -107,7 +107,7 @@ def _sentence(found: Mapping[str, Any]) -> str:
     reasons = "; ".join(map(str, found.get("reasons", ())))
     words = {str(name): words for name, words in _WORDS.items()}.get(str(regime), "")
     if regime == Regime.DAMPED and found.get("excitation") == Excitation.FORCED:
-        words = "It does not vibrate by itself: only the roughness of the wheel shakes it (damped, forced)"
+        words = "It does not vibrate by itself: the roughness of the wheel shakes it (damped, forced)"
     if not words:
         return f"The run does not decide it: {reasons}."
     if (frequency := found.get("frequency")) is not None:

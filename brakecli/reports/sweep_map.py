@@ -108,8 +108,9 @@ def _side(axis: Axis, length: float, upwards: bool = False) -> Side:
     edges = length * (edges - edges[0]) / (edges[-1] - edges[0])
     edges = length - edges if upwards else edges
     factor, unit = style.prefixed(style.largest(axis.values), axis.units)
-    texts = list(axis.texts or (style.readable(factor * float(value)) for value in axis.values))
+    texts = list(axis.texts or (style.readable(factor * float(value), axis.digits) for value in axis.values))
     short = list(axis.texts or (style.readable(float(f"{factor * value:.3g}")) for value in axis.values))
+    short = short if len({*short}) == len(short) else texts
     return Side(style.labelled(axis.key, unit), [round(float(edge), 2) for edge in edges], texts, short)
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from brakecli.analysis.regime.evidence import Part, follows
 from brakecli.analysis.regime.of_run import context, numbers_of, stored_run, verdict_on
 from brakecli.analysis.regime.verdict import Excitation, Feeds, Regime, Thresholds
 from brakecli.analysis.stability.modes import crossings
@@ -35,6 +36,7 @@ class Second:
     system: System
     change: str
     smooth: bool  # the same without the wheel's roughness, from where the first has ended
+    friction: float = 1.0  # part of that of the first run
 
 
 def classify_twice(
@@ -79,9 +81,8 @@ def second_system(system: System, history: History) -> Second:
     lost = [crossing.friction for stiffness in stiffnesses for crossing in crossings(c, stiffness, belt)]
     phi = min([c.phi, *lost])
     less = replace(longer, coefficients=c._replace(phi=_REDUCED * phi))
-    return Second(
-        less, f"with a friction coefficient of {_REDUCED * phi:.3g}, at which sliding is stable", smooth=False
-    )
+    change = f"with a friction coefficient of {_REDUCED * phi:.3g}, at which sliding is stable"
+    return Second(less, change, smooth=False, friction=_REDUCED * phi / c.phi)
 
 
 def compared(
@@ -99,7 +100,10 @@ def compared(
         lost = -context(second.system).growth() * second.system.duration > _LOST  # what is left of the start
         lost &= verdict.excitation is not Excitation.SELF_EXCITED
         remains = part >= _REMAINS and (lost or verdict.excitation is Excitation.FORCED)
-        return Feeds.ROUGHNESS if remains else Feeds.FRICTION if part <= _VANISHES else Feeds.UNKNOWN, 0.0, text
+        waves, end = context(second.system).waves, Part(history, history.samples // 2, history.samples)
+        least = _VANISHES  # what moves as the waves do may be forced along x, and falls as friction does
+        vanishes = part <= (min(least, 0.5 * second.friction) if follows(end, waves) else least)
+        return Feeds.ROUGHNESS if remains else Feeds.FRICTION if vanishes else Feeds.UNKNOWN, 0.0, text
     if verdict.regime is Regime.DAMPED:
         return Feeds.ROUGHNESS, 0.0, f"{text}: {verdict.reasons[0]}"
     lasts = verdict.settled and verdict.excitation is Excitation.SELF_EXCITED and part >= _REMAINS

@@ -54,7 +54,7 @@ class Search(NamedTuple):
 
     `error` is the half width of the bracket, plus the bias of the scheme at its step, plus what the growth
     measured leaves open. `bias`: the scheme's own critical value less the exact one. `windows`: both ends of every
-    interval of instability.
+    interval of instability; `window_errors`: their error bars, 0 where a bound of the range cuts it.
     """
 
     outcome: Outcome
@@ -67,16 +67,14 @@ class Search(NamedTuple):
     sustained: float | None = None
     sustained_outcome: Outcome = Outcome.NONE
     windows: tuple[tuple[float, float], ...] = ()
+    window_errors: tuple[tuple[float, float], ...] = ()
 
     @property
-    def windows_lower(self) -> list[float]:
-        """Where each interval of instability begins."""
-        return [low for low, _ in self.windows]
-
-    @property
-    def windows_upper(self) -> list[float]:
-        """Where each interval of instability ends."""
-        return [high for _, high in self.windows]
+    def columns(self) -> dict[str, list[float]]:
+        """Both ends of the windows and their error bars, each by its name."""
+        found = {"": self.windows, "_error": self.window_errors}
+        ends = ("lower", "upper")
+        return {end + of: [each[k] for each in found[of]] for of in found for k, end in enumerate(ends)}
 
 
 class Edge(NamedTuple):
@@ -229,31 +227,34 @@ def _answer(
 
 def _of_edges(critical: Critical, unstable: bool, edges: list[Edge]) -> Search:
     """The critical value and all windows of instability; `unstable`: whether the range begins in one."""
-    ends = [critical.lower] * unstable + [each.value for each in edges]
-    ends += [critical.upper] * (len(ends) % 2)
-    windows = tuple(zip(ends[::2], ends[1::2], strict=True))
+    ends = [(critical.lower, 0.0)] * unstable + [(each.value, each.error) for each in edges]
+    ends += [(critical.upper, 0.0)] * (len(ends) % 2)
+    columns = ([each[k] for each in ends] for k in (0, 1))
+    windows, errors = (tuple(zip(each[::2], each[1::2], strict=True)) for each in columns)
     if not edges:
-        return Search(Outcome.UNSTABLE if unstable else Outcome.STABLE, windows=windows)
+        return Search(Outcome.UNSTABLE if unstable else Outcome.STABLE, windows=windows, window_errors=errors)
     first = next((each for each in edges if each.lost), edges[0])
     if first.error >= WIDEST * (critical.upper - critical.lower):  # almost any value of the range may be it
         return Search(Outcome.UNDECIDED)
-    outcome = Outcome.FOUND if first.lost else Outcome.REGAINED
-    return Search(outcome, *first[:4], windows=windows)
+    return Search(
+        Outcome.FOUND if first.lost else Outcome.REGAINED, *first[:4], windows=windows, window_errors=errors
+    )
 
 
 def _by_simulation(critical: Critical, sliding_at: SlidingAt, exact: Search) -> Search:
     """Where the growth of small disturbances passes zero, by Brent's method, between two values on either side."""
     at = Disturbances(sliding_at)
     values = at.scanned(critical.lower, critical.upper, exact.windows)
+    linear = not any(measured.opened for measured in at.known.values() if measured)
 
     def edge(low: float, high: float) -> Edge:
-        return _narrowed(at, low, high, critical, exact.bias)
+        found = _narrowed(at, low, high, critical, exact.bias)
+        same = exact.columns["lower" if found.lost else "upper"]
+        away = min((abs(each - found.value) for each in same), default=0.0)
+        # Eigenvalues of linear motions are exact: what the bar does not hold is rounding near self-locking.
+        return found._replace(error=max(found.error, 1.001 * away)) if linear else found
 
     found = _answer(critical, sliding_at, at.unstable, values, edge)
-    opened = any(measured.opened for measured in at.known.values() if measured)
-    if not opened and found.error is not None and found.value is not None and exact.outcome is found.outcome:
-        # Motions are linear and eigenvalues exact: what the bar does not hold is rounding near self-locking.
-        found = found._replace(error=max(found.error, 1.001 * abs(found.value - (exact.value or found.value))))
     return found._replace(bias=exact.bias, eigenvalue=exact.eigenvalue)
 
 
@@ -317,13 +318,13 @@ def _fades(verdict: Verdict | Known | None, duration: float, unstable: bool | No
         return not unstable
     if verdict.regime is not Regime.UNDECIDED:
         return verdict.regime is Regime.DAMPED
+    slope, error = (verdict.evidence.get(f"envelope_slope{what}", 0.0) for what in ("", "_error"))
+    slope = slope if abs(slope) > 3.0 * error else 0.0
     if isinstance(verdict, Verdict) and verdict.second_run:  # the roughness may keep it up as well
-        return None
-    slope, error = verdict.evidence.get("envelope_slope"), verdict.evidence.get("envelope_slope_error", 0.0)
+        return True if slope < 0.0 and not limited else None
     if limited:
-        falls = slope if slope is not None and slope < -3.0 * error else 0.0
-        return None if -1.0 < falls * duration < 0.0 else falls < 0.0
-    return bool(slope <= 0.0) if slope is not None and abs(slope) > 3.0 * error else None
+        return None if -1.0 < slope * duration < 0.0 else slope < 0.0
+    return slope < 0.0 if slope else None
 
 
 def _sustained(critical: Critical, fades: Answer, found: Search) -> tuple[float | None, Outcome]:

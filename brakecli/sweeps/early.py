@@ -99,8 +99,8 @@ def early(system: System, *, seen: bool = True) -> Early | None:
         return None
     verdict, end = found
     work = Work(steps=int(o.steps), contact_evaluations=int(o.evaluations))
-    tolerance, error, until = system.method.tolerance, max(float(o.error), ROUNDING), system.sampled_duration
-    certificate = Certificate(tolerance, True, error, until, "the orbit itself")
+    error = max(float(o.error), ROUNDING) if outcome == FOUND else ROUNDING  # not that of an orbit given up
+    certificate = Certificate(system.method.tolerance, True, error, system.sampled_duration, "the orbit itself")
     row = np.array([end])
     return Early(verdict, Ending(system, row, work), certificate if system.method.step is None else None)
 

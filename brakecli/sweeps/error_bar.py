@@ -1,19 +1,23 @@
 """The error bar of a critical value: what the measured growth leaves open."""
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 
 from brakecli.analysis.stability.modes import growth as eigenvalue_growth
+from brakecli.analysis.stability.search import bisect
 from brakecli.sweeps.floquet import Disturbances
 from brakecli.sweeps.periodic import Orbit, Segments, common_period, log_radius, orbit
 from brakecli.sweeps.tables import Critical
 
-STEPS = {2.0: 2.0, 0.5: -0.5}
-"""Divisors of the step, which also multiply the nodes, and the error in changes of the growth: with half the step
-it changes by a half of its error or more, with twice the step by all of it or more; at least half of that counts,
-as patches that open make errors fall unevenly."""
-WIDER = 1.5  # times the shift that these show
-STRIDES = 7  # towards the place where growth with other steps passes zero
+OTHERS = ((2.0, 2.0, 1.5), (2.0, 1.0, 3.0), (0.5, -0.5, 1.5))
+"""Divisors of the step, which also multiply the nodes; which part of the change of growth counts as its error; and
+how much of the way to where growth passes zero then. With half the step growth changes by a half of its error or
+more, and so does the critical value, which counts where growth begins like a root. With twice the step it changes
+by all of its error or more: at least half of that counts, as patches that open make errors fall unevenly."""
+BEYOND = 1.2  # times the way to where growth with other steps passes zero, if it is as steep as further away
+NARROW = 1.1  # ratio of the ends of the bracket of that way
 ROUNDED = 20.0  # times the spread of growth that rounding makes in a three-layer scheme near self-locking
 
 
@@ -35,6 +39,12 @@ def left_open(
     near = sorted(known, key=lambda value: max(low - value, value - high, 0.0))[:2]
     one, other = near[0], near[-1]
 
+    @cache
+    def rate(place: float, finer: float) -> float:
+        if (measured := at.at(place)) is None:
+            return math.nan
+        return (measured.rate if finer == 1.0 else _finer(at, place, finer).rate) - measured.noise
+
     def slope(other: float) -> float:
         return abs((known[other].rate - known[one].rate) / (other - one)) if other != one else 0.0
 
@@ -44,15 +54,15 @@ def left_open(
     bias = abs(bias or 0.0)
     if known[one].bar:  # the bracket holds it
         return bias
+    far = max((slope(end) for end in wide if end in known), default=0.0)
     if one in at.orbits:
         stride = high - low if at.unstable(high) else low - high
-        return WIDER * max(_shifted(at, one, stride, critical, *step) for step in STEPS.items())
+        return max(_shifted(rate, one, stride, critical, far, other) for other in OTHERS)
     if known[one].noise:
         rounded = ROUNDED if found and found.system.scheme.LAG else 1.0
         hidden = rounded * max(known[one].spread, known[other].spread)
         return bias + _reach(at, low, high, 2.0 * known[one].noise + hidden)
     steep = slope(other)
-    far = max((slope(end) for end in wide if end in known), default=0.0)
     if found is not None and found.system.scheme.LAG and far > 0.0:
         steep = min(steep, far)
     return bias + (max(known[one].spread, known[other].spread) / steep if steep > 0.0 else 0.0)
@@ -89,39 +99,46 @@ def _reach(at: Disturbances, low: float, high: float, level: float) -> float:
     return abs(next(beyond, math.inf) - side[0])
 
 
-def error(at: Disturbances, value: float) -> float:
-    """By how much the step may falsify the growth (1/s) of a periodic motion."""
-    coarse = at.orbits[value]
-    return max(abs(part * (_finer(at, value, coarse, finer).rate - coarse.rate)) for finer, part in STEPS.items())
-
-
 def _shifted(
-    at: Disturbances, value: float, stride: float, critical: Critical, finer: float, part: float
+    rate: Callable[[float, float], float],
+    value: float,
+    stride: float,
+    critical: Critical,
+    steep: float,
+    other: tuple[float, float, float],
 ) -> float:
-    """How far from a value growth less its error begins: growing strides, and a straight line within the last.
+    """How far from a value growth with another step begins: growing strides, then bisection.
 
-    The given stride leads to more growth. Without dashpots growth begins like a root, and the longer way counts.
+    `rate`: the growth at a value with the step divided. The given stride leads to more growth; the first one
+    crosses where growth is as `steep` as given.
     """
-    near, place, excess = at.orbits[value], value, math.nan
-    for count in range(STRIDES):
-        before, last = excess, place
-        place = min(max(place + (stride if count else 0.0), critical.lower), critical.upper)
-        if (measured := at.at(place)) is None:
-            break
-        near = _finer(at, place, near, finer)
-        excess = measured.rate - measured.noise + part * (near.rate - measured.rate)
-        if not math.isfinite(excess):
-            return math.inf
-        if before * excess <= 0.0 and before != excess:
-            straight = 0.0 if measured.noise else (place - last) * excess / (before - excess)
-            return abs(place + straight - value)
-        stride = 3.0 * stride if count else math.copysign(stride, -stride * excess)
-    return abs(place - value)
+    (finer, part, times), side = other, 1.0
+
+    def excess(way: float) -> float:
+        own = rate(value + side * way, 1.0)
+        return own + part * (rate(value + side * way, finer) - own)
+
+    if not math.isfinite(here := excess(0.0)):
+        return math.inf
+    side = math.copysign(1.0, -stride * here)
+    bound = critical.upper - value if side > 0.0 else value - critical.lower
+    way = min(max(abs(stride), BEYOND * abs(here) / steep if steep else 0.0), bound)
+    while (there := excess(way)) * here > 0.0 and way < bound:
+        way = min(3.0 * way, bound)
+    if math.isinf(there):
+        return math.inf
+    if there * here < 0.0:
+
+        def as_here(way: float) -> bool | None:
+            return None if math.isnan(there := excess(way)) else there * here > 0.0
+
+        way = bisect(as_here, 0.0, way, width=0.1 * abs(stride), ratio=NARROW)[1]
+    return times * way
 
 
-def _finer(at: Disturbances, value: float, near: Orbit, finer: float) -> Orbit:
-    """The periodic motion at a value near another one, with the step divided and the nodes multiplied."""
-    found = at.sliding_at(value)
+def _finer(at: Disturbances, value: float, finer: float) -> Orbit:
+    """The periodic motion at a value with the step divided and the nodes multiplied."""
+    found, near = at.sliding_at(value), at.orbits[value]
     period = common_period(found.system) if found else None
     if found is None or period is None:
         return replace(near, rate=math.nan)

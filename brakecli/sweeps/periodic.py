@@ -27,7 +27,7 @@ SAME = 1e-15  # relative difference of ratios that are the same but for rounding
 DISTURBANCE = 1e-6  # in static compressions: the rounding of a run is 1e-10 of it
 CLOSED = 1e-7  # largest gap, in static compressions, between the end of a segment and the next one
 ITERATIONS = 10
-SAMPLES = 64  # of a segment
+SAMPLES = 64  # of a segment, or half as many as steps where they are fewer
 BATCHES, BATCH, TRANSIENT = 8, 4, 16  # batches of a long run, segments of a batch, segments before the first
 CERTAIN = 3.5  # standard errors of the mean of eight batches: 99 % of Student's distribution
 
@@ -53,14 +53,18 @@ class Segments:
     def __init__(self, found: Sliding, time: float, count: int, finer: float = 1.0) -> None:
         """Prepare the systems of all segments: the wheel has turned on from one to the next.
 
-        `finer`: divides the step, and multiplies the nodes of the contact.
+        `finer`: divides the step, and multiplies the nodes of the contact. Samples hold a whole number of double
+        steps.
         """
         system, fast = found.system, natural_frequencies(found.system.coefficients, found.stiffness)[1]
         self.scales = found.normal_force / found.stiffness * np.array([1.0, 1.0, *[2.0 * math.pi * fast] * 2])
         self.rest = np.array([found.x, found.y, 0.0, 0.0]) / self.scales
         self.time, length = time, time / count
-        interval = length / SAMPLES
-        step = interval / math.ceil(interval / system.step * (1.0 - 1e-9))
+        pairs = 0.5 * length / system.step * (1.0 - 1e-9)
+        of_sample = math.ceil(pairs / SAMPLES)
+        self.samples = math.ceil(pairs / of_sample)
+        interval = length / self.samples
+        step = interval / (2 * of_sample)
         method = replace(system.method, step=step, start="consistent")
         if finer != 1.0:
             method = replace(method, step=step / finer, nodes=int(finer * system.nodes))
@@ -89,7 +93,9 @@ class Segments:
         count = len(self.systems)
         periods = max(1, math.ceil(time / self.time))
         rows = self._run(replace(self.systems[0], duration=periods * self.time), state)
-        return rows[-count * SAMPLES - 1 : -1 : SAMPLES] if len(rows) > 1 else np.full((count, 4), np.nan)
+        return (
+            rows[-count * self.samples - 1 : -1 : self.samples] if len(rows) > 1 else np.full((count, 4), np.nan)
+        )
 
     def size(self, states: Floats) -> float:
         """The largest distance from steady sliding on the way from some states."""

@@ -61,8 +61,8 @@ def test_what_was_changed_is_reported() -> None:
     for kind, words in {
         "spikes": "spikes removed",
         "drift": "drift removed",
-        "short gaps": "8 short gaps bridged",
-        "long gap": "1 long gaps: only the longest piece is used, 3650 of 5000 samples",
+        "short gaps": "short gaps bridged: 8",
+        "long gap": "long gaps: 1, so that only the longest piece is used, 3650 of 5000 samples",
     }.items():
         slow = disturbed(values, 50, kind)
         if kind == "drift":
@@ -157,3 +157,13 @@ def test_a_measurement_does_not_show_what_drives_it_and_keeps_its_thresholds() -
     assert (found.regime, found.excitation) == (Regime.UNDECIDED, Excitation.NONE)
     assert found.contact_loss_fraction is None
     assert found.thresholds.fewest_cycles == 1000.0
+
+
+@pytest.mark.parametrize("cycles", [12.5, 40.3, 325.6])
+@pytest.mark.parametrize("form", ["sine", "saw-teeth"])
+def test_a_frequency_is_better_than_one_over_the_length_of_the_record(cycles: float, form: str) -> None:
+    phase = np.arange(20_000) * cycles / 20_000
+    values = np.sin(2.0 * np.pi * phase) if form == "sine" else np.minimum(phase % 1.0, 10.0 * (1.0 - phase % 1.0))
+    found = classify_signal(Signal(values, 1.0 / 20_000), quantity=Measurand.DISPLACEMENT)
+    assert found.regime == (Regime.QUASI_HARMONIC if form == "sine" else Regime.RELAXATION)
+    assert found.frequency == pytest.approx(cycles, abs=0.1)

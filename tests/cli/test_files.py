@@ -90,8 +90,8 @@ def test_spectra_and_chosen_variables_are_exported(folder: Path, tmp_path: Path)
     chosen = ["--group", "spectrum", "--variable", "y", "--variable", "vx"]
     brakecli("export", folder / "a.h5", *chosen, "-o", "s.csv", cwd=tmp_path).told(0)
     table = pandas.read_csv(tmp_path / "s.csv")
-    assert [*table.columns] == ["frequency (Hz)", "y ((m)2 Hz-1)", "vx ((m/s)2 Hz-1)"]
-    np.testing.assert_array_equal(table["vx ((m/s)2 Hz-1)"], history(folder / "a.h5", "vx", "spectrum"))
+    assert [*table.columns] == ["frequency (Hz)", "y (m^2/Hz)", "vx ((m/s)^2/Hz)"]
+    np.testing.assert_array_equal(table["vx ((m/s)^2/Hz)"], history(folder / "a.h5", "vx", "spectrum"))
 
 
 def test_a_sweep_and_modes_are_a_row_for_each_point(folder: Path, tmp_path: Path) -> None:
@@ -157,7 +157,7 @@ ERRORS = [
     ),
     (["modes.h5", "-o", "a.wav"], "a.wav: is for runs, and modes.h5 is a stability"),
     (["modes.h5", "-o", "m.csv", "--group", "history"], "--group history: is for runs"),
-    (["a.h5", "-o", "a.csv", "--group", "energy"], "--group energy: there is none; give history or spectrum"),
+    (["a.h5", "-o", "a.csv", "--group", "energy"], "--group energy: there is none; give one of history, spectrum"),
     (["a.h5", "-o", "a.wav", "--group", "spectrum"], "a.wav: a sound is one variable of the history"),
     (["a.h5", "-o", "a.wav", "--variable", "x", "--variable", "y"], "a sound is one variable"),
     (["a.h5", "-o", "a.wav", "--variable", "state"], "--variable state: a.h5 has none; give one of"),

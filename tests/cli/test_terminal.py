@@ -1,6 +1,7 @@
 """What a terminal of 80 columns shows, what long work says without one, and the starters."""
 
 import re
+import sys
 import time
 import tomllib
 from pathlib import Path
@@ -67,6 +68,20 @@ def test_evidence_has_the_units_of_the_page() -> None:
     for name, unit in units.items():
         if name != "line_frequencies":
             assert shown[name.replace("_", " ")] == f"2.5 {'' if unit == '1' else unit}".rstrip(), name
+
+
+def test_a_terminal_gets_messages_without_a_broken_word_and_a_file_gets_them_in_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = f"sweep-of-angles.toml: {'is-not-readable ' * 12}{'directory/' * 9}"
+    output.say(words)
+    assert capsys.readouterr().err == f"brakecli: {words}\n"
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    output.say(words)
+    lines = capsys.readouterr().err.splitlines()
+    assert " ".join(map(str.strip, lines)) == f"brakecli: {words}"
+    assert len(lines) > 3
+    assert all(len(line) <= 80 or "directory" in line for line in lines)
 
 
 def test_long_work_without_a_terminal_says_a_line_now_and_then(

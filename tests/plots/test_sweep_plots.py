@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import tomli_w
+from matplotlib.colors import to_rgb
 from matplotlib.contour import ContourSet
 from matplotlib.image import imread
 from numpy.typing import NDArray
@@ -19,7 +20,8 @@ from brakecli.files.read import open_result
 from brakecli.files.write import new_result
 from brakecli.plots.axis import Axis
 from brakecli.plots.result import draw, plot_result
-from brakecli.plots.style import applied, prefixed, readable, rendered
+from brakecli.plots.style import applied, headed, prefixed, readable, rendered
+from brakecli.plots.sweep import REGIMES
 from brakecli.sweeps.plan import parse_sweep
 from brakecli.sweeps.workers.task import compute_units
 from tests.campaign import campaign
@@ -188,6 +190,41 @@ def test_numbers_at_ticks_stand_apart(tmp_path: Path) -> None:
             assert before.x1 < after.x0
             checked += 1
     assert checked >= 5
+
+
+@pytest.mark.parametrize("width", [0.1, 1e-4, 1.0])
+@pytest.mark.parametrize("count", [5, 9])
+def test_ticks_tell_apart_values_that_differ_little_about_a_large_one(
+    width: float, count: int, tmp_path: Path
+) -> None:
+    near = {"parameter": "link1.stiffness", "start": 1e6, "stop": 1e6 + width, "num": count}
+    figure = drawn(write(tmp_path / "r.h5", {"axis": [near]}))
+    with applied():
+        rendered(figure, ".png")
+    texts = [text.get_text() for text in figure.axes[-1].get_xticklabels()]
+    assert len({*texts}) == len(texts) >= 2
+
+
+def test_regimes_differ_in_grey_and_cells_without_a_number_are_explained(tmp_path: Path) -> None:
+    shades = sorted(float(np.dot((0.299, 0.587, 0.114), to_rgb(colour))) for colour, _ in REGIMES.values())
+    assert np.diff(shades).min() > 0.1
+    with open_result(write(tmp_path / "m.h5", {"axis": [ANGLE, SPEED]})) as stored, applied():
+        figure = draw(stored, variable="frequency")
+    assert "no value" in legend(figure)
+    found = line(figure.axes[1], "no value").get_xydata()
+    assert len(found) == np.isnan(columns((8, 7), critical=False)["frequency"]).sum()
+
+
+def test_no_power_of_ten_stands_at_the_end_of_an_axis_and_no_dot_at_that_of_a_line() -> None:
+    with applied():
+        figure = headed(5.0, 4.0, "A title", "   ·   ".join(["a part of the heading"] * 5))
+        axes = figure.subplots()
+        axes.plot([0.0, 3e-20], [0.0, 2e15])
+        rendered(figure, ".png")
+    assert [axis.get_offset_text().get_text() for axis in (axes.xaxis, axes.yaxis)] == ["", ""]
+    assert "2·10¹⁵" in [text.get_text() for text in axes.get_yticklabels()]
+    assert len(figure.texts) > 2
+    assert not any(text.get_text().endswith("·") for text in figure.texts)
 
 
 def test_any_number_of_a_sweep_is_drawn(tmp_path: Path) -> None:

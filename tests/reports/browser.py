@@ -69,11 +69,12 @@ class Browser:
             self.call("Input.dispatchKeyEvent", type=kind, key=key, code=key, windowsVirtualKeyCode=code)
 
     def complaints(self) -> list[Any]:
-        """Errors and warnings of the console, and requests that are not for the file itself or for data in it."""
+        """What stands on the console beside notes, and requests that are not for files or for data in them."""
         wrong = []
         for event in self.events:
             method, given = event.get("method"), event.get("params", {})
-            if method in ("Runtime.exceptionThrown", "Log.entryAdded", "Runtime.consoleAPICalled"):
+            told = method == "Runtime.consoleAPICalled" and given["type"] != "log"
+            if told or method in ("Runtime.exceptionThrown", "Log.entryAdded"):
                 wrong.append(given)
             elif method == "Network.requestWillBeSent" and given["request"]["url"].split(":")[0] not in (
                 "file",

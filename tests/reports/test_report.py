@@ -1,21 +1,27 @@
 """A report is one page that needs nothing else, says what its results hold, and lets nothing hostile in."""
 
+import base64
 import json
 import re
 import sys
 from html.parser import HTMLParser
+from io import BytesIO
 from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from PIL import Image
 
 from brakecli.case.read import parse_case
 from brakecli.errors import BrakecliError, UsageError
 from brakecli.files.read import open_result
 from brakecli.files.write import new_result
-from brakecli.reports import page, sweep_map
+from brakecli.plots import style
+from brakecli.reports import blocks, page, sweep_map
 from brakecli.reports.page import write_report
 from brakecli.runs.advise import advise
 from brakecli.runs.run import run
@@ -28,6 +34,7 @@ from tests.plots.helpers import ANGLE, CRITICAL, SPEED, columns, write
 from tests.reports.browser import browser
 
 HOSTILE = '</script><script>alert(1)</script><img src=x onerror=alert(2)> & "Ä"'
+COLOURS = (style.BLUE, style.ORANGE, style.VERMILION, style.GREEN, style.GREY, style.DARK)
 BASE = TINY.replace('"Tiny"', json.dumps(HOSTILE))
 
 
@@ -176,6 +183,23 @@ def test_what_cannot_be_reported_is_refused_and_nothing_is_left(
     monkeypatch.setitem(sys.modules, "jinja2", None)
     with pytest.raises(UsageError, match="pip install matplotlib jinja2"):
         write_report(results, tmp_path / "r.html", force=False, progress=quiet)
+
+
+def test_a_picture_in_a_page_keeps_colours_that_are_rare() -> None:
+    def draw() -> Figure:
+        figure = Figure(figsize=(3.0, 3.0))
+        axes = figure.subplots()
+        for place, colour in enumerate(COLOURS):
+            axes.plot([place], [place], "s", ms=3.0, color=colour)
+        return figure
+
+    found = blocks.picture("words", draw)
+    for data in (found.wide, found.narrow):
+        picture = Image.open(BytesIO(base64.b64decode(data.partition(",")[2]))).convert("RGB")
+        there = np.asarray(picture).reshape(-1, 3).astype(int)
+        for colour in COLOURS:
+            wanted = 255.0 * np.array(to_rgb(colour))
+            assert np.abs(there - wanted).max(axis=1).min() < 12.0, colour
 
 
 @campaign

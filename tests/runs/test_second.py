@@ -7,7 +7,7 @@ import pytest
 import tomli_w
 
 from brakecli.analysis.regime.of_run import context, verdict_on
-from brakecli.analysis.regime.verdict import Feeds, Regime
+from brakecli.analysis.regime.verdict import Excitation, Feeds, Regime
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
 from brakecli.runs.second import compared, second_system
@@ -105,3 +105,22 @@ def test_no_motion_is_called_quasi_harmonic_that_sticks_without_the_roughness() 
     assert (feeds, sticks > 0.9) == (Feeds.FRICTION, True)
     assert verdict_on(history, system, None, None, feeds).regime is Regime.QUASI_HARMONIC
     assert verdict_on(history, system, None, None, feeds, sticks).regime is Regime.UNDECIDED
+
+
+@pytest.mark.parametrize("name", ["ring-down on a line", "forced where sliding is unstable"])
+def test_a_second_run_shows_that_the_roughness_forces_what_lasts(name: str) -> None:
+    """By another integrator, the one dies to what the waves force; the other repeats with the wheel to 1e-13."""
+    system = system_of(parse_case(tomli_w.dumps(SHOES[name]), "case").case)
+    history = array_history(system.interval, solve(system).rows)
+    feeds, *_ = compared(second_system(system, history), history)
+    assert verdict_on(history, system, None).regime is Regime.UNDECIDED
+    assert verdict_on(history, system, None, None, feeds).excitation is Excitation.FORCED
+
+
+def test_what_falls_as_friction_does_is_not_shown_to_be_self_excited() -> None:
+    """By another integrator the level rises smoothly from a third of the critical friction through it."""
+    system = system_of(
+        parse_case(tomli_w.dumps(SHOES["grows with friction, without a critical value"]), "case").case
+    )
+    history = array_history(system.interval, solve(system).rows)
+    assert compared(second_system(system, history), history)[0] is Feeds.UNKNOWN

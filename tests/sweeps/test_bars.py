@@ -86,6 +86,52 @@ def test_the_truth_lies_within_the_error_bar(kind: str, seed: int) -> None:
     assert changes_within(tables, key, found.value, bar, start)
 
 
+DAMPING: Tables = {  # its weights damp: an error of first order, 11 % of the growth at a step
+    "shoe": {"mass": 18.55},
+    "wheel": {"radius": 0.33, "angular_speed": 48.57},
+    "link1": {"stiffness": 9392000.0, "damping": 68.27, "angle_deg": 0.0},
+    "link2": {"stiffness": 15550000.0, "damping": 53.02, "angle_deg": 26.34},
+    "load": {"force": 2304.0},
+    "friction": {"coefficient": 0.1},
+    "contact": {"half_length": 0.055, "stiffness": 30360000.0},
+    "roughness": {
+        "wheel": {"amplitudes": [0.0001283], "wavelengths": [0.056]},
+        "shoe": {"amplitudes": [5.594e-05], "wavelengths": [0.01]},
+    },
+    "solver": {"duration": 0.4, "scheme": "two-layer", "step": 6.6e-5, "theta": [0.52, 0.5]},
+}
+BETWEEN: Tables = {  # stable for half a per cent of the range
+    "shoe": {"mass": 9.792},
+    "wheel": {"radius": 0.2, "angular_speed": 25.44},
+    "link1": {"stiffness": 2556000.0, "damping": 9.511, "angle_deg": 0.0},
+    "link2": {"stiffness": 2290000.0, "damping": 12.11, "angle_deg": 29.84},
+    "load": {"force": 386.2},
+    "friction": {"coefficient": 0.1},
+    "contact": {"half_length": 0.055, "stiffness": 22780000.0},
+    "roughness": {
+        "wheel": {"amplitudes": [3.585e-05], "wavelengths": [0.028], "phases_deg": [80.72]},
+        "shoe": {"amplitudes": [1.411e-05, 1.441e-05], "wavelengths": [0.026, 0.036]},
+    },
+    "solver": {"duration": 0.59, "scheme": "two-layer", "step": 0.00016},
+}
+
+
+@pytest.mark.parametrize(("tables", "upper", "windows"), [(DAMPING, 4.0, 1), (BETWEEN, 5.8, 2)])
+def test_the_truth_lies_within_the_error_bars_of_all_windows(tables: Tables, upper: float, windows: int) -> None:
+    key, critical = (
+        "friction__coefficient",
+        Critical(parameter="friction.coefficient", lower=0.0, upper=upper, tolerance=1e-4),
+    )
+    found = search(critical, lambda value: make(tables, **{key: value}), lambda case: None)
+    ends, errors = np.ravel(found.windows), np.ravel(found.window_errors)
+    assert (found.value, found.error) == (ends[0], errors[0])
+    assert len(found.windows) == windows
+    assert (ends[-1], errors[-1]) == (upper, 0.0)
+    for end, error in zip(ends[:-1], errors, strict=False):
+        assert error < 0.045 * end
+        assert changes_within(tables, key, end, error, end - 1.5 * error)
+
+
 @campaign
 def test_a_narrow_window_lies_where_the_scheme_vibrates_at_half_the_frequency_of_a_wave() -> None:
     """At the exact natural frequency, half a width of the window away, the scheme at its step is stable."""

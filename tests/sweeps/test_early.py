@@ -227,3 +227,12 @@ def test_a_result_of_many_blocks_holds_every_point_in_its_place(tmp_path: Path, 
         np.testing.assert_array_equal(found, expected.reshape(2, 120, 140).transpose(0, 2, 1))
     else:
         np.testing.assert_array_equal(found, expected.reshape(found.shape))
+
+
+def test_an_orbit_that_is_given_up_leaves_no_error_to_a_motion_that_fades() -> None:
+    """Near the critical friction the returns come close to one another long before the motion slides steadily."""
+    settings = ("solver={tolerance=1e-4, duration=1.0}", "friction.coefficient=0.569", "wheel.angular_speed=0.05")
+    _, found = known(case_of(RELAXATION, *settings))
+    assert found.verdict.frequency is None
+    assert found.certificate is not None
+    assert found.certificate.estimated_error < 1e-4

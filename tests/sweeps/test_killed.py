@@ -6,6 +6,7 @@ import re
 import signal
 import time
 from functools import partial
+from itertools import chain, repeat
 from pathlib import Path
 from typing import Any
 
@@ -121,7 +122,8 @@ def test_a_point_that_ends_its_worker_is_marked_and_all_others_are_computed(
 def test_workers_that_die_idle_cost_no_point(tmp_path: Path) -> None:
     loaded = write_sweep(tmp_path, frictions(12))
     with LocalEngine(partial(slow, loaded.plan), 2) as engine:
-        tasks = iter([Task(0, 1, True), Task(1, 9, True), None, Task(10, 1, True), Task(11, 1, True), *[None] * 9])
+        planned = Task(0, 1, True), Task(1, 9, True), None, Task(10, 1, True), Task(11, 1, True)
+        tasks = chain(planned, repeat(None))
         killed: list[int] = []
 
         def next_task() -> Task | None:

@@ -175,13 +175,13 @@ def _longest_piece(values: Array, longest_gap: float, notes: list[str]) -> tuple
     gaps = np.flatnonzero(bad[1:] != bad[:-1]).reshape(-1, 2)
     cuts = gaps[np.diff(gaps)[:, 0] > longest_gap]
     if len(cuts) < len(gaps):
-        notes.append(f"{len(gaps) - len(cuts)} short gaps bridged")
+        notes.append(f"short gaps bridged: {len(gaps) - len(cuts)}")
     if not len(cuts):
         return values, 0
     pieces = np.array([0, *cuts.flat, len(values)]).reshape(-1, 2)
     begin, end = pieces[np.argmax(np.diff(pieces))]
     used = f"{end - begin} of {len(values)} samples"
-    notes.append(f"{len(cuts)} long gaps: only the longest piece is used, {used}")
+    notes.append(f"long gaps: {len(cuts)}, so that only the longest piece is used, {used}")
     return values[begin:end], int(begin)
 
 
@@ -201,5 +201,5 @@ def _without_spikes(values: Array, is_velocity: bool, notes: list[str]) -> Array
         power = np.abs(np.fft.rfft(_without_slow(_handy(without)))) ** 2
         if line_share(power) < _LINES_LEFT:  # nothing is left without them
             return values
-    notes.append(f"{count} spikes removed")
+    notes.append(f"spikes removed: {count}")
     return without

@@ -160,8 +160,7 @@ def _beginnings(part: Part, velocity: Array) -> tuple[Array, int]:
             longest = 1.0 / (rises * period * part.history.interval)
             divisors = [each for each in range(1, rises) if rises % each == 0]
             for fewer in divisors:  # samples may repeat only after several cycles
-                most = _HARMONICS if fewer == 1 else 2  # further up there is what samples make of jumps
-                lines = [n * longest for n in range(1, most * rises) if n % (rises // fewer)]
+                lines = [n * longest for n in range(1, 2 * rises) if n % (rises // fewer)]  # above: jumps, aliased
                 if part.share(lines) <= _BETWEEN:
                     return crossings[::fewer], fewer
             return crossings[::rises], rises

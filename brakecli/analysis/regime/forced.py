@@ -6,10 +6,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brakecli.analysis.regime.cycles import Cycles
-from brakecli.analysis.regime.evidence import LINE_BINS, WINDOWS, Envelope, Part
+from brakecli.analysis.regime.evidence import LINE_BINS, WINDOWS, Envelope, Part, follows
 from brakecli.analysis.regime.verdict import Context, Decision, Excitation, Feeds, Regime, Thresholds
 from brakecli.solver.history import History
 from brakecli.solver.quantities import ContactState
@@ -26,10 +25,9 @@ QUARTER = 4.0 / 3.0  # a run whose last quarter is settled, over what comes befo
 _ERRORS = 2.0  # standard errors of a mean power
 _LARGER = 5.0  # times what the waves force in full contact: a larger motion needs more proof that it is forced
 _OFTEN = 0.1  # part of the time that shows that stick or flight holds a vibration within its limits
+_RING_DOWN = 0.5  # of the own vibration's decay, and of what dashpots take, that is kept up by nothing
 _TRACE = 0.1  # part of the energy of vx on the lines themselves, without which nothing is their subharmonic
 _MOST_COMBINED = 6  # waves whose frequencies are combined by threes
-_FOLLOWS = 0.1  # part of the energy of vx and vy in which a motion differs that comes back with the waves
-_PROBES, _MOST_RETURNS, _APART = 400, 1 << 14, 5  # times compared, among how many, so many cycles of vx apart
 SECOND_RUN = "a second run: brakecli classify RESULT.h5 --second-run"
 _COMBINATIONS = [(i, j, k) for i in range(-2, 3) for j in range(-2, 3) for k in (-1, 0, 1)]
 
@@ -77,6 +75,14 @@ class ForcedRules:
         counts = [f for f, swing in self.context.waves if swing >= self.limits.settled_within * least]
         return 1.0 / min(counts) if counts else 0.0
 
+    @property
+    def _beat(self) -> float:
+        """Period (s) of the slowest wave, or of the slowest beat of one that counts with a multiple of another."""
+        slow, most = self._slowest(0.0), max((swing for _, swing in self.context.waves), default=0.0)
+        counts = [f for f, swing in self.context.waves if swing >= self.limits.settled_within * most]
+        beats = [abs(f - n * g) for f in counts for g in counts for n in range(1, 11)]
+        return max([slow, *(1.0 / beat for beat in beats if beat * slow > _NOTHING)])
+
     def _long_enough(self, slow: float) -> float:
         """Duration (s) of a run whose settled part holds two periods."""
         start = self.settled_part.start * self.history.interval if self.settled else 2.0 * slow
@@ -101,10 +107,10 @@ class ForcedRules:
             return self._too_short(slow)
         growth = self.context.growth()
         if self.context.frictionless:
-            text = "without friction nothing but the roughness shakes the shoe"
-            return self._forced(text) if growth < 0.0 else Decision(f"{text}, but no dashpot damps it")
+            text = "without friction nothing else excites it"
+            return self._forced(text) if growth < 0.0 else Decision(f"{text}, but no dashpot damps the shoe")
         if self.context.feeds is Feeds.ROUGHNESS:
-            return self._forced("only the roughness shakes the shoe, as a second run shows")
+            return self._forced("a second run shows it")
         if self.context.feeds is Feeds.FRICTION:
             return None
         share, dense = self._share(self.context.forced, 0.5)
@@ -116,8 +122,7 @@ class ForcedRules:
             self._feeds()
             if self._locked:
                 return self._either()
-            text = "the motion comes back wherever the waves of the wheel do, and sliding is stable"
-            return self._forced(f"only the roughness shakes the shoe: {text}")
+            return self._forced("the motion comes back wherever the waves of the wheel do, and sliding is stable")
         if share < self.limits.forced_share:
             lines = tuple({*self.context.forced, *self.context.subharmonics()})
             trace = share
@@ -145,7 +150,7 @@ class ForcedRules:
                 f"{what}, which lie too close to be told from others; run twice as long, or decide by {SECOND_RUN}"
             )
             return self.fed() or Decision(text, second_run=True)
-        return self._forced(f"only the roughness shakes the shoe: {what}")
+        return self._forced(what)
 
     @property
     def _unstable_in_full_contact(self) -> bool:
@@ -158,9 +163,12 @@ class ForcedRules:
 
         Full contact says nothing of a pad that opens and moves as the waves do.
         """
-        on_lines = self.evidence.get("forced_share", 0.0) >= self.limits.forced_share
-        stable = self.context.growth() < 0.0 and (on_lines or not self._unstable_in_full_contact)
-        return stable and self.context.feeds is not Feeds.FRICTION
+        if self.context.feeds is Feeds.FRICTION:
+            return False
+        stable = self.context.growth() < 0.0
+        if self.evidence.get("forced_share", 0.0) >= self.limits.forced_share:
+            return stable or self._follows()
+        return stable and not self._unstable_in_full_contact
 
     @property
     def _locked(self) -> bool:
@@ -198,32 +206,7 @@ class ForcedRules:
         return math.sqrt(0.5 * sum(swing**2 for _, swing in self.context.waves))
 
     def _follows(self) -> bool:
-        """Whether vx and vy come back, at times far from one another, wherever all waves have the same phase."""
-        from scipy.spatial import cKDTree
-
-        speeds = np.array([frequency * swing for frequency, swing in self.context.waves])
-        for part in (self.settled_part, self.last):
-            velocity = np.stack([part.last("vx"), part.last("vy")], axis=1)
-            rises = np.count_nonzero((velocity[:-1, 0] < 0.0) & (velocity[1:, 0] >= 0.0))
-            size = velocity.std(axis=0)
-            if rises <= 2 * _APART or not size.all():
-                continue
-            stride = -(-len(velocity) // _MOST_RETURNS)
-            places: NDArray[np.intp] = np.arange(0, len(velocity), stride)
-            turns = np.outer(places * part.history.interval, [frequency for frequency, _ in self.context.waves])
-            waves = speeds / speeds.max() * np.exp(2j * math.pi * turns)
-            points = np.concatenate([waves.real, waves.imag], axis=1)
-            probes = np.linspace(0, len(places) - 1, _PROBES).astype(int)
-            near = np.asarray(cKDTree(points).query(points[probes], k=min(_PROBES, len(places)))[1])
-            far = np.abs(near - probes[:, None]) * stride > _APART * len(velocity) / rises
-            found = far.any(axis=1)
-            if np.count_nonzero(found) < _PROBES // 2:
-                continue
-            pairs = probes[found], near[found, far[found].argmax(axis=1)]
-            apart = np.subtract(*(velocity[places[each]] / size for each in pairs))
-            if float(np.mean(apart**2)) <= 2.0 * _FOLLOWS:
-                return True
-        return False
+        return any(follows(part, self.context.waves) for part in (self.settled_part, self.last))
 
     def _share(self, lines: Sequence[float], most: float) -> tuple[float, bool]:
         """Part of the energy of vx on lines, in the second half or in the last quarter, where it is more.
@@ -238,8 +221,11 @@ class ForcedRules:
         clear = [share for share, dense in shares if not dense and share >= self.limits.forced_share]
         return (max(clear), False) if clear else max(shares)
 
-    def _forced(self, text: str) -> Decision:
-        """Forced, as seen in a settled part of two periods of the slowest wave."""
+    def _forced(self, what: str) -> Decision:
+        """Forced, as seen in a settled part of two periods of the slowest wave, and as `what` shows."""
+        if self._open and not self.context.touches():
+            text = "sliding steadily the shoe would not touch the wheel: it bounces, and may leave it for good"
+            return Decision(f"{text}; check the sign and size of load.force")
         growth = self.context.growth()
         fading = 0.25 * self.duration * growth > -_RELAXED  # too slowly to be seen within a quarter of the run
         falls = 0.0
@@ -250,13 +236,24 @@ class ForcedRules:
         if self._settled_seconds < 2.0 * slow:
             return self._too_short(slow)
         self.rings = not self.lasts and growth < 0.0 and (fading or falls > self.limits.settled_within)
-        if self.rings:
-            if own := self._own_line():
-                ringing = f"the shoe's own vibration at {own:.4g} Hz, which decays, lies on the same lines"
-                text = f"sliding is stable, and the roughness shakes the shoe; {ringing}"
-            needed = max(QUARTER * (self.duration - self._powers_to_lose / growth), self._long_enough(slow))
-            text += f"; run at least {needed:.3g} s to see the amplitude that lasts"
-        return Decision(text, Regime.DAMPED, Excitation.FORCED)
+        if not self.rings:
+            if self._settled_seconds < self._beat:
+                self.settled, what = False, f"{what}; the waves beat every {self._beat:.3g} s"
+            return Decision(f"only the roughness shakes the shoe: {what}", Regime.DAMPED, Excitation.FORCED)
+        needed = max(QUARTER * (self.duration - self._powers_to_lose / growth), self._long_enough(slow))
+        hint = f"; run at least {needed:.3g} s to see the amplitude that lasts"
+        rate = f"decays at {-growth:.3g} 1/s"
+        if self._trend < _RING_DOWN * growth and self._open:
+            text = f"still decaying at {-self._trend:.3g} 1/s; the shoe's own vibration {rate}"
+            return Decision(f"{text}{hint}, or decide by {SECOND_RUN}", second_run=True)
+        own = f" at {line:.4g} Hz on the same lines" if (line := self._own_line()) else ""
+        text = f"the roughness shakes the shoe beside its own vibration{own}, which {rate}"
+        return Decision(f"{text}: {what}{hint}", Regime.DAMPED, Excitation.FORCED)
+
+    @property
+    def _open(self) -> bool:
+        """Whether neither theory nor a second run has shown that what does not decay is forced."""
+        return not self.context.frictionless and self.context.feeds is Feeds.UNKNOWN
 
     @property
     def _trend(self) -> float:
@@ -313,10 +310,9 @@ class ForcedRules:
         open_by = abs(friction + roughness - lost)
         error = _ERRORS * max(math.hypot(off, off_too), open_by)
         stable = self.context.growth() < 0.0 and not self._unstable_in_full_contact
-        if stable and roughness - 2.0 * max(friction, 0.0) > error:
-            return Feeds.ROUGHNESS
         takes = self.context.growth() < 0.0 and friction + _ERRORS * max(off, open_by) < 0.0
-        if takes and roughness > -0.5 * friction:
+        shakes = stable and roughness - 2.0 * max(friction, 0.0) > error
+        if (shakes or (takes and roughness > -0.5 * friction)) and friction + roughness > _RING_DOWN * lost:
             return Feeds.ROUGHNESS
         if friction > error and (roughness + error < 0.0 or friction > (2.0 if stable else 1.0) * roughness):
             return Feeds.FRICTION
@@ -326,7 +322,7 @@ class ForcedRules:
         """On a rough wheel: forced where it is the roughness that feeds the vibration."""
         if not self.context.forced or self._feeds() is not Feeds.ROUGHNESS:
             return None
-        return self._forced(f"only the roughness shakes the shoe: {self._powers}")
+        return self._forced(self._powers)
 
     def _either(self) -> Decision:
         text = f"{self._powers}, so that either may keep it up"

@@ -111,6 +111,7 @@ def context(system: System) -> Context:
         scale=fastest,
         frictionless=c.phi == 0.0,
         undamped=is_undamped(c),
+        touches=lambda: stiffness() > 0.0,
         growth=lambda: growth(c, stiffness(), grip),
         modes=lambda: [each for k in (stiffness(), system.contact_stiffness) for each in modes(c, k, grip)],
         linear=theory,

@@ -69,21 +69,20 @@ class _Rules(ForcedRules):
         if not replace(self.last, start=start).slides(theory.slip) and not theory.stays(self._end()[1]):
             return None
         mean, theory = theory, theory.with_slopes()
-        mode = theory.mode
         if theory.direction != mean.direction and (theory.direction == 0 or self._swings_far(theory)):
             return self._steep(theory)
         self.theory = theory
         if theory.direction == 0:
             return Decision(f"{theory.sentence}; a dashpot would decide")
         if theory.direction > 0:
-            self.evidence["seconds_to_go"] = more = theory.seconds_to_limit(*self._end()) + 3.0 / mode.growth
+            more = theory.seconds_to_limit(*self._end())
+            self.evidence["seconds_to_go"] = more = more + 3.0 / theory.mode.growth
             return Decision(f"{theory.sentence}; run at least {QUARTER * (self.duration + more):.3g} s")
-        decays = theory.sentence
         if not len(theory.waves):
-            return Decision(decays, Regime.DAMPED)
+            return Decision(theory.sentence, Regime.DAMPED)
         if self.duration < slow:
             return self._too_short(slow)
-        return self._shaken(theory, slow, decays)
+        return self._shaken(theory, slow)
 
     def _swings_far(self, theory: "Linear") -> bool:
         """Whether what the shoe adds is no longer small beside the waves, so that their slope is not linear."""
@@ -105,7 +104,7 @@ class _Rules(ForcedRules):
         state = [float(self.history.read(name, last, last + 1)[0]) for name in ("x", "y", "vx", "vy")]
         return last * self.history.interval, np.array(state)
 
-    def _shaken(self, theory: "Linear", slow: float, decays: str) -> Decision | None:
+    def _shaken(self, theory: "Linear", slow: float) -> Decision | None:
         """The forced motion that lasts, with the settled part in which the shoe's own part has gone."""
         forced, lasting, own, time = theory.parts(*self.whole.places())
         starts = -(-len(own) * np.arange(WINDOWS) // WINDOWS)
@@ -128,13 +127,13 @@ class _Rules(ForcedRules):
             hint = f"; run at least {needed:.3g} s to see only that"
         chosen = time >= self.settled_part.start * self.history.interval
         self.parts, self.unseen = (forced, 0.5 * float(np.ptp(own[chosen]))), forced - 0.5 * float(np.ptp(lasting))
-        text = f"only the roughness shakes the shoe, by {forced:.3g} m: {decays}{hint}"
+        text = f"only the roughness shakes the shoe, by {forced:.3g} m: {theory.sentence}{hint}"
         return Decision(text, Regime.DAMPED, Excitation.FORCED)
 
     def died_out(self) -> Decision | None:
         """Little is left beside the start, beside the wheel's speed and beside the compression, and it falls."""
-        envelope, belt = self.envelope, abs(self.context.belt_speed)
-        if belt == 0.0 and self.context.growth() < 0.0:
+        envelope = self.envelope
+        if self.context.belt_speed == 0.0 and self.context.growth() < 0.0:
             return Decision("the wheel stands: friction and dashpots take the energy", Regime.DAMPED)
         kept = bool(self.context.forced) and self.context.growth() < 0.0  # up by the roughness
         falls = self.evidence.get("envelope_slope", 0.0) < 0.0 or (kept and self._trend == 0.0)
@@ -146,11 +145,11 @@ class _Rules(ForcedRules):
             return None
         text = f"vx has fallen to {envelope.final / envelope.largest:.2g} of its largest amplitude"
         if kept:
-            text = f"the shoe's own vibration has died out: {text}, and only the roughness shakes it"
             found = self._forced(text)
             if found.regime is Regime.DAMPED:
                 return found
-            return Decision(f"{text}; {found.reason}", Regime.DAMPED, Excitation.FORCED)
+            text = f"the shoe's own vibration has died out: {text}; {found.reason}"
+            return Decision(text, Regime.DAMPED, Excitation.FORCED)
         return Decision(f"the vibration has died out: {text}", Regime.DAMPED)
 
     @property
@@ -263,17 +262,17 @@ class _Rules(ForcedRules):
     def amplitude(self, decision: Decision) -> tuple[float, float | None]:
         """Half of peak to peak of x (m) as a median over cycles, and its spread."""
         part = self.settled_part
-        if self.cycles and decision.excitation is Excitation.SELF_EXCITED:
-            spread = self._held(self.cycles.amplitude_spread, self.cycles.amplitude, self.cycles.drift)
-            return self.cycles.amplitude, spread
+        if (found := self.cycles) and decision.excitation is Excitation.SELF_EXCITED:
+            short, change = self._settled_seconds < self._slowest(0.0), 0.5 * abs(self._trend) * self.duration
+            if not self.lasts and (short or change > self.limits.settled_within):
+                return found.amplitude, None  # where it ends, the run does not show
+            return found.amplitude, self._held(found.amplitude_spread, found.amplitude, found.drift)
         if decision.excitation is not Excitation.FORCED:
             return part.amplitude("x"), None
         if self.theory and self.parts:
             return self.parts[0], self.parts[1] + self.unseen if self.settled else None
         samples = len(part.last("x"))
-        beats = [abs(f - g) for f, _ in self.context.waves for g, _ in self.context.waves if f != g]
-        slow = max([self._slowest(0.0), *(1.0 / beat for beat in beats)])
-        period = max(min(slow / self.history.interval, samples - 1), 1.0)
+        period = max(min(self._beat / self.history.interval, samples - 1), 1.0)
         edges = np.asarray(samples - period * np.arange(int(samples / period), -1, -1), np.float64)
         size, spread = median(swings(part, edges))
         if self.rings or len(edges) < 3:
@@ -290,11 +289,11 @@ class _Rules(ForcedRules):
 
     def _held(self, spread: float, value: float, drift: Drift) -> float | None:
         """A spread with what a drift becomes until small disturbances have changed by a factor of e."""
+        if self.lasts:
+            return spread + (abs(drift.part) * value if drift.sure else 0.0)
         if self.context.undamped:
             return None  # there is no end to it
         ends = min(abs(self.context.growth()) * self._settled_seconds, 1.0)
-        if self.lasts:
-            return spread + (abs(drift.part) * value if drift.sure else 0.0)
         return min(spread + abs(drift.part) * value / max(ends, 1e-9), value)
 
 

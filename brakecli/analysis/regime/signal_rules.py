@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 
 from brakecli.analysis.regime.cleaning import CERTAIN, Velocity
-from brakecli.analysis.regime.spectra import line_share
+from brakecli.analysis.regime.spectra import interpolated, line_share
 from brakecli.analysis.regime.stick import Slips
 from brakecli.analysis.regime.verdict import Decision, Regime
 
@@ -124,7 +124,8 @@ class SignalRules:
         if not slips.stick_slip:
             return None
         reason = f"{self.slips.count} events of stick and slip: skewness of the velocity {self.slips.skewness:.2g}"
-        often = self.slips.count / self.duration
+        places = self.slips.places
+        often = (len(places) - 1) / (float(places[-1] - places[0]) * self.interval)
         return Decision(reason, Regime.RELAXATION, frequency=often, stick_fraction=self.slips.stick)
 
     def _overtones(self, total: float) -> Iterator[tuple[str, float, float]]:
@@ -145,7 +146,7 @@ class SignalRules:
         if flat and np.isfinite(self.belt):
             stick = max(0.0, top - 0.5 * beside)
             reason = f"the velocity is that of the belt for {stick:.0%} of the time, in most cycles or in all"
-            return Decision(reason, Regime.RELAXATION, frequency=self.frequency, stick_fraction=stick)
+            return Decision(reason, Regime.RELAXATION, frequency=self._line(), stick_fraction=stick)
         share = line_share(self.power)
         self.evidence |= {"line_share": share}
         if flat:
@@ -164,7 +165,14 @@ class SignalRules:
         known = np.isfinite(self.belt)  # otherwise stick may be too short to be seen
         reason += "" if known or not self.has_belt else "; short stick would show only by --belt-speed"
         none = 0.0 if known else None
-        return Decision(reason, Regime.QUASI_HARMONIC, frequency=self.frequency, stick_fraction=none)
+        return Decision(reason, Regime.QUASI_HARMONIC, frequency=self._line(), stick_fraction=none)
+
+    def _line(self) -> float:
+        """Frequency (Hz) of the strongest line; a line of the spectrum alone may be off by half a cycle in all."""
+        power = self.velocity.denoised(hann=True)[1]
+        near = max(self.strongest - 1, 0)
+        place = near + int(np.argmax(power[near : near + 3]))
+        return interpolated(np.arange(len(power)) / (len(self.clean) * self.interval), power, place)
 
     def _plateau(self) -> tuple[float, float]:
         """Part of the time at the belt's speed (or an extreme velocity), and part of the time next to it."""

@@ -67,6 +67,7 @@ class Context:
     scale: float = math.inf  # m/s, of a motion that would open the contact
     frictionless: bool = False
     undamped: bool = False
+    touches: Callable[[], bool] = lambda: True  # whether the shoe touches the wheel where it slides steadily
     growth: Callable[[], float] = lambda: 0.0  # 1/s, of a small disturbance of steady sliding; below 0 it decays
     modes: Callable[[], list["Mode"]] = list  # of small vibrations
     linear: Callable[[], "Linear | None"] = lambda: None  # the theory of full contact
