@@ -71,7 +71,7 @@ REASONS = {
         "One evaluation: the compiler does not know the number of waves, and each has a loop of its own."
     ),
     "map of regimes": (
-        "The map of regimes: a point whose verdict comes early takes 0.3 ms, a third of it to make and check its case."
+        "The map of regimes: a point whose verdict comes early takes 0.3 ms, a quarter of it for its case."
         " One in a hundred, beside the critical friction, runs to its end: thirty times as long."
     ),
     "map on B": (

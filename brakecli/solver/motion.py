@@ -105,7 +105,7 @@ class Stepping:
         self.counts = new(COUNTS)
         self.counts.level = self.scheme.LAG
         # the same place in memory, which is read in a tenth of the time
-        self._level: Any = np.ndarray((), np.int64, self.counts, COUNTS.fields["level"][1])  # type: ignore[index]
+        self._level = np.frombuffer(self.counts, COUNTS)["level"]
         self.plant = Plant(
             c=system.coefficients,
             s=system.weights,
