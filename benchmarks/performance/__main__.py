@@ -75,8 +75,9 @@ REASONS = {
         " One in a hundred, beside the critical friction, runs to its end: thirty times as long."
     ),
     "map on B": (
-        "The map on B: a point takes some 3.5 ms of a core. Its promise takes five runs of 48,000 steps together,"
-        " at 30 ns a step in lanes; then comes the verdict, one point at a time."
+        "The map on B: a point takes some 1.9 ms of a core. Its promise takes five runs of 12,000 steps together,"
+        " 0.4 ms in lanes. The verdict takes 0.8 ms, and case, ladder and record 0.6 ms, one point at a time in"
+        " Python. A worker takes 0.9 s to start."
     ),
     "critical: an open": "Critical values of open pads: growth is measured by runs, one after the other.",
 }
@@ -227,7 +228,7 @@ def many(report: Report) -> None:
         what = f"sweep with verdicts, {ours.label}"
         found.insert(0, ensembles.ours(200, what, f"solver={solver}", f"contact.nodes={method.nodes}", interval))
     promised = f"solver={{tolerance=1e-3, duration={ensembles.DURATION}}}"
-    found.insert(0, ensembles.ours(1000, "sweep with verdicts, `tolerance = 1e-3`", promised, interval))
+    found.insert(0, ensembles.ours(10_000, "sweep with verdicts, `tolerance = 1e-3`", promised, interval))
     speed = found[0].per_second
     report.goals.append(("map on B: points/s", "≥ 2,500", number(speed), speed >= 2500))
 

@@ -10,6 +10,7 @@ from brakecli.errors import BrakecliError
 from brakecli.runs.pilot import RUNGS
 from brakecli.runs.tolerance import (
     Certified,
+    InLanes,
     begins_with_steps,
     ladder,
     slower_than_events,
@@ -27,7 +28,7 @@ LANE_STEP_SECONDS = 3e-8
 
 def _ladder(system: System) -> Generator[System, Motion, Certified]:
     method = replace(system.method, scheme="three-layer", theta=NUMEROV)
-    return ladder(replace(system, method=method), slower_than_events(system, lambda samples: None))
+    return ladder(replace(system, method=method), slower_than_events(system, lambda samples: None), InLanes)
 
 
 def seconds_together(system: System) -> float | None:

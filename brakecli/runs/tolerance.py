@@ -28,6 +28,8 @@ FIRST_ON_NODES, NODES_RATIO = 0.2, 0.1  # first tolerance there over the request
 FIRST_TURN = 15.0  # square of the turn (rad) of the fastest motion in a first step, over the tolerance
 # Two halvings leave a sixth of the tolerance: (1/12, 10/12, 1/12) takes a sixth of that square off a velocity.
 LONGEST_TURN = 0.4  # rad, in a first step
+# In lanes errors grow with nearly the fourth power of such steps; two halvings leave a tenth of the tolerance.
+FIRST_TURN_IN_LANES, LONGEST_TURN_IN_LANES = 60.0, 0.5
 FIRST_PER_WAVE = 8.0  # first steps to a passing wave, at least
 FINEST_FIRST = 4e-4  # tolerance from which on a quarter of the usual nodes is enough to begin with
 MOST_SPARSE = 4  # halvings of a first step before it has reached the sample interval, at most
@@ -196,28 +198,49 @@ class _Axis:
 
     growth: ClassVar[float] = 0.5  # power of the error's fall with which the work grows
     margin: ClassVar[float] = 1.0
+    order: ClassVar[int] = 2  # with which errors fall at least
     doublings: int = 0
     before: float = math.inf
     last: float = math.inf
+
+    @staticmethod
+    def turn(tolerance: float) -> float:
+        """By which angle (rad) the fastest motion turns in a first step."""
+        return min(LONGEST_TURN, math.sqrt(FIRST_TURN * tolerance))
 
     @property
     def error(self) -> float:
         """Thrice the error that is left.
 
         Differences that fall by a factor r leave the last one over r - 1. They fall unevenly, and one that is
-        small by luck must not pass: no less is left than second order makes of each of the last two. A single one
+        small by luck must not pass: no less is left than the order makes of each of the last two. A single one
         says nothing: where no edge of a patch crosses the middle of a cell, twice the nodes give the same force.
         """
         if max(self.before, self.last) <= ROUNDING:
             return self.last
         if math.isinf(self.before) or self.last >= self.before:
             return math.inf
-        left = max(self.last, 3.0 * self.last / (self.before / self.last - 1.0), self.before / 4.0)
+        fall = 2.0**self.order
+        least = max(self.last, 3.0 * self.before / (fall * fall - fall))
+        left = max(least, 3.0 * self.last / (self.before / self.last - 1.0))
         return self.margin * left
 
     def more(self, tolerance: float) -> float:
         """By how much the work is likely to grow until the error is below the tolerance."""
         return max(1.0, self.last / tolerance) ** self.growth if self.last < math.inf else 2.0
+
+
+@dataclass
+class InLanes(_Axis):
+    """Of the steps of runs in lanes, whose errors fall with h³ at least."""
+
+    growth: ClassVar[float] = 0.3
+    order: ClassVar[int] = 3
+
+    @staticmethod
+    def turn(tolerance: float) -> float:
+        """As of other steps, longer by the order."""
+        return min(LONGEST_TURN_IN_LANES, math.sqrt(math.sqrt(FIRST_TURN_IN_LANES * tolerance)))
 
 
 @dataclass
@@ -253,7 +276,9 @@ def _by_steps(
 
 
 def ladder(
-    system: System, is_left: Callable[[Motion, float], bool] = lambda run, more: False
+    system: System,
+    is_left: Callable[[Motion, float], bool] = lambda run, more: False,
+    kind: type[_Axis] = _Axis,
 ) -> Generator[System, Motion, Certified]:
     """Runs with steps half as long, or a tenth of the local tolerance, or twice the nodes: what is needed more.
 
@@ -262,15 +287,15 @@ def ladder(
     may not, nor over what speed or load do between two knots, as no run would see it.
     """
     wanted, events = system.method.tolerance, system.method.own_steps
-    (first, every), fineness = first_rung(system), "tolerance" if events else "step"
+    (first, every), fineness = first_rung(system, kind), "tolerance" if events else "step"
     longest = min(_shortest_span(system) / STEPS_BETWEEN_KNOTS, system.interval) * (1.0 + 1e-9)
-    nodes, steps, quadrature = first_nodes(system), _Tolerances() if events else _Axis(), _Nodes()
+    nodes, steps, quadrature = first_nodes(system), _Tolerances() if events else kind(), _Nodes()
     before, finer, seconds = None, steps, 0.0
     while True:
-        sampled = replace(system, interval=max(1, every >> steps.doublings) * system.interval)
+        interval = max(1, every >> steps.doublings) * system.interval
         at = first * (NODES_RATIO if events else 0.5) ** steps.doublings
         changes: dict[str, Any] = {"nodes": nodes << quadrature.doublings, fineness: at}
-        run = yield replace(sampled, method=replace(sampled.method, **changes))
+        run = yield replace(system, interval=interval, method=replace(system.method, **changes))
         spent, failed = run.work.solve_seconds, run.work.failed
         run.work.solve_seconds = seconds = seconds + spent
         if before is not None and not failed:
@@ -342,7 +367,7 @@ def _sizes(system: System, one: Floats, other: Floats) -> Floats:
     return np.where(np.maximum(one, other) > rounding, np.maximum(other, rounding), math.inf)
 
 
-def first_rung(system: System) -> tuple[float, int]:
+def first_rung(system: System, kind: type[_Axis] = _Axis) -> tuple[float, int]:
     """The steps (s) that a ladder begins with, and how many samples each passes over, a power of two.
 
     Where steps are found it is the local tolerance that the ladder begins with.
@@ -350,7 +375,7 @@ def first_rung(system: System) -> tuple[float, int]:
     if system.method.own_steps:
         return FIRST_ON_NODES * system.method.tolerance, 1
     interval, fastest = system.interval, 2.0 * math.pi * max(system.natural_frequencies[1], 1e-300)
-    wanted = min(LONGEST_TURN, math.sqrt(FIRST_TURN * system.method.tolerance)) / fastest
+    wanted = kind.turn(system.method.tolerance) / fastest
     wanted = min(wanted, 1.0 / (FIRST_PER_WAVE * max(system.passing_frequency, 1e-300)))
     wanted = min(wanted, max(_shortest_span(system) / STEPS_BETWEEN_KNOTS, wanted / 2**MOST_DOUBLINGS))
     if interval > wanted:

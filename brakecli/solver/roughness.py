@@ -35,7 +35,7 @@ class Surface(NamedTuple):
 
     def __hash__(self) -> int:
         """By the numbers, so that what is made of a surface can be kept for all that are like it."""
-        return hash(self._bytes)
+        return hash((self.g.tobytes(), self.turns.tobytes()))
 
     @property
     def _bytes(self) -> tuple[bytes, ...]:

@@ -68,7 +68,7 @@ class System:
         build = _build_small if self.table_bytes < _SMALL_TABLES else build_pad
         return build(self.layer_stiffness, self.half_length, self.shoe, self.wheel, self.nodes)
 
-    @property
+    @cached_property
     def table_bytes(self) -> float:
         """Memory that `pad` takes while it is made: values at nodes, and two numbers for each pair of waves."""
         terms, nodes = len(self.shoe.g) + len(self.wheel.g), self.nodes
@@ -82,7 +82,7 @@ class System:
             remedy = "reduce contact.nodes, or the number of waves in roughness"
             raise RefusedError(f"{what} {self.table_bytes / 1e9:.3g} GB of memory; {remedy}")
 
-    @property
+    @cached_property
     def evaluator(self) -> str:
         """The contact evaluator that runs: "auto" is "closed-form" on smooth surfaces."""
         if self.method.evaluator != "auto":
@@ -94,7 +94,7 @@ class System:
         """Whether the contact evaluator seeks the edges of every patch that touches."""
         return contact.EVALUATORS[self.evaluator].finds_patches
 
-    @property
+    @cached_property
     def nodes(self) -> int:
         """Quadrature nodes; 0 where no quadrature can be needed."""
         if not contact.EVALUATORS[self.evaluator].needs_nodes:
@@ -170,7 +170,7 @@ class System:
         """h, s; the sample interval where the scheme finds its steps itself, unless they are exact."""
         return self.interval / self.per_sample
 
-    @property
+    @cached_property
     def samples(self) -> int:
         """Samples after the one at t = 0."""
         return _at_least(self.duration / self.interval)

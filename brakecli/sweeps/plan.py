@@ -13,7 +13,7 @@ import tomli_w
 from pydantic import ValidationError
 
 from brakecli.case import wording
-from brakecli.case.case import Case
+from brakecli.case.case import Case, given_toml
 from brakecli.case.read import LoadedCase, key_path, parse_case, parse_table, put, read_text
 from brakecli.case.tables import Table
 from brakecli.case.toml_lines import Located, innermost
@@ -106,11 +106,6 @@ def _tables(data: dict[str, Any]) -> dict[str, Any]:
     return {key: _tables(value) if isinstance(value, dict) else value for key, value in data.items()}
 
 
-def given_toml(table: Sweep | Case) -> str:
-    """The keys of a table that were given, as TOML."""
-    return tomli_w.dumps(table.model_dump(mode="json", exclude_unset=True, exclude_none=True))
-
-
 @lru_cache(maxsize=4)
 def plan_of(sweep_text: str, case_text: str) -> Plan:
     """The plan of the texts of a sweep and of its case; a worker meets the same ones again and again."""
@@ -157,7 +152,13 @@ def sweep_of(tables: dict[str, Any], base: LoadedCase) -> LoadedSweep:
 
 def _checked(sweep: Sweep, text: str, name: str, base: LoadedCase) -> LoadedSweep:
     """A sweep over a case; raises `CaseError` where its axes do not fit."""
-    plan = Plan(given_toml(sweep), given_toml(base.case))
+    given = tomli_w.dumps(sweep.model_dump(mode="json", exclude_unset=True, exclude_none=True))
+    keys = [key_path(text) for axis in sweep.axis if not axis.direction for text in axis.parameter]
+    keys += [key_path(sweep.critical.parameter)] if sweep.critical else []
+    # Other keys leave the sines of a measured profile as they are: workers elsewhere do without its file. Along a
+    # line the wheel keeps its waves.
+    anew = any(path[0] == "roughness" or path in (("wheel",), ("wheel", "radius")) for path in keys)
+    plan = Plan(given, given_toml(base.case, profiles=anew))
     if problems := _wrong_values(plan, text, name):
         raise CaseError(problems)
     resolved = tomli_w.dumps(sweep.model_dump(mode="json", exclude_none=True))

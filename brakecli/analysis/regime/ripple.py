@@ -58,8 +58,10 @@ def ripple(system: System, belt: float, stiffness: float, part: Part) -> Ripple 
     (s_xx, s_xy), (s_yx, s_yy) = stiffness_matrix(c, stiffness, grip)
     a, b = s_xx - c.m * omega**2 + 1j * omega * c.b_xx, s_xy + 1j * omega * c.b_xy
     d, e = s_yx + 1j * omega * c.b_xy, s_yy - c.m * omega**2 + 1j * omega * c.b_yy
-    shaken = (grip * e - b) / (a * e - b * d) * off
-    pressed = off - stiffness * (a - grip * d) / (a * e - b * d) * off
+    if not (determinant := a * e - b * d).all():  # nothing holds the shoe
+        return None
+    shaken = (grip * e - b) / determinant * off
+    pressed = off - stiffness * (a - grip * d) / determinant * off
     in_x, in_vx, in_force = (
         min(float(np.linalg.norm(ours) / size), 1.0) if (size := np.linalg.norm(whole)) else 0.0
         for ours, whole in zip((shaken, 1j * omega * shaken, pressed), seen, strict=True)

@@ -297,18 +297,25 @@ class _Rules(ForcedRules):
         return min(spread + abs(drift.part) * value / max(ends, 1e-9), value)
 
 
-def classify(history: History, context: Context, thresholds: Thresholds = _DEFAULT) -> Verdict:
-    """The regime of a run's history, by the rules of docs/regimes.md; the first that applies decides."""
+def classify(
+    history: History, context: Context, thresholds: Thresholds = _DEFAULT, *, in_full: bool = True
+) -> Verdict:
+    """The regime of a run's history, by the rules of docs/regimes.md; the first that applies decides.
+
+    Where not `in_full`, evidence and numbers that a sweep does not keep are left out; all others are the same.
+    """
     rules = _Rules(history, context, thresholds)
     decision = rules.decide()
     part, belt, cycles = rules.settled_part, context.belt_speed, rules.cycles
     sustained = cycles is not None and decision.excitation is Excitation.SELF_EXCITED
     friction, torques = part.mean("friction_force"), part.extremes("friction_force")
-    evidence = rules.evidence | {f"amplitude_{name}": part.amplitude(name) for name in ("y", "vx", "vy")}
-    if belt != 0.0:
-        evidence["largest_vx_over_belt_speed"] = part.extremes("vx")[int(belt > 0.0)] / belt
-    evidence |= part.lines(context.forced, context.quiet) | (context.powers(part) if context.steady else {})
-    split = rules.parts or (None if rules.rings else rules.split())
+    evidence = rules.evidence
+    if in_full:
+        evidence |= {f"amplitude_{name}": part.amplitude(name) for name in ("y", "vx", "vy")}
+        if belt != 0.0:
+            evidence["largest_vx_over_belt_speed"] = part.extremes("vx")[int(belt > 0.0)] / belt
+        evidence |= part.lines(context.forced, context.quiet) | (context.powers(part) if context.steady else {})
+    split = rules.parts or (None if rules.rings or not in_full else rules.split())
     forced, own = split if split and not (sustained and split[0] > split[1]) else (None, None)
     amplitude, spread = rules.amplitude(decision)
     ripple = context.ripple(part) if context.steady and not sustained else None
@@ -322,6 +329,9 @@ def classify(history: History, context: Context, thresholds: Thresholds = _DEFAU
     if torque is None:
         finer = f"give an output.sample_interval of {0.25 * history.interval:.2g} s"
         reasons.append(f"samples miss impacts of the friction force, and torque_variation is missing: {finer}")
+    short = (part.stop - part.start) * history.interval < 0.999 * context.pattern
+    if short and context.steady and not sustained and decision.regime is not Regime.UNDECIDED:
+        reasons.append(f"torque_variation needs {context.pattern:.3g} s, until the waves repeat: run longer")
     return Verdict(
         regime=decision.regime,
         excitation=decision.excitation,
