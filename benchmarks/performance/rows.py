@@ -27,8 +27,7 @@ from brakecli.sweeps.point import compute
 
 CASES, RELAXATION = ensembles.CASES, ensembles.CASES / "relaxation.toml"
 REGIMES = "solver={tolerance=1e-3, duration=2.0}"
-PROBE = 20
-WHOLE_MAP = 60.0  # s, of the map of 100 x 100 points: a longer one is computed in part
+PROBE = 100  # points along each axis: of 20, the one beside the critical friction counts for too much
 # B's waves with a common length of 2.6 m, which passes in 1 s, on a suspension that loses stability
 PERIODIC = (
     "wheel.angular_speed=5.2",
@@ -80,13 +79,12 @@ def map_seconds(points: int) -> tuple[float, float]:
 
 
 def regimes_map(points: int) -> tuple[float, str]:
-    """Seconds of the map, and how they were found: of a long one, a part is computed."""
+    """Seconds of the map, and how they were found: those of a larger one follow from that of `PROBE` x `PROBE`."""
     (start, start_used), (seconds, used) = map_seconds(2), map_seconds(PROBE)
-    share = points**2 / PROBE**2
-    whole, each = start + (seconds - start) * share, 1e3 * (used - start_used) / PROBE**2
-    told = f"{each:.3g} ms of a core a point, start and end {start:.2g} s"
-    if whole < WHOLE_MAP:
-        return map_seconds(points)[0], told
+    told = f"{1e3 * (used - start_used) / PROBE**2:.3g} ms of a core a point, start and end {start:.2g} s"
+    if points == PROBE:
+        return seconds, told
+    whole = start + (seconds - start) * points**2 / PROBE**2
     return whole, f"extrapolated from {PROBE} × {PROBE} points in {seconds:.1f} s; {told}"
 
 

@@ -188,7 +188,7 @@ BELT, BELT_SLOPE, LOAD, LOAD_SLOPE = range(4, 8)
 SIZE, PHASES, MARGINS, WORKS, TERMS, NODES = 8, 4, 3, 4, 18, 6
 """Its components, phases, margins of a phase, works, terms of its series, nodes of its quadrature."""
 PAIRS = SIZE * (SIZE + 1) // 2
-"""Products of two components; pairs of different ones stand for both orders."""
+"""Products of two components."""
 AHEAD = 4 + 2 * MARGINS + 2
 """What a step computes: x, y, v_x and v_y, the margins, their slopes times the step, and 2 to fill up vectors."""
 
@@ -203,7 +203,7 @@ FLOW = record(
     phase=int,
     started=int,  # 0 before the phase of the start is known
     events=int,  # events without progress
-    made=(int, PHASES),  # 1 where the matrices of a phase are made
+    made=(int, PHASES),  # 1 where the matrices of a phase are made, 2 where the forms of its works are, too
     row=(float, 8),  # the sample at the level reached
     z=(float, SIZE),  # motion reached
     error=(float, 4),  # of x, y, v_x and v_y by the rounding of all steps so far
@@ -216,16 +216,19 @@ FLOW = record(
     friction=(float, (PHASES, SIZE)),  # row of the friction force, N
     margins=(
         float,
-        (PHASES, 2 * MARGINS, SIZE),
-    ),  # rows of what is positive while the phase lasts, and of `before`
-    step=(float, (PHASES, SIZE, AHEAD)),  # columns of exp(A h) for x, y, v_x and v_y, and for the rest of `after`
+        (PHASES, SIZE, AHEAD),
+    ),  # columns of `before`: z, then what is positive in a phase
+    step=(float, (PHASES, SIZE, AHEAD)),  # the same times exp(A h), which give `after`
     now=(float, (SIZE, AHEAD)),  # those of the present phase: at a fixed place, the compiler makes vectors of them
-    works=(float, (PHASES, WORKS, PAIRS)),  # forms in z that are the works of a step from z on, J
-    sums=(float, PAIRS),  # sums of products of components of z over the steps whose works wait to be added up
+    works=(float, (PHASES, WORKS, SIZE, SIZE)),  # forms in z that are the works of a step from z on, J
+    factors=(float, (5, NODES, SIZE)),  # what powers at the nodes of Gauss' rule are products of
+    sums=(float, PAIRS),  # products of components of z, added up over the steps that wait
     series=(float, (SIZE, TERMS)),  # of each component over the span of a step
-    pull=(float, (NODES + 1, SIZE)),  # friction force in `at`, N
-    at=(float, (NODES + 1, SIZE, SIZE)),  # motions at the nodes of Gauss' rule, and at the end of the step
+    flow=(float, (TERMS, 4, SIZE)),  # the series of exp(A h): its rows for x, y, v_x and v_y
+    rows=(float, (4, SIZE)),  # those of exp(A t) at the end of a step, or at a node of Gauss' rule
+    at=(float, SIZE),  # the motion at a part of the span
     polynomial=(float, (2, TERMS)),  # a margin on it, and the margin's slope, negative
+    waiting=int,  # 1 where works of whole steps do; further up, it would push vectors across lines of the cache
 )
 """A piecewise-exact motion with the matrices of its phases."""
 

@@ -15,12 +15,16 @@ from pydantic import ValidationError
 from brakecli.case import wording
 from brakecli.case.case import Case, given_toml
 from brakecli.case.read import LoadedCase, key_path, parse_case, parse_table, put, read_text
+from brakecli.case.tables import Table
 from brakecli.case.toml_lines import Located, innermost
 from brakecli.errors import CaseError, KeyPath, Problem
 from brakecli.files import fields
 from brakecli.sweeps.tables import Axis, Sweep
 
 MOST_TRIED = 1000  # listed values of an axis that are tried before the sweep starts; of a range it is both ends
+
+_ALONE = ("shoe", "wheel", "link1", "link2", "load", "friction", "contact", "solver")
+"""Tables of a case that hold nothing which follows from another table."""
 
 Settings = dict[tuple[str, ...], Any]
 """Values by key path, to be put into the base case."""
@@ -42,6 +46,7 @@ class Plan:
         self.points = math.prod(self.shape)  # of the grid
         # the axis along which the motion is followed, and how often that is: twice both up and down
         self.followed = next((index for index, axis in enumerate(axes) if axis.direction), None)
+        self._valid = dict[str, Table]()  # tables of the case that no point has changed
         self.passes = 2 if any(axis.direction == "both" for axis in axes) else 1
         sizes = {axis.name: axis.size for axis in axes} or {"point": 1}
         self.dimensions = {"direction": 2, **sizes} if self.passes == 2 else sizes  # of the result
@@ -71,8 +76,13 @@ class Plan:
         data = _tables(self.case_keys)
         for path, value in settings.items():
             put(data, path, value, Case, kept=settings)
+        touched = {path[0] for path in settings}
+        same = [name for name in _ALONE if name not in touched and data.get(name) == self.case_keys.get(name)]
+        data |= {name: self._valid[name] for name in same if name in self._valid}
         try:
-            return Case.model_validate(data)
+            case = Case.model_validate(data)
+            self._valid |= {name: getattr(case, name) for name in same}
+            return case
         except ValidationError as error:
             for each in error.errors(include_url=False):
                 path = tuple(map(str, each["loc"]))
