@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from brakecli.analysis.regime.classify import classify
 from brakecli.analysis.regime.forced import forced_lines
-from brakecli.analysis.regime.rules import classify
 from brakecli.analysis.regime.verdict import Context, Excitation, Regime, Thresholds
 from brakecli.solver.history import History
 from tests.analysis.histories import INTERVAL, history_of, verdict_of
