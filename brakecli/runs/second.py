@@ -1,5 +1,6 @@
 """A second run of a case, which decides whether friction or the roughness keeps its vibration up."""
 
+import math
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -9,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from brakecli.analysis.regime.evidence import Part, follows
+from brakecli.analysis.regime.forced import GROWN
 from brakecli.analysis.regime.of_run import context, numbers_of, stored_run, verdict_on
 from brakecli.analysis.regime.verdict import Excitation, Feeds, Regime, Thresholds
-from brakecli.analysis.stability.modes import crossings
+from brakecli.analysis.stability.modes import crossings, growth
 from brakecli.errors import CaseError, RefusedError
 from brakecli.runs.cost import duration_text
 from brakecli.runs.limits import check, refuse
@@ -37,6 +39,7 @@ class Second:
     change: str
     smooth: bool  # the same without the wheel's roughness, from where the first has ended
     friction: float = 1.0  # part of that of the first run
+    growth: float = 0.0  # 1/s, of a small disturbance where the pad touches as it does in the first run
 
 
 def classify_twice(
@@ -82,7 +85,9 @@ def second_system(system: System, history: History) -> Second:
     phi = min([c.phi, *lost])
     less = replace(longer, coefficients=c._replace(phi=_REDUCED * phi))
     change = f"with a friction coefficient of {_REDUCED * phi:.3g}, at which sliding is stable"
-    return Second(less, change, smooth=False, friction=_REDUCED * phi / c.phi)
+    touching = Part(history, history.samples // 2, history.samples).mean("contact_fraction")
+    rate = growth(c, touching * system.contact_stiffness, math.copysign(c.phi, belt))
+    return Second(less, change, smooth=False, friction=_REDUCED * phi / c.phi, growth=rate)
 
 
 def compared(
@@ -100,6 +105,10 @@ def compared(
         lost = -context(second.system).growth() * second.system.duration > _LOST  # what is left of the start
         lost &= verdict.excitation is not Excitation.SELF_EXCITED
         remains = part >= _REMAINS and (lost or verdict.excitation is Excitation.FORCED)
+        duration = history.samples * history.interval
+        if remains and 0.0 < second.growth * duration < GROWN:  # what it has not shown yet, less friction cannot
+            own = f"but sliding is unstable: the shoe's own vibration grows at {second.growth:.3g} 1/s"
+            return Feeds.UNKNOWN, 0.0, f"{text}, {own}; run at least {1.01 * GROWN / second.growth:.3g} s"
         waves, end = context(second.system).waves, Part(history, history.samples // 2, history.samples)
         least = _VANISHES  # what moves as the waves do may be forced along x, and falls as friction does
         vanishes = part <= (min(least, 0.5 * second.friction) if follows(end, waves) else least)

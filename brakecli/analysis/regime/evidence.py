@@ -112,22 +112,22 @@ class Part:
         frequencies: Array = np.fft.rfftfreq(len(values), self.history.interval).astype(np.float64)
         return frequencies, power, float(power.sum())
 
-    def share(self, lines: Sequence[float]) -> float:
-        """Part of the energy of vx that lies on lines (Hz)."""
+    def share(self, lines: Sequence[float], bins: int = LINE_BINS) -> float:
+        """Part of the energy of vx that lies on lines (Hz), with so many bins on either side."""
         frequencies, power, total = self._spectrum
         if not lines or total == 0.0:
             return 0.0
-        return float(power[_near(lines, frequencies)].sum()) / total
+        return float(power[_near(lines, frequencies, bins)].sum()) / total
 
     def narrow(self) -> float:
         """Part of the energy of vx in its three strongest narrow bands."""
         return line_share(self._spectrum[1])
 
-    def covered(self, lines: Sequence[float]) -> float:
+    def covered(self, lines: Sequence[float], bins: int = LINE_BINS) -> float:
         """Part of the band up to the highest frequency of note that lines (Hz) take: what chance would find."""
         frequencies, power, total = self._spectrum
-        band = 1 + int(np.searchsorted(np.cumsum(power), 0.99 * total)) + LINE_BINS
-        return float(_near(lines, frequencies)[:band].mean()) if lines else 0.0
+        band = 1 + int(np.searchsorted(np.cumsum(power), 0.99 * total)) + bins
+        return float(_near(lines, frequencies, bins)[:band].mean()) if lines else 0.0
 
     def split(self, lines: Sequence[float]) -> tuple[float, float] | None:
         """Half of peak to peak of the parts of x on lines (Hz) and beside them, in the middle half of the samples.
@@ -152,7 +152,7 @@ class Part:
         None where vx (m/s) is quiet: that is rounding.
         """
         frequencies, power, total = self._spectrum
-        left, found, places = power.copy(), list[tuple[float, float, float]](), np.array(forced)
+        left, found, chosen = power.copy(), list[tuple[float, float, float]](), _near(forced, frequencies)
         total = total if self.amplitude("vx") > quiet else 0.0
         while total > 0.0 and len(found) < _MOST_LINES:
             top = int(np.argmax(left))
@@ -163,19 +163,17 @@ class Part:
             left[near] = 0.0
             if top < FEWEST_CYCLES:
                 continue  # a line of fewer cycles is not told from the drift of the mean
-            frequency = interpolated(frequencies, power, top)
-            distance = np.abs(places - frequency).min(initial=np.inf)
-            found.append((frequency, share, float(distance <= LINE_BINS * frequencies[1])))
+            found.append((interpolated(frequencies, power, top), share, float(chosen[top])))
         names = ("line_frequencies", "line_shares", "line_forced")
         return {name: [line[i] for line in found] for i, name in enumerate(names)}
 
 
-def _near(lines: Sequence[float], frequencies: NDArray[Any]) -> NDArray[np.bool_]:
+def _near(lines: Sequence[float], frequencies: NDArray[Any], bins: int = LINE_BINS) -> NDArray[np.bool_]:
     """Which frequencies of a spectrum belong to lines (Hz)."""
     chosen = np.zeros(len(frequencies), dtype=bool)
     for line in lines:
         middle = round(line / frequencies[1])
-        chosen[max(middle - LINE_BINS, 0) : middle + LINE_BINS + 1] = True
+        chosen[max(middle - bins, 0) : middle + bins + 1] = True
     return chosen
 
 

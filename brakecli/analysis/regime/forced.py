@@ -3,7 +3,6 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,28 +27,7 @@ _LARGER = 5.0  # times what the waves force in full contact: a larger motion nee
 _OFTEN = 0.1  # part of the time that shows that stick or flight holds a vibration within its limits
 _RING_DOWN = 0.5  # of the own vibration's decay, and of what dashpots take, that is kept up by nothing
 _TRACE = 0.1  # part of the energy of vx on the lines themselves, without which nothing is their subharmonic
-_MOST_COMBINED = 6  # waves whose frequencies are combined by threes
 SECOND_RUN = "a second run: brakecli classify RESULT.h5 --second-run"
-_COMBINATIONS = [(i, j, k) for i in range(-2, 3) for j in range(-2, 3) for k in (-1, 0, 1)]
-
-
-@lru_cache(maxsize=4)  # the points of a sweep ask for the same ones
-def forced_lines(belt_speed: float, waves_per_metre: tuple[float, ...], highest: float) -> tuple[float, ...]:
-    """Frequencies (Hz, up to `highest`) of the passing waves, their multiples, and sums and differences of two."""
-    base = [abs(belt_speed) * waves for waves in waves_per_metre]
-    multiples = {n * f for f in base for n in range(1, 11)}
-    pairs = {abs(f + sign * g) for f in base for g in base for sign in (1, -1)}
-    return tuple(sorted(f for f in multiples | pairs if 0.0 < f <= highest))
-
-
-@lru_cache(maxsize=4)
-def subharmonics(belt_speed: float, waves_per_metre: tuple[float, ...], highest: float) -> tuple[float, ...]:
-    """Halves, thirds and quarters of the passing frequencies, their multiples, and sums of up to three."""
-    base = [abs(belt_speed) * waves for waves in waves_per_metre]
-    parts = {k * f / n for f in base for n in (2, 3, 4) for k in range(1, 4 * n)}
-    few = base if len(base) <= _MOST_COMBINED else []
-    sums = {abs(i * f + j * g + k * h) for f in few for g in few for h in few for i, j, k in _COMBINATIONS}
-    return tuple(sorted(f for f in parts | sums if 0.0 < f <= highest))
 
 
 class ForcedRules:
@@ -146,13 +124,12 @@ class ForcedRules:
         if feeds is Feeds.FRICTION and self.evidence["power_of_roughness"] < 0.0:
             return None
         doubtful = larger or self._unstable_in_full_contact or self._locked
+        doubtful = doubtful or (self._makes_up and self._own_line() is not None)
         if feeds is Feeds.FRICTION or (doubtful and feeds is Feeds.UNKNOWN):
             return self._either()
         if dense:
-            text = (
-                f"{what}, which lie too close to be told from others; run twice as long, or decide by {SECOND_RUN}"
-            )
-            return self.fed() or Decision(text, second_run=True)
+            text = f"{what}, which lie too close to be told from others; run twice as long"
+            return self.fed() or Decision(f"{text}, or decide by {SECOND_RUN}", second_run=True)
         return self._forced(what)
 
     @property
@@ -182,7 +159,14 @@ class ForcedRules:
         """
         states = (ContactState.STICK, ContactState.SEPARATED)
         limited = sum(self.settled_part.fraction(state) for state in states) >= _OFTEN
-        return limited and self.evidence["power_of_friction"] > max(self.evidence["power_of_roughness"], 0.0)
+        return limited and self._gives[0] > max(self._gives[1], 0.0)
+
+    @property
+    def _makes_up(self) -> bool:
+        """Whether friction gives far more than the roughness, and about what the dashpots take."""
+        friction, roughness = self._gives
+        lost = self.context.powers(self.settled_part).get("power_dashpots", 0.0)
+        return friction > 2.0 * max(roughness, 0.0) and abs(friction - lost) < _RING_DOWN * lost
 
     @property
     def _relaxed(self) -> bool:
@@ -218,9 +202,9 @@ class ForcedRules:
         than what they force.
         """
         shares = []
-        for part in (self.settled_part, self.last):
-            dense = part.covered(lines) > most and part.deviation("x") > 2.0 * self._expected
-            shares.append((part.share(lines), dense))
+        for part, bins in ((self.settled_part, LINE_BINS), (self.last, LINE_BINS // 2)):  # as many Hz
+            dense = part.covered(lines, bins) > most and part.deviation("x") > 2.0 * self._expected
+            shares.append((part.share(lines, bins), dense))
         clear = [share for share, dense in shares if not dense and share >= self.limits.forced_share]
         return (max(clear), False) if clear else max(shares)
 
@@ -245,13 +229,13 @@ class ForcedRules:
             return Decision(f"only the roughness shakes the shoe: {what}", Regime.DAMPED, Excitation.FORCED)
         needed = max(QUARTER * (self.duration - self._powers_to_lose / growth), self._long_enough(slow))
         hint = f"; run at least {needed:.3g} s to see the amplitude that lasts"
-        rate = f"decays at {-growth:.3g} 1/s"
+        rate = f"a small vibration of its own decays at {-growth:.3g} 1/s"
         if self._trend < _RING_DOWN * growth and self._open:
-            text = f"still decaying at {-self._trend:.3g} 1/s; the shoe's own vibration {rate}"
+            text = f"still decaying at {-self._trend:.3g} 1/s; {rate}"
             return Decision(f"{text}{hint}, or decide by {SECOND_RUN}", second_run=True)
-        own = f" at {line:.4g} Hz on the same lines" if (line := self._own_line()) else ""
-        text = f"the roughness shakes the shoe beside its own vibration{own}, which {rate}"
-        return Decision(f"{text}: {what}{hint}", Regime.DAMPED, Excitation.FORCED)
+        own = f"; its line at {line:.4g} Hz is not told from the waves'" if (line := self._own_line()) else ""
+        text = f"the roughness shakes the shoe: {what}; {rate}{own}{hint}"
+        return Decision(text, Regime.DAMPED, Excitation.FORCED)
 
     @property
     def _open(self) -> bool:
@@ -321,6 +305,11 @@ class ForcedRules:
             return Feeds.FRICTION
         return Feeds.UNKNOWN
 
+    @property
+    def _gives(self) -> tuple[float, float]:
+        """What friction and the roughness give to the vibration, W."""
+        return self.evidence["power_of_friction"], self.evidence["power_of_roughness"]
+
     def fed(self) -> Decision | None:
         """On a rough wheel: forced where it is the roughness that feeds the vibration."""
         if not self.context.forced or self._feeds() is not Feeds.ROUGHNESS:
@@ -328,17 +317,19 @@ class ForcedRules:
         return self._forced(self._powers)
 
     def _either(self) -> Decision:
-        text = f"{self._powers}, so that either may keep it up"
+        friction, roughness = self._gives
+        rings = friction + roughness <= 0.0
+        who = "either" if min(friction, roughness) > 0.0 else "friction" if friction > 0.0 else "the roughness"
+        text = f"{self._powers}, so that {'it may be ringing down' if rings else f'{who} may keep it up'}"
         if self.context.undamped and self.context.growth() <= 0.0:
             return Decision(f"{text}, and no dashpot damps what the shoe adds; a dashpot would decide")
-        return Decision(
-            f"{text}; decide by {SECOND_RUN}, at some four times the cost of this one", second_run=True
-        )
+        text += f"; {'run longer, or ' if rings else ''}decide by {SECOND_RUN}"
+        return Decision(f"{text}, at some four times the cost of this one", second_run=True)
 
     @property
     def _powers(self) -> str:
-        friction, roughness = (self.evidence[name] for name in ("power_of_friction", "power_of_roughness"))
-        return f"friction gives {friction:.2g} W and the roughness {roughness:.2g} W to the vibration"
+        friction, roughness = (f"{'gives' if each > 0.0 else 'takes'} {abs(each):.2g} W" for each in self._gives)
+        return f"of the vibration's power friction {friction} and the roughness {roughness}"
 
     def split(self) -> tuple[float, float] | None:
         """Half of peak to peak of x (m) that roughness forces and that the shoe adds, by the spectrum."""

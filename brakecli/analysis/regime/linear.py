@@ -50,7 +50,7 @@ class Linear:
     push: Array  # the same of a normal force of 1 N
     slopes: Complex  # N/m, by which each wave changes the normal force with x, with its phase at t = 0
     wavenumbers: Array  # rad/m
-    heights: float  # m, by which a rough shoe may part from a smooth wheel that touches it in the mean
+    heights: float  # m, by which a rough shoe may part from a wheel that touches it in the mean
     known_to: float = 0.0  # 1/s, by how much the growth may be off
 
     @property
@@ -62,7 +62,13 @@ class Linear:
         elif self.direction < 0:
             fate = f"the shoe's own vibration decays at {-mode.growth:.3g} 1/s"
         how = f"{mode.frequency:.4g} Hz" if mode.frequency else "without oscillation"
-        return f"full contact and slip to one side make the motion linear: {fate} ({how})"
+        why = "without friction makes" if self.slip is None else "and slip to one side make"
+        return f"full contact {why} the motion linear: {fate} ({how})"
+
+    @property
+    def opens(self) -> bool:
+        """Whether waves that meet may open the pad: their heights, and how far they force y, bound that."""
+        return self.depth < self.heights + float(np.abs(self.waves[:, 1]).sum())
 
     def with_slopes(self) -> "Linear":
         """The same with the growth that the passing waves leave to the mode by their slopes."""
@@ -173,5 +179,5 @@ def linear_theory(system: System, belt: float) -> Linear | None:
         np.concatenate([np.zeros(2), push / c.m]),
         wheel.omega * phases,
         wheel.omega,
-        2.0 * float(np.abs(system.shoe.g).sum()),
+        2.0 * float(np.abs(system.shoe.g).sum()) + float(np.abs(wheel.g).sum()),
     )

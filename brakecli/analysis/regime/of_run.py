@@ -12,10 +12,10 @@ import numpy as np
 
 from brakecli.analysis.regime.classify import classify
 from brakecli.analysis.regime.evidence import Part
-from brakecli.analysis.regime.forced import forced_lines, subharmonics
 from brakecli.analysis.regime.linear import linear_theory
 from brakecli.analysis.regime.over_time import over_time
 from brakecli.analysis.regime.ripple import ripple
+from brakecli.analysis.regime.spectra import forced_lines, subharmonics
 from brakecli.analysis.regime.verdict import Context, Excitation, Feeds, Regime, Thresholds, Verdict
 from brakecli.analysis.stability.modes import growth, is_undamped, modes
 from brakecli.case.read import parse_case

@@ -81,7 +81,7 @@ class Rules(ForcedRules):
             return Decision(theory.sentence, Regime.DAMPED)
         if self.duration < slow:
             return self._too_short(slow)
-        return self._shaken(theory, slow)
+        return self._shaken(theory, slow, (self.history.samples - start) * self.history.interval)
 
     def _swings_far(self, theory: "Linear") -> bool:
         """Whether what the shoe adds is no longer small beside the waves, so that their slope is not linear."""
@@ -93,9 +93,11 @@ class Rules(ForcedRules):
         found = self.forced()
         if found and found.regime is Regime.DAMPED:
             return found
-        rate = f"{theory.mode.growth:.2g} ± {theory.known_to:.1g} 1/s"
-        text = f"in full contact the slopes of the passing waves make the shoe's own vibration grow at {rate}"
-        return Decision(f"{text}; run longer, and see whether amplitude_own falls")
+        forced, _, own, _ = theory.parts(*self.settled_part.places())
+        self.parts = forced, 0.5 * float(np.ptp(own))
+        text = "the slopes of the passing waves leave open whether the shoe's own vibration grows in full contact"
+        rate = f"by {theory.mode.growth:.2g} ± {theory.known_to:.1g} 1/s"
+        return Decision(f"{text}, {rate}; run longer, and see whether amplitude_own falls")
 
     def _end(self) -> tuple[float, Any]:
         """Time and state of the last sample."""
@@ -103,7 +105,7 @@ class Rules(ForcedRules):
         state = [float(self.history.read(name, last, last + 1)[0]) for name in ("x", "y", "vx", "vy")]
         return last * self.history.interval, np.array(state)
 
-    def _shaken(self, theory: "Linear", slow: float) -> Decision | None:
+    def _shaken(self, theory: "Linear", slow: float, seen: float) -> Decision | None:
         """The forced motion that lasts, with the settled part in which the shoe's own part has gone."""
         forced, lasting, own, time = theory.parts(*self.whole.places())
         starts = -(-len(own) * np.arange(WINDOWS) // WINDOWS)
@@ -124,6 +126,8 @@ class Rules(ForcedRules):
         else:
             needed = max(_LONGER * (self.duration + wait), 1.05 * (self.duration + wait + 2.0 * slow))
             hint = f"; run at least {needed:.3g} s to see only that"
+        if theory.opens and (beat := self._beat) > seen:
+            hint += f"; the waves beat every {beat:.3g} s, which may open the pad again"
         chosen = time >= self.settled_part.start * self.history.interval
         self.parts, self.unseen = (forced, 0.5 * float(np.ptp(own[chosen]))), forced - 0.5 * float(np.ptp(lasting))
         text = f"only the roughness shakes the shoe, by {forced:.3g} m: {theory.sentence}{hint}"
@@ -176,6 +180,8 @@ class Rules(ForcedRules):
         if self.context.growth() > 0.0 and 0.5 * abs(slope) * self.duration <= _NEAR:
             return None  # a vibration that has reached its limits, cannot die out, and comes near its amplitude
         text = f"still {'growing' if slope > 0.0 else 'decaying'} at {abs(slope):.3g} 1/s"
+        if slope < 0.0 and self.context.undamped:
+            return Decision(f"{text}, though no dashpot damps the shoe; run four times as long, or add a dashpot")
         more = 3.0 / abs(slope)
         if slope < 0.0:  # until what is left is forced, has died out, or lasts
             more = max(self._powers_to_lose, math.log(max(self.envelope.final / self._little, 1.0))) / -slope
@@ -189,9 +195,10 @@ class Rules(ForcedRules):
         cycles = found.evidence["cycles"] if found else 0.0
         self.evidence |= found.evidence if found else {}
         if not found or cycles < (1.0 if self.settled else _UNSETTLED) * self.limits.fewest_cycles:
-            return Decision(
-                f"only {cycles:.0f} cycles in the {'settled part' if self.settled else 'second half'}; run longer"
-            )
+            text = f"only {cycles:.0f} cycles in the {'settled part' if self.settled else 'second half'}"
+            if (growth := self.context.growth()) > 0.0:
+                text += f", and a disturbance of steady sliding grows at {growth:.3g} 1/s"
+            return Decision(f"{text}; run longer")
         period, stick, harmonic = (
             found.evidence[name] for name in ("samples_per_cycle", "stick_cycles", "harmonic_share")
         )

@@ -1,7 +1,8 @@
-"""Power spectral densities, their peak, and the rises of a signal through zero."""
+"""Power spectral densities, their peak, the lines of a rough wheel, and the rises of a signal through zero."""
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -17,6 +18,8 @@ SEGMENTS_WANTED = 8
 SHORTEST_SEGMENT = 16
 FEWEST_CYCLES = 5  # of a line in the record, and bins below it: what is slower is not told from drift
 _FEWEST_BINS = 3
+_MOST_COMBINED = 6  # waves whose frequencies are combined by threes
+_COMBINATIONS = [(i, j, k) for i in range(-2, 3) for j in range(-2, 3) for k in (-1, 0, 1)]
 SPECTRAL = ("x", "y", "vx", "vy", "friction_force", "normal_force", "contact_fraction")
 
 
@@ -110,3 +113,22 @@ def line_share(power: Array) -> float:
         found += float(left[band].sum())
         left[band] = 0.0
     return found / total if total > 0.0 else 0.0
+
+
+@lru_cache(maxsize=4)  # the points of a sweep ask for the same ones
+def forced_lines(belt_speed: float, waves_per_metre: tuple[float, ...], highest: float) -> tuple[float, ...]:
+    """Frequencies (Hz, up to `highest`) of the passing waves, their multiples, and sums and differences of two."""
+    base = [abs(belt_speed) * waves for waves in waves_per_metre]
+    multiples = {n * f for f in base for n in range(1, 11)}
+    pairs = {abs(f + sign * g) for f in base for g in base for sign in (1, -1)}
+    return tuple(sorted(f for f in multiples | pairs if 0.0 < f <= highest))
+
+
+@lru_cache(maxsize=4)
+def subharmonics(belt_speed: float, waves_per_metre: tuple[float, ...], highest: float) -> tuple[float, ...]:
+    """Halves, thirds and quarters of the passing frequencies, their multiples, and sums of up to three."""
+    base = [abs(belt_speed) * waves for waves in waves_per_metre]
+    parts = {k * f / n for f in base for n in (2, 3, 4) for k in range(1, 4 * n)}
+    few = base if len(base) <= _MOST_COMBINED else []
+    sums = {abs(i * f + j * g + k * h) for f in few for g in few for h in few for i, j, k in _COMBINATIONS}
+    return tuple(sorted(f for f in parts | sums if 0.0 < f <= highest))
