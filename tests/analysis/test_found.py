@@ -341,14 +341,3 @@ def test_a_reason_says_no_more_than_is_known(name: str, says: str, not_this: str
     assert re.search(says, verdict.reasons[0])
     assert not_this is None or not_this not in verdict.reasons[0]
     assert verdict.second_run == ("second run" in verdict.reasons[0])
-
-
-def test_advice_on_the_growth_between_steep_waves_can_be_followed() -> None:
-    """The shoe's own part falls with the run; its line is not among those of the waves, nor counted there."""
-    short, long = (judged("steep waves leave the growth open", times) for times in (0.25, 1.0))
-    assert all("leave open whether" in each.reasons[0] for each in (short, long))
-    assert short.amplitude_own is not None
-    assert long.amplitude_own is not None
-    assert long.amplitude_own < 0.5 * short.amplitude_own
-    assert (long.evidence["line_shares"][0] > 0.8, long.evidence["line_forced"][0]) == (True, 0.0)
-    assert long.evidence["forced_share"] < 0.5

@@ -11,6 +11,7 @@ from brakecli.analysis.regime.linear import linear_theory
 from brakecli.analysis.regime.slopes import growth_with_slopes
 from brakecli.analysis.regime.verdict import Excitation, Regime
 from brakecli.case.system import system_of
+from tests.analysis.found import SHOES
 from tests.analysis.histories import verdict_of
 from tests.campaign import counts
 from tests.examples import SQUEAL, make, simulate
@@ -94,3 +95,15 @@ def test_a_steep_wave_lets_grow_what_the_mean_stiffness_damps(detuned: float) ->
     first, last = (float(np.log(part.std())) for part in np.split(apart[-30_000:], 2))
     # The step changes frequencies by (ωh)²/12 = 1e-5, and thereby the distance from resonance by 0.02 1/s.
     assert verdict.growth_rate == pytest.approx((last - first) / 1.5, abs=0.05)
+
+
+def test_advice_on_the_growth_between_steep_waves_can_be_followed() -> None:
+    """The shoe's own part falls with the run; its line is not among those of the waves, nor counted there."""
+    tables = SHOES["steep waves leave the growth open"]
+    short, long = (verdict_of(make(tables, solver__duration=times * 4.38384)) for times in (0.25, 1.0))
+    assert all("leave open whether" in each.reasons[0] for each in (short, long))
+    assert short.amplitude_own is not None
+    assert long.amplitude_own is not None
+    assert long.amplitude_own < 0.5 * short.amplitude_own
+    assert (long.evidence["line_shares"][0] > 0.8, long.evidence["line_forced"][0]) == (True, 0.0)
+    assert long.evidence["forced_share"] < 0.5
