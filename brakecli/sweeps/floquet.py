@@ -30,6 +30,7 @@ NEUTRAL = (
 SHORTEST = 16  # parts of the way from a known motion to the next that are tried
 LARGEST_PART = 0.25  # of the waves' amplitudes that is added at once to a motion
 RELAXED = 100.0  # periods of the slowest motion after which a stable motion has come near its orbit
+CLOSE = 0.5  # of the size of a motion: how far its neighbour may be from where it is looked for
 MISSED = 3  # searches for a motion that grows out of steady sliding that may fail
 
 
@@ -76,6 +77,8 @@ class Disturbances:
             return sorted({*values[::PARTS], *(0.5 * (low + high) for low, high in pairwise(ends))})
         values = sorted({*values, *self.resonances(values)})
         self.scan(values)
+        self._go_on(values)
+        self._go_on(values[::-1])
         for _ in range(REFINED):
             added = set[float]()
             for triple in zip(values, values[1:], values[2:], strict=False):
@@ -88,6 +91,16 @@ class Disturbances:
             values = sorted({*values, *added})
             self.scan(sorted(added))
         return values
+
+    def _go_on(self, values: list[float]) -> None:
+        """Follow stable motions on in this order where another one, which is unstable, was found beyond."""
+        for before, value in pairwise(values):
+            known, other, found = self.orbits.get(before), self.known.get(value), self.sliding_at(value)
+            period = common_period(found.system) if found else None
+            if known and other and found and period and value in self.orbits and known.rate < 0.0 < other.rate:
+                forced = self._followed(value, found, period, before)
+                if forced is not None and forced.rate < 0.0:
+                    self.orbits[value], self.known[value] = forced, replace(other, rate=forced.rate)
 
     def resonances(self, values: list[float]) -> list[float]:
         """Between the values: where a wave of the wheel, its second or third harmonic, or the sum or difference of
@@ -163,13 +176,14 @@ class Disturbances:
         return Growth(forced.rate, 0.0, noise, opened=True)
 
     def _near(self, value: float) -> tuple[float, Orbit | None]:
-        near = min(self.orbits, key=lambda other: abs(other - value), default=math.nan)
+        """The nearest motion; where one side is stable and the other is not, the stable one: it may go on."""
+        below = max((other for other in self.orbits if other <= value), default=-math.inf)
+        above = min((other for other in self.orbits if other >= value), default=math.inf)
+        near = below if value - below <= above - value else above
+        if math.isfinite(below) and math.isfinite(above):
+            ends = sorted((below, above), key=lambda other: self.orbits[other].rate)
+            near = ends[0] if self.orbits[ends[0]].rate < 0.0 < self.orbits[ends[1]].rate else near
         return near, self.orbits.get(near)
-
-    def _nearest(self, value: float) -> tuple[float, float]:
-        """Where the two nearest motions are, or twice the only one."""
-        near = sorted(self.orbits, key=lambda other: abs(other - value))[:2]
-        return near[0], near[-1]
 
     def _segments(self, value: float, found: Sliding, period: float) -> Segments:
         _, near = self._near(value)
@@ -177,11 +191,11 @@ class Disturbances:
         count = min(max(1, math.ceil(period * slow / SEGMENT)), MOST_SEGMENTS)
         return Segments(found, period, len(near.states) if near else count)
 
-    def _followed(self, value: float, found: Sliding, period: float) -> Orbit | None:
-        """The periodic motion from the nearest one that is known, on the way in strides; from steady sliding where
-        none is known.
+    def _followed(self, value: float, found: Sliding, period: float, start: float | None = None) -> Orbit | None:
+        """The periodic motion from one that is known (the nearest one), on the way in strides; from steady sliding
+        where none is known.
         """
-        place, near = self._near(value)
+        place, near = self._near(value) if start is None else (start, self.orbits[start])
         if near is None:
             segments = self._segments(value, found, period)
             return orbit(segments, np.tile(segments.rest, (len(segments.systems), 1)), None)
@@ -190,7 +204,7 @@ class Disturbances:
             aim = value if abs(value - place) <= abs(stride) else place + stride
             at = found if aim == value else self.sliding_at(aim)
             length = common_period(at.system) if at else None
-            forced = self._beside(aim, at, length) if at and length else None
+            forced = self._beside(aim, at, length, place) if at and length else None
             if forced is None:
                 stride *= 0.5
             elif aim == value:
@@ -199,16 +213,20 @@ class Disturbances:
                 self.orbits[aim], place = forced, aim
         return None
 
-    def _beside(self, value: float, found: Sliding, period: float) -> Orbit | None:
-        """The periodic motion that continues the line through the two nearest ones, or is near the nearest."""
-        segments, (one, other) = self._segments(value, found, period), self._nearest(value)
-        near = self.orbits[one]
+    def _beside(self, value: float, found: Sliding, period: float, place: float) -> Orbit | None:
+        """The periodic motion that continues the line through one and its neighbour, or is near that one."""
+        near, segments = self.orbits[place], self._segments(value, found, period)
         guesses = [segments.moved(near)]
-        if abs(value - one) <= 2.0 * abs(one - other):
+        same = (other for other in self.orbits if other != place and self.orbits[other].rate * near.rate > 0.0)
+        other = min(same, key=lambda other: abs(other - place), default=place)
+        if abs(value - place) <= 2.0 * abs(place - other):
             along = guesses[0] - segments.moved(self.orbits[other])
-            guesses.insert(0, guesses[0] + along * ((value - one) / (one - other)))
-        tried = (orbit(segments, guess, near.maps) for guess in guesses)
-        return next((forced for forced in tried if forced), None)
+            guesses.insert(0, guesses[0] + along * ((value - place) / (place - other)))
+        for guess in guesses:
+            forced = orbit(segments, guess, near.maps)
+            if forced and np.abs(forced.states - guess).max() <= CLOSE * near.size:
+                return forced
+        return None
 
     def _grown(self, value: float, found: Sliding, period: float) -> Orbit | None:
         """The periodic motion that grows out of steady sliding with the waves of the wheel."""
