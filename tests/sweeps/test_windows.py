@@ -114,3 +114,25 @@ def test_the_third_harmonic_of_a_wave_under_an_opening_pad_is_found() -> None:
     assert abs(answer.value - 6.2833) < (answer.error or 0.0)
     [window] = answer.windows
     assert abs(window[1] - 6.3431) < (answer.error or 0.0)
+
+
+def test_a_stable_motion_is_followed_beside_an_unstable_one_until_its_fold() -> None:
+    """Another integrator follows it from 2.2, where it is small, and loses it between 4.88 and 4.92."""
+    tables: dict[str, Any] = {
+        "shoe": {"mass": 5.598},
+        "wheel": {"radius": 0.33, "angular_speed": 28.3},
+        "link1": {"stiffness": 14970000.0, "damping": 56.26, "angle_deg": 2.715},
+        "link2": {"stiffness": 21640000.0, "damping": 44.6, "angle_deg": 25.79},
+        "load": {"force": 511.5},
+        "friction": {"coefficient": 0.1},
+        "contact": {"half_length": 0.015, "stiffness": 113300000.0},
+        "roughness": {"wheel": {"amplitudes": [8.465e-06, 1.126e-05], "wavelengths": [0.032, 0.016]}},
+        "output": {"sample_interval": 0.00015},
+        "solver": {"duration": 0.2, "tolerance": 0.001},
+    }
+    answer = found(tables, 0.0, 7.5, tolerance=1e-4)
+    assert answer.value is not None
+    assert answer.error is not None
+    assert abs(answer.value - 4.9) < answer.error < 0.3
+    [window] = answer.windows
+    assert window == (answer.value, 7.5)
