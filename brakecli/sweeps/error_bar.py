@@ -63,7 +63,8 @@ def left_open(
     if one in at.orbits:
         inner, outer = ([known[end].rate for end in ends if end in known] for ends in (bracket, wide))
         usual = np.ptp(outer) if known[one].noise else -min(outer, default=0.0)
-        if wide[1] - wide[0] > NARROWED * (high - low) and inner and np.ptp(inner) > JUMP * usual:
+        steps = wide[1] - wide[0] > NARROWED * (high - low) and inner and np.ptp(inner) > JUMP * usual
+        if steps or at.jumps(low, high):
             return max(low - wide[0], wide[1] - high)
         stride = high - low if at.unstable(high) else low - high
         return max(_shifted(rate, one, stride, critical, far, other) for other in OTHERS)

@@ -42,6 +42,7 @@ class Disturbances:
         self.sliding_at = sliding_at
         self.known: dict[float, Growth | None] = {}
         self.orbits: dict[float, Orbit] = {}
+        self.branches: dict[float, float] = {}  # by where the motion was found first, with dashpots
         self.missed = 0
 
     def at(self, value: float) -> Growth | None:
@@ -78,7 +79,6 @@ class Disturbances:
         values = sorted({*values, *self.resonances(values)})
         self.scan(values)
         self._go_on(values)
-        self._go_on(values[::-1])
         for _ in range(REFINED):
             added = set[float]()
             for triple in zip(values, values[1:], values[2:], strict=False):
@@ -90,17 +90,37 @@ class Disturbances:
                     added |= {0.5 * (low + high) for low, high in pairwise(triple)}
             values = sorted({*values, *added})
             self.scan(sorted(added))
+        self._go_on(values)
         return values
 
+    def jumps(self, low: float, high: float) -> bool:
+        """Whether a motion with dashpots at one value is not known to go on to the other, with another one there."""
+        ends = [self.branches[value] for value in (low, high) if value in self.branches]
+        return len(ends) == 2 and ends[0] != ends[1]
+
     def _go_on(self, values: list[float]) -> None:
-        """Follow stable motions on in this order where another one, which is unstable, was found beyond."""
-        for before, value in pairwise(values):
-            known, other, found = self.orbits.get(before), self.known.get(value), self.sliding_at(value)
-            period = common_period(found.system) if found else None
-            if known and other and found and period and value in self.orbits and known.rate < 0.0 < other.rate:
+        """Follow stable motions on where another one was found beyond: from the end that is stable.
+
+        On the way back they are followed only where that other one is unstable.
+        """
+        up = 1 if self.unstable(values[0]) is False else -1
+        for order, back in ((values[::up], False), (values[::-up], True)):
+            for before, value in pairwise(order):
+                known, other, found = self.known[before], self.known[value], self.sliding_at(value)
+                period = common_period(found.system) if found else None
+                if not (known and other and found and period and before in self.branches and value in self.branches):
+                    continue
+                jumps = self.jumps(before, value)
+                if known.unstable or not (other.unstable or (jumps and not back)):
+                    continue
                 forced = self._followed(value, found, period, before)
-                if forced is not None and forced.rate < 0.0:
-                    self.orbits[value], self.known[value] = forced, replace(other, rate=forced.rate)
+                if forced is None or (forced.rate > 0.0 and (back or not jumps)):
+                    continue
+                was, now, old = self.branches[value], self.branches[before], self.orbits[value]
+                if np.abs(forced.states - old.states).max() <= CLOSE * old.size:
+                    self.branches = {at: now if each == was else each for at, each in self.branches.items()}
+                self.orbits[value], self.known[value] = forced, replace(other, rate=forced.rate)
+                self.branches[value] = now
 
     def resonances(self, values: list[float]) -> list[float]:
         """Between the values: where a wave of the wheel, its second or third harmonic, or the sum or difference of
@@ -159,8 +179,9 @@ class Disturbances:
         place, near = self._near(value)
         low, high = sorted((place, value))
         gap = any(lost is None and low < other < high for other, lost in self.known.items())
-        forced = None if gap else self._followed(value, found, period)
-        if forced is None and not is_undamped(found.system.coefficients):
+        forced, damped = None if gap else self._followed(value, found, period), not is_undamped(found.system.coefficients)
+        branch = self.branches.get(place, value) if forced else value
+        if forced is None and damped:
             if plain is None and near is not None and near.rate > 0.0:
                 plain = growth(found)
             if plain is None or plain.rate <= 0.0:
@@ -171,8 +192,10 @@ class Disturbances:
         if forced is None:
             return None
         self.orbits[value] = forced
+        if damped:
+            self.branches[value] = branch
         slow, fast = natural_frequencies(found.system.coefficients, found.stiffness)
-        noise = NEUTRAL * 2.0 * math.pi * (slow or fast) if is_undamped(found.system.coefficients) else 0.0
+        noise = 0.0 if damped else NEUTRAL * 2.0 * math.pi * (slow or fast)
         return Growth(forced.rate, 0.0, noise, opened=True)
 
     def _near(self, value: float) -> tuple[float, Orbit | None]:
@@ -210,21 +233,26 @@ class Disturbances:
             elif aim == value:
                 return forced
             else:
+                if place in self.branches:
+                    self.branches[aim] = self.branches[place]
                 self.orbits[aim], place = forced, aim
         return None
 
     def _beside(self, value: float, found: Sliding, period: float, place: float) -> Orbit | None:
-        """The periodic motion that continues the line through one and its neighbour, or is near that one."""
-        near, segments = self.orbits[place], self._segments(value, found, period)
-        guesses = [segments.moved(near)]
-        same = (other for other in self.orbits if other != place and self.orbits[other].rate * near.rate > 0.0)
+        """The periodic motion that continues the line through one and its neighbour, or is near that one.
+
+        Without dashpots no motion leads through a resonance: there any motion will do.
+        """
+        near, segments, branch = self.orbits[place], self._segments(value, found, period), self.branches.get(place)
+        same = (other for other in self.orbits if other != place and self.branches.get(other) == branch)
         other = min(same, key=lambda other: abs(other - place), default=place)
+        guesses = [segments.moved(near)]
         if abs(value - place) <= 2.0 * abs(place - other):
             along = guesses[0] - segments.moved(self.orbits[other])
             guesses.insert(0, guesses[0] + along * ((value - place) / (place - other)))
         for guess in guesses:
             forced = orbit(segments, guess, near.maps)
-            if forced and np.abs(forced.states - guess).max() <= CLOSE * near.size:
+            if forced and (branch is None or np.abs(forced.states - guess).max() <= CLOSE * near.size):
                 return forced
         return None
 
