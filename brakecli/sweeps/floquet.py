@@ -27,10 +27,10 @@ STRONGEST = 6  # waves of the wheel of which two may act together
 NEUTRAL = (
     1e-5  # damping ratio, of the slowest motion, that would stop a growth which counts as none without dashpots
 )
-SHORTEST = 16  # parts of the way from a known motion to the next that are tried
-LARGEST_PART = 0.25  # of the waves' amplitudes that is added at once to a motion
+SHORTEST = 256  # parts of the way from a known motion to the next that are tried
+LARGEST_PART, LEAST_PART = 0.25, 0.015  # of the waves' amplitudes that is added at once to a motion
 RELAXED = 100.0  # periods of the slowest motion after which a stable motion has come near its orbit
-CLOSE = 0.5  # of the size of a motion: how far its neighbour may be from where it is looked for
+CLOSE = 0.05  # of the size of a motion: how far its neighbour may be from where it is looked for
 MISSED = 3  # searches for a motion that grows out of steady sliding that may fail
 
 
@@ -94,7 +94,7 @@ class Disturbances:
         return values
 
     def jumps(self, low: float, high: float) -> bool:
-        """Whether a motion with dashpots at one value is not known to go on to the other, with another one there."""
+        """Whether the motions at two values are not known to be one; without dashpots that does not count."""
         ends = [self.branches[value] for value in (low, high) if value in self.branches]
         return len(ends) == 2 and ends[0] != ends[1]
 
@@ -106,18 +106,19 @@ class Disturbances:
         up = 1 if self.unstable(values[0]) is False else -1
         for order, back in ((values[::up], False), (values[::-up], True)):
             for before, value in pairwise(order):
-                known, other, found = self.known[before], self.known[value], self.sliding_at(value)
-                period = common_period(found.system) if found else None
-                if not (known and other and found and period and before in self.branches and value in self.branches):
+                if not (before in self.branches and value in self.branches):
                     continue
-                jumps = self.jumps(before, value)
-                if known.unstable or not (other.unstable or (jumps and not back)):
+                known, other, found = self.known[before], self.known[value], self.sliding_at(value)
+                period, jumps = common_period(found.system) if found else None, self.jumps(before, value)
+                if not (known and other and found and period) or known.unstable:
+                    continue
+                if not other.unstable and (back or not jumps):
                     continue
                 forced = self._followed(value, found, period, before)
                 if forced is None or (forced.rate > 0.0 and (back or not jumps)):
                     continue
-                was, now, old = self.branches[value], self.branches[before], self.orbits[value]
-                if np.abs(forced.states - old.states).max() <= CLOSE * old.size:
+                was, now = self.branches[value], self.branches[before]
+                if _same(forced, self.orbits[value]):
                     self.branches = {at: now if each == was else each for at, each in self.branches.items()}
                 self.orbits[value], self.known[value] = forced, replace(other, rate=forced.rate)
                 self.branches[value] = now
@@ -179,8 +180,8 @@ class Disturbances:
         place, near = self._near(value)
         low, high = sorted((place, value))
         gap = any(lost is None and low < other < high for other, lost in self.known.items())
-        forced, damped = None if gap else self._followed(value, found, period), not is_undamped(found.system.coefficients)
-        branch = self.branches.get(place, value) if forced else value
+        forced = None if gap else self._followed(value, found, period)
+        followed, damped = forced is not None, not is_undamped(found.system.coefficients)
         if forced is None and damped:
             if plain is None and near is not None and near.rate > 0.0:
                 plain = growth(found)
@@ -191,9 +192,11 @@ class Disturbances:
             self.missed += forced is None
         if forced is None:
             return None
-        self.orbits[value] = forced
         if damped:
-            self.branches[value] = branch
+            place, near = (place, near) if followed else self._near(value)
+            goes_on = followed or (near is not None and _same(forced, near))
+            self.branches[value] = self.branches.get(place, value) if goes_on else value
+        self.orbits[value] = forced
         slow, fast = natural_frequencies(found.system.coefficients, found.stiffness)
         noise = 0.0 if damped else NEUTRAL * 2.0 * math.pi * (slow or fast)
         return Growth(forced.rate, 0.0, noise, opened=True)
@@ -259,7 +262,7 @@ class Disturbances:
     def _grown(self, value: float, found: Sliding, period: float) -> Orbit | None:
         """The periodic motion that grows out of steady sliding with the waves of the wheel."""
         wheel, near, part, stride = found.system.wheel, None, 0.0, LARGEST_PART
-        while part < 1.0 and stride >= LARGEST_PART / SHORTEST:
+        while part < 1.0 and stride >= LEAST_PART:
             more = min(part + stride, 1.0)
             system = replace(found.system, wheel=wheel._replace(g=more * wheel.g))
             segments = self._segments(value, replace(found, system=system), period)
@@ -278,3 +281,8 @@ class Disturbances:
         waited = segments.settled(start, min(RELAXED / slow, LONGEST) if slow > 0.0 else LONGEST)
         forced = orbit(segments, waited, None)
         return None if forced and near and forced.size > DEPARTED * near.size else forced
+
+
+def _same(one: Orbit, other: Orbit) -> bool:
+    """Whether two motions are so close that they are one."""
+    return bool(np.abs(one.states - one.segments.moved(other)).max() <= CLOSE * other.size)
