@@ -20,7 +20,7 @@ more, and so does the critical value, which counts where growth begins like a ro
 by all of its error or more: at least half of that counts, as patches that open make errors fall unevenly."""
 BEYOND = 1.2  # times the way to where growth with other steps passes zero, if it is as steep as further away
 NARROW = 1.1  # ratio of the ends of the bracket of that way
-JUMP = 0.5  # of the decay, or of all change without dashpots: in a narrow bracket growth jumps so, at a fold
+JUMP = 0.5  # of all change in the bracket found first: in a narrow bracket growth jumps so, at a fold
 FOLD = 1.0 / 32.0  # of the range: least bar there, for steps move a fold, too, by an amount that is not measured
 NARROWED = 10.0  # times as narrow as the bracket that was found first
 ROUNDED = 20.0  # times the spread of growth that rounding makes in a three-layer scheme near self-locking
@@ -63,9 +63,8 @@ def left_open(
     far = max((slope(end) for end in wide if end in known), default=0.0)
     if one in at.orbits:
         inner, outer = ([known[end].rate for end in ends if end in known] for ends in (bracket, wide))
-        usual = np.ptp(outer) if known[one].noise else -min(outer, default=0.0)
-        steps = wide[1] - wide[0] > NARROWED * (high - low) and inner and np.ptp(inner) > JUMP * usual
-        if steps or at.jumps(low, high):
+        steep = wide[1] - wide[0] > NARROWED * (high - low) and inner and np.ptp(inner) > JUMP * np.ptp(outer)
+        if steep or at.jumps(low, high):
             return max(low - wide[0], wide[1] - high, FOLD * (critical.upper - critical.lower))
         stride = high - low if at.unstable(high) else low - high
         return max(_shifted(rate, one, stride, critical, far, other) for other in OTHERS)
