@@ -210,27 +210,19 @@ def _answer(
     unstable: Answer,
     values: list[float],
     edge: Callable[[float, float], Edge],
-    jumps: Callable[[float, float], bool] = lambda low, high: False,
 ) -> Search:
     """What the answers at some values say; `edge` narrows a change between two of them down.
 
-    Stability is lost, too, where steady sliding ends, and where a stable motion `jumps` to another one, which is
-    stable: a window without width.
+    Stability is lost, too, where steady sliding ends.
     """
     if all(sliding_at(value) is None for value in values):
         return Search(Outcome.NO_SLIDING)
     answers = [(value, unstable(value)) for value in values]
     decided = [each for each in answers if each[1] is not None]
-    edges = list[Edge]()
-    for (low, before), (high, after) in pairwise(decided):
-        if before is not after:
-            edges.append(edge(low, high))
-        elif not before and jumps(low, high):
-            fold = Edge(0.5 * (low + high), low, high, 0.5 * (high - low), True)
-            edges += [fold, fold._replace(lost=False)]
-    if not edges and len(decided) < len(answers):
+    changes = [(one, other) for (one, before), (other, after) in pairwise(decided) if before is not after]
+    if not changes and len(decided) < len(answers):
         return Search(Outcome.UNDECIDED)
-    return _of_edges(critical, bool(decided[0][1]), edges)
+    return _of_edges(critical, bool(decided[0][1]), [edge(*change) for change in changes])
 
 
 def _of_edges(critical: Critical, unstable: bool, edges: list[Edge]) -> Search:
@@ -262,7 +254,7 @@ def _by_simulation(critical: Critical, sliding_at: SlidingAt, exact: Search) -> 
         # Eigenvalues of linear motions are exact: what the bar does not hold is rounding near self-locking.
         return found._replace(error=max(found.error, 1.001 * away)) if linear else found
 
-    found = _answer(critical, sliding_at, at.unstable, values, edge, at.jumps)
+    found = _answer(critical, sliding_at, at.unstable, values, edge)
     return found._replace(bias=exact.bias, eigenvalue=exact.eigenvalue)
 
 
