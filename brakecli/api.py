@@ -1,7 +1,4 @@
-"""`import brakecli`: cases in, xarray objects out. Names, units and errors are those of the command line.
-
-Everything large is imported on the first call.
-"""
+"""`import brakecli`: cases in, xarray objects out, as on the command line. Large imports wait for a call."""
 
 import json
 import multiprocessing
@@ -11,12 +8,13 @@ import threading
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from itertools import pairwise
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from brakecli.errors import BrakecliError, UsageError
+from brakecli.errors import BrakecliError, UsageError, in_python
 from brakecli.files.os_signals import Interrupted, unwinding
 from brakecli.stop import signals_shown
 
@@ -46,11 +44,12 @@ def load(source: "str | PathLike[str]", settings: "Settings | None" = None) -> A
     from brakecli.cli.inputs import is_result, is_sweep, load_case, load_sweep
 
     name = str(source)
-    if is_result(name):
-        if settings:
-            raise UsageError(f"{name}: holds a result, which has no settings; give them to brakecli.run")
-        return _opened(Path(name))
-    return (load_sweep if is_sweep(name) else load_case)(name, _overrides(settings))
+    with in_python():
+        if is_result(name):
+            if settings:
+                raise UsageError(f"{name}: holds a result, which has no settings; give them to brakecli.run")
+            return _opened(Path(name))
+        return (load_sweep if is_sweep(name) else load_case)(name, _overrides(settings))
 
 
 def run(
@@ -161,6 +160,8 @@ def sweep(
     if getattr(multiprocessing.current_process(), "_inheriting", False):  # a worker that is being started
         raise UsageError('brakecli.sweep: in a script, call it below  if __name__ == "__main__":')
     with _interruptible(), _target(output) as path:
+        from brakecli.cli.inputs import load_sweep
+        from brakecli.runs.run import load_kernels
         from brakecli.sweeps.driver import choose_engine, sweep
         from brakecli.sweeps.plan import LoadedSweep, sweep_of
 
@@ -171,11 +172,7 @@ def sweep(
         elif isinstance(source, LoadedSweep):
             loaded = source
         else:
-            from brakecli.cli.inputs import load_sweep
-
             loaded = load_sweep(str(source), _overrides(settings))
-        from brakecli.runs.run import load_kernels
-
         load_kernels(loaded.base)
         with choose_engine(loaded.plan, jobs) as engine:
             report = sweep(loaded, path, engine, force=force)
@@ -232,10 +229,11 @@ def classify(
 def _interruptible() -> Iterator[None]:
     """Let Ctrl-C end compiled code, too, and remove unfinished files; other threads hear no signals."""
     if threading.current_thread() is not threading.main_thread():
-        yield
+        with in_python():
+            yield
         return
     try:
-        with signals_shown(), unwinding():
+        with signals_shown(), unwinding(), in_python():
             yield
     except Interrupted as error:
         if error.exit_code == 128 + signal.SIGINT:
@@ -254,17 +252,17 @@ def _target(output: "str | PathLike[str] | None") -> Iterator[Path]:
 
 
 def _case(source: "Source | LoadedSweep", settings: "Settings | None") -> "LoadedCase":
-    from brakecli.case.read import LoadedCase, parse_case
+    from brakecli.case.case import given_toml
+    from brakecli.case.read import LoadedCase, parse_case, parse_resolved
     from brakecli.cli.inputs import load_case
 
     if isinstance(source, LoadedCase):
-        return parse_case(source.resolved, "the case", _overrides(settings)) if settings else source
+        changed = parse_case(given_toml(source.case), "the case", _overrides(settings)) if settings else source
+        return replace(changed, text=source.text)
     if resolved := getattr(source, "attrs", {}).get("resolved_toml"):  # a result
-        return parse_case(str(resolved), "its case", _overrides(settings))
+        return parse_resolved(str(resolved), "its case", _overrides(settings))
     if not isinstance(source, str | PathLike):
-        raise UsageError(
-            f"{type(source).__name__}: is no case; give a path, or what brakecli.load returns for one"
-        )
+        raise UsageError(f"{type(source).__name__}: is no case; give a path, or a case from brakecli.load")
     return load_case(str(source), _overrides(settings))
 
 
@@ -280,11 +278,14 @@ def _toml(value: Any, key: str) -> str:
 
     if isinstance(value, Mapping):
         return "{" + ", ".join(f"{name} = {_toml(each, f'{key}.{name}')}" for name, each in value.items()) + "}"
+    value = _plain(value)
+    if isinstance(value, list):
+        return f"[{', '.join(_toml(each, key) for each in value)}]"
     try:
-        return tomli_w.dumps({"value": _plain(value)}).removeprefix("value = ").strip()
+        return tomli_w.dumps({"value": value}).removeprefix("value = ").strip()
     except TypeError:
-        what = f"{key}: cannot be set to {type(value).__name__}"
-        raise UsageError(f"{what}; give a number, a text, a list or a table") from None
+        kind = type(value).__name__
+        raise UsageError(f"{key}: cannot be set to {kind}; give a number, a text, a list or a table") from None
 
 
 def _axis(vary: "Mapping[str | tuple[str, ...], Iterable[float]]") -> "Axis":

@@ -7,8 +7,9 @@ import json
 import os
 import re
 import unicodedata
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 
 _ODD = {"Cc", "Cf", "Cn", "Co", "Cs", "Zl", "Zp"}  # categories of Unicode
 KeyPath = tuple[str | int, ...]
@@ -73,6 +74,37 @@ class UnreadableResultError(BrakecliError, exit_code=4):
 
 class CannotWriteError(BrakecliError, exit_code=os.EX_IOERR):
     """An output cannot be written."""
+
+
+_WORDS = (  # of the command line, and of Python
+    (r', or "-" for standard input', ""),
+    (r"(?<!\S)--force\b", "force=True"),
+    (r"(?<!\S)-o\b", "output"),
+    (r"(?<!\S)--set\b", "setting"),
+    (r"(?<!\S)--threshold\b", "thresholds"),
+    (r"(?<!\S)--([a-z]+)-([a-z]+)", r"\1_\2"),
+    (r"(?<!\S)--(?=[a-z])", ""),
+    (r"with: brakecli (sweep|run) \S+", r"with: brakecli.\1"),
+)
+
+
+@contextmanager
+def in_python() -> Iterator[None]:
+    """Name arguments instead of options in what errors say."""
+
+    def said(text: str) -> str:
+        for pattern, words in _WORDS:
+            text = re.sub(pattern, words, text)
+        return text
+
+    try:
+        yield
+    except CaseError as error:
+        texts = [(each, said(each.source), said(each.remedy)) for each in error.problems]
+        raise CaseError([replace(each, source=where, remedy=remedy) for each, where, remedy in texts]) from error
+    except BrakecliError as error:
+        error.args = (said(str(error)),)
+        raise
 
 
 def key_text(path: KeyPath) -> str:

@@ -63,6 +63,16 @@ def test_outputs_stay_only_where_they_are_asked_for(tmp_path: Path, monkeypatch:
     assert [each.name for each in tmp_path.iterdir()] == ["kept.h5"]
 
 
+def test_settings_lead_to_the_same_run_whether_the_case_was_loaded_before_or_not(tmp_path: Path) -> None:
+    places = np.linspace(0.0, np.pi, 180, endpoint=False)  # m; a turn of a wheel of 0.5 m
+    heights = 1e-6 * np.sin(2.0 * places)
+    np.savetxt(tmp_path / "runout.csv", np.transpose([places, heights]), delimiter=",")
+    (tmp_path / "c.toml").write_text(f'{TINY}\nroughness.wheel.profile = "runout.csv"\n')
+    for settings in ({"wheel.radius": 0.6}, {"roughness.wheel.profile_error": 0.5}, {"solver.step": 5e-5}, {}):
+        loaded = brakecli.load(tmp_path / "c.toml")
+        assert brakecli.run(loaded, settings).identical(brakecli.run(tmp_path / "c.toml", settings)), settings
+
+
 def test_a_file_that_was_changed_is_read_again(tmp_path: Path) -> None:
     file = tmp_path / "c.toml"
     for load in (5000.0, 4000.0):
@@ -117,6 +127,16 @@ def test_a_sweep_is_that_of_its_file(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.critical, exact, rtol=1e-9)
 
 
+def test_whole_numbers_along_an_axis_stay_whole_where_their_key_is(tmp_path: Path) -> None:
+    (tmp_path / "t.toml").write_text(TINY)
+    seeds = [2**60 + 1, 2**60 + 3]
+    spectrum = {"rms": 1e-7, "hurst": 0.8, "shortest": 0.01, "longest": 0.07, "terms": 5}
+    axes: dict[str | tuple[str, ...], Any] = {"roughness.wheel.spectrum.seed": seeds, "shoe.mass": [9, 10]}
+    found = brakecli.sweep(tmp_path / "t.toml", {"roughness.wheel": {"spectrum": spectrum}}, axes=axes, jobs=1)
+    assert found.roughness_wheel_spectrum_seed.values.tolist() == seeds
+    assert (found.roughness_wheel_spectrum_seed.dtype.kind, found.shoe_mass.dtype.kind) == ("i", "f")
+
+
 def test_a_signal_is_classified(tmp_path: Path) -> None:
     time_axis = np.arange(4000) / 2e4
     rows = "\n".join(f"{t},{math.sin(2 * math.pi * 400.0 * t)}" for t in time_axis)
@@ -159,6 +179,40 @@ def test_errors_are_those_of_the_commands(tmp_path: Path) -> None:
         brakecli.run(3)  # type: ignore[arg-type]
     with pytest.raises(UsageError, match="no threshold few"):
         brakecli.classify(tmp_path / "broken.h5", thresholds={"few": 1})
+
+
+SAID = [
+    (lambda: brakecli.run("none.toml"), "no such file or directory; name a TOML file$"),
+    (lambda: brakecli.load("none.toml"), "no such file or directory; name a TOML file$"),
+    (lambda: brakecli.run(CASE, {"shoe.mas": 3}), r"^setting shoe\.mas=3: shoe\.mas: is unknown"),
+    (lambda: brakecli.run(CASE, {"wheel.times": [1.0, -math.inf]}), r"^setting wheel\.times=\[1\.0, -inf\]: "),
+    (
+        lambda: brakecli.run(CASE, SHORT, output="kept"),
+        "replace it with force=True, or choose another output with output$",
+    ),
+    (lambda: brakecli.classify("kept", "velocity"), "give either sample_rate HZ or time_column$"),
+    (lambda: brakecli.classify("kept", belt_speed=3.0), "^belt_speed: is only .* state with quantity what was"),
+    (lambda: brakecli.classify("kept.h5", thresholds={"few": 1}), "^thresholds few=1: there is no threshold few"),
+    (lambda: brakecli.sweep(CASE), "simulate it with: brakecli.run$"),
+]
+
+
+@pytest.mark.parametrize(("call", "words"), SAID)
+def test_errors_name_arguments_and_no_options(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: Any, words: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("kept", "kept.h5"):
+        (tmp_path / name).write_text("1,2\n3,4\n5,6\n7,8\n")
+    with pytest.raises(BrakecliError, match=words) as caught:
+        call()
+    assert "--" not in str(caught.value)
+
+
+def test_a_netcdf_copy_of_a_result_is_refused_with_its_reason(tmp_path: Path) -> None:
+    brakecli.run(CASE, SHORT).to_netcdf(tmp_path / "copy.nc", engine="h5netcdf")
+    with pytest.raises(UnreadableResultError, match="a copy that xarray writes has another form"):
+        brakecli.load(tmp_path / "copy.nc")
 
 
 def test_a_run_that_fails_raises_and_keeps_its_history(tmp_path: Path) -> None:

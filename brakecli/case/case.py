@@ -6,7 +6,7 @@ The tables and keys are those of the case file, version 1. `brakecli.case.read` 
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import tomli_w
 from pydantic import Field
@@ -212,17 +212,22 @@ class Case(Table):
             self.__dict__["output"] = Output(sample_interval=self.solver.step)
 
     def _put_sines(self) -> Iterator[Problem]:
-        """Put sines in the place of measured profiles; yield a problem for each that cannot be used."""
+        """Put sines beside measured profiles; yield a problem for each that cannot be used.
+
+        A surface with a profile counts as given by it alone, so that other settings may lead to other sines.
+        """
         for side, given in self.roughness:
-            if given is None or given.profile is None:
+            if given is None or given.profile is None or given.amplitudes is not None:
                 continue
             from brakecli.case.profile import sines_of
 
             pad = self.contact.half_length if side == "shoe" else None
             error = 0.01 if given.profile_error is None else given.profile_error
             try:
-                sines = sines_of(Path(given.profile), error, self.wheel.radius, pad)
-                self.__dict__["roughness"] = self.roughness.model_copy(update={side: type(given)(**sines)})
+                sines = dict(type(given)(**sines_of(Path(given.profile), error, self.wheel.radius, pad)))
+                written = {"profile": str(Path(given.profile).absolute()), "profile_error": given.profile_error}
+                surface = given.model_construct(given.model_fields_set, **sines | written)
+                self.__dict__["roughness"] = self.roughness.model_copy(update={side: surface})
             except OSError as failure:
                 what = f"cannot be read: {(failure.strerror or str(failure)).lower()}"
                 yield self.wrong(f"roughness.{side}.profile", what, "name a CSV file")
@@ -266,8 +271,19 @@ def resolved_toml(case: Case) -> str:
 
     Reading it gives an equal case, to the last bit.
     """
-    data = case.model_dump(mode="json", exclude_none=True)
-    for side, profile in case.roughness:
-        if profile is not None and profile.spectrum is not None:
-            data["roughness"][side] = {**profile.sines(), **({"note": profile.note} if profile.note else {})}
+    return _as_toml(case, case.model_dump(mode="json", exclude_none=True), ("profile", "spectrum"))
+
+
+def given_toml(case: Case, *, profiles: bool = True) -> str:
+    """The keys that were given, as TOML; without `profiles` their sines."""
+    given = case.model_dump(mode="json", exclude_unset=True, exclude_none=True)
+    return _as_toml(case, given, () if profiles else ("profile",))
+
+
+def _as_toml(case: Case, data: dict[str, Any], as_sines: tuple[str, ...]) -> str:
+    """Keys of a case as TOML, with sines in place of surfaces that are given by one of these keys."""
+    for side, surface in case.roughness:
+        if surface is not None and any(getattr(surface, key) is not None for key in as_sines):
+            sines = type(surface)(**surface.sines(), note=surface.note)
+            data["roughness"][side] = sines.model_dump(mode="json", exclude_none=True)
     return tomli_w.dumps(data)

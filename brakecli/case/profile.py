@@ -2,6 +2,7 @@
 
 import math
 import stat
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from brakecli.files.table import Array, TextTable, require
 _ROUNDING = 1e-12  # of heights, relative to their root mean square
 _GAP = 4.0  # median steps between two places from which on nothing was measured there
 _FITS = 0.005  # part of a turn by which a record may miss a whole number of turns
+_SEEN = 0.01  # per cent by which a record is stretched unsaid
 
 
 def sines_of(path: Path, error: float, radius: float, pad: float | None) -> dict[str, Any]:
@@ -23,7 +25,9 @@ def sines_of(path: Path, error: float, radius: float, pad: float | None) -> dict
     wheel, of which whole turns are averaged. Otherwise the profile is repeated beyond what was measured. Raises
     UnreadableResultError, UsageError and OSError.
     """
-    place, height = _read(path, radius)
+    status = path.stat()
+    place, height, is_angle = _read(path, (status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns))
+    place = place * radius if is_angle else place
     turn, step = 2.0 * math.pi * radius, float(np.median(np.diff(place)))
     turns, around = _turns(place, step, turn) if pad is None else (0, 0.0)
     if turns:
@@ -32,9 +36,11 @@ def sines_of(path: Path, error: float, radius: float, pad: float | None) -> dict
         grid = np.arange(turns * count) * (around / count)
         rows = np.interp(grid, (place - place[0])[inside], height[inside], period=turns * around)
         rows = rows.reshape(turns, count)
+        stretched = 100.0 * (turn / around - 1.0)
         found = rows.mean(axis=0) - rows.mean()
         spread = float(np.sqrt(np.mean((rows - rows.mean(axis=0)) ** 2)))
         how = f", mean of {turns} turns, which differ from it by {spread:.3g} m (RMS)" * (turns > 1)
+        how += f"; the record was stretched by {stretched:.2g} % to whole turns" * (abs(stretched) > _SEEN)
         length = turn
     else:
         span = float(place[-1] - place[0])
@@ -48,20 +54,31 @@ def sines_of(path: Path, error: float, radius: float, pad: float | None) -> dict
             how += f"; the pad from {-pad:g} to {pad:g} m reaches beyond {place[0]:.4g} to {place[-1]:.4g} m"
     widest = float(np.diff(place).max())
     how += f"; a straight line bridges a gap of {widest:.3g} m" * (widest > _GAP * step)
+    rms = float(np.sqrt(np.mean(found**2)))
+    even = rms <= _ROUNDING * float(np.abs(height).max())
+    require(
+        not even, "its heights lie on a straight line, which is removed; leave the surface out, which is smooth"
+    )
     chosen, amplitudes, phases, lost = _strongest(found, error)
     phases = (phases - 360.0 * (chosen * place[0] / length % 1.0)) % 360.0
-    rms = float(np.sqrt(np.mean(found**2)))
-    note = f"{len(chosen)} of {count // 2} sines leave out {100.0 * lost:.2g} % of the RMS of {rms:.3g} m{how}"
+    note = f"{len(chosen)} of {count // 2} sines leave out {100.0 * lost:.3g} % of the RMS of {rms:.3g} m{how}"
     waves = {"orders": chosen.astype(float).tolist()} if turns else {"wavelengths": (length / chosen).tolist()}
     note = f"{printable(path.name)}: {note}"
     return {"amplitudes": amplitudes.tolist(), **waves, "phases_deg": phases.tolist(), "note": note}
 
 
-def _read(path: Path, radius: float) -> tuple[Array, Array]:
-    """Places along the surface, rising, and heights there, m."""
+@lru_cache(maxsize=2)
+def _read(path: Path, stamp: tuple[int, ...]) -> tuple[Array, Array, bool]:
+    """Places along the surface, rising, and heights there, m; whether the places are angles, rad.
+
+    The same file serves all points of a sweep; `stamp` tells when it has changed.
+    """
     require(stat.S_ISREG(path.stat().st_mode), "this is not a regular file; name a CSV file")
     table = TextTable(path)
-    require(table.columns == 2, f"has {table.columns} columns; give two: position or angle, and height")
+    require(
+        table.columns == 2,
+        f"has {table.columns} column{'s' * (table.columns > 1)}; give two: position or angle, and height",
+    )
     lines = [line for line in table.header if line.strip()]
     unnamed = "its first lines do not name both columns; separate names and numbers alike, or remove these lines"
     require(table.names or not lines, unnamed)
@@ -82,7 +99,7 @@ def _read(path: Path, radius: float) -> tuple[Array, Array]:
         steps.min() > 0.0, f"its places do not rise or fall throughout, see row {row} of numbers; sort the rows"
     )
     require(np.ptp(height) > 0.0, "all heights are equal; leave the surface out, which is smooth")
-    return place * (radius if along and along[1] == "radian" else 1.0), height
+    return place, height, bool(along and along[1] == "radian")
 
 
 def _turns(place: Array, step: float, turn: float) -> tuple[int, float]:

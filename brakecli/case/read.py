@@ -76,6 +76,35 @@ def parse_case(text: str, label: str, overrides: Sequence[str] = (), option: str
     return LoadedCase(case, text, resolved_toml(case))
 
 
+def parse_resolved(text: str, label: str, overrides: Sequence[str] = ()) -> LoadedCase:
+    """Make a case of the resolved one in a result; see `parse_case`.
+
+    What its surfaces were made of is not there, and cannot be changed alone.
+    """
+    remedy = (
+        "a result holds the sines of a surface alone; run the case file anew, or set the whole surface as well"
+    )
+    stored = parse_case(text, label)
+    try:
+        loaded = parse_case(text, label, overrides)
+    except CaseError as error:
+        made_of = [
+            each.path[:1] == ("roughness",) and {*each.path} & {"profile_error", "spectrum"}
+            for each in error.problems
+        ]
+        raise CaseError(
+            [
+                replace(each, remedy=remedy) if made else each
+                for each, made in zip(error.problems, made_of, strict=True)
+            ]
+        ) from None
+    before, wheel = stored.case.wheel.radius, stored.case.roughness.wheel
+    if wheel and wheel.note and loaded.case.wheel.radius != before and loaded.case.roughness.wheel == wheel:
+        what = f"cannot change the sines of a measured profile, made for {before!r} m"
+        raise CaseError([Problem(("wheel", "radius"), what, remedy, source=label)])
+    return loaded
+
+
 def parse_table(
     kind: type[_Table], text: str, label: str, overrides: Sequence[str] = (), option: str = "--set"
 ) -> _Table:

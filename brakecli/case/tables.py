@@ -145,6 +145,8 @@ class Table(BaseModel):
     @classmethod
     def _find_every_problem(cls, data: Any, handler: Callable[[Any], Self]) -> Self:
         """Check the rules between keys even where some keys are wrong by themselves, and report all at once."""
+        if isinstance(data, cls):
+            return data  # valid by construction
         errors: list[InitErrorDetails] = []
         try:
             table = handler(data)

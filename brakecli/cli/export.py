@@ -16,7 +16,7 @@ def command(
     output: Annotated[Path | None, output_option("File, .csv or .wav", "FILE.csv, here")] = None,
     variables: Annotated[list[str] | None, option(VARIABLE, "NAME", "--variable")] = None,
     group: Annotated[
-        str | None, option("What of a run: history (default), spectrum, over_time or vibrations.", "GROUP")
+        str | None, option("Of a run: history (default), spectrum, over_time, spectrogram, vibrations.", "GROUP")
     ] = None,
     force: Force = False,
     quiet: Quiet = False,

@@ -35,7 +35,9 @@ def diff_table(files: Mapping[str, str], numbers: Mapping[str, Any]) -> str:
         shown = [each for each in numbers[name] if not each["name"].startswith(_ASIDE)]
         if shown:
             columns = {title: [each["name"] for each in shown]}
-            columns |= {files[side]: [_text(each[side]) for each in shown] for side in ("a", "b")}
+            columns |= {
+                files[side]: [_text(each[side], each.get("units")) for each in shown] for side in ("a", "b")
+            }
             parts.append(grid(columns))
         if more := len(numbers[name]) - len(shown):
             parts.append(f"{more} more with reasons and evidence differ; --json lists them")
@@ -43,13 +45,15 @@ def diff_table(files: Mapping[str, str], numbers: Mapping[str, Any]) -> str:
         columns = {
             "variable": [f"{each['group']}/{each['name']}".replace("//", "") for each in variables],
             "differ": [f"{each['different']} of {each['compared']}" for each in variables],
-            "by at most": [text_of(each["largest"], form=".3g") for each in variables],
+            "by at most": [_text(each["largest"], each["units"], ".3g") for each in variables],
             "of the largest": [text_of(each["relative"], form=".2%") for each in variables],
             "shapes": [" and ".join(map(_shape, each["shapes"])) for each in variables],
         }
         if all(each["shapes"][0] == each["shapes"][1] for each in variables):
             del columns["shapes"]
         parts.append(grid(columns))
+        if along := {each["interpolated"]: None for each in variables if each["interpolated"]}:
+            parts.append(f"compared at equal {' and '.join(along)}; the finer result is interpolated")
     if numbers["same"]:
         parts.append("no difference in case, numbers and variables")
     if files["output"]:
@@ -57,8 +61,10 @@ def diff_table(files: Mapping[str, str], numbers: Mapping[str, Any]) -> str:
     return "\n\n".join(parts)
 
 
-def _text(value: Any) -> str:
-    return "-" if value is None else f"{value:.6g}" if isinstance(value, float) else value_text(value).strip('"')
+def _text(value: Any, units: str | None = None, form: str = ".6g") -> str:
+    if isinstance(value, float):
+        return text_of(value, "" if units in (None, "1") else str(units), form)
+    return "-" if value is None else value_text(value).strip('"')
 
 
 def _shape(shape: Any) -> str:

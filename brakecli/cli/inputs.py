@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 def load_case(source: str, overrides: list[str] | None) -> "LoadedCase":
     """The case of a case file, or the one that a result file holds."""
-    from brakecli.case.read import parse_case
+    from brakecli.case.read import parse_case, parse_resolved
 
     if not is_result(source):
         text = _text(source)
@@ -38,7 +38,7 @@ def load_case(source: str, overrides: list[str] | None) -> "LoadedCase":
     except CaseError as error:
         what = f"{source}: the case in it is not valid: {error.problems[0]}"
         raise UnreadableResultError(f"{what}; name an intact result file") from error
-    return replace(parse_case(resolved, label, overrides or ()), text=given)
+    return replace(parse_resolved(resolved, label, overrides or ()), text=given)
 
 
 def load_sweep(source: str, overrides: list[str] | None) -> "LoadedSweep":

@@ -9,7 +9,7 @@ import fcntl
 import os
 import socket
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from io import FileIO
 from pathlib import Path
@@ -86,6 +86,18 @@ class OutputFile(FileIO):
         for action in (self.close, self._temporary.unlink):
             with suppress(OSError):  # a failing disk may refuse; what is left is overwritten next time
                 action()
+
+
+def check_target(target: Path, what: str, suffixes: Sequence[str], results: Iterable[Path] = ()) -> None:
+    """Raise UsageError where a target has the suffix of nothing that can be written, or is one of the results."""
+    if target.suffix.lower() not in suffixes:
+        problem = f"its suffix does not name {what} (found {target.suffix!r})"
+        named = " or ".join(filter(None, (", ".join(suffixes[:-1]), suffixes[-1])))
+        raise UsageError(f"{target}: {problem}; name a file that ends in {named} with -o")
+    for result in results:
+        with suppress(OSError, ValueError):  # one of them does not exist, or cannot
+            if target.samefile(result):
+                raise UsageError(f"{target}: this is the result itself; choose another output with -o")
 
 
 @contextmanager

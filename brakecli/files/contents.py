@@ -1,6 +1,8 @@
 """What a result file holds, and how two of them differ."""
 
+import math
 import tomllib
+from bisect import bisect_left
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -9,12 +11,16 @@ import numpy as np
 
 from brakecli.errors import UnreadableResultError, UsageError
 from brakecli.files.field import plain
-from brakecli.files.read import StoredResult
+from brakecli.files.fields import COMPARISON, LOCK_IN, RUN, SWEEP, WELCH
+from brakecli.files.read import StoredResult, Variable
 from brakecli.files.write import FILL
 
 _CASES = ("resolved_toml", "resolved_sweep_toml")
 _APART = {"case_toml", "sweep_toml", *_CASES, "title", "kind", "format", "format_version", "complete"}
 _BLOCK = 1 << 20  # rows read at a time
+_RISING = ("time", "frequency")  # axes along which values are interpolated
+_ROUNDING = 1e-9  # of the largest value, which interpolation may add
+_DECLARED = {"run": RUN, "sweep": SWEEP, "comparison": COMPARISON, "stability": LOCK_IN}
 
 
 def contents(result: StoredResult) -> dict[str, Any]:
@@ -62,9 +68,19 @@ def difference(a: StoredResult, b: StoredResult) -> Difference:
             for name, value in result.group_attributes(group).items() if group in there else ():
                 if name not in _APART and not name.endswith("_version"):
                     found[name if group == "/" else f"{group}/{name}"] = plain(value)
+    declared = _DECLARED.get(kinds[0], ())
+    units = {
+        f"{field.group}/{row.name}": row.units
+        for field in declared
+        for row in (field.rows if field.group else [field])
+    }
+    units |= {f"spectrum/{field.name}": field.units for field in WELCH}
+    differing = [
+        each | {"units": units.get(each["name"], units.get(f"/{each['name']}", ""))} for each in _changed(*numbers)
+    ]
     return Difference(
         [*_changed(*map(_keys, (a, b)))],
-        [*_changed(*numbers)],
+        differing,
         [each for group in groups for each in _variables(a, b, group)],
         [*_changed(*(_versions(each.attributes) for each in (a, b)))],
     )
@@ -108,7 +124,7 @@ def _changed(a: dict[str, Any], b: dict[str, Any]) -> Iterator[dict[str, Any]]:
 
 
 def _variables(a: StoredResult, b: StoredResult, group: str) -> Iterator[dict[str, Any]]:
-    """The variables of a group that differ; of two lengths the first rows are compared."""
+    """The variables of a group that differ, at the same places along their axis."""
     known = [
         {name: each for name, each in result.variables(group).items() if "units" in each.attributes}
         if group in result.groups()
@@ -116,20 +132,23 @@ def _variables(a: StoredResult, b: StoredResult, group: str) -> Iterator[dict[st
         for result in (a, b)  # what other programs have added need not have units
     ]
     for name in dict.fromkeys([*known[0], *known[1]]):
+        held = [each[name] for each in known if name in each]
         shapes = [list(each[name].shape) if name in each else [] for each in known]
         compared = different = 0
         largest = highest = 0.0
-        numeric = True
+        numeric, along = True, None
         if all(shapes) and shapes[0][1:] == shapes[1][1:]:
-            rows = min(shape[0] for shape in shapes)
-            for one, other in zip(*(_blocks(each, group, name, rows) for each in (a, b)), strict=True):
-                apart = one != other
-                compared, different = compared + one.size, different + int(apart.sum())
+            along = _other_places(a, b, group, held)
+            for one, other in (_pairs if along is None else _interpolated)(a, b, group, name, along or ""):
                 numeric = one.dtype.kind in "iuf" and other.dtype.kind in "iuf"
+                apart = one != other
                 if numeric:
                     there = (one != FILL) & (other != FILL)
-                    largest = max(largest, float(np.abs(1.0 * one - other)[there].max(initial=0.0)))
-                    highest = max(highest, *(float(np.abs(each[there]).max(initial=0.0)) for each in (one, other)))
+                    off = np.where(there, np.abs(1.0 * one - other), 0.0)
+                    sizes = [float(np.abs(each[there]).max(initial=0.0)) for each in (one, other)]
+                    apart &= ~there | (off > (_ROUNDING * max(sizes) if along else 0.0))
+                    largest, highest = max(largest, float(off.max(initial=0.0))), max(highest, *sizes)
+                compared, different = compared + one.size, different + int(apart.sum())
         if different or shapes[0] != shapes[1]:
             yield {
                 "group": group,
@@ -139,9 +158,50 @@ def _variables(a: StoredResult, b: StoredResult, group: str) -> Iterator[dict[st
                 "different": different,
                 "largest": largest if numeric and compared else None,
                 "relative": largest / highest if numeric and highest else None,
+                "units": str(held[0].attributes["units"]),
+                "interpolated": along,
             }
 
 
-def _blocks(result: StoredResult, group: str, name: str, rows: int) -> Iterator[Any]:
+def _other_places(a: StoredResult, b: StoredResult, group: str, held: list[Variable]) -> str | None:
+    """The name of the axis of a variable, if it has one of numbers with other values in the second result."""
+    axis = held[0].dims[0]
+    if held[0].dims != held[1].dims or len({*held[0].dims} - {"mode"}) != 1 or axis not in _RISING:
+        return None
+    return axis if any((one != other).any() for one, other in _pairs(a, b, group, axis)) else None
+
+
+def _pairs(a: StoredResult, b: StoredResult, group: str, name: str, _: str = "") -> Iterator[tuple[Any, Any]]:
+    """The rows of a variable in both results, up to the end of the shorter one."""
+    rows = min(result.variables(group)[name].shape[0] for result in (a, b))
     for start in range(0, rows, _BLOCK):
-        yield result.read(group, name, start, min(start + _BLOCK, rows))
+        one, other = (result.read(group, name, start, min(start + _BLOCK, rows)) for result in (a, b))
+        yield one, other
+
+
+def _interpolated(a: StoredResult, b: StoredResult, group: str, name: str, axis: str) -> Iterator[tuple[Any, Any]]:
+    """A variable where the result with fewer rows in the common range has it; states are those of the nearest."""
+
+    def row(result: StoredResult, place: float) -> int:
+        rows = range(result.variables(group)[axis].shape[0])
+        return bisect_left(rows, place, key=lambda row: float(result.read(group, axis, row, row + 1)[0]))
+
+    ends = [[float(result.read(group, axis, *at)[0]) for at in ((0, 1), (-1, None))] for result in (a, b)]
+    first, last = max(low for low, _ in ends), min(high for _, high in ends)
+    parts = [range(row(result, first), row(result, math.nextafter(last, math.inf))) for result in (a, b)]
+    swapped = len(parts[1]) < len(parts[0])
+    one, other, part = (b, a, parts[1]) if swapped else (a, b, parts[0])
+    for start in part[::_BLOCK]:
+        stop = min(start + _BLOCK, part.stop)
+        at, values = (one.read(group, each, start, stop) for each in (axis, name))
+        near = max(row(other, at[0]) - 1, 0), row(other, at[-1]) + 1
+        places, there = (other.read(group, each, *near) for each in (axis, name))
+        where = np.interp(at, places, np.arange(len(places)))
+        low, high = np.floor(where).astype(int), np.ceil(where).astype(int)
+        if there.dtype.kind == "f":
+            weight = (where - low).reshape(-1, *[1] * (there.ndim - 1))
+            known = (there[low] != FILL) & (there[high] != FILL)
+            between = np.where(known, there[low] + weight * (there[high] - there[low]), FILL)
+        else:
+            between = there[np.round(where).astype(int)]
+        yield (between, values) if swapped else (values, between)

@@ -13,7 +13,7 @@ import numpy as np
 
 from brakecli.errors import UnreadableResultError, UsageError
 from brakecli.files import fields
-from brakecli.files.atomic import new_output
+from brakecli.files.atomic import check_target, new_output
 from brakecli.files.read import StoredResult, Variable
 from brakecli.files.write import FILL
 
@@ -23,9 +23,16 @@ _BLOCK = 1 << 16  # rows read at a time
 _LONGEST = 3600.0  # s of sound
 _QUIET = 1e-3  # part of the power that may be left out unsaid
 _HEARD = 20.0  # Hz
+_UNEVEN = 1e-3  # of the time between two samples, by which it may vary
 _TABLES = (fields.HISTORY, fields.POINT, fields.CRITICAL, fields.VARIED, fields.MODES, fields.ENTRY)
 _ORDER = [field.name for rows in _TABLES for field in rows]  # of columns
-_AXES = {"history": "time", "spectrum": "frequency", "over_time": "time", "vibrations": "interval"}
+_AXES = {
+    "history": ("time",),
+    "spectrum": ("frequency",),
+    "over_time": ("time",),
+    "spectrogram": ("time", "frequency"),
+    "vibrations": ("interval",),
+}
 
 
 def export(
@@ -35,9 +42,8 @@ def export(
 
     Raises UsageError for what the result does not have, UnreadableResultError and CannotWriteError.
     """
+    check_target(target, "a kind of file", (".csv", ".wav"), [result.path])
     suffix, kind = target.suffix.lower(), result.attributes.get("kind")
-    if suffix not in (".csv", ".wav"):
-        raise UsageError(f"{target}: its suffix does not name a kind of file; name one that ends in .csv or .wav")
     if kind != "run" and (group or suffix == ".wav"):
         what = f"--group {group}" if group else str(target)
         raise UsageError(f"{what}: is for runs, and {result.path} is a {kind}; export it as .csv without --group")
@@ -66,7 +72,7 @@ def export(
 def _rows(result: StoredResult, group: str, names: Sequence[str]) -> Iterator[list[Sequence[Any]]]:
     """The header and blocks of rows of a table: one row for each place along the axes of the group."""
     known = result.variables(group)
-    axes = (_AXES[group],) if group != "/" else _main(known)
+    axes = _AXES[group] if group != "/" else _main(known)
     if not axes or any(axis not in known for axis in axes):
         raise UnreadableResultError(f"{result.path}: {group} lacks its axes; name an intact result file")
     shape = tuple(known[axis].shape[0] for axis in axes)
@@ -134,9 +140,11 @@ def _sound(result: StoredResult, name: str) -> tuple[bytes, list[str]]:
 
     known = result.variables("history")
     _checked([name], [each for each in known if each not in ("time", "state")], result)
-    ends = result.read("history", "time", 0, 2)
-    values = np.zeros(0) if len(ends) < 2 else result.read("history", name)
-    duration = float(ends[1] - ends[0]) * len(values) if len(values) else 0.0
+    steps = np.diff(result.read("history", "time"))
+    values = result.read("history", name) if len(steps) else np.zeros(0)
+    if len(steps) and np.ptp(steps) > _UNEVEN * np.median(steps):
+        raise UsageError(f"{result.path}: its samples are not equally spaced, as a sound needs them; export .csv")
+    duration = float(np.mean(steps)) * len(values) if len(values) else 0.0
     if duration > _LONGEST:
         raise UsageError(
             f"{result.path}: {duration:.4g} s are too long for a sound; run a case of an hour at most"
@@ -147,8 +155,8 @@ def _sound(result: StoredResult, name: str) -> tuple[bytes, list[str]]:
             f"{result.path}: {name} does not change, there is nothing to hear; name another --variable"
         )
     rate, notes = len(values) / duration, list[str]()
+    power, frequency = np.abs(np.fft.rfft(values)) ** 2, np.fft.rfftfreq(len(values), 1.0 / rate)
     if rate > RATE:
-        power, frequency = np.abs(np.fft.rfft(values)) ** 2, np.fft.rfftfreq(len(values), 1.0 / rate)
         lost = float(power[frequency > 0.5 * RATE].sum() / power.sum())
         if lost > _QUIET:
             notes.append(f"{lost:.2%} of the power of {name} is above {0.5 * RATE:g} Hz and not in the sound")
@@ -158,7 +166,7 @@ def _sound(result: StoredResult, name: str) -> tuple[bytes, list[str]]:
         raise UsageError(
             f"{result.path}: all of {name} is above {0.5 * RATE:g} Hz, no sound holds it; export .csv"
         )
-    tone = result.attributes.get("frequency") or math.nan
+    tone = result.attributes.get("frequency") or frequency[np.argmax(power)]
     if tone < _HEARD or tone > 0.5 * RATE:
         notes.append(f"the vibration at {tone:.4g} Hz cannot be heard")
     stream = io.BytesIO()

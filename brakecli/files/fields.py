@@ -373,6 +373,7 @@ DIFFERENT_VALUE = (
     Field("a", "", "value in the first file; null where there is none", OBJECT),
     Field("b", "", "value in the second file; null where there is none", OBJECT),
 )
+DIFFERENT_NUMBER = (*DIFFERENT_VALUE, Field("units", "", "unit of both values", TEXT))
 DIFFERENT_VARIABLE = (
     *HELD[:2],
     Field("shapes", "1", "lengths of its axes in both files; null where it is missing", OBJECT),
@@ -380,11 +381,13 @@ DIFFERENT_VARIABLE = (
     integer("different", "number of those that differ"),
     Field("largest", "of the variable", "largest difference of two values; null for texts"),
     ratio("relative", "that over the largest value in both; null where that is 0"),
+    Field("units", "", "unit of the variable", TEXT),
+    Field("interpolated", "", "the axis, time or frequency, where its values differ; null otherwise", TEXT),
 )
 DIFFERENCE_OF_TWO = (
     Field("same", "", "whether case, numbers and variables are the same", "?"),
     Field("case", "", "keys of the case and of the sweep that differ", OBJECT, rows=DIFFERENT_VALUE),
-    Field("numbers", "", "attributes that differ", OBJECT, rows=DIFFERENT_VALUE),
+    Field("numbers", "", "attributes that differ", OBJECT, rows=DIFFERENT_NUMBER),
     Field("variables", "", "variables that differ", OBJECT, rows=DIFFERENT_VARIABLE),
     Field("versions", "", "versions that differ", OBJECT, rows=DIFFERENT_VALUE),
 )

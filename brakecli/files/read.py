@@ -39,7 +39,6 @@ from brakecli.files.valid import (
 FORMAT = "brakecli"
 FORMAT_VERSION = 1
 
-_FOREIGN = f'it was not written by this program, attribute format = "{FORMAT}" is missing'
 SHORTEST_TRIAL = 5.0  # s of processor time, and 0.1 s for each MB, to read a file that may be damaged
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
@@ -138,7 +137,7 @@ def open_result(path: Path, kind: str | None = None) -> Iterator[StoredResult]:
             its_kind = str(plain_attribute(file, "kind"))
             attributes = attributes_of(file, its_kind)
             if attributes.get("format") != FORMAT:
-                raise ValueError(_FOREIGN)
+                raise ValueError(f'it was not written by this program, attribute format = "{FORMAT}" is missing')
             if (version := attributes.get("format_version")) != FORMAT_VERSION:
                 raise ValueError(
                     f"its format version is {version}, and only version {FORMAT_VERSION} is known here"
@@ -175,8 +174,8 @@ def _has_digest(file: RawIOBase) -> bool:
     superblock = file.read(36) or b""
     if not superblock.startswith(_SIGNATURE):
         raise ValueError("this is not an HDF5 file" if superblock else "the file is empty")
-    if superblock[8:9] != b"\x02":  # versions 0 and 1 have another layout; this program does not write them
-        raise ValueError(_FOREIGN)
+    if superblock[8:9] != b"\x02":  # other versions have other layouts; this program does not write them
+        raise ValueError("it was not written by this program; a copy that xarray writes has another form")
     end = int.from_bytes(superblock[28:36], "little")
     behind = file.seek(0, 2) - end
     if behind and (behind != 32 or digest(file, end) != file.read(32)):

@@ -33,13 +33,13 @@ def require(good: Any, problem: str) -> None:
 class TextTable:
     """A text file of columns. Its first lines show separator, decimal sign and header."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, wanted: str = "a CSV file") -> None:
         """Read the first lines; the numbers are read when they are asked for."""
         self.path = path
         with path.open("rb") as file:
             head = file.read(_HEAD)
         require(head.strip() != b"", "the file is empty; name a file with numbers")
-        require(b"\0" not in head, "this is not text; name a CSV file, or FILE.h5:/path of an HDF5 file")
+        require(b"\0" not in head, f"this is not text; name {wanted}")
         lines = head.decode("utf-8-sig", errors="replace").splitlines()
         lines = lines[:-1] if len(head) == _HEAD and len(lines) > 1 else lines
         self.names: list[str] = []

@@ -1,12 +1,12 @@
 """Draw any result: read its file, choose the picture of its kind, write the file of the picture."""
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from brakecli.errors import UsageError
-from brakecli.files.atomic import new_output
+from brakecli.files.atomic import check_target, new_output
 from brakecli.files.read import StoredResult, open_result
 
 if TYPE_CHECKING:
@@ -50,13 +50,7 @@ def _opened(
 ) -> Iterator[tuple[Callable[["Figure"], None], list[StoredResult]]]:
     """Results for a picture, and what writes it."""
     suffix = target.suffix.lower()
-    if suffix not in (".pdf", ".png", ".svg"):
-        problem = f"its suffix does not name a kind of picture (found {target.suffix!r})"
-        raise UsageError(f"{target}: {problem}; name a file that ends in .pdf, .png or .svg with -o")
-    for result in results:
-        with suppress(OSError, ValueError):  # one of them does not exist, or cannot
-            if target.samefile(result):
-                raise UsageError(f"{target}: this is the result itself; choose another output with -o")
+    check_target(target, "a kind of picture", (".pdf", ".png", ".svg"), results)
     try:
         import matplotlib.figure  # noqa: F401
     except ImportError as error:

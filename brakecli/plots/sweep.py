@@ -19,7 +19,7 @@ from brakecli.plots import style
 from brakecli.plots.axis import Axis
 from brakecli.sweeps.critical import Outcome
 from brakecli.sweeps.margin import margins
-from brakecli.sweeps.plan import Plan, given_toml, label
+from brakecli.sweeps.plan import Plan, label
 from brakecli.sweeps.point import Status
 from brakecli.sweeps.tables import Critical, Sweep
 
@@ -231,7 +231,7 @@ def _variables(result: StoredResult, sweep: Sweep, shown: str, more: Sequence[st
     base = str(result.attributes.get("resolved_toml", ""))
     margin = None
     with suppress(CaseError):  # of older results, and of forged ones
-        margin = margins(Plan(given_toml(sweep), base)) if sweep.critical is None else None
+        margin = margins(Plan(result.text("resolved_sweep_toml"), base)) if sweep.critical is None else None
     if margin is not None and margin.size == np.prod(variables["status"].shape[1:]):
         variables[MARGIN] = np.broadcast_to(
             margin.reshape(variables["status"].shape[1:]), variables["status"].shape

@@ -41,7 +41,7 @@ def _runs(results: tuple[StoredResult, StoredResult], variable: str) -> Figure:
     same_end = len({picture.detail["time"][-1] for picture in pictures}) == 1
     details = [picture.detail[variable] for picture in pictures]
     look = scaled(variable, np.concatenate(details), np.concatenate(details))
-    envelopes = [_wider(*picture.envelope) for picture in pictures]
+    envelopes = [_wider(picture) for picture in pictures]
     whole = np.concatenate([end for envelope in envelopes for end in envelope[1:]])
     name = pictures[0].whole
     whole_look = scaled(name, whole, whole)
@@ -72,10 +72,12 @@ def _runs(results: tuple[StoredResult, StoredResult], variable: str) -> Figure:
     return figure
 
 
-def _wider(time: style.Array, lowest: style.Array, highest: style.Array) -> list[style.Array]:
-    """An envelope of fewer columns, so that each holds a cycle or more."""
+def _wider(picture: RunPicture) -> list[style.Array]:
+    """An envelope of fewer columns, so that each holds a cycle or more; the last one reaches to the end."""
+    (time, lowest, highest), end = picture.envelope, picture.span[1]
     first = np.arange(0, len(time), max(1, len(time) // _COLUMNS))
-    return [time[first], np.minimum.reduceat(lowest, first), np.maximum.reduceat(highest, first)]
+    low, high = np.minimum.reduceat(lowest, first), np.maximum.reduceat(highest, first)
+    return [np.append(time[first], end), np.append(low, low[-1]), np.append(high, high[-1])]
 
 
 def _spectra(axes: Axes, pictures: list[RunPicture], variable: str, scale: float, label: str) -> None:

@@ -3,14 +3,13 @@
 import base64
 import hashlib
 from collections.abc import Sequence
-from contextlib import suppress
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from brakecli import __version__
 from brakecli.errors import UsageError
-from brakecli.files.atomic import new_output
+from brakecli.files.atomic import check_target, new_output
 from brakecli.files.read import StoredResult, open_result
 
 if TYPE_CHECKING:
@@ -26,13 +25,7 @@ def write_report(results: Sequence[Path], target: Path, *, force: bool, progress
     Raises UsageError for another suffix, an existing target without `force`, a page that would be too large, and
     where a library is missing; UnreadableResultError; CannotWriteError.
     """
-    if target.suffix.lower() not in (".html", ".htm"):
-        problem = f"its suffix does not name a page (found {target.suffix!r})"
-        raise UsageError(f"{target}: {problem}; name a file that ends in .html with -o")
-    for result in results:
-        with suppress(OSError, ValueError):
-            if target.samefile(result):
-                raise UsageError(f"{target}: this is a result itself; choose another output with -o")
+    check_target(target, "a page", (".html", ".htm"), results)
     try:
         import jinja2
         import matplotlib.figure  # noqa: F401

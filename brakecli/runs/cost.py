@@ -7,13 +7,14 @@ import numpy as np
 
 from brakecli.analysis.stability.report import LARGEST_FRICTION
 from brakecli.errors import CaseError
-from brakecli.solver.steady_sliding import PLACES, TABLE, steady_sliding
+from brakecli.solver.steady_sliding import PLACES, TABLE, averaged_length, fills_window, steady_sliding
 from brakecli.solver.system import System
 
 # Seconds, measured with `make cases` on one core.
 _STEP_SECONDS = 1.5e-7
 _NODE_SECONDS = 5e-10  # per node, and again per node and wave of the wheel:
 _NODE_WAVE_SECONDS = 1.5e-10
+_WINDOW_WAVES, _POINT_WAVE_SECONDS = 3, 3e-10  # with a window: as many waves; to fill it, per point and wave
 _TERM_SECONDS, _PAIR_SECONDS = 2.5e-8, 5e-10  # exact, for each wave on the pad: per harmonic, and per pair of them
 _EVALUATIONS = 1.5  # of the contact in a step
 _OWN_STEPS = 25.0  # in a period, of a scheme that finds them itself, at a tolerance of 1e-10
@@ -25,12 +26,14 @@ _START_EVALUATIONS = 6.0  # at each place of the wheel
 
 def steps_and_seconds(system: System) -> tuple[int, float]:
     """Steps of a run, and a rough guess at the time of all runs that it takes to keep the tolerance."""
-    method, pairs = system.method, float(len(system.wheel.g) ** 2)
+    method, pairs = system.method, 0.0 if system.window_rows else float(len(system.wheel.g) ** 2)
     if not method.own_steps:
         each = _STEP_SECONDS * (1.0 + pairs / 20.0)
         if system.finds_patches or system.nodes:
             each = _STEP_SECONDS + _EVALUATIONS * evaluation_seconds(system)
-        return system.steps, system.steps * each
+        return system.steps, system.steps * each + _window_seconds(
+            system, system.sampled_duration * system.fastest_belt
+        )
     c, alone = system.coefficients, method.step is not None
     if method.row.exact:
         return system.steps, system.steps * _EXACT_STEP_SECONDS
@@ -69,7 +72,9 @@ def stability_seconds(system: System) -> float:
 
 def _average_seconds(system: System) -> float:
     """Of the mean contact at one height."""
-    return (PLACES if len(system.wheel.g) else 1) * evaluation_seconds(system)
+    if not fills_window(system):
+        return (PLACES if len(system.wheel.g) else 1) * evaluation_seconds(system, summed=True)
+    return PLACES * evaluation_seconds(system) + _window_seconds(system, averaged_length(system))
 
 
 def _opens(system: System, phi: float) -> bool:
@@ -88,12 +93,22 @@ def _opens(system: System, phi: float) -> bool:
     return opens
 
 
-def evaluation_seconds(system: System) -> float:
-    """A rough guess at the time that one evaluation of a contact which is open in part takes."""
+def evaluation_seconds(system: System, *, summed: bool = False) -> float:
+    """A rough guess at the time that one evaluation of a contact which is open in part takes.
+
+    `summed`: without a window.
+    """
     if system.finds_patches:
         terms, waves = len(system.shoe.g) + len(system.wheel.g), 1.0 + 2.0 * system.half_length * system.most_turns
         return waves * terms * (_TERM_SECONDS + _PAIR_SECONDS * terms)
-    return system.nodes * (_NODE_SECONDS + _NODE_WAVE_SECONDS * len(system.wheel.g))
+    waves = _WINDOW_WAVES if system.window_rows and not summed else len(system.wheel.g)
+    return system.nodes * (_NODE_SECONDS + _NODE_WAVE_SECONDS * waves)
+
+
+def _window_seconds(system: System, travel: float) -> float:
+    """A rough guess at the time to fill the window while the wheel travels so far (m)."""
+    points = system.nodes * system.window_rows * (1.0 + travel / (2.0 * system.half_length))
+    return points * len(system.wheel.g) * _POINT_WAVE_SECONDS
 
 
 def duration_text(seconds: float) -> str:

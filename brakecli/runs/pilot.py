@@ -5,13 +5,8 @@ from time import process_time
 from typing import NamedTuple
 
 from brakecli.runs.cost import evaluation_seconds, start_seconds
-from brakecli.runs.tolerance import (
-    EVENT_RATIO,
-    NODES_FROM,
-    first_event_tolerance,
-    first_nodes,
-    first_rung,
-)
+from brakecli.runs.ladder import first_nodes, first_rung
+from brakecli.runs.tolerance import EVENT_RATIO, NODES_FROM, first_event_tolerance
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.motion import Stepping
 from brakecli.solver.system import System

@@ -22,9 +22,10 @@ from brakecli.case.system import system_of
 from brakecli.files import fields
 from brakecli.files.field import values_of
 from brakecli.files.write import ResultFile, new_result
+from brakecli.runs.certificate import Certificate
 from brakecli.runs.limits import Check, check, free_bytes, refuse, within_range
 from brakecli.runs.modelled import modelled
-from brakecli.runs.tolerance import Certificate, certify
+from brakecli.runs.tolerance import certify
 from brakecli.solver.history import History
 from brakecli.solver.motion import Motion, Progress, Sink, solve
 from brakecli.solver.quantities import HISTORY, ContactState

@@ -7,13 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from brakecli.errors import BrakecliError
+from brakecli.runs.certificate import Certified
+from brakecli.runs.ladder import InLanes, ladder
 from brakecli.runs.pilot import RUNGS
-from brakecli.runs.tolerance import (
-    Certified,
-    begins_with_steps,
-    ladder,
-    slower_than_events,
-)
+from brakecli.runs.tolerance import begins_with_steps, slower_than_events
 from brakecli.solver.ensemble import fits, run_together
 from brakecli.solver.motion import Motion
 from brakecli.solver.schemes import NUMEROV
@@ -27,7 +24,7 @@ LANE_STEP_SECONDS = 3e-8
 
 def _ladder(system: System) -> Generator[System, Motion, Certified]:
     method = replace(system.method, scheme="three-layer", theta=NUMEROV)
-    return ladder(replace(system, method=method), slower_than_events(system, lambda samples: None))
+    return ladder(replace(system, method=method), slower_than_events(system, lambda samples: None), InLanes)
 
 
 def seconds_together(system: System) -> float | None:

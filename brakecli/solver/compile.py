@@ -27,6 +27,8 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 vector = float64[::1]
 """A contiguous array of doubles, for the compiler."""
+FAST = frozenset({"reassoc", "contract", "nsz"})
+"""What fast loops allow: sums in any order, fused multiply-add, no signed zeros; NaN stays NaN."""
 
 config: Any = numba_config  # its settings come from the environment, so type checkers know none of them
 caching: Any = numba_caching  # has no types

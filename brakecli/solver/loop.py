@@ -9,7 +9,7 @@ from brakecli.solver.friction import observed
 from brakecli.solver.implicit_step import SOLVED
 from brakecli.solver.quantities import BOUND, Failure
 from brakecli.solver.records import EVALUATE, FINISH, PLANT, PREPARE, SOLVE, Plant
-from brakecli.solver.roughness import wheel_angles
+from brakecli.solver.roughness import turn
 from brakecli.solver.schedules import integral_at, slope_at, value_at
 
 _NONE, _UNCONVERGED, _DIVERGED, _NOT_CLOSED = (int(failure) for failure in tuple(Failure)[:4])
@@ -33,9 +33,9 @@ def sample(p: Plant, row: Floats) -> None:
     t = grid.interval * ((p.counts.level - grid.lag) // grid.per_sample)
     x, y = (state.x, state.y) if grid.lag == 0 else (state.x_old, state.y_old)
     v_x, v_y, belt = state.v_x, state.v_y, value_at(drive.belt, t)
-    if drive.wheel.size > 0:
+    if p.layer.pad.wheel_terms > 0:
         travel, travel_low = integral_at(drive.belt, t, 0.0)
-        wheel_angles(drive.wheel, travel, travel_low, p.layer.angles)
+        turn(travel, travel_low, p.layer)
     _evaluate_at(p.layer.evaluate)(x, y, p.layer)
     p.counts.evaluations += 1
     normal = contact.normal_force
@@ -75,9 +75,9 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
         belt_next = value_at(belt, t + (part + 1) * s.h)
         problem.belt_now, problem.belt_next = belt_now, belt_next
         problem.load = value_at(p.drive.load, t + t_low)
-        if p.drive.wheel.size > 0:
+        if layer.pad.wheel_terms > 0:
             travel, travel_low = integral_at(belt, t, t_low)
-            wheel_angles(p.drive.wheel, travel, travel_low, layer.angles)
+            turn(travel, travel_low, layer)
         prepare(c, s, state, problem)
         if state.force > 0.0:  # the guess lies on the parabola through the last three forces
             problem.normal_force = max(3.0 * (state.force - state.force_before) + state.force_earlier, 0.0)

@@ -117,16 +117,29 @@ PAD = record(
     ss_at=int,  # integrals of products, see `contact.pad`
     cc_at=int,
     pr_at=int,
+    opposite_at=int,  # f1 at the nodes of one half and at those opposite, tile by tile
     nodes_at=int,  # f1 at the nodes
     waves_at=int,  # g sin(ωξ) and g cos(ωξ) of the wheel at the nodes, tile by tile
+    turns_at=int,  # phases (rad) and waves per metre of the wheel, the latter as sums of two doubles
+    rows=int,  # points of a window's grid to a node, a power of two; 0 where sums of waves are as fast
 )
+
+WINDOW = record(
+    "spacing",  # of the grid, m
+    "points travel",  # that the wheel has travelled: points of the grid, a whole number, and the rest, m
+    rows=int,  # points to a node; 0 where there is no window
+    shift=int,  # their binary logarithm
+    width=int,  # nodes, in whole tiles
+    at=int,  # where in the scratch it begins, row by row; weights lie before it
+    origin=int,  # its first tile
+    first=int,  # the tiles that are filled, from this one on
+    end=int,
+)
+"""The wheel's surface below the pad and ahead of it, see `solver.heights`."""
 
 KNOT = record("time value value_low slope slope_low integral integral_low")
 """A piecewise linear function of time, at one of its knots (s). Value, slope after it and integral from t = 0 are
 sums of two doubles, to 32 digits."""
-
-WAVE = record("phase turns turns_low")
-"""A harmonic of the wheel: its phase (rad) and its exact number of waves per metre, a sum of two doubles."""
 
 
 X, Y, V_X, V_Y = range(4)
@@ -145,9 +158,11 @@ MOTION = record(
     "load load_slope",  # Q, N, and its slope, N/s
     "anchor anchor_low",  # x - travel in stick, a sum of two doubles, m
     "tolerance",  # of a step
+    "pressed_x pressed_y pressed",  # where full contact has been computed in this step, and its force, N
     "step",  # to try next, s
     "events_time",  # since which `events` are counted, s
-    "step_done time_done tau_done side_done",  # the step of the continuous solution, its begin and its phase
+    "step_done time_done tau_done side_done",  # the step of the continuous solution, its begin and its phase,
+    "belt_done belt_slope_done load_done load_slope_done",  # and what acted from outside at its begin
     touching_done=int,
     touching=int,  # 0 where the pad is clear of the wheel for sure
     pair=int,  # 0: steps of order eight, 1: of order five
@@ -173,7 +188,7 @@ BELT, BELT_SLOPE, LOAD, LOAD_SLOPE = range(4, 8)
 SIZE, PHASES, MARGINS, WORKS, TERMS, NODES = 8, 4, 3, 4, 18, 6
 """Its components, phases, margins of a phase, works, terms of its series, nodes of its quadrature."""
 PAIRS = SIZE * (SIZE + 1) // 2
-"""Products of two components; pairs of different ones stand for both orders."""
+"""Products of two components."""
 AHEAD = 4 + 2 * MARGINS + 2
 """What a step computes: x, y, v_x and v_y, the margins, their slopes times the step, and 2 to fill up vectors."""
 
@@ -188,7 +203,7 @@ FLOW = record(
     phase=int,
     started=int,  # 0 before the phase of the start is known
     events=int,  # events without progress
-    made=(int, PHASES),  # 1 where the matrices of a phase are made
+    made=(int, PHASES),  # 1 where the matrices of a phase are made, 2 where the forms of its works are, too
     row=(float, 8),  # the sample at the level reached
     z=(float, SIZE),  # motion reached
     error=(float, 4),  # of x, y, v_x and v_y by the rounding of all steps so far
@@ -201,16 +216,19 @@ FLOW = record(
     friction=(float, (PHASES, SIZE)),  # row of the friction force, N
     margins=(
         float,
-        (PHASES, 2 * MARGINS, SIZE),
-    ),  # rows of what is positive while the phase lasts, and of `before`
-    step=(float, (PHASES, SIZE, AHEAD)),  # columns of exp(A h) for x, y, v_x and v_y, and for the rest of `after`
+        (PHASES, SIZE, AHEAD),
+    ),  # columns of `before`: z, then what is positive in a phase
+    step=(float, (PHASES, SIZE, AHEAD)),  # the same times exp(A h), which give `after`
     now=(float, (SIZE, AHEAD)),  # those of the present phase: at a fixed place, the compiler makes vectors of them
-    works=(float, (PHASES, WORKS, PAIRS)),  # forms in z that are the works of a step from z on, J
-    sums=(float, PAIRS),  # sums of products of components of z over the steps whose works wait to be added up
+    works=(float, (PHASES, WORKS, SIZE, SIZE)),  # forms in z that are the works of a step from z on, J
+    factors=(float, (5, NODES, SIZE)),  # what powers at the nodes of Gauss' rule are products of
+    sums=(float, PAIRS),  # products of components of z, added up over the steps that wait
     series=(float, (SIZE, TERMS)),  # of each component over the span of a step
-    pull=(float, (NODES + 1, SIZE)),  # friction force in `at`, N
-    at=(float, (NODES + 1, SIZE, SIZE)),  # motions at the nodes of Gauss' rule, and at the end of the step
+    flow=(float, (TERMS, 4, SIZE)),  # the series of exp(A h): its rows for x, y, v_x and v_y
+    rows=(float, (4, SIZE)),  # those of exp(A t) at the end of a step, or at a node of Gauss' rule
+    at=(float, SIZE),  # the motion at a part of the span
     polynomial=(float, (2, TERMS)),  # a margin on it, and the margin's slope, negative
+    waiting=int,  # 1 where works of whole steps do; further up, it would push vectors across lines of the cache
 )
 """A piecewise-exact motion with the matrices of its phases."""
 
@@ -253,11 +271,10 @@ class Grid(NamedTuple):
 
 
 class Drive(NamedTuple):
-    """What acts from outside: the speed U of the wheel's surface (m/s), the load Q (N), the wheel's profile."""
+    """What acts from outside: the speed U of the wheel's surface (m/s) and the load Q (N)."""
 
     belt: NDArray[Any]
     load: NDArray[Any]
-    wheel: NDArray[Any]
 
 
 class Layer(NamedTuple):
@@ -269,6 +286,7 @@ class Layer(NamedTuple):
     tables: Floats
     angles: Floats  # phases of the wheel's harmonics, rad
     scratch: Floats
+    window: Any
     contact: Any
 
 
@@ -295,16 +313,15 @@ class Plant(NamedTuple):
     counts: Any
 
 
-STATE_TYPE, MOTION_TYPE, FLOW_TYPE, PROBLEM_TYPE, CONTACT_TYPE, WORK_TYPE, COUNTS_TYPE, PAD_TYPE = (
-    numba.from_dtype(each) for each in (STATE, MOTION, FLOW, PROBLEM, CONTACT, WORK, COUNTS, PAD)
+STATE_TYPE, MOTION_TYPE, FLOW_TYPE, PROBLEM_TYPE, CONTACT_TYPE, WORK_TYPE, COUNTS_TYPE, PAD_TYPE, WINDOW_TYPE = (
+    numba.from_dtype(each) for each in (STATE, MOTION, FLOW, PROBLEM, CONTACT, WORK, COUNTS, PAD, WINDOW)
 )
 KNOTS = types.Array(numba.from_dtype(KNOT), 1, "C")
-WAVES = types.Array(numba.from_dtype(WAVE), 1, "C")
 COEFFICIENTS = types.NamedUniTuple(float64, len(Coefficients._fields), Coefficients)
 WEIGHTS = types.NamedUniTuple(float64, len(Weights._fields), Weights)
 GRID = types.NamedTuple([float64, int64, float64, int64, int64, int64, int64, float64], Grid)
-DRIVE = types.NamedTuple([KNOTS, KNOTS, WAVES], Drive)
-LAYER = types.NamedTuple([int64, int64, PAD_TYPE, vector, vector, vector, CONTACT_TYPE], Layer)
+DRIVE = types.NamedUniTuple(KNOTS, len(Drive._fields), Drive)
+LAYER = types.NamedTuple([int64, int64, PAD_TYPE, vector, vector, vector, WINDOW_TYPE, CONTACT_TYPE], Layer)
 PLUG = types.NamedUniTuple(int64, 3, Plug)
 
 

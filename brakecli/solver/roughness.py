@@ -3,15 +3,14 @@
 import math
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import float64, void
-from numpy.typing import NDArray
 
 from brakecli.solver.compile import Floats, kernel, vector
-from brakecli.solver.double_double import multiply, split
-from brakecli.solver.records import WAVE, WAVES
+from brakecli.solver.double_double import multiply, split, two_product
+from brakecli.solver.records import LAYER, Layer
 
 PI = Fraction(314159265358979323846264338327950288419716939937511, 10**50)
 TWO_PI = 2.0 * math.pi
@@ -35,16 +34,16 @@ class Surface(NamedTuple):
 
     def __hash__(self) -> int:
         """By the numbers, so that what is made of a surface can be kept for all that are like it."""
-        return hash(self._bytes)
+        return hash((self.g.tobytes(), self.turns.tobytes()))
 
     @property
     def _bytes(self) -> tuple[bytes, ...]:
         return tuple(each.tobytes() for each in self)
 
     @property
-    def waves(self) -> NDArray[Any]:
-        """What `wheel_angles` needs, as records of `WAVE`."""
-        return np.array(list(zip(self.phase, self.turns, self.turns_low, strict=True)), WAVE)
+    def waves(self) -> Floats:
+        """What `wheel_angles` needs."""
+        return np.concatenate([self.phase, self.turns, self.turns_low])
 
 
 def surface(
@@ -86,15 +85,28 @@ def height(f: Surface, xi: Floats) -> Floats:
     return f_xi
 
 
-@kernel(void(WAVES, float64, float64, vector))
-def wheel_angles(waves: NDArray[Any], travel: float, travel_low: float, angles: Floats) -> None:
+@kernel(void(vector, float64, float64, vector))
+def wheel_angles(waves: Floats, travel: float, travel_low: float, angles: Floats) -> None:
     """Phase in rad of each harmonic at xi = 0 after the wheel has travelled: phase - omega travel, reduced.
 
+    `waves` has their phases and the two parts of their turns.
     The waves are counted in turns with 32 digits and only their fraction is kept, so that the phase is as exact
     after 10^7 m as at the start.
     """
-    for i in range(waves.size):
-        wave = waves[i]
-        number, number_low = multiply(travel, travel_low, wave.turns, wave.turns_low)
+    n = angles.size
+    for i in range(n):
+        number, number_low = multiply(travel, travel_low, waves[n + i], waves[2 * n + i])
         fraction = (number - math.floor(number)) + number_low
-        angles[i] = wave.phase - TWO_PI * fraction
+        angles[i] = waves[i] - TWO_PI * fraction
+
+
+@kernel(void(float64, float64, LAYER))
+def turn(travel: float, travel_low: float, layer: Layer) -> None:
+    """The wheel has travelled so far (m): its phases, or its place on the grid of the window."""
+    window, at, n = layer.window, layer.pad.turns_at, layer.angles.size
+    if window.rows == 0:
+        wheel_angles(layer.tables[at : at + 3 * n], travel, travel_low, layer.angles)
+        return
+    points = np.floor(travel / window.spacing + 0.5)
+    grid, grid_low = two_product(points, window.spacing)
+    window.points, window.travel = points, (travel - grid) + (travel_low - grid_low)

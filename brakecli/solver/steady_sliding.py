@@ -7,18 +7,18 @@ from typing import Any
 
 import numpy as np
 from numba import float64, void
-from numpy.typing import NDArray
 
 from brakecli.errors import CaseError, Problem
 from brakecli.solver.compile import Floats, at_address, borrowed, kernel, vector
 from brakecli.solver.contact.closed_form import CLEAR, FULL, coverage
 from brakecli.solver.contact.pad import build_layer
-from brakecli.solver.records import EVALUATE, LAYER, WAVES, Layer
-from brakecli.solver.roughness import wheel_angles
+from brakecli.solver.records import EVALUATE, LAYER, Layer
+from brakecli.solver.roughness import turn
 from brakecli.solver.system import System
 
 PLACES = 1024
 """Positions of the wheel that an average takes, over 50 of its longest waves."""
+_LONGEST = 50.0
 TABLE = 129
 
 _evaluate_at = at_address(EVALUATE)
@@ -38,17 +38,27 @@ class SteadySliding:
     contact_fraction: float
 
 
-@kernel(void(float64, vector, vector, WAVES, LAYER, vector))
-def add_places(y: float, places: Floats, weights: Floats, waves: NDArray[Any], layer: Layer, sums: Floats) -> None:
+@kernel(void(float64, vector, vector, LAYER, vector))
+def add_places(y: float, places: Floats, weights: Floats, layer: Layer, sums: Floats) -> None:
     """Add force, stiffness and touching part at places of the wheel, with their weights."""
     layer = borrowed(layer)
     contact = layer.contact
     for i in range(places.size):
-        wheel_angles(waves, places[i], 0.0, layer.angles)
+        turn(places[i], 0.0, layer)
         _evaluate_at(layer.evaluate)(0.0, y, layer)
         sums[0] += weights[i] * contact.normal_force
         sums[1] += weights[i] * contact.stiffness
         sums[2] += weights[i] * contact.fraction
+
+
+def averaged_length(system: System) -> float:
+    """Travel of the wheel (m) that an average is taken over."""
+    return _LONGEST / float(system.wheel.turns.min()) if len(system.wheel.g) else 0.0
+
+
+def fills_window(system: System) -> bool:
+    """Whether the places are so near each other that a window is filled sooner than each of them is summed."""
+    return 0.0 < system.window_rows * averaged_length(system) < PLACES * 2.0 * system.half_length
 
 
 def mean_contact(system: System, y: float) -> tuple[float, float, float]:
@@ -64,10 +74,11 @@ def mean_contact(system: System, y: float) -> tuple[float, float, float]:
         return 0.0, 0.0, 0.0
     if covered == FULL:
         return -pad.k * length * (y + pad.shoe_mean), pad.k * length, 1.0
-    places = np.zeros(1) if wheel.g.size == 0 else 50.0 / wheel.turns.min() * (np.arange(PLACES) + 0.5) / PLACES
+    places = np.zeros(1) if wheel.g.size == 0 else averaged_length(system) * (np.arange(PLACES) + 0.5) / PLACES
     weights = np.ones(1) if wheel.g.size == 0 else 2.0 * np.sin(np.pi * (np.arange(PLACES) + 0.5) / PLACES) ** 2
     found = np.zeros(3)
-    add_places(y, places, weights, wheel.waves, build_layer(system.evaluate, system.pad), found)
+    layer = build_layer(system.evaluate, system.pad, moving=fills_window(system))
+    add_places(y, places, weights, layer, found)
     force, stiffness, fraction = found / len(places)
     return float(force), float(stiffness), float(fraction)
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from brakecli.errors import RefusedError
 from brakecli.solver import contact, schemes
-from brakecli.solver.contact.pad import Pad, build_pad, default_nodes
+from brakecli.solver.contact.pad import Pad, build_pad, default_nodes, window_rows, window_width
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.method import MOST, Method
 from brakecli.solver.records import Coefficients, Grid, Weights
@@ -68,11 +68,17 @@ class System:
         build = _build_small if self.table_bytes < _SMALL_TABLES else build_pad
         return build(self.layer_stiffness, self.half_length, self.shoe, self.wheel, self.nodes)
 
-    @property
+    @cached_property
     def table_bytes(self) -> float:
-        """Memory that `pad` takes while it is made: values at nodes, and two numbers for each pair of waves."""
+        """Memory of the contact: values at nodes, a window, two numbers for each pair of waves."""
         terms, nodes = len(self.shoe.g) + len(self.wheel.g), self.nodes
-        return 8.0 * (nodes * (2.0 * len(self.wheel.g) + 2.0) + 2.0 * terms**2)
+        at_nodes = nodes * (2.0 * len(self.wheel.g) + 3.0) + self.window_rows * window_width(nodes)
+        return 8.0 * (at_nodes + 2.0 * terms**2)
+
+    @property
+    def window_rows(self) -> int:
+        """Points of the grid of a window to a node, see `solver.heights`; 0 without one."""
+        return window_rows(self.wheel, 2.0 * self.half_length / self.nodes) if self.nodes else 0
 
     def refuse_tables(self) -> None:
         """Raise RefusedError where the tables of the contact would be too large."""
@@ -82,7 +88,7 @@ class System:
             remedy = "reduce contact.nodes, or the number of waves in roughness"
             raise RefusedError(f"{what} {self.table_bytes / 1e9:.3g} GB of memory; {remedy}")
 
-    @property
+    @cached_property
     def evaluator(self) -> str:
         """The contact evaluator that runs: "auto" is "closed-form" on smooth surfaces."""
         if self.method.evaluator != "auto":
@@ -94,7 +100,7 @@ class System:
         """Whether the contact evaluator seeks the edges of every patch that touches."""
         return contact.EVALUATORS[self.evaluator].finds_patches
 
-    @property
+    @cached_property
     def nodes(self) -> int:
         """Quadrature nodes; 0 where no quadrature can be needed."""
         if not contact.EVALUATORS[self.evaluator].needs_nodes:
@@ -170,7 +176,7 @@ class System:
         """h, s; the sample interval where the scheme finds its steps itself, unless they are exact."""
         return self.interval / self.per_sample
 
-    @property
+    @cached_property
     def samples(self) -> int:
         """Samples after the one at t = 0."""
         return _at_least(self.duration / self.interval)

@@ -123,7 +123,7 @@ def search(
         # Beside stable sliding it may yet fade away, or has not yet come to where it lasts.
         times, before, longest = 1.0, cast("Verdict | Known | None", None), LONGER * case.solver.duration
         with within_range():
-            known = early(system_of(changed(case, solver={"duration": longest})))
+            known = early(system_of(changed(case, solver={"duration": longest})), seen=False)
         answer = _fades(known.verdict, longest, unstable, linear) if known is not None else None
         if answer is not None:
             return answer

@@ -22,7 +22,7 @@ from brakecli.analysis.regime.forced import QUARTER
 from brakecli.analysis.regime.linear import Linear, linear_theory
 from brakecli.analysis.regime.verdict import Excitation, Regime
 from brakecli.analysis.stability.modes import is_undamped
-from brakecli.runs.tolerance import ROUNDING, Certificate
+from brakecli.runs.certificate import ROUNDING, Certificate
 from brakecli.solver.compile import Floats
 from brakecli.solver.motion import Work
 from brakecli.solver.records import BELT, FLOW, LOAD, new
@@ -36,7 +36,7 @@ _POWERS = 10.0  # of e, by which what is left then fades until the end: drift is
 _SETTLED_PART = 0.35  # of the run, at least: a quarter and the width of windows
 _CYCLES = 5.0  # in a window of its envelope: of fewer, windows differ by where they cut the cycles
 _SAMPLES = 40.0  # in a cycle, so that its shape is seen
-_SEEN = 2.5  # samples in a stick, or off the wheel
+_SEEN = 1.2  # samples in a stick, or off the wheel: one falls into each, also where the orbit is not reached yet
 _WINDOW = 0.05  # of the run, by which a whole run may see the settled part begin earlier or later
 
 
@@ -73,8 +73,11 @@ class Early(NamedTuple):
     certificate: Certificate | None
 
 
-def early(system: System) -> Early | None:
-    """The verdict on the motion of a system before its end; None where none is certain."""
+def early(system: System, *, seen: bool = True) -> Early | None:
+    """The verdict on the motion of a system before its end; None where none is certain.
+
+    Unless it has to be `seen` by a whole run, too, an orbit counts however its samples would show it.
+    """
     theory = _theory(system)
     if theory is None:
         return None
@@ -91,7 +94,7 @@ def early(system: System) -> Early | None:
     if outcome == LINEAR:
         found = _linear(system, theory, flow, o)
     else:
-        found = _cycle(system, theory, flow, o) if outcome == FOUND else None
+        found = _cycle(system, theory, flow, o, seen) if outcome == FOUND else None
     if found is None:
         return None
     verdict, end = found
@@ -156,7 +159,7 @@ def _linear(system: System, theory: Linear, flow: Any, o: Any) -> tuple[Known, l
     return Known(regime, Excitation.NONE, (reason,), None, *numbers, False, start, slope), last.tolist()
 
 
-def _cycle(system: System, theory: Linear, flow: Any, o: Any) -> tuple[Known, list[float]] | None:
+def _cycle(system: System, theory: Linear, flow: Any, o: Any, seen: bool) -> tuple[Known, list[float]] | None:
     """The verdict on an orbit that the motion has come to well before the end of the run, and a state on it."""
     end, period, interval = system.sampled_duration, float(o.period), system.interval
     factor = float(np.abs(np.linalg.eigvals(o.map)).max())
@@ -167,18 +170,18 @@ def _cycle(system: System, theory: Linear, flow: Any, o: Any) -> tuple[Known, li
     part, growth = end - start, abs(theory.mode.growth)
     stick, clear = float(o.spent[STICK]), float(o.spent[OPEN])
     limited = period - float(o.spent[o.sliding])
-    if (
-        rate * part < _POWERS
-        or part < _SETTLED_PART * end
+    hidden = (
+        part < _SETTLED_PART * end
         or end < _CYCLES * WINDOWS * period
         or period < _SAMPLES * interval
         or min(limited, stick or limited, clear or limited) < _SEEN * interval
         or o.beaten.tolist() != [1, 1]
-    ):
+    )
+    if rate * part < _POWERS or (seen and hidden):
         return None
     undamped = is_undamped(system.coefficients)
     lasts = growth * (part - _WINDOW * end) >= 1.0 and not undamped
-    if not lasts and (theory.direction < 0 or (growth * end >= 1.0 and not undamped)):
+    if seen and not lasts and (theory.direction < 0 or (growth * end >= 1.0 and not undamped)):
         return None  # whether the vibration lasts depends on where exactly a whole run sees it settled
     c, how = system.coefficients, "with" if stick > 0.0 else "without"
     force = (c.c_xx * float(o.mean_x) + c.c_xy * float(o.mean_y)) / period + system.load_at_start * c.sin_beta

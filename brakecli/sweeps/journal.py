@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.errors import BrakecliError, CannotWriteError, RefusedError
+from brakecli.errors import BrakecliError, CannotWriteError, RefusedError, value_text
 from brakecli.files.atomic import explained, open_own
 from brakecli.sweeps.plan import Plan
 from brakecli.sweeps.point import Status, record_type
@@ -210,8 +210,10 @@ def _checksum(place: tuple[int, int, int], packed: bytes) -> int:
 
 def identity(plan: Plan) -> dict[str, Any]:
     """What makes a sweep this one: every key of the sweep and its case, and the versions it is computed with."""
-    sweep = tomllib.loads(plan.sweep_text)
-    return {**fingerprint(), **dict(_flat(plan.case_keys, "", "")), **dict(_flat(sweep, "sweep ", ""))}
+    sweep, case = tomllib.loads(plan.sweep_text), dict(_flat(plan.case_keys, "", ""))
+    profiles = [Path(text) for key, text in case.items() if key.endswith(".profile")]
+    measured = {f"checksum of {path.name}": zlib.crc32(path.read_bytes()) for path in profiles}
+    return {**fingerprint(), **case, **measured, **dict(_flat(sweep, "sweep ", ""))}
 
 
 def _flat(value: Any, path: str, dot: str = ".") -> Iterator[tuple[str, Any]]:
@@ -234,7 +236,8 @@ def _refusal(found: bytes, own: Mapping[str, Any]) -> str:
         return "holds no finished points; remove it, or start again with --force"
     if not keys:
         return ""
-    each = [f"{key} was {there.get(key, 'not set')!s:.60}, is {own.get(key, 'not set')!s:.60}" for key in keys]
+    were, are = ({key: value_text(held.get(key, "not set")).strip('"') for key in keys} for held in (there, own))
+    each = [f"{key} was {were[key]}, is {are[key]}" for key in keys]
     each[MOST_DIFFERENCES:] = [f"and {more} more"] if (more := len(keys) - MOST_DIFFERENCES) > 0 else []
     remedy = "undo the change to go on, or start again with --force, which drops the finished points"
     return f"holds finished points of another sweep: {', '.join(each)}; {remedy}"

@@ -13,6 +13,7 @@ import tomli_w
 from brakecli.analysis.stability.follow import followed
 from brakecli.analysis.stability.report import is_stable, stability
 from brakecli.analysis.stability.search import bisect
+from brakecli.case.case import given_toml
 from brakecli.case.read import LoadedCase
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError
@@ -22,7 +23,7 @@ from brakecli.files.field import Field, values_of
 from brakecli.files.write import new_result
 from brakecli.runs.run import origin
 from brakecli.solver.system import System
-from brakecli.sweeps.plan import Plan, given_toml
+from brakecli.sweeps.plan import Plan
 from brakecli.sweeps.result import unit
 from brakecli.sweeps.tables import Axis
 

@@ -13,14 +13,18 @@ import tomli_w
 from pydantic import ValidationError
 
 from brakecli.case import wording
-from brakecli.case.case import Case
+from brakecli.case.case import Case, given_toml
 from brakecli.case.read import LoadedCase, key_path, parse_case, parse_table, put, read_text
+from brakecli.case.tables import Table
 from brakecli.case.toml_lines import Located, innermost
 from brakecli.errors import CaseError, KeyPath, Problem
 from brakecli.files import fields
 from brakecli.sweeps.tables import Axis, Sweep
 
 MOST_TRIED = 1000  # listed values of an axis that are tried before the sweep starts; of a range it is both ends
+
+_ALONE = ("shoe", "wheel", "link1", "link2", "load", "friction", "contact", "solver")
+"""Tables of a case that hold nothing which follows from another table."""
 
 Settings = dict[tuple[str, ...], Any]
 """Values by key path, to be put into the base case."""
@@ -42,6 +46,7 @@ class Plan:
         self.points = math.prod(self.shape)  # of the grid
         # the axis along which the motion is followed, and how often that is: twice both up and down
         self.followed = next((index for index, axis in enumerate(axes) if axis.direction), None)
+        self._valid = dict[str, Table]()  # tables of the case that no point has changed
         self.passes = 2 if any(axis.direction == "both" for axis in axes) else 1
         sizes = {axis.name: axis.size for axis in axes} or {"point": 1}
         self.dimensions = {"direction": 2, **sizes} if self.passes == 2 else sizes  # of the result
@@ -71,8 +76,13 @@ class Plan:
         data = _tables(self.case_keys)
         for path, value in settings.items():
             put(data, path, value, Case, kept=settings)
+        touched = {path[0] for path in settings}
+        same = [name for name in _ALONE if name not in touched and data.get(name) == self.case_keys.get(name)]
+        data |= {name: self._valid[name] for name in same if name in self._valid}
         try:
-            return Case.model_validate(data)
+            case = Case.model_validate(data)
+            self._valid |= {name: getattr(case, name) for name in same}
+            return case
         except ValidationError as error:
             for each in error.errors(include_url=False):
                 path = tuple(map(str, each["loc"]))
@@ -94,11 +104,6 @@ class Plan:
 def _tables(data: dict[str, Any]) -> dict[str, Any]:
     """The data of a table whose tables, but no lists, are copies."""
     return {key: _tables(value) if isinstance(value, dict) else value for key, value in data.items()}
-
-
-def given_toml(table: Sweep | Case) -> str:
-    """The keys of a table that were given, as TOML."""
-    return tomli_w.dumps(table.model_dump(mode="json", exclude_unset=True, exclude_none=True))
 
 
 @lru_cache(maxsize=4)
@@ -147,7 +152,13 @@ def sweep_of(tables: dict[str, Any], base: LoadedCase) -> LoadedSweep:
 
 def _checked(sweep: Sweep, text: str, name: str, base: LoadedCase) -> LoadedSweep:
     """A sweep over a case; raises `CaseError` where its axes do not fit."""
-    plan = Plan(given_toml(sweep), given_toml(base.case))
+    given = tomli_w.dumps(sweep.model_dump(mode="json", exclude_unset=True, exclude_none=True))
+    keys = [key_path(text) for axis in sweep.axis if not axis.direction for text in axis.parameter]
+    keys += [key_path(sweep.critical.parameter)] if sweep.critical else []
+    # Other keys leave the sines of a measured profile as they are: workers elsewhere do without its file. Along a
+    # line the wheel keeps its waves.
+    anew = any(path[0] == "roughness" or path in (("wheel",), ("wheel", "radius")) for path in keys)
+    plan = Plan(given, given_toml(base.case, profiles=anew))
     if problems := _wrong_values(plan, text, name):
         raise CaseError(problems)
     resolved = tomli_w.dumps(sweep.model_dump(mode="json", exclude_none=True))

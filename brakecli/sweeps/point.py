@@ -19,10 +19,10 @@ from brakecli.case.system import system_of
 from brakecli.errors import BrakecliError
 from brakecli.files import fields
 from brakecli.files.field import values_of
+from brakecli.runs.certificate import Certificate, Certified
 from brakecli.runs.limits import Check, check, refuse, within_range
 from brakecli.runs.run import motion_of
 from brakecli.runs.together import TOGETHER, certify_together
-from brakecli.runs.tolerance import Certificate, Certified
 from brakecli.solver.history import array_history
 from brakecli.solver.motion import Motion
 from brakecli.solver.roughness import TWO_PI, wheel_angles
@@ -64,7 +64,7 @@ class Outcome:
 
 
 def simulate(case: Case, *, whole: bool = True) -> Outcome:
-    """Run a case in memory, to its end or, unless `whole`, only until its verdict is known.
+    """Run a case in memory, to its end or, unless `whole`, only until what a sweep keeps is known.
 
     Raises RefusedError, and CaseError where it has no start.
     """
@@ -92,7 +92,7 @@ def _judged(case: Case, found: Check, certified: Certified | None, *, whole: boo
             if not np.isfinite(motion.rows).all():
                 raise FloatingPointError("a force overflows")
             history = array_history(system.interval, motion.rows)
-            verdict = verdict_on(history, system, motion.work.failure_sentence)
+            verdict = verdict_on(history, system, motion.work.failure_sentence, in_full=whole)
     told = (text for text in verdict.reasons[1:] if "torque_variation" not in text)  # no number of a sweep
     warnings, work = [*found.warnings, *told], motion.work
     if work.unconverged_steps and not work.failed:
@@ -171,7 +171,10 @@ def next_start(outcome: Outcome) -> Settings:
         wheel_angles(system.wheel.waves, *integral_at(system.belt, system.sampled_duration, 0.0), angles)
         phases = iter(angles)  # a wave without amplitude has no phase
         turned = [math.degrees(next(phases) % TWO_PI) if g else 0.0 for g in wheel.sines()["amplitudes"]]
-        start["roughness", "wheel", "phases_deg"] = turned
+        if wheel.profile is None:
+            start["roughness", "wheel", "phases_deg"] = turned
+        else:
+            start["roughness", "wheel"] = {**wheel.sines(), "phases_deg": turned}
     return start
 
 

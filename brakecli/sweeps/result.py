@@ -107,8 +107,10 @@ def write(result: ResultFile, report: SweepReport, journal: Journal) -> None:
     if "direction" in found.dimensions:
         result.axis("/", fields.DIRECTION, np.array(["up", "down"]))
     for axis in plan.sweep.axis:
-        data = np.array(_values(axis), np.float64) if axis.numeric else np.array([*map(label, _values(axis))])
-        field = Field(axis.name, unit(axis.parameter[0]), ", ".join(axis.parameter))
+        about, given = key_schema(Case, key_path(axis.parameter[0])), {*map(type, _values(axis))}
+        number = "i8" if given == {int} and about.get("type") == "integer" else "f8"
+        data = np.array(_values(axis), number) if axis.numeric else np.array([*map(label, _values(axis))])
+        field = Field(axis.name, unit(axis.parameter[0]), ", ".join(axis.parameter), number)
         result.variable("/", field, (axis.name,), data, parameters=list(axis.parameter))
     if not plan.sweep.axis:
         result.axis("/", fields.BASE_POINT, np.zeros(1))

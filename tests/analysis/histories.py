@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
+from brakecli.analysis.regime.classify import classify
 from brakecli.analysis.regime.of_run import context
-from brakecli.analysis.regime.rules import classify
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.case.system import system_of
 from brakecli.solver.history import History, array_history

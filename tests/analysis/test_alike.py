@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brakecli.analysis.regime.rules import classify
+from brakecli.analysis.regime.classify import classify
 from brakecli.analysis.regime.spectra import peak, spectrum
 from brakecli.analysis.regime.verdict import Context, Excitation, Regime
 from brakecli.case.system import system_of

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from brakecli.analysis.regime.classify import classify
 from brakecli.analysis.regime.forced import forced_lines
-from brakecli.analysis.regime.rules import classify
 from brakecli.analysis.regime.verdict import Context, Excitation, Regime, Thresholds
 from brakecli.solver.history import History
 from tests.analysis.histories import INTERVAL, history_of, verdict_of
@@ -103,7 +103,7 @@ def test_stick_in_some_cycles_only_is_irregular() -> None:
 
 
 def test_a_line_of_the_roughness_is_forced_and_another_is_not() -> None:
-    lines = forced_lines(2.0, [1.0 / 0.02], 5000.0)
+    lines = forced_lines(2.0, (1.0 / 0.02,), 5000.0)
     assert lines[0] == pytest.approx(100.0)
     assert len(lines) == 10
     forced = classify(shaken(np.sin(2 * np.pi * 100.0 * TIME)), Context(2.0, True, lines))
@@ -126,7 +126,7 @@ def test_where_sliding_is_unstable_a_motion_is_not_forced(
 ) -> None:
     """By its growth over the whole run: none, none but rounding, too little to see, and enough from any start."""
     duration = len(TIME) * (TIME[1] - TIME[0])
-    lines = forced_lines(2.0, [1.0 / 0.02], 5000.0)
+    lines = forced_lines(2.0, (1.0 / 0.02,), 5000.0)
     known = Context(2.0, True, lines, growth=lambda: powers_of_e / duration)
     motion = shaken if regime is Regime.DAMPED else made
     verdict = classify(motion(np.sin(2 * np.pi * 100.0 * TIME)), known)
@@ -204,7 +204,7 @@ def test_evidence_names_lines_harmonics_and_powers() -> None:
 
 
 def test_lines_of_the_roughness_are_distinguished_from_others() -> None:
-    lines = forced_lines(2.0, [1.0 / 0.02], 5000.0)
+    lines = forced_lines(2.0, (1.0 / 0.02,), 5000.0)
     both = np.sin(2 * np.pi * 100.0 * TIME) + np.sin(2 * np.pi * 151.0 * TIME + 1.0)
     evidence = classify(made(both), Context(2.0, True, lines)).evidence
     found = dict(zip(evidence["line_frequencies"], evidence["line_forced"], strict=True))
@@ -267,3 +267,29 @@ def test_impacts_of_less_than_a_sample_show_in_some_cycles_or_are_missed(
         assert verdict.torque_variation is None
     else:
         assert verdict.torque_variation == pytest.approx(800.0, rel=0.03)  # (π/13)²/2
+
+
+@pytest.mark.parametrize(
+    ("waves", "turns"),
+    [
+        ([1, 7], 1.0),
+        ([2, 3], 1.0),
+        ([4, 6], 0.5),
+        ([6.0], 1 / 6),
+        ([0.5, 2.5], 2.0),
+        ([2.5], 0.4),
+        ([1.3, 4], 1 / 1.3),
+    ],
+)
+def test_the_variation_of_the_torque_needs_the_time_in_which_the_waves_repeat(
+    waves: list[float], turns: float
+) -> None:
+    turn = 2.0 * np.pi * 0.4 / 3.0  # s, at 3 m/s
+    passing = tuple((wave / turn, 1e-6) for wave in waves)
+    context = Context(-3.0, radius=0.4, waves=(*passing, (0.01, 1e-12)))  # a weak wave is not waited for
+    assert context.pattern == pytest.approx(turns * turn)
+    history = history_of(len(TIME), state=-1.0)  # damped
+    reasons = classify(history, Context(3.0, waves=((0.9 / TIME[-1], 1e-6),))).reasons
+    assert any("torque_variation needs" in each for each in reasons)
+    reasons = classify(history, Context(3.0, waves=((60.0, 1e-6),))).reasons
+    assert not any("torque_variation needs" in each for each in reasons)

@@ -60,7 +60,7 @@ def test_growth_with_slopes_is_that_of_the_monodromy(systems: int) -> None:
         if np.abs(bends).sum() > 0.25:  # the theory is of the first order in it
             continue
         found += 1
-        p = np.outer(np.concatenate([np.zeros(2), push]), [1.0, 0.0, 0.0, 0.0])
+        p = np.concatenate([np.zeros(2), push])
         rate, off = growth_with_slopes(a, p, -omega, g * k * np.exp(1j * phase), bends)
         # The integration is exact to 1e-9 a period of about 10.
         exact = floquet(a, b, push, (g, k, omega, phase), 12.0 * math.pi / omega[0])

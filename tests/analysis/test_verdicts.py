@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from brakecli.analysis.regime.classify import classify
 from brakecli.analysis.regime.of_run import verdict_on
-from brakecli.analysis.regime.rules import classify
 from brakecli.analysis.regime.verdict import Context, Excitation, Regime
 from brakecli.analysis.stability.report import stability
 from brakecli.case.system import system_of

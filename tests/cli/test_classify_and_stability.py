@@ -192,3 +192,20 @@ def test_stability_varies_a_key(here: Path) -> None:
     assert {"critical", "friction", "of", "the", "scheme"} <= {*table.out.partition("Along ")[2].split()}
     kinds = [entry["instability"] for entry in numbers.json["vary"]]
     assert kinds == ["divergence", None, "flutter"]
+
+
+def test_a_force_of_the_contact_is_not_taken_for_that_of_the_spring_without_a_word(here: Path) -> None:
+    brakecli("export", "run.h5", "-o", "run.csv", "-q", cwd=here).told(0)
+    table = ["classify", "run.csv", "--time-column", "time (s)", "--column"]
+    done = each(
+        here,
+        [
+            [*table, "friction_force (N)", "--quantity", "force"],
+            [*table, "normal_force (N)", "--quantity", "force"],
+            ["classify", "run.h5:/history/friction_force", "--sample-rate", "20000", "--quantity", "force"],
+            [*table, "vx (m/s)", "--quantity", "velocity"],
+            ["classify", "saw.csv", "--time-column", "t", "--column", "force", "--quantity", "force"],
+        ],
+    )
+    said = ["a force of the contact jumps where slip ends" in each.err for each in done]
+    assert said == [True, True, True, False, False]

@@ -1,5 +1,7 @@
 """What a result holds, how two of them differ, and numbers for other programs."""
 
+import math
+import re
 import wave
 from importlib import import_module
 from pathlib import Path
@@ -11,6 +13,8 @@ import pytest
 
 from brakecli import __version__
 from brakecli.files import fields
+from brakecli.files.read import open_result
+from brakecli.plots import two
 from tests.commands import TINY, attributes, brakecli, each, left_in
 
 pandas = import_module("pandas")
@@ -94,6 +98,27 @@ def test_spectra_and_chosen_variables_are_exported(folder: Path, tmp_path: Path)
     np.testing.assert_array_equal(table["vx ((m/s)^2/Hz)"], history(folder / "a.h5", "vx", "spectrum"))
 
 
+def test_the_windows_of_a_stop_are_exported(tmp_path: Path) -> None:
+    (tmp_path / "tiny.toml").write_text(SQUEAL)
+    stop = "wheel={radius=0.5, times=[0.0, 0.5], angular_speeds=[0.4, 0.1]}"
+    groups = {"over_time": 1, "spectrogram": 2, "vibrations": 1}
+    exports = [["export", "r.h5", "-q", "--group", group, "-o", f"{group}.csv"] for group in groups]
+    for done in each(tmp_path, [["run", "tiny.toml", "-q", "-o", "r.h5", "--set", stop], *exports]):
+        done.told(0)
+    for group, axes in groups.items():
+        table = pandas.read_csv(tmp_path / f"{group}.csv")
+        with h5py.File(tmp_path / "r.h5") as file:
+            assert {head.partition(" ")[0] for head in table.columns} == {*file[group]}
+            assert [*table.columns[:axes].str.partition(" ").get_level_values(0)] == {
+                "over_time": ["time"],
+                "spectrogram": ["time", "frequency"],
+                "vibrations": ["interval"],
+            }[group]
+            for head in table.columns[axes:]:
+                held = file[group][head.partition(" ")[0]][:].ravel()
+                np.testing.assert_array_equal(table[head].fillna(held.max()), held)
+
+
 def test_a_sweep_and_modes_are_a_row_for_each_point(folder: Path, tmp_path: Path) -> None:
     (tmp_path / "tiny.toml").write_text(TINY)
     (tmp_path / "grid.toml").write_text(GRID)
@@ -150,14 +175,44 @@ def test_a_sound_tells_what_cannot_be_heard(tmp_path: Path) -> None:
     assert "of the power of vx is above 22050 Hz and not in the sound" in done.told(0)
 
 
+@pytest.mark.parametrize("mass", [1e3, 1e7])
+def test_a_tone_below_hearing_is_told_whether_it_is_sustained_or_not(tmp_path: Path, mass: float) -> None:
+    (tmp_path / "tiny.toml").write_text(TINY.replace("{ step = 1e-5, duration = 0.02 }", "{ duration = 3.0 }"))
+    lowest = math.sqrt(1e7 / mass) / (2.0 * math.pi)  # Hz; the stiffer spring is 1.2e7 N/m and the contact 2e6 N/m
+    change = [
+        "--set",
+        f"shoe.mass={mass}",
+        "--set",
+        "output.sample_interval=1e-3",
+        "--set",
+        "wheel.angular_speed=1",
+    ]
+    done = each(tmp_path, [["run", "tiny.toml", "-q", "-o", "r.h5", *change], ["export", "r.h5", "-o", "r.wav"]])
+    found = re.search(r"the vibration at (\S+) Hz cannot be heard", done[1].told(0))
+    assert found
+    assert 0.5 * lowest < float(found[1]) < 2.0 * lowest + 1.0 / 3.0  # Hz, the distance of lines of 3 s
+
+
+def test_samples_that_are_not_equally_spaced_make_no_sound(folder: Path, tmp_path: Path) -> None:
+    (tmp_path / "r.h5").write_bytes((folder / "a.h5").read_bytes())
+    with h5py.File(tmp_path / "r.h5", "r+") as file:
+        time = file["history/time"]
+        time[:] = time[-1] * (time[:] / time[-1]) ** 1.1
+    brakecli("export", "r.h5", "-o", "r.wav", cwd=tmp_path).told(2, "its samples are not equally spaced")
+    brakecli("export", "r.h5", cwd=tmp_path).told(0)
+
+
 ERRORS = [
     (
         ["a.h5", "-o", "a.txt"],
-        "a.txt: its suffix does not name a kind of file; name one that ends in .csv or .wav",
+        "its suffix does not name a kind of file (found '.txt'); name a file that ends in .csv or .wav with -o",
     ),
     (["modes.h5", "-o", "a.wav"], "a.wav: is for runs, and modes.h5 is a stability"),
     (["modes.h5", "-o", "m.csv", "--group", "history"], "--group history: is for runs"),
-    (["a.h5", "-o", "a.csv", "--group", "energy"], "--group energy: there is none; give one of history, spectrum"),
+    (
+        ["a.h5", "-o", "a.csv", "--group", "energy"],
+        "--group energy: there is none; give one of history, spectrum, over_time",
+    ),
     (["a.h5", "-o", "a.wav", "--group", "spectrum"], "a.wav: a sound is one variable of the history"),
     (["a.h5", "-o", "a.wav", "--variable", "x", "--variable", "y"], "a sound is one variable"),
     (["a.h5", "-o", "a.wav", "--variable", "state"], "--variable state: a.h5 has none; give one of"),
@@ -262,6 +317,38 @@ def test_of_two_lengths_the_first_samples_are_compared(folder: Path) -> None:
     assert (time["shapes"], time["compared"], time["different"]) == ([[5001], [2501]], 2501, 0)
 
 
+@pytest.mark.parametrize("interval", ["2e-4", "1.37e-4"])
+def test_samples_are_compared_at_the_same_time_and_lines_at_the_same_frequency(
+    folder: Path, tmp_path: Path, interval: str
+) -> None:
+    change = ["--set", f"output.sample_interval={interval}", "--set", "solver.duration=0.45"]
+    coarse, fine = tmp_path / "coarse.h5", folder / "a.h5"
+    brakecli("run", "tiny.toml", "-q", "-o", coarse, *change, cwd=folder).told(0)
+    for names, swap in (((fine, coarse), 1), ((coarse, fine), -1)):
+        found = brakecli("diff", *names, "--json", cwd=folder).json
+        variables = {(each["group"], each["name"]): each for each in found["variables"]}
+        times = history(coarse, "time")
+        for name, unit in (("vx", "m/s"), ("y", "m")):
+            expected = np.interp(times, history(fine, "time"), history(fine, name))
+            apart = np.abs(history(coarse, name) - expected).max()
+            each_ = variables["history", name]
+            assert each_["largest"] == pytest.approx(apart, rel=1e-9, abs=1e-15)
+            assert (
+                each_["relative"] < 0.02
+            )  # linear interpolation: (2 pi 174 Hz x 1e-4 s)^2 / 8 is 0.15 %, and kinks
+            assert (each_["compared"], each_["units"], each_["interpolated"]) == (len(times), unit, "time")
+            assert each_["shapes"][::swap] == [[5001], [len(times)]]
+        assert variables["history", "time"]["different"] == 0
+        lines, there = (history(path, "frequency", "spectrum") for path in (coarse, fine))
+        common = lines[lines <= there[-1]] if len(lines) < len(there) else there[there <= lines[-1]]
+        assert variables["spectrum", "vx"]["compared"] == len(common)
+        assert variables["spectrum", "vx"]["interpolated"] == "frequency"
+    numbers = {each["name"]: each.get("units") for each in found["numbers"]}
+    assert numbers["amplitude"] == "m"
+    shown = " ".join(brakecli("diff", fine, coarse, cwd=folder).out.split())
+    assert "compared at equal time and frequency; the finer result is interpolated" in shown
+
+
 def test_results_of_two_kinds_are_not_compared(folder: Path) -> None:
     brakecli("diff", "a.h5", "modes.h5", cwd=folder).told(2, "a.h5 is a run, and modes.h5 a stability")
 
@@ -271,6 +358,20 @@ def test_two_results_are_drawn_over_each_other(folder: Path, tmp_path: Path, nam
     done = brakecli("diff", *(folder / name for name in names), "-o", "d.png", "--json", cwd=tmp_path)
     assert done.json["output"] == "d.png"
     assert (tmp_path / "d.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_spectra_of_two_runs_have_the_unit_of_their_motion_and_envelopes_reach_its_end(folder: Path) -> None:
+    with open_result(folder / "a.h5") as a, open_result(folder / "b.h5") as b:
+        motion, whole, spectra = two.draw((a, b), "vx").axes
+    unit = motion.get_ylabel().rpartition("(")[2].rstrip(")")
+    assert unit == "mm/s"
+    assert f"(({unit})²/Hz)" in spectra.get_ylabel()
+    curves = [np.asarray(line.get_data()) for line in spectra.lines]
+    highest = max(np.nanmax(curve[1]) for curve in curves)
+    assert highest == pytest.approx(
+        1e6 * max(history(folder / f"{name}.h5", "vx", "spectrum").max() for name in "ab")
+    )
+    assert {np.asarray(line.get_xdata())[-1] for line in whole.lines} == {history(folder / "a.h5", "time")[-1]}
 
 
 def test_what_has_no_curves_is_refused_and_leaves_no_picture(folder: Path, tmp_path: Path) -> None:

@@ -172,7 +172,7 @@ def test_what_cannot_be_reported_is_refused_and_nothing_is_left(
     refused(r"ends in \.html", results[0], tmp_path / "r.pdf")
     (tmp_path / "mine.html").write_text("mine")
     refused("--force", results[0], tmp_path / "mine.html")
-    refused("a result itself", tmp_path / "mine.html", tmp_path / "mine.html", force=True)
+    refused("the result itself", tmp_path / "mine.html", tmp_path / "mine.html", force=True)
     refused("cannot be read as a result", tmp_path / "absent.h5", tmp_path / "r.html")
     with new_result(tmp_path / "other.h5", force=False) as result:
         result.set_attributes({"kind": "other"})

@@ -84,17 +84,20 @@ def case(seed: int, duration: float) -> System:
 def test_stability_costs_averages_of_the_contact_only_where_the_pad_opens_and_is_refused_if_they_take_days(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def waved(count: int, size: float) -> System:
-        waves: dict[str, Any] = {"amplitudes": [size / count] * count, "wavelengths": [0.01] * count}
+    def waved(count: int, size: float, longest: float = 0.01) -> System:
+        lengths = [longest] + [0.01] * (count - 1)
+        waves: dict[str, Any] = {"amplitudes": [size / count] * count, "wavelengths": lengths}
         return system_of(make(SQUEAL | {"roughness": {"wheel": waves}}))
 
     assert stability_seconds(system_of(make(SQUEAL))) == stability_seconds(waved(10, 1e-9)) == 0.0
     few, many = (stability_seconds(waved(count, 1e-3)) for count in (10, 100))
+    assert 0.0 < many < few  # places that are near each other have a window
+    few, many = (stability_seconds(waved(count, 1e-3, 20.0)) for count in (10, 100))
     assert many > 5.0 * few > 0.0
     assert sliding_text(waved(10, 1e-3)) is None
     monkeypatch.setattr("brakecli.runs.limits.MOST_SECONDS", few)
     with pytest.raises(RefusedError, match=r"pad that opens takes about .*; reduce contact\.nodes"):
-        sliding_text(waved(100, 1e-3))
+        sliding_text(waved(100, 1e-3, 20.0))
 
 
 def spent(system: System, most: float) -> float:

@@ -13,9 +13,11 @@ from brakecli.case.case import Case, changed
 from brakecli.case.system import system_of
 from brakecli.comparison.compare import errors
 from brakecli.errors import CaseError
+from brakecli.runs import ladder
 from brakecli.runs import tolerance as module
+from brakecli.runs.certificate import Certified
 from brakecli.runs.modelled import modelled
-from brakecli.runs.tolerance import Certified, certify
+from brakecli.runs.tolerance import certify
 from brakecli.solver.motion import solve
 from brakecli.solver.quantities import HISTORY
 from tests.campaign import campaign, counts
@@ -142,6 +144,21 @@ def test_nodes_that_agree_by_luck_are_doubled_again() -> None:
     assert kept(found, case, 1e-9) <= 1e-3
 
 
+def test_tolerances_that_agree_by_luck_leave_a_part_of_what_they_differed_by_before() -> None:
+    system = system_of(promised(OPEN, 1e-4, solver__duration=0.001))
+    on_nodes = replace(system, method=replace(system.method, evaluator="midpoint"))
+    motion = solve(replace(on_nodes, method=replace(on_nodes.method, nodes=64, tolerance=1e-3)))
+    closed, found = replace(motion.work, evaluators={"closed-form": 1}), list[Certified]()
+    runs = ladder.ladder(on_nodes)
+    rung = next(runs)
+    for scale in (1.002, 1.001, 1.0009999):
+        try:
+            rung = runs.send(replace(motion, system=rung, rows=scale * motion.rows, work=replace(closed)))
+        except StopIteration as end:
+            found.append(end.value)
+    assert found[0].certificate.estimated_error == pytest.approx(1e-3 / 20.0, rel=0.01)
+
+
 def test_the_edges_of_patches_that_hardly_move_do_not_break_a_certificate() -> None:
     """The wheel moves by 1 µm: the error of a sum over nodes is that of one position, and falls unevenly."""
     tables: dict[str, Any] = {
@@ -261,7 +278,7 @@ def test_what_happens_between_two_steps_is_not_overlooked(scheme: str, changes: 
 
 
 def test_what_no_step_can_follow_is_not_certified(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "MOST_DOUBLINGS", 4)
+    monkeypatch.setattr(ladder, "MOST_DOUBLINGS", 4)
     case = promised({**WAVE, "load": PULSE}, 1e-2, solver__scheme="two-layer")
     found = certify(system_of(case))
     assert not found.certificate.certified
@@ -312,7 +329,7 @@ def test_no_run_is_compared_with_itself() -> None:
 
 
 def test_steps_that_do_not_get_there_are_not_certified(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "MOST_DOUBLINGS", 4)
+    monkeypatch.setattr(ladder, "MOST_DOUBLINGS", 4)
     found = certify(system_of(promised(SQUEAL, 1e-8, solver__scheme="two-layer", solver__duration=0.05)))
     assert not found.certificate.certified
     assert found.certificate.estimated_error > 1e-8

@@ -16,7 +16,7 @@ from brakecli.sweeps.journal import open_journal
 from brakecli.sweeps.plan import LoadedSweep, read_sweep
 from brakecli.sweeps.workers.task import compute_units, fingerprint
 from tests.commands import ROOT, brakecli, left_in
-from tests.sweeps.helpers import frictions, inline, interrupted, write_sweep
+from tests.sweeps.helpers import axis, frictions, inline, interrupted, write_sweep
 
 pytestmark = pytest.mark.usefixtures("compiled")
 
@@ -82,6 +82,14 @@ def test_the_command_names_the_key_that_has_changed_and_starts_anew_with_force(t
     anew.told(0)
     assert anew.json["resumed_points"] == 0
     assert left_in(tmp_path) == {"tiny.toml", "s.toml", "s.h5"}
+
+
+def test_a_long_list_that_has_changed_is_told_by_its_beginning(tmp_path: Path) -> None:
+    loaded = write_sweep(tmp_path, axis("shoe.mass", f"values = {[*range(5, 35)]}"))
+    interrupted(loaded, tmp_path / "s.h5", compute_units, limit=4, task_size=3)
+    other = write_sweep(tmp_path, axis("shoe.mass", "values = [5, 6]"))
+    with pytest.raises(RefusedError, match=r"was \[5, 6, 7, 8, 9, …\], is \[5, 6\]; undo"):
+        inline(other, tmp_path / "s.h5", compute_units)
 
 
 def test_a_journal_of_the_same_sweep_is_taken_up(tmp_path: Path) -> None:

@@ -8,9 +8,13 @@ import numpy as np
 import pytest
 import tomli_w
 
+from brakecli.analysis.regime.of_run import verdict_on
 from brakecli.case.system import system_of
+from brakecli.files import fields
+from brakecli.files.field import values_of
 from brakecli.runs.together import TOGETHER, certify_together
 from brakecli.runs.tolerance import certify
+from brakecli.solver.history import array_history
 from brakecli.solver.method import Method
 from brakecli.solver.motion import solve
 from brakecli.sweeps.plan import LoadedSweep
@@ -63,6 +67,20 @@ def test_their_numbers_are_those_of_runs_alone(tmp_path: Path, num: int) -> None
         assert found["estimated_error"][point] <= TOLERANCE
         assert found["amplitude"][point] == pytest.approx(whole.verdict.amplitude, rel=2.0 * TOLERANCE)
         assert found["braking_torque"][point] == pytest.approx(whole.verdict.braking_torque, rel=2.0 * TOLERANCE)
+
+
+def test_what_a_sweep_leaves_out_of_a_verdict_changes_nothing_that_it_keeps(tmp_path: Path) -> None:
+    loaded, kept = rough(tmp_path, 5), [field for field in fields.POINT if field.at.startswith("verdict.")]
+    assert len(kept) > 8
+    for point in range(1, loaded.plan.points):
+        system = system_of(loaded.plan.case(loaded.plan.settings(point)))
+        (found,) = certify_together([system])
+        assert found is not None
+        history = array_history(system.interval, found.motion.rows)
+        whole, brief = (verdict_on(history, system, None, in_full=full) for full in (True, False))
+        one, other = (values_of(kept, {"verdict": verdict}) for verdict in (whole, brief))
+        assert one == other
+        assert whole.reasons == brief.reasons
 
 
 def test_one_that_leaves_its_lane_is_certified_alone() -> None:

@@ -53,7 +53,7 @@ class Part:
 
     def fraction(self, state: ContactState) -> float:
         """Part of the samples in a state of the contact."""
-        return sum(int(np.sum(piece == state)) for piece in self.pieces("state")) / (self.stop - self.start)
+        return sum(np.count_nonzero(piece == state) for piece in self.pieces("state")) / (self.stop - self.start)
 
     def extremes(self, name: str) -> tuple[float, float]:
         """Least and largest value of a variable."""

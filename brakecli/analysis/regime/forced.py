@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -32,7 +33,8 @@ SECOND_RUN = "a second run: brakecli classify RESULT.h5 --second-run"
 _COMBINATIONS = [(i, j, k) for i in range(-2, 3) for j in range(-2, 3) for k in (-1, 0, 1)]
 
 
-def forced_lines(belt_speed: float, waves_per_metre: Sequence[float], highest: float) -> tuple[float, ...]:
+@lru_cache(maxsize=4)  # the points of a sweep ask for the same ones
+def forced_lines(belt_speed: float, waves_per_metre: tuple[float, ...], highest: float) -> tuple[float, ...]:
     """Frequencies (Hz, up to `highest`) of the passing waves, their multiples, and sums and differences of two."""
     base = [abs(belt_speed) * waves for waves in waves_per_metre]
     multiples = {n * f for f in base for n in range(1, 11)}
@@ -40,7 +42,8 @@ def forced_lines(belt_speed: float, waves_per_metre: Sequence[float], highest: f
     return tuple(sorted(f for f in multiples | pairs if 0.0 < f <= highest))
 
 
-def subharmonics(belt_speed: float, waves_per_metre: Sequence[float], highest: float) -> tuple[float, ...]:
+@lru_cache(maxsize=4)
+def subharmonics(belt_speed: float, waves_per_metre: tuple[float, ...], highest: float) -> tuple[float, ...]:
     """Halves, thirds and quarters of the passing frequencies, their multiples, and sums of up to three."""
     base = [abs(belt_speed) * waves for waves in waves_per_metre]
     parts = {k * f / n for f in base for n in (2, 3, 4) for k in range(1, 4 * n)}
@@ -59,8 +62,8 @@ class ForcedRules:
         self.history, self.context, self.limits = history, context, limits
         self.duration = history.samples * history.interval
         self.whole = Part(history, 0, history.samples)
-        self.last = replace(self.whole, start=history.samples * (WINDOWS - 10) // WINDOWS)
-        self.settled_part, self.settled = replace(self.whole, start=history.samples // 2), False
+        self.last = Part(history, history.samples * (WINDOWS - 10) // WINDOWS, history.samples)
+        self.settled_part, self.settled = Part(history, history.samples // 2, history.samples), False
         self.theory: Linear | None = None  # where the motion is linear
         self.cycles: Cycles | None = None
         # m, half of peak to peak of what is forced and what is added

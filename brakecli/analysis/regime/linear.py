@@ -68,9 +68,8 @@ class Linear:
         """The same with the growth that the passing waves leave to the mode by their slopes."""
         if not len(self.waves):
             return self
-        p = np.outer(self.push, [1.0, 0.0, 0.0, 0.0])
         bends = np.outer(self.wavenumbers, self.waves[:, 0])
-        rate, off = growth_with_slopes(self.matrix, p, 2.0 * math.pi * self.passing, self.slopes, bends)
+        rate, off = growth_with_slopes(self.matrix, self.push, 2.0 * math.pi * self.passing, self.slopes, bends)
         off += _ROUNDING_WITH_SLOPES * float(np.abs(self.values).max())
         if not abs(rate) < math.inf:
             return replace(self, direction=0, known_to=math.inf)
@@ -79,18 +78,14 @@ class Linear:
 
     def forced(self, time: Array) -> tuple[Array, Array]:
         """Positions and velocities (rows x, y) that the waves force."""
-        position, velocity, at = np.zeros((2, time.size)), np.zeros((2, time.size)), time.tobytes()
-        for frequency, wave in zip(self.passing.tolist(), self.waves, strict=True):
-            turn, speed = _turn(frequency, at), 2.0 * math.pi * frequency
-            position += np.stack([wave.real, wave.imag], axis=1) @ turn
-            velocity += np.stack([-speed * wave.imag, speed * wave.real], axis=1) @ turn
-        return position, velocity
+        turns, speeds = _turns(tuple(self.passing.tolist()), time.tobytes()), 2.0 * math.pi * self.passing
+        position, velocity = self.waves.T, 1j * speeds * self.waves.T
+        found = [np.concatenate([each.real, each.imag], axis=1) @ turns for each in (position, velocity)]
+        return found[0], found[1]
 
     def _forced_x(self, time: Array) -> Array:
-        x, at = np.zeros(time.size), time.tobytes()
-        for frequency, wave in zip(self.passing.tolist(), self.waves[:, 0], strict=True):
-            x += np.array([wave.real, wave.imag]) @ _turn(frequency, at)
-        return x
+        x = self.waves[:, 0]
+        return np.asarray(np.concatenate([x.real, x.imag]) @ _turns(tuple(self.passing.tolist()), time.tobytes()))
 
     def parts(self, x: Array, time: Array) -> tuple[float, Array, Array, Array]:
         """What the waves force: half of peak to peak of x (m), beyond the run too, as waves beat.
@@ -125,11 +120,11 @@ class Linear:
         return max(math.log(min(bounds, default=1.0)), 0.0) / self.mode.growth
 
 
-@lru_cache(maxsize=16)  # the points of a sweep ask for the same ones
-def _turn(frequency: float, time: bytes) -> Array:
-    """Sine and cosine of a wave (Hz) at times (s)."""
-    angle = 2.0 * math.pi * (frequency * np.frombuffer(time) % 1.0)
-    return np.stack([np.sin(angle), np.cos(angle)])
+@lru_cache(maxsize=4)  # the points of a sweep ask for the same ones
+def _turns(frequencies: tuple[float, ...], time: bytes) -> Array:
+    """Sines, then cosines of waves (Hz) at times (s)."""
+    angles = 2.0 * math.pi * (np.outer(frequencies, np.frombuffer(time)) % 1.0)
+    return np.concatenate([np.sin(angles), np.cos(angles)])
 
 
 def linear_theory(system: System, belt: float) -> Linear | None:

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from brakecli.analysis.regime.classify import classify
 from brakecli.analysis.regime.evidence import Part
 from brakecli.analysis.regime.forced import forced_lines, subharmonics
 from brakecli.analysis.regime.linear import linear_theory
 from brakecli.analysis.regime.over_time import over_time
 from brakecli.analysis.regime.ripple import ripple
-from brakecli.analysis.regime.rules import classify
 from brakecli.analysis.regime.verdict import Context, Excitation, Feeds, Regime, Thresholds, Verdict
 from brakecli.analysis.stability.modes import growth, is_undamped, modes
 from brakecli.case.read import parse_case
@@ -65,9 +65,12 @@ def verdict_on(
     limits: Thresholds | None = None,
     feeds: Feeds = Feeds.UNKNOWN,
     sticks: float = 0.0,
+    *,
+    in_full: bool = True,
 ) -> Verdict:
     """The verdict on a motion; a run that has failed has none. `feeds`, `sticks`: what a second run has shown."""
-    verdict = classify(history, replace(context(system), feeds=feeds, sticks=sticks), limits or Thresholds())
+    known = replace(context(system), feeds=feeds, sticks=sticks)
+    verdict = classify(history, known, limits or Thresholds(), in_full=in_full)
     if not failure:
         return verdict
     verdict = replace(verdict, growth_rate=None, ringing_frequency=None, frequency=None, settled=False)
@@ -93,7 +96,7 @@ def context(system: System) -> Context:
 
     theory, turns, highest = (
         cache(partial(linear_theory, system, belt)),
-        system.wheel.turns.tolist(),
+        tuple(system.wheel.turns.tolist()),
         0.5 / system.interval,
     )
     swings = np.abs(known.waves[:, 0]) if turns and (known := theory()) else np.ones(len(turns))

@@ -45,12 +45,12 @@ def ripple(system: System, belt: float, stiffness: float, part: Part) -> Ripple 
     if not 0 < work <= _MOST_WORK or system.method.step is None or end.slides(None):
         return None
     pad = build_pad(system.layer_stiffness, system.half_length, system.shoe, system.wheel, _FINER * system.nodes)
-    layer, waves = build_layer(system.evaluate, pad), system.wheel.waves
+    layer = build_layer(system.evaluate, pad, moving=True)
     x, y, v_x, force = (part.history.read(name, end.start, end.stop) for name in ("x", "y", "vx", "normal_force"))
     travel = belt * part.history.interval * np.arange(end.start, end.stop) - x
     finer = np.zeros((samples, 3))
     for i, sums in enumerate(finer):
-        add_places(y[i], travel[i : i + 1], np.ones(1), waves, layer, sums)
+        add_places(y[i], travel[i : i + 1], np.ones(1), layer, sums)
     c, window = system.coefficients, np.hanning(samples)
     omega = 2.0 * math.pi * np.fft.rfftfreq(samples, part.history.interval)
     off, *seen = (np.fft.rfft((each - each.mean()) * window) for each in (force - finer[:, 0], x, v_x, force))
@@ -58,8 +58,10 @@ def ripple(system: System, belt: float, stiffness: float, part: Part) -> Ripple 
     (s_xx, s_xy), (s_yx, s_yy) = stiffness_matrix(c, stiffness, grip)
     a, b = s_xx - c.m * omega**2 + 1j * omega * c.b_xx, s_xy + 1j * omega * c.b_xy
     d, e = s_yx + 1j * omega * c.b_xy, s_yy - c.m * omega**2 + 1j * omega * c.b_yy
-    shaken = (grip * e - b) / (a * e - b * d) * off
-    pressed = off - stiffness * (a - grip * d) / (a * e - b * d) * off
+    if not (determinant := a * e - b * d).all():  # nothing holds the shoe
+        return None
+    shaken = (grip * e - b) / determinant * off
+    pressed = off - stiffness * (a - grip * d) / determinant * off
     in_x, in_vx, in_force = (
         min(float(np.linalg.norm(ours) / size), 1.0) if (size := np.linalg.norm(whole)) else 0.0
         for ours, whole in zip((shaken, 1j * omega * shaken, pressed), seen, strict=True)

@@ -9,9 +9,7 @@ import numpy as np
 from brakecli.analysis.regime.cycles import SIZE_OFF, Cycles, Drift, contact_length, cycles_of, median, swings
 from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, WINDOWS, Envelope, line
 from brakecli.analysis.regime.forced import GROWN, QUARTER, ForcedRules
-from brakecli.analysis.regime.spectra import segment
-from brakecli.analysis.regime.verdict import Context, Decision, Excitation, Feeds, Regime, Thresholds, Verdict
-from brakecli.solver.history import History
+from brakecli.analysis.regime.verdict import Decision, Excitation, Feeds, Regime
 from brakecli.solver.quantities import ContactState
 
 if TYPE_CHECKING:  # a measured signal needs no compiled code
@@ -26,13 +24,13 @@ _LONGER = 1.4  # a run whose last quarter and the window before it are settled, 
 _SPARSE = 8  # of the places at which a forced motion is computed, one of so many suffices
 _UNSETTLED = 1.5  # times as many cycles where nothing has settled: a hop may look like a vibration
 _FAR = 0.3  # rad, of a wave, by which what the shoe adds moves it
-_DEFAULT = Thresholds()
 
 
-class _Rules(ForcedRules):
+class Rules(ForcedRules):
     """The rules on one history, in their order. They gather evidence until one of them decides."""
 
     def contact(self) -> Decision | None:
+        """The shoe does not touch the wheel, or sticks to it throughout."""
         standing = self.context.belt_speed == 0.0
         if self.settled_part.fraction(ContactState.SEPARATED) == 1.0:
             never = self.whole.fraction(ContactState.SEPARATED) == 1.0
@@ -47,6 +45,7 @@ class _Rules(ForcedRules):
         return Decision("the shoe sticks throughout and is carried along by the wheel; run longer")
 
     def unmoved(self) -> Decision | None:
+        """There is nothing to judge, or nothing that could settle."""
         if self.history.samples < FEWEST_SAMPLES:
             return Decision(f"fewer than {FEWEST_SAMPLES} samples; run longer")
         envelope = self.envelope = Envelope(self.history)
@@ -184,6 +183,7 @@ class _Rules(ForcedRules):
         return Decision(f"{text}; run at least {longer:.2g} s longer")
 
     def sustained(self) -> Decision:
+        """What is left is a vibration that lasts, if enough of it is there: its cycles decide."""
         theory = self.context.linear() if not self.context.forced else None
         self.cycles = found = cycles_of(self.settled_part, theory.slip if theory else None, self.context.step)
         cycles = found.evidence["cycles"] if found else 0.0
@@ -295,56 +295,3 @@ class _Rules(ForcedRules):
             return None  # there is no end to it
         ends = min(abs(self.context.growth()) * self._settled_seconds, 1.0)
         return min(spread + abs(drift.part) * value / max(ends, 1e-9), value)
-
-
-def classify(history: History, context: Context, thresholds: Thresholds = _DEFAULT) -> Verdict:
-    """The regime of a run's history, by the rules of docs/regimes.md; the first that applies decides."""
-    rules = _Rules(history, context, thresholds)
-    decision = rules.decide()
-    part, belt, cycles = rules.settled_part, context.belt_speed, rules.cycles
-    sustained = cycles is not None and decision.excitation is Excitation.SELF_EXCITED
-    friction, torques = part.mean("friction_force"), part.extremes("friction_force")
-    evidence = rules.evidence | {f"amplitude_{name}": part.amplitude(name) for name in ("y", "vx", "vy")}
-    if belt != 0.0:
-        evidence["largest_vx_over_belt_speed"] = part.extremes("vx")[int(belt > 0.0)] / belt
-    evidence |= part.lines(context.forced, context.quiet) | (context.powers(part) if context.steady else {})
-    split = rules.parts or (None if rules.rings else rules.split())
-    forced, own = split if split and not (sustained and split[0] > split[1]) else (None, None)
-    amplitude, spread = rules.amplitude(decision)
-    ripple = context.ripple(part) if context.steady and not sustained else None
-    if ripple:
-        evidence |= {f"ripple_{name}": getattr(ripple, name) for name in ("x", "vx", "force")}
-        spread = spread + ripple.size if spread is not None else None
-    reasons = [decision.reason, *([ripple.sentence] if ripple else [])]
-    torque: float | None = context.radius * (torques[1] - torques[0])
-    if sustained and cycles:
-        torque = context.radius * cycles.force_variation if cycles.force_variation is not None else None
-    if torque is None:
-        finer = f"give an output.sample_interval of {0.25 * history.interval:.2g} s"
-        reasons.append(f"samples miss impacts of the friction force, and torque_variation is missing: {finer}")
-    return Verdict(
-        regime=decision.regime,
-        excitation=decision.excitation,
-        frequency=decision.frequency,
-        amplitude=amplitude,
-        amplitude_spread=spread,
-        amplitude_forced=forced,
-        amplitude_own=own,
-        growth_rate=rules.theory.mode.growth if rules.theory else None,
-        ringing_frequency=rules.theory.mode.frequency if rules.theory else None,
-        frequency_resolution=1.0 / (segment(part.stop - part.start) * history.interval),
-        torque_variation=torque,
-        settled_from=part.start * history.interval,
-        start=part.start,
-        settled=rules.lasts and decision.regime is not Regime.UNDECIDED and not ripple,
-        stick_fraction=cycles.stick_fraction if sustained and cycles else part.fraction(ContactState.STICK),
-        contact_loss_fraction=(
-            cycles.contact_loss_fraction if sustained and cycles else part.fraction(ContactState.SEPARATED)
-        ),
-        mean_friction_force=friction,
-        braking_torque=context.radius * friction,
-        reasons=tuple(reasons),
-        evidence=evidence,
-        thresholds=thresholds,
-        second_run=decision.second_run,
-    )

@@ -6,6 +6,7 @@ Columns are named as in the header, or counted from 1. Whatever is wrong in the 
 import re
 import stat
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +28,11 @@ _GRAVITY = 9.80665e3  # m/s² over the gram's size in kg
 _UNEVEN = 0.01  # part of the step by which steps may differ before the signal is resampled
 _GAP = 1.5  # steps of this many times the usual one are gaps
 _LONGEST = 10.0  # gaps may make a signal so many times as long; a record with longer gaps is mostly gap
+
+_JUMPS = (
+    "a force of the contact jumps where slip ends, and --quantity force is that of the spring, which does not: "
+    "regime and frequency may be wrong; classify the velocity, or the result itself"
+)
 
 
 def read_signal(
@@ -65,15 +71,20 @@ def read_signal(
             if column is not None or time_column is not None:
                 raise UsageError("a dataset has no columns; leave out --column, and give --sample-rate HZ")
             values, written = _dataset(path, inside)
-            times, size = [], _size(_written(written, unit, quantity), unit, *_SI[quantity])
+            times, size, name = [], _size(_written(written, unit, quantity), unit, *_SI[quantity]), inside
         else:
-            table = TextTable(path)
+            table = TextTable(path, "a CSV file, or FILE.h5:/path of an HDF5 file")
             values, *times = table.columns_of(column, time_column)
             place, *clock = table.places
             size = _size(table.unit(place, *_SI[quantity]), unit, *_SI[quantity])
             times = [time * _size(table.unit(clock[0], "second"), time_unit, "second") for time in times]
+            name = table.names[place] if table.names else ""
         values = _numbers(values) * size
-        return Signal(values, 1.0 / sample_rate) if sample_rate is not None else _evenly(values, *times)
+        signal = Signal(values, 1.0 / sample_rate) if sample_rate is not None else _evenly(values, *times)
+        of_contact = quantity is Measurand.FORCE and any(
+            word in name for word in ("friction_force", "normal_force")
+        )
+        return replace(signal, notes=(*signal.notes, _JUMPS)) if of_contact else signal
     except (UsageError, UnreadableResultError) as error:
         raise type(error)(f"{source}: {error}") from error
     except OSError as error:

@@ -37,15 +37,21 @@ def growth_with_slopes(
     """Growth rate (1/s) of the fastest solution of ż = (A + K s(t) P) z, and how far it may be off.
 
     Each wave passes at a frequency (rad/s). Its `slopes` (N/m) are K s = Re Σ slopes e^{iΩt} at rest; the forced
-    motion x = Im Σ X e^{iΩt} moves its phase by `bends` = ω X. Of P, only the column of x is not zero.
+    motion x = Im Σ X e^{iΩt} moves its phase by `bends` = ω X. `p` is the first column of P.
     """
     scale = np.repeat([float(np.abs(np.linalg.eigvals(a)).max()) or 1.0, 1.0], 2)  # of position beside velocity
-    a, p = (scale[:, None] * each / scale for each in (a, p))
+    a, p = scale[:, None] * a / scale, scale * p / scale[0]
     values, vectors = np.linalg.eig(a)
-    plain = float(values.real.max())
-    modal = np.linalg.cond(vectors) < _DEFECTIVE
-    effects = np.abs(slopes) * np.linalg.norm(np.linalg.solve(vectors, p @ vectors) if modal else p, 2)
-    if modal and float(effects.sum()) <= _NEGLIGIBLE * abs(plain):  # a bound of what the waves change
+    plain, residues = float(values.real.max()), None
+    with suppress(np.linalg.LinAlgError):
+        inverse = np.linalg.inv(vectors)
+        if np.linalg.norm(vectors) * np.linalg.norm(inverse) < _DEFECTIVE:
+            residues = inverse @ p
+    size = np.linalg.norm(p) if residues is None else np.linalg.norm(residues) * np.linalg.norm(vectors[0])
+    effects = np.abs(slopes) * size
+    if residues is not None and float(effects.sum()) <= _NEGLIGIBLE * abs(
+        plain
+    ):  # a bound of what the waves change
         return plain, float(effects.sum())
     steepest = np.argsort(-effects)
     few = min(len(steepest), _MOST_WAVES)
@@ -54,7 +60,7 @@ def growth_with_slopes(
     omega, bends = frequencies[kept], bends[np.ix_(kept, kept)]
     moved = [0.5 * slopes[kept], *(0.25 * slopes[kept] * each for each in bends.T)]  # cos(θ + δ) = cos θ - δ sin θ
     parts = np.concatenate([*moved, *(-0.25 * slopes[kept] * each for each in bends.conj().T)])
-    answer = (values, vectors[0] * np.linalg.solve(vectors, p[:, 0])) if modal else None
+    answer = None if residues is None else (values, vectors[0] * residues)
     begin = values[values.imag >= 0.0]
     coarse, begin = _fastest(a, p, omega, parts, order - 1, answer, begin)
     fine, _ = _fastest(a, p, omega, parts, order, answer, begin)
@@ -77,7 +83,7 @@ def _sums(waves: int, order: int) -> list[Sum]:
 
 @cache
 def _pattern(waves: int, order: int) -> tuple[Any, Any, Any]:
-    """The sums; to which change of sums each part of K s(t) and its conjugate belong; the change between two sums.
+    """The sums; the changes of sums to which each part of K s(t) and its conjugate belong; those between two sums.
 
     The parts are one for each wave, then products of two, up to which K s(t) is a sum over e^{iΩt}.
     """
@@ -88,22 +94,25 @@ def _pattern(waves: int, order: int) -> tuple[Any, Any, Any]:
     place = {tuple(each): i for i, each in enumerate(known.tolist())}
     sums = np.array(_sums(waves, order)).reshape(-1, waves)
     between = [[place.get(tuple(each), len(known)) for each in (one - sums).tolist()] for one in sums]
-    return sums, where.ravel(), np.array(between)
+    return sums.astype(float), np.eye(len(known) + 1)[:, where.ravel()], np.array(between)
 
 
 def _fastest(
     a: Any, p: Any, omega: Any, parts: Complex, order: int, answer: tuple[Any, Any] | None, begin: Complex
 ) -> tuple[float, Complex]:
     """Growth rate (1/s) with sums of at most so many frequencies; the modes, with which the next order begins."""
-    sums, where, between = _pattern(len(omega), order)
-    amounts = np.zeros(between.max() + 1, complex)
-    np.add.at(amounts, where, np.concatenate([parts, parts.conj()]))
-    coupling, turns = amounts[between], 1j * (sums @ omega)
+    sums, belongs, between = _pattern(len(omega), order)
+    coupling = (belongs @ np.concatenate([parts, parts.conj()]))[between]
+    turns = 1j * (sums @ omega)
     with suppress(np.linalg.LinAlgError):
         if answer is not None and (found := _beside(a, p, turns, coupling, *answer, begin)) is not None:
             return float(found.real.max()), found
     size = len(sums)
-    matrix = np.kron(coupling, p) + np.kron(np.eye(size), a) - np.kron(np.diag(turns), np.eye(4))
+    matrix = (
+        np.kron(coupling, np.outer(p, [1.0, 0.0, 0.0, 0.0]))
+        + np.kron(np.eye(size), a)
+        - np.kron(np.diag(turns), np.eye(4))
+    )
     values, vectors = np.linalg.eig(matrix)
     own = slice(4 * (size // 2), 4 * (size // 2) + 4)
     try:
@@ -119,28 +128,34 @@ def _beside(
 ) -> Complex | None:
     """The modes, from what they are nearly; None where one is not alone, so that all eigenvalues are needed.
 
-    x answers a force e^{μt} by Σ residues/(values - μ). The part of an eigenvector at the sum 0 is 1/(1 - f')
-    where λ = f(λ).
+    x answers a force e^{μt} by Σ residues/(values - μ). So λ = value + T residue/(1 - T Σ') with the stiffness T,
+    where Σ' is the sum of residues/(λ - values) over the other values. The part of an eigenvector at the sum 0 is
+    1/(1 - f') where λ = f(λ).
     """
     own, exact = len(turns) // 2, _EXACT * np.abs(values).max()
-    others = np.arange(len(turns)) != own
-    block, out, back = coupling[np.ix_(others, others)], coupling[own, others], coupling[others, own]
-    before, after = np.zeros(0, complex), np.zeros(0, complex)
+    others = np.arange(1, len(turns))
+    others[:own] -= 1
+    turns, unit = turns[others, None], np.eye(len(others))
+    block, out, back = coupling[others[:, None], others], coupling[own, others], coupling[others, own]
+    before, after, places = np.zeros(0, complex), np.zeros(0, complex), np.arange(len(now))
     for _ in range(_MOST_STEPS):
-        distance = values - (now[:, None, None] + turns[others][None, :, None])
+        distance = values - (now[:, None, None] + turns)
         if not distance.all():
             return None
         response = (residues / distance).sum(axis=-1)
-        inner = np.eye(len(back)) + response[:, :, None] * block
+        inner = unit + response[:, :, None] * block
         stiffness = coupling[own, own] - np.linalg.solve(inner, (response * back)[:, :, None])[:, :, 0] @ out
-        all_values = np.linalg.eigvals(a + stiffness[:, None, None] * p)
-        new = np.take_along_axis(all_values, np.abs(all_values - now[:, None]).argmin(axis=1)[:, None], 1)[:, 0]
+        away = now[:, None] - values
+        nearest = np.abs(away).argmin(axis=1)
+        away[places, nearest] = math.inf
+        beside = stiffness * (residues / away).sum(axis=1)
+        new = values[nearest] + stiffness * residues[nearest] / (1.0 - beside)
         if len(before):
             moved = np.where(np.abs(now - before) > exact, now - before, math.inf)
             slope = np.abs((new - after) / moved).max()
             if not slope <= _ALONE:
                 return None
             if (slope + 1e-3) * np.abs(new - now).max() <= exact:
-                return new
+                return np.asarray(new)
         before, after, now = now, new, new
     return None

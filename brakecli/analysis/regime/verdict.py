@@ -78,6 +78,17 @@ class Context:
     feeds: Feeds = Feeds.UNKNOWN  # what a second run has shown
     sticks: float = 0.0  # part of the cycles that stick in a second run without roughness
 
+    @property
+    def pattern(self) -> float:
+        """Time (s) until the strong waves repeat: a turn or a part of it if they are orders, or the longest."""
+        strong = 0.01 * max((swing for _, swing in self.waves), default=0.0)
+        passing = [frequency for frequency, swing in self.waves if swing > strong]
+        turns = abs(self.belt_speed) / (2.0 * math.pi * self.radius)
+        orders = [round(each / turns) for each in passing]
+        whole = all(math.isclose(each, order * turns) for each, order in zip(passing, orders, strict=True))
+        slowest = turns * math.gcd(*orders) if whole else min(passing)
+        return 1.0 / slowest if passing else 0.0
+
 
 class Decision(NamedTuple):
     """What a rule decides, and why."""

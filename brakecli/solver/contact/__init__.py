@@ -4,11 +4,12 @@ The rows are plain data; a file is imported when it is used.
 
 Contract of an evaluator module: `evaluate(x, y, layer)`, a kernel of the signature `records.EVALUATE`, fills
 `layer.contact`, a record of `records.CONTACT`, for the shoe at (x, y) and the phases `layer.angles` of the wheel's
-harmonics (`roughness.wheel_angles`). It takes constants and tables from `layer.pad` and `layer.tables`, changes
-nothing but the contact and `layer.scratch`, and notes its place in `kinds()`. With `near` and `blur` it says how
-far F_y can be from linear nearby, which may save an evaluation; both may be left as they are. What it keeps in the
-scratch may save work, and change results by rounding alone. A kernel `press` of the same signature may find normal
-force, stiffness, fraction, kind and validity alone, for event-driven runs. One whose work is small begins with
+harmonics (`roughness.turn`). On nodes it takes heights from `heights.profiles`: with a window there are no phases.
+It takes constants and tables from `layer.pad` and `layer.tables`, changes nothing but the contact and
+`layer.scratch`, and notes its place in `kinds()`. With `near` and `blur` it says how far F_y can be from linear
+nearby, which may save an evaluation; both may be left as they are. What it keeps in the scratch may save work,
+and change results by rounding alone. A kernel `press` of the same signature may find normal force, stiffness,
+fraction, kind and validity alone, for event-driven runs. One whose work is small begins with
 `layer = borrowed(layer)`: reference counts would cost a third of a step.
 """
 

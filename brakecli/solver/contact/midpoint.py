@@ -7,16 +7,14 @@ zeros or on the order of additions. Both together make it about as fast as C for
 
 from numba import float64, types, void
 
-from brakecli.solver.compile import Floats, borrowed, kernel, stopped, vector
+from brakecli.solver.compile import FAST, Floats, borrowed, kernel, stopped, vector
 from brakecli.solver.contact import MIDPOINT
 from brakecli.solver.contact.pad import BESIDE, TILE
+from brakecli.solver.heights import phases, profiles
 from brakecli.solver.records import EVALUATE, LAYER, Layer
-from brakecli.solver.sine import sine_cosine
-
-_FAST = frozenset({"reassoc", "contract", "nsz"})
 
 
-@kernel(types.UniTuple(float64, 6)(float64, float64, vector, vector), fastmath=_FAST)
+@kernel(types.UniTuple(float64, 6)(float64, float64, vector, vector), fastmath=FAST)
 def _sums(y: float, reach: float, f1: Floats, f2: Floats) -> tuple[float, float, float, float, float, float]:
     """Sums over the touching nodes of: gap, 1, rise of f2 across the cell, gap², gap times rise; and the number of
     nodes where the gap is within reach of zero. The rise is that of a polynomial through six neighbours.
@@ -36,30 +34,7 @@ def _sums(y: float, reach: float, f1: Floats, f2: Floats) -> tuple[float, float,
     return force, touching, rise / 60.0, square, work / 60.0, near
 
 
-@kernel(void(vector, vector, float64, float64), fastmath=_FAST)
-def _add_wave(f2: Floats, table: Floats, s: float, c: float) -> None:
-    """Add g sin(ωξ + ψ) at the nodes of a tile, by addition from the tables of g sin(ωξ) and g cos(ωξ)."""
-    for j in range(TILE):
-        f2[j] += c * table[j] + s * table[j + TILE]
-
-
-@kernel(void(vector, vector, vector, vector), fastmath=_FAST)
-def _add_five(f2: Floats, table: Floats, s: Floats, c: Floats) -> None:
-    """Add five waves at once: f2 is read and written only once."""
-    s_0, s_1, s_2, s_3, s_4 = s[0], s[1], s[2], s[3], s[4]
-    c_0, c_1, c_2, c_3, c_4 = c[0], c[1], c[2], c[3], c[4]
-    for j in range(TILE):
-        one = c_0 * table[j] + s_0 * table[j + TILE] + c_1 * table[j + 2 * TILE] + s_1 * table[j + 3 * TILE]
-        two = (
-            c_2 * table[j + 4 * TILE]
-            + s_2 * table[j + 5 * TILE]
-            + c_3 * table[j + 6 * TILE]
-            + s_3 * table[j + 7 * TILE]
-        )
-        f2[j] += one + two + c_4 * table[j + 8 * TILE] + s_4 * table[j + 9 * TILE]
-
-
-@kernel(types.UniTuple(float64, 2)(float64, vector, vector), fastmath=_FAST)
+@kernel(types.UniTuple(float64, 2)(float64, vector, vector), fastmath=FAST)
 def _pressed(y: float, f1: Floats, f2: Floats) -> tuple[float, float]:
     """Sums over the touching nodes of: gap, 1."""
     force, touching = 0.0, 0.0
@@ -72,40 +47,70 @@ def _pressed(y: float, f1: Floats, f2: Floats) -> tuple[float, float]:
     return force, touching
 
 
-@kernel(types.UniTuple(vector, 2)(float64, LAYER))
-def _profiles(x: float, layer: Layer) -> tuple[Floats, Floats]:
-    """f1 at the nodes, and f2 with those beside them; empty where the process is to end."""
-    pad, tables, angles = layer.pad, layer.tables, layer.angles
-    n, waves, omega_at, at = pad.nodes, pad.wheel_terms, pad.wheel_at + pad.wheel_terms, pad.waves_at
-    columns = n + 2 * BESIDE + TILE
-    eights = (waves + 7) // 8 * 8  # sines come eight at a time
-    f2, sines = layer.scratch[:columns], layer.scratch[columns : columns + eights]
-    cosines = layer.scratch[columns + eights : columns + 2 * eights]
-    for i in range(waves):
-        sines[i] = tables[omega_at + i] * x + angles[i]
-    for i in range(eights):
-        sines[i], cosines[i] = sine_cosine(sines[i])
-    for begin in range(0, n + 2 * BESIDE, TILE):
+@kernel(void(vector, vector, vector, float64, float64), fastmath=FAST)
+def _add_parts(even: Floats, odd: Floats, table: Floats, s: float, c: float) -> None:
+    """`_add_wave`, with what is even in ξ and what is odd apart."""
+    for j in range(even.size):
+        even[j] += s * table[j + TILE]
+        odd[j] += c * table[j]
+
+
+@kernel(void(vector, vector, vector, vector, vector), fastmath=FAST)
+def _add_five_parts(even: Floats, odd: Floats, table: Floats, s: Floats, c: Floats) -> None:
+    """`_add_five`, with what is even in ξ and what is odd apart."""
+    s_0, s_1, s_2, s_3, s_4 = s[0], s[1], s[2], s[3], s[4]
+    c_0, c_1, c_2, c_3, c_4 = c[0], c[1], c[2], c[3], c[4]
+    for j in range(even.size):
+        one = s_0 * table[j + TILE] + s_1 * table[j + 3 * TILE] + s_2 * table[j + 5 * TILE]
+        even[j] += one + (s_3 * table[j + 7 * TILE] + s_4 * table[j + 9 * TILE])
+        two = c_0 * table[j] + c_1 * table[j + 2 * TILE] + c_2 * table[j + 4 * TILE]
+        odd[j] += two + (c_3 * table[j + 6 * TILE] + c_4 * table[j + 8 * TILE])
+
+
+@kernel(types.UniTuple(float64, 2)(float64, vector, vector, vector), fastmath=FAST)
+def _pressed_both(y: float, f1: Floats, even: Floats, odd: Floats) -> tuple[float, float]:
+    """Sums over the touching nodes of a tile and of those opposite: gap, 1."""
+    force, touching = 0.0, 0.0
+    for j in range(even.size):
+        one, other = even[j] + odd[j] - f1[j] - y, even[j] - odd[j] - f1[j + TILE] - y
+        touching += (1.0 if one > 0.0 else 0.0) + (1.0 if other > 0.0 else 0.0)
+        force += (one if one > 0.0 else 0.0) + (other if other > 0.0 else 0.0)
+    return force, touching
+
+
+@kernel(types.UniTuple(float64, 2)(float64, float64, LAYER))
+def _press_halves(x: float, y: float, layer: Layer) -> tuple[float, float]:
+    """As `_pressed`. What is even in f2 and what is odd give two opposite heights from the tables of one node."""
+    pad, tables, (sines, cosines) = layer.pad, layer.tables, phases(x, layer)
+    n, waves, at = pad.nodes, pad.wheel_terms, pad.waves_at
+    force, touching, left = 0.0, 0.0, (n + 1) // 2 + BESIDE
+    for opposite in range(pad.opposite_at, pad.opposite_at + n + 2 * BESIDE, 2 * TILE):
         if stopped(pad.signals):
-            return f2[:0], f2[:0]
-        tile, i = f2[begin : begin + TILE], 0
-        for j in range(TILE):
-            tile[j] = 0.0
+            break
+        columns, i = min(TILE, (left + 7) // 8 * 8), 0
+        even, odd, left = layer.scratch[:columns], layer.scratch[TILE : TILE + columns], left - TILE
+        for j in range(columns):
+            even[j] = odd[j] = 0.0
         while i + 5 <= waves:
-            _add_five(tile, tables[at : at + 10 * TILE], sines[i : i + 5], cosines[i : i + 5])
+            _add_five_parts(even, odd, tables[at : at + 10 * TILE], sines[i : i + 5], cosines[i : i + 5])
             i, at = i + 5, at + 10 * TILE
         while i < waves:
-            _add_wave(tile, tables[at : at + 2 * TILE], sines[i], cosines[i])
+            _add_parts(even, odd, tables[at : at + 2 * TILE], sines[i], cosines[i])
             i, at = i + 1, at + 2 * TILE
-    return tables[pad.nodes_at : pad.nodes_at + n], f2
+        more, touch = _pressed_both(y, tables[opposite : opposite + 2 * TILE], even, odd)
+        force, touching = force + more, touching + touch
+    return force, touching
 
 
 @kernel(EVALUATE)
 def press(x: float, y: float, layer: Layer) -> None:
-    """`evaluate` where normal force, stiffness and fraction are enough."""
+    """`evaluate` where normal force, stiffness and fraction are enough; the same but for rounding."""
     layer = borrowed(layer)
     pad, contact = layer.pad, layer.contact
-    force, touching = _pressed(y, *_profiles(x, layer))
+    if layer.window.rows > 0:
+        force, touching = _pressed(y, *profiles(x, layer))
+    else:
+        force, touching = _press_halves(x, y, layer)
     spacing = 2.0 * pad.half_length / pad.nodes
     contact.normal_force = pad.k * spacing * force  # Eq. (2)
     contact.stiffness = pad.k * spacing * touching
@@ -120,7 +125,7 @@ def evaluate(x: float, y: float, layer: Layer) -> None:
     """
     layer = borrowed(layer)
     pad, contact, n = layer.pad, layer.contact, layer.pad.nodes
-    f1, f2 = _profiles(x, layer)
+    f1, f2 = profiles(x, layer)
     force, touching, rise, square, work, near = _sums(y, contact.reach, f1, f2)
     k, spacing = pad.k, 2.0 * pad.half_length / n
     contact.normal_force = k * spacing * force  # Eq. (2)

@@ -12,11 +12,17 @@ import numpy as np
 
 from brakecli import stop
 from brakecli.solver.compile import Floats, address
-from brakecli.solver.records import CONTACT, PAD, Layer, new
+from brakecli.solver.records import CONTACT, PAD, WINDOW, Layer, new
 from brakecli.solver.roughness import Surface, height
 
 TILE, BESIDE = 72, 3
 """Nodes of a piece of the tables, and nodes beyond each end of the pad."""
+
+MOST_SUMMED = 10
+"""Waves of the wheel up to which their sums at all nodes are as fast as a window."""
+ROWS, POINTS, INTERPOLATED = (1, 2, 4, 8, 16), 12, 1e-15
+"""Of windows: points of the grid to a node; points that a height is interpolated from; the largest error of that
+over the sum of amplitudes, which is rounding."""
 
 MOST_CELLS = 2**16
 """Cells of the pad of which the exact contact keeps what it has found."""
@@ -55,7 +61,7 @@ def build_pad(k: float, half_length: float, shoe: Surface, wheel: Surface, nodes
     cells = max(8.0, 8.0 * half_length * max([*shoe.turns, *wheel.turns], default=0.0))
     pad.cell, pad.cells = 2.0 * half_length / cells, min(math.ceil(cells), MOST_CELLS)
     waves, tiles = wheel.g.size, -(-(nodes + 2 * BESIDE) // TILE) if nodes else 0
-    pad.edges_at = nodes + 2 * BESIDE + TILE + 2 * (waves + 7)  # behind what the other evaluators keep
+    pad.edges_at = nodes + 2 * BESIDE + 2 * TILE + 2 * (waves + 7)  # behind what the other evaluators keep
     shapes = {
         "waves_at": (tiles, waves, 2, TILE),  # first, for its tiles must be aligned
         "gap_at": (3 * (waves + shoe.g.size),),
@@ -64,7 +70,9 @@ def build_pad(k: float, half_length: float, shoe: Surface, wheel: Surface, nodes
         "ss_at": (waves, waves),
         "cc_at": (waves, waves),
         "pr_at": (2 * waves,),
+        "opposite_at": (-(-tiles // 2), 2, TILE),
         "nodes_at": (nodes,),
+        "turns_at": (3 * waves,),
     }
     # Large tables are made in their place: a copy of gigabytes would not hear a signal.
     flat, table, place = aligned(sum(map(math.prod, shapes.values()))), dict[str, Floats](), 0
@@ -75,20 +83,56 @@ def build_pad(k: float, half_length: float, shoe: Surface, wheel: Surface, nodes
     table["gap_at"][:] = np.concatenate(
         [wheel.g, -shoe.g, wheel.omega, shoe.omega, np.zeros(waves), shoe.phase],
     )
+    table["turns_at"][:] = wheel.waves
     table["wheel_at"][:] = np.concatenate([wheel.g, wheel.omega])
     table["full_at"][:] = 2.0 * half_length * k * wheel.g * np.sinc(wheel.omega * half_length / np.pi)
     into = table["ss_at"], table["cc_at"]
     table["pr_at"][:], pad.shoe_mean, pad.shoe_square = _products(half_length, shoe, wheel, into)
     if nodes:
+        pad.rows = window_rows(wheel, 2.0 * half_length / nodes)
         pad.rise_error = _node_tables(half_length, shoe, wheel, table["nodes_at"], table["waves_at"])
+        table["opposite_at"][:] = _opposite(table["nodes_at"], -(-tiles // 2))
     return Pad(pad, flat)
 
 
-def build_layer(evaluate: Any, pad: Pad, press: Any = None) -> Layer:
-    """What the kernel `evaluate`, or `press` where the force is enough, works on and fills for this pad."""
+def interpolation_error(wheel: Surface, spacing: float) -> float:
+    """Upper bound (m) of the error of heights that are interpolated from a grid of this spacing (m).
+
+    Between the middle ones of 2n points a polynomial through all of them misses a sine by at most (ω spacing)^2n /
+    (2n)! times the product of 1/4, 9/4, …, (n - 1/2)²: Lagrange's remainder.
+    """
+    middle = math.prod((i + 0.5) ** 2 for i in range(POINTS // 2))
+    return float(np.abs(wheel.g) @ (wheel.omega * spacing) ** POINTS) * middle / math.factorial(POINTS)
+
+
+def window_rows(wheel: Surface, spacing: float) -> int:
+    """Points of a window's grid to a node of this spacing (m); 0 without window: few waves, or too short ones."""
+    if wheel.g.size <= MOST_SUMMED:
+        return 0
+    allowed = INTERPOLATED * float(np.abs(wheel.g).sum())
+    return next((rows for rows in ROWS if interpolation_error(wheel, spacing / rows) <= allowed), 0)
+
+
+def window_width(nodes: int) -> int:
+    """Nodes of a window, in whole tiles: three times as many as are needed at once."""
+    return 3 * TILE * (-(-(nodes + 2 * BESIDE + POINTS) // TILE) + 1)
+
+
+def build_layer(evaluate: Any, pad: Pad, press: Any = None, *, moving: bool = False) -> Layer:
+    """What the kernel `evaluate`, or `press` where the force is enough, works on and fills for this pad.
+
+    A `moving` one may have a window: places that follow each other are near each other.
+    """
     constants, tables = pad
     waves = constants.shoe_terms + constants.wheel_terms
-    scratch, found = aligned(constants.edges_at + 8 * waves + 6 + 3 * constants.cells), new(CONTACT)
+    found, window, rows = new(CONTACT), new(WINDOW), int(constants.rows) if moving else 0
+    size = int(constants.edges_at + 8 * waves + 6 + 3 * constants.cells)
+    if rows:
+        window.rows, window.shift, window.width = rows, rows.bit_length() - 1, window_width(constants.nodes)
+        window.spacing = 2.0 * constants.half_length / constants.nodes / rows
+        window.at = (size + POINTS + 7) // 8 * 8
+        size = int(window.at + rows * window.width)
+    scratch = aligned(size)
     found.near = math.inf  # an evaluator that does not know it leaves it
     return Layer(
         address(evaluate),
@@ -97,6 +141,7 @@ def build_layer(evaluate: Any, pad: Pad, press: Any = None) -> Layer:
         tables,
         np.zeros(constants.wheel_terms),
         scratch,
+        window,
         found,
     )
 
@@ -144,6 +189,14 @@ def _node_tables(a: float, shoe: Surface, wheel: Surface, f1: Floats, waves: Flo
     turns = np.sin(np.outer([1.0, 2.0, 3.0], wheel.omega * spacing))
     differences = np.array([45.0, -9.0, 1.0]) @ turns / (30.0 * spacing)  # what they make of omega
     return float(np.abs(wheel.g) @ np.abs(wheel.omega - differences))
+
+
+def _opposite(f1: Floats, tiles: int) -> Floats:
+    """f1 by tiles as in `_node_tables` at the nodes of one half, and at those opposite; elsewhere no gap opens."""
+    half, found = f1.size // 2, np.full((2, tiles * TILE), 1e300)
+    found[0, BESIDE : BESIDE + f1.size - half] = f1[: f1.size - half]
+    found[1, BESIDE : BESIDE + half] = f1[: f1.size - half - 1 : -1]
+    return found.reshape(2, tiles, TILE).swapaxes(0, 1)
 
 
 def _products(a: float, shoe: Surface, wheel: Surface, into: tuple[Floats, Floats]) -> tuple[Floats, float, float]:

@@ -13,9 +13,8 @@ from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.energy import energy_at_level
 from brakecli.solver.friction import observed
 from brakecli.solver.quantities import Failure
-from brakecli.solver.records import DRIVE, MOTION, V_X, V_Y, Drive, Pair, Plant, Weights, X, Y, plant_type
-from brakecli.solver.schedules import integral_at, slope_at, value_at
-from brakecli.solver.schemes.event_driven.phases import SHOE, Shoe, press, resistance
+from brakecli.solver.records import MOTION, V_X, V_Y, Pair, Plant, Weights, X, Y, plant_type
+from brakecli.solver.schemes.event_driven.phases import EPSILON, SHOE, Shoe, press, resistance
 from brakecli.solver.schemes.event_driven.runge_kutta import interpolated
 from brakecli.solver.schemes.event_driven.step import STEP, first_step, step
 
@@ -52,26 +51,28 @@ def begin(s: Weights, state: Any, position: Pair, velocity: Pair, acceleration: 
     state.v_x, state.v_y = velocity
 
 
-@kernel(void(SHOE, DRIVE, float64, int64), inlined=False)
-def _sample(p: Shoe, drive: Drive, interval: float, level: int) -> None:
+@kernel(void(SHOE, float64, int64), inlined=False)
+def _sample(p: Shoe, interval: float, level: int) -> None:
     """Put the sample of a level that the motion has reached into the state, with the forces at its time."""
     c, m = p.c, p.motion
     t = interval * level
-    travel, travel_low = integral_at(drive.belt, t, 0.0)
-    belt, belt_slope = value_at(drive.belt, t), slope_at(drive.belt, t)
     side, touching = m.side, m.touching
-    x, y, v_x, v_y = m.x, m.y, m.v_x, m.v_y
-    if m.level > level or m.tau > 0.0:
+    at, x, y, v_x, v_y = m.x, m.x, m.y, m.v_x, m.v_y
+    belt, belt_slope, load = m.belt, m.belt_slope, m.load
+    if m.level > level or m.tau > 4.0 * EPSILON * t:
         side, touching = m.side_done, m.touching_done
-        theta = ((t - m.time_done) - m.tau_done) / m.step_done
+        since = (t - m.time_done) - m.tau_done
+        theta, rest, belt_slope = since / m.step_done, (m.time - t) + m.tau, m.belt_slope_done
+        belt, load = m.belt_done + belt_slope * since, m.load_done + m.load_slope_done * since
+        passed = -(belt + 0.5 * belt_slope * rest) * rest  # by the wheel since the end of the step
         x, y = interpolated(m, X, theta), interpolated(m, Y, theta)
         v_x, v_y = interpolated(m, V_X, theta), interpolated(m, V_Y, theta)
+        at = x - passed
         if side == 0.0:
-            x, v_x = (m.anchor + travel) + (m.anchor_low + travel_low), belt
-    passed = (travel - m.travel) + (travel_low - m.travel_low)
-    normal = max(press(p, x - passed, y, touching), 0.0)
+            at, x, v_x = m.x, m.x + passed, belt
+    normal = max(press(p, at, y, touching), 0.0)
     bound = c.phi * normal
-    against_x, _ = resistance(c, value_at(drive.load, t), x, y, v_x, v_y)
+    against_x, _ = resistance(c, load, x, y, v_x, v_y)
     needed = c.m * belt_slope + against_x  # Eq. (6) in stick
     holds = side == 0.0 and abs(needed) <= bound * (1.0 + 1e-12)  # by the rounding of the cone it still sticks
     state, friction = observed(side, holds, needed, normal, bound)
@@ -92,11 +93,11 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
     """
     p: Plant = _plant_at(address)
     m, counts, drive, grid, row, steps = p.state, p.counts, p.drive, p.grid, 0, 0
-    waves = p.layer.pad.shoe_terms + p.layer.pad.wheel_terms
+    waves = p.layer.pad.shoe_terms + p.layer.pad.wheel_terms if p.layer.window.rows == 0 else 0
     shoe = Shoe(p.c, p.layer, m, p.work, counts)
     if m.started == 0:
         first_step(shoe, drive, grid)
-        _sample(shoe, drive, grid.interval, 0)
+        _sample(shoe, grid.interval, 0)
         m.started = 1
     while True:
         while counts.level < stop and counts.level < m.level:
@@ -104,7 +105,7 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
                 rows[row, column] = m.row[column]
             row += 1
             counts.level += 1
-            _sample(shoe, drive, grid.interval, counts.level)
+            _sample(shoe, grid.interval, counts.level)
         if counts.level == stop or steps >= _BUDGET:
             return _NONE
         failure: int = _step_at(p.plug.solve)(shoe, drive, grid)

@@ -6,6 +6,7 @@ and an event ends the phase where it vanishes. On a rough pad patches that appea
 the order gap^(3/2) inside a phase; the control of the step finds them.
 """
 
+import math
 from typing import Any, NamedTuple
 
 from numba import float64, int64, types, void
@@ -16,7 +17,7 @@ from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.contact.closed_form import FULL, clear, coverage, full_contact, full_press
 from brakecli.solver.double_double import two_sum
 from brakecli.solver.records import COEFFICIENTS, V_X, V_Y, Coefficients, Drive, Layer, Y
-from brakecli.solver.roughness import wheel_angles
+from brakecli.solver.roughness import turn
 from brakecli.solver.schedules import integral_at, slope_at, value_at
 from brakecli.solver.schemes.event_driven.runge_kutta import END_STAGE, interpolated
 
@@ -72,8 +73,9 @@ def arrive(p: Shoe, drive: Drive) -> None:
     m.belt, m.belt_slope = value_at(drive.belt, t + tau), slope_at(drive.belt, after)
     m.load, m.load_slope = value_at(drive.load, t + tau), slope_at(drive.load, after)
     m.travel, m.travel_low = integral_at(drive.belt, t, tau)
-    if drive.wheel.size > 0:
-        wheel_angles(drive.wheel, m.travel, m.travel_low, p.layer.angles)
+    if p.layer.pad.wheel_terms > 0:
+        turn(m.travel, m.travel_low, p.layer)
+    m.pressed_x = math.nan
     if m.started != 0 and m.side == 0.0:  # no drift can build up
         m.x, m.v_x = (m.anchor + m.travel) + (m.anchor_low + m.travel_low), m.belt
 
@@ -94,13 +96,21 @@ def press(p: Shoe, x: float, y: float, touching: int) -> float:
         contact.normal_force = -contact.stiffness * y  # Eq. (2), continued: an event ends the phase at y = 0
         contact.fraction = 1.0 if y < 0.0 else 0.0
         contact.store_x, contact.kind, contact.valid = 0.0, CLOSED_FORM, 1
-    elif coverage(y, pad) == FULL:
-        if p.motion.light == 1:
-            full_press(x, y, p.layer)
-        else:
-            full_contact(x, y, p.layer)
+        return contact.normal_force  # type: ignore[no-any-return]
+    full, m = coverage(y, pad) == FULL, p.motion
+    if not full or p.layer.window.rows > 0:
+        _evaluate_at(p.layer.press if m.light == 1 else p.layer.evaluate)(x, y, p.layer)
+        if full:  # the sum over nodes is the closed form
+            contact.kind = CLOSED_FORM
+    elif m.light == 0:
+        full_contact(x, y, p.layer)
+    elif x == m.pressed_x:  # in stick; the force is linear in y
+        contact.stiffness, contact.fraction = 2.0 * pad.half_length * pad.k, 1.0
+        contact.normal_force = m.pressed - contact.stiffness * (y - m.pressed_y)
+        contact.kind, contact.valid = CLOSED_FORM, 1
     else:
-        _evaluate_at(p.layer.press if p.motion.light == 1 else p.layer.evaluate)(x, y, p.layer)
+        full_press(x, y, p.layer)
+        m.pressed_x, m.pressed_y, m.pressed = x, y, contact.normal_force
     return contact.normal_force  # type: ignore[no-any-return]
 
 
@@ -113,9 +123,10 @@ def find_slopes(p: Shoe, stage: int, since: float, x: float, y: float, v_x: floa
     c, m = p.c, p.motion
     side, load = m.side, m.load + m.load_slope * since
     belt, travel = m.belt + m.belt_slope * since, (m.belt + 0.5 * m.belt_slope * since) * since
+    at = x - travel
     if side == 0.0:
-        x, v_x = m.x + travel, belt
-    normal = press(p, x - travel, y, m.touching)
+        at, x, v_x = m.x, m.x + travel, belt
+    normal = press(p, at, y, m.touching)
     against_x, against_y = resistance(c, load, x, y, v_x, v_y)
     friction = -side * c.phi * normal if side != 0.0 else c.m * m.belt_slope + against_x  # Eq. (5), Eq. (4)
     sliding = v_x - belt

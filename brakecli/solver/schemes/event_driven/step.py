@@ -47,7 +47,7 @@ def _to_knot(s: Schedule, t: float) -> float:
     return s[k].time - t if k < s.size else math.inf
 
 
-@kernel(float64(SHOE, float64), inlined=False)
+@kernel(float64(SHOE, float64))
 def _longest(p: Shoe, duration: float) -> float:
     """The longest step (s), by the fastest motion and the passing waves; `duration` where nothing limits it."""
     c, m, pad = p.c, p.motion, p.layer.pad
@@ -171,7 +171,7 @@ def _to_event(p: Shoe, which: int, h: float) -> float:
     return h + rest
 
 
-@kernel(float64(MOTION_TYPE, int64), inlined=False)
+@kernel(float64(MOTION_TYPE, int64))
 def _passed(m: Any, item: int) -> float:
     """A work of the step that has been made, over its length."""
     total = 0.0
@@ -180,11 +180,12 @@ def _passed(m: Any, item: int) -> float:
     return total
 
 
-@kernel(void(SHOE, DRIVE, GRID, float64, int64), inlined=False)
+@kernel(void(SHOE, DRIVE, GRID, float64, int64))
 def _take(p: Shoe, drive: Drive, grid: Grid, h: float, last: int) -> None:
     """Take the step that has been made; `last` is 1 where it reaches the end of the run."""
     m, work, interval = p.motion, p.work, grid.interval
     m.time_done, m.tau_done, m.side_done, m.touching_done = m.time, m.tau, m.side, m.touching
+    m.belt_done, m.belt_slope_done, m.load_done, m.load_slope_done = m.belt, m.belt_slope, m.load, m.load_slope
     work.belt += h * _passed(m, 0)
     work.friction += h * _passed(m, 1)
     work.dashpots += h * _passed(m, 2)
@@ -208,7 +209,7 @@ def _take(p: Shoe, drive: Drive, grid: Grid, h: float, last: int) -> None:
     p.counts.kinds[p.layer.contact.kind] += 1
 
 
-@kernel(int64(SHOE, int64, float64), inlined=False)
+@kernel(int64(SHOE, int64, float64))
 def _enter(p: Shoe, which: int, longest: float) -> int:
     """Enter the phase after an event, and see that events do not pile up without progress; a `Failure`."""
     m = p.motion

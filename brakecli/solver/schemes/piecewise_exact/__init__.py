@@ -110,19 +110,20 @@ def _carry(m: Any) -> None:
 def whole(m: Any, h: float) -> int:
     """Take a whole step and return 1, unless a margin runs out in it or may do so.
 
-    A margin that falls at first and rises at last is lowest inside, and not below its tangents at both ends. It
-    does not fall but by rounding where a shoe breaks loose: then it begins at zero, and without a slope.
+    A margin that falls at first and rises at last is lowest inside, and not below where its tangents at both ends
+    cross. It does not fall but by rounding where a shoe breaks loose: then it begins at zero, and without a slope.
     """
     _ahead(m)
     for k in range(4, 4 + MARGINS):
         fall, rise = m.before[MARGINS + k], m.after[MARGINS + k]
-        if m.after[k] < 0.0 or (fall < -_FLAT * rise < 0.0 and min(m.before[k] + fall, m.after[k] - rise) < 0.0):
+        if m.after[k] < 0.0 or (fall < -_FLAT * rise < 0.0 and fall * m.after[k] > rise * (m.before[k] + fall)):
             return 0
     pair = 0
     for i in range(SIZE):
         for j in range(i + 1):
             m.sums[pair] += m.z[i] * m.z[j]
             pair += 1
+    m.waiting = 1
     for i in range(4):
         m.z[i] = m.after[i]
     _carry(m)
@@ -152,11 +153,13 @@ def look(m: Any) -> None:
     """The matrix of the phase, the margins of the motion reached, and their slopes."""
     for i in range(SIZE):
         for k in range(AHEAD):
+            m.now[i, k] = m.margins[m.phase, i, k]
+    _ahead(m)
+    for i in range(SIZE):
+        for k in range(AHEAD):
             m.now[i, k] = m.step[m.phase, i, k]
-    for k in range(2 * MARGINS):
-        m.before[4 + k] = 0.0
-        for i in range(SIZE):
-            m.before[4 + k] += m.margins[m.phase, k, i] * m.z[i]
+    for k in range(AHEAD):
+        m.before[k] = m.after[k]
 
 
 @kernel(void(_PLANT, float64), inlined=False)
@@ -233,7 +236,7 @@ def _through(p: Plant, t: float, to_sample: int) -> int:
             m.events += 1
             if m.events > _MOST_EVENTS:
                 return _STALLED
-            add_works(m, p.work)
+            add_works(p.c, m, p.work, p.s.h)
             switch(p.c, m, which, p.s.h)
             _anchor(p, t, tau)
             if m.phase == STICK:
@@ -260,7 +263,7 @@ def _sample(p: Plant, t: float) -> None:
         m.worst[i], m.largest[i] = max(m.worst[i], abs(m.error[i])), max(m.largest[i], abs(z[i]))
     normal = max(-m.stiffness * z[Y], 0.0) if m.phase != OPEN else 0.0
     needed = 0.0
-    for i in range(SIZE):
+    for i in range(SIZE if m.phase == STICK else 0):
         needed += m.needed[i] * z[i]
     holds = m.phase == STICK and abs(needed) <= c.phi * normal * (1.0 + 1e-12)  # by the rounding it still sticks
     state, friction = observed(float(m.phase - STICK), holds, needed, normal, c.phi * normal)
@@ -289,7 +292,7 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
         if counts.level == stop:
             break
         if part == 0:
-            for column in range(rows.shape[1]):  # a slice would take seconds to compile
+            for column in range(8):  # a slice would take seconds to compile
                 rows[row, column] = m.row[column]
             row += 1
         if m.beyond == 0.0 and t + h < m.knot and whole(m, h) == 1:
@@ -304,6 +307,6 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
             if part == grid.per_sample:
                 sampled, part = sampled + 1, 0
         if failure != _NONE or counts.level % _KEPT == 0 or counts.level == last:
-            add_works(m, p.work)
+            add_works(p.c, m, p.work, p.s.h)
     m.x, m.y, m.v_x, m.v_y = m.z[X], m.z[Y], m.z[V_X], m.z[V_Y]
     return failure

@@ -51,7 +51,7 @@ def root(m: Any, row: int, left: float, right: float) -> float:
 @kernel(types.UniTuple(float64, 3)(FLOW_TYPE, int64), inlined=False)
 def _follow(m: Any, which: int) -> tuple[float, float, float]:
     """A margin on the series as a polynomial: its value and slope at the end, and what rounding does to it."""
-    row, z, of = m.margins[m.phase, which], m.series, m.polynomial
+    row, z, of = m.margins[m.phase, :, 4 + which], m.series, m.polynomial
     x, y, v_x, v_y = row[X], row[Y], row[V_X], row[V_Y]
     for k in range(TERMS):
         of[0, k] = (x * z[X, k] + y * z[Y, k]) + (v_x * z[V_X, k] + v_y * z[V_Y, k])

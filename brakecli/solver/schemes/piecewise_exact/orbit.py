@@ -28,7 +28,6 @@ from brakecli.solver.compile import kernel
 from brakecli.solver.records import (
     COEFFICIENTS,
     FLOW_TYPE,
-    NODES,
     PHASES,
     SIZE,
     TERMS,
@@ -113,7 +112,7 @@ def _expand(m: Any, o: Any) -> None:
 @kernel(void(FLOW_TYPE, ORBIT_TYPE, float64))
 def _take(m: Any, o: Any, part: float) -> None:
     """The motion at a part of the series."""
-    phases.reach(m, o.old, part, NODES, 0)
+    phases.reach(m, part)
 
 
 @kernel(void(COEFFICIENTS, FLOW_TYPE, ORBIT_TYPE, int64), inlined=False)
@@ -129,7 +128,7 @@ def step(c: Coefficients, m: Any, o: Any, closely: int) -> None:
         o.which, o.part = first_event(m)
         _take(m, o, o.part)
         for i in range(SIZE):
-            m.z[i] = m.at[NODES, 0, i]
+            m.z[i] = m.at[i]
         if o.which != NO_EVENT:
             switch(c, m, o.which, o.h)
         look(m)
@@ -160,16 +159,16 @@ def _carry(m: Any, o: Any, part: float) -> None:
     for j in range(3):
         if whole_step:
             for i in range(4):
-                m.at[NODES, 0, i] = 0.0
+                m.at[i] = 0.0
                 for k in range(4):
-                    m.at[NODES, 0, i] += m.step[o.old, k, i] * o.tangents[j, k]
+                    m.at[i] += m.step[o.old, k, i] * o.tangents[j, k]
         else:
             for i in range(SIZE):
                 m.series[i, 0] = o.tangents[j, i] if i < 4 else 0.0
             phases.expand(m, o.old, o.h)
             _take(m, o, part)
         for i in range(4):
-            o.tangents[j, i] = m.at[NODES, 0, i]
+            o.tangents[j, i] = m.at[i]
 
 
 @kernel(float64(FLOW_TYPE, ORBIT_TYPE, int64, int64))
@@ -186,14 +185,14 @@ def _jump(m: Any, o: Any, section: int) -> int:
     """Take the disturbances through an event, or onto the section, at `o.kept`; 0 where it is only grazed."""
     rate = 0.0
     for i in range(4):
-        normal = (1.0 if i == V_X else 0.0) if section == 1 else m.margins[o.old, o.which, i]
+        normal = (1.0 if i == V_X else 0.0) if section == 1 else m.margins[o.old, i, 4 + o.which]
         rate += normal * _velocity(m, o, o.old, i)
     if rate >= 0.0:
         return 0
     for j in range(3):
         late = 0.0
         for i in range(4):
-            normal = (1.0 if i == V_X else 0.0) if section == 1 else m.margins[o.old, o.which, i]
+            normal = (1.0 if i == V_X else 0.0) if section == 1 else m.margins[o.old, i, 4 + o.which]
             late += normal * o.tangents[j, i] / rate
         for i in range(4):
             leaves = 0.0 if section == 1 else _velocity(m, o, m.phase, i)
@@ -214,7 +213,7 @@ def _add_up(m: Any, o: Any, part: float, band: float, falls: int) -> None:
             o.beaten[k], o.side[k] = o.beaten[k] + (1 if o.side[k] > below else 0), below
     if falls == 1 or o.begin[V_X] < 0.0 <= m.z[V_X]:
         zero_of_velocity(m, o, 1.0 if falls == 1 else -1.0)
-        o.low, o.high = min(o.low, m.at[NODES, 0, X]), max(o.high, m.at[NODES, 0, X])
+        o.low, o.high = min(o.low, m.at[X]), max(o.high, m.at[X])
 
 
 @kernel(int64(COEFFICIENTS, FLOW_TYPE, ORBIT_TYPE, int64), inlined=False)
@@ -244,7 +243,7 @@ def _around(c: Coefficients, m: Any, o: Any, closely: int) -> int:
         if last:
             part = zero_of_velocity(m, o, 1.0)
         for i in range(SIZE):
-            o.kept[i] = m.at[NODES, 0, i] if last else m.z[i]
+            o.kept[i] = m.at[i] if last else m.z[i]
         o.period, o.spent[o.old] = o.period + part * o.h, o.spent[o.old] + part * o.h
         if closely == 1:
             _add_up(m, o, part, band, falls)

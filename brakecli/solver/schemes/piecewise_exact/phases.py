@@ -4,13 +4,12 @@ A phase is a side of the friction law, or a pad that is clear of the wheel. With
 components, the motion is z' = A z in each, what keeps the phase up is linear in z, and powers are quadratic in z.
 """
 
-import math
 from typing import Any
 
 import numpy as np
 from numba import float64, int64, types, void
 
-from brakecli.solver.compile import kernel
+from brakecli.solver.compile import Floats, kernel
 from brakecli.solver.records import (
     BELT,
     BELT_SLOPE,
@@ -20,14 +19,12 @@ from brakecli.solver.records import (
     LOAD_SLOPE,
     MARGINS,
     NODES,
-    PAIRS,
     PHASES,
     SIZE,
     TERMS,
     V_X,
     V_Y,
     WORK_TYPE,
-    WORKS,
     Coefficients,
     X,
     Y,
@@ -42,6 +39,8 @@ needed is within the friction cone, on the side of backward slip and, third, on 
 _NODES = 0.5 + 0.5 * np.polynomial.legendre.leggauss(NODES)[0]
 _SHARES = 0.5 * np.polynomial.legendre.leggauss(NODES)[1]
 """Gauss' rule over a step: as a step is a part of a period, exact to rounding for what is quadratic in z."""
+_POWERS = np.vander(np.append(_NODES, 1.0), TERMS, increasing=True)
+"""Of the nodes, and of the end of the step."""
 
 
 @kernel(void(FLOW_TYPE, int64, float64), inlined=False)
@@ -61,123 +60,184 @@ def expand(m: Any, phase: int, span: float) -> None:
         z[X, k], z[Y, k], z[V_X, k], z[V_Y, k] = x, y, v_x, v_y
 
 
-@kernel(void(FLOW_TYPE, int64, float64, int64, int64))
-def reach(m: Any, phase: int, theta: float, node: int, column: int) -> None:
-    """Put the motion at a part of the span of the series into `m.at[node, column]`, with its friction force."""
+@kernel(void(FLOW_TYPE, float64))
+def reach(m: Any, theta: float) -> None:
+    """Put the motion at a part of the span of the series into `m.at`."""
     z, at, q = m.series, m.at, theta * theta
     x = y = v_x = v_y = 0.0
     for k in range(TERMS - 2, -1, -2):  # in pairs, which wait for each other half as long
         x, y = x * q + (z[X, k + 1] * theta + z[X, k]), y * q + (z[Y, k + 1] * theta + z[Y, k])
         v_x, v_y = v_x * q + (z[V_X, k + 1] * theta + z[V_X, k]), v_y * q + (z[V_Y, k + 1] * theta + z[V_Y, k])
-    at[node, column, X], at[node, column, Y], at[node, column, V_X], at[node, column, V_Y] = x, y, v_x, v_y
-    at[node, column, BELT], at[node, column, BELT_SLOPE] = z[BELT, 0] + theta * z[BELT, 1], z[BELT_SLOPE, 0]
-    at[node, column, LOAD], at[node, column, LOAD_SLOPE] = z[LOAD, 0] + theta * z[LOAD, 1], z[LOAD_SLOPE, 0]
-    m.pull[node, column] = 0.0
-    for i in range(SIZE):
-        m.pull[node, column] += m.friction[phase, i] * at[node, column, i]
-
-
-@kernel(types.UniTuple(float64, WORKS)(COEFFICIENTS, FLOW_TYPE, int64, int64, int64, int64))
-def _powers(
-    c: Coefficients, m: Any, phase: int, node: int, one: int, other: int
-) -> tuple[float, float, float, float]:
-    """The powers of the account (W) in a motion at a node, or their bilinear form in two."""
-    z, w, f_z, f_w = m.at[node, one], m.at[node, other], m.pull[node, one], m.pull[node, other]
-    belt = f_z * w[BELT] + f_w * z[BELT]
-    heat = f_z * (w[BELT] - w[V_X]) + f_w * (z[BELT] - z[V_X]) if phase != STICK else 0.0
-    dashpots = c.b_xx * z[V_X] * w[V_X] + c.b_xy * (z[V_X] * w[V_Y] + z[V_Y] * w[V_X]) + c.b_yy * z[V_Y] * w[V_Y]
-    load = z[LOAD] * (c.sin_beta * w[V_X] + c.cos_beta * w[V_Y])
-    load += w[LOAD] * (c.sin_beta * z[V_X] + c.cos_beta * z[V_Y])
-    return 0.5 * belt, 0.5 * heat, dashpots, 0.5 * load
+    at[X], at[Y], at[V_X], at[V_Y] = x, y, v_x, v_y
+    at[BELT], at[BELT_SLOPE] = z[BELT, 0] + theta * z[BELT, 1], z[BELT_SLOPE, 0]
+    at[LOAD], at[LOAD_SLOPE] = z[LOAD, 0] + theta * z[LOAD, 1], z[LOAD_SLOPE, 0]
 
 
 @kernel(void(COEFFICIENTS, FLOW_TYPE, int64), inlined=False)
 def _describe(c: Coefficients, m: Any, phase: int) -> None:
-    """The generator of a phase, its friction force, margins and powers."""
-    a, force, margin, needed = m.generator[phase], m.friction[phase], m.margins[phase], m.needed
+    """The generator of a phase, its friction force and margins."""
+    a, force, needed, margin = m.generator[phase], m.friction[phase], m.needed, m.margins[phase, :, 4:]
     pressed = m.stiffness if phase != OPEN else 0.0  # F_y = -pressed y, Eq. (2)
     side = phase - STICK if phase != OPEN else 0
+    for j in range(4):
+        m.margins[phase, j, j] = 1.0
     # Eq. (6) with the velocity and the acceleration of the wheel
     needed[X], needed[Y], needed[V_Y], needed[LOAD] = c.c_xx, c.c_xy, c.b_xy, c.sin_beta
     needed[BELT], needed[BELT_SLOPE] = c.b_xx, c.m
     a[X, V_X] = a[Y, V_Y] = a[BELT, BELT_SLOPE] = a[LOAD, LOAD_SLOPE] = 1.0
     a[V_Y, X], a[V_Y, Y], a[V_Y, LOAD] = -c.c_xy / c.m, -(c.c_yy + pressed) / c.m, -c.cos_beta / c.m  # Eq. (7)
     a[V_Y, V_X], a[V_Y, V_Y] = -c.b_xy / c.m, -c.b_yy / c.m
-    margin[HEIGHT, Y] = 1.0 if phase == OPEN else -1.0
+    margin[Y, HEIGHT] = 1.0 if phase == OPEN else -1.0
     if phase == STICK:
         a[V_X, BELT_SLOPE] = 1.0
         for j in range(SIZE):
             force[j] = needed[j]  # Eq. (4)
-            margin[1, j], margin[2, j] = -needed[j], needed[j]
-        margin[1, Y], margin[2, Y] = margin[1, Y] - c.phi * pressed, margin[2, Y] - c.phi * pressed
+            margin[j, 1], margin[j, 2] = -needed[j], needed[j]
+        margin[Y, 1], margin[Y, 2] = margin[Y, 1] - c.phi * pressed, margin[Y, 2] - c.phi * pressed
     else:
         force[Y] = side * c.phi * pressed  # Eq. (5)
         a[V_X, X], a[V_X, Y], a[V_X, LOAD] = -c.c_xx / c.m, (force[Y] - c.c_xy) / c.m, -c.sin_beta / c.m  # Eq. (6)
         a[V_X, V_X], a[V_X, V_Y] = -c.b_xx / c.m, -c.b_xy / c.m
-        margin[SLIDING, V_X], margin[SLIDING, BELT] = side, -side
+        margin[V_X, SLIDING], margin[BELT, SLIDING] = side, -side
+
+
+@kernel(void(FLOW_TYPE, int64, float64), inlined=False)
+def _unroll(m: Any, phase: int, h: float) -> None:
+    """The series of exp(A h): the rows for x, y, v_x and v_y of (A h)^k / k!.
+
+    Two terms in one loop make it large enough for the compiler to take vectors; a short one it unrolls instead.
+    """
+    a, f = m.generator, m.flow
+    for i in range(4):
+        for j in range(SIZE):
+            f[0, i, j], f[1, i, j] = 1.0 if i == j else 0.0, h * a[phase, i, j]
+    xx, xy, xu, xv = a[phase, V_X, X], a[phase, V_X, Y], a[phase, V_X, V_X], a[phase, V_X, V_Y]
+    yx, yy, yu, yv = a[phase, V_Y, X], a[phase, V_Y, Y], a[phase, V_Y, V_X], a[phase, V_Y, V_Y]
+    for k in range(2, TERMS, 2):
+        part, then = h / k, h / (k + 1)
+        for j in range(SIZE):
+            x, y, v_x, v_y = f[k - 1, X, j], f[k - 1, Y, j], f[k - 1, V_X, j], f[k - 1, V_Y, j]
+            a_x, a_y = (xx * x + xy * y) + (xu * v_x + xv * v_y), (yx * x + yy * y) + (yu * v_x + yv * v_y)
+            x, y, v_x, v_y = part * v_x, part * v_y, part * a_x, part * a_y
+            f[k, X, j], f[k, Y, j], f[k, V_X, j], f[k, V_Y, j] = x, y, v_x, v_y
+            a_x, a_y = (xx * x + xy * y) + (xu * v_x + xv * v_y), (yx * x + yy * y) + (yu * v_x + yv * v_y)
+            f[k + 1, X, j], f[k + 1, Y, j] = then * v_x, then * v_y
+            f[k + 1, V_X, j], f[k + 1, V_Y, j] = then * a_x, then * a_y
+    for k in range(1, TERMS):  # a slope of Q is followed as Q is, and added up over time
+        for i in range(4):
+            f[k, i, LOAD_SLOPE] = h / k * f[k - 1, i, LOAD]
+
+
+@kernel(types.UniTuple(float64, 3)(COEFFICIENTS, float64, float64))
+def _rates(c: Coefficients, v_x: float, v_y: float) -> tuple[float, float, float]:
+    """The forces of the dashpots (N) on a velocity, and the velocity along Q."""
+    return c.b_xx * v_x + c.b_xy * v_y, c.b_xy * v_x + c.b_yy * v_y, c.sin_beta * v_x + c.cos_beta * v_y
+
+
+@kernel(void(FLOW_TYPE, int64))
+def _sum_up(m: Any, node: int) -> None:
+    """The rows of exp(A t) at a node of Gauss' rule, or at the end of the step: the small terms first."""
+    for i in range(4):
+        for j in range(SIZE):
+            total = 0.0
+            for k in range(TERMS - 1, -1, -1):
+                total += _POWERS[node, k] * m.flow[k, i, j]
+            m.rows[i, j] = total
+
+
+@kernel(float64(types.Array(float64, 1, "A"), int64, float64))
+def _driven(row: Floats, j: int, time: float) -> float:
+    """What one of U, Q and their slopes is worth in a row after a time: U and Q are integrals of slopes."""
+    return (row[j] if j > V_Y else 0.0) + (time * row[j - 1] if j in (BELT_SLOPE, LOAD_SLOPE) else 0.0)
 
 
 @kernel(void(COEFFICIENTS, FLOW_TYPE, int64, float64), inlined=False)
 def make(c: Coefficients, m: Any, phase: int, h: float) -> None:
-    """The matrices of a phase for steps h: exp(A h), and the works of a step as forms in its first motion."""
-    if m.made[phase] == 1:
+    """The matrices of a phase for steps h, with exp(A h)."""
+    if m.made[phase] > 0:
         return
     m.made[phase] = 1
     _describe(c, m, phase)
-    a, margins, works, step = m.generator[phase], m.margins[phase], m.works[phase], m.step[phase]
-    for k in range(MARGINS):
-        for i in range(SIZE):
-            for j in range(SIZE):
-                margins[MARGINS + k, j] += h * margins[k, i] * a[i, j]
-    still = m.knot == math.inf and m.z[BELT_SLOPE] == 0.0 and m.z[LOAD_SLOPE] == 0.0  # slopes stay zero
+    a, margins, step, rows = m.generator[phase], m.margins[phase], m.step[phase], m.rows
+    for k in range(4, 4 + MARGINS):
+        for j in range(SIZE):
+            slope = 0.0
+            for i in range(SIZE):
+                slope += margins[i, k] * a[i, j]
+            margins[j, k + MARGINS] = h * slope
+    _unroll(m, phase, h)
+    _sum_up(m, NODES)
     for j in range(SIZE):
-        if still and j in (BELT_SLOPE, LOAD_SLOPE):
-            continue
-        for i in range(SIZE):
-            m.series[i, 0] = 1.0 if i == j else 0.0
-        expand(m, phase, h)
-        for node in range(NODES + 1):
-            reach(m, phase, _NODES[node] if node < NODES else 1.0, node, j)
-        for i in range(SIZE):
-            if i <= V_Y:
-                step[j, i] = m.at[NODES, j, i]
-            for k in range(2 * MARGINS):
-                step[j, 4 + k] += margins[k, i] * m.at[NODES, j, i]
-    for node in range(NODES):
-        pair = 0
-        for i in range(SIZE):
-            for j in range(i + 1):
-                if still and (i in (BELT_SLOPE, LOAD_SLOPE) or j == BELT_SLOPE):
-                    pair += 1
-                    continue
-                share = h * _SHARES[node] * (1.0 if i == j else 2.0)
-                belt, heat, dashpots, load = _powers(c, m, phase, node, i, j)
-                works[0, pair], works[1, pair] = works[0, pair] + share * belt, works[1, pair] + share * heat
-                works[2, pair], works[3, pair] = works[2, pair] + share * dashpots, works[3, pair] + share * load
-                pair += 1
+        for k in range(4):
+            step[j, k] = rows[k, j]
+        for k in range(4, 4 + 2 * MARGINS):
+            moved = rows[X, j] * margins[X, k] + rows[Y, j] * margins[Y, k]
+            moved += rows[V_X, j] * margins[V_X, k] + rows[V_Y, j] * margins[V_Y, k]
+            step[j, k] = moved + _driven(margins[:, k], j, h)
+
+
+@kernel(void(COEFFICIENTS, FLOW_TYPE, int64, float64), inlined=False)
+def _make_works(c: Coefficients, m: Any, phase: int, h: float) -> None:
+    """The works of a step of a phase as forms in its first motion."""
+    m.made[phase] = 2
+    r, pull, v_x, v_y, along, across = m.rows, m.factors[0], m.factors[1], m.factors[2], m.factors[3], m.factors[4]
+    slides, w = 0.0 if phase == STICK else 1.0, m.works[phase]
+    _unroll(m, phase, h)
+    for n in range(NODES):
+        _sum_up(m, n)
+        share, time = h * _SHARES[n], h * _NODES[n]
+        for j in range(SIZE):
+            force, rates = _driven(m.friction[phase], j, time), _rates(c, r[V_X, j], r[V_Y, j])
+            for i in range(4):
+                force += m.friction[phase, i] * r[i, j]
+            pull[n, j], v_x[n, j], v_y[n, j] = share * force, r[V_X, j], r[V_Y, j]
+            along[n, j], across[n, j] = share * rates[0], share * rates[1]
+            for k in range(2):
+                u, q, part = max(j, BELT + k), max(j, LOAD + k), time if k == 1 else 1.0
+                w[0, u, j + BELT + k - u] += part * pull[n, j]
+                w[3, q, j + LOAD + k - q] += part * share * rates[2]
+    for i in range(SIZE):
+        for j in range(i + 1):
+            drag = damp = 0.0
+            for n in range(NODES):
+                drag += pull[n, i] * v_x[n, j] + pull[n, j] * v_x[n, i]
+                damp += v_x[n, i] * along[n, j] + v_y[n, i] * across[n, j]
+            w[1, i, j] = slides * (w[0, i, j] - (drag if j < i else 0.5 * drag))
+            w[2, i, j] = 2.0 * damp if j < i else damp
 
 
 @kernel(void(COEFFICIENTS, FLOW_TYPE, WORK_TYPE, float64, float64), inlined=False)
 def take_part(c: Coefficients, m: Any, work: Any, span: float, theta: float) -> None:
     """Move to a part of the span of the series, and add the works on the way."""
+    z = m.at
     for node in range(NODES):
-        reach(m, m.phase, theta * _NODES[node], node, 0)
-        share = theta * span * _SHARES[node]
-        belt, heat, dashpots, load = _powers(c, m, m.phase, node, 0, 0)
-        work.belt, work.friction = work.belt + share * belt, work.friction + share * heat
-        work.dashpots, work.load = work.dashpots + share * dashpots, work.load + share * load
-    reach(m, m.phase, theta, NODES, 0)
+        reach(m, theta * _NODES[node])
+        share, force, rates = theta * span * _SHARES[node], 0.0, _rates(c, z[V_X], z[V_Y])
+        for i in range(SIZE):
+            force += m.friction[m.phase, i] * z[i]
+        work.belt += share * force * z[BELT]
+        work.friction += share * force * (z[BELT] - z[V_X]) if m.phase != STICK else 0.0
+        work.dashpots += share * (rates[0] * z[V_X] + rates[1] * z[V_Y])
+        work.load += share * z[LOAD] * rates[2]
+    reach(m, theta)
     for i in range(SIZE):
-        m.z[i] = m.at[NODES, 0, i]
+        m.z[i] = z[i]
 
 
-@kernel(void(FLOW_TYPE, WORK_TYPE), inlined=False)
-def add_works(m: Any, work: Any) -> None:
+@kernel(void(COEFFICIENTS, FLOW_TYPE, WORK_TYPE, float64), inlined=False)
+def add_works(c: Coefficients, m: Any, work: Any, h: float) -> None:
     """Add up the works of the whole steps that wait for it, all of the present phase."""
-    works, sums, belt, heat, dashpots, load = m.works[m.phase], m.sums, 0.0, 0.0, 0.0, 0.0
-    for pair in range(PAIRS):
-        belt, heat = belt + works[0, pair] * sums[pair], heat + works[1, pair] * sums[pair]
-        dashpots, load = dashpots + works[2, pair] * sums[pair], load + works[3, pair] * sums[pair]
-        sums[pair] = 0.0
+    if m.waiting == 0:
+        return
+    if m.made[m.phase] < 2:
+        _make_works(c, m, m.phase, h)
+    works, sums, belt, heat, dashpots, load, pair = m.works[m.phase], m.sums, 0.0, 0.0, 0.0, 0.0, 0
+    for i in range(SIZE):
+        for j in range(i + 1):
+            belt, heat = belt + works[0, i, j] * sums[pair], heat + works[1, i, j] * sums[pair]
+            dashpots, load = dashpots + works[2, i, j] * sums[pair], load + works[3, i, j] * sums[pair]
+            sums[pair] = 0.0
+            pair += 1
+    m.waiting = 0
     work.belt, work.friction = work.belt + belt, work.friction + heat
     work.dashpots, work.load = work.dashpots + dashpots, work.load + load

@@ -13,7 +13,7 @@ from typing import Any
 from numba import float64, int64, void
 
 from brakecli.solver.compile import kernel
-from brakecli.solver.records import COEFFICIENTS, FLOW_TYPE, NODES, SIZE, V_X, V_Y, Coefficients, X, Y
+from brakecli.solver.records import COEFFICIENTS, FLOW_TYPE, SIZE, V_X, V_Y, Coefficients, X, Y
 from brakecli.solver.schemes.piecewise_exact import look, phases
 from brakecli.solver.schemes.piecewise_exact.orbit import (
     MOST_EVENTS,
@@ -67,7 +67,7 @@ def _returned(m: Any, o: Any, fall: float) -> int:
         s[k, 0], s[k, 1], s[k, 2], o.fell[k] = s[k - 1, 0], s[k - 1, 1], s[k - 1, 2], o.fell[k - 1]
         if k < MOST_TURNS:
             o.lows[k], o.ways[k] = o.lows[k - 1], o.ways[k - 1]
-    s[0, 0], s[0, 1], s[0, 2] = m.at[NODES, 0, X], m.at[NODES, 0, Y], m.at[NODES, 0, V_Y]
+    s[0, 0], s[0, 1], s[0, 2] = m.at[X], m.at[Y], m.at[V_Y]
     o.fell[0], o.lows[0], o.ways[0], o.falls = fall, o.low, o.way, o.falls + 1
     o.low, o.way, o.events = s[0, 0], 0, 0
     if o.falls < max(o.next_try, 3):
@@ -138,7 +138,7 @@ def swing(c: Coefficients, m: Any, o: Any, seconds: float) -> None:
             part = zero_of_velocity(m, o, 1.0 if o.begin[V_X] > 0.0 else -1.0)
             if (number + part) * o.h > seconds:
                 return
-            o.low, o.high = min(o.low, m.at[NODES, 0, X]), max(o.high, m.at[NODES, 0, X])
+            o.low, o.high = min(o.low, m.at[X]), max(o.high, m.at[X])
             _bound(m, o, seconds)
             if o.rest[X] + o.bound[0] <= o.high and o.rest[X] - o.bound[0] >= o.low:
                 return

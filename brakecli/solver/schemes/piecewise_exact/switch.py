@@ -22,7 +22,7 @@ def _take_hold(c: Coefficients, m: Any, h: float) -> None:
     for which in range(1, MARGINS):
         total, terms = 0.0, 0.0
         for i in range(SIZE):
-            part = m.margins[STICK, which, i] * m.z[i]
+            part = m.margins[STICK, i, 4 + which] * m.z[i]
             total, terms = total + part, terms + abs(part)
         if total < -0.5 * ROUNDING * terms:
             m.phase = BACKWARD if which == 1 else FORWARD

@@ -1,0 +1,82 @@
+"""The verdict on a history: what the rules decide, with the numbers of the settled part."""
+
+from collections.abc import Iterator
+
+from brakecli.analysis.regime.rules import Rules
+from brakecli.analysis.regime.spectra import segment
+from brakecli.analysis.regime.verdict import Context, Excitation, Regime, Thresholds, Verdict
+from brakecli.solver.history import History
+from brakecli.solver.quantities import ContactState
+
+_DEFAULT = Thresholds()
+
+
+def classify(
+    history: History, context: Context, thresholds: Thresholds = _DEFAULT, *, in_full: bool = True
+) -> Verdict:
+    """The regime of a run's history, by the rules of docs/regimes.md; the first that applies decides.
+
+    Where not `in_full`, evidence and numbers that a sweep does not keep are left out; all others are the same.
+    """
+    rules = Rules(history, context, thresholds)
+    decision = rules.decide()
+    part, radius = rules.settled_part, context.radius
+    cycles = rules.cycles if decision.excitation is Excitation.SELF_EXCITED else None
+    undecided = decision.regime is Regime.UNDECIDED
+    if in_full:
+        _add_evidence(rules, context)
+    split = rules.parts or (None if rules.rings or not in_full else rules.split())
+    forced, own = split if split and not (cycles and split[0] > split[1]) else (None, None)
+    amplitude, spread = rules.amplitude(decision)
+    ripple = context.ripple(part) if context.steady and not cycles else None
+    if ripple:
+        rules.evidence |= {f"ripple_{name}": getattr(ripple, name) for name in ("x", "vx", "force")}
+        spread = spread + ripple.size if spread is not None else None
+    low, high = part.extremes("friction_force")
+    variation = cycles.force_variation if cycles else high - low
+    doubts = _torque_doubts(rules, context, variation, lasting=not cycles and not undecided)
+    friction = part.mean("friction_force")
+    return Verdict(
+        regime=decision.regime,
+        excitation=decision.excitation,
+        frequency=decision.frequency,
+        amplitude=amplitude,
+        amplitude_spread=spread,
+        amplitude_forced=forced,
+        amplitude_own=own,
+        growth_rate=rules.theory.mode.growth if rules.theory else None,
+        ringing_frequency=rules.theory.mode.frequency if rules.theory else None,
+        frequency_resolution=1.0 / (segment(part.stop - part.start) * history.interval),
+        torque_variation=radius * variation if variation is not None else None,
+        settled_from=part.start * history.interval,
+        start=part.start,
+        settled=rules.lasts and not undecided and not ripple,
+        stick_fraction=cycles.stick_fraction if cycles else part.fraction(ContactState.STICK),
+        contact_loss_fraction=cycles.contact_loss_fraction if cycles else part.fraction(ContactState.SEPARATED),
+        mean_friction_force=friction,
+        braking_torque=radius * friction,
+        reasons=(decision.reason, *([ripple.sentence] if ripple else []), *doubts),
+        evidence=rules.evidence,
+        thresholds=thresholds,
+        second_run=decision.second_run,
+    )
+
+
+def _add_evidence(rules: Rules, context: Context) -> None:
+    """Evidence on the settled part that no rule needs."""
+    part, belt = rules.settled_part, context.belt_speed
+    rules.evidence |= {f"amplitude_{name}": part.amplitude(name) for name in ("y", "vx", "vy")}
+    if belt != 0.0:
+        rules.evidence["largest_vx_over_belt_speed"] = part.extremes("vx")[int(belt > 0.0)] / belt
+    rules.evidence |= part.lines(context.forced, context.quiet) | (context.powers(part) if context.steady else {})
+
+
+def _torque_doubts(rules: Rules, context: Context, variation: float | None, *, lasting: bool) -> Iterator[str]:
+    """Why the variation of the torque is missing, or may be too small."""
+    part, interval = rules.settled_part, rules.history.interval
+    if variation is None:
+        finer = f"give an output.sample_interval of {0.25 * interval:.2g} s"
+        yield f"samples miss impacts of the friction force, and torque_variation is missing: {finer}"
+    short = (part.stop - part.start) * interval < 0.999 * context.pattern
+    if short and context.steady and lasting:
+        yield f"torque_variation needs {context.pattern:.3g} s, until the waves repeat: run longer"

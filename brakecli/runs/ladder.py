@@ -1,0 +1,193 @@
+"""The ladder of runs that keep a tolerance: steps and nodes are refined apart, each as far as is needed."""
+
+import math
+from collections.abc import Callable, Generator
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from brakecli.runs.certificate import ROUNDING, Certificate, Certified, compare
+from brakecli.solver.contact import EVALUATORS
+from brakecli.solver.contact.pad import default_nodes
+from brakecli.solver.motion import Motion
+from brakecli.solver.system import System
+
+FIRST_ON_NODES, NODES_RATIO = 0.2, 0.1  # first tolerance there over the requested one; from one to the next
+FIRST_TURN = 15.0  # square of the turn (rad) of the fastest motion in a first step, over the tolerance
+# Two halvings leave a sixth of the tolerance: (1/12, 10/12, 1/12) takes a sixth of that square off a velocity.
+LONGEST_TURN = 0.4  # rad, in a first step
+# In lanes errors grow with nearly the fourth power of such steps; two halvings leave a tenth of the tolerance.
+FIRST_TURN_IN_LANES, LONGEST_TURN_IN_LANES = 60.0, 0.5
+FIRST_PER_WAVE = 8.0  # first steps to a passing wave, at least
+FINEST_FIRST = 4e-4  # tolerance from which on a quarter of the usual nodes is enough to begin with
+MOST_SPARSE = 4  # halvings of a first step before it has reached the sample interval, at most
+MOST_DOUBLINGS = 12  # of steps and nodes each
+STEPS_BETWEEN_KNOTS = 4  # of speed or load, at least: with fewer, no run sees what happens there
+JUMPS = 3.0  # what the estimate of steps is multiplied by where friction turns, or speed or load have knots
+MOST_SECONDS = 900.0  # time of the loop after which no finer run is begun
+
+
+@dataclass
+class _Axis:
+    """How often steps were halved, or nodes doubled, and what the last two times changed."""
+
+    growth: ClassVar[float] = 0.5  # power of the error's fall with which the work grows
+    margin: ClassVar[float] = 1.0
+    order: ClassVar[int] = 2  # with which errors fall at least
+    doublings: int = 0
+    before: float = math.inf
+    last: float = math.inf
+
+    @staticmethod
+    def turn(tolerance: float) -> float:
+        """By which angle (rad) the fastest motion turns in a first step."""
+        return min(LONGEST_TURN, math.sqrt(FIRST_TURN * tolerance))
+
+    @property
+    def error(self) -> float:
+        """Thrice the error that is left.
+
+        Differences that fall by a factor r leave the last one over r - 1. They fall unevenly, and one that is
+        small by luck must not pass: no less is left than the order makes of each of the last two. A single one
+        says nothing: where no edge of a patch crosses the middle of a cell, twice the nodes give the same force.
+        """
+        if max(self.before, self.last) <= ROUNDING:
+            return self.last
+        if math.isinf(self.before) or self.last >= self.before:
+            return math.inf
+        fall = 2.0**self.order
+        least = max(self.last, 3.0 * self.before / (fall * fall - fall))
+        left = max(least, 3.0 * self.last / (self.before / self.last - 1.0))
+        return self.margin * left
+
+    def more(self, tolerance: float) -> float:
+        """By how much the work is likely to grow until the error is below the tolerance."""
+        return max(1.0, self.last / tolerance) ** self.growth if self.last < math.inf else 2.0
+
+
+@dataclass
+class InLanes(_Axis):
+    """Of the steps of runs in lanes, whose errors fall with h³ at least."""
+
+    growth: ClassVar[float] = 0.3
+    order: ClassVar[int] = 3
+
+    @staticmethod
+    def turn(tolerance: float) -> float:
+        """As of other steps, longer by the order."""
+        return min(LONGEST_TURN_IN_LANES, math.sqrt(math.sqrt(FIRST_TURN_IN_LANES * tolerance)))
+
+
+@dataclass
+class _Nodes(_Axis):
+    """Of quadrature nodes: where the edges of patches hardly move, no sum over many positions evens errors out."""
+
+    margin: ClassVar[float] = 2.0
+
+
+@dataclass
+class _Tolerances(_Axis):
+    """Of steps that are found: local tolerances, each a tenth of the one before."""
+
+    growth: ClassVar[float] = 0.2
+
+    @property
+    def error(self) -> float:
+        """What the last two runs differ by, which is the error of the coarser one.
+
+        Two may agree by luck: no less is left than a twentieth of what the two before differed by.
+        """
+        return max(self.last, self.before / 20.0) if self.before < math.inf else self.last
+
+
+def ladder(
+    system: System,
+    is_left: Callable[[Motion, float], bool] = lambda run, more: False,
+    kind: type[_Axis] = _Axis,
+) -> Generator[System, Motion, Certified]:
+    """Runs with steps half as long, or a tenth of the local tolerance, or twice the nodes: what is needed more.
+
+    It yields what is to be run, receives its motion, and returns the last one with its certificate. The errors of
+    steps and of nodes add up, and each is estimated apart. The first steps may pass over samples, the last ones
+    may not, nor over what speed or load do between two knots, as no run would see it.
+    """
+    wanted, events = system.method.tolerance, system.method.own_steps
+    (first, every), fineness = first_rung(system, kind), "tolerance" if events else "step"
+    longest = min(_shortest_span(system) / STEPS_BETWEEN_KNOTS, system.interval) * (1.0 + 1e-9)
+    nodes, steps, quadrature = first_nodes(system), _Tolerances() if events else kind(), _Nodes()
+    before, finer, seconds = None, steps, 0.0
+    while True:
+        at = first * (NODES_RATIO if events else 0.5) ** steps.doublings
+        changes: dict[str, Any] = {"nodes": nodes << quadrature.doublings, fineness: at}
+        interval = max(1, every >> steps.doublings) * system.interval
+        run = yield replace(system, interval=interval, method=replace(system.method, **changes))
+        spent, failed = run.work.solve_seconds, run.work.failed
+        run.work.solve_seconds = seconds = seconds + spent
+        if before is not None and not failed:
+            finer.before, finer.last = finer.last, compare(before, run, wanted)[1]
+        before = before if failed else run
+        opens = set(run.work.evaluators) != {"closed-form"}
+        used = quadrature if nodes and opens else _Axis(0, 0.0, 0.0)
+        margin = JUMPS if not events and (run.work.turns or len(system.belt) + len(system.load) > 2) else 1.0
+        jump = _jump_error(run)
+        error = math.inf if failed else margin * steps.error + used.error + jump
+        short = events or run.system.step <= longest
+        if certified := short and error <= wanted:
+            break
+        coarse = failed or not short or jump > 0.5 * wanted
+        finer = steps if coarse or margin * steps.error >= used.error else quadrature
+        late = run.system.interval == system.interval and seconds + 2.2 * spent > MOST_SECONDS
+        more = 2.0 * steps.more(0.5 * wanted / margin) * used.more(0.5 * wanted)
+        if finer.doublings == MOST_DOUBLINGS or late or is_left(run, more):
+            break
+        finer.doublings += 1
+    until = system.sampled_duration if certified else 0.0
+    if not certified:
+        error = max(error, wanted * 1.0000001) if short and error < math.inf else 1.0
+    with_nodes = f" and {run.system.nodes} nodes" if used is quadrature else ""
+    finest = f"local tolerances of {at:.0e}" if events else f"steps of {run.system.step:.3g} s"
+    how = f"{system.method.scheme} runs down to {finest}{with_nodes}"
+    return Certified(run, Certificate(wanted, certified, error, until, how))
+
+
+def _shortest_span(system: System) -> float:
+    """Between two knots of speed or load, s; infinite where there are none."""
+    return min(float(np.diff(each["time"]).min(initial=math.inf)) for each in (system.belt, system.load))
+
+
+def _jump_error(run: Motion) -> float:
+    """By how much ẋ may be off, relative to its largest value, as steps do not know when in them friction turns.
+
+    Where it turns right behind a time that all rungs step on, they agree on what is wrong by up to this. A shoe
+    that sticks for more than a step has the velocity of the wheel then, whenever in a step it began.
+    """
+    jump = 2.0 * run.system.coefficients.phi * run.work.crossing * run.system.step / run.system.coefficients.m
+    fastest = float(np.abs(run.rows[:, 2]).max(initial=0.0))
+    return jump / fastest if fastest > 0.0 else math.inf if jump > 0.0 else 0.0
+
+
+def first_rung(system: System, kind: type[_Axis] = _Axis) -> tuple[float, int]:
+    """The steps (s) that a ladder begins with, and how many samples each passes over, a power of two.
+
+    Where steps are found it is the local tolerance that the ladder begins with.
+    """
+    if system.method.own_steps:
+        return FIRST_ON_NODES * system.method.tolerance, 1
+    interval, fastest = system.interval, 2.0 * math.pi * max(system.natural_frequencies[1], 1e-300)
+    wanted = kind.turn(system.method.tolerance) / fastest
+    wanted = min(wanted, 1.0 / (FIRST_PER_WAVE * max(system.passing_frequency, 1e-300)))
+    wanted = min(wanted, max(_shortest_span(system) / STEPS_BETWEEN_KNOTS, wanted / 2**MOST_DOUBLINGS))
+    if interval > wanted:
+        return float(interval / math.ceil(interval / wanted)), 1
+    every = 2 ** int(min(MOST_SPARSE, math.log2(min(wanted / interval, system.samples))))
+    return every * interval, every
+
+
+def first_nodes(system: System) -> int:
+    """The nodes that a ladder begins with, which hardly resolve the shortest wave; 0 where none are needed."""
+    if system.smooth or not EVALUATORS[system.method.evaluator].needs_nodes:
+        return 0
+    usual = default_nodes(system.half_length, system.shoe, system.wheel)
+    finer = max(0, int(0.5 * math.log2(FINEST_FIRST / system.method.tolerance)))
+    return max(64, usual // 4) << finer

@@ -1,0 +1,261 @@
+"""The step of many runs at once, each in a lane of its own: `ensemble` says which runs these may be.
+
+The weights (1/12, 10/12, 1/12) are Numerov's here: they weigh positions, velocities and contact forces at the
+three levels. `schemes.three_layer` computes the force at weighted positions, and a velocity from two of them.
+That is right to h² only; here errors fall with h³.
+
+A lane knows slip to one side at constant speed and load, and an iteration like the paper's, (13), from a guess
+that is good enough for most steps. A run that sticks, turns, blows up or needs many evaluations is `out`.
+"""
+
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+from numba import float64, int64, types, void
+from numpy.typing import NDArray
+
+from brakecli.solver.compile import FAST, Floats, borrowed, kernel, stopped, vector
+from brakecli.solver.friction import observed
+from brakecli.solver.quantities import BOUND
+from brakecli.solver.records import Coefficients, record
+from brakecli.solver.roughness import TWO_PI
+from brakecli.solver.schemes import NUMEROV
+from brakecli.solver.sine import sine_cosine
+
+LANES, WAVES = 16, 5
+"""Runs side by side, and waves of the wheel, at most."""
+THETA_1, THETA_2, THETA_3 = NUMEROV
+
+_MOST = 8  # evaluations of the contact in a step
+
+
+def _lanes(names: str) -> dict[str, Any]:
+    return dict.fromkeys(names.split(), (float, LANES))
+
+
+LANE = record(
+    **_lanes(" ".join(Coefficients._fields) + " load belt"),  # given: Q, N, and U, m/s
+    **_lanes("side grip k"),  # sign of the sliding velocity, F_x/F_y, stiffness of the layer, N/m²
+    **_lanes("i_11 i_12 i_22 limit"),  # inverse of a, s/kg; change of the force (N) at which (13) goes on
+    **_lanes("answer"),  # what a force of 1 N in a step takes off the force of a pad that touches everywhere, N
+    **_lanes("x y x_old y_old d e d_old e_old"),  # the motion, as in `records.STATE`
+    **_lanes("force before earlier touching touched"),  # at x, x_old and the level before; parts that touch
+    **_lanes("g_1 g_2"),  # a step, as in `records.PROBLEM`
+    **_lanes("v_x v_y friction state"),  # a sample
+    **_lanes("at_x at_y found touches partly"),  # where the contact is evaluated, its force, the part that touches
+    **_lanes("guess done out evaluations closed"),  # of the force; 1 where it is right; 1 without a result; counts
+    rate=(float, (WAVES, LANES)),  # waves that pass in a second
+    sine=(float, (WAVES, LANES)),  # of a wave at the middle of the pad
+    cosine=(float, (WAVES, LANES)),
+)
+_LANE = numba.from_dtype(LANE)
+_PAIR = types.UniTuple(float64, 2)
+
+
+class Shared(NamedTuple):
+    """What the runs have in common: their grid of time, surfaces and nodes; lengths in m."""
+
+    h: float  # s
+    interval: float  # between samples, s
+    per_sample: int
+    nodes: int
+    length: float  # of the pad
+    full_up_to: float
+    clear_from: float
+    shoe_mean: float
+    waves: Floats  # of each: wavenumber, phase, and its part of the force in full contact over k sin, m²
+    table: Floats  # of each node: f1, and g sin(ωξ), g cos(ωξ) of all waves
+    signals: int
+
+
+_SHARED = types.NamedTuple([float64, float64, int64, int64, *[float64] * 4, vector, vector, int64], Shared)
+
+
+@kernel(void(_LANE, _SHARED, int64, float64), fastmath=FAST)
+def _pass(o: Any, shared: Shared, i: int, t: float) -> None:
+    """Sine and cosine of a wave of the wheel."""
+    omega, phase = shared.waves[3 * i], shared.waves[3 * i + 1]
+    for n in range(LANES):
+        turns = o.rate[i, n] * t
+        angle = omega * o.at_x[n] + (phase - TWO_PI * (turns - np.floor(turns)))
+        o.sine[i, n], o.cosine[i, n] = sine_cosine(angle)
+
+
+@kernel(void(_LANE, _SHARED), fastmath=FAST)
+def _add_nodes(o: Any, shared: Shared) -> None:
+    """The midpoint sum of the gaps (m), and how many nodes touch."""
+    table, at = shared.table, 0
+    for n in range(LANES):
+        o.found[n] = o.touches[n] = 0.0
+    for _ in range(shared.nodes):
+        f1, s_0, s_1, s_2 = table[at], table[at + 1], table[at + 2], table[at + 3]
+        s_3, s_4, c_0, c_1 = table[at + 4], table[at + 5], table[at + 6], table[at + 7]
+        c_2, c_3, c_4 = table[at + 8], table[at + 9], table[at + 10]
+        at += 11
+        for n in range(LANES):
+            gap = o.cosine[0, n] * s_0 + o.sine[0, n] * c_0 + o.cosine[1, n] * s_1 + o.sine[1, n] * c_1
+            gap += o.cosine[2, n] * s_2 + o.sine[2, n] * c_2 + o.cosine[3, n] * s_3 + o.sine[3, n] * c_3
+            gap += o.cosine[4, n] * s_4 + o.sine[4, n] * c_4 - f1 - o.at_y[n]
+            o.found[n] += gap if gap > 0.0 else 0.0
+            o.touches[n] += 1.0 if gap > 0.0 else 0.0
+
+
+@kernel(void(_LANE, _SHARED, float64), fastmath=FAST, inlined=False)
+def _touch(o: Any, shared: Shared, t: float) -> None:
+    """The normal force, (2), and the part that touches: in closed form where a bound proves it, or by nodes."""
+    shared = borrowed(shared)
+    waves, length, full, clear = shared.waves, shared.length, shared.full_up_to, shared.clear_from
+    for i in range(WAVES):
+        _pass(o, shared, i, t)
+    some = 0.0
+    for n in range(LANES):
+        o.partly[n] = 1.0 if full < o.at_y[n] and o.at_y[n] < clear else 0.0
+        some += o.partly[n]
+    if some > 0.0:
+        _add_nodes(o, shared)
+    g_0, g_1, g_2, g_3, g_4 = waves[2], waves[5], waves[8], waves[11], waves[14]
+    spacing, part = length / shared.nodes, 1.0 / shared.nodes
+    for n in range(LANES):
+        mean = g_0 * o.sine[0, n] + g_1 * o.sine[1, n] + g_2 * o.sine[2, n] + g_3 * o.sine[3, n]
+        mean += g_4 * o.sine[4, n] - length * (o.at_y[n] + shared.shoe_mean)
+        closed = mean if mean > 0.0 and o.at_y[n] <= full else 0.0
+        o.found[n] = o.k[n] * (spacing * o.found[n] if o.partly[n] > 0.0 else closed)
+        o.touches[n] = part * o.touches[n] if o.partly[n] > 0.0 else 1.0 if o.at_y[n] <= full else 0.0
+
+
+@kernel(_PAIR(_LANE, int64, *[float64] * 5))
+def _acceleration(o: Any, n: int, x: float, y: float, v_x: float, v_y: float, force: float) -> tuple[float, float]:
+    """By (6) and (7) without the load."""
+    a_x = o.grip[n] * force - o.b_xx[n] * v_x - o.b_xy[n] * v_y - o.c_xx[n] * x - o.c_xy[n] * y
+    a_y = force - o.b_xy[n] * v_x - o.b_yy[n] * v_y - o.c_xy[n] * x - o.c_yy[n] * y
+    return a_x / o.m[n], a_y / o.m[n]
+
+
+@kernel(void(_LANE, _SHARED), inlined=False)
+def _begin(o: Any, shared: Shared) -> None:
+    """The second level from the first, x¹ = x⁰ + h v⁰ + h² (2 a⁰ + a¹)/6, where `g_1` and `g_2` hold a."""
+    h = shared.h
+    for n in range(LANES):
+        o.at_x[n], o.at_y[n], o.g_1[n], o.g_2[n] = o.x_old[n], o.y_old[n], 0.0, 0.0
+    for late in range(2):
+        _touch(o, shared, late * h)
+        part, moves = (h * h / 6.0, 0.0) if late else (0.5 * h * h, h)
+        for n in range(LANES):
+            v_x, v_y = o.d[n] + h * o.g_1[n], o.e[n] + h * o.g_2[n]
+            a_x, a_y = _acceleration(o, n, o.at_x[n], o.at_y[n], v_x, v_y, o.found[n])
+            a_x, a_y = a_x - o.load[n] * o.sin_beta[n] / o.m[n], a_y - o.load[n] * o.cos_beta[n] / o.m[n]
+            o.at_x[n] += moves * v_x + part * (a_x - o.g_1[n])
+            o.at_y[n] += moves * v_y + part * (a_y - o.g_2[n])
+            o.g_1[n], o.g_2[n] = a_x, a_y
+            if not late:
+                o.before[n], o.touched[n] = o.found[n], o.touches[n]
+                o.d_old[n], o.e_old[n] = v_x - h * a_x, v_y - h * a_y
+    _touch(o, shared, h)
+    for n in range(LANES):
+        o.x[n], o.y[n], o.force[n], o.touching[n] = o.at_x[n], o.at_y[n], o.found[n], o.touches[n]
+        o.earlier[n] = 2.0 * o.before[n] - o.force[n]
+
+
+@kernel(void(_LANE, _SHARED), fastmath=FAST)
+def _prepare(o: Any, shared: Shared) -> None:
+    """The known part of (6) and (7) over three levels, and the guess of the force as in `loop.advance`.
+
+    The mean of three velocities is d - (d^{n+1} - 2d + d^{n-1})/12, taken a level earlier.
+    """
+    h = shared.h
+    for n in range(LANES):
+        inertia, x_old, y_old = o.m[n] * (2.0 / (h * h)), o.x_old[n], o.y_old[n]
+        x = THETA_2 * o.x[n] + (THETA_3 + THETA_1) * x_old
+        y = THETA_2 * o.y[n] + (THETA_3 + THETA_1) * y_old
+        v_x, v_y = THETA_1 * (2.0 * o.d[n] - o.d_old[n]), THETA_1 * (2.0 * o.e[n] - o.e_old[n])
+        known = THETA_2 * o.force[n] + THETA_3 * o.before[n]
+        o.g_1[n] = inertia * (o.x[n] - x_old) - o.c_xx[n] * x - o.c_xy[n] * y - o.load[n] * o.sin_beta[n]
+        o.g_2[n] = inertia * (o.y[n] - y_old) - o.c_yy[n] * y - o.c_xy[n] * x - o.load[n] * o.cos_beta[n]
+        o.g_1[n] += o.grip[n] * known - o.b_xx[n] * v_x - o.b_xy[n] * v_y
+        o.g_2[n] += known - o.b_xy[n] * v_x - o.b_yy[n] * v_y
+        force = 3.0 * (o.force[n] - o.before[n]) + o.earlier[n]
+        force = force if force > 0.0 else 0.0
+        o.guess[n] = force if o.force[n] > 0.0 else 0.0
+        o.earlier[n], o.before[n], o.touched[n] = o.before[n], o.force[n], o.touching[n]
+        o.done[n] = o.out[n]
+
+
+@kernel(void(_LANE, _SHARED, float64), fastmath=FAST)
+def _iterate(o: Any, shared: Shared, t: float) -> None:
+    """The force of the next level in `guess`: as (13), until what is left is below the bound."""
+    h = shared.h
+    for _ in range(_MOST):
+        for n in range(LANES):
+            f_x, f_y = o.g_1[n] + THETA_1 * o.grip[n] * o.guess[n], o.g_2[n] + THETA_1 * o.guess[n]
+            x = o.x_old[n] + 2.0 * h * (o.i_11[n] * f_x + o.i_12[n] * f_y)  # Eq. (15), (16)
+            y = o.y_old[n] + 2.0 * h * (o.i_12[n] * f_x + o.i_22[n] * f_y)
+            o.at_x[n] = x if o.done[n] == 0.0 else o.at_x[n]
+            o.at_y[n] = y if o.done[n] == 0.0 else o.at_y[n]
+        _touch(o, shared, t)
+        left = 0.0
+        for n in range(LANES):
+            waits, change = 1.0 - o.done[n], abs(o.found[n] - o.guess[n])
+            near = o.guess[n] + (o.found[n] - o.guess[n]) / (1.0 + o.answer[n] * o.touches[n])  # Newton's method
+            o.guess[n] = near if waits > 0.0 else o.guess[n]
+            o.evaluations[n] += waits
+            o.done[n] = 1.0 if change <= o.limit[n] else o.done[n]
+            left += 1.0 - o.done[n]
+        if left == 0.0:
+            return
+
+
+@kernel(void(_LANE, _SHARED))
+def _finish(o: Any, shared: Shared) -> None:
+    """The next level; a lane is out where the shoe slips to its side no more, or (13) did not converge."""
+    h = shared.h
+    for n in range(LANES):
+        f_x, f_y = o.g_1[n] + THETA_1 * o.grip[n] * o.guess[n], o.g_2[n] + THETA_1 * o.guess[n]
+        d, e = o.i_11[n] * f_x + o.i_12[n] * f_y, o.i_12[n] * f_x + o.i_22[n] * f_y
+        x, y = o.x_old[n] + 2.0 * h * d, o.y_old[n] + 2.0 * h * e
+        o.x_old[n], o.y_old[n], o.x[n], o.y[n] = o.x[n], o.y[n], x, y
+        o.d_old[n], o.e_old[n], o.d[n], o.e[n] = o.d[n], o.e[n], d, e
+        o.force[n], o.touching[n] = o.guess[n], o.touches[n]
+        good = o.done[n] > 0.0 and o.side[n] * (d - o.belt[n]) > 0.0 and abs(x) + abs(y) + abs(d) + abs(e) < BOUND
+        o.out[n] = o.out[n] if good else 1.0
+        o.closed[n] += 1.0 - o.partly[n]
+
+
+@kernel(void(_LANE, _SHARED, float64[:, :, ::1], int64), fastmath=FAST)
+def _sample(o: Any, shared: Shared, rows: NDArray[np.float64], number: int) -> None:
+    """The sample at the older level, as `loop.sample` has it; d without h²/6 of its second derivative."""
+    h = shared.h
+    part, squared = h * h / 6.0 if number else 0.0, 2.0 / (h * h)
+    for n in range(LANES):
+        x_old, y_old, v_x, v_y, belt, normal = o.x_old[n], o.y_old[n], o.d[n], o.e[n], o.belt[n], o.before[n]
+        a_x, a_y = squared * (o.x[n] - x_old - h * v_x), squared * (o.y[n] - y_old - h * v_y)
+        rate = 0.5 / h * (o.force[n] - o.earlier[n])
+        j_x, j_y = _acceleration(o, n, v_x, v_y, a_x, a_y, rate)
+        o.v_x[n], o.v_y[n] = v_x - part * j_x, v_y - part * j_y
+        sliding, bound = o.v_x[n] - belt, o.phi[n] * normal
+        needed = o.b_xx[n] * belt + o.b_xy[n] * o.v_y[n] + o.c_xx[n] * x_old + o.c_xy[n] * y_old
+        needed += o.load[n] * o.sin_beta[n]  # Eq. (6)
+        holds = abs(sliding) <= h * bound / o.m[n] and abs(needed) <= bound
+        o.state[n], o.friction[n] = observed(sliding, holds, needed, normal, bound)
+    for n in range(LANES):
+        row = rows[n, :, number]
+        row[0], row[1], row[2], row[3] = o.x_old[n], o.y_old[n], o.v_x[n], o.v_y[n]
+        row[4], row[5], row[6], row[7] = o.friction[n], o.before[n], o.touched[n], o.state[n]
+
+
+@kernel(void(_LANE, _SHARED, float64[:, :, ::1]))
+def advance(o: Any, shared: Shared, rows: NDArray[np.float64]) -> None:
+    """Run all lanes; `rows` gets the samples of each, variable by variable."""
+    shared = borrowed(shared)
+    _begin(o, shared)
+    for number in range(rows.shape[2]):
+        _sample(o, shared, rows, number)
+        left = 0.0
+        for n in range(LANES):
+            left += 1.0 - o.out[n]
+        if number == rows.shape[2] - 1 or left == 0.0 or stopped(shared.signals):
+            return
+        for step in range(shared.per_sample):
+            _prepare(o, shared)
+            _iterate(o, shared, number * shared.interval + (step + 2) * shared.h)
+            _finish(o, shared)
