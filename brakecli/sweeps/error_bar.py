@@ -62,9 +62,11 @@ def left_open(
         return bias
     far = max((slope(end) for end in wide if end in known), default=0.0)
     if one in at.orbits:
-        inner, outer = ([known[end].rate for end in ends if end in known] for ends in (bracket, wide))
-        steep = wide[1] - wide[0] > NARROWED * (high - low) and inner and np.ptp(inner) > JUMP * np.ptp(outer)
-        if steep or at.jumps(low, high):
+        inner, outer = (
+            np.ptp([known[end].rate for end in ends if end in known] or [0.0]) for ends in (bracket, wide)
+        )
+        narrowed = wide[1] - wide[0] > NARROWED * (high - low)
+        if at.jumps(low, high) or (narrowed and inner > JUMP * outer):
             return max(low - wide[0], wide[1] - high, FOLD * (critical.upper - critical.lower))
         stride = high - low if at.unstable(high) else low - high
         return max(_shifted(rate, one, stride, critical, far, other) for other in OTHERS)
