@@ -27,7 +27,7 @@ STRONGEST = 6  # waves of the wheel of which two may act together
 NEUTRAL = (
     1e-5  # damping ratio, of the slowest motion, that would stop a growth which counts as none without dashpots
 )
-SHORTEST = 256  # parts of the way from a known motion to the next that are tried
+SHORTEST, FINEST = 16, 256  # parts of the way from a known motion to the next that are tried; with dashpots
 LARGEST_PART, LEAST_PART = 0.25, 0.015  # of the waves' amplitudes that is added at once to a motion
 RELAXED = 100.0  # periods of the slowest motion after which a stable motion has come near its orbit
 CLOSE = 0.05  # of the size of a motion: how far its neighbour may be from where it is looked for
@@ -206,7 +206,7 @@ class Disturbances:
         below = max((other for other in self.orbits if other <= value), default=-math.inf)
         above = min((other for other in self.orbits if other >= value), default=math.inf)
         near = below if value - below <= above - value else above
-        if math.isfinite(below) and math.isfinite(above):
+        if below in self.branches and above in self.branches:
             ends = sorted((below, above), key=lambda other: self.orbits[other].rate)
             near = ends[0] if self.orbits[ends[0]].rate < 0.0 < self.orbits[ends[1]].rate else near
         return near, self.orbits.get(near)
@@ -225,7 +225,7 @@ class Disturbances:
         if near is None:
             segments = self._segments(value, found, period)
             return orbit(segments, np.tile(segments.rest, (len(segments.systems), 1)), None)
-        stride, shortest = value - place, abs(value - place) / SHORTEST
+        stride, shortest = value - place, abs(value - place) / (FINEST if place in self.branches else SHORTEST)
         while abs(stride) >= shortest:
             aim = value if abs(value - place) <= abs(stride) else place + stride
             at = found if aim == value else self.sliding_at(aim)
@@ -248,7 +248,7 @@ class Disturbances:
         """
         near, segments, branch = self.orbits[place], self._segments(value, found, period), self.branches.get(place)
         same = (other for other in self.orbits if other != place and self.branches.get(other) == branch)
-        other = min(same, key=lambda other: abs(other - place), default=place)
+        other = min(same, key=lambda other: abs(other - (value if branch is None else place)), default=place)
         guesses = [segments.moved(near)]
         if abs(value - place) <= 2.0 * abs(place - other):
             along = guesses[0] - segments.moved(self.orbits[other])
