@@ -1,6 +1,7 @@
 """A second run of a case, which decides whether friction or the roughness keeps its vibration up."""
 
 import math
+import re
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -10,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from brakecli.analysis.regime.evidence import Part, follows
-from brakecli.analysis.regime.forced import GROWN
+from brakecli.analysis.regime.forced import GROWN, SECOND_RUN
 from brakecli.analysis.regime.of_run import context, numbers_of, stored_run, verdict_on
 from brakecli.analysis.regime.verdict import Excitation, Feeds, Regime, Thresholds
 from brakecli.analysis.stability.modes import crossings, growth
@@ -60,7 +61,8 @@ def classify_twice(
         say(f"second run, {second.change}, four times as long: about {duration_text(found.seconds)}")
         feeds, sticks, shown = compared(second, history, lambda done: progress("steps", done, second.system.steps))
         verdict = verdict_on(history, system, failure, thresholds, feeds, sticks)
-        return numbers_of(replace(verdict, reasons=(*verdict.reasons, shown)), failure)
+        first = re.sub(rf"(;|, or) decide by {re.escape(SECOND_RUN)}.*", "", verdict.reasons[0])  # that is done
+        return numbers_of(replace(verdict, reasons=(first, *verdict.reasons[1:], shown)), failure)
 
 
 def second_system(system: System, history: History) -> Second:
@@ -107,7 +109,9 @@ def compared(
         remains = part >= _REMAINS and (lost or verdict.excitation is Excitation.FORCED)
         duration = history.samples * history.interval
         if remains and 0.0 < second.growth * duration < GROWN:  # what it has not shown yet, less friction cannot
-            own = f"but sliding is unstable: the shoe's own vibration grows at {second.growth:.3g} 1/s"
+            own = (
+                f"but in the first sliding is unstable: the shoe's own vibration grows at {second.growth:.3g} 1/s"
+            )
             return Feeds.UNKNOWN, 0.0, f"{text}, {own}; run at least {1.01 * GROWN / second.growth:.3g} s"
         waves, end = context(second.system).waves, Part(history, history.samples // 2, history.samples)
         least = _VANISHES  # what moves as the waves do may be forced along x, and falls as friction does

@@ -69,6 +69,16 @@ def test_a_second_run_decides_what_its_verdict_leaves_open(here: Path) -> None:
     assert all("in the second run" in result.json["reasons"][-1] for result in (forced, own))
 
 
+def test_a_second_run_that_decides_nothing_is_not_asked_for_again(here: Path) -> None:
+    (here / "slow.toml").write_text(tomli_w.dumps(SHOES["its own vibration grows for ever so slowly"]))
+    brakecli("run", "slow.toml", "--quiet", cwd=here).told(0)
+    (found,) = each(here, [["classify", "slow.h5", "--second-run", "--json"]])
+    assert found.json["regime"] == "undecided"
+    assert found.json["reasons"][0].endswith("; run at least 690 s")  # ln 1e9 over 0.0303 1/s, and 1 % more
+    assert "in the first sliding is unstable" in found.json["reasons"][-1]
+    assert not any(COMMAND in reason for reason in found.json["reasons"])
+
+
 def test_a_second_run_is_made_only_where_it_can_decide(here: Path) -> None:
     brakecli("run", "forced.toml", "--set", "roughness.wheel.amplitudes=[1e-6]", "-o", "full.h5", "-q", cwd=here)
     (here / "signal.csv").write_text("\n".join(str(i % 7) for i in range(500)))
