@@ -115,10 +115,11 @@ def context(system: System) -> Context:
         frictionless=c.phi == 0.0,
         undamped=is_undamped(c),
         touches=lambda: stiffness() > 0.0,
+        settles=(c.b_xx + c.b_yy) / (3.0 * c.m),  # phase space shrinks by the dashpots only, in three directions
         growth=lambda: growth(c, stiffness(), grip),
         modes=lambda: [each for k in (stiffness(), system.contact_stiffness) for each in modes(c, k, grip)],
         linear=theory,
-        ripple=lambda part: ripple(system, belt, stiffness(), part),
+        ripple=lambda part, lines: ripple(system, belt, stiffness(), part, lines),
         powers=partial(_powers, system, belt),
     )
 
