@@ -73,8 +73,8 @@ def ripple(system: System, belt: float, stiffness: float, part: Part, lines: Seq
     )
     if max(in_x, in_vx, in_force) < _LEAST:
         return None
-    parts, size = np.array([in_x, in_vx, in_force]), 0.5 * float(np.ptp(np.fft.irfft(shaken, samples)))
+    swing = 0.5 * float(np.ptp(np.fft.irfft(shaken, samples)))
     if lines:
-        beside, sizes = np.array([part.beside(name, lines) for name in ("x", "vx", "normal_force")]).T
-        parts, size = np.maximum(parts, beside), max(size, float(sizes[0]))
-    return Ripple(*parts.tolist(), size, system.nodes)
+        (beside, own), (vx, _), (pressing, _) = (part.beside(name, lines) for name in ("x", "vx", "normal_force"))
+        in_x, in_vx, in_force, swing = max(in_x, beside), max(in_vx, vx), max(in_force, pressing), max(swing, own)
+    return Ripple(in_x, in_vx, in_force, swing, system.nodes)

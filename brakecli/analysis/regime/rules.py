@@ -243,7 +243,7 @@ class Rules(ForcedRules):
         if not self.settled or rate == 0.0:
             return
         if not self.lasts:
-            text = f"disturbances of this vibration decay at {rate:.2g} 1/s at most"
+            text = f"this vibration may settle at only {rate:.2g} 1/s"
         elif slope > _SURE * error and change > self.limits.settled_within:
             text, self.settled = f"the vibration still changes by {change:.0%} within the settled part", False
         else:

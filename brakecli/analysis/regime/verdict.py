@@ -68,7 +68,7 @@ class Context:
     frictionless: bool = False
     undamped: bool = False
     touches: Callable[[], bool] = lambda: True  # whether the shoe touches the wheel where it slides steadily
-    settles: float = math.inf  # 1/s, at least the rate at which the slowest disturbance of a limit cycle decays
+    settles: float = math.inf  # 1/s: the slowest disturbance of a limit cycle without stick decays no faster
     growth: Callable[[], float] = lambda: 0.0  # 1/s, of a small disturbance of steady sliding; below 0 it decays
     modes: Callable[[], list["Mode"]] = list  # of small vibrations
     linear: Callable[[], "Linear | None"] = lambda: None  # the theory of full contact
