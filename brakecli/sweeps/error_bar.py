@@ -5,6 +5,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 
+import numpy as np
+
 from brakecli.analysis.stability.modes import growth as eigenvalue_growth
 from brakecli.analysis.stability.search import bisect
 from brakecli.sweeps.floquet import Disturbances
@@ -18,6 +20,9 @@ more, and so does the critical value, which counts where growth begins like a ro
 by all of its error or more: at least half of that counts, as patches that open make errors fall unevenly."""
 BEYOND = 1.2  # times the way to where growth with other steps passes zero, if it is as steep as further away
 NARROW = 1.1  # ratio of the ends of the bracket of that way
+JUMP = 0.5  # of all change in the bracket found first: in a narrow bracket growth jumps so, at a fold
+FOLD = 1.0 / 32.0  # of the range: least bar there, for steps move a fold, too, by an amount that is not measured
+NARROWED = 10.0  # times as narrow as the bracket that was found first
 ROUNDED = 20.0  # times the spread of growth that rounding makes in a three-layer scheme near self-locking
 
 
@@ -32,8 +37,9 @@ def left_open(
 
     The error of a periodic motion holds that of its scheme. A three-layer scheme takes velocities from differences
     of positions: near self-locking, where the force grows beyond all bounds, their rounding makes the growth jump,
-    so that the slope counts only as far as the ends of the bracket that was found first show it. Where
-    the `bias` is not known, the bar of a linear motion reaches to where the eigenvalues change.
+    so that the slope counts only as far as the ends of the bracket that was found first show it. Where a motion
+    ends in a fold, growth jumps, and the bar holds that bracket. Where the `bias` is not known, the bar of a
+    linear motion reaches to where the eigenvalues change.
     """
     known, (low, high) = {value: each for value, each in at.known.items() if each is not None}, bracket
     near = sorted(known, key=lambda value: max(low - value, value - high, 0.0))[:2]
@@ -56,6 +62,12 @@ def left_open(
         return bias
     far = max((slope(end) for end in wide if end in known), default=0.0)
     if one in at.orbits:
+        inner, outer = (
+            np.ptp([known[end].rate for end in ends if end in known] or [0.0]) for ends in (bracket, wide)
+        )
+        narrowed = wide[1] - wide[0] > NARROWED * (high - low)
+        if at.jumps(low, high) or (narrowed and inner > JUMP * outer):
+            return max(low - wide[0], wide[1] - high, FOLD * (critical.upper - critical.lower))
         stride = high - low if at.unstable(high) else low - high
         return max(_shifted(rate, one, stride, critical, far, other) for other in OTHERS)
     if known[one].noise:

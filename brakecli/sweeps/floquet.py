@@ -27,9 +27,10 @@ STRONGEST = 6  # waves of the wheel of which two may act together
 NEUTRAL = (
     1e-5  # damping ratio, of the slowest motion, that would stop a growth which counts as none without dashpots
 )
-SHORTEST = 16  # parts of the way from a known motion to the next that are tried
-LARGEST_PART = 0.25  # of the waves' amplitudes that is added at once to a motion
+SHORTEST, FINEST = 16, 256  # parts of the way from a known motion to the next that are tried; with dashpots
+LARGEST_PART, LEAST_PART = 0.25, 0.015  # of the waves' amplitudes that is added at once to a motion
 RELAXED = 100.0  # periods of the slowest motion after which a stable motion has come near its orbit
+CLOSE = 0.05  # of the size of a motion: how far its neighbour may be from where it is looked for
 MISSED = 3  # searches for a motion that grows out of steady sliding that may fail
 
 
@@ -41,6 +42,7 @@ class Disturbances:
         self.sliding_at = sliding_at
         self.known: dict[float, Growth | None] = {}
         self.orbits: dict[float, Orbit] = {}
+        self.branches: dict[float, float] = {}  # by where the motion was found first, with dashpots
         self.missed = 0
 
     def at(self, value: float) -> Growth | None:
@@ -76,6 +78,7 @@ class Disturbances:
             return sorted({*values[::PARTS], *(0.5 * (low + high) for low, high in pairwise(ends))})
         values = sorted({*values, *self.resonances(values)})
         self.scan(values)
+        self._go_on(values)
         for _ in range(REFINED):
             added = set[float]()
             for triple in zip(values, values[1:], values[2:], strict=False):
@@ -87,7 +90,38 @@ class Disturbances:
                     added |= {0.5 * (low + high) for low, high in pairwise(triple)}
             values = sorted({*values, *added})
             self.scan(sorted(added))
+        self._go_on(values)
         return values
+
+    def jumps(self, low: float, high: float) -> bool:
+        """Whether the motions at two values are not known to be one; without dashpots that does not count."""
+        ends = [self.branches[value] for value in (low, high) if value in self.branches]
+        return len(ends) == 2 and ends[0] != ends[1]
+
+    def _go_on(self, values: list[float]) -> None:
+        """Follow stable motions on where another one was found beyond: from the end that is stable.
+
+        On the way back they are followed only where that other one is unstable.
+        """
+        up = 1 if self.unstable(values[0]) is False else -1
+        for order, back in ((values[::up], False), (values[::-up], True)):
+            for before, value in pairwise(order):
+                if not (before in self.branches and value in self.branches):
+                    continue
+                known, other, found = self.known[before], self.known[value], self.sliding_at(value)
+                period, jumps = common_period(found.system) if found else None, self.jumps(before, value)
+                if not (known and other and found and period) or known.unstable:
+                    continue
+                if not other.unstable and (back or not jumps):
+                    continue
+                forced = self._followed(value, found, period, before)
+                if forced is None or (forced.rate > 0.0 and (back or not jumps)):
+                    continue
+                was, now = self.branches[value], self.branches[before]
+                if _same(forced, self.orbits[value]):
+                    self.branches = {at: now if each == was else each for at, each in self.branches.items()}
+                self.orbits[value], self.known[value] = forced, replace(other, rate=forced.rate)
+                self.branches[value] = now
 
     def resonances(self, values: list[float]) -> list[float]:
         """Between the values: where a wave of the wheel, its second or third harmonic, or the sum or difference of
@@ -147,7 +181,8 @@ class Disturbances:
         low, high = sorted((place, value))
         gap = any(lost is None and low < other < high for other, lost in self.known.items())
         forced = None if gap else self._followed(value, found, period)
-        if forced is None and not is_undamped(found.system.coefficients):
+        followed, damped = forced is not None, not is_undamped(found.system.coefficients)
+        if forced is None and damped:
             if plain is None and near is not None and near.rate > 0.0:
                 plain = growth(found)
             if plain is None or plain.rate <= 0.0:
@@ -157,19 +192,24 @@ class Disturbances:
             self.missed += forced is None
         if forced is None:
             return None
+        if damped:
+            place, near = (place, near) if followed else self._near(value)
+            goes_on = followed or (near is not None and _same(forced, near))
+            self.branches[value] = self.branches.get(place, value) if goes_on else value
         self.orbits[value] = forced
         slow, fast = natural_frequencies(found.system.coefficients, found.stiffness)
-        noise = NEUTRAL * 2.0 * math.pi * (slow or fast) if is_undamped(found.system.coefficients) else 0.0
+        noise = 0.0 if damped else NEUTRAL * 2.0 * math.pi * (slow or fast)
         return Growth(forced.rate, 0.0, noise, opened=True)
 
     def _near(self, value: float) -> tuple[float, Orbit | None]:
-        near = min(self.orbits, key=lambda other: abs(other - value), default=math.nan)
+        """The nearest motion; where one side is stable and the other is not, the stable one: it may go on."""
+        below = max((other for other in self.orbits if other <= value), default=-math.inf)
+        above = min((other for other in self.orbits if other >= value), default=math.inf)
+        near = below if value - below <= above - value else above
+        if below in self.branches and above in self.branches:
+            ends = sorted((below, above), key=lambda other: self.orbits[other].rate)
+            near = ends[0] if self.orbits[ends[0]].rate < 0.0 < self.orbits[ends[1]].rate else near
         return near, self.orbits.get(near)
-
-    def _nearest(self, value: float) -> tuple[float, float]:
-        """Where the two nearest motions are, or twice the only one."""
-        near = sorted(self.orbits, key=lambda other: abs(other - value))[:2]
-        return near[0], near[-1]
 
     def _segments(self, value: float, found: Sliding, period: float) -> Segments:
         _, near = self._near(value)
@@ -177,43 +217,52 @@ class Disturbances:
         count = min(max(1, math.ceil(period * slow / SEGMENT)), MOST_SEGMENTS)
         return Segments(found, period, len(near.states) if near else count)
 
-    def _followed(self, value: float, found: Sliding, period: float) -> Orbit | None:
-        """The periodic motion from the nearest one that is known, on the way in strides; from steady sliding where
-        none is known.
+    def _followed(self, value: float, found: Sliding, period: float, start: float | None = None) -> Orbit | None:
+        """The periodic motion from one that is known (the nearest one), on the way in strides; from steady sliding
+        where none is known.
         """
-        place, near = self._near(value)
+        place, near = self._near(value) if start is None else (start, self.orbits[start])
         if near is None:
             segments = self._segments(value, found, period)
             return orbit(segments, np.tile(segments.rest, (len(segments.systems), 1)), None)
-        stride, shortest = value - place, abs(value - place) / SHORTEST
+        stride, shortest = value - place, abs(value - place) / (FINEST if place in self.branches else SHORTEST)
         while abs(stride) >= shortest:
             aim = value if abs(value - place) <= abs(stride) else place + stride
             at = found if aim == value else self.sliding_at(aim)
             length = common_period(at.system) if at else None
-            forced = self._beside(aim, at, length) if at and length else None
+            forced = self._beside(aim, at, length, place) if at and length else None
             if forced is None:
                 stride *= 0.5
             elif aim == value:
                 return forced
             else:
+                if place in self.branches:
+                    self.branches[aim] = self.branches[place]
                 self.orbits[aim], place = forced, aim
         return None
 
-    def _beside(self, value: float, found: Sliding, period: float) -> Orbit | None:
-        """The periodic motion that continues the line through the two nearest ones, or is near the nearest."""
-        segments, (one, other) = self._segments(value, found, period), self._nearest(value)
-        near = self.orbits[one]
+    def _beside(self, value: float, found: Sliding, period: float, place: float) -> Orbit | None:
+        """The periodic motion that continues the line through one and its neighbour, or is near that one.
+
+        Without dashpots no motion leads through a resonance: there any motion will do.
+        """
+        near, segments, branch = self.orbits[place], self._segments(value, found, period), self.branches.get(place)
+        same = (other for other in self.orbits if other != place and self.branches.get(other) == branch)
+        other = min(same, key=lambda other: abs(other - (value if branch is None else place)), default=place)
         guesses = [segments.moved(near)]
-        if abs(value - one) <= 2.0 * abs(one - other):
+        if abs(value - place) <= 2.0 * abs(place - other):
             along = guesses[0] - segments.moved(self.orbits[other])
-            guesses.insert(0, guesses[0] + along * ((value - one) / (one - other)))
-        tried = (orbit(segments, guess, near.maps) for guess in guesses)
-        return next((forced for forced in tried if forced), None)
+            guesses.insert(0, guesses[0] + along * ((value - place) / (place - other)))
+        for guess in guesses:
+            forced = orbit(segments, guess, near.maps)
+            if forced and (branch is None or np.abs(forced.states - guess).max() <= CLOSE * near.size):
+                return forced
+        return None
 
     def _grown(self, value: float, found: Sliding, period: float) -> Orbit | None:
         """The periodic motion that grows out of steady sliding with the waves of the wheel."""
         wheel, near, part, stride = found.system.wheel, None, 0.0, LARGEST_PART
-        while part < 1.0 and stride >= LARGEST_PART / SHORTEST:
+        while part < 1.0 and stride >= LEAST_PART:
             more = min(part + stride, 1.0)
             system = replace(found.system, wheel=wheel._replace(g=more * wheel.g))
             segments = self._segments(value, replace(found, system=system), period)
@@ -232,3 +281,8 @@ class Disturbances:
         waited = segments.settled(start, min(RELAXED / slow, LONGEST) if slow > 0.0 else LONGEST)
         forced = orbit(segments, waited, None)
         return None if forced and near and forced.size > DEPARTED * near.size else forced
+
+
+def _same(one: Orbit, other: Orbit) -> bool:
+    """Whether two motions are so close that they are one."""
+    return bool(np.abs(one.states - one.segments.moved(other)).max() <= CLOSE * other.size)

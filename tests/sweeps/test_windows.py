@@ -9,11 +9,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 import tomli_w
 import xarray as xr
 from scipy.integrate import solve_ivp
 
 from brakecli.case.system import system_of
+from brakecli.sweeps.critical import Outcome
+from tests.campaign import campaign
 from tests.commands import brakecli
 from tests.examples import make
 from tests.plots.helpers import drawn
@@ -114,3 +117,79 @@ def test_the_third_harmonic_of_a_wave_under_an_opening_pad_is_found() -> None:
     assert abs(answer.value - 6.2833) < (answer.error or 0.0)
     [window] = answer.windows
     assert abs(window[1] - 6.3431) < (answer.error or 0.0)
+
+
+FOLDS: dict[str, dict[str, Any]] = {
+    "unstable beside": {
+        "shoe": {"mass": 5.598},
+        "wheel": {"radius": 0.33, "angular_speed": 28.3},
+        "link1": {"stiffness": 14970000.0, "damping": 56.26, "angle_deg": 2.715},
+        "link2": {"stiffness": 21640000.0, "damping": 44.6, "angle_deg": 25.79},
+        "load": {"force": 511.5},
+        "friction": {"coefficient": 0.1},
+        "contact": {"half_length": 0.015, "stiffness": 113300000.0},
+        "roughness": {"wheel": {"amplitudes": [8.465e-06, 1.126e-05], "wavelengths": [0.032, 0.016]}},
+        "output": {"sample_interval": 0.00015},
+        "solver": {"duration": 0.2, "tolerance": 0.001},
+    },
+    "resonance": {
+        "shoe": {"mass": 0.7835},
+        "wheel": {"radius": 0.5, "angular_speed": 30.2},
+        "link1": {"stiffness": 6360000.0, "damping": 19.63, "angle_deg": 0.0},
+        "link2": {"stiffness": 6736000.0, "damping": 15.07, "angle_deg": 28.45},
+        "load": {"force": 6333.0},
+        "friction": {"coefficient": 0.1},
+        "contact": {"half_length": 0.04, "stiffness": 52460000.0},
+        "roughness": {"wheel": {"amplitudes": [6.876e-05], "wavelengths": [0.032], "phases_deg": [77.67]}},
+        "output": {"sample_interval": 8.6e-05},
+        "solver": {"duration": 0.2},
+    },
+    "both sides": {
+        "shoe": {"mass": 3.727},
+        "wheel": {"radius": 0.33, "angular_speed": -27.73},
+        "link1": {"stiffness": 6024000.0, "damping": 15.52, "angle_deg": 0.0},
+        "link2": {"stiffness": 12400000.0, "damping": 23.47, "angle_deg": -4.105},
+        "load": {"force": 503.1},
+        "friction": {"coefficient": 1.555},
+        "contact": {"half_length": 0.01, "stiffness": 149500000.0},
+        "roughness": {"wheel": {"amplitudes": [2.244e-05], "wavelengths": [0.032]}},
+        "solver": {"duration": 0.21, "scheme": "two-layer", "step": 3.5e-05, "theta": [0.55, 0.5]},
+    },
+    "doubling": {
+        "shoe": {"mass": 1.179},
+        "wheel": {"radius": 0.5, "angular_speed": 17.66},
+        "link1": {"stiffness": 926400.0, "damping": 7.885, "angle_deg": -10.35},
+        "link2": {"stiffness": 3188000.0, "damping": 4.907, "angle_deg": 17.61},
+        "load": {"force": 155.3},
+        "friction": {"coefficient": 0.9488},
+        "contact": {"half_length": 0.01, "stiffness": 70610000.0},
+        "roughness": {"wheel": {"amplitudes": [5.552e-06, 4.644e-06], "wavelengths": [0.062, 0.034]}},
+        "output": {"sample_interval": 0.00019},
+        "solver": {"duration": 0.22, "scheme": "event-driven"},
+    },
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "key", "ends", "truth", "least"),
+    [
+        ("unstable beside", "friction__coefficient", (0.0, 7.5), 4.86, 2.7),
+        ("resonance", "friction__coefficient", (0.0, 2.5), 2.326, 1.6),
+        pytest.param("both sides", "shoe__mass", (1.491, 9.317), 3.691, 3.6, marks=campaign),
+        pytest.param("doubling", "link2__stiffness", (1.594e6, 5.42e6), 3.8355e6, 3.62e6, marks=campaign),
+    ],
+)
+def test_a_stable_motion_is_followed_until_it_ends(
+    name: str, key: str, ends: tuple[float, float], truth: float, least: float
+) -> None:
+    """Another integrator, of fourth order, follows it in small steps to the `truth`. At the `least` value, where
+    another motion is unstable, it is stable.
+    """
+    answer = found(FOLDS[name], *ends, key, tolerance=1e-3 * (ends[1] - ends[0]))
+    assert answer.value is not None
+    assert answer.error is not None
+    assert abs(answer.value - truth) < answer.error
+    assert least < answer.value
+    assert answer.error < 0.04 * (ends[1] - ends[0])
+    lost = answer.outcome is Outcome.FOUND
+    assert answer.windows[-1] == ((answer.value, ends[1]) if lost else (ends[0], answer.value))
