@@ -196,7 +196,7 @@ class ForcedRules:
     @property
     def _rate(self) -> float:
         """Rate (1/s) at which disturbances of a limit cycle change: dashpots alone may make it settle."""
-        return min(abs(self.context.growth()), self.context.settles)
+        return 0.0 if self.context.undamped else min(abs(self.context.growth()), self.context.settles)
 
     @property
     def lasts(self) -> bool:
