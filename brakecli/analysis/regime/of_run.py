@@ -17,7 +17,7 @@ from brakecli.analysis.regime.linear import linear_theory
 from brakecli.analysis.regime.over_time import over_time
 from brakecli.analysis.regime.ripple import ripple
 from brakecli.analysis.regime.verdict import Context, Excitation, Feeds, Regime, Thresholds, Verdict
-from brakecli.analysis.stability.modes import growth, is_undamped, modes
+from brakecli.analysis.stability.modes import growth, is_undamped, modes, slowest_of_cycles
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError, UnreadableResultError
@@ -115,7 +115,7 @@ def context(system: System) -> Context:
         frictionless=c.phi == 0.0,
         undamped=is_undamped(c),
         touches=lambda: stiffness() > 0.0,
-        settles=(c.b_xx + c.b_yy) / (3.0 * c.m),  # phase space shrinks by the dashpots only, in three directions
+        settles=slowest_of_cycles(c),
         growth=lambda: growth(c, stiffness(), grip),
         modes=lambda: [each for k in (stiffness(), system.contact_stiffness) for each in modes(c, k, grip)],
         linear=theory,
