@@ -21,7 +21,7 @@ from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, WINDOWS
 from brakecli.analysis.regime.forced import QUARTER
 from brakecli.analysis.regime.linear import Linear, linear_theory
 from brakecli.analysis.regime.verdict import Excitation, Regime
-from brakecli.analysis.stability.modes import is_undamped
+from brakecli.analysis.stability.modes import slowest_of_cycles
 from brakecli.runs.certificate import ROUNDING, Certificate
 from brakecli.solver.compile import Floats
 from brakecli.solver.motion import Work
@@ -167,7 +167,7 @@ def _cycle(system: System, theory: Linear, flow: Any, o: Any, seen: bool) -> tup
         return None
     rate = -math.log(max(factor, 1e-300)) / period
     start = float(o.fell[0]) + max(math.log(max(float(o.away), 1e-300) / _SETTLED), 0.0) / rate
-    part, growth = end - start, abs(theory.mode.growth)
+    part, slow = end - start, min(abs(theory.mode.growth), slowest_of_cycles(system.coefficients))
     stick, clear = float(o.spent[STICK]), float(o.spent[OPEN])
     limited = period - float(o.spent[o.sliding])
     hidden = (
@@ -179,9 +179,8 @@ def _cycle(system: System, theory: Linear, flow: Any, o: Any, seen: bool) -> tup
     )
     if rate * part < _POWERS or (seen and hidden):
         return None
-    undamped = is_undamped(system.coefficients)
-    lasts = growth * (part - _WINDOW * end) >= 1.0 and not undamped
-    if seen and not lasts and (theory.direction < 0 or (growth * end >= 1.0 and not undamped)):
+    lasts = slow * (part - _WINDOW * end) >= 1.0
+    if seen and not lasts and (theory.direction < 0 or slow * end >= 1.0):
         return None  # whether the vibration lasts depends on where exactly a whole run sees it settled
     c, how = system.coefficients, "with" if stick > 0.0 else "without"
     force = (c.c_xx * float(o.mean_x) + c.c_xy * float(o.mean_y)) / period + system.load_at_start * c.sin_beta

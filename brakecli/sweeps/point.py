@@ -32,6 +32,7 @@ from brakecli.sweeps.early import Ending, Known, early
 from brakecli.sweeps.plan import Plan, Settings
 
 OUT_OF_MEMORY = "out of memory; sample less often, or reduce contact.nodes"
+_UNTOLD = ("torque_variation", "numbers that last")  # no number of a sweep, and its column `settled`
 _FAULTS = (BrakecliError, FloatingPointError, MemoryError)
 
 
@@ -93,7 +94,7 @@ def _judged(case: Case, found: Check, certified: Certified | None, *, whole: boo
                 raise FloatingPointError("a force overflows")
             history = array_history(system.interval, motion.rows)
             verdict = verdict_on(history, system, motion.work.failure_sentence, in_full=whole)
-    told = (text for text in verdict.reasons[1:] if "torque_variation" not in text)  # no number of a sweep
+    told = (text for text in verdict.reasons[1:] if not any(each in text for each in _UNTOLD))
     warnings, work = [*found.warnings, *told], motion.work
     if work.unconverged_steps and not work.failed:
         warnings.append(f"{work.unconverged_steps} of {work.steps} steps did not converge, as the case allows")

@@ -91,6 +91,52 @@ def test_the_spread_of_what_is_not_settled_holds_what_it_becomes(name: str, late
     assert abs(verdict.frequency - later[1]) <= 2.0 * verdict.evidence["frequency_spread"]
 
 
+@pytest.mark.parametrize(
+    ("name", "later"),
+    [  # amplitude (m) and frequency (Hz) eight times later, by another integrator
+        ("settles by its dashpots alone", (1.056e-3, 210.3)),
+        ("falls by its dashpots alone", (1.35e-4, None)),
+        ("grows by its dashpots alone", (2.87e-3, 26.335)),
+        ("grows, and its frequency falls", (1.35e-4, 202.0)),
+        ("grows, and hardly damped", (7.55e-5, 381.5)),
+        ("falls on a rough wheel by its dashpots alone", (3.64e-4, None)),
+        ("its frequency grows on a rough wheel", (None, 2202.0)),
+    ],
+)
+def test_a_limit_cycle_settles_no_faster_than_a_third_of_what_phase_space_shrinks_by(
+    name: str, later: tuple[float | None, float | None]
+) -> None:
+    """Sliding is unstable at tens to hundreds of 1/s, which says nothing of a shoe off the wheel."""
+    verdict, shoe = judged(name), Shoe.of(SHOES[name])
+    assert (verdict.excitation, verdict.settled) == (Excitation.SELF_EXCITED, False)
+    told = re.search(r"may settle at only ([\d.]+) 1/s: run at least", verdict.reasons[1])
+    assert told is not None
+    assert float(told[1]) == pytest.approx(np.trace(shoe.b) / (3.0 * shoe.m), rel=0.06)  # two digits
+    if later[0] and verdict.amplitude_spread is not None:
+        assert abs(verdict.amplitude - later[0]) <= 2.0 * verdict.amplitude_spread
+    if later[1] and verdict.frequency:
+        assert abs(verdict.frequency - later[1]) <= 2.0 * verdict.evidence["frequency_spread"]
+
+
+def test_a_run_as_long_as_a_limit_cycle_takes_to_settle_has_its_numbers() -> None:
+    told = re.search(r"run at least ([\d.]+) s", judged("falls by its dashpots alone").reasons[1])
+    assert told is not None
+    later = judged("falls by its dashpots alone", float(told[1]) / 6.3122)
+    assert later.settled
+    assert later.amplitude_spread is not None
+    assert later.amplitude == pytest.approx(1.35e-4, abs=later.amplitude_spread)
+
+
+@pytest.mark.parametrize(
+    ("name", "times"), [("grows by its dashpots alone", 5.0), ("grows, and hardly damped", 9.0)]
+)
+def test_an_envelope_that_surely_grows_has_not_settled(name: str, times: float) -> None:
+    """The dashpots had their time, but x swings by 5 % and 4 % less than in a run twice as long."""
+    verdict = judged(name, times)
+    assert verdict.settled is False
+    assert re.search(r"still changes by \d% within the settled part: run at least", verdict.reasons[1])
+
+
 def test_chaos_with_most_of_its_energy_in_three_bands_is_irregular() -> None:
     """Neighbouring runs part at 7.3 1/s, and the amplitude of a longer run is half, or two and a half times."""
     verdict = judged("chaotic")
@@ -116,6 +162,17 @@ def test_ripple_of_the_nodes_is_named_and_gone_with_the_nodes_that_are_asked_for
     # By another integrator, from the contact integral to 1e-4; peak to peak still ripples by twice `_LEAST`.
     torque = {"ripple of 64 nodes": 0.00229, "ripple in the force": 4.835}[name]
     assert finer.torque_variation == pytest.approx(torque, rel=0.1)
+
+
+def test_what_lies_beside_the_lines_of_a_forced_motion_is_ripple_if_nodes_ripple() -> None:
+    """The mean stiffness misses the resonance of the open pad: it makes 9 % of vx of what is 98 %."""
+    verdict = judged("ripple on the frequency of an open pad")
+    assert (verdict.excitation, verdict.settled) == (Excitation.FORCED, False)
+    # By another integrator with 300 to 1200 nodes: vx is 2.5e-5 m/s, of 1.4e-4 with ripple, amplitude 8.2e-7 m.
+    assert verdict.evidence["ripple_vx"] == pytest.approx(math.sqrt(1.0 - (2.5 / 14.0) ** 2), abs=0.01)
+    assert verdict.amplitude_spread is not None
+    assert abs(verdict.amplitude - 8.2e-7) <= verdict.amplitude_spread
+    assert "contact.nodes = 1024" in verdict.reasons[1]
 
 
 def test_an_impact_between_the_samples_of_most_cycles_counts_for_the_torque() -> None:

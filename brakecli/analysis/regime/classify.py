@@ -28,10 +28,13 @@ def classify(
     split = rules.parts or (None if rules.rings or not in_full else rules.split())
     forced, own = split if split and not (cycles and split[0] > split[1]) else (None, None)
     amplitude, spread = rules.amplitude(decision)
-    ripple = context.ripple(part) if context.steady and not cycles else None
+    lasting = decision.excitation is Excitation.FORCED and not rules.rings
+    lines = (*context.forced, *context.subharmonics()) if lasting else ()
+    ripple = context.ripple(part, lines) if context.steady and not cycles else None
     if ripple:
         rules.evidence |= {f"ripple_{name}": getattr(ripple, name) for name in ("x", "vx", "force")}
         spread = spread + ripple.size if spread is not None else None
+    notes = rules.drifts if cycles else None, ripple.sentence if ripple else None
     low, high = part.extremes("friction_force")
     variation = cycles.force_variation if cycles else high - low
     doubts = _torque_doubts(rules, context, variation, lasting=not cycles and not undecided)
@@ -55,7 +58,7 @@ def classify(
         contact_loss_fraction=cycles.contact_loss_fraction if cycles else part.fraction(ContactState.SEPARATED),
         mean_friction_force=friction,
         braking_torque=radius * friction,
-        reasons=(decision.reason, *([ripple.sentence] if ripple else []), *doubts),
+        reasons=(decision.reason, *filter(None, notes), *doubts),
         evidence=rules.evidence,
         thresholds=thresholds,
         second_run=decision.second_run,

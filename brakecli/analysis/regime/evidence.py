@@ -146,6 +146,16 @@ class Part:
         parts = 0.5 * float(np.ptp(forced)), 0.5 * float(np.ptp(x[middle] - forced))
         return parts if parts[0] > _LEAST_FORCED * parts[1] else None
 
+    def beside(self, name: str, lines: Sequence[float]) -> tuple[float, float]:
+        """Part of the deviation of a variable that lies on no line (Hz), and half of its peak to peak."""
+        values = self.last(name)
+        spectrum = np.fft.rfft(values * np.hanning(len(values)))
+        near = _near(lines, np.fft.rfftfreq(len(values), self.history.interval))
+        near[: LINE_BINS // 2] = True
+        rest = np.where(near, 0.0, spectrum)
+        share = float(np.linalg.norm(rest)) / max(float(np.linalg.norm(spectrum)), 1e-300)
+        return share, 0.5 * float(np.ptp(np.fft.irfft(rest, len(values))))
+
     def lines(self, forced: Sequence[float], quiet: float = 0.0) -> dict[str, list[float]]:
         """The strongest lines of vx: frequencies (Hz), parts of the energy, and 1 where roughness acts there.
 

@@ -44,8 +44,7 @@ class ForcedRules:
         self.settled_part, self.settled = Part(history, history.samples // 2, history.samples), False
         self.theory: Linear | None = None  # where the motion is linear
         self.cycles: Cycles | None = None
-        # m, half of peak to peak of what is forced and what is added
-        self.parts: tuple[float, float] | None = None
+        self.parts: tuple[float, float] | None = None  # m, half of peak to peak: forced, and added
         self.unseen = 0.0  # m, by which waves that beat force more at other times
         self.rings = False  # whether what the shoe adds to a forced motion has not died away yet
         self.evidence: dict[str, Any] = {}
@@ -179,9 +178,14 @@ class ForcedRules:
         return 4.0 * _RELAXED / abs(self.context.growth())
 
     @property
+    def _rate(self) -> float:
+        """Rate (1/s) at which disturbances of a limit cycle change: dashpots alone may make it settle."""
+        return 0.0 if self.context.undamped else min(abs(self.context.growth()), self.context.settles)
+
+    @property
     def lasts(self) -> bool:
         """Whether the numbers of the settled part are those of any longer run."""
-        return self.settled and (self.theory is not None or (self._relaxed and not self.context.undamped))
+        return self.settled and (self.theory is not None or self._rate * self._settled_seconds >= _RELAXED)
 
     @property
     def _larger(self) -> bool:

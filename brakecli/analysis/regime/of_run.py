@@ -17,7 +17,7 @@ from brakecli.analysis.regime.over_time import over_time
 from brakecli.analysis.regime.ripple import ripple
 from brakecli.analysis.regime.spectra import forced_lines, subharmonics
 from brakecli.analysis.regime.verdict import Context, Excitation, Feeds, Regime, Thresholds, Verdict
-from brakecli.analysis.stability.modes import growth, is_undamped, modes
+from brakecli.analysis.stability.modes import growth, is_undamped, modes, slowest_of_cycles
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError, UnreadableResultError
@@ -115,10 +115,11 @@ def context(system: System) -> Context:
         frictionless=c.phi == 0.0,
         undamped=is_undamped(c),
         touches=lambda: stiffness() > 0.0,
+        settles=slowest_of_cycles(c),
         growth=lambda: growth(c, stiffness(), grip),
         modes=lambda: [each for k in (stiffness(), system.contact_stiffness) for each in modes(c, k, grip)],
         linear=theory,
-        ripple=lambda part: ripple(system, belt, stiffness(), part),
+        ripple=lambda part, lines: ripple(system, belt, stiffness(), part, lines),
         powers=partial(_powers, system, belt),
     )
 

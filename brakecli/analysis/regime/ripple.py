@@ -5,6 +5,7 @@ linear equations with the mean stiffness of the contact.
 """
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -37,8 +38,12 @@ class Ripple(NamedTuple):
         return f"ripple of the contact's {self.nodes} nodes is {parts}; take contact.nodes = {enough}"
 
 
-def ripple(system: System, belt: float, stiffness: float, part: Part) -> Ripple | None:
-    """The ripple in the last samples of a part, at a mean stiffness (N/m); None where it is small or not known."""
+def ripple(system: System, belt: float, stiffness: float, part: Part, lines: Sequence[float]) -> Ripple | None:
+    """The ripple in the last samples of a part, at a mean stiffness (N/m); None where it is small or not known.
+
+    Where the part is forced on `lines` (Hz), what lies beside them is ripple: the mean stiffness of an open pad
+    may miss a resonance.
+    """
     samples = min(part.stop - part.start, _MOST_SAMPLES)
     end = Part(part.history, part.stop - samples, part.stop)
     work = samples * _FINER * system.nodes * len(system.wheel.g)
@@ -68,4 +73,8 @@ def ripple(system: System, belt: float, stiffness: float, part: Part) -> Ripple 
     )
     if max(in_x, in_vx, in_force) < _LEAST:
         return None
-    return Ripple(in_x, in_vx, in_force, 0.5 * float(np.ptp(np.fft.irfft(shaken, samples))), system.nodes)
+    swing = 0.5 * float(np.ptp(np.fft.irfft(shaken, samples)))
+    if lines:
+        (beside, own), (vx, _), (pressing, _) = (part.beside(name, lines) for name in ("x", "vx", "normal_force"))
+        in_x, in_vx, in_force, swing = max(in_x, beside), max(in_vx, vx), max(in_force, pressing), max(swing, own)
+    return Ripple(in_x, in_vx, in_force, swing, system.nodes)

@@ -23,11 +23,14 @@ _REST = 0.3  # of a forced motion, by which its closed form may be off
 _LONGER = 1.4  # a run whose last quarter and the window before it are settled, over what comes before
 _SPARSE = 8  # of the places at which a forced motion is computed, one of so many suffices
 _UNSETTLED = 1.5  # times as many cycles where nothing has settled: a hop may look like a vibration
+_SURE = 10.0  # standard errors of a slope: neighbouring windows of an amplitude that wanders go together
 _FAR = 0.3  # rad, of a wave, by which what the shoe adds moves it
 
 
 class Rules(ForcedRules):
     """The rules on one history, in their order. They gather evidence until one of them decides."""
+
+    drifts: str | None = None  # why a limit cycle that seems settled may still change
 
     def contact(self) -> Decision | None:
         """The shoe does not touch the wheel, or sticks to it throughout."""
@@ -213,6 +216,7 @@ class Rules(ForcedRules):
         if self.context.forced and not certain and (self._feeds() is Feeds.UNKNOWN or self._doubtful):
             return self._either()
         drift = abs(found.drift.part) if found.drift.sure else 0.0
+        self._drift_further()
         self.settled &= max(drift, abs(found.detuning.part) if found.detuning.sure else 0.0) <= _DRIFT
         unsure = self.context.undamped or self.context.growth() < 0.0
         if drift > (_DRIFT if unsure else self.limits.settled_within):
@@ -238,6 +242,20 @@ class Rules(ForcedRules):
         irregular = f"irregular: stick in {stick:.0%} of the cycles{without}, {lines}"
         irregular += ", but the frequency wanders" if wanders else ""
         return Decision(f"{irregular}; run longer, or look at the spectrum")
+
+    def _drift_further(self) -> None:
+        """Whether a limit cycle that seems settled may still change, and how long a run must be to show it."""
+        slope, error = abs(self._trend), self.evidence.get("envelope_slope_error", 0.0)
+        change, rate = slope * self._settled_seconds, self._rate
+        if not self.settled or rate == 0.0:
+            return
+        if not self.lasts:
+            text = f"this vibration may settle at only {rate:.2g} 1/s"
+        elif slope > _SURE * error and change > self.limits.settled_within:
+            text, self.settled = f"the vibration still changes by {change:.0%} within the settled part", False
+        else:
+            return
+        self.drifts = f"{text}: run at least {QUARTER * (self.duration + 3.0 / rate):.3g} s for numbers that last"
 
     def _unfounded(self, theory: "Linear", found: Cycles) -> Decision | None:
         """What speaks against self-excited vibration on smooth surfaces, where theory knows small vibrations."""
@@ -300,5 +318,5 @@ class Rules(ForcedRules):
             return spread + (abs(drift.part) * value if drift.sure else 0.0)
         if self.context.undamped:
             return None  # there is no end to it
-        ends = min(abs(self.context.growth()) * self._settled_seconds, 1.0)
+        ends = min(self._rate * self._settled_seconds, 1.0)
         return min(spread + abs(drift.part) * value / max(ends, 1e-9), value)

@@ -1,7 +1,7 @@
 """What a verdict says, and what of the case it goes by; `rules` finds it."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -68,10 +68,11 @@ class Context:
     frictionless: bool = False
     undamped: bool = False
     touches: Callable[[], bool] = lambda: True  # whether the shoe touches the wheel where it slides steadily
+    settles: float = math.inf  # 1/s: the slowest disturbance of a limit cycle without stick decays no faster
     growth: Callable[[], float] = lambda: 0.0  # 1/s, of a small disturbance of steady sliding; below 0 it decays
     modes: Callable[[], list["Mode"]] = list  # of small vibrations
     linear: Callable[[], "Linear | None"] = lambda: None  # the theory of full contact
-    ripple: Callable[[Part], "Ripple | None"] = lambda part: None  # of the quadrature nodes
+    ripple: Callable[[Part, Sequence[float]], "Ripple | None"] = lambda part, lines: None  # of the nodes
     powers: Callable[[Part], dict[str, float]] = lambda part: {}  # W, what becomes of the power of the belt
     radius: float = 1.0  # R, m
     step: float = 0.0  # s; 0 where steps are chosen to keep an error

@@ -57,6 +57,14 @@ def is_undamped(c: Coefficients) -> bool:
     return c.b_xx == 0.0 and c.b_yy == 0.0
 
 
+def slowest_of_cycles(c: Coefficients) -> float:
+    """Rate (1/s) that the slowest disturbance of a limit cycle without stick decays at, at most.
+
+    Dashpots alone shrink volumes in phase space, at (b1 + b2)/m, which its three disturbances share.
+    """
+    return (c.b_xx + c.b_yy) / (3.0 * c.m)
+
+
 @lru_cache(maxsize=4)
 def eigensystem(c: Coefficients, contact_stiffness: float, grip: float) -> tuple[Complex, Complex]:
     """The four eigenvalues (1/s) and the displacement parts of their vectors, in columns.
