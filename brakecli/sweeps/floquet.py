@@ -24,9 +24,8 @@ REFINED = 3  # times that values are added beside one at which stability is near
 MOST_RESONANCES, HALVINGS = 32, 12  # places where values are put, and how exactly
 BESIDE = 0.01  # of a frequency: how far beside such a place others are put
 STRONGEST = 6  # waves of the wheel of which two may act together
-NEUTRAL = (
-    1e-5  # damping ratio, of the slowest motion, that would stop a growth which counts as none without dashpots
-)
+# Damping ratio, of the slowest motion, that would stop a growth which counts as none without dashpots
+NEUTRAL = 1e-5
 SHORTEST, FINEST = 16, 256  # parts of the way from a known motion to the next that are tried; with dashpots
 LARGEST_PART, LEAST_PART = 0.25, 0.015  # of the waves' amplitudes that is added at once to a motion
 RELAXED = 100.0  # periods of the slowest motion after which a stable motion has come near its orbit

@@ -391,9 +391,12 @@ def test_multipliers_of_a_motion_that_opens_are_those_of_the_event_driven_scheme
         assert measured is not None
         return measured.rate
 
-    own = rate(1.0)  # other steps say how wrong it may be, as in an error bar
-    error = max(abs(part * times * (own - rate(finer))) for finer, part, times in OTHERS)
-    assert abs(own - event_driven_growth(friction)) <= error
+    exact, (coarse, own, half, quarter) = event_driven_growth(friction), map(rate, (0.5, 1.0, 2.0, 4.0))
+    others = {0.5: coarse, 2.0: half}  # other steps say how wrong it may be, as in an error bar
+    assert abs(own - exact) <= max(abs(part * times * (own - others[finer])) for finer, part, times in OTHERS)
+    assert abs(own - exact) < 0.1 * abs(exact)
+    # An error of first order at least: half of the step takes half of it away, the double one adds all of it
+    assert abs(half - exact) <= max(2.0 * abs(half - quarter), 0.5 * abs(own - half))
 
 
 @pytest.mark.parametrize("friction", [0.6, 1.2, 1.8, 1.9, 2.1])
