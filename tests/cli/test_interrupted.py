@@ -27,8 +27,16 @@ from tests.commands import (
 pytestmark = pytest.mark.usefixtures("compiled")
 
 
+def listens(process: subprocess.Popen[bytes]) -> bool:
+    """Whether the command has handlers of its own; before, Python's hears SIGINT, and nothing the others."""
+    status = Path(f"/proc/{process.pid}/status").read_text()
+    caught = int(next(line for line in status.splitlines() if line.startswith("SigCgt")).split()[1], 16)
+    return bool(caught >> (signal.SIGTERM - 1) & 1)
+
+
 def interrupt(process: subprocess.Popen[bytes], number: signal.Signals) -> None:
-    """Send a signal; the command ends soon, with its code and one sentence."""
+    """Send a signal to a command that has minutes to go; it ends soon, with its code and one sentence."""
+    wait_until(lambda: listens(process))
     assert process.poll() is None
     start = time.monotonic()
     process.send_signal(number)
@@ -96,11 +104,11 @@ def test_a_signal_ends_a_run_of_slow_steps(here: Path) -> None:
     assert left_in(here) == {"tiny.toml"}
 
 
-def many_waves(count: int, duration: float) -> str:
-    """A case on an open pad, whose steps take 0.1 s with 300 waves, and minutes with 3000."""
+def many_waves(count: int) -> str:
+    """A case on an open pad, whose run takes minutes with 300 waves, and hours with 3000."""
     waves = [round(0.03 * 0.1 ** (i / count), 9) for i in range(count)]
     rough = f"\n[roughness.wheel]\namplitudes = {[round(6e-5 / count, 12)] * count}\nwavelengths = {waves}\n"
-    solver = f'scheme = "event-driven", tolerance = 1e-6, duration = {duration}'
+    solver = 'scheme = "event-driven", tolerance = 1e-6, duration = 0.1'
     case = TINY.replace("step = 1e-5, duration = 0.02", solver)
     return case.replace("load.force = 5000.0", "load.force = 200.0") + rough
 
@@ -117,7 +125,7 @@ def many_waves(count: int, duration: float) -> str:
 def test_a_signal_ends_steps_that_find_the_patches_of_many_waves(
     here: Path, count: int, number: signal.Signals
 ) -> None:
-    (here / "tiny.toml").write_text(many_waves(count, 2e-3))
+    (here / "tiny.toml").write_text(many_waves(count))
     with started("run", "tiny.toml", cwd=here) as process:
         wait_until((here / ".tiny.h5.part").exists)
         time.sleep(1.0 if count < 1000 else 3.0)  # for the tables of the contact
@@ -148,10 +156,12 @@ def test_a_signal_ends_a_search_for_the_patches_of_millions_of_waves(
 
 @campaign
 @pytest.mark.parametrize("count", [300, 3000, 7800])
-@pytest.mark.parametrize("command", ["run", "check", "stability", "compare-schemes", "sweep"])
-def test_a_signal_ends_every_command_on_many_waves_at_any_time(here: Path, command: str, count: int) -> None:
-    """Ten commands, in their imports and later."""
-    (here / "tiny.toml").write_text(many_waves(count, 2e-3))
+@pytest.mark.parametrize("command", ["run", "stability", "compare-schemes", "sweep"])
+def test_a_signal_ends_every_long_command_on_many_waves_at_any_time(here: Path, command: str, count: int) -> None:
+    """In their imports and later."""
+    if (command, count) == ("stability", 7800):
+        count = 5000  # more waves are refused, for they would take hours
+    (here / "tiny.toml").write_text(many_waves(count))
     axis = '[[axis]]\nparameter = "load.force"\nvalues = [200.0, 250.0]\n'
     search = '[critical]\nparameter = "friction.coefficient"\nlower = 0.0\nupper = 2.0\n'
     (here / "map.toml").write_text(f'case = "tiny.toml"\n{axis}{search}')
@@ -159,13 +169,12 @@ def test_a_signal_ends_every_command_on_many_waves_at_any_time(here: Path, comma
     for number, delay in ((signal.SIGINT, 1.5), (signal.SIGTERM, 6.0)):
         with started(command, file, "--quiet", cwd=here) as process:
             time.sleep(delay)
-            if process.poll() is None:  # `check` may have ended
-                interrupt(process, number)
+            interrupt(process, number)
         assert left_in(here) <= {"tiny.toml", "map.toml", "map.h5.partial"}
 
 
 def test_more_waves_than_memory_are_refused_by_every_command(here: Path) -> None:
-    (here / "tiny.toml").write_text(many_waves(16000, 2e-3))
+    (here / "tiny.toml").write_text(many_waves(16000))
     for command in ("run", "check", "stability"):
         said = brakecli(command, "tiny.toml", cwd=here).told(3, "4.1 GB of memory", "number of waves in roughness")
         assert said.count("16000 waves") == 1
