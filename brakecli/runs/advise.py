@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from brakecli.analysis.regime.of_run import verdict_on
 from brakecli.analysis.regime.verdict import Regime, Verdict
 from brakecli.analysis.stability.advice import (
     Change,
@@ -26,8 +25,7 @@ from brakecli.case.system import system_of
 from brakecli.files import fields
 from brakecli.files.field import values_of
 from brakecli.runs.cost import steps_and_seconds
-from brakecli.runs.run import motion_of
-from brakecli.solver.history import array_history
+from brakecli.runs.run import motion_of, verdict_in_memory
 from brakecli.solver.system import System
 
 CHECK_SECONDS = 5.0  # of computing; a run that would take longer is cut short
@@ -175,6 +173,6 @@ def _checked(case: Case, best: Change, progress: Progress) -> CheckRun | None:
     system = replace(system, duration=system.duration * min(1.0, CHECK_SECONDS / max(seconds, 1e-9)))
     start = time.perf_counter()
     motion, _ = motion_of(system, lambda done: progress("steps of the check", done, system.steps))
-    verdict = verdict_on(array_history(system.interval, motion.rows), system, motion.work.failure_sentence)
+    verdict = verdict_in_memory(motion, system)
     spent = time.perf_counter() - start
     return CheckRun(best.parameter, best.to or 0.0, verdict, system.sampled_duration, spent)

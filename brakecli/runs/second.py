@@ -1,7 +1,6 @@
 """A second run of a case, which decides whether friction or the roughness keeps its vibration up."""
 
 import math
-import re
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -11,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from brakecli.analysis.regime.evidence import Part, follows
-from brakecli.analysis.regime.forced import GROWN, SECOND_RUN
+from brakecli.analysis.regime.forced import GROWN
 from brakecli.analysis.regime.of_run import context, numbers_of, stored_run, verdict_on
 from brakecli.analysis.regime.verdict import Excitation, Feeds, Regime, Thresholds
 from brakecli.analysis.stability.modes import crossings, growth
@@ -49,7 +48,7 @@ def classify_twice(
     """The verdict on a stored run as `classify_result` gives it, by a second run where one is asked for."""
     with stored_run(path) as (system, history, failure):
         verdict = verdict_on(history, system, failure, thresholds)
-        if not verdict.second_run:
+        if not verdict.decision.second_run:
             say("--second-run: this verdict asks for none; nothing was run")
             return numbers_of(verdict, failure)
         second = second_system(system, history)
@@ -61,8 +60,8 @@ def classify_twice(
         say(f"second run, {second.change}, four times as long: about {duration_text(found.seconds)}")
         feeds, sticks, shown = compared(second, history, lambda done: progress("steps", done, second.system.steps))
         verdict = verdict_on(history, system, failure, thresholds, feeds, sticks)
-        first = re.sub(rf"(;|, or) decide by {re.escape(SECOND_RUN)}.*", "", verdict.reasons[0])  # that is done
-        return numbers_of(replace(verdict, reasons=(first, *verdict.reasons[1:], shown)), failure)
+        decision, notes = verdict.decision._replace(second_run=False), {**verdict.notes, "second_run": shown}
+        return numbers_of(replace(verdict, decision=decision, notes=notes), failure)
 
 
 def second_system(system: System, history: History) -> Second:

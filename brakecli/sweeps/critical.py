@@ -320,7 +320,7 @@ def _fades(verdict: Verdict | Known | None, duration: float, unstable: bool | No
         return verdict.regime is Regime.DAMPED
     slope, error = (verdict.evidence.get(f"envelope_slope{what}", 0.0) for what in ("", "_error"))
     slope = slope if abs(slope) > 3.0 * error else 0.0
-    if isinstance(verdict, Verdict) and verdict.second_run:  # the roughness may keep it up as well
+    if isinstance(verdict, Verdict) and verdict.decision.second_run:  # the roughness may keep it up as well
         return True if slope < 0.0 and not limited else None
     if limited:
         return None if -1.0 < slope * duration < 0.0 else slope < 0.0

@@ -218,7 +218,7 @@ def test_a_vibration_that_is_locked_to_the_waves_is_not_called_forced() -> None:
     """Without the roughness it goes on for good: 0.37 m/s beside 0.32 m/s, after 64 times as long."""
     for times in (1.0, 4.0):
         verdict = judged("locked to the waves", times)
-        assert (verdict.regime, verdict.second_run) == ("undecided", True)
+        assert (verdict.regime, verdict.decision.second_run) == ("undecided", True)
 
 
 def test_a_cycle_is_not_doubled_because_its_samples_repeat_after_two() -> None:
@@ -231,7 +231,7 @@ def test_a_cycle_is_not_doubled_because_its_samples_repeat_after_two() -> None:
 def test_a_forced_motion_on_a_pad_that_is_stable_where_it_opens_is_not_called_self_excited() -> None:
     """At a fifth of the critical friction it swings by 0.72 of this, by another integrator."""
     verdict = judged("forced, and unstable in full contact alone")
-    assert (verdict.regime, verdict.second_run) == ("undecided", True)
+    assert (verdict.regime, verdict.decision.second_run) == ("undecided", True)
 
 
 def test_a_shoe_that_bounces_off_the_wheel_for_good_is_not_called_forced() -> None:
@@ -333,7 +333,7 @@ def test_a_ring_down_on_or_near_lines_of_the_roughness_is_still_decaying(
     told = RATE.search(verdict.reasons[0])
     assert told is not None
     assert float(told[1]) == pytest.approx(rate, rel=0.2)
-    assert verdict.second_run is on_lines
+    assert verdict.decision.second_run is on_lines
 
 
 def test_powers_that_do_not_make_up_for_the_dashpots_show_no_forced_vibration() -> None:
@@ -371,7 +371,7 @@ def test_waves_whose_multiples_beat_longer_than_the_settled_part_have_not_settle
 def test_what_moves_with_the_waves_where_sliding_is_unstable_is_decided_by_a_second_run(times: float) -> None:
     """By another integrator it repeats with the wheel to 1e-13, and rises smoothly with friction."""
     verdict = judged("forced where sliding is unstable", times)
-    assert (verdict.regime, verdict.second_run) == (Regime.UNDECIDED, True)
+    assert (verdict.regime, verdict.decision.second_run) == (Regime.UNDECIDED, True)
 
 
 @pytest.mark.parametrize("name", ["grows without end in sight", "shorter than its wave"])
@@ -397,4 +397,4 @@ def test_a_reason_says_no_more_than_is_known(name: str, says: str, not_this: str
     verdict = judged(name)
     assert re.search(says, verdict.reasons[0])
     assert not_this is None or not_this not in verdict.reasons[0]
-    assert verdict.second_run == ("second run" in verdict.reasons[0])
+    assert verdict.decision.second_run == ("second run" in verdict.reasons[0])

@@ -27,7 +27,6 @@ _LARGER = 5.0  # times what the waves force in full contact: a larger motion nee
 _OFTEN = 0.1  # part of the time that shows that stick or flight holds a vibration within its limits
 _RING_DOWN = 0.5  # of the own vibration's decay, and of what dashpots take, that is kept up by nothing
 _TRACE = 0.1  # part of the energy of vx on the lines themselves, without which nothing is their subharmonic
-SECOND_RUN = "a second run: brakecli classify RESULT.h5 --second-run"
 
 
 class ForcedRules:
@@ -72,7 +71,7 @@ class ForcedRules:
         turns = (self.duration if self.duration < slow else self._settled_seconds) / slow
         what = "run" if self.duration < slow else "settled part"
         text = f"the {what} holds only {turns:.2g} periods of the slowest wave, which passes every {slow:.3g} s"
-        return Decision(f"{text}; run at least {self._long_enough(slow):.3g} s")
+        return Decision(text, advice=f"run at least {self._long_enough(slow):.3g} s")
 
     @property
     def _settled_seconds(self) -> float:
@@ -97,7 +96,7 @@ class ForcedRules:
         self.evidence["forced_share"] = share
         if share >= self.limits.forced_share and self.context.undamped and growth <= 0.0:
             text = f"{share:.0%} of the energy of vx lies on the lines of the roughness"
-            return Decision(f"{text}, but no dashpot damps what the shoe adds; a dashpot would decide")
+            return Decision(f"{text}, but no dashpot damps what the shoe adds", advice="a dashpot would decide")
         if growth < 0.0 and not self._unstable_in_full_contact and not self._larger and self._follows():
             self._feeds()
             if self._locked:
@@ -118,8 +117,8 @@ class ForcedRules:
         what = f"{share:.0%} of the energy of vx lies on the lines of the roughness"
         if powers_of_e > _NOTHING:
             own = f"but sliding is unstable: the shoe's own vibration grows at {growth:.3g} 1/s"
-            text = f"{what}, {own}; run at least {1.01 * GROWN / growth:.3g} s, or decide by {SECOND_RUN}"
-            return self.fed() or Decision(text, second_run=True)
+            advice = f"run at least {1.01 * GROWN / growth:.3g} s"
+            return self.fed() or Decision(f"{what}, {own}", advice=advice, second_run=True)
         if feeds is Feeds.FRICTION and self.evidence["power_of_roughness"] < 0.0:
             return None
         doubtful = larger or self._unstable_in_full_contact or self._locked
@@ -127,8 +126,8 @@ class ForcedRules:
         if feeds is Feeds.FRICTION or (doubtful and feeds is Feeds.UNKNOWN):
             return self._either()
         if dense:
-            text = f"{what}, which lie too close to be told from others; run twice as long"
-            return self.fed() or Decision(f"{text}, or decide by {SECOND_RUN}", second_run=True)
+            text = f"{what}, which lie too close to be told from others"
+            return self.fed() or Decision(text, advice="run twice as long", second_run=True)
         return self._forced(what)
 
     @property
@@ -216,7 +215,7 @@ class ForcedRules:
         """Forced, as seen in a settled part of two periods of the slowest wave, and as `what` shows."""
         if self._open and not self.context.touches():
             text = "sliding steadily the shoe would not touch the wheel: it bounces, and may leave it for good"
-            return Decision(f"{text}; check the sign and size of load.force")
+            return Decision(text, advice="check the sign and size of load.force")
         growth = self.context.growth()
         fading = 0.25 * self.duration * growth > -_RELAXED  # too slowly to be seen within a quarter of the run
         falls = 0.0
@@ -232,14 +231,14 @@ class ForcedRules:
                 self.settled, what = False, f"{what}; the waves beat every {self._beat:.3g} s"
             return Decision(f"only the roughness shakes the shoe: {what}", Regime.DAMPED, Excitation.FORCED)
         needed = max(QUARTER * (self.duration - self._powers_to_lose / growth), self._long_enough(slow))
-        hint = f"; run at least {needed:.3g} s to see the amplitude that lasts"
+        advice = f"run at least {needed:.3g} s to see the amplitude that lasts"
         rate = f"a small vibration of its own decays at {-growth:.3g} 1/s"
         if self._trend < _RING_DOWN * growth and self._open:
             text = f"still decaying at {-self._trend:.3g} 1/s; {rate}"
-            return Decision(f"{text}{hint}, or decide by {SECOND_RUN}", second_run=True)
+            return Decision(text, advice=advice, second_run=True)
         own = f"; its line at {line:.4g} Hz is not told from the waves'" if (line := self._own_line()) else ""
-        text = f"the roughness shakes the shoe: {what}; {rate}{own}{hint}"
-        return Decision(text, Regime.DAMPED, Excitation.FORCED)
+        text = f"the roughness shakes the shoe: {what}; {rate}{own}"
+        return Decision(text, Regime.DAMPED, Excitation.FORCED, advice=advice)
 
     @property
     def _open(self) -> bool:
@@ -326,9 +325,8 @@ class ForcedRules:
         who = "either" if min(friction, roughness) > 0.0 else "friction" if friction > 0.0 else "the roughness"
         text = f"{self._powers}, so that {'it may be ringing down' if rings else f'{who} may keep it up'}"
         if self.context.undamped and self.context.growth() <= 0.0:
-            return Decision(f"{text}, and no dashpot damps what the shoe adds; a dashpot would decide")
-        text += f"; {'run longer, or ' if rings else ''}decide by {SECOND_RUN}"
-        return Decision(f"{text}, at some four times the cost of this one", second_run=True)
+            return Decision(f"{text}, and no dashpot damps what the shoe adds", advice="a dashpot would decide")
+        return Decision(text, advice="run longer" if rings else "", second_run=True)
 
     @property
     def _powers(self) -> str:

@@ -16,7 +16,7 @@ from brakecli.analysis.regime.linear import linear_theory
 from brakecli.analysis.regime.over_time import over_time
 from brakecli.analysis.regime.ripple import ripple
 from brakecli.analysis.regime.spectra import forced_lines, subharmonics
-from brakecli.analysis.regime.verdict import Context, Excitation, Feeds, Regime, Thresholds, Verdict
+from brakecli.analysis.regime.verdict import Context, Decision, Feeds, Thresholds, Verdict
 from brakecli.analysis.stability.modes import growth, is_undamped, modes, slowest_of_cycles
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
@@ -74,8 +74,8 @@ def verdict_on(
     if not failure:
         return verdict
     verdict = replace(verdict, growth_rate=None, ringing_frequency=None, frequency=None, settled=False)
-    why, none = (f"the run failed: {failure}",), Excitation.NONE
-    return replace(verdict, regime=Regime.UNDECIDED, excitation=none, reasons=why, second_run=False)
+    failed = Decision(f"the run failed: {failure}")
+    return replace(verdict, regime=failed.regime, excitation=failed.excitation, decision=failed, notes={})
 
 
 def context(system: System) -> Context:

@@ -148,7 +148,7 @@ def _judge(
         amplitude = moved * size * step**order / spring
     verdict = SignalVerdict(
         regime=decision.regime,
-        reasons=(decision.reason,),
+        reasons=(decision.sentence,),
         frequency=decision.frequency,
         amplitude=amplitude if np.isfinite(amplitude) else None,
         stick_fraction=decision.stick_fraction,
