@@ -54,7 +54,7 @@ def read_text(source: str) -> tuple[str, str]:
         closed = isinstance(error, AttributeError)
         reason = "it is closed" if closed else getattr(error, "strerror", None) or str(error)
         what = f"cannot be read: {reason[0].lower()}{reason[1:]}"
-        raise unfit(what, 'name a TOML file, or "-" for standard input', name) from error
+        raise unfit(what, "name a TOML file", name) from error
     check_size(data, name)
     try:
         return data.decode("utf-8"), name
@@ -65,14 +65,14 @@ def read_text(source: str) -> tuple[str, str]:
         raise unfit(what, "save the file as UTF-8", name, line) from error
 
 
-def parse_case(text: str, label: str, overrides: Sequence[str] = (), option: str = "--set") -> LoadedCase:
+def parse_case(text: str, label: str, overrides: Sequence[str] = ()) -> LoadedCase:
     """Make a case of a TOML text, which messages call `label`. Raises `CaseError`, which holds every problem.
 
-    An override reads `key.path=VALUE`, the value in TOML; messages call it by its option. It replaces what the
-    text says, creates the tables that it needs, and takes effect before anything is checked. Of two keys that
-    exclude each other (a constant load or a schedule), an override of one removes the other from the text.
+    An override reads `key.path=VALUE`, the value in TOML. It replaces what the text says, creates the tables that
+    it needs, and takes effect before anything is checked. Of two keys that exclude each other (a constant load or a
+    schedule), an override of one removes the other from the text.
     """
-    case = parse_table(Case, text, label, overrides, option)
+    case = parse_table(Case, text, label, overrides)
     return LoadedCase(case, text, resolved_toml(case))
 
 
@@ -105,9 +105,7 @@ def parse_resolved(text: str, label: str, overrides: Sequence[str] = ()) -> Load
     return loaded
 
 
-def parse_table(
-    kind: type[_Table], text: str, label: str, overrides: Sequence[str] = (), option: str = "--set"
-) -> _Table:
+def parse_table(kind: type[_Table], text: str, label: str, overrides: Sequence[str] = ()) -> _Table:
     """Make a table of some kind, such as a case, of a whole TOML text; see `parse_case`."""
     located, problems = Located(text, label), list[Problem]()
     try:
@@ -121,7 +119,7 @@ def parse_table(
         if isinstance(surface, dict) and isinstance(profile := surface.get("profile"), str) and profile:
             surface["profile"] = str(Path(label).parent / profile)  # those of overrides are seen from here
     for override in overrides:
-        sources.append(by := f"{option} {printable(override)}")
+        sources.append(by := f"--set {printable(override)}")
         try:
             path, value = parse_override(override)
             set_by |= dict.fromkeys((*put(data, path, value, kind, kept=set_by), path), by)
