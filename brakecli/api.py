@@ -211,16 +211,16 @@ def classify(
         UsageError, UnreadableResultError: as `brakecli classify`.
     """
     from brakecli.cli.classify import Options
+    from brakecli.cli.measured import Measured
     from brakecli.files.fields import VERDICT
 
-    how = dict.fromkeys(("column", "time_column", "sample_rate", "unit", "time_unit"))
-    if unknown := sorted(reading.keys() - how.keys()):
+    how = ("column", "time_column", "sample_rate", "unit", "time_unit")
+    if unknown := sorted(reading.keys() - {*how}):
         raise UsageError(f"classify: there is no argument {unknown[0]}; give one of {', '.join(how)}")
     changes = [f"{name}={value}" for name, value in (thresholds or {}).items()]
-    machine = {"belt_speed": belt_speed, "stiffness": stiffness}
+    measured = Measured(quantity, belt_speed=belt_speed, stiffness=stiffness, **reading)
     with _interruptible():
-        judging = Options(quantity, how | reading, machine, changes, second_run, quiet=True)
-        numbers = judging.verdict(str(source))
+        numbers = Options(measured, changes, second_run, quiet=True).verdict(str(source))
     _warn(numbers.get("warnings", ()))
     return _dataset(VERDICT, numbers)
 

@@ -69,8 +69,8 @@ def parse_case(text: str, label: str, overrides: Sequence[str] = ()) -> LoadedCa
     """Make a case of a TOML text, which messages call `label`. Raises `CaseError`, which holds every problem.
 
     An override reads `key.path=VALUE`, the value in TOML. It replaces what the text says, creates the tables that
-    it needs, and takes effect before anything is checked. Of two keys that exclude each other (a constant load or a
-    schedule), an override of one removes the other from the text.
+    it needs, and takes effect before anything is checked. Of two keys that exclude each other, such as a constant
+    load and a schedule, an override of one removes the other from the text.
     """
     case = parse_table(Case, text, label, overrides)
     return LoadedCase(case, text, resolved_toml(case))
