@@ -38,11 +38,6 @@ def starters() -> dict[str, str]:
     return {each.name.removesuffix(".toml"): each.read_text(encoding="utf-8") for each in sorted(files, key=str)}
 
 
-def read_case(source: str, overrides: Sequence[str] = ()) -> LoadedCase:
-    """Read the case from a path, or from standard input where the path is "-"; see `parse_case`."""
-    return parse_case(*read_text(source), overrides)
-
-
 def read_text(source: str) -> tuple[str, str]:
     """The text of a file, or of standard input where the path is "-", and its name; line ends stay as they are."""
     name = "standard input" if source == "-" else source
