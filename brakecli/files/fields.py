@@ -57,6 +57,7 @@ VERDICT = (
     Field("evidence", "", "numbers by which the rules decided", OBJECT, "verdict.", group="regime/evidence"),
     Field("thresholds", "", "limits of the rules", OBJECT, "verdict.", group="regime/thresholds"),
 )
+MEASURED_UNITS = {"displacement": "m", "velocity": "m/s", "force": "N", "acceleration": "m/s²", "pressure": "Pa"}
 EVIDENCE_UNITS = {"envelope_slope": "1/s", "envelope_final": "m/s", "envelope_largest": "m/s", "power_": "W"}
 EVIDENCE_UNITS |= {
     "amplitude_v": "m/s",
