@@ -18,7 +18,7 @@ from brakecli.case.read import LoadedCase, key_path
 from brakecli.case.tables import key_schema
 from brakecli.errors import escaped
 from brakecli.files import fields
-from brakecli.files.field import named
+from brakecli.files.field import flat, named
 from brakecli.files.read import StoredResult
 from brakecli.plots import lock_in, style
 from brakecli.plots.result import draw
@@ -72,8 +72,9 @@ def part_of_run(result: StoredResult, progress: Progress) -> Part:
 
 def case_blocks(loaded: LoadedCase) -> list[Any]:
     """Every key of a case with its value and unit, and the text to copy."""
-    keys = _keys(loaded.case.model_dump(mode="json"))
-    rows = [(key, shown(value, unit(key)), _meaning(key)) for key, value in keys]
+    keys = {key: value for key, value in flat(loaded.case.model_dump(mode="json")) if value is not None}
+    del keys["title"]
+    rows = [(key, shown(value, unit(key)), _meaning(key)) for key, value in keys.items()]
     idle, head = [row for row in rows if row[0].startswith(_IDLE)], ("key", "value", "meaning")
     shoe = Table([row for row in rows if row not in idle], head)
     return [shoe, Table(idle, head, "Start, solver and output"), Code(loaded.resolved, "The whole case as a file")]
@@ -210,14 +211,6 @@ def _warnings(found: Mapping[str, Any], advice: AdviceReport) -> list[str]:
     lines = [str(each) for name in ("warnings", "adjustments") for each in found.get(name, ())]
     lines += [f"left out: {each}" for each in found.get("left_out", ())] + advice.notes()
     return [f"{line[:1].upper()}{line[1:]}." for line in lines] or ["There are none."]
-
-
-def _keys(table: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, Any]]:
-    for key, value in table.items():
-        if isinstance(value, Mapping):
-            yield from _keys(value, f"{path}{key}.")
-        elif value is not None and path:
-            yield f"{path}{key}", value
 
 
 def _meaning(key: str) -> str:
