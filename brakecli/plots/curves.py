@@ -79,8 +79,7 @@ def _draw_critical(axes: Axes, picture: SweepPicture) -> None:
     error = np.nan_to_num(picture["critical_error"][0])
     drawn = np.concatenate([value - error, value + error, eigenvalue, sustained, within])
     highest = style.largest(drawn) or max(abs(critical.lower), abs(critical.upper))
-    unit = style.set_ticks(axes.yaxis, 0.0, highest, picture.units["critical"])
-    axes.set_ylabel(style.labelled(f"critical {critical.parameter}", unit), parse_math=False)
+    style.set_ticks(axes.yaxis, 0.0, highest, picture.units["critical"], f"critical {critical.parameter}")
     if np.isfinite(drawn).any():
         style.widen(axes, drawn)
     else:
@@ -94,9 +93,9 @@ def _draw_difference(axes: Axes, picture: SweepPicture) -> None:
     error = np.where(np.isfinite(difference), picture["critical_error"][0], np.nan)
     axes.axhline(0.0, color=style.DARK, lw=1.1)
     axes.errorbar(x, difference, error, **_bars(_size(x)))
-    unit = style.set_ticks(axes.yaxis, 0.0, style.largest(np.abs(difference) + error), picture.units["critical"])
     axes.margins(y=0.15)
-    axes.set_ylabel(style.labelled("simulation\nless eigenvalue", unit), parse_math=False)
+    highest, name = style.largest(np.abs(difference) + error), "simulation\nless eigenvalue"
+    style.set_ticks(axes.yaxis, 0.0, highest, picture.units["critical"], name)
 
 
 def _draw_motion(axes: Axes, picture: SweepPicture, name: str) -> None:

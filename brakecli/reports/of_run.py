@@ -2,7 +2,7 @@
 
 import math
 import shlex
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from functools import partial
 from typing import Any
 
@@ -25,6 +25,7 @@ from brakecli.plots.result import draw
 from brakecli.plots.run import case_of
 from brakecli.reports.blocks import Code, Part, Section, Table, Texts, picture, rows_of, shown
 from brakecli.runs.advise import AdviceReport, advise
+from brakecli.solver.motion import Counted
 from brakecli.sweeps.result import unit
 
 QUESTION = "Will this shoe vibrate, in which way, at which frequency, and what should be changed?"
@@ -44,10 +45,8 @@ _ACCURACY = (
     *("certified_by", "nodes", "steps", "contact_evaluations", "unconverged_steps", "non_unique_steps"),
 )
 
-Progress = Callable[[str, int, int], None]
 
-
-def part_of_run(result: StoredResult, progress: Progress) -> Part:
+def part_of_run(result: StoredResult, progress: Counted) -> Part:
     """What the page says of a run. Raises UnreadableResultError."""
     found, loaded = result.attributes, case_of(result)
     advice = advise(loaded, KEYS, MARGIN, progress)

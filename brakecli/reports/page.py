@@ -14,12 +14,12 @@ from brakecli.files.read import StoredResult, open_result
 
 if TYPE_CHECKING:
     from brakecli.reports.blocks import Part
-    from brakecli.reports.of_run import Progress
+    from brakecli.solver.motion import Counted
 
 LARGEST = 3_000_000  # bytes
 
 
-def write_report(results: Sequence[Path], target: Path, *, force: bool, progress: "Progress") -> None:
+def write_report(results: Sequence[Path], target: Path, *, force: bool, progress: "Counted") -> None:
     """Write the page of some results.
 
     Raises UsageError for another suffix, an existing target without `force`, a page that would be too large, and
