@@ -72,11 +72,7 @@ def load_kernels(loaded: LoadedCase) -> System:
 
 
 def run(
-    loaded: LoadedCase,
-    output: Path,
-    *,
-    force: bool,
-    progress: Counted = lambda what, done, total: None,
+    loaded: LoadedCase, output: Path, *, force: bool, progress: Counted = lambda what, done, total: None
 ) -> RunReport:
     """Simulate a case and write its result file.
 
