@@ -116,9 +116,8 @@ def _draw_motion(axes: Axes, picture: SweepPicture, name: str) -> None:
     for place in np.flatnonzero(picture["hysteresis"][0]):  # `style.labels` names the first alone
         span = axis.edges[place : place + 2]
         axes.axvspan(*span, color=style.GREEN, alpha=0.16, lw=0, zorder=0.5, label=sweep.DIFFERENT)
-    for crossing in _crossings(
-        axis.values, picture[sweep.MARGIN][0] if sweep.MARGIN in picture.variables else np.zeros(0)
-    ):
+    margin = picture.variables.get(sweep.MARGIN, np.zeros((1, 0)))[0]
+    for crossing in _crossings(axis.values, margin):
         axes.axvline(crossing, color=style.DARK, lw=1.1, ls=style.DASHES, zorder=0.7, label=sweep.CRITICAL_LINE)
     words = picture.long_names[name].replace("`", "")
     axes.set(ylabel=style.labelled(name.replace("_", " "), unit), title=words[:1].upper() + words[1:])
