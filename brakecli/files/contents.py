@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from brakecli.errors import UnreadableResultError, UsageError
+from brakecli.errors import UnreadableResultError, UsageError, printable
 from brakecli.files.field import plain
 from brakecli.files.fields import COMPARISON, LOCK_IN, RUN, SWEEP, WELCH
 from brakecli.files.read import StoredResult, Variable
@@ -58,7 +58,7 @@ def difference(a: StoredResult, b: StoredResult) -> Difference:
     """Compare two results of one kind; raises UsageError for two kinds, and UnreadableResultError."""
     kinds = [str(each.attributes.get("kind")) for each in (a, b)]
     if kinds[0] != kinds[1]:
-        what = f"{a.path} is a {kinds[0]}, and {b.path} a {kinds[1]}"
+        what = f"{a.path} is a {printable(kinds[0])}, and {b.path} a {printable(kinds[1])}"
         raise UsageError(f"{what}: they hold different things; name two results of one kind")
     groups = list(dict.fromkeys([*a.groups(), *b.groups()]))
     numbers: list[dict[str, Any]] = [{}, {}]
@@ -88,7 +88,7 @@ def difference(a: StoredResult, b: StoredResult) -> Difference:
 
 def _versions(attributes: Mapping[str, Any]) -> dict[str, Any]:
     return {
-        name.removesuffix("_version"): value
+        name.removesuffix("_version"): plain(value)
         for name, value in attributes.items()
         if name.endswith("_version") and name != "format_version"
     }
@@ -109,12 +109,19 @@ def _keys(result: StoredResult) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for name in _CASES:
         try:
-            found |= flat(tomllib.loads(str(result.attributes.get(name, ""))), "")
+            found |= flat(tomllib.loads(str(result.attributes.get(name, "")), parse_float=_finite), "")
         except (ValueError, RecursionError) as error:
             raise UnreadableResultError(
                 f"{result.path}: the case in it is not valid; name an intact file"
             ) from error
     return found
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"{text} is no number")
+    return value
 
 
 def _changed(a: dict[str, Any], b: dict[str, Any]) -> Iterator[dict[str, Any]]:
