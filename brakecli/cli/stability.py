@@ -56,9 +56,8 @@ def command(
     numbers = values_of(STABILITY, report)
     if found:
         numbers |= {"vary": found.entries, **values_of(LOCK_IN, found), "output": target and str(target)}
-    show_result(
-        "stability", numbers, stability_table, loaded.case.title, report, found, as_json=as_json, quiet=quiet
-    )
+    shown = loaded.case.title, report, found
+    show_result("stability", numbers, stability_table, *shown, as_json=as_json, quiet=quiet)
 
 
 def _parse_axis(text: str) -> "Axis":

@@ -129,9 +129,8 @@ def compare(
         found, entries = ladder(system, steps), list[Entry]()
         for kind in kinds(system, schemes):  # compilation is not part of the budget
             _ = load(kind.scheme), contact.load("exact" if kind.evaluator == "auto" else kind.evaluator)
-            entries += [
-                Entry(method_label(kind), kind, each, place) for place, each in enumerate(rungs(kind, found))
-            ]
+            label = method_label(kind)
+            entries += [Entry(label, kind, each, place) for place, each in enumerate(rungs(kind, found))]
         begin = time.perf_counter()
         report = linear.stability(system)
         progress("reference", 0, 0)

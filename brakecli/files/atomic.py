@@ -159,10 +159,8 @@ def _acquired(path: Path, lock: Path) -> int:
             raise _not_ours(lock)
         if not _take(descriptor, holder):
             os.close(descriptor)
-            raise UsageError(
-                f"{path}: is being written by {holder or 'another process'}; "
-                "wait until it has ended, or choose another output with -o"
-            )
+            remedy = "wait until it has ended, or choose another output with -o"
+            raise UsageError(f"{path}: is being written by {holder or 'another process'}; {remedy}")
         with suppress(FileNotFoundError):  # its last holder has removed it meanwhile
             if os.path.samestat(os.fstat(descriptor), lock.lstat()):
                 return descriptor

@@ -90,9 +90,8 @@ class StoredResult:
             for name in parent:
                 node = member(parent, name)
                 if isinstance(node, h5py.Dataset):
-                    found[name] = Variable(
-                        axes_of(node, name), node.shape, attributes_of(node, ""), node.dtype.kind
-                    )
+                    dims, attributes = axes_of(node, name), attributes_of(node, "")
+                    found[name] = Variable(dims, node.shape, attributes, node.dtype.kind)
         return found
 
     def read(self, group: str, name: str, start: int = 0, stop: int | None = None) -> NDArray[Any]:
@@ -141,9 +140,7 @@ def open_result(path: Path, kind: str | None = None) -> Iterator[StoredResult]:
             if attributes.get("format") != FORMAT:
                 raise ValueError(f'it was not written by this program, attribute format = "{FORMAT}" is missing')
             if (version := attributes.get("format_version")) != FORMAT_VERSION:
-                raise ValueError(
-                    f"its format version is {version}, and only version {FORMAT_VERSION} is known here"
-                )
+                raise ValueError(f"its format version is {version}, and only version {FORMAT_VERSION} is known")
             if attributes.get("complete") != 1:
                 raise ValueError("it is incomplete, attribute complete is not 1")
             if kind is not None and attributes.get("kind") != kind:
@@ -213,7 +210,5 @@ def _explained(path: Path) -> Iterator[None]:
         yield
     except Exception as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise UnreadableResultError(
-            f"{path}: cannot be read as a result: {' '.join(reason.split())}; name an intact result file, "
-            "or compute it again"
-        ) from error
+        what = f"{path}: cannot be read as a result: {' '.join(reason.split())}"
+        raise UnreadableResultError(f"{what}; name an intact result file, or compute it again") from error

@@ -149,9 +149,8 @@ def _draw_motion(axes: Axes, picture: SweepPicture, name: str) -> None:
 
 def _crossings(x: style.Array, margin: style.Array) -> Iterator[float]:
     """Where the margin in friction passes zero, between neighbours along a straight line."""
-    for place in (
-        np.flatnonzero(np.diff(np.sign(margin)) * np.isfinite(margin[:-1] + margin[1:])) if len(margin) else ()
-    ):
+    passes = np.diff(np.sign(margin)) * np.isfinite(margin[:-1] + margin[1:])
+    for place in np.flatnonzero(passes):
         low, high = margin[place : place + 2]
         yield float(x[place] - low * (x[place + 1] - x[place]) / (high - low))
 

@@ -132,9 +132,8 @@ def _draw_regimes(axes: Axes, picture: SweepPicture, _: Scale) -> ScalarMappable
     if MARGIN in picture.variables and min(map(len, (x.values, y.values))) > 1 and not (x.texts or y.texts):
         margin = np.ma.masked_invalid(picture[MARGIN][0].T)
         if margin.min() < 0.0 < margin.max():
-            axes.contour(
-                x.values, y.values, margin, [0.0], colors="black", linewidths=1.8, linestyles=[style.DASHES]
-            )
+            look = {"colors": "black", "linewidths": 1.8, "linestyles": [style.DASHES]}
+            axes.contour(x.values, y.values, margin, [0.0], **look)
             axes.plot([], [], color="black", lw=1.8, ls=style.DASHES, label=CRITICAL_LINE)
     return mesh
 
@@ -158,9 +157,9 @@ def _draw_critical(axes: Axes, picture: SweepPicture, scale: Scale) -> ScalarMap
     numeric = all(axis.texts is None and len(axis.values) >= 3 for axis in picture.axes)
     if numeric and np.mean(areas) > 0.3:
         _draw_contours(axes, picture, values, scale.norm)
-    elif values.size <= _MOST_NUMBERS and axes.get_window_extent().width > _LEAST_CELL * axes.figure.dpi * len(
-        values
-    ):
+        return mesh
+    width = axes.get_window_extent().width / axes.figure.dpi
+    if values.size <= _MOST_NUMBERS and width > _LEAST_CELL * len(values):
         for i, j in np.argwhere(known):
             x, y, value = picture.axes[0].values[i], picture.axes[1].values[j], values[i, j]
             colour = "white" if scale.norm(value) < 0.6 else "black"

@@ -8,16 +8,10 @@ from matplotlib.figure import Figure
 
 from brakecli.analysis.regime.of_signal import Measurand, SignalLook
 from brakecli.analysis.regime.spectra import segment
+from brakecli.files.fields import MEASURED_UNITS
 from brakecli.plots import style
 from brakecli.plots.run import COLUMNS, CYCLES, FEW, MOST_DETAIL, envelope
 
-_UNITS = {
-    Measurand.DISPLACEMENT: "m",
-    Measurand.VELOCITY: "m/s",
-    Measurand.FORCE: "N",
-    Measurand.ACCELERATION: "m/s²",
-    Measurand.PRESSURE: "Pa",
-}
 _VELOCITY = {Measurand.FORCE: ("rate of the force", "N/s"), Measurand.PRESSURE: ("pressure", "Pa")}
 _LABELLED = 4  # bursts whose frequency is written into the record
 
@@ -46,11 +40,9 @@ def _title(source: str) -> str:
 
 def _draw_record(axes: Axes, look: SignalLook) -> None:
     values, step = look.signal.values, look.signal.interval
-    factor, unit = style.prefixed(style.largest(values), _UNITS[look.quantity])
+    factor, unit = style.prefixed(style.largest(values), MEASURED_UNITS[look.quantity])
     if len(values) > 2 * COLUMNS:
-        gaps = np.isnan(values)
-        filled = np.where(gaps, np.nan, values)
-        places, low, high = envelope(lambda begin, end: filled[begin:end], len(filled))
+        places, low, high = envelope(lambda begin, end: values[begin:end], len(values))
         axes.fill_between(step * places, factor * low, factor * high, color=style.BLUE, lw=0.6)
     else:
         axes.plot(step * np.arange(len(values)), factor * values, color=style.BLUE, lw=0.9)
@@ -113,7 +105,7 @@ def _draw_spectrum(axes: Axes, look: SignalLook) -> None:
     size = segment(len(filled))
     frequencies, density = welch(filled, 1.0 / look.signal.interval, nperseg=size, detrend="constant")
     shown = (frequencies > 0.0) & (density > 0.0)
-    scale, label = style.density(density, frequencies, _UNITS[look.quantity])
+    scale, label = style.density(density, frequencies, MEASURED_UNITS[look.quantity])
     density *= scale
     axes.loglog(frequencies[shown], density[shown], color=style.BLUE, lw=1.0)
     axes.set(title=f"Spectrum of the {look.quantity}", ylabel=label)

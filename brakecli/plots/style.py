@@ -204,12 +204,6 @@ def set_ticks(axis: Axis, low: float, high: float, unit: str = "") -> str:
     return unit
 
 
-def is_constant(values: Array, scale: float = 0.0) -> bool:
-    """Whether values differ by their rounding only, that of numbers as large as they are, or as `scale`."""
-    known = values[np.isfinite(values)]
-    return known.size == 0 or float(np.ptp(known)) <= ROUNDING * max(largest(known), scale)
-
-
 def widen(axes: Axes, values: Array) -> None:
     """Fit the axis to the values, and keep those that differ too little in its middle."""
     low, high = np.nanmin(values), np.nanmax(values)
@@ -228,10 +222,11 @@ def make_room(axes: Axes, part: float = 0.14) -> None:
 
 
 def keep_flat(axes: Axes, values: Array, scale: float = 0.0) -> None:
-    """Draw values that are constant as a line in the middle, and not their rounding from bottom to top."""
+    """Draw values that differ by rounding, of numbers as large as they or `scale`, as a line in the middle."""
     known = values[np.isfinite(values)]
-    if known.size and is_constant(known, scale):
-        middle, half = float(np.median(known)), 0.05 * (max(largest(known), scale) or 1.0)
+    size = max(largest(known), scale)
+    if known.size and float(np.ptp(known)) <= ROUNDING * size:
+        middle, half = float(np.median(known)), 0.05 * (size or 1.0)
         axes.set_ylim(middle - half, middle + half)
 
 

@@ -26,9 +26,7 @@ def draw(results: tuple[StoredResult, StoredResult], variable: str) -> Figure:
     a, b = results
     kind = str(a.attributes.get("kind"))
     if kind != b.attributes.get("kind") or kind not in ("run", *_SHOWN):
-        raise UsageError(
-            f"{a.path}: only two runs, two sweeps, or two results of stability have curves to compare"
-        )
+        raise UsageError(f"{a.path}: only two runs, sweeps, or results of stability have curves to compare")
     return _runs(results, variable or "vx") if kind == "run" else _curves(results, kind, variable)
 
 

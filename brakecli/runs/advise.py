@@ -7,16 +7,8 @@ from functools import partial
 from typing import Any
 
 from brakecli.analysis.regime.verdict import Regime, Verdict
-from brakecli.analysis.stability.advice import (
-    Change,
-    Sensitivity,
-    advised,
-    advised_keys,
-    answer,
-    changed,
-    sensitivity,
-)
-from brakecli.analysis.stability.advice import numbers as numbers_of
+from brakecli.analysis.stability import advice as of_case
+from brakecli.analysis.stability.advice import Change, Sensitivity
 from brakecli.analysis.stability.modes import is_undamped
 from brakecli.analysis.stability.report import LARGEST_FRICTION, StabilityReport, stability
 from brakecli.case.case import Case
@@ -102,14 +94,12 @@ class AdviceReport:
         elif critical is not None:
             yield f"stable up to {critical:.3g}{_far(self.margin, own)}"
             if report.stable and critical < own:
-                turns = [
-                    f"{'lost' if each.lost else 'regained'} at {each.friction:.3g}" for each in report.crossings
-                ]
-                yield f"the case lies above a range of instability, as stability is {', '.join(turns)}"
+                changes = (("lost" if each.lost else "regained", each.friction) for each in report.crossings)
+                turns = ", ".join(f"{change} at {friction:.3g}" for change, friction in changes)
+                yield f"the case lies above a range of instability, as stability is {turns}"
         elif report.equilibrium is not None and report.contact_stiffness > 0.0:
-            yield "stable: no friction makes it unstable" + (
-                "" if self.system.smooth else f", up to {LARGEST_FRICTION:g}"
-            )
+            searched = "" if self.system.smooth else f", up to {LARGEST_FRICTION:g}"
+            yield f"stable: no friction makes it unstable{searched}"
 
     def _remedy(self) -> Iterator[str]:
         if not self.advice:
@@ -119,9 +109,8 @@ class AdviceReport:
             yield f"no key alone gives a margin of {100.0 * self.wanted_margin:.3g} %"
             return
         critical = best.critical_friction
-        yield f"{best.parameter} {best.start:.4g} → {best.rounded} " + (
-            f"gives {critical:.3g}" if critical is not None else "takes the instability away"
-        )
+        effect = f"gives {critical:.3g}" if critical is not None else "takes the instability away"
+        yield f"{best.parameter} {best.start:.4g} → {best.rounded} {effect}"
         if self.check and self.check.verdict.regime not in (Regime.DAMPED, Regime.UNDECIDED):
             yield f"but from the case's own start it still vibrates: {self.check.verdict.regime}"
 
@@ -132,10 +121,8 @@ def _far(margin: float | None, own: float) -> str:
         return ""
     if margin > 10.0:
         return f", {margin + 1.0:.3g} times the case's {own:g}"
-    part = 100.0 * abs(margin)
-    return (
-        f", {part:{'.0f' if part > 99.0 else '.2g'}} % {'above' if margin > 0.0 else 'below'} the case's {own:g}"
-    )
+    part, where = 100.0 * abs(margin), "above" if margin > 0.0 else "below"
+    return f", {part:{'.0f' if part > 99.0 else '.2g'}} % {where} the case's {own:g}"
 
 
 def advise(loaded: LoadedCase, patterns: Sequence[str], margin: float, progress: Progress) -> AdviceReport:
@@ -144,18 +131,18 @@ def advise(loaded: LoadedCase, patterns: Sequence[str], margin: float, progress:
     A case that has the margin (a part of its friction) needs no advice. Raises UsageError.
     """
     case, advice, check = loaded.case, list[Change](), None
-    keys, everything = advised_keys(case, patterns), numbers_of(case)
+    keys, everything = of_case.advised_keys(case, patterns), of_case.numbers(case)
     system = system_of(case)
-    report, found = stability(system), answer(case)
+    report, found = stability(system), of_case.answer(case)
     critical = found.critical if found else None
     sensitivities = list[Sensitivity]()
     if found is not None:
         for done, path in enumerate(everything):
             tell = partial(progress, "derivatives", done, len(everything))
-            sensitivities.append(sensitivity(case, path, critical, tell))
+            sensitivities.append(of_case.sensitivity(case, path, critical, tell))
         if not found.safe((1.0 + margin) * report.friction):
             for done, path in enumerate(keys):
-                advice.append(advised(case, path, margin, partial(progress, "keys", done, len(keys))))
+                advice.append(of_case.advised(case, path, margin, partial(progress, "keys", done, len(keys))))
     sensitivities.sort(key=lambda each: -abs(each.elasticity or 0.0))
     advice.sort(key=lambda each: each.size)
     if advice and advice[0].to is not None:
@@ -165,7 +152,7 @@ def advise(loaded: LoadedCase, patterns: Sequence[str], margin: float, progress:
 
 def _checked(case: Case, best: Change, progress: Progress) -> CheckRun | None:
     """Run the case with an advised value, from its own start and for its own time if that is short."""
-    there = changed(case, key_path(best.parameter), best.to or 0.0)
+    there = of_case.changed(case, key_path(best.parameter), best.to or 0.0)
     if there is None:
         return None
     system = system_of(there)

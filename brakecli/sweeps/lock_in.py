@@ -70,9 +70,8 @@ def lock_in(loaded: LoadedCase, axis: Axis, option: str, progress: Progress) -> 
         found = dict(zip((field.name for field in fields.MODES), columns, strict=True))
         entries.append({"value": value, **values_of(fields.VARIED, report), **found})
     critical = list[float]()
-    turning = [
-        (value, report.stable is True) for value, report in zip(values, reports, strict=True) if report.belt_speed
-    ]
+    turned = ((value, report) for value, report in zip(values, reports, strict=True) if report.belt_speed)
+    turning = [(value, report.stable is True) for value, report in turned]
     for (low, before), (high, after) in pairwise(turning):
         if before != after:
             ends, at_low = sorted((low, high)), before if low < high else after

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from brakecli.analysis.stability.advice import KEYS
-from brakecli.case.read import read_case
+from brakecli.case.read import parse_case, read_text
 from brakecli.cli.stability_tables import advice_table
 from brakecli.runs.advise import advise
 from tests.campaign import campaign
@@ -45,7 +45,7 @@ def test_json_has_the_names_of_the_page_and_the_advised_value_keeps_its_promise(
 
 def test_the_table_fits_into_eighty_columns_and_ends_in_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "80")
-    loaded = read_case(CASES["relaxation"], ["solver.duration=0.1"])
+    loaded = parse_case(*read_text(CASES["relaxation"]), ["solver.duration=0.1"])
     table = advice_table(advise(loaded, KEYS, 0.2, lambda what, done, total: None))
     assert max(map(len, table.splitlines())) <= 80
     for words in ("contact.half_length  ", "link2.angle_deg    5        7.692", "no help    -           500 to"):

@@ -131,9 +131,8 @@ def advised_keys(case: Case, patterns: Sequence[str]) -> list[Path]:
     known = {key: path for key, path in known.items() if path[0] not in _IDLE}
     for pattern in patterns:
         if pattern not in KEYS and not any(fnmatchcase(key, pattern) for key in known):
-            raise UsageError(
-                f"--keys {pattern}: names no number that may be advised; these are {', '.join(known)}"
-            )
+            what = "names no number that may be advised"
+            raise UsageError(f"--keys {pattern}: {what}; these are {', '.join(known)}")
     return [path for key, path in known.items() if any(fnmatchcase(key, pattern) for pattern in patterns)]
 
 
