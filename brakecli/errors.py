@@ -100,6 +100,8 @@ def in_python() -> Iterator[None]:
             for each in error.problems
         ]
         raise CaseError(problems) from error
+    except RecursionError:
+        raise UsageError("a value lies too deep in others, or in itself; give numbers, texts and lists") from None
     except BrakecliError as error:
         error.args = (_for_python(str(error)),)
         raise

@@ -16,6 +16,8 @@ _ROUNDING = 1e-12  # of heights, relative to their root mean square
 _GAP = 4.0  # median steps between two places from which on nothing was measured there
 _FITS = 0.005  # part of a turn by which a record may miss a whole number of turns
 _SEEN = 0.01  # per cent by which a record is stretched unsaid
+_NEAREST = 1e-9  # m; nothing is measured at places nearer to each other
+_FEWEST = 8  # places in a turn: fewer show none of its waves but the longest three
 
 
 def sines_of(path: Path, error: float, radius: float, pad: float | None) -> dict[str, Any]:
@@ -29,9 +31,13 @@ def sines_of(path: Path, error: float, radius: float, pad: float | None) -> dict
     place, height, is_angle = _read(path, (status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns))
     place = place * radius if is_angle else place
     turn, step = 2.0 * math.pi * radius, float(np.median(np.diff(place)))
+    apart = f"its places lie {step:.3g} m apart, as a rule"
+    require(step >= _NEAREST, f"{apart}; check their unit")
     turns, around = _turns(place, step, turn) if pad is None else (0, 0.0)
     if turns:
-        count = round(around / step)
+        count = min(round(around / step), 10 * len(place) // turns)
+        few = f"{apart}, {count} in a turn of {turn:.3g} m; check their unit, or measure {_FEWEST} or more"
+        require(count >= _FEWEST, few)
         inside = place - place[0] < turns * around - 0.5 * step  # the last value may repeat the first
         grid = np.arange(turns * count) * (around / count)
         rows = np.interp(grid, (place - place[0])[inside], height[inside], period=turns * around)

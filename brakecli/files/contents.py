@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from brakecli.errors import UnreadableResultError, UsageError
+from brakecli.errors import UnreadableResultError, UsageError, printable
 from brakecli.files.field import flat, plain
 from brakecli.files.fields import COMPARISON, LOCK_IN, RUN, SWEEP, WELCH
 from brakecli.files.read import StoredResult, Variable
@@ -55,7 +55,7 @@ def difference(a: StoredResult, b: StoredResult) -> Difference:
     """Compare two results of one kind; raises UsageError for two kinds, and UnreadableResultError."""
     kinds = [str(each.attributes.get("kind")) for each in (a, b)]
     if kinds[0] != kinds[1]:
-        what = f"{a.path} is a {kinds[0]}, and {b.path} a {kinds[1]}"
+        what = f"{a.path} is a {printable(kinds[0])}, and {b.path} a {printable(kinds[1])}"
         raise UsageError(f"{what}: they hold different things; name two results of one kind")
     groups = list(dict.fromkeys([*a.groups(), *b.groups()]))
     numbers: list[dict[str, Any]] = [{}, {}]
@@ -79,7 +79,7 @@ def difference(a: StoredResult, b: StoredResult) -> Difference:
 
 def _versions(attributes: Mapping[str, Any]) -> dict[str, Any]:
     names = [name for name in attributes if name.endswith("_version") and name != "format_version"]
-    return {name.removesuffix("_version"): attributes[name] for name in names}
+    return {name.removesuffix("_version"): plain(attributes[name]) for name in names}
 
 
 def _keys(result: StoredResult) -> dict[str, Any]:
@@ -87,11 +87,18 @@ def _keys(result: StoredResult) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for name in _CASES:
         try:
-            found |= flat(tomllib.loads(str(result.attributes.get(name, ""))))
+            found |= flat(tomllib.loads(str(result.attributes.get(name, "")), parse_float=_finite))
         except (ValueError, RecursionError) as error:
             what = f"{result.path}: the case in it is not valid"
             raise UnreadableResultError(f"{what}; name an intact file") from error
     return found
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"{text} is no number")
+    return value
 
 
 def _changed(a: dict[str, Any], b: dict[str, Any]) -> Iterator[dict[str, Any]]:

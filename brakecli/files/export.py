@@ -89,7 +89,7 @@ def _rows(result: StoredResult, group: str, names: Sequence[str]) -> Iterator[li
         part = places[0][start : start + rows]
         columns = [each.ravel() for each in np.meshgrid(part, *places[1:], indexing="ij")]
         for name, kept in chosen.items():
-            if known[name].shape == shape[1:] != shape[:1]:  # alike in both directions
+            if known[name].dims == axes[1:]:  # alike in both directions
                 values = np.broadcast_to(result.read(group, name), (len(part), *shape[1:]))
             else:
                 values = result.read(group, name, start, start + rows)

@@ -23,7 +23,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.errors import UnreadableResultError
+from brakecli.errors import UnreadableResultError, printable
 from brakecli.files import valid
 
 FORMAT = "brakecli"
@@ -96,6 +96,8 @@ class StoredResult:
             values = np.asarray(node[start:stop])
             if values.dtype.kind == "S":
                 return np.char.decode(values, "utf-8")
+            if values.dtype == np.float16:  # its squares are infinite from 256 on
+                values = values.astype(np.float64)
             limit = valid.LARGEST_IN_HISTORY if group == "history" else valid.LARGEST
             if values.dtype.kind == "f" and not (np.abs(values) <= limit).all():
                 raise ValueError(f"{where} holds values that are not finite, or too large")
@@ -132,7 +134,7 @@ def open_result(path: Path, kind: str | None = None) -> Iterator[StoredResult]:
             if attributes.get("complete") != 1:
                 raise ValueError("it is incomplete, attribute complete is not 1")
             if kind is not None and attributes.get("kind") != kind:
-                raise ValueError(f"it holds a result of kind {attributes.get('kind')!r}, and {kind!r} is needed")
+                raise ValueError(f"it holds a result of kind {printable(its_kind)}, and {kind!r} is needed")
             length = path.stat().st_size
             valid.check_variables(file, its_kind, length)
         yield StoredResult(path, file, attributes, length, sealed)

@@ -21,7 +21,8 @@ Array = NDArray[Any]
 _COMMENTS = ("#", "%")
 _HEAD = 1 << 16  # bytes of a text file from which its layout is found
 _ONE = r"[^\W\d_]+|[°%]"  # name of a unit
-_UNIT = rf"(?:{_ONE})(?:\^?-?\d|[²³])?(?:\s*[*·/ ]\s*(?:{_ONE})(?:\^?-?\d|[²³])?)*"  # of bounded powers
+_LONGEST = 80  # characters of a unit
+_UNIT = rf"(?:{_ONE})(?:\^?-?\d|[²³])?(?:(?: *[*·/] *| +)(?:{_ONE})(?:\^?-?\d|[²³])?)*"  # of bounded powers
 
 
 def require(good: Any, problem: str) -> None:
@@ -163,7 +164,7 @@ def _registry() -> Any:
 @cache
 def si(unit: str) -> tuple[float, str] | None:
     """The size of a unit in SI, and that SI unit in words, such as meter or radian; None where there is none."""
-    if not re.fullmatch(_UNIT, unit):  # pint would compute powers of powers
+    if len(unit) > _LONGEST or not re.fullmatch(_UNIT, unit):  # pint would compute powers of powers
         return None
     registry = _registry()
     try:

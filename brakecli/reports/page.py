@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from brakecli import __version__
-from brakecli.errors import UsageError
+from brakecli.errors import UsageError, printable
 from brakecli.files.atomic import check_target, new_output
 from brakecli.files.read import StoredResult, open_result
 
@@ -40,7 +40,9 @@ def write_report(results: Sequence[Path], target: Path, *, force: bool, progress
         if kind == "run":
             return part_of_run(stored, progress)
         if kind not in ("sweep", "comparison", "stability"):
-            raise UsageError(f"{stored.path}: holds a result of kind {kind!r}, of which there is no report")
+            raise UsageError(
+                f"{stored.path}: holds a result of kind {printable(kind)}, of which there is no report"
+            )
         return part_of_sweep(stored) if kind == "sweep" else part_of_other(stored)
 
     with new_output(target, force=force) as file:

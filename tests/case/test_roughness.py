@@ -254,6 +254,11 @@ WRONG = {
     "0,1\n1,1\n2,1\n3,1\n": "all heights are equal",
     "\n".join(f"{0.001 * i},{0.3 * i}" for i in range(300)): "its heights lie on a straight line",
     "1\n2\n3\n4\n": "has 1 column (found",
+    "angle_turn,height_um\n0,0\n3,1\n6,0\n9,1\n": "in a turn of 3.14 m; check their unit",
+    "angle_deg,height_um\n0,0\n200,1\n400,0\n600,1\n800,3\n": "2 in a turn of 3.14 m",
+    "0,0\n1e-300,1\n2e-300,0\n3e-300,1\n": "its places lie 1e-300 m apart",
+    "angle_deg,height_um\n0,0\n4e-6,1\n8e-6,0\n400,1\n": "its heights lie on a straight line",
+    "t,x (" + "   ".join("m" * 22) + "!)\n1,2\n2,3\n3,1\n4,5\n": "there is no unit m   m",
     "\0\0": "this is not text",
 }
 

@@ -130,8 +130,9 @@ def _sound(path: Path, column: str | None, sample_rate: float | None) -> tuple[A
             warnings.simplefilter("ignore")  # chunks that it does not know
             rate, values = wavfile.read(path)
     except Exception as error:
-        what = f"cannot be read: {' '.join(str(error).split())}"
-        raise UnreadableResultError(f"{what}; name an intact WAV file") from error
+        known = isinstance(error, ValueError | OSError)  # others are of SciPy's own code
+        what = ": " + " ".join(str(error).split()) if known else ""
+        raise UnreadableResultError(f"cannot be read{what}; name an intact WAV file") from error
     _require(rate > 0, "it has no sampling rate; name an intact WAV file")
     if sample_rate not in (None, rate):
         raise UsageError(f"--sample-rate {sample_rate:g}: the file has {rate} Hz; leave the option out")
