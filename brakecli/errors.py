@@ -107,6 +107,16 @@ def in_python() -> Iterator[None]:
         raise
 
 
+@contextmanager
+def installed(*packages: str) -> Iterator[None]:
+    """Within the block libraries are imported; raises UsageError where one is missing."""
+    try:
+        yield
+    except ImportError as error:
+        what = f"{error.name or 'a library'} cannot be imported ({error})"
+        raise UsageError(f"{what}; install it with: python -m pip install {' '.join(packages)}") from error
+
+
 def key_text(path: KeyPath) -> str:
     """A key path as TOML writes it, with places in a list in brackets: `roughness.wheel.amplitudes[2]`."""
     text = ""
