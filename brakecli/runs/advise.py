@@ -70,7 +70,7 @@ class AdviceReport:
             found.append(f"the pad opens in part: this rests on the mean stiffness of the contact; {instead}")
         if is_undamped(self.system.coefficients):
             found.append("no dashpot acts: where sliding is stable, vibration does not die away either")
-        if len(self.system.belt) > 1 or len(self.system.load) > 1:
+        if not self.system.steady:
             found.append("speed and load are those of t = 0")
         return found
 
