@@ -134,7 +134,7 @@ def open_result(path: Path, kind: str | None = None) -> Iterator[StoredResult]:
             if attributes.get("complete") != 1:
                 raise ValueError("it is incomplete, attribute complete is not 1")
             if kind is not None and attributes.get("kind") != kind:
-                raise ValueError(f"it holds a result of kind {printable(its_kind)}, and {kind!r} is needed")
+                raise ValueError(f"it holds a result of kind {printable(repr(its_kind))}, and {kind!r} is needed")
             length = path.stat().st_size
             valid.check_variables(file, its_kind, length)
         yield StoredResult(path, file, attributes, length, sealed)
