@@ -109,12 +109,10 @@ def _changed(a: dict[str, Any], b: dict[str, Any]) -> Iterator[dict[str, Any]]:
 
 def _variables(a: StoredResult, b: StoredResult, group: str) -> Iterator[dict[str, Any]]:
     """The variables of a group that differ, at the same places along their axis."""
-    known = [
-        {name: each for name, each in result.variables(group).items() if "units" in each.attributes}
-        if group in result.groups()
-        else {}
-        for result in (a, b)  # what other programs have added need not have units
-    ]
+    known = []
+    for result in (a, b):  # what other programs have added need not have units
+        there = result.variables(group) if group in result.groups() else {}
+        known.append({name: each for name, each in there.items() if "units" in each.attributes})
     for name in dict.fromkeys([*known[0], *known[1]]):
         held = [each[name] for each in known if name in each]
         shapes = [list(each[name].shape) if name in each else [] for each in known]
