@@ -3,7 +3,7 @@
 import math
 import tomllib
 from bisect import bisect_left
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,7 +33,7 @@ def contents(result: StoredResult) -> dict[str, Any]:
     attributes = result.attributes
     known = {name: attributes.get(name) for name in ("status", "kind", "title", "format_version")}
     sizes = {"whole": result.sealed, "bytes": result.length}
-    return {"path": str(result.path), **known, **sizes, "versions": _versions(attributes), "variables": held}
+    return {"path": str(result.path), **known, **sizes, "versions": result.versions, "variables": held}
 
 
 @dataclass(frozen=True)
@@ -73,13 +73,8 @@ def difference(a: StoredResult, b: StoredResult) -> Difference:
     for each in differing:
         each["units"] = units.get(each["name"], units.get(f"/{each['name']}", ""))
     variables = [each for group in groups for each in _variables(a, b, group)]
-    of_program = [*_changed(*(_versions(each.attributes) for each in (a, b)))]
+    of_program = [*_changed(a.versions, b.versions)]
     return Difference([*_changed(*map(_keys, (a, b)))], differing, variables, of_program)
-
-
-def _versions(attributes: Mapping[str, Any]) -> dict[str, Any]:
-    names = [name for name in attributes if name.endswith("_version") and name != "format_version"]
-    return {name.removesuffix("_version"): plain(attributes[name]) for name in names}
 
 
 def _keys(result: StoredResult) -> dict[str, Any]:

@@ -72,6 +72,12 @@ class StoredResult:
                 raise ValueError(f"attribute {name} is missing")
             return str(self.attributes[name])
 
+    @property
+    def versions(self) -> dict[str, str]:
+        """Program and libraries by which it was made."""
+        names = [name for name in self.attributes if name.endswith("_version") and name != "format_version"]
+        return {name.removesuffix("_version"): str(self.attributes[name]) for name in names}
+
     def variables(self, group: str) -> dict[str, Variable]:
         """The variables of a group, its axes included, by name."""
         found = {}

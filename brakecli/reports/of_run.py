@@ -66,7 +66,7 @@ def part_of_run(result: StoredResult, progress: Counted) -> Part:
     ]
     answer = [*stretches, _sentence(found), f"By theory: {advice.conclusion()}."]
     name, title = escaped(result.path.name), loaded.case.title or "Case without a title"
-    return Part(name, title, QUESTION, answer, sections, versions(found))
+    return Part(name, title, QUESTION, answer, sections, result.versions)
 
 
 def case_blocks(loaded: LoadedCase) -> list[Any]:
@@ -84,12 +84,6 @@ def repeat(result: StoredResult, again: str, given: str) -> list[Any]:
     report = f"brakecli report {escaped(shlex.quote(result.path.name))} -o report.html"
     exactly = "The same version on the same machine gives the same numbers, to the last bit."
     return [Code(f"{again}\n{report}"), Texts([exactly]), Code(given, "The file as it was given")]
-
-
-def versions(found: Mapping[str, Any]) -> dict[str, str]:
-    """Program and libraries by which a result was made."""
-    names = [name for name in found if name.endswith("_version") and name != "format_version"]
-    return {name.removesuffix("_version"): str(found[name]) for name in names}
 
 
 def _sentence(found: Mapping[str, Any]) -> str:

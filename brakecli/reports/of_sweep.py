@@ -15,7 +15,7 @@ from brakecli.plots.result import draw
 from brakecli.plots.run import case_of
 from brakecli.plots.sweep import SweepPicture, gather, numeric
 from brakecli.reports.blocks import Part, Section, Table, Texts, picture, rows_of, shown
-from brakecli.reports.of_run import case_blocks, repeat, versions
+from brakecli.reports.of_run import case_blocks, repeat
 from brakecli.reports.sweep_map import MOST, maps
 from brakecli.sweeps.point import Status
 
@@ -119,4 +119,4 @@ def _plain(
     again = repeat(result, f"brakecli {_COMMANDS[kind]} -o again.h5", given)
     sections += [Section("Case", case_blocks(loaded)), Section("How to repeat it", again)]
     title, name = str(attributes.get("title", "")) or "Result without a title", escaped(result.path.name)
-    return Part(name, title, question or _QUESTIONS[kind], answer, sections, versions(attributes))
+    return Part(name, title, question or _QUESTIONS[kind], answer, sections, result.versions)
