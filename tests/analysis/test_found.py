@@ -175,6 +175,22 @@ def test_what_lies_beside_the_lines_of_a_forced_motion_is_ripple_if_nodes_ripple
     assert "contact.nodes = 1024" in verdict.reasons[1]
 
 
+@pytest.mark.parametrize("times", [0.5, 0.9, 1.0, 1.1])
+def test_a_stick_of_less_than_a_sample_is_not_said_to_be_none(times: float) -> None:
+    """The step locks the cycle to 12.000 samples: none of 181 cycles shows the stick, or a fifth to a third of them."""
+    name = "sticks for less than a sample"
+    verdict = judged(name, output__sample_interval=times * SHOES[name]["output"]["sample_interval"])
+    assert verdict.regime is Regime.UNDECIDED
+    assert abs(verdict.stick_fraction - 0.0270) <= verdict.evidence["stick_spread"]  # by located events
+    told = re.search(r"may fall between samples in 100%; reduce (.*) to ([\d.e-]+) s", verdict.reasons[0])
+    assert told is not None
+    interval = float(told[2])
+    changes = {key.replace(".", "__"): interval for key in told[1].split(" and ")}
+    finer = judged(name, **changes)
+    assert (finer.regime, finer.settled) == (Regime.RELAXATION, True)
+    assert abs(finer.stick_fraction - 0.0270) <= finer.evidence["stick_spread"]
+
+
 def test_an_impact_between_the_samples_of_most_cycles_counts_for_the_torque() -> None:
     verdict = judged("impacts of less than a sample")
     assert verdict.settled

@@ -194,7 +194,9 @@ class Rules(ForcedRules):
     def sustained(self) -> Decision:
         """What is left is a vibration that lasts, if enough of it is there: its cycles decide."""
         theory = self.context.linear() if not self.context.forced else None
-        self.cycles = found = cycles_of(self.settled_part, theory.slip if theory else None, self.context.step)
+        self.cycles = found = cycles_of(
+            self.settled_part, theory.slip if theory else None, self.context.step, self.context.belt_speed
+        )
         cycles = found.evidence["cycles"] if found else 0.0
         self.evidence |= found.evidence if found else {}
         if not found or cycles < (1.0 if self.settled else _UNSETTLED) * self.limits.fewest_cycles:
@@ -228,6 +230,11 @@ class Rules(ForcedRules):
         if stick >= self.limits.stick_cycles:
             text = f"sustained, with stick in {stick:.0%} of {cycles:.0f} cycles"
             return Decision(text, Regime.RELAXATION, *own)
+        if self._sticks(stick) != self._sticks(found.may_stick):
+            finer = 0.25 * self.history.interval
+            keys = "solver.step and " * (finer < 1.1 * self.context.step) + "output.sample_interval"
+            text = f"stick is seen in {stick:.0%} of the cycles, but may fall between samples in {found.may_stick:.0%}"
+            return Decision(text, advice=f"reduce {keys} to {finer:.2g} s")
         bands = self.evidence["band_share"] = self.settled_part.narrow()
         lines = f"{harmonic:.0%} of the energy of vx in one line and its harmonics"
         if harmonic < bands:
@@ -242,6 +249,10 @@ class Rules(ForcedRules):
         irregular = f"irregular: stick in {stick:.0%} of the cycles{without}, {lines}"
         irregular += ", but the frequency wanders" if wanders else ""
         return Decision(irregular, advice="run longer, or look at the spectrum")
+
+    def _sticks(self, part: float) -> int:
+        """Whether stick in a part of the cycles is stick in hardly any (0), in some, or in nearly all (2)."""
+        return (part > 1.0 - self.limits.stick_cycles) + (part >= self.limits.stick_cycles)
 
     def _drift_further(self) -> None:
         """Whether a limit cycle that seems settled may still change, and how long a run must be to show it."""
