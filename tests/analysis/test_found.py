@@ -177,7 +177,7 @@ def test_what_lies_beside_the_lines_of_a_forced_motion_is_ripple_if_nodes_ripple
 
 @pytest.mark.parametrize("times", [0.5, 0.9, 1.0, 1.1])
 def test_a_stick_of_less_than_a_sample_is_not_said_to_be_none(times: float) -> None:
-    """The step locks the cycle to 12.000 samples: none of 181 cycles shows the stick, or a fifth to a third of them."""
+    """The step locks the cycle to 12.000 samples: none of 181 cycles shows the stick, or a third."""
     name = "sticks for less than a sample"
     verdict = judged(name, output__sample_interval=times * SHOES[name]["output"]["sample_interval"])
     assert verdict.regime is Regime.UNDECIDED

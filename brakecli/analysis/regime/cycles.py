@@ -70,9 +70,9 @@ def cycles_of(
 ) -> Cycles | None:
     """The cycles of a part; None if there are none. `slip` is the side to which the shoe slips in steady sliding.
 
-    The spreads hold what a step (s) may change, with which the motion was computed on a wheel of speed `belt` (m/s). Stick, loss of contact and
-    frequency are medians of ten groups of neighbouring cycles, so that it does not matter how samples fall into
-    each cycle.
+    The spreads hold what a step (s) may change, with which the motion was computed, on a wheel of speed `belt`
+    (m/s). Stick, loss of contact and frequency are medians of ten groups of neighbouring cycles, so that it does
+    not matter how samples fall into each cycle.
     """
     velocity = part.last("vx")
     crossings, rises = _beginnings(part, velocity)

@@ -233,7 +233,8 @@ class Rules(ForcedRules):
         if self._sticks(stick) != self._sticks(found.may_stick):
             finer = 0.25 * self.history.interval
             keys = "solver.step and " * (finer < 1.1 * self.context.step) + "output.sample_interval"
-            text = f"stick is seen in {stick:.0%} of the cycles, but may fall between samples in {found.may_stick:.0%}"
+            text = f"stick is seen in {stick:.0%} of the cycles"
+            text += f", but may fall between samples in {found.may_stick:.0%}"
             return Decision(text, advice=f"reduce {keys} to {finer:.2g} s")
         bands = self.evidence["band_share"] = self.settled_part.narrow()
         lines = f"{harmonic:.0%} of the energy of vx in one line and its harmonics"
