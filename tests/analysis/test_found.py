@@ -191,6 +191,16 @@ def test_a_stick_of_less_than_a_sample_is_not_said_to_be_none(times: float) -> N
     assert abs(finer.stick_fraction - 0.0270) <= finer.evidence["stick_spread"]
 
 
+def test_what_ripple_of_the_nodes_feeds_is_not_called_self_excited() -> None:
+    """A wave passes under the nodes at 483 Hz, the shoe's own is 457 Hz. It dies by another integrator."""
+    verdict = judged("ripple beside its own frequency")
+    told = re.search(r"192 nodes gives .* W .*; take contact.nodes = (\d+)", verdict.reasons[0])
+    assert told is not None
+    assert verdict.regime is Regime.UNDECIDED
+    finer = judged("ripple beside its own frequency", contact__nodes=int(told[1]))
+    assert "still decaying" in finer.reasons[0]
+
+
 def test_an_impact_between_the_samples_of_most_cycles_counts_for_the_torque() -> None:
     verdict = judged("impacts of less than a sample")
     assert verdict.settled

@@ -65,9 +65,7 @@ class Cycles:
     force_variation: float | None  # N, peak to peak of the friction force
 
 
-def cycles_of(
-    part: Part, slip: ContactState | None = None, step: float = 0.0, belt: float = 0.0
-) -> Cycles | None:
+def cycles_of(part: Part, slip: ContactState | None = None, step: float = 0.0, belt: float = 0.0) -> Cycles | None:
     """The cycles of a part; None if there are none. `slip` is the side to which the shoe slips in steady sliding.
 
     The spreads hold what a step (s) may change, with which the motion was computed, on a wheel of speed `belt`

@@ -25,6 +25,7 @@ _SPARSE = 8  # of the places at which a forced motion is computed, one of so man
 _UNSETTLED = 1.5  # times as many cycles where nothing has settled: a hop may look like a vibration
 _SURE = 10.0  # standard errors of a slope: neighbouring windows of an amplitude that wanders go together
 _LONG, _DASHPOT = "run longer", "a dashpot would decide"
+_FED = 0.1  # of what keeps a vibration up, that nodes may add
 _FAR = 0.3  # rad, of a wave, by which what the shoe adds moves it
 
 
@@ -224,6 +225,8 @@ class Rules(ForcedRules):
         if drift > (_DRIFT if unsure else self.limits.settled_within):
             text = f"the amplitude still changes by {found.drift.part:.1%} within the last part of the run"
             return Decision(text, advice=_LONG)
+        if self.context.forced and (decision := self._rippled()):
+            return decision
         own, wander = (Excitation.SELF_EXCITED, found.frequency), found.evidence["frequency_spread"]
         held = self._held(wander, found.frequency, found.detuning)
         self.evidence["frequency_spread"] = (wander if held is None else held) + found.frequency_off
@@ -250,6 +253,17 @@ class Rules(ForcedRules):
         irregular = f"irregular: stick in {stick:.0%} of the cycles{without}, {lines}"
         irregular += ", but the frequency wanders" if wanders else ""
         return Decision(irregular, advice="run longer, or look at the spectrum")
+
+    def _rippled(self) -> Decision | None:
+        """What the ripple of the nodes gives to a vibration that friction seems to keep up."""
+        if not (ripple := self.context.ripple(self.settled_part, ())):
+            return None
+        friction, _ = self.settled_part.power("friction_force", "vx")
+        gains = max(self.context.powers(self.settled_part).get("power_dashpots", 0.0), abs(friction))
+        if ripple.power <= _FED * gains:
+            return None
+        text = f"ripple of the contact's {ripple.nodes} nodes gives {ripple.power:.2g} W to the vibration"
+        return Decision(f"{text}, so that friction may not keep it up", advice=ripple.advice)
 
     def _sticks(self, part: float) -> int:
         """Whether stick in a part of the cycles is stick in hardly any (0), in some, or in nearly all (2)."""
@@ -300,7 +314,8 @@ class Rules(ForcedRules):
             short, change = self._settled_seconds < self._slowest(0.0), 0.5 * abs(self._trend) * self.duration
             if not self.lasts and (short or change > self.limits.settled_within):
                 return found.amplitude, None  # where it ends, the run does not show
-            return found.amplitude, self._held(found.amplitude_spread, found.amplitude, found.drift)
+            held = self._held(found.amplitude_spread, found.amplitude, found.drift)
+            return found.amplitude, held if held is None or held < found.amplitude else None
         if decision.excitation is not Excitation.FORCED:
             return part.amplitude("x"), None
         if self.theory and self.parts:
