@@ -201,6 +201,12 @@ def test_what_ripple_of_the_nodes_feeds_is_not_called_self_excited() -> None:
     assert "still decaying" in finer.reasons[0]
 
 
+def test_a_wave_that_modulates_two_hops_makes_no_cycle_of_four() -> None:
+    verdict = judged("two hops that a wave modulates")
+    assert verdict.frequency == pytest.approx(36.02, rel=0.003)  # by another integrator; the wave passes at 51.85 Hz
+    assert verdict.evidence["rises_per_cycle"] == 2.0
+
+
 def test_an_impact_between_the_samples_of_most_cycles_counts_for_the_torque() -> None:
     verdict = judged("impacts of less than a sample")
     assert verdict.settled

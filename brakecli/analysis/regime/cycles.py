@@ -1,12 +1,13 @@
 """What the cycles of a vibration show: amplitude, frequency, stick, force, and how far they drift."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.analysis.regime.evidence import Part
+from brakecli.analysis.regime.evidence import LINE_BINS, Part
 from brakecli.analysis.regime.spectra import Array, upward_crossings
 from brakecli.solver.quantities import ContactState
 
@@ -65,15 +66,21 @@ class Cycles:
     force_variation: float | None  # N, peak to peak of the friction force
 
 
-def cycles_of(part: Part, slip: ContactState | None = None, step: float = 0.0, belt: float = 0.0) -> Cycles | None:
+def cycles_of(
+    part: Part,
+    slip: ContactState | None = None,
+    step: float = 0.0,
+    belt: float = 0.0,
+    waves: Sequence[tuple[float, float]] = (),
+) -> Cycles | None:
     """The cycles of a part; None if there are none. `slip` is the side to which the shoe slips in steady sliding.
 
     The spreads hold what a step (s) may change, with which the motion was computed, on a wheel of speed `belt`
-    (m/s). Stick, loss of contact and frequency are medians of ten groups of neighbouring cycles, so that it does
-    not matter how samples fall into each cycle.
+    (m/s) whose `waves` (Hz, m) pass. Stick, loss of contact and frequency are medians of ten groups of cycles, so
+    that it does not matter how samples fall into each cycle.
     """
     velocity = part.last("vx")
-    crossings, rises = _beginnings(part, velocity)
+    crossings, rises = _beginnings(part, velocity, waves)
     if len(crossings) < 4:
         return None
     cycles = len(crossings) - 1
@@ -169,12 +176,16 @@ def _force_variation(force: Array, crossings: Array, groups: Array, alike: bool)
     return swings[0] if min(swings) >= _SEEN * swings[0] else None
 
 
-def _beginnings(part: Part, velocity: Array) -> tuple[Array, int]:
-    """Where cycles begin, and how many rises each holds: one, unless lines lie between those of one."""
+def _beginnings(part: Part, velocity: Array, waves: Sequence[tuple[float, float]]) -> tuple[Array, int]:
+    """Where cycles begin, and how many rises each holds: one, unless lines lie between those of one.
+
+    Lines of waves (Hz, m) may lie there as well.
+    """
     crossings = upward_crossings(velocity, 0.3 * float(velocity.std()))
     if len(crossings) < 2:
         return crossings, 1
     period = float(crossings[-1] - crossings[0]) / (len(crossings) - 1)
+    width = 2.0 * LINE_BINS / (len(velocity) * part.history.interval)
     close = 2.0 * _SAME * float(velocity.var())
     for rises in range(1, _MOST_RISES_PER_CYCLE + 1):  # after which the motion repeats
         shift = round(rises * period)
@@ -183,7 +194,8 @@ def _beginnings(part: Part, velocity: Array) -> tuple[Array, int]:
             divisors = [each for each in range(1, rises) if rises % each == 0]
             for fewer in divisors:  # samples may repeat only after several cycles
                 lines = [n * longest for n in range(1, 2 * rises) if n % (rises // fewer)]  # above: jumps, aliased
-                if part.share(lines) <= _BETWEEN:
+                beside = [f for f in lines if all(abs(f - wave) > width for wave, _ in waves)]
+                if part.share(beside, LINE_BINS // 2) <= _BETWEEN:
                     return crossings[::fewer], fewer
             return crossings[::rises], rises
     return crossings, 1

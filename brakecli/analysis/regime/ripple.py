@@ -22,7 +22,7 @@ _LEAST = 0.05  # part of a number from which on it is said
 
 
 class Ripple(NamedTuple):
-    """Parts of the deviations of x, vx and the friction force, half of peak to peak of x (m), and its power (W)."""
+    """Parts of the deviations of x, vx and the friction force, half of peak to peak of x (m), its power (W)."""
 
     x: float
     vx: float

@@ -195,9 +195,8 @@ class Rules(ForcedRules):
     def sustained(self) -> Decision:
         """What is left is a vibration that lasts, if enough of it is there: its cycles decide."""
         theory = self.context.linear() if not self.context.forced else None
-        self.cycles = found = cycles_of(
-            self.settled_part, theory.slip if theory else None, self.context.step, self.context.belt_speed
-        )
+        known, slip = self.context, theory.slip if theory else None
+        self.cycles = found = cycles_of(self.settled_part, slip, known.step, known.belt_speed, known.waves)
         cycles = found.evidence["cycles"] if found else 0.0
         self.evidence |= found.evidence if found else {}
         if not found or cycles < (1.0 if self.settled else _UNSETTLED) * self.limits.fewest_cycles:
