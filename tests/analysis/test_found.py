@@ -203,8 +203,22 @@ def test_what_ripple_of_the_nodes_feeds_is_not_called_self_excited() -> None:
 
 def test_a_wave_that_modulates_two_hops_makes_no_cycle_of_four() -> None:
     verdict = judged("two hops that a wave modulates")
-    assert verdict.frequency == pytest.approx(36.02, rel=0.003)  # by another integrator; the wave passes at 51.85 Hz
+    assert verdict.frequency == pytest.approx(36.02, rel=0.003)  # by another integrator; wave: 51.85 Hz
     assert verdict.evidence["rises_per_cycle"] == 2.0
+
+
+def test_what_one_beat_of_the_waves_shows_has_a_spread_that_holds_what_others_show() -> None:
+    verdict = judged("one beat of waves under an opening pad")
+    assert verdict.settled
+    assert verdict.amplitude_spread is not None
+    assert abs(verdict.amplitude - 1.239e-6) <= verdict.amplitude_spread  # later parts, by another integrator
+
+
+def test_what_lies_on_sums_of_three_waves_is_not_what_the_shoe_adds() -> None:
+    """Two starts far apart differ by 5e-11 in the middle of the run: all is forced."""
+    verdict = judged("sums of three waves")
+    assert (verdict.excitation, verdict.amplitude_own) == (Excitation.FORCED, None)
+    assert f"{verdict.evidence['forced_share']:.0%} of the energy" in verdict.reasons[0]
 
 
 def test_an_impact_between_the_samples_of_most_cycles_counts_for_the_torque() -> None:

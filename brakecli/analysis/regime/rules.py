@@ -323,7 +323,7 @@ class Rules(ForcedRules):
         period = max(min(self._beat / self.history.interval, samples - 1), 1.0)
         edges = np.asarray(samples - period * np.arange(int(samples / period), -1, -1), np.float64)
         size, spread = median(swings(part, edges))
-        if self.rings or len(edges) < 3:
+        if self.rings or len(edges) < 3 - self.settled:
             return size, None
         off = SIZE_OFF * size * self.context.step / self.history.interval / contact_length(part)
         return size, off + max(spread, self._beating() * part.amplitude("x") - size)
