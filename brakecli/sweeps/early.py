@@ -108,8 +108,7 @@ def early(system: System, *, seen: bool = True) -> Early | None:
 
 def may_be_early(system: System) -> bool:
     """Whether a verdict may come early: smooth pads, the piecewise-exact scheme, constant speed and load."""
-    steady = len(system.belt) == 1 and len(system.load) == 1
-    return system.smooth and system.method.row.exact and steady and system.samples >= FEWEST_SAMPLES
+    return system.smooth and system.method.row.exact and system.steady and system.samples >= FEWEST_SAMPLES
 
 
 def _theory(system: System) -> Linear | None:

@@ -112,14 +112,11 @@ def cycles_of(
 
     (stick, stick_spread), (loss, loss_spread) = (time_in(which) for which in _ENDS)
     frequency = 1.0 / (period * part.history.interval)
-    first, *higher = (part.share([n * frequency]) for n in range(1, _HARMONICS + 1))
     evidence = {
         "cycles": float(cycles),
         "samples_per_cycle": period,
         "rises_per_cycle": float(rises),
-        "fundamental_share": first,
-        "harmonic_share": part.share([n * frequency for n in range(1, 1 + int(0.5 * period))]),
-        "harmonics": [float(np.sqrt(share / first)) for share in higher if first > 0.0],
+        **_in_lines(part, frequency, period),
         "stick_cycles": float(np.mean(per_cycle > 0)),
         "stick_episodes_per_cycle": float(np.mean(per_cycle)),
         "frequency_spread": frequency * period_spread / period,
@@ -153,6 +150,16 @@ def _hidden_sticks(velocity: Array, state: Array, belt: float) -> NDArray[np.int
     touches = np.minimum(state[1:-2], state[2:-1]) < ContactState.SEPARATED
     slips = (state[1:-2] != ContactState.STICK) & (state[2:-1] != ContactState.STICK)
     return np.flatnonzero(crest & touches & slips) + 2
+
+
+def _in_lines(part: Part, frequency: float, period: float) -> dict[str, Any]:
+    """Parts of the energy of vx in a line (Hz) and its harmonics, and their amplitudes over its own."""
+    first, *higher = (part.share([n * frequency]) for n in range(1, _HARMONICS + 1))
+    return {
+        "fundamental_share": first,
+        "harmonic_share": part.share([n * frequency for n in range(1, 1 + int(0.5 * period))]),
+        "harmonics": [float(np.sqrt(share / first)) for share in higher if first > 0.0],
+    }
 
 
 def contact_length(part: Part) -> float:
