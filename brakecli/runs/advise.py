@@ -80,7 +80,7 @@ class AdviceReport:
             yield "the wheel stands, so that nothing slides: give wheel.angular_speed"
             return
         if report.equilibrium is None:
-            yield f"there is no steady sliding at {own:g}: {str(report.no_equilibrium).partition(': ')[2]}"
+            yield f"at {own:g} {report.no_equilibrium}"
         elif report.contact_stiffness == 0.0:
             yield "the shoe does not touch the wheel: give a load that presses it on"
         elif own == 0.0:
