@@ -132,25 +132,22 @@ def cycles_of(
     missed = 3.0 / 128.0 * (2.0 * np.pi / period) ** 4 * amplitude  # of a crest between two samples: parabola
     spread = max(spread, unseen * missed) + (0.25 * turn**2 + SIZE_OFF * impact) * amplitude
     medians = amplitude, spread, stick, loss, float(np.mean(may > 0))
-    varies = _force_variation(force, state, crossings, groups, alike=unseen > _ALIKE)
+    varies = _force_variation(force, crossings, groups, alike=unseen > _ALIKE)
     off = frequency * (turn**2 / 8.0 + _PERIOD_OFF * impact)
     return Cycles(evidence, frequency, off, *medians, limited, drift, detuning, varies)
 
 
-def _crests(values: Array, jumps: NDArray[np.bool_] | None = None) -> Array:
+def _crests(values: Array) -> Array:
     """The most that values may reach behind each sample, where they have a crest there; otherwise -infinity.
 
-    Beside a crest they lie below the lines through the two samples on either side. Where they may jump, they reach
-    the end of one line or the other.
+    Beside a crest they lie below the tangents at the two samples, by parabolas through the three on either side.
     """
-    before, first, last, after = (values[i : len(values) - 3 + i] for i in range(4))
-    rises, falls = first - before, last - after
+    earlier, before, first, last, after, later = (values[i : len(values) - 5 + i] for i in range(6))
+    rises, falls = (1.5 * x - 2.0 * y + 0.5 * z for x, y, z in ((first, before, earlier), (last, after, later)))
     crest = (rises > 0.0) & (falls > 0.0)
     meet = np.clip((last + falls - first) / np.where(crest, rises + falls, 1.0), 0.0, 1.0)
     met = np.where(crest, np.minimum(first + rises * meet, last + falls * (1.0 - meet)), -np.inf)
-    if jumps is not None:
-        met = np.where(jumps[1:-2], np.maximum(first + rises, last + falls), met)
-    return np.pad(met, (1, 2), constant_values=-np.inf)
+    return np.pad(met, (2, 3), constant_values=-np.inf)
 
 
 def _hidden_sticks(velocity: Array, state: Array, belt: float) -> NDArray[np.intp]:
@@ -179,24 +176,17 @@ def contact_length(part: Part) -> float:
     return (1.0 - part.fraction(away)) * (part.stop - part.start) / begins if begins else np.inf
 
 
-def _force_variation(force: Array, state: Array, crossings: Array, groups: Array, alike: bool) -> float | None:
+def _force_variation(force: Array, crossings: Array, groups: Array, alike: bool) -> float | None:
     """Peak to peak (N) in groups of cycles, as a median: an impact of less than a sample is seen in one of them.
 
     None where every other sample shows much less, so that all of them may miss some. Where cycles are sampled
-    alike, those are every other one of each cycle, and also where crests between samples may show much more.
+    alike, those are every other one of each cycle.
     """
     edges, begin = crossings.astype(int), groups[:-1].astype(int) - int(crossings[0])
     force, place = force[edges[0] : edges[-1]], np.arange(edges[-1] - edges[0])
     odd = (place - (np.repeat(edges[:-1], np.diff(edges)) if alike else 0)) % 2 == 1
     seen = [force, np.where(odd, force, np.nan), np.where(odd, np.nan, force)]
     swings = [median(np.fmax.reduceat(each, begin) - np.fmin.reduceat(each, begin))[0] for each in seen]
-    if alike:  # and an impact may fall between two samples of each
-        state = state[edges[0] : edges[-1]]
-        jumps = np.append(state[1:] != state[:-1], False)
-        most = (np.maximum(each, _crests(each, jumps)) for each in (force, -force))
-        high, low = (np.maximum.reduceat(each, begin) for each in most)
-        if swings[0] < _SEEN * median(high + low)[0]:
-            return None
     return swings[0] if min(swings) >= _SEEN * swings[0] else None
 
 
