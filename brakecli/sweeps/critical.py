@@ -21,7 +21,7 @@ from brakecli.runs.limits import within_range
 from brakecli.solver.system import System
 from brakecli.sweeps.early import Known, early
 from brakecli.sweeps.error_bar import left_open
-from brakecli.sweeps.floquet import Disturbances
+from brakecli.sweeps.floquet import Disturbances, between
 from brakecli.sweeps.growth import Sliding, has_exact_steps, sliding, stepped, with_step
 from brakecli.sweeps.sustained import lasting, settling, verdict_fades
 from brakecli.sweeps.tables import Critical
@@ -175,14 +175,14 @@ def _by_eigenvalues(critical: Critical, sliding_at: SlidingAt) -> Search:
         low, high = bisect(lambda value: unstable(value) is not lost, low, high, width=width)
         return Edge(0.5 * (low + high), low, high, 0.5 * (high - low), lost)
 
-    def found(unstable: Callable[[float], bool], count: int) -> Search:
-        values = np.linspace(critical.lower, critical.upper, count).tolist()
+    def found(unstable: Callable[[float], bool], count: int, values: list[float]) -> Search:
+        values = sorted({*np.linspace(critical.lower, critical.upper, count).tolist(), *values})
         return _answer(critical, sliding_at, cache(unstable), values, partial(edge, unstable))
 
-    exact = found(grows, SCANNED_WHERE_OPEN if opens else SCANNED_BY_EIGENVALUES)
+    exact = found(grows, SCANNED_WHERE_OPEN if opens else SCANNED_BY_EIGENVALUES, [])
     if first is not None and first.system.method.own_steps:
         return exact._replace(eigenvalue=exact.value, bias=0.0 if exact.value is not None else None)
-    own = found(grows_in_steps, SCANNED_WHERE_OPEN)
+    own = found(grows_in_steps, SCANNED_WHERE_OPEN, between(critical.lower, critical.upper, exact.windows))
     exact = exact._replace(eigenvalue=exact.value)
     if exact.value is None or own.value is None or exact.outcome is not own.outcome:
         return exact

@@ -74,8 +74,7 @@ class Disturbances:
         self.periodic = any(found.forced for found in map(self.sliding_at, values) if found)
         self.scan(values[::PARTS])
         if not any(measured and measured.opened for measured in map(self.at, values[::PARTS])):
-            ends = [lower, *(end for window in windows for end in window), upper]
-            return sorted({*values[::PARTS], *(0.5 * (low + high) for low, high in pairwise(ends))})
+            return sorted({*values[::PARTS], *between(lower, upper, windows)})
         values = sorted({*values, *self.resonances(values)})
         self.scan(values)
         self._go_on(values)
@@ -111,10 +110,11 @@ class Disturbances:
                     before = value
 
     def _goes_on(self, before: float, value: float, back: bool) -> bool:
-        """Follow the motion of one value to another where that one has none, or another one, if it is stable."""
+        """Follow a motion to another value that has none, or another one; an unstable one beside unstable ones."""
         known, other, found = self.known[before], self.known[value], self.sliding_at(value)
         period, jumps = common_period(found.system) if found else None, self.jumps(before, value)
-        if before not in self.branches or not (known and found and period) or known.unstable:
+        on = jumps and bool(other and other.unstable)
+        if before not in self.branches or not (known and found and period) or (known.unstable and not on):
             return False
         if other and not other.unstable and (back or not jumps):
             return False
@@ -284,6 +284,12 @@ class Disturbances:
         waited = segments.settled(start, min(RELAXED / slow, LONGEST) if slow > 0.0 else LONGEST)
         forced = orbit(segments, waited, None)
         return None if forced and near and forced.size > DEPARTED * near.size else forced
+
+
+def between(lower: float, upper: float, windows: Iterable[tuple[float, float]]) -> list[float]:
+    """The middle of each of the windows within a range, and of what lies between them."""
+    ends = [lower, *(end for window in windows for end in window), upper]
+    return [0.5 * (low + high) for low, high in pairwise(ends)]
 
 
 def _same(one: Orbit, other: Orbit) -> bool:
