@@ -166,8 +166,8 @@ def sweep(
         from brakecli.sweeps.plan import LoadedSweep, sweep_of
 
         if axes is not None or critical is not None:
-            tables = [{"parameter": keys, "values": _plain(values)} for keys, values in (axes or {}).items()]
-            given = {"case": "-", "axis": tables, "critical": critical}
+            tables = [{"parameter": keys, "values": values} for keys, values in _mapping(axes, "axes").items()]
+            given = _plain({"case": "-", "axis": tables, "critical": critical})
             loaded = sweep_of({name: each for name, each in given.items() if each}, _case(source, settings))
         elif isinstance(source, LoadedSweep):
             loaded = source
@@ -268,9 +268,13 @@ def _case(source: "Source | LoadedSweep", settings: "Settings | None") -> "Loade
 
 def _overrides(settings: "Settings | None") -> list[str]:
     """Settings as `--set` has them; a table replaces the one that the case has."""
-    if not isinstance(settings, Mapping | None):
-        raise UsageError("settings: are no mapping; write them as {'friction.coefficient': 0.4}")
-    return [f"{key}={_toml(value, key)}" for key, value in (settings or {}).items()]
+    return [f"{key}={_toml(value, key)}" for key, value in _mapping(settings, "settings").items()]
+
+
+def _mapping(given: Any, name: str) -> Mapping[Any, Any]:
+    if not isinstance(given, Mapping | None):
+        raise UsageError(f"{name}: is no mapping; write it as {{'friction.coefficient': ...}}")
+    return given or {}
 
 
 def _toml(value: Any, key: str) -> str:
@@ -294,7 +298,7 @@ def _axis(vary: "Mapping[str | tuple[str, ...], Iterable[float]]") -> "Axis":
     from brakecli.case.read import parse_table
     from brakecli.sweeps.tables import Axis
 
-    if len(vary) != 1:
+    if len(_mapping(vary, "vary")) != 1:
         raise UsageError("vary: takes one key with its values, or one tuple of keys; give the others as settings")
     [(keys, values)] = vary.items()
     axis = parse_table(Axis, tomli_w.dumps({"parameter": keys, "values": _plain(values)}), "vary")

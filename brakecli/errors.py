@@ -100,9 +100,21 @@ def in_python() -> Iterator[None]:
             for each in error.problems
         ]
         raise CaseError(problems) from error
+    except RecursionError:
+        raise UsageError("a value lies too deep in others, or in itself; give numbers, texts and lists") from None
     except BrakecliError as error:
         error.args = (_for_python(str(error)),)
         raise
+
+
+@contextmanager
+def installed(*packages: str) -> Iterator[None]:
+    """Within the block libraries are imported; raises UsageError where one is missing."""
+    try:
+        yield
+    except ImportError as error:
+        what = f"{error.name or 'a library'} cannot be imported ({error})"
+        raise UsageError(f"{what}; install it with: python -m pip install {' '.join(packages)}") from error
 
 
 def key_text(path: KeyPath) -> str:

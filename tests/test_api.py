@@ -167,8 +167,22 @@ def test_errors_are_those_of_the_commands(tmp_path: Path) -> None:
             brakecli.sweep(CASE, axes={"shoe.mass": [1.0]}, jobs=jobs)  # type: ignore[arg-type]
     with pytest.raises(UsageError, match=r"shoe\.mass: cannot be set to NoneType"):
         brakecli.run(CASE, {"shoe.mass": None})
-    with pytest.raises(UsageError, match="are no mapping"):
+    with pytest.raises(UsageError, match="settings: is no mapping"):
         brakecli.run(CASE, ["shoe.mass=1"])  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match="axes: is no mapping"):
+        brakecli.sweep(CASE, axes=1.5)  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match="vary: is no mapping"):
+        brakecli.stability(CASE, vary="x")  # type: ignore[arg-type]
+    endless: list[Any] = []
+    endless.append(endless)
+    for deep in (endless, {"parameter": endless}):
+        with pytest.raises(UsageError, match="a value lies too deep in others, or in itself"):
+            brakecli.run(CASE, {"shoe.mass": deep})
+        with pytest.raises(UsageError, match="a value lies too deep in others, or in itself"):
+            brakecli.sweep(CASE, critical={"parameter": deep})
+    for name in ({1}, b"shoe.mass"):
+        with pytest.raises(CaseError, match=r"critical\.parameter"):
+            brakecli.sweep(CASE, critical={"parameter": name, "lower": 0, "upper": 1})
     with pytest.raises(UsageError, match="rise or fall"):
         brakecli.stability(CASE, vary={"shoe.mass": [1.0, 3.0, 2.0]})
     with pytest.raises(UsageError, match="only for a measured signal"):

@@ -38,11 +38,6 @@ def starters() -> dict[str, str]:
     return {each.name.removesuffix(".toml"): each.read_text(encoding="utf-8") for each in sorted(files, key=str)}
 
 
-def read_case(source: str, overrides: Sequence[str] = ()) -> LoadedCase:
-    """Read the case from a path, or from standard input where the path is "-"; see `parse_case`."""
-    return parse_case(*read_text(source), overrides)
-
-
 def read_text(source: str) -> tuple[str, str]:
     """The text of a file, or of standard input where the path is "-", and its name; line ends stay as they are."""
     name = "standard input" if source == "-" else source
@@ -81,23 +76,17 @@ def parse_resolved(text: str, label: str, overrides: Sequence[str] = ()) -> Load
 
     What its surfaces were made of is not there, and cannot be changed alone.
     """
-    remedy = (
-        "a result holds the sines of a surface alone; run the case file anew, or set the whole surface as well"
-    )
+    remedy = "a result holds the sines of a surface alone; run the case file anew, or set the whole surface, too"
+
+    def explained(problem: Problem) -> Problem:
+        made_of = problem.path[:1] == ("roughness",) and {*problem.path} & {"profile_error", "spectrum"}
+        return replace(problem, remedy=remedy) if made_of else problem
+
     stored = parse_case(text, label)
     try:
         loaded = parse_case(text, label, overrides)
     except CaseError as error:
-        made_of = [
-            each.path[:1] == ("roughness",) and {*each.path} & {"profile_error", "spectrum"}
-            for each in error.problems
-        ]
-        raise CaseError(
-            [
-                replace(each, remedy=remedy) if made else each
-                for each, made in zip(error.problems, made_of, strict=True)
-            ]
-        ) from None
+        raise CaseError([*map(explained, error.problems)]) from None
     before, wheel = stored.case.wheel.radius, stored.case.roughness.wheel
     if wheel and wheel.note and loaded.case.wheel.radius != before and loaded.case.roughness.wheel == wheel:
         what = f"cannot change the sines of a measured profile, made for {before!r} m"

@@ -35,9 +35,8 @@ def diff_table(files: Mapping[str, str], numbers: Mapping[str, Any]) -> str:
         shown = [each for each in numbers[name] if not each["name"].startswith(_ASIDE)]
         if shown:
             columns = {title: [each["name"] for each in shown]}
-            columns |= {
-                files[side]: [_text(each[side], each.get("units")) for each in shown] for side in ("a", "b")
-            }
+            for side in ("a", "b"):
+                columns[files[side]] = [_text(each[side], each.get("units")) for each in shown]
             parts.append(grid(columns))
         if more := len(numbers[name]) - len(shown):
             parts.append(f"{more} more with reasons and evidence differ; --json lists them")

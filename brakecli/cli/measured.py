@@ -39,9 +39,8 @@ class Measured:
         for name, value in asdict(self).items():
             where = "--" + name.replace("_", "-")
             if value is not None and quantity is None:
-                raise UsageError(
-                    f"{where}: is only for a measured signal; state with --quantity what was measured"
-                )
+                remedy = "state with --quantity what was measured"
+                raise UsageError(f"{where}: is only for a measured signal; {remedy}")
             if name == "stiffness" and value is not None and not 0.0 < value < math.inf:
                 raise UsageError(f"{where} {value}: is not a positive number; give one in SI units")
             if name == "belt_speed" and value is not None and not math.isfinite(value):

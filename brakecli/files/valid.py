@@ -52,9 +52,8 @@ def check_variables(file: h5py.File, kind: str, length: int) -> None:
             continue
         if not isinstance(parent, h5py.Group):
             raise ValueError(f"{group} is not a group")
-        found = {
-            field.name: (field, node) for field in declared if (node := member(parent, field.name)) is not None
-        }
+        members = {field.name: (field, member(parent, field.name)) for field in declared}
+        found = {name: (field, node) for name, (field, node) in members.items() if node is not None}
         for name, (field, node) in found.items():
             where = f"variable {name} in group {group}"
             if not isinstance(node, h5py.Dataset) or node.ndim == 0 or node.dtype.kind not in _kinds(field):

@@ -51,10 +51,8 @@ class Axis:
     def named(self, place: int) -> str:
         """The value at a place, with its key and unit."""
         factor, units = style.prefixed(style.largest(self.values), self.units)
-        value = (
-            self.texts[place] if self.texts else style.readable(factor * float(self.values[place]), self.digits)
-        )
-        return f"{self.key} = {value} {units}".rstrip()
+        number = style.readable(factor * float(self.values[place]), self.digits)
+        return f"{self.key} = {self.texts[place] if self.texts else number} {units}".rstrip()
 
     def place(self, value: str) -> int | None:
         """Where the nearest value stands; None for a text that is not there, and for a number beyond all cells."""

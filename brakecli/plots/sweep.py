@@ -220,11 +220,9 @@ def _variables(result: StoredResult, sweep: Sweep, shown: str, more: Sequence[st
     both = dims[:1] == ("direction",)
     variables = {name: style.read_column(result, name)[... if both else np.newaxis] for name in names}
     for name in _WINDOWS if sweep.critical is not None else ():  # older results have none
-        shape = (*variables["status"].shape, 1)
         there = name in known and known[name].dims == (*dims, fields.WINDOW.name)
-        variables[name] = (
-            style.read_column(result, name)[... if both else np.newaxis] if there else np.full(shape, np.nan)
-        )
+        found = style.read_column(result, name)[... if both else np.newaxis] if there else None
+        variables[name] = np.full((*variables["status"].shape, 1), np.nan) if found is None else found
     if shown and shown not in (able := numeric(result)):
         problem = f"--variable {shown}: no number of its points has this name"
         raise UsageError(f"{result.path}: {problem}; give one of {', '.join(able)}")
@@ -232,10 +230,9 @@ def _variables(result: StoredResult, sweep: Sweep, shown: str, more: Sequence[st
     margin = None
     with suppress(CaseError):  # of older results, and of forged ones
         margin = margins(Plan(result.text("resolved_sweep_toml"), base)) if sweep.critical is None else None
-    if margin is not None and margin.size == np.prod(variables["status"].shape[1:]):
-        variables[MARGIN] = np.broadcast_to(
-            margin.reshape(variables["status"].shape[1:]), variables["status"].shape
-        )
+    shape = variables["status"].shape
+    if margin is not None and margin.size == np.prod(shape[1:]):
+        variables[MARGIN] = np.broadcast_to(margin.reshape(shape[1:]), shape)
     for name in {shown, *more} - {"", *variables}:
         values = style.read_column(result, name)[... if both else np.newaxis]
         nothing = np.nan if values.dtype.kind in "if" else ""
@@ -243,7 +240,7 @@ def _variables(result: StoredResult, sweep: Sweep, shown: str, more: Sequence[st
     for name in ("regime", "excitation"):  # those of points that failed mean nothing
         variables[name] = np.where(variables["status"] == Status.DONE, variables[name], "")
     differ = result.read("/", "hysteresis") == 1 if both and "hysteresis" in known else False
-    variables["hysteresis"] = np.broadcast_to(differ, variables["status"].shape)
+    variables["hysteresis"] = np.broadcast_to(differ, shape)
     return variables
 
 

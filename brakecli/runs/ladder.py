@@ -102,9 +102,7 @@ class _Tolerances(_Axis):
 
 
 def ladder(
-    system: System,
-    is_left: Callable[[Motion, float], bool] = lambda run, more: False,
-    kind: type[_Axis] = _Axis,
+    system: System, is_left: Callable[[Motion, float], bool] = lambda run, more: False, kind: type[_Axis] = _Axis
 ) -> Generator[System, Motion, Certified]:
     """Runs with steps half as long, or a tenth of the local tolerance, or twice the nodes: what is needed more.
 

@@ -19,7 +19,7 @@ from brakecli.runs.cost import duration_text
 from brakecli.runs.limits import check, refuse
 from brakecli.runs.run import motion_of
 from brakecli.solver.history import History, array_history
-from brakecli.solver.motion import Progress
+from brakecli.solver.motion import Counted, Progress
 from brakecli.solver.quantities import HISTORY
 from brakecli.solver.roughness import surface
 from brakecli.solver.steady_sliding import steady_sliding
@@ -43,7 +43,7 @@ class Second:
 
 
 def classify_twice(
-    path: Path, thresholds: Thresholds, say: Callable[[str], None], progress: Callable[[str, int, int], None]
+    path: Path, thresholds: Thresholds, say: Callable[[str], None], progress: Counted
 ) -> dict[str, Any]:
     """The verdict on a stored run as `classify_result` gives it, by a second run where one is asked for."""
     with stored_run(path) as (system, history, failure):
@@ -108,10 +108,9 @@ def compared(
         remains = part >= _REMAINS and (lost or verdict.excitation is Excitation.FORCED)
         duration = history.samples * history.interval
         if remains and 0.0 < second.growth * duration < GROWN:  # what it has not shown yet, less friction cannot
-            own = (
-                f"but in the first sliding is unstable: the shoe's own vibration grows at {second.growth:.3g} 1/s"
-            )
-            return Feeds.UNKNOWN, 0.0, f"{text}, {own}; run at least {1.01 * GROWN / second.growth:.3g} s"
+            own = f"the shoe's own vibration grows at {second.growth:.3g} 1/s"
+            needed = f"run at least {1.01 * GROWN / second.growth:.3g} s"
+            return Feeds.UNKNOWN, 0.0, f"{text}, but in the first sliding is unstable: {own}; {needed}"
         waves, end = context(second.system).waves, Part(history, history.samples // 2, history.samples)
         least = _VANISHES  # what moves as the waves do may be forced along x, and falls as friction does
         vanishes = part <= (min(least, 0.5 * second.friction) if follows(end, waves) else least)

@@ -87,9 +87,8 @@ def _run_lanes(systems: list[System]) -> list[Motion | None]:
     for n, system in enumerate(systems):
         steps, closed = system.steps, int(o.closed[n])
         kinds = {kind: count for kind, count in (("closed-form", closed), ("midpoint", steps - closed)) if count}
-        work = Work(
-            steps=steps, contact_evaluations=int(o.evaluations[n]), evaluators=kinds, solve_seconds=seconds
-        )
+        work = Work(steps=steps, contact_evaluations=int(o.evaluations[n]), evaluators=kinds)
+        work.solve_seconds = seconds
         motions.append(Motion(system, rows[n].T, work, NOT_KEPT) if o.out[n] == 0.0 else None)
     return motions
 

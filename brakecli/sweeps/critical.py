@@ -88,6 +88,7 @@ class Edge(NamedTuple):
 
 
 SlidingAt = Callable[[float], Sliding | None]
+EdgeIn = Callable[[float, float], Edge]
 Answer = Callable[[float], bool | None]
 """The answer to a question at a value of the parameter; None where it is not known."""
 
@@ -106,9 +107,8 @@ def search(
             return None
 
     if critical.parameter == "friction.coefficient":
-        exact = _friction_by_eigenvalues(
-            critical, with_step(system_of(case_at(critical.lower)), unless=exact_steps)
-        )
+        system = with_step(system_of(case_at(critical.lower)), unless=exact_steps)
+        exact = _friction_by_eigenvalues(critical, system)
     else:
         exact = _by_eigenvalues(critical, sliding_at)
     if critical.method == "eigenvalue":
@@ -205,11 +205,7 @@ def _friction_by_eigenvalues(critical: Critical, system: System) -> Search:
 
 
 def _answer(
-    critical: Critical,
-    sliding_at: SlidingAt,
-    unstable: Answer,
-    values: list[float],
-    edge: Callable[[float, float], Edge],
+    critical: Critical, sliding_at: SlidingAt, unstable: Answer, values: list[float], edge: EdgeIn
 ) -> Search:
     """What the answers at some values say; `edge` narrows a change between two of them down.
 
@@ -236,9 +232,8 @@ def _of_edges(critical: Critical, unstable: bool, edges: list[Edge]) -> Search:
     first = next((each for each in edges if each.lost), edges[0])
     if first.error >= WIDEST * (critical.upper - critical.lower):  # almost any value of the range may be it
         return Search(Outcome.UNDECIDED)
-    return Search(
-        Outcome.FOUND if first.lost else Outcome.REGAINED, *first[:4], windows=windows, window_errors=errors
-    )
+    outcome = Outcome.FOUND if first.lost else Outcome.REGAINED
+    return Search(outcome, *first[:4], windows=windows, window_errors=errors)
 
 
 def _by_simulation(critical: Critical, sliding_at: SlidingAt, exact: Search) -> Search:

@@ -118,9 +118,8 @@ def compute(plan: Plan, first: int, count: int) -> NDArray[Any]:
         points = [_begun(plan, plan.settings(each)) for each in range(start, min(start + TOGETHER, first + count))]
         ready = [each for each in points if isinstance(each, Begun)]
         with within_range():
-            certified = dict(
-                zip(map(id, ready), certify_together([each.check.system for each in ready]), strict=True)
-            )
+            found = certify_together([each.check.system for each in ready])
+        certified = dict(zip(map(id, ready), found, strict=True))
         records += [_computed(plan, each, certified.get(id(each)))[0] for each in points]
     return np.concatenate(records)
 

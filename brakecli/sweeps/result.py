@@ -61,9 +61,8 @@ class Findings:
             known = values[~np.isnan(values)]
             self.critical = (len(known), float(known.min()), float(known.max())) if len(known) else (0, 0.0, 0.0)
             self.sentences += _on_lasting_vibration(journal, plan.sweep.critical.tolerance)
-            self.sentences += _on_wide_bars(
-                journal, WIDE * (plan.sweep.critical.upper - plan.sweep.critical.lower)
-            )
+            span = plan.sweep.critical.upper - plan.sweep.critical.lower
+            self.sentences += _on_wide_bars(journal, WIDE * span)
         self.variables: dict[str, Any] | None = None
         if self.points <= MOST_AS_JSON:
             self.variables = {field.name: plain(journal.column(field.name)) for field in plan.fields}
@@ -114,17 +113,12 @@ def write(result: ResultFile, report: SweepReport, journal: Journal) -> None:
         result.variable("/", field, (axis.name,), data, parameters=list(axis.parameter))
     if not plan.sweep.axis:
         result.axis("/", fields.BASE_POINT, np.zeros(1))
-    windows = 0
-    if plan.sweep.critical is not None:
+    windows, critical = 0, plan.sweep.critical
+    if critical is not None:
         windows = journal.column("critical_windows_lower").shape[-1]
         result.axis("/", fields.WINDOW, np.arange(float(windows)))
     for field in plan.fields:
-        attributes, critical, kind, dimensions = (
-            {},
-            plan.sweep.critical,
-            journal.stored[field.name],
-            found.dimensions,
-        )
+        attributes, kind, dimensions = {}, journal.stored[field.name], found.dimensions
         if critical is not None and field in fields.CRITICAL and "f8" in field.kind:
             attributes, field = {"parameter": critical.parameter}, replace(field, units=unit(critical.parameter))
         if kind.shape:

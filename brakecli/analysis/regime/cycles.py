@@ -99,14 +99,11 @@ def cycles_of(part: Part, slip: ContactState | None = None, step: float = 0.0) -
 
     (stick, stick_spread), (loss, loss_spread) = (time_in(which) for which in _ENDS)
     frequency = 1.0 / (period * part.history.interval)
-    first, *higher = (part.share([n * frequency]) for n in range(1, _HARMONICS + 1))
     evidence = {
         "cycles": float(cycles),
         "samples_per_cycle": period,
         "rises_per_cycle": float(rises),
-        "fundamental_share": first,
-        "harmonic_share": part.share([n * frequency for n in range(1, 1 + int(0.5 * period))]),
-        "harmonics": [float(np.sqrt(share / first)) for share in higher if first > 0.0],
+        **_in_lines(part, frequency, period),
         "stick_cycles": float(np.mean(per_cycle > 0)),
         "stick_episodes_per_cycle": float(np.mean(per_cycle)),
         "frequency_spread": frequency * period_spread / period,
@@ -124,6 +121,16 @@ def cycles_of(part: Part, slip: ContactState | None = None, step: float = 0.0) -
     varies = _force_variation(force, crossings, groups, alike=unseen > 0.5)
     off = frequency * (turn**2 / 8.0 + _PERIOD_OFF * impact)
     return Cycles(evidence, frequency, off, *medians, limited, drift, detuning, varies)
+
+
+def _in_lines(part: Part, frequency: float, period: float) -> dict[str, Any]:
+    """Parts of the energy of vx in a line (Hz) and its harmonics, and their amplitudes over its own."""
+    first, *higher = (part.share([n * frequency]) for n in range(1, _HARMONICS + 1))
+    return {
+        "fundamental_share": first,
+        "harmonic_share": part.share([n * frequency for n in range(1, 1 + int(0.5 * period))]),
+        "harmonics": [float(np.sqrt(share / first)) for share in higher if first > 0.0],
+    }
 
 
 def contact_length(part: Part) -> float:

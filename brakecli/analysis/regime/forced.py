@@ -270,9 +270,8 @@ class ForcedRules:
     @property
     def _powers_to_lose(self) -> float:
         """Powers of e by which what the shoe adds has to decay until the forced motion is left."""
-        lasting = self.limits.decayed_to * math.sqrt(
-            0.5 * sum((f * swing) ** 2 for f, swing in self.context.waves)
-        )
+        forced = math.sqrt(0.5 * sum((f * swing) ** 2 for f, swing in self.context.waves))
+        lasting = self.limits.decayed_to * forced
         left = self.envelope.final / (2.0 * math.pi * lasting) if lasting > 0.0 else 1.0
         return min(max(3.0, math.log(max(left, 1.0))), GROWN)
 

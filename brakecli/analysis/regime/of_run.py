@@ -94,11 +94,8 @@ def context(system: System) -> Context:
         except CaseError:  # none: a shoe that locks itself drifts away, by what full contact makes of it
             return system.contact_stiffness
 
-    theory, turns, highest = (
-        cache(partial(linear_theory, system, belt)),
-        tuple(system.wheel.turns.tolist()),
-        0.5 / system.interval,
-    )
+    theory = cache(partial(linear_theory, system, belt))
+    turns, highest = tuple(system.wheel.turns.tolist()), 0.5 / system.interval
     swings = np.abs(known.waves[:, 0]) if turns and (known := theory()) else np.ones(len(turns))
     waves = tuple((abs(belt) * turn, float(swing)) for turn, swing in zip(turns, swings, strict=True))
     fastest = compression * system.natural_frequencies[1]

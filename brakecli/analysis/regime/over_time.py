@@ -115,10 +115,8 @@ def _statistics(history: History, hop: int, count: int) -> list[Array]:
     """
     inner = [round((place + 0.5 * (_HOPS + 1)) * hop) for place in range(count - 1)]
     parts = [*pairwise([0, *inner, history.samples])]
-    means = {
-        name: np.array([history.read(name, *part).mean() for part in parts])
-        for name in ("x", "vx", "friction_force")
-    }
+    names = ("x", "vx", "friction_force")
+    means = {name: np.array([history.read(name, *part).mean() for part in parts]) for name in names}
 
     def swing(name: str) -> Array:
         """Half of peak to peak about the trend that the means of the neighbours show."""

@@ -202,9 +202,8 @@ class Rules(ForcedRules):
             if (growth := self.context.growth()) > 0.0:
                 text += f", and a disturbance of steady sliding grows at {growth:.3g} 1/s"
             return Decision(text, advice=_LONG)
-        period, stick, harmonic = (
-            found.evidence[name] for name in ("samples_per_cycle", "stick_cycles", "harmonic_share")
-        )
+        names = ("samples_per_cycle", "stick_cycles", "harmonic_share")
+        period, stick, harmonic = (found.evidence[name] for name in names)
         if period < self.limits.samples_per_cycle:
             return Decision(f"only {period:.1f} samples a cycle", advice="reduce output.sample_interval")
         if self._settled_seconds < 2.0 * (slow := self._slowest(found.amplitude)):

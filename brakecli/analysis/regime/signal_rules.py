@@ -154,9 +154,8 @@ class SignalRules:
             return Decision(text, advice="give --belt-speed" * self.has_belt)
         least, most = np.quantile(self.clean + self.velocity.raw.mean(), [0.01, 0.99])
         if any(0.95 * self.belt <= v <= 1.2 * self.belt for v in (-least, most)):
-            return Decision(
-                "the velocity just reaches that of the belt; with less noise it would show whether it stays"
-            )
+            text = "the velocity just reaches that of the belt"
+            return Decision(text, advice="with less noise it would show whether it stays")
         if share < self.limits.line_share:
             return Decision(f"irregular without stick: {share:.0%} of the energy in three lines", advice=_LONG)
         reason = f"sustained without stick: {share:.0%} of the energy of the velocity in at most three lines"

@@ -38,13 +38,10 @@ class Slips:
     scale: int = 1  # samples over which the velocity is smoothed to see them
     places: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, np.intp), repr=False)  # the last before
     stick: float = 0.0  # part of the time between slips
-    lasts: float = (
-        1.0  # part of a slip that is left a quarter of a cycle later; 0 for a ring-down, or a spike of x
-    )
+    lasts: float = 1.0  # part of a slip that is left a quarter of a cycle later; 0 for a ring-down, or a spike
     returns: float = 0.0  # what swings back at once, over the slip; 0 for stick, nearly 1 for a ring-down
     swings: float = 0.0  # the largest velocity the other way around the mean slip, over that in the slip
     loaded: bool = True  # whether slips go with the time that has loaded them; random spikes do not
-
     period: float = 0.0  # samples from one to the next, in the mean
 
     @property

@@ -109,12 +109,6 @@ def _expand(m: Any, o: Any) -> None:
     phases.expand(m, o.old, o.h)
 
 
-@kernel(void(FLOW_TYPE, ORBIT_TYPE, float64))
-def _take(m: Any, o: Any, part: float) -> None:
-    """The motion at a part of the series."""
-    phases.reach(m, part)
-
-
 @kernel(void(COEFFICIENTS, FLOW_TYPE, ORBIT_TYPE, int64), inlined=False)
 def step(c: Coefficients, m: Any, o: Any, closely: int) -> None:
     """Move to the end of a step, or through the event in it; `closely` follows the series in any case."""
@@ -126,7 +120,7 @@ def step(c: Coefficients, m: Any, o: Any, closely: int) -> None:
     if closely == 1 or whole(m, o.h) == 0:
         _expand(m, o)
         o.which, o.part = first_event(m)
-        _take(m, o, o.part)
+        phases.reach(m, o.part)
         for i in range(SIZE):
             m.z[i] = m.at[i]
         if o.which != NO_EVENT:
@@ -141,7 +135,7 @@ def zero_of_velocity(m: Any, o: Any, sign: float) -> float:
     for k in range(TERMS):
         m.polynomial[0, k] = sign * m.series[V_X, k]
     part = root(m, 0, 0.0, o.part)
-    _take(m, o, part)
+    phases.reach(m, part)
     return part
 
 
@@ -166,7 +160,7 @@ def _carry(m: Any, o: Any, part: float) -> None:
             for i in range(SIZE):
                 m.series[i, 0] = o.tangents[j, i] if i < 4 else 0.0
             phases.expand(m, o.old, o.h)
-            _take(m, o, part)
+            phases.reach(m, part)
         for i in range(4):
             o.tangents[j, i] = m.at[i]
 
