@@ -267,8 +267,8 @@ def _narrowed(at: Disturbances, low: float, high: float, critical: Critical, bia
 
         value = float(brentq(excess, low, high, xtol=0.05 * tolerance))
         for end in (value - 0.4 * tolerance, value + 0.4 * tolerance):
-            if low < end < high:
-                low, high = (end, high) if at.unstable(end) == below else (low, end)
+            if low < end < high and (answer := at.unstable(end)) is not None:
+                low, high = (end, high) if answer == below else (low, end)
 
     def as_below(value: float) -> bool | None:
         return None if (answer := at.unstable(value)) is None else answer == below
