@@ -25,6 +25,7 @@ class Problem:
     remedy: str
     source: str = ""  # the file, or the override as ``--set key.path=VALUE``
     line: int = 0  # 0 where no line can be named
+    instead: tuple[str, ...] = ()  # of what is missing: other keys of its table that may be meant
 
     @property
     def where(self) -> str:

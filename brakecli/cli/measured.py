@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from brakecli.cli.options import option
-from brakecli.errors import UsageError
+from brakecli.errors import UsageError, printable
 
 if TYPE_CHECKING:
     from brakecli.analysis.regime.of_signal import SignalLook
@@ -59,7 +59,9 @@ class Measured:
 
         name, reading = self.quantity_of(source), asdict(self)
         if name not in set(Measurand):
-            raise UsageError(f"--quantity {name}: is not known; give one of {', '.join(Measurand)}")
+            raise UsageError(
+                f"--quantity {printable(str(name))}: is not known; give one of {', '.join(Measurand)}"
+            )
         del reading["quantity"]
         machine = {key: reading.pop(key) for key in ("belt_speed", "stiffness")}
         signal = read_signal(source, Measurand(name), **reading)

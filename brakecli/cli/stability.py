@@ -12,6 +12,7 @@ from brakecli.errors import UsageError, printable
 if TYPE_CHECKING:
     from brakecli.sweeps.tables import Axis
 
+VARY = "Follow both modes along a key, or along several alike."
 MOST_VALUES = 10_000
 
 
@@ -19,9 +20,7 @@ def command(
     case: CaseArgument,
     output: Annotated[Path | None, output_option("File of --vary: .h5 or .csv", "none")] = None,
     overrides: Overrides = None,
-    vary: Annotated[
-        str | None, option("Follow both modes along a key, or along several alike.", "KEY[,KEY]=START:STOP:NUM")
-    ] = None,
+    vary: Annotated[str | None, option(VARY, "KEY[,KEY]=START:STOP:NUM")] = None,
     force: Force = False,
     as_json: AsJson = False,
     quiet: Quiet = False,

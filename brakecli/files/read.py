@@ -72,6 +72,12 @@ class StoredResult:
                 raise ValueError(f"attribute {name} is missing")
             return str(self.attributes[name])
 
+    @property
+    def versions(self) -> dict[str, str]:
+        """Program and libraries by which it was made."""
+        names = [name for name in self.attributes if name.endswith("_version") and name != "format_version"]
+        return {name.removesuffix("_version"): str(self.attributes[name]) for name in names}
+
     def variables(self, group: str) -> dict[str, Variable]:
         """The variables of a group, its axes included, by name."""
         found = {}
@@ -134,7 +140,7 @@ def open_result(path: Path, kind: str | None = None) -> Iterator[StoredResult]:
             if attributes.get("complete") != 1:
                 raise ValueError("it is incomplete, attribute complete is not 1")
             if kind is not None and attributes.get("kind") != kind:
-                raise ValueError(f"it holds a result of kind {printable(its_kind)}, and {kind!r} is needed")
+                raise ValueError(f"it holds a result of kind {printable(repr(its_kind))}, and {kind!r} is needed")
             length = path.stat().st_size
             valid.check_variables(file, its_kind, length)
         yield StoredResult(path, file, attributes, length, sealed)

@@ -147,10 +147,8 @@ def prefixed(magnitude: float, unit: str) -> tuple[float, str]:
 
     Prefixes are those that engineers use: no km/s, kHz from ten of them on, none for angles and pure numbers.
     """
-    large, small = (
-        (unit == "Hz" and magnitude >= 1e4) or unit[:1] in "NJWP",
-        unit in ("m", "m/s", "m/s²", "s") or unit[:1] in "NJWP",
-    )
+    large = (unit == "Hz" and magnitude >= 1e4) or unit[:1] in "NJWP"
+    small = unit in ("m", "m/s", "m/s²", "s") or unit[:1] in "NJWP"
     for exponent, prefix in ((9, "G"), (6, "M"), (3, "k"), (0, ""), (-3, "m"), (-6, "µ"), (-9, "n"), (-12, "p")):
         wanted = unit and (large if exponent > 0 else small or exponent == 0)
         if wanted and 10.0**exponent <= magnitude < 1e12:

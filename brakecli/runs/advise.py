@@ -70,7 +70,7 @@ class AdviceReport:
             found.append(f"the pad opens in part: this rests on the mean stiffness of the contact; {instead}")
         if is_undamped(self.system.coefficients):
             found.append("no dashpot acts: where sliding is stable, vibration does not die away either")
-        if len(self.system.belt) > 1 or len(self.system.load) > 1:
+        if not self.system.steady:
             found.append("speed and load are those of t = 0")
         return found
 
@@ -80,7 +80,7 @@ class AdviceReport:
             yield "the wheel stands, so that nothing slides: give wheel.angular_speed"
             return
         if report.equilibrium is None:
-            yield f"there is no steady sliding at {own:g}: {str(report.no_equilibrium).partition(': ')[2]}"
+            yield f"at {own:g} {report.no_equilibrium}"
         elif report.contact_stiffness == 0.0:
             yield "the shoe does not touch the wheel: give a load that presses it on"
         elif own == 0.0:

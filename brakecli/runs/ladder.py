@@ -127,7 +127,7 @@ def ladder(
         before = before if failed else run
         opens = set(run.work.evaluators) != {"closed-form"}
         used = quadrature if nodes and opens else _Axis(0, 0.0, 0.0)
-        margin = JUMPS if not events and (run.work.turns or len(system.belt) + len(system.load) > 2) else 1.0
+        margin = JUMPS if not events and (run.work.turns or not system.steady) else 1.0
         jump = _jump_error(run)
         error = math.inf if failed else margin * steps.error + used.error + jump
         short = events or run.system.step <= longest

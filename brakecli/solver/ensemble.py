@@ -43,7 +43,7 @@ def fits(system: System) -> Hashable | None:
     if kind != ("three-layer", NUMEROV, "consistent", "newton", "auto") or not 0 < len(wheel.g) <= WAVES:
         return None
     large = system.samples > MOST_SAMPLES or system.table_bytes > _MOST_BYTES or system.per_sample > _MOST_STEPS
-    if len(system.belt) + len(system.load) > 2 or sliding == 0.0 or large:
+    if not system.steady or sliding == 0.0 or large:
         return None
     if system.passing_frequency * system.sampled_duration > _MOST_PASSED:
         return None

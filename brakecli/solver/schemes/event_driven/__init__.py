@@ -6,12 +6,12 @@ slip, lift-off and touch-down end a step: nothing is smoothed, nothing stepped o
 
 from numba import float64, int64, void
 
+from brakecli.solver import own_steps
 from brakecli.solver.compile import Floats, at_address, in_memory, kernel
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.friction import observed
 from brakecli.solver.quantities import Failure
 from brakecli.solver.records import MOTION, V_X, V_Y, Plant, Weights, X, Y, plant_type
-from brakecli.solver.schemes import own_steps
 from brakecli.solver.schemes.event_driven.phases import EPSILON, SHOE, Shoe, press, resistance
 from brakecli.solver.schemes.event_driven.runge_kutta import interpolated
 from brakecli.solver.schemes.event_driven.step import STEP, first_step, step

@@ -10,6 +10,7 @@ from typing import Any
 
 from numba import float64, int64, void
 
+from brakecli.solver import own_steps
 from brakecli.solver.compile import Floats, in_memory, kernel
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.double_double import two_sum
@@ -36,7 +37,6 @@ from brakecli.solver.records import (
     plant_type,
 )
 from brakecli.solver.schedules import integral_at, segment, slope_at, value_at
-from brakecli.solver.schemes import own_steps
 from brakecli.solver.schemes.piecewise_exact import phases
 from brakecli.solver.schemes.piecewise_exact.locate import NO_EVENT, first_event
 from brakecli.solver.schemes.piecewise_exact.phases import OPEN, STICK, add_works

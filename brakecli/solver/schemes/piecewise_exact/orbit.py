@@ -26,6 +26,7 @@ from numba import float64, int64, types, void
 
 from brakecli.solver.compile import kernel
 from brakecli.solver.records import (
+    BELT,
     COEFFICIENTS,
     FLOW_TYPE,
     PHASES,
@@ -64,6 +65,7 @@ ORBIT = record(
     "low high",  # least and largest x since the last fall, or of the cycle, m
     "error",  # of the orbit, in sizes
     "away",  # of the last return from the orbit, in sizes
+    "fastest",  # largest v_x of the orbit over the wheel's speed
     "mean_x mean_y square",  # integrals of x, y and v_x² over the orbit, m s and m²/s
     which=int,  # event at the end of the last step
     old=int,  # phase of that step
@@ -200,6 +202,7 @@ def _add_up(m: Any, o: Any, part: float, band: float, falls: int) -> None:
     for k in range(TERMS):
         power = o.h * part ** (k + 1) / (k + 1)
         o.mean_x, o.mean_y = o.mean_x + power * m.series[X, k], o.mean_y + power * m.series[Y, k]
+    o.fastest = max(o.fastest, m.z[V_X] / m.z[BELT])
     o.square += 0.5 * part * o.h * (o.begin[V_X] ** 2 + m.z[V_X] ** 2)
     for k in range(2):
         if abs(m.z[V_X]) > _BANDS[k] * band:
@@ -224,7 +227,7 @@ def _around(c: Coefficients, m: Any, o: Any, closely: int) -> int:
     look(m)
     band, turns = math.sqrt(o.square / o.period), 0  # of the round before
     o.period, o.mean_x, o.mean_y, o.square, o.events, o.way, o.strange = 0.0, 0.0, 0.0, 0.0, 0, 0, 0
-    o.low = o.high = o.point[0]
+    o.low, o.high, o.fastest = o.point[0], o.point[0], 0.0
     for k in range(2):
         o.beaten[k], o.side[k] = 0, 0
     for k in range(PHASES):
