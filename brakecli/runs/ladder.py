@@ -163,8 +163,8 @@ def _jump_error(run: Motion) -> float:
     that sticks for more than a step has the velocity of the wheel then, whenever in a step it began.
     """
     jump = 2.0 * run.system.coefficients.phi * run.work.crossing * run.system.step / run.system.coefficients.m
-    fastest = float(np.abs(run.rows[:, 2]).max(initial=0.0))
-    return jump / fastest if fastest > 0.0 else math.inf if jump > 0.0 else 0.0
+    fastest = float(np.abs(run.rows[:, 2]).max(initial=0.0)) if jump > 0.0 else 1.0
+    return jump / fastest if fastest > 0.0 else math.inf
 
 
 def first_rung(system: System, kind: type[_Axis] = _Axis) -> tuple[float, int]:

@@ -8,7 +8,7 @@ from typing import Any
 
 from numba import float64, int64, void
 
-from brakecli.solver.compile import Floats, at_address, in_memory, kernel
+from brakecli.solver.compile import Floats, at_address, from_memory, into_memory, kernel
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.energy import energy_at_level
 from brakecli.solver.friction import observed
@@ -25,7 +25,7 @@ VELOCITIES = ("v_x", "v_y")
 mechanical_energy = energy_at_level
 
 _PLANT = plant_type(MOTION)
-hold, _plant_at = in_memory(_PLANT)
+hold, _plant_at = into_memory(_PLANT), from_memory(_PLANT)
 _step_at = at_address(STEP)  # compiled in its own place: otherwise `advance` would compile it again
 
 _BUDGET, _EXACT = 4096, 64
