@@ -136,7 +136,8 @@ def ladder(
         if certified := short and error <= wanted:
             break
         coarse = failed or not short or jump > 0.5 * wanted
-        finer = steps if coarse or margin * steps.error >= used.error else quadrature
+        # Found steps are nearly the same on other nodes: the first tolerance is enough to tell nodes apart.
+        finer = steps if coarse or (margin * steps.error, not events) > (used.error, False) else quadrature
         late = run.system.interval == system.interval and seconds + 2.2 * spent > MOST_SECONDS
         more = 2.0 * steps.more(0.5 * wanted / margin) * used.more(0.5 * wanted)
         if finer.doublings == MOST_DOUBLINGS or late or is_left(run, more):
