@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numba import int64, njit, void
 
-from brakecli.case.read import read_case
+from brakecli.case.read import parse_case, read_text
 from brakecli.case.system import system_of
 from brakecli.solver import contact
 from brakecli.solver.compile import Floats, address, at_address
@@ -146,7 +146,7 @@ def timed(system: System) -> tuple[Motion, float]:
 
 def main() -> int:
     """Print everything."""
-    cases = {name: system_of(read_case(str(CASES / f"{name}.toml")).case) for name in "SBC"}
+    cases = {name: system_of(parse_case(*read_text(str(CASES / f"{name}.toml"))).case) for name in "SBC"}
     for nodes in (64, 256, 1024):
         found = of_one_evaluation(cases["B"], nodes)
         times = ", ".join(f"{name} {1e9 * seconds:.0f} ns" for name, seconds in found.items())

@@ -14,7 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 from time import process_time
 
-from brakecli.case.read import read_case
+from brakecli.case.read import parse_case, read_text
 from brakecli.case.system import system_of
 from brakecli.comparison.compare import errors
 from brakecli.comparison.methods import kinds, ladder, method_label, rungs
@@ -77,7 +77,7 @@ def main() -> None:
     print("| case | " + " | ".join(f"{tolerance:g}" for tolerance in TOLERANCES) + " |")
     print("|---|" + "---|" * len(TOLERANCES), flush=True)
     for name, file in NAMES.items():
-        system = system_of(read_case(str(CASES / file)).case)
+        system = system_of(parse_case(*read_text(str(CASES / file))).case)
         for duration in DURATIONS:
             sampled = replace(system, interval=ladder(system)[0], duration=duration)
             exact = solve(sampled, EXACT).rows

@@ -12,8 +12,9 @@ import tempfile
 import time
 from pathlib import Path
 
+from brakecli.cli.inputs import load_sweep
 from brakecli.sweeps.driver import choose_engine, sweep
-from brakecli.sweeps.plan import LoadedSweep, read_sweep
+from brakecli.sweeps.plan import LoadedSweep
 from brakecli.sweeps.point import compute
 
 CASE = Path(__file__).parents[1] / "cases" / "relaxation.toml"
@@ -25,7 +26,7 @@ def load(folder: Path, points: int, duration: float) -> LoadedSweep:
     path.write_text(
         f'case = "{CASE}"\n[[axis]]\nparameter = "friction.coefficient"\nstart = 0.5\nstop = 0.8\nnum = {points}\n'
     )
-    return read_sweep(str(path), [f"solver.duration={duration}"])
+    return load_sweep(str(path), [f"solver.duration={duration}"])
 
 
 def seconds(loaded: LoadedSweep, workers: int, folder: Path) -> float:
@@ -69,10 +70,10 @@ def early(folder: Path) -> None:
     (folder / "map.toml").write_text(MAP)
     (folder / "search.toml").write_text(SEARCH)
     overrides = ["solver={tolerance=1e-3, duration=2.0}"]
-    loaded = read_sweep(str(folder / "map.toml"), overrides)
+    loaded = load_sweep(str(folder / "map.toml"), overrides)
     for what, plan, chunks, size in (
         ("a point of a map of regimes", loaded.plan, range(0, 10_000, 230), 50),
-        ("both critical values", read_sweep(str(folder / "search.toml"), overrides).plan, (0,), 1),
+        ("both critical values", load_sweep(str(folder / "search.toml"), overrides).plan, (0,), 1),
     ):
         times = []
         for _ in range(5):

@@ -9,6 +9,7 @@ import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
+from datetime import date, time
 from itertools import pairwise
 from os import PathLike
 from pathlib import Path
@@ -166,8 +167,8 @@ def sweep(
         from brakecli.sweeps.plan import LoadedSweep, sweep_of
 
         if axes is not None or critical is not None:
-            tables = [{"parameter": keys, "values": _plain(values)} for keys, values in (axes or {}).items()]
-            given = {"case": "-", "axis": tables, "critical": critical}
+            tables = [{"parameter": keys, "values": values} for keys, values in _mapping(axes, "axes").items()]
+            given = _plain({"case": "-", "axis": tables, "critical": critical or {}}, "sweep")
             loaded = sweep_of({name: each for name, each in given.items() if each}, _case(source, settings))
         elif isinstance(source, LoadedSweep):
             loaded = source
@@ -211,16 +212,17 @@ def classify(
         UsageError, UnreadableResultError: as `brakecli classify`.
     """
     from brakecli.cli.classify import Options
+    from brakecli.cli.measured import Measured
     from brakecli.files.fields import VERDICT
 
-    how = dict.fromkeys(("column", "time_column", "sample_rate", "unit", "time_unit"))
-    if unknown := sorted(reading.keys() - how.keys()):
+    how = ("column", "time_column", "sample_rate", "unit", "time_unit")
+    if unknown := sorted(reading.keys() - {*how}):
         raise UsageError(f"classify: there is no argument {unknown[0]}; give one of {', '.join(how)}")
-    changes = [f"{name}={value}" for name, value in (thresholds or {}).items()]
-    machine = {"belt_speed": belt_speed, "stiffness": stiffness}
+    changes = [f"{name}={value}" for name, value in _mapping(thresholds, "thresholds").items()]
+    quantity = None if quantity is None else str(quantity)
+    measured = Measured(quantity, belt_speed=belt_speed, stiffness=stiffness, **reading)
     with _interruptible():
-        judging = Options(quantity, how | reading, machine, changes, second_run, quiet=True)
-        numbers = judging.verdict(str(source))
+        numbers = Options(measured, changes, second_run, quiet=True).verdict(str(source))
     _warn(numbers.get("warnings", ()))
     return _dataset(VERDICT, numbers)
 
@@ -268,24 +270,24 @@ def _case(source: "Source | LoadedSweep", settings: "Settings | None") -> "Loade
 
 def _overrides(settings: "Settings | None") -> list[str]:
     """Settings as `--set` has them; a table replaces the one that the case has."""
-    if not isinstance(settings, Mapping | None):
-        raise UsageError("settings: are no mapping; write them as {'friction.coefficient': 0.4}")
-    return [f"{key}={_toml(value, key)}" for key, value in (settings or {}).items()]
+    return [f"{key}={_toml(value, key)}" for key, value in _mapping(settings, "settings").items()]
+
+
+def _mapping(given: Any, name: str) -> Mapping[Any, Any]:
+    if not isinstance(given, Mapping | None):
+        raise UsageError(f"{name}: is no mapping; write it as {{'friction.coefficient': ...}}")
+    return given or {}
 
 
 def _toml(value: Any, key: str) -> str:
     import tomli_w
 
+    value = _plain(value, key)
     if isinstance(value, Mapping):
         return "{" + ", ".join(f"{name} = {_toml(each, f'{key}.{name}')}" for name, each in value.items()) + "}"
-    value = _plain(value)
     if isinstance(value, list):
         return f"[{', '.join(_toml(each, key) for each in value)}]"
-    try:
-        return tomli_w.dumps({"value": value}).removeprefix("value = ").strip()
-    except TypeError:
-        kind = type(value).__name__
-        raise UsageError(f"{key}: cannot be set to {kind}; give a number, a text, a list or a table") from None
+    return tomli_w.dumps({"value": value}).removeprefix("value = ").strip()
 
 
 def _axis(vary: "Mapping[str | tuple[str, ...], Iterable[float]]") -> "Axis":
@@ -294,25 +296,27 @@ def _axis(vary: "Mapping[str | tuple[str, ...], Iterable[float]]") -> "Axis":
     from brakecli.case.read import parse_table
     from brakecli.sweeps.tables import Axis
 
-    if len(vary) != 1:
+    if len(_mapping(vary, "vary")) != 1:
         raise UsageError("vary: takes one key with its values, or one tuple of keys; give the others as settings")
     [(keys, values)] = vary.items()
-    axis = parse_table(Axis, tomli_w.dumps({"parameter": keys, "values": _plain(values)}), "vary")
+    axis = parse_table(Axis, tomli_w.dumps(_plain({"parameter": keys, "values": values}, "vary")), "vary")
     steps = [after - before for before, after in pairwise(axis.values or ()) if axis.numeric]
     if not axis.numeric or min(steps, default=1) * max(steps, default=1) <= 0:
         raise UsageError("vary: modes are followed along numbers that rise or fall; sort them, each once")
     return axis
 
 
-def _plain(value: Any) -> Any:
-    """A value without NumPy or xarray, as TOML holds it."""
+def _plain(value: Any, key: str) -> Any:
+    """The value of a key without NumPy or xarray, as TOML holds it, or UsageError."""
     value = value.to_numpy() if hasattr(value, "to_numpy") else value
-    if hasattr(value, "tolist"):
-        return value.tolist()
+    value = value.tolist() if hasattr(value, "tolist") else value
     if isinstance(value, Mapping):
-        return {name: _plain(each) for name, each in value.items()}
+        return {str(name): _plain(each, f"{key}.{name}") for name, each in value.items()}
     if isinstance(value, Iterable) and not isinstance(value, str):
-        return [_plain(each) for each in value]
+        return [_plain(each, key) for each in value]
+    if not isinstance(value, str | int | float | date | time | PathLike):
+        kind = type(value).__name__
+        raise UsageError(f"{key}: cannot be set to {kind}; give a number, a text, a list or a table")
     return str(value) if isinstance(value, PathLike) else value
 
 

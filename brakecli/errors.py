@@ -25,6 +25,7 @@ class Problem:
     remedy: str
     source: str = ""  # the file, or the override as ``--set key.path=VALUE``
     line: int = 0  # 0 where no line can be named
+    instead: tuple[str, ...] = ()  # of what is missing: other keys of its table that may be meant
 
     @property
     def where(self) -> str:
@@ -76,35 +77,45 @@ class CannotWriteError(BrakecliError, exit_code=os.EX_IOERR):
     """An output cannot be written."""
 
 
-_WORDS = (  # of the command line, and of Python
-    (r', or "-" for standard input', ""),
-    (r"(?<!\S)--force\b", "force=True"),
-    (r"(?<!\S)-o\b", "output"),
-    (r"(?<!\S)--set\b", "setting"),
-    (r"(?<!\S)--threshold\b", "thresholds"),
-    (r"(?<!\S)--([a-z]+)-([a-z]+)", r"\1_\2"),
-    (r"(?<!\S)--(?=[a-z])", ""),
-    (r"with: brakecli (sweep|run) \S+", r"with: brakecli.\1"),
-)
+_ARGUMENTS = {"--force": "force=True", "-o": "output", "--set": "setting", "--threshold": "thresholds"}
+
+
+def _for_python(text: str) -> str:
+    """A message that names functions and their arguments instead of commands and their options."""
+
+    def argument(option: re.Match[str]) -> str:
+        return _ARGUMENTS.get(option[0], option[0].strip("-").replace("-", "_"))
+
+    text = re.sub(r"with: brakecli (\w+) \S+", r"with: brakecli.\1", text)
+    return re.sub(r"(?<!\S)(-o|--[a-z][a-z-]*)\b", argument, text)
 
 
 @contextmanager
 def in_python() -> Iterator[None]:
-    """Name arguments instead of options in what errors say."""
-
-    def said(text: str) -> str:
-        for pattern, words in _WORDS:
-            text = re.sub(pattern, words, text)
-        return text
-
+    """Turn messages for the command line into those for Python."""
     try:
         yield
     except CaseError as error:
-        texts = [(each, said(each.source), said(each.remedy)) for each in error.problems]
-        raise CaseError([replace(each, source=where, remedy=remedy) for each, where, remedy in texts]) from error
+        problems = [
+            replace(each, source=_for_python(each.source), remedy=_for_python(each.remedy))
+            for each in error.problems
+        ]
+        raise CaseError(problems) from error
+    except RecursionError:
+        raise UsageError("a value lies too deep in others, or in itself; give numbers, texts and lists") from None
     except BrakecliError as error:
-        error.args = (said(str(error)),)
+        error.args = (_for_python(str(error)),)
         raise
+
+
+@contextmanager
+def installed(*packages: str) -> Iterator[None]:
+    """Within the block libraries are imported; raises UsageError where one is missing."""
+    try:
+        yield
+    except ImportError as error:
+        what = f"{error.name or 'a library'} cannot be imported ({error})"
+        raise UsageError(f"{what}; install it with: python -m pip install {' '.join(packages)}") from error
 
 
 def key_text(path: KeyPath) -> str:

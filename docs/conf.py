@@ -14,7 +14,6 @@ import brakecli
 from brakecli.cli import app
 
 HERE = Path(__file__).parent
-COMMANDS = [module.__name__.rpartition(".")[2].replace("_", "-") for module in app.COMMANDS]
 
 project, author, release = "brakecli", "the authors of brakecli", brakecli.__version__
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
@@ -38,7 +37,7 @@ autodoc_typehints = "description"
 def write_commands(site: Sphinx) -> None:
     """Write the help of every command, as the program prints it."""
     parts, terminal = list[str](), {"COLUMNS": "80", "LANG": "C.UTF-8"}
-    for name in ("", *COMMANDS):
+    for name in ("", *app.COMMANDS):
         line = [sys.executable, "-m", "brakecli", *name.split(), "--help"]
         done = subprocess.run(line, capture_output=True, text=True, check=True, env=terminal)
         parts.append(f"## {name or 'brakecli'}\n\n```text\n{done.stdout.strip()}\n```\n")

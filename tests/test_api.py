@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import time
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -167,8 +168,28 @@ def test_errors_are_those_of_the_commands(tmp_path: Path) -> None:
             brakecli.sweep(CASE, axes={"shoe.mass": [1.0]}, jobs=jobs)  # type: ignore[arg-type]
     with pytest.raises(UsageError, match=r"shoe\.mass: cannot be set to NoneType"):
         brakecli.run(CASE, {"shoe.mass": None})
-    with pytest.raises(UsageError, match="are no mapping"):
+    with pytest.raises(UsageError, match="settings: is no mapping"):
         brakecli.run(CASE, ["shoe.mass=1"])  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match="axes: is no mapping"):
+        brakecli.sweep(CASE, axes=1.5)  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match="vary: is no mapping"):
+        brakecli.stability(CASE, vary="x")  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match="thresholds: is no mapping"):
+        brakecli.classify(CASE, thresholds=5)  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match=r"vary\.values: cannot be set to Fraction"):
+        brakecli.stability(CASE, vary={"shoe.mass": [Fraction(1, 3)]})  # type: ignore[list-item]
+    with pytest.raises(UsageError, match=r"sweep\.critical\.lower: cannot be set to NoneType"):
+        brakecli.sweep(CASE, critical={"lower": None})
+    endless: list[Any] = []
+    endless.append(endless)
+    for deep in (endless, {"parameter": endless}):
+        with pytest.raises(UsageError, match="a value lies too deep in others, or in itself"):
+            brakecli.run(CASE, {"shoe.mass": deep})
+        with pytest.raises(UsageError, match="a value lies too deep in others, or in itself"):
+            brakecli.sweep(CASE, critical={"parameter": deep})
+    for name in ({1}, b"shoe.mass"):
+        with pytest.raises(CaseError, match=r"critical\.parameter"):
+            brakecli.sweep(CASE, critical={"parameter": name, "lower": 0, "upper": 1})
     with pytest.raises(UsageError, match="rise or fall"):
         brakecli.stability(CASE, vary={"shoe.mass": [1.0, 3.0, 2.0]})
     with pytest.raises(UsageError, match="only for a measured signal"):

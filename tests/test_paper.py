@@ -16,9 +16,10 @@ from brakecli.analysis.stability.report import stability
 from brakecli.case.case import Case
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
+from brakecli.cli.inputs import load_sweep
 from brakecli.solver.roughness import TWO_PI
 from brakecli.sweeps.critical import Outcome, Search, search
-from brakecli.sweeps.plan import kind_of, read_sweep
+from brakecli.sweeps.plan import kind_of
 from brakecli.sweeps.point import simulate
 from brakecli.sweeps.tables import Critical
 from tests.campaign import campaign, differences
@@ -70,7 +71,7 @@ def test_every_file_beside_the_cases_reads() -> None:
         text = path.read_text()
         kinds[(kind_of(text) == "sweep")] += 1
         if kind_of(text) == "sweep":
-            assert read_sweep(str(path)).plan.points > 1
+            assert load_sweep(str(path), None).plan.points > 1
         else:
             system_of(parse_case(text, path.name).case)
     assert kinds[True] >= 10

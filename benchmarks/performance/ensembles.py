@@ -16,10 +16,11 @@ from numba import njit, prange, set_num_threads
 from benchmarks.performance import peers
 from benchmarks.performance.matching import Entry, Floats
 from benchmarks.performance.problem import Problem
-from brakecli.case.read import read_case
+from brakecli.case.read import parse_case, read_text
 from brakecli.case.system import system_of
+from brakecli.cli.inputs import load_sweep
 from brakecli.sweeps.driver import choose_engine, sweep
-from brakecli.sweeps.plan import LoadedSweep, read_sweep
+from brakecli.sweeps.plan import LoadedSweep
 from brakecli.sweeps.point import compute
 
 CASES = Path(__file__).parents[2] / "cases"
@@ -123,7 +124,7 @@ def scipy(problem: Problem, entry: Entry, size: Floats) -> Rate:
 
 
 def b_problem(duration: float) -> Problem:
-    return Problem(replace(system_of(read_case(str(B)).case), interval=INTERVAL, duration=duration))
+    return Problem(replace(system_of(parse_case(*read_text(str(B))).case), interval=INTERVAL, duration=duration))
 
 
 def our_sweep(
@@ -133,7 +134,7 @@ def our_sweep(
     path = folder / "sweep.toml"
     axis = f'parameter = "friction.coefficient"\nstart = {low}\nstop = {high}\nnum = {points}\n'
     path.write_text(f'case = "{case}"\n[[axis]]\n{axis}')
-    return read_sweep(str(path), list(settings))
+    return load_sweep(str(path), list(settings))
 
 
 def swept(loaded: LoadedSweep, workers: int, folder: Path) -> float:

@@ -14,15 +14,15 @@ import numpy as np
 
 from benchmarks.performance import ensembles
 from benchmarks.performance.matching import Entry, cheapest, loop
-from brakecli.case.read import read_case
+from brakecli.case.read import parse_case, read_text
 from brakecli.case.system import system_of
+from brakecli.cli.inputs import load_sweep
 from brakecli.runs.tolerance import certify
 from brakecli.solver.method import Method
 from brakecli.solver.motion import solve
 from brakecli.solver.roughness import surface
 from brakecli.solver.schemes import NUMEROV
 from brakecli.solver.system import System
-from brakecli.sweeps.plan import read_sweep
 from brakecli.sweeps.point import compute
 
 CASES, RELAXATION = ensembles.CASES, ensembles.CASES / "relaxation.toml"
@@ -39,7 +39,7 @@ PERIODIC = (
 
 
 def load(name: str, *settings: str) -> System:
-    return system_of(read_case(str(CASES / name), settings).case)
+    return system_of(parse_case(*read_text(str(CASES / name)), settings).case)
 
 
 def loop_seconds(system: System, method: Method, turns: int = 5) -> float:
@@ -95,7 +95,7 @@ def critical_seconds(case: str, high: float, settings: Iterable[str] = ()) -> fl
         axis = '[[axis]]\nparameter = "link1.damping"\nvalues = [300.0]\n'
         critical = f'[critical]\nparameter = "friction.coefficient"\nlower = 0.0\nupper = {high}\n'
         path.write_text(f'case = "{CASES / case}"\n{axis}{critical}')
-        loaded = read_sweep(str(path), list(settings))
+        loaded = load_sweep(str(path), list(settings))
         begin = time.process_time()
         compute(loaded.plan, 0, 1)
         return time.process_time() - begin

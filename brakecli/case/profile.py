@@ -16,6 +16,8 @@ _ROUNDING = 1e-12  # of heights, relative to their root mean square
 _GAP = 4.0  # median steps between two places from which on nothing was measured there
 _FITS = 0.005  # part of a turn by which a record may miss a whole number of turns
 _SEEN = 0.01  # per cent by which a record is stretched unsaid
+_NEAREST = 1e-9  # m; nothing is measured at places nearer to each other
+_FEWEST = 8  # places in a turn: fewer show none of its waves but the longest three
 
 
 def sines_of(path: Path, error: float, radius: float, pad: float | None) -> dict[str, Any]:
@@ -29,9 +31,13 @@ def sines_of(path: Path, error: float, radius: float, pad: float | None) -> dict
     place, height, is_angle = _read(path, (status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns))
     place = place * radius if is_angle else place
     turn, step = 2.0 * math.pi * radius, float(np.median(np.diff(place)))
+    apart = f"its places lie {step:.3g} m apart, as a rule"
+    require(step >= _NEAREST, f"{apart}; check their unit")
     turns, around = _turns(place, step, turn) if pad is None else (0, 0.0)
     if turns:
-        count = round(around / step)
+        count = min(round(around / step), 10 * len(place) // turns)
+        few = f"{apart}, {count} in a turn of {turn:.3g} m; check their unit, or measure {_FEWEST} or more"
+        require(count >= _FEWEST, few)
         inside = place - place[0] < turns * around - 0.5 * step  # the last value may repeat the first
         grid = np.arange(turns * count) * (around / count)
         rows = np.interp(grid, (place - place[0])[inside], height[inside], period=turns * around)
@@ -55,10 +61,8 @@ def sines_of(path: Path, error: float, radius: float, pad: float | None) -> dict
     widest = float(np.diff(place).max())
     how += f"; a straight line bridges a gap of {widest:.3g} m" * (widest > _GAP * step)
     rms = float(np.sqrt(np.mean(found**2)))
-    even = rms <= _ROUNDING * float(np.abs(height).max())
-    require(
-        not even, "its heights lie on a straight line, which is removed; leave the surface out, which is smooth"
-    )
+    straight = "its heights lie on a straight line, which is removed; leave the surface out, which is smooth"
+    require(rms > _ROUNDING * float(np.abs(height).max()), straight)
     chosen, amplitudes, phases, lost = _strongest(found, error)
     phases = (phases - 360.0 * (chosen * place[0] / length % 1.0)) % 360.0
     note = f"{len(chosen)} of {count // 2} sines leave out {100.0 * lost:.3g} % of the RMS of {rms:.3g} m{how}"
@@ -75,10 +79,8 @@ def _read(path: Path, stamp: tuple[int, ...]) -> tuple[Array, Array, bool]:
     """
     require(stat.S_ISREG(path.stat().st_mode), "this is not a regular file; name a CSV file")
     table = TextTable(path)
-    require(
-        table.columns == 2,
-        f"has {table.columns} column{'s' * (table.columns > 1)}; give two: position or angle, and height",
-    )
+    columns = f"{table.columns} column{'s' * (table.columns > 1)}"
+    require(table.columns == 2, f"has {columns}; give two: position or angle, and height")
     lines = [line for line in table.header if line.strip()]
     unnamed = "its first lines do not name both columns; separate names and numbers alike, or remove these lines"
     require(table.names or not lines, unnamed)
@@ -86,18 +88,16 @@ def _read(path: Path, stamp: tuple[int, ...]) -> tuple[Array, Array, bool]:
     angles = ("angle", "theta", "phi", "θ", "φ")
     bare = along is None and table.names and any(word in table.names[0].lower() for word in angles)
     require(not bare, f"column {table.names[0] if bare else ''}: has no unit; name it angle_deg or angle_rad")
-    place, height = (
-        values * (unit or (1.0, "meter"))[0] for values, unit in zip(table.numbers(), (along, up), strict=True)
-    )
+    sizes = (unit[0] if unit else 1.0 for unit in (along, up))
+    place, height = (values * size for values, size in zip(table.numbers(), sizes, strict=True))
     require(np.isfinite(place).all() and np.isfinite(height).all(), "a cell is empty or no number; fill it")
     if place[-1] < place[0]:
         place, height = place[::-1], height[::-1]
     steps = np.diff(place)
     require(len(place) > 3, f"has {len(place)} rows; measure four places or more")
     row = int(np.argmin(steps > 0.0)) + 2
-    require(
-        steps.min() > 0.0, f"its places do not rise or fall throughout, see row {row} of numbers; sort the rows"
-    )
+    back = f"its places do not rise or fall throughout, see row {row} of numbers; sort the rows"
+    require(steps.min() > 0.0, back)
     require(np.ptp(height) > 0.0, "all heights are equal; leave the surface out, which is smooth")
     return place, height, bool(along and along[1] == "radian")
 
@@ -106,9 +106,8 @@ def _turns(place: Array, step: float, turn: float) -> tuple[int, float]:
     """Whole turns in a record, and the length of each; a record that nearly is so many turns has their length."""
     span = float(place[-1] - place[0])
     turns = math.floor((span + step) / turn + _FITS)
-    length = min(
-        (span + step, span), key=lambda length: abs(length - turns * turn)
-    )  # the end may repeat the start
+    # The end may repeat the start.
+    length = min((span + step, span), key=lambda length: abs(length - turns * turn))
     fits = turns and abs(length - turns * turn) <= _FITS * turn
     return turns, length / turns if fits else turn
 

@@ -38,11 +38,6 @@ def starters() -> dict[str, str]:
     return {each.name.removesuffix(".toml"): each.read_text(encoding="utf-8") for each in sorted(files, key=str)}
 
 
-def read_case(source: str, overrides: Sequence[str] = ()) -> LoadedCase:
-    """Read the case from a path, or from standard input where the path is "-"; see `parse_case`."""
-    return parse_case(*read_text(source), overrides)
-
-
 def read_text(source: str) -> tuple[str, str]:
     """The text of a file, or of standard input where the path is "-", and its name; line ends stay as they are."""
     name = "standard input" if source == "-" else source
@@ -54,7 +49,7 @@ def read_text(source: str) -> tuple[str, str]:
         closed = isinstance(error, AttributeError)
         reason = "it is closed" if closed else getattr(error, "strerror", None) or str(error)
         what = f"cannot be read: {reason[0].lower()}{reason[1:]}"
-        raise unfit(what, 'name a TOML file, or "-" for standard input', name) from error
+        raise unfit(what, "name a TOML file", name) from error
     check_size(data, name)
     try:
         return data.decode("utf-8"), name
@@ -65,14 +60,14 @@ def read_text(source: str) -> tuple[str, str]:
         raise unfit(what, "save the file as UTF-8", name, line) from error
 
 
-def parse_case(text: str, label: str, overrides: Sequence[str] = (), option: str = "--set") -> LoadedCase:
+def parse_case(text: str, label: str, overrides: Sequence[str] = ()) -> LoadedCase:
     """Make a case of a TOML text, which messages call `label`. Raises `CaseError`, which holds every problem.
 
-    An override reads `key.path=VALUE`, the value in TOML; messages call it by its option. It replaces what the
-    text says, creates the tables that it needs, and takes effect before anything is checked. Of two keys that
-    exclude each other (a constant load or a schedule), an override of one removes the other from the text.
+    An override reads `key.path=VALUE`, the value in TOML. It replaces what the text says, creates the tables that
+    it needs, and takes effect before anything is checked. Of two keys that exclude each other, such as a constant
+    load and a schedule, an override of one removes the other from the text.
     """
-    case = parse_table(Case, text, label, overrides, option)
+    case = parse_table(Case, text, label, overrides)
     return LoadedCase(case, text, resolved_toml(case))
 
 
@@ -81,23 +76,17 @@ def parse_resolved(text: str, label: str, overrides: Sequence[str] = ()) -> Load
 
     What its surfaces were made of is not there, and cannot be changed alone.
     """
-    remedy = (
-        "a result holds the sines of a surface alone; run the case file anew, or set the whole surface as well"
-    )
+    remedy = "a result holds the sines of a surface alone; run the case file anew, or set the whole surface, too"
+
+    def explained(problem: Problem) -> Problem:
+        made_of = problem.path[:1] == ("roughness",) and {*problem.path} & {"profile_error", "spectrum"}
+        return replace(problem, remedy=remedy) if made_of else problem
+
     stored = parse_case(text, label)
     try:
         loaded = parse_case(text, label, overrides)
     except CaseError as error:
-        made_of = [
-            each.path[:1] == ("roughness",) and {*each.path} & {"profile_error", "spectrum"}
-            for each in error.problems
-        ]
-        raise CaseError(
-            [
-                replace(each, remedy=remedy) if made else each
-                for each, made in zip(error.problems, made_of, strict=True)
-            ]
-        ) from None
+        raise CaseError([*map(explained, error.problems)]) from None
     before, wheel = stored.case.wheel.radius, stored.case.roughness.wheel
     if wheel and wheel.note and loaded.case.wheel.radius != before and loaded.case.roughness.wheel == wheel:
         what = f"cannot change the sines of a measured profile, made for {before!r} m"
@@ -105,9 +94,7 @@ def parse_resolved(text: str, label: str, overrides: Sequence[str] = ()) -> Load
     return loaded
 
 
-def parse_table(
-    kind: type[_Table], text: str, label: str, overrides: Sequence[str] = (), option: str = "--set"
-) -> _Table:
+def parse_table(kind: type[_Table], text: str, label: str, overrides: Sequence[str] = ()) -> _Table:
     """Make a table of some kind, such as a case, of a whole TOML text; see `parse_case`."""
     located, problems = Located(text, label), list[Problem]()
     try:
@@ -121,7 +108,7 @@ def parse_table(
         if isinstance(surface, dict) and isinstance(profile := surface.get("profile"), str) and profile:
             surface["profile"] = str(Path(label).parent / profile)  # those of overrides are seen from here
     for override in overrides:
-        sources.append(by := f"{option} {printable(override)}")
+        sources.append(by := f"--set {printable(override)}")
         try:
             path, value = parse_override(override)
             set_by |= dict.fromkeys((*put(data, path, value, kind, kept=set_by), path), by)

@@ -29,9 +29,7 @@ def system_of(case: Case) -> System:
         _surface_of(each, wheel.radius) if each is not None else _SMOOTH
         for each in (case.roughness.shoe, case.roughness.wheel)
     )
-    chosen = (
-        "event-driven" if shoe.g.size or wheel_surface.g.size else "piecewise-exact"
-    )  # a tolerance may change it
+    rough = shoe.g.size or wheel_surface.g.size  # where a tolerance may change the scheme
     return System(
         coefficients=coefficients(
             mass=case.shoe.mass,
@@ -54,7 +52,7 @@ def system_of(case: Case) -> System:
         interval=case.output.sample_interval,
         duration=solver.duration,
         method=Method(
-            scheme=chosen if automatic else solver.scheme,
+            scheme=("event-driven" if rough else "piecewise-exact") if automatic else solver.scheme,
             theta=solver.theta,
             start=solver.start,
             iteration=solver.iteration,

@@ -7,27 +7,12 @@ that `--help` is quick.
 import os
 import resource
 import sys
+from importlib import import_module
 from typing import Annotated
 
 import typer
 
 from brakecli import __version__
-from brakecli.cli import (
-    advise,
-    check,
-    classify,
-    compare_schemes,
-    diff,
-    export,
-    info,
-    new,
-    plot,
-    report,
-    run,
-    schema,
-    stability,
-    sweep,
-)
 from brakecli.cli.inputs import as_argument
 from brakecli.cli.options import option
 from brakecli.cli.output import say, show
@@ -35,22 +20,10 @@ from brakecli.errors import BrakecliError, RefusedError
 from brakecli.files.os_signals import Interrupted
 
 COMMANDS = (
-    run,
-    sweep,
-    classify,
-    compare_schemes,
-    stability,
-    advise,
-    check,
-    new,
-    schema,
-    plot,
-    report,
-    info,
-    diff,
-    export,
+    *("run", "sweep", "classify", "compare-schemes", "stability", "advise", "check"),
+    *("new", "schema", "plot", "report", "info", "diff", "export"),
 )
-"""The files of the commands, in the order in which `--help` lists them."""
+"""In the order in which `--help` lists them."""
 
 LIBRARIES = 750_000_000
 """Bytes of address space to load the libraries and compile all kernels; with less, LLVM aborts or never ends.
@@ -66,8 +39,8 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
     help="Vibration of a brake shoe on a rough wheel: will it vibrate, how, from which friction coefficient on.",
 )
-for module in COMMANDS:
-    app.command(module.__name__.rpartition(".")[2].replace("_", "-"))(module.command)
+for name in COMMANDS:
+    app.command(name)(import_module(f"brakecli.cli.{name.replace('-', '_')}").command)
 
 
 def main() -> None:

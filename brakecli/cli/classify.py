@@ -3,23 +3,12 @@
 import dataclasses
 import difflib
 import math
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any
 
-from brakecli.cli.measured import (
-    BeltSpeed,
-    Column,
-    Quantity,
-    SampleRate,
-    Stiffness,
-    TimeColumn,
-    TimeUnit,
-    Unit,
-    check,
-    look_at,
-    quantity_of,
-)
+from brakecli.cli.measured import UNMEASURED, Measured, with_measured
 from brakecli.cli.options import AsJson, Quiet, option, source_argument
 from brakecli.cli.output import announce_compilation, progress, say, show_result, warn
 from brakecli.errors import UnreadableResultError, UsageError
@@ -31,26 +20,17 @@ SECOND = "Where friction or roughness may keep a vibration up, run the case once
 THRESHOLD = option("Change a threshold of the rules; repeatable.", "NAME=VALUE", "--threshold")
 
 
+@with_measured
 def command(
     sources: Annotated[list[str], source_argument("FILE", SOURCES)],
-    quantity: Quantity = None,
-    column: Column = None,
-    time_column: TimeColumn = None,
-    sample_rate: SampleRate = None,
-    unit: Unit = None,
-    time_unit: TimeUnit = None,
-    belt_speed: BeltSpeed = None,
-    stiffness: Stiffness = None,
+    measured: Measured = UNMEASURED,
     thresholds: Annotated[list[str] | None, THRESHOLD] = None,
     second_run: Annotated[bool, option(SECOND, None, "--second-run")] = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
     """Regime of runs or of measured signals, with evidence."""
-    reading = {"column": column, "time_column": time_column, "sample_rate": sample_rate}
-    reading |= {"unit": unit, "time_unit": time_unit}
-    machine = {"belt_speed": belt_speed, "stiffness": stiffness}
-    options = Options(quantity, reading, machine, thresholds, second_run, quiet)
+    options = Options(measured, thresholds, second_run, quiet)
     if len(sources) == 1:
         from brakecli.cli.tables import verdict_table
 
@@ -79,17 +59,14 @@ def command(
 class Options:
     """How to judge a file."""
 
-    quantity: str | None
-    reading: dict[str, Any]
-    machine: dict[str, Any]
+    measured: Measured
     thresholds: list[str] | None
     second_run: bool
     quiet: bool
 
     def verdict(self, source: str) -> dict[str, Any]:
         """The verdict on one file, by the names of `--json`."""
-        quantity = quantity_of(source, self.quantity)
-        check(quantity, {**self.reading, **self.machine})
+        quantity = self.measured.quantity_of(source)
         if self.second_run and quantity is not None:
             raise UsageError("--second-run: is for the result of a run, whose case can be run again; leave it out")
         announce_compilation(self.quiet or quantity is not None)
@@ -99,7 +76,7 @@ class Options:
             from brakecli.analysis.regime.signal_rules import SignalThresholds
 
             limits = changed(SignalThresholds, self.thresholds)
-            found = look_at(source, quantity, self.reading, self.machine, limits).verdict
+            found = self.measured.look_at(source, limits).verdict
             numbers = {**dataclasses.asdict(found), "bursts": [tone.numbers() for tone in found.bursts]}
             numbers["quantity"] = quantity
         return numbers
@@ -110,18 +87,16 @@ class Options:
 
         try:
             limits = changed(Thresholds, self.thresholds)
-            return _twice(source, limits, self.quiet) if self.second_run else classify_result(Path(source), limits)
+            if not self.second_run:
+                return classify_result(Path(source), limits)
+            from brakecli.runs.second import classify_twice
+
+            tell: Callable[[str], None] = (lambda text: None) if self.quiet else say
+            with progress(self.quiet) as show_progress:
+                return classify_twice(Path(source), limits, tell, show_progress)
         except UnreadableResultError as error:
             remedy = "for a measured signal, state with --quantity what was measured"
             raise UnreadableResultError(f"{error}; {remedy}") from error
-
-
-def _twice(source: str, limits: Any, quiet: bool) -> dict[str, Any]:
-    """The verdict by a second run, whose cost is said before."""
-    from brakecli.runs.second import classify_twice
-
-    with progress(quiet) as show_progress:
-        return classify_twice(Path(source), limits, lambda text: None if quiet else say(text), show_progress)
 
 
 def changed(thresholds: type[Any], changes: list[str] | None) -> Any:

@@ -25,7 +25,6 @@ CRITICAL_NAMES = ("critical", "critical_error", "critical_eigenvalue", "critical
 CRITICAL_POINTS = (*named(fields.POINT, "regime"), *named(fields.CRITICAL, *CRITICAL_NAMES))
 IF_KNOWN = ("growth_rate", "ringing_frequency", "amplitude_spread", "amplitude_forced", "amplitude_own")
 MOST_LISTED_POINTS, MOST_LISTED_BURSTS = 30, 12
-SI_UNITS = {"displacement": "m", "velocity": "m/s", "force": "N", "acceleration": "m/s²", "pressure": "Pa"}
 NARROWEST = 40  # columns of a table, whatever the terminal says: nothing can be read in fewer
 
 Row = tuple[str, str | Sequence[str]]
@@ -55,14 +54,11 @@ def run_table(report: RunReport) -> str:
     step = "" if report.check.step is None else f" of {report.check.step:.4g} s"
     error = abs(numbers["energy"]["relative_closing_error"])
     peak = text_of(numbers["spectrum_peak"]) if numbers["spectrum_peak"] is not None else ""
-    since = f"from {numbers['settled_from']:.4g} s on"
+    since, resolution = f"from {numbers['settled_from']:.4g} s on", numbers["frequency_resolution"]
     rows = [
         ("failed", [numbers["failure"]] if work.failed else []),
         *_verdict_rows(numbers),
-        (
-            "peak of the spectrum of vx",
-            f"{peak} ± {numbers['frequency_resolution']:.2g} Hz" if peak else "not resolved",
-        ),
+        ("peak of the spectrum of vx", f"{peak} ± {resolution:.2g} Hz" if peak else "not resolved"),
         *_rows(fields.RUN, numbers, "mean_friction_force", "braking_torque", "torque_variation"),
         ("settled part", f"{'' if numbers['settled'] else 'none; the numbers are those '}{since}"),
         ("scheme", method.scheme + how),
@@ -81,7 +77,7 @@ def run_table(report: RunReport) -> str:
 def verdict_table(source: str, numbers: Mapping[str, Any]) -> str:
     """A verdict, from the names and values that `--json` gives."""
     rows = _verdict_rows(numbers)
-    si_unit = SI_UNITS.get(numbers.get("quantity", ""), "")
+    si_unit = fields.MEASURED_UNITS.get(numbers.get("quantity", ""), "")
     tones = numbers.get("bursts", ())
     for tone in tones[:MOST_LISTED_BURSTS]:
         when, level = f"{tone['start']:.4g} to {tone['end']:.4g} s", f"{tone['level']:.3g} {si_unit}"
@@ -144,7 +140,7 @@ def check_table(title: str, found: Check) -> str:
         ("scheme", [growth] * has_step),
         ("contact", system.evaluator + (f", {system.nodes} nodes" if system.nodes else "")),
         ("nodes per shortest wave", text_of(found.nodes_per_wave)),
-        *_cost_rows(found, "at least" if found.at_least else "about"),
+        *_cost_rows(found),
         ("adjusted", found.adjustments),
     ]
     return two_columns(title, rows)
@@ -152,17 +148,15 @@ def check_table(title: str, found: Check) -> str:
 
 def estimate_table(title: str, found: Estimate) -> str:
     """What a sweep would cost."""
-    about = "at least" if found.at_least else "about"
-    return two_columns(
-        title, [("points", str(found.points)), ("workers", str(found.workers)), *_cost_rows(found, about)]
-    )
+    rows = [("points", str(found.points)), ("workers", str(found.workers)), *_cost_rows(found)]
+    return two_columns(title, rows)
 
 
-def _cost_rows(found: Check | Estimate, about: str = "about") -> list[Row]:
+def _cost_rows(found: Check | Estimate) -> list[Row]:
     from brakecli.runs.cost import duration_text
 
     return [
-        ("time", f"{about} {duration_text(found.seconds)}"),
+        ("time", f"{'at least' if found.at_least else 'about'} {duration_text(found.seconds)}"),
         ("memory", f"about {found.memory / 1e6:.0f} MB"),
         ("file", f"about {found.file_size / 1e6:.2g} MB"),
     ]
@@ -226,9 +220,8 @@ def comparison_table(report: ComparisonReport) -> str:
     if best is not None:
         recommended = [f"{best}: error {best.error:.2g}, {report.margin:.3g} times below {report.target:g}"]
         if (finer := found.finer_error(best)) > report.target:
-            recommended.append(
-                f"this is by chance: at a finer step its error is {finer:.2g}; choose a method with more margin"
-            )
+            chance = f"this is by chance: at a finer step its error is {finer:.2g}"
+            recommended.append(f"{chance}; choose a method with more margin")
     left_out = f"{found.left_out} entries, because the time was used up; give a larger --budget"
     rows = [
         ("compared over", f"{found.duration:.6g} s of motion"),

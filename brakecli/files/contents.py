@@ -3,14 +3,14 @@
 import math
 import tomllib
 from bisect import bisect_left
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from brakecli.errors import UnreadableResultError, UsageError
-from brakecli.files.field import plain
+from brakecli.errors import UnreadableResultError, UsageError, printable
+from brakecli.files.field import flat, plain
 from brakecli.files.fields import COMPARISON, LOCK_IN, RUN, SWEEP, WELCH
 from brakecli.files.read import StoredResult, Variable
 from brakecli.files.write import FILL
@@ -28,15 +28,12 @@ def contents(result: StoredResult) -> dict[str, Any]:
     held = []
     for group in result.groups():
         for name, each in result.variables(group).items():
-            about = {key: each.attributes.get(there, "") for key, there in _ABOUT.items()}
+            about = {"units": each.attributes.get("units", ""), "meaning": each.attributes.get("long_name", "")}
             held.append({"group": group, "name": name, "dims": each.dims, "shape": each.shape, **about})
     attributes = result.attributes
     known = {name: attributes.get(name) for name in ("status", "kind", "title", "format_version")}
     sizes = {"whole": result.sealed, "bytes": result.length}
-    return {"path": str(result.path), **known, **sizes, "versions": _versions(attributes), "variables": held}
-
-
-_ABOUT = {"units": "units", "meaning": "long_name"}
+    return {"path": str(result.path), **known, **sizes, "versions": result.versions, "variables": held}
 
 
 @dataclass(frozen=True)
@@ -58,7 +55,7 @@ def difference(a: StoredResult, b: StoredResult) -> Difference:
     """Compare two results of one kind; raises UsageError for two kinds, and UnreadableResultError."""
     kinds = [str(each.attributes.get("kind")) for each in (a, b)]
     if kinds[0] != kinds[1]:
-        what = f"{a.path} is a {kinds[0]}, and {b.path} a {kinds[1]}"
+        what = f"{a.path} is a {printable(kinds[0])}, and {b.path} a {printable(kinds[1])}"
         raise UsageError(f"{what}: they hold different things; name two results of one kind")
     groups = list(dict.fromkeys([*a.groups(), *b.groups()]))
     numbers: list[dict[str, Any]] = [{}, {}]
@@ -69,52 +66,34 @@ def difference(a: StoredResult, b: StoredResult) -> Difference:
                 if name not in _APART and not name.endswith("_version"):
                     found[name if group == "/" else f"{group}/{name}"] = plain(value)
     declared = _DECLARED.get(kinds[0], ())
-    units = {
-        f"{field.group}/{row.name}": row.units
-        for field in declared
-        for row in (field.rows if field.group else [field])
-    }
+    rows = ((field.group, row) for field in declared for row in (field.rows if field.group else [field]))
+    units = {f"{group}/{row.name}": row.units for group, row in rows}
     units |= {f"spectrum/{field.name}": field.units for field in WELCH}
-    differing = [
-        each | {"units": units.get(each["name"], units.get(f"/{each['name']}", ""))} for each in _changed(*numbers)
-    ]
-    return Difference(
-        [*_changed(*map(_keys, (a, b)))],
-        differing,
-        [each for group in groups for each in _variables(a, b, group)],
-        [*_changed(*(_versions(each.attributes) for each in (a, b)))],
-    )
-
-
-def _versions(attributes: Mapping[str, Any]) -> dict[str, Any]:
-    return {
-        name.removesuffix("_version"): value
-        for name, value in attributes.items()
-        if name.endswith("_version") and name != "format_version"
-    }
+    differing = [*_changed(*numbers)]
+    for each in differing:
+        each["units"] = units.get(each["name"], units.get(f"/{each['name']}", ""))
+    variables = [each for group in groups for each in _variables(a, b, group)]
+    of_program = [*_changed(a.versions, b.versions)]
+    return Difference([*_changed(*map(_keys, (a, b)))], differing, variables, of_program)
 
 
 def _keys(result: StoredResult) -> dict[str, Any]:
     """All keys of the case and of the sweep with their values."""
-
-    def flat(value: Any, path: str) -> Iterator[tuple[str, Any]]:
-        inner: Any = value.items() if isinstance(value, dict) else ()
-        if isinstance(value, list) and value and isinstance(value[0], dict):
-            inner = ((f"[{place}]", each) for place, each in enumerate(value))
-        if not inner:
-            yield path, value
-        for key, each in inner:
-            yield from flat(each, path + key if key[0] == "[" else f"{path}.{key}".strip("."))
-
     found: dict[str, Any] = {}
     for name in _CASES:
         try:
-            found |= flat(tomllib.loads(str(result.attributes.get(name, ""))), "")
+            found |= flat(tomllib.loads(str(result.attributes.get(name, "")), parse_float=_finite))
         except (ValueError, RecursionError) as error:
-            raise UnreadableResultError(
-                f"{result.path}: the case in it is not valid; name an intact file"
-            ) from error
+            what = f"{result.path}: the case in it is not valid"
+            raise UnreadableResultError(f"{what}; name an intact file") from error
     return found
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"{text} is no number")
+    return value
 
 
 def _changed(a: dict[str, Any], b: dict[str, Any]) -> Iterator[dict[str, Any]]:
@@ -125,12 +104,10 @@ def _changed(a: dict[str, Any], b: dict[str, Any]) -> Iterator[dict[str, Any]]:
 
 def _variables(a: StoredResult, b: StoredResult, group: str) -> Iterator[dict[str, Any]]:
     """The variables of a group that differ, at the same places along their axis."""
-    known = [
-        {name: each for name, each in result.variables(group).items() if "units" in each.attributes}
-        if group in result.groups()
-        else {}
-        for result in (a, b)  # what other programs have added need not have units
-    ]
+    known = []
+    for result in (a, b):  # what other programs have added need not have units
+        there = result.variables(group) if group in result.groups() else {}
+        known.append({name: each for name, each in there.items() if "units" in each.attributes})
     for name in dict.fromkeys([*known[0], *known[1]]):
         held = [each[name] for each in known if name in each]
         shapes = [list(each[name].shape) if name in each else [] for each in known]

@@ -52,9 +52,8 @@ def export(
     if group and group not in result.file:
         raise UsageError(f"--group {group}: this run has none; it has one where speed or load change")
     if suffix == ".wav" and (group not in (None, "history") or len(names) > 1):
-        raise UsageError(
-            f"{target}: a sound is one variable of the history; give one --variable and no other group"
-        )
+        remedy = "give one --variable and no other group"
+        raise UsageError(f"{target}: a sound is one variable of the history; {remedy}")
     with new_output(target, force=force) as file:
         notes = list[str]()
         if suffix == ".wav":
@@ -90,7 +89,7 @@ def _rows(result: StoredResult, group: str, names: Sequence[str]) -> Iterator[li
         part = places[0][start : start + rows]
         columns = [each.ravel() for each in np.meshgrid(part, *places[1:], indexing="ij")]
         for name, kept in chosen.items():
-            if known[name].shape == shape[1:] != shape[:1]:  # alike in both directions
+            if known[name].dims == axes[1:]:  # alike in both directions
                 values = np.broadcast_to(result.read(group, name), (len(part), *shape[1:]))
             else:
                 values = result.read(group, name, start, start + rows)
@@ -146,14 +145,11 @@ def _sound(result: StoredResult, name: str) -> tuple[bytes, list[str]]:
         raise UsageError(f"{result.path}: its samples are not equally spaced, as a sound needs them; export .csv")
     duration = float(np.mean(steps)) * len(values) if len(values) else 0.0
     if duration > _LONGEST:
-        raise UsageError(
-            f"{result.path}: {duration:.4g} s are too long for a sound; run a case of an hour at most"
-        )
+        raise UsageError(f"{result.path}: {duration:.4g} s are too long for a sound; an hour is the most")
     values = values - np.mean(values) if len(values) else values
     if not np.any(values):
-        raise UsageError(
-            f"{result.path}: {name} does not change, there is nothing to hear; name another --variable"
-        )
+        silent = f"{name} does not change, there is nothing to hear"
+        raise UsageError(f"{result.path}: {silent}; name another --variable")
     rate, notes = len(values) / duration, list[str]()
     power, frequency = np.abs(np.fft.rfft(values)) ** 2, np.fft.rfftfreq(len(values), 1.0 / rate)
     if rate > RATE:
@@ -163,9 +159,8 @@ def _sound(result: StoredResult, name: str) -> tuple[bytes, list[str]]:
     ratio = Fraction(RATE / rate).limit_denominator(10_000)
     sound = resample_poly(values, ratio.numerator, ratio.denominator)
     if not (peak := float(np.abs(sound).max())) > 1e-6 * float(np.abs(values).max()):
-        raise UsageError(
-            f"{result.path}: all of {name} is above {0.5 * RATE:g} Hz, no sound holds it; export .csv"
-        )
+        above = f"all of {name} is above {0.5 * RATE:g} Hz, which no sound holds"
+        raise UsageError(f"{result.path}: {above}; export .csv")
     tone = result.attributes.get("frequency") or frequency[np.argmax(power)]
     if tone < _HEARD or tone > 0.5 * RATE:
         notes.append(f"the vibration at {tone:.4g} Hz cannot be heard")

@@ -1,7 +1,7 @@
 """How a number or text of a result is declared and read; `brakecli.files.fields` declares them all."""
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, is_dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, is_dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -58,6 +58,11 @@ def ratio(name: str, meaning: str, at: str = "", **more: Any) -> Field:
     return Field(name, "1", meaning, "f8", at, **more)
 
 
+def within(at: str, *fields: Field) -> tuple[Field, ...]:
+    """The fields of a part of a report, which is found `at` the end of this path."""
+    return tuple(replace(field, at=at + field.at) for field in fields)
+
+
 def values_of(fields: Iterable[Field], report: object) -> dict[str, Any]:
     """Names and values as `--json` gives them; None stands for what does not exist."""
     return {field.name: field.read(report) for field in fields}
@@ -67,6 +72,17 @@ def named(fields: Iterable[Field], *names: str) -> tuple[Field, ...]:
     """The fields of these names, in this order."""
     known = {field.name: field for field in fields}
     return tuple(known[name] for name in names)
+
+
+def flat(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    """The keys of nested tables, and of lists of tables, by their paths as `axis[0].values`."""
+    inner: Any = value.items() if isinstance(value, dict) else ()
+    if isinstance(value, list) and value and isinstance(value[0], dict):
+        inner = ((f"[{place}]", each) for place, each in enumerate(value))
+    if not inner:
+        yield path, value
+    for key, each in inner:
+        yield from flat(each, path + key if key[0] == "[" else f"{path}.{key}".strip("."))
 
 
 def plain(value: Any) -> Any:

@@ -6,7 +6,7 @@ that all files have in common, `docs/regimes.md` the evidence, and `docs/stabili
 stability, which have the attributes of their classes.
 """
 
-from brakecli.files.field import Field, integer, named, ratio
+from brakecli.files.field import Field, integer, named, ratio, within
 from brakecli.solver.quantities import HISTORY as QUANTITIES
 from brakecli.solver.quantities import TIME
 
@@ -16,56 +16,41 @@ WINDOWS, PAIR = f"({MOST_WINDOWS},)f8", "(2,)f8"
 
 # A run
 
-VERDICT = (
-    Field("regime", "", "regime of the motion", "S16", "verdict."),
-    Field("excitation", "", "where the energy of a sustained motion comes from", "S16", "verdict."),
-    Field("frequency", "Hz", "fundamental frequency of vx of a sustained motion", at="verdict."),
+VERDICT = within(
+    "verdict.",
+    Field("regime", "", "regime of the motion", "S16"),
+    Field("excitation", "", "where the energy of a sustained motion comes from", "S16"),
+    Field("frequency", "Hz", "fundamental frequency of vx of a sustained motion"),
     Field(
         "growth_rate",
         "1/s",
         "where the motion is linear: growth rate of its slowest mode, slopes of passing waves included",
-        at="verdict.",
     ),
-    Field("ringing_frequency", "Hz", "frequency of that mode", at="verdict."),
-    Field(
-        "amplitude", "m", "half of peak to peak of x: median of the cycles", at="verdict.", label="amplitude of x"
-    ),
-    Field("amplitude_spread", "m", "by which the amplitude varies or drifts; missing if unknown", at="verdict."),
-    Field("amplitude_forced", "m", "on a rough wheel: what the roughness forces", at="verdict."),
-    Field("amplitude_own", "m", "on a rough wheel: what the shoe adds", at="verdict."),
-    Field("frequency_resolution", "Hz", "distance of two lines in the spectrum", at="verdict."),
-    Field(
-        "torque_variation",
-        "N m",
-        "braking torque, peak to peak; missing if samples miss impacts",
-        at="verdict.",
-    ),
-    integer("settled", "whether a settled part was found (0, 1); otherwise the second half is judged", "verdict."),
-    Field("settled_from", "s", "start of the settled part, or of the second half", at="verdict."),
-    Field("mean_friction_force", "N", "mean friction force on the shoe, from `settled_from` on", at="verdict."),
-    Field("braking_torque", "N m", "mean torque of the friction force, from `settled_from` on", at="verdict."),
-    ratio(
-        "stick_fraction", "part of the time in stick; a median where the motion lasts", "verdict.", label="stick"
-    ),
+    Field("ringing_frequency", "Hz", "frequency of that mode"),
+    Field("amplitude", "m", "half of peak to peak of x: median of the cycles", label="amplitude of x"),
+    Field("amplitude_spread", "m", "by which the amplitude varies or drifts; missing if unknown"),
+    Field("amplitude_forced", "m", "on a rough wheel: what the roughness forces"),
+    Field("amplitude_own", "m", "on a rough wheel: what the shoe adds"),
+    Field("frequency_resolution", "Hz", "distance of two lines in the spectrum"),
+    Field("torque_variation", "N m", "braking torque, peak to peak; missing if samples miss impacts"),
+    integer("settled", "whether a settled part was found (0, 1); otherwise the second half is judged"),
+    Field("settled_from", "s", "start of the settled part, or of the second half"),
+    Field("mean_friction_force", "N", "mean friction force on the shoe, from `settled_from` on"),
+    Field("braking_torque", "N m", "mean torque of the friction force, from `settled_from` on"),
+    ratio("stick_fraction", "part of the time in stick; a median where the motion lasts", label="stick"),
     ratio(
         "contact_loss_fraction",
         "part of the time without contact; a median where the motion lasts",
-        "verdict.",
         label="lost contact",
     ),
-    Field("reasons", "", "why the regime is as it is", OBJECT, "verdict."),
-    Field("evidence", "", "numbers by which the rules decided", OBJECT, "verdict.", group="regime/evidence"),
-    Field("thresholds", "", "limits of the rules", OBJECT, "verdict.", group="regime/thresholds"),
+    Field("reasons", "", "why the regime is as it is", OBJECT),
+    Field("evidence", "", "numbers by which the rules decided", OBJECT, group="regime/evidence"),
+    Field("thresholds", "", "limits of the rules", OBJECT, group="regime/thresholds"),
 )
-EVIDENCE_UNITS = {"envelope_slope": "1/s", "envelope_final": "m/s", "envelope_largest": "m/s", "power_": "W"}
-EVIDENCE_UNITS |= {
-    "amplitude_v": "m/s",
-    "amplitude_": "m",
-    "seconds": "s",
-    "frequency_": "Hz",
-    "line_freq": "Hz",
-    "force_": "N",
-}
+MEASURED_UNITS = {"displacement": "m", "velocity": "m/s", "force": "N", "acceleration": "m/s²", "pressure": "Pa"}
+EVIDENCE_UNITS = {"envelope_slope": "1/s", "seconds": "s", "frequency_": "Hz", "line_freq": "Hz", "power_": "W"}
+EVIDENCE_UNITS |= dict.fromkeys(("envelope_final", "envelope_largest", "amplitude_v"), "m/s")
+EVIDENCE_UNITS |= {"amplitude_": "m", "force_": "N"}
 """By how the names of the evidence begin; all others are pure numbers."""
 
 

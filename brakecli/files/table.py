@@ -21,7 +21,8 @@ Array = NDArray[Any]
 _COMMENTS = ("#", "%")
 _HEAD = 1 << 16  # bytes of a text file from which its layout is found
 _ONE = r"[^\W\d_]+|[°%]"  # name of a unit
-_UNIT = rf"(?:{_ONE})(?:\^?-?\d|[²³])?(?:\s*[*·/ ]\s*(?:{_ONE})(?:\^?-?\d|[²³])?)*"  # of bounded powers
+_LONGEST = 80  # characters of a unit
+_UNIT = rf"(?:{_ONE})(?:\^?-?\d|[²³])?(?:(?: *[*·/] *| +)(?:{_ONE})(?:\^?-?\d|[²³])?)*"  # of bounded powers
 
 
 def require(good: Any, problem: str) -> None:
@@ -152,18 +153,15 @@ def _is_number(cell: str, decimal_comma: bool) -> bool:
 
 @cache
 def _registry() -> Any:
-    try:
-        import pint
-    except ImportError as error:
-        remedy = "install it with: python -m pip install pint"
-        raise UsageError(f"pint, which knows units, cannot be imported ({error}); {remedy}") from error
+    import pint
+
     return pint.UnitRegistry()
 
 
 @cache
 def si(unit: str) -> tuple[float, str] | None:
     """The size of a unit in SI, and that SI unit in words, such as meter or radian; None where there is none."""
-    if not re.fullmatch(_UNIT, unit):  # pint would compute powers of powers
+    if len(unit) > _LONGEST or not re.fullmatch(_UNIT, unit):  # pint would compute powers of powers
         return None
     registry = _registry()
     try:

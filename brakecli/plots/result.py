@@ -5,7 +5,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from brakecli.errors import UsageError
+from brakecli.errors import UsageError, installed, printable
 from brakecli.files.atomic import check_target, new_output
 from brakecli.files.read import StoredResult, open_result
 
@@ -51,11 +51,8 @@ def _opened(
     """Results for a picture, and what writes it."""
     suffix = target.suffix.lower()
     check_target(target, "a kind of picture", (".pdf", ".png", ".svg"), results)
-    try:
+    with installed("matplotlib"):
         import matplotlib.figure  # noqa: F401
-    except ImportError as error:
-        problem = f"matplotlib cannot be imported ({error})"
-        raise UsageError(f"{problem}; install it with: python -m pip install matplotlib") from error
     from brakecli.plots import style
 
     with ExitStack() as stack:
@@ -74,13 +71,13 @@ def draw(result: StoredResult, select: Sequence[str] = (), variable: str = "") -
     """The picture of an open result, drawn with the style that is set."""
     from brakecli.plots import comparison, curves, lock_in, maps, run, sweep
 
-    kind = result.attributes.get("kind")
+    kind = str(result.attributes.get("kind"))
     if kind == "sweep":
         picture = sweep.gather(result, select, variable)
         return curves.draw(picture) if len(picture.axes) == 1 else maps.draw(picture)
     if kind not in ("run", "comparison", "stability"):
         known = "a run, of a sweep, of a comparison or of stability"
-        raise UsageError(f"{result.path}: holds a result of kind {kind!r}; name the result of {known}")
+        raise UsageError(f"{result.path}: holds a result of kind {printable(kind)}; name the result of {known}")
     if select:
         raise UsageError(f"{result.path}: --select is for sweeps (found {select[0]!r}); leave it out for a {kind}")
     if kind == "run":

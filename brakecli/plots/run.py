@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from brakecli.analysis.stability.modes import modes
-from brakecli.case.read import parse_case
+from brakecli.case.read import LoadedCase, parse_case
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError, UsageError
 from brakecli.files.read import StoredResult
@@ -54,10 +54,7 @@ class RunPicture:
         shapes = {variables[name].shape if name in variables else (0,) for name in needed}
         if len(shapes) != 1 or not (samples := max(shapes)[0]):
             raise style.unreadable(result, f"its history has no {', '.join(needed)} of equal length above 0")
-        try:
-            case = parse_case(str(result.attributes.get("resolved_toml", "")), "its resolved case").case
-        except CaseError as error:
-            raise style.unreadable(result, f"the case in it is not valid: {error.problems[0]}") from error
+        case = case_of(result).case
         system, lever = system_of(case), {"torque": case.wheel.radius}
 
         def read(name: str, first: int, stop: int) -> style.Array:
@@ -90,11 +87,17 @@ class RunPicture:
         self.line = ("fundamental", fundamental) if fundamental else ("highest peak", peak)  # Hz
         self.resolution = result.attributes.get("frequency_resolution")  # Hz, not in older files
         steady, fastest = np.ptp(system.belt["value"]) == 0.0, system.fastest_belt
-        self.passing = (
-            tuple(sorted(fastest * system.wheel.turns)) if steady and fastest else ()
-        )  # Hz, of its waves
+        self.passing = tuple(sorted(fastest * system.wheel.turns)) if steady and fastest else ()  # Hz
         self.modes = _mode_frequencies(system)
         self.stop = Stop(result, system) if "spectrogram" in result.file else None
+
+
+def case_of(result: StoredResult) -> LoadedCase:
+    """The case that a result holds; raises UnreadableResultError."""
+    try:
+        return parse_case(result.text("resolved_toml"), "its resolved case")
+    except CaseError as error:
+        raise style.unreadable(result, f"the case in it is not valid: {error.problems[0]}") from error
 
 
 def _mode_frequencies(system: System) -> list[float]:
@@ -189,13 +192,10 @@ def draw(picture: RunPicture) -> Figure:
         axes.set_title(note, loc="right", size=8.5, color=style.VERMILION)
     spans: tuple[Any, ...] = (picture.detail["time"], picture.span, picture.span)
     for axes, time in zip(panels[:, 0], spans, strict=False):
-        unit = style.set_ticks(axes.xaxis, float(time[0]), float(time[-1]), "s")
-        axes.set_xlabel(style.labelled("time", unit))
+        style.set_ticks(axes.xaxis, float(time[0]), float(time[-1]), "s", "time")
         if time[-1] > time[0]:
             axes.set_xlim(time[0], time[-1])
-        if (
-            axes in panels[:2, 0] and axes.get_legend_handles_labels()[1]
-        ):  # with room for the legend above the data
+        if axes in panels[:2, 0] and axes.get_legend_handles_labels()[1]:  # which gets room above the data
             style.make_room(axes)
             axes.legend(loc="upper right", ncols=3)
     return figure
@@ -278,7 +278,7 @@ def _draw_spectrum(axes: Axes, picture: RunPicture) -> None:
     axes.semilogy(frequency, density, color=style.BLUE, lw=1.0, marker=_marker(frequency))
     right = min(highest, max(1.3 * float(frequency[density > lowest][-1]), 2.0 * (line or 0.0)))
     axes.set_xlim(0.0, right)
-    axes.set_xlabel(style.labelled("frequency", style.set_ticks(axes.xaxis, 0.0, right, "Hz")))
+    style.set_ticks(axes.xaxis, 0.0, right, "Hz", "frequency")
     for number, wave in enumerate(few):
         axes.axvline(wave, lw=0.9, zorder=0.8, label="" if number else "waves of the wheel pass", **_BELT)
     if picture.passing and not few:

@@ -8,16 +8,10 @@ from matplotlib.figure import Figure
 
 from brakecli.analysis.regime.of_signal import Measurand, SignalLook
 from brakecli.analysis.regime.spectra import segment
+from brakecli.files.fields import MEASURED_UNITS
 from brakecli.plots import style
 from brakecli.plots.run import COLUMNS, CYCLES, FEW, MOST_DETAIL, envelope
 
-_UNITS = {
-    Measurand.DISPLACEMENT: "m",
-    Measurand.VELOCITY: "m/s",
-    Measurand.FORCE: "N",
-    Measurand.ACCELERATION: "m/s²",
-    Measurand.PRESSURE: "Pa",
-}
 _VELOCITY = {Measurand.FORCE: ("rate of the force", "N/s"), Measurand.PRESSURE: ("pressure", "Pa")}
 _LABELLED = 4  # bursts whose frequency is written into the record
 
@@ -46,11 +40,9 @@ def _title(source: str) -> str:
 
 def _draw_record(axes: Axes, look: SignalLook) -> None:
     values, step = look.signal.values, look.signal.interval
-    factor, unit = style.prefixed(style.largest(values), _UNITS[look.quantity])
+    factor, unit = style.prefixed(style.largest(values), MEASURED_UNITS[look.quantity])
     if len(values) > 2 * COLUMNS:
-        gaps = np.isnan(values)
-        filled = np.where(gaps, np.nan, values)
-        places, low, high = envelope(lambda begin, end: filled[begin:end], len(filled))
+        places, low, high = envelope(lambda begin, end: values[begin:end], len(values))
         axes.fill_between(step * places, factor * low, factor * high, color=style.BLUE, lw=0.6)
     else:
         axes.plot(step * np.arange(len(values)), factor * values, color=style.BLUE, lw=0.9)
@@ -62,7 +54,7 @@ def _draw_record(axes: Axes, look: SignalLook) -> None:
     words = ", where a tone stands out shaded" if look.verdict.bursts else ""
     axes.set_title(f"Record{words}", pad=14.0)
     axes.set(ylabel=style.labelled(str(look.quantity), unit), xlim=(0.0, step * len(values)))
-    axes.set_xlabel(style.labelled("time", style.set_ticks(axes.xaxis, 0.0, step * len(values), "s")))
+    style.set_ticks(axes.xaxis, 0.0, step * len(values), "s", "time")
 
 
 def _draw_velocity(axes: Axes, look: SignalLook) -> None:
@@ -101,7 +93,7 @@ def _draw_velocity(axes: Axes, look: SignalLook) -> None:
         style.make_room(axes)
         axes.legend(loc="upper right")
     axes.set(xlim=(time[0], time[-1]), ylabel=f"{name} ({unit})")
-    axes.set_xlabel(style.labelled("time", style.set_ticks(axes.xaxis, time[0], time[-1], "s")))
+    style.set_ticks(axes.xaxis, time[0], time[-1], "s", "time")
 
 
 def _draw_spectrum(axes: Axes, look: SignalLook) -> None:
@@ -113,15 +105,14 @@ def _draw_spectrum(axes: Axes, look: SignalLook) -> None:
     size = segment(len(filled))
     frequencies, density = welch(filled, 1.0 / look.signal.interval, nperseg=size, detrend="constant")
     shown = (frequencies > 0.0) & (density > 0.0)
-    scale, label = style.density(density, frequencies, _UNITS[look.quantity])
+    scale, label = style.density(density, frequencies, MEASURED_UNITS[look.quantity])
     density *= scale
     axes.loglog(frequencies[shown], density[shown], color=style.BLUE, lw=1.0)
     axes.set(title=f"Spectrum of the {look.quantity}", ylabel=label)
     if shown.any() and style.largest(density) < style.WIDE * density[shown].min():
         style.set_ticks(axes.yaxis, *axes.get_ylim())
     low, high = (float(frequencies[shown][i]) for i in (0, -1)) if shown.any() else (1.0, 1.0)
-    hertz = style.set_ticks(axes.xaxis, low, high, "Hz")
-    axes.set_xlabel(f"frequency ({hertz})")
+    style.set_ticks(axes.xaxis, low, high, "Hz", "frequency")
     if frequency is not None:
         label = f"{'events' if look.verdict.regime == 'relaxation' else 'line'} {frequency:.4g} Hz"
         axes.axvline(frequency, color=style.GREEN, ls=style.DOTS, lw=1.4, zorder=0.9, label=label)

@@ -112,7 +112,6 @@ def rows_of(known: Iterable[Field], values: Mapping[str, Any]) -> list[tuple[str
     for each in known:
         if (value := values.get(each.name)) is not None:
             value = bool(value) if "(0, 1)" in each.meaning else value
-            rows.append(
-                (each.title, shown(value, each.units), each.meaning.replace("`", "").replace(" (0, 1)", ""))
-            )
+            meaning = each.meaning.replace("`", "").replace(" (0, 1)", "")
+            rows.append((each.title, shown(value, each.units), meaning))
     return rows

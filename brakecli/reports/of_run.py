@@ -2,7 +2,7 @@
 
 import math
 import shlex
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from functools import partial
 from typing import Any
 
@@ -12,18 +12,20 @@ from matplotlib.figure import Figure
 from brakecli.analysis.regime.verdict import Excitation, Regime
 from brakecli.analysis.stability.advice import KEYS
 from brakecli.analysis.stability.follow import followed
-from brakecli.analysis.stability.modes import modes
+from brakecli.analysis.stability.modes import Mode, modes
 from brakecli.case.case import Case
-from brakecli.case.read import LoadedCase, key_path, parse_case
+from brakecli.case.read import LoadedCase, key_path
 from brakecli.case.tables import key_schema
-from brakecli.errors import CaseError, escaped
+from brakecli.errors import escaped
 from brakecli.files import fields
-from brakecli.files.field import named
+from brakecli.files.field import flat, named
 from brakecli.files.read import StoredResult
 from brakecli.plots import lock_in, style
 from brakecli.plots.result import draw
+from brakecli.plots.run import case_of
 from brakecli.reports.blocks import Code, Part, Section, Table, Texts, picture, rows_of, shown
 from brakecli.runs.advise import AdviceReport, advise
+from brakecli.solver.motion import Counted
 from brakecli.sweeps.result import unit
 
 QUESTION = "Will this shoe vibrate, in which way, at which frequency, and what should be changed?"
@@ -43,10 +45,8 @@ _ACCURACY = (
     *("certified_by", "nodes", "steps", "contact_evaluations", "unconverged_steps", "non_unique_steps"),
 )
 
-Progress = Callable[[str, int, int], None]
 
-
-def part_of_run(result: StoredResult, progress: Progress) -> Part:
+def part_of_run(result: StoredResult, progress: Counted) -> Part:
     """What the page says of a run. Raises UnreadableResultError."""
     found, loaded = result.attributes, case_of(result)
     advice = advise(loaded, KEYS, MARGIN, progress)
@@ -66,21 +66,14 @@ def part_of_run(result: StoredResult, progress: Progress) -> Part:
     ]
     answer = [*stretches, _sentence(found), f"By theory: {advice.conclusion()}."]
     name, title = escaped(result.path.name), loaded.case.title or "Case without a title"
-    return Part(name, title, QUESTION, answer, sections, versions(found))
-
-
-def case_of(result: StoredResult) -> LoadedCase:
-    """The case that a result holds."""
-    try:
-        return parse_case(result.text("resolved_toml"), "its resolved case")
-    except CaseError as error:
-        raise style.unreadable(result, f"the case in it is not valid: {error.problems[0]}") from error
+    return Part(name, title, QUESTION, answer, sections, result.versions)
 
 
 def case_blocks(loaded: LoadedCase) -> list[Any]:
     """Every key of a case with its value and unit, and the text to copy."""
-    keys = _keys(loaded.case.model_dump(mode="json"))
-    rows = [(key, shown(value, unit(key)), _meaning(key)) for key, value in keys]
+    keys = {key: value for key, value in flat(loaded.case.model_dump(mode="json")) if value is not None}
+    del keys["title"]
+    rows = [(key, shown(value, unit(key)), _meaning(key)) for key, value in keys.items()]
     idle, head = [row for row in rows if row[0].startswith(_IDLE)], ("key", "value", "meaning")
     shoe = Table([row for row in rows if row not in idle], head)
     return [shoe, Table(idle, head, "Start, solver and output"), Code(loaded.resolved, "The whole case as a file")]
@@ -91,12 +84,6 @@ def repeat(result: StoredResult, again: str, given: str) -> list[Any]:
     report = f"brakecli report {escaped(shlex.quote(result.path.name))} -o report.html"
     exactly = "The same version on the same machine gives the same numbers, to the last bit."
     return [Code(f"{again}\n{report}"), Texts([exactly]), Code(given, "The file as it was given")]
-
-
-def versions(found: Mapping[str, Any]) -> dict[str, str]:
-    """Program and libraries by which a result was made."""
-    names = [name for name in found if name.endswith("_version") and name != "format_version"]
-    return {name.removesuffix("_version"): str(found[name]) for name in names}
 
 
 def _sentence(found: Mapping[str, Any]) -> str:
@@ -124,10 +111,8 @@ def _stability(advice: AdviceReport) -> Iterator[Any]:
     report = advice.stability
     rows = [("steady sliding", "none", report.no_equilibrium or "")] if report.equilibrium is None else []
     for each in report.crossings:
-        change = f"stability {'lost' if each.lost else 'regained'}"
-        rows.append(
-            (change, f"at φ = {each.friction:.6g}", f"by {each.instability}, {shown(each.frequency, 'Hz')}")
-        )
+        change, how = "lost" if each.lost else "regained", f"by {each.instability}, {shown(each.frequency, 'Hz')}"
+        rows.append((f"stability {change}", f"at φ = {each.friction:.6g}", how))
     for mode in report.modes:
         growth = f"{'grows' if mode.growth > 0.0 else 'decays'} at {abs(mode.growth):.4g} 1/s"
         ratio = style.readable(float(f"{mode.damping_ratio:.3g}"))
@@ -147,13 +132,8 @@ def _stability(advice: AdviceReport) -> Iterator[Any]:
             )
             for each in advice.advice
         ]
-        head = (
-            "what to change",
-            "from",
-            f"to, for a margin of {advice.wanted_margin:.0%}",
-            "critical friction then",
-        )
-        yield Table(changes, head)
+        wanted = f"to, for a margin of {advice.wanted_margin:.0%}"
+        yield Table(changes, ("what to change", "from", wanted, "critical friction then"))
     known = [each for each in advice.sensitivities if each.elasticity][:MOST_SENSITIVE]
     if known:
         moves = [(each.parameter, f"{each.elasticity:+.3g}\u00a0%".replace("-", "−")) for each in known]
@@ -170,16 +150,14 @@ def _diagram(advice: AdviceReport) -> Figure:
     if highest > 4.0 * report.friction > 0.0:
         highest = 4.0 * report.friction
     phi = np.linspace(0.0, highest, VALUES)
-    stiffness = [report.stiffness_at(float(each)) for each in phi]
-    pairs = followed(
-        tuple(modes(c._replace(phi=float(each)), k, math.copysign(float(each), report.belt_speed)))
-        if k > 0.0
-        else ()
-        for each, k in zip(phi, stiffness, strict=True)
-    )
-    found = np.array(
-        [[(mode.frequency, mode.growth) for mode in pair] if pair else np.full((2, 2), np.nan) for pair in pairs]
-    )
+
+    def at(friction: float) -> tuple[Mode, ...]:
+        k, grip = report.stiffness_at(friction), math.copysign(friction, report.belt_speed)
+        return tuple(modes(c._replace(phi=friction), k, grip)) if k > 0.0 else ()
+
+    pairs = followed(map(at, phi.tolist()))
+    none = [(np.nan, np.nan)] * 2
+    found = np.array([[(mode.frequency, mode.growth) for mode in pair] if pair else none for pair in pairs])
     ends = np.array([each.friction for each in report.crossings if each.friction <= highest])
     figure = lock_in.diagram("", "friction coefficient φ", "", phi, (found[..., 0], found[..., 1]), ends)
     for axes in figure.axes:
@@ -199,12 +177,8 @@ def _regime(result: StoredResult) -> list[Any]:
     reasons = Texts([f"{reason[:1].upper()}{reason[1:]}." for reason in map(str, found.get("reasons", ()))])
     intervals, head = _vibrations(result), [each.meaning for each in fields.VIBRATION]
     beats = [Table([[shown(*each) for each in zip(row, _UNITS, strict=True)] for row in intervals], head)]
-    return [
-        reasons,
-        *beats * bool(intervals),
-        Table(rows),
-        Table(proof, ("evidence", "value"), "All numbers by which the rules decided"),
-    ]
+    shown_on_demand = Table(proof, ("evidence", "value"), "All numbers by which the rules decided")
+    return [reasons, *beats * bool(intervals), Table(rows), shown_on_demand]
 
 
 def _vibrations(result: StoredResult) -> list[list[float]]:
@@ -216,12 +190,8 @@ def _vibrations(result: StoredResult) -> list[list[float]]:
 
 
 def _accuracy(result: StoredResult) -> list[Any]:
-    energy = result.group_attributes("energy")
-    closing = (
-        "energy account",
-        f"{abs(float(energy.get('relative_closing_error', math.nan))):.1e}",
-        "what it does not account for, over its largest item",
-    )
+    error = abs(float(result.group_attributes("energy").get("relative_closing_error", math.nan)))
+    closing = "energy account", f"{error:.1e}", "what it does not account for, over its largest item"
     return [Table([*rows_of(named(fields.RUN, *_ACCURACY), result.attributes), closing])]
 
 
@@ -229,14 +199,6 @@ def _warnings(found: Mapping[str, Any], advice: AdviceReport) -> list[str]:
     lines = [str(each) for name in ("warnings", "adjustments") for each in found.get(name, ())]
     lines += [f"left out: {each}" for each in found.get("left_out", ())] + advice.notes()
     return [f"{line[:1].upper()}{line[1:]}." for line in lines] or ["There are none."]
-
-
-def _keys(table: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, Any]]:
-    for key, value in table.items():
-        if isinstance(value, Mapping):
-            yield from _keys(value, f"{path}{key}.")
-        elif value is not None and path:
-            yield f"{path}{key}", value
 
 
 def _meaning(key: str) -> str:

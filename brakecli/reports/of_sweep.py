@@ -12,9 +12,10 @@ from brakecli.files import fields
 from brakecli.files.read import StoredResult
 from brakecli.plots import style
 from brakecli.plots.result import draw
+from brakecli.plots.run import case_of
 from brakecli.plots.sweep import SweepPicture, gather, numeric
 from brakecli.reports.blocks import Part, Section, Table, Texts, picture, rows_of, shown
-from brakecli.reports.of_run import case_blocks, case_of, repeat, versions
+from brakecli.reports.of_run import case_blocks, repeat
 from brakecli.reports.sweep_map import MOST, maps
 from brakecli.sweeps.point import Status
 
@@ -22,6 +23,11 @@ MOST_FAILURES = 20
 _TEXTS = ("regime", "excitation", "critical_status", "sustained_status", "reason")
 _ERRORS = ("estimated_error", "critical_error", "critical_bias", "unconverged_steps")
 _IDLE = ("settled", "settled_from", "steps", "contact_evaluations", "unconverged_steps", "warning_count")
+_COMMANDS = {
+    "sweep": "sweep SWEEP.toml",
+    "comparison": "compare-schemes CASE.toml",
+    "stability": "stability CASE.toml --vary …",
+}
 _QUESTIONS = {
     "sweep": "Where does this shoe vibrate, and in which way?",
     "critical": "From which value of {} on does steady sliding lose its stability?",
@@ -45,14 +51,7 @@ def part_of_sweep(result: StoredResult) -> Part:
         blocks.append(Texts([f"Values of single points are left out above {MOST} of them; they are in the file."]))
     blocks.append(picture(f"Picture of the sweep: {found.summary}", partial(draw, result)))
     answer = [*_answer(found), *(f"{each[:1].upper()}{each[1:]}." for each in found.findings)]
-    axes = [
-        (
-            axis.named(0).partition(" = ")[0],
-            f"{len(axis.values)} values",
-            f"{axis.named(0).partition(' = ')[2]} to {axis.named(len(axis.values) - 1).partition(' = ')[2]}",
-        )
-        for axis in found.axes
-    ]
+    axes = [(axis.key, f"{len(axis.values)} values", f"{axis.text(0)} to {axis.text(-1)}") for axis in found.axes]
     sections = [Section("Map and pictures", blocks), Section("Grid", [Table(axes, ("key", "values", "from, to"))])]
     errors = {name: np.asarray(found.variables.get(name, np.nan), float) for name in _ERRORS}
     accuracy = [
@@ -66,16 +65,17 @@ def part_of_sweep(result: StoredResult) -> Part:
     reasons, warned = np.ravel(result.read("/", "reason")), np.ravel(result.read("/", "warning"))
     lines = [f"Failed: {reason}." for reason in dict.fromkeys(reasons[failed].tolist())][:MOST_FAILURES]
     lines += [f"{warning}." for warning in dict.fromkeys(warned[warned != ""].tolist())][:MOST_FAILURES]
-    return _plain(
-        result, "sweep", answer, [*sections, Section("Warnings", [Texts(lines or ["There are none."])])], question
-    )
+    sections.append(Section("Warnings", [Texts(lines or ["There are none."])]))
+    return _plain(result, "sweep", answer, sections, question)
 
 
 def _answer(found: SweepPicture) -> Iterator[str]:
     """What the points say, and at which of them the most and the least."""
-    done, name = found["status"] == Status.DONE, "amplitude" if found.critical is None else "critical"
-    size, values, lasts = done.size, found[name], found.critical is None
-    if lasts:
+    done, name, words, end = found["status"] == Status.DONE, "amplitude", "largest amplitude", np.nanargmax
+    if found.critical is not None:
+        name, words, end = "critical", "least critical value", np.nanargmin
+    size, values = done.size, found[name]
+    if found.critical is None:
         lasting = np.isin(found["regime"], (Regime.RELAXATION, Regime.QUASI_HARMONIC))
         kinds, counts = np.unique(found["regime"][done], return_counts=True)
         each = ", ".join(f"{kind} at {count}" for kind, count in zip(kinds, counts, strict=True))
@@ -84,10 +84,7 @@ def _answer(found: SweepPicture) -> Iterator[str]:
     else:
         none = int(size - np.isfinite(values).sum())
         yield f"A critical value is found at {size - none} of {size} points."
-    ends = (
-        {"largest amplitude": np.nanargmax} if found.critical is None else {"least critical value": np.nanargmin}
-    )
-    for words, end in ends.items() if np.isfinite(values).any() else ():
+    if np.isfinite(values).any():
         place = np.unravel_index(end(values), values.shape)
         where = ", ".join(axis.named(int(at)) for axis, at in zip(found.axes, place[1:], strict=True))
         value = shown(float(f"{values[place]:.4g}"), found.units[name])
@@ -104,9 +101,7 @@ def part_of_other(result: StoredResult) -> Part:
     if kind == "stability":
         where = ", ".join(f"{value:.6g}" for value in np.ravel(result.attributes.get("critical_values", ())))
         key = ", ".join(map(str, result.attributes.get("parameters", ())))
-        answer = [
-            f"Along {key}, stability changes at {where}." if where else f"Along {key}, stability does not change."
-        ]
+        answer = [f"Along {key}, stability {f'changes at {where}' if where else 'does not change'}."]
     best = result.attributes.get("recommended")
     if kind == "comparison" and isinstance(best, int):
         method, step, error = (style.read_column(result, name)[best] for name in ("method", "step", "error"))
@@ -120,15 +115,8 @@ def _plain(
 ) -> Part:
     """A part with what is said of every result."""
     loaded, attributes = case_of(result), result.attributes
-    command = {"sweep": "sweep SWEEP.toml", "comparison": "compare-schemes CASE.toml"}.get(
-        kind, "stability CASE.toml --vary …"
-    )
     given = str(attributes.get("sweep_toml") or attributes.get("case_toml", ""))
-    sections += [
-        Section("Case", case_blocks(loaded)),
-        Section("How to repeat it", repeat(result, f"brakecli {command} -o again.h5", given)),
-    ]
-    title = str(attributes.get("title", "")) or "Result without a title"
-    return Part(
-        escaped(result.path.name), title, question or _QUESTIONS[kind], answer, sections, versions(attributes)
-    )
+    again = repeat(result, f"brakecli {_COMMANDS[kind]} -o again.h5", given)
+    sections += [Section("Case", case_blocks(loaded)), Section("How to repeat it", again)]
+    title, name = str(attributes.get("title", "")) or "Result without a title", escaped(result.path.name)
+    return Part(name, title, question or _QUESTIONS[kind], answer, sections, result.versions)

@@ -20,11 +20,7 @@ MOST = 10_000  # points whose values are on the page
 _WORDY = 2000  # up to here with the reasons, and with five digits
 WIDTH, HEIGHT = 400.0, 260.0  # of the cells, in units of the drawing; a row alone is lower
 _TICKS, _SHADES, _NONE = 7, 32, "#f2f2f2"
-_LETTERS = {
-    Regime.RELAXATION: "R",
-    Regime.QUASI_HARMONIC: "Q",
-    Regime.UNDECIDED: "?",
-}  # in grey, colours are alike
+_LETTERS = {Regime.RELAXATION: "R", Regime.QUASI_HARMONIC: "Q", Regime.UNDECIDED: "?"}  # colours are alike in grey
 _LEAST_LETTER = 11.0  # of a cell that holds a letter
 
 
@@ -81,9 +77,8 @@ def _map(picture: SweepPicture, names: list[str], title: str) -> Map:
     for i, j in product(*map(range, shape)):
         left, right, one, other = *x.edges[i : i + 2], *y.edges[j : j + 2]
         low, high = min(one, other), max(one, other)
-        found.setdefault(colours.reshape(shape)[i, j], []).append(
-            f"M{left:.4g} {low:.4g}H{right:.4g}V{high:.4g}H{left:.4g}z"
-        )
+        cell = f"M{left:.4g} {low:.4g}H{right:.4g}V{high:.4g}H{left:.4g}z"
+        found.setdefault(colours.reshape(shape)[i, j], []).append(cell)
         letter = _LETTERS.get(picture["regime"].reshape(shape)[i, j], "") if picture.critical is None else ""
         if letter and right - left > _LEAST_LETTER < high - low:
             letters.append((0.5 * (left + right), 0.5 * (low + high) + 4.0, letter))
@@ -91,14 +86,8 @@ def _map(picture: SweepPicture, names: list[str], title: str) -> Map:
     for name in names:
         values, unit = picture[name].reshape(shape), picture.units.get(name, "")
         columns[name.replace("_", " ")] = _numbers(values, unit) if values.dtype.kind in "iuf" else _texts(values)
-    data = {
-        "x": x.edges,
-        "y": y.edges,
-        "xs": x.values,
-        "ys": y.values,
-        "names": [x.label, y.label],
-        "columns": columns,
-    }
+    data = {"x": x.edges, "y": y.edges, "xs": x.values, "ys": y.values, "names": [x.label, y.label]}
+    data["columns"] = columns
     return Map(title, x, y, [(colour, "".join(paths)) for colour, paths in found.items()], letters, legend, data)
 
 
@@ -120,9 +109,8 @@ def _colours(picture: SweepPicture) -> tuple[style.Array, list[tuple[str, str]]]
         known = {str(regime): colour for regime, (colour, _) in REGIMES.items()} | {"": _NONE}
         regimes = picture["regime"].astype(str)
         present = [name for name in known if (regimes == name).any()]
-        return np.vectorize(known.get, otypes=[object])(regimes), [
-            (known[name], name or "failed") for name in present
-        ]
+        legend = [(known[name], name or "failed") for name in present]
+        return np.vectorize(known.get, otypes=[object])(regimes), legend
     values, shades = picture["critical"], colormaps["cividis"]
     there = values[np.isfinite(values)]
     low, high = (float(there.min()), float(there.max())) if there.size else (0.0, 1.0)
@@ -137,10 +125,11 @@ def _numbers(values: style.Array, unit: str) -> dict[str, Any]:
     """Numbers in the unit of the largest, with the digits that a reader needs; null where there is none."""
     factor, unit = style.prefixed(style.largest(values), unit)
     digits = 5 if values.size <= _WORDY else 4
-    kept = [
-        [float(f"{factor * x:.{digits}g}") if np.isfinite(x) else None for x in row] for row in values.tolist()
-    ]
-    return {"unit": unit, "values": kept}
+
+    def kept(x: float) -> float | None:
+        return float(f"{factor * x:.{digits}g}") if np.isfinite(x) else None
+
+    return {"unit": unit, "values": [[*map(kept, row)] for row in values.tolist()]}
 
 
 def _texts(values: style.Array) -> dict[str, Any]:

@@ -1,23 +1,14 @@
 """What to change so that a shoe does not squeal: sensitivities, advised values, and a run that checks the best."""
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from brakecli.analysis.regime.of_run import verdict_on
 from brakecli.analysis.regime.verdict import Regime, Verdict
-from brakecli.analysis.stability.advice import (
-    Change,
-    Sensitivity,
-    advised,
-    advised_keys,
-    answer,
-    changed,
-    sensitivity,
-)
-from brakecli.analysis.stability.advice import numbers as numbers_of
+from brakecli.analysis.stability import advice as of_case
+from brakecli.analysis.stability.advice import Change, Sensitivity
 from brakecli.analysis.stability.modes import is_undamped
 from brakecli.analysis.stability.report import LARGEST_FRICTION, StabilityReport, stability
 from brakecli.case.case import Case
@@ -26,13 +17,11 @@ from brakecli.case.system import system_of
 from brakecli.files import fields
 from brakecli.files.field import values_of
 from brakecli.runs.cost import steps_and_seconds
-from brakecli.runs.run import motion_of
-from brakecli.solver.history import array_history
+from brakecli.runs.run import motion_of, verdict_in_memory
+from brakecli.solver.motion import Counted
 from brakecli.solver.system import System
 
 CHECK_SECONDS = 5.0  # of computing; a run that would take longer is cut short
-
-Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True)
@@ -81,7 +70,7 @@ class AdviceReport:
             found.append(f"the pad opens in part: this rests on the mean stiffness of the contact; {instead}")
         if is_undamped(self.system.coefficients):
             found.append("no dashpot acts: where sliding is stable, vibration does not die away either")
-        if len(self.system.belt) > 1 or len(self.system.load) > 1:
+        if not self.system.steady:
             found.append("speed and load are those of t = 0")
         return found
 
@@ -91,7 +80,7 @@ class AdviceReport:
             yield "the wheel stands, so that nothing slides: give wheel.angular_speed"
             return
         if report.equilibrium is None:
-            yield f"there is no steady sliding at {own:g}: {str(report.no_equilibrium).partition(': ')[2]}"
+            yield f"at {own:g} {report.no_equilibrium}"
         elif report.contact_stiffness == 0.0:
             yield "the shoe does not touch the wheel: give a load that presses it on"
         elif own == 0.0:
@@ -104,14 +93,12 @@ class AdviceReport:
         elif critical is not None:
             yield f"stable up to {critical:.3g}{_far(self.margin, own)}"
             if report.stable and critical < own:
-                turns = [
-                    f"{'lost' if each.lost else 'regained'} at {each.friction:.3g}" for each in report.crossings
-                ]
-                yield f"the case lies above a range of instability, as stability is {', '.join(turns)}"
+                changes = (("lost" if each.lost else "regained", each.friction) for each in report.crossings)
+                turns = ", ".join(f"{change} at {friction:.3g}" for change, friction in changes)
+                yield f"the case lies above a range of instability, as stability is {turns}"
         elif report.equilibrium is not None and report.contact_stiffness > 0.0:
-            yield "stable: no friction makes it unstable" + (
-                "" if self.system.smooth else f", up to {LARGEST_FRICTION:g}"
-            )
+            searched = "" if self.system.smooth else f", up to {LARGEST_FRICTION:g}"
+            yield f"stable: no friction makes it unstable{searched}"
 
     def _remedy(self) -> Iterator[str]:
         if not self.advice:
@@ -121,9 +108,8 @@ class AdviceReport:
             yield f"no key alone gives a margin of {100.0 * self.wanted_margin:.3g} %"
             return
         critical = best.critical_friction
-        yield f"{best.parameter} {best.start:.4g} → {best.rounded} " + (
-            f"gives {critical:.3g}" if critical is not None else "takes the instability away"
-        )
+        effect = f"gives {critical:.3g}" if critical is not None else "takes the instability away"
+        yield f"{best.parameter} {best.start:.4g} → {best.rounded} {effect}"
         if self.check and self.check.verdict.regime not in (Regime.DAMPED, Regime.UNDECIDED):
             yield f"but from the case's own start it still vibrates: {self.check.verdict.regime}"
 
@@ -134,30 +120,28 @@ def _far(margin: float | None, own: float) -> str:
         return ""
     if margin > 10.0:
         return f", {margin + 1.0:.3g} times the case's {own:g}"
-    part = 100.0 * abs(margin)
-    return (
-        f", {part:{'.0f' if part > 99.0 else '.2g'}} % {'above' if margin > 0.0 else 'below'} the case's {own:g}"
-    )
+    part, where = 100.0 * abs(margin), "above" if margin > 0.0 else "below"
+    return f", {part:{'.0f' if part > 99.0 else '.2g'}} % {where} the case's {own:g}"
 
 
-def advise(loaded: LoadedCase, patterns: Sequence[str], margin: float, progress: Progress) -> AdviceReport:
+def advise(loaded: LoadedCase, patterns: Sequence[str], margin: float, progress: Counted) -> AdviceReport:
     """Sensitivities of a case, the nearest safe value of each key that fits a pattern, and a run of the best.
 
     A case that has the margin (a part of its friction) needs no advice. Raises UsageError.
     """
     case, advice, check = loaded.case, list[Change](), None
-    keys, everything = advised_keys(case, patterns), numbers_of(case)
+    keys, everything = of_case.advised_keys(case, patterns), of_case.numbers(case)
     system = system_of(case)
-    report, found = stability(system), answer(case)
+    report, found = stability(system), of_case.answer(case)
     critical = found.critical if found else None
     sensitivities = list[Sensitivity]()
     if found is not None:
         for done, path in enumerate(everything):
             tell = partial(progress, "derivatives", done, len(everything))
-            sensitivities.append(sensitivity(case, path, critical, tell))
+            sensitivities.append(of_case.sensitivity(case, path, critical, tell))
         if not found.safe((1.0 + margin) * report.friction):
             for done, path in enumerate(keys):
-                advice.append(advised(case, path, margin, partial(progress, "keys", done, len(keys))))
+                advice.append(of_case.advised(case, path, margin, partial(progress, "keys", done, len(keys))))
     sensitivities.sort(key=lambda each: -abs(each.elasticity or 0.0))
     advice.sort(key=lambda each: each.size)
     if advice and advice[0].to is not None:
@@ -165,9 +149,9 @@ def advise(loaded: LoadedCase, patterns: Sequence[str], margin: float, progress:
     return AdviceReport(case.title, system, report, critical, margin, sensitivities, advice, check)
 
 
-def _checked(case: Case, best: Change, progress: Progress) -> CheckRun | None:
+def _checked(case: Case, best: Change, progress: Counted) -> CheckRun | None:
     """Run the case with an advised value, from its own start and for its own time if that is short."""
-    there = changed(case, key_path(best.parameter), best.to or 0.0)
+    there = of_case.changed(case, key_path(best.parameter), best.to or 0.0)
     if there is None:
         return None
     system = system_of(there)
@@ -175,6 +159,6 @@ def _checked(case: Case, best: Change, progress: Progress) -> CheckRun | None:
     system = replace(system, duration=system.duration * min(1.0, CHECK_SECONDS / max(seconds, 1e-9)))
     start = time.perf_counter()
     motion, _ = motion_of(system, lambda done: progress("steps of the check", done, system.steps))
-    verdict = verdict_on(array_history(system.interval, motion.rows), system, motion.work.failure_sentence)
+    verdict = verdict_in_memory(motion, system)
     spent = time.perf_counter() - start
     return CheckRun(best.parameter, best.to or 0.0, verdict, system.sampled_duration, spent)

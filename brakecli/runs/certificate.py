@@ -44,9 +44,8 @@ def compare(coarse: Motion, fine: Motion, tolerance: float) -> tuple[float, floa
     What never exceeds the rounding of the motion does not count, as velocities of a shoe that stays where it is.
     """
     system = max(coarse.system, fine.system, key=lambda each: each.interval)
-    one, other = (
-        each.rows[:: round(system.interval / each.system.interval), :4].T.copy() for each in (coarse, fine)
-    )
+    every = (round(system.interval / each.system.interval) for each in (coarse, fine))
+    one, other = (each.rows[::n, :4].T.copy() for each, n in zip((coarse, fine), every, strict=True))
     count = other.shape[1]
     if one.shape[1] < count:
         return 0.0, 1.0

@@ -31,9 +31,8 @@ def steps_and_seconds(system: System) -> tuple[int, float]:
         each = _STEP_SECONDS * (1.0 + pairs / 20.0)
         if system.finds_patches or system.nodes:
             each = _STEP_SECONDS + _EVALUATIONS * evaluation_seconds(system)
-        return system.steps, system.steps * each + _window_seconds(
-            system, system.sampled_duration * system.fastest_belt
-        )
+        window = _window_seconds(system, system.sampled_duration * system.fastest_belt)
+        return system.steps, system.steps * each + window
     c, alone = system.coefficients, method.step is not None
     if method.row.exact:
         return system.steps, system.steps * _EXACT_STEP_SECONDS

@@ -1,6 +1,6 @@
 """One run, from a case to a finished result file: what `brakecli run` does."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import astuple, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -26,8 +26,8 @@ from brakecli.runs.certificate import Certificate
 from brakecli.runs.limits import Check, check, free_bytes, refuse, within_range
 from brakecli.runs.modelled import modelled
 from brakecli.runs.tolerance import certify
-from brakecli.solver.history import History
-from brakecli.solver.motion import Motion, Progress, Sink, solve
+from brakecli.solver.history import History, array_history
+from brakecli.solver.motion import Counted, Motion, Progress, Sink, solve
 from brakecli.solver.quantities import HISTORY, ContactState
 from brakecli.solver.system import System
 
@@ -72,11 +72,7 @@ def load_kernels(loaded: LoadedCase) -> System:
 
 
 def run(
-    loaded: LoadedCase,
-    output: Path,
-    *,
-    force: bool,
-    progress: Callable[[str, int, int], None] = lambda what, done, total: None,
+    loaded: LoadedCase, output: Path, *, force: bool, progress: Counted = lambda what, done, total: None
 ) -> RunReport:
     """Simulate a case and write its result file.
 
@@ -100,7 +96,7 @@ def run(
             changing = None if motion.work.failed else over_time(history, system)
             if changing:
                 _write_over_time(result, changing)
-            warnings = (*found.warnings, *_warnings(motion, certificate), *verdict.reasons[1:])
+            warnings = (*found.warnings, *_warnings(motion, certificate), *verdict.notes.values())
             shown = changing, top, warnings, *modelled(motion)
             report = RunReport(loaded.case.title, output, verdict, motion, found, certificate, *shown)
             result.set_attributes(origin("run", report.title, loaded))
@@ -126,6 +122,18 @@ def motion_of(
     return certified
 
 
+def verdict_in_memory(motion: Motion, system: System, *, in_full: bool = True) -> Verdict:
+    """The verdict on a motion whose samples are in memory."""
+    _refuse_overflow(motion.rows)
+    history = array_history(system.interval, motion.rows)
+    return verdict_on(history, system, motion.work.failure_sentence, in_full=in_full)
+
+
+def _refuse_overflow(rows: NDArray[np.float64]) -> None:
+    if not np.isfinite(rows).all():  # the loop bounds only the motion itself
+        raise FloatingPointError("a force overflows")
+
+
 def _history_sink(result: ResultFile, interval: float) -> Sink:
     """Declare the history of a file; what is returned writes samples to it."""
     names = " ".join(state.name.lower() for state in ContactState)
@@ -134,8 +142,7 @@ def _history_sink(result: ResultFile, interval: float) -> Sink:
         result.variable("history", field, ("time",), **(states if field.name == "state" else {}))
 
     def append(rows: NDArray[np.float64]) -> None:
-        if not np.isfinite(rows).all():  # the loop bounds only the motion itself
-            raise FloatingPointError("a force overflows")
+        _refuse_overflow(rows)
         done = result.rows("history")
         time = interval * np.arange(done, done + len(rows))
         result.append("history", {"time": time, **dict(zip(HISTORY, rows.T, strict=True))})

@@ -1,7 +1,6 @@
 """A second run of a case, which decides whether friction or the roughness keeps its vibration up."""
 
 import math
-import re
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -11,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from brakecli.analysis.regime.evidence import Part, follows
-from brakecli.analysis.regime.forced import GROWN, SECOND_RUN
+from brakecli.analysis.regime.forced import GROWN
 from brakecli.analysis.regime.of_run import context, numbers_of, stored_run, verdict_on
 from brakecli.analysis.regime.verdict import Excitation, Feeds, Regime, Thresholds
 from brakecli.analysis.stability.modes import crossings, growth
@@ -20,7 +19,7 @@ from brakecli.runs.cost import duration_text
 from brakecli.runs.limits import check, refuse
 from brakecli.runs.run import motion_of
 from brakecli.solver.history import History, array_history
-from brakecli.solver.motion import Progress
+from brakecli.solver.motion import Counted, Progress
 from brakecli.solver.quantities import HISTORY
 from brakecli.solver.roughness import surface
 from brakecli.solver.steady_sliding import steady_sliding
@@ -44,12 +43,12 @@ class Second:
 
 
 def classify_twice(
-    path: Path, thresholds: Thresholds, say: Callable[[str], None], progress: Callable[[str, int, int], None]
+    path: Path, thresholds: Thresholds, say: Callable[[str], None], progress: Counted
 ) -> dict[str, Any]:
     """The verdict on a stored run as `classify_result` gives it, by a second run where one is asked for."""
     with stored_run(path) as (system, history, failure):
         verdict = verdict_on(history, system, failure, thresholds)
-        if not verdict.second_run:
+        if not verdict.decision.second_run:
             say("--second-run: this verdict asks for none; nothing was run")
             return numbers_of(verdict, failure)
         second = second_system(system, history)
@@ -61,8 +60,8 @@ def classify_twice(
         say(f"second run, {second.change}, four times as long: about {duration_text(found.seconds)}")
         feeds, sticks, shown = compared(second, history, lambda done: progress("steps", done, second.system.steps))
         verdict = verdict_on(history, system, failure, thresholds, feeds, sticks)
-        first = re.sub(rf"(;|, or) decide by {re.escape(SECOND_RUN)}.*", "", verdict.reasons[0])  # that is done
-        return numbers_of(replace(verdict, reasons=(first, *verdict.reasons[1:], shown)), failure)
+        decision, notes = verdict.decision._replace(second_run=False), {**verdict.notes, "second_run": shown}
+        return numbers_of(replace(verdict, decision=decision, notes=notes), failure)
 
 
 def second_system(system: System, history: History) -> Second:
@@ -109,10 +108,9 @@ def compared(
         remains = part >= _REMAINS and (lost or verdict.excitation is Excitation.FORCED)
         duration = history.samples * history.interval
         if remains and 0.0 < second.growth * duration < GROWN:  # what it has not shown yet, less friction cannot
-            own = (
-                f"but in the first sliding is unstable: the shoe's own vibration grows at {second.growth:.3g} 1/s"
-            )
-            return Feeds.UNKNOWN, 0.0, f"{text}, {own}; run at least {1.01 * GROWN / second.growth:.3g} s"
+            own = f"the shoe's own vibration grows at {second.growth:.3g} 1/s"
+            needed = f"run at least {1.01 * GROWN / second.growth:.3g} s"
+            return Feeds.UNKNOWN, 0.0, f"{text}, but in the first sliding is unstable: {own}; {needed}"
         waves, end = context(second.system).waves, Part(history, history.samples // 2, history.samples)
         least = _VANISHES  # what moves as the waves do may be forced along x, and falls as friction does
         vanishes = part <= (min(least, 0.5 * second.friction) if follows(end, waves) else least)

@@ -30,6 +30,8 @@ EXACT_BLOCK = 16384
 
 Sink = Callable[[Floats], None]
 Progress = Callable[[int], None]
+Counted = Callable[[str, int, int], None]
+"""Called with what is counted, how many are done, and of how many; 0 where that is not known."""
 
 _plant_at, _evaluate_at = from_memory(PLANT), at_address(EVALUATE)
 

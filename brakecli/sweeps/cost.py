@@ -25,9 +25,7 @@ _SAMPLE_SECONDS = 1e-7
 _SEARCH_RUNS = 12.0  # for the least sustained value
 _SEARCH_GROWTHS = 20.0
 _GROWTH_SECONDS = 0.03
-_FORCED_RUNS = (
-    1000.0  # over a period of the wheel, in a search that follows a forced motion; more where it is lost
-)
+_FORCED_RUNS = 1000.0  # over a period of the wheel, in a search that follows a forced motion
 _EXPONENT_RUNS = 200.0  # of as long as an exponent needs
 _EIGENVALUE_SECONDS = 0.1
 _WORKER_BYTES = 1.8e8
@@ -67,15 +65,12 @@ def estimate(plan: Plan, workers: int) -> Estimate:
             system = system_of(plan.case(plan.settings(point)))
             checked = check(system)
             refuse(checked)
-            in_lanes = seconds_together(system) if plan.followed is None else None
-            if may_be_early(system):
-                times.append(_EARLY_SECONDS - _POINT_SECONDS)
-            else:
-                times.append(
-                    (checked.seconds if in_lanes is None else in_lanes) + _SAMPLE_SECONDS * system.samples
-                )
+            in_lanes, seconds = seconds_together(system) if plan.followed is None else None, checked.seconds
             if in_lanes is not None:
+                seconds = in_lanes
                 together = max(1, min(TOGETHER, plan.units // workers))
+            seconds += _SAMPLE_SECONDS * system.samples
+            times.append(_EARLY_SECONDS - _POINT_SECONDS if may_be_early(system) else seconds)
             samples = max(samples, system.samples)
             if (critical := plan.sweep.critical) is not None and critical.method == "simulation":
                 forced = max(forced, _forced_seconds(plan, plan.settings(point), critical))

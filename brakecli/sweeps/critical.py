@@ -88,6 +88,7 @@ class Edge(NamedTuple):
 
 
 SlidingAt = Callable[[float], Sliding | None]
+EdgeIn = Callable[[float, float], Edge]
 Answer = Callable[[float], bool | None]
 """The answer to a question at a value of the parameter; None where it is not known."""
 
@@ -106,9 +107,8 @@ def search(
             return None
 
     if critical.parameter == "friction.coefficient":
-        exact = _friction_by_eigenvalues(
-            critical, with_step(system_of(case_at(critical.lower)), unless=exact_steps)
-        )
+        system = with_step(system_of(case_at(critical.lower)), unless=exact_steps)
+        exact = _friction_by_eigenvalues(critical, system)
     else:
         exact = _by_eigenvalues(critical, sliding_at)
     if critical.method == "eigenvalue":
@@ -180,10 +180,10 @@ def _by_eigenvalues(critical: Critical, sliding_at: SlidingAt) -> Search:
         return _answer(critical, sliding_at, cache(unstable), values, partial(edge, unstable))
 
     exact = found(grows, SCANNED_WHERE_OPEN if opens else SCANNED_BY_EIGENVALUES)
-    if first is not None and first.system.method.own_steps:
-        return exact._replace(eigenvalue=exact.value, bias=0.0 if exact.value is not None else None)
-    own = found(grows_in_steps, SCANNED_WHERE_OPEN)
     exact = exact._replace(eigenvalue=exact.value)
+    if first is not None and first.system.method.own_steps:
+        return exact._replace(bias=None if exact.value is None else 0.0)
+    own = found(grows_in_steps, SCANNED_WHERE_OPEN)
     if exact.value is None or own.value is None or exact.outcome is not own.outcome:
         return exact
     return exact._replace(bias=own.value - exact.value)
@@ -205,11 +205,7 @@ def _friction_by_eigenvalues(critical: Critical, system: System) -> Search:
 
 
 def _answer(
-    critical: Critical,
-    sliding_at: SlidingAt,
-    unstable: Answer,
-    values: list[float],
-    edge: Callable[[float, float], Edge],
+    critical: Critical, sliding_at: SlidingAt, unstable: Answer, values: list[float], edge: EdgeIn
 ) -> Search:
     """What the answers at some values say; `edge` narrows a change between two of them down.
 
@@ -236,9 +232,8 @@ def _of_edges(critical: Critical, unstable: bool, edges: list[Edge]) -> Search:
     first = next((each for each in edges if each.lost), edges[0])
     if first.error >= WIDEST * (critical.upper - critical.lower):  # almost any value of the range may be it
         return Search(Outcome.UNDECIDED)
-    return Search(
-        Outcome.FOUND if first.lost else Outcome.REGAINED, *first[:4], windows=windows, window_errors=errors
-    )
+    outcome = Outcome.FOUND if first.lost else Outcome.REGAINED
+    return Search(outcome, *first[:4], windows=windows, window_errors=errors)
 
 
 def _by_simulation(critical: Critical, sliding_at: SlidingAt, exact: Search) -> Search:
@@ -320,7 +315,7 @@ def _fades(verdict: Verdict | Known | None, duration: float, unstable: bool | No
         return verdict.regime is Regime.DAMPED
     slope, error = (verdict.evidence.get(f"envelope_slope{what}", 0.0) for what in ("", "_error"))
     slope = slope if abs(slope) > 3.0 * error else 0.0
-    if isinstance(verdict, Verdict) and verdict.second_run:  # the roughness may keep it up as well
+    if isinstance(verdict, Verdict) and verdict.decision.second_run:  # the roughness may keep it up as well
         return True if slope < 0.0 and not limited else None
     if limited:
         return None if -1.0 < slope * duration < 0.0 else slope < 0.0

@@ -62,9 +62,8 @@ def left_open(
         return bias
     far = max((slope(end) for end in wide if end in known), default=0.0)
     if one in at.orbits:
-        inner, outer = (
-            np.ptp([known[end].rate for end in ends if end in known] or [0.0]) for ends in (bracket, wide)
-        )
+        within = ([known[end].rate for end in ends if end in known] for ends in (bracket, wide))
+        inner, outer = (np.ptp(rates or [0.0]) for rates in within)
         narrowed = wide[1] - wide[0] > NARROWED * (high - low)
         if at.jumps(low, high) or (narrowed and inner > JUMP * outer):
             return max(low - wide[0], wide[1] - high, FOLD * (critical.upper - critical.lower))

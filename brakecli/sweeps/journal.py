@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from brakecli.errors import BrakecliError, CannotWriteError, RefusedError, value_text
 from brakecli.files.atomic import explained, open_own
+from brakecli.files.field import flat
 from brakecli.sweeps.plan import Plan
 from brakecli.sweeps.point import Status, record_type
 from brakecli.sweeps.workers.task import fingerprint
@@ -140,9 +141,8 @@ class Journal:
         if found and not force:
             raise RefusedError(f"{self.path}: {refusal}")
         if found and _FIRST_KEY not in found[:100]:
-            raise RefusedError(
-                f"{self.path}: was not written by this program; move it away, or choose another output"
-            )
+            what = "was not written by this program"
+            raise RefusedError(f"{self.path}: {what}; move it away, or choose another output")
         os.ftruncate(self._file.fileno(), 0)
         self._file.seek(0)
         try:
@@ -210,21 +210,10 @@ def _checksum(place: tuple[int, int, int], packed: bytes) -> int:
 
 def identity(plan: Plan) -> dict[str, Any]:
     """What makes a sweep this one: every key of the sweep and its case, and the versions it is computed with."""
-    sweep, case = tomllib.loads(plan.sweep_text), dict(_flat(plan.case_keys, "", ""))
+    sweep, case = dict(flat(tomllib.loads(plan.sweep_text))), dict(flat(plan.case_keys))
     profiles = [Path(text) for key, text in case.items() if key.endswith(".profile")]
     measured = {f"checksum of {path.name}": zlib.crc32(path.read_bytes()) for path in profiles}
-    return {**fingerprint(), **case, **measured, **dict(_flat(sweep, "sweep ", ""))}
-
-
-def _flat(value: Any, path: str, dot: str = ".") -> Iterator[tuple[str, Any]]:
-    if isinstance(value, dict):
-        for key, each in value.items():
-            yield from _flat(each, f"{path}{dot}{key}")
-    elif isinstance(value, list) and value and isinstance(value[0], dict):
-        for index, each in enumerate(value):
-            yield from _flat(each, f"{path}[{index}]")
-    else:
-        yield path, value
+    return {**fingerprint(), **case, **measured, **{f"sweep {key}": each for key, each in sweep.items()}}
 
 
 def _refusal(found: bytes, own: Mapping[str, Any]) -> str:

@@ -2,7 +2,6 @@
 
 import csv
 import io
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -22,12 +21,11 @@ from brakecli.files.atomic import new_output
 from brakecli.files.field import Field, values_of
 from brakecli.files.write import new_result
 from brakecli.runs.run import origin
+from brakecli.solver.motion import Counted
 from brakecli.solver.system import System
 from brakecli.sweeps.plan import Plan
 from brakecli.sweeps.result import unit
 from brakecli.sweeps.tables import Axis
-
-Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True)
@@ -44,7 +42,7 @@ class LockIn:
         return list(self.axis.parameter)
 
 
-def lock_in(loaded: LoadedCase, axis: Axis, option: str, progress: Progress) -> LockIn:
+def lock_in(loaded: LoadedCase, axis: Axis, option: str, progress: Counted) -> LockIn:
     """Modes and critical friction at each value of an axis; messages call the axis `option`. Raises CaseError."""
     sweep = {"case": "-", "axis": [axis.model_dump(exclude_unset=True)]}
     plan = Plan(tomli_w.dumps(sweep), given_toml(loaded.case))
@@ -70,9 +68,8 @@ def lock_in(loaded: LoadedCase, axis: Axis, option: str, progress: Progress) -> 
         found = dict(zip((field.name for field in fields.MODES), columns, strict=True))
         entries.append({"value": value, **values_of(fields.VARIED, report), **found})
     critical = list[float]()
-    turning = [
-        (value, report.stable is True) for value, report in zip(values, reports, strict=True) if report.belt_speed
-    ]
+    turned = ((value, report) for value, report in zip(values, reports, strict=True) if report.belt_speed)
+    turning = [(value, report.stable is True) for value, report in turned]
     for (low, before), (high, after) in pairwise(turning):
         if before != after:
             ends, at_low = sorted((low, high)), before if low < high else after

@@ -93,9 +93,8 @@ class Segments:
         count = len(self.systems)
         periods = max(1, math.ceil(time / self.time))
         rows = self._run(replace(self.systems[0], duration=periods * self.time), state)
-        return (
-            rows[-count * self.samples - 1 : -1 : self.samples] if len(rows) > 1 else np.full((count, 4), np.nan)
-        )
+        failed = len(rows) == 1
+        return np.full((count, 4), np.nan) if failed else rows[-count * self.samples - 1 : -1 : self.samples]
 
     def size(self, states: Floats) -> float:
         """The largest distance from steady sliding on the way from some states."""
@@ -156,9 +155,8 @@ def exponent_length(found: Sliding) -> float:
     """The time (s) of the run that Lyapunov's exponent is measured in."""
     slow = natural_frequencies(found.system.coefficients, found.stiffness)[0]
     passing = abs(found.system.belt_speed) * float(found.system.wheel.turns.min())
-    return (TRANSIENT + BATCHES * BATCH) * min(
-        max(2.0 / slow if slow > 0.0 else 0.0, 1.0 / passing), LONGEST / BATCH
-    )
+    segment = min(max(2.0 / slow if slow > 0.0 else 0.0, 1.0 / passing), LONGEST / BATCH)
+    return (TRANSIENT + BATCHES * BATCH) * segment
 
 
 def lyapunov(found: Sliding, plain: Growth | None) -> Growth | None:

@@ -128,11 +128,6 @@ class LoadedSweep:
         return self.sweep.title or self.base.case.title
 
 
-def read_sweep(source: str, overrides: Sequence[str] = ()) -> LoadedSweep:
-    """Read a sweep from a path, or from standard input where the path is "-"; see `parse_sweep`."""
-    return parse_sweep(*read_text(source), Path() if source == "-" else Path(source).parent, overrides)
-
-
 def parse_sweep(text: str, name: str, folder: Path, overrides: Sequence[str] = ()) -> LoadedSweep:
     """Make a sweep of its text; the path of its base case begins at `folder`. Raises `CaseError`.
 

@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.analysis.regime.of_run import verdict_on
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.case.case import Case
 from brakecli.case.read import key_path
@@ -21,9 +20,8 @@ from brakecli.files import fields
 from brakecli.files.field import values_of
 from brakecli.runs.certificate import Certificate, Certified
 from brakecli.runs.limits import Check, check, refuse, within_range
-from brakecli.runs.run import motion_of
+from brakecli.runs.run import motion_of, verdict_in_memory
 from brakecli.runs.together import TOGETHER, certify_together
-from brakecli.solver.history import array_history
 from brakecli.solver.motion import Motion
 from brakecli.solver.roughness import TWO_PI, wheel_angles
 from brakecli.solver.schedules import integral_at
@@ -32,7 +30,7 @@ from brakecli.sweeps.early import Ending, Known, early
 from brakecli.sweeps.plan import Plan, Settings
 
 OUT_OF_MEMORY = "out of memory; sample less often, or reduce contact.nodes"
-_UNTOLD = ("torque_variation", "numbers that last")  # no number of a sweep, and its column `settled`
+_UNTOLD = ("torque_variation", "settled")  # no number of a sweep, and a column of its own
 _FAULTS = (BrakecliError, FloatingPointError, MemoryError)
 
 
@@ -51,7 +49,7 @@ def record_type(plan: Plan) -> np.dtype[Any]:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class PointRun:
     """A run in memory, as far as a sweep is interested in it. `fields.POINT` says where each number is."""
 
     verdict: Verdict | Known
@@ -64,7 +62,7 @@ class Outcome:
     warning_count: int
 
 
-def simulate(case: Case, *, whole: bool = True) -> Outcome:
+def simulate(case: Case, *, whole: bool = True) -> PointRun:
     """Run a case in memory, to its end or, unless `whole`, only until what a sweep keeps is known.
 
     Raises RefusedError, and CaseError where it has no start.
@@ -80,29 +78,26 @@ def checked(case: Case) -> Check:
     return found
 
 
-def _judged(case: Case, found: Check, certified: Certified | None, *, whole: bool) -> Outcome:
+def _judged(case: Case, found: Check, certified: Certified | None, *, whole: bool) -> PointRun:
     """The end of `simulate`, by a motion that is known already or by one that is computed."""
     verdict: Verdict | Known
     motion: Motion | Ending
-    system = found.system
+    system, warnings = found.system, [*found.warnings]
     with within_range():
         if certified is None and not whole and (known := early(system)) is not None:
             verdict, motion, certificate = known
         else:
             motion, certificate = certified or motion_of(system)
-            if not np.isfinite(motion.rows).all():
-                raise FloatingPointError("a force overflows")
-            history = array_history(system.interval, motion.rows)
-            verdict = verdict_on(history, system, motion.work.failure_sentence, in_full=whole)
-    told = (text for text in verdict.reasons[1:] if not any(each in text for each in _UNTOLD))
-    warnings, work = [*found.warnings, *told], motion.work
+            verdict = verdict_in_memory(motion, system, in_full=whole)
+            warnings += [note for about, note in verdict.notes.items() if about not in _UNTOLD]
+    work = motion.work
     if work.unconverged_steps and not work.failed:
         warnings.append(f"{work.unconverged_steps} of {work.steps} steps did not converge, as the case allows")
     if certificate is not None and not certificate.certified:
         warnings.append(f"solver.tolerance: {certificate.sentence()}")
     status, reason = Status.FAILED if work.failed else Status.DONE, "; ".join(verdict.reasons)
     first = next(iter(warnings), "")
-    return Outcome(verdict, case, motion, certificate, status, reason, first, len(warnings))
+    return PointRun(verdict, case, motion, certificate, status, reason, first, len(warnings))
 
 
 def blank(kind: np.dtype[Any], status: Status, reason: str) -> NDArray[Any]:
@@ -123,9 +118,8 @@ def compute(plan: Plan, first: int, count: int) -> NDArray[Any]:
         points = [_begun(plan, plan.settings(each)) for each in range(start, min(start + TOGETHER, first + count))]
         ready = [each for each in points if isinstance(each, Begun)]
         with within_range():
-            certified = dict(
-                zip(map(id, ready), certify_together([each.check.system for each in ready]), strict=True)
-            )
+            found = certify_together([each.check.system for each in ready])
+        certified = dict(zip(map(id, ready), found, strict=True))
         records += [_computed(plan, each, certified.get(id(each)))[0] for each in points]
     return np.concatenate(records)
 
@@ -161,7 +155,7 @@ def line_points(plan: Plan, line: int) -> list[int]:
     return [(outer * followed.size + place) * inner + rest for place in places]
 
 
-def next_start(outcome: Outcome) -> Settings:
+def next_start(outcome: PointRun) -> Settings:
     """The start of a case where another has ended."""
     x, y, v_x, v_y = (float(value) for value in outcome.motion.rows[-1, :4])
     start: Settings = {("initial",): {"x": x, "y": y, "vx": v_x, "vy": v_y}}
@@ -206,7 +200,7 @@ def _begun(plan: Plan, settings: Settings) -> Begun | Exception:
 
 def _computed(
     plan: Plan, point: Begun | Exception, certified: Certified | None = None
-) -> tuple[NDArray[Any], Outcome | None]:
+) -> tuple[NDArray[Any], PointRun | None]:
     """The record of a point and its run, which is None where it was not possible."""
     try:
         if isinstance(point, Exception):

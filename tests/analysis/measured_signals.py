@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.analysis.regime.of_signal import Measurand, Signal, SignalVerdict, classify_signal
+from brakecli.analysis.regime.of_signal import Measurand, Signal, SignalVerdict, look
 from brakecli.analysis.regime.verdict import Regime
 
 Array = NDArray[np.float64]
@@ -103,7 +103,7 @@ def disturbed(values: Array, per_cycle: int, kind: str, seed: int = 9) -> Array:
 
 def verdict(values: Array, per_cycle: int, quantity: Measurand) -> SignalVerdict:
     """The verdict, without any knowledge of the belt."""
-    return classify_signal(Signal(values, 1.0 / per_cycle), quantity=quantity)
+    return look(Signal(values, 1.0 / per_cycle), quantity=quantity).verdict
 
 
 def outcome(found: Regime, true: Regime) -> str:
@@ -138,7 +138,7 @@ def _short_stick(stick: float, decibels: float, belt_speed: float | None) -> str
     velocity = clipped(stick)
     noise = 10.0 ** (-decibels / 20.0) * velocity.std() * np.random.default_rng(1).normal(0.0, 1.0, len(velocity))
     signal = Signal(velocity + noise, 1e-3)
-    return str(classify_signal(signal, quantity=Measurand.VELOCITY, belt_speed=belt_speed).regime)
+    return str(look(signal, quantity=Measurand.VELOCITY, belt_speed=belt_speed).verdict.regime)
 
 
 def main() -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from brakecli.analysis.regime.bursts import bursts
-from brakecli.analysis.regime.of_signal import Measurand, Signal, classify_signal
+from brakecli.analysis.regime.of_signal import Measurand, Signal, look
 from brakecli.analysis.regime.verdict import Regime
 
 RATE = 20000.0
@@ -32,7 +32,7 @@ def test_two_squeals_are_found_where_they_are(noise: float) -> None:
 @pytest.mark.parametrize("quantity", list(Measurand))
 def test_a_squeal_of_part_of_the_record_has_not_died_out(quantity: Measurand) -> None:
     values = tone(2000.0, 0.3, 0.7, 0.1) + 1e-4 * np.random.default_rng(2).normal(size=len(TIME))
-    found = classify_signal(Signal(values, 1.0 / RATE), quantity=quantity)
+    found = look(Signal(values, 1.0 / RATE), quantity=quantity).verdict
     assert found.regime == Regime.QUASI_HARMONIC, found
     assert found.frequency == pytest.approx(2000.0, rel=1e-3)
     assert "in a burst from 0.3" in found.reasons[0]
@@ -42,7 +42,7 @@ def test_a_squeal_of_part_of_the_record_has_not_died_out(quantity: Measurand) ->
 def test_a_ring_down_has_died_out_and_a_steady_tone_is_one_burst() -> None:
     noise = 1e-3 * np.random.default_rng(3).normal(size=len(TIME))
     ringing = np.exp(-8.0 * TIME) * np.sin(2.0 * np.pi * 2000.0 * TIME) + noise
-    found = classify_signal(Signal(ringing, 1.0 / RATE), quantity=Measurand.PRESSURE)
+    found = look(Signal(ringing, 1.0 / RATE), quantity=Measurand.PRESSURE).verdict
     assert found.regime == Regime.DAMPED
     assert found.bursts[0].start < 0.01
     (whole,) = bursts(np.sin(2.0 * np.pi * 440.0 * TIME) + noise, 1.0 / RATE)
@@ -53,8 +53,8 @@ def test_a_ring_down_has_died_out_and_a_steady_tone_is_one_burst() -> None:
 def test_an_acceleration_gives_the_amplitude_of_the_displacement() -> None:
     turn, size = 2.0 * np.pi * 200.0, 3e-6
     values = -(turn**2) * size * np.sin(turn * TIME)
-    found = classify_signal(Signal(values, 1.0 / RATE), quantity=Measurand.ACCELERATION)
+    found = look(Signal(values, 1.0 / RATE), quantity=Measurand.ACCELERATION).verdict
     assert found.amplitude == pytest.approx(size, rel=0.02)
     assert found.frequency == pytest.approx(200.0, rel=1e-3)
-    sound = classify_signal(Signal(values, 1.0 / RATE), quantity=Measurand.PRESSURE)
+    sound = look(Signal(values, 1.0 / RATE), quantity=Measurand.PRESSURE).verdict
     assert sound.amplitude is None  # a pressure has no metres

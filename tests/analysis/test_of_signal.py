@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from brakecli.analysis.regime.of_signal import Measurand, Signal, SignalVerdict, classify_signal
+from brakecli.analysis.regime.of_signal import Measurand, Signal, SignalVerdict, look
 from brakecli.analysis.regime.signal_rules import SignalThresholds
 from brakecli.analysis.regime.verdict import Excitation, Regime
 from tests.analysis.measured_signals import (
@@ -81,11 +81,11 @@ def test_frequency_and_amplitude_of_a_sine_are_those_of_its_displacement() -> No
         (v, Measurand.VELOCITY),
         (stiffness * x, Measurand.FORCE),
     ):
-        known = classify_signal(Signal(values, 1e-3), quantity=quantity, stiffness=stiffness)
+        known = look(Signal(values, 1e-3), quantity=quantity, stiffness=stiffness).verdict
         assert known.frequency == pytest.approx(frequency, rel=1.0 / 400)  # a bin of 400 cycles
         # smoothed over a cycle's 1/25 at most, and the largest sample up to 1/100 of a cycle from the peak
         assert known.amplitude == pytest.approx(size, rel=0.01)
-    assert classify_signal(Signal(stiffness * x, 1e-3), quantity=Measurand.FORCE).amplitude is None
+    assert look(Signal(stiffness * x, 1e-3), quantity=Measurand.FORCE).verdict.amplitude is None
 
 
 def test_events_and_time_of_stick_are_counted() -> None:
@@ -100,20 +100,20 @@ def test_events_and_time_of_stick_are_counted() -> None:
 @pytest.mark.parametrize("stick", [0.08, 0.1, 0.2])
 def test_short_stick_shows_by_the_speed_of_the_belt(stick: float) -> None:
     signal = Signal(clipped(stick), 1e-3)
-    known = classify_signal(signal, quantity=Measurand.VELOCITY, belt_speed=1.0)
+    known = look(signal, quantity=Measurand.VELOCITY, belt_speed=1.0).verdict
     assert known.regime == Regime.RELAXATION
     assert known.stick_fraction == pytest.approx(stick, abs=0.03)
-    assert classify_signal(signal, quantity=Measurand.VELOCITY).regime != Regime.QUASI_HARMONIC
+    assert look(signal, quantity=Measurand.VELOCITY).verdict.regime != Regime.QUASI_HARMONIC
 
 
 @pytest.mark.parametrize("size", [0.5, 0.9, 2.0])
 def test_a_sine_that_passes_the_belts_speed_or_keeps_below_does_not_stick(size: float) -> None:
     signal = Signal(size * np.cos(0.0631 * np.arange(20000)), 1e-3)
-    assert classify_signal(signal, quantity=Measurand.VELOCITY, belt_speed=1.0).regime == Regime.QUASI_HARMONIC
+    assert look(signal, quantity=Measurand.VELOCITY, belt_speed=1.0).verdict.regime == Regime.QUASI_HARMONIC
 
 
 def _undecided(values: Array, reason: str) -> SignalVerdict:
-    found = classify_signal(Signal(values, 1.0), quantity=Measurand.DISPLACEMENT)
+    found = look(Signal(values, 1.0), quantity=Measurand.DISPLACEMENT).verdict
     assert found.regime == Regime.UNDECIDED
     assert reason in found.reasons[0]
     assert found.frequency is None
@@ -143,17 +143,17 @@ def test_short_and_hostile_signals_are_undecided_at_worst() -> None:
     ]
     for values in hostile:
         for quantity in Measurand:
-            found = classify_signal(Signal(values, 1.0), quantity=quantity, belt_speed=1.0, stiffness=1.0)
+            found = look(Signal(values, 1.0), quantity=quantity, belt_speed=1.0, stiffness=1.0).verdict
             assert found.regime in (Regime.UNDECIDED, Regime.DAMPED), values[:5]
             assert all(np.isfinite(list(found.evidence.values()))), found.evidence
 
 
 def test_a_measurement_does_not_show_what_drives_it_and_keeps_its_thresholds() -> None:
-    found = classify_signal(
+    found = look(
         Signal(np.sin(0.1 * np.arange(5000)), 1.0),
         quantity=Measurand.DISPLACEMENT,
         thresholds=SignalThresholds(fewest_cycles=1000.0),
-    )
+    ).verdict
     assert (found.regime, found.excitation) == (Regime.UNDECIDED, Excitation.NONE)
     assert found.contact_loss_fraction is None
     assert found.thresholds.fewest_cycles == 1000.0
@@ -164,6 +164,6 @@ def test_a_measurement_does_not_show_what_drives_it_and_keeps_its_thresholds() -
 def test_a_frequency_is_better_than_one_over_the_length_of_the_record(cycles: float, form: str) -> None:
     phase = np.arange(20_000) * cycles / 20_000
     values = np.sin(2.0 * np.pi * phase) if form == "sine" else np.minimum(phase % 1.0, 10.0 * (1.0 - phase % 1.0))
-    found = classify_signal(Signal(values, 1.0 / 20_000), quantity=Measurand.DISPLACEMENT)
+    found = look(Signal(values, 1.0 / 20_000), quantity=Measurand.DISPLACEMENT).verdict
     assert found.regime == (Regime.QUASI_HARMONIC if form == "sine" else Regime.RELAXATION)
     assert found.frequency == pytest.approx(cycles, abs=0.1)

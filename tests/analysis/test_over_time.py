@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 from brakecli.analysis.regime.over_time import LOUD, over_time
-from brakecli.case.read import read_case
+from brakecli.case.read import parse_case, read_text
 from brakecli.case.system import system_of
 from brakecli.files.read import open_result
 from brakecli.solver.history import History, array_history
@@ -17,7 +17,7 @@ from brakecli.solver.quantities import HISTORY, ContactState
 from brakecli.solver.schedules import schedule
 from tests.commands import ROOT, brakecli
 
-SYSTEM = replace(system_of(read_case(str(ROOT / "cases" / "brake-stop.toml")).case), interval=1e-4)
+SYSTEM = replace(system_of(parse_case(*read_text(str(ROOT / "cases" / "brake-stop.toml"))).case), interval=1e-4)
 FREQUENCY, AMPLITUDE = 250.0, 3e-5
 
 
@@ -91,7 +91,7 @@ def test_a_fast_wheel_hides_no_vibration() -> None:
 
 
 def test_constant_speed_or_few_samples_have_no_windows() -> None:
-    steady = system_of(read_case(str(ROOT / "cases" / "relaxation.toml")).case)
+    steady = system_of(parse_case(*read_text(str(ROOT / "cases" / "relaxation.toml"))).case)
     assert over_time(burst(0.0, 4.0), steady) is None
     assert over_time(burst(0.0, 0.01, samples=100), SYSTEM) is None
     # 64 cycles of the lower natural frequency, 165 Hz, take 0.39 s

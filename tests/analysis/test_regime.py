@@ -97,9 +97,11 @@ def test_a_decay_to_nothing_is_damped() -> None:
 def test_stick_in_some_cycles_only_is_irregular() -> None:
     vx = 0.02 * np.sin(2 * np.pi * 170.0 * TIME)
     state = np.where((vx > 0.019) & (np.floor(170.0 * TIME) % 3 == 0), 0.0, -1.0)
-    verdict = classify(made(vx, state), Context(0.02))
+    verdict = classify(made(vx, state), Context(0.03))
     assert verdict.regime is Regime.UNDECIDED
     assert "irregular" in verdict.reasons[0]
+    reached = classify(made(vx, state), Context(0.02))  # the wheel's speed, between samples of every cycle
+    assert "stick is seen in 33% of the cycles, but may fall between samples in 100%" in reached.reasons[0]
 
 
 def test_a_line_of_the_roughness_is_forced_and_another_is_not() -> None:

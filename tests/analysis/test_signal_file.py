@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.io import wavfile
 
-from brakecli.analysis.regime.of_signal import Measurand, Signal, classify_signal
+from brakecli.analysis.regime.of_signal import Measurand, Signal, look
 from brakecli.analysis.regime.signal_file import read_signal
 from brakecli.errors import UnreadableResultError, UsageError
 
@@ -165,7 +165,7 @@ def test_units_come_from_the_file_or_from_options(header: str, options: dict[str
     signal = read_signal(str(path), Measurand.VELOCITY, column="2", time_column="1", **options)
     assert signal.interval == pytest.approx(1.0 / 40000.0)
     np.testing.assert_allclose(signal.values, 3e-3 * SINE, atol=1e-11)
-    assert classify_signal(signal, quantity=Measurand.VELOCITY).frequency == pytest.approx(1870.0, rel=1e-3)
+    assert look(signal, quantity=Measurand.VELOCITY).verdict.frequency == pytest.approx(1870.0, rel=1e-3)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
-from brakecli.analysis.regime.of_signal import Measurand, Signal, SignalVerdict, classify_signal
+from brakecli.analysis.regime.of_signal import Measurand, Signal, SignalVerdict, look
 from brakecli.analysis.regime.verdict import Regime
 from tests.analysis.measured_signals import Array
 from tests.campaign import counts
@@ -17,7 +17,7 @@ BOTH = (Measurand.DISPLACEMENT, Measurand.VELOCITY)
 
 
 def judged(values: Array, quantity: Measurand, rate: float = RATE) -> SignalVerdict:
-    return classify_signal(Signal(values, 1.0 / rate), quantity=quantity)
+    return look(Signal(values, 1.0 / rate), quantity=quantity).verdict
 
 
 def wandering(samples: int, size: float, random: np.random.Generator) -> Array:

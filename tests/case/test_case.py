@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from brakecli.case.case import Case, resolved_toml
-from brakecli.case.read import parse_case, read_case, starters
+from brakecli.case.read import parse_case, read_text, starters
 from brakecli.case.tables import json_schema, tables_within
 from brakecli.solver.method import MOST
 from tests.case.examples import SMALL
@@ -285,14 +285,14 @@ def test_the_text_is_kept_as_it_was_with_its_line_ends(tmp_path: Path) -> None:
     path = tmp_path / "wüst, with spaces.toml"
     text = SMALL.replace("\n", "\r\n") + "# ω"
     path.write_bytes(text.encode())
-    loaded = read_case(str(path))
+    loaded = parse_case(*read_text(str(path)))
     assert loaded.text == text
     assert loaded.case == parse_case(SMALL, "small").case
 
 
 def test_a_case_is_read_from_standard_input(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(SMALL.encode())))
-    assert read_case("-").case == parse_case(SMALL, "small").case
+    assert parse_case(*read_text("-")).case == parse_case(SMALL, "small").case
 
 
 def test_reading_a_case_imports_no_numerical_library() -> None:

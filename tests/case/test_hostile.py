@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from brakecli.case.read import parse_case, read_case
+from brakecli.case.read import parse_case, read_text
 from brakecli.case.toml_lines import LARGEST_TEXT, MOST_MARKS, MOST_PARTS, MOST_STATEMENTS
 from brakecli.errors import CaseError
 from tests.case.examples import CONSTANT, change, messages, problems, put
@@ -109,7 +109,7 @@ def test_bytes_that_are_not_utf_8_text_are_refused(tmp_path: Path, data: bytes, 
     path = tmp_path / "case.toml"
     path.write_bytes(data)
     with pytest.raises(CaseError) as caught:
-        read_case(str(path))
+        parse_case(*read_text(str(path)))
     (problem,) = caught.value.problems
     assert problem.where == (f"{path}:{place}" if place else str(path))
     assert problem.what == what
@@ -117,7 +117,7 @@ def test_bytes_that_are_not_utf_8_text_are_refused(tmp_path: Path, data: bytes, 
 
 def test_a_file_without_end_is_not_read_to_its_end() -> None:
     with pytest.raises(CaseError, match="larger than"):
-        read_case("/dev/zero")
+        parse_case(*read_text("/dev/zero"))
 
 
 @pytest.mark.parametrize("name", ["absent.toml", ".", "absent/case.toml", "x" * 300, "a\0b", "", "case.toml/x"])
@@ -127,7 +127,7 @@ def test_a_file_that_cannot_be_read_is_a_usage_error(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "case.toml").write_text(CONSTANT)
     with pytest.raises(CaseError, match=r"cannot be read: [a-z]") as caught:
-        read_case(name)
+        parse_case(*read_text(name))
     assert caught.value.exit_code == 2
 
 
@@ -139,4 +139,4 @@ def test_a_closed_standard_input_is_a_usage_error(
         stream.close()
     monkeypatch.setattr(sys, "stdin", stream)
     with pytest.raises(CaseError, match="standard input: cannot be read"):
-        read_case("-")
+        parse_case(*read_text("-"))

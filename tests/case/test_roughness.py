@@ -11,7 +11,7 @@ import tomli_w
 
 import brakecli
 from brakecli.case.case import resolved_toml
-from brakecli.case.read import LoadedCase, parse_case, parse_resolved, read_case
+from brakecli.case.read import LoadedCase, parse_case, parse_resolved, read_text
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError
 from brakecli.runs.limits import adjustments
@@ -225,7 +225,7 @@ def test_a_result_repeats_without_the_profile_and_tells_what_was_lost(tmp_path: 
     (tmp_path / "sub").mkdir()
     saved(tmp_path / "sub" / "runout.csv", "angle_deg,height_um", ANGLES, RUNOUT)
     (tmp_path / "sub" / "case.toml").write_text(SMALL + '\nroughness.wheel.profile = "runout.csv"\n')
-    first = read_case(str(tmp_path / "sub" / "case.toml"))  # the profile lies beside the case
+    first = parse_case(*read_text(str(tmp_path / "sub" / "case.toml")))  # the profile lies beside the case
     (tmp_path / "sub" / "runout.csv").unlink()
     again = parse_case(first.resolved, "resolved")
     for one, other in zip(system_of(first.case).wheel, system_of(again.case).wheel, strict=True):
@@ -254,6 +254,11 @@ WRONG = {
     "0,1\n1,1\n2,1\n3,1\n": "all heights are equal",
     "\n".join(f"{0.001 * i},{0.3 * i}" for i in range(300)): "its heights lie on a straight line",
     "1\n2\n3\n4\n": "has 1 column (found",
+    "angle_turn,height_um\n0,0\n3,1\n6,0\n9,1\n": "in a turn of 3.14 m; check their unit",
+    "angle_deg,height_um\n0,0\n200,1\n400,0\n600,1\n800,3\n": "2 in a turn of 3.14 m",
+    "0,0\n1e-300,1\n2e-300,0\n3e-300,1\n": "its places lie 1e-300 m apart",
+    "angle_deg,height_um\n0,0\n4e-6,1\n8e-6,0\n400,1\n": "its heights lie on a straight line",
+    "t,x (" + "   ".join("m" * 22) + "!)\n1,2\n2,3\n3,1\n4,5\n": "there is no unit m   m",
     "\0\0": "this is not text",
 }
 
@@ -361,15 +366,15 @@ def test_a_sweep_of_other_keys_needs_no_file_of_a_profile(tmp_path: Path) -> Non
 def test_a_profile_that_was_changed_is_read_again_and_ends_a_continuation(tmp_path: Path) -> None:
     path = profiled(tmp_path)
     text = "case = 'case.toml'\n[[axis]]\nparameter = 'wheel.radius'\nvalues = [0.5, 0.6]\n"
-    plan, before = parse_sweep(text, "sweep.toml", tmp_path).plan, read_case(str(path)).resolved
+    plan, before = parse_sweep(text, "sweep.toml", tmp_path).plan, parse_case(*read_text(str(path))).resolved
     was = identity(plan)
     saved(tmp_path / "runout.csv", "s_m,h_um", RADIUS * np.radians(ANGLES), 2.0 * RUNOUT)
-    assert read_case(str(path)).resolved != before
+    assert parse_case(*read_text(str(path))).resolved != before
     assert {key for key, value in identity(plan).items() if was[key] != value} == {"checksum of runout.csv"}
 
 
 def test_a_result_says_why_it_does_not_take_what_its_surface_was_made_of(tmp_path: Path) -> None:
-    resolved = read_case(str(profiled(tmp_path))).resolved
+    resolved = parse_case(*read_text(str(profiled(tmp_path)))).resolved
     for key in ("roughness.wheel.profile_error=0.1", "roughness.wheel.spectrum.seed=5", "wheel.radius=0.6"):
         with pytest.raises(CaseError, match="a result holds the sines of a surface alone; run the case file anew"):
             parse_resolved(resolved, "r.h5", [key])

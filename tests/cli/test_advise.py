@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 
 from brakecli.analysis.stability.advice import KEYS
-from brakecli.case.read import read_case
+from brakecli.case.read import parse_case, read_text
 from brakecli.cli.stability_tables import advice_table
 from brakecli.runs.advise import advise
 from tests.campaign import campaign
-from tests.cli.test_interrupted import many_waves
-from tests.commands import LIMIT, QUICK, ROOT, brakecli, each, left_in, started
+from tests.cli.test_interrupted import interrupt, many_waves
+from tests.commands import ROOT, brakecli, each, left_in, started
 
 CASES = {name: str(ROOT / "cases" / f"{name}.toml") for name in ("relaxation", "damped", "rough-partly-open")}
 SHORT = ["--set", "solver.duration=0.1"]
@@ -45,7 +45,7 @@ def test_json_has_the_names_of_the_page_and_the_advised_value_keeps_its_promise(
 
 def test_the_table_fits_into_eighty_columns_and_ends_in_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "80")
-    loaded = read_case(CASES["relaxation"], ["solver.duration=0.1"])
+    loaded = parse_case(*read_text(CASES["relaxation"]), ["solver.duration=0.1"])
     table = advice_table(advise(loaded, KEYS, 0.2, lambda what, done, total: None))
     assert max(map(len, table.splitlines())) <= 80
     for words in ("contact.half_length  ", "link2.angle_deg    5        7.692", "no help    -           500 to"):
@@ -85,14 +85,8 @@ def test_wrong_options_are_told(tmp_path: Path) -> None:
 def test_a_signal_ends_a_command_soon_and_leaves_nothing(
     tmp_path: Path, line: list[str], number: signal.Signals
 ) -> None:
-    (tmp_path / "waves.toml").write_text(many_waves(300, 2e-3))  # takes a minute
+    (tmp_path / "waves.toml").write_text(many_waves(300))
     with started(*line, cwd=tmp_path) as process:
         time.sleep(4.0)  # for the imports
-        assert process.poll() is None
-        start = time.monotonic()
-        process.send_signal(number)
-        out, err = process.communicate(timeout=LIMIT)
-    assert time.monotonic() - start < QUICK
-    assert (process.returncode, out) == (128 + number, b"")
-    assert err.count(b"\n") == 1
+        interrupt(process, number)
     assert left_in(tmp_path) == {"waves.toml"}

@@ -1,5 +1,6 @@
 """What a result holds, how two of them differ, and numbers for other programs."""
 
+import csv
 import math
 import re
 import wave
@@ -88,6 +89,20 @@ def test_what_is_exported_can_be_classified_by_its_names_and_units(folder: Path,
     done, verdict = (brakecli(*line, cwd=tmp_path) for line in (export, ["classify", "v.csv", *columns, "--json"]))
     assert (done.told(0), done.out) == ("", "")
     assert verdict.json["frequency"] == pytest.approx(attributes(folder / "b.h5")["frequency"], rel=1e-3)
+
+
+def test_as_many_values_as_directions_are_exported(tmp_path: Path) -> None:
+    """`hysteresis` has one number for each value, alike in both directions."""
+    (tmp_path / "tiny.toml").write_text(TINY)
+    axis = 'parameter = "friction.coefficient"\nvalues = [0.5, 0.6]\ndirection = "both"\n'
+    (tmp_path / "s.toml").write_text(f'case = "tiny.toml"\n[[axis]]\n{axis}')
+    brakecli("sweep", "s.toml", "-q", "-j", "1", cwd=tmp_path).told(0)
+    brakecli("export", "s.h5", cwd=tmp_path).told(0)
+    head, *rows = csv.DictReader((tmp_path / "s.csv").read_text().splitlines())
+    rows = [head, *rows]
+    assert len(rows) == 4
+    with h5py.File(tmp_path / "s.h5") as file:
+        assert [float(row["hysteresis"]) for row in rows] == [*file["hysteresis"]] * 2
 
 
 def test_spectra_and_chosen_variables_are_exported(folder: Path, tmp_path: Path) -> None:

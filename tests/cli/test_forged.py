@@ -103,11 +103,33 @@ def test_what_other_programs_have_added_does_no_harm(results: Path, tmp_path: Pa
         file["history/own"], file["history/one"] = np.arange(3), 1.0
         file.create_dataset("history/large", (10**9,), "f8", chunks=(1000,))
         file["history/elsewhere"], file["more/x"] = h5py.SoftLink("/nowhere"), [b"a"]
-    for command in COMMANDS["run"]:
+        file.attrs["tool_version"] = [1, 2]
+    for command in [*COMMANDS["run"], ["diff", str(results / "run.h5"), "--json"]]:
         tried(tmp_path, "f.h5", command).told(0)
     with open_result(tmp_path / "f.h5") as stored:
         assert stored.attributes["note"] == "ü"
         assert stored.read("history", "own").tolist() == [0, 1, 2]
+
+
+def test_a_history_in_half_precision_is_computed_with_in_double(results: Path, tmp_path: Path) -> None:
+    shutil.copy(results / "run.h5", tmp_path / "f.h5")
+    with h5py.File(tmp_path / "f.h5", "r+") as file:
+        half = 1e4 * np.ones_like(file["history/vy"], dtype="f2")  # its square is beyond the largest such number
+        half[::2] = -1e4
+        replaced("history/vy", half)(file)
+    done = tried(tmp_path, "f.h5", ["classify", "--json"])
+    assert done.code in (0, 4)
+    assert "Warning" not in done.told(done.code)
+    with open_result(tmp_path / "f.h5") as stored:
+        assert stored.read("history", "vy").dtype == np.float64
+
+
+def test_a_case_with_numbers_that_are_none_is_refused(results: Path, tmp_path: Path) -> None:
+    shutil.copy(results / "run.h5", tmp_path / "f.h5")
+    with h5py.File(tmp_path / "f.h5", "r+") as file:
+        file.attrs["resolved_toml"] = str(file.attrs["resolved_toml"]) + "\n[more]\nx = nan\n"
+    for command in (["diff", str(results / "run.h5"), "--json"], ["classify", "--json"]):
+        tried(tmp_path, "f.h5", command).told(4, "the case in it is not valid" if command[0] == "diff" else "")
 
 
 def dims(kind: str) -> Callable[[h5py.File], object]:

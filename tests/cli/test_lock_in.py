@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from brakecli.analysis.stability.report import stability
-from brakecli.case.read import read_case
+from brakecli.case.read import parse_case, read_text
 from brakecli.case.system import system_of
 from brakecli.cli.stability_tables import stability_table
 from brakecli.sweeps.lock_in import lock_in
@@ -116,7 +116,7 @@ def test_keys_are_tied_and_whole_numbers_stay_whole(here: Path) -> None:
 
 def test_a_table_fits_into_eighty_columns_and_breaks_no_word(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "80")
-    case = read_case(DAMPED)
+    case = parse_case(*read_text(DAMPED))
     axis = Axis(parameter=("link1.stiffness", "link2.stiffness"), start=1e7, stop=2e7, num=3)
     found = lock_in(case, axis, "--vary", lambda what, done, total: None)
     table = stability_table("Title", stability(system_of(case.case)), found).split("Along ")[1]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from brakecli.analysis.stability.report import stability
 from brakecli.case.case import Case
-from brakecli.case.read import read_case
+from brakecli.case.read import parse_case, read_text
 from brakecli.case.system import system_of
 from brakecli.cli.tables import comparison_table
 from brakecli.comparison.compare import Comparison, Entry, compare, errors
@@ -247,7 +247,7 @@ def test_the_bias_of_weights_of_one_is_as_published() -> None:
 
 def test_on_rough_surfaces_the_bias_is_that_of_stability_too() -> None:
     path, solver = str(ROOT / "cases" / "accuracy" / "C.toml"), ["solver.theta=[1.0, 1.0]", "solver.duration=1e-3"]
-    case = read_case(path, [*solver, "solver.step=2e-5", "output.sample_interval=2e-5"]).case
+    case = parse_case(*read_text(path), [*solver, "solver.step=2e-5", "output.sample_interval=2e-5"]).case
     found = compare(system_of(case), schemes=["two-layer"], steps=[2e-5], budget=1.0)
     (entry,) = entries_of(found, "two-layer", (1.0, 1.0))
     known = stability(system_of(case)).discrete
@@ -395,7 +395,7 @@ def test_options_and_outputs_that_cannot_be_are_refused_before_anything_is_compu
 
 @pytest.mark.parametrize("path", sorted((ROOT / "cases" / "accuracy").glob("*.toml")), ids=lambda path: path.stem)
 def test_every_case_of_the_documentation_on_accuracy_is_valid(path: Path) -> None:
-    case = read_case(str(path)).case
+    case = parse_case(*read_text(str(path))).case
     system = system_of(case)
     assert case.title.startswith(f"Accuracy, case {path.stem}")
     assert system.smooth == (path.stem == "S")

@@ -7,7 +7,7 @@ import h5py
 import numpy as np
 import pytest
 
-from brakecli.case.read import read_case
+from brakecli.case.read import parse_case, read_text
 from brakecli.errors import UnreadableResultError
 from brakecli.files.read import open_result
 from brakecli.plots import style
@@ -19,7 +19,7 @@ from tests.commands import ROOT
 @pytest.fixture(scope="module")
 def stop(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("stop") / "stop.h5"
-    run(read_case(str(ROOT / "cases" / "brake-stop.toml")), path, force=False)
+    run(parse_case(*read_text(str(ROOT / "cases" / "brake-stop.toml"))), path, force=False)
     return path
 
 

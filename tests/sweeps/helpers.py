@@ -17,9 +17,10 @@ from typing import Any
 
 import numpy as np
 
+from brakecli.cli.inputs import load_sweep
 from brakecli.errors import RefusedError
 from brakecli.sweeps.driver import sweep
-from brakecli.sweeps.plan import LoadedSweep, Plan, read_sweep
+from brakecli.sweeps.plan import LoadedSweep, Plan
 from brakecli.sweeps.point import Status, blank, record_type
 from brakecli.sweeps.result import SweepReport
 from brakecli.sweeps.workers.dask import ClusterEngine
@@ -55,7 +56,7 @@ def write_sweep(folder: Path, *tables: str, case: str = TINY) -> LoadedSweep:
     """A sweep of the tiny case, in s.toml."""
     (folder / "tiny.toml").write_text(case)
     (folder / "s.toml").write_text("\n".join(('case = "tiny.toml"', *tables)))
-    return read_sweep(str(folder / "s.toml"))
+    return load_sweep(str(folder / "s.toml"), None)
 
 
 # functions in place of `compute_units`: those of a module, so that worker processes find them
@@ -206,7 +207,7 @@ def journal_size(folder: Path) -> int:
 def stuck(file: str) -> None:
     """Start workers whose computation does not end."""
     os.chdir(Path(file).parent)
-    local(read_sweep(file), Path(file).with_suffix(".h5"), deaf)
+    local(load_sweep(file, None), Path(file).with_suffix(".h5"), deaf)
 
 
 def memory(file: str, name: str) -> None:
@@ -220,7 +221,7 @@ def memory(file: str, name: str) -> None:
             largest = max([largest, *map(peak, workers(os.getpid()))])
 
     functions: dict[str, Compute] = {"compute_units": compute_units, "quick": quick}
-    report = local(read_sweep(file), Path(file).with_suffix(".h5"), functions[name], 1, progress=progress)
+    report = local(load_sweep(file, None), Path(file).with_suffix(".h5"), functions[name], 1, progress=progress)
     numbers = {"points": report.findings.points, "failed": report.findings.failed, "workers": largest}
     print(json.dumps({**numbers, "parent": peak("self"), "seconds": report.seconds}))  # noqa: T201
 
@@ -229,7 +230,7 @@ def refused(*files: str) -> None:
     """Try sweeps that are too large, and print the largest memory of this process, in bytes."""
     for file in files:
         try:
-            local(read_sweep(file), Path(file).with_suffix(".h5"), compute_units)
+            local(load_sweep(file, None), Path(file).with_suffix(".h5"), compute_units)
         except RefusedError:
             continue
         raise AssertionError(file)
@@ -238,7 +239,7 @@ def refused(*files: str) -> None:
 
 def on_cluster(file: str, address: str) -> None:
     """Sweep on a cluster, with functions of this module; print what has come of it."""
-    loaded = read_sweep(file)
+    loaded = load_sweep(file, None)
     functions: dict[str, Compute] = {"deadly": deadly, "hungry": hungry}
     found = {}
     for name, function in functions.items():

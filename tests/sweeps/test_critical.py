@@ -11,6 +11,7 @@ from brakecli.analysis.stability.modes import growth as eigenvalue_growth
 from brakecli.analysis.stability.report import stability
 from brakecli.case.case import Case, changed
 from brakecli.case.system import system_of
+from brakecli.cli.inputs import load_sweep
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.motion import solve
 from brakecli.solver.system import Initial
@@ -19,7 +20,6 @@ from brakecli.sweeps.error_bar import OTHERS
 from brakecli.sweeps.floquet import Disturbances
 from brakecli.sweeps.growth import Sliding, growth, sliding, with_step
 from brakecli.sweeps.periodic import common_period
-from brakecli.sweeps.plan import read_sweep
 from brakecli.sweeps.point import verdict_of
 from brakecli.sweeps.tables import Critical
 from tests.analysis.test_regime_table import random_case
@@ -427,7 +427,7 @@ def test_multipliers_of_one_are_no_instability_without_dashpots(
     """Below flutter all multipliers have modulus one; where the wave meets a natural frequency, as at 25 degrees,
     a pad that opens bounds the motion.
     """
-    case = read_sweep(str(ROOT / "cases/paper/alpha-open.toml")).plan.case({})
+    case = load_sweep(str(ROOT / "cases/paper/alpha-open.toml"), None).plan.case({})
     bare = changed(case, link1={"damping": 0.0}, link2={"damping": 0.0, "angle_deg": angle})
 
     def sliding_at(value: float) -> Sliding | None:

@@ -9,16 +9,16 @@ from typing import Any
 
 import pytest
 
+from brakecli.cli.inputs import load_sweep
 from brakecli.errors import CannotWriteError
 from brakecli.sweeps.journal import identity
-from brakecli.sweeps.plan import read_sweep
 from tests.commands import brakecli, left_in, shell
 from tests.sweeps.helpers import frictions, inline, interrupted, journal_size, write_sweep
 
 
 def journal_bytes(folder: Path) -> int:
     """How large the journal of a sweep gets, at least: some 100 bytes of a packed point are numbers."""
-    plan = read_sweep(str(folder / "s.toml")).plan
+    plan = load_sweep(str(folder / "s.toml"), None).plan
     return len(json.dumps(identity(plan))) + 100 * plan.points
 
 

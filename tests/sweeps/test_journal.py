@@ -10,10 +10,11 @@ from pathlib import Path
 import pytest
 
 from brakecli import __version__
+from brakecli.cli.inputs import load_sweep
 from brakecli.errors import CannotWriteError, RefusedError
 from brakecli.solver.compile import source_hash
 from brakecli.sweeps.journal import open_journal
-from brakecli.sweeps.plan import LoadedSweep, read_sweep
+from brakecli.sweeps.plan import LoadedSweep
 from brakecli.sweeps.workers.task import compute_units, fingerprint
 from tests.commands import ROOT, brakecli, left_in
 from tests.sweeps.helpers import axis, frictions, inline, interrupted, write_sweep
@@ -61,12 +62,15 @@ def test_finished_points_of_another_sweep_are_refused_and_the_key_named(
     edit(tmp_path)
     before = (tmp_path / "s.h5.partial").read_bytes()
     with pytest.raises(RefusedError, match=r"s\.h5\.partial: holds .* start again with --force") as refused:
-        inline(read_sweep(str(tmp_path / "s.toml")), tmp_path / "s.h5", compute_units)
+        inline(load_sweep(str(tmp_path / "s.toml"), None), tmp_path / "s.h5", compute_units)
     assert refused.value.exit_code == 3
     assert difference in str(refused.value)
     assert (tmp_path / "s.h5.partial").read_bytes() == before
     assert left_in(tmp_path) == {"tiny.toml", "s.toml", "s.h5.partial"}
-    assert inline(read_sweep(str(tmp_path / "s.toml")), tmp_path / "s.h5", compute_units, force=True).resumed == 0
+    assert (
+        inline(load_sweep(str(tmp_path / "s.toml"), None), tmp_path / "s.h5", compute_units, force=True).resumed
+        == 0
+    )
     assert left_in(tmp_path) == {"tiny.toml", "s.toml", "s.h5"}
 
 

@@ -61,11 +61,8 @@ def bursts(values: Array, interval: float) -> list[Burst]:
 
 def _tones(values: Array, size: int) -> Iterator[tuple[int, float, float]]:
     """First sample, frequency (1/sample) and power of the tone of each frame in which one stands out."""
-    window, frequencies, ramp = (
-        np.hanning(size),
-        np.fft.rfftfreq(size).astype(np.float64),
-        np.linspace(0.0, 1.0, size),
-    )
+    window, ramp = np.hanning(size), np.linspace(0.0, 1.0, size)
+    frequencies = np.fft.rfftfreq(size).astype(np.float64)
     for first in range(0, len(values) - size + 1, size // 2):
         part = values[first : first + size]
         flat = part - part[0] - (part[-1] - part[0]) * ramp

@@ -1,7 +1,5 @@
 """The verdict on a history: what the rules decide, with the numbers of the settled part."""
 
-from collections.abc import Iterator
-
 from brakecli.analysis.regime.rules import Rules
 from brakecli.analysis.regime.spectra import segment
 from brakecli.analysis.regime.verdict import Context, Excitation, Regime, Thresholds, Verdict
@@ -25,19 +23,23 @@ def classify(
     undecided = decision.regime is Regime.UNDECIDED
     if in_full:
         _add_evidence(rules, context)
-    split = rules.parts or (None if rules.rings or not in_full else rules.split())
-    forced, own = split if split and not (cycles and split[0] > split[1]) else (None, None)
-    amplitude, spread = rules.amplitude(decision)
     lasting = decision.excitation is Excitation.FORCED and not rules.rings
     lines = (*context.forced, *context.subharmonics()) if lasting else ()
+    split = rules.parts or (None if rules.rings or not in_full else rules.split(lines or context.forced))
+    forced, own = split if split and not (cycles and split[0] > split[1]) else (None, None)
+    amplitude, spread = rules.amplitude(decision)
     ripple = context.ripple(part, lines) if context.steady and not cycles else None
     if ripple:
         rules.evidence |= {f"ripple_{name}": getattr(ripple, name) for name in ("x", "vx", "force")}
         spread = spread + ripple.size if spread is not None else None
-    notes = rules.drifts if cycles else None, ripple.sentence if ripple else None
     low, high = part.extremes("friction_force")
     variation = cycles.force_variation if cycles else high - low
-    doubts = _torque_doubts(rules, context, variation, lasting=not cycles and not undecided)
+    doubt = _torque_doubt(rules, context, variation, lasting=not cycles and not undecided)
+    notes = {
+        "settled": rules.drifts if cycles else None,
+        "ripple": ripple.sentence if ripple else None,
+        "torque_variation": doubt,
+    }
     friction = part.mean("friction_force")
     return Verdict(
         regime=decision.regime,
@@ -58,10 +60,10 @@ def classify(
         contact_loss_fraction=cycles.contact_loss_fraction if cycles else part.fraction(ContactState.SEPARATED),
         mean_friction_force=friction,
         braking_torque=radius * friction,
-        reasons=(decision.reason, *filter(None, notes), *doubts),
+        decision=decision,
+        notes={about: note for about, note in notes.items() if note},
         evidence=rules.evidence,
         thresholds=thresholds,
-        second_run=decision.second_run,
     )
 
 
@@ -74,12 +76,13 @@ def _add_evidence(rules: Rules, context: Context) -> None:
     rules.evidence |= part.lines(context.forced, context.quiet) | (context.powers(part) if context.steady else {})
 
 
-def _torque_doubts(rules: Rules, context: Context, variation: float | None, *, lasting: bool) -> Iterator[str]:
+def _torque_doubt(rules: Rules, context: Context, variation: float | None, *, lasting: bool) -> str | None:
     """Why the variation of the torque is missing, or may be too small."""
     part, interval = rules.settled_part, rules.history.interval
     if variation is None:
         finer = f"give an output.sample_interval of {0.25 * interval:.2g} s"
-        yield f"samples miss impacts of the friction force, and torque_variation is missing: {finer}"
+        return f"samples miss impacts of the friction force, and torque_variation is missing: {finer}"
     short = (part.stop - part.start) * interval < 0.999 * context.pattern
     if short and context.steady and lasting:
-        yield f"torque_variation needs {context.pattern:.3g} s, until the waves repeat: run longer"
+        return f"torque_variation needs {context.pattern:.3g} s, until the waves repeat: run longer"
+    return None

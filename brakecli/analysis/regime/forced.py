@@ -27,7 +27,6 @@ _LARGER = 5.0  # times what the waves force in full contact: a larger motion nee
 _OFTEN = 0.1  # part of the time that shows that stick or flight holds a vibration within its limits
 _RING_DOWN = 0.5  # of the own vibration's decay, and of what dashpots take, that is kept up by nothing
 _TRACE = 0.1  # part of the energy of vx on the lines themselves, without which nothing is their subharmonic
-SECOND_RUN = "a second run: brakecli classify RESULT.h5 --second-run"
 
 
 class ForcedRules:
@@ -72,7 +71,7 @@ class ForcedRules:
         turns = (self.duration if self.duration < slow else self._settled_seconds) / slow
         what = "run" if self.duration < slow else "settled part"
         text = f"the {what} holds only {turns:.2g} periods of the slowest wave, which passes every {slow:.3g} s"
-        return Decision(f"{text}; run at least {self._long_enough(slow):.3g} s")
+        return Decision(text, advice=f"run at least {self._long_enough(slow):.3g} s")
 
     @property
     def _settled_seconds(self) -> float:
@@ -97,7 +96,7 @@ class ForcedRules:
         self.evidence["forced_share"] = share
         if share >= self.limits.forced_share and self.context.undamped and growth <= 0.0:
             text = f"{share:.0%} of the energy of vx lies on the lines of the roughness"
-            return Decision(f"{text}, but no dashpot damps what the shoe adds; a dashpot would decide")
+            return Decision(f"{text}, but no dashpot damps what the shoe adds", advice="a dashpot would decide")
         if growth < 0.0 and not self._unstable_in_full_contact and not self._larger and self._follows():
             self._feeds()
             if self._locked:
@@ -118,17 +117,18 @@ class ForcedRules:
         what = f"{share:.0%} of the energy of vx lies on the lines of the roughness"
         if powers_of_e > _NOTHING:
             own = f"but sliding is unstable: the shoe's own vibration grows at {growth:.3g} 1/s"
-            text = f"{what}, {own}; run at least {1.01 * GROWN / growth:.3g} s, or decide by {SECOND_RUN}"
-            return self.fed() or Decision(text, second_run=True)
+            advice = f"run at least {1.01 * GROWN / growth:.3g} s"
+            return self.fed() or Decision(f"{what}, {own}", advice=advice, second_run=True)
         if feeds is Feeds.FRICTION and self.evidence["power_of_roughness"] < 0.0:
             return None
         doubtful = larger or self._unstable_in_full_contact or self._locked
         doubtful = doubtful or (self._makes_up and self._own_line() is not None)
         if feeds is Feeds.FRICTION or (doubtful and feeds is Feeds.UNKNOWN):
             return self._either()
+        self.evidence["forced_share"] = share
         if dense:
-            text = f"{what}, which lie too close to be told from others; run twice as long"
-            return self.fed() or Decision(f"{text}, or decide by {SECOND_RUN}", second_run=True)
+            text = f"{what}, which lie too close to be told from others"
+            return self.fed() or Decision(text, advice="run twice as long", second_run=True)
         return self._forced(what)
 
     @property
@@ -216,7 +216,7 @@ class ForcedRules:
         """Forced, as seen in a settled part of two periods of the slowest wave, and as `what` shows."""
         if self._open and not self.context.touches():
             text = "sliding steadily the shoe would not touch the wheel: it bounces, and may leave it for good"
-            return Decision(f"{text}; check the sign and size of load.force")
+            return Decision(text, advice="check the sign and size of load.force")
         growth = self.context.growth()
         fading = 0.25 * self.duration * growth > -_RELAXED  # too slowly to be seen within a quarter of the run
         falls = 0.0
@@ -232,14 +232,14 @@ class ForcedRules:
                 self.settled, what = False, f"{what}; the waves beat every {self._beat:.3g} s"
             return Decision(f"only the roughness shakes the shoe: {what}", Regime.DAMPED, Excitation.FORCED)
         needed = max(QUARTER * (self.duration - self._powers_to_lose / growth), self._long_enough(slow))
-        hint = f"; run at least {needed:.3g} s to see the amplitude that lasts"
+        advice = f"run at least {needed:.3g} s to see the amplitude that lasts"
         rate = f"a small vibration of its own decays at {-growth:.3g} 1/s"
         if self._trend < _RING_DOWN * growth and self._open:
             text = f"still decaying at {-self._trend:.3g} 1/s; {rate}"
-            return Decision(f"{text}{hint}, or decide by {SECOND_RUN}", second_run=True)
+            return Decision(text, advice=advice, second_run=True)
         own = f"; its line at {line:.4g} Hz is not told from the waves'" if (line := self._own_line()) else ""
-        text = f"the roughness shakes the shoe: {what}; {rate}{own}{hint}"
-        return Decision(text, Regime.DAMPED, Excitation.FORCED)
+        text = f"the roughness shakes the shoe: {what}; {rate}{own}"
+        return Decision(text, Regime.DAMPED, Excitation.FORCED, advice=advice)
 
     @property
     def _open(self) -> bool:
@@ -271,9 +271,8 @@ class ForcedRules:
     @property
     def _powers_to_lose(self) -> float:
         """Powers of e by which what the shoe adds has to decay until the forced motion is left."""
-        lasting = self.limits.decayed_to * math.sqrt(
-            0.5 * sum((f * swing) ** 2 for f, swing in self.context.waves)
-        )
+        forced = math.sqrt(0.5 * sum((f * swing) ** 2 for f, swing in self.context.waves))
+        lasting = self.limits.decayed_to * forced
         left = self.envelope.final / (2.0 * math.pi * lasting) if lasting > 0.0 else 1.0
         return min(max(3.0, math.log(max(left, 1.0))), GROWN)
 
@@ -326,16 +325,15 @@ class ForcedRules:
         who = "either" if min(friction, roughness) > 0.0 else "friction" if friction > 0.0 else "the roughness"
         text = f"{self._powers}, so that {'it may be ringing down' if rings else f'{who} may keep it up'}"
         if self.context.undamped and self.context.growth() <= 0.0:
-            return Decision(f"{text}, and no dashpot damps what the shoe adds; a dashpot would decide")
-        text += f"; {'run longer, or ' if rings else ''}decide by {SECOND_RUN}"
-        return Decision(f"{text}, at some four times the cost of this one", second_run=True)
+            return Decision(f"{text}, and no dashpot damps what the shoe adds", advice="a dashpot would decide")
+        return Decision(text, advice="run longer" if rings else "", second_run=True)
 
     @property
     def _powers(self) -> str:
         friction, roughness = (f"{'gives' if each > 0.0 else 'takes'} {abs(each):.2g} W" for each in self._gives)
         return f"of the vibration's power friction {friction} and the roughness {roughness}"
 
-    def split(self) -> tuple[float, float] | None:
-        """Half of peak to peak of x (m) that roughness forces and that the shoe adds, by the spectrum."""
+    def split(self, lines: Sequence[float]) -> tuple[float, float] | None:
+        """Half of peak to peak of x (m) that roughness forces on lines (Hz), and that the shoe adds."""
         slow = min((frequency for frequency, _ in self.context.waves), default=0.0)
-        return self.settled_part.split(self.context.forced) if self._settled_seconds * slow >= 2.0 else None
+        return self.settled_part.split(lines) if self._settled_seconds * slow >= 2.0 else None

@@ -16,7 +16,7 @@ from brakecli.analysis.regime.linear import linear_theory
 from brakecli.analysis.regime.over_time import over_time
 from brakecli.analysis.regime.ripple import ripple
 from brakecli.analysis.regime.spectra import forced_lines, subharmonics
-from brakecli.analysis.regime.verdict import Context, Excitation, Feeds, Regime, Thresholds, Verdict
+from brakecli.analysis.regime.verdict import Context, Decision, Feeds, Thresholds, Verdict
 from brakecli.analysis.stability.modes import growth, is_undamped, modes, slowest_of_cycles
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
@@ -74,8 +74,8 @@ def verdict_on(
     if not failure:
         return verdict
     verdict = replace(verdict, growth_rate=None, ringing_frequency=None, frequency=None, settled=False)
-    why, none = (f"the run failed: {failure}",), Excitation.NONE
-    return replace(verdict, regime=Regime.UNDECIDED, excitation=none, reasons=why, second_run=False)
+    failed = Decision(f"the run failed: {failure}")
+    return replace(verdict, regime=failed.regime, excitation=failed.excitation, decision=failed, notes={})
 
 
 def context(system: System) -> Context:
@@ -94,11 +94,8 @@ def context(system: System) -> Context:
         except CaseError:  # none: a shoe that locks itself drifts away, by what full contact makes of it
             return system.contact_stiffness
 
-    theory, turns, highest = (
-        cache(partial(linear_theory, system, belt)),
-        tuple(system.wheel.turns.tolist()),
-        0.5 / system.interval,
-    )
+    theory = cache(partial(linear_theory, system, belt))
+    turns, highest = tuple(system.wheel.turns.tolist()), 0.5 / system.interval
     swings = np.abs(known.waves[:, 0]) if turns and (known := theory()) else np.ones(len(turns))
     waves = tuple((abs(belt) * turn, float(swing)) for turn, swing in zip(turns, swings, strict=True))
     fastest = compression * system.natural_frequencies[1]
@@ -106,7 +103,7 @@ def context(system: System) -> Context:
         belt,
         radius=system.radius,
         step=0.0 if system.method.own_steps or system.method.step is None else system.step,
-        steady=len(system.belt) == 1 and len(system.load) == 1,
+        steady=system.steady,
         forced=forced_lines(belt, turns, highest),
         subharmonics=partial(subharmonics, belt, turns, highest),
         waves=waves if belt else (),

@@ -76,18 +76,6 @@ class SignalLook:
     smoothing: int  # samples
 
 
-def classify_signal(
-    signal: Signal,
-    *,
-    quantity: Measurand,
-    belt_speed: float | None = None,
-    stiffness: float | None = None,
-    thresholds: SignalThresholds = _DEFAULT,
-) -> SignalVerdict:
-    """The regime of a measured signal; `belt_speed` in m/s, `stiffness` in N/m (of a force) where known."""
-    return look(signal, quantity, belt_speed, stiffness, thresholds).verdict
-
-
 def look(
     signal: Signal,
     quantity: Measurand,
@@ -95,7 +83,10 @@ def look(
     stiffness: float | None = None,
     thresholds: SignalThresholds = _DEFAULT,
 ) -> SignalLook:
-    """The verdict with the velocity that it rests on; that of the longest burst where all else is silence."""
+    """The verdict with the velocity that it rests on; that of the longest burst where all else is silence.
+
+    `belt_speed` in m/s, `stiffness` in N/m (of a force) where known.
+    """
     step, good = signal.interval, np.flatnonzero(np.isfinite(signal.values))
     found = _judge(signal, quantity, belt_speed, stiffness, thresholds)
     filled = np.interp(np.arange(len(signal.values)), good, signal.values[good]) if len(good) else signal.values
@@ -148,7 +139,7 @@ def _judge(
         amplitude = moved * size * step**order / spring
     verdict = SignalVerdict(
         regime=decision.regime,
-        reasons=(decision.reason,),
+        reasons=(decision.sentence,),
         frequency=decision.frequency,
         amplitude=amplitude if np.isfinite(amplitude) else None,
         stick_fraction=decision.stick_fraction,

@@ -24,6 +24,8 @@ _LONGER = 1.4  # a run whose last quarter and the window before it are settled, 
 _SPARSE = 8  # of the places at which a forced motion is computed, one of so many suffices
 _UNSETTLED = 1.5  # times as many cycles where nothing has settled: a hop may look like a vibration
 _SURE = 10.0  # standard errors of a slope: neighbouring windows of an amplitude that wanders go together
+_LONG, _DASHPOT = "run longer", "a dashpot would decide"
+_FED = 0.1  # of what keeps a vibration up, that nodes may add
 _FAR = 0.3  # rad, of a wave, by which what the shoe adds moves it
 
 
@@ -38,19 +40,19 @@ class Rules(ForcedRules):
         if self.settled_part.fraction(ContactState.SEPARATED) == 1.0:
             never = self.whole.fraction(ContactState.SEPARATED) == 1.0
             text = "never touched the wheel" if never else "lost contact for good"
-            return Decision(f"the shoe has {text}; check the sign and size of load.force")
+            return Decision(f"the shoe has {text}", advice="check the sign and size of load.force")
         if self.last.fraction(ContactState.SEPARATED) == 1.0:
-            return Decision("the shoe has left the wheel; run longer, to see whether it comes back")
+            return Decision("the shoe has left the wheel", advice="run longer, to see whether it comes back")
         if (self.last if standing else self.settled_part).fraction(ContactState.STICK) < 1.0:
             return None
         if standing:
             return Decision("the shoe has come to rest, sticking to the standing wheel", Regime.DAMPED)
-        return Decision("the shoe sticks throughout and is carried along by the wheel; run longer")
+        return Decision("the shoe sticks throughout and is carried along by the wheel", advice=_LONG)
 
     def unmoved(self) -> Decision | None:
         """There is nothing to judge, or nothing that could settle."""
         if self.history.samples < FEWEST_SAMPLES:
-            return Decision(f"fewer than {FEWEST_SAMPLES} samples; run longer")
+            return Decision(f"fewer than {FEWEST_SAMPLES} samples", advice=_LONG)
         envelope = self.envelope = Envelope(self.history)
         self.evidence |= envelope.evidence
         if not self.context.steady:
@@ -59,7 +61,8 @@ class Rules(ForcedRules):
             return None
         if (growth := self.context.growth()) > 0.0:
             text = f"nothing moves yet, but sliding is unstable: a disturbance grows at {growth:.3g} 1/s"
-            return Decision(f"{text}; start beside steady sliding, or run at least {GROWN / growth:.2g} s")
+            advice = f"start beside steady sliding, or run at least {GROWN / growth:.2g} s"
+            return Decision(text, advice=advice)
         return Decision("nothing moves beyond rounding: the shoe slides steadily or rests", Regime.DAMPED)
 
     def linear(self) -> Decision | None:
@@ -75,11 +78,11 @@ class Rules(ForcedRules):
             return self._steep(theory)
         self.theory = theory
         if theory.direction == 0:
-            return Decision(f"{theory.sentence}; a dashpot would decide")
+            return Decision(theory.sentence, advice=_DASHPOT)
         if theory.direction > 0:
             more = theory.seconds_to_limit(*self._end())
             self.evidence["seconds_to_go"] = more = more + 3.0 / theory.mode.growth
-            return Decision(f"{theory.sentence}; run at least {QUARTER * (self.duration + more):.3g} s")
+            return Decision(theory.sentence, advice=f"run at least {QUARTER * (self.duration + more):.3g} s")
         if not len(theory.waves):
             return Decision(theory.sentence, Regime.DAMPED)
         if self.duration < slow:
@@ -100,7 +103,7 @@ class Rules(ForcedRules):
         self.parts = forced, 0.5 * float(np.ptp(own))
         text = "the slopes of the passing waves leave open whether the shoe's own vibration grows in full contact"
         rate = f"by {theory.mode.growth:.2g} ± {theory.known_to:.1g} 1/s"
-        return Decision(f"{text}, {rate}; run longer, and see whether amplitude_own falls")
+        return Decision(f"{text}, {rate}", advice="run longer, and see whether amplitude_own falls")
 
     def _end(self) -> tuple[float, Any]:
         """Time and state of the last sample."""
@@ -123,18 +126,18 @@ class Rules(ForcedRules):
         first = WINDOWS - int(np.argmin((left <= level)[::-1]))
         begin = max(first, 1) * self.history.samples // WINDOWS
         wait = math.log(max(end / max(level, 1e-300), 1.0)) / -theory.mode.growth
-        hint = ""
+        advice = list[str]()
         if first <= WINDOWS - 10 and self.duration - begin * self.history.interval >= 2.0 * slow:
             self.settled_part, self.settled = replace(self.whole, start=begin), True
         else:
             needed = max(_LONGER * (self.duration + wait), 1.05 * (self.duration + wait + 2.0 * slow))
-            hint = f"; run at least {needed:.3g} s to see only that"
+            advice.append(f"run at least {needed:.3g} s to see only that")
         if theory.opens and (beat := self._beat) > seen:
-            hint += f"; the waves beat every {beat:.3g} s, which may open the pad again"
+            advice.append(f"the waves beat every {beat:.3g} s, which may open the pad again")
         chosen = time >= self.settled_part.start * self.history.interval
         self.parts, self.unseen = (forced, 0.5 * float(np.ptp(own[chosen]))), forced - 0.5 * float(np.ptp(lasting))
-        text = f"only the roughness shakes the shoe, by {forced:.3g} m: {theory.sentence}{hint}"
-        return Decision(text, Regime.DAMPED, Excitation.FORCED)
+        text = f"only the roughness shakes the shoe, by {forced:.3g} m: {theory.sentence}"
+        return Decision(text, Regime.DAMPED, Excitation.FORCED, advice="; ".join(advice))
 
     def died_out(self) -> Decision | None:
         """Little is left beside the start, beside the wheel's speed and beside the compression, and it falls."""
@@ -154,7 +157,7 @@ class Rules(ForcedRules):
             found = self._forced(text)
             if found.regime is Regime.DAMPED:
                 return found
-            text = f"the shoe's own vibration has died out: {text}; {found.reason}"
+            text = f"the shoe's own vibration has died out: {text}; {found.sentence}"
             return Decision(text, Regime.DAMPED, Excitation.FORCED)
         return Decision(f"the vibration has died out: {text}", Regime.DAMPED)
 
@@ -167,46 +170,44 @@ class Rules(ForcedRules):
     def trend(self) -> Decision | None:
         """Decides where the motion still grows or decays; otherwise it finds the settled part."""
         if self.context.frictionless:
+            text = "without friction nothing excites the shoe"
             if self.context.growth() < 0.0:
-                return Decision(
-                    "without friction nothing excites the shoe, and the dashpots damp it", Regime.DAMPED
-                )
-            return Decision(
-                "without friction nothing excites the shoe, but no dashpot damps it; a dashpot would decide"
-            )
+                return Decision(f"{text}, and the dashpots damp it", Regime.DAMPED)
+            return Decision(f"{text}, but no dashpot damps it", advice=_DASHPOT)
         if self._settle():
             return None
         if "envelope_slope" not in self.evidence:
-            return Decision("the motion comes and goes; run longer")
+            return Decision("the motion comes and goes", advice=_LONG)
         if not (slope := self._trend):
             return None  # an amplitude that beats or wanders, without a trend
         if self.context.growth() > 0.0 and 0.5 * abs(slope) * self.duration <= _NEAR:
             return None  # a vibration that has reached its limits, cannot die out, and comes near its amplitude
         text = f"still {'growing' if slope > 0.0 else 'decaying'} at {abs(slope):.3g} 1/s"
         if slope < 0.0 and self.context.undamped:
-            return Decision(f"{text}, though no dashpot damps the shoe; run four times as long, or add a dashpot")
+            text += ", though no dashpot damps the shoe"
+            return Decision(text, advice="run four times as long, or add a dashpot")
         more = 3.0 / abs(slope)
         if slope < 0.0:  # until what is left is forced, has died out, or lasts
             more = max(self._powers_to_lose, math.log(max(self.envelope.final / self._little, 1.0))) / -slope
         longer = QUARTER * (self.duration + more) - self.duration  # the last quarter is judged
-        return Decision(f"{text}; run at least {longer:.2g} s longer")
+        return Decision(text, advice=f"run at least {longer:.2g} s longer")
 
     def sustained(self) -> Decision:
         """What is left is a vibration that lasts, if enough of it is there: its cycles decide."""
         theory = self.context.linear() if not self.context.forced else None
-        self.cycles = found = cycles_of(self.settled_part, theory.slip if theory else None, self.context.step)
+        known, slip = self.context, theory.slip if theory else None
+        self.cycles = found = cycles_of(self.settled_part, slip, known.step, known.belt_speed, known.waves)
         cycles = found.evidence["cycles"] if found else 0.0
         self.evidence |= found.evidence if found else {}
         if not found or cycles < (1.0 if self.settled else _UNSETTLED) * self.limits.fewest_cycles:
             text = f"only {cycles:.0f} cycles in the {'settled part' if self.settled else 'second half'}"
             if (growth := self.context.growth()) > 0.0:
                 text += f", and a disturbance of steady sliding grows at {growth:.3g} 1/s"
-            return Decision(f"{text}; run longer")
-        period, stick, harmonic = (
-            found.evidence[name] for name in ("samples_per_cycle", "stick_cycles", "harmonic_share")
-        )
+            return Decision(text, advice=_LONG)
+        names = ("samples_per_cycle", "stick_cycles", "harmonic_share")
+        period, stick, harmonic = (found.evidence[name] for name in names)
         if period < self.limits.samples_per_cycle:
-            return Decision(f"only {period:.1f} samples a cycle; reduce output.sample_interval")
+            return Decision(f"only {period:.1f} samples a cycle", advice="reduce output.sample_interval")
         if self._settled_seconds < 2.0 * (slow := self._slowest(found.amplitude)):
             return self._too_short(slow)
         if theory and (decision := self._unfounded(theory, found)):
@@ -221,13 +222,21 @@ class Rules(ForcedRules):
         unsure = self.context.undamped or self.context.growth() < 0.0
         if drift > (_DRIFT if unsure else self.limits.settled_within):
             text = f"the amplitude still changes by {found.drift.part:.1%} within the last part of the run"
-            return Decision(f"{text}; run longer")
+            return Decision(text, advice=_LONG)
+        if self.context.forced and (decision := self._rippled()):
+            return decision
         own, wander = (Excitation.SELF_EXCITED, found.frequency), found.evidence["frequency_spread"]
         held = self._held(wander, found.frequency, found.detuning)
         self.evidence["frequency_spread"] = (wander if held is None else held) + found.frequency_off
         if stick >= self.limits.stick_cycles:
             text = f"sustained, with stick in {stick:.0%} of {cycles:.0f} cycles"
             return Decision(text, Regime.RELAXATION, *own)
+        if self._sticks(stick) != self._sticks(found.may_stick):
+            finer = 0.25 * self.history.interval
+            keys = "solver.step and " * (finer < 1.1 * self.context.step) + "output.sample_interval"
+            text = f"stick is seen in {stick:.0%} of the cycles"
+            text += f", but may fall between samples in {found.may_stick:.0%}"
+            return Decision(text, advice=f"reduce {keys} to {finer:.2g} s")
         bands = self.evidence["band_share"] = self.settled_part.narrow()
         lines = f"{harmonic:.0%} of the energy of vx in one line and its harmonics"
         if harmonic < bands:
@@ -241,7 +250,22 @@ class Rules(ForcedRules):
         without = f" ({self.context.sticks:.0%} without the roughness)" if self.context.sticks else ""
         irregular = f"irregular: stick in {stick:.0%} of the cycles{without}, {lines}"
         irregular += ", but the frequency wanders" if wanders else ""
-        return Decision(f"{irregular}; run longer, or look at the spectrum")
+        return Decision(irregular, advice="run longer, or look at the spectrum")
+
+    def _rippled(self) -> Decision | None:
+        """What the ripple of the nodes gives to a vibration that friction seems to keep up."""
+        if not (ripple := self.context.ripple(self.settled_part, ())):
+            return None
+        friction, _ = self.settled_part.power("friction_force", "vx")
+        gains = max(self.context.powers(self.settled_part).get("power_dashpots", 0.0), abs(friction))
+        if ripple.power <= _FED * gains:
+            return None
+        text = f"ripple of the contact's {ripple.nodes} nodes gives {ripple.power:.2g} W to the vibration"
+        return Decision(f"{text}, so that friction may not keep it up", advice=ripple.advice)
+
+    def _sticks(self, part: float) -> int:
+        """Whether stick in a part of the cycles is stick in hardly any (0), in some, or in nearly all (2)."""
+        return (part > 1.0 - self.limits.stick_cycles) + (part >= self.limits.stick_cycles)
 
     def _drift_further(self) -> None:
         """Whether a limit cycle that seems settled may still change, and how long a run must be to show it."""
@@ -261,22 +285,19 @@ class Rules(ForcedRules):
         """What speaks against self-excited vibration on smooth surfaces, where theory knows small vibrations."""
         if found.limited < self.limits.stick_cycles:
             text = f"the shoe sticks or leaves the wheel in only {found.limited:.0%} of the settled part"
-            return Decision(f"{text}; run longer")
+            return Decision(text, advice=_LONG)
         if theory.direction > 0:
             return None
         if theory.direction == 0:
-            return Decision(
-                "sliding is stable, and no dashpot makes a large vibration settle; a dashpot would decide"
-            )
+            return Decision("sliding is stable, and no dashpot makes a large vibration settle", advice=_DASHPOT)
         if not self._relaxed:
             text = f"sliding is stable, but disturbances decay at only {-theory.mode.growth:.2g} 1/s"
-            return Decision(
-                f"{text}, so that the vibration may still die out; run at least {self._relaxing:.3g} s"
-            )
+            advice = f"run at least {self._relaxing:.3g} s"
+            return Decision(f"{text}, so that the vibration may still die out", advice=advice)
         sticks = found.evidence["stick_cycles"] >= self.limits.stick_cycles
         if abs(found.drift.part) > (self.limits.settled_within if sticks else _DRIFT):
             text = f"sliding is stable, and the amplitude still changes by {found.drift.part:.2%}"
-            return Decision(f"{text} within the last part of the run; run longer")
+            return Decision(f"{text} within the last part of the run", advice=_LONG)
         return None
 
     def decide(self) -> Decision:
@@ -291,7 +312,8 @@ class Rules(ForcedRules):
             short, change = self._settled_seconds < self._slowest(0.0), 0.5 * abs(self._trend) * self.duration
             if not self.lasts and (short or change > self.limits.settled_within):
                 return found.amplitude, None  # where it ends, the run does not show
-            return found.amplitude, self._held(found.amplitude_spread, found.amplitude, found.drift)
+            held = self._held(found.amplitude_spread, found.amplitude, found.drift)
+            return found.amplitude, held if held is None or held < found.amplitude else None
         if decision.excitation is not Excitation.FORCED:
             return part.amplitude("x"), None
         if self.theory and self.parts:
@@ -300,7 +322,7 @@ class Rules(ForcedRules):
         period = max(min(self._beat / self.history.interval, samples - 1), 1.0)
         edges = np.asarray(samples - period * np.arange(int(samples / period), -1, -1), np.float64)
         size, spread = median(swings(part, edges))
-        if self.rings or len(edges) < 3:
+        if self.rings or len(edges) < 3 - self.settled:
             return size, None
         off = SIZE_OFF * size * self.context.step / self.history.interval / contact_length(part)
         return size, off + max(spread, self._beating() * part.amplitude("x") - size)

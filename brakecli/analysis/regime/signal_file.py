@@ -64,9 +64,8 @@ def read_signal(
             values, sample_rate = _sound(path, column, sample_rate)
             return Signal(_numbers(values) * _size(None, unit, *_SI[quantity]), 1.0 / sample_rate)
         if (sample_rate is None) == (time_column is None):
-            raise UsageError(
-                "the times of the samples are needed once; give either --sample-rate HZ or --time-column"
-            )
+            what = "the times of the samples are needed once"
+            raise UsageError(f"{what}; give either --sample-rate HZ or --time-column")
         if inside is not None:
             if column is not None or time_column is not None:
                 raise UsageError("a dataset has no columns; leave out --column, and give --sample-rate HZ")
@@ -81,10 +80,9 @@ def read_signal(
             name = table.names[place] if table.names else ""
         values = _numbers(values) * size
         signal = Signal(values, 1.0 / sample_rate) if sample_rate is not None else _evenly(values, *times)
-        of_contact = quantity is Measurand.FORCE and any(
-            word in name for word in ("friction_force", "normal_force")
-        )
-        return replace(signal, notes=(*signal.notes, _JUMPS)) if of_contact else signal
+        of_contact = any(word in name for word in ("friction_force", "normal_force"))
+        jumps = [_JUMPS] * (of_contact and quantity is Measurand.FORCE)
+        return replace(signal, notes=(*signal.notes, *jumps))
     except (UsageError, UnreadableResultError) as error:
         raise type(error)(f"{source}: {error}") from error
     except OSError as error:
@@ -102,9 +100,8 @@ def _size(found: tuple[float, str] | None, option: str | None, *wanted: str) -> 
         if given[1] not in ("", *wanted):
             raise UsageError(f"{name}: is {given[1]}, not {' or '.join(wanted)}; correct the unit, or --quantity")
         if found not in (None, given):
-            raise UsageError(
-                f"{name}: the file gives another unit, of {found[0]:g} {found[1]}; leave the option out"
-            )
+            another = f"the file gives another unit, of {found[0]:g} {found[1]}"
+            raise UsageError(f"{name}: {another}; leave the option out")
         found = given
     size, base = found or (1.0, "")
     if base == "kilogram" and size > 1e-3:
@@ -119,9 +116,8 @@ def _written(text: str, option: str | None, quantity: Measurand) -> tuple[float,
         return None
     found = si(text)
     _require(found is not None, f"there is no unit {printable(text)}; say with --unit what it means")
-    _require(
-        found and found[1] in _SI[quantity], f"its unit {printable(text)} is no {quantity}; correct --quantity"
-    )
+    fits = found and found[1] in _SI[quantity]
+    _require(fits, f"its unit {printable(text)} is no {quantity}; correct --quantity")
     return found
 
 
@@ -134,8 +130,9 @@ def _sound(path: Path, column: str | None, sample_rate: float | None) -> tuple[A
             warnings.simplefilter("ignore")  # chunks that it does not know
             rate, values = wavfile.read(path)
     except Exception as error:
-        what = f"cannot be read: {' '.join(str(error).split())}"
-        raise UnreadableResultError(f"{what}; name an intact WAV file") from error
+        known = isinstance(error, ValueError | OSError)  # others are of SciPy's own code
+        what = ": " + " ".join(str(error).split()) if known else ""
+        raise UnreadableResultError(f"cannot be read{what}; name an intact WAV file") from error
     _require(rate > 0, "it has no sampling rate; name an intact WAV file")
     if sample_rate not in (None, rate):
         raise UsageError(f"--sample-rate {sample_rate:g}: the file has {rate} Hz; leave the option out")

@@ -15,6 +15,7 @@ FEWEST_SAMPLES = 64
 _FINE = 1000.0  # samples of a cycle, after interpolation, among which a plateau is sought
 _PLATEAU_SAMPLES = 1 << 20  # most samples in which a plateau is sought
 _SHORTEST_PLATEAU = 0.03  # of the time
+_LONG = "measure longer"
 
 
 @dataclass(frozen=True)
@@ -58,14 +59,15 @@ class SignalRules:
         """Decides where cycles or samples are too few, or nothing rises above the noise."""
         velocity, limits = self.velocity, self.limits
         if self.count < FEWEST_SAMPLES:
-            return Decision(f"only {self.count} samples without a gap; measure longer")
+            return Decision(f"only {self.count} samples without a gap", advice=_LONG)
         self.clean, self.power = velocity.denoised()
         self.evidence |= {"samples": float(self.count), "skewness": self.slips.skewness}
         self.evidence |= {"smoothed_over": float(self.smoothing), "events": float(self.slips.count)}
         self.evidence |= {"slip_lasts": self.slips.lasts, "slip_returns": self.slips.returns}
         self.evidence |= {"slip_swings": self.slips.swings}
         if not self.above_noise or not (self.certain or self.power.any()):
-            return Decision("the vibration is hidden by noise; measure closer to the shoe, or with less noise")
+            advice = "measure closer to the shoe, or with less noise"
+            return Decision("the vibration is hidden by noise", advice=advice)
         self.strongest = strongest = int(np.argmax(self.power))
         if self.certain:
             cycles, self.frequency = float(self.slips.count), max(self.slips.count, 1) / self.duration
@@ -76,9 +78,9 @@ class SignalRules:
         period = 1.0 / (self.frequency * self.interval)
         self.evidence |= {"cycles": cycles, "samples_per_cycle": period}
         if cycles < limits.fewest_cycles:
-            return Decision(f"only {cycles:.0f} cycles; measure longer")
+            return Decision(f"only {cycles:.0f} cycles", advice=_LONG)
         if period < limits.samples_per_cycle:
-            return Decision(f"only {period:.1f} samples a cycle; measure at a higher rate")
+            return Decision(f"only {period:.1f} samples a cycle", advice="measure at a higher rate")
         return None
 
     def unsettled(self) -> Decision | None:
@@ -100,15 +102,12 @@ class SignalRules:
                 self.start = start
                 return None
         word, end = ("growing", "settled") if ratio > 1.0 else ("decaying", "died out")
-        return Decision(f"still {word}; measure longer, until it has {end}")
+        return Decision(f"still {word}", advice=f"{_LONG}, until it has {end}")
 
     def sticking(self) -> Decision | None:
         """Decides where stick has skewed the velocity; undecided if noise hides whether two lines in step did."""
         limits, velocity, total = self.limits, self.velocity, float(self.power.sum())
-        slips, hidden = (
-            self.slips,
-            "stick, or lines in phase, have skewed the velocity, and noise hides which of them",
-        )
+        slips = self.slips
         if slips.count < limits.fewest_cycles or slips.skewness < limits.skewness_unlikely:
             return None
         if not slips.stick_slip and slips.skewness >= limits.skewness_certain:
@@ -118,7 +117,8 @@ class SignalRules:
         for name, found, least in self._overtones(total):
             self.evidence |= {name: found}
             if found <= least and CERTAIN * self.count * velocity.noise**2 * gain > least / 3.0 * total:
-                return Decision(f"{hidden}; measure with less noise, or for longer")
+                hidden = "stick, or lines in phase, have skewed the velocity, and noise hides which of them"
+                return Decision(hidden, advice="measure with less noise, or for longer")
             if found <= least:
                 return None
         if not slips.stick_slip:
@@ -150,17 +150,14 @@ class SignalRules:
         share = line_share(self.power)
         self.evidence |= {"line_share": share}
         if flat:
-            return Decision(
-                "the velocity has a plateau on one side, which short stick can cause"
-                + "; give --belt-speed" * self.has_belt
-            )
+            text = "the velocity has a plateau on one side, which short stick can cause"
+            return Decision(text, advice="give --belt-speed" * self.has_belt)
         least, most = np.quantile(self.clean + self.velocity.raw.mean(), [0.01, 0.99])
         if any(0.95 * self.belt <= v <= 1.2 * self.belt for v in (-least, most)):
-            return Decision(
-                "the velocity just reaches that of the belt; with less noise it would show whether it stays"
-            )
+            text = "the velocity just reaches that of the belt"
+            return Decision(text, advice="with less noise it would show whether it stays")
         if share < self.limits.line_share:
-            return Decision(f"irregular without stick: {share:.0%} of the energy in three lines; measure longer")
+            return Decision(f"irregular without stick: {share:.0%} of the energy in three lines", advice=_LONG)
         reason = f"sustained without stick: {share:.0%} of the energy of the velocity in at most three lines"
         known = np.isfinite(self.belt)  # otherwise stick may be too short to be seen
         reason += "" if known or not self.has_belt else "; short stick would show only by --belt-speed"

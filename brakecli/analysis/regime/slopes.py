@@ -49,10 +49,9 @@ def growth_with_slopes(
             residues = inverse @ p
     size = np.linalg.norm(p) if residues is None else np.linalg.norm(residues) * np.linalg.norm(vectors[0])
     effects = np.abs(slopes) * size
-    if residues is not None and float(effects.sum()) <= _NEGLIGIBLE * abs(
-        plain
-    ):  # a bound of what the waves change
-        return plain, float(effects.sum())
+    most = float(effects.sum())  # a bound of what the waves change
+    if residues is not None and most <= _NEGLIGIBLE * abs(plain):
+        return plain, most
     steepest = np.argsort(-effects)
     few = min(len(steepest), _MOST_WAVES)
     kept, left = steepest[:few], float(effects[steepest[few:]].sum())
@@ -108,11 +107,8 @@ def _fastest(
         if answer is not None and (found := _beside(a, p, turns, coupling, *answer, begin)) is not None:
             return float(found.real.max()), found
     size = len(sums)
-    matrix = (
-        np.kron(coupling, np.outer(p, [1.0, 0.0, 0.0, 0.0]))
-        + np.kron(np.eye(size), a)
-        - np.kron(np.diag(turns), np.eye(4))
-    )
+    matrix = np.kron(coupling, np.outer(p, [1.0, 0.0, 0.0, 0.0])) + np.kron(np.eye(size), a)
+    matrix = matrix - np.kron(np.diag(turns), np.eye(4))
     values, vectors = np.linalg.eig(matrix)
     own = slice(4 * (size // 2), 4 * (size // 2) + 4)
     try:

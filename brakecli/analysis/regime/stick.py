@@ -38,13 +38,10 @@ class Slips:
     scale: int = 1  # samples over which the velocity is smoothed to see them
     places: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, np.intp), repr=False)  # the last before
     stick: float = 0.0  # part of the time between slips
-    lasts: float = (
-        1.0  # part of a slip that is left a quarter of a cycle later; 0 for a ring-down, or a spike of x
-    )
+    lasts: float = 1.0  # part of a slip that is left a quarter of a cycle later; 0 for a ring-down, or a spike
     returns: float = 0.0  # what swings back at once, over the slip; 0 for stick, nearly 1 for a ring-down
     swings: float = 0.0  # the largest velocity the other way around the mean slip, over that in the slip
     loaded: bool = True  # whether slips go with the time that has loaded them; random spikes do not
-
     period: float = 0.0  # samples from one to the next, in the mean
 
     @property
@@ -151,13 +148,10 @@ def _returning(x: Array, starts: NDArray[np.intp], fine: int, scale: int) -> flo
     between = starts[:-1][long] + waits[long] // 2
     exact = sliding_window_view(near, 2 * scale)
     starts = starts + exact[np.minimum(starts, len(exact) - 1)].argmin(axis=1)
-    (low, high), (least, most) = (
-        (np.median(part.min(axis=1)), np.median(part.max(axis=1)))
-        for part in (
-            sliding_window_view(near, wide)[np.clip(i - wide // 4, 0, len(near) - wide)[:: 1 + len(i) // _MOST]]
-            for i in (starts, between)
-        )
-    )
+    windows = sliding_window_view(near, wide)
+    places = (np.clip(i - wide // 4, 0, len(near) - wide)[:: 1 + len(i) // _MOST] for i in (starts, between))
+    ends = ((windows[i].min(axis=1), windows[i].max(axis=1)) for i in places)
+    (low, high), (least, most) = (map(np.median, each) for each in ends)
     return float((high - most) / max(least - low, 0.25 * (most - least), 1e-300))
 
 

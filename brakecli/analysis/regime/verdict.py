@@ -91,6 +91,9 @@ class Context:
         return 1.0 / slowest if passing else 0.0
 
 
+SECOND_RUN = "decide by a second run, at some four times the cost: brakecli classify RESULT.h5 --second-run"
+
+
 class Decision(NamedTuple):
     """What a rule decides, and why."""
 
@@ -99,7 +102,14 @@ class Decision(NamedTuple):
     excitation: Excitation = Excitation.NONE
     frequency: float | None = None  # Hz
     stick_fraction: float | None = None
-    second_run: bool = False  # whether a second run may decide
+    advice: str = ""  # what to do
+    second_run: bool = False  # whether a second run may decide, too
+
+    @property
+    def sentence(self) -> str:
+        """The reason, and what to do."""
+        ways = [self.advice] * bool(self.advice) + [SECOND_RUN] * self.second_run
+        return f"{self.reason}; {', or '.join(ways)}" if ways else self.reason
 
 
 @dataclass(frozen=True)
@@ -124,7 +134,12 @@ class Verdict:
     contact_loss_fraction: float
     mean_friction_force: float  # N
     braking_torque: float  # N m, its mean torque on the wheel's axis, R F_x
-    reasons: tuple[str, ...]
+    decision: Decision
+    notes: dict[str, str]  # on single numbers, by their names
     evidence: dict[str, Any]
     thresholds: Thresholds
-    second_run: bool  # whether a second run may decide who keeps the vibration up
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """Why the regime is as it is, and the notes."""
+        return self.decision.sentence, *self.notes.values()

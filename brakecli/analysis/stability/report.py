@@ -184,10 +184,8 @@ def _discrete(system: System, stiffness_at: StiffnessAt, exact: Crossing | None,
     if system.method.own_steps:  # the motion itself
         critical, bias = (exact.friction, 0.0) if exact else (None, None)
         return Discrete(math.exp(rate * h), rate, None, critical, bias)
-    radius, critical = (
-        spectral_radius(system, stiffness_at(phi), phi),
-        discrete_critical(system, stiffness_at, exact),
-    )
+    radius = spectral_radius(system, stiffness_at(phi), phi)
+    critical = discrete_critical(system, stiffness_at, exact)
     growth = math.log(radius) / h if radius > 0.0 else None
     bias = critical - exact.friction if critical is not None and exact else None
     return Discrete(radius, growth, step_limit(system, stiffness_at), critical, bias)

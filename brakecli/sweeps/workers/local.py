@@ -79,10 +79,9 @@ class LocalEngine(Engine):
                 worker.process.start()
                 self.pool.append(worker)
         except OSError as error:
-            raise BrakecliError(
-                f"a worker process cannot be started: {error.strerror or error}; finished points are kept, run "
-                "the same command again with fewer --jobs"
-            ) from error
+            what = f"a worker process cannot be started: {error.strerror or error}"
+            remedy = "finished points are kept, run the same command again with fewer --jobs"
+            raise BrakecliError(f"{what}; {remedy}") from error
         return worker
 
     def _remove(self, worker: Worker) -> None:
