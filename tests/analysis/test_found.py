@@ -303,7 +303,11 @@ def test_the_time_that_a_verdict_asks_for_is_enough_or_the_new_one_has_another_r
 
 @pytest.mark.parametrize(
     ("name", "amplitude", "frequency", "stick"),
-    [("impacts of 70 steps", 1.1894e-5, 402.1, 0.1304), ("impacts of 14 steps", 4.455e-5, 1469.1, 0.232)],
+    [
+        ("impacts of 70 steps", 1.1894e-5, 402.1, 0.1304),
+        ("impacts of 14 steps", 4.455e-5, 1469.1, 0.232),
+        ("sticks for four steps of three layers", 9.484e-5, 428.31, 0.0452),
+    ],
 )
 def test_the_spreads_of_impacts_hold_what_shorter_steps_and_another_integrator_change(
     name: str, amplitude: float, frequency: float, stick: float
