@@ -137,6 +137,26 @@ def test_an_envelope_that_surely_grows_has_not_settled(name: str, times: float) 
     assert re.search(r"still changes by \d% within the settled part: run at least", verdict.reasons[1])
 
 
+@pytest.mark.parametrize(
+    ("name", "times", "lasting"),
+    [  # by another integrator: 52.15 Hz with a doubled period, and 7.458e-5 m
+        ("leaves a cycle that doubles", 1.0, False),
+        ("leaves a cycle that doubles", 4.0, False),
+        ("leaves a cycle that doubles", 8.0, True),
+        ("leaves a cycle for one that turns round it", 1.0, False),
+    ],
+)
+def test_a_cycle_whose_neighbours_part_has_not_settled(name: str, times: float, *, lasting: bool) -> None:
+    """The multipliers of the cycles are -1.008 and 1.025 exp(±2.34i)."""
+    exact: dict[str, Any] = {"solver__scheme": "piecewise-exact", "solver__step": None}
+    for changes in ({}, exact)[lasting:]:
+        verdict = judged(name, times, **changes)
+        assert verdict.excitation is Excitation.SELF_EXCITED
+        assert verdict.settled is lasting
+        assert lasting or re.search("neighbouring cycles part at .* run at least", verdict.reasons[1])
+    assert not lasting or verdict.frequency == pytest.approx(52.15, abs=0.02)
+
+
 def test_chaos_with_most_of_its_energy_in_three_bands_is_irregular() -> None:
     """Neighbouring runs part at 7.3 1/s, and the amplitude of a longer run is half, or two and a half times."""
     verdict = judged("chaotic")

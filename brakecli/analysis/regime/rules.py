@@ -215,7 +215,7 @@ class Rules(ForcedRules):
         if self.context.forced and not certain and (self._feeds() is Feeds.UNKNOWN or self._doubtful):
             return self._either()
         drift = abs(found.drift.part) if found.drift.sure else 0.0
-        self._drift_further()
+        self._drift_further(*found.parting)
         self.settled &= max(drift, abs(found.detuning.part) if found.detuning.sure else 0.0) <= _DRIFT
         unsure = self.context.undamped or self.context.growth() < 0.0
         if drift > (_DRIFT if unsure else self.limits.settled_within):
@@ -242,19 +242,25 @@ class Rules(ForcedRules):
         irregular += ", but the frequency wanders" if wanders else ""
         return Decision(irregular, advice="run longer, or look at the spectrum")
 
-    def _drift_further(self) -> None:
-        """Whether a limit cycle that seems settled may still change, and how long a run must be to show it."""
+    def _drift_further(self, parted: float, left: float) -> None:
+        """Whether a limit cycle that seems settled may still change, and how long a run must be to show it.
+
+        Its neighbouring cycles have `parted` by so many powers of e, and lie apart when they have by those `left`.
+        """
         slope, error = abs(self._trend), self.evidence.get("envelope_slope_error", 0.0)
-        change, rate = slope * self._settled_seconds, self._rate
+        change, rate, more = slope * self._settled_seconds, self._rate, 3.0
         if not self.settled or rate == 0.0:
             return
-        if not self.lasts:
+        if parted:
+            rate, more, self.settled = parted / self._settled_seconds, left + 3.0, False
+            text = f"neighbouring cycles part at {rate:.2g} 1/s, so that this vibration becomes another"
+        elif not self.lasts:
             text = f"this vibration may settle at only {rate:.2g} 1/s"
         elif slope > _SURE * error and change > self.limits.settled_within:
             text, self.settled = f"the vibration still changes by {change:.0%} within the settled part", False
         else:
             return
-        self.drifts = f"{text}: run at least {QUARTER * (self.duration + 3.0 / rate):.3g} s for numbers that last"
+        self.drifts = f"{text}: run at least {QUARTER * (self.duration + more / rate):.3g} s for numbers that last"
 
     def _unfounded(self, theory: "Linear", found: Cycles) -> Decision | None:
         """What speaks against self-excited vibration on smooth surfaces, where theory knows small vibrations."""
