@@ -376,6 +376,14 @@ def test_a_shoe_that_the_load_pulls_off_the_wheel_is_not_called_forced() -> None
     assert judged("hangs off the wheel", 4.0).regime is Regime.UNDECIDED
 
 
+def test_ripple_near_the_mean_makes_no_cycle_where_the_motion_repeats_without_it() -> None:
+    """By another integrator 153.27 Hz and multiples, with stick in every cycle; vx dips to -0.3 deviations."""
+    verdict = judged("ripple beside its cycles")
+    assert verdict.settled
+    assert verdict.frequency == pytest.approx(153.27, abs=verdict.evidence["frequency_spread"])
+    assert verdict.evidence["stick_cycles"] == 1.0
+
+
 def test_a_trace_that_fades_makes_no_cycle_of_three_rises() -> None:
     """By another integrator 151.4 Hz; at a third of it is 1e-4 of the energy at first, and 4e-9 later."""
     verdict = judged("a fading third of a cycle")

@@ -46,6 +46,14 @@ def test_the_three_regimes_of_the_paper(phi: float, omega: float, regime: Regime
     assert (verdict.stick_fraction > 0.02) == (regime is Regime.RELAXATION)
 
 
+def test_rises_that_miss_the_lines_of_a_motion_give_no_frequency() -> None:
+    """In most cycles of the line at 100 Hz the one at 237 Hz makes no further rise, in some it does."""
+    lines = [size * np.sin(2.0 * np.pi * frequency * TIME) for size, frequency in ((1.0, 100.0), (0.9, 237.0))]
+    verdict = classify(made(lines[0] + lines[1]), Context(3.0, growth=lambda: 1.0, settles=100.0))
+    assert (verdict.regime, verdict.frequency) == (Regime.UNDECIDED, None)
+    assert "Hz of its rises; look at the spectrum" in verdict.reasons[0]
+
+
 def test_a_shoe_shaken_by_roughness_below_its_critical_friction_is_damped_and_forced() -> None:
     verdict = verdict_of(make(ROUGH, solver__duration=1.0, solver__step=2e-5))
     assert (verdict.regime, verdict.excitation) == (Regime.DAMPED, Excitation.FORCED)

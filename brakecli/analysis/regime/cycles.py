@@ -20,6 +20,7 @@ _ALTERNATES, _PARTS = (
     0.3,
     1.0,
 )  # powers of e by which odd and even cycles, or any neighbours, part in the whole part
+_BANDS = (0.3, 0.5, 0.15)  # of the standard deviation of vx: ripple within it does not count
 _BETWEEN = 1e-3  # of the energy of vx, between the lines of one rise, that makes a cycle of several
 _SEEN = 0.85  # least part of a force's swing in every other sample that all samples see
 SIZE_OFF, _PERIOD_OFF = 3.0, 0.2  # of an amplitude and a period, per step in a contact: most that impacts were off
@@ -153,10 +154,18 @@ def _force_variation(force: Array, crossings: Array, groups: Array, alike: bool)
 
 
 def _beginnings(part: Part, velocity: Array) -> tuple[Array, int]:
-    """Where cycles begin, and how many rises each holds: one, unless lines lie between those of one."""
-    crossings = upward_crossings(velocity, 0.3 * float(velocity.std()))
+    """Where cycles begin, and how many rises each holds: one, unless lines lie between those of one.
+
+    Rises are told from ripple by the first of `_BANDS` with which the motion repeats after some of them.
+    """
+    everywhere = [upward_crossings(velocity, band * float(velocity.std())) for band in _BANDS]
+    return next((found for each in everywhere if (found := _repeated(part, velocity, each))), (everywhere[0], 1))
+
+
+def _repeated(part: Part, velocity: Array, crossings: Array) -> tuple[Array, int] | None:
+    """Where cycles begin, and how many rises each holds; None if the motion does not repeat after as few."""
     if len(crossings) < 2:
-        return crossings, 1
+        return None
     period = float(crossings[-1] - crossings[0]) / (len(crossings) - 1)
     close = 2.0 * _SAME * float(velocity.var())
     for rises in range(1, _MOST_RISES_PER_CYCLE + 1):  # after which the motion repeats
@@ -169,7 +178,7 @@ def _beginnings(part: Part, velocity: Array) -> tuple[Array, int]:
                 if part.share(lines) <= _BETWEEN:
                     return crossings[::fewer], fewer
             return crossings[::rises], rises
-    return crossings, 1
+    return None
 
 
 class Drift(NamedTuple):

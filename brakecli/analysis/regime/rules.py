@@ -19,6 +19,9 @@ _NEAR = 0.3  # by which the amplitude of a motion that stick or loss of contact 
 _DRIFT = 5e-3  # by which the amplitude of a motion without stick may change where sliding is stable
 _BANDS = 0.9  # least part of the energy in three bands: chaos may have less
 _SPREAD = 0.05  # of the frequency of cycles, beyond which three bands hold no vibration
+_CYCLES_SHARE = (
+    0.5  # of the energy on the lines of the cycles, below which they must be those of the strongest line
+)
 _REST = 0.3  # of a forced motion, by which its closed form may be off
 _LONGER = 1.4  # a run whose last quarter and the window before it are settled, over what comes before
 _SPARSE = 8  # of the places at which a forced motion is computed, one of so many suffices
@@ -224,7 +227,8 @@ class Rules(ForcedRules):
         own, wander = (Excitation.SELF_EXCITED, found.frequency), found.evidence["frequency_spread"]
         held = self._held(wander, found.frequency, found.detuning)
         self.evidence["frequency_spread"] = (wander if held is None else held) + found.frequency_off
-        if stick >= self.limits.stick_cycles:
+        misses = harmonic < _CYCLES_SHARE and not self.settled_part.on_lines(found.frequency, wander)
+        if stick >= self.limits.stick_cycles and not misses:
             text = f"sustained, with stick in {stick:.0%} of {cycles:.0f} cycles"
             return Decision(text, Regime.RELAXATION, *own)
         bands = self.evidence["band_share"] = self.settled_part.narrow()
@@ -234,13 +238,16 @@ class Rules(ForcedRules):
         wanders = wander > _SPREAD * found.frequency
         regular = harmonic if wanders or bands < _BANDS else max(harmonic, bands)
         slips = max(stick, self.context.sticks) <= 1.0 - self.limits.stick_cycles
-        if slips and regular >= self.limits.harmonic_share:
+        if slips and regular >= self.limits.harmonic_share and not misses:
             how = f"with stick in only {stick:.0%} of the cycles" if stick else "without stick"
             return Decision(f"sustained {how}: {lines}", Regime.QUASI_HARMONIC, *own)
         without = f" ({self.context.sticks:.0%} without the roughness)" if self.context.sticks else ""
         irregular = f"irregular: stick in {stick:.0%} of the cycles{without}, {lines}"
         irregular += ", but the frequency wanders" if wanders else ""
-        return Decision(irregular, advice="run longer, or look at the spectrum")
+        irregular += (
+            f", but its strongest line is not at the {found.frequency:.4g} Hz of its rises" if misses else ""
+        )
+        return Decision(irregular, advice=f"{'' if misses else 'run longer, or '}look at the spectrum")
 
     def _drift_further(self, parted: float, left: float) -> None:
         """Whether a limit cycle that seems settled may still change, and how long a run must be to show it.
