@@ -1,5 +1,6 @@
 """Regimes of runs whose regime is known, and of histories made by hand."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -72,6 +73,20 @@ def test_a_shoe_that_is_carried_along_is_not_called_damped() -> None:
     verdict = verdict_of(make(SQUEAL, **changes))
     assert verdict.regime is Regime.UNDECIDED
     assert "carried along" in verdict.reasons[0]
+
+
+@pytest.mark.parametrize(("part", "locks"), [(0.98, False), (1.02, True)])
+def test_a_shoe_that_locks_itself_is_told_that_no_longer_run_will_see_it_slip(part: float, *, locks: bool) -> None:
+    """The wheel draws x, the links ask for a force and press the pad: both are linear in x, and y gives way."""
+    angle, first, second, contact = math.radians(40.0), 1e7, 1.2e7, 2e6
+    xx, xy, yy = second * math.cos(angle) ** 2, second * math.sin(angle) * math.cos(angle), first
+    yy += second * math.sin(angle) ** 2
+    limit = (xx - xy**2 / (yy + contact)) / (contact * xy / (yy + contact))
+    changes: dict[str, Any] = {"link2__angle_deg": -40.0, "friction__coefficient": part * limit}
+    verdict = verdict_of(make(SQUEAL, **changes, wheel__angular_speed=0.5, solver__duration=1.0))
+    assert verdict.stick_fraction == float(locks)
+    assert locks is (f"it slips below a friction coefficient of {limit:.4g}" in verdict.reasons[0])
+    assert "run longer" not in verdict.reasons[0]
 
 
 def test_a_shoe_that_lost_contact_is_not_called_damped() -> None:

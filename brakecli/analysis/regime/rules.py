@@ -49,7 +49,13 @@ class Rules(ForcedRules):
             return None
         if standing:
             return Decision("the shoe has come to rest, sticking to the standing wheel", Regime.DAMPED)
-        return Decision("the shoe sticks throughout and is carried along by the wheel", advice=_LONG)
+        text = "the shoe sticks throughout and is carried along by the wheel"
+        if (limit := self.context.locks) is None or not self.context.steady:
+            return Decision(text, advice=_LONG)
+        why = "friction grows faster with x than the force that it needs, so that no longer run will see it slip"
+        return Decision(
+            f"{text}: it locks itself, as {why}", advice=f"it slips below a friction coefficient of {limit:.4g}"
+        )
 
     def unmoved(self) -> Decision | None:
         """There is nothing to judge, or nothing that could settle."""
