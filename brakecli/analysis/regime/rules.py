@@ -233,7 +233,10 @@ class Rules(ForcedRules):
         own, wander = (Excitation.SELF_EXCITED, found.frequency), found.evidence["frequency_spread"]
         held = self._held(wander, found.frequency, found.detuning)
         self.evidence["frequency_spread"] = (wander if held is None else held) + found.frequency_off
-        misses = harmonic < _CYCLES_SHARE and not self.settled_part.on_lines(found.frequency, wander)
+        wanders = wander > _SPREAD * found.frequency
+        misses = (
+            harmonic < _CYCLES_SHARE and not wanders and not self.settled_part.on_lines(found.frequency, wander)
+        )
         if stick >= self.limits.stick_cycles and not misses:
             text = f"sustained, with stick in {stick:.0%} of {cycles:.0f} cycles"
             return Decision(text, Regime.RELAXATION, *own)
@@ -241,7 +244,6 @@ class Rules(ForcedRules):
         lines = f"{harmonic:.0%} of the energy of vx in one line and its harmonics"
         if harmonic < bands:
             lines = f"{bands:.0%} of the energy of vx in three narrow bands"
-        wanders = wander > _SPREAD * found.frequency
         regular = harmonic if wanders or bands < _BANDS else max(harmonic, bands)
         slips = max(stick, self.context.sticks) <= 1.0 - self.limits.stick_cycles
         if slips and regular >= self.limits.harmonic_share and not misses:
