@@ -9,6 +9,7 @@ import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
+from datetime import date, time
 from itertools import pairwise
 from os import PathLike
 from pathlib import Path
@@ -167,7 +168,7 @@ def sweep(
 
         if axes is not None or critical is not None:
             tables = [{"parameter": keys, "values": values} for keys, values in _mapping(axes, "axes").items()]
-            given = _plain({"case": "-", "axis": tables, "critical": critical})
+            given = _plain({"case": "-", "axis": tables, "critical": critical or {}}, "sweep")
             loaded = sweep_of({name: each for name, each in given.items() if each}, _case(source, settings))
         elif isinstance(source, LoadedSweep):
             loaded = source
@@ -217,7 +218,8 @@ def classify(
     how = ("column", "time_column", "sample_rate", "unit", "time_unit")
     if unknown := sorted(reading.keys() - {*how}):
         raise UsageError(f"classify: there is no argument {unknown[0]}; give one of {', '.join(how)}")
-    changes = [f"{name}={value}" for name, value in (thresholds or {}).items()]
+    changes = [f"{name}={value}" for name, value in _mapping(thresholds, "thresholds").items()]
+    quantity = None if quantity is None else str(quantity)
     measured = Measured(quantity, belt_speed=belt_speed, stiffness=stiffness, **reading)
     with _interruptible():
         numbers = Options(measured, changes, second_run, quiet=True).verdict(str(source))
@@ -280,16 +282,12 @@ def _mapping(given: Any, name: str) -> Mapping[Any, Any]:
 def _toml(value: Any, key: str) -> str:
     import tomli_w
 
+    value = _plain(value, key)
     if isinstance(value, Mapping):
         return "{" + ", ".join(f"{name} = {_toml(each, f'{key}.{name}')}" for name, each in value.items()) + "}"
-    value = _plain(value)
     if isinstance(value, list):
         return f"[{', '.join(_toml(each, key) for each in value)}]"
-    try:
-        return tomli_w.dumps({"value": value}).removeprefix("value = ").strip()
-    except TypeError:
-        kind = type(value).__name__
-        raise UsageError(f"{key}: cannot be set to {kind}; give a number, a text, a list or a table") from None
+    return tomli_w.dumps({"value": value}).removeprefix("value = ").strip()
 
 
 def _axis(vary: "Mapping[str | tuple[str, ...], Iterable[float]]") -> "Axis":
@@ -301,22 +299,24 @@ def _axis(vary: "Mapping[str | tuple[str, ...], Iterable[float]]") -> "Axis":
     if len(_mapping(vary, "vary")) != 1:
         raise UsageError("vary: takes one key with its values, or one tuple of keys; give the others as settings")
     [(keys, values)] = vary.items()
-    axis = parse_table(Axis, tomli_w.dumps({"parameter": keys, "values": _plain(values)}), "vary")
+    axis = parse_table(Axis, tomli_w.dumps(_plain({"parameter": keys, "values": values}, "vary")), "vary")
     steps = [after - before for before, after in pairwise(axis.values or ()) if axis.numeric]
     if not axis.numeric or min(steps, default=1) * max(steps, default=1) <= 0:
         raise UsageError("vary: modes are followed along numbers that rise or fall; sort them, each once")
     return axis
 
 
-def _plain(value: Any) -> Any:
-    """A value without NumPy or xarray, as TOML holds it."""
+def _plain(value: Any, key: str) -> Any:
+    """The value of a key without NumPy or xarray, as TOML holds it, or UsageError."""
     value = value.to_numpy() if hasattr(value, "to_numpy") else value
-    if hasattr(value, "tolist"):
-        return value.tolist()
+    value = value.tolist() if hasattr(value, "tolist") else value
     if isinstance(value, Mapping):
-        return {name: _plain(each) for name, each in value.items()}
+        return {str(name): _plain(each, f"{key}.{name}") for name, each in value.items()}
     if isinstance(value, Iterable) and not isinstance(value, str):
-        return [_plain(each) for each in value]
+        return [_plain(each, key) for each in value]
+    if not isinstance(value, str | int | float | date | time | PathLike):
+        kind = type(value).__name__
+        raise UsageError(f"{key}: cannot be set to {kind}; give a number, a text, a list or a table")
     return str(value) if isinstance(value, PathLike) else value
 
 

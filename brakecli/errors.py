@@ -25,6 +25,7 @@ class Problem:
     remedy: str
     source: str = ""  # the file, or the override as ``--set key.path=VALUE``
     line: int = 0  # 0 where no line can be named
+    instead: tuple[str, ...] = ()  # of what is missing: other keys of its table that may be meant
 
     @property
     def where(self) -> str:
@@ -105,6 +106,16 @@ def in_python() -> Iterator[None]:
     except BrakecliError as error:
         error.args = (_for_python(str(error)),)
         raise
+
+
+@contextmanager
+def installed(*packages: str) -> Iterator[None]:
+    """Within the block libraries are imported; raises UsageError where one is missing."""
+    try:
+        yield
+    except ImportError as error:
+        what = f"{error.name or 'a library'} cannot be imported ({error})"
+        raise UsageError(f"{what}; install it with: python -m pip install {' '.join(packages)}") from error
 
 
 def key_text(path: KeyPath) -> str:

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import time
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -173,6 +174,12 @@ def test_errors_are_those_of_the_commands(tmp_path: Path) -> None:
         brakecli.sweep(CASE, axes=1.5)  # type: ignore[arg-type]
     with pytest.raises(UsageError, match="vary: is no mapping"):
         brakecli.stability(CASE, vary="x")  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match="thresholds: is no mapping"):
+        brakecli.classify(CASE, thresholds=5)  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match=r"vary\.values: cannot be set to Fraction"):
+        brakecli.stability(CASE, vary={"shoe.mass": [Fraction(1, 3)]})  # type: ignore[list-item]
+    with pytest.raises(UsageError, match=r"sweep\.critical\.lower: cannot be set to NoneType"):
+        brakecli.sweep(CASE, critical={"lower": None})
     endless: list[Any] = []
     endless.append(endless)
     for deep in (endless, {"parameter": endless}):

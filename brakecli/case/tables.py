@@ -125,7 +125,7 @@ class Table(BaseModel):
                 yield Problem((key,), MISSING, f"give {' and '.join((*given, *missing[0]))} together")
         elif missing and all(missing):
             choices = ", or ".join(" and ".join(group) for group in missing)
-            yield Problem((missing[0][0],), MISSING, f"give {choices}")
+            yield Problem((missing[0][0],), MISSING, f"give {choices}", instead=sum(map(tuple, missing), ()))
 
     def different_lengths(self, key: str, other: str) -> Iterator[Problem]:
         """Yield a problem if a list is not as long as another one; either may be absent."""

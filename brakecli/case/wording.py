@@ -1,6 +1,5 @@
 """What pydantic found wrong with a table, in plain sentences that name the remedy."""
 
-import re
 from collections.abc import Iterator
 from dataclasses import replace
 from difflib import get_close_matches
@@ -79,8 +78,7 @@ def _meant(path: KeyPath, tables: dict[KeyPath, type[Table]]) -> list[KeyPath]:
 
 def _may_be(missing: Problem, path: KeyPath) -> bool:
     """Whether a key is the one that is missing, or one of the choices in its place."""
-    choices = re.findall(r"\w+", missing.remedy) if ", or " in missing.remedy else ()
-    return missing.path == path or (missing.path[:-1] == path[:-1] and path[-1] in choices)
+    return missing.path[:-1] == path[:-1] and path[-1] in (missing.path[-1], *missing.instead)
 
 
 def _name(path: KeyPath, tables: dict[KeyPath, type[Table]]) -> str:

@@ -3,6 +3,7 @@
 import dataclasses
 import difflib
 import math
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any
@@ -86,18 +87,16 @@ class Options:
 
         try:
             limits = changed(Thresholds, self.thresholds)
-            return _twice(source, limits, self.quiet) if self.second_run else classify_result(Path(source), limits)
+            if not self.second_run:
+                return classify_result(Path(source), limits)
+            from brakecli.runs.second import classify_twice
+
+            tell: Callable[[str], None] = (lambda text: None) if self.quiet else say
+            with progress(self.quiet) as show_progress:
+                return classify_twice(Path(source), limits, tell, show_progress)
         except UnreadableResultError as error:
             remedy = "for a measured signal, state with --quantity what was measured"
             raise UnreadableResultError(f"{error}; {remedy}") from error
-
-
-def _twice(source: str, limits: Any, quiet: bool) -> dict[str, Any]:
-    """The verdict by a second run, whose cost is said before."""
-    from brakecli.runs.second import classify_twice
-
-    with progress(quiet) as show_progress:
-        return classify_twice(Path(source), limits, lambda text: None if quiet else say(text), show_progress)
 
 
 def changed(thresholds: type[Any], changes: list[str] | None) -> Any:

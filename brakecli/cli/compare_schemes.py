@@ -8,19 +8,18 @@ from brakecli.cli.options import AsJson, CaseArgument, Force, Overrides, Quiet, 
 from brakecli.cli.output import announce_compilation, progress, show_result
 from brakecli.solver.schemes import SCHEMES
 
+STEPS = "Time steps in s; the largest is a whole multiple of each."
+TARGET = "Recommend the cheapest method with this error."
+
 
 def command(
     case: CaseArgument,
     output: Annotated[Path | None, output_option("Result file", "the case's name with -schemes.h5, here")] = None,
     overrides: Overrides = None,
     schemes: Annotated[str | None, option(f"Compare only these: {', '.join(SCHEMES)}.", "NAME,…")] = None,
-    steps: Annotated[
-        str | None, option("Time steps in s; the largest is a whole multiple of each.", "H,…")
-    ] = None,
+    steps: Annotated[str | None, option(STEPS, "H,…")] = None,
     budget: Annotated[float, option("Approximate time to spend.", "SECONDS", min=1.0, max=86400.0)] = 60.0,
-    target_error: Annotated[
-        float, option("Recommend the cheapest method with this error.", "E", min=1e-12, max=1.0)
-    ] = 1e-3,
+    target_error: Annotated[float, option(TARGET, "E", min=1e-12, max=1.0)] = 1e-3,
     force: Force = False,
     as_json: AsJson = False,
     quiet: Quiet = False,

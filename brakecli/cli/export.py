@@ -8,6 +8,7 @@ from brakecli.cli.options import Force, Quiet, option, output_option, source_arg
 from brakecli.cli.output import show, warn
 from brakecli.files.os_signals import unwinding
 
+GROUP = "Of a run: history (default), spectrum, over_time, spectrogram, vibrations."
 VARIABLE = "Variable to export, of a table repeatable; all of them, or vx for sound, if left out."
 
 
@@ -15,9 +16,7 @@ def command(
     result: Annotated[Path, source_argument("FILE.h5", "Result of a run, a sweep, a comparison or stability.")],
     output: Annotated[Path | None, output_option("File, .csv or .wav", "FILE.csv, here")] = None,
     variables: Annotated[list[str] | None, option(VARIABLE, "NAME", "--variable")] = None,
-    group: Annotated[
-        str | None, option("Of a run: history (default), spectrum, over_time, spectrogram, vibrations.", "GROUP")
-    ] = None,
+    group: Annotated[str | None, option(GROUP, "GROUP")] = None,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:

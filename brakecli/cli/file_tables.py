@@ -31,10 +31,10 @@ def info_table(numbers: Mapping[str, Any]) -> str:
 def diff_table(files: Mapping[str, str], numbers: Mapping[str, Any]) -> str:
     """Keys, numbers and variables that differ, each side by side."""
     parts = []
-    for title, name in (("case", "case"), ("numbers", "numbers"), ("versions", "versions")):
+    for name in ("case", "numbers", "versions"):
         shown = [each for each in numbers[name] if not each["name"].startswith(_ASIDE)]
         if shown:
-            columns = {title: [each["name"] for each in shown]}
+            columns = {name: [each["name"] for each in shown]}
             for side in ("a", "b"):
                 columns[files[side]] = [_text(each[side], each.get("units")) for each in shown]
             parts.append(grid(columns))

@@ -2,13 +2,13 @@
 
 import os
 import shlex
-from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from brakecli.errors import CaseError, UnreadableResultError, UsageError
+from brakecli.files.atomic import refuse_source
 
 if TYPE_CHECKING:
     from brakecli.case.read import LoadedCase
@@ -90,9 +90,7 @@ def result_path(output: Path | None, source: str, kind: str = "case", ending: st
     """
     target = output or Path((kind if source == "-" else Path(source).stem) + ending)
     if source != "-" and not is_result(source):
-        with suppress(OSError, ValueError):  # one of them does not exist, or cannot
-            if target.samefile(source):
-                raise UsageError(f"{target}: this is the {kind} itself; choose another output with -o")
+        refuse_source(target, source, kind)
     return target
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from brakecli.cli.options import option
-from brakecli.errors import UsageError
+from brakecli.errors import UsageError, printable
 
 if TYPE_CHECKING:
     from brakecli.analysis.regime.of_signal import SignalLook
@@ -39,9 +39,8 @@ class Measured:
         for name, value in asdict(self).items():
             where = "--" + name.replace("_", "-")
             if value is not None and quantity is None:
-                raise UsageError(
-                    f"{where}: is only for a measured signal; state with --quantity what was measured"
-                )
+                remedy = "state with --quantity what was measured"
+                raise UsageError(f"{where}: is only for a measured signal; {remedy}")
             if name == "stiffness" and value is not None and not 0.0 < value < math.inf:
                 raise UsageError(f"{where} {value}: is not a positive number; give one in SI units")
             if name == "belt_speed" and value is not None and not math.isfinite(value):
@@ -60,7 +59,9 @@ class Measured:
 
         name, reading = self.quantity_of(source), asdict(self)
         if name not in set(Measurand):
-            raise UsageError(f"--quantity {name}: is not known; give one of {', '.join(Measurand)}")
+            raise UsageError(
+                f"--quantity {printable(str(name))}: is not known; give one of {', '.join(Measurand)}"
+            )
         del reading["quantity"]
         machine = {key: reading.pop(key) for key in ("belt_speed", "stiffness")}
         signal = read_signal(source, Measurand(name), **reading)

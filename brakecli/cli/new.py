@@ -36,7 +36,7 @@ def command(
     path = output or Path(name if name.endswith(".toml") else f"{name}.toml")
     text = texts.get(name.removesuffix(".toml"), texts["case"])
     written, is_sweep = {path: text}, text.startswith("case = ", text.find("\n\n") + 2)
-    if is_sweep and not (base := path.with_name("case.toml")).exists():
+    if is_sweep and not (base := path.parent / "case.toml").exists():
         written[base] = texts["case"]
     for place, content in written.items():
         with unwinding(), new_output(place, force=force) as file:

@@ -10,6 +10,7 @@ from brakecli.errors import UsageError
 from brakecli.files.os_signals import unwinding
 
 SOURCE = "Result of a run, a sweep, a comparison or stability; with --quantity a measured signal, as for classify."
+SELECT = "Draw the nearest value of a sweep's axis; repeatable."
 VARIABLE = (
     "Draw this number of a sweep; of a run x, y, vx, vy, friction_force, normal_force, torque or contact_fraction."
 )
@@ -19,9 +20,7 @@ VARIABLE = (
 def command(
     result: Annotated[str, source_argument("FILE", SOURCE)],
     output: Annotated[Path | None, output_option("Picture", "FILE.png, here")] = None,
-    select: Annotated[
-        list[str] | None, option("Draw the nearest value of a sweep's axis; repeatable.", "KEY=VALUE")
-    ] = None,
+    select: Annotated[list[str] | None, option(SELECT, "KEY=VALUE")] = None,
     variable: Annotated[str | None, option(VARIABLE, "NAME")] = None,
     measured: Measured = UNMEASURED,
     force: Force = False,

@@ -6,11 +6,11 @@ from typing import Annotated
 from brakecli.cli.options import Force, Quiet, output_option, source_argument
 from brakecli.cli.output import announce_compilation, progress, show
 
+RESULTS = "Results of runs, sweeps, comparisons or stability."
+
 
 def command(
-    results: Annotated[
-        list[Path], source_argument("FILE.h5…", "Results of runs, sweeps, comparisons or stability.")
-    ],
+    results: Annotated[list[Path], source_argument("FILE.h5…", RESULTS)],
     output: Annotated[Path | None, output_option("Page", "report.html, here")] = None,
     force: Force = False,
     quiet: Quiet = False,

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 from brakecli.cli.inputs import load_case, result_path
 from brakecli.cli.options import AsJson, CaseArgument, Force, Overrides, Quiet, option, output_option
 from brakecli.cli.output import announce_compilation, progress, say, show_result
-from brakecli.errors import UsageError
+from brakecli.errors import UsageError, printable
 
 if TYPE_CHECKING:
     from brakecli.sweeps.tables import Axis
 
+VARY = "Follow both modes along a key, or along several alike."
 MOST_VALUES = 10_000
 
 
@@ -19,9 +20,7 @@ def command(
     case: CaseArgument,
     output: Annotated[Path | None, output_option("File of --vary: .h5 or .csv", "none")] = None,
     overrides: Overrides = None,
-    vary: Annotated[
-        str | None, option("Follow both modes along a key, or along several alike.", "KEY[,KEY]=START:STOP:NUM")
-    ] = None,
+    vary: Annotated[str | None, option(VARY, "KEY[,KEY]=START:STOP:NUM")] = None,
     force: Force = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
@@ -50,7 +49,7 @@ def command(
 
             with new_output(target, force=force) if target else nullcontext():  # whether it can be written
                 pass
-            found = lock_in(loaded, axis, f"--vary {vary}", show_progress)
+            found = lock_in(loaded, axis, f"--vary {printable(str(vary))}", show_progress)
             if target:
                 write(target, loaded, found, force=force)
     numbers = values_of(STABILITY, report)
@@ -73,4 +72,4 @@ def _parse_axis(text: str) -> "Axis":
         if different and axis.size <= MOST_VALUES and (axis.size == 1 or axis.start != axis.stop):
             return axis
     what = f"is not KEY=START:STOP:NUM with two ends, NUM from 1 to {MOST_VALUES}, and no key twice"
-    raise UsageError(f"--vary {text}: {what}; write, for instance, --vary link2.angle_deg=1:10:10")
+    raise UsageError(f"--vary {printable(text)}: {what}; write, for instance, --vary link2.angle_deg=1:10:10")

@@ -58,14 +58,11 @@ def _lock_in(found: LockIn) -> str:
     columns = {"value": [f"{entry['value']:.6g}" for entry in entries]}
     columns |= {field.title: [text_of(each[field.name]) for each in entries] for field in fields.VARIED}
     looks = (("frequency {}, Hz", 1.0, ".5g"), ("growth {}, 1/s", 1.0, ".4g"), ("damping {}, %", 100.0, ".3g"))
-    columns |= {
-        head.format(mode + 1): [
-            text_of(None if value is None else factor * value, form=form)
-            for value in (each[field.name][mode] for each in entries)
-        ]
-        for field, (head, factor, form) in zip(fields.MODES, looks, strict=True)
-        for mode in (0, 1)
-    }
+    for field, (head, factor, form) in zip(fields.MODES, looks, strict=True):
+        for mode in (0, 1):
+            values = [each[field.name][mode] for each in entries]
+            shown = [None if value is None else factor * value for value in values]
+            columns[head.format(mode + 1)] = [text_of(value, form=form) for value in shown]
     units = unit(found.parameters[0])
     critical = ", ".join(text_of(value, units.removeprefix("1"), ".7g") for value in found.critical_values)
     changes = f"Stability changes at {critical}." if critical else "Stability does not change in between."

@@ -10,6 +10,8 @@ from brakecli.errors import BrakecliError
 
 JOBS = "Worker processes  [default: one for each core]"
 SCHEDULER = "Compute on a dask cluster: the scheduler's address, as tcp://host:8786."
+SCHEDULER_FILE = "The same cluster, given by the scheduler's file."
+TASK_SIZE = "Points in each task  [default: as many as take 0.2 s]"
 SETTING = "Set a key of the base case or of [critical]; repeatable."
 REPLACE = "Replace an existing output, and drop finished points of another sweep."
 
@@ -20,12 +22,8 @@ def command(
     overrides: Annotated[list[str] | None, option(SETTING, *SET)] = None,
     jobs: Annotated[int | None, option(JOBS, None, "--jobs", "-j", min=1, max=4096)] = None,
     scheduler: Annotated[str | None, option(SCHEDULER, "ADDRESS", envvar="DASK_SCHEDULER_ADDRESS")] = None,
-    scheduler_file: Annotated[
-        str | None, option("The same cluster, given by the scheduler's file.", "FILE")
-    ] = None,
-    task_size: Annotated[
-        int | None, option("Points in each task  [default: as many as take 0.2 s]", min=1)
-    ] = None,
+    scheduler_file: Annotated[str | None, option(SCHEDULER_FILE, "FILE")] = None,
+    task_size: Annotated[int | None, option(TASK_SIZE, min=1)] = None,
     force: Annotated[bool, option(REPLACE, None, "--force")] = False,
     as_json: AsJson = False,
     quiet: Quiet = False,

@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import pairwise
@@ -17,7 +17,7 @@ from brakecli.runs.limits import check, refuse, within_range
 from brakecli.solver import contact
 from brakecli.solver.compile import Floats
 from brakecli.solver.method import Method
-from brakecli.solver.motion import Motion, Work, solve
+from brakecli.solver.motion import Counted, Motion, Work, solve
 from brakecli.solver.quantities import HISTORY
 from brakecli.solver.schemes import load
 from brakecli.solver.system import System
@@ -30,8 +30,6 @@ MOST_REPEATS, SLOW_REPEATS = 21, 3  # turns of most loops, and of slow ones: the
 SLOW = 0.1  # s, of a loop
 LONGEST_CALL = 1.0  # s, of a loop that is timed in one call; the time that blocks take is small beside longer ones
 LEFT_OUT = "left out: no time within the budget"
-
-Progress = Callable[[str, int, int], None]  # called with what is done, how many rungs are done, and of how many
 
 
 @dataclass(frozen=True)
@@ -122,7 +120,7 @@ def compare(
     schemes: Sequence[str] = (),
     steps: Sequence[float] = (),
     budget: float = 60.0,
-    progress: Progress = lambda what, done, total: None,
+    progress: Counted = lambda what, done, total: None,
 ) -> Comparison:
     """Compare the methods on a system within about `budget` s. Raises RefusedError where there is no reference."""
     with within_range():
@@ -176,7 +174,7 @@ def _reference(system: System, budget: float) -> Motion:
         part = replace(part, duration=min(longer, whole))
 
 
-def _measure(system: System, entries: list[Entry], reference: Floats, deadline: float, progress: Progress) -> None:
+def _measure(system: System, entries: list[Entry], reference: Floats, deadline: float, progress: Counted) -> None:
     """Run every rung once, the coarse ones first, while there is time, and measure its error."""
     last: dict[Method, float] = {}
     for done, entry in enumerate(sorted(entries, key=lambda each: each.place)):
@@ -198,7 +196,7 @@ def _measure(system: System, entries: list[Entry], reference: Floats, deadline: 
             entry.errors = errors(motion.rows, reference)
 
 
-def _repeat(system: System, entries: list[Entry], deadline: float, progress: Progress) -> int:
+def _repeat(system: System, entries: list[Entry], deadline: float, progress: Counted) -> int:
     """Time all that ran again, in turns, as often as the budget allows; how many times each."""
     timed = [entry for entry in entries if entry.seconds]
     for repeat in range(MOST_REPEATS):

@@ -95,9 +95,14 @@ def check_target(target: Path, what: str, suffixes: Sequence[str], results: Iter
         named = " or ".join(filter(None, (", ".join(suffixes[:-1]), suffixes[-1])))
         raise UsageError(f"{target}: {problem}; name a file that ends in {named} with -o")
     for result in results:
-        with suppress(OSError, ValueError):  # one of them does not exist, or cannot
-            if target.samefile(result):
-                raise UsageError(f"{target}: this is the result itself; choose another output with -o")
+        refuse_source(target, result, "result")
+
+
+def refuse_source(target: Path, source: str | Path, what: str) -> None:
+    """Raise UsageError where a target is the file that it is made of."""
+    with suppress(OSError, ValueError):  # one of them does not exist, or cannot
+        if target.samefile(source):
+            raise UsageError(f"{target}: this is the {what} itself; choose another output with -o")
 
 
 @contextmanager

@@ -3,7 +3,7 @@
 import math
 import tomllib
 from bisect import bisect_left
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,7 +33,7 @@ def contents(result: StoredResult) -> dict[str, Any]:
     attributes = result.attributes
     known = {name: attributes.get(name) for name in ("status", "kind", "title", "format_version")}
     sizes = {"whole": result.sealed, "bytes": result.length}
-    return {"path": str(result.path), **known, **sizes, "versions": _versions(attributes), "variables": held}
+    return {"path": str(result.path), **known, **sizes, "versions": result.versions, "variables": held}
 
 
 @dataclass(frozen=True)
@@ -73,13 +73,8 @@ def difference(a: StoredResult, b: StoredResult) -> Difference:
     for each in differing:
         each["units"] = units.get(each["name"], units.get(f"/{each['name']}", ""))
     variables = [each for group in groups for each in _variables(a, b, group)]
-    of_program = [*_changed(*(_versions(each.attributes) for each in (a, b)))]
+    of_program = [*_changed(a.versions, b.versions)]
     return Difference([*_changed(*map(_keys, (a, b)))], differing, variables, of_program)
-
-
-def _versions(attributes: Mapping[str, Any]) -> dict[str, Any]:
-    names = [name for name in attributes if name.endswith("_version") and name != "format_version"]
-    return {name.removesuffix("_version"): plain(attributes[name]) for name in names}
 
 
 def _keys(result: StoredResult) -> dict[str, Any]:
@@ -109,12 +104,10 @@ def _changed(a: dict[str, Any], b: dict[str, Any]) -> Iterator[dict[str, Any]]:
 
 def _variables(a: StoredResult, b: StoredResult, group: str) -> Iterator[dict[str, Any]]:
     """The variables of a group that differ, at the same places along their axis."""
-    known = [
-        {name: each for name, each in result.variables(group).items() if "units" in each.attributes}
-        if group in result.groups()
-        else {}
-        for result in (a, b)  # what other programs have added need not have units
-    ]
+    known = []
+    for result in (a, b):  # what other programs have added need not have units
+        there = result.variables(group) if group in result.groups() else {}
+        known.append({name: each for name, each in there.items() if "units" in each.attributes})
     for name in dict.fromkeys([*known[0], *known[1]]):
         held = [each[name] for each in known if name in each]
         shapes = [list(each[name].shape) if name in each else [] for each in known]

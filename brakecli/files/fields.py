@@ -48,15 +48,9 @@ VERDICT = within(
     Field("thresholds", "", "limits of the rules", OBJECT, group="regime/thresholds"),
 )
 MEASURED_UNITS = {"displacement": "m", "velocity": "m/s", "force": "N", "acceleration": "m/s²", "pressure": "Pa"}
-EVIDENCE_UNITS = {"envelope_slope": "1/s", "envelope_final": "m/s", "envelope_largest": "m/s", "power_": "W"}
-EVIDENCE_UNITS |= {
-    "amplitude_v": "m/s",
-    "amplitude_": "m",
-    "seconds": "s",
-    "frequency_": "Hz",
-    "line_freq": "Hz",
-    "force_": "N",
-}
+EVIDENCE_UNITS = {"envelope_slope": "1/s", "seconds": "s", "frequency_": "Hz", "line_freq": "Hz", "power_": "W"}
+EVIDENCE_UNITS |= dict.fromkeys(("envelope_final", "envelope_largest", "amplitude_v"), "m/s")
+EVIDENCE_UNITS |= {"amplitude_": "m", "force_": "N"}
 """By how the names of the evidence begin; all others are pure numbers."""
 
 

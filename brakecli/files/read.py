@@ -24,17 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.errors import UnreadableResultError, printable
-from brakecli.files.valid import (
-    LARGEST,
-    LARGEST_IN_HISTORY,
-    attributes_of,
-    axes_of,
-    check_size,
-    check_variables,
-    member,
-    plain_attribute,
-    read_everything,
-)
+from brakecli.files import valid
 
 FORMAT = "brakecli"
 FORMAT_VERSION = 1
@@ -68,12 +58,12 @@ class StoredResult:
         with _explained(self.path):
             names = ["/"]
             self.file.visit(names.append)
-            return [name for name in names if isinstance(member(self.file, name), h5py.Group)]
+            return [name for name in names if isinstance(valid.member(self.file, name), h5py.Group)]
 
     def group_attributes(self, group: str) -> dict[str, Any]:
         """The attributes of a group."""
         with _explained(self.path):
-            return attributes_of(self._group(group), str(self.attributes.get("kind")))
+            return valid.attributes_of(self._group(group), str(self.attributes.get("kind")))
 
     def text(self, name: str) -> str:
         """A text among the attributes of the root."""
@@ -82,39 +72,45 @@ class StoredResult:
                 raise ValueError(f"attribute {name} is missing")
             return str(self.attributes[name])
 
+    @property
+    def versions(self) -> dict[str, str]:
+        """Program and libraries by which it was made."""
+        names = [name for name in self.attributes if name.endswith("_version") and name != "format_version"]
+        return {name.removesuffix("_version"): str(self.attributes[name]) for name in names}
+
     def variables(self, group: str) -> dict[str, Variable]:
         """The variables of a group, its axes included, by name."""
         found = {}
         with _explained(self.path):
             parent = self._group(group)
             for name in parent:
-                node = member(parent, name)
+                node = valid.member(parent, name)
                 if isinstance(node, h5py.Dataset):
-                    dims, attributes = axes_of(node, name), attributes_of(node, "")
+                    dims, attributes = valid.axes_of(node, name), valid.attributes_of(node, "")
                     found[name] = Variable(dims, node.shape, attributes, node.dtype.kind)
         return found
 
     def read(self, group: str, name: str, start: int = 0, stop: int | None = None) -> NDArray[Any]:
         """The rows `start` to `stop` of a variable, checked: no damage, and no number that is not finite."""
         with _explained(self.path):
-            node, where = member(self._group(group), name), f"variable {name} in group {group}"
+            node, where = valid.member(self._group(group), name), f"variable {name} in group {group}"
             if not isinstance(node, h5py.Dataset) or node.ndim == 0:
                 raise ValueError(f"there is no {where}")
             if node.dtype.kind not in "iufS":
                 raise ValueError(f"{where} holds no numbers")
-            check_size(node, self.length, where)
+            valid.check_size(node, self.length, where)
             values = np.asarray(node[start:stop])
             if values.dtype.kind == "S":
                 return np.char.decode(values, "utf-8")
             if values.dtype == np.float16:  # its squares are infinite from 256 on
                 values = values.astype(np.float64)
-            limit = LARGEST_IN_HISTORY if group == "history" else LARGEST
+            limit = valid.LARGEST_IN_HISTORY if group == "history" else valid.LARGEST
             if values.dtype.kind == "f" and not (np.abs(values) <= limit).all():
                 raise ValueError(f"{where} holds values that are not finite, or too large")
             return values
 
     def _group(self, group: str) -> h5py.Group:
-        node = member(self.file, group)
+        node = valid.member(self.file, group)
         if not isinstance(node, h5py.Group):
             raise ValueError(f"there is no group {group}")
         return node
@@ -135,8 +131,8 @@ def open_result(path: Path, kind: str | None = None) -> Iterator[StoredResult]:
                 _try_out(path)
             # h5py gets the very file that was verified, and does without the file locks of HDF5
             file = stack.enter_context(h5py.File(stream, "r"))
-            its_kind = str(plain_attribute(file, "kind"))
-            attributes = attributes_of(file, its_kind)
+            its_kind = str(valid.plain_attribute(file, "kind"))
+            attributes = valid.attributes_of(file, its_kind)
             if attributes.get("format") != FORMAT:
                 raise ValueError(f'it was not written by this program, attribute format = "{FORMAT}" is missing')
             if (version := attributes.get("format_version")) != FORMAT_VERSION:
@@ -144,9 +140,9 @@ def open_result(path: Path, kind: str | None = None) -> Iterator[StoredResult]:
             if attributes.get("complete") != 1:
                 raise ValueError("it is incomplete, attribute complete is not 1")
             if kind is not None and attributes.get("kind") != kind:
-                raise ValueError(f"it holds a result of kind {printable(its_kind)}, and {kind!r} is needed")
+                raise ValueError(f"it holds a result of kind {printable(repr(its_kind))}, and {kind!r} is needed")
             length = path.stat().st_size
-            check_variables(file, its_kind, length)
+            valid.check_variables(file, its_kind, length)
         yield StoredResult(path, file, attributes, length, sealed)
 
 
@@ -196,7 +192,7 @@ def _try_out(path: Path) -> None:
             seconds = int(SHORTEST_TRIAL + size / 1e7)
             resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
             with h5py.File(path, "r", locking=False) as file:
-                read_everything(file, size)
+                valid.read_everything(file, size)
         finally:
             os._exit(0)  # what fails here with an exception will do so again
     if os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) < 0:

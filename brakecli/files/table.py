@@ -153,11 +153,8 @@ def _is_number(cell: str, decimal_comma: bool) -> bool:
 
 @cache
 def _registry() -> Any:
-    try:
-        import pint
-    except ImportError as error:
-        remedy = "install it with: python -m pip install pint"
-        raise UsageError(f"pint, which knows units, cannot be imported ({error}); {remedy}") from error
+    import pint
+
     return pint.UnitRegistry()
 
 

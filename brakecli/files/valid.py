@@ -56,7 +56,8 @@ def check_variables(file: h5py.File, kind: str, length: int) -> None:
         found = {name: (field, node) for name, (field, node) in members.items() if node is not None}
         for name, (field, node) in found.items():
             where = f"variable {name} in group {group}"
-            if not isinstance(node, h5py.Dataset) or node.ndim == 0 or node.dtype.kind not in _kinds(field):
+            kinds = "S" if field.kind[0] in "SO" else "iuf"  # other programs write whole numbers as floats
+            if not isinstance(node, h5py.Dataset) or node.ndim == 0 or node.dtype.kind not in kinds:
                 raise ValueError(f"{where} is not what belongs there: {field.meaning}")
             check_size(node, length, where)
             axis = declared[0].name if kind != "sweep" else "status"
@@ -172,11 +173,6 @@ def _decoded(value: Any) -> Any:
     if isinstance(value, str):
         value.encode()  # h5py marks what is not UTF-8
     return value.decode() if isinstance(value, bytes) else value
-
-
-def _kinds(field: Field) -> str:
-    """The kinds of NumPy types that a variable may have; other programs write whole numbers as floats."""
-    return "S" if field.kind[0] in "SO" else "iuf"
 
 
 def _fits(field: Field, value: Any) -> bool:

@@ -74,12 +74,8 @@ def draw(result: StoredResult) -> Figure:
             axes.axhspan(low, floor, label="within the reference's error", **band)
     found = style.labels(figure)
     look: dict[str, Any] = {"frameon": False, "handlelength": 2.6, "labelspacing": 0.6}
-    figure.legend(
-        found.values(),
-        found.keys(),
-        loc="outside lower left" if style.is_narrow() else "outside right center",
-        **look,
-    )
+    look["loc"] = "outside lower left" if style.is_narrow() else "outside right center"
+    figure.legend(found.values(), found.keys(), **look)
     return figure
 
 

@@ -9,19 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from brakecli.analysis.regime.verdict import Excitation
-from brakecli.plots import style
-from brakecli.plots.sweep import (
-    CRITICAL_LINE,
-    DIFFERENT,
-    FORCED,
-    MARGIN,
-    REGIMES,
-    WIDTH,
-    Sign,
-    SweepPicture,
-    add_legend,
-    sign,
-)
+from brakecli.plots import style, sweep
+from brakecli.plots.sweep import Sign, SweepPicture
 from brakecli.sweeps.critical import Outcome
 
 _FEW = 60  # points up to which each has a marker of full size
@@ -39,14 +28,14 @@ def draw(picture: SweepPicture) -> Figure:
         compared = np.isfinite(picture["critical"] - picture["critical_eigenvalue"]).any()
         if compared and picture.critical.method == "simulation":
             panels[_draw_difference] = 1.0
-    figure = picture.figure(WIDTH, 5.2 if len(panels) == 1 else 6.4)
+    figure = picture.figure(sweep.WIDTH, 5.2 if len(panels) == 1 else 6.4)
     rows = figure.subplots(len(panels), 1, sharex=True, height_ratios=[*panels.values()], squeeze=False)
     for axes, draw_panel in zip(rows.flat, panels, strict=True):
         draw_panel(axes, picture)
         picture.axes[0].apply_to(axes.xaxis)
         axes.label_outer()
     figure.align_ylabels()
-    add_legend(figure)
+    sweep.add_legend(figure)
     return figure
 
 
@@ -79,8 +68,7 @@ def _draw_critical(axes: Axes, picture: SweepPicture) -> None:
     error = np.nan_to_num(picture["critical_error"][0])
     drawn = np.concatenate([value - error, value + error, eigenvalue, sustained, within])
     highest = style.largest(drawn) or max(abs(critical.lower), abs(critical.upper))
-    unit = style.set_ticks(axes.yaxis, 0.0, highest, picture.units["critical"])
-    axes.set_ylabel(style.labelled(f"critical {critical.parameter}", unit), parse_math=False)
+    style.set_ticks(axes.yaxis, 0.0, highest, picture.units["critical"], f"critical {critical.parameter}")
     if np.isfinite(drawn).any():
         style.widen(axes, drawn)
     else:
@@ -94,9 +82,9 @@ def _draw_difference(axes: Axes, picture: SweepPicture) -> None:
     error = np.where(np.isfinite(difference), picture["critical_error"][0], np.nan)
     axes.axhline(0.0, color=style.DARK, lw=1.1)
     axes.errorbar(x, difference, error, **_bars(_size(x)))
-    unit = style.set_ticks(axes.yaxis, 0.0, style.largest(np.abs(difference) + error), picture.units["critical"])
     axes.margins(y=0.15)
-    axes.set_ylabel(style.labelled("simulation\nless eigenvalue", unit), parse_math=False)
+    highest, name = style.largest(np.abs(difference) + error), "simulation\nless eigenvalue"
+    style.set_ticks(axes.yaxis, 0.0, highest, picture.units["critical"], name)
 
 
 def _draw_motion(axes: Axes, picture: SweepPicture, name: str) -> None:
@@ -115,7 +103,7 @@ def _draw_motion(axes: Axes, picture: SweepPicture, name: str) -> None:
             arrows: dict[str, Any] = {"marker": arrow, "mfc": "white", "mec": style.DARK, "ms": size}
             label = f"on the way {direction}" if direction else None
             axes.plot(x, y, color="#777777", lw=1.0, ls=dashes, label=label, **arrows)
-        for regime, (colour, marker) in REGIMES.items():
+        for regime, (colour, marker) in sweep.REGIMES.items():
             points: dict[str, Any] = {"ls": "none", "mfc": colour, "mec": style.DARK, "mew": 0.6}
             chosen = picture["regime"][number] == regime
             axes.plot(x[chosen], y[chosen], marker=arrow or marker, ms=size, **points)
@@ -124,12 +112,13 @@ def _draw_motion(axes: Axes, picture: SweepPicture, name: str) -> None:
         if (seen := shaken[number] & np.isfinite(y)).any():
             axes.plot(x[seen], y[seen], "o", color=style.DARK, ms=0.4 * size, mec="white", mew=0.5)
     if shaken.any():
-        axes.plot([], [], "o", ms=3, color=style.DARK, label=FORCED)
+        axes.plot([], [], "o", ms=3, color=style.DARK, label=sweep.FORCED)
     for place in np.flatnonzero(picture["hysteresis"][0]):  # `style.labels` names the first alone
         span = axis.edges[place : place + 2]
-        axes.axvspan(*span, color=style.GREEN, alpha=0.16, lw=0, zorder=0.5, label=DIFFERENT)
-    for crossing in _crossings(axis.values, picture[MARGIN][0] if MARGIN in picture.variables else np.zeros(0)):
-        axes.axvline(crossing, color=style.DARK, lw=1.1, ls=style.DASHES, zorder=0.7, label=CRITICAL_LINE)
+        axes.axvspan(*span, color=style.GREEN, alpha=0.16, lw=0, zorder=0.5, label=sweep.DIFFERENT)
+    margin = picture.variables.get(sweep.MARGIN, np.zeros((1, 0)))[0]
+    for crossing in _crossings(axis.values, margin):
+        axes.axvline(crossing, color=style.DARK, lw=1.1, ls=style.DASHES, zorder=0.7, label=sweep.CRITICAL_LINE)
     words = picture.long_names[name].replace("`", "")
     axes.set(ylabel=style.labelled(name.replace("_", " "), unit), title=words[:1].upper() + words[1:])
     floor, highest = factor * least, factor * float(np.nanmax(values, initial=0.0))
@@ -144,7 +133,7 @@ def _draw_motion(axes: Axes, picture: SweepPicture, name: str) -> None:
         style.set_ticks(axes.yaxis, 0.5 * floor, 2.0 * highest)
     else:
         axes.set_ylim(-0.03 * (highest or 1.0), 1.08 * (highest or 1.0))
-    _mark(axes, x, [sign(small, "smaller than drawn", "v", style.DARK, "white"), picture.failed()])
+    _mark(axes, x, [sweep.sign(small, "smaller than drawn", "v", style.DARK, "white"), picture.failed()])
 
 
 def _crossings(x: style.Array, margin: style.Array) -> Iterator[float]:

@@ -52,11 +52,9 @@ def diagram(
             look = {"label": "stability changes"} if number == 0 else {}
             axes.axvline(value, color=style.DARK, lw=1.1, ls=style.DOTS, zorder=1.6, **look)
         style.keep_flat(axes, values, turning if label == "growth rate" else 0.0)
-        unit = style.set_ticks(axes.yaxis, 0.0, style.largest(values), "Hz" if label == "frequency" else "1/s")
-        axes.set_ylabel(style.labelled(label, unit))
+        style.set_ticks(axes.yaxis, 0.0, style.largest(values), "Hz" if label == "frequency" else "1/s", label)
     panels[1].axhline(0.0, color=style.DARK, lw=1.0, zorder=1.5)
-    unit = style.set_ticks(panels[1].xaxis, float(x.min()), float(x.max()), units.removeprefix("1"))
-    panels[1].set_xlabel(style.labelled(key, unit), parse_math=False)
+    style.set_ticks(panels[1].xaxis, float(x.min()), float(x.max()), units.removeprefix("1"), key)
     figure.align_ylabels()
     panels[0].legend(loc="best")
     return figure

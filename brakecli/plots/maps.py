@@ -13,19 +13,8 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
 from brakecli.analysis.regime.verdict import Excitation, Regime
-from brakecli.plots import style
-from brakecli.plots.sweep import (
-    CRITICAL_LINE,
-    DIFFERENT,
-    FORCED,
-    MARGIN,
-    MOST_PANELS,
-    REGIMES,
-    WIDTH,
-    Sign,
-    SweepPicture,
-    add_legend,
-)
+from brakecli.plots import style, sweep
+from brakecli.plots.sweep import Sign, SweepPicture
 from brakecli.sweeps.point import Status
 
 _LONG_TITLE = 34  # characters of a panel's title from which on it takes two lines
@@ -58,7 +47,7 @@ def draw(picture: SweepPicture) -> Figure:
         width, height = max(_MAP_WIDTH, 1.2 + _PANEL_WIDTH * len(pieces)), 4.6 if critical else 7.2
     else:
         pieces = [(f" on the way {way}" if way else "", picture.towards(way)) for way in picture.directions]
-        width, height = (WIDTH, 5.8) if critical else (_MAP_WIDTH, 1.0 + 3.9 * len(pieces))
+        width, height = (sweep.WIDTH, 5.8) if critical else (_MAP_WIDTH, 1.0 + 3.9 * len(pieces))
     shape = (len(layers), len(pieces)) if sliced else (len(pieces), len(layers))
     figure = picture.figure(width, height, shape[1])
     panels = style.panels(figure, *shape, sharex=True, sharey=True)
@@ -74,14 +63,14 @@ def draw(picture: SweepPicture) -> Figure:
     bar.minorticks_off()
     bar.set_label(scale.label, parse_math=False)
     bar.outline.set_visible(False)
-    add_legend(figure)
+    sweep.add_legend(figure)
     return figure
 
 
 def slices(picture: SweepPicture) -> list[tuple[str, SweepPicture]]:
     """Title and picture for each value of the shortest axis, or of an axis of texts if there is one."""
     lengths = [len(axis.values) for axis in picture.axes]
-    short = [number for number in range(3) if lengths[number] <= MOST_PANELS]
+    short = [number for number in range(3) if lengths[number] <= sweep.MOST_PANELS]
     sliced = min(short, key=lambda number: (picture.axes[number].texts is None, lengths[number], -number))
     pieces = [(picture.axes[sliced].named(place), picture.at(sliced, place)) for place in range(lengths[sliced])]
     return [(name if len(name) < _LONG_TITLE else name.replace(" = ", "\n= "), piece) for name, piece in pieces]
@@ -115,26 +104,26 @@ def _scale(picture: SweepPicture, name: str) -> Scale:
 
 def _draw_regimes(axes: Axes, picture: SweepPicture, _: Scale) -> ScalarMappable:
     codes = np.full(picture["regime"].shape, np.nan)
-    for code, (regime, (colour, _marker)) in enumerate(REGIMES.items()):
+    for code, (regime, (colour, _marker)) in enumerate(sweep.REGIMES.items()):
         marker = "X" if regime == Regime.UNDECIDED else "s"  # its cells have a cross
         if (where := picture["regime"] == regime).any():
             codes[where] = code
             axes.plot([], [], marker, ms=9, mfc=colour, mec="none", label=str(regime))
-    colours = ListedColormap([colour for colour, _marker in REGIMES.values()])
-    shaken = {"marker": "o", "color": style.DARK, "mec": "white", "label": FORCED}
-    different = {"marker": "$≠$", "color": style.DARK, "label": DIFFERENT}
+    colours = ListedColormap([colour for colour, _marker in sweep.REGIMES.values()])
+    shaken = {"marker": "o", "color": style.DARK, "mec": "white", "label": sweep.FORCED}
+    different = {"marker": "$≠$", "color": style.DARK, "label": sweep.DIFFERENT}
     open_ = {"marker": "x", "color": style.DARK, "label": "_"}  # in grey its colour is that of relaxation
     signs = [(picture["excitation"] == Excitation.FORCED, shaken), (picture["hysteresis"], different)]
     signs += [(picture["regime"] == Regime.UNDECIDED, open_), picture.failed()]
-    look: dict[str, Any] = {"cmap": colours, "vmin": -0.5, "vmax": len(REGIMES) - 0.5}
+    look: dict[str, Any] = {"cmap": colours, "vmin": -0.5, "vmax": len(sweep.REGIMES) - 0.5}
     mesh = _mesh(axes, picture, codes, *signs, **look)
     x, y = picture.axes
-    if MARGIN in picture.variables and min(map(len, (x.values, y.values))) > 1 and not (x.texts or y.texts):
-        margin = np.ma.masked_invalid(picture[MARGIN][0].T)
+    if sweep.MARGIN in picture.variables and min(map(len, (x.values, y.values))) > 1 and not (x.texts or y.texts):
+        margin = np.ma.masked_invalid(picture[sweep.MARGIN][0].T)
         if margin.min() < 0.0 < margin.max():
             look = {"colors": "black", "linewidths": 1.8, "linestyles": [style.DASHES]}
             axes.contour(x.values, y.values, margin, [0.0], **look)
-            axes.plot([], [], color="black", lw=1.8, ls=style.DASHES, label=CRITICAL_LINE)
+            axes.plot([], [], color="black", lw=1.8, ls=style.DASHES, label=sweep.CRITICAL_LINE)
     return mesh
 
 

@@ -5,7 +5,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from brakecli.errors import UsageError, printable
+from brakecli.errors import UsageError, installed, printable
 from brakecli.files.atomic import check_target, new_output
 from brakecli.files.read import StoredResult, open_result
 
@@ -51,11 +51,8 @@ def _opened(
     """Results for a picture, and what writes it."""
     suffix = target.suffix.lower()
     check_target(target, "a kind of picture", (".pdf", ".png", ".svg"), results)
-    try:
+    with installed("matplotlib"):
         import matplotlib.figure  # noqa: F401
-    except ImportError as error:
-        problem = f"matplotlib cannot be imported ({error})"
-        raise UsageError(f"{problem}; install it with: python -m pip install matplotlib") from error
     from brakecli.plots import style
 
     with ExitStack() as stack:

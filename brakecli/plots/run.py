@@ -192,8 +192,7 @@ def draw(picture: RunPicture) -> Figure:
         axes.set_title(note, loc="right", size=8.5, color=style.VERMILION)
     spans: tuple[Any, ...] = (picture.detail["time"], picture.span, picture.span)
     for axes, time in zip(panels[:, 0], spans, strict=False):
-        unit = style.set_ticks(axes.xaxis, float(time[0]), float(time[-1]), "s")
-        axes.set_xlabel(style.labelled("time", unit))
+        style.set_ticks(axes.xaxis, float(time[0]), float(time[-1]), "s", "time")
         if time[-1] > time[0]:
             axes.set_xlim(time[0], time[-1])
         if axes in panels[:2, 0] and axes.get_legend_handles_labels()[1]:  # which gets room above the data
@@ -279,7 +278,7 @@ def _draw_spectrum(axes: Axes, picture: RunPicture) -> None:
     axes.semilogy(frequency, density, color=style.BLUE, lw=1.0, marker=_marker(frequency))
     right = min(highest, max(1.3 * float(frequency[density > lowest][-1]), 2.0 * (line or 0.0)))
     axes.set_xlim(0.0, right)
-    axes.set_xlabel(style.labelled("frequency", style.set_ticks(axes.xaxis, 0.0, right, "Hz")))
+    style.set_ticks(axes.xaxis, 0.0, right, "Hz", "frequency")
     for number, wave in enumerate(few):
         axes.axvline(wave, lw=0.9, zorder=0.8, label="" if number else "waves of the wheel pass", **_BELT)
     if picture.passing and not few:

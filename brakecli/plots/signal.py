@@ -54,7 +54,7 @@ def _draw_record(axes: Axes, look: SignalLook) -> None:
     words = ", where a tone stands out shaded" if look.verdict.bursts else ""
     axes.set_title(f"Record{words}", pad=14.0)
     axes.set(ylabel=style.labelled(str(look.quantity), unit), xlim=(0.0, step * len(values)))
-    axes.set_xlabel(style.labelled("time", style.set_ticks(axes.xaxis, 0.0, step * len(values), "s")))
+    style.set_ticks(axes.xaxis, 0.0, step * len(values), "s", "time")
 
 
 def _draw_velocity(axes: Axes, look: SignalLook) -> None:
@@ -93,7 +93,7 @@ def _draw_velocity(axes: Axes, look: SignalLook) -> None:
         style.make_room(axes)
         axes.legend(loc="upper right")
     axes.set(xlim=(time[0], time[-1]), ylabel=f"{name} ({unit})")
-    axes.set_xlabel(style.labelled("time", style.set_ticks(axes.xaxis, time[0], time[-1], "s")))
+    style.set_ticks(axes.xaxis, time[0], time[-1], "s", "time")
 
 
 def _draw_spectrum(axes: Axes, look: SignalLook) -> None:
@@ -112,8 +112,7 @@ def _draw_spectrum(axes: Axes, look: SignalLook) -> None:
     if shown.any() and style.largest(density) < style.WIDE * density[shown].min():
         style.set_ticks(axes.yaxis, *axes.get_ylim())
     low, high = (float(frequencies[shown][i]) for i in (0, -1)) if shown.any() else (1.0, 1.0)
-    hertz = style.set_ticks(axes.xaxis, low, high, "Hz")
-    axes.set_xlabel(f"frequency ({hertz})")
+    style.set_ticks(axes.xaxis, low, high, "Hz", "frequency")
     if frequency is not None:
         label = f"{'events' if look.verdict.regime == 'relaxation' else 'line'} {frequency:.4g} Hz"
         axes.axvline(frequency, color=style.GREEN, ls=style.DOTS, lw=1.4, zorder=0.9, label=label)

@@ -48,8 +48,7 @@ def draw_spectrogram(axes: Axes, stop: Stop, modes: list[float]) -> None:
         look = {"transform": axes.get_xaxis_transform(), "color": style.VERMILION, "lw": 0}
         axes.broken_barh(stop.vibrations, (0.97, 0.03), label="vibrates", **look)
     axes.set(title=f"Spectrogram of ẋ, {DECIBELS:.0f} dB from dark to bright", ylim=(0.0, _highest(stop, modes)))
-    style.set_ticks(axes.yaxis, 0.0, _highest(stop, modes), "Hz")
-    axes.set_ylabel(style.labelled("frequency", style.prefixed(_highest(stop, modes), "Hz")[1]))
+    style.set_ticks(axes.yaxis, 0.0, _highest(stop, modes), "Hz", "frequency")
     axes.grid(False)
     if axes.get_legend_handles_labels()[1]:
         axes.legend(loc="upper right", ncols=3, bbox_to_anchor=(1.0, 0.97))
@@ -65,15 +64,14 @@ def _highest(stop: Stop, modes: list[float]) -> float:
 def draw_amplitude(axes: Axes, stop: Stop) -> None:
     """Amplitude of x against the wheel's speed, or the load where that alone changes; stick is marked."""
     factor, unit = style.prefixed(style.largest(stop.amplitude), "m")
-    along, name, its_unit = stop.speed, "speed", "m/s"
+    along, name, its_unit, words = stop.speed, "speed", "m/s", "speed of the wheel's surface"
     if np.ptp(along) <= 1e-9 * style.largest(along):
-        along, name, its_unit = stop.load, "load", "N"
+        along, name, its_unit, words = stop.load, "load", "N", "load"
     axes.plot(along, factor * stop.amplitude, color=style.BLUE, lw=0.8, marker=".")
     stuck = stop.stick > 0.0
     look: dict[str, Any] = {"ls": "none", "marker": "s", "ms": 4.0, "color": style.ORANGE, "label": "with stick"}
     axes.plot(along[stuck], factor * stop.amplitude[stuck], **look)
     axes.set(title=f"Amplitude of x against {name}", ylabel=style.labelled("amplitude", unit))
-    unit = style.set_ticks(axes.xaxis, float(along.min()), float(along.max()), its_unit)
-    axes.set_xlabel(style.labelled({"speed": "speed of the wheel's surface", "load": "load"}[name], unit))
+    style.set_ticks(axes.xaxis, float(along.min()), float(along.max()), its_unit, words)
     if stuck.any():
         axes.legend(loc="best")

@@ -147,10 +147,8 @@ def prefixed(magnitude: float, unit: str) -> tuple[float, str]:
 
     Prefixes are those that engineers use: no km/s, kHz from ten of them on, none for angles and pure numbers.
     """
-    large, small = (
-        (unit == "Hz" and magnitude >= 1e4) or unit[:1] in "NJWP",
-        unit in ("m", "m/s", "m/s²", "s") or unit[:1] in "NJWP",
-    )
+    large = (unit == "Hz" and magnitude >= 1e4) or unit[:1] in "NJWP"
+    small = unit in ("m", "m/s", "m/s²", "s") or unit[:1] in "NJWP"
     for exponent, prefix in ((9, "G"), (6, "M"), (3, "k"), (0, ""), (-3, "m"), (-6, "µ"), (-9, "n"), (-12, "p")):
         wanted = unit and (large if exponent > 0 else small or exponent == 0)
         if wanted and 10.0**exponent <= magnitude < 1e12:
@@ -186,22 +184,23 @@ def labelled(name: str, units: str) -> str:
     return f"{name} ({units})" if units else name
 
 
-def set_ticks(axis: Axis, low: float, high: float, unit: str = "") -> str:
+def set_ticks(axis: Axis, low: float, high: float, unit: str = "", name: str = "") -> None:
     """Write each tick of an axis from `low` to `high` in full, without a power of ten at the end of the axis.
 
-    Returns the unit of the numbers at the ticks: with a prefix where values of `unit` need one.
+    The label, if there is a name, has the unit of the numbers at the ticks: with a prefix where they need one.
     """
     logarithmic = axis.get_scale() == "log"
     largest, digits = max(abs(low), abs(high)), digits_of(max(abs(low), abs(high)), 0.1 * (high - low))
     factor, unit = (1.0, unit) if logarithmic and unit == "Hz" else prefixed(largest, unit)
+    if name:
+        axis.set_label_text(labelled(name, unit), parse_math=False)
     if logarithmic:
         axis.set_major_locator(log_locator(high / low))
         if high / low < WIDE:
             axis.set_minor_locator(NullLocator())
     elif factor == 1.0 and 1e-2 <= largest < 1e5:
-        return unit
+        return
     axis.set_major_formatter(lambda value, _: readable(factor * value, digits))
-    return unit
 
 
 def widen(axes: Axes, values: Array) -> None:

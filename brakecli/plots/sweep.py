@@ -218,11 +218,15 @@ def _variables(result: StoredResult, sweep: Sweep, shown: str, more: Sequence[st
         raise style.unreadable(result, "its variables do not lie on the same axes")
     dims = known["status"].dims
     both = dims[:1] == ("direction",)
-    variables = {name: style.read_column(result, name)[... if both else np.newaxis] for name in names}
+
+    def read(name: str) -> style.Array:
+        return style.read_column(result, name)[... if both else np.newaxis]
+
+    variables = {name: read(name) for name in names}
+    shape = variables["status"].shape
     for name in _WINDOWS if sweep.critical is not None else ():  # older results have none
         there = name in known and known[name].dims == (*dims, fields.WINDOW.name)
-        found = style.read_column(result, name)[... if both else np.newaxis] if there else None
-        variables[name] = np.full((*variables["status"].shape, 1), np.nan) if found is None else found
+        variables[name] = read(name) if there else np.full((*shape, 1), np.nan)
     if shown and shown not in (able := numeric(result)):
         problem = f"--variable {shown}: no number of its points has this name"
         raise UsageError(f"{result.path}: {problem}; give one of {', '.join(able)}")
@@ -230,11 +234,10 @@ def _variables(result: StoredResult, sweep: Sweep, shown: str, more: Sequence[st
     margin = None
     with suppress(CaseError):  # of older results, and of forged ones
         margin = margins(Plan(result.text("resolved_sweep_toml"), base)) if sweep.critical is None else None
-    shape = variables["status"].shape
     if margin is not None and margin.size == np.prod(shape[1:]):
         variables[MARGIN] = np.broadcast_to(margin.reshape(shape[1:]), shape)
     for name in {shown, *more} - {"", *variables}:
-        values = style.read_column(result, name)[... if both else np.newaxis]
+        values = read(name)
         nothing = np.nan if values.dtype.kind in "if" else ""
         variables[name] = np.where(variables["status"] == Status.DONE, values, nothing)
     for name in ("regime", "excitation"):  # those of points that failed mean nothing

@@ -93,7 +93,7 @@ def _along(axes: Axes, name: str, ends: list[float], unit: str) -> None:
     low, high = ends
     if low < high:
         axes.set_xlim(low, high)
-    axes.set_xlabel(style.labelled(name, style.set_ticks(axes.xaxis, low, high, unit)))
+    style.set_ticks(axes.xaxis, low, high, unit, name)
 
 
 def _curves(results: tuple[StoredResult, StoredResult], kind: str, variable: str) -> Figure:
@@ -120,12 +120,11 @@ def _curves(results: tuple[StoredResult, StoredResult], kind: str, variable: str
         drawn = np.concatenate([values.ravel() for values in columns])
         if name == "frequency" and np.isfinite(drawn).any():
             style.widen(axes, drawn)
-        unit = style.set_ticks(axes.yaxis, 0.0, max(map(style.largest, columns)), units[name])
-        axes.set_ylabel(style.labelled(str(name).replace("_", " "), unit))
+        words = str(name).replace("_", " ")
+        style.set_ticks(axes.yaxis, 0.0, max(map(style.largest, columns)), units[name], words)
     both = np.concatenate(places)
-    unit = style.set_ticks(panels[-1].xaxis, float(both.min()), float(both.max()), units[axis])
     words = str(known[axis].attributes.get("long_name", axis))
-    panels[-1].set_xlabel(style.labelled(words, unit), parse_math=False)
+    style.set_ticks(panels[-1].xaxis, float(both.min()), float(both.max()), units[axis], words)
     panels[0].legend(loc="best")
     figure.align_ylabels()
     return figure

@@ -2,7 +2,7 @@
 
 import math
 import shlex
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from functools import partial
 from typing import Any
 
@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from brakecli.analysis.regime.verdict import Excitation, Regime
 from brakecli.analysis.stability.advice import KEYS
 from brakecli.analysis.stability.follow import followed
-from brakecli.analysis.stability.modes import modes
+from brakecli.analysis.stability.modes import Mode, modes
 from brakecli.case.case import Case
 from brakecli.case.read import LoadedCase, key_path
 from brakecli.case.tables import key_schema
@@ -25,6 +25,7 @@ from brakecli.plots.result import draw
 from brakecli.plots.run import case_of
 from brakecli.reports.blocks import Code, Part, Section, Table, Texts, picture, rows_of, shown
 from brakecli.runs.advise import AdviceReport, advise
+from brakecli.solver.motion import Counted
 from brakecli.sweeps.result import unit
 
 QUESTION = "Will this shoe vibrate, in which way, at which frequency, and what should be changed?"
@@ -44,10 +45,8 @@ _ACCURACY = (
     *("certified_by", "nodes", "steps", "contact_evaluations", "unconverged_steps", "non_unique_steps"),
 )
 
-Progress = Callable[[str, int, int], None]
 
-
-def part_of_run(result: StoredResult, progress: Progress) -> Part:
+def part_of_run(result: StoredResult, progress: Counted) -> Part:
     """What the page says of a run. Raises UnreadableResultError."""
     found, loaded = result.attributes, case_of(result)
     advice = advise(loaded, KEYS, MARGIN, progress)
@@ -67,7 +66,7 @@ def part_of_run(result: StoredResult, progress: Progress) -> Part:
     ]
     answer = [*stretches, _sentence(found), f"By theory: {advice.conclusion()}."]
     name, title = escaped(result.path.name), loaded.case.title or "Case without a title"
-    return Part(name, title, QUESTION, answer, sections, versions(found))
+    return Part(name, title, QUESTION, answer, sections, result.versions)
 
 
 def case_blocks(loaded: LoadedCase) -> list[Any]:
@@ -85,12 +84,6 @@ def repeat(result: StoredResult, again: str, given: str) -> list[Any]:
     report = f"brakecli report {escaped(shlex.quote(result.path.name))} -o report.html"
     exactly = "The same version on the same machine gives the same numbers, to the last bit."
     return [Code(f"{again}\n{report}"), Texts([exactly]), Code(given, "The file as it was given")]
-
-
-def versions(found: Mapping[str, Any]) -> dict[str, str]:
-    """Program and libraries by which a result was made."""
-    names = [name for name in found if name.endswith("_version") and name != "format_version"]
-    return {name.removesuffix("_version"): str(found[name]) for name in names}
 
 
 def _sentence(found: Mapping[str, Any]) -> str:
@@ -157,13 +150,12 @@ def _diagram(advice: AdviceReport) -> Figure:
     if highest > 4.0 * report.friction > 0.0:
         highest = 4.0 * report.friction
     phi = np.linspace(0.0, highest, VALUES)
-    stiffness = [report.stiffness_at(float(each)) for each in phi]
-    pairs = followed(
-        tuple(modes(c._replace(phi=float(each)), k, math.copysign(float(each), report.belt_speed)))
-        if k > 0.0
-        else ()
-        for each, k in zip(phi, stiffness, strict=True)
-    )
+
+    def at(friction: float) -> tuple[Mode, ...]:
+        k, grip = report.stiffness_at(friction), math.copysign(friction, report.belt_speed)
+        return tuple(modes(c._replace(phi=friction), k, grip)) if k > 0.0 else ()
+
+    pairs = followed(map(at, phi.tolist()))
     none = [(np.nan, np.nan)] * 2
     found = np.array([[(mode.frequency, mode.growth) for mode in pair] if pair else none for pair in pairs])
     ends = np.array([each.friction for each in report.crossings if each.friction <= highest])
@@ -185,12 +177,8 @@ def _regime(result: StoredResult) -> list[Any]:
     reasons = Texts([f"{reason[:1].upper()}{reason[1:]}." for reason in map(str, found.get("reasons", ()))])
     intervals, head = _vibrations(result), [each.meaning for each in fields.VIBRATION]
     beats = [Table([[shown(*each) for each in zip(row, _UNITS, strict=True)] for row in intervals], head)]
-    return [
-        reasons,
-        *beats * bool(intervals),
-        Table(rows),
-        Table(proof, ("evidence", "value"), "All numbers by which the rules decided"),
-    ]
+    shown_on_demand = Table(proof, ("evidence", "value"), "All numbers by which the rules decided")
+    return [reasons, *beats * bool(intervals), Table(rows), shown_on_demand]
 
 
 def _vibrations(result: StoredResult) -> list[list[float]]:

@@ -15,7 +15,7 @@ from brakecli.plots.result import draw
 from brakecli.plots.run import case_of
 from brakecli.plots.sweep import SweepPicture, gather, numeric
 from brakecli.reports.blocks import Part, Section, Table, Texts, picture, rows_of, shown
-from brakecli.reports.of_run import case_blocks, repeat, versions
+from brakecli.reports.of_run import case_blocks, repeat
 from brakecli.reports.sweep_map import MOST, maps
 from brakecli.sweeps.point import Status
 
@@ -51,14 +51,7 @@ def part_of_sweep(result: StoredResult) -> Part:
         blocks.append(Texts([f"Values of single points are left out above {MOST} of them; they are in the file."]))
     blocks.append(picture(f"Picture of the sweep: {found.summary}", partial(draw, result)))
     answer = [*_answer(found), *(f"{each[:1].upper()}{each[1:]}." for each in found.findings)]
-    axes = [
-        (
-            axis.named(0).partition(" = ")[0],
-            f"{len(axis.values)} values",
-            f"{axis.named(0).partition(' = ')[2]} to {axis.named(len(axis.values) - 1).partition(' = ')[2]}",
-        )
-        for axis in found.axes
-    ]
+    axes = [(axis.key, f"{len(axis.values)} values", f"{axis.text(0)} to {axis.text(-1)}") for axis in found.axes]
     sections = [Section("Map and pictures", blocks), Section("Grid", [Table(axes, ("key", "values", "from, to"))])]
     errors = {name: np.asarray(found.variables.get(name, np.nan), float) for name in _ERRORS}
     accuracy = [
@@ -122,11 +115,8 @@ def _plain(
 ) -> Part:
     """A part with what is said of every result."""
     loaded, attributes = case_of(result), result.attributes
-    command = _COMMANDS[kind]
     given = str(attributes.get("sweep_toml") or attributes.get("case_toml", ""))
-    sections += [
-        Section("Case", case_blocks(loaded)),
-        Section("How to repeat it", repeat(result, f"brakecli {command} -o again.h5", given)),
-    ]
+    again = repeat(result, f"brakecli {_COMMANDS[kind]} -o again.h5", given)
+    sections += [Section("Case", case_blocks(loaded)), Section("How to repeat it", again)]
     title, name = str(attributes.get("title", "")) or "Result without a title", escaped(result.path.name)
-    return Part(name, title, question or _QUESTIONS[kind], answer, sections, versions(attributes))
+    return Part(name, title, question or _QUESTIONS[kind], answer, sections, result.versions)

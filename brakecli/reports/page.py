@@ -8,30 +8,27 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from brakecli import __version__
-from brakecli.errors import UsageError, printable
+from brakecli.errors import UsageError, installed, printable
 from brakecli.files.atomic import check_target, new_output
 from brakecli.files.read import StoredResult, open_result
 
 if TYPE_CHECKING:
     from brakecli.reports.blocks import Part
-    from brakecli.reports.of_run import Progress
+    from brakecli.solver.motion import Counted
 
 LARGEST = 3_000_000  # bytes
 
 
-def write_report(results: Sequence[Path], target: Path, *, force: bool, progress: "Progress") -> None:
+def write_report(results: Sequence[Path], target: Path, *, force: bool, progress: "Counted") -> None:
     """Write the page of some results.
 
     Raises UsageError for another suffix, an existing target without `force`, a page that would be too large, and
     where a library is missing; UnreadableResultError; CannotWriteError.
     """
     check_target(target, "a page", (".html", ".htm"), results)
-    try:
+    with installed("matplotlib", "jinja2"):
         import jinja2
         import matplotlib.figure  # noqa: F401
-    except ImportError as error:
-        problem = f"{error.name or 'a library'} cannot be imported ({error})"
-        raise UsageError(f"{problem}; install it with: python -m pip install matplotlib jinja2") from error
     from brakecli.reports.of_run import part_of_run
     from brakecli.reports.of_sweep import part_of_other, part_of_sweep
 
@@ -40,9 +37,8 @@ def write_report(results: Sequence[Path], target: Path, *, force: bool, progress
         if kind == "run":
             return part_of_run(stored, progress)
         if kind not in ("sweep", "comparison", "stability"):
-            raise UsageError(
-                f"{stored.path}: holds a result of kind {printable(kind)}, of which there is no report"
-            )
+            what = f"holds a result of kind {printable(kind)}, of which there is no report"
+            raise UsageError(f"{stored.path}: {what}")
         return part_of_sweep(stored) if kind == "sweep" else part_of_other(stored)
 
     with new_output(target, force=force) as file:

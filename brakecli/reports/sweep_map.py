@@ -20,11 +20,7 @@ MOST = 10_000  # points whose values are on the page
 _WORDY = 2000  # up to here with the reasons, and with five digits
 WIDTH, HEIGHT = 400.0, 260.0  # of the cells, in units of the drawing; a row alone is lower
 _TICKS, _SHADES, _NONE = 7, 32, "#f2f2f2"
-_LETTERS = {
-    Regime.RELAXATION: "R",
-    Regime.QUASI_HARMONIC: "Q",
-    Regime.UNDECIDED: "?",
-}  # colours are alike in grey
+_LETTERS = {Regime.RELAXATION: "R", Regime.QUASI_HARMONIC: "Q", Regime.UNDECIDED: "?"}  # colours are alike in grey
 _LEAST_LETTER = 11.0  # of a cell that holds a letter
 
 

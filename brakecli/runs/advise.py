@@ -1,7 +1,7 @@
 """What to change so that a shoe does not squeal: sensitivities, advised values, and a run that checks the best."""
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -18,11 +18,10 @@ from brakecli.files import fields
 from brakecli.files.field import values_of
 from brakecli.runs.cost import steps_and_seconds
 from brakecli.runs.run import motion_of, verdict_in_memory
+from brakecli.solver.motion import Counted
 from brakecli.solver.system import System
 
 CHECK_SECONDS = 5.0  # of computing; a run that would take longer is cut short
-
-Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True)
@@ -71,7 +70,7 @@ class AdviceReport:
             found.append(f"the pad opens in part: this rests on the mean stiffness of the contact; {instead}")
         if is_undamped(self.system.coefficients):
             found.append("no dashpot acts: where sliding is stable, vibration does not die away either")
-        if len(self.system.belt) > 1 or len(self.system.load) > 1:
+        if not self.system.steady:
             found.append("speed and load are those of t = 0")
         return found
 
@@ -81,7 +80,7 @@ class AdviceReport:
             yield "the wheel stands, so that nothing slides: give wheel.angular_speed"
             return
         if report.equilibrium is None:
-            yield f"there is no steady sliding at {own:g}: {str(report.no_equilibrium).partition(': ')[2]}"
+            yield f"at {own:g} {report.no_equilibrium}"
         elif report.contact_stiffness == 0.0:
             yield "the shoe does not touch the wheel: give a load that presses it on"
         elif own == 0.0:
@@ -125,7 +124,7 @@ def _far(margin: float | None, own: float) -> str:
     return f", {part:{'.0f' if part > 99.0 else '.2g'}} % {where} the case's {own:g}"
 
 
-def advise(loaded: LoadedCase, patterns: Sequence[str], margin: float, progress: Progress) -> AdviceReport:
+def advise(loaded: LoadedCase, patterns: Sequence[str], margin: float, progress: Counted) -> AdviceReport:
     """Sensitivities of a case, the nearest safe value of each key that fits a pattern, and a run of the best.
 
     A case that has the margin (a part of its friction) needs no advice. Raises UsageError.
@@ -150,7 +149,7 @@ def advise(loaded: LoadedCase, patterns: Sequence[str], margin: float, progress:
     return AdviceReport(case.title, system, report, critical, margin, sensitivities, advice, check)
 
 
-def _checked(case: Case, best: Change, progress: Progress) -> CheckRun | None:
+def _checked(case: Case, best: Change, progress: Counted) -> CheckRun | None:
     """Run the case with an advised value, from its own start and for its own time if that is short."""
     there = of_case.changed(case, key_path(best.parameter), best.to or 0.0)
     if there is None:

@@ -102,9 +102,7 @@ class _Tolerances(_Axis):
 
 
 def ladder(
-    system: System,
-    is_left: Callable[[Motion, float], bool] = lambda run, more: False,
-    kind: type[_Axis] = _Axis,
+    system: System, is_left: Callable[[Motion, float], bool] = lambda run, more: False, kind: type[_Axis] = _Axis
 ) -> Generator[System, Motion, Certified]:
     """Runs with steps half as long, or a tenth of the local tolerance, or twice the nodes: what is needed more.
 
@@ -129,7 +127,7 @@ def ladder(
         before = before if failed else run
         opens = set(run.work.evaluators) != {"closed-form"}
         used = quadrature if nodes and opens else _Axis(0, 0.0, 0.0)
-        margin = JUMPS if not events and (run.work.turns or len(system.belt) + len(system.load) > 2) else 1.0
+        margin = JUMPS if not events and (run.work.turns or not system.steady) else 1.0
         jump = _jump_error(run)
         error = math.inf if failed else margin * steps.error + used.error + jump
         short = events or run.system.step <= longest

@@ -1,6 +1,6 @@
 """One run, from a case to a finished result file: what `brakecli run` does."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import astuple, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -27,7 +27,7 @@ from brakecli.runs.limits import Check, check, free_bytes, refuse, within_range
 from brakecli.runs.modelled import modelled
 from brakecli.runs.tolerance import certify
 from brakecli.solver.history import History, array_history
-from brakecli.solver.motion import Motion, Progress, Sink, solve
+from brakecli.solver.motion import Counted, Motion, Progress, Sink, solve
 from brakecli.solver.quantities import HISTORY, ContactState
 from brakecli.solver.system import System
 
@@ -72,11 +72,7 @@ def load_kernels(loaded: LoadedCase) -> System:
 
 
 def run(
-    loaded: LoadedCase,
-    output: Path,
-    *,
-    force: bool,
-    progress: Callable[[str, int, int], None] = lambda what, done, total: None,
+    loaded: LoadedCase, output: Path, *, force: bool, progress: Counted = lambda what, done, total: None
 ) -> RunReport:
     """Simulate a case and write its result file.
 

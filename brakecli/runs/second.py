@@ -19,7 +19,7 @@ from brakecli.runs.cost import duration_text
 from brakecli.runs.limits import check, refuse
 from brakecli.runs.run import motion_of
 from brakecli.solver.history import History, array_history
-from brakecli.solver.motion import Progress
+from brakecli.solver.motion import Counted, Progress
 from brakecli.solver.quantities import HISTORY
 from brakecli.solver.roughness import surface
 from brakecli.solver.steady_sliding import steady_sliding
@@ -44,7 +44,7 @@ class Second:
 
 
 def classify_twice(
-    path: Path, thresholds: Thresholds, say: Callable[[str], None], progress: Callable[[str, int, int], None]
+    path: Path, thresholds: Thresholds, say: Callable[[str], None], progress: Counted
 ) -> dict[str, Any]:
     """The verdict on a stored run as `classify_result` gives it, by a second run where one is asked for."""
     with stored_run(path) as (system, history, failure):

@@ -59,9 +59,9 @@ def certify(system: System, progress: Progress = lambda samples: None) -> Certif
 
 def begins_with_steps(system: System) -> bool:
     """Whether steps and nodes that are refined apart may keep the tolerance."""
-    method, changing = system.method, len(system.belt) > 1 or len(system.load) > 1
+    method = system.method
     chosen = method.automatic and method.own_steps and not method.row.exact
-    return chosen and method.tolerance >= NODES_FROM and not changing
+    return chosen and method.tolerance >= NODES_FROM and system.steady
 
 
 def _run(system: System, progress: Progress, **changes: Any) -> Motion:

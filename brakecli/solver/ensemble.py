@@ -43,7 +43,7 @@ def fits(system: System) -> Hashable | None:
     if kind != ("three-layer", NUMEROV, "consistent", "newton", "auto") or not 0 < len(wheel.g) <= WAVES:
         return None
     large = system.samples > MOST_SAMPLES or system.table_bytes > _MOST_BYTES or system.per_sample > _MOST_STEPS
-    if len(system.belt) + len(system.load) > 2 or sliding == 0.0 or large:
+    if not system.steady or sliding == 0.0 or large:
         return None
     if system.passing_frequency * system.sampled_duration > _MOST_PASSED:
         return None
@@ -87,9 +87,8 @@ def _run_lanes(systems: list[System]) -> list[Motion | None]:
     for n, system in enumerate(systems):
         steps, closed = system.steps, int(o.closed[n])
         kinds = {kind: count for kind, count in (("closed-form", closed), ("midpoint", steps - closed)) if count}
-        work = Work(
-            steps=steps, contact_evaluations=int(o.evaluations[n]), evaluators=kinds, solve_seconds=seconds
-        )
+        work = Work(steps=steps, contact_evaluations=int(o.evaluations[n]), evaluators=kinds)
+        work.solve_seconds = seconds
         motions.append(Motion(system, rows[n].T, work, NOT_KEPT) if o.out[n] == 0.0 else None)
     return motions
 

@@ -9,15 +9,7 @@ from brakecli.solver.records import Coefficients
 
 
 def coefficients(
-    *,
-    mass: float,
-    c_1: float,
-    b_1: float,
-    beta_deg: float,
-    c_2: float,
-    b_2: float,
-    alpha_deg: float,
-    phi: float,
+    *, mass: float, c_1: float, b_1: float, beta_deg: float, c_2: float, b_2: float, alpha_deg: float, phi: float
 ) -> Coefficients:
     """Coefficients for link 1 at `beta_deg` to the vertical and link 2 at `alpha_deg` to the friction plane."""
     sin_beta, cos_beta = _sin_cos(beta_deg)

@@ -29,6 +29,8 @@ EXACT_BLOCK = 16384
 
 Sink = Callable[[Floats], None]
 Progress = Callable[[int], None]
+Counted = Callable[[str, int, int], None]
+"""Called with what is counted, how many are done, and of how many; 0 where that is not known."""
 
 
 @dataclass

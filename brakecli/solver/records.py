@@ -215,10 +215,7 @@ FLOW = record(
     needed=(float, SIZE),  # row whose product with z is the friction force that stick takes, N
     generator=(float, (PHASES, SIZE, SIZE)),  # A
     friction=(float, (PHASES, SIZE)),  # row of the friction force, N
-    margins=(
-        float,
-        (PHASES, SIZE, AHEAD),
-    ),  # columns of `before`: z, then what is positive in a phase
+    margins=(float, (PHASES, SIZE, AHEAD)),  # columns of `before`: z, then the margins of a phase
     step=(float, (PHASES, SIZE, AHEAD)),  # the same times exp(A h), which give `after`
     now=(float, (SIZE, AHEAD)),  # those of the present phase: at a fixed place, the compiler makes vectors of them
     works=(float, (PHASES, WORKS, SIZE, SIZE)),  # forms in z that are the works of a step from z on, J

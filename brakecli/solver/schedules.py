@@ -21,7 +21,9 @@ Schedule = NDArray[Any]
 
 
 def schedule(times: Sequence[float], values: Sequence[float], scale: float = 1.0) -> Schedule:
-    """Schedule through (times, scale * values); one pair makes a constant. The times increase strictly."""
+    """Schedule through (times, scale * values); equal values make a constant. The times increase strictly."""
+    if len({*values}) == 1:
+        times, values = (0.0,), values[:1]
     t = [Fraction(time) for time in times]
     v = [Fraction(value) * Fraction(scale) for value in values]
     slopes = [(v[i + 1] - v[i]) / (t[i + 1] - t[i]) for i in range(len(t) - 1)] + [Fraction(0)]

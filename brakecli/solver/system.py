@@ -123,6 +123,11 @@ class System:
         return self.shoe.g.size == 0 and self.wheel.g.size == 0
 
     @property
+    def steady(self) -> bool:
+        """Whether speed and load are constant."""
+        return len(self.belt) == len(self.load) == 1
+
+    @property
     def contact_stiffness(self) -> float:
         """2ak, N/m: the contact that touches everywhere."""
         return 2.0 * self.half_length * self.layer_stiffness

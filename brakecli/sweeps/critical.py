@@ -180,10 +180,10 @@ def _by_eigenvalues(critical: Critical, sliding_at: SlidingAt) -> Search:
         return _answer(critical, sliding_at, cache(unstable), values, partial(edge, unstable))
 
     exact = found(grows, SCANNED_WHERE_OPEN if opens else SCANNED_BY_EIGENVALUES)
-    if first is not None and first.system.method.own_steps:
-        return exact._replace(eigenvalue=exact.value, bias=0.0 if exact.value is not None else None)
-    own = found(grows_in_steps, SCANNED_WHERE_OPEN)
     exact = exact._replace(eigenvalue=exact.value)
+    if first is not None and first.system.method.own_steps:
+        return exact._replace(bias=None if exact.value is None else 0.0)
+    own = found(grows_in_steps, SCANNED_WHERE_OPEN)
     if exact.value is None or own.value is None or exact.outcome is not own.outcome:
         return exact
     return exact._replace(bias=own.value - exact.value)

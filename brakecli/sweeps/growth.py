@@ -27,10 +27,7 @@ from brakecli.solver.system import Initial, System
 
 DISTURBANCE = 1e-7  # in static compressions: the rounding of a run is 1e-9 of it, unless a soft link reaches far
 SATURATED = 1e-3  # largest difference, in static compressions, that follows the linear equations to 1e-3
-LARGEST = (
-    1e-2,
-    1e-5,
-)  # of disturbances on smooth surfaces, where motions are linear until they lift off, and others
+LARGEST = 1e-2, 1e-5  # of disturbances on smooth surfaces, linear until the shoe lifts off, and on others
 ROUNDED = 1e-9  # least ratio of a disturbance to the shoe's distance from the origin: rounding is 1e-16 of that
 FADED = 1e-5  # smallest difference, in parts of its first size, that holds four digits
 SLOPE = 1e-3  # of a wheel's waves that feed no disturbance

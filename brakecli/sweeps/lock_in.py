@@ -2,7 +2,6 @@
 
 import csv
 import io
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -22,12 +21,11 @@ from brakecli.files.atomic import new_output
 from brakecli.files.field import Field, values_of
 from brakecli.files.write import new_result
 from brakecli.runs.run import origin
+from brakecli.solver.motion import Counted
 from brakecli.solver.system import System
 from brakecli.sweeps.plan import Plan
 from brakecli.sweeps.result import unit
 from brakecli.sweeps.tables import Axis
-
-Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True)
@@ -44,7 +42,7 @@ class LockIn:
         return list(self.axis.parameter)
 
 
-def lock_in(loaded: LoadedCase, axis: Axis, option: str, progress: Progress) -> LockIn:
+def lock_in(loaded: LoadedCase, axis: Axis, option: str, progress: Counted) -> LockIn:
     """Modes and critical friction at each value of an axis; messages call the axis `option`. Raises CaseError."""
     sweep = {"case": "-", "axis": [axis.model_dump(exclude_unset=True)]}
     plan = Plan(tomli_w.dumps(sweep), given_toml(loaded.case))

@@ -54,8 +54,7 @@ class Findings:
         self.critical: tuple[int, float, float] | None = None  # how many points have one, the least, the largest
         self.sentences: list[str] = []
         if plan.passes == 2:
-            self.hysteresis = _hysteresis(journal)
-            self.sentences += _on_hysteresis(journal, self.hysteresis)
+            self.hysteresis, self.sentences = _hysteresis(journal)
         if plan.sweep.critical is not None:
             values = journal.column("critical")
             known = values[~np.isnan(values)]
@@ -144,50 +143,32 @@ def _values(axis: Axis) -> list[Any]:
     return [axis.value(place) for place in range(axis.size)]
 
 
-def _hysteresis(journal: Journal) -> NDArray[Any]:
-    """Where the motions on the way up and on the way down differ (1)."""
-    regime = journal.column("regime")
-    differ = (regime[0] != regime[1]) | (_apart(journal) & _lasting(journal))
-    return np.asarray(~_unknown(journal) & differ, dtype=np.int64)
-
-
-def _lasting(journal: Journal) -> NDArray[np.bool_]:
-    """Where the motion of a direction is not damped."""
-    return np.asarray((journal.column("regime") != b"damped").any(axis=0))
-
-
-def _unknown(journal: Journal) -> NDArray[np.bool_]:
-    """Where the motion of a direction is undecided or has failed."""
-    done = (journal.column("status") == _DONE) & (journal.column("regime") != b"undecided")
-    return np.asarray(~done.all(axis=0))
-
-
-def _apart(journal: Journal) -> NDArray[np.bool_]:
-    """Where the amplitudes of both directions differ; not where one is missing."""
-    amplitude = journal.column("amplitude")
-    return np.asarray(np.ptp(amplitude, axis=0) > SAME_AMPLITUDE * amplitude.max(axis=0))
-
-
-def _on_hysteresis(journal: Journal, hysteresis: NDArray[Any]) -> Iterator[str]:
-    """What is to be said about motions that were followed up and down."""
-    if count := int(hysteresis.sum()):
-        where = [_parameters(journal.plan, int(index)) for index in np.flatnonzero(hysteresis.ravel())[:3]]
+def _hysteresis(journal: Journal) -> tuple[NDArray[Any], list[str]]:
+    """Where the motions on the way up and on the way down differ (1), and what is to be said about that."""
+    regime, amplitude = journal.column("regime"), journal.column("amplitude")
+    done = (journal.column("status") == _DONE) & (regime != b"undecided")
+    known, lasting = done.all(axis=0), (regime != b"damped").any(axis=0)
+    apart = np.ptp(amplitude, axis=0) > SAME_AMPLITUDE * amplitude.max(axis=0)  # not where one is missing
+    differ = known & ((regime[0] != regime[1]) | (apart & lasting))
+    count, size, decided, said = int(differ.sum()), differ.size, int(known.sum()), list[str]()
+    if count:
+        where = [_parameters(journal.plan, int(index)) for index in np.flatnonzero(differ.ravel())[:3]]
         places = "; ".join(", ".join(f"{key} = {label(value)}" for key, value in each.items()) for each in where)
         more = f"; and {count - 3} more" if count > 3 else ""
-        yield f"hysteresis at {count} of {hysteresis.size} points: {places}{more}"
-    known = hysteresis.size - int(_unknown(journal).sum())
-    if known and not count:
-        those = f" at the {known} points that are decided" if known < hysteresis.size else ""
+        said.append(f"hysteresis at {count} of {size} points: {places}{more}")
+    elif decided:
+        those = f" at the {decided} points that are decided" if decided < size else ""
         same = "the motion is the same on the way up and on the way down"
-        if damped := int((~_unknown(journal) & ~_lasting(journal)).sum()):
+        if damped := int((known & ~lasting).sum()):
             both = "damped on the way up and on the way down"
-            same = both if damped == known else f"{both} at {damped} of them, and {same} at the others"
-        yield f"no hysteresis{those}: {same}"
-    if known < hysteresis.size:
-        apart = int((_unknown(journal) & _apart(journal)).sum())
-        differ = f"; the amplitudes of the two ways differ at {apart} of them" if apart else ""
-        undecided = f"{hysteresis.size - known} points, which failed or are undecided in a direction"
-        yield f"hysteresis is not known at {undecided}{differ}"
+            same = both if damped == decided else f"{both} at {damped} of them, and {same} at the others"
+        said.append(f"no hysteresis{those}: {same}")
+    if decided < size:
+        doubtful = int((~known & apart).sum())
+        ways = f"; the amplitudes of the two ways differ at {doubtful} of them" if doubtful else ""
+        undecided = f"{size - decided} points, which failed or are undecided in a direction"
+        said.append(f"hysteresis is not known at {undecided}{ways}")
+    return differ.astype(np.int64), said
 
 
 def _on_lasting_vibration(journal: Journal, tolerance: float) -> Iterator[str]:

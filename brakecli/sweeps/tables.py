@@ -113,7 +113,7 @@ class Sweep(Table):
 
     def _broken_rules(self) -> Iterator[Problem]:
         if not self.axis and self.critical is None:
-            yield Problem(("axis",), MISSING, "give at least one [[axis]], or [critical]")
+            yield Problem(("axis",), MISSING, "give at least one [[axis]], or [critical]", instead=("critical",))
         taken: set[tuple[str, ...]] = set()
         for index, text in ((index, text) for index, axis in enumerate(self.axis) for text in axis.parameter):
             if key_path(text) in taken:

@@ -207,7 +207,7 @@ ZERO["link2__stiffness"] = 2e6 * math.sin(math.radians(40.0)) / math.sin(math.ra
         ({"link2__angle_deg": 0.0}, ["stable: no friction makes it unstable"]),
         (
             {"link2__angle_deg": -5.0, "friction__coefficient": 80.0, "solver__duration": 0.05},
-            ["there is no steady sliding at 80", "self-locking", "stable up to 68.6, 14 % below", "→"],
+            ["at 80 there is no steady sliding: ", "self-locking", "stable up to 68.6, 14 % below", "→"],
         ),
         (ZERO, ["squeals at", "unstable at any friction, however small", "gives 0.36"]),
     ],

@@ -195,6 +195,52 @@ def test_what_lies_beside_the_lines_of_a_forced_motion_is_ripple_if_nodes_ripple
     assert "contact.nodes = 1024" in verdict.reasons[1]
 
 
+@pytest.mark.parametrize("times", [0.5, 0.9, 1.0, 1.1])
+def test_a_stick_of_less_than_a_sample_is_not_said_to_be_none(times: float) -> None:
+    """The step locks the cycle to 12.000 samples: none of 181 cycles shows the stick, or a third."""
+    name = "sticks for less than a sample"
+    verdict = judged(name, output__sample_interval=times * SHOES[name]["output"]["sample_interval"])
+    assert verdict.regime is Regime.UNDECIDED
+    assert abs(verdict.stick_fraction - 0.0270) <= verdict.evidence["stick_spread"]  # by located events
+    told = re.search(r"may fall between samples in 100%; reduce (.*) to ([\d.e-]+) s", verdict.reasons[0])
+    assert told is not None
+    interval = float(told[2])
+    changes = {key.replace(".", "__"): interval for key in told[1].split(" and ")}
+    finer = judged(name, **changes)
+    assert (finer.regime, finer.settled) == (Regime.RELAXATION, True)
+    assert abs(finer.stick_fraction - 0.0270) <= finer.evidence["stick_spread"]
+
+
+def test_what_ripple_of_the_nodes_feeds_is_not_called_self_excited() -> None:
+    """A wave passes under the nodes at 483 Hz, the shoe's own is 457 Hz. It dies by another integrator."""
+    verdict = judged("ripple beside its own frequency")
+    told = re.search(r"192 nodes gives .* W .*; take contact.nodes = (\d+)", verdict.reasons[0])
+    assert told is not None
+    assert verdict.regime is Regime.UNDECIDED
+    finer = judged("ripple beside its own frequency", contact__nodes=int(told[1]))
+    assert "still decaying" in finer.reasons[0]
+
+
+def test_a_wave_that_modulates_two_hops_makes_no_cycle_of_four() -> None:
+    verdict = judged("two hops that a wave modulates")
+    assert verdict.frequency == pytest.approx(36.02, rel=0.003)  # by another integrator; wave: 51.85 Hz
+    assert verdict.evidence["rises_per_cycle"] == 2.0
+
+
+def test_what_one_beat_of_the_waves_shows_has_a_spread_that_holds_what_others_show() -> None:
+    verdict = judged("one beat of waves under an opening pad")
+    assert verdict.settled
+    assert verdict.amplitude_spread is not None
+    assert abs(verdict.amplitude - 1.239e-6) <= verdict.amplitude_spread  # later parts, by another integrator
+
+
+def test_what_lies_on_sums_of_three_waves_is_not_what_the_shoe_adds() -> None:
+    """Two starts far apart differ by 5e-11 in the middle of the run: all is forced."""
+    verdict = judged("sums of three waves")
+    assert (verdict.excitation, verdict.amplitude_own) == (Excitation.FORCED, None)
+    assert f"{verdict.evidence['forced_share']:.0%} of the energy" in verdict.reasons[0]
+
+
 def test_an_impact_between_the_samples_of_most_cycles_counts_for_the_torque() -> None:
     verdict = judged("impacts of less than a sample")
     assert verdict.settled

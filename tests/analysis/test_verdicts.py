@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from brakecli.analysis.regime.classify import classify
+from brakecli.analysis.regime.linear import linear_theory
 from brakecli.analysis.regime.of_run import verdict_on
 from brakecli.analysis.regime.verdict import Context, Excitation, Regime
 from brakecli.analysis.stability.report import stability
@@ -133,6 +134,24 @@ def test_what_roughness_forces_in_full_contact_is_the_motion_that_lasts(seed: in
     # The record ends within a turn of the beat of two waves; the shoe's motion acts on the phase of a wave by the
     # slope 2π g/λ = 2e-4 times 30.
     assert verdict.amplitude_forced == pytest.approx(0.5 * float(np.ptp(last)), rel=0.03)
+
+
+@pytest.mark.parametrize("waves", [2, 5, 7, 10])
+def test_the_amplitude_of_many_waves_is_that_of_their_highest_meeting(waves: int) -> None:
+    """Their sum is taken at sixteen times in each period of the fastest, over 64 times the run."""
+    rng = np.random.default_rng(waves)
+    lengths, heights = rng.uniform(0.02, 0.04, waves), rng.uniform(1e-7, 1e-6, waves)
+    rough = {"wheel": {"wavelengths": lengths.tolist(), "amplitudes": heights.tolist()}}
+    changes: dict[str, Any] = {"wheel__angular_speed": 10.0, "solver__duration": 4.0}
+    system = system_of(make(SQUEAL | {"roughness": rough}, **changes))
+    theory = linear_theory(system, system.belt_speed)
+    assert theory is not None
+    turns, step = 2j * np.pi * theory.passing, 1.0 / (16.0 * np.abs(theory.passing).max())
+    block = theory.waves[:, :1] * np.exp(np.outer(turns, step * np.arange(1 << 14)))
+    starts = np.arange(0.0, 64.0 * 4.0, step * (1 << 14))
+    bounds = [(x.min(), x.max()) for x in (np.imag(np.exp(turns * start) @ block) for start in starts)]
+    swing = 0.5 * (max(high for _, high in bounds) - min(low for low, _ in bounds))
+    assert theory.parts(np.zeros(2), np.array([0.0, 4.0]))[0] == pytest.approx(swing, rel=0.01)
 
 
 @pytest.mark.parametrize("shoes", counts(6, 100))

@@ -202,8 +202,10 @@ def test_a_case_whose_name_begins_with_a_dash_is_suggested_as_a_path(here: Path)
         ["check", "-absent.toml"],
         ["sweep", "--", "-dash.toml"],
         ["new", "--", "-new case"],
+        ["new", "map", "-o", "."],
     ]
-    check, absent, sweep, new = each(here, lines)
+    check, absent, sweep, new, folder = each(here, lines)
+    folder.told(74, ".: cannot write: this is a directory")
     check.told(2, "No such option", "brakecli: -dash.toml: was read as options; name the file ./-dash.toml")
     assert "./" not in absent.told(2, "No such option")
     sweep.told(2, "-dash.toml: this is a case; simulate it with: brakecli run ./-dash.toml")

@@ -135,6 +135,10 @@ def test_a_single_knot_is_a_constant(height: float, knot: float, t: float) -> No
     assert abs(error) <= Fraction(1e-30) * abs(Fraction(height)) * (abs(Fraction(t)) + 2 * abs(Fraction(knot)))
 
 
+def test_equal_values_are_a_constant() -> None:
+    assert schedule((0.5, 1.0, 3.0), (4.0, 4.0, 4.0), 0.5) == schedule((0.0,), (2.0,))
+
+
 def test_the_integral_starts_at_zero_and_has_no_jump_at_a_knot() -> None:
     s = schedule([-1.0, 0.5, 3.0], [2.0, -4.0, 7.0], 0.3)
     assert integral_at(s, 0.0, 0.0) == (0.0, 0.0)

@@ -23,11 +23,11 @@ def classify(
     undecided = decision.regime is Regime.UNDECIDED
     if in_full:
         _add_evidence(rules, context)
-    split = rules.parts or (None if rules.rings or not in_full else rules.split())
-    forced, own = split if split and not (cycles and split[0] > split[1]) else (None, None)
-    amplitude, spread = rules.amplitude(decision)
     lasting = decision.excitation is Excitation.FORCED and not rules.rings
     lines = (*context.forced, *context.subharmonics()) if lasting else ()
+    split = rules.parts or (None if rules.rings or not in_full else rules.split(lines or context.forced))
+    forced, own = split if split and not (cycles and split[0] > split[1]) else (None, None)
+    amplitude, spread = rules.amplitude(decision)
     ripple = context.ripple(part, lines) if context.steady and not cycles else None
     if ripple:
         rules.evidence |= {f"ripple_{name}": getattr(ripple, name) for name in ("x", "vx", "force")}

@@ -1,12 +1,13 @@
 """What the cycles of a vibration show: amplitude, frequency, stick, force, and how far they drift."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.analysis.regime.evidence import Part, line
+from brakecli.analysis.regime.evidence import LINE_BINS, Part, line
 from brakecli.analysis.regime.spectra import Array, upward_crossings
 from brakecli.solver.quantities import ContactState
 
@@ -24,6 +25,8 @@ _BANDS = (0.3, 0.5, 0.15)  # of the standard deviation of vx: ripple within it d
 _BETWEEN = 1e-3  # of the energy of vx, between the lines of one rise, that makes a cycle of several
 _SEEN = 0.85  # least part of a force's swing in every other sample that all samples see
 SIZE_OFF, _PERIOD_OFF = 3.0, 0.2  # of an amplitude and a period, per step in a contact: most that impacts were off
+_ALIKE = 0.5  # of a sample that no cycle has seen, beyond which all cycles are seen at the same places
+_ROUNDING = 1e-9  # of the wheel's speed
 _SAME = 0.02  # squared difference, over twice the variance, between one period of vx and the next
 
 
@@ -61,6 +64,7 @@ class Cycles:
     amplitude_spread: float
     stick_fraction: float
     contact_loss_fraction: float
+    may_stick: float  # part of the cycles that stick, or may between two samples
     limited: float  # part of the groups of cycles in which the shoe sticks, leaves the wheel or overtakes it
     drift: "Drift"  # of the amplitude
     detuning: "Drift"  # of the period
@@ -68,15 +72,21 @@ class Cycles:
     force_variation: float | None  # N, peak to peak of the friction force
 
 
-def cycles_of(part: Part, slip: ContactState | None = None, step: float = 0.0) -> Cycles | None:
+def cycles_of(
+    part: Part,
+    slip: ContactState | None = None,
+    step: float = 0.0,
+    belt: float = 0.0,
+    waves: Sequence[tuple[float, float]] = (),
+) -> Cycles | None:
     """The cycles of a part; None if there are none. `slip` is the side to which the shoe slips in steady sliding.
 
-    The spreads hold what a step (s) may change, with which the motion was computed. Stick, loss of contact and
-    frequency are medians of ten groups of neighbouring cycles, so that it does not matter how samples fall into
-    each cycle.
+    The spreads hold what a step (s) may change, with which the motion was computed, on a wheel of speed `belt`
+    (m/s) whose `waves` (Hz, m) pass. Stick, loss of contact and frequency are medians of ten groups of cycles, so
+    that it does not matter how samples fall into each cycle.
     """
     velocity = part.last("vx")
-    crossings, rises = _beginnings(part, velocity)
+    crossings, rises = _beginnings(part, velocity, waves)
     if len(crossings) < 4:
         return None
     cycles = len(crossings) - 1
@@ -85,7 +95,11 @@ def cycles_of(part: Part, slip: ContactState | None = None, step: float = 0.0) -
     period, period_spread = median(np.diff(groups) / np.diff(edges))
     state = part.history.read("state", part.stop - len(velocity), part.stop)
     sticks = np.flatnonzero((state[1:] == ContactState.STICK) & (state[:-1] != ContactState.STICK)) + 1
-    per_cycle = np.histogram(sticks, crossings)[0]
+    places = np.sort(crossings % 1.0)  # within their samples: where cycles last whole samples, all at one
+    unseen, step = float(np.diff(places, append=places[0] + 1.0).max()), step / part.history.interval
+    raw = part.history.read("vx", part.stop - len(velocity), part.stop)
+    hidden = _hidden_sticks(raw, state, belt)
+    per_cycle, may = (np.histogram(each, crossings)[0] for each in (sticks, np.concatenate([sticks, hidden])))
     begin, end = groups[:-1].astype(int), groups[1:].astype(int) + 1
 
     def shares(found: NDArray[np.bool_]) -> Array:
@@ -93,26 +107,22 @@ def cycles_of(part: Part, slip: ContactState | None = None, step: float = 0.0) -
         count = np.concatenate([[0], np.cumsum(found)])
         return np.asarray((count[end] - count[begin]) / (end - begin))
 
-    places = np.sort(crossings % 1.0)  # within their samples: where cycles last whole samples, all at one
-    unseen, step = float(np.diff(places, append=places[0] + 1.0).max()), step / part.history.interval
     turn, impact = 2.0 * np.pi * step / period, step / contact_length(part)
 
     def time_in(which: ContactState) -> tuple[float, float]:
         """Part of a cycle, and its spread, with the step, and the part of a sample that no cycle has seen."""
         there = state == which
         middle, spread = median(shares(there))
-        return middle, max(spread, (unseen + step) * float(np.sum(there[1:] & ~there[:-1])) / cycles / period)
+        begins = float(np.sum(there[1:] & ~there[:-1])) + (len(hidden) if which == ContactState.STICK else 0)
+        return middle, max(spread, (unseen + step) * begins / cycles / period)
 
     (stick, stick_spread), (loss, loss_spread) = (time_in(which) for which in _ENDS)
     frequency = 1.0 / (period * part.history.interval)
-    first, *higher = (part.share([n * frequency]) for n in range(1, _HARMONICS + 1))
     evidence = {
         "cycles": float(cycles),
         "samples_per_cycle": period,
         "rises_per_cycle": float(rises),
-        "fundamental_share": first,
-        "harmonic_share": part.share([n * frequency for n in range(1, 1 + int(0.5 * period))]),
-        "harmonics": [float(np.sqrt(share / first)) for share in higher if first > 0.0],
+        **in_lines(part, frequency, period),
         "stick_cycles": float(np.mean(per_cycle > 0)),
         "stick_episodes_per_cycle": float(np.mean(per_cycle)),
         "frequency_spread": frequency * period_spread / period,
@@ -126,10 +136,36 @@ def cycles_of(part: Part, slip: ContactState | None = None, step: float = 0.0) -
     amplitude, spread = median(sizes)
     missed = 3.0 / 128.0 * (2.0 * np.pi / period) ** 4 * amplitude  # of a crest between two samples: parabola
     spread = max(spread, unseen * missed) + (0.25 * turn**2 + SIZE_OFF * impact) * amplitude
-    medians = amplitude, spread, stick, loss
-    varies = _force_variation(force, crossings, groups, alike=unseen > 0.5)
+    medians = amplitude, spread, stick, loss, float(np.mean(may > 0))
+    varies = _force_variation(force, crossings, groups, alike=unseen > _ALIKE)
     off = frequency * (turn**2 / 8.0 + _PERIOD_OFF * impact)
     return Cycles(evidence, frequency, off, *medians, limited, *changes, varies)
+
+
+def _hidden_sticks(velocity: Array, state: Array, belt: float) -> NDArray[np.intp]:
+    """The samples before which the shoe may stick unseen: its velocity (m/s) may reach the wheel's between two.
+
+    Beside its crest a velocity lies below the lines through the two samples on either side.
+    """
+    slower = abs(belt) - np.sign(belt) * velocity
+    before, first, last, after = (slower[i : len(slower) - 3 + i] for i in range(4))
+    falls, rises, least = first - before, last - after, -_ROUNDING * abs(belt)
+    crest = (falls < 0.0) & (rises < 0.0) & (np.minimum(first, last) > least)
+    meet = np.clip((last + rises - first) / np.where(crest, falls + rises, 1.0), 0.0, 1.0)
+    crest &= np.maximum(first + falls * meet, last + rises * (1.0 - meet)) <= -least
+    touches = np.minimum(state[1:-2], state[2:-1]) < ContactState.SEPARATED
+    slips = (state[1:-2] != ContactState.STICK) & (state[2:-1] != ContactState.STICK)
+    return np.flatnonzero(crest & touches & slips) + 2
+
+
+def in_lines(part: Part, frequency: float, period: float) -> dict[str, Any]:
+    """Parts of the energy of vx in a line (Hz) and its harmonics, and their amplitudes over its own."""
+    first, *higher = (part.share([n * frequency]) for n in range(1, _HARMONICS + 1))
+    return {
+        "fundamental_share": first,
+        "harmonic_share": part.share([n * frequency for n in range(1, 1 + int(0.5 * period))]),
+        "harmonics": [float(np.sqrt(share / first)) for share in higher if first > 0.0],
+    }
 
 
 def contact_length(part: Part) -> float:
@@ -153,20 +189,26 @@ def _force_variation(force: Array, crossings: Array, groups: Array, alike: bool)
     return swings[0] if min(swings) >= _SEEN * swings[0] else None
 
 
-def _beginnings(part: Part, velocity: Array) -> tuple[Array, int]:
+def _beginnings(part: Part, velocity: Array, waves: Sequence[tuple[float, float]]) -> tuple[Array, int]:
     """Where cycles begin, and how many rises each holds: one, unless lines lie between those of one.
 
-    Rises are told from ripple by the first of `_BANDS` with which the motion repeats after some of them.
+    Lines of waves (Hz, m) may lie there as well. Rises are told from ripple by the first of `_BANDS` with which
+    the motion repeats after some of them.
     """
     everywhere = [upward_crossings(velocity, band * float(velocity.std())) for band in _BANDS]
-    return next((found for each in everywhere if (found := _repeated(part, velocity, each))), (everywhere[0], 1))
+    return next(
+        (found for each in everywhere if (found := _repeated(part, velocity, waves, each))), (everywhere[0], 1)
+    )
 
 
-def _repeated(part: Part, velocity: Array, crossings: Array) -> tuple[Array, int] | None:
+def _repeated(
+    part: Part, velocity: Array, waves: Sequence[tuple[float, float]], crossings: Array
+) -> tuple[Array, int] | None:
     """Where cycles begin, and how many rises each holds; None if the motion does not repeat after as few."""
     if len(crossings) < 2:
         return None
     period = float(crossings[-1] - crossings[0]) / (len(crossings) - 1)
+    width = 2.0 * LINE_BINS / (len(velocity) * part.history.interval)
     close = 2.0 * _SAME * float(velocity.var())
     for rises in range(1, _MOST_RISES_PER_CYCLE + 1):  # after which the motion repeats
         shift = round(rises * period)
@@ -175,7 +217,8 @@ def _repeated(part: Part, velocity: Array, crossings: Array) -> tuple[Array, int
             divisors = [each for each in range(1, rises) if rises % each == 0]
             for fewer in divisors:  # samples may repeat only after several cycles
                 lines = [n * longest for n in range(1, 2 * rises) if n % (rises // fewer)]  # above: jumps, aliased
-                if part.share(lines) <= _BETWEEN:
+                beside = [f for f in lines if all(abs(f - wave) > width for wave, _ in waves)]
+                if part.share(beside, LINE_BINS // 2) <= _BETWEEN:
                     return crossings[::fewer], fewer
             return crossings[::rises], rises
     return None

@@ -119,12 +119,12 @@ class Part:
             return 0.0
         return float(power[_near(lines, frequencies, bins)].sum()) / total
 
-    def on_lines(self, frequency: float, off: float) -> bool:
-        """Whether the strongest line of vx is a frequency (Hz), known to `off`, or a multiple of it."""
+    @property
+    def strongest(self) -> tuple[float, float]:
+        """Frequency (Hz) of the strongest line of vx, and half of its width."""
         frequencies, power, _ = self._spectrum
-        strongest = float(frequencies[FEWEST_CYCLES + np.argmax(power[FEWEST_CYCLES:])])
-        number = max(round(strongest / frequency), 1)
-        return abs(strongest - number * frequency) <= number * off + LINE_BINS * float(frequencies[1])
+        top = FEWEST_CYCLES + int(np.argmax(power[FEWEST_CYCLES:]))
+        return interpolated(frequencies, power, top), LINE_BINS * float(frequencies[1])
 
     def narrow(self) -> float:
         """Part of the energy of vx in its three strongest narrow bands."""

@@ -125,6 +125,7 @@ class ForcedRules:
         doubtful = doubtful or (self._makes_up and self._own_line() is not None)
         if feeds is Feeds.FRICTION or (doubtful and feeds is Feeds.UNKNOWN):
             return self._either()
+        self.evidence["forced_share"] = share
         if dense:
             text = f"{what}, which lie too close to be told from others"
             return self.fed() or Decision(text, advice="run twice as long", second_run=True)
@@ -332,7 +333,7 @@ class ForcedRules:
         friction, roughness = (f"{'gives' if each > 0.0 else 'takes'} {abs(each):.2g} W" for each in self._gives)
         return f"of the vibration's power friction {friction} and the roughness {roughness}"
 
-    def split(self) -> tuple[float, float] | None:
-        """Half of peak to peak of x (m) that roughness forces and that the shoe adds, by the spectrum."""
+    def split(self, lines: Sequence[float]) -> tuple[float, float] | None:
+        """Half of peak to peak of x (m) that roughness forces on lines (Hz), and that the shoe adds."""
         slow = min((frequency for frequency, _ in self.context.waves), default=0.0)
-        return self.settled_part.split(self.context.forced) if self._settled_seconds * slow >= 2.0 else None
+        return self.settled_part.split(lines) if self._settled_seconds * slow >= 2.0 else None

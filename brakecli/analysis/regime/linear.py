@@ -26,7 +26,10 @@ from brakecli.solver.quantities import ContactState
 from brakecli.solver.system import System
 
 _BEYOND = 64.0  # times as long as the run
-_SCATTERED: Array = np.arange(1 << 14, dtype=np.float64) * 0.6180339887498949 % 1.0  # evenly, without a period
+_DENSE, _MOST_DENSE = 128, 1024  # blocks of time for each wave, and times in each of them
+_SCATTERED: Array = np.arange(_MOST_DENSE, dtype=np.float64) * 0.6180339887498949 % 1.0  # evenly, without a period
+_NEAR: Array = np.linspace(-1.0, 1.0, 33) / 8.0  # periods of the fastest wave: a block has a time in each eighth
+_HIGHEST = 32  # blocks that are looked at so closely
 _ROUNDING = 1e-12  # of the largest eigenvalue: what a growth rate of zero may be off
 _ROUNDING_WITH_SLOPES = 1e-9  # the same where the passing waves enter it
 
@@ -93,14 +96,33 @@ class Linear:
         x = self.waves[:, 0]
         return np.asarray(np.concatenate([x.real, x.imag]) @ _turns(tuple(self.passing.tolist()), time.tobytes()))
 
+    def _extremes(self, span: float) -> tuple[float, float]:
+        """Largest and least x (m) that the waves force within a time (s).
+
+        Where many meet is rare: blocks of time are scattered over it, and the highest are looked at closely.
+        """
+        speeds, size = 2.0 * math.pi * self.passing, min(_DENSE * len(self.passing), _MOST_DENSE)
+        period = 1.0 / float(np.abs(self.passing).max())
+        starts, fine = span * _SCATTERED[:size], 0.125 * period * np.arange(size)
+        begins = (self.waves[:, :1] * np.exp(1j * np.outer(speeds, starts))).astype(np.complex64)
+        turns = np.exp(1j * np.outer(speeds, fine)).astype(np.complex64)
+        x = np.concatenate([begins.imag, begins.real]).T @ np.concatenate([turns.real, turns.imag])
+        found = []
+        for blocks in (x, -x):
+            highest = np.argsort(blocks.max(axis=1))[-_HIGHEST:]
+            times = starts[highest] + fine[blocks[highest].argmax(axis=1)]
+            near = np.outer(speeds, np.add.outer(times, period * _NEAR))
+            found.append((self.waves[:, 0] @ np.exp(1j * near)).imag)
+        return float(found[0].max()), float(found[1].min())
+
     def parts(self, x: Array, time: Array) -> tuple[float, Array, Array, Array]:
         """What the waves force: half of peak to peak of x (m), beyond the run too, as waves beat.
 
         Then, at the times given, the x that they force and that the shoe adds (m), and the times again (s).
         """
         lasting = self._forced_x(time)
-        later = self._forced_x(_BEYOND * time[-1] * _SCATTERED) if len(self.waves) > 1 else lasting
-        size = 0.5 * float(max(lasting.max(), later.max()) - min(lasting.min(), later.min()))
+        high, low = self._extremes(_BEYOND * time[-1]) if len(self.waves) > 1 and self.belt else (0.0, 0.0)
+        size = 0.5 * (max(float(lasting.max()), high) - min(float(lasting.min()), low))
         return size, lasting, x - self.rest[0] - lasting, time
 
     def stays(self, state: Array) -> bool:

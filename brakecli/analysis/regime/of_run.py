@@ -103,7 +103,7 @@ def context(system: System) -> Context:
         belt,
         radius=system.radius,
         step=0.0 if system.method.own_steps or system.method.step is None else system.step,
-        steady=len(system.belt) == 1 and len(system.load) == 1,
+        steady=system.steady,
         forced=forced_lines(belt, turns, highest),
         subharmonics=partial(subharmonics, belt, turns, highest),
         waves=waves if belt else (),

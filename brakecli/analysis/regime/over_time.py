@@ -50,11 +50,6 @@ class OverTime:
     vibrations: list[Vibration]
 
 
-def changes(system: System) -> bool:
-    """Whether speed or load change."""
-    return len(system.belt) > 1 or len(system.load) > 1
-
-
 def over_time(history: History, system: System) -> OverTime | None:
     """What the windows of a history show; None where speed and load are constant, or samples are too few."""
     lowest, highest = system.natural_frequencies
@@ -63,7 +58,7 @@ def over_time(history: History, system: System) -> OverTime | None:
     hop = round(window / (_HOPS * history.interval))
     count = history.samples // max(hop, 1) - _HOPS + 1
     few = hop < _HOPS or hop * history.interval * lowest < SHORTEST
-    if not changes(system) or few or count < 1:
+    if system.steady or few or count < 1:
         return None
     frequency, density = _spectra(history, hop, count)
     middles = (np.arange(count) + _HOPS / 2).astype(np.float64) * hop * history.interval

@@ -6,7 +6,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from brakecli.analysis.regime.cycles import SIZE_OFF, Cycles, Drift, contact_length, cycles_of, median, swings
+from brakecli.analysis.regime.cycles import (
+    SIZE_OFF,
+    Cycles,
+    Drift,
+    contact_length,
+    cycles_of,
+    in_lines,
+    median,
+    swings,
+)
 from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, WINDOWS, Envelope, line
 from brakecli.analysis.regime.forced import GROWN, QUARTER, ForcedRules
 from brakecli.analysis.regime.verdict import Decision, Excitation, Feeds, Regime
@@ -28,6 +37,7 @@ _SPARSE = 8  # of the places at which a forced motion is computed, one of so man
 _UNSETTLED = 1.5  # times as many cycles where nothing has settled: a hop may look like a vibration
 _SURE = 10.0  # standard errors of a slope: neighbouring windows of an amplitude that wanders go together
 _LONG, _DASHPOT = "run longer", "a dashpot would decide"
+_FED = 0.1  # of what keeps a vibration up, that nodes may add
 _FAR = 0.3  # rad, of a wave, by which what the shoe adds moves it
 
 
@@ -203,7 +213,8 @@ class Rules(ForcedRules):
     def sustained(self) -> Decision:
         """What is left is a vibration that lasts, if enough of it is there: its cycles decide."""
         theory = self.context.linear() if not self.context.forced else None
-        self.cycles = found = cycles_of(self.settled_part, theory.slip if theory else None, self.context.step)
+        known, slip = self.context, theory.slip if theory else None
+        self.cycles = found = cycles_of(self.settled_part, slip, known.step, known.belt_speed, known.waves)
         cycles = found.evidence["cycles"] if found else 0.0
         self.evidence |= found.evidence if found else {}
         if not found or cycles < (1.0 if self.settled else _UNSETTLED) * self.limits.fewest_cycles:
@@ -230,32 +241,64 @@ class Rules(ForcedRules):
         if drift > (_DRIFT if unsure else self.limits.settled_within):
             text = f"the amplitude still changes by {found.drift.part:.1%} within the last part of the run"
             return Decision(text, advice=_LONG)
+        if self.context.forced and (decision := self._rippled()):
+            return decision
         own, wander = (Excitation.SELF_EXCITED, found.frequency), found.evidence["frequency_spread"]
         held = self._held(wander, found.frequency, found.detuning)
         self.evidence["frequency_spread"] = (wander if held is None else held) + found.frequency_off
         wanders = wander > _SPREAD * found.frequency
-        misses = (
-            harmonic < _CYCLES_SHARE and not wanders and not self.settled_part.on_lines(found.frequency, wander)
-        )
-        if stick >= self.limits.stick_cycles and not misses:
+        missed = None if wanders or harmonic >= _CYCLES_SHARE else self._missed(found.frequency, wander)
+        if stick >= self.limits.stick_cycles and not missed:
             text = f"sustained, with stick in {stick:.0%} of {cycles:.0f} cycles"
             return Decision(text, Regime.RELAXATION, *own)
+        if self._sticks(stick) != self._sticks(found.may_stick):
+            finer = 0.25 * self.history.interval
+            keys = "solver.step and " * (finer < 1.1 * self.context.step) + "output.sample_interval"
+            text = f"stick is seen in {stick:.0%} of the cycles"
+            text += f", but may fall between samples in {found.may_stick:.0%}"
+            return Decision(text, advice=f"reduce {keys} to {finer:.2g} s")
         bands = self.evidence["band_share"] = self.settled_part.narrow()
         lines = f"{harmonic:.0%} of the energy of vx in one line and its harmonics"
         if harmonic < bands:
             lines = f"{bands:.0%} of the energy of vx in three narrow bands"
         regular = harmonic if wanders or bands < _BANDS else max(harmonic, bands)
         slips = max(stick, self.context.sticks) <= 1.0 - self.limits.stick_cycles
-        if slips and regular >= self.limits.harmonic_share and not misses:
+        if slips and regular >= self.limits.harmonic_share:
             how = f"with stick in only {stick:.0%} of the cycles" if stick else "without stick"
+            own = (Excitation.SELF_EXCITED, missed or found.frequency)
             return Decision(f"sustained {how}: {lines}", Regime.QUASI_HARMONIC, *own)
         without = f" ({self.context.sticks:.0%} without the roughness)" if self.context.sticks else ""
         irregular = f"irregular: stick in {stick:.0%} of the cycles{without}, {lines}"
         irregular += ", but the frequency wanders" if wanders else ""
-        irregular += (
-            f", but its strongest line is not at the {found.frequency:.4g} Hz of its rises" if misses else ""
-        )
-        return Decision(irregular, advice=f"{'' if misses else 'run longer, or '}look at the spectrum")
+        irregular += f", but not at the {found.frequency:.4g} Hz of its rises" if missed else ""
+        return Decision(irregular, advice=f"{'' if missed else 'run longer, or '}look at the spectrum")
+
+    def _missed(self, frequency: float, off: float) -> float | None:
+        """Frequency (Hz) of the strongest line of vx where it is no multiple of that of its rises."""
+        line, width = self.settled_part.strongest
+        multiple = max(round(line / frequency), 1)
+        if abs(line - multiple * frequency) <= multiple * off + width:
+            return None
+        self.evidence |= {
+            "frequency_spread": width,
+            **in_lines(self.settled_part, line, 1.0 / line / self.history.interval),
+        }
+        return line
+
+    def _rippled(self) -> Decision | None:
+        """What the ripple of the nodes gives to a vibration that friction seems to keep up."""
+        if not (ripple := self.context.ripple(self.settled_part, ())):
+            return None
+        friction, _ = self.settled_part.power("friction_force", "vx")
+        gains = max(self.context.powers(self.settled_part).get("power_dashpots", 0.0), abs(friction))
+        if ripple.power <= _FED * gains:
+            return None
+        text = f"ripple of the contact's {ripple.nodes} nodes gives {ripple.power:.2g} W to the vibration"
+        return Decision(f"{text}, so that friction may not keep it up", advice=ripple.advice)
+
+    def _sticks(self, part: float) -> int:
+        """Whether stick in a part of the cycles is stick in hardly any (0), in some, or in nearly all (2)."""
+        return (part > 1.0 - self.limits.stick_cycles) + (part >= self.limits.stick_cycles)
 
     def _drift_further(self, parted: float, left: float) -> None:
         """Whether a limit cycle that seems settled may still change, and how long a run must be to show it.
@@ -308,7 +351,8 @@ class Rules(ForcedRules):
             short, change = self._settled_seconds < self._slowest(0.0), 0.5 * abs(self._trend) * self.duration
             if not self.lasts and (short or change > self.limits.settled_within):
                 return found.amplitude, None  # where it ends, the run does not show
-            return found.amplitude, self._held(found.amplitude_spread, found.amplitude, found.drift)
+            held = self._held(found.amplitude_spread, found.amplitude, found.drift)
+            return found.amplitude, held if held is None or held < found.amplitude else None
         if decision.excitation is not Excitation.FORCED:
             return part.amplitude("x"), None
         if self.theory and self.parts:
@@ -317,7 +361,7 @@ class Rules(ForcedRules):
         period = max(min(self._beat / self.history.interval, samples - 1), 1.0)
         edges = np.asarray(samples - period * np.arange(int(samples / period), -1, -1), np.float64)
         size, spread = median(swings(part, edges))
-        if self.rings or len(edges) < 3:
+        if self.rings or len(edges) < 3 - self.settled:
             return size, None
         off = SIZE_OFF * size * self.context.step / self.history.interval / contact_length(part)
         return size, off + max(spread, self._beating() * part.amplitude("x") - size)

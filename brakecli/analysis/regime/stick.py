@@ -148,13 +148,10 @@ def _returning(x: Array, starts: NDArray[np.intp], fine: int, scale: int) -> flo
     between = starts[:-1][long] + waits[long] // 2
     exact = sliding_window_view(near, 2 * scale)
     starts = starts + exact[np.minimum(starts, len(exact) - 1)].argmin(axis=1)
-    (low, high), (least, most) = (
-        (np.median(part.min(axis=1)), np.median(part.max(axis=1)))
-        for part in (
-            sliding_window_view(near, wide)[np.clip(i - wide // 4, 0, len(near) - wide)[:: 1 + len(i) // _MOST]]
-            for i in (starts, between)
-        )
-    )
+    windows = sliding_window_view(near, wide)
+    places = (np.clip(i - wide // 4, 0, len(near) - wide)[:: 1 + len(i) // _MOST] for i in (starts, between))
+    ends = ((windows[i].min(axis=1), windows[i].max(axis=1)) for i in places)
+    (low, high), (least, most) = (map(np.median, each) for each in ends)
     return float((high - most) / max(least - low, 0.25 * (most - least), 1e-300))
 
 

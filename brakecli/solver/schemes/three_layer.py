@@ -26,11 +26,9 @@ def order(s: Weights, start: str) -> int:
 
 def begin(s: Weights, state: Any, position: Pair, velocity: Pair, acceleration: Pair) -> None:
     """Two levels: x¹ = x⁰ + h v⁰ + h² a⁰/2. The paper's start x¹ = x⁰ is v⁰ = a⁰ = 0."""
-    h = s.h
+    h, levels = s.h, zip(position, velocity, acceleration, strict=True)
     state.x_old, state.y_old = position
-    state.x, state.y = (
-        r + h * v + 0.5 * h * h * a for r, v, a in zip(position, velocity, acceleration, strict=True)
-    )
+    state.x, state.y = (r + h * v + 0.5 * h * h * a for r, v, a in levels)
     state.v_x, state.v_y = velocity
 
 

@@ -4,25 +4,22 @@ Its steps are its own. Each component keeps the tolerance, relative to the large
 slip, lift-off and touch-down end a step: nothing is smoothed, nothing stepped over.
 """
 
-from typing import Any
-
 from numba import float64, int64, void
 
+from brakecli.solver import own_steps
 from brakecli.solver.compile import Floats, at_address, in_memory, kernel
 from brakecli.solver.contact import CLOSED_FORM
-from brakecli.solver.energy import energy_at_level
 from brakecli.solver.friction import observed
 from brakecli.solver.quantities import Failure
-from brakecli.solver.records import MOTION, V_X, V_Y, Pair, Plant, Weights, X, Y, plant_type
+from brakecli.solver.records import MOTION, V_X, V_Y, Plant, Weights, X, Y, plant_type
 from brakecli.solver.schemes.event_driven.phases import EPSILON, SHOE, Shoe, press, resistance
 from brakecli.solver.schemes.event_driven.runge_kutta import interpolated
 from brakecli.solver.schemes.event_driven.step import STEP, first_step, step
 
 STATE, solve = MOTION, step
-LAG = 0
-MEMORY = ("x", "y", "v_x", "v_y")
-VELOCITIES = ("v_x", "v_y")
-mechanical_energy = energy_at_level
+LAG, MEMORY, VELOCITIES = own_steps.LAG, own_steps.MEMORY, own_steps.VELOCITIES
+begin, sample, weighted_time = own_steps.begin, own_steps.sample, own_steps.weighted_time
+mechanical_energy = own_steps.mechanical_energy
 
 _PLANT = plant_type(MOTION)
 hold, _plant_at = in_memory(_PLANT)
@@ -35,20 +32,9 @@ waves adds to both. An interruption need not wait for a sample."""
 _NONE = int(Failure.NONE)
 
 
-def weighted_time(s: Weights) -> float:
-    """Steps of other schemes place their forces; this one has none."""
-    return 0.0
-
-
 def order(s: Weights, start: str) -> int:
     """The order of the steps, through all events, on smooth surfaces."""
     return 8
-
-
-def begin(s: Weights, state: Any, position: Pair, velocity: Pair, acceleration: Pair) -> None:
-    """The initial state; the phase is found with the first step."""
-    state.x, state.y = position
-    state.v_x, state.v_y = velocity
 
 
 @kernel(void(SHOE, float64, int64), inlined=False)
@@ -78,11 +64,6 @@ def _sample(p: Shoe, interval: float, level: int) -> None:
     state, friction = observed(side, holds, needed, normal, bound)
     m.row[0], m.row[1], m.row[2], m.row[3] = x, y, v_x, v_y
     m.row[4], m.row[5], m.row[6], m.row[7] = friction, normal, p.layer.contact.fraction, state
-
-
-def sample(p: Plant, row: Floats) -> None:
-    """Write the sample at the level that has been reached."""
-    row[:] = p.state.row
 
 
 @kernel(int64(int64, float64[:, ::1], float64[:, ::1], int64))

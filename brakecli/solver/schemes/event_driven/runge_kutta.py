@@ -149,9 +149,8 @@ def interpolated(m: Any, component: int, theta: float) -> float:
 @kernel(float64(MOTION_TYPE, int64))
 def reach(m: Any, component: int) -> float:
     """A bound of how far one component of the continuous solution gets from the begin of its step."""
-    far = (
-        abs(m.powers[0, component]) + abs(m.powers[1, component]) / 4.0 + abs(m.powers[2, component]) * 4.0 / 27.0
-    )
+    far = abs(m.powers[0, component]) + abs(m.powers[1, component]) / 4.0
+    far += abs(m.powers[2, component]) * 4.0 / 27.0
     for p in range(3, TERMS[m.pair]):
         far += abs(m.powers[p, component]) / 16.0
     return far  # type: ignore[no-any-return]

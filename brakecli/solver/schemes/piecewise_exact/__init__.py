@@ -10,10 +10,10 @@ from typing import Any
 
 from numba import float64, int64, void
 
+from brakecli.solver import own_steps
 from brakecli.solver.compile import Floats, in_memory, kernel
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.double_double import two_sum
-from brakecli.solver.energy import energy_at_level
 from brakecli.solver.friction import observed
 from brakecli.solver.quantities import BOUND, Failure
 from brakecli.solver.records import (
@@ -30,7 +30,6 @@ from brakecli.solver.records import (
     TERMS,
     V_X,
     V_Y,
-    Pair,
     Plant,
     Weights,
     X,
@@ -44,10 +43,9 @@ from brakecli.solver.schemes.piecewise_exact.phases import OPEN, STICK, add_work
 from brakecli.solver.schemes.piecewise_exact.switch import place, switch
 
 STATE = FLOW
-LAG = 0
-MEMORY = ("x", "y", "v_x", "v_y")
-VELOCITIES = ("v_x", "v_y")
-mechanical_energy = energy_at_level
+LAG, MEMORY, VELOCITIES = own_steps.LAG, own_steps.MEMORY, own_steps.VELOCITIES
+begin, sample, weighted_time = own_steps.begin, own_steps.sample, own_steps.weighted_time
+mechanical_energy = own_steps.mechanical_energy
 
 _MOST_EVENTS, _NO_PROGRESS = 1000, 1e-6  # a run ends after so many events within that part of a step
 _FLAT = 1e-12  # fall of a margin over its rise, by which it dips by 1e-18 of this at most
@@ -60,20 +58,9 @@ hold, _plant_at = in_memory(_PLANT)
 _NONE, _, _DIVERGED, _, _, _STALLED = (int(failure) for failure in Failure)
 
 
-def weighted_time(s: Weights) -> float:
-    """Steps of other schemes place their forces; this one has none."""
-    return 0.0
-
-
 def order(s: Weights, start: str) -> int:
     """The order of the series that steps with events follow; all others are exact."""
     return TERMS - 1
-
-
-def begin(s: Weights, state: Any, position: Pair, velocity: Pair, acceleration: Pair) -> None:
-    """The initial state; its phase is found with the first step."""
-    state.x, state.y = position
-    state.v_x, state.v_y = velocity
 
 
 @kernel(void(FLOW_TYPE))
@@ -269,11 +256,6 @@ def _sample(p: Plant, t: float) -> None:
     state, friction = observed(float(m.phase - STICK), holds, needed, normal, c.phi * normal)
     m.row[0], m.row[1], m.row[2], m.row[3] = z[X], z[Y], z[V_X], z[V_Y]
     m.row[4], m.row[5], m.row[6], m.row[7] = friction, normal, 1.0 if normal > 0.0 else 0.0, state
-
-
-def sample(p: Plant, row: Floats) -> None:
-    """Write the sample at the level that has been reached."""
-    row[:] = p.state.row
 
 
 @kernel(int64(int64, float64[:, ::1], float64[:, ::1], int64))

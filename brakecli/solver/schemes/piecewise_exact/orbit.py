@@ -26,6 +26,7 @@ from numba import float64, int64, types, void
 
 from brakecli.solver.compile import kernel
 from brakecli.solver.records import (
+    BELT,
     COEFFICIENTS,
     FLOW_TYPE,
     PHASES,
@@ -64,6 +65,7 @@ ORBIT = record(
     "low high",  # least and largest x since the last fall, or of the cycle, m
     "error",  # of the orbit, in sizes
     "away",  # of the last return from the orbit, in sizes
+    "fastest",  # largest v_x of the orbit over the wheel's speed
     "mean_x mean_y square",  # integrals of x, y and v_x² over the orbit, m s and m²/s
     which=int,  # event at the end of the last step
     old=int,  # phase of that step
@@ -109,12 +111,6 @@ def _expand(m: Any, o: Any) -> None:
     phases.expand(m, o.old, o.h)
 
 
-@kernel(void(FLOW_TYPE, ORBIT_TYPE, float64))
-def _take(m: Any, o: Any, part: float) -> None:
-    """The motion at a part of the series."""
-    phases.reach(m, part)
-
-
 @kernel(void(COEFFICIENTS, FLOW_TYPE, ORBIT_TYPE, int64), inlined=False)
 def step(c: Coefficients, m: Any, o: Any, closely: int) -> None:
     """Move to the end of a step, or through the event in it; `closely` follows the series in any case."""
@@ -126,7 +122,7 @@ def step(c: Coefficients, m: Any, o: Any, closely: int) -> None:
     if closely == 1 or whole(m, o.h) == 0:
         _expand(m, o)
         o.which, o.part = first_event(m)
-        _take(m, o, o.part)
+        phases.reach(m, o.part)
         for i in range(SIZE):
             m.z[i] = m.at[i]
         if o.which != NO_EVENT:
@@ -141,7 +137,7 @@ def zero_of_velocity(m: Any, o: Any, sign: float) -> float:
     for k in range(TERMS):
         m.polynomial[0, k] = sign * m.series[V_X, k]
     part = root(m, 0, 0.0, o.part)
-    _take(m, o, part)
+    phases.reach(m, part)
     return part
 
 
@@ -166,7 +162,7 @@ def _carry(m: Any, o: Any, part: float) -> None:
             for i in range(SIZE):
                 m.series[i, 0] = o.tangents[j, i] if i < 4 else 0.0
             phases.expand(m, o.old, o.h)
-            _take(m, o, part)
+            phases.reach(m, part)
         for i in range(4):
             o.tangents[j, i] = m.at[i]
 
@@ -206,6 +202,7 @@ def _add_up(m: Any, o: Any, part: float, band: float, falls: int) -> None:
     for k in range(TERMS):
         power = o.h * part ** (k + 1) / (k + 1)
         o.mean_x, o.mean_y = o.mean_x + power * m.series[X, k], o.mean_y + power * m.series[Y, k]
+    o.fastest = max(o.fastest, m.z[V_X] / m.z[BELT])
     o.square += 0.5 * part * o.h * (o.begin[V_X] ** 2 + m.z[V_X] ** 2)
     for k in range(2):
         if abs(m.z[V_X]) > _BANDS[k] * band:
@@ -230,7 +227,7 @@ def _around(c: Coefficients, m: Any, o: Any, closely: int) -> int:
     look(m)
     band, turns = math.sqrt(o.square / o.period), 0  # of the round before
     o.period, o.mean_x, o.mean_y, o.square, o.events, o.way, o.strange = 0.0, 0.0, 0.0, 0.0, 0, 0, 0
-    o.low = o.high = o.point[0]
+    o.low, o.high, o.fastest = o.point[0], o.point[0], 0.0
     for k in range(2):
         o.beaten[k], o.side[k] = 0, 0
     for k in range(PHASES):

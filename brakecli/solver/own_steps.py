@@ -1,0 +1,27 @@
+"""What schemes have in common that find their steps themselves: the sample that is due waits in their state."""
+
+from typing import Any
+
+from brakecli.solver.compile import Floats
+from brakecli.solver.energy import energy_at_level
+from brakecli.solver.records import Pair, Plant, Weights
+
+LAG = 0
+MEMORY, VELOCITIES = ("x", "y", "v_x", "v_y"), ("v_x", "v_y")
+mechanical_energy = energy_at_level
+
+
+def weighted_time(s: Weights) -> float:
+    """Steps of other schemes place their forces; these have none."""
+    return 0.0
+
+
+def begin(s: Weights, state: Any, position: Pair, velocity: Pair, acceleration: Pair) -> None:
+    """The initial state; its phase is found with the first step."""
+    state.x, state.y = position
+    state.v_x, state.v_y = velocity
+
+
+def sample(p: Plant, row: Floats) -> None:
+    """Write the sample at the level that has been reached."""
+    row[:] = p.state.row
