@@ -1,8 +1,7 @@
 """What kind of vibration a history shows, and why: the rules. `evidence` measures what they go by."""
 
 import math
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,8 +15,9 @@ from brakecli.analysis.regime.cycles import (
     median,
     swings,
 )
-from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, WINDOWS, Envelope, line
-from brakecli.analysis.regime.forced import GROWN, QUARTER, ForcedRules
+from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, Envelope
+from brakecli.analysis.regime.forced import GROWN, QUARTER
+from brakecli.analysis.regime.linear_rules import DASHPOT, LinearRules
 from brakecli.analysis.regime.verdict import Decision, Excitation, Feeds, Regime
 from brakecli.solver.quantities import ContactState
 
@@ -28,20 +28,15 @@ _NEAR = 0.3  # by which the amplitude of a motion that stick or loss of contact 
 _DRIFT = 5e-3  # by which the amplitude of a motion without stick may change where sliding is stable
 _BANDS = 0.9  # least part of the energy in three bands: chaos may have less
 _SPREAD = 0.05  # of the frequency of cycles, beyond which three bands hold no vibration
-_CYCLES_SHARE = (
-    0.5  # of the energy on the lines of the cycles, below which they must be those of the strongest line
-)
-_REST = 0.3  # of a forced motion, by which its closed form may be off
-_LONGER = 1.4  # a run whose last quarter and the window before it are settled, over what comes before
+_CYCLES_SHARE = 0.5  # of the energy on the lines of the cycles, below which the strongest line must be one of them
 _SPARSE = 8  # of the places at which a forced motion is computed, one of so many suffices
 _UNSETTLED = 1.5  # times as many cycles where nothing has settled: a hop may look like a vibration
 _SURE = 10.0  # standard errors of a slope: neighbouring windows of an amplitude that wanders go together
-_LONG, _DASHPOT = "run longer", "a dashpot would decide"
+_LONG = "run longer"
 _FED = 0.1  # of what keeps a vibration up, that nodes may add
-_FAR = 0.3  # rad, of a wave, by which what the shoe adds moves it
 
 
-class Rules(ForcedRules):
+class Rules(LinearRules):
     """The rules on one history, in their order. They gather evidence until one of them decides."""
 
     drifts: str | None = None  # why a limit cycle that seems settled may still change
@@ -83,80 +78,6 @@ class Rules(ForcedRules):
             return Decision(text, advice=advice)
         return Decision("nothing moves beyond rounding: the shoe slides steadily or rests", Regime.DAMPED)
 
-    def linear(self) -> Decision | None:
-        """Theory decides where the shoe has long been sliding in full contact, to one side."""
-        theory, slow = self.context.linear(), self._slowest(0.0)
-        start = max(min(self.last.start, self.history.samples - int(slow / self.history.interval)), 0)
-        if theory is None:
-            return None
-        if not replace(self.last, start=start).slides(theory.slip) and not theory.stays(self._end()[1]):
-            return None
-        mean, theory = theory, theory.with_slopes()
-        if theory.direction != mean.direction and (theory.direction == 0 or self._swings_far(theory)):
-            return self._steep(theory)
-        self.theory = theory
-        if theory.direction == 0:
-            return Decision(theory.sentence, advice=_DASHPOT)
-        if theory.direction > 0:
-            more = theory.seconds_to_limit(*self._end())
-            self.evidence["seconds_to_go"] = more = more + 3.0 / theory.mode.growth
-            return Decision(theory.sentence, advice=f"run at least {QUARTER * (self.duration + more):.3g} s")
-        if not len(theory.waves):
-            return Decision(theory.sentence, Regime.DAMPED)
-        if self.duration < slow:
-            return self._too_short(slow)
-        return self._shaken(theory, slow, (self.history.samples - start) * self.history.interval)
-
-    def _swings_far(self, theory: "Linear") -> bool:
-        """Whether what the shoe adds is no longer small beside the waves, so that their slope is not linear."""
-        own = theory.parts(*self.last.places())[2]
-        return 0.5 * float(np.ptp(own)) * float(theory.wavenumbers.max()) > _FAR
-
-    def _steep(self, theory: "Linear") -> Decision:
-        """The slopes of the waves leave open whether a small vibration grows: lines may show that it is forced."""
-        found = self.forced()
-        if found and found.regime is Regime.DAMPED:
-            return found
-        forced, _, own, _ = theory.parts(*self.settled_part.places())
-        self.parts = forced, 0.5 * float(np.ptp(own))
-        text = "the slopes of the passing waves leave open whether the shoe's own vibration grows in full contact"
-        rate = f"by {theory.mode.growth:.2g} ± {theory.known_to:.1g} 1/s"
-        return Decision(f"{text}, {rate}", advice="run longer, and see whether amplitude_own falls")
-
-    def _end(self) -> tuple[float, Any]:
-        """Time and state of the last sample."""
-        last = self.history.samples - 1
-        state = [float(self.history.read(name, last, last + 1)[0]) for name in ("x", "y", "vx", "vy")]
-        return last * self.history.interval, np.array(state)
-
-    def _shaken(self, theory: "Linear", slow: float, seen: float) -> Decision | None:
-        """The forced motion that lasts, with the settled part in which the shoe's own part has gone."""
-        forced, lasting, own, time = theory.parts(*self.whole.places())
-        starts = -(-len(own) * np.arange(WINDOWS) // WINDOWS)
-        left = 0.5 * (np.maximum.reduceat(own, starts) - np.minimum.reduceat(own, starts))
-        end = float(left[-10:].max())
-        slope = line(np.arange(0.5 * WINDOWS), np.log(np.maximum(left[WINDOWS // 2 :], 1e-300)))[0]
-        if slope * WINDOWS > 1.0 and end > self.limits.settled_within * forced:
-            return None  # the passing waves excite what the mean stiffness damps
-        level, decay = self.limits.settled_within * forced, theory.mode.growth * self.duration / WINDOWS
-        if 0.25 * WINDOWS * decay < -1.0 and slope > 0.25 * decay and end < _REST * forced:
-            level = max(level, 1.2 * end)  # what does not decay is forced, and missing in the closed form
-        first = WINDOWS - int(np.argmin((left <= level)[::-1]))
-        begin = max(first, 1) * self.history.samples // WINDOWS
-        wait = math.log(max(end / max(level, 1e-300), 1.0)) / -theory.mode.growth
-        advice = list[str]()
-        if first <= WINDOWS - 10 and self.duration - begin * self.history.interval >= 2.0 * slow:
-            self.settled_part, self.settled = replace(self.whole, start=begin), True
-        else:
-            needed = max(_LONGER * (self.duration + wait), 1.05 * (self.duration + wait + 2.0 * slow))
-            advice.append(f"run at least {needed:.3g} s to see only that")
-        if theory.opens and (beat := self._beat) > seen:
-            advice.append(f"the waves beat every {beat:.3g} s, which may open the pad again")
-        chosen = time >= self.settled_part.start * self.history.interval
-        self.parts, self.unseen = (forced, 0.5 * float(np.ptp(own[chosen]))), forced - 0.5 * float(np.ptp(lasting))
-        text = f"only the roughness shakes the shoe, by {forced:.3g} m: {theory.sentence}"
-        return Decision(text, Regime.DAMPED, Excitation.FORCED, advice="; ".join(advice))
-
     def died_out(self) -> Decision | None:
         """Little is left beside the start, beside the wheel's speed and beside the compression, and it falls."""
         envelope = self.envelope
@@ -191,7 +112,7 @@ class Rules(ForcedRules):
             text = "without friction nothing excites the shoe"
             if self.context.growth() < 0.0:
                 return Decision(f"{text}, and the dashpots damp it", Regime.DAMPED)
-            return Decision(f"{text}, but no dashpot damps it", advice=_DASHPOT)
+            return Decision(f"{text}, but no dashpot damps it", advice=DASHPOT)
         if self._settle():
             return None
         if "envelope_slope" not in self.evidence:
@@ -328,7 +249,7 @@ class Rules(ForcedRules):
         if theory.direction > 0:
             return None
         if theory.direction == 0:
-            return Decision("sliding is stable, and no dashpot makes a large vibration settle", advice=_DASHPOT)
+            return Decision("sliding is stable, and no dashpot makes a large vibration settle", advice=DASHPOT)
         if not self._relaxed:
             text = f"sliding is stable, but disturbances decay at only {-theory.mode.growth:.2g} 1/s"
             advice = f"run at least {self._relaxing:.3g} s"
