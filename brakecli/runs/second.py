@@ -29,6 +29,7 @@ _REDUCED = 1.0 / 3.0  # of the critical friction: far below it also where surfac
 _LOST = 4.0  # powers of e by which what is not forced has decayed
 _LONGER = 4.0  # times as long, so that it loses its start, and a vibration that dies becomes linear
 _REMAINS, _VANISHES = 0.7, 0.2  # part of the level of the first run
+_HARDLY = 0.8  # part of it beyond which a second run hardly decays, as the first may
 _HALVED = math.log(2.0) / 3.5  # decay rate times duration of the first, where the second ends at half its level
 
 
@@ -117,14 +118,14 @@ def compared(
         feeds = Feeds.ROUGHNESS if remains else Feeds.FRICTION if vanishes else Feeds.UNKNOWN
         return _told(feeds, 0.0, text, needed, ", or sweep friction.coefficient to see where the level sets in")
     text, decays = f"{text}: {verdict.decision.reason}", verdict.regime is Regime.DAMPED
-    if decays and part >= _REMAINS:  # the first may decay as slowly
+    if decays and part >= _HARDLY:
         text += ", too slowly to show whether the first does"
         needed = max(needed, _HALVED / abs(verdict.growth_rate or math.inf))
     elif decays and _friction_feeds(history):
         both = "but in the first friction gives energy and the roughness takes it: neither keeps it up alone"
         return Feeds.UNKNOWN, 0.0, f"{text}, {both}"
     lasts = verdict.settled and verdict.excitation is Excitation.SELF_EXCITED and part >= _REMAINS
-    feeds = Feeds.ROUGHNESS if decays and part < _REMAINS else Feeds.FRICTION if lasts else Feeds.UNKNOWN
+    feeds = Feeds.ROUGHNESS if decays and part < _HARDLY else Feeds.FRICTION if lasts else Feeds.UNKNOWN
     return _told(feeds, verdict.evidence.get("stick_cycles", 0.0), text, needed)
 
 
