@@ -64,11 +64,11 @@ REASONS = {
     "SciPy": "SciPy has a compiled right-hand side and its cheapest method at each error, LSODA on S.",
     "critical: a smooth point": "Critical values: making cases and finding limit cycles takes most of the time.",
     "heyoka.py: relaxation": (
-        "relaxation.toml: 694 events and 4,400 steps take 0.6 ms, setting up and closing the account 0.2 to 0.4."
+        "relaxation.toml: 694 events and 4,400 steps take 0.55 ms, setting up and closing the account 0.1 to 0.2."
     ),
     "promise": (
-        "A promise on B: a difference of tolerances and two of nodes take four runs, together eight times as long"
-        " as the cheapest over 20 ms; making, closing and comparing takes 0.2 ms for each."
+        "A promise on B: two differences of nodes and one of tolerances take four runs, together seven times as"
+        " long as the cheapest over 20 ms; making, closing and comparing takes 0.14 ms for each."
     ),
     "one evaluation": (
         "One evaluation: the compiler does not know the number of waves, and each has a loop of its own."
@@ -79,8 +79,8 @@ REASONS = {
     ),
     "map on B": (
         "The map on B: a point takes some 1.9 ms of a core. Its promise takes five runs of 12,000 steps together,"
-        " 0.4 ms in lanes. The verdict takes 0.8 ms, and case, ladder and record 0.6 ms, one point at a time in"
-        " Python. A worker takes 0.9 s to start."
+        " 0.4 ms in lanes. The verdict takes 0.9 ms, 0.4 of it for the growth between passing waves, and case,"
+        " ladder and record 0.5 ms, one point at a time in Python. A worker takes 0.9 s to start."
     ),
     "critical: an open": "Critical values of open pads: growth is measured by runs, one after the other.",
 }

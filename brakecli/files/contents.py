@@ -26,7 +26,7 @@ _DECLARED = {"run": RUN, "sweep": SWEEP, "comparison": COMPARISON, "stability": 
 def contents(result: StoredResult) -> dict[str, Any]:
     """What `fields.INFO` declares."""
     held = []
-    for group in result.groups():
+    for group in result.groups:
         for name, each in result.variables(group).items():
             about = {"units": each.attributes.get("units", ""), "meaning": each.attributes.get("long_name", "")}
             held.append({"group": group, "name": name, "dims": each.dims, "shape": each.shape, **about})
@@ -57,12 +57,11 @@ def difference(a: StoredResult, b: StoredResult) -> Difference:
     if kinds[0] != kinds[1]:
         what = f"{a.path} is a {printable(kinds[0])}, and {b.path} a {printable(kinds[1])}"
         raise UsageError(f"{what}: they hold different things; name two results of one kind")
-    groups = list(dict.fromkeys([*a.groups(), *b.groups()]))
+    groups = list(dict.fromkeys([*a.groups, *b.groups]))
     numbers: list[dict[str, Any]] = [{}, {}]
     for found, result in zip(numbers, (a, b), strict=True):
-        there = set(result.groups())
         for group in groups:
-            for name, value in result.group_attributes(group).items() if group in there else ():
+            for name, value in result.group_attributes(group).items() if group in result.groups else ():
                 if name not in _APART and not name.endswith("_version"):
                     found[name if group == "/" else f"{group}/{name}"] = plain(value)
     declared = _DECLARED.get(kinds[0], ())
@@ -106,7 +105,7 @@ def _variables(a: StoredResult, b: StoredResult, group: str) -> Iterator[dict[st
     """The variables of a group that differ, at the same places along their axis."""
     known = []
     for result in (a, b):  # what other programs have added need not have units
-        there = result.variables(group) if group in result.groups() else {}
+        there = result.variables(group) if group in result.groups else {}
         known.append({name: each for name, each in there.items() if "units" in each.attributes})
     for name in dict.fromkeys([*known[0], *known[1]]):
         held = [each[name] for each in known if name in each]

@@ -14,7 +14,8 @@ import stat
 import warnings
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from io import RawIOBase
 from pathlib import Path
 from typing import Any
@@ -52,13 +53,15 @@ class StoredResult:
     attributes: dict[str, Any]
     length: int  # bytes
     sealed: bool  # whether the whole file is as it was written, by its digest
+    _variables: dict[str, dict[str, Variable]] = field(default_factory=dict)  # that were looked at
 
-    def groups(self) -> list[str]:
+    @cached_property
+    def groups(self) -> dict[str, None]:
         """All groups, the root first."""
         with _explained(self.path):
             names = ["/"]
             self.file.visit(names.append)
-            return [name for name in names if isinstance(valid.member(self.file, name), h5py.Group)]
+            return {name: None for name in names if isinstance(valid.member(self.file, name), h5py.Group)}
 
     def group_attributes(self, group: str) -> dict[str, Any]:
         """The attributes of a group."""
@@ -80,6 +83,8 @@ class StoredResult:
 
     def variables(self, group: str) -> dict[str, Variable]:
         """The variables of a group, its axes included, by name."""
+        if group in self._variables:
+            return self._variables[group]
         found = {}
         with _explained(self.path):
             parent = self._group(group)
@@ -88,6 +93,7 @@ class StoredResult:
                 if isinstance(node, h5py.Dataset):
                     dims, attributes = valid.axes_of(node, name), valid.attributes_of(node, "")
                     found[name] = Variable(dims, node.shape, attributes, node.dtype.kind)
+        self._variables[group] = found
         return found
 
     def read(self, group: str, name: str, start: int = 0, stop: int | None = None) -> NDArray[Any]:

@@ -134,7 +134,8 @@ def ladder(
         if certified := short and error <= wanted:
             break
         coarse = failed or not short or jump > 0.5 * wanted
-        finer = steps if coarse or margin * steps.error >= used.error else quadrature
+        # Found steps are nearly the same on other nodes: the first tolerance is enough to tell nodes apart.
+        finer = steps if coarse or (margin * steps.error, not events) > (used.error, False) else quadrature
         late = run.system.interval == system.interval and seconds + 2.2 * spent > MOST_SECONDS
         more = 2.0 * steps.more(0.5 * wanted / margin) * used.more(0.5 * wanted)
         if finer.doublings == MOST_DOUBLINGS or late or is_left(run, more):
@@ -161,8 +162,8 @@ def _jump_error(run: Motion) -> float:
     that sticks for more than a step has the velocity of the wheel then, whenever in a step it began.
     """
     jump = 2.0 * run.system.coefficients.phi * run.work.crossing * run.system.step / run.system.coefficients.m
-    fastest = float(np.abs(run.rows[:, 2]).max(initial=0.0))
-    return jump / fastest if fastest > 0.0 else math.inf if jump > 0.0 else 0.0
+    fastest = float(np.abs(run.rows[:, 2]).max(initial=0.0)) if jump > 0.0 else 1.0
+    return jump / fastest if fastest > 0.0 else math.inf
 
 
 def first_rung(system: System, kind: type[_Axis] = _Axis) -> tuple[float, int]:

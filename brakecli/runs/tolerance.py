@@ -70,8 +70,9 @@ def _run(system: System, progress: Progress, **changes: Any) -> Motion:
 
 
 def _solved(system: System, progress: Progress) -> Motion:
-    per_sample, each = system.per_sample, evaluation_seconds(system) + 1e-6
-    block = 1 if system.method.own_steps and not system.nodes else 1 + int(FIRST_BLOCK / each)
+    per_sample, block = system.per_sample, 1
+    if system.nodes or not system.method.own_steps:
+        block += int(FIRST_BLOCK / (evaluation_seconds(system) + 1e-6))
     return solve(system, progress=lambda steps: progress(steps // per_sample), first_block=block)
 
 

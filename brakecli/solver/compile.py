@@ -243,8 +243,8 @@ def _put(typing: Any, value: Any, address: Any) -> Any:
 _kept: Any = (lambda value, address: _tuples.update({address: value})) if config.DISABLE_JIT else _put
 
 
-def in_memory(type_: Any) -> tuple[Any, Any]:
-    """Kernels that put a tuple of this type into memory, and take it from there; the former for Python.
+def into_memory(type_: Any) -> Any:
+    """A kernel for Python that puts a tuple of this type into memory, where `from_memory` finds it.
 
     A call from Python converts every member of a tuple that it hands over, which takes 14 µs for a `Plant`.
     """
@@ -252,6 +252,12 @@ def in_memory(type_: Any) -> tuple[Any, Any]:
     @kernel(types.void(type_, int64))
     def hold(value: Any, address: int) -> None:
         _kept(borrowed(value), address)
+
+    return hold
+
+
+def from_memory(type_: Any) -> Any:
+    """For kernels: the tuple at an address, of this type or of one that has other records."""
 
     @intrinsic
     def taken(typing: Any, address: Any) -> Any:
@@ -261,4 +267,4 @@ def in_memory(type_: Any) -> tuple[Any, Any]:
 
         return type_(types.int64), codegen
 
-    return hold, _tuples.__getitem__ if config.DISABLE_JIT else taken
+    return _tuples.__getitem__ if config.DISABLE_JIT else taken

@@ -4,7 +4,7 @@ import math
 
 from numba import float64, int64, void
 
-from brakecli.solver.compile import Floats, at_address, borrowed, in_memory, kernel, stopped, vector
+from brakecli.solver.compile import Floats, at_address, borrowed, from_memory, into_memory, kernel, stopped, vector
 from brakecli.solver.friction import observed
 from brakecli.solver.implicit_step import SOLVED
 from brakecli.solver.quantities import BOUND, Failure
@@ -17,7 +17,7 @@ _NONE, _UNCONVERGED, _DIVERGED, _NOT_CLOSED = (int(failure) for failure in tuple
 _evaluate_at, _prepare_at, _finish_at, _solve_at = (
     at_address(signature) for signature in (EVALUATE, PREPARE, FINISH, SOLVE)
 )
-hold, _plant_at = in_memory(PLANT)
+hold, _plant_at = into_memory(PLANT), from_memory(PLANT)
 
 
 @kernel(void(PLANT, vector))

@@ -5,15 +5,16 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numba import float64, int64, void
 
 from brakecli.solver import contact
-from brakecli.solver.compile import LARGEST, Floats, address
+from brakecli.solver.compile import LARGEST, Floats, address, at_address, from_memory, kernel
 from brakecli.solver.contact.pad import build_layer
 from brakecli.solver.energy import OPEN_ACCOUNT, EnergyAccount, account
 from brakecli.solver.friction import minimise
 from brakecli.solver.method import Method
 from brakecli.solver.quantities import HISTORY, Failure
-from brakecli.solver.records import COUNTS, PROBLEM, WORK, Drive, Pair, Plant, Plug, new
+from brakecli.solver.records import COUNTS, EVALUATE, PLANT, PROBLEM, WORK, Drive, Pair, Plant, Plug, new
 from brakecli.solver.roughness import turn
 from brakecli.solver.schedules import integral_at, slope_at
 from brakecli.solver.steady_sliding import steady_sliding
@@ -31,6 +32,17 @@ Sink = Callable[[Floats], None]
 Progress = Callable[[int], None]
 Counted = Callable[[str, int, int], None]
 """Called with what is counted, how many are done, and of how many; 0 where that is not known."""
+
+_plant_at, _evaluate_at = from_memory(PLANT), at_address(EVALUATE)
+
+
+@kernel(void(int64, float64, float64, float64, float64))
+def touch(address: int, x: float, y: float, t: float, part: float) -> None:
+    """Evaluate the contact of a plant in memory, whatever its scheme, at time t + part (s)."""
+    p: Plant = _plant_at(address)
+    travel, travel_low = integral_at(p.drive.belt, t, part)
+    turn(travel, travel_low, p.layer)
+    _evaluate_at(p.layer.evaluate)(x, y, p.layer)
 
 
 @dataclass
@@ -186,9 +198,7 @@ class Stepping:
     def _evaluate_at(self, x: float, y: float, steps: float) -> None:
         """Evaluate the contact, `steps` steps after t = 0."""
         t, part = divmod(steps, self.system.per_sample)
-        travel = integral_at(self.system.belt, t * self.system.interval, part * self.system.step)
-        turn(*travel, self.plant.layer)
-        self.system.evaluate(x, y, self.plant.layer)
+        touch(self._plant_at, x, y, t * self.system.interval, part * self.system.step)
 
     def _energy(self) -> tuple[float, float, float]:
         """Kinetic energy, energy of the links and of the contact (J), where the scheme places them."""

@@ -9,7 +9,7 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
-from brakecli.analysis.regime.verdict import Regime, Verdict
+from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.stability.discrete import spectral_radius
 from brakecli.analysis.stability.modes import growth as eigenvalue_growth
 from brakecli.analysis.stability.report import MARGIN, stability
@@ -21,8 +21,9 @@ from brakecli.runs.limits import within_range
 from brakecli.solver.system import System
 from brakecli.sweeps.early import Known, early
 from brakecli.sweeps.error_bar import left_open
-from brakecli.sweeps.floquet import Disturbances
+from brakecli.sweeps.floquet import Disturbances, between
 from brakecli.sweeps.growth import Sliding, has_exact_steps, sliding, stepped, with_step
+from brakecli.sweeps.sustained import lasting, settling, verdict_fades
 from brakecli.sweeps.tables import Critical
 
 WIDEST = 1.0 / 3.0  # of the range, that an error bar with an answer may have
@@ -32,7 +33,6 @@ SCANNED_WHERE_OPEN = 17  # by eigenvalues where surfaces open: their mean stiffn
 GALLOP = 4.0  # factor from one stride to the next in looking for the end of sustained vibration
 LONGER = 8.0  # durations of the case that vibration beside stable sliding has to last
 PATIENT = 128.0  # durations that it may take to die out on smooth surfaces; on rough ones twice `LONGER`
-STEADY = 0.01  # relative change of the amplitude in a run twice as long that shows that a vibration lasts
 
 
 class Outcome(StrEnum):
@@ -119,21 +119,21 @@ def search(
     def fades(value: float) -> bool | None:
         unstable = value >= found.upper if found.outcome is Outcome.FOUND else None
         steady, case = sliding_at(value), stepped(case_at(value))
-        linear = steady is not None and not steady.opens
+        linear, rate = steady is not None and not steady.opens, settling(steady)
         # Beside stable sliding it may yet fade away, or has not yet come to where it lasts.
         times, before, longest = 1.0, cast("Verdict | Known | None", None), LONGER * case.solver.duration
         with within_range():
             known = early(system_of(changed(case, solver={"duration": longest})), seen=False)
-        answer = _fades(known.verdict, longest, unstable, linear) if known is not None else None
+        answer = verdict_fades(known.verdict, longest, unstable, linear, rate) if known is not None else None
         if answer is not None:
             return answer
         patience, answer = PATIENT if system_of(case).smooth else 2.0 * LONGER, None
         while times <= LONGER or (answer is None and times <= patience):
             duration = times * case.solver.duration
             verdict = verdict_of(changed(case, solver={"duration": duration}))
-            answer = _fades(verdict, duration, unstable, linear)
+            answer = verdict_fades(verdict, duration, unstable, linear, rate)
             last = times >= LONGER or unstable is not False
-            if verdict is not None and answer is not None and (last or _lasting(answer, before, verdict)):
+            if verdict is not None and answer is not None and (last or lasting(answer, before, verdict)):
                 return answer
             times, before = 2.0 * times, verdict
         return None
@@ -175,15 +175,15 @@ def _by_eigenvalues(critical: Critical, sliding_at: SlidingAt) -> Search:
         low, high = bisect(lambda value: unstable(value) is not lost, low, high, width=width)
         return Edge(0.5 * (low + high), low, high, 0.5 * (high - low), lost)
 
-    def found(unstable: Callable[[float], bool], count: int) -> Search:
-        values = np.linspace(critical.lower, critical.upper, count).tolist()
+    def found(unstable: Callable[[float], bool], count: int, values: list[float]) -> Search:
+        values = sorted({*np.linspace(critical.lower, critical.upper, count).tolist(), *values})
         return _answer(critical, sliding_at, cache(unstable), values, partial(edge, unstable))
 
-    exact = found(grows, SCANNED_WHERE_OPEN if opens else SCANNED_BY_EIGENVALUES)
+    exact = found(grows, SCANNED_WHERE_OPEN if opens else SCANNED_BY_EIGENVALUES, [])
     exact = exact._replace(eigenvalue=exact.value)
     if first is not None and first.system.method.own_steps:
         return exact._replace(bias=None if exact.value is None else 0.0)
-    own = found(grows_in_steps, SCANNED_WHERE_OPEN)
+    own = found(grows_in_steps, SCANNED_WHERE_OPEN, between(critical.lower, critical.upper, exact.windows))
     if exact.value is None or own.value is None or exact.outcome is not own.outcome:
         return exact
     return exact._replace(bias=own.value - exact.value)
@@ -267,8 +267,8 @@ def _narrowed(at: Disturbances, low: float, high: float, critical: Critical, bia
 
         value = float(brentq(excess, low, high, xtol=0.05 * tolerance))
         for end in (value - 0.4 * tolerance, value + 0.4 * tolerance):
-            if low < end < high:
-                low, high = (end, high) if at.unstable(end) == below else (low, end)
+            if low < end < high and (answer := at.unstable(end)) is not None:
+                low, high = (end, high) if answer == below else (low, end)
 
     def as_below(value: float) -> bool | None:
         return None if (answer := at.unstable(value)) is None else answer == below
@@ -282,44 +282,6 @@ def _narrowed(at: Disturbances, low: float, high: float, critical: Critical, bia
     bar = left_open(at, (low, high), wide, bias, critical)
     error = 0.5 * (high - low) + min(bar, critical.upper - critical.lower)
     return Edge(value, low, high, error, not below)
-
-
-def _lasting(answer: bool, before: Verdict | Known | None, verdict: Verdict | Known) -> bool:
-    """Whether the answer of a run beside stable sliding is that of a longer one, too.
-
-    It is once the shoe has come to rest or moves by linear equations, where its orbit is known, and where the
-    vibration is the same as in a run half as long.
-    """
-    if isinstance(verdict, Known):
-        return True
-    if answer:
-        return verdict.regime is Regime.DAMPED or verdict.stick_fraction + verdict.contact_loss_fraction == 0.0
-    if before is None or before.regime is not verdict.regime:
-        return False
-    return abs(before.amplitude - verdict.amplitude) <= STEADY * verdict.amplitude
-
-
-def _fades(verdict: Verdict | Known | None, duration: float, unstable: bool | None, linear: bool) -> bool | None:
-    """Whether the vibration of a run dies out; None where the run does not answer that.
-
-    `unstable`: what is known of steady sliding. Where it is unstable no vibration can die out. A `linear` motion
-    that neither sticks nor lifts off is on its way by the same equations: it lasts if sliding is unstable. One
-    that does fades if it loses a factor e in its `duration` (s); as long as it loses less, nobody knows.
-    """
-    if verdict is None or verdict.contact_loss_fraction == 1.0 or verdict.stick_fraction == 1.0:
-        return None
-    limited = verdict.stick_fraction > 0.0 or verdict.contact_loss_fraction > 0.0
-    if unstable or (unstable is False and linear and not limited):
-        return not unstable
-    if verdict.regime is not Regime.UNDECIDED:
-        return verdict.regime is Regime.DAMPED
-    slope, error = (verdict.evidence.get(f"envelope_slope{what}", 0.0) for what in ("", "_error"))
-    slope = slope if abs(slope) > 3.0 * error else 0.0
-    if isinstance(verdict, Verdict) and verdict.decision.second_run:  # the roughness may keep it up as well
-        return True if slope < 0.0 and not limited else None
-    if limited:
-        return None if -1.0 < slope * duration < 0.0 else slope < 0.0
-    return slope < 0.0 if slope else None
 
 
 def _sustained(critical: Critical, fades: Answer, found: Search) -> tuple[float | None, Outcome]:

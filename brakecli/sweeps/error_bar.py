@@ -5,8 +5,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 
-import numpy as np
-
 from brakecli.analysis.stability.modes import growth as eigenvalue_growth
 from brakecli.analysis.stability.search import bisect
 from brakecli.sweeps.floquet import Disturbances
@@ -20,9 +18,11 @@ more, and so does the critical value, which counts where growth begins like a ro
 by all of its error or more: at least half of that counts, as patches that open make errors fall unevenly."""
 BEYOND = 1.2  # times the way to where growth with other steps passes zero, if it is as steep as further away
 NARROW = 1.1  # ratio of the ends of the bracket of that way
-JUMP = 0.5  # of all change in the bracket found first: in a narrow bracket growth jumps so, at a fold
+STEEPER, JUMP = (
+    10.0,
+    0.5,
+)  # times the slope of growth around; of the change in a bracket, in an eighth of it: a fold
 FOLD = 1.0 / 32.0  # of the range: least bar there, for steps move a fold, too, by an amount that is not measured
-NARROWED = 10.0  # times as narrow as the bracket that was found first
 ROUNDED = 20.0  # times the spread of growth that rounding makes in a three-layer scheme near self-locking
 
 
@@ -62,10 +62,7 @@ def left_open(
         return bias
     far = max((slope(end) for end in wide if end in known), default=0.0)
     if one in at.orbits:
-        within = ([known[end].rate for end in ends if end in known] for ends in (bracket, wide))
-        inner, outer = (np.ptp(rates or [0.0]) for rates in within)
-        narrowed = wide[1] - wide[0] > NARROWED * (high - low)
-        if at.jumps(low, high) or (narrowed and inner > JUMP * outer):
+        if at.jumps(low, high) or _ends(at, low, high, far):
             return max(low - wide[0], wide[1] - high, FOLD * (critical.upper - critical.lower))
         stride = high - low if at.unstable(high) else low - high
         return max(_shifted(rate, one, stride, critical, far, other) for other in OTHERS)
@@ -77,6 +74,22 @@ def left_open(
     if found is not None and found.system.scheme.LAG and far > 0.0:
         steep = min(steep, far)
     return bias + (max(known[one].spread, known[other].spread) / steep if steep > 0.0 else 0.0)
+
+
+def _ends(at: Disturbances, low: float, high: float, steep: float) -> bool:
+    """Whether a motion ends in a bracket: growth changes far more than it is `steep` outside, and in a part of it.
+
+    Where growth crosses zero, even if it begins like a root, it changes less in a narrower bracket.
+    """
+
+    def change(low: float, high: float) -> float:
+        ends = [measured.rate for measured in (at.at(low), at.at(high)) if measured]
+        return abs(ends[0] - ends[-1])
+
+    whole, below = change(low, high), at.unstable(low)
+    if whole <= STEEPER * steep * (high - low):
+        return False
+    return change(*bisect(lambda value: at.unstable(value) is below, low, high, halvings=3)) > JUMP * whole
 
 
 def _to_eigenvalues(at: Disturbances, low: float, high: float, critical: Critical) -> float:

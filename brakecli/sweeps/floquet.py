@@ -42,7 +42,7 @@ class Disturbances:
         self.known: dict[float, Growth | None] = {}
         self.orbits: dict[float, Orbit] = {}
         self.branches: dict[float, float] = {}  # by where the motion was found first, with dashpots
-        self.missed = 0
+        self.missed, self.periodic = 0, False
 
     def at(self, value: float) -> Growth | None:
         """The growth at a value; None without steady sliding, and where no forced motion is found."""
@@ -71,10 +71,10 @@ class Disturbances:
         Otherwise the `windows` that eigenvalues show have one value each.
         """
         values: list[float] = np.linspace(lower, upper, PARTS * (SCANNED - 1) + 1).tolist()
+        self.periodic = any(found.forced for found in map(self.sliding_at, values) if found)
         self.scan(values[::PARTS])
         if not any(measured and measured.opened for measured in map(self.at, values[::PARTS])):
-            ends = [lower, *(end for window in windows for end in window), upper]
-            return sorted({*values[::PARTS], *(0.5 * (low + high) for low, high in pairwise(ends))})
+            return sorted({*values[::PARTS], *between(lower, upper, windows)})
         values = sorted({*values, *self.resonances(values)})
         self.scan(values)
         self._go_on(values)
@@ -104,23 +104,29 @@ class Disturbances:
         """
         up = 1 if self.unstable(values[0]) is False else -1
         for order, back in ((values[::up], False), (values[::-up], True)):
-            for before, value in pairwise(order):
-                if not (before in self.branches and value in self.branches):
-                    continue
-                known, other, found = self.known[before], self.known[value], self.sliding_at(value)
-                period, jumps = common_period(found.system) if found else None, self.jumps(before, value)
-                if not (known and other and found and period) or known.unstable:
-                    continue
-                if not other.unstable and (back or not jumps):
-                    continue
-                forced = self._followed(value, found, period, before)
-                if forced is None or (forced.rate > 0.0 and (back or not jumps)):
-                    continue
-                was, now = self.branches[value], self.branches[before]
-                if _same(forced, self.orbits[value]):
-                    self.branches = {at: now if each == was else each for at, each in self.branches.items()}
-                self.orbits[value], self.known[value] = forced, replace(other, rate=forced.rate)
-                self.branches[value] = now
+            before = order[0]
+            for value in order[1:]:
+                if self._goes_on(before, value, back) or value in self.branches:
+                    before = value
+
+    def _goes_on(self, before: float, value: float, back: bool) -> bool:
+        """Follow a motion to another value that has none, or another one; an unstable one beside unstable ones."""
+        known, other, found = self.known[before], self.known[value], self.sliding_at(value)
+        period, jumps = common_period(found.system) if found else None, self.jumps(before, value)
+        on = jumps and bool(other and other.unstable)
+        if before not in self.branches or not (known and found and period) or (known.unstable and not on):
+            return False
+        if other and not other.unstable and (back or not jumps):
+            return False
+        forced = self._followed(value, found, period, before)
+        if forced is None or (other and forced.rate > 0.0 and (back or not jumps)):
+            return False
+        was, now = self.branches.get(value), self.branches[before]
+        if was is not None and _same(forced, self.orbits[value]):
+            self.branches = {at: now if each == was else each for at, each in self.branches.items()}
+        self.orbits[value], self.known[value] = forced, replace(known, rate=forced.rate)
+        self.branches[value] = now
+        return True
 
     def resonances(self, values: list[float]) -> list[float]:
         """Between the values: where a wave of the wheel, its second or third harmonic, or the sum or difference of
@@ -170,20 +176,18 @@ class Disturbances:
         return found if 3 * len(found) > MOST_RESONANCES else [*found, *places(-BESIDE), *places(BESIDE)]
 
     def _measured(self, value: float, found: Sliding) -> Growth | None:
-        smooth, periodic = found.system.wheel.g.size == 0, bool(self.orbits) or found.modulated
-        plain = None if periodic else growth(found)  # from the first motion that opens on, all may
-        if smooth or (not periodic and plain and not plain.opened):
-            return plain or growth(found)
+        if not (self.periodic or found.forced):
+            return growth(found)
         if (period := common_period(found.system)) is None:
-            return lyapunov(found, plain)
+            plain = None if found.modulated else growth(found)
+            return plain if plain and not plain.opened else lyapunov(found, plain)
         place, near = self._near(value)
         low, high = sorted((place, value))
         gap = any(lost is None and low < other < high for other, lost in self.known.items())
         forced = None if gap else self._followed(value, found, period)
         followed, damped = forced is not None, not is_undamped(found.system.coefficients)
         if forced is None and damped:
-            if plain is None and near is not None and near.rate > 0.0:
-                plain = growth(found)
+            plain = growth(found) if near is not None and near.rate > 0.0 else None
             if plain is None or plain.rate <= 0.0:
                 forced = self._waited(value, found, period)
         if forced is None and self.missed < MISSED:
@@ -280,6 +284,12 @@ class Disturbances:
         waited = segments.settled(start, min(RELAXED / slow, LONGEST) if slow > 0.0 else LONGEST)
         forced = orbit(segments, waited, None)
         return None if forced and near and forced.size > DEPARTED * near.size else forced
+
+
+def between(lower: float, upper: float, windows: Iterable[tuple[float, float]]) -> list[float]:
+    """The middle of each of the windows within a range, and of what lies between them."""
+    ends = [lower, *(end for window in windows for end in window), upper]
+    return [0.5 * (low + high) for low, high in pairwise(ends)]
 
 
 def _same(one: Orbit, other: Orbit) -> bool:

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from brakecli.analysis.regime.linear import linear_theory
 from brakecli.analysis.stability.modes import is_undamped
 from brakecli.case.case import Case, changed
 from brakecli.case.system import system_of
@@ -83,8 +84,11 @@ class Sliding(SteadySliding):
 
     @property
     def forced(self) -> bool:
-        """Whether a rough wheel forces a motion that is not linear, or whose disturbances it feeds."""
-        return bool(self.system.wheel.g.size) and (self.opens or self.modulated)
+        """Whether a rough wheel may force a motion that is not linear, or whose disturbances it feeds."""
+        if not self.system.wheel.g.size:
+            return False
+        theory = None if self.opens or self.modulated else linear_theory(self.system, self.system.belt_speed)
+        return theory is None or theory.opens
 
     @property
     def opens(self) -> bool:

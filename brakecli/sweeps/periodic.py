@@ -66,6 +66,8 @@ class Segments:
         interval = length / self.samples
         step = interval / (2 * of_sample)
         method = replace(system.method, step=step, start="consistent")
+        if not (system.scheme.LAG and method.theta[0] == method.theta[-1]):  # weights that damp hide slow growth
+            method = replace(method, theta=method.row.theta)
         if finer != 1.0:
             method = replace(method, step=step / finer, nodes=int(finer * system.nodes))
         whole = held(replace(system, interval=interval, duration=length, method=method))

@@ -241,6 +241,12 @@ def test_what_lies_on_sums_of_three_waves_is_not_what_the_shoe_adds() -> None:
     assert f"{verdict.evidence['forced_share']:.0%} of the energy" in verdict.reasons[0]
 
 
+def test_cycles_of_whole_samples_know_a_flight_to_a_sample() -> None:
+    verdict = judged("leaves the wheel for 13 of 20 samples")
+    assert verdict.settled
+    assert abs(verdict.contact_loss_fraction - 0.6041) <= verdict.evidence["contact_loss_spread"]  # located events
+
+
 def test_an_impact_between_the_samples_of_most_cycles_counts_for_the_torque() -> None:
     verdict = judged("impacts of less than a sample")
     assert verdict.settled

@@ -1,6 +1,7 @@
 """A tolerance is a promise: what is certified is true, and what is not true is not certified."""
 
 import math
+from contextlib import suppress
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -142,6 +143,18 @@ def test_nodes_that_agree_by_luck_are_doubled_again() -> None:
     found = certify(system_of(case))
     assert found.certificate.certified
     assert kept(found, case, 1e-9) <= 1e-3
+
+
+def test_nodes_are_refined_at_the_first_local_tolerance_and_tolerances_on_the_finest_nodes() -> None:
+    system = system_of(promised(OPEN, 1e-3, solver__duration=0.004))
+    runs = ladder.ladder(replace(system, method=replace(system.method, evaluator="midpoint")))
+    rungs = [next(runs)]
+    with suppress(StopIteration):
+        while True:
+            rungs.append(runs.send(solve(rungs[-1])))
+    nodes, tolerances = [rung.nodes for rung in rungs], [rung.method.tolerance for rung in rungs]
+    assert nodes == [nodes[0], 2 * nodes[0], 4 * nodes[0], 4 * nodes[0]]
+    assert tolerances == pytest.approx([2e-4, 2e-4, 2e-4, 2e-5])
 
 
 def test_tolerances_that_agree_by_luck_leave_a_part_of_what_they_differed_by_before() -> None:

@@ -483,6 +483,18 @@ def test_windows_are_found_by_both_methods_and_cut_by_the_bounds() -> None:
         assert found(SQUEAL, 0.8, 1.2, method=method).windows == ((0.8, 1.2),)
 
 
+def test_a_window_between_two_values_of_the_scan_has_a_narrow_bar() -> None:
+    """Two-layer steps are as exact as the eigenvalues here: -83.3456, 0.3913, 6.2881 by their polynomial."""
+    changes = {"friction__coefficient": 0.7, "solver__scheme": "two-layer", "solver__step": 2e-5}
+    answer = found(SQUEAL, -90.0, 90.0, "link2__angle_deg", tolerance=0.1, **changes)
+    upper, error = answer.windows[1], answer.window_errors[1]
+    assert answer.outcome is Outcome.FOUND
+    np.testing.assert_allclose([answer.windows[0][1], *upper], [-83.3456, 0.3913, 6.2881], atol=0.05)
+    assert max(error) < 0.1
+    assert answer.bias is not None
+    assert abs(answer.bias) < 1e-3
+
+
 @pytest.mark.parametrize("scheme", ["two-layer", "three-layer"])
 def test_rounding_of_a_far_position_is_in_the_error_bar_near_self_locking(scheme: str) -> None:
     exact = stability(system_of(make(SOFT))).critical

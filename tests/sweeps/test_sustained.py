@@ -61,12 +61,47 @@ OPEN: dict[str, Any] = {  # nothing lasts at 550 … 599 MN/m² but what the pas
     "output": {"sample_interval": 0.00016},
     "solver": {"duration": 0.2, "tolerance": 1e-3},
 }
+BOUNCING: dict[str, Any] = {  # dies out from 4.2 compressions to 1e-14 at 1.865, and keeps half of one at 1.876
+    "shoe": {"mass": 0.586},
+    "wheel": {"radius": 0.5, "angular_speed": 1.22},
+    "link1": {"stiffness": 14200000.0, "damping": 0.899, "angle_deg": 0.0},
+    "link2": {"stiffness": 24900000.0, "damping": 2.36, "angle_deg": 7.23},
+    "load": {"force": 4000.0},
+    "friction": {"coefficient": 0.1},
+    "contact": {"half_length": 0.02, "stiffness": 75400000.0},
+    "output": {"sample_interval": 1.8e-05},
+    "solver": {"duration": 0.07, "scheme": "piecewise-exact"},
+    "initial": {"vx": -7.37, "vy": 1.18},
+}
+HARD: dict[str, Any] = {  # bounces long, and dies out everywhere
+    "shoe": {"mass": 1.22},
+    "wheel": {"radius": 0.5, "angular_speed": 0.929},
+    "link1": {"stiffness": 438000.0, "damping": 0.15, "angle_deg": 0.0},
+    "link2": {"stiffness": 682000.0, "damping": 0.115, "angle_deg": 23.6},
+    "load": {"force": 58.0},
+    "friction": {"coefficient": 0.1},
+    "contact": {"half_length": 0.02, "stiffness": 2320000.0},
+    "solver": {"duration": 0.57, "scheme": "event-driven"},
+    "output": {"sample_interval": 0.00014},
+    "initial": {"vy": 0.204},
+}
+STEEP: dict[str, Any] = {  # bounces for 10 to 40 s, and then fades at the 0.0102 1/s of its eigenvalue
+    "shoe": {"mass": 10.0},
+    "wheel": {"radius": 0.5, "angular_speed": 4.0},
+    "link1": {"stiffness": 10000000.0, "damping": 300.0, "angle_deg": 90.0},
+    "link2": {"stiffness": 12000000.0, "damping": 300.0, "angle_deg": 5.0},
+    "load": {"force": 5000.0},
+    "friction": {"coefficient": 0.3},
+    "contact": {"half_length": 0.05, "stiffness": 20000000.0},
+    "solver": {"step": 2e-05, "scheme": "two-layer", "duration": 0.2},
+}
 
 
 @pytest.mark.parametrize(
     ("tables", "key", "ends", "tolerance", "lives"),
     [
         (KICKED, "friction__coefficient", (0.0, 5.07), 0.0015, (3.15, 3.17)),
+        (BOUNCING, "friction__coefficient", (1.7, 2.07), 0.002, (1.865, 1.876)),
         (RESTING, "link2__stiffness", (122400.0, 1020000.0), 900.0, (157.4e3, 157.7e3)),
     ],
 )
@@ -92,3 +127,15 @@ def test_slow_decay_or_what_is_forced_on_a_rough_pad_is_no_hysteresis(
 ) -> None:
     answer = found(tables, *ends, key, tolerance=tolerance)
     assert answer.sustained is None or answer.sustained > fades_up_to - tolerance
+
+
+@pytest.mark.parametrize(
+    ("tables", "upper"), [(HARD, 2.47), pytest.param(STEEP, 2.0, marks=campaign)], ids=["hard", "steep"]
+)
+def test_what_bounces_longer_than_a_run_beside_stable_sliding_does_not_last(
+    tables: dict[str, Any], upper: float
+) -> None:
+    answer = found(tables, 0.0, upper, tolerance=1e-3 * upper)
+    assert answer.outcome is Outcome.STABLE
+    assert answer.sustained_outcome in (Outcome.DAMPED, Outcome.UNDECIDED)
+    assert answer.sustained is None

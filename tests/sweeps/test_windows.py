@@ -15,7 +15,8 @@ import xarray as xr
 from scipy.integrate import solve_ivp
 
 from brakecli.case.system import system_of
-from brakecli.sweeps.critical import Outcome
+from brakecli.sweeps.critical import Outcome, Search, search
+from brakecli.sweeps.tables import Critical
 from tests.campaign import campaign
 from tests.commands import brakecli
 from tests.examples import make
@@ -167,7 +168,67 @@ FOLDS: dict[str, dict[str, Any]] = {
         "output": {"sample_interval": 0.00019},
         "solver": {"duration": 0.22, "scheme": "event-driven"},
     },
+    "over a gap": {
+        "shoe": {"mass": 5.344},
+        "wheel": {"radius": 0.33, "angular_speed": 49.96},
+        "link1": {"stiffness": 18350000.0, "damping": 18.92, "angle_deg": 0.0},
+        "link2": {"stiffness": 31340000.0, "damping": 35.76, "angle_deg": 15.4},
+        "load": {"force": 916.7},
+        "friction": {"coefficient": 0.1},
+        "contact": {"half_length": 0.055, "stiffness": 46810000.0},
+        "roughness": {
+            "wheel": {"amplitudes": [1.826e-05], "wavelengths": [0.043]},
+            "shoe": {"amplitudes": [3.639e-06], "wavelengths": [0.024]},
+        },
+        "solver": {"duration": 0.2, "scheme": "three-layer", "step": 4.3e-05, "theta": [0.35, 0.3, 0.35]},
+    },
+    "never": {
+        "shoe": {"mass": 2.991},
+        "wheel": {"radius": 0.2, "angular_speed": 49.0},
+        "link1": {"stiffness": 4444000.0, "damping": 9.575, "angle_deg": 0.0},
+        "link2": {"stiffness": 8549000.0, "damping": 15.32, "angle_deg": 11.14},
+        "load": {"force": 172.1},
+        "friction": {"coefficient": 0.1},
+        "contact": {"half_length": 0.04, "stiffness": 20920000.0},
+        "roughness": {"wheel": {"amplitudes": [1.837e-05], "wavelengths": [0.041]}},
+        "solver": {"duration": 0.23, "scheme": "three-layer", "step": 1.9e-05, "theta": [0.25, 0.5, 0.25]},
+    },
+    "weights that damp": {
+        "shoe": {"mass": 15.76},
+        "wheel": {"radius": 0.5, "angular_speed": -16.26},
+        "link1": {"stiffness": 2333000.0, "damping": 18.9, "angle_deg": -6.37},
+        "link2": {"stiffness": 4897000.0, "damping": 37.4, "angle_deg": -6.827},
+        "load": {"force": 340.7},
+        "friction": {"coefficient": 1.603},
+        "contact": {"half_length": 0.01, "stiffness": 59600000.0},
+        "roughness": {
+            "wheel": {"amplitudes": [8.238e-05], "wavelengths": [0.064], "phases_deg": [208.3]},
+            "shoe": {"amplitudes": [9.225e-06, 2.525e-05], "wavelengths": [0.01, 0.037]},
+        },
+        "solver": {"duration": 0.69, "scheme": "two-layer", "step": 0.00011, "theta": [0.55, 0.5]},
+    },
+    "stable again": {
+        "shoe": {"mass": 1.973},
+        "wheel": {"radius": 0.5, "angular_speed": -8.699},
+        "link1": {"stiffness": 364800.0, "damping": 1.37, "angle_deg": -13.11},
+        "link2": {"stiffness": 1642000.0, "damping": 2.295, "angle_deg": -34.82},
+        "load": {"force": 253.7},
+        "friction": {"coefficient": 1.211},
+        "contact": {"half_length": 0.01, "stiffness": 45170000.0},
+        "roughness": {"wheel": {"amplitudes": [0.0001918], "wavelengths": [0.06], "phases_deg": [302.3]}},
+        "output": {"sample_interval": 0.00033},
+        "solver": {"duration": 0.39, "tolerance": 0.0001},
+    },
 }
+
+
+def followed(name: str, key: str, ends: tuple[float, float]) -> Search:
+    """What a search finds, without its runs for the least sustained value."""
+    lower, upper = ends
+    critical = Critical(
+        parameter=key.replace("__", "."), lower=lower, upper=upper, tolerance=1e-3 * (upper - lower)
+    )
+    return search(critical, lambda value: make(FOLDS[name], **{key: value}), lambda case: None)
 
 
 @pytest.mark.parametrize(
@@ -175,6 +236,7 @@ FOLDS: dict[str, dict[str, Any]] = {
     [
         ("unstable beside", "friction__coefficient", (0.0, 7.5), 4.86, 2.7),
         ("resonance", "friction__coefficient", (0.0, 2.5), 2.326, 1.6),
+        pytest.param("over a gap", "friction__coefficient", (0.0, 2.4), 1.8876, 1.7, marks=campaign),
         pytest.param("both sides", "shoe__mass", (1.491, 9.317), 3.691, 3.6, marks=campaign),
         pytest.param("doubling", "link2__stiffness", (1.594e6, 5.42e6), 3.8355e6, 3.62e6, marks=campaign),
     ],
@@ -185,7 +247,7 @@ def test_a_stable_motion_is_followed_until_it_ends(
     """Another integrator, of fourth order, follows it in small steps to the `truth`. At the `least` value, where
     another motion is unstable, it is stable.
     """
-    answer = found(FOLDS[name], *ends, key, tolerance=1e-3 * (ends[1] - ends[0]))
+    answer = followed(name, key, ends)
     assert answer.value is not None
     assert answer.error is not None
     assert abs(answer.value - truth) < answer.error
@@ -193,3 +255,33 @@ def test_a_stable_motion_is_followed_until_it_ends(
     assert answer.error < 0.04 * (ends[1] - ends[0])
     lost = answer.outcome is Outcome.FOUND
     assert answer.windows[-1] == ((answer.value, ends[1]) if lost else (ends[0], answer.value))
+
+
+@pytest.mark.parametrize("ends", [(0.0, 2.5), (1.0, 1.6)])
+def test_a_motion_that_full_contact_would_have_does_not_count_where_it_would_open(
+    ends: tuple[float, float],
+) -> None:
+    """By the equations of full contact sliding is unstable from 1.231 on. The wave opens the pad from 1.03 on, and
+    another integrator follows the motion that opens, always stable, to 2.5.
+    """
+    answer = followed("never", "friction__coefficient", ends)
+    assert answer.outcome is Outcome.STABLE
+    assert answer.windows == ()
+
+
+@campaign
+@pytest.mark.parametrize(
+    ("name", "key", "range_", "truth", "most"),
+    [  # its weights take away 0.5 1/s, more than the growth
+        ("weights that damp", "shoe__mass", (6.304, 39.4), [8.82, 17.35, 28.02, 29.85, 39.4], 0.6),
+        ("stable again", "link2__stiffness", (8.21e5, 2.791e6), [1.7233e6, 1.8384e6, 1.90733e6], 7e4),
+    ],
+)
+def test_no_window_of_a_motion_that_is_followed_is_hidden(
+    name: str, key: str, range_: tuple[float, float], truth: list[float], most: float
+) -> None:
+    """Another integrator follows it and finds where multipliers pass one."""
+    answer = followed(name, key, range_)
+    ends, errors = (np.ravel(each)[-len(truth) :] for each in (answer.windows, answer.window_errors))
+    assert (np.abs(ends - truth) <= errors).all()
+    assert (errors < most).all()

@@ -114,7 +114,8 @@ def cycles_of(
         there = state == which
         middle, spread = median(shares(there))
         begins = float(np.sum(there[1:] & ~there[:-1])) + (len(hidden) if which == ContactState.STICK else 0)
-        return middle, max(spread, (unseen + step) * begins / cycles / period)
+        missed = 1.0 if unseen > _ALIKE else unseen
+        return middle, max(spread, (missed + step) * begins / cycles / period)
 
     (stick, stick_spread), (loss, loss_spread) = (time_in(which) for which in _ENDS)
     frequency = 1.0 / (period * part.history.interval)
@@ -142,20 +143,26 @@ def cycles_of(
     return Cycles(evidence, frequency, off, *medians, limited, *changes, varies)
 
 
-def _hidden_sticks(velocity: Array, state: Array, belt: float) -> NDArray[np.intp]:
-    """The samples before which the shoe may stick unseen: its velocity (m/s) may reach the wheel's between two.
+def _crests(values: Array) -> Array:
+    """The most that values may reach behind each sample, where they have a crest there; otherwise -infinity.
 
-    Beside its crest a velocity lies below the lines through the two samples on either side.
+    Beside a crest they lie below the tangents at the two samples, by parabolas through the three on either side.
     """
-    slower = abs(belt) - np.sign(belt) * velocity
-    before, first, last, after = (slower[i : len(slower) - 3 + i] for i in range(4))
-    falls, rises, least = first - before, last - after, -_ROUNDING * abs(belt)
-    crest = (falls < 0.0) & (rises < 0.0) & (np.minimum(first, last) > least)
-    meet = np.clip((last + rises - first) / np.where(crest, falls + rises, 1.0), 0.0, 1.0)
-    crest &= np.maximum(first + falls * meet, last + rises * (1.0 - meet)) <= -least
-    touches = np.minimum(state[1:-2], state[2:-1]) < ContactState.SEPARATED
-    slips = (state[1:-2] != ContactState.STICK) & (state[2:-1] != ContactState.STICK)
-    return np.flatnonzero(crest & touches & slips) + 2
+    earlier, before, first, last, after, later = (values[i : len(values) - 5 + i] for i in range(6))
+    rises, falls = (1.5 * x - 2.0 * y + 0.5 * z for x, y, z in ((first, before, earlier), (last, after, later)))
+    crest = (rises > 0.0) & (falls > 0.0)
+    meet = np.clip((last + falls - first) / np.where(crest, rises + falls, 1.0), 0.0, 1.0)
+    met = np.where(crest, np.minimum(first + rises * meet, last + falls * (1.0 - meet)), -np.inf)
+    return np.pad(met, (2, 3), constant_values=-np.inf)
+
+
+def _hidden_sticks(velocity: Array, state: Array, belt: float) -> NDArray[np.intp]:
+    """The samples before which the shoe may stick unseen: its velocity (m/s) may reach the wheel's between two."""
+    faster, least = np.sign(belt) * velocity - abs(belt), _ROUNDING * abs(belt)
+    reached = (np.maximum(faster[:-1], faster[1:]) < least) & (_crests(faster)[:-1] >= -least)
+    touches = np.minimum(state[:-1], state[1:]) < ContactState.SEPARATED
+    slips = (state[:-1] != ContactState.STICK) & (state[1:] != ContactState.STICK)
+    return np.flatnonzero(reached & touches & slips) + 1
 
 
 def in_lines(part: Part, frequency: float, period: float) -> dict[str, Any]:

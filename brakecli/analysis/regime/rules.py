@@ -172,7 +172,8 @@ class Rules(LinearRules):
         if stick >= self.limits.stick_cycles and not missed:
             text = f"sustained, with stick in {stick:.0%} of {cycles:.0f} cycles"
             return Decision(text, Regime.RELAXATION, *own)
-        if self._sticks(stick) != self._sticks(found.may_stick):
+        unseen = self._sticks(found.may_stick - stick) > 0  # in more than hardly any
+        if unseen and self._sticks(stick) != self._sticks(found.may_stick):
             finer = 0.25 * self.history.interval
             keys = "solver.step and " * (finer < 1.1 * self.context.step) + "output.sample_interval"
             text = f"stick is seen in {stick:.0%} of the cycles"

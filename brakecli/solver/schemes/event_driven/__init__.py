@@ -7,7 +7,7 @@ slip, lift-off and touch-down end a step: nothing is smoothed, nothing stepped o
 from numba import float64, int64, void
 
 from brakecli.solver import own_steps
-from brakecli.solver.compile import Floats, at_address, in_memory, kernel
+from brakecli.solver.compile import Floats, at_address, from_memory, into_memory, kernel
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.friction import observed
 from brakecli.solver.quantities import Failure
@@ -22,7 +22,7 @@ begin, sample, weighted_time = own_steps.begin, own_steps.sample, own_steps.weig
 mechanical_energy = own_steps.mechanical_energy
 
 _PLANT = plant_type(MOTION)
-hold, _plant_at = in_memory(_PLANT)
+hold, _plant_at = into_memory(_PLANT), from_memory(_PLANT)
 _step_at = at_address(STEP)  # compiled in its own place: otherwise `advance` would compile it again
 
 _BUDGET, _EXACT = 4096, 64

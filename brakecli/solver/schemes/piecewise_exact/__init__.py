@@ -11,7 +11,7 @@ from typing import Any
 from numba import float64, int64, void
 
 from brakecli.solver import own_steps
-from brakecli.solver.compile import Floats, in_memory, kernel
+from brakecli.solver.compile import Floats, from_memory, into_memory, kernel
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.double_double import two_sum
 from brakecli.solver.friction import observed
@@ -54,7 +54,7 @@ _ERROR_TERMS = 9  # of the series of an error, which is known to a few digits on
 _KEPT = 4096  # levels from one sum of the works to the next, so that rounding does not add up
 
 _PLANT = plant_type(FLOW)
-hold, _plant_at = in_memory(_PLANT)
+hold, _plant_at = into_memory(_PLANT), from_memory(_PLANT)
 _NONE, _, _DIVERGED, _, _, _STALLED = (int(failure) for failure in Failure)
 
 
@@ -209,7 +209,7 @@ def _through(p: Plant, t: float, to_sample: int) -> int:
             continue
         span = max(min(h - tau if to_sample == 1 else h, to_knot), 0.0)
         for i in range(SIZE):
-            m.series[i, 0] = m.z[i]
+            m.series[0, i] = m.z[i]
         phases.expand(m, m.phase, span)
         which, theta = first_event(m)
         if theta > 0.0:

@@ -54,13 +54,13 @@ def _follow(m: Any, which: int) -> tuple[float, float, float]:
     row, z, of = m.margins[m.phase, :, 4 + which], m.series, m.polynomial
     x, y, v_x, v_y = row[X], row[Y], row[V_X], row[V_Y]
     for k in range(TERMS):
-        of[0, k] = (x * z[X, k] + y * z[Y, k]) + (v_x * z[V_X, k] + v_y * z[V_Y, k])
-    of[0, 1] += row[BELT] * z[BELT, 1] + row[LOAD] * z[LOAD, 1]
+        of[0, k] = (x * z[k, X] + y * z[k, Y]) + (v_x * z[k, V_X] + v_y * z[k, V_Y])
+    of[0, 1] += row[BELT] * z[1, BELT] + row[LOAD] * z[1, LOAD]
     terms, value, slope = 0.0, 0.0, 0.0
     for i in range(SIZE):
-        terms += abs(row[i] * z[i, 0])
+        terms += abs(row[i] * z[0, i])
         if i > V_Y:
-            of[0, 0] += row[i] * z[i, 0]
+            of[0, 0] += row[i] * z[0, i]
     for k in range(TERMS - 1, -1, -1):
         value, slope, terms = value + of[0, k], slope + k * of[0, k], terms + abs(of[0, k])
     return value, slope, ROUNDING * terms

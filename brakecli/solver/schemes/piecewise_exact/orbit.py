@@ -107,7 +107,7 @@ ORBIT_TYPE = numba.from_dtype(ORBIT)
 def _expand(m: Any, o: Any) -> None:
     """The series of the last step."""
     for i in range(SIZE):
-        m.series[i, 0] = o.begin[i]
+        m.series[0, i] = o.begin[i]
     phases.expand(m, o.old, o.h)
 
 
@@ -135,7 +135,7 @@ def zero_of_velocity(m: Any, o: Any, sign: float) -> float:
     """The part of the last step at which v_x falls through zero, or rises where the sign is -1; goes there."""
     _expand(m, o)
     for k in range(TERMS):
-        m.polynomial[0, k] = sign * m.series[V_X, k]
+        m.polynomial[0, k] = sign * m.series[k, V_X]
     part = root(m, 0, 0.0, o.part)
     phases.reach(m, part)
     return part
@@ -160,7 +160,7 @@ def _carry(m: Any, o: Any, part: float) -> None:
                     m.at[i] += m.step[o.old, k, i] * o.tangents[j, k]
         else:
             for i in range(SIZE):
-                m.series[i, 0] = o.tangents[j, i] if i < 4 else 0.0
+                m.series[0, i] = o.tangents[j, i] if i < 4 else 0.0
             phases.expand(m, o.old, o.h)
             phases.reach(m, part)
         for i in range(4):
@@ -201,7 +201,7 @@ def _add_up(m: Any, o: Any, part: float, band: float, falls: int) -> None:
     """Add a part of the last step to the numbers of the cycle."""
     for k in range(TERMS):
         power = o.h * part ** (k + 1) / (k + 1)
-        o.mean_x, o.mean_y = o.mean_x + power * m.series[X, k], o.mean_y + power * m.series[Y, k]
+        o.mean_x, o.mean_y = o.mean_x + power * m.series[k, X], o.mean_y + power * m.series[k, Y]
     o.fastest = max(o.fastest, m.z[V_X] / m.z[BELT])
     o.square += 0.5 * part * o.h * (o.begin[V_X] ** 2 + m.z[V_X] ** 2)
     for k in range(2):

@@ -47,8 +47,8 @@ _POWERS = np.vander(np.append(_NODES, 1.0), TERMS, increasing=True)
 def expand(m: Any, phase: int, span: float) -> None:
     """The series of the motion over a span (s), from its first coefficient on: (A span)^k z / k!."""
     a, z = m.generator, m.series
-    x, y, v_x, v_y, load, belt_slope = z[X, 0], z[Y, 0], z[V_X, 0], z[V_Y, 0], z[LOAD, 0], z[BELT_SLOPE, 0]
-    z[BELT, 1], z[LOAD, 1] = span * z[BELT_SLOPE, 0], span * z[LOAD_SLOPE, 0]  # further terms are 0
+    x, y, v_x, v_y, load, belt_slope = z[0, X], z[0, Y], z[0, V_X], z[0, V_Y], z[0, LOAD], z[0, BELT_SLOPE]
+    z[1, BELT], z[1, LOAD] = span * z[0, BELT_SLOPE], span * z[0, LOAD_SLOPE]  # further terms are 0
     for k in range(1, TERMS):
         part = span / k
         a_x = (a[phase, V_X, X] * x + a[phase, V_X, Y] * y) + (a[phase, V_X, V_X] * v_x + a[phase, V_X, V_Y] * v_y)
@@ -56,21 +56,19 @@ def expand(m: Any, phase: int, span: float) -> None:
         a_x += a[phase, V_X, LOAD] * load + a[phase, V_X, BELT_SLOPE] * belt_slope
         a_y += a[phase, V_Y, LOAD] * load
         x, y, v_x, v_y = part * v_x, part * v_y, part * a_x, part * a_y
-        load, belt_slope = z[LOAD, 1] if k == 1 else 0.0, 0.0
-        z[X, k], z[Y, k], z[V_X, k], z[V_Y, k] = x, y, v_x, v_y
+        load, belt_slope = z[1, LOAD] if k == 1 else 0.0, 0.0
+        z[k, X], z[k, Y], z[k, V_X], z[k, V_Y] = x, y, v_x, v_y
 
 
 @kernel(void(FLOW_TYPE, float64))
 def reach(m: Any, theta: float) -> None:
     """Put the motion at a part of the span of the series into `m.at`."""
-    z, at, q = m.series, m.at, theta * theta
-    x = y = v_x = v_y = 0.0
-    for k in range(TERMS - 2, -1, -2):  # in pairs, which wait for each other half as long
-        x, y = x * q + (z[X, k + 1] * theta + z[X, k]), y * q + (z[Y, k + 1] * theta + z[Y, k])
-        v_x, v_y = v_x * q + (z[V_X, k + 1] * theta + z[V_X, k]), v_y * q + (z[V_Y, k + 1] * theta + z[V_Y, k])
-    at[X], at[Y], at[V_X], at[V_Y] = x, y, v_x, v_y
-    at[BELT], at[BELT_SLOPE] = z[BELT, 0] + theta * z[BELT, 1], z[BELT_SLOPE, 0]
-    at[LOAD], at[LOAD_SLOPE] = z[LOAD, 0] + theta * z[LOAD, 1], z[LOAD_SLOPE, 0]
+    z, q = m.series, theta * theta
+    for i in range(SIZE):  # the compiler makes one vector of them
+        value = 0.0
+        for k in range(TERMS - 2, -1, -2):  # in pairs, which wait for each other half as long
+            value = value * q + (z[k + 1, i] * theta + z[k, i])
+        m.at[i] = value
 
 
 @kernel(void(COEFFICIENTS, FLOW_TYPE, int64), inlined=False)
