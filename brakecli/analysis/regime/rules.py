@@ -174,11 +174,7 @@ class Rules(LinearRules):
             return Decision(text, Regime.RELAXATION, *own)
         unseen = self._sticks(found.may_stick - stick) > 0  # in more than hardly any
         if unseen and self._sticks(stick) != self._sticks(found.may_stick):
-            finer = 0.25 * self.history.interval
-            keys = "solver.step and " * (finer < 1.1 * self.context.step) + "output.sample_interval"
-            text = f"stick is seen in {stick:.0%} of the cycles"
-            text += f", but may fall between samples in {found.may_stick:.0%}"
-            return Decision(text, advice=f"reduce {keys} to {finer:.2g} s")
+            return self._unseen(stick, found.may_stick)
         bands = self.evidence["band_share"] = self.settled_part.narrow()
         lines = f"{harmonic:.0%} of the energy of vx in one line and its harmonics"
         if harmonic < bands:
@@ -194,6 +190,13 @@ class Rules(LinearRules):
         irregular += ", but the frequency wanders" if wanders else ""
         irregular += f", but not at the {found.frequency:.4g} Hz of its rises" if missed else ""
         return Decision(irregular, advice=f"{'' if missed else 'run longer, or '}look at the spectrum")
+
+    def _unseen(self, stick: float, may: float) -> Decision:
+        """Stick is seen in a part of the cycles, and may fall between samples in more of them."""
+        finer = 0.25 * self.history.interval
+        keys = "solver.step and " * (finer < 1.1 * self.context.step) + "output.sample_interval"
+        text = f"stick is seen in {stick:.0%} of the cycles, but may fall between samples in {may:.0%}"
+        return Decision(text, advice=f"reduce {keys} to {finer:.2g} s")
 
     def _missed(self, frequency: float, off: float) -> float | None:
         """Frequency (Hz) of the strongest line of vx where it is no multiple of that of its rises."""
