@@ -29,6 +29,8 @@ _REDUCED = 1.0 / 3.0  # of the critical friction: far below it also where surfac
 _LOST = 4.0  # powers of e by which what is not forced has decayed
 _LONGER = 4.0  # times as long, so that it loses its start, and a vibration that dies becomes linear
 _REMAINS, _VANISHES = 0.7, 0.2  # part of the level of the first run
+_HARDLY = 0.8  # part of it beyond which a second run hardly decays, as the first may
+_HALVED = math.log(2.0) / 3.5  # decay rate times duration of the first, where the second ends at half its level
 
 
 @dataclass(frozen=True)
@@ -99,27 +101,45 @@ def compared(
     if motion.work.failed:
         return Feeds.UNKNOWN, 0.0, f"the second run failed: {motion.work.failure_sentence}"
     again = array_history(second.system.interval, motion.rows)
-    part = level(again) / level(history)
+    part, duration = level(again) / level(history), history.samples * history.interval
     text = f"in the second run, {second.change}, vx has {part:.2g} times the level"
-    verdict = verdict_on(again, second.system, None)
+    verdict, needed = verdict_on(again, second.system, None), _LONGER * duration
     if not second.smooth:
         lost = -context(second.system).growth() * second.system.duration > _LOST  # what is left of the start
         lost &= verdict.excitation is not Excitation.SELF_EXCITED
         remains = part >= _REMAINS and (lost or verdict.excitation is Excitation.FORCED)
-        duration = history.samples * history.interval
         if remains and 0.0 < second.growth * duration < GROWN:  # what it has not shown yet, less friction cannot
             own = f"the shoe's own vibration grows at {second.growth:.3g} 1/s"
-            needed = f"run at least {1.01 * GROWN / second.growth:.3g} s"
-            return Feeds.UNKNOWN, 0.0, f"{text}, but in the first sliding is unstable: {own}; {needed}"
+            text = f"{text}, but in the first sliding is unstable: {own}"
+            return _told(Feeds.UNKNOWN, 0.0, text, 1.01 * GROWN / second.growth)
         waves, end = context(second.system).waves, Part(history, history.samples // 2, history.samples)
         least = _VANISHES  # what moves as the waves do may be forced along x, and falls as friction does
         vanishes = part <= (min(least, 0.5 * second.friction) if follows(end, waves) else least)
-        return Feeds.ROUGHNESS if remains else Feeds.FRICTION if vanishes else Feeds.UNKNOWN, 0.0, text
-    if verdict.regime is Regime.DAMPED:
-        return Feeds.ROUGHNESS, 0.0, f"{text}: {verdict.reasons[0]}"
+        feeds = Feeds.ROUGHNESS if remains else Feeds.FRICTION if vanishes else Feeds.UNKNOWN
+        return _told(feeds, 0.0, text, needed, ", or sweep friction.coefficient to see where the level sets in")
+    text, decays = f"{text}: {verdict.decision.reason}", verdict.regime is Regime.DAMPED
+    if decays and part >= _HARDLY:
+        text += ", too slowly to show whether the first does"
+        needed = max(needed, _HALVED / abs(verdict.growth_rate or math.inf))
+    elif decays and _friction_feeds(history):
+        both = "but in the first friction gives energy and the roughness takes it: neither keeps it up alone"
+        return Feeds.UNKNOWN, 0.0, f"{text}, {both}"
     lasts = verdict.settled and verdict.excitation is Excitation.SELF_EXCITED and part >= _REMAINS
-    sticks = verdict.evidence.get("stick_cycles", 0.0)
-    return Feeds.FRICTION if lasts else Feeds.UNKNOWN, sticks, f"{text}: {verdict.reasons[0]}"
+    feeds = Feeds.ROUGHNESS if decays and part < _HARDLY else Feeds.FRICTION if lasts else Feeds.UNKNOWN
+    return _told(feeds, verdict.evidence.get("stick_cycles", 0.0), text, needed)
+
+
+def _told(feeds: Feeds, sticks: float, text: str, needed: float, other: str = "") -> tuple[Feeds, float, str]:
+    """What a second run has shown; where that decides nothing, with the duration (s) that the first needs."""
+    undecided = feeds is Feeds.UNKNOWN
+    return feeds, sticks, f"{text}; run at least {needed:.3g} s and decide again{other}" if undecided else text
+
+
+def _friction_feeds(history: History) -> bool:
+    """Whether friction surely gives energy to the vibration, and the roughness takes it."""
+    half = Part(history, history.samples // 2, history.samples)
+    (gives, off), (takes, off_too) = half.power("friction_force", "vx"), half.power("normal_force", "vy")
+    return gives > 2.0 * off and takes < -2.0 * off_too
 
 
 def level(history: History) -> float:

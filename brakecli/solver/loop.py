@@ -25,8 +25,8 @@ def sample(p: Plant, row: Floats) -> None:
     """Write the sample that is due at this level: the motion, and the forces at its own time.
 
     F_y is evaluated at the sample; F_x follows from the slip law, or in stick from (6) with the wheel's
-    acceleration. A three-layer scheme's velocity flickers about U in stick by the velocity that friction can
-    change in a step: it sticks within that distance, where the force needed lies inside the friction cone.
+    acceleration. In stick a three-layer scheme's velocity leaves U at every other level, by no more than friction
+    changes it in a step: it sticks there, too, while the force needed lies inside the friction cone.
     """
     p = borrowed(p)
     c, grid, drive, state, contact = p.c, p.grid, p.drive, p.state, p.layer.contact
@@ -46,7 +46,8 @@ def sample(p: Plant, row: Floats) -> None:
         sliding = 0.0
     # Eq. (6) with the velocity and the acceleration of the wheel
     needed = c.m * belt_slope + c.b_xx * belt + c.b_xy * v_y + c.c_xx * x + c.c_xy * y + load * c.sin_beta
-    holds = abs(sliding) <= grid.lag * p.s.h * bound / c.m and abs(needed) <= bound
+    flicker = grid.lag * p.s.h * bound / c.m if p.counts.stuck >= p.counts.level - 1 else 0.0
+    holds = abs(sliding) <= flicker and abs(needed) <= bound
     side, friction = observed(sliding, holds, needed, normal, bound)
     row[0], row[1], row[2], row[3] = x, y, v_x, v_y
     row[4], row[5], row[6], row[7] = friction, normal, contact.fraction, side
@@ -111,6 +112,8 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
             return _DIVERGED
         counts.kinds[layer.contact.kind] += 1
         counts.level += 1
+        if problem.side == 0.0:
+            counts.stuck = counts.level
         part += 1
         if part == grid.per_sample:
             sampled, part = sampled + 1, 0

@@ -80,6 +80,7 @@ WORK = record(
 COUNTS = record(
     "side crossing",  # sign of the last sliding velocity; largest contact force (N) as it turned within a step
     held=int,  # steps that the shoe has stuck for since
+    stuck=int,  # level reached by the last step in which it stuck
     level=int,  # level of time that has been reached; of a scheme with steps of its own the sample
     evaluations=int,  # of the contact
     unconverged=int,  # steps whose iteration did not converge

@@ -137,6 +137,26 @@ def test_an_envelope_that_surely_grows_has_not_settled(name: str, times: float) 
     assert re.search(r"still changes by \d% within the settled part: run at least", verdict.reasons[1])
 
 
+@pytest.mark.parametrize(
+    ("name", "times", "lasting"),
+    [  # by another integrator: 52.15 Hz with a doubled period, and 7.458e-5 m
+        ("leaves a cycle that doubles", 1.0, False),
+        ("leaves a cycle that doubles", 4.0, False),
+        ("leaves a cycle that doubles", 8.0, True),
+        ("leaves a cycle for one that turns round it", 1.0, False),
+    ],
+)
+def test_a_cycle_whose_neighbours_part_has_not_settled(name: str, times: float, *, lasting: bool) -> None:
+    """The multipliers of the cycles are -1.008 and 1.025 exp(±2.34i)."""
+    exact: dict[str, Any] = {"solver__scheme": "piecewise-exact", "solver__step": None}
+    for changes in ({}, exact)[lasting:]:
+        verdict = judged(name, times, **changes)
+        assert verdict.excitation is Excitation.SELF_EXCITED
+        assert verdict.settled is lasting
+        assert lasting or re.search("neighbouring cycles part at .* run at least", verdict.reasons[1])
+    assert not lasting or verdict.frequency == pytest.approx(52.15, abs=0.02)
+
+
 def test_chaos_with_most_of_its_energy_in_three_bands_is_irregular() -> None:
     """Neighbouring runs part at 7.3 1/s, and the amplitude of a longer run is half, or two and a half times."""
     verdict = judged("chaotic")
@@ -355,7 +375,11 @@ def test_the_time_that_a_verdict_asks_for_is_enough_or_the_new_one_has_another_r
 
 @pytest.mark.parametrize(
     ("name", "amplitude", "frequency", "stick"),
-    [("impacts of 70 steps", 1.1894e-5, 402.1, 0.1304), ("impacts of 14 steps", 4.455e-5, 1469.1, 0.232)],
+    [
+        ("impacts of 70 steps", 1.1894e-5, 402.1, 0.1304),
+        ("impacts of 14 steps", 4.455e-5, 1469.1, 0.232),
+        ("sticks for four steps of three layers", 9.484e-5, 428.31, 0.0452),
+    ],
 )
 def test_the_spreads_of_impacts_hold_what_shorter_steps_and_another_integrator_change(
     name: str, amplitude: float, frequency: float, stick: float
@@ -402,6 +426,14 @@ def test_a_shoe_that_the_load_pulls_off_the_wheel_is_not_called_forced() -> None
     assert verdict.regime is Regime.UNDECIDED
     assert "would not touch the wheel" in verdict.reasons[0]
     assert judged("hangs off the wheel", 4.0).regime is Regime.UNDECIDED
+
+
+def test_ripple_near_the_mean_makes_no_cycle_where_the_motion_repeats_without_it() -> None:
+    """By another integrator 153.27 Hz and multiples, with stick in every cycle; vx dips to -0.3 deviations."""
+    verdict = judged("ripple beside its cycles")
+    assert verdict.settled
+    assert verdict.frequency == pytest.approx(153.27, abs=verdict.evidence["frequency_spread"])
+    assert verdict.evidence["stick_cycles"] == 1.0
 
 
 def test_a_trace_that_fades_makes_no_cycle_of_three_rises() -> None:

@@ -1,5 +1,6 @@
 """Regimes of runs whose regime is known, and of histories made by hand."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -46,6 +47,19 @@ def test_the_three_regimes_of_the_paper(phi: float, omega: float, regime: Regime
     assert (verdict.stick_fraction > 0.02) == (regime is Regime.RELAXATION)
 
 
+def test_where_rises_miss_the_lines_of_a_motion_the_strongest_line_is_its_frequency() -> None:
+    """In most cycles of the line at 100 Hz the one at 237 Hz makes no further rise, in some it does."""
+    lines = [size * np.sin(2.0 * np.pi * frequency * TIME) for size, frequency in ((1.0, 100.0), (0.9, 237.0))]
+    slides, known = made(lines[0] + lines[1]), Context(3.0, growth=lambda: 1.0, settles=100.0)
+    verdict = classify(slides, known)
+    assert verdict.regime is Regime.QUASI_HARMONIC
+    assert verdict.frequency == pytest.approx(100.0, abs=0.1)
+    assert verdict.evidence["fundamental_share"] == pytest.approx(1.0 / 1.81, abs=0.01)
+    sticks = classify(made(lines[0] + lines[1], np.where(lines[0] > 0.9, 0.0, -1.0)), known)
+    assert (sticks.regime, sticks.frequency) == (Regime.UNDECIDED, None)
+    assert sticks.reasons[0].endswith("Hz of its rises; look at the spectrum")
+
+
 def test_a_shoe_shaken_by_roughness_below_its_critical_friction_is_damped_and_forced() -> None:
     verdict = verdict_of(make(ROUGH, solver__duration=1.0, solver__step=2e-5))
     assert (verdict.regime, verdict.excitation) == (Regime.DAMPED, Excitation.FORCED)
@@ -64,6 +78,20 @@ def test_a_shoe_that_is_carried_along_is_not_called_damped() -> None:
     verdict = verdict_of(make(SQUEAL, **changes))
     assert verdict.regime is Regime.UNDECIDED
     assert "carried along" in verdict.reasons[0]
+
+
+@pytest.mark.parametrize(("part", "locks"), [(0.98, False), (1.02, True)])
+def test_a_shoe_that_locks_itself_is_told_that_no_longer_run_will_see_it_slip(part: float, *, locks: bool) -> None:
+    """The wheel draws x, the links ask for a force and press the pad: both are linear in x, and y gives way."""
+    angle, first, second, contact = math.radians(40.0), 1e7, 1.2e7, 2e6
+    xx, xy, yy = second * math.cos(angle) ** 2, second * math.sin(angle) * math.cos(angle), first
+    yy += second * math.sin(angle) ** 2
+    limit = (xx - xy**2 / (yy + contact)) / (contact * xy / (yy + contact))
+    changes: dict[str, Any] = {"link2__angle_deg": -40.0, "friction__coefficient": part * limit}
+    verdict = verdict_of(make(SQUEAL, **changes, wheel__angular_speed=0.5, solver__duration=1.0))
+    assert verdict.stick_fraction == float(locks)
+    assert locks is (f"it slips below a friction coefficient of {limit:.4g}" in verdict.reasons[0])
+    assert "run longer" not in verdict.reasons[0]
 
 
 def test_a_shoe_that_lost_contact_is_not_called_damped() -> None:

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import tomli_w
 
@@ -14,6 +15,7 @@ from brakecli.runs.second import compared, second_system
 from brakecli.solver.history import array_history
 from brakecli.solver.motion import solve
 from tests.analysis.found import SHOES
+from tests.analysis.histories import history_of
 from tests.commands import brakecli, each
 
 FORCED: dict[str, Any] = {  # sliding is stable; the record is too short for its lines
@@ -125,6 +127,37 @@ def test_a_second_run_shows_that_the_roughness_forces_what_lasts(name: str) -> N
     feeds, *_ = compared(second_system(system, history), history)
     assert verdict_on(history, system, None).regime is Regime.UNDECIDED
     assert verdict_on(history, system, None, None, feeds).excitation is Excitation.FORCED
+
+
+def test_a_second_run_that_leaves_most_of_the_level_decides_nothing() -> None:
+    """By another integrator it lasts for 160 runs: friction gives energy, and the roughness takes it."""
+    system = system_of(parse_case(tomli_w.dumps(SHOES["hardly decays without the roughness"]), "case").case)
+    history = array_history(system.interval, solve(system).rows)
+    feeds, _, shown = compared(second_system(system, history), history)
+    assert feeds is Feeds.UNKNOWN
+    assert "vx has 0.99 times the level" in shown
+    # A half is left at the end of a second run of that time: exp(-3.5 · 0.001226/s · 161 s).
+    assert shown.endswith("too slowly to show whether the first does; run at least 161 s and decide again")
+
+
+def test_what_friction_feeds_and_the_roughness_brakes_is_not_forced_though_it_dies_without_roughness() -> None:
+    system = system_of(parse_case(tomli_w.dumps(FORCED), "case").case)
+    second = second_system(system, array_history(system.interval, solve(system).rows))
+    wave = np.sin(0.1 * np.arange(2000))
+    feeds = [
+        compared(second, history_of(2000, vx=wave, vy=wave, friction_force=wave, normal_force=part * wave))[0]
+        for part in (-0.1, 0.1)
+    ]
+    assert feeds == [Feeds.UNKNOWN, Feeds.ROUGHNESS]
+
+
+def test_a_second_run_that_decides_nothing_says_how_long_to_run() -> None:
+    system = system_of(
+        parse_case(tomli_w.dumps(SHOES["grows with friction, without a critical value"]), "case").case
+    )
+    history = array_history(system.interval, solve(system).rows)
+    told = f"run at least {4.0 * system.duration:.3g} s and decide again, or sweep friction.coefficient"
+    assert told in compared(second_system(system, history), history)[2]
 
 
 def test_what_falls_as_friction_does_is_not_shown_to_be_self_excited() -> None:

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.analysis.regime.evidence import LINE_BINS, Part
+from brakecli.analysis.regime.evidence import LINE_BINS, Part, line
 from brakecli.analysis.regime.spectra import Array, upward_crossings
 from brakecli.solver.quantities import ContactState
 
@@ -17,6 +17,11 @@ _GROUPS = 10  # of neighbouring cycles, of which a median is taken
 _ENDS = (ContactState.STICK, ContactState.SEPARATED)
 _MIDDLE = np.array([1.0 / 6.0, 0.5, 5.0 / 6.0])  # quantiles
 _TREND = 3.0  # standard errors of the slope of ten medians, beyond which an amplitude drifts
+_ALTERNATES, _PARTS = (
+    0.3,
+    1.0,
+)  # powers of e by which odd and even cycles, or any neighbours, part in the whole part
+_BANDS = (0.3, 0.5, 0.15)  # of the standard deviation of vx: ripple within it does not count
 _BETWEEN = 1e-3  # of the energy of vx, between the lines of one rise, that makes a cycle of several
 _SEEN = 0.85  # least part of a force's swing in every other sample that all samples see
 SIZE_OFF, _PERIOD_OFF = 3.0, 0.2  # of an amplitude and a period, per step in a contact: most that impacts were off
@@ -63,6 +68,7 @@ class Cycles:
     limited: float  # part of the groups of cycles in which the shoe sticks, leaves the wheel or overtakes it
     drift: "Drift"  # of the amplitude
     detuning: "Drift"  # of the period
+    parting: tuple[float, float]  # powers of e by which neighbouring cycles surely part, and until they lie apart
     force_variation: float | None  # N, peak to peak of the friction force
 
 
@@ -117,7 +123,7 @@ def cycles_of(
         "cycles": float(cycles),
         "samples_per_cycle": period,
         "rises_per_cycle": float(rises),
-        **_in_lines(part, frequency, period),
+        **in_lines(part, frequency, period),
         "stick_cycles": float(np.mean(per_cycle > 0)),
         "stick_episodes_per_cycle": float(np.mean(per_cycle)),
         "frequency_spread": frequency * period_spread / period,
@@ -125,8 +131,8 @@ def cycles_of(
         "contact_loss_spread": loss_spread,
     }
     limited = float(np.mean(shares(state != slip) > 0.0))
-    sizes = swings(part, crossings)
-    drift, detuning = _drift(sizes), _drift(np.diff(crossings))
+    sizes, periods = swings(part, crossings), np.diff(crossings)
+    changes = _drift(sizes), _drift(periods), _parting(sizes, periods)
     force = part.history.read("friction_force", part.stop - len(velocity), part.stop)
     amplitude, spread = median(sizes)
     missed = 3.0 / 128.0 * (2.0 * np.pi / period) ** 4 * amplitude  # of a crest between two samples: parabola
@@ -134,7 +140,7 @@ def cycles_of(
     medians = amplitude, spread, stick, loss, float(np.mean(may > 0))
     varies = _force_variation(force, crossings, groups, alike=unseen > _ALIKE)
     off = frequency * (turn**2 / 8.0 + _PERIOD_OFF * impact)
-    return Cycles(evidence, frequency, off, *medians, limited, drift, detuning, varies)
+    return Cycles(evidence, frequency, off, *medians, limited, *changes, varies)
 
 
 def _crests(values: Array) -> Array:
@@ -159,7 +165,7 @@ def _hidden_sticks(velocity: Array, state: Array, belt: float) -> NDArray[np.int
     return np.flatnonzero(reached & touches & slips) + 1
 
 
-def _in_lines(part: Part, frequency: float, period: float) -> dict[str, Any]:
+def in_lines(part: Part, frequency: float, period: float) -> dict[str, Any]:
     """Parts of the energy of vx in a line (Hz) and its harmonics, and their amplitudes over its own."""
     first, *higher = (part.share([n * frequency]) for n in range(1, _HARMONICS + 1))
     return {
@@ -193,11 +199,21 @@ def _force_variation(force: Array, crossings: Array, groups: Array, alike: bool)
 def _beginnings(part: Part, velocity: Array, waves: Sequence[tuple[float, float]]) -> tuple[Array, int]:
     """Where cycles begin, and how many rises each holds: one, unless lines lie between those of one.
 
-    Lines of waves (Hz, m) may lie there as well.
+    Lines of waves (Hz, m) may lie there as well. Rises are told from ripple by the first of `_BANDS` with which
+    the motion repeats after some of them.
     """
-    crossings = upward_crossings(velocity, 0.3 * float(velocity.std()))
+    everywhere = [upward_crossings(velocity, band * float(velocity.std())) for band in _BANDS]
+    return next(
+        (found for each in everywhere if (found := _repeated(part, velocity, waves, each))), (everywhere[0], 1)
+    )
+
+
+def _repeated(
+    part: Part, velocity: Array, waves: Sequence[tuple[float, float]], crossings: Array
+) -> tuple[Array, int] | None:
+    """Where cycles begin, and how many rises each holds; None if the motion does not repeat after as few."""
     if len(crossings) < 2:
-        return crossings, 1
+        return None
     period = float(crossings[-1] - crossings[0]) / (len(crossings) - 1)
     width = 2.0 * LINE_BINS / (len(velocity) * part.history.interval)
     close = 2.0 * _SAME * float(velocity.var())
@@ -212,7 +228,7 @@ def _beginnings(part: Part, velocity: Array, waves: Sequence[tuple[float, float]
                 if part.share(beside, LINE_BINS // 2) <= _BETWEEN:
                     return crossings[::fewer], fewer
             return crossings[::rises], rises
-    return crossings, 1
+    return None
 
 
 class Drift(NamedTuple):
@@ -231,3 +247,23 @@ def _drift(sizes: Array) -> Drift:
     rest = groups - groups.mean() - slope * places
     error = float(np.std(rest) / (np.std(places) * np.sqrt(max(len(groups) - 2, 1))))
     return Drift(last / first - 1.0 if first > 0.0 else 0.0, abs(slope) > _TREND * error)
+
+
+def _parting(*numbers: Array) -> tuple[float, float]:
+    """By how many powers of e neighbouring cycles part within the record, and until they lie apart; or zeros.
+
+    The difference of odd and even ones grows, or of each and the mean of its neighbours: surely in all numbers.
+    """
+    count = len(numbers[0]) - 2
+    if count < 4 * _GROUPS:
+        return 0.0, 0.0
+    bends = np.array([np.convolve(each / each.mean(), [0.5, -1.0, 0.5], "valid") for each in numbers])
+    odd, every = (np.array_split(each, _GROUPS, axis=1) for each in (bends * (-1.0) ** np.arange(count), bends))
+    alternating, typical = [each.mean(axis=1) for each in odd], [each.std(axis=1) for each in every]
+    for sizes, least in ((alternating, _ALTERNATES), (typical, _PARTS)):
+        logs = np.log(np.maximum(np.abs(sizes).T, 1e-300))
+        slopes = _GROUPS * np.array([line(np.arange(1.0 * _GROUPS), each) for each in logs])
+        surely = not np.ptp(np.sign(sizes), axis=0).any() and np.all(slopes @ [1.0, -_TREND] > 0.0)
+        if surely and (parted := float(slopes[:, 0].min())) > least:
+            return parted, max(-float(logs[:, -1].max()), 0.0)
+    return 0.0, 0.0

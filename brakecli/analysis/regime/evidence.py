@@ -119,6 +119,13 @@ class Part:
             return 0.0
         return float(power[_near(lines, frequencies, bins)].sum()) / total
 
+    @property
+    def strongest(self) -> tuple[float, float]:
+        """Frequency (Hz) of the strongest line of vx, and half of its width."""
+        frequencies, power, _ = self._spectrum
+        top = FEWEST_CYCLES + int(np.argmax(power[FEWEST_CYCLES:]))
+        return interpolated(frequencies, power, top), LINE_BINS * float(frequencies[1])
+
     def narrow(self) -> float:
         """Part of the energy of vx in its three strongest narrow bands."""
         return line_share(self._spectrum[1])

@@ -17,7 +17,7 @@ from brakecli.analysis.regime.over_time import over_time
 from brakecli.analysis.regime.ripple import ripple
 from brakecli.analysis.regime.spectra import forced_lines, subharmonics
 from brakecli.analysis.regime.verdict import Context, Decision, Feeds, Thresholds, Verdict
-from brakecli.analysis.stability.modes import growth, is_undamped, modes, slowest_of_cycles
+from brakecli.analysis.stability.modes import growth, is_undamped, locks_from, modes, slowest_of_cycles
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError, UnreadableResultError
@@ -111,6 +111,7 @@ def context(system: System) -> Context:
         scale=fastest,
         frictionless=c.phi == 0.0,
         undamped=is_undamped(c),
+        locks=limit if c.phi > (limit := locks_from(c, system.contact_stiffness, belt)) else None,
         touches=lambda: stiffness() > 0.0,
         settles=slowest_of_cycles(c),
         growth=lambda: growth(c, stiffness(), grip),

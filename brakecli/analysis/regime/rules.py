@@ -1,14 +1,23 @@
 """What kind of vibration a history shows, and why: the rules. `evidence` measures what they go by."""
 
 import math
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from brakecli.analysis.regime.cycles import SIZE_OFF, Cycles, Drift, contact_length, cycles_of, median, swings
-from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, WINDOWS, Envelope, line
-from brakecli.analysis.regime.forced import GROWN, QUARTER, ForcedRules
+from brakecli.analysis.regime.cycles import (
+    SIZE_OFF,
+    Cycles,
+    Drift,
+    contact_length,
+    cycles_of,
+    in_lines,
+    median,
+    swings,
+)
+from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, Envelope
+from brakecli.analysis.regime.forced import GROWN, QUARTER
+from brakecli.analysis.regime.linear_rules import DASHPOT, LinearRules
 from brakecli.analysis.regime.verdict import Decision, Excitation, Feeds, Regime
 from brakecli.solver.quantities import ContactState
 
@@ -19,17 +28,15 @@ _NEAR = 0.3  # by which the amplitude of a motion that stick or loss of contact 
 _DRIFT = 5e-3  # by which the amplitude of a motion without stick may change where sliding is stable
 _BANDS = 0.9  # least part of the energy in three bands: chaos may have less
 _SPREAD = 0.05  # of the frequency of cycles, beyond which three bands hold no vibration
-_REST = 0.3  # of a forced motion, by which its closed form may be off
-_LONGER = 1.4  # a run whose last quarter and the window before it are settled, over what comes before
+_CYCLES_SHARE = 0.5  # of the energy on the lines of the cycles, below which the strongest line must be one of them
 _SPARSE = 8  # of the places at which a forced motion is computed, one of so many suffices
 _UNSETTLED = 1.5  # times as many cycles where nothing has settled: a hop may look like a vibration
 _SURE = 10.0  # standard errors of a slope: neighbouring windows of an amplitude that wanders go together
-_LONG, _DASHPOT = "run longer", "a dashpot would decide"
+_LONG = "run longer"
 _FED = 0.1  # of what keeps a vibration up, that nodes may add
-_FAR = 0.3  # rad, of a wave, by which what the shoe adds moves it
 
 
-class Rules(ForcedRules):
+class Rules(LinearRules):
     """The rules on one history, in their order. They gather evidence until one of them decides."""
 
     drifts: str | None = None  # why a limit cycle that seems settled may still change
@@ -47,7 +54,13 @@ class Rules(ForcedRules):
             return None
         if standing:
             return Decision("the shoe has come to rest, sticking to the standing wheel", Regime.DAMPED)
-        return Decision("the shoe sticks throughout and is carried along by the wheel", advice=_LONG)
+        text = "the shoe sticks throughout and is carried along by the wheel"
+        if (limit := self.context.locks) is None or not self.context.steady:
+            return Decision(text, advice=_LONG)
+        why = "friction grows faster with x than the force that it needs, so that no longer run will see it slip"
+        return Decision(
+            f"{text}: it locks itself, as {why}", advice=f"it slips below a friction coefficient of {limit:.4g}"
+        )
 
     def unmoved(self) -> Decision | None:
         """There is nothing to judge, or nothing that could settle."""
@@ -64,80 +77,6 @@ class Rules(ForcedRules):
             advice = f"start beside steady sliding, or run at least {GROWN / growth:.2g} s"
             return Decision(text, advice=advice)
         return Decision("nothing moves beyond rounding: the shoe slides steadily or rests", Regime.DAMPED)
-
-    def linear(self) -> Decision | None:
-        """Theory decides where the shoe has long been sliding in full contact, to one side."""
-        theory, slow = self.context.linear(), self._slowest(0.0)
-        start = max(min(self.last.start, self.history.samples - int(slow / self.history.interval)), 0)
-        if theory is None:
-            return None
-        if not replace(self.last, start=start).slides(theory.slip) and not theory.stays(self._end()[1]):
-            return None
-        mean, theory = theory, theory.with_slopes()
-        if theory.direction != mean.direction and (theory.direction == 0 or self._swings_far(theory)):
-            return self._steep(theory)
-        self.theory = theory
-        if theory.direction == 0:
-            return Decision(theory.sentence, advice=_DASHPOT)
-        if theory.direction > 0:
-            more = theory.seconds_to_limit(*self._end())
-            self.evidence["seconds_to_go"] = more = more + 3.0 / theory.mode.growth
-            return Decision(theory.sentence, advice=f"run at least {QUARTER * (self.duration + more):.3g} s")
-        if not len(theory.waves):
-            return Decision(theory.sentence, Regime.DAMPED)
-        if self.duration < slow:
-            return self._too_short(slow)
-        return self._shaken(theory, slow, (self.history.samples - start) * self.history.interval)
-
-    def _swings_far(self, theory: "Linear") -> bool:
-        """Whether what the shoe adds is no longer small beside the waves, so that their slope is not linear."""
-        own = theory.parts(*self.last.places())[2]
-        return 0.5 * float(np.ptp(own)) * float(theory.wavenumbers.max()) > _FAR
-
-    def _steep(self, theory: "Linear") -> Decision:
-        """The slopes of the waves leave open whether a small vibration grows: lines may show that it is forced."""
-        found = self.forced()
-        if found and found.regime is Regime.DAMPED:
-            return found
-        forced, _, own, _ = theory.parts(*self.settled_part.places())
-        self.parts = forced, 0.5 * float(np.ptp(own))
-        text = "the slopes of the passing waves leave open whether the shoe's own vibration grows in full contact"
-        rate = f"by {theory.mode.growth:.2g} ± {theory.known_to:.1g} 1/s"
-        return Decision(f"{text}, {rate}", advice="run longer, and see whether amplitude_own falls")
-
-    def _end(self) -> tuple[float, Any]:
-        """Time and state of the last sample."""
-        last = self.history.samples - 1
-        state = [float(self.history.read(name, last, last + 1)[0]) for name in ("x", "y", "vx", "vy")]
-        return last * self.history.interval, np.array(state)
-
-    def _shaken(self, theory: "Linear", slow: float, seen: float) -> Decision | None:
-        """The forced motion that lasts, with the settled part in which the shoe's own part has gone."""
-        forced, lasting, own, time = theory.parts(*self.whole.places())
-        starts = -(-len(own) * np.arange(WINDOWS) // WINDOWS)
-        left = 0.5 * (np.maximum.reduceat(own, starts) - np.minimum.reduceat(own, starts))
-        end = float(left[-10:].max())
-        slope = line(np.arange(0.5 * WINDOWS), np.log(np.maximum(left[WINDOWS // 2 :], 1e-300)))[0]
-        if slope * WINDOWS > 1.0 and end > self.limits.settled_within * forced:
-            return None  # the passing waves excite what the mean stiffness damps
-        level, decay = self.limits.settled_within * forced, theory.mode.growth * self.duration / WINDOWS
-        if 0.25 * WINDOWS * decay < -1.0 and slope > 0.25 * decay and end < _REST * forced:
-            level = max(level, 1.2 * end)  # what does not decay is forced, and missing in the closed form
-        first = WINDOWS - int(np.argmin((left <= level)[::-1]))
-        begin = max(first, 1) * self.history.samples // WINDOWS
-        wait = math.log(max(end / max(level, 1e-300), 1.0)) / -theory.mode.growth
-        advice = list[str]()
-        if first <= WINDOWS - 10 and self.duration - begin * self.history.interval >= 2.0 * slow:
-            self.settled_part, self.settled = replace(self.whole, start=begin), True
-        else:
-            needed = max(_LONGER * (self.duration + wait), 1.05 * (self.duration + wait + 2.0 * slow))
-            advice.append(f"run at least {needed:.3g} s to see only that")
-        if theory.opens and (beat := self._beat) > seen:
-            advice.append(f"the waves beat every {beat:.3g} s, which may open the pad again")
-        chosen = time >= self.settled_part.start * self.history.interval
-        self.parts, self.unseen = (forced, 0.5 * float(np.ptp(own[chosen]))), forced - 0.5 * float(np.ptp(lasting))
-        text = f"only the roughness shakes the shoe, by {forced:.3g} m: {theory.sentence}"
-        return Decision(text, Regime.DAMPED, Excitation.FORCED, advice="; ".join(advice))
 
     def died_out(self) -> Decision | None:
         """Little is left beside the start, beside the wheel's speed and beside the compression, and it falls."""
@@ -173,7 +112,7 @@ class Rules(ForcedRules):
             text = "without friction nothing excites the shoe"
             if self.context.growth() < 0.0:
                 return Decision(f"{text}, and the dashpots damp it", Regime.DAMPED)
-            return Decision(f"{text}, but no dashpot damps it", advice=_DASHPOT)
+            return Decision(f"{text}, but no dashpot damps it", advice=DASHPOT)
         if self._settle():
             return None
         if "envelope_slope" not in self.evidence:
@@ -217,7 +156,7 @@ class Rules(ForcedRules):
         if self.context.forced and not certain and (self._feeds() is Feeds.UNKNOWN or self._doubtful):
             return self._either()
         drift = abs(found.drift.part) if found.drift.sure else 0.0
-        self._drift_further()
+        self._drift_further(*found.parting)
         self.settled &= max(drift, abs(found.detuning.part) if found.detuning.sure else 0.0) <= _DRIFT
         unsure = self.context.undamped or self.context.growth() < 0.0
         if drift > (_DRIFT if unsure else self.limits.settled_within):
@@ -228,30 +167,48 @@ class Rules(ForcedRules):
         own, wander = (Excitation.SELF_EXCITED, found.frequency), found.evidence["frequency_spread"]
         held = self._held(wander, found.frequency, found.detuning)
         self.evidence["frequency_spread"] = (wander if held is None else held) + found.frequency_off
-        if stick >= self.limits.stick_cycles:
+        wanders = wander > _SPREAD * found.frequency
+        missed = None if wanders or harmonic >= _CYCLES_SHARE else self._missed(found.frequency, wander)
+        if stick >= self.limits.stick_cycles and not missed:
             text = f"sustained, with stick in {stick:.0%} of {cycles:.0f} cycles"
             return Decision(text, Regime.RELAXATION, *own)
         unseen = self._sticks(found.may_stick - stick) > 0  # in more than hardly any
         if unseen and self._sticks(stick) != self._sticks(found.may_stick):
-            finer = 0.25 * self.history.interval
-            keys = "solver.step and " * (finer < 1.1 * self.context.step) + "output.sample_interval"
-            text = f"stick is seen in {stick:.0%} of the cycles"
-            text += f", but may fall between samples in {found.may_stick:.0%}"
-            return Decision(text, advice=f"reduce {keys} to {finer:.2g} s")
+            return self._unseen(stick, found.may_stick)
         bands = self.evidence["band_share"] = self.settled_part.narrow()
         lines = f"{harmonic:.0%} of the energy of vx in one line and its harmonics"
         if harmonic < bands:
             lines = f"{bands:.0%} of the energy of vx in three narrow bands"
-        wanders = wander > _SPREAD * found.frequency
         regular = harmonic if wanders or bands < _BANDS else max(harmonic, bands)
         slips = max(stick, self.context.sticks) <= 1.0 - self.limits.stick_cycles
         if slips and regular >= self.limits.harmonic_share:
             how = f"with stick in only {stick:.0%} of the cycles" if stick else "without stick"
+            own = (Excitation.SELF_EXCITED, missed or found.frequency)
             return Decision(f"sustained {how}: {lines}", Regime.QUASI_HARMONIC, *own)
         without = f" ({self.context.sticks:.0%} without the roughness)" if self.context.sticks else ""
         irregular = f"irregular: stick in {stick:.0%} of the cycles{without}, {lines}"
         irregular += ", but the frequency wanders" if wanders else ""
-        return Decision(irregular, advice="run longer, or look at the spectrum")
+        irregular += f", but not at the {found.frequency:.4g} Hz of its rises" if missed else ""
+        return Decision(irregular, advice=f"{'' if missed else 'run longer, or '}look at the spectrum")
+
+    def _unseen(self, stick: float, may: float) -> Decision:
+        """Stick is seen in a part of the cycles, and may fall between samples in more of them."""
+        finer = 0.25 * self.history.interval
+        keys = "solver.step and " * (finer < 1.1 * self.context.step) + "output.sample_interval"
+        text = f"stick is seen in {stick:.0%} of the cycles, but may fall between samples in {may:.0%}"
+        return Decision(text, advice=f"reduce {keys} to {finer:.2g} s")
+
+    def _missed(self, frequency: float, off: float) -> float | None:
+        """Frequency (Hz) of the strongest line of vx where it is no multiple of that of its rises."""
+        line, width = self.settled_part.strongest
+        multiple = max(round(line / frequency), 1)
+        if abs(line - multiple * frequency) <= multiple * off + width:
+            return None
+        self.evidence |= {
+            "frequency_spread": width,
+            **in_lines(self.settled_part, line, 1.0 / line / self.history.interval),
+        }
+        return line
 
     def _rippled(self) -> Decision | None:
         """What the ripple of the nodes gives to a vibration that friction seems to keep up."""
@@ -268,19 +225,25 @@ class Rules(ForcedRules):
         """Whether stick in a part of the cycles is stick in hardly any (0), in some, or in nearly all (2)."""
         return (part > 1.0 - self.limits.stick_cycles) + (part >= self.limits.stick_cycles)
 
-    def _drift_further(self) -> None:
-        """Whether a limit cycle that seems settled may still change, and how long a run must be to show it."""
+    def _drift_further(self, parted: float, left: float) -> None:
+        """Whether a limit cycle that seems settled may still change, and how long a run must be to show it.
+
+        Its neighbouring cycles have `parted` by so many powers of e, and lie apart when they have by those `left`.
+        """
         slope, error = abs(self._trend), self.evidence.get("envelope_slope_error", 0.0)
-        change, rate = slope * self._settled_seconds, self._rate
+        change, rate, more = slope * self._settled_seconds, self._rate, 3.0
         if not self.settled or rate == 0.0:
             return
-        if not self.lasts:
+        if parted:
+            rate, more, self.settled = parted / self._settled_seconds, left + 3.0, False
+            text = f"neighbouring cycles part at {rate:.2g} 1/s, so that this vibration becomes another"
+        elif not self.lasts:
             text = f"this vibration may settle at only {rate:.2g} 1/s"
         elif slope > _SURE * error and change > self.limits.settled_within:
             text, self.settled = f"the vibration still changes by {change:.0%} within the settled part", False
         else:
             return
-        self.drifts = f"{text}: run at least {QUARTER * (self.duration + 3.0 / rate):.3g} s for numbers that last"
+        self.drifts = f"{text}: run at least {QUARTER * (self.duration + more / rate):.3g} s for numbers that last"
 
     def _unfounded(self, theory: "Linear", found: Cycles) -> Decision | None:
         """What speaks against self-excited vibration on smooth surfaces, where theory knows small vibrations."""
@@ -290,7 +253,7 @@ class Rules(ForcedRules):
         if theory.direction > 0:
             return None
         if theory.direction == 0:
-            return Decision("sliding is stable, and no dashpot makes a large vibration settle", advice=_DASHPOT)
+            return Decision("sliding is stable, and no dashpot makes a large vibration settle", advice=DASHPOT)
         if not self._relaxed:
             text = f"sliding is stable, but disturbances decay at only {-theory.mode.growth:.2g} 1/s"
             advice = f"run at least {self._relaxing:.3g} s"

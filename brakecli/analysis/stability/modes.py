@@ -52,6 +52,17 @@ def first_order(c: Coefficients, s: NDArray[np.float64]) -> NDArray[np.float64]:
     return a
 
 
+def locks_from(c: Coefficients, contact_stiffness: float, belt: float) -> float:
+    """The friction coefficient from which a shoe that sticks for long never slips again; or infinity.
+
+    The wheel carries it along: with x grow the force that the links ask for, (c_xx - c_xy²/(c_yy + K)) |x|, and
+    the one that friction offers, φ K c_xy sign(U) |x|/(c_yy + K). From there on S has a negative determinant.
+    """
+    presses = math.copysign(contact_stiffness, belt) * c.c_xy
+    asks = c.c_xx * (c.c_yy + contact_stiffness) - c.c_xy**2
+    return asks / presses if presses > 0.0 else math.inf
+
+
 def is_undamped(c: Coefficients) -> bool:
     """Whether no dashpot acts at all: then what is stable is only marginally so."""
     return c.b_xx == 0.0 and c.b_yy == 0.0

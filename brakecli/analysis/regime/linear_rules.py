@@ -1,0 +1,97 @@
+"""The rules of a motion that is linear: theory decides where the shoe slides in full contact."""
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from brakecli.analysis.regime.evidence import WINDOWS, line
+from brakecli.analysis.regime.forced import QUARTER, ForcedRules
+from brakecli.analysis.regime.verdict import Decision, Excitation, Regime
+
+if TYPE_CHECKING:  # a measured signal needs no compiled code
+    from brakecli.analysis.regime.linear import Linear
+
+_REST = 0.3  # of a forced motion, by which its closed form may be off
+_LONGER = 1.4  # a run whose last quarter and the window before it are settled, over what comes before
+_FAR = 0.3  # rad, of a wave, by which what the shoe adds moves it
+DASHPOT = "a dashpot would decide"
+
+
+class LinearRules(ForcedRules):
+    """The rules where theory knows the motion."""
+
+    def linear(self) -> Decision | None:
+        """Theory decides where the shoe has long been sliding in full contact, to one side."""
+        theory, slow = self.context.linear(), self._slowest(0.0)
+        start = max(min(self.last.start, self.history.samples - int(slow / self.history.interval)), 0)
+        if theory is None:
+            return None
+        if not replace(self.last, start=start).slides(theory.slip) and not theory.stays(self._end()[1]):
+            return None
+        mean, theory = theory, theory.with_slopes()
+        if theory.direction != mean.direction and (theory.direction == 0 or self._swings_far(theory)):
+            return self._steep(theory)
+        self.theory = theory
+        if theory.direction == 0:
+            return Decision(theory.sentence, advice=DASHPOT)
+        if theory.direction > 0:
+            more = theory.seconds_to_limit(*self._end())
+            self.evidence["seconds_to_go"] = more = more + 3.0 / theory.mode.growth
+            return Decision(theory.sentence, advice=f"run at least {QUARTER * (self.duration + more):.3g} s")
+        if not len(theory.waves):
+            return Decision(theory.sentence, Regime.DAMPED)
+        if self.duration < slow:
+            return self._too_short(slow)
+        return self._shaken(theory, slow, (self.history.samples - start) * self.history.interval)
+
+    def _swings_far(self, theory: "Linear") -> bool:
+        """Whether what the shoe adds is no longer small beside the waves, so that their slope is not linear."""
+        own = theory.parts(*self.last.places())[2]
+        return 0.5 * float(np.ptp(own)) * float(theory.wavenumbers.max()) > _FAR
+
+    def _steep(self, theory: "Linear") -> Decision:
+        """The slopes of the waves leave open whether a small vibration grows: lines may show that it is forced."""
+        found = self.forced()
+        if found and found.regime is Regime.DAMPED:
+            return found
+        forced, _, own, _ = theory.parts(*self.settled_part.places())
+        self.parts = forced, 0.5 * float(np.ptp(own))
+        text = "the slopes of the passing waves leave open whether the shoe's own vibration grows in full contact"
+        rate = f"by {theory.mode.growth:.2g} ± {theory.known_to:.1g} 1/s"
+        return Decision(f"{text}, {rate}", advice="run longer, and see whether amplitude_own falls")
+
+    def _end(self) -> tuple[float, Any]:
+        """Time and state of the last sample."""
+        last = self.history.samples - 1
+        state = [float(self.history.read(name, last, last + 1)[0]) for name in ("x", "y", "vx", "vy")]
+        return last * self.history.interval, np.array(state)
+
+    def _shaken(self, theory: "Linear", slow: float, seen: float) -> Decision | None:
+        """The forced motion that lasts, with the settled part in which the shoe's own part has gone."""
+        forced, lasting, own, time = theory.parts(*self.whole.places())
+        starts = -(-len(own) * np.arange(WINDOWS) // WINDOWS)
+        left = 0.5 * (np.maximum.reduceat(own, starts) - np.minimum.reduceat(own, starts))
+        end = float(left[-10:].max())
+        slope = line(np.arange(0.5 * WINDOWS), np.log(np.maximum(left[WINDOWS // 2 :], 1e-300)))[0]
+        if slope * WINDOWS > 1.0 and end > self.limits.settled_within * forced:
+            return None  # the passing waves excite what the mean stiffness damps
+        level, decay = self.limits.settled_within * forced, theory.mode.growth * self.duration / WINDOWS
+        if 0.25 * WINDOWS * decay < -1.0 and slope > 0.25 * decay and end < _REST * forced:
+            level = max(level, 1.2 * end)  # what does not decay is forced, and missing in the closed form
+        first = WINDOWS - int(np.argmin((left <= level)[::-1]))
+        begin = max(first, 1) * self.history.samples // WINDOWS
+        wait = math.log(max(end / max(level, 1e-300), 1.0)) / -theory.mode.growth
+        advice = list[str]()
+        if first <= WINDOWS - 10 and self.duration - begin * self.history.interval >= 2.0 * slow:
+            self.settled_part, self.settled = replace(self.whole, start=begin), True
+        else:
+            needed = max(_LONGER * (self.duration + wait), 1.05 * (self.duration + wait + 2.0 * slow))
+            advice.append(f"run at least {needed:.3g} s to see only that")
+        if theory.opens and (beat := self._beat) > seen:
+            advice.append(f"the waves beat every {beat:.3g} s, which may open the pad again")
+        chosen = time >= self.settled_part.start * self.history.interval
+        self.parts, self.unseen = (forced, 0.5 * float(np.ptp(own[chosen]))), forced - 0.5 * float(np.ptp(lasting))
+        text = f"only the roughness shakes the shoe, by {forced:.3g} m: {theory.sentence}"
+        return Decision(text, Regime.DAMPED, Excitation.FORCED, advice="; ".join(advice))
