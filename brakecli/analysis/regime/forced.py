@@ -125,11 +125,13 @@ class ForcedRules:
         doubtful = doubtful or (self._makes_up and self._own_line() is not None)
         if feeds is Feeds.FRICTION or (doubtful and feeds is Feeds.UNKNOWN):
             return self._either()
-        self.evidence["forced_share"] = share
         if dense:
             text = f"{what}, which lie too close to be told from others"
             return self.fed() or Decision(text, advice="run twice as long", second_run=True)
-        return self._forced(what)
+        decision = self._forced(what)
+        if what in decision.reason:
+            self.evidence["forced_share"] = share
+        return decision
 
     @property
     def _unstable_in_full_contact(self) -> bool:
