@@ -37,7 +37,7 @@ _SETTLED_PART = 0.35  # of the run, at least: a quarter and the width of windows
 _CYCLES = 5.0  # in a window of its envelope: of fewer, windows differ by where they cut the cycles
 _SAMPLES = 40.0  # in a cycle, so that its shape is seen
 _SEEN = 1.2  # samples in a stick, or off the wheel: one falls into each, also where the orbit is not reached yet
-_GRAZES = 0.05  # of the wheel's speed: nearer to it, samples leave open whether the shoe sticks
+_GRAZES = 0.01  # of the wheel's speed: nearer to it, samples leave open whether the shoe sticks
 _WINDOW = 0.05  # of the run, by which a whole run may see the settled part begin earlier or later
 
 

@@ -185,6 +185,25 @@ def test_hard_cases_move_as_by_the_event_driven_scheme(name: str) -> None:
     same_as_event_driven(tabled(SQUEAL, solver__duration=0.05, **HARD[name]), 1e-10)
 
 
+def test_a_shoe_that_rests_on_the_wheel_and_is_pulled_off_leaves_it_at_once() -> None:
+    """For a part of a step: at its end the pad is pressed in again. Here the tangential spring pulls it off."""
+    pulled: dict[str, Any] = {
+        **SQUEAL,
+        "wheel": {"radius": 0.5, "angular_speed": 0.11507838902049322},
+        "link1": {"stiffness": 1322428.1169843683, "damping": 300.0},
+        "link2": {"stiffness": 395238.6330925894, "damping": 1000.0, "angle_deg": -46.18439620304848},
+        "friction": {"coefficient": 0.24491735372226153},
+        "contact": {"half_length": 0.05, "stiffness": 80458070.83688746},
+        "initial": {"x": -0.025755755210794953, "vx": 0.05753919451024661},
+        "solver": {"duration": 0.02},
+        "output": {"sample_interval": 0.02},
+    }
+    case = make(pulled)
+    same_as_event_driven(case, 1e-10)
+    later = make(pulled, initial__y=1e-25)
+    np.testing.assert_allclose(motion(case).rows[-1, :4], motion(later).rows[-1, :4], rtol=1e-9)
+
+
 def test_relaxation_is_that_of_the_event_driven_scheme() -> None:
     found = same_as_event_driven(tabled(SQUEAL, friction__coefficient=0.7, solver__duration=0.2), 1e-11)
     assert {-1.0, 0.0} <= set(found.rows[:, 7])

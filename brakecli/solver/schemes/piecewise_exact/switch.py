@@ -2,10 +2,10 @@
 
 from typing import Any
 
-from numba import float64, int64, void
+from numba import boolean, float64, int64, void
 
 from brakecli.solver.compile import kernel
-from brakecli.solver.records import BELT, COEFFICIENTS, FLOW_TYPE, MARGINS, SIZE, V_X, V_Y, Coefficients, Y
+from brakecli.solver.records import BELT, COEFFICIENTS, FLOW_TYPE, MARGINS, SIZE, TERMS, V_X, V_Y, Coefficients, Y
 from brakecli.solver.schemes.piecewise_exact import phases
 from brakecli.solver.schemes.piecewise_exact.locate import ROUNDING
 from brakecli.solver.schemes.piecewise_exact.phases import BACKWARD, FORWARD, HEIGHT, OPEN, STICK
@@ -39,10 +39,28 @@ def _land(c: Coefficients, m: Any, h: float) -> None:
         m.phase = FORWARD if m.z[V_X] > m.z[BELT] else BACKWARD
 
 
+@kernel(boolean(COEFFICIENTS, FLOW_TYPE, float64), inlined=False)
+def _rises(c: Coefficients, m: Any, h: float) -> bool:
+    """Whether a shoe that rests on the wheel without pressing it leaves: its first derivative that is not zero."""
+    phases.make(c, m, OPEN, h)  # nothing presses, so that all phases begin alike
+    for i in range(SIZE):
+        m.series[0, i] = m.z[i]
+    phases.expand(m, OPEN, h)
+    for k in range(TERMS):
+        total, terms = 0.0, 0.0
+        for i in range(SIZE):
+            part = m.generator[OPEN, V_Y, i] * m.series[k, i] if i < BELT or k < 2 else 0.0
+            total, terms = total + part, terms + abs(part)
+        if abs(total) > ROUNDING * terms:
+            return total > 0.0
+    return False
+
+
 @kernel(void(COEFFICIENTS, FLOW_TYPE, float64), inlined=False)
 def place(c: Coefficients, m: Any, h: float) -> None:
     """Find the phase of a motion."""
-    if m.z[Y] > 0.0 or (m.z[Y] == 0.0 and m.z[V_Y] > 0.0):
+    touches = m.z[Y] == 0.0
+    if m.z[Y] > 0.0 or (touches and (m.z[V_Y] > 0.0 or (m.z[V_Y] == 0.0 and _rises(c, m, h)))):
         m.phase = OPEN
     else:
         _land(c, m, h)
