@@ -219,8 +219,8 @@ def classify(
     if unknown := sorted(reading.keys() - {*how}):
         raise UsageError(f"classify: there is no argument {unknown[0]}; give one of {', '.join(how)}")
     changes = [f"{name}={value}" for name, value in _mapping(thresholds, "thresholds").items()]
-    quantity = None if quantity is None else str(quantity)
-    measured = Measured(quantity, belt_speed=belt_speed, stiffness=stiffness, **reading)
+    what = None if quantity is None else str(quantity)
+    measured = Measured(what, belt_speed=belt_speed, stiffness=stiffness, **reading)
     with _interruptible():
         numbers = Options(measured, changes, second_run, quiet=True).verdict(str(source))
     _warn(numbers.get("warnings", ()))
@@ -238,9 +238,8 @@ def _interruptible() -> Iterator[None]:
         with signals_shown(), unwinding(), in_python():
             yield
     except Interrupted as error:
-        if error.exit_code == 128 + signal.SIGINT:
-            raise KeyboardInterrupt from None
-        raise SystemExit(error.exit_code) from None
+        asked = error.exit_code == 128 + signal.SIGINT
+        raise (KeyboardInterrupt() if asked else SystemExit(error.exit_code)) from None
 
 
 @contextmanager
@@ -315,8 +314,7 @@ def _plain(value: Any, key: str) -> Any:
     if isinstance(value, Iterable) and not isinstance(value, str):
         return [_plain(each, key) for each in value]
     if not isinstance(value, str | int | float | date | time | PathLike):
-        kind = type(value).__name__
-        raise UsageError(f"{key}: cannot be set to {kind}; give a number, a text, a list or a table")
+        raise UsageError(f"{key}: cannot be set to {type(value).__name__}; give a number, text, list or table")
     return str(value) if isinstance(value, PathLike) else value
 
 

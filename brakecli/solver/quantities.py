@@ -76,7 +76,7 @@ class Failure(IntEnum):
         'the iteration of a step did not converge; reduce solver.step, take solver.iteration = "newton", '
         "or set solver.allow_unconverged = true to continue and count these steps",
     )
-    DIVERGED = 2, "the motion grew beyond all bounds; reduce solver.step"
+    DIVERGED = 2, "the motion grew beyond all bounds; check the case, or reduce solver.step where it has one"
     NOT_CLOSED = (
         3,
         "the pad may no longer touch everywhere, so the closed form does not hold; "
@@ -90,5 +90,6 @@ class Failure(IntEnum):
     STALLED = (
         5,
         "the steps shrink to nothing: stick, slip, lift-off and touch-down alternate without progress, or "
-        "the tolerance is below the accuracy of the forces; increase solver.tolerance",
+        "the tolerance is below the accuracy of the forces; increase solver.tolerance, or take the two-layer scheme "
+        "with a step",
     )
