@@ -90,6 +90,6 @@ class Failure(IntEnum):
     STALLED = (
         5,
         "the steps shrink to nothing: stick, slip, lift-off and touch-down alternate without progress, or "
-        "the tolerance is below the accuracy of the forces; increase solver.tolerance, or take the two-layer scheme "
+        "the tolerance is below the accuracy of the forces; increase solver.tolerance, or take two layers "
         "with a step",
     )
