@@ -78,6 +78,11 @@ def slow(plan: Plan, first: int, count: int) -> bytes:
     return quick(plan, first, count)
 
 
+def threads(plan: Plan, first: int, count: int) -> bytes:
+    """How many threads linear algebra may take here."""
+    return os.environ.get("OPENBLAS_NUM_THREADS", "all").encode()
+
+
 def deadly(plan: Plan, first: int, count: int) -> bytes:
     """The same, but for the wicked point."""
     if first <= WICKED < first + count:

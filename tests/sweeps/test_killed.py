@@ -32,6 +32,7 @@ from tests.sweeps.helpers import (
     journal_size,
     local,
     slow,
+    threads,
     workers,
     write_sweep,
 )
@@ -138,6 +139,19 @@ def test_workers_that_die_idle_cost_no_point(tmp_path: Path) -> None:
     assert killed
     assert sorted(each.task.first for each in found if each.task and each.records) == [0, 1, 10, 11]
     assert len(found) == 4
+
+
+@pytest.mark.parametrize("ours", ["7", None])
+def test_linear_algebra_takes_one_thread_in_a_worker_and_ours_here(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ours: str | None
+) -> None:
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    if ours:
+        monkeypatch.setenv("OPENBLAS_NUM_THREADS", ours)
+    with LocalEngine(partial(threads, write_sweep(tmp_path, frictions(2)).plan), 1) as engine:
+        (found,) = engine.run(chain([Task(0, 1, True)], repeat(None)).__next__)
+    assert found.records == b"1"
+    assert os.environ.get("OPENBLAS_NUM_THREADS") == ours
 
 
 def test_a_point_without_memory_fails_with_the_reason_and_exit_code_1(tmp_path: Path) -> None:

@@ -17,10 +17,7 @@ _GROUPS = 10  # of neighbouring cycles, of which a median is taken
 _ENDS = (ContactState.STICK, ContactState.SEPARATED)
 _MIDDLE = np.array([1.0 / 6.0, 0.5, 5.0 / 6.0])  # quantiles
 _TREND = 3.0  # standard errors of the slope of ten medians, beyond which an amplitude drifts
-_ALTERNATES, _PARTS = (
-    0.3,
-    1.0,
-)  # powers of e by which odd and even cycles, or any neighbours, part in the whole part
+_ALTERNATES, _PARTS = 0.3, 1.0  # powers of e by which odd and even cycles, or any neighbours, part
 _BANDS = (0.3, 0.5, 0.15)  # of the standard deviation of vx: ripple within it does not count
 _BETWEEN = 1e-3  # of the energy of vx, between the lines of one rise, that makes a cycle of several
 _SEEN = 0.85  # least part of a force's swing in every other sample that all samples see

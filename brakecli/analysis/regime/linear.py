@@ -101,18 +101,14 @@ class Linear:
 
         Where many meet is rare: blocks of time are scattered over it, and the highest are looked at closely.
         """
-        speeds, size = 2.0 * math.pi * self.passing, min(_DENSE * len(self.passing), _MOST_DENSE)
-        period = 1.0 / float(np.abs(self.passing).max())
-        starts, fine = span * _SCATTERED[:size], 0.125 * period * np.arange(size)
-        begins = (self.waves[:, :1] * np.exp(1j * np.outer(speeds, starts))).astype(np.complex64)
-        turns = np.exp(1j * np.outer(speeds, fine)).astype(np.complex64)
-        x = np.concatenate([begins.imag, begins.real]).T @ np.concatenate([turns.real, turns.imag])
-        found = []
-        for blocks in (x, -x):
-            highest = np.argsort(blocks.max(axis=1))[-_HIGHEST:]
-            times = starts[highest] + fine[blocks[highest].argmax(axis=1)]
-            near = np.outer(speeds, np.add.outer(times, period * _NEAR))
-            found.append((self.waves[:, 0] @ np.exp(1j * near)).imag)
+        begins, turns, near = _blocks(tuple(self.passing.tolist()), span)
+        begins = self.waves[:, :1] * begins
+        rows = np.concatenate([begins.imag, begins.real]).T.astype(np.float32)
+        few = rows.reshape(-1, 32, rows.shape[1])  # products so small wake no threads
+        x = (few @ np.concatenate([turns.real, turns.imag], dtype=np.float32)).reshape(len(rows), -1)
+        high, low = np.argsort(x.max(axis=1))[-_HIGHEST:], np.argsort(x.min(axis=1))[:_HIGHEST]
+        tops = begins[:, high] * turns[:, x[high].argmax(axis=1)], begins[:, low] * turns[:, x[low].argmin(axis=1)]
+        found = [(top.T @ near).imag for top in tops]
         return float(found[0].max()), float(found[1].min())
 
     def parts(self, x: Array, time: Array) -> tuple[float, Array, Array, Array]:
@@ -146,6 +142,16 @@ class Linear:
         _, y, vx, _ = size * np.abs(self.vectors[:, fastest])
         bounds = [bound / part for bound, part in ((abs(self.belt), vx), (self.depth, y)) if part > 0.0]
         return max(math.log(min(bounds, default=1.0)), 0.0) / self.mode.growth
+
+
+@lru_cache(maxsize=1)  # the points of a sweep ask for the same ones
+def _blocks(frequencies: tuple[float, ...], span: float) -> tuple[Complex, Complex, Complex]:
+    """e^iωt of waves (Hz) where blocks of time begin within a span (s), then in a block, and near a time in it."""
+    speeds, size = 2.0 * math.pi * np.array(frequencies), min(_DENSE * len(frequencies), _MOST_DENSE)
+    period = 1.0 / max(map(abs, frequencies))
+    times = span * _SCATTERED[:size], 0.125 * period * np.arange(size), period * _NEAR
+    begins, turns, near = (np.exp(1j * np.outer(speeds, each)) for each in times)
+    return begins, turns, near
 
 
 @lru_cache(maxsize=4)  # the points of a sweep ask for the same ones

@@ -11,6 +11,7 @@ from multiprocessing import connection, get_context, parent_process, resource_tr
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 
+from brakecli import ONE_THREAD
 from brakecli.errors import BrakecliError
 from brakecli.files.os_signals import signals_deferred
 from brakecli.sweeps.workers.task import Compute, Engine, Finished, NextTask, Task, attempt
@@ -111,12 +112,16 @@ def _cause_of_death(code: int) -> str:
 
 @contextmanager
 def _starting() -> Iterator[None]:
-    """Let a child start without signals: one would end Python's start in a traceback."""
+    """Let a child start on one thread and without signals: one would end Python's start in a traceback."""
     with signals_deferred():
-        mask = signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
+        mask, ours = signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS), dict(os.environ)
+        os.environ.update(ONE_THREAD)
         try:
             yield
         finally:
+            for name in ONE_THREAD.keys() - ours.keys():
+                del os.environ[name]
+            os.environ.update(ours)
             signal.pthread_sigmask(signal.SIG_SETMASK, mask)
 
 
