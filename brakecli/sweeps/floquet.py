@@ -191,7 +191,9 @@ class Disturbances:
         return found if 3 * len(found) > MOST_RESONANCES else [*found, *places(-BESIDE), *places(BESIDE)]
 
     def _measured(self, value: float, found: Sliding) -> Growth | None:
-        if not (self.periodic or found.forced):
+        # Without dashpots the motion nearest to steady sliding counts: one in full contact, where there is one.
+        damped = not is_undamped(found.system.coefficients)
+        if not found.forced and not (self.periodic and damped):
             return growth(found)
         if (period := common_period(found.system)) is None:
             plain = None if found.modulated else growth(found)
@@ -200,7 +202,7 @@ class Disturbances:
         low, high = sorted((place, value))
         gap = any(lost is None and low < other < high for other, lost in self.known.items())
         forced = None if gap else self._followed(value, found, period)
-        followed, damped = forced is not None, not is_undamped(found.system.coefficients)
+        followed = forced is not None
         if forced is None and damped:
             plain = growth(found) if near is not None and near.rate > 0.0 else None
             if plain is None or plain.rate <= 0.0:

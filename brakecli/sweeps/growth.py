@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.analysis.regime.linear import linear_theory
+from brakecli.analysis.stability.modes import growth as eigenvalue_growth
 from brakecli.analysis.stability.modes import is_undamped
 from brakecli.case.case import Case, changed
 from brakecli.case.system import system_of
@@ -176,6 +177,8 @@ def growth(found: Sliding) -> Growth | None:
     moved = np.abs(maps[:, 1:]).max(axis=(1, 2)) if system.smooth and not system.scheme.LAG else sizes
     last = _last_linear(found, runs, (moved > saturated / small) | (sizes < FADED), interval, slow)
     opened = bool((runs[:, : last + 1, _CONTACT] < 1.0).any())
+    if opened and not (found.forced or found.opens):  # it had left full contact, where eigenvalues are exact
+        return Growth(eigenvalue_growth(system.coefficients, found.stiffness, found.grip), 0.0, 0.0)
     # A linear motion has all its directions from the start on: none has faded there. Others come to their orbit.
     first = max(1, last // 4) if opened else 1
     if last - first < 4:  # out of steady sliding at once
