@@ -104,7 +104,14 @@ class Disturbances:
             values = sorted({*values, *added})
             self.scan(sorted(added))
         self._go_on(values)
-        return values
+        return sorted({*values, *(place for pair in pairwise(values) for place in self._hidden(*pair))})
+
+    def _hidden(self, low: float, high: float) -> list[float]:
+        """What was seen on the way from one value, where stability changed and another motion lies at the next."""
+        places = [place for place in self.branches if low < place < high]
+        own = [place for place in places if self.branches[place] == self.branches.get(low)]
+        changes = any(self.unstable(place) is not self.unstable(low) for place in own)
+        return own if changes and not self.unstable(low) else []
 
     def jumps(self, low: float, high: float) -> bool:
         """Whether the motions at two values are not known to be one; without dashpots that does not count."""
@@ -257,7 +264,10 @@ class Disturbances:
                 return forced
             else:
                 if place in self.branches:
-                    self.branches[aim] = self.branches[place]
+                    self.branches[aim], self.known[aim] = (
+                        self.branches[place],
+                        Growth(forced.rate, 0.0, 0.0, opened=True),
+                    )
                 self.orbits[aim], place = forced, aim
         return None
 
