@@ -24,7 +24,7 @@ _SEEN = 0.85  # least part of a force's swing in every other sample that all sam
 SIZE_OFF, _PERIOD_OFF = 3.0, 0.2  # of an amplitude and a period, per step in a contact: most that impacts were off
 _ALIKE = 0.5  # of a sample that no cycle has seen, beyond which all cycles are seen at the same places
 _ROUNDING = 1e-9  # of the wheel's speed
-_SAME = 0.02  # squared difference, over twice the variance, between one period of vx and the next
+_SAME = 0.02  # squared difference, over twice the variance, between one period of the mean of vx and the next
 
 
 def median(values: Array) -> tuple[float, float]:
@@ -213,19 +213,30 @@ def _repeated(
         return None
     period = float(crossings[-1] - crossings[0]) / (len(crossings) - 1)
     width = 2.0 * LINE_BINS / (len(velocity) * part.history.interval)
-    close = 2.0 * _SAME * float(velocity.var())
+    mean = np.diff(part.last("x"))
     for rises in range(1, _MOST_RISES_PER_CYCLE + 1):  # after which the motion repeats
-        shift = round(rises * period)
-        if 0 < shift < len(velocity) // 2 and np.mean((velocity[shift:] - velocity[:-shift]) ** 2) <= close:
-            longest = 1.0 / (rises * period * part.history.interval)
+        if 1.0 <= (lag := rises * period) < len(velocity) // 2 and _unlike(mean, lag) <= _SAME:
+            longest = 1.0 / (lag * part.history.interval)
             divisors = [each for each in range(1, rises) if rises % each == 0]
             for fewer in divisors:  # samples may repeat only after several cycles
                 lines = [n * longest for n in range(1, 2 * rises) if n % (rises // fewer)]  # above: jumps, aliased
                 beside = [f for f in lines if all(abs(f - wave) > width for wave, _ in waves)]
-                if part.share(beside, LINE_BINS // 2) <= _BETWEEN:
+                if part.mean_share(beside, LINE_BINS // 2) <= _BETWEEN:
                     return crossings[::fewer], fewer
             return crossings[::rises], rises
     return None
+
+
+def _unlike(values: Array, lag: float) -> float:
+    """Squared difference of samples and of those a lag later, over twice the variance.
+
+    A lag of no whole number of samples (at least one) is met by cubic interpolation.
+    """
+    first, a = int(lag) - 1, lag % 1.0
+    inner, outer = 0.5 * (a + 1.0) * (a - 2.0), a * (a - 1.0) / 6.0
+    weights = [-outer * (a - 2.0), inner * (a - 1.0), -inner * a, outer * (a + 1.0)]
+    later = np.convolve(values[first:], weights[::-1], "valid")
+    return float(np.mean((later - values[: len(later)]) ** 2)) / (2.0 * float(values.var()) or 1.0)
 
 
 class Drift(NamedTuple):
