@@ -107,11 +107,11 @@ class Disturbances:
         return sorted({*values, *(place for pair in pairwise(values) for place in self._hidden(*pair))})
 
     def _hidden(self, low: float, high: float) -> list[float]:
-        """What was seen on the way from one value, where stability changed and another motion lies at the next."""
-        places = [place for place in self.branches if low < place < high]
-        own = [place for place in places if self.branches[place] == self.branches.get(low)]
-        changes = any(self.unstable(place) is not self.unstable(low) for place in own)
-        return own if changes and not self.unstable(low) else []
+        """What was seen on the way from a stable motion that loses and regains stability before another one follows."""
+        branch = self.branches.get(low)
+        own = sorted(place for place in self.branches if low < place < high and self.branches[place] == branch)
+        answers = [self.unstable(place) for place in (low, *own)]
+        return own if any(answers) and not (answers[0] or answers[-1]) else []
 
     def jumps(self, low: float, high: float) -> bool:
         """Whether the motions at two values are not known to be one; without dashpots that does not count."""
