@@ -61,7 +61,7 @@ def test_where_rises_miss_the_lines_of_a_motion_the_strongest_line_is_its_freque
 
 
 def test_an_amplitude_that_varies_by_as_much_as_itself_is_not_settled() -> None:
-    """Two fifths of the cycles swing five times as far as the others, in turns as long as the envelope's windows."""
+    """Two fifths of the cycles swing five times as far as others, in turns as long as the envelope's windows."""
     known, settled = Context(3.0, growth=lambda: 1.0, settles=100.0), []
     time = INTERVAL * np.arange(100_000)
     for low in (0.2, 0.9):
