@@ -162,8 +162,7 @@ class Rules(LinearRules):
         if self.context.forced and not certain and (self._feeds() is Feeds.UNKNOWN or self._doubtful):
             return self._either()
         drift = abs(found.drift.part) if found.drift.sure else 0.0
-        self._drift_further(*found.parting)
-        self.settled &= max(drift, abs(found.detuning.part) if found.detuning.sure else 0.0) <= _DRIFT
+        self._drift_further(found, max(drift, abs(found.detuning.part) if found.detuning.sure else 0.0))
         unsure = self.context.undamped or self.context.growth() < 0.0
         if drift > (_DRIFT if unsure else self.limits.settled_within):
             text = f"the amplitude still changes by {found.drift.part:.1%} within the last part of the run"
@@ -233,14 +232,16 @@ class Rules(LinearRules):
         """Whether stick in a part of the cycles is stick in hardly any (0), in some, or in nearly all (2)."""
         return (part > 1.0 - self.limits.stick_cycles) + (part >= self.limits.stick_cycles)
 
-    def _drift_further(self, parted: float, left: float) -> None:
+    def _drift_further(self, found: Cycles, changed: float) -> None:
         """Whether a limit cycle that seems settled may still change, and how long a run must be to show it.
 
-        Its neighbouring cycles have `parted` by so many powers of e, and lie apart when they have by those `left`.
+        Its amplitude or frequency has `changed` by a part of itself.
         """
         slope, error = abs(self._trend), self.evidence.get("envelope_slope_error", 0.0)
         change, rate, more = slope * self._settled_seconds, self._rate, 3.0
-        if not self.settled or rate == 0.0:
+        settled, lasts, (parted, left) = self.settled, self.lasts, found.parting
+        self.settled &= changed <= _DRIFT
+        if not settled or rate == 0.0:
             return
         if (shift := self._shift) >= _SHIFTED:
             step, self.settled = self.context.step * math.sqrt(0.3 * _SHIFTED / shift), False
@@ -251,10 +252,12 @@ class Rules(LinearRules):
         if parted:
             rate, more, self.settled = parted / self._settled_seconds, left + 3.0, False
             text = f"neighbouring cycles part at {rate:.2g} 1/s, so that this vibration becomes another"
-        elif not self.lasts:
+        elif not lasts:
             text = f"this vibration may settle at only {rate:.2g} 1/s"
         elif slope > _SURE * error and change > self.limits.settled_within:
             text, self.settled = f"the vibration still changes by {change:.0%} within the settled part", False
+        elif not self.settled:
+            text = f"its amplitude or frequency still changes by {changed:.1%} within the settled part"
         else:
             return
         self.drifts = f"{text}: run at least {QUARTER * (self.duration + more / rate):.3g} s for numbers that last"
