@@ -15,7 +15,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from brakecli.errors import BrakecliError, UsageError, in_python
+from brakecli.errors import BrakecliError, UnreadableResultError, UsageError, in_python
 from brakecli.files.os_signals import Interrupted, unwinding
 from brakecli.stop import signals_shown
 
@@ -322,15 +322,18 @@ def _plain(value: Any, key: str) -> Any:
 
 
 def _opened(path: Path) -> "xr.DataTree":
-    """A result file in memory, checked."""
+    """A result file in memory, checked; what other programs have put there may be more than xarray takes."""
     import xarray as xr
 
     from brakecli.files.read import open_result
 
     with open_result(path):
         pass
-    with xr.open_datatree(path, engine="h5netcdf") as tree:
-        return tree.load()
+    try:
+        with xr.open_datatree(path, engine="h5netcdf") as tree:
+            return tree.load()
+    except (ValueError, TypeError, LookupError, AttributeError, OSError, RuntimeError) as error:
+        raise UnreadableResultError(f"{path}: xarray cannot read what it holds: {error}") from error
 
 
 def _dataset(declared: "Iterable[Field]", numbers: Mapping[str, Any]) -> "xr.Dataset":

@@ -11,6 +11,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 import xarray as xr
@@ -145,6 +146,14 @@ def test_a_signal_is_classified(tmp_path: Path) -> None:
     verdict = brakecli.classify(tmp_path / "s.csv", "velocity", column="v", time_column="t")
     assert verdict.regime == "quasi-harmonic"
     assert abs(float(verdict.frequency) - 400.0) < 0.5  # a tenth of the distance of two lines, 1 / 0.2 s
+
+
+def test_what_xarray_cannot_read_is_told(tmp_path: Path) -> None:
+    brakecli.run(CASE, SHORT, output=tmp_path / "r.h5")
+    with h5py.File(tmp_path / "r.h5", "r+") as file:  # cuts the digest off
+        file["history/vx"].attrs["scale_factor"] = "x"
+    with pytest.raises(UnreadableResultError, match="xarray cannot read what it holds"):
+        brakecli.load(tmp_path / "r.h5")
 
 
 def test_errors_are_those_of_the_commands(tmp_path: Path) -> None:
