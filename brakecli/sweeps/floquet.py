@@ -107,10 +107,10 @@ class Disturbances:
         return sorted({*values, *(place for pair in pairwise(values) for place in self._hidden(*pair))})
 
     def _hidden(self, low: float, high: float) -> list[float]:
-        """What was seen on the way from a stable motion that loses and regains stability before another one follows."""
+        """What was seen on the way from a motion that loses and regains stability before another one follows."""
         branch = self.branches.get(low)
         own = sorted(place for place in self.branches if low < place < high and self.branches[place] == branch)
-        answers = [self.unstable(place) for place in (low, *own)]
+        answers = [self.orbits[place].rate > 0.0 for place in (low, *own) if place in self.orbits]
         return own if any(answers) and not (answers[0] or answers[-1]) else []
 
     def jumps(self, low: float, high: float) -> bool:
@@ -264,10 +264,7 @@ class Disturbances:
                 return forced
             else:
                 if place in self.branches:
-                    self.branches[aim], self.known[aim] = (
-                        self.branches[place],
-                        Growth(forced.rate, 0.0, 0.0, opened=True),
-                    )
+                    self.branches[aim] = self.branches[place]
                 self.orbits[aim], place = forced, aim
         return None
 
