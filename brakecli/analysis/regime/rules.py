@@ -30,9 +30,7 @@ _DRIFT = 5e-3  # by which the amplitude of a motion without stick may change whe
 _BANDS = 0.9  # least part of the energy in three bands: chaos may have less
 _SPREAD = 0.05  # of the frequency of cycles, beyond which three bands hold no vibration
 _CYCLES_SHARE = 0.5  # of the energy on the lines of the cycles, below which the strongest line must be one of them
-_CREEPS = (
-    2.0  # amplitudes by which the mean of x may move where nothing has settled: beyond, no place is met twice
-)
+_CREEPS = 2.0  # amplitudes by which the mean of x may move where nothing has settled
 _SPARSE = 8  # of the places at which a forced motion is computed, one of so many suffices
 _UNSETTLED = 1.5  # times as many cycles where nothing has settled: a hop may look like a vibration
 _SURE = 10.0  # standard errors of a slope: neighbouring windows of an amplitude that wanders go together
