@@ -152,7 +152,8 @@ def ladder(
 
 def _shortest_span(system: System) -> float:
     """Between two knots of speed or load, s; infinite where there are none."""
-    return min(float(np.diff(each["time"]).min(initial=math.inf)) for each in (system.belt, system.load))
+    times = (each["time"] for each in (system.belt, system.load) if len(each) > 1)
+    return min((float(np.diff(each).min()) for each in times), default=math.inf)
 
 
 def _jump_error(run: Motion) -> float:
