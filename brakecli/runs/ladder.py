@@ -123,7 +123,7 @@ def ladder(
         spent, failed = run.work.solve_seconds, run.work.failed
         run.work.solve_seconds = seconds = seconds + spent
         if before is not None and not failed:
-            finer.before, finer.last = finer.last, compare(before, run, wanted)[1]
+            finer.before, finer.last = finer.last, compare(before, run, math.inf)[1]
         before = before if failed else run
         opens = set(run.work.evaluators) != {"closed-form"}
         used = quadrature if nodes and opens else _Axis(0, 0.0, 0.0)
