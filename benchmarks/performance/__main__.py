@@ -253,7 +253,7 @@ def promises(report: Report) -> None:
 def beside_c(report: Report) -> None:
     report.missing = in_c.unavailable()
     if not report.missing:
-        report.single = in_c.beside_c(rows.load("accuracy/B.toml"))
+        report.single = in_c.beside_c(partial(rows.load, "accuracy/B.toml"))
         value = report.single[0].ours / report.single[0].theirs
         report.goals.append(("one evaluation: 256 nodes, against C", "≤ 1.15", number(value), value <= 1.15))
 
