@@ -14,7 +14,6 @@ fraction, kind and validity alone, for event-driven runs. One whose work is smal
 """
 
 from dataclasses import dataclass
-from functools import cache
 from importlib import import_module
 from typing import Any
 
@@ -50,17 +49,14 @@ def kinds() -> tuple[str, ...]:
 CLOSED_FORM, MIDPOINT, EXACT = (kinds().index(name) for name in ("closed-form", "midpoint", "exact"))
 
 
-_module = cache(import_module)  # which takes 3 µs even where a module is loaded
-
-
 def load(name: str) -> Any:
     """The kernel `evaluate` of an evaluator; it is compiled on the first call of a new version."""
     if len(kinds()) > MOST_KINDS:
         raise ValueError(f"EVALUATORS has {len(kinds())} kinds, a run can count {MOST_KINDS}; increase MOST_KINDS")
-    return _module(EVALUATORS[name].module).evaluate
+    return import_module(EVALUATORS[name].module).evaluate
 
 
 def load_press(name: str) -> Any:
     """What finds the force alone: the kernel `press` of an evaluator, or `evaluate` where it has none."""
-    module = _module(EVALUATORS[name].module)
+    module = import_module(EVALUATORS[name].module)
     return getattr(module, "press", module.evaluate)

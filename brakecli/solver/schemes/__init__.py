@@ -18,7 +18,6 @@ Contract of every scheme module:
 """
 
 from dataclasses import dataclass
-from functools import cache
 from importlib import import_module
 from types import ModuleType
 
@@ -94,9 +93,6 @@ SCHEMES: dict[str, Scheme] = {
 }
 
 
-_module = cache(import_module)  # which takes 3 µs even where a module is loaded
-
-
 def load(name: str) -> ModuleType:
     """The module of a scheme; its kernels are compiled on the first call of a new version."""
-    return _module(SCHEMES[name].module)
+    return import_module(SCHEMES[name].module)
