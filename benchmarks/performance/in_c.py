@@ -83,7 +83,9 @@ def beside_c(load: Callable[[], System]) -> list[Beside]:
     """Medians over processes: where in memory one has its machine code and tables changes a ratio by 5 %."""
     with multiprocessing.get_context("spawn").Pool(1, maxtasksperchild=1) as pool:
         found = [pool.apply(_measured, (load,)) for _ in range(PROCESSES)]
-    return [sorted(each, key=lambda one: one.ours / one.theirs)[PROCESSES // 2] for each in zip(*found, strict=True)]
+    return [
+        sorted(each, key=lambda one: one.ours / one.theirs)[PROCESSES // 2] for each in zip(*found, strict=True)
+    ]
 
 
 def _measured(load: Callable[[], System]) -> list[Beside]:
