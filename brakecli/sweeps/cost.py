@@ -82,7 +82,7 @@ def estimate(plan: Plan, workers: int) -> Estimate:
             each += _SEARCH_RUNS * run + _SEARCH_GROWTHS * _GROWTH_SECONDS + forced
     records, in_parent = plan.passes * plan.points, _POINT_BYTES if plan.followed is None else _FOLLOWED_BYTES
     return Estimate(
-        points=plan.points,
+        points=records,
         workers=workers,
         seconds=2.0 + records * each / min(workers, records),
         memory=_WORKER_BYTES * (workers + 1) + _SAMPLE_BYTES * samples * workers * together + in_parent * records,

@@ -135,7 +135,7 @@ def keeping_points(output: Path) -> Iterator[None]:
     try:
         yield
     except (CannotWriteError, Interrupted) as error:
-        if os.path.lexists(journal_path(output)):
+        if (journal := journal_path(output)).is_file() and not journal.is_symlink():
             kept = "finished points are kept, and the same command goes on with them"
             if isinstance(error, CannotWriteError):
                 raise CannotWriteError(f"{error}; {kept}") from error

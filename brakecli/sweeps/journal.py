@@ -13,7 +13,9 @@ import zlib
 from bisect import bisect_right, insort
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
+from enum import StrEnum
 from io import FileIO
+from itertools import chain
 from operator import itemgetter
 from pathlib import Path
 from typing import Any
@@ -21,6 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from brakecli.analysis.regime.verdict import Excitation, Regime
 from brakecli.errors import BrakecliError, CannotWriteError, RefusedError, value_text
 from brakecli.files.atomic import explained, open_own
 from brakecli.files.field import flat
@@ -32,6 +35,7 @@ _PLACE = struct.Struct("<qqI")  # first unit, units, bytes of their records, whi
 _HEAD = struct.Struct("<qqII")  # the place, checksum of the place and the packed records
 _LEVEL = 1  # of packing: texts are alike, and numbers hardly smaller at the others
 _AT_ONCE = 1 << 14  # points read at a time
+_KNOWN: dict[str, type[StrEnum]] = {"status": Status, "regime": Regime, "excitation": Excitation}
 _LONGEST_HEADER, _FIRST_KEY = 5_000_000, b"brakecli_version"
 MOST_DIFFERENCES = 5
 
@@ -163,9 +167,27 @@ class Journal:
             if len(packed) < length or _checksum((first, count, length), packed) != checksum:
                 break
             if not self.finished[first : first + count].any():  # a copy of a block brings nothing new
-                self._note((first, count, length), offset + _HEAD.size, zlib.decompress(packed))
+                if (records := self._sound(packed, count * self._unit_bytes)) is None:
+                    break
+                self._note((first, count, length), offset + _HEAD.size, records)
             offset = self._file.tell()
         os.ftruncate(self._file.fileno(), offset)
+
+    def _sound(self, packed: bytes, size: int) -> bytes | None:
+        """The records of a block of so many bytes; None where they are not what belongs there."""
+        try:
+            records = zlib.decompressobj().decompress(packed, size + 1)
+            found = np.frombuffer(records, self.kind)
+            for name in self.kind.names or ():
+                if self.kind[name].kind == "S":
+                    known = {each.decode() for each in np.unique(found[name]).tolist()}
+                    if not known <= {*_KNOWN.get(name, known)}:
+                        return None
+                elif self.kind[name].base.kind == "f" and np.isinf(found[name]).any():
+                    return None
+        except (zlib.error, ValueError):  # also texts that are not UTF-8
+            return None
+        return records if len(records) == size else None
 
     def _note(self, place: tuple[int, int, int], offset: int, records: bytes) -> None:
         first, count, length = place
@@ -209,11 +231,24 @@ def _checksum(place: tuple[int, int, int], packed: bytes) -> int:
 
 
 def identity(plan: Plan) -> dict[str, Any]:
-    """What makes a sweep this one: every key of the sweep and its case, and the versions it is computed with."""
+    """What makes a sweep this one: every key of the sweep and its case, and the versions it is computed with.
+
+    Of measured profiles, also those that points read, the contents count.
+    """
     sweep, case = dict(flat(tomllib.loads(plan.sweep_text))), dict(flat(plan.case_keys))
-    profiles = [Path(text) for key, text in case.items() if key.endswith(".profile")]
-    measured = {f"checksum of {path.name}": zlib.crc32(path.read_bytes()) for path in profiles}
+    varied = [
+        flat(value, key) for axis in plan.sweep.axis for key in axis.parameter for value in axis.values or ()
+    ]
+    read = [text for key, text in chain(case.items(), *varied) if key.endswith(".profile") and type(text) is str]
+    measured = {f"checksum of {text}": _contents(Path(text)) for text in read}
     return {**fingerprint(), **case, **measured, **{f"sweep {key}": each for key, each in sweep.items()}}
+
+
+def _contents(path: Path) -> int | None:
+    """A checksum of a file; None where it cannot be read."""
+    with suppress(OSError, ValueError):
+        return zlib.crc32(path.read_bytes()) if path.is_file() else None
+    return None
 
 
 def _refusal(found: bytes, own: Mapping[str, Any]) -> str:

@@ -10,6 +10,7 @@ from brakecli.analysis.regime.classify import classify
 from brakecli.analysis.regime.spectra import peak, spectrum
 from brakecli.analysis.regime.verdict import Context, Excitation, Regime
 from brakecli.case.system import system_of
+from brakecli.solver.quantities import ContactState
 from tests.analysis.histories import INTERVAL, history_of, verdict_of
 from tests.analysis.test_verdicts import DRUM
 from tests.campaign import campaign, counts
@@ -87,3 +88,21 @@ def test_each_peak_of_a_short_record_is_right_within_its_resolution_or_left_out(
         else:
             assert cycles < 10.0, (frequency, cycles)
     assert named >= draws // 4
+
+
+@pytest.mark.parametrize("draws", counts(20, 200))
+def test_a_cycle_of_no_whole_number_of_samples_is_not_taken_for_several(draws: int) -> None:
+    """The shoe sticks to a belt of speed 1, and slips back at once faster than that: vx jumps, x does not."""
+    rng = np.random.default_rng(17)
+    for _ in range(draws):
+        cycle = rng.integers(8, 20) + rng.choice([1 / 4, 1 / 3, 1 / 2, 2 / 3, 3 / 4]) + rng.uniform(-2e-3, 2e-3)
+        slip = rng.uniform(0.2, 0.5)  # part of a cycle
+        place = np.arange(20000) / cycle % 1.0
+        turn = np.pi * (place - 1.0 + slip) / slip
+        sticks = place < 1.0 - slip
+        x = np.where(sticks, place, (1.0 - slip) * 0.5 * (1.0 + np.cos(turn)))
+        vx = np.where(sticks, 1.0, -(1.0 - slip) * 0.5 * np.pi / slip * np.sin(turn))
+        state = np.where(sticks, ContactState.STICK, ContactState.BACKWARD_SLIP)
+        verdict = classify(history_of(len(x), x=x * cycle * INTERVAL, vx=vx, state=state), Context(1.0))
+        assert verdict.regime is Regime.RELAXATION, (cycle, slip)
+        assert verdict.frequency == pytest.approx(1.0 / cycle / INTERVAL, rel=1e-3), (cycle, slip)

@@ -4,9 +4,12 @@ import json
 import os
 import random
 import re
+import zlib
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
 from brakecli import __version__
@@ -16,7 +19,7 @@ from brakecli.solver.compile import source_hash
 from brakecli.sweeps.journal import open_journal
 from brakecli.sweeps.plan import LoadedSweep
 from brakecli.sweeps.workers.task import compute_units, fingerprint
-from tests.commands import ROOT, brakecli, left_in
+from tests.commands import ROOT, TINY, brakecli, left_in
 from tests.sweeps.helpers import axis, frictions, inline, interrupted, write_sweep
 
 pytestmark = pytest.mark.usefixtures("compiled")
@@ -160,6 +163,77 @@ def test_a_block_that_is_there_twice_counts_once(tmp_path: Path) -> None:
     result = inline(loaded, tmp_path / "s.h5")
     assert result.resumed == 4
     assert (tmp_path / "s.h5").read_bytes() == (tmp_path / "expected.h5").read_bytes()
+
+
+def forged(name: str, value: Any) -> Callable[[bytes, np.dtype[Any]], bytes]:
+    def forge(records: bytes, kind: np.dtype[Any]) -> bytes:
+        found = np.frombuffer(records, kind).copy()
+        found[name] = value
+        return found.tobytes()
+
+    return forge
+
+
+@pytest.mark.parametrize(
+    "forge",
+    [
+        forged("status", b"relaxati"),
+        forged("regime", b"nonsense"),
+        forged("amplitude", np.inf),
+        forged("reason", b"\xff\xfe"),
+        lambda records, kind: records[:-1],
+        lambda records, kind: records[: -kind.itemsize],
+        lambda records, kind: records + records,
+        lambda records, kind: b"",
+    ],
+    ids=["status", "regime", "infinite", "not UTF-8", "cut", "fewer", "more", "none"],
+)
+def test_a_block_that_holds_something_else_is_computed_again(
+    tmp_path: Path, forge: Callable[[bytes, np.dtype[Any]], bytes], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its checksum is right: somebody has made it."""
+    loaded = write_sweep(tmp_path, frictions(4))
+    inline(loaded, tmp_path / "expected.h5")
+    with open_journal(tmp_path / "s.h5.partial", loaded.plan, force=False) as journal:
+        pack = zlib.compress
+        monkeypatch.setattr(zlib, "compress", lambda records, level: pack(forge(records, journal.kind), level))
+        journal.add(0, compute_units(loaded.plan, 0, 2))
+        monkeypatch.undo()
+    assert inline(loaded, tmp_path / "s.h5").resumed == 0
+    assert (tmp_path / "s.h5").read_bytes() == (tmp_path / "expected.h5").read_bytes()
+
+
+def test_a_block_that_cannot_be_unpacked_is_computed_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    loaded = write_sweep(tmp_path, frictions(4))
+    with open_journal(tmp_path / "s.h5.partial", loaded.plan, force=False) as journal:
+        monkeypatch.setattr(zlib, "compress", lambda records, level: records)
+        journal.add(0, compute_units(loaded.plan, 0, 2))
+        monkeypatch.undo()
+    assert inline(loaded, tmp_path / "s.h5").resumed == 0
+
+
+PROFILE = "place [mm],height [um]\n" + "".join(f"{5 * n},{n % 7}\n" for n in range(41))
+
+
+@pytest.mark.parametrize("changed", ["a/p.csv", "b/p.csv", "b/q.csv"])
+def test_points_of_profiles_that_were_measured_anew_are_refused(
+    tmp_path: Path, changed: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("a/p.csv", "b/p.csv", "b/q.csv"):
+        Path(name).parent.mkdir(exist_ok=True)
+        Path(name).write_text(PROFILE)
+    surfaces = "\n[roughness]\nwheel.profile = 'a/p.csv'\nshoe.profile = 'b/p.csv'\n"
+    tables = axis("roughness.wheel.profile", "values = ['a/p.csv', 'b/q.csv']"), frictions(2)
+    loaded = write_sweep(Path(), *tables, case=TINY + surfaces)
+    interrupted(loaded, Path("s.h5"), limit=2, task_size=1)
+    Path(changed).write_text(PROFILE.replace("5,1", "5,1.1"))
+    with pytest.raises(RefusedError, match=f"checksum of .*{changed} was "):
+        inline(loaded, Path("s.h5"))
+    Path(changed).write_text(PROFILE)
+    assert inline(loaded, Path("s.h5")).resumed == 2
 
 
 def test_every_bit_of_the_place_of_a_block_is_part_of_its_checksum(tmp_path: Path) -> None:

@@ -24,7 +24,7 @@ _SEEN = 0.85  # least part of a force's swing in every other sample that all sam
 SIZE_OFF, _PERIOD_OFF = 3.0, 0.2  # of an amplitude and a period, per step in a contact: most that impacts were off
 _ALIKE = 0.5  # of a sample that no cycle has seen, beyond which all cycles are seen at the same places
 _ROUNDING = 1e-9  # of the wheel's speed
-_SAME = 0.02  # squared difference, over twice the variance, between one period of vx and the next
+_SAME = 0.02  # squared difference, over twice the variance, between one period of the mean of vx and the next
 
 
 def median(values: Array) -> tuple[float, float]:
@@ -92,8 +92,7 @@ def cycles_of(
     period, period_spread = median(np.diff(groups) / np.diff(edges))
     state = part.history.read("state", part.stop - len(velocity), part.stop)
     sticks = np.flatnonzero((state[1:] == ContactState.STICK) & (state[:-1] != ContactState.STICK)) + 1
-    places = np.sort(crossings % 1.0)  # within their samples: where cycles last whole samples, all at one
-    unseen, step = float(np.diff(places, append=places[0] + 1.0).max()), step / part.history.interval
+    unseen, step = _unseen(crossings)[0], step / part.history.interval
     raw = part.history.read("vx", part.stop - len(velocity), part.stop)
     hidden = _hidden_sticks(raw, state, belt)
     per_cycle, may = (np.histogram(each, crossings)[0] for each in (sticks, np.concatenate([sticks, hidden])))
@@ -135,7 +134,7 @@ def cycles_of(
     missed = 3.0 / 128.0 * (2.0 * np.pi / period) ** 4 * amplitude  # of a crest between two samples: parabola
     spread = max(spread, unseen * missed) + (0.25 * turn**2 + SIZE_OFF * impact) * amplitude
     medians = amplitude, spread, stick, loss, float(np.mean(may > 0))
-    varies = _force_variation(force, crossings, groups, alike=unseen > _ALIKE)
+    varies = _force_variation(force, crossings, groups)
     off = frequency * (turn**2 / 8.0 + _PERIOD_OFF * impact)
     return Cycles(evidence, frequency, off, *medians, limited, *changes, varies)
 
@@ -179,18 +178,27 @@ def contact_length(part: Part) -> float:
     return (1.0 - part.fraction(away)) * (part.stop - part.start) / begins if begins else np.inf
 
 
-def _force_variation(force: Array, crossings: Array, groups: Array, alike: bool) -> float | None:
+def _force_variation(force: Array, crossings: Array, groups: Array) -> float | None:
     """Peak to peak (N) in groups of cycles, as a median: an impact of less than a sample is seen in one of them.
 
-    None where every other sample shows much less, so that all of them may miss some. Where cycles are sampled
-    alike, those are every other one of each cycle.
+    None where half of the places in a cycle that samples see, in turn, show much less, so that all may miss some.
     """
     edges, begin = crossings.astype(int), groups[:-1].astype(int) - int(crossings[0])
-    force, place = force[edges[0] : edges[-1]], np.arange(edges[-1] - edges[0])
-    odd = (place - (np.repeat(edges[:-1], np.diff(edges)) if alike else 0)) % 2 == 1
+    force = force[edges[0] : edges[-1]]
+    unseen, middle = _unseen(crossings)
+    place = np.arange(edges[0], edges[-1]) - np.repeat(crossings[:-1], np.diff(edges)) + middle
+    odd = np.floor(place / unseen) % 2.0 == 1.0
     seen = [force, np.where(odd, force, np.nan), np.where(odd, np.nan, force)]
     swings = [median(np.fmax.reduceat(each, begin) - np.fmin.reduceat(each, begin))[0] for each in seen]
     return swings[0] if min(swings) >= _SEEN * swings[0] else None
+
+
+def _unseen(crossings: Array) -> tuple[float, float]:
+    """The longest part of a sample that no cycle has seen, and its middle in one that begins a cycle."""
+    places = np.sort(crossings % 1.0)  # where cycles last whole samples, all are one
+    gaps = np.diff(places, append=places[0] + 1.0)
+    longest = int(np.argmax(gaps))
+    return float(gaps[longest]), float(places[longest] + 0.5 * gaps[longest])
 
 
 def _beginnings(part: Part, velocity: Array, waves: Sequence[tuple[float, float]]) -> tuple[Array, int]:
@@ -213,19 +221,30 @@ def _repeated(
         return None
     period = float(crossings[-1] - crossings[0]) / (len(crossings) - 1)
     width = 2.0 * LINE_BINS / (len(velocity) * part.history.interval)
-    close = 2.0 * _SAME * float(velocity.var())
+    mean = np.diff(part.last("x"))
     for rises in range(1, _MOST_RISES_PER_CYCLE + 1):  # after which the motion repeats
-        shift = round(rises * period)
-        if 0 < shift < len(velocity) // 2 and np.mean((velocity[shift:] - velocity[:-shift]) ** 2) <= close:
-            longest = 1.0 / (rises * period * part.history.interval)
+        if 1.0 <= (lag := rises * period) < len(velocity) // 2 and _unlike(mean, lag) <= _SAME:
+            longest = 1.0 / (lag * part.history.interval)
             divisors = [each for each in range(1, rises) if rises % each == 0]
             for fewer in divisors:  # samples may repeat only after several cycles
                 lines = [n * longest for n in range(1, 2 * rises) if n % (rises // fewer)]  # above: jumps, aliased
                 beside = [f for f in lines if all(abs(f - wave) > width for wave, _ in waves)]
-                if part.share(beside, LINE_BINS // 2) <= _BETWEEN:
+                if part.mean_share(beside, LINE_BINS // 2) <= _BETWEEN:
                     return crossings[::fewer], fewer
             return crossings[::rises], rises
     return None
+
+
+def _unlike(values: Array, lag: float) -> float:
+    """Squared difference of samples and of those a lag later, over twice the variance.
+
+    A lag of no whole number of samples (at least one) is met by cubic interpolation.
+    """
+    first, a = int(lag) - 1, lag % 1.0
+    inner, outer = 0.5 * (a + 1.0) * (a - 2.0), a * (a - 1.0) / 6.0
+    weights = [-outer * (a - 2.0), inner * (a - 1.0), -inner * a, outer * (a + 1.0)]
+    later = np.convolve(values[first:], weights[::-1], "valid")
+    return float(np.mean((later - values[: len(later)]) ** 2)) / (2.0 * float(values.var()) or 1.0)
 
 
 class Drift(NamedTuple):

@@ -107,18 +107,15 @@ class Part:
     @cached_property
     def _spectrum(self) -> tuple[Array, Array, float]:
         """Frequencies (Hz), power of the last samples of vx under a Hann window, to some scale, and its sum."""
-        values = self.last("vx")
-        scale = float(np.max(np.abs(values))) or 1.0
-        power = np.abs(np.fft.rfft(values / scale * np.hanning(len(values)))) ** 2
-        frequencies: Array = np.fft.rfftfreq(len(values), self.history.interval).astype(np.float64)
-        return frequencies, power, float(power.sum())
+        return _spectrum(self.last("vx"), self.history.interval)
 
     def share(self, lines: Sequence[float], bins: int = LINE_BINS) -> float:
         """Part of the energy of vx that lies on lines (Hz), with so many bins on either side."""
-        frequencies, power, total = self._spectrum
-        if not lines or total == 0.0:
-            return 0.0
-        return float(power[_near(lines, frequencies, bins)].sum()) / total
+        return _share(self._spectrum, lines, bins)
+
+    def mean_share(self, lines: Sequence[float], bins: int = LINE_BINS) -> float:
+        """The same of the mean of vx between two samples, whose jumps are aliased much less."""
+        return _share(_spectrum(np.diff(self.last("x")), self.history.interval), lines, bins)
 
     @property
     def strongest(self) -> tuple[float, float]:
@@ -184,6 +181,22 @@ class Part:
             found.append((interpolated(frequencies, power, top), share, float(chosen[top])))
         names = ("line_frequencies", "line_shares", "line_forced")
         return {name: [line[i] for line in found] for i, name in enumerate(names)}
+
+
+def _spectrum(values: Array, interval: float) -> tuple[Array, Array, float]:
+    """Frequencies (Hz), power of samples under a Hann window, to some scale, and its sum; the interval in s."""
+    scale = float(np.max(np.abs(values))) or 1.0
+    power = np.abs(np.fft.rfft(values / scale * np.hanning(len(values)))) ** 2
+    frequencies: Array = np.fft.rfftfreq(len(values), interval).astype(np.float64)
+    return frequencies, power, float(power.sum())
+
+
+def _share(spectrum: tuple[Array, Array, float], lines: Sequence[float], bins: int) -> float:
+    """Part of the energy of a spectrum that lies on lines (Hz), with so many bins on either side."""
+    frequencies, power, total = spectrum
+    if not lines or total == 0.0:
+        return 0.0
+    return float(power[_near(lines, frequencies, bins)].sum()) / total
 
 
 def _near(lines: Sequence[float], frequencies: NDArray[Any], bins: int = LINE_BINS) -> NDArray[np.bool_]:

@@ -189,7 +189,8 @@ class Rules(LinearRules):
         irregular = f"irregular: stick in {stick:.0%} of the cycles{without}, {lines}"
         irregular += ", but the frequency wanders" if wanders else ""
         irregular += f", but not at the {found.frequency:.4g} Hz of its rises" if missed else ""
-        return Decision(irregular, advice=f"{'' if missed else 'run longer, or '}look at the spectrum")
+        finer = "reduce output.sample_interval, " if self._sticks(stick) == 1 else ""  # stick may hide between two
+        return Decision(irregular, advice=f"{finer}{'' if missed else 'run longer, or '}look at the spectrum")
 
     def _unseen(self, stick: float, may: float) -> Decision:
         """Stick is seen in a part of the cycles, and may fall between samples in more of them."""
