@@ -189,9 +189,9 @@ def test_errors_are_those_of_the_commands(tmp_path: Path) -> None:
         brakecli.stability(CASE, vary={"shoe.mass": [Fraction(1, 3)]})  # type: ignore[list-item]
     with pytest.raises(UsageError, match=r"sweep\.critical\.lower: cannot be set to NoneType"):
         brakecli.sweep(CASE, critical={"lower": None})
-    for name in ("sample_rate", "stiffness"):
-        with pytest.raises(UsageError, match=f"{name} 1000: is not a number"):
-            brakecli.classify(CASE, "force", **{name: "1000"})  # type: ignore[arg-type]
+    for given in ("sample_rate", "stiffness"):
+        with pytest.raises(UsageError, match=f"{given} 1000: is not a number"):
+            brakecli.classify(CASE, "force", **{given: "1000"})  # type: ignore[arg-type]
     with pytest.raises(UsageError, match="output 5: is no path"):
         brakecli.run(CASE, SHORT, output=5)  # type: ignore[arg-type]
     (tmp_path / "own.toml").write_text(TINY)
