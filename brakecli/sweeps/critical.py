@@ -78,13 +78,14 @@ class Search(NamedTuple):
 
 
 class Edge(NamedTuple):
-    """Where stability is lost, or regained, with its bracket and error bar."""
+    """Where stability is lost, or regained, with its bracket and error bar; or where it is not known any more."""
 
     value: float
     lower: float
     upper: float
     error: float
     lost: bool
+    known: bool = True
 
 
 SlidingAt = Callable[[float], Sliding | None]
@@ -209,16 +210,31 @@ def _answer(
 ) -> Search:
     """What the answers at some values say; `edge` narrows a change between two of them down.
 
-    Stability is lost, too, where steady sliding ends.
+    Stability is lost, too, where steady sliding ends. Where there is no answer it may be lost, and the bars say so.
     """
     if all(sliding_at(value) is None for value in values):
         return Search(Outcome.NO_SLIDING)
     answers = [(value, unstable(value)) for value in values]
-    decided = [each for each in answers if each[1] is not None]
-    changes = [(one, other) for (one, before), (other, after) in pairwise(decided) if before is not after]
-    if not changes and len(decided) < len(answers):
+    decided = [(value, answer) for value, answer in answers if answer is not None]
+    if not decided:
         return Search(Outcome.UNDECIDED)
-    return _of_edges(critical, bool(decided[0][1]), [edge(*change) for change in changes])
+    (first, begun), (last, ended) = decided[0], decided[-1]
+    edges = list[Edge]()
+    if first > values[0]:
+        edges += [_unknown(values[0], first, lost=True), *[_unknown(first, values[0], lost=False)] * (not begun)]
+    for (one, before), (other, after) in pairwise(decided):
+        if before is not after:
+            edges.append(edge(one, other))
+        elif not before and any(answer is None and one < value < other for value, answer in answers):
+            edges += [_unknown(one, other, lost=True), _unknown(other, one, lost=False)]
+    if last < values[-1]:
+        edges += [_unknown(values[-1], last, lost=False) if ended else _unknown(last, values[-1], lost=True)]
+    return _of_edges(critical, bool(begun) and first == values[0], edges)
+
+
+def _unknown(value: float, other: float, lost: bool) -> Edge:
+    """An end of what may be a window of instability: at a value, or anywhere on the way to another one."""
+    return Edge(value, min(value, other), max(value, other), abs(other - value), lost, known=False)
 
 
 def _of_edges(critical: Critical, unstable: bool, edges: list[Edge]) -> Search:
@@ -230,6 +246,8 @@ def _of_edges(critical: Critical, unstable: bool, edges: list[Edge]) -> Search:
     if not edges:
         return Search(Outcome.UNSTABLE if unstable else Outcome.STABLE, windows=windows, window_errors=errors)
     first = next((each for each in edges if each.lost), edges[0])
+    if not first.known:
+        return Search(Outcome.UNDECIDED, windows=windows, window_errors=errors)
     if first.error >= WIDEST * (critical.upper - critical.lower):  # almost any value of the range may be it
         return Search(Outcome.UNDECIDED)
     outcome = Outcome.FOUND if first.lost else Outcome.REGAINED

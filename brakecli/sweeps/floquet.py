@@ -56,7 +56,7 @@ class Disturbances:
         self.known: dict[float, Growth | None] = {}
         self.orbits: dict[float, Orbit] = {}
         self.branches: dict[float, float] = {}  # by where the motion was found first, with dashpots
-        self.missed, self.periodic = 0, False
+        self.missed, self.periodic, self.least = 0, False, 0.0
 
     def at(self, value: float) -> Growth | None:
         """The growth at a value; None without steady sliding, and where no forced motion is found."""
@@ -86,14 +86,15 @@ class Disturbances:
         """
         values: list[float] = np.linspace(lower, upper, PARTS * (SCANNED - 1) + 1).tolist()
         self.periodic = any(found.forced for found in map(self.sliding_at, values) if found)
+        self.least = SAME * (upper - lower)
         self.scan(values[::PARTS])
         if not any(measured and measured.opened for measured in map(self.at, values[::PARTS])):
             return sorted({*values[::PARTS], *between(lower, upper, windows)})
         self.scan(values)
         self._go_on(values)
         for _ in range(REFINED):
-            known, least = np.array(values), SAME * (upper - lower)
-            added = {place for place in self.resonances(values) if np.abs(known - place).min() > least}
+            known = np.array(values)
+            added = {place for place in self.resonances(values) if np.abs(known - place).min() > self.least}
             for triple in zip(values, values[1:], values[2:], strict=False):
                 rates = [measured.rate - measured.noise for measured in map(self.at, triple) if measured]
                 if len(rates) < len(triple) or min(rates) * max(rates) <= 0.0:
@@ -271,18 +272,22 @@ class Disturbances:
     def _beside(self, value: float, found: Sliding, period: float, place: float) -> Orbit | None:
         """The periodic motion that continues the line through one and its neighbour, or is near that one.
 
-        Without dashpots no motion leads through a resonance: there any motion will do.
+        Without dashpots no motion leads through a resonance: there any motion will do. An unstable one that grows
+        at once is left for a vibration that keeps in step with the waves.
         """
         near, segments, branch = self.orbits[place], self._segments(value, found, period), self.branches.get(place)
-        same = (other for other in self.orbits if other != place and self.branches.get(other) == branch)
-        other = min(same, key=lambda other: abs(other - (value if branch is None else place)), default=place)
+        own = [at for at in self.orbits if at != place and self.branches.get(at) == branch]
+        other = min(own, key=lambda other: abs(other - (value if branch is None else place)), default=place)
         guesses = [segments.moved(near)]
         if abs(value - place) <= 2.0 * abs(place - other):
             along = guesses[0] - segments.moved(self.orbits[other])
             guesses.insert(0, guesses[0] + along * ((value - place) / (place - other)))
+        sizes = [self.orbits[at].size for at in own if abs(at - value) < self.least]
+        departed = DEPARTED * min(sizes, default=math.inf) if near.rate > 0.0 else math.inf
         for guess in guesses:
             forced = orbit(segments, guess, near.maps)
-            if forced and (branch is None or np.abs(forced.states - guess).max() <= CLOSE * near.size):
+            close = forced and np.abs(forced.states - guess).max() <= CLOSE * near.size
+            if forced and (branch is None or (close and forced.size < departed)):
                 return forced
         return None
 
