@@ -45,6 +45,7 @@ RELAXED = (
 )
 CLOSE = 0.05  # of the size of a motion: how far its neighbour may be from where it is looked for
 MISSED = 3  # searches for a motion that grows out of steady sliding that may fail
+RESUMED = 8  # motions that may be found to go on beyond where they seemed to end
 
 
 class Disturbances:
@@ -56,7 +57,7 @@ class Disturbances:
         self.known: dict[float, Growth | None] = {}
         self.orbits: dict[float, Orbit] = {}
         self.branches: dict[float, float] = {}  # by where the motion was found first, with dashpots
-        self.missed, self.periodic, self.least = 0, False, 0.0
+        self.missed, self.resumed, self.periodic, self.least = 0, 0, False, 0.0
 
     def at(self, value: float) -> Growth | None:
         """The growth at a value; None without steady sliding, and where no forced motion is found."""
@@ -118,6 +119,19 @@ class Disturbances:
         """Whether the motions at two values are not known to be one; without dashpots that does not count."""
         ends = [self.branches[value] for value in (low, high) if value in self.branches]
         return len(ends) == 2 and ends[0] != ends[1]
+
+    def goes_on(self, low: float, high: float, wide: tuple[float, float]) -> bool:
+        """Whether a stable motion goes on over a bracket in which it seemed to end; follow it on from there.
+
+        A follow may fail for its stride only.
+        """
+        before, beyond, end = (low, high, wide[1]) if self.unstable(low) is False else (high, low, wide[0])
+        if self.resumed == RESUMED or not self.jumps(low, high) or not self._goes_on(before, beyond, False):
+            return False
+        self.resumed += 1
+        if beyond != end:
+            self._goes_on(beyond, end, False)
+        return True
 
     def _go_on(self, values: list[float]) -> None:
         """Follow stable motions on where another one was found beyond: from the end that is stable.
