@@ -181,25 +181,25 @@ class Disturbances:
         period, level = common_period(found.system), NEUTRAL * 2.0 * math.pi * (slow or fast)
         noise, exact = 0.0 if damped else level, None
         if found.linear:
-            theory = found.linear.with_slopes()
-            if theory.known_to < max(
-                level, abs(theory.mode.growth - noise)
-            ):  # it leaves much open with many waves
+            theory = found.linear.with_slopes()  # it leaves much open with many waves
+            if theory.known_to < max(level, abs(theory.mode.growth - noise)):
                 exact = Growth(theory.mode.growth, theory.known_to, noise, exact=True)
         if not (self.periodic or found.forced):
             return exact or growth(found)
         if period is None:
             plain = None if exact or found.modulated else growth(found)
             return exact or (plain if plain and not plain.opened else lyapunov(found, plain))
-        forced = self._found(value, found, period, damped)
+        forced, full = self._found(value, found, period, damped)
         if forced is not None:
             self.orbits[value] = forced
-        return exact or (Growth(forced.rate, 0.0, noise, opened=True) if forced else None)
+        if exact and (full or forced is None or not damped):
+            return exact
+        return Growth(forced.rate, 0.0, noise, opened=True) if forced else None
 
-    def _found(self, value: float, found: Sliding, period: float, damped: bool) -> Orbit | None:
-        """The periodic motion at a value: in full contact where linear theory has it, otherwise the one followed.
+    def _found(self, value: float, found: Sliding, period: float, damped: bool) -> tuple[Orbit | None, bool]:
+        """The periodic motion at a value, and whether it is the one of linear theory.
 
-        Without dashpots it begins in full contact wherever that lasts: what roughness forces then stays small.
+        That one counts wherever it lasts, unless dashpots make a stable one beside it that is followed.
         """
         place, near = self._near(value)
         low, high = sorted((place, value))
@@ -208,8 +208,9 @@ class Disturbances:
         forced = own if own and near and _same(own, near) else None
         if forced is None and not gap and (damped or own is None):
             forced = self._followed(value, found, period)
-        followed = forced is not None and (own is None or _same(own, forced))
-        forced = own or forced
+        followed = forced is not None
+        if own and (forced is None or forced.rate >= 0.0 or _same(own, forced)):
+            forced, followed = own, followed and forced is not None and _same(own, forced)
         if forced is None and damped:
             plain = growth(found) if near is not None and near.rate > 0.0 else None
             if plain is None or plain.rate <= 0.0:
@@ -221,7 +222,7 @@ class Disturbances:
             place, near = (place, near) if followed else self._near(value)
             goes_on = followed or (near is not None and _same(forced, near))
             self.branches[value] = self.branches.get(place, value) if goes_on else value
-        return forced
+        return forced, forced is own
 
     def _in_full_contact(self, value: float, found: Sliding, period: float) -> Orbit | None:
         """The periodic motion beside that of linear theory; None where the pad lifts off or sticks too much."""
