@@ -15,7 +15,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from brakecli.errors import BrakecliError, UsageError, in_python
+from brakecli.errors import BrakecliError, UnreadableResultError, UsageError, in_python
 from brakecli.files.os_signals import Interrupted, unwinding
 from brakecli.stop import signals_shown
 
@@ -62,8 +62,8 @@ def run(
 ) -> "xr.DataTree":
     """Simulate one case: the result as a tree of datasets.
 
-    Groups `history` (dimension `time`, s) and `spectrum` (dimension `frequency`, Hz) hold the motion; attributes
-    of the root are regime, frequency (Hz), amplitude (m) and all else that `docs/result-format.md` names.
+    Groups `history` (over `time`, s) and `spectrum` (over `frequency`, Hz) hold the motion; attributes of the root
+    are regime, frequency (Hz), amplitude (m) and all else that `docs/result-format.md` names.
 
     Args:
         case: path of a case file or of a result, or what `load` gave.
@@ -212,15 +212,16 @@ def classify(
         UsageError, UnreadableResultError: as `brakecli classify`.
     """
     from brakecli.cli.classify import Options
-    from brakecli.cli.measured import Measured
+    from brakecli.cli.measured import NUMBERS, Measured
     from brakecli.files.fields import VERDICT
 
     how = ("column", "time_column", "sample_rate", "unit", "time_unit")
     if unknown := sorted(reading.keys() - {*how}):
         raise UsageError(f"classify: there is no argument {unknown[0]}; give one of {', '.join(how)}")
     changes = [f"{name}={value}" for name, value in _mapping(thresholds, "thresholds").items()]
-    what = None if quantity is None else str(quantity)
-    measured = Measured(what, belt_speed=belt_speed, stiffness=stiffness, **reading)
+    given = {"quantity": quantity, "belt_speed": belt_speed, "stiffness": stiffness, **reading}
+    texts = {name: str(each) for name, each in given.items() if each is not None and name not in NUMBERS}
+    measured = Measured(**given | texts)
     with _interruptible():
         numbers = Options(measured, changes, second_run, quiet=True).verdict(str(source))
     _warn(numbers.get("warnings", ()))
@@ -246,6 +247,8 @@ def _interruptible() -> Iterator[None]:
 def _target(output: "str | PathLike[str] | None") -> Iterator[Path]:
     """Where a result goes: to a file that stays, or to one that does not."""
     if output is not None:
+        if not isinstance(output, str | PathLike):
+            raise UsageError(f"output {output!r}: is no path; give one, or leave it out")
         yield Path(output)
         return
     with tempfile.TemporaryDirectory(prefix="brakecli-") as folder:
@@ -319,15 +322,18 @@ def _plain(value: Any, key: str) -> Any:
 
 
 def _opened(path: Path) -> "xr.DataTree":
-    """A result file in memory, checked."""
+    """A result file in memory, checked; what other programs have put there may be more than xarray takes."""
     import xarray as xr
 
     from brakecli.files.read import open_result
 
     with open_result(path):
         pass
-    with xr.open_datatree(path, engine="h5netcdf") as tree:
-        return tree.load()
+    try:
+        with xr.open_datatree(path, engine="h5netcdf") as tree:
+            return tree.load()
+    except (ValueError, TypeError, LookupError, AttributeError, OSError, RuntimeError) as error:
+        raise UnreadableResultError(f"{path}: xarray cannot read what it holds: {error}") from error
 
 
 def _dataset(declared: "Iterable[Field]", numbers: Mapping[str, Any]) -> "xr.Dataset":

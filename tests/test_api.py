@@ -11,6 +11,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 import xarray as xr
@@ -147,6 +148,14 @@ def test_a_signal_is_classified(tmp_path: Path) -> None:
     assert abs(float(verdict.frequency) - 400.0) < 0.5  # a tenth of the distance of two lines, 1 / 0.2 s
 
 
+def test_what_xarray_cannot_read_is_told(tmp_path: Path) -> None:
+    brakecli.run(CASE, SHORT, output=tmp_path / "r.h5")
+    with h5py.File(tmp_path / "r.h5", "r+") as file:  # cuts the digest off
+        file["history/vx"].attrs["scale_factor"] = "x"
+    with pytest.raises(UnreadableResultError, match="xarray cannot read what it holds"):
+        brakecli.load(tmp_path / "r.h5")
+
+
 def test_errors_are_those_of_the_commands(tmp_path: Path) -> None:
     with pytest.raises(CaseError, match=r"friction\.coefficient: is out of range"):
         brakecli.run(CASE, {"friction.coefficient": -1})
@@ -180,6 +189,15 @@ def test_errors_are_those_of_the_commands(tmp_path: Path) -> None:
         brakecli.stability(CASE, vary={"shoe.mass": [Fraction(1, 3)]})  # type: ignore[list-item]
     with pytest.raises(UsageError, match=r"sweep\.critical\.lower: cannot be set to NoneType"):
         brakecli.sweep(CASE, critical={"lower": None})
+    for given in ("sample_rate", "stiffness"):
+        with pytest.raises(UsageError, match=f"{given} 1000: is not a number"):
+            brakecli.classify(CASE, "force", **{given: "1000"})  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match="output 5: is no path"):
+        brakecli.run(CASE, SHORT, output=5)  # type: ignore[arg-type]
+    (tmp_path / "own.toml").write_text(TINY)
+    with pytest.raises(UsageError, match="is no result, and is not replaced by one"):
+        brakecli.run(tmp_path / "own.toml", output=tmp_path / "own.toml", force=True)
+    assert (tmp_path / "own.toml").read_text() == TINY
     endless: list[Any] = []
     endless.append(endless)
     for deep in (endless, {"parameter": endless}):

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from brakecli.cli.inputs import load_case
 from brakecli.cli.options import AsJson, CaseArgument, Overrides, Quiet, option
-from brakecli.cli.output import announce_compilation, progress, show_result
+from brakecli.cli.output import announce_compilation, progress, say, show_result
 
 KEYS = "Keys that may be advised, with * for any part; masses, stiffnesses, dampings, angles and load if left out."
 MARGIN = "Part of its friction by which the case is to stay stable above it."
@@ -23,11 +23,14 @@ def command(
     announce_compilation(quiet)
     from brakecli.analysis.stability.advice import KEYS as USUAL
     from brakecli.cli.stability_tables import advice_table
-    from brakecli.runs.advise import advise
-    from brakecli.runs.limits import within_range
+    from brakecli.runs.advise import advise, advise_seconds
+    from brakecli.runs.cost import duration_text
+    from brakecli.runs.limits import WORTH_SAYING, within_range
     from brakecli.runs.run import load_kernels
 
     load_kernels(loaded)
     with progress(quiet) as show_progress, within_range():
+        if (seconds := advise_seconds(loaded)) > WORTH_SAYING and not quiet:
+            say(f"a pad that opens: this takes about {duration_text(seconds)}")
         report = advise(loaded, keys.split(",") if keys is not None else USUAL, margin, show_progress)
     show_result("advise", report.numbers(), advice_table, report, as_json=as_json, quiet=quiet)

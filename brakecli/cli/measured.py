@@ -5,6 +5,7 @@ import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from functools import wraps
+from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
 WHAT = "What was measured: displacement, velocity, force, acceleration or pressure (of a .wav, if left out)."
 UNIT = "Unit of the signal, as mm/s or g; SI, or that of the file, if left out."
+NUMBERS = ("sample_rate", "belt_speed", "stiffness")
 TIME_UNIT = "Unit of the time column, as ms; that of the file, or s, if left out."
 
 
@@ -41,6 +43,8 @@ class Measured:
             if value is not None and quantity is None:
                 remedy = "state with --quantity what was measured"
                 raise UsageError(f"{where}: is only for a measured signal; {remedy}")
+            if name in NUMBERS and not isinstance(value, Real | None):
+                raise UsageError(f"{where} {printable(str(value))}: is not a number; give one in SI units")
             if name == "stiffness" and value is not None and not 0.0 < value < math.inf:
                 raise UsageError(f"{where} {value}: is not a positive number; give one in SI units")
             if name == "belt_speed" and value is not None and not math.isfinite(value):

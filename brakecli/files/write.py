@@ -5,7 +5,7 @@ The same calls give the same bytes, however the rows of a growing variable are c
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -15,10 +15,11 @@ import h5py
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from brakecli.errors import UsageError
 from brakecli.files.atomic import OutputFile, new_output
 from brakecli.files.field import Field
 from brakecli.files.os_signals import signals_deferred
-from brakecli.files.read import FORMAT, FORMAT_VERSION, digest
+from brakecli.files.read import FORMAT, FORMAT_VERSION, digest, is_hdf5
 
 FILL = 9.969209968386869e36  # what netCDF puts where a number is missing; the attribute `_FillValue` names it
 _CHUNK = 16384  # most values in a chunk: 128 KiB of float64
@@ -250,8 +251,12 @@ class ResultFile:
 def new_result(path: Path, *, force: bool) -> Iterator[ResultFile]:
     """Begin a result file; unless `commit` is called within the block, nothing of it remains.
 
-    Raises what `new_output` raises, before anything is computed.
+    Raises what `new_output` raises, before anything is computed, and UsageError where the file is no result: it
+    may be the case, or a profile that the case reads.
     """
+    with suppress(OSError, ValueError):
+        if force and path.suffix != ".h5" and path.is_file() and path.stat().st_size and not is_hdf5(path):
+            raise UsageError(f"{path}: is no result, and is not replaced by one; choose another output with -o")
     with new_output(path, force=force) as output, closing(ResultFile(output)) as result:
         result.open()
         yield result

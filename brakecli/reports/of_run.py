@@ -32,7 +32,7 @@ QUESTION = "Will this shoe vibrate, in which way, at which frequency, and what s
 PICTURE = "The motion in detail, its phase portrait, the whole history, and the spectrum of the velocity"
 MARGIN = 0.2  # of the friction, that advice aims at
 VALUES = 121  # of the friction in the lock-in diagram
-MOST_SENSITIVE = 6
+MOST_SENSITIVE, MOST_SECONDS = 6, 60.0  # keys that are shown, and what it may take to ask all
 _UNITS = [each.units for each in fields.VIBRATION]
 _IDLE = ("initial.", "solver.", "output.")  # keys that stand below the others
 _WORDS = {
@@ -49,7 +49,7 @@ _ACCURACY = (
 def part_of_run(result: StoredResult, progress: Counted) -> Part:
     """What the page says of a run. Raises UnreadableResultError."""
     found, loaded = result.attributes, case_of(result)
-    advice = advise(loaded, KEYS, MARGIN, progress)
+    advice = advise(loaded, KEYS, MARGIN, progress, most=MOST_SECONDS)
     again = f"brakecli run {escaped(shlex.quote(result.path.name))} -o again.h5"
     sections = [
         Section("Case", case_blocks(loaded)),

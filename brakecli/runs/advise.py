@@ -1,5 +1,6 @@
 """What to change so that a shoe does not squeal: sensitivities, advised values, and a run that checks the best."""
 
+import math
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -16,12 +17,12 @@ from brakecli.case.read import LoadedCase, key_path
 from brakecli.case.system import system_of
 from brakecli.files import fields
 from brakecli.files.field import values_of
-from brakecli.runs.cost import steps_and_seconds
+from brakecli.runs.cost import duration_text, stability_seconds, steps_and_seconds
 from brakecli.runs.run import motion_of, verdict_in_memory
 from brakecli.solver.motion import Counted
 from brakecli.solver.system import System
 
-CHECK_SECONDS = 5.0  # of computing; a run that would take longer is cut short
+CHECK_SECONDS, _CHECK_SAMPLES = 5.0, 1_000_000  # of the run that checks, which is cut short beyond
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,7 @@ class AdviceReport:
     sensitivities: list[Sensitivity]
     advice: list[Change]
     check: CheckRun | None
+    left_out: str = ""  # what was not asked, as it takes too long
 
     @property
     def margin(self) -> float | None:
@@ -72,6 +74,8 @@ class AdviceReport:
             found.append("no dashpot acts: where sliding is stable, vibration does not die away either")
         if not self.system.steady:
             found.append("speed and load are those of t = 0")
+        if self.left_out:
+            found.append(self.left_out)
         return found
 
     def _state(self) -> Iterator[str]:
@@ -124,18 +128,28 @@ def _far(margin: float | None, own: float) -> str:
     return f", {part:{'.0f' if part > 99.0 else '.2g'}} % {where} the case's {own:g}"
 
 
-def advise(loaded: LoadedCase, patterns: Sequence[str], margin: float, progress: Counted) -> AdviceReport:
+def advise_seconds(loaded: LoadedCase) -> float:
+    """A rough guess at the time of `advise`: each number of a case is changed to find critical friction anew."""
+    return len(of_case.numbers(loaded.case)) * stability_seconds(system_of(loaded.case))
+
+
+def advise(
+    loaded: LoadedCase, patterns: Sequence[str], margin: float, progress: Counted, most: float = math.inf
+) -> AdviceReport:
     """Sensitivities of a case, the nearest safe value of each key that fits a pattern, and a run of the best.
 
-    A case that has the margin (a part of its friction) needs no advice. Raises UsageError.
+    A case that has the margin (a part of its friction) needs no advice; what takes more than `most` seconds is
+    left out. Raises UsageError.
     """
     case, advice, check = loaded.case, list[Change](), None
     keys, everything = of_case.advised_keys(case, patterns), of_case.numbers(case)
     system = system_of(case)
     report, found = stability(system), of_case.answer(case)
     critical = found.critical if found else None
-    sensitivities = list[Sensitivity]()
-    if found is not None:
+    sensitivities, left_out = list[Sensitivity](), ""
+    if (seconds := advise_seconds(loaded)) > most:
+        left_out = f"what to change is left out: `brakecli advise` takes about {duration_text(seconds)}"
+    elif found is not None:
         for done, path in enumerate(everything):
             tell = partial(progress, "derivatives", done, len(everything))
             sensitivities.append(of_case.sensitivity(case, path, critical, tell))
@@ -146,7 +160,7 @@ def advise(loaded: LoadedCase, patterns: Sequence[str], margin: float, progress:
     advice.sort(key=lambda each: each.size)
     if advice and advice[0].to is not None:
         check = _checked(case, advice[0], progress)
-    return AdviceReport(case.title, system, report, critical, margin, sensitivities, advice, check)
+    return AdviceReport(case.title, system, report, critical, margin, sensitivities, advice, check, left_out)
 
 
 def _checked(case: Case, best: Change, progress: Counted) -> CheckRun | None:
@@ -156,7 +170,8 @@ def _checked(case: Case, best: Change, progress: Counted) -> CheckRun | None:
         return None
     system = system_of(there)
     _, seconds = steps_and_seconds(system)
-    system = replace(system, duration=system.duration * min(1.0, CHECK_SECONDS / max(seconds, 1e-9)))
+    part = min(1.0, CHECK_SECONDS / max(seconds, 1e-9), _CHECK_SAMPLES / system.samples)
+    system = replace(system, duration=part * system.duration)
     start = time.perf_counter()
     motion, _ = motion_of(system, lambda done: progress("steps of the check", done, system.steps))
     verdict = verdict_in_memory(motion, system)

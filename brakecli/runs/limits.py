@@ -25,7 +25,7 @@ MOST_STEPS = 1e11
 MOST_SECONDS = 24 * 3600.0
 MOST_BYTES = 1e11
 UNSTABLE = 1e-5  # growth per step that no rounding of the eigenvalues explains
-_WORTH_SAYING = 5.0  # s, of work before which its time is said
+WORTH_SAYING = 5.0  # s, of work before which its time is said
 _COARSE_NODES = NODES_PER_WAVE / 2
 _TAKEN = 0.01  # part of the fastest motion that a scheme may take out of a run unsaid
 _ROUNDING = 1e-8  # of the factors of a step
@@ -107,7 +107,7 @@ def sliding_text(system: System) -> str | None:
     text = f"steady sliding on a pad that opens takes about {duration_text(seconds)}"
     if seconds > MOST_SECONDS:
         raise RefusedError(f"{text}; reduce contact.nodes, or the number of waves in roughness")
-    return text if seconds > _WORTH_SAYING else None
+    return text if seconds > WORTH_SAYING else None
 
 
 def _blows_up(growth: float, steps: float) -> bool:

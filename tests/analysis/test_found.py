@@ -70,6 +70,7 @@ def test_a_line_at_an_own_frequency_is_not_counted_as_forced(name: str) -> None:
     told = re.search(r"; its line at ([\d.]+) Hz is not told from the waves'; run at least", verdict.reasons[0])
     assert told is not None
     assert float(told[1]) == pytest.approx(np.abs(Shoe.of(tables).modes.imag).min() / (2.0 * math.pi), rel=0.05)
+    assert "of the energy" not in verdict.reasons[0]  # which holds that line
     assert (verdict.amplitude_spread, verdict.amplitude_forced, verdict.settled) == (None, None, False)
 
 
@@ -351,6 +352,49 @@ def test_a_forced_motion_has_settled_after_the_time_that_is_asked_for() -> None:
     assert (again.excitation, ASKED.search(again.reasons[0])) == (Excitation.FORCED, None)
     # The same four times later, by another integrator.
     assert again.amplitude == pytest.approx(7.70e-6, rel=0.01)
+
+
+@pytest.mark.parametrize("name", ["forced from the start", "forced from the start, waves shorter than its period"])
+def test_linear_forced_motion_has_settled_after_the_time_that_is_asked_for_once(name: str) -> None:
+    verdict, duration = judged(name), SHOES[name]["solver"]["duration"]
+    told = ASKED.search(verdict.reasons[0])
+    assert told is not None
+    again = judged(name, 1.001 * float(told[1]) / duration)
+    assert again.settled
+    assert again.amplitude == pytest.approx(verdict.amplitude, rel=0.02)  # by the closed form
+
+
+def test_a_shoe_that_winds_up_its_links_does_not_vibrate_for_good() -> None:
+    """By another integrator it slips to one side from 1.3 times the run on, and dies."""
+    verdict = judged("winds up its links")
+    assert (verdict.regime, verdict.settled) == (Regime.UNDECIDED, False)
+    assert re.fullmatch(
+        r"x creeps by .* m in the second half, but vibrates by .* m only; run longer", verdict.reasons[0]
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "frequency", "amplitude"),  # by another integrator, with half the step as well
+    [
+        ("shifted by impacts of 18 steps", 398.11, 8.448e-7),
+        pytest.param("shifted by impacts of 24 steps", 114.07, 7.14e-5, marks=campaign),
+    ],
+)
+def test_a_cycle_that_impacts_shift_has_settled_with_the_step_that_is_asked_for(
+    name: str, frequency: float, amplitude: float
+) -> None:
+    verdict, step = judged(name), SHOES[name]["solver"]["step"]
+    told = re.search(r"impacts of so few steps may .* take a solver.step of (\S+) s, or", verdict.reasons[1])
+    assert told is not None
+    assert not verdict.settled
+    finer = step / math.ceil(step / float(told[1]))
+    again = judged(name, 2.0, solver__step=finer)
+    assert again.settled
+    for each in (verdict, again):
+        assert each.frequency is not None
+        assert each.amplitude_spread is not None
+        assert abs(each.frequency - frequency) <= each.evidence["frequency_spread"]
+        assert abs(each.amplitude - amplitude) <= each.amplitude_spread
 
 
 @campaign

@@ -60,6 +60,18 @@ def test_where_rises_miss_the_lines_of_a_motion_the_strongest_line_is_its_freque
     assert sticks.reasons[0].endswith("Hz of its rises; look at the spectrum")
 
 
+def test_an_amplitude_that_varies_by_as_much_as_itself_is_not_settled() -> None:
+    """Two fifths of the cycles swing five times as far as others, in turns as long as the envelope's windows."""
+    known, settled = Context(3.0, growth=lambda: 1.0, settles=100.0), []
+    time = INTERVAL * np.arange(100_000)
+    for low in (0.2, 0.9):
+        sizes = np.where(time % 0.25 < 0.1, 1.0, low)
+        verdict = classify(made(sizes * np.sin(2.0 * np.pi * 100.0 * time)), known)
+        assert verdict.regime is Regime.QUASI_HARMONIC
+        settled.append((verdict.settled, verdict.amplitude_spread is not None, len(verdict.reasons)))
+    assert settled == [(False, False, 2), (True, True, 1)]
+
+
 def test_a_shoe_shaken_by_roughness_below_its_critical_friction_is_damped_and_forced() -> None:
     verdict = verdict_of(make(ROUGH, solver__duration=1.0, solver__step=2e-5))
     assert (verdict.regime, verdict.excitation) == (Regime.DAMPED, Excitation.FORCED)

@@ -221,6 +221,19 @@ def test_an_existing_output_is_kept_unless_forced(tmp_path: Path) -> None:
     assert is_hdf5(path)
 
 
+def test_only_a_result_is_replaced(tmp_path: Path) -> None:
+    """What is called .h5, or empty, may be what is left of one."""
+    for name, text in (("case.toml", "[shoe]"), ("profile.csv", "x,y")):
+        (tmp_path / name).write_text(text)
+        with pytest.raises(UsageError, match="is no result, and is"), new_result(tmp_path / name, force=True):
+            raise AssertionError
+        assert (tmp_path / name).read_text() == text
+    for name in ("empty", "damaged.h5"):
+        (tmp_path / name).write_text("?" * (name != "empty"))
+        with new_result(tmp_path / name, force=True) as result:
+            result.commit()
+
+
 def test_an_output_that_appears_meanwhile_is_kept_unless_forced(tmp_path: Path) -> None:
     path = tmp_path / "r.h5"
     with new_result(path, force=False) as result:

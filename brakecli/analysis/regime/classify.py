@@ -7,6 +7,7 @@ from brakecli.solver.history import History
 from brakecli.solver.quantities import ContactState
 
 _DEFAULT = Thresholds()
+_VAGUE = "the amplitude may be off by as much as itself: run longer, or take a smaller solver.step"
 
 
 def classify(
@@ -32,11 +33,12 @@ def classify(
     if ripple:
         rules.evidence |= {f"ripple_{name}": getattr(ripple, name) for name in ("x", "vx", "force")}
         spread = spread + ripple.size if spread is not None else None
+    vague = spread is not None and 0.0 < amplitude <= spread  # then not even its order is known
     low, high = part.extremes("friction_force")
     variation = cycles.force_variation if cycles else high - low
     doubt = _torque_doubt(rules, context, variation, lasting=not cycles and not undecided)
     notes = {
-        "settled": rules.drifts if cycles else None,
+        "settled": (rules.drifts if cycles else None) or (_VAGUE if vague and rules.lasts else None),
         "ripple": ripple.sentence if ripple else None,
         "torque_variation": doubt,
     }
@@ -46,7 +48,7 @@ def classify(
         excitation=decision.excitation,
         frequency=decision.frequency,
         amplitude=amplitude,
-        amplitude_spread=spread,
+        amplitude_spread=None if vague else spread,
         amplitude_forced=forced,
         amplitude_own=own,
         growth_rate=rules.theory.mode.growth if rules.theory else None,
@@ -55,7 +57,7 @@ def classify(
         torque_variation=radius * variation if variation is not None else None,
         settled_from=part.start * history.interval,
         start=part.start,
-        settled=rules.lasts and not undecided and not ripple,
+        settled=rules.lasts and not (undecided or ripple or vague),
         stick_fraction=cycles.stick_fraction if cycles else part.fraction(ContactState.STICK),
         contact_loss_fraction=cycles.contact_loss_fraction if cycles else part.fraction(ContactState.SEPARATED),
         mean_friction_force=friction,

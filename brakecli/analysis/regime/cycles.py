@@ -21,7 +21,7 @@ _ALTERNATES, _PARTS = 0.3, 1.0  # powers of e by which odd and even cycles, or a
 _BANDS = (0.3, 0.5, 0.15)  # of the standard deviation of vx: ripple within it does not count
 _BETWEEN = 1e-3  # of the energy of vx, between the lines of one rise, that makes a cycle of several
 _SEEN = 0.85  # least part of a force's swing in every other sample that all samples see
-SIZE_OFF, _PERIOD_OFF = 3.0, 0.2  # of an amplitude and a period, per step in a contact: most that impacts were off
+SIZE_OFF, _PERIOD_OFF = 3.5, 0.2  # of an amplitude and a period, per step in a contact: most that impacts were off
 _ALIKE = 0.5  # of a sample that no cycle has seen, beyond which all cycles are seen at the same places
 _ROUNDING = 1e-9  # of the wheel's speed
 _SAME = 0.02  # squared difference, over twice the variance, between one period of the mean of vx and the next
@@ -57,6 +57,7 @@ class Cycles:
     evidence: dict[str, Any]
     frequency: float  # Hz
     frequency_off: float  # Hz, what the step may change
+    kick: float  # part of itself by which impacts, as steps fall into them, may change the vibration in a cycle
     amplitude: float  # m
     amplitude_spread: float
     stick_fraction: float
@@ -81,6 +82,11 @@ def cycles_of(
     The spreads hold what a step (s) may change, with which the motion was computed, on a wheel of speed `belt`
     (m/s) whose `waves` (Hz, m) pass. Stick, loss of contact and frequency are medians of ten groups of cycles, so
     that it does not matter how samples fall into each cycle.
+
+    `kick`: where contact begins (or ends) a part s ≤ 1/2 into a step h, the force at its middle pushes by
+    K v h² s²/2 too little, and likewise from the other end: by 1/24 in the mean over s, and by up to 1/8 where all
+    cycles meet the step alike. With Ω² = K/m that is (Ω h)² times as much of the speed v, and a contact takes
+    half a period of Ω.
     """
     velocity = part.last("vx")
     crossings, rises = _beginnings(part, velocity, waves)
@@ -103,7 +109,8 @@ def cycles_of(
         count = np.concatenate([[0], np.cumsum(found)])
         return np.asarray((count[end] - count[begin]) / (end - begin))
 
-    turn, impact = 2.0 * np.pi * step / period, step / contact_length(part)
+    turn, contact = 2.0 * np.pi * step / period, contact_length(part)
+    impact = step / contact
 
     def time_in(which: ContactState) -> tuple[float, float]:
         """Part of a cycle, and its spread, with the step, and the part of a sample that no cycle has seen."""
@@ -136,7 +143,9 @@ def cycles_of(
     medians = amplitude, spread, stick, loss, float(np.mean(may > 0))
     varies = _force_variation(force, crossings, groups)
     off = frequency * (turn**2 / 8.0 + _PERIOD_OFF * impact)
-    return Cycles(evidence, frequency, off, *medians, limited, *changes, varies)
+    alike = _unseen(crossings / step)[0] if step else 0.0
+    kick = (1.0 - loss) * period / contact * (np.pi * impact) ** 2 * (1.0 + 2.0 * alike) / 24.0  # of all impacts
+    return Cycles(evidence, frequency, off, kick, *medians, limited, *changes, varies)
 
 
 def _crests(values: Array) -> Array:

@@ -26,6 +26,7 @@ _ERRORS = 2.0  # standard errors of a mean power
 _LARGER = 5.0  # times what the waves force in full contact: a larger motion needs more proof that it is forced
 _OFTEN = 0.1  # part of the time that shows that stick or flight holds a vibration within its limits
 _RING_DOWN = 0.5  # of the own vibration's decay, and of what dashpots take, that is kept up by nothing
+_ON_LINES = "of the energy of vx lies on the lines of the roughness"
 _TRACE = 0.1  # part of the energy of vx on the lines themselves, without which nothing is their subharmonic
 
 
@@ -95,7 +96,7 @@ class ForcedRules:
         share, dense = self._share(self.context.forced, 0.5)
         self.evidence["forced_share"] = share
         if share >= self.limits.forced_share and self.context.undamped and growth <= 0.0:
-            text = f"{share:.0%} of the energy of vx lies on the lines of the roughness"
+            text = f"{share:.0%} {_ON_LINES}"
             return Decision(f"{text}, but no dashpot damps what the shoe adds", advice="a dashpot would decide")
         if growth < 0.0 and not self._unstable_in_full_contact and not self._larger and self._follows():
             self._feeds()
@@ -114,7 +115,7 @@ class ForcedRules:
         feeds, larger = self._feeds(), self._larger
         if feeds is Feeds.FRICTION and larger and self._settle():
             return None
-        what = f"{share:.0%} of the energy of vx lies on the lines of the roughness"
+        what = f"{share:.0%} {_ON_LINES}"
         if powers_of_e > _NOTHING:
             own = f"but sliding is unstable: the shoe's own vibration grows at {growth:.3g} 1/s"
             advice = f"run at least {1.01 * GROWN / growth:.3g} s"
@@ -239,8 +240,11 @@ class ForcedRules:
         if self._trend < _RING_DOWN * growth and self._open:
             text = f"still decaying at {-self._trend:.3g} 1/s; {rate}"
             return Decision(text, advice=advice, second_run=True)
-        own = f"; its line at {line:.4g} Hz is not told from the waves'" if (line := self._own_line()) else ""
-        text = f"the roughness shakes the shoe: {what}; {rate}{own}"
+        known = f"{what}; {rate}"
+        if line := self._own_line():
+            own = f"{rate}; its line at {line:.4g} Hz is not told from the waves'"
+            known = own if what.endswith(_ON_LINES) else f"{what}; {own}"  # their share holds that line
+        text = f"the roughness shakes the shoe: {known}"
         return Decision(text, Regime.DAMPED, Excitation.FORCED, advice=advice)
 
     @property

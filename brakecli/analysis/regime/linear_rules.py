@@ -73,15 +73,15 @@ class LinearRules(ForcedRules):
         forced, lasting, own, time = theory.parts(*self.whole.places())
         starts = -(-len(own) * np.arange(WINDOWS) // WINDOWS)
         left = 0.5 * (np.maximum.reduceat(own, starts) - np.minimum.reduceat(own, starts))
-        end = float(left[-10:].max())
+        end = 0.5 * float(np.ptp(own[starts[-10] :]))  # a window may be shorter than a period
         slope = line(np.arange(0.5 * WINDOWS), np.log(np.maximum(left[WINDOWS // 2 :], 1e-300)))[0]
         if slope * WINDOWS > 1.0 and end > self.limits.settled_within * forced:
             return None  # the passing waves excite what the mean stiffness damps
         level, decay = self.limits.settled_within * forced, theory.mode.growth * self.duration / WINDOWS
         if 0.25 * WINDOWS * decay < -1.0 and slope > 0.25 * decay and end < _REST * forced:
             level = max(level, 1.2 * end)  # what does not decay is forced, and missing in the closed form
-        first = WINDOWS - int(np.argmin((left <= level)[::-1]))
-        begin = max(first, 1) * self.history.samples // WINDOWS
+        first = int(np.flatnonzero(np.append(True, left[1:] > level))[-1]) + 1
+        begin = first * self.history.samples // WINDOWS
         wait = math.log(max(end / max(level, 1e-300), 1.0)) / -theory.mode.growth
         advice = list[str]()
         if first <= WINDOWS - 10 and self.duration - begin * self.history.interval >= 2.0 * slow:

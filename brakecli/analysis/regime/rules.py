@@ -1,6 +1,7 @@
 """What kind of vibration a history shows, and why: the rules. `evidence` measures what they go by."""
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,10 +30,13 @@ _DRIFT = 5e-3  # by which the amplitude of a motion without stick may change whe
 _BANDS = 0.9  # least part of the energy in three bands: chaos may have less
 _SPREAD = 0.05  # of the frequency of cycles, beyond which three bands hold no vibration
 _CYCLES_SHARE = 0.5  # of the energy on the lines of the cycles, below which the strongest line must be one of them
+_CREEPS = 2.0  # amplitudes by which the mean of x may move where nothing has settled
 _SPARSE = 8  # of the places at which a forced motion is computed, one of so many suffices
 _UNSETTLED = 1.5  # times as many cycles where nothing has settled: a hop may look like a vibration
 _SURE = 10.0  # standard errors of a slope: neighbouring windows of an amplitude that wanders go together
 _LONG = "run longer"
+_SHIFTED = 0.5  # of itself, by which impacts may shift a cycle: beyond, its frequency is not known to _SPREAD
+_KICKED = 0.5, 0.1  # of its shift by impacts: most that the amplitude and the frequency of a cycle were off
 _FED = 0.1  # of what keeps a vibration up, that nodes may add
 
 
@@ -156,8 +160,7 @@ class Rules(LinearRules):
         if self.context.forced and not certain and (self._feeds() is Feeds.UNKNOWN or self._doubtful):
             return self._either()
         drift = abs(found.drift.part) if found.drift.sure else 0.0
-        self._drift_further(*found.parting)
-        self.settled &= max(drift, abs(found.detuning.part) if found.detuning.sure else 0.0) <= _DRIFT
+        self._drift_further(found, max(drift, abs(found.detuning.part) if found.detuning.sure else 0.0))
         unsure = self.context.undamped or self.context.growth() < 0.0
         if drift > (_DRIFT if unsure else self.limits.settled_within):
             text = f"the amplitude still changes by {found.drift.part:.1%} within the last part of the run"
@@ -166,7 +169,8 @@ class Rules(LinearRules):
             return decision
         own, wander = (Excitation.SELF_EXCITED, found.frequency), found.evidence["frequency_spread"]
         held = self._held(wander, found.frequency, found.detuning)
-        self.evidence["frequency_spread"] = (wander if held is None else held) + found.frequency_off
+        off = found.frequency_off + _KICKED[1] * self._shift * found.frequency
+        self.evidence["frequency_spread"] = min((wander if held is None else held) + off, found.frequency)
         wanders = wander > _SPREAD * found.frequency
         missed = None if wanders or harmonic >= _CYCLES_SHARE else self._missed(found.frequency, wander)
         if stick >= self.limits.stick_cycles and not missed:
@@ -226,22 +230,32 @@ class Rules(LinearRules):
         """Whether stick in a part of the cycles is stick in hardly any (0), in some, or in nearly all (2)."""
         return (part > 1.0 - self.limits.stick_cycles) + (part >= self.limits.stick_cycles)
 
-    def _drift_further(self, parted: float, left: float) -> None:
+    def _drift_further(self, found: Cycles, changed: float) -> None:
         """Whether a limit cycle that seems settled may still change, and how long a run must be to show it.
 
-        Its neighbouring cycles have `parted` by so many powers of e, and lie apart when they have by those `left`.
+        Its amplitude or frequency has `changed` by a part of itself.
         """
         slope, error = abs(self._trend), self.evidence.get("envelope_slope_error", 0.0)
         change, rate, more = slope * self._settled_seconds, self._rate, 3.0
-        if not self.settled or rate == 0.0:
+        settled, lasts, (parted, left) = self.settled, self.lasts, found.parting
+        self.settled &= changed <= _DRIFT
+        if not settled or rate == 0.0:
+            return
+        if (shift := self._shift) >= _SHIFTED:
+            step, self.settled = self.context.step * math.sqrt(0.3 * _SHIFTED / shift), False
+            text = f"this vibration settles at only {rate:.2g} 1/s, and impacts of so few steps may shift it by"
+            advice = f"take a solver.step of {step:.2g} s, or a solver.tolerance"
+            self.drifts = f"{text} {_KICKED[0] * shift:.0%}: {advice}"
             return
         if parted:
             rate, more, self.settled = parted / self._settled_seconds, left + 3.0, False
             text = f"neighbouring cycles part at {rate:.2g} 1/s, so that this vibration becomes another"
-        elif not self.lasts:
+        elif not lasts:
             text = f"this vibration may settle at only {rate:.2g} 1/s"
         elif slope > _SURE * error and change > self.limits.settled_within:
             text, self.settled = f"the vibration still changes by {change:.0%} within the settled part", False
+        elif not self.settled:
+            text = f"its amplitude or frequency still changes by {changed:.1%} within the settled part"
         else:
             return
         self.drifts = f"{text}: run at least {QUARTER * (self.duration + more / rate):.3g} s for numbers that last"
@@ -250,6 +264,9 @@ class Rules(LinearRules):
         """What speaks against self-excited vibration on smooth surfaces, where theory knows small vibrations."""
         if found.limited < self.limits.stick_cycles:
             text = f"the shoe sticks or leaves the wheel in only {found.limited:.0%} of the settled part"
+            return Decision(text, advice=_LONG)
+        if not self.settled and (creep := self._creep) > _CREEPS * found.amplitude:
+            text = f"x creeps by {creep:.2g} m in the second half, but vibrates by {found.amplitude:.2g} m only"
             return Decision(text, advice=_LONG)
         if theory.direction > 0:
             return None
@@ -265,6 +282,13 @@ class Rules(LinearRules):
             return Decision(f"{text} within the last part of the run", advice=_LONG)
         return None
 
+    @property
+    def _creep(self) -> float:
+        """Distance (m) of the means of x in the third and in the last quarter."""
+        before = replace(self.settled_part, stop=(self.settled_part.start + self.history.samples) // 2)
+        after = replace(self.settled_part, start=before.stop)
+        return abs(after.mean("x") - before.mean("x"))
+
     def decide(self) -> Decision:
         """What the first rule that applies decides."""
         rules = (self.contact, self.unmoved, self.linear, self.forced, self.died_out, self.trend, self.fed)
@@ -277,8 +301,8 @@ class Rules(LinearRules):
             short, change = self._settled_seconds < self._slowest(0.0), 0.5 * abs(self._trend) * self.duration
             if not self.lasts and (short or change > self.limits.settled_within):
                 return found.amplitude, None  # where it ends, the run does not show
-            held = self._held(found.amplitude_spread, found.amplitude, found.drift)
-            return found.amplitude, held if held is None or held < found.amplitude else None
+            spread = found.amplitude_spread + _KICKED[0] * self._shift * found.amplitude
+            return found.amplitude, self._held(spread, found.amplitude, found.drift)
         if decision.excitation is not Excitation.FORCED:
             return part.amplitude("x"), None
         if self.theory and self.parts:
@@ -298,6 +322,15 @@ class Rules(LinearRules):
             return 1.0
         forced, lasting, *_ = theory.parts(*(each[::_SPARSE] for each in self.settled_part.places()))
         return 2.0 * forced / max(float(np.ptp(lasting)), 1e-300)
+
+    @property
+    def _shift(self) -> float:
+        """Part of itself by which a step may shift a cycle: what impacts change in a cycle, over its decay in one.
+
+        z' = (1 - rT) z + kick comes to rest at z = kick/rT.
+        """
+        found, rate = self.cycles, self._rate
+        return found.kick * found.frequency / rate if found and rate > 0.0 else 0.0
 
     def _held(self, spread: float, value: float, drift: Drift) -> float | None:
         """A spread with what a drift becomes until small disturbances have changed by a factor of e."""
