@@ -45,7 +45,9 @@ def compare(coarse: Motion, fine: Motion, tolerance: float) -> tuple[float, floa
     """
     system = max(coarse.system, fine.system, key=lambda each: each.interval)
     every = (round(system.interval / each.system.interval) for each in (coarse, fine))
-    one, other = (each.rows[::n, :4].T.copy() for each, n in zip((coarse, fine), every, strict=True))
+    one, other = (
+        np.ascontiguousarray(each.rows[::n, :4].T) for each, n in zip((coarse, fine), every, strict=True)
+    )
     count = other.shape[1]
     if one.shape[1] < count:
         return 0.0, 1.0

@@ -123,7 +123,7 @@ def ladder(
         spent, failed = run.work.solve_seconds, run.work.failed
         run.work.solve_seconds = seconds = seconds + spent
         if before is not None and not failed:
-            finer.before, finer.last = finer.last, compare(before, run, wanted)[1]
+            finer.before, finer.last = finer.last, compare(before, run, math.inf)[1]
         before = before if failed else run
         opens = set(run.work.evaluators) != {"closed-form"}
         used = quadrature if nodes and opens else _Axis(0, 0.0, 0.0)
@@ -152,7 +152,8 @@ def ladder(
 
 def _shortest_span(system: System) -> float:
     """Between two knots of speed or load, s; infinite where there are none."""
-    return min(float(np.diff(each["time"]).min(initial=math.inf)) for each in (system.belt, system.load))
+    times = (each["time"] for each in (system.belt, system.load) if len(each) > 1)
+    return min((float(np.diff(each).min()) for each in times), default=math.inf)
 
 
 def _jump_error(run: Motion) -> float:

@@ -23,7 +23,7 @@ from brakecli.sweeps.early import Known, early
 from brakecli.sweeps.error_bar import left_open
 from brakecli.sweeps.floquet import Disturbances, between
 from brakecli.sweeps.growth import Sliding, has_exact_steps, sliding, stepped, with_step
-from brakecli.sweeps.sustained import lasting, settling, verdict_fades
+from brakecli.sweeps.sustained import fades_linearly, lasting, settling, verdict_fades
 from brakecli.sweeps.tables import Critical
 
 WIDEST = 1.0 / 3.0  # of the range, that an error bar with an answer may have
@@ -119,7 +119,7 @@ def search(
     def fades(value: float) -> bool | None:
         unstable = value >= found.upper if found.outcome is Outcome.FOUND else None
         steady, case = sliding_at(value), stepped(case_at(value))
-        linear, rate = steady is not None and not steady.opens, settling(steady)
+        linear, rate = steady is not None and fades_linearly(steady), settling(steady)
         # Beside stable sliding it may yet fade away, or has not yet come to where it lasts.
         times, before, longest = 1.0, cast("Verdict | Known | None", None), LONGER * case.solver.duration
         with within_range():
@@ -133,7 +133,7 @@ def search(
             verdict = verdict_of(changed(case, solver={"duration": duration}))
             answer = verdict_fades(verdict, duration, unstable, linear, rate)
             last = times >= LONGER or unstable is not False
-            if verdict is not None and answer is not None and (last or lasting(answer, before, verdict)):
+            if verdict is not None and answer is not None and (last or lasting(answer, before, verdict, linear)):
                 return answer
             times, before = 2.0 * times, verdict
         return None

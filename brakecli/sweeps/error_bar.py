@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from itertools import takewhile
 
 from brakecli.analysis.stability.modes import growth as eigenvalue_growth
 from brakecli.analysis.stability.search import bisect
@@ -21,7 +22,7 @@ NARROW = 1.1  # ratio of the ends of the bracket of that way
 STEEPER, JUMP = (
     10.0,
     0.5,
-)  # times the slope of growth around; of the change in a bracket, in an eighth of it: a fold
+)  # times the slope of growth around; of the change in a bracket, in a 32nd of it: a fold
 FOLD = 1.0 / 32.0  # of the range: least bar there, for steps move a fold, too, by an amount that is not measured
 ROUNDED = 20.0  # times the spread of growth that rounding makes in a three-layer scheme near self-locking
 
@@ -66,7 +67,15 @@ def left_open(
         if at.jumps(low, high) or _ends(at, low, high, far):
             return max(low - wide[0], wide[1] - high, FOLD * (critical.upper - critical.lower))
         stride = high - low if at.unstable(high) else low - high
-        return max(_shifted(rate, one, stride, critical, far, other) for other in OTHERS)
+
+        def peak(side: float) -> float:
+            """How far it is to the most growth, or decay, before stability changes again."""
+            values = [value for value in known if (value - low) * side > 0.0 and (value - high) * side >= 0.0]
+            values.sort(key=lambda value: abs(value - one))
+            same = takewhile(lambda value: known[value].unstable is known[values[0]].unstable, values)
+            return max(((abs(known[value].rate), abs(value - one)) for value in same), default=(0.0, 0.0))[1]
+
+        return max(_shifted(rate, one, stride, critical, far, peak, other) for other in OTHERS)
     if known[one].noise:
         rounded = ROUNDED if found and found.system.scheme.LAG and not exact else 1.0
         hidden = rounded * max(known[one].spread, known[other].spread)
@@ -90,7 +99,7 @@ def _ends(at: Disturbances, low: float, high: float, steep: float) -> bool:
     whole, below = change(low, high), at.unstable(low)
     if whole <= STEEPER * steep * (high - low):
         return False
-    return change(*bisect(lambda value: at.unstable(value) is below, low, high, halvings=3)) > JUMP * whole
+    return change(*bisect(lambda value: at.unstable(value) is below, low, high, halvings=5)) > JUMP * whole
 
 
 def _to_eigenvalues(at: Disturbances, low: float, high: float, critical: Critical) -> float:
@@ -130,12 +139,13 @@ def _shifted(
     stride: float,
     critical: Critical,
     steep: float,
+    peak: Callable[[float], float],
     other: tuple[float, float, float],
 ) -> float:
     """How far from a value growth with another step begins: growing strides, then bisection.
 
     `rate`: the growth at a value with the step divided. The given stride leads to more growth; the first one
-    crosses where growth is as `steep` as given.
+    crosses where growth is as `steep` as given, and is not beyond the `peak` on its side.
     """
     (finer, part, times), side = other, 1.0
 
@@ -147,7 +157,7 @@ def _shifted(
         return math.inf
     side = math.copysign(1.0, -stride * here)
     bound = critical.upper - value if side > 0.0 else value - critical.lower
-    way = min(max(abs(stride), BEYOND * abs(here) / steep if steep else 0.0), bound)
+    way = min(max(abs(stride), min(BEYOND * abs(here) / steep if steep else 0.0, peak(side))), bound)
     while (there := excess(way)) * here > 0.0 and way < bound:
         way = min(3.0 * way, bound)
     if math.isinf(there):

@@ -10,17 +10,29 @@ from itertools import combinations, pairwise
 
 import numpy as np
 
-from brakecli.analysis.stability.modes import is_undamped, modes
+from brakecli.analysis.stability.modes import is_undamped
 from brakecli.analysis.stability.search import bisect
 from brakecli.solver.links import natural_frequencies
 from brakecli.sweeps.growth import DEPARTED, Growth, Sliding, growth
-from brakecli.sweeps.periodic import LONGEST, Floats, Orbit, Segments, common_period, lyapunov, orbit
+from brakecli.sweeps.periodic import (
+    LONGEST,
+    Floats,
+    Orbit,
+    Segments,
+    common_period,
+    lyapunov,
+    natural,
+    orbit,
+    shift,
+)
 
 SEGMENT = 10.0  # periods of the slowest motion
 MOST_SEGMENTS = 250
 SCANNED = 9  # values of the parameter, both ends among them, between which a change is looked for by runs
 PARTS = 4  # of each interval between them, where surfaces open in a run
-REFINED = 3  # times that values are added beside one at which stability is nearly lost or regained
+REFINED = 4  # times that values are added beside one at which stability is nearly lost or regained
+BUMP = 20.0  # how much nearer to zero that rate may be than it changes there
+SAME = 1e-3  # of the range: nearer to a value no other one is put
 MOST_RESONANCES, HALVINGS = 32, 12  # places where values are put, and how exactly
 BESIDE = 0.01  # of a frequency: how far beside such a place others are put
 STRONGEST = 6  # waves of the wheel of which two may act together
@@ -28,7 +40,9 @@ STRONGEST = 6  # waves of the wheel of which two may act together
 NEUTRAL = 1e-5
 SHORTEST, FINEST = 16, 256  # parts of the way from a known motion to the next that are tried; with dashpots
 LARGEST_PART, LEAST_PART = 0.25, 0.015  # of the waves' amplitudes that is added at once to a motion
-RELAXED = 100.0  # periods of the slowest motion after which a stable motion has come near its orbit
+RELAXED = (
+    100.0  # periods of the slowest motion after which a stable motion has come near its natural, orbit, turning
+)
 CLOSE = 0.05  # of the size of a motion: how far its neighbour may be from where it is looked for
 MISSED = 3  # searches for a motion that grows out of steady sliding that may fail
 
@@ -75,22 +89,29 @@ class Disturbances:
         self.scan(values[::PARTS])
         if not (self.periodic or any(each and each.opened for each in map(self.at, values[::PARTS]))):
             return sorted({*values[::PARTS], *between(lower, upper, windows)})
-        values = sorted({*values, *self.resonances(values)})
         self.scan(values)
         self._go_on(values)
         for _ in range(REFINED):
-            added = set[float]()
+            known, least = np.array(values), SAME * (upper - lower)
+            added = {place for place in self.resonances(values) if np.abs(known - place).min() > least}
             for triple in zip(values, values[1:], values[2:], strict=False):
-                rates = [measured.rate for measured in map(self.at, triple) if measured]
+                rates = [measured.rate - measured.noise for measured in map(self.at, triple) if measured]
                 if len(rates) < len(triple) or min(rates) * max(rates) <= 0.0:
                     continue
                 least = min(map(abs, rates))
-                if least == abs(rates[1]) and least < 2.0 * np.ptp(rates):
+                if least == abs(rates[1]) and least < BUMP * np.ptp(rates):
                     added |= {0.5 * (low + high) for low, high in pairwise(triple)}
             values = sorted({*values, *added})
             self.scan(sorted(added))
         self._go_on(values)
-        return values
+        return sorted({*values, *(place for pair in pairwise(values) for place in self._hidden(*pair))})
+
+    def _hidden(self, low: float, high: float) -> list[float]:
+        """What was seen on the way from a motion that loses and regains stability before another one follows."""
+        branch = self.branches.get(low)
+        own = sorted(place for place in self.branches if low < place < high and self.branches[place] == branch)
+        answers = [self.orbits[place].rate > 0.0 for place in (low, *own) if place in self.orbits]
+        return own if any(answers) and not (answers[0] or answers[-1]) else []
 
     def jumps(self, low: float, high: float) -> bool:
         """Whether the motions at two values are not known to be one; without dashpots that does not count."""
@@ -132,18 +153,19 @@ class Disturbances:
         """Between the values: where a wave of the wheel, its second or third harmonic, or the sum or difference of
         two waves passes at twice a natural frequency, or at the sum or the difference of both.
 
-        There it may feed a vibration, in a narrow range of the parameter. An opening pad makes the harmonics, and
-        its stiffness is not quite the mean one: where there are few such places, those beside them are added.
+        There it may feed a vibration, in a narrow range of the parameter. An opening pad makes the harmonics. Its
+        stiffness is not quite the mean one: natural frequencies are those of the motions at the values.
         """
+        followed = [(value, self.sliding_at(value)) for value in values if value in self.branches]
+        shifts = [(value, shift(each, self.orbits[value])) for value, each in followed if each]
+        known = [(value, *ratios) for value, ratios in shifts if ratios is not None]
 
         def away(value: float) -> Floats | None:
             """Ratios, less one: of the waves first, of what two of the strongest make, of third harmonics."""
             if (found := self.sliding_at(value)) is None:
                 return None
-            known = modes(found.system.coefficients, found.stiffness, found.grip)
-            exact = sorted(mode.frequency for mode in known)
-            turned = math.pi * found.system.step  # the schemes vibrate too slowly, by the trapezoidal rule
-            first, second = np.arctan(turned * np.array(exact[-2:])) / turned
+            where, *faster = zip(*known, strict=True) if known else ((value,), (1.0,), (1.0,))
+            first, second = natural(found) * [np.interp(value, where, each) for each in faster]
             wheel, speed = found.system.wheel, abs(found.system.belt_speed)
             strongest = speed * wheel.turns[np.argsort(-np.abs(wheel.g))[:STRONGEST]]
             pairs = [made for a, b in combinations(strongest, 2) for made in (a + b, abs(a - b))]

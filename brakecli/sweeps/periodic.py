@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from brakecli.analysis.stability.modes import first_order, modes, stiffness_matrix
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.motion import solve
 from brakecli.solver.quantities import Failure
@@ -29,6 +30,7 @@ CLOSED = 1e-7  # largest gap, in static compressions, between the end of a segme
 ITERATIONS = 10
 SAMPLES = 64  # of a segment, or half as many as steps where they are fewer
 BATCHES, BATCH, TRANSIENT = 8, 4, 16  # batches of a long run, segments of a batch, segments before the first
+HIDDEN = 1e-9  # ratio of the least multiplier to the largest, below which rounding hides its vector
 CERTAIN = 3.5  # standard errors of the mean of eight batches: 99 % of Student's distribution
 
 Floats = NDArray[np.float64]
@@ -220,3 +222,40 @@ def log_radius(maps: Floats) -> float:
             return -math.inf
         product, log_size = product / size, log_size + math.log(size)
     return log_size + math.log(max(float(np.abs(np.linalg.eigvals(product)).max()), 1e-300))
+
+
+def natural(found: Sliding) -> Floats:
+    """The natural frequencies (Hz) of the scheme at its step with the mean stiffness; 0 where there is none."""
+    turned = math.pi * found.system.step  # the schemes vibrate too slowly, by the trapezoidal rule
+    known = modes(found.system.coefficients, found.stiffness, found.grip)
+    return np.arctan(turned * np.array(sorted(mode.frequency for mode in known)[-2:])) / turned
+
+
+def shift(found: Sliding, forced: Orbit) -> Floats | None:
+    """How much faster disturbances of a motion vibrate than with the mean stiffness; None where rounding hides it.
+
+    For each mode the disturbance nearest to it is followed. In a segment its angle in the plane of the mode
+    differs from the expected one by less than half a turn.
+    """
+    c, scales = found.system.coefficients, forced.segments.scales
+    motion = first_order(c, stiffness_matrix(c, found.stiffness, found.grip) / c.m)
+    values, vectors = np.linalg.eig(motion * scales / scales[:, None])
+    modal = np.argsort(values.imag)[-2:]
+    product = np.eye(4)
+    for each in forced.maps:
+        product = each @ product
+        product /= np.abs(product).max()
+    multipliers, way = np.linalg.eig(product)
+    sizes = np.abs(multipliers)
+    if not values[modal].imag.min() > 0.0 or sizes.min() < HIDDEN * sizes.max():
+        return None
+    planes, ways = np.linalg.inv(vectors)[modal], [way]
+    for each in forced.maps:
+        ways.append(each @ ways[-1])
+    seen = planes @ np.array([each / np.linalg.norm(each, axis=0) for each in ways])
+    nearest = np.abs(seen).mean(axis=0).argmax(axis=1)
+    turned = np.array([seen[:, k, which] for k, which in enumerate(nearest)])
+    expected = 2.0 * math.pi * natural(found) * forced.segments.time / len(forced.maps)
+    more = np.angle(turned[:, 1:] / turned[:, :-1] * np.exp(-1j * expected)[:, None])
+    ratios: Floats = 1.0 + more.mean(axis=1) / expected
+    return ratios

@@ -11,19 +11,26 @@ from brakecli.sweeps.growth import Sliding
 STEADY = 0.01  # relative change of the amplitude in a run twice as long that shows that a vibration lasts
 
 
-def lasting(answer: bool, before: Verdict | Known | None, verdict: Verdict | Known) -> bool:
+def lasting(answer: bool, before: Verdict | Known | None, verdict: Verdict | Known, linear: bool) -> bool:
     """Whether the answer of a run beside stable sliding is that of a longer one, too.
 
-    It is once the shoe has come to rest or moves by linear equations, where its orbit is known, and where the
+    It is once the shoe has come to rest or moves by `linear` equations, where its orbit is known, and where the
     vibration is the same as in a run half as long.
     """
     if isinstance(verdict, Known):
         return True
     if answer:
-        return verdict.regime is Regime.DAMPED or verdict.stick_fraction + verdict.contact_loss_fraction == 0.0
+        free = verdict.stick_fraction + verdict.contact_loss_fraction == 0.0
+        return verdict.regime is Regime.DAMPED or (linear and free)
     if before is None or before.regime is not verdict.regime:
         return False
     return abs(before.amplitude - verdict.amplitude) <= STEADY * verdict.amplitude
+
+
+def fades_linearly(steady: Sliding) -> bool:
+    """Whether a motion that neither sticks nor lifts off follows linear equations, by which it does not grow."""
+    c, k = steady.system.coefficients, steady.stiffness
+    return not (steady.opens or steady.forced) and eigenvalue_growth(c, k, steady.grip) <= 0.0
 
 
 def settling(steady: Sliding | None) -> float:
@@ -46,16 +53,16 @@ def verdict_fades(
     """
     if verdict is None or verdict.contact_loss_fraction == 1.0 or verdict.stick_fraction == 1.0:
         return None
-    limited = verdict.stick_fraction > 0.0 or verdict.contact_loss_fraction > 0.0
-    if unstable or (unstable is False and linear and not limited):
+    linear &= verdict.stick_fraction + verdict.contact_loss_fraction == 0.0
+    if unstable or (unstable is False and linear):
         return not unstable
     if verdict.regime is not Regime.UNDECIDED:
         return verdict.regime is Regime.DAMPED
     slope, error = (verdict.evidence.get(f"envelope_slope{what}", 0.0) for what in ("", "_error"))
     slope = slope if abs(slope) > 3.0 * error else 0.0
     if isinstance(verdict, Verdict) and verdict.decision.second_run:  # the roughness may keep it up as well
-        return True if slope < 0.0 and not limited else None
+        return True if slope < 0.0 and linear else None
     if slope < 0.0:
-        return None if limited and slope * duration > -1.0 else True
-    kept = limited or slope > 0.0
+        return True if linear or slope * duration < -1.0 else None
+    kept = not linear or slope > 0.0
     return False if kept and rate * (duration - verdict.settled_from) >= 1.0 else None

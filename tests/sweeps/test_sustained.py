@@ -7,6 +7,7 @@ import pytest
 from brakecli.sweeps.critical import Outcome
 from tests.campaign import campaign
 from tests.sweeps.test_critical import found
+from tests.sweeps.test_windows import FOLDS
 
 KICKED: dict[
     str, Any
@@ -127,6 +128,16 @@ def test_slow_decay_or_what_is_forced_on_a_rough_pad_is_no_hysteresis(
 ) -> None:
     answer = found(tables, *ends, key, tolerance=tolerance)
     assert answer.sustained is None or answer.sustained > fades_up_to - tolerance
+
+
+@campaign
+def test_what_lasts_beside_a_motion_that_opens_does_not_fade() -> None:
+    """Full contact loses stability at 1.558. Above, runs of ten durations and more of another integrator end in a
+    vibration of the shoe's own, also at 1.57, although a motion that opens is stable to 1.89.
+    """
+    answer = found(FOLDS["over a gap"], 1.2, 2.4, tolerance=0.02)
+    assert answer.outcome is Outcome.FOUND
+    assert answer.sustained is None or answer.sustained < 1.65
 
 
 @pytest.mark.parametrize(

@@ -207,6 +207,60 @@ FOLDS: dict[str, dict[str, Any]] = {
         },
         "solver": {"duration": 0.69, "scheme": "two-layer", "step": 0.00011, "theta": [0.55, 0.5]},
     },
+    "beside": {
+        "shoe": {"mass": 22.35},
+        "wheel": {"radius": 0.33, "angular_speed": -9.931},
+        "link1": {"stiffness": 8091000.0, "damping": 78.07, "angle_deg": -1.199},
+        "link2": {"stiffness": 36830000.0, "damping": 120.5, "angle_deg": -18.08},
+        "load": {"force": 241.5},
+        "friction": {"coefficient": 0.1},
+        "contact": {"half_length": 0.015, "stiffness": 531400000.0},
+        "roughness": {
+            "wheel": {"amplitudes": [4.244e-06, 6.172e-06], "wavelengths": [0.051, 0.008]},
+            "shoe": {"amplitudes": [1.872e-06], "wavelengths": [0.037]},
+        },
+        "solver": {"duration": 0.3, "scheme": "two-layer", "step": 5e-05, "theta": [0.6, 0.5]},
+    },
+    "narrow": {
+        "shoe": {"mass": 16.26},
+        "wheel": {"radius": 0.33, "angular_speed": -13.6},
+        "link1": {"stiffness": 1959000.0, "damping": 0.0, "angle_deg": 0.0},
+        "link2": {"stiffness": 2230000.0, "damping": 0.0, "angle_deg": -4.532},
+        "load": {"force": 340.4},
+        "friction": {"coefficient": 0.7902},
+        "contact": {"half_length": 0.015, "stiffness": 21630000.0},
+        "roughness": {
+            "wheel": {
+                "amplitudes": [5.649e-05, 3.036e-05],
+                "wavelengths": [0.021, 0.044],
+                "phases_deg": [198.5, 277.9],
+            },
+            "shoe": {"amplitudes": [1.926e-05], "wavelengths": [0.013]},
+        },
+        "solver": {"duration": 0.97, "scheme": "two-layer", "step": 8.1e-05, "theta": [0.52, 0.5]},
+    },
+    "full contact": {
+        "shoe": {"mass": 8.084},
+        "wheel": {"radius": 0.5, "angular_speed": 5.279},
+        "link1": {"stiffness": 17320000.0, "damping": 67.79, "angle_deg": 0.0},
+        "link2": {"stiffness": 46910000.0, "damping": 39.62, "angle_deg": 24.04},
+        "load": {"force": 2172.0},
+        "friction": {"coefficient": 0.1},
+        "contact": {"half_length": 0.01, "stiffness": 938000000.0},
+        "roughness": {"wheel": {"amplitudes": [7.67e-06], "wavelengths": [0.073], "phases_deg": [356.6]}},
+        "solver": {"duration": 0.2, "scheme": "two-layer", "step": 2.6e-05, "theta": [0.55, 0.55]},
+    },
+    "no dashpots": {
+        "shoe": {"mass": 75.84},
+        "wheel": {"radius": 0.5, "angular_speed": -9.686},
+        "link1": {"stiffness": 5510000.0, "damping": 0.0, "angle_deg": -13.95},
+        "link2": {"stiffness": 11850000.0, "damping": 0.0, "angle_deg": -14.6},
+        "load": {"force": 499.3},
+        "friction": {"coefficient": 0.1},
+        "contact": {"half_length": 0.015, "stiffness": 135600000.0},
+        "roughness": {"wheel": {"amplitudes": [3.096e-06], "wavelengths": [0.085], "phases_deg": [359.4]}},
+        "solver": {"duration": 0.96, "scheme": "three-layer", "step": 0.00027, "theta": [0.3, 0.45, 0.25]},
+    },
     "stable again": {
         "shoe": {"mass": 1.973},
         "wheel": {"radius": 0.5, "angular_speed": -8.699},
@@ -274,6 +328,7 @@ def test_a_motion_that_full_contact_would_have_does_not_count_where_it_would_ope
     ("name", "key", "range_", "truth", "most"),
     [  # its weights take away 0.5 1/s, more than the growth
         ("weights that damp", "shoe__mass", (6.304, 39.4), [8.82, 17.35, 28.02, 29.85, 39.4], 0.6),
+        ("beside", "friction__coefficient", (0.0, 1.1), [0.67342, 0.68719, 0.74487, 1.1], 0.005),
         ("stable again", "link2__stiffness", (8.21e5, 2.791e6), [1.7233e6, 1.8384e6, 1.90733e6], 7e4),
     ],
 )
@@ -285,3 +340,25 @@ def test_no_window_of_a_motion_that_is_followed_is_hidden(
     ends, errors = (np.ravel(each)[-len(truth) :] for each in (answer.windows, answer.window_errors))
     assert (np.abs(ends - truth) <= errors).all()
     assert (errors < most).all()
+
+
+def test_the_bar_of_a_narrow_window_does_not_reach_for_the_next_one() -> None:
+    """Another integrator finds it from 898.018 to 898.873 kN/m, a 4800th of the range wide."""
+    answer = followed("narrow", "link1__stiffness", (7.836e5, 4.898e6))
+    ends, errors = np.array(answer.windows[0]), np.array(answer.window_errors[0])
+    assert (np.abs(ends - [898018.0, 898873.0]) <= errors).all()
+    assert (errors < 5e3).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "upper", "critical"), [("full contact", 1.9, 0.91319), ("no dashpots", 0.94, 0.46959)]
+)
+def test_in_full_contact_nothing_but_the_linear_motion_counts(name: str, upper: float, critical: float) -> None:
+    """Fast growth saturates, and without dashpots large motions lie beside it. By eigenvalues sliding is unstable
+    from its loss on to the end of the range.
+    """
+    answer = followed(name, "friction__coefficient", (0.0, upper))
+    [(lower, end)] = answer.windows
+    assert answer.error is not None
+    assert abs(lower - critical) <= answer.error < 0.02 * upper
+    assert end == upper

@@ -53,7 +53,8 @@ class Part:
 
     def fraction(self, state: ContactState) -> float:
         """Part of the samples in a state of the contact."""
-        return sum(np.count_nonzero(piece == state) for piece in self.pieces("state")) / (self.stop - self.start)
+        number = int(state)  # which NumPy compares in half the time
+        return sum(np.count_nonzero(piece == number) for piece in self.pieces("state")) / (self.stop - self.start)
 
     def extremes(self, name: str) -> tuple[float, float]:
         """Least and largest value of a variable."""

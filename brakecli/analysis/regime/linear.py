@@ -106,8 +106,9 @@ class Linear:
         rows = np.concatenate([begins.imag, begins.real]).T.astype(np.float32)
         few = rows.reshape(-1, 32, rows.shape[1])  # products so small wake no threads
         x = (few @ np.concatenate([turns.real, turns.imag], dtype=np.float32)).reshape(len(rows), -1)
-        high, low = np.argsort(x.max(axis=1))[-_HIGHEST:], np.argsort(x.min(axis=1))[:_HIGHEST]
-        tops = begins[:, high] * turns[:, x[high].argmax(axis=1)], begins[:, low] * turns[:, x[low].argmin(axis=1)]
+        each, ups, downs = np.arange(len(x)), x.argmax(axis=1), x.argmin(axis=1)  # in half the time of max and min
+        high, low = np.argsort(x[each, ups])[-_HIGHEST:], np.argsort(x[each, downs])[:_HIGHEST]
+        tops = begins[:, high] * turns[:, ups[high]], begins[:, low] * turns[:, downs[low]]
         found = [(top.T @ near).imag for top in tops]
         return float(found[0].max()), float(found[1].min())
 

@@ -39,8 +39,9 @@ def growth_with_slopes(
     Each wave passes at a frequency (rad/s). Its `slopes` (N/m) are K s = Re Σ slopes e^{iΩt} at rest; the forced
     motion x = Im Σ X e^{iΩt} moves its phase by `bends` = ω X. `p` is the first column of P.
     """
-    scale = np.repeat([float(np.abs(np.linalg.eigvals(a)).max()) or 1.0, 1.0], 2)  # of position beside velocity
-    a, p = scale[:, None] * a / scale, scale * p / scale[0]
+    largest = float(np.abs(np.linalg.eigvals(a)).max()) or 1.0
+    scale = np.array([largest, largest, 1.0, 1.0])  # of position beside velocity
+    a, p = scale[:, None] * a / scale, scale * p / largest
     values, vectors = np.linalg.eig(a)
     plain, residues = float(values.real.max()), None
     with suppress(np.linalg.LinAlgError):
@@ -56,7 +57,7 @@ def growth_with_slopes(
     few = min(len(steepest), _MOST_WAVES)
     kept, left = steepest[:few], float(effects[steepest[few:]].sum())
     order = _order(few)
-    omega, bends = frequencies[kept], bends[np.ix_(kept, kept)]
+    omega, bends = frequencies[kept], bends[kept[:, None], kept]
     moved = [0.5 * slopes[kept], *(0.25 * slopes[kept] * each for each in bends.T)]  # cos(θ + δ) = cos θ - δ sin θ
     parts = np.concatenate([*moved, *(-0.25 * slopes[kept] * each for each in bends.conj().T)])
     answer = None if residues is None else (values, vectors[0] * residues)
@@ -93,7 +94,21 @@ def _pattern(waves: int, order: int) -> tuple[Any, Any, Any]:
     place = {tuple(each): i for i, each in enumerate(known.tolist())}
     sums = np.array(_sums(waves, order)).reshape(-1, waves)
     between = [[place.get(tuple(each), len(known)) for each in (one - sums).tolist()] for one in sums]
-    return sums.astype(float), np.eye(len(known) + 1)[:, where.ravel()], np.array(between)
+    return sums.astype(float), np.eye(len(known) + 1, dtype=complex)[:, where.ravel()], np.array(between)
+
+
+@cache
+def _around(waves: int, order: int) -> tuple[Any, Any, Any, Any, Any]:
+    """The sums beside 0, and which changes lie between two of them, from them to 0, from 0 to them, and at 0."""
+    sums, _, between = _pattern(waves, order)
+    own, others = len(sums) // 2, np.delete(np.arange(len(sums)), len(sums) // 2)
+    return (
+        sums[others],
+        between[np.ix_(others, others)],
+        between[own, others],
+        between[others, own],
+        between[own, own],
+    )
 
 
 def _fastest(
@@ -101,12 +116,11 @@ def _fastest(
 ) -> tuple[float, Complex]:
     """Growth rate (1/s) with sums of at most so many frequencies; the modes, with which the next order begins."""
     sums, belongs, between = _pattern(len(omega), order)
-    coupling = (belongs @ np.concatenate([parts, parts.conj()]))[between]
-    turns = 1j * (sums @ omega)
+    changes = belongs @ np.concatenate([parts, parts.conj()])
     with suppress(np.linalg.LinAlgError):
-        if answer is not None and (found := _beside(a, p, turns, coupling, *answer, begin)) is not None:
+        if answer is not None and (found := _beside(omega, changes, order, *answer, begin)) is not None:
             return float(found.real.max()), found
-    size = len(sums)
+    size, coupling, turns = len(sums), changes[between], 1j * (sums @ omega)
     matrix = np.kron(coupling, np.outer(p, [1.0, 0.0, 0.0, 0.0])) + np.kron(np.eye(size), a)
     matrix = matrix - np.kron(np.diag(turns), np.eye(4))
     values, vectors = np.linalg.eig(matrix)
@@ -120,7 +134,7 @@ def _fastest(
 
 
 def _beside(
-    a: Any, p: Any, turns: Any, coupling: Any, values: Complex, residues: Complex, now: Complex
+    omega: Any, changes: Complex, order: int, values: Complex, residues: Complex, now: Complex
 ) -> Complex | None:
     """The modes, from what they are nearly; None where one is not alone, so that all eigenvalues are needed.
 
@@ -128,11 +142,10 @@ def _beside(
     where Σ' is the sum of residues/(λ - values) over the other values. The part of an eigenvector at the sum 0 is
     1/(1 - f') where λ = f(λ).
     """
-    own, exact = len(turns) // 2, _EXACT * np.abs(values).max()
-    others = np.arange(1, len(turns))
-    others[:own] -= 1
-    turns, unit = turns[others, None], np.eye(len(others))
-    block, out, back = coupling[others[:, None], others], coupling[own, others], coupling[others, own]
+    exact = _EXACT * np.abs(values).max()
+    sums, *among = _around(len(omega), order)
+    turns, unit = (1j * (sums @ omega))[:, None], np.eye(len(sums))
+    block, out, back, mean = (changes[each] for each in among)
     before, after, places = np.zeros(0, complex), np.zeros(0, complex), np.arange(len(now))
     for _ in range(_MOST_STEPS):
         distance = values - (now[:, None, None] + turns)
@@ -140,7 +153,7 @@ def _beside(
             return None
         response = (residues / distance).sum(axis=-1)
         inner = unit + response[:, :, None] * block
-        stiffness = coupling[own, own] - np.linalg.solve(inner, (response * back)[:, :, None])[:, :, 0] @ out
+        stiffness = mean - np.linalg.solve(inner, (response * back)[:, :, None])[:, :, 0] @ out
         away = now[:, None] - values
         nearest = np.abs(away).argmin(axis=1)
         away[places, nearest] = math.inf
