@@ -40,9 +40,7 @@ STRONGEST = 6  # waves of the wheel of which two may act together
 NEUTRAL = 1e-5
 SHORTEST, FINEST = 16, 256  # parts of the way from a known motion to the next that are tried; with dashpots
 LARGEST_PART, LEAST_PART = 0.25, 0.015  # of the waves' amplitudes that is added at once to a motion
-RELAXED = (
-    100.0  # periods of the slowest motion after which a stable motion has come near its natural, orbit, turning
-)
+RELAXED = 100.0  # periods of the slowest motion after which a stable motion has come near its orbit
 CLOSE = 0.05  # of the size of a motion: how far its neighbour may be from where it is looked for
 MISSED = 3  # searches for a motion that grows out of steady sliding that may fail
 
