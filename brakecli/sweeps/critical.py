@@ -271,7 +271,7 @@ def _by_simulation(critical: Critical, sliding_at: SlidingAt, exact: Search) -> 
     """Where the growth of small disturbances passes zero, by Brent's method, between two values on either side."""
     at = Disturbances(sliding_at)
     values = at.scanned(critical.lower, critical.upper, exact.windows)
-    linear = not any(measured.opened for measured in at.known.values() if measured)
+    by_runs = not any(measured.opened or measured.exact for measured in at.known.values() if measured)
 
     @cache
     def edge(low: float, high: float) -> Edge:
@@ -279,7 +279,7 @@ def _by_simulation(critical: Critical, sliding_at: SlidingAt, exact: Search) -> 
         same = exact.columns["lower" if found.lost else "upper"]
         away = min((abs(each - found.value) for each in same), default=0.0)
         # Eigenvalues of linear motions are exact: what the bar does not hold is rounding near self-locking.
-        return found._replace(error=max(found.error, 1.001 * away)) if linear else found
+        return found._replace(error=max(found.error, 1.001 * away)) if by_runs else found
 
     found = _answer(critical, sliding_at, at.unstable, values, edge)
     return found._replace(bias=exact.bias, eigenvalue=exact.eigenvalue)

@@ -40,9 +40,7 @@ STRONGEST = 6  # waves of the wheel of which two may act together
 NEUTRAL = 1e-5
 SHORTEST, FINEST = 16, 256  # parts of the way from a known motion to the next that are tried; with dashpots
 LARGEST_PART, LEAST_PART = 0.25, 0.015  # of the waves' amplitudes that is added at once to a motion
-RELAXED = (
-    100.0  # periods of the slowest motion after which a stable motion has come near its natural, orbit, turning
-)
+RELAXED = 100.0  # periods of the slowest motion after which a stable motion has come near its orbit
 CLOSE = 0.05  # of the size of a motion: how far its neighbour may be from where it is looked for
 MISSED = 3  # searches for a motion that grows out of steady sliding that may fail
 RESUMED = 8  # motions that may be found to go on beyond where they seemed to end
@@ -89,7 +87,7 @@ class Disturbances:
         self.periodic = any(found.forced for found in map(self.sliding_at, values) if found)
         self.least = SAME * (upper - lower)
         self.scan(values[::PARTS])
-        if not any(measured and measured.opened for measured in map(self.at, values[::PARTS])):
+        if not (self.periodic or any(each and each.opened for each in map(self.at, values[::PARTS]))):
             return sorted({*values[::PARTS], *between(lower, upper, windows)})
         self.scan(values)
         self._go_on(values)
@@ -160,7 +158,7 @@ class Disturbances:
         was, now = self.branches.get(value), self.branches[before]
         if was is not None and _same(forced, self.orbits[value]):
             self.branches = {at: now if each == was else each for at, each in self.branches.items()}
-        self.orbits[value], self.known[value] = forced, replace(known, rate=forced.rate)
+        self.orbits[value], self.known[value] = forced, Growth(forced.rate, 0.0, 0.0, opened=True)
         self.branches[value] = now
         return True
 
@@ -213,18 +211,41 @@ class Disturbances:
         return found if 3 * len(found) > MOST_RESONANCES else [*found, *places(-BESIDE), *places(BESIDE)]
 
     def _measured(self, value: float, found: Sliding) -> Growth | None:
-        # Without dashpots the motion nearest to steady sliding counts: one in full contact, where there is one.
         damped = not is_undamped(found.system.coefficients)
-        if not found.forced and not (self.periodic and damped):
-            return growth(found)
-        if (period := common_period(found.system)) is None:
-            plain = None if found.modulated else growth(found)
-            return plain if plain and not plain.opened else lyapunov(found, plain)
+        slow, fast = natural_frequencies(found.system.coefficients, found.stiffness)
+        period, level = common_period(found.system), NEUTRAL * 2.0 * math.pi * (slow or fast)
+        noise, exact = 0.0 if damped else level, None
+        if found.linear:
+            theory = found.linear.with_slopes()  # it leaves much open with many waves
+            if theory.known_to < max(level, abs(theory.mode.growth - noise)):
+                exact = Growth(theory.mode.growth, theory.known_to, noise, exact=True)
+        if not (self.periodic or found.forced):
+            return exact or growth(found)
+        if period is None:
+            plain = None if exact or found.modulated else growth(found)
+            return exact or (plain if plain and not plain.opened else lyapunov(found, plain))
+        forced, full = self._found(value, found, period, damped)
+        if forced is not None:
+            self.orbits[value] = forced
+        if exact and (full or forced is None or not damped):
+            return exact
+        return Growth(forced.rate, 0.0, noise, opened=True) if forced else None
+
+    def _found(self, value: float, found: Sliding, period: float, damped: bool) -> tuple[Orbit | None, bool]:
+        """The periodic motion at a value, and whether it is the one of linear theory.
+
+        That one counts wherever it lasts, unless dashpots make a stable one beside it that is followed.
+        """
         place, near = self._near(value)
         low, high = sorted((place, value))
         gap = any(lost is None and low < other < high for other, lost in self.known.items())
-        forced = None if gap else self._followed(value, found, period)
+        own = self._in_full_contact(value, found, period) if found.linear or not damped else None
+        forced = own if own and near and _same(own, near) else None
+        if forced is None and not gap and (damped or own is None):
+            forced = self._followed(value, found, period)
         followed = forced is not None
+        if own and (forced is None or forced.rate >= 0.0 or _same(own, forced)):
+            forced, followed = own, followed and forced is not None and _same(own, forced)
         if forced is None and damped:
             plain = growth(found) if near is not None and near.rate > 0.0 else None
             if plain is None or plain.rate <= 0.0:
@@ -232,16 +253,20 @@ class Disturbances:
         if forced is None and self.missed < MISSED:
             forced = self._grown(value, found, period)
             self.missed += forced is None
-        if forced is None:
-            return None
-        if damped:
+        if forced and damped:
             place, near = (place, near) if followed else self._near(value)
             goes_on = followed or (near is not None and _same(forced, near))
             self.branches[value] = self.branches.get(place, value) if goes_on else value
-        self.orbits[value] = forced
-        slow, fast = natural_frequencies(found.system.coefficients, found.stiffness)
-        noise = 0.0 if damped else NEUTRAL * 2.0 * math.pi * (slow or fast)
-        return Growth(forced.rate, 0.0, noise, opened=True)
+        return forced, forced is own
+
+    def _in_full_contact(self, value: float, found: Sliding, period: float) -> Orbit | None:
+        """The periodic motion beside that of linear theory; None where the pad lifts off or sticks too much."""
+        segments, (_, near) = self._segments(value, found, period), self._near(value)
+        count = len(segments.systems)
+        expected = found.in_full_contact(np.arange(count) * period / count) / segments.scales
+        forced = orbit(segments, expected, near.maps if near else None)
+        close = forced is not None and np.abs(forced.states - expected).max() <= CLOSE * forced.size
+        return forced if close else None
 
     def _near(self, value: float) -> tuple[float, Orbit | None]:
         """The nearest motion; where one side is stable and the other is not, the stable one: it may go on."""
