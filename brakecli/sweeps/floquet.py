@@ -6,25 +6,22 @@ The motion is stable while all its multipliers lie inside the unit circle; `peri
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from itertools import combinations, pairwise
+from itertools import pairwise
 
 import numpy as np
 
 from brakecli.analysis.stability.modes import is_undamped
-from brakecli.analysis.stability.search import bisect
 from brakecli.solver.links import natural_frequencies
 from brakecli.sweeps.growth import DEPARTED, Growth, Sliding, growth
 from brakecli.sweeps.periodic import (
     LONGEST,
-    Floats,
     Orbit,
     Segments,
     common_period,
     lyapunov,
-    natural,
     orbit,
-    shift,
 )
+from brakecli.sweeps.resonances import resonances
 
 SEGMENT = 10.0  # periods of the slowest motion
 MOST_SEGMENTS = 250
@@ -33,9 +30,6 @@ PARTS = 4  # of each interval between them, where surfaces open in a run
 REFINED = 4  # times that values are added beside one at which stability is nearly lost or regained
 BUMP = 20.0  # how much nearer to zero that rate may be than it changes there
 SAME = 1e-3  # of the range: nearer to a value no other one is put
-MOST_RESONANCES, HALVINGS = 32, 12  # places where values are put, and how exactly
-BESIDE = 0.01  # of a frequency: how far beside such a place others are put
-STRONGEST = 6  # waves of the wheel of which two may act together
 # Damping ratio, of the slowest motion, that would stop a growth which counts as none without dashpots
 NEUTRAL = 1e-5
 SHORTEST, FINEST = 16, 256  # parts of the way from a known motion to the next that are tried; with dashpots
@@ -93,7 +87,9 @@ class Disturbances:
         self._go_on(values)
         for _ in range(REFINED):
             known = np.array(values)
-            added = {place for place in self.resonances(values) if np.abs(known - place).min() > self.least}
+            followed = {value: self.orbits[value] for value in values if value in self.branches}
+            places = resonances(self.sliding_at, followed, values)
+            added = {place for place in places if np.abs(known - place).min() > self.least}
             for triple in zip(values, values[1:], values[2:], strict=False):
                 rates = [measured.rate - measured.noise for measured in map(self.at, triple) if measured]
                 if len(rates) < len(triple) or min(rates) * max(rates) <= 0.0:
@@ -161,54 +157,6 @@ class Disturbances:
         self.orbits[value], self.known[value] = forced, Growth(forced.rate, 0.0, 0.0, opened=True)
         self.branches[value] = now
         return True
-
-    def resonances(self, values: list[float]) -> list[float]:
-        """Between the values: where a wave of the wheel, its second or third harmonic, or the sum or difference of
-        two waves passes at twice a natural frequency, or at the sum or the difference of both.
-
-        There it may feed a vibration, in a narrow range of the parameter. An opening pad makes the harmonics. Its
-        stiffness is not quite the mean one: natural frequencies are those of the motions at the values.
-        """
-        followed = [(value, self.sliding_at(value)) for value in values if value in self.branches]
-        shifts = [(value, shift(each, self.orbits[value])) for value, each in followed if each]
-        known = [(value, *ratios) for value, ratios in shifts if ratios is not None]
-
-        def away(value: float) -> Floats | None:
-            """Ratios, less one: of the waves first, of what two of the strongest make, of third harmonics."""
-            if (found := self.sliding_at(value)) is None:
-                return None
-            where, *faster = zip(*known, strict=True) if known else ((value,), (1.0,), (1.0,))
-            first, second = natural(found) * [np.interp(value, where, each) for each in faster]
-            wheel, speed = found.system.wheel, abs(found.system.belt_speed)
-            strongest = speed * wheel.turns[np.argsort(-np.abs(wheel.g))[:STRONGEST]]
-            pairs = [made for a, b in combinations(strongest, 2) for made in (a + b, abs(a - b))]
-            drives = [*np.outer([1.0, 2.0], speed * wheel.turns).ravel(), *pairs, *(3.0 * speed * wheel.turns)]
-            vibrating = np.array([2.0 * first, 2.0 * second, first + second, second - first])
-            ratios: Floats = np.outer(drives, 1.0 / np.maximum(vibrating, 1e-9)).ravel() - 1.0
-            return ratios
-
-        rows = [away(value) for value in values]
-
-        def places(beside: float) -> list[float]:
-            changes = [
-                (int(which), low, high)
-                for (low, high), (before, after) in zip(pairwise(values), pairwise(rows), strict=True)
-                if before is not None and after is not None and before.size == after.size
-                for which in np.flatnonzero((before - beside) * (after - beside) < 0.0)
-            ]
-            found = []
-            for which, low, high in sorted(changes)[:MOST_RESONANCES]:
-
-                def above(value: float, which: int = which) -> bool | None:
-                    return None if (there := away(value)) is None else bool(there[which] > beside)
-
-                rising = above(low) is False
-                ends = bisect(lambda v: (above(v) is False) == rising, low, high, halvings=HALVINGS)  # noqa: B023
-                found.append(0.5 * sum(ends))
-            return found
-
-        found = places(0.0)
-        return found if 3 * len(found) > MOST_RESONANCES else [*found, *places(-BESIDE), *places(BESIDE)]
 
     def _measured(self, value: float, found: Sliding) -> Growth | None:
         damped = not is_undamped(found.system.coefficients)
