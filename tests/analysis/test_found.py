@@ -119,6 +119,13 @@ def test_a_limit_cycle_settles_no_faster_than_a_third_of_what_phase_space_shrink
         assert abs(verdict.frequency - later[1]) <= 2.0 * verdict.evidence["frequency_spread"]
 
 
+def test_a_vibration_that_waves_modulate_has_not_settled_before_they_have_beaten() -> None:
+    """By another integrator it has twice this frequency later: waves pass at 0.785 and 0.878 Hz."""
+    verdict = judged("waves that beat under stick-slip")
+    assert (verdict.regime, verdict.settled) == (Regime.RELAXATION, False)
+    assert "the waves beat every 5.33 s: run at least 7.8" in verdict.reasons[1]
+
+
 def test_a_run_as_long_as_a_limit_cycle_takes_to_settle_has_its_numbers() -> None:
     told = re.search(r"run at least ([\d.]+) s", judged("falls by its dashpots alone").reasons[1])
     assert told is not None

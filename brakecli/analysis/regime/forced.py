@@ -51,15 +51,16 @@ class ForcedRules:
 
     def _slowest(self, amplitude: float) -> float:
         """Period (s) of the slowest wave that counts beside an amplitude of x (m) and beside the others; or 0."""
-        least = max([amplitude, *(swing for _, swing in self.context.waves)]) if self.context.waves else 0.0
-        counts = [f for f, swing in self.context.waves if swing >= self.limits.settled_within * least]
-        return 1.0 / min(counts) if counts else 0.0
+        return 1.0 / min(counts) if (counts := self._counting(amplitude)) else 0.0
 
-    @property
-    def _beat(self) -> float:
+    def _counting(self, amplitude: float) -> list[float]:
+        """Frequencies (Hz) of the waves that count beside an amplitude of x (m) and beside the others."""
+        least = max([amplitude, *(swing for _, swing in self.context.waves)])
+        return [f for f, swing in self.context.waves if swing >= self.limits.settled_within * least]
+
+    def _beat(self, amplitude: float = 0.0) -> float:
         """Period (s) of the slowest wave, or of the slowest beat of one that counts with a multiple of another."""
-        slow, most = self._slowest(0.0), max((swing for _, swing in self.context.waves), default=0.0)
-        counts = [f for f, swing in self.context.waves if swing >= self.limits.settled_within * most]
+        slow, counts = self._slowest(amplitude), self._counting(amplitude)
         beats = [abs(f - n * g) for f in counts for g in counts for n in range(1, 11)]
         return max([slow, *(1.0 / beat for beat in beats if beat * slow > _NOTHING)])
 
@@ -231,8 +232,8 @@ class ForcedRules:
             return self._too_short(slow)
         self.rings = not self.lasts and growth < 0.0 and (fading or falls > self.limits.settled_within)
         if not self.rings:
-            if self._settled_seconds < self._beat:
-                self.settled, what = False, f"{what}; the waves beat every {self._beat:.3g} s"
+            if self._settled_seconds < (beat := self._beat()):
+                self.settled, what = False, f"{what}; the waves beat every {beat:.3g} s"
             return Decision(f"only the roughness shakes the shoe: {what}", Regime.DAMPED, Excitation.FORCED)
         needed = max(QUARTER * (self.duration - self._powers_to_lose / growth), self._long_enough(slow))
         advice = f"run at least {needed:.3g} s to see the amplitude that lasts"

@@ -89,7 +89,7 @@ class LinearRules(ForcedRules):
         else:
             needed = max(_LONGER * (self.duration + wait), 1.05 * (self.duration + wait + 2.0 * slow))
             advice.append(f"run at least {needed:.3g} s to see only that")
-        if theory.opens and (beat := self._beat) > seen:
+        if theory.opens and (beat := self._beat()) > seen:
             advice.append(f"the waves beat every {beat:.3g} s, which may open the pad again")
         chosen = time >= self.settled_part.start * self.history.interval
         self.parts, self.unseen = (forced, 0.5 * float(np.ptp(own[chosen]))), forced - 0.5 * float(np.ptp(lasting))

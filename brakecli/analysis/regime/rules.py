@@ -31,6 +31,7 @@ _BANDS = 0.9  # least part of the energy in three bands: chaos may have less
 _SPREAD = 0.05  # of the frequency of cycles, beyond which three bands hold no vibration
 _CYCLES_SHARE = 0.5  # of the energy on the lines of the cycles, below which the strongest line must be one of them
 _CREEPS = 2.0  # amplitudes by which the mean of x may move where nothing has settled
+_MODULATES = 0.1  # of the part of a vibration at which a wave counts: one of a hundredth changes its cycles
 _SPARSE = 8  # of the places at which a forced motion is computed, one of so many suffices
 _UNSETTLED = 1.5  # times as many cycles where nothing has settled: a hop may look like a vibration
 _SURE = 10.0  # standard errors of a slope: neighbouring windows of an amplitude that wanders go together
@@ -161,6 +162,10 @@ class Rules(LinearRules):
             return self._either()
         drift = abs(found.drift.part) if found.drift.sure else 0.0
         self._drift_further(found, max(drift, abs(found.detuning.part) if found.detuning.sure else 0.0))
+        if self.lasts and self._settled_seconds < (beat := self._beat(_MODULATES * found.amplitude)):
+            longer = 1.05 * (self.settled_part.start * self.history.interval + beat)
+            text = f"the waves beat every {beat:.3g} s: run at least {longer:.3g} s for numbers that last"
+            self.settled, self.drifts = False, text
         unsure = self.context.undamped or self.context.growth() < 0.0
         if drift > (_DRIFT if unsure else self.limits.settled_within):
             text = f"the amplitude still changes by {found.drift.part:.1%} within the last part of the run"
@@ -308,7 +313,7 @@ class Rules(LinearRules):
         if self.theory and self.parts:
             return self.parts[0], self.parts[1] + self.unseen if self.settled else None
         samples = len(part.last("x"))
-        period = max(min(self._beat / self.history.interval, samples - 1), 1.0)
+        period = max(min(self._beat() / self.history.interval, samples - 1), 1.0)
         edges = np.asarray(samples - period * np.arange(int(samples / period), -1, -1), np.float64)
         size, spread = median(swings(part, edges))
         if self.rings or len(edges) < 3 - self.settled:
