@@ -84,8 +84,8 @@ def test_wrong_options_are_told(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("line", "number"),
     [
-        (["advise", "waves.toml"], signal.SIGINT),
-        (["advise", "waves.toml"], signal.SIGTERM),
+        (["advise", "waves.toml", "--quiet"], signal.SIGINT),
+        (["advise", "waves.toml", "--quiet"], signal.SIGTERM),
         (["stability", CASES["rough-partly-open"], "--vary", "contact.half_length=0.01:0.1:200"], signal.SIGTERM),
         (
             ["stability", CASES["rough-partly-open"], "--vary", "load.force=5e2:5e3:400", "-o", "x.h5"],
