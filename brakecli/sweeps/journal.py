@@ -236,11 +236,11 @@ def identity(plan: Plan) -> dict[str, Any]:
     Of measured profiles, also those that points read, the contents count.
     """
     sweep, case = dict(flat(tomllib.loads(plan.sweep_text))), dict(flat(plan.case_keys))
-    varied = [
-        flat(value, key) for axis in plan.sweep.axis for key in axis.parameter for value in axis.values or ()
-    ]
-    read = [text for key, text in chain(case.items(), *varied) if key.endswith(".profile") and type(text) is str]
-    measured = {f"checksum of {text}": _contents(Path(text)) for text in read}
+    values = [(key, value) for axis in plan.sweep.axis for key in axis.parameter for value in axis.values or ()]
+    given = chain(case.items(), *(flat(value, key) for key, value in values))
+    read = sorted({Path(text) for key, text in given if key.endswith(".profile") and isinstance(text, str)})
+    named = {path.name: [each for each in read if each.name == path.name] for path in read}
+    measured = {f"checksum of {name}": [_contents(each) for each in paths] for name, paths in named.items()}
     return {**fingerprint(), **case, **measured, **{f"sweep {key}": each for key, each in sweep.items()}}
 
 

@@ -230,7 +230,7 @@ def test_points_of_profiles_that_were_measured_anew_are_refused(
     loaded = write_sweep(Path(), *tables, case=TINY + surfaces)
     interrupted(loaded, Path("s.h5"), limit=2, task_size=1)
     Path(changed).write_text(PROFILE.replace("5,1", "5,1.1"))
-    with pytest.raises(RefusedError, match=f"checksum of .*{changed} was "):
+    with pytest.raises(RefusedError, match=f"checksum of {Path(changed).name} was "):
         inline(loaded, Path("s.h5"))
     Path(changed).write_text(PROFILE)
     assert inline(loaded, Path("s.h5")).resumed == 2
