@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 WHAT = "What was measured: displacement, velocity, force, acceleration or pressure (of a .wav, if left out)."
 UNIT = "Unit of the signal, as mm/s or g; SI, or that of the file, if left out."
-NUMBERS = ("sample_rate", "belt_speed", "stiffness")
 TIME_UNIT = "Unit of the time column, as ms; that of the file, or s, if left out."
+NUMBERS = ("sample_rate", "belt_speed", "stiffness")
 
 
 @dataclass(frozen=True)

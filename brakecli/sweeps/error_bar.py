@@ -19,10 +19,7 @@ more, and so does the critical value, which counts where growth begins like a ro
 by all of its error or more: at least half of that counts, as patches that open make errors fall unevenly."""
 BEYOND = 1.2  # times the way to where growth with other steps passes zero, if it is as steep as further away
 NARROW = 1.1  # ratio of the ends of the bracket of that way
-STEEPER, JUMP = (
-    10.0,
-    0.5,
-)  # times the slope of growth around; of the change in a bracket, in a 32nd of it: a fold
+STEEPER, JUMP = 10.0, 0.5  # times the slope around; of the change in a bracket, in a 32nd of it: a fold
 FOLD = 1.0 / 32.0  # of the range: least bar there, for steps move a fold, too, by an amount that is not measured
 ROUNDED = 20.0  # times the spread of growth that rounding makes in a three-layer scheme near self-locking
 

@@ -90,8 +90,8 @@ class Disturbances:
         self.scan(values)
         self._go_on(values)
         for _ in range(REFINED):
-            known, least = np.array(values), SAME * (upper - lower)
-            added = {place for place in self.resonances(values) if np.abs(known - place).min() > least}
+            known, apart = np.array(values), SAME * (upper - lower)
+            added = {place for place in self.resonances(values) if np.abs(known - place).min() > apart}
             for triple in zip(values, values[1:], values[2:], strict=False):
                 rates = [measured.rate - measured.noise for measured in map(self.at, triple) if measured]
                 if len(rates) < len(triple) or min(rates) * max(rates) <= 0.0:

@@ -203,7 +203,7 @@ def _force_variation(force: Array, crossings: Array, groups: Array) -> float | N
 
 
 def _unseen(crossings: Array) -> tuple[float, float]:
-    """The longest part of a sample that no cycle has seen, and its middle in one that begins a cycle."""
+    """The longest part of a sample in which no cycle begins, and where in a sample its middle lies."""
     places = np.sort(crossings % 1.0)  # where cycles last whole samples, all are one
     gaps = np.diff(places, append=places[0] + 1.0)
     longest = int(np.argmax(gaps))
