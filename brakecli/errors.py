@@ -86,7 +86,7 @@ def _for_python(text: str) -> str:
     def argument(option: re.Match[str]) -> str:
         return _ARGUMENTS.get(option[0], option[0].strip("-").replace("-", "_"))
 
-    text = re.sub(r"with: brakecli (\w+) \S+", r"with: brakecli.\1", text)
+    text = re.sub(r"""with: brakecli (\w+) (?:'[^']*'|"[^"]*"|[^\s'"])+""", r"with: brakecli.\1", text)
     return re.sub(r"(?<!\S)(-o|--[a-z][a-z-]*)\b", argument, text)
 
 

@@ -236,6 +236,13 @@ SAID = [
 ]
 
 
+@pytest.mark.parametrize("name", ["my case.toml", "it's.toml", "a  b's c.toml"])
+def test_errors_name_functions_whatever_the_path_is(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text(TINY)
+    with pytest.raises(UsageError, match=r"simulate it with: brakecli\.run$"):
+        brakecli.sweep(tmp_path / name)
+
+
 @pytest.mark.parametrize(("call", "words"), SAID)
 def test_errors_name_arguments_and_no_options(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: Any, words: str
