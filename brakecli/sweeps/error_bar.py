@@ -42,10 +42,11 @@ def left_open(
     known, (low, high) = {value: each for value, each in at.known.items() if each is not None}, bracket
     near = sorted(known, key=lambda value: max(low - value, value - high, 0.0))[:2]
     one, other = near[0], near[-1]
+    exact = known[one].exact and known[other].exact
 
     @cache
     def rate(place: float, finer: float) -> float:
-        if (measured := at.at(place)) is None:
+        if (measured := at.at(place)) is None or place not in at.orbits:
             return math.nan
         return (measured.rate if finer == 1.0 else _finer(at, place, finer).rate) - measured.noise
 
@@ -53,13 +54,13 @@ def left_open(
         return abs((known[other].rate - known[one].rate) / (other - one)) if other != one else 0.0
 
     found = at.sliding_at(one)
-    if bias is None and found and not found.forced and not known[one].noise:
+    if bias is None and found and not (found.forced or exact or known[one].noise):
         bias = _to_eigenvalues(at, low, high, critical)
-    bias = abs(bias or 0.0)
+    bias = 0.0 if exact else abs(bias or 0.0)
     if known[one].bar:  # the bracket holds it
         return bias
     far = max((slope(end) for end in wide if end in known), default=0.0)
-    if one in at.orbits:
+    if one in at.orbits and not exact:
         if at.jumps(low, high) or _ends(at, low, high, far):
             return max(low - wide[0], wide[1] - high, FOLD * (critical.upper - critical.lower))
         stride = high - low if at.unstable(high) else low - high
@@ -73,11 +74,11 @@ def left_open(
 
         return max(_shifted(rate, one, stride, critical, far, peak, other) for other in OTHERS)
     if known[one].noise:
-        rounded = ROUNDED if found and found.system.scheme.LAG else 1.0
+        rounded = ROUNDED if found and found.system.scheme.LAG and not exact else 1.0
         hidden = rounded * max(known[one].spread, known[other].spread)
         return bias + _reach(at, low, high, 2.0 * known[one].noise + hidden)
     steep = slope(other)
-    if found is not None and found.system.scheme.LAG and far > 0.0:
+    if found is not None and found.system.scheme.LAG and far > 0.0 and not exact:
         steep = min(steep, far)
     return bias + (max(known[one].spread, known[other].spread) / steep if steep > 0.0 else 0.0)
 
