@@ -270,7 +270,7 @@ def _of_edges(critical: Critical, unstable: bool, edges: list[Edge]) -> Search:
 def _by_simulation(critical: Critical, sliding_at: SlidingAt, exact: Search) -> Search:
     """Where the growth of small disturbances passes zero, by Brent's method, between two values on either side."""
     at = Disturbances(sliding_at)
-    values = at.scanned(critical.lower, critical.upper, exact.windows)
+    values = at.scanned(critical.lower, critical.upper, critical.tolerance, exact.windows)
     by_runs = not any(measured.opened or measured.exact for measured in at.known.values() if measured)
 
     @cache
@@ -306,7 +306,7 @@ def _narrowed(at: Disturbances, low: float, high: float, critical: Critical, bia
         return None if (answer := at.unstable(value)) is None else answer == below
 
     low, high = bisect(as_below, low, high, width=tolerance)
-    if at.goes_on(low, high, wide):
+    if at.goes_on(low, high, wide) and at.unstable(low) is at.unstable(high):
         if at.unstable(wide[0]) is at.unstable(wide[1]):
             return _unknown(*wide, lost=not below)
         return _narrowed(at, *((wide[0], low) if below else (high, wide[1])), critical, bias)

@@ -6,13 +6,15 @@ from dataclasses import replace
 from functools import cache
 from itertools import takewhile
 
+import numpy as np
+
 from brakecli.analysis.stability.modes import growth as eigenvalue_growth
 from brakecli.analysis.stability.search import bisect
 from brakecli.sweeps.floquet import Disturbances
-from brakecli.sweeps.periodic import Orbit, Segments, common_period, log_radius, orbit
+from brakecli.sweeps.periodic import Orbit, Segments, common_period, exponents, orbit
 from brakecli.sweeps.tables import Critical
 
-OTHERS = ((2.0, 2.0, 1.5), (2.0, 1.0, 3.0), (0.5, -0.5, 1.5))
+OTHERS = ((2.0, 2.0, 1.5), (2.0, 1.0, 3.0), (3.0, 1.5, 1.5), (0.5, -0.5, 1.5))
 """Divisors of the step, which also multiply the nodes; which part of the change of growth counts as its error; and
 how much of the way to where growth passes zero then. With half the step growth changes by a half of its error or
 more, and so does the critical value, which counts where growth begins like a root. With twice the step it changes
@@ -173,10 +175,10 @@ def _finer(at: Disturbances, value: float, finer: float) -> Orbit:
     found, near = at.sliding_at(value), at.orbits[value]
     period = common_period(found.system) if found else None
     if found is None or period is None:
-        return replace(near, rate=math.nan)
+        return replace(near, exponents=np.full(4, np.nan + 0j))
     segments = Segments(found, period, len(near.states), finer)
     states = segments.moved(near)
     if (forced := orbit(segments, states, near.maps)) is not None:
         return forced
     maps = segments.maps(states, segments.ends(states))
-    return Orbit(segments, states, maps, log_radius(maps) / period, near.size)
+    return Orbit(segments, states, maps, exponents(maps), near.size)

@@ -21,7 +21,7 @@ from brakecli.sweeps.periodic import (
     lyapunov,
     orbit,
 )
-from brakecli.sweeps.resonances import resonances
+from brakecli.sweeps.resonances import meetings, resonances
 
 SEGMENT = 10.0  # periods of the slowest motion
 MOST_SEGMENTS = 250
@@ -29,7 +29,8 @@ SCANNED = 9  # values of the parameter, both ends among them, between which a ch
 PARTS = 4  # of each interval between them, where surfaces open in a run
 REFINED = 4  # times that values are added beside one at which stability is nearly lost or regained
 BUMP = 20.0  # how much nearer to zero that rate may be than it changes there
-SAME = 1e-3  # of the range: nearer to a value no other one is put
+SAME, FINE = 1e-3, 1e-4  # of the range: nearer to a value no other one is put; least width of a window
+ROUNDS, MOST = 12, 200  # of narrowing down where multipliers may meet, and of values that this may take
 # Damping ratio, of the slowest motion, that would stop a growth which counts as none without dashpots
 NEUTRAL = 1e-5
 SHORTEST, FINEST = 16, 256  # parts of the way from a known motion to the next that are tried; with dashpots
@@ -49,7 +50,7 @@ class Disturbances:
         self.known: dict[float, Growth | None] = {}
         self.orbits: dict[float, Orbit] = {}
         self.branches: dict[float, float] = {}  # by where the motion was found first, with dashpots
-        self.missed, self.resumed, self.periodic, self.least = 0, 0, False, 0.0
+        self.missed, self.resumed, self.periodic, self.least, self.finest = 0, 0, False, 0.0, 0.0
 
     def at(self, value: float) -> Growth | None:
         """The growth at a value; None without steady sliding, and where no forced motion is found."""
@@ -71,7 +72,9 @@ class Disturbances:
                 del self.known[value]
                 self.at(value)
 
-    def scanned(self, lower: float, upper: float, windows: Iterable[tuple[float, float]]) -> list[float]:
+    def scanned(
+        self, lower: float, upper: float, tolerance: float, windows: Iterable[tuple[float, float]]
+    ) -> list[float]:
         """The values between which changes are looked for.
 
         Where surfaces open they lie closer, and closest beside values where stability is nearly lost or regained.
@@ -80,34 +83,59 @@ class Disturbances:
         values: list[float] = np.linspace(lower, upper, PARTS * (SCANNED - 1) + 1).tolist()
         self.periodic = any(found.forced for found in map(self.sliding_at, values) if found)
         self.least = SAME * (upper - lower)
+        self.finest = max(min(0.5 * tolerance, self.least), FINE * (upper - lower))
         self.scan(values[::PARTS])
         if not (self.periodic or any(each and each.opened for each in map(self.at, values[::PARTS]))):
             return sorted({*values[::PARTS], *between(lower, upper, windows)})
         self.scan(values)
         self._go_on(values)
-        for _ in range(REFINED):
-            known = np.array(values)
-            followed = {value: self.orbits[value] for value in values if value in self.branches}
-            places = resonances(self.sliding_at, followed, values)
-            added = {place for place in places if np.abs(known - place).min() > self.least}
-            for triple in zip(values, values[1:], values[2:], strict=False):
-                rates = [measured.rate - measured.noise for measured in map(self.at, triple) if measured]
-                if len(rates) < len(triple) or min(rates) * max(rates) <= 0.0:
-                    continue
-                least = min(map(abs, rates))
-                if least == abs(rates[1]) and least < BUMP * np.ptp(rates):
-                    added |= {0.5 * (low + high) for low, high in pairwise(triple)}
+        for turn in range(ROUNDS):
+            added = set(self._meetings(values)[: max(MOST - len(values), 0)])
+            if turn < REFINED:
+                known = np.array(values)
+                followed = {value: self.orbits[value] for value in values if value in self.branches}
+                places = resonances(self.sliding_at, followed, values)
+                added |= {place for place in places if np.abs(known - place).min() > self.least}
+                for triple in zip(values, values[1:], values[2:], strict=False):
+                    rates = [measured.rate - measured.noise for measured in map(self.at, triple) if measured]
+                    if len(rates) < len(triple) or min(rates) * max(rates) <= 0.0:
+                        continue
+                    least = min(map(abs, rates))
+                    if least == abs(rates[1]) and least < BUMP * np.ptp(rates):
+                        added |= {0.5 * (low + high) for low, high in pairwise(triple)}
+            if not added:
+                break
             values = sorted({*values, *added})
             self.scan(sorted(added))
         self._go_on(values)
         return sorted({*values, *(place for pair in pairwise(values) for place in self._hidden(*pair))})
 
+    def _meetings(self, values: list[float]) -> list[float]:
+        """Values between two of one stable motion, where its multipliers may meet and part beyond the unit circle."""
+        by_motion: dict[float | None, list[float]] = {}
+        for value in sorted({*self.branches, *(value for value in values if value in self.orbits)}):
+            by_motion.setdefault(self.branches.get(value), []).append(value)
+        places: dict[float, float] = {}
+        for own in by_motion.values():
+            slides = {value: found for value in own if (found := self.sliding_at(value))}
+            motions = [self.orbits[value] for value in slides]
+            if len(slides) > 1:
+                noise = max((measured.noise for each in slides if (measured := self.known.get(each))), default=0.0)
+                places |= meetings([*slides.values()], motions, [*slides], noise, self.finest)
+        return sorted((place for place in places if place not in self.known), key=lambda place: -places[place])
+
     def _hidden(self, low: float, high: float) -> list[float]:
-        """What was seen on the way from a motion that loses and regains stability before another one follows."""
-        branch = self.branches.get(low)
-        own = sorted(place for place in self.branches if low < place < high and self.branches[place] == branch)
-        answers = [self.orbits[place].rate > 0.0 for place in (low, *own) if place in self.orbits]
-        return own if any(answers) and not (answers[0] or answers[-1]) else []
+        """What was seen of a motion that loses its stability between two values, if not at its end, by a fold."""
+        found = []
+        for branch in {self.branches.get(low), self.branches.get(high)} - {None}:
+            own = sorted(at for at in self.branches if low <= at <= high and self.branches[at] == branch)
+            stable = [at for at in own if self.orbits[at].rate <= 0.0]
+            lost = [at for at in own if at not in stable]
+            ended = any(
+                not self.orbits[at].folds or min(stable, default=at) < at < max(stable, default=at) for at in lost
+            )
+            found += own * ended
+        return found
 
     def jumps(self, low: float, high: float) -> bool:
         """Whether the motions at two values are not known to be one; without dashpots that does not count."""
