@@ -14,7 +14,7 @@ from brakecli.sweeps.floquet import Disturbances
 from brakecli.sweeps.periodic import Orbit, Segments, common_period, exponents, orbit
 from brakecli.sweeps.tables import Critical
 
-OTHERS = ((2.0, 2.0, 1.5), (2.0, 1.0, 3.0), (3.0, 1.5, 1.5), (0.5, -0.5, 1.5))
+OTHERS = ((2.0, 2.0, 1.5), (2.0, 1.0, 3.0), (0.5, -0.5, 1.5))
 """Divisors of the step, which also multiply the nodes; which part of the change of growth counts as its error; and
 how much of the way to where growth passes zero then. With half the step growth changes by a half of its error or
 more, and so does the critical value, which counts where growth begins like a root. With twice the step it changes

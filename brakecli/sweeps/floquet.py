@@ -108,10 +108,16 @@ class Disturbances:
             values = sorted({*values, *added})
             self.scan(sorted(added))
         self._go_on(values)
-        return sorted({*values, *(place for pair in pairwise(values) for place in self._hidden(*pair))})
+        values = sorted({*values, *(place for pair in pairwise(values) for place in self._hidden(*pair))})
+        return [value for value in values if self._sure(value)]
+
+    def _sure(self, value: float) -> bool:
+        """Whether the answer at a value is certain: beside where stability is lost it may be rounding."""
+        measured = self.at(value)
+        return not measured or measured.exact or value not in self.branches or self.orbits[value].sure
 
     def _meetings(self, values: list[float]) -> list[float]:
-        """Values between two of one stable motion, where its multipliers may meet and part beyond the unit circle."""
+        """Values at which multipliers of a motion may meet, the likeliest to hide a window first."""
         by_motion: dict[float | None, list[float]] = {}
         for value in sorted({*self.branches, *(value for value in values if value in self.orbits)}):
             by_motion.setdefault(self.branches.get(value), []).append(value)
@@ -129,12 +135,10 @@ class Disturbances:
         found = []
         for branch in {self.branches.get(low), self.branches.get(high)} - {None}:
             own = sorted(at for at in self.branches if low <= at <= high and self.branches[at] == branch)
-            stable = [at for at in own if self.orbits[at].rate <= 0.0]
-            lost = [at for at in own if at not in stable]
-            ended = any(
-                not self.orbits[at].folds or min(stable, default=at) < at < max(stable, default=at) for at in lost
-            )
-            found += own * ended
+            stable = [at for at in own if self.orbits[at].rate <= 0.0] or [math.nan]
+            lost = (at for at in own if self.orbits[at].rate > 0.0)
+            if any(stable[0] < at < stable[-1] or not self.orbits[at].folds for at in lost):
+                found += own
         return found
 
     def jumps(self, low: float, high: float) -> bool:

@@ -31,6 +31,7 @@ ITERATIONS = 10
 SAMPLES = 64  # of a segment, or half as many as steps where they are fewer
 BATCHES, BATCH, TRANSIENT = 8, 4, 16  # batches of a long run, segments of a batch, segments before the first
 HIDDEN = 1e-9  # ratio of the least multiplier to the largest, below which rounding hides its vector
+STICKS = 1.0  # neper that a volume shrinks in a period beyond what dashpots take: the shoe sticks at times
 CERTAIN = 3.5  # standard errors of the mean of eight batches: 99 % of Student's distribution
 
 Floats = NDArray[np.float64]
@@ -129,6 +130,16 @@ class Orbit:
     def rate(self) -> float:
         """Growth (1/s) of the fastest disturbance."""
         return float(self.exponents[-1].real) / self.segments.time
+
+    @property
+    def sure(self) -> bool:
+        """Whether its growth is more than its error.
+
+        While the shoe slips volumes of states shrink as its dashpots say (Liouville); the multipliers may not.
+        """
+        c = self.segments.systems[0].coefficients
+        error = abs(float(self.exponents.real.sum()) / self.segments.time + (c.b_xx + c.b_yy) / c.m)
+        return abs(self.rate) > error or error * self.segments.time > STICKS
 
     @property
     def folds(self) -> bool:

@@ -13,49 +13,46 @@ from brakecli.sweeps.periodic import Floats, Orbit, natural, shift
 MOST_RESONANCES, HALVINGS = 32, 12  # places where values are put, and how exactly
 BESIDE = 0.01  # of a frequency: how far beside such a place others are put
 STRONGEST = 6  # waves of the wheel of which two may act together
-HIDDEN = 0.7  # of the decay over a period: a window hides where angles change by more
-NEARLY = 1.2  # times the change of angles: how far apart multipliers may be that meet on the way
+HIDDEN = (
+    0.7  # of the decay over a period: least change of the angles where a window hides, as it is not well known
+)
+NEARLY = 1.2  # times that change: how far apart multipliers may be that meet on the way
 
 
 def meetings(
     found: list[Sliding], motions: list[Orbit], values: list[float], noise: float, finest: float
 ) -> dict[float, float]:
-    """Between values of one motion: where multipliers may meet, and one may leave the unit circle and come back.
+    """Between values of one motion: where multipliers may meet, and one leave the unit circle; and how likely.
 
-    Where pairs meet, at 1, at -1 or each other, they part by k in their angles and then in their moduli, by no more
-    than k. They leave the circle if k is more than the decay over a period; then their angles, if they passed each
-    other, would change by twice that on the way. They change as the natural frequencies do, or as nearby. Growth
-    up to `noise` (1/s) counts as none; where a window is less than `finest` wide nothing is looked for.
+    Where pairs meet, at 1, at -1 or each other, they part by k in their angles, and in their moduli by no more
+    than that. They leave the circle if k is more than the decay over a period; the angles, if they pass each
+    other, then change by twice the decay on the way. They change as natural frequencies do, or as they do beside.
+    Growth up to `noise` (1/s) counts as none. Nothing is looked for between values as near as two of `finest`.
     """
     gaps, modes = np.diff(values), np.array([motion.modes for motion in motions])
-    modes[:, :, 0] += noise * motions[0].segments.time
-    turned = np.array([2.0 * math.pi * natural(f) * m.segments.time for f, m in zip(found, motions, strict=True)])
-    speeds = np.maximum(
-        np.abs(np.diff(modes[:, :, 1], axis=0)), np.abs(np.diff(turned, axis=0)).max(axis=1)[:, None]
-    )
-    speeds = np.pad(speeds / gaps[:, None], ((1, 1), (0, 0)))
-    changes = np.maximum(np.maximum(speeds[:-2], speeds[1:-1]), speeds[2:]) * gaps[:, None]
-    (first, second), (one, other) = modes[:, :, 0].T, modes[:, :, 1].T
-    decays, rows = list[Floats](), list[Floats]()
-    for decay, apart, change in (
-        (first, one, changes[:, 0]),
-        (first, math.pi - one, changes[:, 0]),
-        (second, other, changes[:, 1]),
-        (second, math.pi - other, changes[:, 1]),
-        (0.5 * (first + second), other - one, changes.sum(axis=1)),
-    ):
-        near, most = np.minimum(apart[:-1], apart[1:]), np.maximum(decay[:-1], decay[1:])
-        least = np.where((least := np.minimum(decay[:-1], decay[1:])) > 0.0, least, 0.5 * most)
-        hides = np.where((near <= NEARLY * change) & (least > 0.0), change / least, 0.0)
-        part = apart[:-1] / np.maximum(apart[:-1] + apart[1:], 1e-300)
-        decays.append(hides)
-        rows.append(np.clip(part, 0.25, 0.75))
-    hidden, parts = np.array(decays), np.array(rows)
-    which, every = hidden.argmax(axis=0), np.arange(len(gaps))
-    most, part = hidden[which, every], parts[which, every]
-    stable = modes[:, :, 0].min(axis=1) > 0.0
-    most[(gaps <= 2.0 * finest) | ~(stable[:-1] | stable[1:])] = 0.0
-    return {values[k] + float(part[k] * gaps[k]): float(most[k]) for k in np.flatnonzero(most > HIDDEN)}
+    decays, angles = modes[:, :, 0] + noise * motions[0].segments.time, modes[:, :, 1]
+    turned = [
+        2.0 * math.pi * natural(at) * motion.segments.time for at, motion in zip(found, motions, strict=True)
+    ]
+    expected = np.abs(np.diff(turned, axis=0)).max(axis=1)
+    speeds = np.maximum(np.abs(np.diff(angles, axis=0)), expected[:, None]) / gaps[:, None]
+    beside = np.pad(speeds, ((1, 1), (0, 0)))
+    changes = np.maximum(np.maximum(beside[:-2], speeds), beside[2:]) * gaps[:, None]
+    # Columns: each pair at 1, each at -1, and both.
+    apart = np.column_stack([angles, math.pi - angles, angles[:, 1] - angles[:, 0]])
+    decay = np.column_stack([decays, decays, decays.mean(axis=1)])
+    change = np.column_stack([changes, changes, changes.sum(axis=1)])
+    least = np.minimum(decay[:-1], decay[1:])
+    least = np.where(
+        least > 0.0, least, 0.5 * np.maximum(decay[:-1], decay[1:])
+    )  # on the way to an end of a window
+    meet = (np.minimum(apart[:-1], apart[1:]) <= NEARLY * change) & (least > 0.0)
+    likely = np.where(meet, change / np.where(meet, least, 1.0), 0.0)
+    parts = np.clip(apart[:-1] / np.maximum(apart[:-1] + apart[1:], 1e-300), 0.25, 0.75)
+    stable = decays.min(axis=1) > 0.0
+    looked = (gaps > 2.0 * finest) & (stable[:-1] | stable[1:]) & (likely.max(axis=1) > HIDDEN)
+    most = likely.argmax(axis=1)
+    return {values[k] + parts[k, most[k]] * gaps[k]: likely[k, most[k]] for k in np.flatnonzero(looked).tolist()}
 
 
 def resonances(
