@@ -23,6 +23,7 @@ BEYOND = 1.2  # times the way to where growth with other steps passes zero, if i
 NARROW = 1.1  # ratio of the ends of the bracket of that way
 STEEPER, JUMP = 10.0, 0.5  # times the slope around; of the change in a bracket, in a 32nd of it: a fold
 FOLD = 1.0 / 32.0  # of the range: least bar there, for steps move a fold, too, by an amount that is not measured
+APPROACH = 4  # values before the one that counts, from which the motion with another step is followed
 ROUNDED = 20.0  # times the spread of growth that rounding makes in a three-layer scheme near self-locking
 
 
@@ -45,12 +46,18 @@ def left_open(
     near = sorted(known, key=lambda value: max(low - value, value - high, 0.0))[:2]
     one, other = near[0], near[-1]
     exact = known[one].exact and known[other].exact
+    finers: dict[float, dict[float, Orbit]] = {}
 
     @cache
     def rate(place: float, finer: float) -> float:
         if (measured := at.at(place)) is None or place not in at.orbits:
             return math.nan
-        return (measured.rate if finer == 1.0 else _finer(at, place, finer).rate) - measured.noise
+        if finer == 1.0:
+            return measured.rate - measured.noise
+        others = finers.setdefault(finer, {})
+        for each in (place,) if others else (*_before(at, one), place):
+            others[each] = _finer(at, each, finer, others)
+        return others[place].rate - measured.noise
 
     def slope(other: float) -> float:
         return abs((known[other].rate - known[one].rate) / (other - one)) if other != one else 0.0
@@ -170,14 +177,32 @@ def _shifted(
     return times * way
 
 
-def _finer(at: Disturbances, value: float, finer: float) -> Orbit:
-    """The periodic motion at a value with the step divided and the nodes multiplied."""
+def _before(at: Disturbances, value: float) -> list[float]:
+    """Values on the way to one, from further off to nearer, at which its motion is stable."""
+    own = [place for place in at.orbits if at.branches.get(place) == at.branches.get(value)]
+    found, reach = list[float](), 0.0
+    for place in sorted(own, key=lambda place: abs(place - value)):
+        if at.orbits[place].rate < 0.0 and abs(place - value) >= reach and len(found) < APPROACH:
+            found, reach = [place, *found], 4.0 * abs(place - value)
+    return found
+
+
+def _finer(at: Disturbances, value: float, finer: float, others: dict[float, Orbit]) -> Orbit:
+    """The periodic motion at a value with the step divided and the nodes multiplied.
+
+    It differs from the known one as the nearest of the `others` does, if there is one.
+    """
     found, near = at.sliding_at(value), at.orbits[value]
     period = common_period(found.system) if found else None
     if found is None or period is None:
         return replace(near, exponents=np.full(4, np.nan + 0j))
     segments = Segments(found, period, len(near.states), finer)
     states = segments.moved(near)
+    if others:
+        beside = min(others, key=lambda other: abs(other - value))
+        moved = states + segments.moved(others[beside]) - segments.moved(at.orbits[beside])
+        if (forced := orbit(segments, moved, others[beside].maps)) is not None:
+            return forced
     if (forced := orbit(segments, states, near.maps)) is not None:
         return forced
     maps = segments.maps(states, segments.ends(states))

@@ -52,7 +52,8 @@ def meetings(
     stable = decays.min(axis=1) > 0.0
     looked = (gaps > 2.0 * finest) & (stable[:-1] | stable[1:]) & (likely.max(axis=1) > HIDDEN)
     most = likely.argmax(axis=1)
-    return {values[k] + parts[k, most[k]] * gaps[k]: likely[k, most[k]] for k in np.flatnonzero(looked).tolist()}
+    rows = [(k, most[k]) for k in np.flatnonzero(looked)]
+    return {values[k] + float(parts[k, which] * gaps[k]): float(likely[k, which]) for k, which in rows}
 
 
 def resonances(
