@@ -110,6 +110,37 @@ def test_a_drum_that_swings_once_per_turn_is_forced_with_the_amplitude_that_last
     assert verdict.torque_variation == pytest.approx(0.5 * force, rel=0.02)
 
 
+@pytest.mark.parametrize("duration", [2.0, 5.0])
+def test_the_variation_of_the_torque_waits_for_the_force_where_y_rings_longer_than_x(duration: float) -> None:
+    tables = {
+        "shoe": {"mass": 2.1},
+        "wheel": {"radius": 0.1, "angular_speed": 1.575},
+        "link1": {"stiffness": 5.1374e5, "damping": 38.6, "angle_deg": -41.8},
+        "link2": {"stiffness": 5.0972e4, "damping": 7.69, "angle_deg": 20.05},
+        "load": {"force": 2514.7},
+        "friction": {"coefficient": 0.479},
+        "contact": {"half_length": 0.01, "stiffness": 1.375e8},
+        "roughness": {"wheel": {"amplitudes": [2e-5], "wavelengths": [0.05]}},
+        "initial": {"at": "rest", "vx": 0.03, "vy": 0.003},
+        "solver": {"duration": duration, "step": 1e-4},
+        "output": {"sample_interval": 2e-4},
+    }
+    verdict, system = verdict_of(make(tables)), system_of(make(tables))
+    assert verdict.settled
+    if duration < 4.0:
+        assert verdict.torque_variation is None
+        assert any("the friction force still rings" in each for each in verdict.reasons)
+        return
+    # (S + iωB - ω²m) z = (φ, 1) K w, and F_y = K (w - y)
+    c, k = system.coefficients, system.contact_stiffness
+    s = np.array([[c.c_xx, c.c_xy + c.phi * k], [c.c_xy, c.c_yy + k]])
+    omega = 2.0 * np.pi * 0.1 * 1.575 / 0.05
+    s = s - c.m * omega**2 * np.eye(2) + 1j * omega * np.array([[c.b_xx, c.b_xy], [c.b_xy, c.b_yy]])
+    wave = 2e-5 * np.sinc(2.0 * 0.01 / 0.05)  # in the mean over the pad
+    lasting = 2.0 * 0.1 * c.phi * k * abs(wave - np.linalg.solve(s, [c.phi, 1.0])[1] * k * wave)
+    assert verdict.torque_variation == pytest.approx(lasting, rel=0.05)  # settled_within
+
+
 @pytest.mark.parametrize("duration", [0.3, 0.5, 1.0])
 def test_a_run_of_few_turns_says_how_long_it_must_be(duration: float) -> None:
     short = verdict_of(make(DRUM, solver__duration=duration))

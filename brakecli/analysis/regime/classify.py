@@ -1,5 +1,8 @@
 """The verdict on a history: what the rules decide, with the numbers of the settled part."""
 
+from dataclasses import replace
+
+from brakecli.analysis.regime.forced import QUARTER
 from brakecli.analysis.regime.rules import Rules
 from brakecli.analysis.regime.spectra import segment
 from brakecli.analysis.regime.verdict import Context, Excitation, Regime, Thresholds, Verdict
@@ -34,8 +37,8 @@ def classify(
         rules.evidence |= {f"ripple_{name}": getattr(ripple, name) for name in ("x", "vx", "force")}
         spread = spread + ripple.size if spread is not None else None
     vague = spread is not None and 0.0 < amplitude <= spread  # then not even its order is known
-    low, high = part.extremes("friction_force")
-    variation = cycles.force_variation if cycles else high - low
+    low, high = replace(part, start=max(part.start, rules.force_from)).extremes("friction_force")
+    variation = cycles.force_variation if cycles else None if rules.force_rings is not None else high - low
     doubt = _torque_doubt(rules, context, variation, lasting=not cycles and not undecided)
     notes = {
         "settled": (rules.drifts if cycles else None) or (_VAGUE if vague and rules.lasts else None),
@@ -81,10 +84,13 @@ def _add_evidence(rules: Rules, context: Context) -> None:
 def _torque_doubt(rules: Rules, context: Context, variation: float | None, *, lasting: bool) -> str | None:
     """Why the variation of the torque is missing, or may be too small."""
     part, interval = rules.settled_part, rules.history.interval
+    if (rings := rules.force_rings) is not None:
+        longer = QUARTER * (rules.duration + rings)
+        return f"the friction force still rings, and torque_variation is missing: run at least {longer:.3g} s"
     if variation is None:
         finer = f"give an output.sample_interval of {0.25 * interval:.2g} s"
         return f"samples miss impacts of the friction force, and torque_variation is missing: {finer}"
-    short = (part.stop - part.start) * interval < 0.999 * context.pattern
+    short = (part.stop - max(part.start, rules.force_from)) * interval < 0.999 * context.pattern
     if short and context.steady and lasting:
         return f"torque_variation needs {context.pattern:.3g} s, until the waves repeat: run longer"
     return None

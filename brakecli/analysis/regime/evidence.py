@@ -81,12 +81,12 @@ class Part:
             return False
         return self.extremes("contact_fraction")[0] >= _FULL
 
-    def places(self) -> tuple[Array, Array]:
-        """Evenly spaced samples of x, not too many, and their times (s)."""
+    def places(self, name: str = "x") -> tuple[Array, Array]:
+        """Evenly spaced samples of a variable, not too many, and their times (s)."""
         stride = -(-(self.stop - self.start) // _MOST_PLACES)
         picked, first = [], self.start
         for begin in range(self.start, self.stop, _LONGEST):
-            values = self.history.read("x", begin, min(begin + _LONGEST, self.stop))
+            values = self.history.read(name, begin, min(begin + _LONGEST, self.stop))
             picked.append(values[first - begin :: stride])
             first += stride * len(picked[-1])
         x = np.concatenate(picked)

@@ -92,9 +92,10 @@ class Linear:
         found = [np.concatenate([each.real, each.imag], axis=1) @ turns for each in (position, velocity)]
         return found[0], found[1]
 
-    def _forced_x(self, time: Array) -> Array:
-        x = self.waves[:, 0]
-        return np.asarray(np.concatenate([x.real, x.imag]) @ _turns(tuple(self.passing.tolist()), time.tobytes()))
+    def _sum(self, waves: Complex, time: Array) -> Array:
+        """What has these amplitudes, with their phases at t = 0, at times (s)."""
+        turns = _turns(tuple(self.passing.tolist()), time.tobytes())
+        return np.asarray(np.concatenate([waves.real, waves.imag]) @ turns)
 
     def _extremes(self, span: float) -> tuple[float, float]:
         """Largest and least x (m) that the waves force within a time (s).
@@ -117,10 +118,16 @@ class Linear:
 
         Then, at the times given, the x that they force and that the shoe adds (m), and the times again (s).
         """
-        lasting = self._forced_x(time)
+        lasting = self._sum(self.waves[:, 0], time)
         high, low = self._extremes(_BEYOND * time[-1]) if len(self.waves) > 1 and self.belt else (0.0, 0.0)
         size = 0.5 * (max(float(lasting.max()), high) - min(float(lasting.min()), low))
         return size, lasting, x - self.rest[0] - lasting, time
+
+    def force_parts(self, y: Array, time: Array) -> tuple[float, Array]:
+        """Half of peak to peak of the normal force (N) that the waves force; what the shoe adds at the times."""
+        stiffness, lasting = self.force / self.depth, self.waves[:, 1]
+        forced = self._sum(self.slopes / self.wavenumbers - stiffness * lasting, time)
+        return 0.5 * float(np.ptp(forced)), stiffness * (self.rest[1] + self._sum(lasting, time) - y)
 
     def stays(self, state: Array) -> bool:
         """Whether a motion on a smooth wheel that decays can neither stick nor open any more.

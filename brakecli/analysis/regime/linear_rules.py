@@ -8,6 +8,7 @@ import numpy as np
 
 from brakecli.analysis.regime.evidence import WINDOWS, line
 from brakecli.analysis.regime.forced import QUARTER, ForcedRules
+from brakecli.analysis.regime.spectra import Array
 from brakecli.analysis.regime.verdict import Decision, Excitation, Regime
 
 if TYPE_CHECKING:  # a measured signal needs no compiled code
@@ -21,6 +22,9 @@ DASHPOT = "a dashpot would decide"
 
 class LinearRules(ForcedRules):
     """The rules where theory knows the motion."""
+
+    force_from = 0  # the sample from which on the force has settled: y may ring longer than x
+    force_rings: float | None = None  # s, for which it still rings beside a settled x
 
     def linear(self) -> Decision | None:
         """Theory decides where the shoe has long been sliding in full contact, to one side."""
@@ -71,21 +75,20 @@ class LinearRules(ForcedRules):
     def _shaken(self, theory: "Linear", slow: float, seen: float) -> Decision | None:
         """The forced motion that lasts, with the settled part in which the shoe's own part has gone."""
         forced, lasting, own, time = theory.parts(*self.whole.places())
-        starts = -(-len(own) * np.arange(WINDOWS) // WINDOWS)
-        left = 0.5 * (np.maximum.reduceat(own, starts) - np.minimum.reduceat(own, starts))
-        end = 0.5 * float(np.ptp(own[starts[-10] :]))  # a window may be shorter than a period
-        slope = line(np.arange(0.5 * WINDOWS), np.log(np.maximum(left[WINDOWS // 2 :], 1e-300)))[0]
+        first, level, end, slope = self._gone(theory, own, forced)
         if slope * WINDOWS > 1.0 and end > self.limits.settled_within * forced:
             return None  # the passing waves excite what the mean stiffness damps
-        level, decay = self.limits.settled_within * forced, theory.mode.growth * self.duration / WINDOWS
-        if 0.25 * WINDOWS * decay < -1.0 and slope > 0.25 * decay and end < _REST * forced:
-            level = max(level, 1.2 * end)  # what does not decay is forced, and missing in the closed form
-        first = int(np.flatnonzero(np.append(True, left[1:] > level))[-1]) + 1
         begin = first * self.history.samples // WINDOWS
         wait = math.log(max(end / max(level, 1e-300), 1.0)) / -theory.mode.growth
         advice = list[str]()
         if first <= WINDOWS - 10 and self.duration - begin * self.history.interval >= 2.0 * slow:
             self.settled_part, self.settled = replace(self.whole, start=begin), True
+            force, rings = theory.force_parts(*self.whole.places("y"))
+            first, level, end, _ = self._gone(theory, rings, force)
+            if first <= WINDOWS - 10:
+                self.force_from = first * self.history.samples // WINDOWS
+            elif theory.slip is not None:
+                self.force_rings = math.log(max(end / max(level, 1e-300), 1.0)) / -theory.mode.growth
         else:
             needed = max(_LONGER * (self.duration + wait), 1.05 * (self.duration + wait + 2.0 * slow))
             advice.append(f"run at least {needed:.3g} s to see only that")
@@ -95,3 +98,17 @@ class LinearRules(ForcedRules):
         self.parts, self.unseen = (forced, 0.5 * float(np.ptp(own[chosen]))), forced - 0.5 * float(np.ptp(lasting))
         text = f"only the roughness shakes the shoe, by {forced:.3g} m: {theory.sentence}"
         return Decision(text, Regime.DAMPED, Excitation.FORCED, advice="; ".join(advice))
+
+    def _gone(self, theory: "Linear", own: Array, forced: float) -> tuple[int, float, float, float]:
+        """The window from which on what the shoe adds has gone beside what is forced, and to which level.
+
+        Also what is left in the last quarter, and the slope of its logarithm, per window.
+        """
+        starts = -(-len(own) * np.arange(WINDOWS) // WINDOWS)
+        left = 0.5 * (np.maximum.reduceat(own, starts) - np.minimum.reduceat(own, starts))
+        end = 0.5 * float(np.ptp(own[starts[-10] :]))  # a window may be shorter than a period
+        slope = line(np.arange(0.5 * WINDOWS), np.log(np.maximum(left[WINDOWS // 2 :], 1e-300)))[0]
+        level, decay = self.limits.settled_within * forced, theory.mode.growth * self.duration / WINDOWS
+        if 0.25 * WINDOWS * decay < -1.0 and slope > 0.25 * decay and end < _REST * forced:
+            level = max(level, 1.2 * end)  # what does not decay is forced, and missing in the closed form
+        return int(np.flatnonzero(np.append(True, left[1:] > level))[-1]) + 1, level, end, slope
