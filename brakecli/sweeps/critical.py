@@ -12,6 +12,7 @@ import numpy as np
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.stability.discrete import spectral_radius
 from brakecli.analysis.stability.modes import growth as eigenvalue_growth
+from brakecli.analysis.stability.modes import is_undamped
 from brakecli.analysis.stability.report import MARGIN, stability
 from brakecli.analysis.stability.search import bisect
 from brakecli.case.case import Case, changed
@@ -78,13 +79,14 @@ class Search(NamedTuple):
 
 
 class Edge(NamedTuple):
-    """Where stability is lost, or regained, with its bracket and error bar."""
+    """Where stability is lost, or regained, with its bracket and error bar; or where it is not known any more."""
 
     value: float
     lower: float
     upper: float
     error: float
     lost: bool
+    known: bool = True
 
 
 SlidingAt = Callable[[float], Sliding | None]
@@ -155,11 +157,7 @@ def _by_eigenvalues(critical: Critical, sliding_at: SlidingAt) -> Search:
     """Where the eigenvalues of steady sliding pass zero, and by how much the scheme at its step moves that."""
 
     def grows(value: float) -> bool:
-        if (found := sliding_at(value)) is None:
-            return True
-        c, k = found.system.coefficients, found.stiffness
-        rate = eigenvalue_growth(c, k, found.grip)
-        return rate > 1e-12 * math.sqrt((abs(c.c_xx) + abs(c.c_yy) + k) / c.m)
+        return (found := sliding_at(value)) is None or _grows(found)
 
     def grows_in_steps(value: float) -> bool:
         found = sliding_at(value)
@@ -189,6 +187,12 @@ def _by_eigenvalues(critical: Critical, sliding_at: SlidingAt) -> Search:
     return exact._replace(bias=own.value - exact.value)
 
 
+def _grows(found: Sliding) -> bool:
+    """Whether disturbances of steady sliding grow, by its eigenvalues."""
+    c, k = found.system.coefficients, found.stiffness
+    return eigenvalue_growth(c, k, found.grip) > 1e-12 * math.sqrt((abs(c.c_xx) + abs(c.c_yy) + k) / c.m)
+
+
 def _friction_by_eigenvalues(critical: Critical, system: System) -> Search:
     """The first loss of stability within the range of φ, otherwise the first regain."""
     report = stability(system)
@@ -209,16 +213,41 @@ def _answer(
 ) -> Search:
     """What the answers at some values say; `edge` narrows a change between two of them down.
 
-    Stability is lost, too, where steady sliding ends.
+    Stability is lost, too, where steady sliding ends. Where there is no answer it may be lost, as the bars say;
+    without dashpots no motion leads through a resonance, and there eigenvalues say whether it may.
     """
     if all(sliding_at(value) is None for value in values):
         return Search(Outcome.NO_SLIDING)
     answers = [(value, unstable(value)) for value in values]
-    decided = [each for each in answers if each[1] is not None]
-    changes = [(one, other) for (one, before), (other, after) in pairwise(decided) if before is not after]
-    if not changes and len(decided) < len(answers):
+    decided = [(value, answer) for value, answer in answers if answer is not None]
+    if not decided:
         return Search(Outcome.UNDECIDED)
-    return _of_edges(critical, bool(decided[0][1]), [edge(*change) for change in changes])
+    unknown = [value for value, answer in answers if answer is None and _may_grow(sliding_at(value))]
+    (first, begun), (last, ended), edges = decided[0], decided[-1], list[Edge]()
+    if unknown and unknown[0] < first:
+        edges += [_unknown(values[0], first, lost=True), *[_unknown(first, values[0], lost=False)] * (not begun)]
+    for (one, before), (other, after) in pairwise(decided):
+        if before is not after:
+            edges.append(edge(one, other))
+            if unstable(one) is unstable(other):  # a motion was found to go on
+                return _answer(critical, sliding_at, unstable, values, edge)
+        elif not before and any(one < value < other for value in unknown):
+            edges += [_unknown(one, other, lost=True), _unknown(other, one, lost=False)]
+    if unknown and unknown[-1] > last:
+        edges += [_unknown(values[-1], last, lost=False) if ended else _unknown(last, values[-1], lost=True)]
+    if not edges and len(decided) < len(answers):
+        return Search(Outcome.UNDECIDED)
+    return _of_edges(critical, begun and not (unknown and unknown[0] < first), edges)
+
+
+def _may_grow(found: Sliding | None) -> bool:
+    """Whether disturbances may grow where no motion is known."""
+    return found is None or not is_undamped(found.system.coefficients) or _grows(found)
+
+
+def _unknown(value: float, other: float, lost: bool) -> Edge:
+    """An end of what may be a window of instability: at a value, or anywhere on the way to another one."""
+    return Edge(value, min(value, other), max(value, other), abs(other - value), lost, known=False)
 
 
 def _of_edges(critical: Critical, unstable: bool, edges: list[Edge]) -> Search:
@@ -230,6 +259,8 @@ def _of_edges(critical: Critical, unstable: bool, edges: list[Edge]) -> Search:
     if not edges:
         return Search(Outcome.UNSTABLE if unstable else Outcome.STABLE, windows=windows, window_errors=errors)
     first = next((each for each in edges if each.lost), edges[0])
+    if not first.known:
+        return Search(Outcome.UNDECIDED, windows=windows, window_errors=errors)
     if first.error >= WIDEST * (critical.upper - critical.lower):  # almost any value of the range may be it
         return Search(Outcome.UNDECIDED)
     outcome = Outcome.FOUND if first.lost else Outcome.REGAINED
@@ -239,15 +270,16 @@ def _of_edges(critical: Critical, unstable: bool, edges: list[Edge]) -> Search:
 def _by_simulation(critical: Critical, sliding_at: SlidingAt, exact: Search) -> Search:
     """Where the growth of small disturbances passes zero, by Brent's method, between two values on either side."""
     at = Disturbances(sliding_at)
-    values = at.scanned(critical.lower, critical.upper, exact.windows)
-    linear = not any(measured.opened for measured in at.known.values() if measured)
+    values = at.scanned(critical.lower, critical.upper, critical.tolerance, exact.windows)
+    by_runs = not any(measured.opened or measured.exact for measured in at.known.values() if measured)
 
+    @cache
     def edge(low: float, high: float) -> Edge:
         found = _narrowed(at, low, high, critical, exact.bias)
         same = exact.columns["lower" if found.lost else "upper"]
         away = min((abs(each - found.value) for each in same), default=0.0)
         # Eigenvalues of linear motions are exact: what the bar does not hold is rounding near self-locking.
-        return found._replace(error=max(found.error, 1.001 * away)) if linear else found
+        return found._replace(error=max(found.error, 1.001 * away)) if by_runs else found
 
     found = _answer(critical, sliding_at, at.unstable, values, edge)
     return found._replace(bias=exact.bias, eigenvalue=exact.eigenvalue)
@@ -274,6 +306,10 @@ def _narrowed(at: Disturbances, low: float, high: float, critical: Critical, bia
         return None if (answer := at.unstable(value)) is None else answer == below
 
     low, high = bisect(as_below, low, high, width=tolerance)
+    if at.goes_on(low, high, wide) and at.unstable(low) is at.unstable(high):
+        if at.unstable(wide[0]) is at.unstable(wide[1]):
+            return _unknown(*wide, lost=not below)
+        return _narrowed(at, *((wide[0], low) if below else (high, wide[1])), critical, bias)
     if high - low > tolerance:  # not known in the middle
         middle = 0.5 * (low + high)
         low = bisect(lambda value: at.unstable(value) is below, low, middle, width=tolerance, halvings=EDGES)[0]

@@ -6,10 +6,12 @@ from dataclasses import replace
 from functools import cache
 from itertools import takewhile
 
+import numpy as np
+
 from brakecli.analysis.stability.modes import growth as eigenvalue_growth
 from brakecli.analysis.stability.search import bisect
 from brakecli.sweeps.floquet import Disturbances
-from brakecli.sweeps.periodic import Orbit, Segments, common_period, log_radius, orbit
+from brakecli.sweeps.periodic import Orbit, Segments, common_period, exponents, orbit
 from brakecli.sweeps.tables import Critical
 
 OTHERS = ((2.0, 2.0, 1.5), (2.0, 1.0, 3.0), (0.5, -0.5, 1.5))
@@ -21,6 +23,7 @@ BEYOND = 1.2  # times the way to where growth with other steps passes zero, if i
 NARROW = 1.1  # ratio of the ends of the bracket of that way
 STEEPER, JUMP = 10.0, 0.5  # times the slope around; of the change in a bracket, in a 32nd of it: a fold
 FOLD = 1.0 / 32.0  # of the range: least bar there, for steps move a fold, too, by an amount that is not measured
+APPROACH = 4  # values before the one that counts, from which the motion with another step is followed
 ROUNDED = 20.0  # times the spread of growth that rounding makes in a three-layer scheme near self-locking
 
 
@@ -42,24 +45,31 @@ def left_open(
     known, (low, high) = {value: each for value, each in at.known.items() if each is not None}, bracket
     near = sorted(known, key=lambda value: max(low - value, value - high, 0.0))[:2]
     one, other = near[0], near[-1]
+    exact = known[one].exact and known[other].exact
+    finers: dict[float, dict[float, Orbit]] = {}
 
     @cache
     def rate(place: float, finer: float) -> float:
-        if (measured := at.at(place)) is None:
+        if (measured := at.at(place)) is None or place not in at.orbits:
             return math.nan
-        return (measured.rate if finer == 1.0 else _finer(at, place, finer).rate) - measured.noise
+        if finer == 1.0:
+            return measured.rate - measured.noise
+        others = finers.setdefault(finer, {})
+        for each in (place,) if others else (*_before(at, one), place):
+            others[each] = _finer(at, each, finer, others)
+        return others[place].rate - measured.noise
 
     def slope(other: float) -> float:
         return abs((known[other].rate - known[one].rate) / (other - one)) if other != one else 0.0
 
     found = at.sliding_at(one)
-    if bias is None and found and not found.forced and not known[one].noise:
+    if bias is None and found and not (found.forced or exact or known[one].noise):
         bias = _to_eigenvalues(at, low, high, critical)
-    bias = abs(bias or 0.0)
+    bias = 0.0 if exact else abs(bias or 0.0)
     if known[one].bar:  # the bracket holds it
         return bias
     far = max((slope(end) for end in wide if end in known), default=0.0)
-    if one in at.orbits:
+    if one in at.orbits and not exact:
         if at.jumps(low, high) or _ends(at, low, high, far):
             return max(low - wide[0], wide[1] - high, FOLD * (critical.upper - critical.lower))
         stride = high - low if at.unstable(high) else low - high
@@ -73,11 +83,11 @@ def left_open(
 
         return max(_shifted(rate, one, stride, critical, far, peak, other) for other in OTHERS)
     if known[one].noise:
-        rounded = ROUNDED if found and found.system.scheme.LAG else 1.0
+        rounded = ROUNDED if found and found.system.scheme.LAG and not exact else 1.0
         hidden = rounded * max(known[one].spread, known[other].spread)
         return bias + _reach(at, low, high, 2.0 * known[one].noise + hidden)
     steep = slope(other)
-    if found is not None and found.system.scheme.LAG and far > 0.0:
+    if found is not None and found.system.scheme.LAG and far > 0.0 and not exact:
         steep = min(steep, far)
     return bias + (max(known[one].spread, known[other].spread) / steep if steep > 0.0 else 0.0)
 
@@ -167,15 +177,33 @@ def _shifted(
     return times * way
 
 
-def _finer(at: Disturbances, value: float, finer: float) -> Orbit:
-    """The periodic motion at a value with the step divided and the nodes multiplied."""
+def _before(at: Disturbances, value: float) -> list[float]:
+    """Values on the way to one, from further off to nearer, at which its motion is stable."""
+    own = [place for place in at.orbits if at.branches.get(place) == at.branches.get(value)]
+    found, reach = list[float](), 0.0
+    for place in sorted(own, key=lambda place: abs(place - value)):
+        if at.orbits[place].rate < 0.0 and abs(place - value) >= reach and len(found) < APPROACH:
+            found, reach = [place, *found], 4.0 * abs(place - value)
+    return found
+
+
+def _finer(at: Disturbances, value: float, finer: float, others: dict[float, Orbit]) -> Orbit:
+    """The periodic motion at a value with the step divided and the nodes multiplied.
+
+    It differs from the known one as the nearest of the `others` does, if there is one.
+    """
     found, near = at.sliding_at(value), at.orbits[value]
     period = common_period(found.system) if found else None
     if found is None or period is None:
-        return replace(near, rate=math.nan)
+        return replace(near, exponents=np.full(4, np.nan + 0j))
     segments = Segments(found, period, len(near.states), finer)
     states = segments.moved(near)
+    if others:
+        beside = min(others, key=lambda other: abs(other - value))
+        moved = states + segments.moved(others[beside]) - segments.moved(at.orbits[beside])
+        if (forced := orbit(segments, moved, others[beside].maps)) is not None:
+            return forced
     if (forced := orbit(segments, states, near.maps)) is not None:
         return forced
     maps = segments.maps(states, segments.ends(states))
-    return Orbit(segments, states, maps, log_radius(maps) / period, near.size)
+    return Orbit(segments, states, maps, exponents(maps), near.size)

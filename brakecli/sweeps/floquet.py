@@ -6,25 +6,22 @@ The motion is stable while all its multipliers lie inside the unit circle; `peri
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from itertools import combinations, pairwise
+from itertools import pairwise
 
 import numpy as np
 
 from brakecli.analysis.stability.modes import is_undamped
-from brakecli.analysis.stability.search import bisect
 from brakecli.solver.links import natural_frequencies
 from brakecli.sweeps.growth import DEPARTED, Growth, Sliding, growth
 from brakecli.sweeps.periodic import (
     LONGEST,
-    Floats,
     Orbit,
     Segments,
     common_period,
     lyapunov,
-    natural,
     orbit,
-    shift,
 )
+from brakecli.sweeps.resonances import meetings, resonances
 
 SEGMENT = 10.0  # periods of the slowest motion
 MOST_SEGMENTS = 250
@@ -32,10 +29,8 @@ SCANNED = 9  # values of the parameter, both ends among them, between which a ch
 PARTS = 4  # of each interval between them, where surfaces open in a run
 REFINED = 4  # times that values are added beside one at which stability is nearly lost or regained
 BUMP = 20.0  # how much nearer to zero that rate may be than it changes there
-SAME = 1e-3  # of the range: nearer to a value no other one is put
-MOST_RESONANCES, HALVINGS = 32, 12  # places where values are put, and how exactly
-BESIDE = 0.01  # of a frequency: how far beside such a place others are put
-STRONGEST = 6  # waves of the wheel of which two may act together
+SAME, FINE = 1e-3, 1e-4  # of the range: nearer to a value no other one is put; least width of a window
+ROUNDS, MOST = 12, 200  # of narrowing down where multipliers may meet, and of values that this may take
 # Damping ratio, of the slowest motion, that would stop a growth which counts as none without dashpots
 NEUTRAL = 1e-5
 SHORTEST, FINEST = 16, 256  # parts of the way from a known motion to the next that are tried; with dashpots
@@ -43,6 +38,7 @@ LARGEST_PART, LEAST_PART = 0.25, 0.015  # of the waves' amplitudes that is added
 RELAXED = 100.0  # periods of the slowest motion after which a stable motion has come near its orbit
 CLOSE = 0.05  # of the size of a motion: how far its neighbour may be from where it is looked for
 MISSED = 3  # searches for a motion that grows out of steady sliding that may fail
+RESUMED = 8  # motions that may be found to go on beyond where they seemed to end
 
 
 class Disturbances:
@@ -54,7 +50,7 @@ class Disturbances:
         self.known: dict[float, Growth | None] = {}
         self.orbits: dict[float, Orbit] = {}
         self.branches: dict[float, float] = {}  # by where the motion was found first, with dashpots
-        self.missed, self.periodic = 0, False
+        self.missed, self.resumed, self.periodic, self.least, self.finest = 0, 0, False, 0.0, 0.0
 
     def at(self, value: float) -> Growth | None:
         """The growth at a value; None without steady sliding, and where no forced motion is found."""
@@ -76,7 +72,9 @@ class Disturbances:
                 del self.known[value]
                 self.at(value)
 
-    def scanned(self, lower: float, upper: float, windows: Iterable[tuple[float, float]]) -> list[float]:
+    def scanned(
+        self, lower: float, upper: float, tolerance: float, windows: Iterable[tuple[float, float]]
+    ) -> list[float]:
         """The values between which changes are looked for.
 
         Where surfaces open they lie closer, and closest beside values where stability is nearly lost or regained.
@@ -84,37 +82,82 @@ class Disturbances:
         """
         values: list[float] = np.linspace(lower, upper, PARTS * (SCANNED - 1) + 1).tolist()
         self.periodic = any(found.forced for found in map(self.sliding_at, values) if found)
+        self.least = SAME * (upper - lower)
+        self.finest = max(min(0.5 * tolerance, self.least), FINE * (upper - lower))
         self.scan(values[::PARTS])
-        if not any(measured and measured.opened for measured in map(self.at, values[::PARTS])):
+        if not (self.periodic or any(each and each.opened for each in map(self.at, values[::PARTS]))):
             return sorted({*values[::PARTS], *between(lower, upper, windows)})
         self.scan(values)
         self._go_on(values)
-        for _ in range(REFINED):
-            known, apart = np.array(values), SAME * (upper - lower)
-            added = {place for place in self.resonances(values) if np.abs(known - place).min() > apart}
-            for triple in zip(values, values[1:], values[2:], strict=False):
-                rates = [measured.rate - measured.noise for measured in map(self.at, triple) if measured]
-                if len(rates) < len(triple) or min(rates) * max(rates) <= 0.0:
-                    continue
-                least = min(map(abs, rates))
-                if least == abs(rates[1]) and least < BUMP * np.ptp(rates):
-                    added |= {0.5 * (low + high) for low, high in pairwise(triple)}
+        for turn in range(ROUNDS):
+            added = set(self._meetings(values)[: max(MOST - len(values), 0)])
+            if turn < REFINED:
+                known = np.array(values)
+                followed = {value: self.orbits[value] for value in values if value in self.branches}
+                places = resonances(self.sliding_at, followed, values)
+                added |= {place for place in places if np.abs(known - place).min() > self.least}
+                for triple in zip(values, values[1:], values[2:], strict=False):
+                    rates = [measured.rate - measured.noise for measured in map(self.at, triple) if measured]
+                    if len(rates) < len(triple) or min(rates) * max(rates) <= 0.0:
+                        continue
+                    least = min(map(abs, rates))
+                    if least == abs(rates[1]) and least < BUMP * np.ptp(rates):
+                        added |= {0.5 * (low + high) for low, high in pairwise(triple)}
+            if not added:
+                break
             values = sorted({*values, *added})
             self.scan(sorted(added))
         self._go_on(values)
-        return sorted({*values, *(place for pair in pairwise(values) for place in self._hidden(*pair))})
+        values = sorted({*values, *(place for pair in pairwise(values) for place in self._hidden(*pair))})
+        return [value for value in values if self._sure(value)]
+
+    def _sure(self, value: float) -> bool:
+        """Whether the answer at a value is certain: beside where stability is lost it may be rounding."""
+        measured = self.at(value)
+        return not measured or measured.exact or value not in self.branches or self.orbits[value].sure
+
+    def _meetings(self, values: list[float]) -> list[float]:
+        """Values at which multipliers of a motion may meet, the likeliest to hide a window first."""
+        by_motion: dict[float | None, list[float]] = {}
+        for value in sorted({*self.branches, *(value for value in values if value in self.orbits)}):
+            by_motion.setdefault(self.branches.get(value), []).append(value)
+        places: dict[float, float] = {}
+        for own in by_motion.values():
+            slides = {value: found for value in own if (found := self.sliding_at(value))}
+            motions = [self.orbits[value] for value in slides]
+            if len(slides) > 1:
+                noise = max((measured.noise for each in slides if (measured := self.known.get(each))), default=0.0)
+                places |= meetings([*slides.values()], motions, [*slides], noise, self.finest)
+        return sorted((place for place in places if place not in self.known), key=lambda place: -places[place])
 
     def _hidden(self, low: float, high: float) -> list[float]:
-        """What was seen on the way from a motion that loses and regains stability before another one follows."""
-        branch = self.branches.get(low)
-        own = sorted(place for place in self.branches if low < place < high and self.branches[place] == branch)
-        answers = [self.orbits[place].rate > 0.0 for place in (low, *own) if place in self.orbits]
-        return own if any(answers) and not (answers[0] or answers[-1]) else []
+        """What was seen of a motion that loses its stability between two values, if not at its end, by a fold."""
+        found = []
+        for branch in {self.branches.get(low), self.branches.get(high)} - {None}:
+            own = sorted(at for at in self.branches if low <= at <= high and self.branches[at] == branch)
+            stable = [at for at in own if self.orbits[at].rate <= 0.0] or [math.nan]
+            lost = (at for at in own if self.orbits[at].rate > 0.0)
+            if any(stable[0] < at < stable[-1] or not self.orbits[at].folds for at in lost):
+                found += own
+        return found
 
     def jumps(self, low: float, high: float) -> bool:
         """Whether the motions at two values are not known to be one; without dashpots that does not count."""
         ends = [self.branches[value] for value in (low, high) if value in self.branches]
         return len(ends) == 2 and ends[0] != ends[1]
+
+    def goes_on(self, low: float, high: float, wide: tuple[float, float]) -> bool:
+        """Whether a stable motion goes on over a bracket in which it seemed to end; follow it on from there.
+
+        A follow may fail for its stride only.
+        """
+        before, beyond, end = (low, high, wide[1]) if self.unstable(low) is False else (high, low, wide[0])
+        if self.resumed == RESUMED or not self.jumps(low, high) or not self._goes_on(before, beyond, False):
+            return False
+        self.resumed += 1
+        if beyond != end:
+            self._goes_on(beyond, end, False)
+        return True
 
     def _go_on(self, values: list[float]) -> None:
         """Follow stable motions on where another one was found beyond: from the end that is stable.
@@ -143,71 +186,46 @@ class Disturbances:
         was, now = self.branches.get(value), self.branches[before]
         if was is not None and _same(forced, self.orbits[value]):
             self.branches = {at: now if each == was else each for at, each in self.branches.items()}
-        self.orbits[value], self.known[value] = forced, replace(known, rate=forced.rate)
+        self.orbits[value], self.known[value] = forced, Growth(forced.rate, 0.0, 0.0, opened=True)
         self.branches[value] = now
         return True
 
-    def resonances(self, values: list[float]) -> list[float]:
-        """Between the values: where a wave of the wheel, its second or third harmonic, or the sum or difference of
-        two waves passes at twice a natural frequency, or at the sum or the difference of both.
-
-        There it may feed a vibration, in a narrow range of the parameter. An opening pad makes the harmonics. Its
-        stiffness is not quite the mean one: natural frequencies are those of the motions at the values.
-        """
-        followed = [(value, self.sliding_at(value)) for value in values if value in self.branches]
-        shifts = [(value, shift(each, self.orbits[value])) for value, each in followed if each]
-        known = [(value, *ratios) for value, ratios in shifts if ratios is not None]
-
-        def away(value: float) -> Floats | None:
-            """Ratios, less one: of the waves first, of what two of the strongest make, of third harmonics."""
-            if (found := self.sliding_at(value)) is None:
-                return None
-            where, *faster = zip(*known, strict=True) if known else ((value,), (1.0,), (1.0,))
-            first, second = natural(found) * [np.interp(value, where, each) for each in faster]
-            wheel, speed = found.system.wheel, abs(found.system.belt_speed)
-            strongest = speed * wheel.turns[np.argsort(-np.abs(wheel.g))[:STRONGEST]]
-            pairs = [made for a, b in combinations(strongest, 2) for made in (a + b, abs(a - b))]
-            drives = [*np.outer([1.0, 2.0], speed * wheel.turns).ravel(), *pairs, *(3.0 * speed * wheel.turns)]
-            vibrating = np.array([2.0 * first, 2.0 * second, first + second, second - first])
-            ratios: Floats = np.outer(drives, 1.0 / np.maximum(vibrating, 1e-9)).ravel() - 1.0
-            return ratios
-
-        rows = [away(value) for value in values]
-
-        def places(beside: float) -> list[float]:
-            changes = [
-                (int(which), low, high)
-                for (low, high), (before, after) in zip(pairwise(values), pairwise(rows), strict=True)
-                if before is not None and after is not None and before.size == after.size
-                for which in np.flatnonzero((before - beside) * (after - beside) < 0.0)
-            ]
-            found = []
-            for which, low, high in sorted(changes)[:MOST_RESONANCES]:
-
-                def above(value: float, which: int = which) -> bool | None:
-                    return None if (there := away(value)) is None else bool(there[which] > beside)
-
-                rising = above(low) is False
-                ends = bisect(lambda v: (above(v) is False) == rising, low, high, halvings=HALVINGS)  # noqa: B023
-                found.append(0.5 * sum(ends))
-            return found
-
-        found = places(0.0)
-        return found if 3 * len(found) > MOST_RESONANCES else [*found, *places(-BESIDE), *places(BESIDE)]
-
     def _measured(self, value: float, found: Sliding) -> Growth | None:
-        # Without dashpots the motion nearest to steady sliding counts: one in full contact, where there is one.
         damped = not is_undamped(found.system.coefficients)
-        if not found.forced and not (self.periodic and damped):
-            return growth(found)
-        if (period := common_period(found.system)) is None:
-            plain = None if found.modulated else growth(found)
-            return plain if plain and not plain.opened else lyapunov(found, plain)
+        slow, fast = natural_frequencies(found.system.coefficients, found.stiffness)
+        period, level = common_period(found.system), NEUTRAL * 2.0 * math.pi * (slow or fast)
+        noise, exact = 0.0 if damped else level, None
+        if found.linear:
+            theory = found.linear.with_slopes()  # it leaves much open with many waves
+            if theory.known_to < max(level, abs(theory.mode.growth - noise)):
+                exact = Growth(theory.mode.growth, theory.known_to, noise, exact=True)
+        if not (self.periodic or found.forced):
+            return exact or growth(found)
+        if period is None:
+            plain = None if exact or found.modulated else growth(found)
+            return exact or (plain if plain and not plain.opened else lyapunov(found, plain))
+        forced, full = self._found(value, found, period, damped)
+        if forced is not None:
+            self.orbits[value] = forced
+        if exact and (full or forced is None or not damped):
+            return exact
+        return Growth(forced.rate, 0.0, noise, opened=True) if forced else None
+
+    def _found(self, value: float, found: Sliding, period: float, damped: bool) -> tuple[Orbit | None, bool]:
+        """The periodic motion at a value, and whether it is the one of linear theory.
+
+        That one counts wherever it lasts, unless dashpots make a stable one beside it that is followed.
+        """
         place, near = self._near(value)
         low, high = sorted((place, value))
         gap = any(lost is None and low < other < high for other, lost in self.known.items())
-        forced = None if gap else self._followed(value, found, period)
+        own = self._in_full_contact(value, found, period) if found.linear or not damped else None
+        forced = own if own and near and _same(own, near) else None
+        if forced is None and not gap and (damped or own is None):
+            forced = self._followed(value, found, period)
         followed = forced is not None
+        if own and (forced is None or forced.rate >= 0.0 or _same(own, forced)):
+            forced, followed = own, followed and forced is not None and _same(own, forced)
         if forced is None and damped:
             plain = growth(found) if near is not None and near.rate > 0.0 else None
             if plain is None or plain.rate <= 0.0:
@@ -215,16 +233,20 @@ class Disturbances:
         if forced is None and self.missed < MISSED:
             forced = self._grown(value, found, period)
             self.missed += forced is None
-        if forced is None:
-            return None
-        if damped:
+        if forced and damped:
             place, near = (place, near) if followed else self._near(value)
             goes_on = followed or (near is not None and _same(forced, near))
             self.branches[value] = self.branches.get(place, value) if goes_on else value
-        self.orbits[value] = forced
-        slow, fast = natural_frequencies(found.system.coefficients, found.stiffness)
-        noise = 0.0 if damped else NEUTRAL * 2.0 * math.pi * (slow or fast)
-        return Growth(forced.rate, 0.0, noise, opened=True)
+        return forced, forced is own
+
+    def _in_full_contact(self, value: float, found: Sliding, period: float) -> Orbit | None:
+        """The periodic motion beside that of linear theory; None where the pad lifts off or sticks too much."""
+        segments, (_, near) = self._segments(value, found, period), self._near(value)
+        count = len(segments.systems)
+        expected = found.in_full_contact(np.arange(count) * period / count) / segments.scales
+        forced = orbit(segments, expected, near.maps if near else None)
+        close = forced is not None and np.abs(forced.states - expected).max() <= CLOSE * forced.size
+        return forced if close else None
 
     def _near(self, value: float) -> tuple[float, Orbit | None]:
         """The nearest motion; where one side is stable and the other is not, the stable one: it may go on."""
@@ -269,18 +291,22 @@ class Disturbances:
     def _beside(self, value: float, found: Sliding, period: float, place: float) -> Orbit | None:
         """The periodic motion that continues the line through one and its neighbour, or is near that one.
 
-        Without dashpots no motion leads through a resonance: there any motion will do.
+        Without dashpots no motion leads through a resonance: there any motion will do. An unstable one that grows
+        at once is left for a vibration that keeps in step with the waves.
         """
         near, segments, branch = self.orbits[place], self._segments(value, found, period), self.branches.get(place)
-        same = (other for other in self.orbits if other != place and self.branches.get(other) == branch)
-        other = min(same, key=lambda other: abs(other - (value if branch is None else place)), default=place)
+        own = [at for at in self.orbits if at != place and self.branches.get(at) == branch]
+        other = min(own, key=lambda other: abs(other - (value if branch is None else place)), default=place)
         guesses = [segments.moved(near)]
         if abs(value - place) <= 2.0 * abs(place - other):
             along = guesses[0] - segments.moved(self.orbits[other])
             guesses.insert(0, guesses[0] + along * ((value - place) / (place - other)))
+        sizes = [self.orbits[at].size for at in own if abs(at - value) < self.least]
+        departed = DEPARTED * min(sizes, default=math.inf) if near.rate > 0.0 else math.inf
         for guess in guesses:
             forced = orbit(segments, guess, near.maps)
-            if forced and (branch is None or np.abs(forced.states - guess).max() <= CLOSE * near.size):
+            close = forced and np.abs(forced.states - guess).max() <= CLOSE * near.size
+            if forced and (branch is None or (close and forced.size < departed)):
                 return forced
         return None
 

@@ -10,12 +10,12 @@ import math
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.analysis.regime.linear import linear_theory
-from brakecli.analysis.stability.modes import growth as eigenvalue_growth
+from brakecli.analysis.regime.linear import Linear, linear_theory
 from brakecli.analysis.stability.modes import is_undamped
 from brakecli.case.case import Case, changed
 from brakecli.case.system import system_of
@@ -47,7 +47,8 @@ class Growth:
     """The growth rate (1/s) of the fastest disturbance of steady sliding; one up to `noise` may be none.
 
     `spread` (1/s): by how much it differs between two halves of the time watched. `opened`: the pad did not touch
-    everywhere all the time. `bar` (1/s): of a mean over a time, within which it is not known.
+    everywhere all the time. `bar` (1/s): of a mean over a time, within which it is not known. `exact`: by
+    theory, not by runs; the spread is what that leaves open.
     """
 
     rate: float
@@ -55,6 +56,7 @@ class Growth:
     noise: float
     opened: bool = False
     bar: float = 0.0
+    exact: bool = False
 
     @property
     def unstable(self) -> bool | None:
@@ -83,13 +85,28 @@ class Sliding(SteadySliding):
         slopes = wheel.g * wheel.omega * np.sinc(wheel.omega * self.system.half_length / np.pi)
         return bool(np.abs(slopes).sum() > SLOPE)
 
+    @cached_property
+    def linear(self) -> Linear | None:
+        """Theory of the motion that a rough wheel forces, where that surely touches everywhere and only slips."""
+        if not self.system.wheel.g.size or self.opens or self.modulated:
+            return None
+        theory = linear_theory(self.system, self.system.belt_speed)
+        if theory is None or theory.opens:
+            return None
+        fastest = 2.0 * math.pi * float(np.abs(theory.waves[:, 0] * theory.passing).sum())
+        return theory if fastest < abs(self.system.belt_speed) else None
+
+    def in_full_contact(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The states x, y, ẋ, ẏ (rows) that the wheel forces at some times (s) by linear theory, if it has any."""
+        theory = linear_theory(self.system, self.system.belt_speed)
+        shaken = np.concatenate(theory.forced(times)).T if theory else np.full((len(times), 4), np.nan)
+        states: NDArray[np.float64] = np.array([self.x, self.y, 0.0, 0.0]) + shaken
+        return states
+
     @property
     def forced(self) -> bool:
         """Whether a rough wheel may force a motion that is not linear, or whose disturbances it feeds."""
-        if not self.system.wheel.g.size:
-            return False
-        theory = None if self.opens or self.modulated else linear_theory(self.system, self.system.belt_speed)
-        return theory is None or theory.opens
+        return bool(self.system.wheel.g.size) and self.linear is None
 
     @property
     def opens(self) -> bool:
@@ -177,8 +194,6 @@ def growth(found: Sliding) -> Growth | None:
     moved = np.abs(maps[:, 1:]).max(axis=(1, 2)) if system.smooth and not system.scheme.LAG else sizes
     last = _last_linear(found, runs, (moved > saturated / small) | (sizes < FADED), interval, slow)
     opened = bool((runs[:, : last + 1, _CONTACT] < 1.0).any())
-    if opened and not (found.forced or found.opens):  # it had left full contact, where eigenvalues are exact
-        return Growth(eigenvalue_growth(system.coefficients, found.stiffness, found.grip), 0.0, 0.0)
     # A linear motion has all its directions from the start on: none has faded there. Others come to their orbit.
     first = max(1, last // 4) if opened else 1
     if last - first < 4:  # out of steady sliding at once

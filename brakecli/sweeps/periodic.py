@@ -31,6 +31,7 @@ ITERATIONS = 10
 SAMPLES = 64  # of a segment, or half as many as steps where they are fewer
 BATCHES, BATCH, TRANSIENT = 8, 4, 16  # batches of a long run, segments of a batch, segments before the first
 HIDDEN = 1e-9  # ratio of the least multiplier to the largest, below which rounding hides its vector
+STICKS = 1.0  # neper that a volume shrinks in a period beyond what dashpots take: the shoe sticks at times
 CERTAIN = 3.5  # standard errors of the mean of eight batches: 99 % of Student's distribution
 
 Floats = NDArray[np.float64]
@@ -122,8 +123,37 @@ class Orbit:
     segments: Segments
     states: Floats
     maps: Floats
-    rate: float  # ln of the largest multiplier's modulus over the period, 1/s
+    exponents: NDArray[np.complex128]  # ln of the multipliers, the largest last
     size: float  # largest distance from steady sliding
+
+    @property
+    def rate(self) -> float:
+        """Growth (1/s) of the fastest disturbance."""
+        return float(self.exponents[-1].real) / self.segments.time
+
+    @property
+    def sure(self) -> bool:
+        """Whether its growth is more than its error.
+
+        While the shoe slips volumes of states shrink as its dashpots say (Liouville); the multipliers may not.
+        """
+        c = self.segments.systems[0].coefficients
+        error = abs(float(self.exponents.real.sum()) / self.segments.time + (c.b_xx + c.b_yy) / c.m)
+        return abs(self.rate) > error or error * self.segments.time > STICKS
+
+    @property
+    def folds(self) -> bool:
+        """Whether the largest multiplier is real and positive, as beside a fold."""
+        return float(self.exponents[-1].imag) == 0.0
+
+    @property
+    def modes(self) -> Floats:
+        """Decay over a period (neper) and angle (0 to pi) of two pairs of multipliers (rows), by the angle."""
+        angles = np.abs(self.exponents.imag)
+        order = np.lexsort((angles, (angles == 0.0) | (angles == math.pi)))  # a real one belongs to another one
+        pairs = np.stack([-self.exponents.real, angles], axis=1)[order].reshape(2, 2, 2).mean(axis=1)
+        rows: Floats = pairs[np.argsort(pairs[:, 1])]
+        return rows
 
 
 def orbit(segments: Segments, states: Floats, maps: Floats | None) -> Orbit | None:
@@ -141,7 +171,7 @@ def orbit(segments: Segments, states: Floats, maps: Floats | None) -> Orbit | No
         if not np.isfinite(maps).all():
             return None
         if gap <= CLOSED:
-            return Orbit(segments, states, maps, log_radius(maps) / segments.time, segments.size(states))
+            return Orbit(segments, states, maps, exponents(maps), segments.size(states))
         change = _correction(maps, gaps)
         for part in (1.0, 0.5, 0.25, 0.125) if fresh else (1.0,):
             moved = _gaps(segments, states + part * change)
@@ -212,16 +242,17 @@ def _correction(maps: Floats, gaps: Floats) -> Floats:
         return np.full((count, 4), np.nan)
 
 
-def log_radius(maps: Floats) -> float:
-    """ln of the largest modulus of the eigenvalues of the product of all maps."""
+def exponents(maps: Floats) -> NDArray[np.complex128]:
+    """ln of the eigenvalues of the product of all maps, the largest last."""
     product, log_size = np.eye(4), 0.0
     for each in maps:
         product = np.matmul(each, product)
-        size = float(np.abs(product).max())
-        if not size > 0.0:
-            return -math.inf
+        size = max(float(np.abs(product).max()), 1e-300)
         product, log_size = product / size, log_size + math.log(size)
-    return log_size + math.log(max(float(np.abs(np.linalg.eigvals(product)).max()), 1e-300))
+    values = np.linalg.eigvals(product).astype(complex)
+    values[np.abs(values) < 1e-300] = 1e-300
+    logs: NDArray[np.complex128] = log_size + np.log(values)
+    return logs[np.argsort(logs.real)]
 
 
 def natural(found: Sliding) -> Floats:

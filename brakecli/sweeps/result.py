@@ -60,8 +60,7 @@ class Findings:
             known = values[~np.isnan(values)]
             self.critical = (len(known), float(known.min()), float(known.max())) if len(known) else (0, 0.0, 0.0)
             self.sentences += _on_lasting_vibration(journal, plan.sweep.critical.tolerance)
-            span = plan.sweep.critical.upper - plan.sweep.critical.lower
-            self.sentences += _on_wide_bars(journal, WIDE * span)
+            self.sentences += _on_wide_bars(journal, plan.sweep.critical.lower, plan.sweep.critical.upper)
         self.variables: dict[str, Any] | None = None
         if self.points <= MOST_AS_JSON:
             self.variables = {field.name: plain(journal.column(field.name)) for field in plan.fields}
@@ -186,8 +185,9 @@ def _on_lasting_vibration(journal: Journal, tolerance: float) -> Iterator[str]:
         yield f"at {above} of {late.size} points {start} {late.max():.3g} {longer}"
 
 
-def _on_wide_bars(journal: Journal, wide: float) -> Iterator[str]:
-    """What is to be done where no critical value is known, or hardly one."""
+def _on_wide_bars(journal: Journal, lower: float, upper: float) -> Iterator[str]:
+    """What is to be done where no critical value is known, or hardly one, and where windows are hardly known."""
+    wide, size = WIDE * (upper - lower), journal.column("status").size
     undecided = int((journal.column("critical_status") == b"undecided").sum())
     unsure = int((np.nan_to_num(journal.column("critical_error"), nan=0.0) > wide).sum())
     wheel = "or waves of the wheel that have a common period"
@@ -197,7 +197,15 @@ def _on_wide_bars(journal: Journal, wide: float) -> Iterator[str]:
         (unsure, "the error bar is a tenth of the range or wider"),
     ):
         if count:
-            yield f"at {count} of {journal.column('status').size} points {what}; {remedy}"
+            yield f"at {count} of {size} points {what}; {remedy}"
+    for end in ("lower", "upper"):
+        values, errors = (journal.column(f"critical_windows_{end}{of}") for of in ("", "_error"))
+        vague = np.nan_to_num(errors, nan=0.0) > wide
+        if vague.any():
+            low, high = max(lower, (values - errors)[vague].min()), min(upper, (values + errors)[vague].max())
+            what = f"a window of instability {'begins' if end == 'lower' else 'ends'} anywhere"
+            where = f"from {low:.5g} to {high:.5g}: no motion was found there, or its growth is not certain"
+            yield f"at {int(vague.any(axis=-1).sum())} of {size} points {what} {where}"
 
 
 def _parameters(plan: Plan, index: int) -> dict[str, Any]:

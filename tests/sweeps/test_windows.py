@@ -292,7 +292,6 @@ def followed(name: str, key: str, ends: tuple[float, float]) -> Search:
         ("resonance", "friction__coefficient", (0.0, 2.5), 2.326, 1.6),
         pytest.param("over a gap", "friction__coefficient", (0.0, 2.4), 1.8876, 1.7, marks=campaign),
         pytest.param("both sides", "shoe__mass", (1.491, 9.317), 3.691, 3.6, marks=campaign),
-        pytest.param("doubling", "link2__stiffness", (1.594e6, 5.42e6), 3.8355e6, 3.62e6, marks=campaign),
     ],
 )
 def test_a_stable_motion_is_followed_until_it_ends(
@@ -326,10 +325,18 @@ def test_a_motion_that_full_contact_would_have_does_not_count_where_it_would_ope
 @campaign
 @pytest.mark.parametrize(
     ("name", "key", "range_", "truth", "most"),
-    [  # its weights take away 0.5 1/s, more than the growth
-        ("weights that damp", "shoe__mass", (6.304, 39.4), [8.82, 17.35, 28.02, 29.85, 39.4], 0.6),
+    [  # its weights take away 0.5 1/s, more than the growth; that is 0.018 1/s half a kilogram above 17.16 kg,
+        # and half the step takes 0.011 of it, so that twice that change is more until then
+        ("weights that damp", "shoe__mass", (6.304, 39.4), [8.82, 17.35, 28.02, 29.85, 39.4], 1.0),
         ("beside", "friction__coefficient", (0.0, 1.1), [0.67342, 0.68719, 0.74487, 1.1], 0.005),
         ("stable again", "link2__stiffness", (8.21e5, 2.791e6), [1.7233e6, 1.8384e6, 1.90733e6], 7e4),
+        (  # ends soon after it has doubled its period; the motion that the shoe falls onto is unstable once more
+            "doubling",
+            "link2__stiffness",
+            (1.594e6, 5.42e6),
+            [3.2139e6, 3.451768e6, 3.463285e6, 3.83164e6, 3.83538e6],
+            1.3e5,
+        ),
     ],
 )
 def test_no_window_of_a_motion_that_is_followed_is_hidden(

@@ -1,0 +1,74 @@
+"""Windows of instability where multipliers meet, far narrower than the values of a scan lie apart.
+
+The truths are those of another integrator, which follows the motion in small steps, at two steps of its own.
+"""
+
+from typing import Any
+
+import pytest
+
+from brakecli.sweeps.critical import search
+from brakecli.sweeps.tables import Critical
+from tests.campaign import campaign
+from tests.examples import make
+
+DOUBLING: dict[str, Any] = {  # its period doubles over a 2150th of the range
+    "shoe": {"mass": 1.961},
+    "wheel": {"radius": 0.5, "angular_speed": 15.74},
+    "link1": {"stiffness": 1422000.0, "damping": 12.82, "angle_deg": -7.031},
+    "link2": {"stiffness": 2334000.0, "damping": 22.81, "angle_deg": 15.86},
+    "load": {"force": 67.39},
+    "friction": {"coefficient": 0.1},
+    "contact": {"half_length": 0.025, "stiffness": 23650000.0},
+    "roughness": {
+        "wheel": {"amplitudes": [1.451e-05, 1.363e-05], "wavelengths": [0.021, 0.036]},
+        "shoe": {"amplitudes": [8.635e-06, 6.059e-06], "wavelengths": [0.021, 0.038]},
+    },
+    "solver": {"duration": 0.31, "scheme": "three-layer", "step": 5.1e-05, "theta": [0.3, 0.4, 0.3]},
+}
+REGAINED: dict[str, Any] = {  # it ends a 290th of the range after it has regained stability
+    "shoe": {"mass": 46.56},
+    "wheel": {"radius": 0.2, "angular_speed": 7.276},
+    "link1": {"stiffness": 410500.0, "damping": 43.4, "angle_deg": 11.44},
+    "link2": {"stiffness": 452300.0, "damping": 70.18, "angle_deg": 29.48},
+    "load": {"force": 178.5},
+    "friction": {"coefficient": 0.1},
+    "contact": {"half_length": 0.015, "stiffness": 22980000.0},
+    "roughness": {"wheel": {"amplitudes": [0.0001145], "wavelengths": [0.074], "phases_deg": [235.6]}},
+    "solver": {"duration": 2.6, "tolerance": 0.0001},
+    "output": {"sample_interval": 0.0021},
+}
+BEYOND: dict[str, Any] = {  # a window of a 1050th above the critical value
+    "shoe": {"mass": 15.92},
+    "wheel": {"radius": 0.33, "angular_speed": 25.46},
+    "link1": {"stiffness": 5096000.0, "damping": 28.86, "angle_deg": 0.0},
+    "link2": {"stiffness": 6462000.0, "damping": 43.43, "angle_deg": 27.86},
+    "load": {"force": 127.5},
+    "friction": {"coefficient": 0.1},
+    "contact": {"half_length": 0.015, "stiffness": 193000000.0},
+    "roughness": {
+        "wheel": {"amplitudes": [3.397e-06, 3.945e-06], "wavelengths": [0.068, 0.056]},
+        "shoe": {"amplitudes": [1.289e-06, 2.209e-06], "wavelengths": [0.025, 0.009]},
+    },
+    "solver": {"duration": 0.45, "scheme": "two-layer", "step": 7.5e-05, "theta": [0.5, 0.5]},
+}
+
+
+@pytest.mark.parametrize(
+    ("tables", "upper", "tolerance", "truth"),
+    [
+        (DOUBLING, 2.3, 1e-3, [0.775843, 0.776855, 0.78291, 2.3]),
+        (REGAINED, 7.1, 1e-3, [1.71369, 1.74247, 1.7668, 7.1]),
+        pytest.param(BEYOND, 2.6, 1e-4, [0.54877, 0.64997, 1.30638, 1.30884, 1.32236, 2.6], marks=campaign),
+    ],
+)
+def test_windows_that_multipliers_open_where_they_meet_are_found(
+    tables: dict[str, Any], upper: float, tolerance: float, truth: list[float]
+) -> None:
+    critical = Critical(parameter="friction.coefficient", lower=0.0, upper=upper, tolerance=tolerance)
+    found = search(critical, lambda value: make(tables, friction__coefficient=value), lambda case: None)
+    ends = [end for window in found.windows for end in window]
+    bars = [bar for errors in found.window_errors for bar in errors]
+    assert len(ends) == len(truth)
+    assert all(abs(end - true) <= bar for end, true, bar in zip(ends, truth, bars, strict=True))
+    assert bars[0] < 0.01 * upper
