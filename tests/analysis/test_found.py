@@ -203,6 +203,21 @@ def test_what_lies_beside_the_lines_of_a_forced_motion_is_ripple_if_nodes_ripple
     assert "contact.nodes = 1024" in verdict.reasons[1]
 
 
+@pytest.mark.parametrize("scheme", ["two-layer", "three-layer"])
+def test_the_spread_of_a_forced_motion_holds_what_a_step_changes_beside_a_resonance(scheme: str) -> None:
+    """The step moves it by 3 %, of which (ωh)²/4 is 0.4 %."""
+    name, step = "forced beside the resonance of an open pad", 6.6549e-05
+    true, spreads = 2.891385e-6, []  # by another integrator, with 1000 nodes and a quarter of the step
+    for part in (1.0, 0.25):
+        verdict = judged(name, solver__scheme=scheme, solver__step=part * step, contact__nodes=512)
+        assert (verdict.excitation, verdict.settled) == (Excitation.FORCED, True)
+        assert verdict.amplitude_spread is not None
+        assert abs(verdict.amplitude - true) <= verdict.amplitude_spread
+        spreads.append(verdict.amplitude_spread / verdict.amplitude)
+    assert spreads[0] < 0.1
+    assert spreads[1] < 0.2 * spreads[0]
+
+
 @pytest.mark.parametrize("times", [0.5, 0.9, 1.0, 1.1])
 def test_a_stick_of_less_than_a_sample_is_not_said_to_be_none(times: float) -> None:
     """The step locks the cycle to 12.000 samples: none of 181 cycles shows the stick, or a third."""

@@ -33,9 +33,10 @@ def classify(
     forced, own = split if split and not (cycles and split[0] > split[1]) else (None, None)
     amplitude, spread = rules.amplitude(decision)
     ripple = context.ripple(part, lines) if context.steady and not cycles else None
-    if ripple:
+    if spread is not None and lines and not rules.theory:
+        spread += amplitude * context.detuned(part, lines) + (ripple.size if ripple else 0.0)
+    if ripple := ripple if ripple and ripple.counts else None:
         rules.evidence |= {f"ripple_{name}": getattr(ripple, name) for name in ("x", "vx", "force")}
-        spread = spread + ripple.size if spread is not None else None
     vague = spread is not None and 0.0 < amplitude <= spread  # then not even its order is known
     low, high = replace(part, start=max(part.start, rules.force_from)).extremes("friction_force")
     variation = cycles.force_variation if cycles else None if rules.force_rings is not None else high - low

@@ -14,7 +14,7 @@ from brakecli.analysis.regime.classify import classify
 from brakecli.analysis.regime.evidence import Part
 from brakecli.analysis.regime.linear import linear_theory
 from brakecli.analysis.regime.over_time import over_time
-from brakecli.analysis.regime.ripple import ripple
+from brakecli.analysis.regime.ripple import detuned, ripple
 from brakecli.analysis.regime.spectra import forced_lines, subharmonics
 from brakecli.analysis.regime.verdict import Context, Decision, Feeds, Thresholds, Verdict
 from brakecli.analysis.stability.modes import growth, is_undamped, locks_from, modes, slowest_of_cycles
@@ -118,6 +118,7 @@ def context(system: System) -> Context:
         modes=lambda: [each for k in (stiffness(), system.contact_stiffness) for each in modes(c, k, grip)],
         linear=theory,
         ripple=lambda part, lines: ripple(system, belt, stiffness(), part, lines),
+        detuned=lambda part, lines: detuned(system, belt, stiffness(), part, lines),
         powers=partial(_powers, system, belt),
     )
 

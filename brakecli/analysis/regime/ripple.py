@@ -1,4 +1,6 @@
-"""How much of a motion is ripple of the quadrature nodes, under which the waves pass where a pad opens.
+"""What nodes and steps change in a forced motion: ripple, and how far the step moves resonances.
+
+Ripple is of the quadrature nodes, under which the waves pass where a pad opens.
 
 The normal force at stored positions is computed again with more nodes. What it differs by shakes the shoe, by the
 linear equations with the mean stiffness of the contact.
@@ -11,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from brakecli.analysis.regime.evidence import Part
-from brakecli.analysis.stability.modes import stiffness_matrix
+from brakecli.analysis.stability.modes import first_order, stiffness_matrix
 from brakecli.solver.contact.pad import build_layer, build_pad
 from brakecli.solver.steady_sliding import add_places
 from brakecli.solver.system import System
@@ -19,6 +21,7 @@ from brakecli.solver.system import System
 _FINER = 4
 _MOST_SAMPLES, _MOST_WORK = 1024, 1 << 24  # samples, and values of waves at nodes
 _LEAST = 0.05  # part of a number from which on it is said
+_STIFFNESSES = np.geomspace(0.8, 1.25, 33)  # of a pad that opens, over the mean one of steady sliding
 
 
 class Ripple(NamedTuple):
@@ -30,6 +33,11 @@ class Ripple(NamedTuple):
     size: float
     power: float
     nodes: int
+
+    @property
+    def counts(self) -> bool:
+        """Whether it is said, and not only part of the spread."""
+        return max(self[:3]) >= _LEAST
 
     @property
     def advice(self) -> str:
@@ -45,7 +53,7 @@ class Ripple(NamedTuple):
 
 
 def ripple(system: System, belt: float, stiffness: float, part: Part, lines: Sequence[float]) -> Ripple | None:
-    """The ripple in the last samples of a part, at a mean stiffness (N/m); None where it is small or not known.
+    """The ripple in the last samples of a part, at a mean stiffness (N/m); None where it is not known.
 
     Where the part is forced on `lines` (Hz), what lies beside them is ripple: the mean stiffness of an open pad
     may miss a resonance.
@@ -80,10 +88,27 @@ def ripple(system: System, belt: float, stiffness: float, part: Part, lines: Seq
         min(float(np.linalg.norm(ours) / size), 1.0) if (size := np.linalg.norm(whole)) else 0.0
         for ours, whole in zip((shaken, 1j * omega * shaken, pressed), seen, strict=True)
     )
-    if max(in_x, in_vx, in_force) < _LEAST:
-        return None
     swing = 0.5 * float(np.ptp(np.fft.irfft(shaken, samples)))
-    if lines:
+    if lines and max(in_x, in_vx, in_force) >= _LEAST:
         (beside, own), (vx, _), (pressing, _) = (part.beside(name, lines) for name in ("x", "vx", "normal_force"))
         in_x, in_vx, in_force, swing = max(in_x, beside), max(in_vx, vx), max(in_force, pressing), max(swing, own)
     return Ripple(in_x, in_vx, in_force, swing, power, system.nodes)
+
+
+def detuned(system: System, belt: float, stiffness: float, part: Part, lines: Sequence[float]) -> float:
+    """Part of the amplitude of a motion forced on `lines` (Hz) by which the step may move it past resonances.
+
+    At half weights the step turns ω into 2/h tan(ωh/2): det(iω - A) changes by (ωh)²/12 Σ ω/|iω - λ| of itself.
+    """
+    if system.method.own_steps or system.method.step is None or not lines:
+        return 0.0
+    c, x, ordered = system.coefficients, part.last("x"), np.unique(lines)
+    size = np.abs(np.fft.rfft(x * np.hanning(len(x)))[1:]) ** 2
+    found = np.fft.rfftfreq(len(x), part.history.interval)[1:]
+    energy = np.bincount(np.searchsorted(0.5 * (ordered[1:] + ordered[:-1]), found), size, len(ordered))
+    held = np.minimum(_STIFFNESSES * stiffness, system.contact_stiffness)
+    grip, omega = math.copysign(c.phi, belt), 2.0 * math.pi * ordered[:, None, None]
+    values = np.linalg.eigvals([first_order(c, stiffness_matrix(c, each, grip) / c.m) for each in held])
+    beside = (omega / np.maximum(np.abs(1j * omega - values), 1e-9 * omega)).sum(axis=2).max(axis=1)
+    change = (omega[:, 0, 0] * system.step) ** 2 * (0.25 + beside / 12.0)
+    return float(np.sqrt(energy @ change**2 / max(energy.sum(), 1e-300)))

@@ -222,7 +222,7 @@ class Rules(LinearRules):
 
     def _rippled(self) -> Decision | None:
         """What the ripple of the nodes gives to a vibration that friction seems to keep up."""
-        if not (ripple := self.context.ripple(self.settled_part, ())):
+        if not (ripple := self.context.ripple(self.settled_part, ())) or not ripple.counts:
             return None
         friction, _ = self.settled_part.power("friction_force", "vx")
         gains = max(self.context.powers(self.settled_part).get("power_dashpots", 0.0), abs(friction))

@@ -74,6 +74,7 @@ class Context:
     modes: Callable[[], list["Mode"]] = list  # of small vibrations
     linear: Callable[[], "Linear | None"] = lambda: None  # the theory of full contact
     ripple: Callable[[Part, Sequence[float]], "Ripple | None"] = lambda part, lines: None  # of the nodes
+    detuned: Callable[[Part, Sequence[float]], float] = lambda part, lines: 0.0  # part of a forced amplitude
     powers: Callable[[Part], dict[str, float]] = lambda part: {}  # W, what becomes of the power of the belt
     radius: float = 1.0  # R, m
     step: float = 0.0  # s; 0 where steps are chosen to keep an error
