@@ -70,7 +70,7 @@ def left_open(
         return bias
     far = max((slope(end) for end in wide if end in known), default=0.0)
     if one in at.orbits and not exact:
-        if at.jumps(low, high) or _ends(at, low, high, far):
+        if at.parts(low, high) or _ends(at, low, high, far):
             return max(low - wide[0], wide[1] - high, FOLD * (critical.upper - critical.lower))
         stride = high - low if at.unstable(high) else low - high
 

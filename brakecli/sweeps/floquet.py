@@ -146,6 +146,11 @@ class Disturbances:
         ends = [self.branches[value] for value in (low, high) if value in self.branches]
         return len(ends) == 2 and ends[0] != ends[1]
 
+    def parts(self, low: float, high: float) -> bool:
+        """Whether motions at two near values are two, also without dashpots."""
+        ends = [self.orbits[value] for value in (low, high) if value in self.orbits and value not in self.branches]
+        return self.jumps(low, high) or (len(ends) == 2 and not _same(*ends))
+
     def goes_on(self, low: float, high: float, wide: tuple[float, float]) -> bool:
         """Whether a stable motion goes on over a bracket in which it seemed to end; follow it on from there.
 
