@@ -199,6 +199,25 @@ def test_the_error_bar_holds_the_bias_of_the_scheme() -> None:
     assert abs(value - 0.75) <= error
 
 
+def test_weights_that_hide_what_eigenvalues_show_decide_nothing() -> None:
+    """Damping of the scheme alone keeps sliding stable throughout."""
+    tables: dict[str, Any] = {
+        "shoe": {"mass": 15.6},
+        "wheel": {"radius": 0.5, "angular_speed": 3.87},
+        "link1": {"stiffness": 202000.0, "damping": 8.03},
+        "link2": {"stiffness": 237000.0, "damping": 15.7, "angle_deg": 2.34},
+        "load": {"force": 3.04},
+        "friction": {"coefficient": 1.05},
+        "contact": {"half_length": 0.02, "stiffness": 1900000.0},
+        "solver": {"duration": 2.8, "scheme": "two-layer", "step": 0.0012, "theta": [1.0, 0.6]},
+    }
+    damped = found(tables, 1.9e5, 7.6e6, "contact__stiffness", tolerance=70.0)
+    assert damped.outcome is Outcome.UNDECIDED
+    neutral = found(tables, 1.9e5, 7.6e6, "contact__stiffness", tolerance=70.0, solver__theta=[0.5, 0.5])
+    assert neutral.outcome is Outcome.FOUND
+    assert neutral.value == pytest.approx(damped.eigenvalue, abs=neutral.error)
+
+
 def test_divergence_is_found_where_steady_sliding_ends() -> None:
     tables = {**SQUEAL, "link2": {**SQUEAL["link2"], "angle_deg": -30.0}}
     exact = stability(system_of(make(tables))).critical

@@ -53,12 +53,31 @@ BEYOND: dict[str, Any] = {  # a window of a 1050th above the critical value
     "solver": {"duration": 0.45, "scheme": "two-layer", "step": 7.5e-05, "theta": [0.5, 0.5]},
 }
 
+FOLD: dict[str, Any] = {  # where growth jumps rounding makes narrow windows
+    "shoe": {"mass": 1.361},
+    "wheel": {"radius": 0.33, "angular_speed": -7.467},
+    "link1": {"stiffness": 495700.0, "damping": 8.161, "angle_deg": -0.0},
+    "link2": {"stiffness": 793500.0, "damping": 14.12, "angle_deg": -32.0},
+    "load": {"force": 133.1},
+    "friction": {"coefficient": 0.1},
+    "contact": {"half_length": 0.04, "stiffness": 2880000.0},
+    "roughness": {
+        "wheel": {
+            "amplitudes": [5.156e-05, 9.372e-05],
+            "wavelengths": [0.025, 0.015],
+            "phases_deg": [5.111, 354.4],
+        }
+    },
+    "solver": {"duration": 0.45, "scheme": "three-layer", "step": 0.00012, "theta": [0.3, 0.4, 0.3]},
+}
+
 
 @pytest.mark.parametrize(
     ("tables", "upper", "tolerance", "truth"),
     [
         (DOUBLING, 2.3, 1e-3, [0.775843, 0.776855, 0.78291, 2.3]),
         (REGAINED, 7.1, 1e-3, [1.71369, 1.74247, 1.7668, 7.1]),
+        pytest.param(FOLD, 4.0, 1e-4, [2.0793, 4.0], marks=campaign),
         pytest.param(BEYOND, 2.6, 1e-4, [0.54877, 0.64997, 1.30638, 1.30884, 1.32236, 2.6], marks=campaign),
     ],
 )
@@ -71,4 +90,4 @@ def test_windows_that_multipliers_open_where_they_meet_are_found(
     bars = [bar for errors in found.window_errors for bar in errors]
     assert len(ends) == len(truth)
     assert all(abs(end - true) <= bar for end, true, bar in zip(ends, truth, bars, strict=True))
-    assert bars[0] < 0.01 * upper
+    assert bars[0] < 0.04 * upper  # at a fold, a 32nd
