@@ -257,8 +257,8 @@ def _of_edges(critical: Critical, unstable: bool, edges: list[Edge]) -> Search:
     """
     wide = WIDEST * (critical.upper - critical.lower)
     for one, other in pairwise(edges):
-        errors = one.error, other.error
-        if one.known and other.known and max(errors) >= wide and other.value - one.value < min(errors):
+        bars = one.error, other.error
+        if one.known and other.known and max(bars) >= wide and other.value - one.value < min(bars):
             return _of_edges(critical, unstable, [each for each in edges if each not in (one, other)])
     ends = [(critical.lower, 0.0)] * unstable + [(each.value, each.error) for each in edges]
     ends += [(critical.upper, 0.0)] * (len(ends) % 2)
