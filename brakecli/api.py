@@ -1,6 +1,5 @@
 """`import brakecli`: cases in, xarray objects out, as on the command line. Large imports wait for a call."""
 
-import json
 import multiprocessing
 import signal
 import tempfile
@@ -15,7 +14,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from brakecli.errors import BrakecliError, UnreadableResultError, UsageError, in_python
+from brakecli.errors import BrakecliError, UsageError, in_python
 from brakecli.files.os_signals import Interrupted, unwinding
 from brakecli.stop import signals_shown
 
@@ -23,7 +22,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from brakecli.case.read import LoadedCase
-    from brakecli.files.field import Field
     from brakecli.sweeps.plan import LoadedSweep
     from brakecli.sweeps.tables import Axis
 
@@ -49,7 +47,9 @@ def load(source: "str | PathLike[str]", settings: "Settings | None" = None) -> A
         if is_result(name):
             if settings:
                 raise UsageError(f"{name}: holds a result, which has no settings; give them to brakecli.run")
-            return _opened(Path(name))
+            from brakecli.files.as_xarray import opened
+
+            return opened(Path(name))
         return (load_sweep if is_sweep(name) else load_case)(name, _overrides(settings))
 
 
@@ -80,13 +80,14 @@ def run(
     """
     with _interruptible(), _target(output) as path:
         loaded = _case(case, settings)
+        from brakecli.files.as_xarray import opened
         from brakecli.runs.run import run
 
         report = run(loaded, path, force=force)
         _warn(report.warnings)
         if report.motion.work.failed:
             raise BrakecliError(str(report.motion.work.failure_sentence))
-        return _opened(path)
+        return opened(path)
 
 
 def stability(
@@ -112,6 +113,7 @@ def stability(
     """
     with _interruptible():
         loaded = _case(case, settings)
+        from brakecli.files.as_xarray import dataset, opened
         from brakecli.files.field import values_of
         from brakecli.files.fields import STABILITY
 
@@ -121,13 +123,13 @@ def stability(
             from brakecli.runs.limits import within_range
 
             with within_range():
-                return _dataset(STABILITY, values_of(STABILITY, stability(system_of(loaded.case))))
+                return dataset(STABILITY, values_of(STABILITY, stability(system_of(loaded.case))))
         from brakecli.sweeps.lock_in import lock_in, write
 
         with _target(None) as path:
             found = lock_in(loaded, _axis(vary), "vary", lambda what, done, total: None)
             write(path, loaded, found, force=False)
-            return _opened(path).to_dataset()
+            return opened(path).to_dataset()
 
 
 def sweep(
@@ -162,6 +164,7 @@ def sweep(
         raise UsageError('brakecli.sweep: in a script, call it below  if __name__ == "__main__":')
     with _interruptible(), _target(output) as path:
         from brakecli.cli.inputs import load_sweep
+        from brakecli.files.as_xarray import opened
         from brakecli.runs.run import load_kernels
         from brakecli.sweeps.driver import choose_engine, sweep
         from brakecli.sweeps.plan import LoadedSweep, sweep_of
@@ -181,7 +184,7 @@ def sweep(
         if found := report.findings.failures:
             failed = f"{report.findings.failed} of {report.findings.points} points failed"
             _warn([f"{failed}, the first: {found[0]['reason']}"])
-        return _opened(path).to_dataset()
+        return opened(path).to_dataset()
 
 
 def classify(
@@ -213,6 +216,7 @@ def classify(
     """
     from brakecli.cli.classify import Options
     from brakecli.cli.measured import NUMBERS, Measured
+    from brakecli.files.as_xarray import dataset
     from brakecli.files.fields import VERDICT
 
     how = ("column", "time_column", "sample_rate", "unit", "time_unit")
@@ -225,7 +229,7 @@ def classify(
     with _interruptible():
         numbers = Options(measured, changes, second_run, quiet=True).verdict(str(source))
     _warn(numbers.get("warnings", ()))
-    return _dataset(VERDICT, numbers)
+    return dataset(VERDICT, numbers)
 
 
 @contextmanager
@@ -319,38 +323,6 @@ def _plain(value: Any, key: str) -> Any:
     if not isinstance(value, str | int | float | date | time | PathLike):
         raise UsageError(f"{key}: cannot be set to {type(value).__name__}; give a number, text, list or table")
     return str(value) if isinstance(value, PathLike) else value
-
-
-def _opened(path: Path) -> "xr.DataTree":
-    """A result file in memory, checked; what other programs have put there may be more than xarray takes."""
-    import xarray as xr
-
-    from brakecli.files.read import open_result
-
-    with open_result(path):
-        pass
-    try:
-        with xr.open_datatree(path, engine="h5netcdf") as tree:
-            return tree.load()
-    except (ValueError, TypeError, LookupError, AttributeError, OSError, RuntimeError) as error:
-        raise UnreadableResultError(f"{path}: xarray cannot read what it holds: {error}") from error
-
-
-def _dataset(declared: "Iterable[Field]", numbers: Mapping[str, Any]) -> "xr.Dataset":
-    """Numbers and texts as variables with their units; lists as attributes, and objects, as JSON."""
-    import xarray as xr
-
-    found, known = xr.Dataset(), {field.name: field for field in declared}
-    for name, value in numbers.items():
-        field = known.get(name)
-        if isinstance(value, list | tuple | dict):
-            flat = not isinstance(value, dict) and all(isinstance(each, str | int | float) for each in value)
-            found.attrs[name] = list(value) if flat else json.dumps(value)
-        elif field and field.kind != "O":
-            missing = "" if field.kind.startswith("S") else float("nan")
-            about = {"units": field.units, "long_name": field.meaning}
-            found[name] = ((), missing if value is None else value, about)
-    return found
 
 
 def _warn(texts: Iterable[str]) -> None:

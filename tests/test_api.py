@@ -1,5 +1,6 @@
 """The functions of `import brakecli`: what they return is what the commands write and print."""
 
+import hashlib
 import json
 import math
 import signal
@@ -153,6 +154,27 @@ def test_what_xarray_cannot_read_is_told(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "r.h5", "r+") as file:  # cuts the digest off
         file["history/vx"].attrs["scale_factor"] = "x"
     with pytest.raises(UnreadableResultError, match="xarray cannot read what it holds"):
+        brakecli.load(tmp_path / "r.h5")
+
+
+def test_axes_that_are_no_references_are_told(tmp_path: Path) -> None:
+    """Taken as references they would end the process, also where the digest fits."""
+    brakecli.run(CASE, SHORT, output=tmp_path / "r.h5")
+    with h5py.File(tmp_path / "r.h5", "r+") as file:
+        file["history/vx"].attrs["DIMENSION_LIST"] = np.array([b"time"])
+    content = (tmp_path / "r.h5").read_bytes()
+    content = content[: int.from_bytes(content[28:36], "little")]
+    (tmp_path / "r.h5").write_bytes(content + hashlib.sha256(content).digest())
+    with pytest.raises(UnreadableResultError, match="DIMENSION_LIST"):
+        brakecli.load(tmp_path / "r.h5")
+
+
+def test_a_group_that_stands_in_itself_is_told(tmp_path: Path) -> None:
+    """xarray would go down without an end."""
+    brakecli.run(CASE, SHORT, output=tmp_path / "r.h5")
+    with h5py.File(tmp_path / "r.h5", "r+") as file:
+        file.create_group("loop")["up"] = file["/"]
+    with pytest.raises(UnreadableResultError, match="stands elsewhere, too"):
         brakecli.load(tmp_path / "r.h5")
 
 

@@ -110,7 +110,7 @@ class TextTable:
         """
         name = self.names[column] if self.names else ""
         end = name.rpartition("_")[2] if "_" in name else ""
-        given = [*self.units[column : column + 1], *re.findall(r"[(\[]([^()\[\]]+)[)\]]\s*$", name)]
+        given = [*self.units[column : column + 1], *re.findall(r"[(\[]([^()\[\]]+)[)\]]", name)[-1:]]
         given += (  # the end of `force_x` or `height_a` need not be a unit, nor a name like `h`
             text
             for text in (end, name)

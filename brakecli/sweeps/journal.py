@@ -176,7 +176,8 @@ class Journal:
     def _sound(self, packed: bytes, size: int) -> bytes | None:
         """The records of a block of so many bytes; None where they are not what belongs there."""
         try:
-            records = zlib.decompressobj().decompress(packed, size + 1)
+            stream = zlib.decompressobj()
+            records = stream.decompress(packed, size + 1)
             found = np.frombuffer(records, self.kind)
             for name in self.kind.names or ():
                 if self.kind[name].kind == "S":
@@ -187,7 +188,7 @@ class Journal:
                     return None
         except (zlib.error, ValueError):  # also texts that are not UTF-8
             return None
-        return records if len(records) == size else None
+        return records if len(records) == size and stream.eof else None
 
     def _note(self, place: tuple[int, int, int], offset: int, records: bytes) -> None:
         first, count, length = place

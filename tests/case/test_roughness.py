@@ -246,6 +246,7 @@ WRONG = {
     "x_mm,z_V\n0,1\n1,2\n2,1\n3,5\n": "not meter; correct the unit",
     "x_mm,z_mV\n0,1\n1,2\n2,1\n3,5\n": "column z_mV: mV is",
     "x (mm),z (qq)\n0,1\n1,2\n2,1\n3,5\n": "column z (qq): there is no unit qq",
+    "x (mm),z (qq) rms\n0,1\n1,2\n2,1\n3,5\n": "column z (qq) rms: there is no unit qq",
     "x_mm,z_mm\nmm,um\n0,1\n1,2\n2,1\n3,5\n": "column z_mm: has the units um and mm; keep one",
     "position (mm) height (um)\n0 1\n1 2\n2 1\n3 5\n": "its first lines do not name both columns",
     "0,1\n1,\n2,1\n3,5\n": "a cell is empty or no number",

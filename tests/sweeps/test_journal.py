@@ -203,12 +203,13 @@ def test_a_block_that_holds_something_else_is_computed_again(
     assert (tmp_path / "s.h5").read_bytes() == (tmp_path / "expected.h5").read_bytes()
 
 
+@pytest.mark.parametrize("kept", [None, -5], ids=["not packed", "without its end"])
 def test_a_block_that_cannot_be_unpacked_is_computed_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, kept: int | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    loaded = write_sweep(tmp_path, frictions(4))
+    loaded, pack = write_sweep(tmp_path, frictions(4)), zlib.compress
     with open_journal(tmp_path / "s.h5.partial", loaded.plan, force=False) as journal:
-        monkeypatch.setattr(zlib, "compress", lambda records, level: records)
+        monkeypatch.setattr(zlib, "compress", lambda data, level: pack(data, level)[:kept] if kept else data)
         journal.add(0, compute_units(loaded.plan, 0, 2))
         monkeypatch.undo()
     assert inline(loaded, tmp_path / "s.h5").resumed == 0
