@@ -21,7 +21,7 @@ from brakecli.errors import CaseError
 from brakecli.runs.limits import within_range
 from brakecli.solver.system import System
 from brakecli.sweeps.early import Known, early
-from brakecli.sweeps.error_bar import left_open
+from brakecli.sweeps.error_bar import FOLD, left_open
 from brakecli.sweeps.floquet import Disturbances, between
 from brakecli.sweeps.growth import Sliding, has_exact_steps, sliding, stepped, with_step
 from brakecli.sweeps.sustained import fades_linearly, lasting, settling, verdict_fades
@@ -260,6 +260,9 @@ def _of_edges(critical: Critical, unstable: bool, edges: list[Edge]) -> Search:
         bars = one.error, other.error
         if one.known and other.known and max(bars) >= wide and other.value - one.value < min(bars):
             return _of_edges(critical, unstable, [each for each in edges if each not in (one, other)])
+        if one.lost and other.value - one.value < max(bars) < FOLD * (critical.upper - critical.lower):
+            # A resonance is at another place with another step: both ends of its window move.
+            edges = [each._replace(error=max(bars)) if each in (one, other) else each for each in edges]
     ends = [(critical.lower, 0.0)] * unstable + [(each.value, each.error) for each in edges]
     ends += [(critical.upper, 0.0)] * (len(ends) % 2)
     columns = ([each[k] for each in ends] for k in (0, 1))
