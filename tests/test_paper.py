@@ -18,10 +18,11 @@ from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
 from brakecli.cli.inputs import load_sweep
 from brakecli.solver.roughness import TWO_PI
-from brakecli.sweeps.critical import Outcome, Search, search
+from brakecli.sweeps.critical import search
 from brakecli.sweeps.plan import kind_of
 from brakecli.sweeps.point import simulate
 from brakecli.sweeps.tables import Critical
+from brakecli.sweeps.windows import Outcome, Search
 from tests.campaign import campaign, differences
 from tests.commands import ROOT
 

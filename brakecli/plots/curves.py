@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from brakecli.analysis.regime.verdict import Excitation
 from brakecli.plots import style, sweep
 from brakecli.plots.sweep import Sign, SweepPicture
-from brakecli.sweeps.critical import Outcome
+from brakecli.sweeps.windows import Outcome
 
 _FEW = 60  # points up to which each has a marker of full size
 _DIRECTIONS = {"": ("", "-"), "up": (">", "-"), "down": ("<", style.DASHES)}  # marker and dashes of curves

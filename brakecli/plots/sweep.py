@@ -17,11 +17,11 @@ from brakecli.files import fields
 from brakecli.files.read import StoredResult
 from brakecli.plots import style
 from brakecli.plots.axis import Axis
-from brakecli.sweeps.critical import Outcome
 from brakecli.sweeps.margin import margins
 from brakecli.sweeps.plan import Plan, label
 from brakecli.sweeps.point import Status
 from brakecli.sweeps.tables import Critical, Sweep
+from brakecli.sweeps.windows import Outcome
 
 REGIMES = {  # colour and marker
     Regime.DAMPED: ("#BFDDF0", "o"),

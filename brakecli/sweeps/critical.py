@@ -2,10 +2,9 @@
 
 import math
 from collections.abc import Callable
-from enum import StrEnum
 from functools import cache, partial
 from itertools import pairwise
-from typing import NamedTuple, cast
+from typing import cast
 
 import numpy as np
 
@@ -21,72 +20,19 @@ from brakecli.errors import CaseError
 from brakecli.runs.limits import within_range
 from brakecli.solver.system import System
 from brakecli.sweeps.early import Known, early
-from brakecli.sweeps.error_bar import FOLD, left_open
+from brakecli.sweeps.error_bar import left_open
 from brakecli.sweeps.floquet import Disturbances, between
 from brakecli.sweeps.growth import Sliding, has_exact_steps, sliding, stepped, with_step
 from brakecli.sweeps.sustained import fades_linearly, lasting, settling, verdict_fades
 from brakecli.sweeps.tables import Critical
+from brakecli.sweeps.windows import Edge, Outcome, Search, no_edge, of_edges
 
-WIDEST = 1.0 / 3.0  # of the range, that an error bar with an answer may have
 EDGES = 4  # halvings towards the ends of a range of the parameter in which the answer is not known
 SCANNED_BY_EIGENVALUES = 129
 SCANNED_WHERE_OPEN = 17  # by eigenvalues where surfaces open: their mean stiffness takes time
 GALLOP = 4.0  # factor from one stride to the next in looking for the end of sustained vibration
 LONGER = 8.0  # durations of the case that vibration beside stable sliding has to last
 PATIENT = 128.0  # durations that it may take to die out on smooth surfaces; on rough ones twice `LONGER`
-
-
-class Outcome(StrEnum):
-    """What a search for a critical value has come to."""
-
-    FOUND = "found"
-    REGAINED = "found, stable above"
-    STABLE = "stable throughout"
-    UNSTABLE = "unstable throughout"
-    NO_SLIDING = "no steady sliding"
-    NONE = "not searched"
-    DAMPED = "damped throughout"
-    SUSTAINED = "sustained throughout"
-    UNDECIDED = "undecided"
-
-
-class Search(NamedTuple):
-    """The answer for one point; None, or NaN, stands for what there is not.
-
-    `error` is the half width of the bracket, plus the bias of the scheme at its step, plus what the growth
-    measured leaves open. `bias`: the scheme's own critical value less the exact one. `windows`: both ends of every
-    interval of instability; `window_errors`: their error bars, 0 where a bound of the range cuts it.
-    """
-
-    outcome: Outcome
-    value: float | None = None
-    lower: float = math.nan
-    upper: float = math.nan
-    error: float | None = None
-    bias: float | None = None
-    eigenvalue: float | None = None
-    sustained: float | None = None
-    sustained_outcome: Outcome = Outcome.NONE
-    windows: tuple[tuple[float, float], ...] = ()
-    window_errors: tuple[tuple[float, float], ...] = ()
-
-    @property
-    def columns(self) -> dict[str, list[float]]:
-        """Both ends of the windows and their error bars, each by its name."""
-        found = {"": self.windows, "_error": self.window_errors}
-        ends = ("lower", "upper")
-        return {end + of: [each[k] for each in found[of]] for of in found for k, end in enumerate(ends)}
-
-
-class Edge(NamedTuple):
-    """Where stability is lost, or regained, with its bracket and error bar; or where it is not known any more."""
-
-    value: float
-    lower: float
-    upper: float
-    error: float
-    lost: bool
-    known: bool = True
 
 
 SlidingAt = Callable[[float], Sliding | None]
@@ -201,7 +147,7 @@ def _friction_by_eigenvalues(critical: Critical, system: System) -> Search:
     held = system.coefficients.c_xx > 0.0  # otherwise there is steady sliding without friction only
     if not edges and (report.stable is None or report.belt_speed == 0.0 or not held):
         return Search(Outcome.NO_SLIDING)
-    found = _of_edges(critical, not edges[0].lost if edges else not report.stable, edges)
+    found = of_edges(critical, not edges[0].lost if edges else not report.stable, edges)
     if found.value is None:
         return found
     lost = report.critical is not None and found.value == report.critical.friction
@@ -225,57 +171,24 @@ def _answer(
     unknown = [value for value, answer in answers if answer is None and _may_grow(sliding_at(value))]
     (first, begun), (last, ended), edges = decided[0], decided[-1], list[Edge]()
     if unknown and unknown[0] < first:
-        edges += [_unknown(values[0], first, lost=True), *[_unknown(first, values[0], lost=False)] * (not begun)]
+        edges += [no_edge(values[0], first, lost=True), *[no_edge(first, values[0], lost=False)] * (not begun)]
     for (one, before), (other, after) in pairwise(decided):
         if before is not after:
             edges.append(edge(one, other))
             if unstable(one) is unstable(other):  # a motion was found to go on
                 return _answer(critical, sliding_at, unstable, values, edge)
         elif not before and any(one < value < other for value in unknown):
-            edges += [_unknown(one, other, lost=True), _unknown(other, one, lost=False)]
+            edges += [no_edge(one, other, lost=True), no_edge(other, one, lost=False)]
     if unknown and unknown[-1] > last:
-        edges += [_unknown(values[-1], last, lost=False) if ended else _unknown(last, values[-1], lost=True)]
+        edges += [no_edge(values[-1], last, lost=False) if ended else no_edge(last, values[-1], lost=True)]
     if not edges and len(decided) < len(answers):
         return Search(Outcome.UNDECIDED)
-    return _of_edges(critical, begun and not (unknown and unknown[0] < first), edges)
+    return of_edges(critical, begun and not (unknown and unknown[0] < first), edges)
 
 
 def _may_grow(found: Sliding | None) -> bool:
     """Whether disturbances may grow where no motion is known."""
     return found is None or not is_undamped(found.system.coefficients) or _grows(found)
-
-
-def _unknown(value: float, other: float, lost: bool) -> Edge:
-    """An end of what may be a window of instability: at a value, or anywhere on the way to another one."""
-    return Edge(value, min(value, other), max(value, other), abs(other - value), lost, known=False)
-
-
-def _of_edges(critical: Critical, unstable: bool, edges: list[Edge]) -> Search:
-    """The critical value and all windows of instability; `unstable`: whether the range begins in one.
-
-    One that is narrower than its bars, of which one is wide, may be none.
-    """
-    wide = WIDEST * (critical.upper - critical.lower)
-    for one, other in pairwise(edges):
-        bars = one.error, other.error
-        if one.known and other.known and max(bars) >= wide and other.value - one.value < min(bars):
-            return _of_edges(critical, unstable, [each for each in edges if each not in (one, other)])
-        if one.lost and other.value - one.value < max(bars) < FOLD * (critical.upper - critical.lower):
-            # A resonance is at another place with another step: both ends of its window move.
-            edges = [each._replace(error=max(bars)) if each in (one, other) else each for each in edges]
-    ends = [(critical.lower, 0.0)] * unstable + [(each.value, each.error) for each in edges]
-    ends += [(critical.upper, 0.0)] * (len(ends) % 2)
-    columns = ([each[k] for each in ends] for k in (0, 1))
-    windows, errors = (tuple(zip(each[::2], each[1::2], strict=True)) for each in columns)
-    if not edges:
-        return Search(Outcome.UNSTABLE if unstable else Outcome.STABLE, windows=windows, window_errors=errors)
-    first = next((each for each in edges if each.lost), edges[0])
-    if not first.known:
-        return Search(Outcome.UNDECIDED, windows=windows, window_errors=errors)
-    if first.error >= wide:  # almost any value of the range may be it
-        return Search(Outcome.UNDECIDED)
-    outcome = Outcome.FOUND if first.lost else Outcome.REGAINED
-    return Search(outcome, *first[:4], windows=windows, window_errors=errors)
 
 
 def _by_simulation(critical: Critical, sliding_at: SlidingAt, exact: Search) -> Search:
@@ -322,7 +235,7 @@ def _narrowed(at: Disturbances, low: float, high: float, critical: Critical, bia
     low, high = bisect(as_below, low, high, width=tolerance)
     if at.goes_on(low, high, wide) and at.unstable(low) is at.unstable(high):
         if at.unstable(wide[0]) is at.unstable(wide[1]):
-            return _unknown(*wide, lost=not below)
+            return no_edge(*wide, lost=not below)
         return _narrowed(at, *((wide[0], low) if below else (high, wide[1])), critical, bias)
     if high - low > tolerance:  # not known in the middle
         middle = 0.5 * (low + high)

@@ -13,6 +13,7 @@ from brakecli.analysis.stability.search import bisect
 from brakecli.sweeps.floquet import Disturbances
 from brakecli.sweeps.periodic import Orbit, Segments, common_period, exponents, orbit
 from brakecli.sweeps.tables import Critical
+from brakecli.sweeps.windows import FOLD
 
 OTHERS = ((2.0, 2.0, 1.5), (2.0, 1.0, 3.0), (0.5, -0.5, 1.5))
 """Divisors of the step, which also multiply the nodes; which part of the change of growth counts as its error; and
@@ -22,7 +23,6 @@ by all of its error or more: at least half of that counts, as patches that open 
 BEYOND = 1.2  # times the way to where growth with other steps passes zero, if it is as steep as further away
 NARROW = 1.1  # ratio of the ends of the bracket of that way
 STEEPER, JUMP = 10.0, 0.5  # times the slope around; of the change in a bracket, in a 32nd of it: a fold
-FOLD = 1.0 / 32.0  # of the range: least bar there, for steps move a fold, too, by an amount that is not measured
 APPROACH = 4  # values before the one that counts, from which the motion with another step is followed
 ROUNDED = 20.0  # times the spread of growth that rounding makes in a three-layer scheme near self-locking
 

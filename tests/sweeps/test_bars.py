@@ -11,8 +11,9 @@ import pytest
 import tomli_w
 
 from brakecli.case.case import Case
-from brakecli.sweeps.critical import Outcome, Search, search
+from brakecli.sweeps.critical import search
 from brakecli.sweeps.tables import Critical
+from brakecli.sweeps.windows import Outcome, Search
 from tests.campaign import campaign
 from tests.commands import brakecli
 from tests.examples import make

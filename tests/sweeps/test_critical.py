@@ -15,13 +15,14 @@ from brakecli.cli.inputs import load_sweep
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.motion import solve
 from brakecli.solver.system import Initial
-from brakecli.sweeps.critical import LONGER, Outcome, Search, search
+from brakecli.sweeps.critical import LONGER, search
 from brakecli.sweeps.error_bar import OTHERS
 from brakecli.sweeps.floquet import Disturbances
 from brakecli.sweeps.growth import Sliding, growth, sliding, with_step
 from brakecli.sweeps.periodic import common_period
 from brakecli.sweeps.point import verdict_of
 from brakecli.sweeps.tables import Critical
+from brakecli.sweeps.windows import Outcome, Search
 from tests.analysis.test_regime_table import random_case
 from tests.campaign import campaign, counts
 from tests.commands import ROOT

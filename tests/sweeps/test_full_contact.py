@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from brakecli.case.system import system_of
-from brakecli.sweeps.critical import Outcome, Search, search
+from brakecli.sweeps.critical import search
 from brakecli.sweeps.growth import Sliding, sliding
 from brakecli.sweeps.tables import Critical
+from brakecli.sweeps.windows import Outcome, Search
 from tests.examples import make
 from tests.sweeps.independent import held_by, smooth_is_unstable
 from tests.sweeps.shoes import flat_critical

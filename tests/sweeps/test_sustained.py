@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from brakecli.sweeps.critical import Outcome
+from brakecli.sweeps.windows import Outcome
 from tests.campaign import campaign
 from tests.sweeps.test_critical import found
 from tests.sweeps.test_windows import FOLDS

@@ -15,8 +15,9 @@ import xarray as xr
 from scipy.integrate import solve_ivp
 
 from brakecli.case.system import system_of
-from brakecli.sweeps.critical import Outcome, Search, search
+from brakecli.sweeps.critical import search
 from brakecli.sweeps.tables import Critical
+from brakecli.sweeps.windows import Outcome, Search
 from tests.campaign import campaign
 from tests.commands import brakecli
 from tests.examples import make
