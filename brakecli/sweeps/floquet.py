@@ -108,8 +108,10 @@ class Disturbances:
             values = sorted({*values, *added})
             self.scan(sorted(added))
         self._go_on(values)
-        values = sorted({*values, *(place for pair in pairwise(values) for place in self._hidden(*pair))})
-        return [value for value in values if self._sure(value)]
+        hidden = {place for pair in pairwise(values) for place in self._hidden(*pair)}
+        for place in hidden:
+            self.known.setdefault(place, Growth(self.orbits[place].rate, 0.0, 0.0, opened=True))
+        return [value for value in sorted({*values, *hidden}) if self._sure(value)]
 
     def _sure(self, value: float) -> bool:
         """Whether the answer at a value is certain: beside where stability is lost it may be rounding."""
