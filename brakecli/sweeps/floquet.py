@@ -90,7 +90,7 @@ class Disturbances:
         self.scan(values)
         self._go_on(values)
         for turn in range(ROUNDS):
-            added = set(self._meetings(values)[: max(MOST - len(values), 0)])
+            added = set(self._meetings()[: max(MOST - len(values), 0)])
             if turn < REFINED:
                 known = np.array(values)
                 followed = {value: self.orbits[value] for value in values if value in self.branches}
@@ -118,18 +118,18 @@ class Disturbances:
         measured = self.at(value)
         return not measured or measured.exact or value not in self.branches or self.orbits[value].sure
 
-    def _meetings(self, values: list[float]) -> list[float]:
+    def _meetings(self) -> list[float]:
         """Values at which multipliers of a motion may meet, the likeliest to hide a window first."""
-        by_motion: dict[float | None, list[float]] = {}
-        for value in sorted({*self.branches, *(value for value in values if value in self.orbits)}):
-            by_motion.setdefault(self.branches.get(value), []).append(value)
+        by_motion: dict[float, list[float]] = {}
+        for value, branch in sorted(self.branches.items()):  # without dashpots all meetings open windows
+            by_motion.setdefault(branch, []).append(value)
         places: dict[float, float] = {}
         for own in by_motion.values():
             slides = {value: found for value in own if (found := self.sliding_at(value))}
-            motions = [self.orbits[value] for value in slides]
             if len(slides) > 1:
-                noise = max((measured.noise for each in slides if (measured := self.known.get(each))), default=0.0)
-                places |= meetings([*slides.values()], motions, [*slides], noise, self.finest)
+                places |= meetings(
+                    [*slides.values()], [self.orbits[value] for value in slides], [*slides], self.finest
+                )
         return sorted((place for place in places if place not in self.known), key=lambda place: -places[place])
 
     def _hidden(self, low: float, high: float) -> list[float]:

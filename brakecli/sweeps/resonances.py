@@ -19,18 +19,16 @@ HIDDEN = (
 NEARLY = 1.2  # times that change: how far apart multipliers may be that meet on the way
 
 
-def meetings(
-    found: list[Sliding], motions: list[Orbit], values: list[float], noise: float, finest: float
-) -> dict[float, float]:
+def meetings(found: list[Sliding], motions: list[Orbit], values: list[float], finest: float) -> dict[float, float]:
     """Between values of one motion: where multipliers may meet, and one leave the unit circle; and how likely.
 
     Where pairs meet, at 1, at -1 or each other, they part by k in their angles, and in their moduli by no more
     than that. They leave the circle if k is more than the decay over a period; the angles, if they pass each
     other, then change by twice the decay on the way. They change as natural frequencies do, or as they do beside.
-    Growth up to `noise` (1/s) counts as none. Nothing is looked for between values as near as two of `finest`.
+    Nothing is looked for between values as near as two of the `finest`.
     """
     gaps, modes = np.diff(values), np.array([motion.modes for motion in motions])
-    decays, angles = modes[:, :, 0] + noise * motions[0].segments.time, modes[:, :, 1]
+    decays, angles = modes[:, :, 0], modes[:, :, 1]
     turned = [
         2.0 * math.pi * natural(at) * motion.segments.time for at, motion in zip(found, motions, strict=True)
     ]
