@@ -57,7 +57,8 @@ def unwinding() -> Iterator[None]:
     """Within the block, the first signal raises `Interrupted`, so that unfinished files are removed.
 
     Later signals are ignored, as they would cut through the clean-up. The C code in front of a compiled function
-    calls back into Python, and loses exceptions or turns them into others: there, a timer asks again soon.
+    calls back into Python, and loses exceptions or turns them into others, and finalizers lose them, too: there, a
+    timer asks again soon.
     Whatever the block has made of it, its end is an interruption: compiled code has given up what it was doing.
     """
     arrived: list[int] = []
@@ -73,6 +74,14 @@ def unwinding() -> Iterator[None]:
             raised.append(Interrupted(arrived[0]))
             raise raised[0]
 
+    def lost(unraisable: Any) -> None:
+        if unraisable.exc_value in raised:
+            raised.clear()
+            signal.setitimer(signal.ITIMER_REAL, 0.01)
+        else:
+            report(unraisable)
+
+    report, sys.unraisablehook = sys.unraisablehook, lost
     with _handled_by(note):
         try:
             yield
@@ -82,6 +91,7 @@ def unwinding() -> Iterator[None]:
             raise
         finally:
             signal.setitimer(signal.ITIMER_REAL, 0.0)
+            sys.unraisablehook = report
         if arrived:
             raise Interrupted(arrived[0])
 

@@ -13,9 +13,7 @@ from brakecli.sweeps.periodic import Floats, Orbit, natural, shift
 MOST_RESONANCES, HALVINGS = 32, 12  # places where values are put, and how exactly
 BESIDE = 0.01  # of a frequency: how far beside such a place others are put
 STRONGEST = 6  # waves of the wheel of which two may act together
-HIDDEN = (
-    0.7  # of the decay over a period: least change of the angles where a window hides, as it is not well known
-)
+HIDDEN = 0.7  # of the decay over a period: least change of angles where a window may hide; it would be twice that
 NEARLY = 1.2  # times that change: how far apart multipliers may be that meet on the way
 
 
@@ -29,10 +27,8 @@ def meetings(found: list[Sliding], motions: list[Orbit], values: list[float], fi
     """
     gaps, modes = np.diff(values), np.array([motion.modes for motion in motions])
     decays, angles = modes[:, :, 0], modes[:, :, 1]
-    turned = [
-        2.0 * math.pi * natural(at) * motion.segments.time for at, motion in zip(found, motions, strict=True)
-    ]
-    expected = np.abs(np.diff(turned, axis=0)).max(axis=1)
+    cycles = [natural(at) * motion.segments.time for at, motion in zip(found, motions, strict=True)]
+    expected = 2.0 * math.pi * np.abs(np.diff(cycles, axis=0)).max(axis=1)
     speeds = np.maximum(np.abs(np.diff(angles, axis=0)), expected[:, None]) / gaps[:, None]
     beside = np.pad(speeds, ((1, 1), (0, 0)))
     changes = np.maximum(np.maximum(beside[:-2], speeds), beside[2:]) * gaps[:, None]
@@ -40,17 +36,14 @@ def meetings(found: list[Sliding], motions: list[Orbit], values: list[float], fi
     apart = np.column_stack([angles, math.pi - angles, angles[:, 1] - angles[:, 0]])
     decay = np.column_stack([decays, decays, decays.mean(axis=1)])
     change = np.column_stack([changes, changes, changes.sum(axis=1)])
-    least = np.minimum(decay[:-1], decay[1:])
-    least = np.where(
-        least > 0.0, least, 0.5 * np.maximum(decay[:-1], decay[1:])
-    )  # on the way to an end of a window
+    least, most = np.minimum(decay[:-1], decay[1:]), np.maximum(decay[:-1], decay[1:])
+    least = np.where(least > 0.0, least, 0.5 * most)  # on the way to an end of a window
     meet = (np.minimum(apart[:-1], apart[1:]) <= NEARLY * change) & (least > 0.0)
     likely = np.where(meet, change / np.where(meet, least, 1.0), 0.0)
     parts = np.clip(apart[:-1] / np.maximum(apart[:-1] + apart[1:], 1e-300), 0.25, 0.75)
     stable = decays.min(axis=1) > 0.0
     looked = (gaps > 2.0 * finest) & (stable[:-1] | stable[1:]) & (likely.max(axis=1) > HIDDEN)
-    most = likely.argmax(axis=1)
-    rows = [(k, most[k]) for k in np.flatnonzero(looked)]
+    rows = [(k, likely[k].argmax()) for k in np.flatnonzero(looked)]
     return {values[k] + float(parts[k, which] * gaps[k]): float(likely[k, which]) for k, which in rows}
 
 

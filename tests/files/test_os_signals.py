@@ -49,6 +49,23 @@ def test_a_signal_during_a_load_of_compiled_code_is_heard_soon_after() -> None:
     assert not deaf
 
 
+def test_a_signal_in_a_finalizer_which_loses_it_is_heard_soon_after(capsys: pytest.CaptureFixture[str]) -> None:
+    class Dying:
+        def __del__(self) -> None:
+            terminate()
+
+    deaf = []
+
+    def act() -> None:
+        Dying()
+        time.sleep(20.0)
+        deaf.append("for 20 s")
+
+    interrupted(act)
+    assert not deaf
+    assert capsys.readouterr().err == ""
+
+
 def test_a_block_ends_as_an_interruption_whatever_it_has_made_of_the_signal() -> None:
     """Compiled code sees the signal and gives up: what the block has found by then is worth nothing."""
 

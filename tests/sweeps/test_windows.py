@@ -240,28 +240,6 @@ FOLDS: dict[str, dict[str, Any]] = {
         },
         "solver": {"duration": 0.97, "scheme": "two-layer", "step": 8.1e-05, "theta": [0.52, 0.5]},
     },
-    "full contact": {
-        "shoe": {"mass": 8.084},
-        "wheel": {"radius": 0.5, "angular_speed": 5.279},
-        "link1": {"stiffness": 17320000.0, "damping": 67.79, "angle_deg": 0.0},
-        "link2": {"stiffness": 46910000.0, "damping": 39.62, "angle_deg": 24.04},
-        "load": {"force": 2172.0},
-        "friction": {"coefficient": 0.1},
-        "contact": {"half_length": 0.01, "stiffness": 938000000.0},
-        "roughness": {"wheel": {"amplitudes": [7.67e-06], "wavelengths": [0.073], "phases_deg": [356.6]}},
-        "solver": {"duration": 0.2, "scheme": "two-layer", "step": 2.6e-05, "theta": [0.55, 0.55]},
-    },
-    "no dashpots": {
-        "shoe": {"mass": 75.84},
-        "wheel": {"radius": 0.5, "angular_speed": -9.686},
-        "link1": {"stiffness": 5510000.0, "damping": 0.0, "angle_deg": -13.95},
-        "link2": {"stiffness": 11850000.0, "damping": 0.0, "angle_deg": -14.6},
-        "load": {"force": 499.3},
-        "friction": {"coefficient": 0.1},
-        "contact": {"half_length": 0.015, "stiffness": 135600000.0},
-        "roughness": {"wheel": {"amplitudes": [3.096e-06], "wavelengths": [0.085], "phases_deg": [359.4]}},
-        "solver": {"duration": 0.96, "scheme": "three-layer", "step": 0.00027, "theta": [0.3, 0.45, 0.25]},
-    },
     "stable again": {
         "shoe": {"mass": 1.973},
         "wheel": {"radius": 0.5, "angular_speed": -8.699},
@@ -356,17 +334,3 @@ def test_the_bar_of_a_narrow_window_does_not_reach_for_the_next_one() -> None:
     ends, errors = np.array(answer.windows[0]), np.array(answer.window_errors[0])
     assert (np.abs(ends - [898018.0, 898873.0]) <= errors).all()
     assert (errors < 5e3).all()
-
-
-@pytest.mark.parametrize(
-    ("name", "upper", "critical"), [("full contact", 1.9, 0.91319), ("no dashpots", 0.94, 0.46959)]
-)
-def test_in_full_contact_nothing_but_the_linear_motion_counts(name: str, upper: float, critical: float) -> None:
-    """Fast growth saturates, and without dashpots large motions lie beside it. By eigenvalues sliding is unstable
-    from its loss on to the end of the range.
-    """
-    answer = followed(name, "friction__coefficient", (0.0, upper))
-    [(lower, end)] = answer.windows
-    assert answer.error is not None
-    assert abs(lower - critical) <= answer.error < 0.02 * upper
-    assert end == upper
