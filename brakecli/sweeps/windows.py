@@ -72,7 +72,7 @@ def no_edge(value: float, other: float, lost: bool) -> Edge:
 def of_edges(critical: Critical, unstable: bool, edges: list[Edge]) -> Search:
     """The critical value and all windows of instability; `unstable`: whether the range begins in one.
 
-    One that is narrower than its bars, of which one is wide, may be none.
+    One that is narrower than its bars, of which one is wide, may be none; so may what lies between two.
     """
     wide = WIDEST * (critical.upper - critical.lower)
     for one, other in pairwise(edges):

@@ -70,6 +70,17 @@ LONGER: dict[str, Any] = {  # of 120
     "roughness": {"wheel": {"amplitudes": [1.648e-05], "wavelengths": [0.087]}},
     "solver": {"duration": 0.3, "scheme": "two-layer", "step": 8.4e-05, "theta": [0.5, 0.5]},
 }
+BESIDE: dict[str, Any] = {  # with the step given, another motion is stable up to half as far from its end
+    "shoe": {"mass": 1.071},
+    "wheel": {"radius": 0.33, "angular_speed": 28.65},
+    "link1": {"stiffness": 894800.0, "damping": 8.673, "angle_deg": 5.911},
+    "link2": {"stiffness": 1951000.0, "damping": 7.418, "angle_deg": 30.67},
+    "load": {"force": 106.0},
+    "friction": {"coefficient": 0.1},
+    "contact": {"half_length": 0.04, "stiffness": 9009000.0},
+    "roughness": {"wheel": {"amplitudes": [1.898e-05, 2.605e-05], "wavelengths": [0.05, 0.048]}},
+    "solver": {"duration": 0.25, "scheme": "three-layer", "step": 4.2e-05, "theta": [0.35, 0.3, 0.35]},
+}
 
 
 def answer(tables: dict[str, Any], upper: float) -> Search:
@@ -102,6 +113,7 @@ def test_where_no_motion_was_found_a_window_ends_anywhere() -> None:
         pytest.param(IN_STEP, 4.9, [2.5145, 4.9], marks=campaign),
         (FLIGHTS, 1.6, [0.91385, 0.98693]),
         pytest.param(LONGER, 1.2, [0.0, 0.38588, 1.1208, 1.2], marks=campaign),
+        pytest.param(BESIDE, 2.5, [1.28478, 2.5], marks=campaign),
     ],
 )
 def test_a_motion_is_followed_to_its_end_and_no_further(

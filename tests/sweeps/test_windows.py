@@ -17,7 +17,7 @@ from scipy.integrate import solve_ivp
 from brakecli.case.system import system_of
 from brakecli.sweeps.critical import search
 from brakecli.sweeps.tables import Critical
-from brakecli.sweeps.windows import Outcome, Search
+from brakecli.sweeps.windows import Edge, Outcome, Search, of_edges
 from tests.campaign import campaign
 from tests.commands import brakecli
 from tests.examples import make
@@ -240,6 +240,18 @@ FOLDS: dict[str, dict[str, Any]] = {
         },
         "solver": {"duration": 0.97, "scheme": "two-layer", "step": 8.1e-05, "theta": [0.52, 0.5]},
     },
+    "ends": {
+        "shoe": {"mass": 34.24},
+        "wheel": {"radius": 0.5, "angular_speed": 1.394},
+        "link1": {"stiffness": 597800.0, "damping": 0.0, "angle_deg": 0.0},
+        "link2": {"stiffness": 2143000.0, "damping": 0.0, "angle_deg": 3.496},
+        "load": {"force": 121.9},
+        "friction": {"coefficient": 0.1},
+        "contact": {"half_length": 0.025, "stiffness": 15220000.0},
+        "roughness": {"wheel": {"amplitudes": [2.047e-05, 1.901e-05], "wavelengths": [0.018, 0.017]}},
+        "output": {"sample_interval": 0.0013},
+        "solver": {"duration": 1.5, "scheme": "event-driven"},
+    },
     "stable again": {
         "shoe": {"mass": 1.973},
         "wheel": {"radius": 0.5, "angular_speed": -8.699},
@@ -304,9 +316,15 @@ def test_a_motion_that_full_contact_would_have_does_not_count_where_it_would_ope
 @campaign
 @pytest.mark.parametrize(
     ("name", "key", "range_", "truth", "most"),
-    [  # its weights take away 0.5 1/s, more than the growth; that is 0.018 1/s half a kilogram above 17.16 kg,
-        # and half the step takes 0.011 of it, so that twice that change is more until then
-        ("weights that damp", "shoe__mass", (6.304, 39.4), [8.82, 17.35, 28.02, 29.85, 39.4], 1.0),
+    [  # its weights take away 0.5 1/s, more than the growth; that is 0.018 1/s half a kilogram above 17.16 kg, and
+        # half the step takes 0.011 of it, so that twice this is more until 17.74 kg: the bar is 1.5 times the way
+        (
+            "weights that damp",
+            "shoe__mass",
+            (6.304, 39.4),
+            [8.82, 17.35, 28.02, 29.85, 39.4],
+            [0.6, 0.9, 0.6, 0.6, 0.6],
+        ),
         ("beside", "friction__coefficient", (0.0, 1.1), [0.67342, 0.68719, 0.74487, 1.1], 0.005),
         ("stable again", "link2__stiffness", (8.21e5, 2.791e6), [1.7233e6, 1.8384e6, 1.90733e6], 7e4),
         (  # ends soon after it has doubled its period; the motion that the shoe falls onto is unstable once more
@@ -319,7 +337,7 @@ def test_a_motion_that_full_contact_would_have_does_not_count_where_it_would_ope
     ],
 )
 def test_no_window_of_a_motion_that_is_followed_is_hidden(
-    name: str, key: str, range_: tuple[float, float], truth: list[float], most: float
+    name: str, key: str, range_: tuple[float, float], truth: list[float], most: float | list[float]
 ) -> None:
     """Another integrator follows it and finds where multipliers pass one."""
     answer = followed(name, key, range_)
@@ -334,3 +352,36 @@ def test_the_bar_of_a_narrow_window_does_not_reach_for_the_next_one() -> None:
     ends, errors = np.array(answer.windows[0]), np.array(answer.window_errors[0])
     assert (np.abs(ends - [898018.0, 898873.0]) <= errors).all()
     assert (errors < 5e3).all()
+
+
+@campaign
+def test_without_dashpots_the_bar_of_an_end_where_a_motion_ends_is_that_of_a_fold() -> None:
+    """Another integrator follows the motion from above to its end at 0.93812."""
+    answer = followed("ends", "friction__coefficient", (0.0, 3.3))
+    (lower, upper), (bar, wide) = answer.windows[0], answer.window_errors[0]
+    assert abs(lower - 0.89866) <= bar < 0.01
+    assert abs(upper - 0.93812) <= wide
+    assert 3.3 / 32.0 <= wide <= 3.3 / 32.0 + 0.5e-3 * 3.3  # a 32nd, and half the bracket
+
+
+def edges(*places: tuple[float, float]) -> Search:
+    """The answer in a range from 0 to 10 for stability lost and regained at some places, with their bars."""
+    critical = Critical(parameter="friction.coefficient", lower=0.0, upper=10.0, tolerance=1e-3)
+    found = [Edge(at, at, at, bar, lost=k % 2 == 0) for k, (at, bar) in enumerate(places)]
+    return of_edges(critical, unstable=False, edges=found)
+
+
+def test_a_window_or_gap_narrower_than_its_bars_of_which_one_is_wide_is_none() -> None:
+    beside = edges((2.0, 0.02), (2.01, 4.0), (2.1, 0.1))
+    assert beside.windows == ((2.1, 10.0),)
+    assert beside.value == 2.1
+    between = edges((2.0, 0.02), (2.03, 4.0), (2.1, 0.1))
+    assert between.windows == ((2.0, 10.0),)
+    kept = edges((2.0, 0.02), (2.03, 4.0), (2.2, 0.1))
+    assert kept.windows == ((2.0, 2.03), (2.2, 10.0))
+
+
+def test_both_ends_of_a_window_narrower_than_its_bars_have_the_wider_one() -> None:
+    assert edges((2.0, 0.02), (2.01, 0.03)).window_errors == ((0.03, 0.03),)
+    assert edges((2.0, 0.02), (2.04, 0.03)).window_errors == ((0.02, 0.03),)
+    assert edges((2.0, 0.02), (2.01, 0.4)).window_errors == ((0.02, 0.4),)  # a fold moves by itself
