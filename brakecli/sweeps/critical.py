@@ -21,8 +21,9 @@ from brakecli.runs.limits import within_range
 from brakecli.solver.system import System
 from brakecli.sweeps.early import Known, early
 from brakecli.sweeps.error_bar import left_open
-from brakecli.sweeps.floquet import Disturbances, between
+from brakecli.sweeps.floquet import Disturbances
 from brakecli.sweeps.growth import Sliding, has_exact_steps, sliding, stepped, with_step
+from brakecli.sweeps.scan import between, scanned
 from brakecli.sweeps.sustained import fades_linearly, lasting, settling, verdict_fades
 from brakecli.sweeps.tables import Critical
 from brakecli.sweeps.windows import Edge, Outcome, Search, no_edge, of_edges
@@ -194,7 +195,7 @@ def _may_grow(found: Sliding | None) -> bool:
 def _by_simulation(critical: Critical, sliding_at: SlidingAt, exact: Search) -> Search:
     """Where the growth of small disturbances passes zero, by Brent's method, between two values on either side."""
     at = Disturbances(sliding_at)
-    values = at.scanned(critical.lower, critical.upper, critical.tolerance, exact.windows)
+    values = scanned(at, critical.lower, critical.upper, critical.tolerance, exact.windows)
     by_runs = not any(measured.opened or measured.exact for measured in at.known.values() if measured)
 
     @cache

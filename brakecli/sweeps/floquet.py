@@ -4,9 +4,8 @@ The motion is stable while all its multipliers lie inside the unit circle; `peri
 """
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -21,16 +20,9 @@ from brakecli.sweeps.periodic import (
     lyapunov,
     orbit,
 )
-from brakecli.sweeps.resonances import meetings, resonances
 
 SEGMENT = 10.0  # periods of the slowest motion
 MOST_SEGMENTS = 250
-SCANNED = 9  # values of the parameter, both ends among them, between which a change is looked for by runs
-PARTS = 4  # of each interval between them, where surfaces open in a run
-REFINED = 4  # times that values are added beside one at which stability is nearly lost or regained
-BUMP = 20.0  # how much nearer to zero that rate may be than it changes there
-SAME, FINE = 1e-3, 1e-4  # of the range: nearer to a value no other one is put; least width of a window
-ROUNDS, MOST = 12, 200  # of narrowing down where multipliers may meet, and of values that this may take
 # Damping ratio, of the slowest motion, that would stop a growth which counts as none without dashpots
 NEUTRAL = 1e-5
 SHORTEST, FINEST = 16, 256  # parts of the way from a known motion to the next that are tried; with dashpots
@@ -50,7 +42,7 @@ class Disturbances:
         self.known: dict[float, Growth | None] = {}
         self.orbits: dict[float, Orbit] = {}
         self.branches: dict[float, float] = {}  # by where the motion was found first, with dashpots
-        self.missed, self.resumed, self.periodic, self.least, self.finest = 0, 0, False, 0.0, 0.0
+        self.missed, self.resumed, self.periodic, self.least = 0, 0, False, 0.0
 
     def at(self, value: float) -> Growth | None:
         """The growth at a value; None without steady sliding, and where no forced motion is found."""
@@ -71,77 +63,6 @@ class Disturbances:
             if max(self.orbits, default=value) > value:
                 del self.known[value]
                 self.at(value)
-
-    def scanned(
-        self, lower: float, upper: float, tolerance: float, windows: Iterable[tuple[float, float]]
-    ) -> list[float]:
-        """The values between which changes are looked for.
-
-        Where surfaces open they lie closer, and closest beside values where stability is nearly lost or regained.
-        Otherwise the `windows` that eigenvalues show have one value each.
-        """
-        values: list[float] = np.linspace(lower, upper, PARTS * (SCANNED - 1) + 1).tolist()
-        self.periodic = any(found.forced for found in map(self.sliding_at, values) if found)
-        self.least = SAME * (upper - lower)
-        self.finest = max(min(0.5 * tolerance, self.least), FINE * (upper - lower))
-        self.scan(values[::PARTS])
-        if not (self.periodic or any(each and each.opened for each in map(self.at, values[::PARTS]))):
-            return sorted({*values[::PARTS], *between(lower, upper, windows)})
-        self.scan(values)
-        self._go_on(values)
-        for turn in range(ROUNDS):
-            added = set(self._meetings()[: max(MOST - len(values), 0)])
-            if turn < REFINED:
-                known = np.array(values)
-                followed = {value: self.orbits[value] for value in values if value in self.branches}
-                places = resonances(self.sliding_at, followed, values)
-                added |= {place for place in places if np.abs(known - place).min() > self.least}
-                for triple in zip(values, values[1:], values[2:], strict=False):
-                    rates = [measured.rate - measured.noise for measured in map(self.at, triple) if measured]
-                    if len(rates) < len(triple) or min(rates) * max(rates) <= 0.0:
-                        continue
-                    least = min(map(abs, rates))
-                    if least == abs(rates[1]) and least < BUMP * np.ptp(rates):
-                        added |= {0.5 * (low + high) for low, high in pairwise(triple)}
-            if not added:
-                break
-            values = sorted({*values, *added})
-            self.scan(sorted(added))
-        self._go_on(values)
-        hidden = {place for pair in pairwise(values) for place in self._hidden(*pair)}
-        for place in hidden:
-            self.known.setdefault(place, Growth(self.orbits[place].rate, 0.0, 0.0, opened=True))
-        return [value for value in sorted({*values, *hidden}) if self._sure(value)]
-
-    def _sure(self, value: float) -> bool:
-        """Whether the answer at a value is certain: beside where stability is lost it may be rounding."""
-        measured = self.at(value)
-        return not measured or measured.exact or value not in self.branches or self.orbits[value].sure
-
-    def _meetings(self) -> list[float]:
-        """Values at which multipliers of a motion may meet, the likeliest to hide a window first."""
-        by_motion: dict[float, list[float]] = {}
-        for value, branch in sorted(self.branches.items()):  # without dashpots all meetings open windows
-            by_motion.setdefault(branch, []).append(value)
-        places: dict[float, float] = {}
-        for own in by_motion.values():
-            slides = {value: found for value in own if (found := self.sliding_at(value))}
-            if len(slides) > 1:
-                places |= meetings(
-                    [*slides.values()], [self.orbits[value] for value in slides], [*slides], self.finest
-                )
-        return sorted((place for place in places if place not in self.known), key=lambda place: -places[place])
-
-    def _hidden(self, low: float, high: float) -> list[float]:
-        """What was seen of a motion that loses its stability between two values, if not at its end, by a fold."""
-        found = []
-        for branch in {self.branches.get(low), self.branches.get(high)} - {None}:
-            own = sorted(at for at in self.branches if low <= at <= high and self.branches[at] == branch)
-            stable = [at for at in own if self.orbits[at].rate <= 0.0] or [math.nan]
-            lost = (at for at in own if self.orbits[at].rate > 0.0)
-            if any(stable[0] < at < stable[-1] or not self.orbits[at].folds for at in lost):
-                found += own
-        return found
 
     def jumps(self, low: float, high: float) -> bool:
         """Whether the motions at two values are not known to be one; without dashpots that does not count."""
@@ -166,7 +87,7 @@ class Disturbances:
             self._goes_on(beyond, end, False)
         return True
 
-    def _go_on(self, values: list[float]) -> None:
+    def go_on(self, values: list[float]) -> None:
         """Follow stable motions on where another one was found beyond: from the end that is stable.
 
         On the way back they are followed only where that other one is unstable.
@@ -339,12 +260,6 @@ class Disturbances:
         waited = segments.settled(start, min(RELAXED / slow, LONGEST) if slow > 0.0 else LONGEST)
         forced = orbit(segments, waited, None)
         return None if forced and near and forced.size > DEPARTED * near.size else forced
-
-
-def between(lower: float, upper: float, windows: Iterable[tuple[float, float]]) -> list[float]:
-    """The middle of each of the windows within a range, and of what lies between them."""
-    ends = [lower, *(end for window in windows for end in window), upper]
-    return [0.5 * (low + high) for low, high in pairwise(ends)]
 
 
 def _same(one: Orbit, other: Orbit) -> bool:

@@ -20,9 +20,9 @@ NEARLY = 1.2  # times that change: how far apart multipliers may be that meet on
 def meetings(found: list[Sliding], motions: list[Orbit], values: list[float], finest: float) -> dict[float, float]:
     """Between values of one motion: where multipliers may meet, and one leave the unit circle; and how likely.
 
-    Where pairs meet, at 1, at -1 or each other, they part by k in their angles, and in their moduli by no more
-    than that. They leave the circle if k is more than the decay over a period; the angles, if they pass each
-    other, then change by twice the decay on the way. They change as natural frequencies do, or as they do beside.
+    Where pairs meet, at 1, at -1 or each other, their angles stand still and their moduli part, by k at most. One
+    leaves the circle only if k is more than the decay over a period. The angles that natural frequencies give
+    change by 2 k on the way past. Angles change as natural frequencies do, or as they do beside.
     Nothing is looked for between values as near as two of the `finest`.
     """
     gaps, modes = np.diff(values), np.array([motion.modes for motion in motions])
