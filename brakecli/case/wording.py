@@ -30,8 +30,8 @@ _TEXT = "one line of text in quotes"
 _KINDS = {"number": "a number", "integer": "a whole number", "boolean": "true or false", "string": _TEXT}
 
 
-def problems(error: ValidationError, kind: type[Table]) -> Iterator[Problem]:
-    """Everything that is wrong with a table, in plain words."""
+def problems(error: ValidationError, kind: type[Table], where: str = "at the top") -> Iterator[Problem]:
+    """Everything that is wrong with a table, in plain words; where says to what its own keys belong."""
     tables = tables_within(kind)
     errors = error.errors(include_url=False)
     meant = {each["loc"]: _meant(each["loc"], tables) for each in errors if each["type"] == "extra_forbidden"}
@@ -52,7 +52,7 @@ def problems(error: ValidationError, kind: type[Table]) -> Iterator[Problem]:
         elif not meant[path]:
             parent = _table(path)
             keys = ", ".join(tables[parent].model_fields)
-            remedy = f"the keys {f'of {_name(parent, tables)}' if parent else 'at the top'} are {keys}"
+            remedy = f"the keys {f'of {_name(parent, tables)}' if parent else where} are {keys}"
             yield Problem(path, "is unknown" + found(value), remedy)
         else:
             near = " or ".join(_name(near, tables) for near in meant[path])
@@ -62,7 +62,8 @@ def problems(error: ValidationError, kind: type[Table]) -> Iterator[Problem]:
                 try:
                     inner.model_validate(value)
                 except ValidationError as wrong:
-                    yield from (replace(problem, path=path + problem.path) for problem in problems(wrong, inner))
+                    for problem in problems(wrong, inner, f"of {near}"):
+                        yield replace(problem, path=path + problem.path)
 
 
 def _meant(path: KeyPath, tables: dict[KeyPath, type[Table]]) -> list[KeyPath]:

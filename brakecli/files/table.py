@@ -22,7 +22,8 @@ _COMMENTS = ("#", "%")
 _HEAD = 1 << 16  # bytes of a text file from which its layout is found
 _ONE = r"[^\W\d_]+|[°%]"  # name of a unit
 _LONGEST = 80  # characters of a unit
-_UNIT = rf"(?:{_ONE})(?:\^?-?\d|[²³])?(?:(?: *[*·/] *| +)(?:{_ONE})(?:\^?-?\d|[²³])?)*"  # of bounded powers
+_POWER = r"(?:\^?-?\d|⁻?[¹²³])?"  # bounded
+_UNIT = rf"(?:{_ONE}){_POWER}(?:(?: *[*·⋅/] *| +)(?:{_ONE}){_POWER})*"
 
 
 def require(good: Any, problem: str) -> None:

@@ -138,6 +138,7 @@ FILES = {  # the same runout as laboratories write it
     "names": ("angle_deg,height_um", ANGLES, RUNOUT, ","),
     "row of units": ("angle;runout\n°;mm", ANGLES, 1e-3 * RUNOUT, ";"),
     "brackets": ("angle [rad]\theight (µm)", np.radians(ANGLES), RUNOUT, "\t"),
+    "superscripts": ("angle [rad],height [mm²·m⁻¹]", np.radians(ANGLES), RUNOUT, ","),
     "comment": ("# phi_mrad, z_nm", 1e3 * np.radians(ANGLES), 1e3 * RUNOUT, ","),
     "position": ("s_mm,h_mm", 1e3 * RADIUS * np.radians(ANGLES), 1e-3 * RUNOUT, ","),
     "metres": ("s,h", RADIUS * np.radians(ANGLES), 1e-6 * RUNOUT, ","),

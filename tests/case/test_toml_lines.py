@@ -21,7 +21,7 @@ def test_unknown_misspelt_duplicate_and_misplaced_keys_are_reported_together_by_
         ("mass = 10.0", "mas = 10.0"),
         ("angular_speed = 4.0", "angular_speed = 4.0\nangular_speed = 5.0\nstiffness = 3.0"),
         ("[friction]", "[fricton]"),
-        ("coefficient = 0.45", "coefficient = -0.45"),
+        ("coefficient = 0.45", "coefficient = -0.45\nqqq = 2"),
         ("[initial]", "[initial]\nzzz = 1\n[load]"),
         ("duration = 1.0", "duration = 1,0"),
     )
@@ -32,14 +32,15 @@ def test_unknown_misspelt_duplicate_and_misplaced_keys_are_reported_together_by_
         " did you mean link1.stiffness or link2.stiffness or contact.stiffness?",
         "case.toml:19: fricton: is unknown (found a table); did you mean [friction]?",
         "case.toml:20: fricton.coefficient: is out of range (found -0.45); give a number of at least 0",
-        "case.toml:35: initial.zzz: is unknown (found 1); the keys of [initial] are at, x, y, vx, vy",
-        "case.toml:36: load: is given twice, first in line 17; keep one of the two",
-        'case.toml:37: load.at: is unknown (found "rest"); did you mean initial.at?',
-        "case.toml:38: load.x: is unknown (found 0.0); did you mean initial.x?",
-        "case.toml:39: load.y: is unknown (found 0.0); did you mean initial.y?",
-        "case.toml:40: load.vx: is unknown (found 0.0); did you mean initial.vx?",
-        "case.toml:41: load.vy: is unknown (found 0.0); did you mean initial.vy?",
-        "case.toml:48: is not valid TOML: expected newline or end of document after a statement"
+        "case.toml:21: fricton.qqq: is unknown (found 2); the keys of [friction] are coefficient",
+        "case.toml:36: initial.zzz: is unknown (found 1); the keys of [initial] are at, x, y, vx, vy",
+        "case.toml:37: load: is given twice, first in line 17; keep one of the two",
+        'case.toml:38: load.at: is unknown (found "rest"); did you mean initial.at?',
+        "case.toml:39: load.x: is unknown (found 0.0); did you mean initial.x?",
+        "case.toml:40: load.y: is unknown (found 0.0); did you mean initial.y?",
+        "case.toml:41: load.vx: is unknown (found 0.0); did you mean initial.vx?",
+        "case.toml:42: load.vy: is unknown (found 0.0); did you mean initial.vy?",
+        "case.toml:49: is not valid TOML: expected newline or end of document after a statement"
         " (found duration = 1,0); numbers are written 1.5 or 2e-3, texts in quotes, lists as [1, 2],"
         " table headers as [table]",
     ]
