@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from brakecli.analysis.stability.modes import is_undamped
 from brakecli.case.case import Case
 from brakecli.case.read import key_path
+from brakecli.case.system import system_of
 from brakecli.case.tables import key_schema
 from brakecli.files import fields
 from brakecli.files.field import Field, plain, values_of
@@ -19,6 +21,7 @@ from brakecli.runs.run import origin
 from brakecli.sweeps.journal import Journal
 from brakecli.sweeps.plan import LoadedSweep, Plan, label
 from brakecli.sweeps.point import Status
+from brakecli.sweeps.scan import PARTS, SCANNED
 from brakecli.sweeps.tables import Axis
 
 MOST_FAILURES = 100
@@ -61,6 +64,7 @@ class Findings:
             self.critical = (len(known), float(known.min()), float(known.max())) if len(known) else (0, 0.0, 0.0)
             self.sentences += _on_lasting_vibration(journal, plan.sweep.critical.tolerance)
             self.sentences += _on_wide_bars(journal, plan.sweep.critical.lower, plan.sweep.critical.upper)
+            self.sentences += _on_no_dashpots(plan)
         self.variables: dict[str, Any] | None = None
         if self.points <= MOST_AS_JSON:
             self.variables = {field.name: plain(journal.column(field.name)) for field in plan.fields}
@@ -206,6 +210,15 @@ def _on_wide_bars(journal: Journal, lower: float, upper: float) -> Iterator[str]
             what = f"a window of instability {'begins' if end == 'lower' else 'ends'} anywhere"
             where = f"from {low:.5g} to {high:.5g}: no motion was found there, or its growth is not certain"
             yield f"at {int(vague.any(axis=-1).sum())} of {size} points {what} {where}"
+
+
+def _on_no_dashpots(plan: Plan) -> Iterator[str]:
+    """What a search does not find where nothing damps: the places at which multipliers meet are not looked at."""
+    system = system_of(plan.case({}))
+    by_runs = plan.sweep.critical is not None and plan.sweep.critical.method == "simulation"
+    if by_runs and len(system.wheel.g) and is_undamped(system.coefficients):
+        missed = f"windows of instability narrower than a {PARTS * (SCANNED - 1)}nd of the range may be missed"
+        yield f"no dashpot acts: where the pad opens, {missed}; give the links the damping that they have"
 
 
 def _parameters(plan: Plan, index: int) -> dict[str, Any]:

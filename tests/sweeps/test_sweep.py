@@ -106,6 +106,18 @@ def test_an_axis_of_texts_and_a_search_without_axes_have_their_dimension(tmp_pat
     assert report.findings.critical[0] == 1
 
 
+def test_a_search_says_what_it_does_not_find_without_dashpots(tmp_path: Path) -> None:
+    (tmp_path / "s.toml").write_text(
+        'case = "tiny.toml"\n[critical]\nparameter = "friction.coefficient"\nlower = 0.3\nupper = 0.9\n'
+    )
+    rough = CASE + "\n[roughness.wheel]\namplitudes = [1e-9]\nwavelengths = [0.02]\n"
+    for text, bare, warned in ((rough, True, True), (rough, False, False), (CASE, True, False)):
+        (tmp_path / "tiny.toml").write_text(text)
+        settings = ["--set", "link1.damping=0", "--set", "link2.damping=0"] if bare else []
+        told = brakecli("sweep", "s.toml", "-j", "1", "--json", "--force", *settings, cwd=tmp_path).json["findings"]
+        assert any("no dashpot acts: where the pad opens, windows" in each for each in told) is warned
+
+
 def test_points_that_fail_are_listed_and_the_others_are_there(tmp_path: Path) -> None:
     text = 'case = "tiny.toml"\n[[axis]]\nparameter = "output.sample_interval"\nvalues = [2e-4, 1e-6, 4e-4]\n'
     (tmp_path / "tiny.toml").write_text(CASE)
