@@ -30,7 +30,8 @@ class Problem:
     @property
     def where(self) -> str:
         """``FILE:LINE``, or the source alone."""
-        return f"{self.source}:{self.line}" if self.line else self.source
+        source = escaped(self.source)
+        return f"{source}:{self.line}" if self.line else source
 
     @property
     def key(self) -> str:
@@ -50,6 +51,10 @@ class BrakecliError(Exception):
     def __init_subclass__(cls, exit_code: int) -> None:
         """Every kind of failure has its exit code."""
         cls.exit_code = exit_code
+
+    def __str__(self) -> str:
+        """The sentences, a line each, without what a terminal would take for a command."""
+        return escaped(super().__str__(), kept="\n")
 
 
 class UsageError(BrakecliError, exit_code=2):

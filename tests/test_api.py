@@ -244,6 +244,7 @@ def test_errors_are_those_of_the_commands(tmp_path: Path) -> None:
 
 SAID = [
     (lambda: brakecli.run("none.toml"), "no such file or directory; name a TOML file$"),
+    (lambda: brakecli.load("a\x1b[31m\nb.toml"), r"^a\\u001b\[31m\\nb\.toml: cannot be read: no such file"),
     (lambda: brakecli.load("none.toml"), "no such file or directory; name a TOML file$"),
     (lambda: brakecli.run(CASE, {"shoe.mas": 3}), r"^setting shoe\.mas=3: shoe\.mas: is unknown"),
     (lambda: brakecli.run(CASE, {"wheel.times": [1.0, -math.inf]}), r"^setting wheel\.times=\[1\.0, -inf\]: "),

@@ -136,7 +136,13 @@ def parse_sweep(text: str, name: str, folder: Path, overrides: Sequence[str] = (
     own = [each for each in overrides if key_path(each.partition("=")[0])[:1] in (("case",), ("critical",))]
     sweep = parse_table(Sweep, text, name, own)
     others = [override for override in overrides if override not in own]
-    return _checked(sweep, text, name, parse_case(*read_text(str(folder / sweep.case)), others))
+    try:
+        case_text, source = read_text(str(folder / sweep.case))
+    except CaseError as error:
+        at = Problem(("case",), "", "", name, innermost(Located(text, name).lines, ("case",), 0))
+        wrong = (replace(at, what=f"{each.where} {each.what}", remedy=each.remedy) for each in error.problems)
+        raise CaseError([*wrong]) from error
+    return _checked(sweep, text, name, parse_case(case_text, source, others))
 
 
 def sweep_of(tables: dict[str, Any], base: LoadedCase) -> LoadedSweep:

@@ -114,8 +114,18 @@ def test_a_search_says_what_it_does_not_find_without_dashpots(tmp_path: Path) ->
     for text, bare, warned in ((rough, True, True), (rough, False, False), (CASE, True, False)):
         (tmp_path / "tiny.toml").write_text(text)
         settings = ["--set", "link1.damping=0", "--set", "link2.damping=0"] if bare else []
-        told = brakecli("sweep", "s.toml", "-j", "1", "--json", "--force", *settings, cwd=tmp_path).json["findings"]
+        told = brakecli("sweep", "s.toml", "-j", "1", "--json", "--force", *settings, cwd=tmp_path).json[
+            "findings"
+        ]
         assert any("no dashpot acts: where the pad opens, windows" in each for each in told) is warned
+
+
+def test_a_case_that_is_not_there_is_reported_at_the_key_of_the_sweep(tmp_path: Path) -> None:
+    (tmp_path / "s.toml").write_text(
+        'title = "a"\ncase = "gone.toml"\n[[axis]]\nparameter = "load.force"\nvalues = [1]'
+    )
+    done = brakecli("sweep", "s.toml", cwd=tmp_path)
+    done.told(2, "s.toml:2: case: ", "gone.toml cannot be read: no such file or directory; name a TOML file")
 
 
 def test_points_that_fail_are_listed_and_the_others_are_there(tmp_path: Path) -> None:
