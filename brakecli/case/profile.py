@@ -17,6 +17,7 @@ _GAP = 4.0  # median steps between two places from which on nothing was measured
 _FITS = 0.005  # part of a turn by which a record may miss a whole number of turns
 _SEEN = 0.01  # per cent by which a record is stretched unsaid
 _NEAREST = 1e-9  # m; nothing is measured at places nearer to each other
+_FARTHEST, _FLATTEST = 1e9, 1e-15  # m; no wheel is larger, and no height less
 _FEWEST = 8  # places in a turn: fewer show none of its waves but the longest three
 
 
@@ -33,6 +34,8 @@ def sines_of(path: Path, error: float, radius: float, pad: float | None) -> dict
     turn, step = 2.0 * math.pi * radius, float(np.median(np.diff(place)))
     apart = f"its places lie {step:.3g} m apart, as a rule"
     require(step >= _NEAREST, f"{apart}; check their unit")
+    far = float(place[-1] - place[0])
+    require(far <= _FARTHEST, f"its places reach over {far:.3g} m; check their unit")
     turns, around = _turns(place, step, turn) if pad is None else (0, 0.0)
     if turns:
         count = min(round(around / step), 10 * len(place) // turns)
@@ -89,16 +92,21 @@ def _read(path: Path, stamp: tuple[int, ...]) -> tuple[Array, Array, bool]:
     bare = along is None and table.names and any(word in table.names[0].lower() for word in angles)
     require(not bare, f"column {table.names[0] if bare else ''}: has no unit; name it angle_deg or angle_rad")
     sizes = (unit[0] if unit else 1.0 for unit in (along, up))
-    place, height = (values * size for values, size in zip(table.numbers(), sizes, strict=True))
+    with np.errstate(over="ignore"):
+        place, height = (values * size for values, size in zip(table.numbers(), sizes, strict=True))
+    require(len(place) > 3, f"has {len(place)} rows; measure four places or more")
     require(np.isfinite(place).all() and np.isfinite(height).all(), "a cell is empty or no number; fill it")
+    for what, largest in (("place", np.abs(place).max()), ("height", np.abs(height).max())):
+        require(largest <= _FARTHEST, f"a {what} is {largest:.3g} in SI units; check the unit")
     if place[-1] < place[0]:
         place, height = place[::-1], height[::-1]
     steps = np.diff(place)
-    require(len(place) > 3, f"has {len(place)} rows; measure four places or more")
     row = int(np.argmin(steps > 0.0)) + 2
     back = f"its places do not rise or fall throughout, see row {row} of numbers; sort the rows"
     require(steps.min() > 0.0, back)
-    require(np.ptp(height) > 0.0, "all heights are equal; leave the surface out, which is smooth")
+    high = float(np.ptp(height))
+    require(high > 0.0, "all heights are equal; leave the surface out, which is smooth")
+    require(high >= _FLATTEST, f"its heights differ by {high:.3g} m; check their unit")
     return place, height, bool(along and along[1] == "radian")
 
 
