@@ -178,6 +178,15 @@ def test_a_group_that_stands_in_itself_is_told(tmp_path: Path) -> None:
         brakecli.load(tmp_path / "r.h5")
 
 
+def test_a_link_to_another_file_is_told(tmp_path: Path) -> None:
+    """In a file that is opened as a stream, HDF5 goes through such a link to that stream again."""
+    brakecli.run(CASE, SHORT, output=tmp_path / "r.h5")
+    with h5py.File(tmp_path / "r.h5", "r+") as file:
+        file["extra"] = h5py.ExternalLink("elsewhere.h5", "/")
+    with pytest.raises(UnreadableResultError, match="extra, which is a link to another file; compute the result"):
+        brakecli.load(tmp_path / "r.h5")
+
+
 def test_errors_are_those_of_the_commands(tmp_path: Path) -> None:
     with pytest.raises(CaseError, match=r"friction\.coefficient: is out of range"):
         brakecli.run(CASE, {"friction.coefficient": -1})

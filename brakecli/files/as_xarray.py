@@ -5,6 +5,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+import h5py
 import xarray as xr
 
 from brakecli.errors import UnreadableResultError
@@ -22,14 +23,21 @@ def opened(path: Path) -> xr.DataTree:
         with xr.open_datatree(path, engine="h5netcdf", phony_dims="access") as tree:
             return tree.load()
     except (ValueError, TypeError, LookupError, AttributeError, OSError, RuntimeError) as error:
-        raise UnreadableResultError(f"{path}: xarray cannot read what it holds: {error}") from error
+        what = f"{path}: xarray cannot read what it holds: {error}"
+        raise UnreadableResultError(f"{what}; compute the result again") from error
 
 
 def _once(root: Any) -> None:
-    """Raise ValueError where a group holds one that was seen before: xarray would read on without an end."""
+    """Raise ValueError where a group holds one that was seen before: xarray would read on without an end.
+
+    So it would behind a link to another file, which is no part of the result.
+    """
     seen, groups = {root}, [root]
     while groups:
         group = groups.pop()
+        for name in group:
+            if isinstance(group.get(name, getlink=True), h5py.ExternalLink):
+                raise ValueError(f"the group {group.name} holds {name}, which is a link to another file")
         for inner in (each for name in group if hasattr(each := group.get(name), "keys")):
             if inner in seen:
                 raise ValueError(f"the group {group.name} holds {inner.name}, which stands elsewhere, too")
