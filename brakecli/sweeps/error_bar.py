@@ -205,5 +205,5 @@ def _finer(at: Disturbances, value: float, finer: float, others: dict[float, Orb
             return forced
     if (forced := orbit(segments, states, near.maps)) is not None:
         return forced
-    maps = segments.maps(states, segments.ends(states))
+    maps = segments.maps(states, segments.ends(states)[0])
     return Orbit(segments, states, maps, exponents(maps), near.size)

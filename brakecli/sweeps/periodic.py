@@ -84,14 +84,16 @@ class Segments:
         end: Floats = self._run(self.systems[k], state)[-1]
         return end
 
-    def ends(self, states: Floats) -> Floats:
-        """Where the segments end."""
-        return np.array([self.end(k, state) for k, state in enumerate(states)])
+    def ends(self, states: Floats) -> tuple[Floats, float]:
+        """Where the segments end, and the largest distance from steady sliding on the way."""
+        runs = [self._run(system, state) for system, state in zip(self.systems, states, strict=True)]
+        return np.array([run[-1] for run in runs]), float(np.abs(np.concatenate(runs) - self.rest).max())
 
     def maps(self, states: Floats, ends: Floats) -> Floats:
         """The derivative of each end by the state where its segment begins."""
-        moved = [self.ends(states + DISTURBANCE * direction) - ends for direction in np.eye(4)]
-        return np.stack(moved, axis=2) / DISTURBANCE
+        beside = [state + DISTURBANCE * np.eye(4) for state in states]
+        moved = [[self.end(k, state) for state in each] for k, each in enumerate(beside)]  # they share tables
+        return (np.array(moved).transpose(0, 2, 1) - ends[:, :, None]) / DISTURBANCE
 
     def settled(self, state: Floats, time: float) -> Floats:
         """The states of the last period, after so many whole ones that a time (s) has passed."""
@@ -100,11 +102,6 @@ class Segments:
         rows = self._run(replace(self.systems[0], duration=periods * self.time), state)
         failed = len(rows) == 1
         return np.full((count, 4), np.nan) if failed else rows[-count * self.samples - 1 : -1 : self.samples]
-
-    def size(self, states: Floats) -> float:
-        """The largest distance from steady sliding on the way from some states."""
-        runs = [self._run(system, state) for system, state in zip(self.systems, states, strict=True)]
-        return float(np.abs(np.concatenate(runs) - self.rest).max())
 
     def moved(self, near: "Orbit") -> Floats:
         """The states of a motion at another value of the parameter, moved with steady sliding."""
@@ -162,7 +159,7 @@ def orbit(segments: Segments, states: Floats, maps: Floats | None) -> Orbit | No
     Derivatives are taken anew where those at hand do not halve the gaps, and where the motion has closed. A step
     that does not lessen the gaps is shortened.
     """
-    fresh, (ends, gaps, gap) = False, _gaps(segments, states)
+    fresh, (ends, gaps, gap, size) = False, _gaps(segments, states)
     for _ in range(ITERATIONS):
         if not math.isfinite(gap):
             return None
@@ -171,12 +168,12 @@ def orbit(segments: Segments, states: Floats, maps: Floats | None) -> Orbit | No
         if not np.isfinite(maps).all():
             return None
         if gap <= CLOSED:
-            return Orbit(segments, states, maps, exponents(maps), segments.size(states))
+            return Orbit(segments, states, maps, exponents(maps), size)
         change = _correction(maps, gaps)
         for part in (1.0, 0.5, 0.25, 0.125) if fresh else (1.0,):
             moved = _gaps(segments, states + part * change)
             if moved[2] < (1.0 - 0.3 * part if fresh else 0.5) * gap:
-                states, (ends, gaps, gap), fresh = states + part * change, moved, False
+                states, (ends, gaps, gap, size), fresh = states + part * change, moved, False
                 break
         else:
             if fresh:
@@ -220,12 +217,12 @@ def lyapunov(found: Sliding, plain: Growth | None) -> Growth | None:
     return Growth(float(means.mean()), 0.0, 0.0, opened=True, bar=error)
 
 
-def _gaps(segments: Segments, states: Floats) -> tuple[Floats, Floats, float]:
-    """Where segments end, what lies between there and the next ones, and the largest of these gaps."""
-    ends = segments.ends(states)
+def _gaps(segments: Segments, states: Floats) -> tuple[Floats, Floats, float, float]:
+    """Where segments end, what lies between there and the next ones, the largest of these gaps, and the size."""
+    ends, size = segments.ends(states)
     gaps = ends - np.roll(states, -1, axis=0)
     gap = float(np.abs(gaps).max())
-    return ends, gaps, gap if math.isfinite(gap) else math.inf
+    return ends, gaps, gap if math.isfinite(gap) else math.inf, size
 
 
 def _correction(maps: Floats, gaps: Floats) -> Floats:
