@@ -50,6 +50,8 @@ def read_text(source: str) -> tuple[str, str]:
         reason = "it is closed" if closed else getattr(error, "strerror", None) or str(error)
         what = f"cannot be read: {reason[0].lower()}{reason[1:]}"
         raise unfit(what, "name a TOML file", name) from error
+    if data.startswith(b"\x89HDF"):
+        raise unfit("is a result, not TOML", "name the TOML file that it was computed from", name)
     check_size(data, name)
     try:
         return data.decode("utf-8"), name

@@ -232,7 +232,7 @@ def _variables(result: StoredResult, sweep: Sweep, shown: str, more: Sequence[st
         raise UsageError(f"{result.path}: {problem}; give one of {', '.join(able)}")
     base = str(result.attributes.get("resolved_toml", ""))
     margin = None
-    with suppress(CaseError):  # of older results, and of forged ones
+    with suppress(CaseError, ValueError, RecursionError):  # of older results, and of forged ones
         margin = margins(Plan(result.text("resolved_sweep_toml"), base)) if sweep.critical is None else None
     if margin is not None and margin.size == np.prod(shape[1:]):
         variables[MARGIN] = np.broadcast_to(margin.reshape(shape[1:]), shape)

@@ -9,7 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
-from brakecli.analysis.stability.discrete import RESOLVED, StepLimits, amplification, step_limits
+from brakecli.analysis.stability.discrete import (
+    RESOLVED,
+    StepLimits,
+    amplification,
+    step_limits,
+    without_damping,
+)
 from brakecli.analysis.stability.modes import eigensystem
 from brakecli.analysis.stability.search import bisect
 from brakecli.errors import RefusedError
@@ -201,11 +207,9 @@ def _of_the_scheme(system: System, limits: StepLimits, steps: int) -> Iterator[s
         yield f"solver.theta: {what}; reduce solver.step, {method.row.unstable}"
     taken = 0.0 if method.own_steps else _taken(system, steps)
     if taken > _TAKEN:
-        weights = list(method.row.theta)
-        remedy = f"take theta = {weights}" if weights else "take another scheme, or a shorter step"
         away = f"it takes {100.0 * taken:.3g} % of the fastest motion away by the end of the run"
         what = f"the scheme itself damps, {away}, and its errors are of first order"
-        yield f"solver.theta: with these weights {what}; {remedy}"
+        yield f"solver.theta: with these weights {what}; {without_damping(method)}"
 
 
 def _taken(system: System, steps: int) -> float:

@@ -11,10 +11,12 @@ from brakecli.analysis.regime.linear import linear_theory
 from brakecli.analysis.regime.of_run import verdict_on
 from brakecli.analysis.regime.verdict import Context, Excitation, Regime
 from brakecli.analysis.stability.report import stability
+from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
 from brakecli.solver.history import array_history
 from tests.analysis.histories import INTERVAL, history_of, verdict_of
 from tests.campaign import counts
+from tests.commands import ROOT
 from tests.examples import SQUEAL, make, simulate
 
 UNDAMPED: dict[str, Any] = {"link1__damping": 0.0, "link2__damping": 0.0}
@@ -41,6 +43,27 @@ def test_a_slow_motion_is_judged_by_its_eigenvalues(friction: float) -> None:
     assert (verdict.growth_rate, verdict.ringing_frequency) == (mode.growth, mode.frequency)
     assert ("still growing" in verdict.reasons[0]) == (mode.growth > 0.0)
     assert verdict.settled is False
+
+
+def test_growth_that_the_steps_damp_is_not_waited_for() -> None:
+    """It grows at 0.16 1/s; weights of 0.6 take 0.1 ω² h away, 1.2 1/s at 174 Hz in steps of 10 µs."""
+    for weights, remedy in (
+        ((0.6, 0.6), "but the scheme's steps damp it; take theta = [0.5, 0.5]"),
+        ((), "run at"),
+    ):
+        theta = {"solver__theta": weights} if weights else {}
+        case = make(SQUEAL, friction__coefficient=0.5765, wheel__angular_speed=1.0, **theta)
+        verdict = verdict_of(case)
+        assert verdict.regime is Regime.UNDECIDED
+        assert remedy in verdict.reasons[0]
+
+
+@pytest.mark.parametrize("name", ["rough-partly-open", "rough-full-contact"])
+def test_a_run_of_a_few_samples_has_a_verdict(name: str) -> None:
+    text = (ROOT / "cases" / f"{name}.toml").read_text()
+    for samples in range(1, 7):
+        case = parse_case(text, name, ["output.sample_interval=2e-4", f"solver.duration={samples * 2e-4}"]).case
+        assert verdict_of(case).regime is Regime.UNDECIDED
 
 
 @pytest.mark.parametrize("weights", [(0.5, 0.5), (1.0, 1.0)])

@@ -111,6 +111,17 @@ def test_what_other_programs_have_added_does_no_harm(results: Path, tmp_path: Pa
         assert stored.read("history", "own").tolist() == [0, 1, 2]
 
 
+@pytest.mark.parametrize("text", ["a = 1\na.b = 2", f"a = {'[' * 3000}{']' * 3000}", ""])
+def test_a_sweep_whose_case_is_no_toml_is_drawn_and_not_reported_on(
+    results: Path, tmp_path: Path, text: str
+) -> None:
+    shutil.copy(results / "sweep.h5", tmp_path / "f.h5")
+    with h5py.File(tmp_path / "f.h5", "r+") as file:
+        file.attrs["resolved_toml"] = text
+    assert tried(tmp_path, "f.h5", ["plot"]).code == 0
+    tried(tmp_path, "f.h5", ["report"]).told(4, "the case in it is not valid")
+
+
 def test_a_history_in_half_precision_is_computed_with_in_double(results: Path, tmp_path: Path) -> None:
     shutil.copy(results / "run.h5", tmp_path / "f.h5")
     with h5py.File(tmp_path / "f.h5", "r+") as file:

@@ -202,7 +202,7 @@ def _share(spectrum: tuple[Array, Array, float], lines: Sequence[float], bins: i
 def _near(lines: Sequence[float], frequencies: NDArray[Any], bins: int = LINE_BINS) -> NDArray[np.bool_]:
     """Which frequencies of a spectrum belong to lines (Hz)."""
     chosen = np.zeros(len(frequencies), dtype=bool)
-    for line in lines:
+    for line in lines if len(frequencies) > 1 else ():
         middle = round(line / frequencies[1])
         chosen[max(middle - bins, 0) : middle + bins + 1] = True
     return chosen

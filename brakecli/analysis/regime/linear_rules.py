@@ -41,6 +41,8 @@ class LinearRules(ForcedRules):
         if theory.direction == 0:
             return Decision(theory.sentence, advice=DASHPOT)
         if theory.direction > 0:
+            if remedy := self.context.steadier():
+                return Decision(f"{theory.sentence}, but the scheme's steps damp it", advice=remedy)
             more = theory.seconds_to_limit(*self._end())
             self.evidence["seconds_to_go"] = more = more + 3.0 / theory.mode.growth
             return Decision(theory.sentence, advice=f"run at least {QUARTER * (self.duration + more):.3g} s")

@@ -17,6 +17,7 @@ from brakecli.analysis.regime.over_time import over_time
 from brakecli.analysis.regime.ripple import detuned, ripple
 from brakecli.analysis.regime.spectra import forced_lines, subharmonics
 from brakecli.analysis.regime.verdict import Context, Decision, Feeds, Thresholds, Verdict
+from brakecli.analysis.stability.discrete import spectral_radius, without_damping
 from brakecli.analysis.stability.modes import growth, is_undamped, locks_from, modes, slowest_of_cycles
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
@@ -117,10 +118,18 @@ def context(system: System) -> Context:
         growth=lambda: growth(c, stiffness(), grip),
         modes=lambda: [each for k in (stiffness(), system.contact_stiffness) for each in modes(c, k, grip)],
         linear=theory,
+        steadier=lambda: _steadier(system),
         ripple=lambda part, lines: ripple(system, belt, stiffness(), part, lines),
         detuned=lambda part, lines: detuned(system, belt, stiffness(), part, lines),
         powers=partial(_powers, system, belt),
     )
+
+
+def _steadier(system: System) -> str:
+    """What to do where no disturbance grows by the scheme at its step; empty where one does."""
+    k, phi = system.contact_stiffness, system.coefficients.phi
+    grows = system.method.own_steps or spectral_radius(system, k, phi) > 1.0
+    return "" if grows else without_damping(system.method)
 
 
 def _powers(system: System, belt: float, part: Part) -> dict[str, float]:

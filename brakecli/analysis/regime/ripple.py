@@ -19,7 +19,8 @@ from brakecli.solver.steady_sliding import add_places
 from brakecli.solver.system import System
 
 _FINER = 4
-_MOST_SAMPLES, _MOST_WORK = 1024, 1 << 24  # samples, and values of waves at nodes
+_FEWEST, _MOST_SAMPLES = 5, 1024  # a window of fewer holds next to nothing
+_MOST_WORK = 1 << 24  # values of waves at nodes
 _LEAST = 0.05  # part of a number from which on it is said
 _STIFFNESSES = np.geomspace(0.8, 1.25, 33)  # of a pad that opens, over the mean one of steady sliding
 
@@ -61,7 +62,7 @@ def ripple(system: System, belt: float, stiffness: float, part: Part, lines: Seq
     samples = min(part.stop - part.start, _MOST_SAMPLES)
     end = Part(part.history, part.stop - samples, part.stop)
     work = samples * _FINER * system.nodes * len(system.wheel.g)
-    if not 0 < work <= _MOST_WORK or system.method.step is None or end.slides(None):
+    if samples < _FEWEST or not 0 < work <= _MOST_WORK or system.method.step is None or end.slides(None):
         return None
     pad = build_pad(system.layer_stiffness, system.half_length, system.shoe, system.wheel, _FINER * system.nodes)
     layer = build_layer(system.evaluate, pad, moving=True)

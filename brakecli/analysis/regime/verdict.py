@@ -73,6 +73,7 @@ class Context:
     growth: Callable[[], float] = lambda: 0.0  # 1/s, of a small disturbance of steady sliding; below 0 it decays
     modes: Callable[[], list["Mode"]] = list  # of small vibrations
     linear: Callable[[], "Linear | None"] = lambda: None  # the theory of full contact
+    steadier: Callable[[], str] = str  # what to do where the steps damp what grows in theory; empty if they do not
     ripple: Callable[[Part, Sequence[float]], "Ripple | None"] = lambda part, lines: None  # of the nodes
     detuned: Callable[[Part, Sequence[float]], float] = lambda part, lines: 0.0  # part of a forced amplitude
     powers: Callable[[Part], dict[str, float]] = lambda part: {}  # W, what becomes of the power of the belt

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from brakecli.solver.contact.closed_form import evaluate as closed_form
 from brakecli.solver.contact.pad import build_layer, build_pad
-from brakecli.solver.method import MOST
+from brakecli.solver.method import MOST, Method
 from brakecli.solver.records import PROBLEM, WORK, Coefficients, Weights, new
 from brakecli.solver.roughness import surface
 from brakecli.solver.system import System
@@ -94,3 +94,9 @@ def spectral_radius(system: System, contact_stiffness: float, phi: float, step: 
     if system.belt_speed < 0.0:  # the same shoe seen from behind: x and U change sign, and so do the couplings
         c = c._replace(b_xy=-c.b_xy, c_xy=-c.c_xy, sin_beta=-c.sin_beta)
     return float(np.abs(np.linalg.eigvals(amplification(c, s, system.scheme, contact_stiffness))).max())
+
+
+def without_damping(method: Method) -> str:
+    """What to do where the steps of a scheme damp what the shoe itself does not."""
+    weights = list(method.row.theta)
+    return f"take theta = {weights}" if weights else "take another scheme, or a shorter step"
