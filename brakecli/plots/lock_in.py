@@ -22,7 +22,8 @@ def draw(result: StoredResult) -> Figure:
     place = next((name for name, each in result.variables("/").items() if "parameters" in each.attributes), "")
     if not place:
         raise style.unreadable(result, "the axis of the key is missing")
-    key, units = (str(result.variables("/")[place].attributes.get(name, "")) for name in ("long_name", "units"))
+    attributes = result.variables("/")[place].attributes
+    key, units = str(attributes.get("long_name", "")), style.unit_of(attributes)
     x, *modes = (style.read_column(result, name) for name in (place, "frequencies", "growth_rates"))
     if not np.isfinite(x).all() or any(values.shape != (len(x), 2) for values in modes):
         raise style.unreadable(result, "its variables do not fit the axis of the key")
@@ -36,7 +37,7 @@ def diagram(
     title: str, key: str, units: str, x: style.Array, modes: Sequence[style.Array], critical: style.Array
 ) -> Figure:
     """The figure of both modes, their frequencies (Hz) and growth rates (1/s), along a key of the case."""
-    factor, unit = style.prefixed(style.largest(x), units.removeprefix("1"))
+    factor, unit = style.prefixed(style.largest(x), units)
     numbers = ", ".join(style.readable(factor * float(value)) for value in critical)
     said = f"changes at {numbers} {unit}".rstrip() if len(critical) else "does not change in between"
     summary = f"{len(x)} value{'s' * (len(x) > 1)}   ·   stability {said}"
@@ -54,7 +55,7 @@ def diagram(
         style.keep_flat(axes, values, turning if label == "growth rate" else 0.0)
         style.set_ticks(axes.yaxis, 0.0, style.largest(values), "Hz" if label == "frequency" else "1/s", label)
     panels[1].axhline(0.0, color=style.DARK, lw=1.0, zorder=1.5)
-    style.set_ticks(panels[1].xaxis, float(x.min()), float(x.max()), units.removeprefix("1"), key)
+    style.set_ticks(panels[1].xaxis, float(x.min()), float(x.max()), units, key)
     figure.align_ylabels()
     panels[0].legend(loc="best")
     return figure

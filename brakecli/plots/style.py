@@ -3,7 +3,7 @@
 import math
 import textwrap
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from io import BytesIO
 from itertools import pairwise
@@ -177,6 +177,12 @@ def density(values: Array, frequency: Array, unit: str) -> tuple[float, str]:
     factor, unit = prefixed(size, unit)
     squared = f"({unit})²" if set(unit) & {"/", " "} else f"{unit}²" if unit else "1"
     return factor**2, f"power spectral density ({squared}/Hz)"
+
+
+def unit_of(attributes: Mapping[str, Any]) -> str:
+    """The unit of a variable; none where it is "1". A dollar sign, with which formulas begin, is left out."""
+    units = str(attributes.get("units", "")).replace("$", "")
+    return "" if units == "1" else units
 
 
 def labelled(name: str, units: str) -> str:

@@ -181,8 +181,7 @@ def gather(
     known, variables = result.variables("/"), _variables(result, sweep, shown, more)
     dims = known["status"].dims
     both = dims[:1] == ("direction",)
-    units = {name: str(each.attributes.get("units", "")) for name, each in known.items()}
-    units = {name: unit if unit != "1" else "" for name, unit in units.items()}
+    units = {name: style.unit_of(each.attributes) for name, each in known.items()}
     long_names = {name: str(each.attributes.get("long_name", "")) for name, each in known.items()}
     axes = []
     for number, dimension in enumerate(dims[both:], start=1):

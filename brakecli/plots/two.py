@@ -48,7 +48,7 @@ def _runs(results: tuple[StoredResult, StoredResult], variable: str) -> Figure:
     highest = max((picture.spectrum[2] for picture in pictures), key=style.largest)
     scale, label = style.density(highest, pictures[0].spectrum[1], VARIABLES[variable][3])
     for number, (result, picture, curve) in enumerate(zip(results, pictures, _LOOKS, strict=True)):
-        panels[0].plot(times[number], look(picture.detail[variable]), label=result.path.name, **curve)
+        panels[0].plot(times[number], look(picture.detail[variable]), label=_name(result), **curve)
         time, lowest, highest = envelopes[number][0], *map(whole_look, envelopes[number][1:])
         if number == 0:
             panels[1].fill_between(time, lowest, highest, color=curve["color"], lw=1.5)
@@ -96,14 +96,18 @@ def _along(axes: Axes, name: str, ends: list[float], unit: str) -> None:
     style.set_ticks(axes.xaxis, low, high, unit, name)
 
 
+def _name(result: StoredResult) -> str:
+    """The name of a file for a legend, in which dollar signs would begin a formula."""
+    return result.path.name.replace("$", r"\$")
+
+
 def _curves(results: tuple[StoredResult, StoredResult], kind: str, variable: str) -> Figure:
     """Numbers along the one axis that both results have."""
     known = results[0].variables("/")
     critical = kind == "sweep" and all("critical" in result.variables("/") for result in results)
     names = (variable,) if variable else ("critical",) if critical else _SHOWN[kind]
     axis = _axis_of(results, names)
-    units = {name: str(known[name].attributes.get("units", "")) for name in (axis, *names)}
-    units = {name: "" if unit == "1" else unit for name, unit in units.items()}
+    units = {name: style.unit_of(known[name].attributes) for name in (axis, *names)}
     title = str(results[0].attributes.get("title", "")) or "Two results"
     files = " and ".join(result.path.name for result in results)
     figure = style.headed(_WIDTH, 2.6 + 2.2 * len(names), title, files)
@@ -114,7 +118,7 @@ def _curves(results: tuple[StoredResult, StoredResult], kind: str, variable: str
         for result, x, values, look in zip(results, places, columns, _LOOKS, strict=True):
             order = np.argsort(x, kind="stable")
             for number, line in enumerate(values[order].reshape(len(x), -1).T):
-                label = result.path.name if number == 0 else None
+                label = _name(result) if number == 0 else None
                 marker = "o" if len(x) <= FEW else ""
                 axes.plot(x[order], line, marker=marker, ms=3.0 + look["lw"], label=label, **look)
         drawn = np.concatenate([values.ravel() for values in columns])

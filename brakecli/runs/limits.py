@@ -101,7 +101,7 @@ def refuse(found: Check, free_bytes: float = math.inf) -> None:
         raise RefusedError(f"{what} {compared / 1e9:.3g} GB of memory; {instead}")
     if _blows_up(growth, found.steps):
         longest = _longest_stable_step(system)
-        shorter = f"take a solver.step of at most {longest:.2g} s" if longest else "reduce solver.step"
+        shorter = f"take a solver.step of at most {_down(longest)} s" if longest else "reduce solver.step"
         what = f"it multiplies disturbances by {growth:.6g} in each of {found.steps} steps"
         remedy = f"{shorter}, {system.method.row.unstable}"
         raise RefusedError(f"solver.theta: at this step the scheme is unstable: {what}; {remedy}")
@@ -121,16 +121,20 @@ def _blows_up(growth: float, steps: float) -> bool:
 
 
 def _longest_stable_step(system: System) -> float | None:
-    """The longest step (s) at which a run of this duration would not blow up, rounded down to two digits."""
+    """The longest step (s) at which a run of this duration would not blow up."""
 
     def is_stable(step: float) -> bool:
         return not _blows_up(step_limits(system, step).growth, system.sampled_duration / step)
 
     if not is_stable(1e-6 * system.step):
         return None
-    longest, _ = bisect(is_stable, 1e-6 * system.step, system.step, ratio=1.001, geometric=True)
-    digit: float = 10.0 ** (math.floor(math.log10(longest)) - 1)
-    return math.floor(longest / digit) * digit
+    return bisect(is_stable, 1e-6 * system.step, system.step, ratio=1.001, geometric=True)[0]
+
+
+def _down(number: float) -> str:
+    """Two digits of a number, rounded down: what is advised is not more than what helps."""
+    digit: float = 10.0 ** (math.floor(math.log10(number)) - 1)
+    return f"{math.floor(number / digit) * digit:.2g}"
 
 
 def adjustments(system: System) -> list[str]:
@@ -155,12 +159,12 @@ def _warnings(found: Check) -> Iterator[str]:
     system, per_wave = found.system, found.nodes_per_wave
     if not system.method.own_steps:
         for what, longest, otherwise in _unresolved(system, found.steps_per_period):
-            yield f"solver.step: {what}; take a step of at most {longest:.2g} s{otherwise}"
+            yield f"solver.step: {what}; take a step of at most {_down(longest)} s{otherwise}"
     nyquist, contact, waves = 0.5 / system.interval, system.natural_frequencies[1], system.passing_frequency
     for what, frequency in (("the contact resonance", contact), ("the shortest wave of the wheel", waves)):
         if frequency > nyquist:
             above = f"lies above half the sampling rate ({nyquist:.4g} Hz) and would be aliased"
-            remedy = f"sample every {0.4 / frequency:.2g} s or more often"
+            remedy = f"sample every {_down(0.4 / frequency)} s or more often"
             yield f"output.sample_interval: {what} at {frequency:.4g} Hz {above} in the spectra; {remedy}"
     if per_wave is not None and per_wave < _COARSE_NODES:
         remedy = f"take at least {math.ceil(system.nodes * _COARSE_NODES / per_wave)}, or leave nodes out"
@@ -197,7 +201,7 @@ def _of_the_scheme(system: System, limits: StepLimits, steps: int) -> Iterator[s
     method = system.method
     if method.iteration == "fixed-point" and limits.contraction >= 1.0:
         bound = f"the bound of its contraction factor is {limits.contraction:.3g}, above 1"
-        remedy = f'take "newton", or a step of at most {system.step / math.sqrt(limits.contraction):.2g} s'
+        remedy = f'take "newton", or a step of at most {_down(system.step / math.sqrt(limits.contraction))} s'
         yield f"solver.iteration: the fixed-point iteration may diverge ({bound}); {remedy}"
     if not limits.unique:
         wedged = "friction can wedge the shoe into the wheel within a step; reduce solver.step or the coefficient"

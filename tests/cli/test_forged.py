@@ -122,6 +122,17 @@ def test_a_sweep_whose_case_is_no_toml_is_drawn_and_not_reported_on(
     tried(tmp_path, "f.h5", ["report"]).told(4, "the case in it is not valid")
 
 
+def test_a_dollar_sign_in_a_unit_or_a_name_begins_no_formula(results: Path, tmp_path: Path) -> None:
+    for name in ("$x^{b$.h5", "$y^{$.h5"):
+        shutil.copy(results / "run.h5", tmp_path / name)
+    assert tried(tmp_path, "$x^{b$.h5", ["diff", "$y^{$.h5", "-o", "d.png"]).code in (0, 1)
+    assert (tmp_path / "d.png").exists()
+    shutil.copy(results / "sweep.h5", tmp_path / "f.h5")
+    with h5py.File(tmp_path / "f.h5", "r+") as file:
+        file["amplitude"].attrs["units"] = file["frequency"].attrs["units"] = r"$x^{$ \frac{"
+    assert tried(tmp_path, "f.h5", ["plot"]).code == 0
+
+
 def test_a_history_in_half_precision_is_computed_with_in_double(results: Path, tmp_path: Path) -> None:
     shutil.copy(results / "run.h5", tmp_path / "f.h5")
     with h5py.File(tmp_path / "f.h5", "r+") as file:
