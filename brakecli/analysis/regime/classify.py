@@ -38,6 +38,8 @@ def classify(
     if ripple := ripple if ripple and ripple.counts else None:
         rules.evidence |= {f"ripple_{name}": getattr(ripple, name) for name in ("x", "vx", "force")}
     vague = spread is not None and 0.0 < amplitude <= spread  # then not even its order is known
+    if lasting and not rules.parts:
+        rules.settle_force()
     low, high = replace(part, start=max(part.start, rules.force_from)).extremes("friction_force")
     variation = cycles.force_variation if cycles else None if rules.force_rings is not None else high - low
     doubt = _torque_doubt(rules, context, variation, lasting=not cycles and not undecided)

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +17,11 @@ if TYPE_CHECKING:  # a measured signal needs no compiled code
 
 _REST = 0.3  # of a forced motion, by which its closed form may be off
 _LONGER = 1.4  # a run whose last quarter and the window before it are settled, over what comes before
+_FEWEST_PIECES, _PIECES, _WIDER = (
+    4,
+    16,
+    1.02,
+)  # of the force: least and most; by how much more its transient swings
 _FAR = 0.3  # rad, of a wave, by which what the shoe adds moves it
 DASHPOT = "a dashpot would decide"
 
@@ -52,6 +58,26 @@ class LinearRules(ForcedRules):
             return self._too_short(slow)
         return self._shaken(theory, slow, (self.history.samples - start) * self.history.interval)
 
+    def settle_force(self) -> None:
+        """Find from where on the friction force of a forced motion has settled: it may ring longer than x.
+
+        From there on it swings no wider, within pieces of the settled part, than in the last half of them.
+        """
+        part, interval = self.settled_part, self.history.interval
+        seconds = max(self.context.pattern, self._beat())
+        count = min(int((part.stop - part.start) * interval / seconds), _PIECES) if seconds else 0
+        if count < _FEWEST_PIECES:
+            return
+        ends = np.linspace(part.start, part.stop, count + 1).astype(int).tolist()
+        pieces = (replace(part, start=start, stop=stop) for start, stop in pairwise(ends))
+        swings = np.array([piece.amplitude("friction_force") for piece in pieces])
+        late = swings[count // 2 :]
+        first = int(np.flatnonzero(np.append(True, swings > _WIDER * late.max()))[-1])
+        if (np.diff(swings[: first + 1]) < 0.0).all():  # not the chance of waves that meet
+            self.force_from = ends[first]
+        if len(late) >= _FEWEST_PIECES and (np.diff(late) < 0.0).all() and late[0] > _WIDER * late[-1]:
+            self.force_rings = self.duration
+
     def _swings_far(self, theory: "Linear") -> bool:
         """Whether what the shoe adds is no longer small beside the waves, so that their slope is not linear."""
         own = theory.parts(*self.last.places())[2]
@@ -80,6 +106,8 @@ class LinearRules(ForcedRules):
         first, level, end, slope = self._gone(theory, own, forced)
         if slope * WINDOWS > 1.0 and end > self.limits.settled_within * forced:
             return None  # the passing waves excite what the mean stiffness damps
+        if end >= _REST * forced and self._stays(theory, slope):
+            return None  # the waves force more than the closed form has
         begin = first * self.history.samples // WINDOWS
         wait = math.log(max(end / max(level, 1e-300), 1.0)) / -theory.mode.growth
         advice = list[str]()
@@ -101,6 +129,11 @@ class LinearRules(ForcedRules):
         text = f"only the roughness shakes the shoe, by {forced:.3g} m: {theory.sentence}"
         return Decision(text, Regime.DAMPED, Excitation.FORCED, advice="; ".join(advice))
 
+    def _stays(self, theory: "Linear", slope: float) -> bool:
+        """Whether what the shoe seems to add does not decay as its own vibration would, but is forced."""
+        decay = theory.mode.growth * self.duration / WINDOWS
+        return 0.25 * WINDOWS * decay < -1.0 and slope > 0.25 * decay
+
     def _gone(self, theory: "Linear", own: Array, forced: float) -> tuple[int, float, float, float]:
         """The window from which on what the shoe adds has gone beside what is forced, and to which level.
 
@@ -110,7 +143,7 @@ class LinearRules(ForcedRules):
         left = 0.5 * (np.maximum.reduceat(own, starts) - np.minimum.reduceat(own, starts))
         end = 0.5 * float(np.ptp(own[starts[-10] :]))  # a window may be shorter than a period
         slope = line(np.arange(0.5 * WINDOWS), np.log(np.maximum(left[WINDOWS // 2 :], 1e-300)))[0]
-        level, decay = self.limits.settled_within * forced, theory.mode.growth * self.duration / WINDOWS
-        if 0.25 * WINDOWS * decay < -1.0 and slope > 0.25 * decay and end < _REST * forced:
-            level = max(level, 1.2 * end)  # what does not decay is forced, and missing in the closed form
+        level = self.limits.settled_within * forced
+        if end < _REST * forced and self._stays(theory, slope):
+            level = max(level, 1.2 * end)  # forced, and missing in the closed form
         return int(np.flatnonzero(np.append(True, left[1:] > level))[-1]) + 1, level, end, slope
