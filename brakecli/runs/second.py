@@ -30,7 +30,6 @@ _LOST = 4.0  # powers of e by which what is not forced has decayed
 _LONGER = 4.0  # times as long, so that it loses its start, and a vibration that dies becomes linear
 _REMAINS, _VANISHES = 0.7, 0.2  # part of the level of the first run
 _HARDLY = 0.8  # part of it beyond which a second run hardly decays, as the first may
-_LITTLE = 0.5  # part of what friction gives that the roughness gives at most where friction may keep it up
 _HALVED = math.log(2.0) / 3.5  # decay rate times duration of the first, where the second ends at half its level
 
 
@@ -113,8 +112,6 @@ def compared(
             own = f"the shoe's own vibration grows at {second.growth:.3g} 1/s"
             text = f"{text}, but in the first sliding is unstable: {own}"
             return _told(Feeds.UNKNOWN, 0.0, text, 1.01 * GROWN / second.growth)
-        if remains and _friction_feeds(history, _LITTLE):
-            return _told(Feeds.UNKNOWN, 0.0, f"{text}, but in the first friction gives most of the energy", needed)
         waves, end = context(second.system).waves, Part(history, history.samples // 2, history.samples)
         least = _VANISHES  # what moves as the waves do may be forced along x, and falls as friction does
         vanishes = part <= (min(least, 0.5 * second.friction) if follows(end, waves) else least)
@@ -138,11 +135,11 @@ def _told(feeds: Feeds, sticks: float, text: str, needed: float, other: str = ""
     return feeds, sticks, f"{text}; run at least {needed:.3g} s and decide again{other}" if undecided else text
 
 
-def _friction_feeds(history: History, most: float = 0.0) -> bool:
-    """Whether friction surely gives energy to the vibration, and the roughness at most a part of that."""
+def _friction_feeds(history: History) -> bool:
+    """Whether friction surely gives energy to the vibration, and the roughness takes it."""
     half = Part(history, history.samples // 2, history.samples)
-    (gives, off), (others, off_too) = half.power("friction_force", "vx"), half.power("normal_force", "vy")
-    return gives > 2.0 * off and others + 2.0 * off_too < most * gives
+    (gives, off), (takes, off_too) = half.power("friction_force", "vx"), half.power("normal_force", "vy")
+    return gives > 2.0 * off and takes < -2.0 * off_too
 
 
 def level(history: History) -> float:

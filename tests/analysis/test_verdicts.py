@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import tomli_w
 
 from brakecli.analysis.regime.classify import classify
 from brakecli.analysis.regime.linear import linear_theory
@@ -14,6 +15,7 @@ from brakecli.analysis.stability.report import stability
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
 from brakecli.solver.history import array_history
+from tests.analysis.found import SHOES
 from tests.analysis.histories import INTERVAL, history_of, verdict_of
 from tests.campaign import counts
 from tests.commands import ROOT
@@ -247,3 +249,18 @@ def test_a_failed_run_is_neither_forced_nor_settled() -> None:
     verdict = verdict_on(motion, system_of(case), "it broke")
     assert (verdict.regime, verdict.excitation, verdict.settled) == (Regime.UNDECIDED, Excitation.NONE, False)
     assert verdict.growth_rate is None
+
+
+def test_what_waves_force_whose_phase_x_shifts_is_taken_from_the_history() -> None:
+    """Its fourth harmonic, at a natural frequency, is not in the closed form, which is 27 % low."""
+    verdict = verdict_of(parse_case(tomli_w.dumps(SHOES["waves whose phase x shifts"]), "case").case)
+    assert (verdict.excitation, verdict.settled) == (Excitation.FORCED, True)
+    assert verdict.amplitude_spread is not None
+    assert abs(verdict.amplitude - 5.090e-6) <= verdict.amplitude_spread < 3e-7  # by another integrator
+
+
+def test_the_torque_of_a_pad_that_opens_waits_for_the_force() -> None:
+    """By another integrator 377.24 N m lasts; y rings where x has settled, and the whole settled part has 467."""
+    verdict = verdict_of(parse_case(tomli_w.dumps(SHOES["force that rings longer than x"]), "case").case)
+    assert (verdict.excitation, verdict.settled) == (Excitation.FORCED, True)
+    assert verdict.torque_variation == pytest.approx(377.24, rel=verdict.thresholds.settled_within)
