@@ -60,6 +60,11 @@ def test_growth_that_the_steps_damp_is_not_waited_for() -> None:
         assert remedy in verdict.reasons[0]
 
 
+def test_a_shoe_that_nothing_holds_along_the_wheel_is_told_of_its_links() -> None:
+    turned = make(SQUEAL, link1__angle_deg=0.0, link2__angle_deg=90.0, solver__duration=0.05)
+    assert "no link holds it along the wheel; incline a link" in verdict_of(turned).reasons[0]
+
+
 @pytest.mark.parametrize("name", ["rough-partly-open", "rough-full-contact"])
 def test_a_run_of_a_few_samples_has_a_verdict(name: str) -> None:
     text = (ROOT / "cases" / f"{name}.toml").read_text()

@@ -220,7 +220,7 @@ class ForcedRules:
         """Forced, as seen in a settled part of two periods of the slowest wave, and as `what` shows."""
         if self._open and not self.context.touches():
             text = "sliding steadily the shoe would not touch the wheel: it bounces, and may leave it for good"
-            return Decision(text, advice="check the sign and size of load.force")
+            return Decision(text, advice="check load.force, and the angles of the links")
         growth = self.context.growth()
         fading = 0.25 * self.duration * growth > -_RELAXED  # too slowly to be seen within a quarter of the run
         falls = 0.0

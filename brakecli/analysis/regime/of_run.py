@@ -112,6 +112,7 @@ def context(system: System) -> Context:
         scale=fastest,
         frictionless=c.phi == 0.0,
         undamped=is_undamped(c),
+        held=c.c_xx > 0.0,
         locks=limit if c.phi > (limit := locks_from(c, system.contact_stiffness, belt)) else None,
         touches=lambda: stiffness() > 0.0,
         settles=slowest_of_cycles(c),

@@ -52,7 +52,7 @@ class Rules(LinearRules):
         if self.settled_part.fraction(ContactState.SEPARATED) == 1.0:
             never = self.whole.fraction(ContactState.SEPARATED) == 1.0
             text = "never touched the wheel" if never else "lost contact for good"
-            return Decision(f"the shoe has {text}", advice="check the sign and size of load.force")
+            return Decision(f"the shoe has {text}", advice="check load.force, and the angles of the links")
         if self.last.fraction(ContactState.SEPARATED) == 1.0:
             return Decision("the shoe has left the wheel", advice="run longer, to see whether it comes back")
         if (self.last if standing else self.settled_part).fraction(ContactState.STICK) < 1.0:
@@ -60,6 +60,8 @@ class Rules(LinearRules):
         if standing:
             return Decision("the shoe has come to rest, sticking to the standing wheel", Regime.DAMPED)
         text = "the shoe sticks throughout and is carried along by the wheel"
+        if not self.context.held:
+            return Decision(f"{text}: no link holds it along the wheel", advice="incline a link, by its angle_deg")
         if (limit := self.context.locks) is None or not self.context.steady:
             return Decision(text, advice=_LONG)
         why = "friction grows faster with x than the force that it needs, so that no longer run will see it slip"

@@ -67,6 +67,7 @@ class Context:
     scale: float = math.inf  # m/s, of a motion that would open the contact
     frictionless: bool = False
     undamped: bool = False
+    held: bool = True  # whether a link holds the shoe along the wheel
     locks: float | None = None  # friction coefficient from which the shoe locks itself, where its own is larger
     touches: Callable[[], bool] = lambda: True  # whether the shoe touches the wheel where it slides steadily
     settles: float = math.inf  # 1/s: the slowest disturbance of a limit cycle without stick decays no faster
