@@ -28,7 +28,8 @@ def contents(result: StoredResult) -> dict[str, Any]:
     held = []
     for group in result.groups:
         for name, each in result.variables(group).items():
-            about = {"units": each.attributes.get("units", ""), "meaning": each.attributes.get("long_name", "")}
+            units, meaning = (str(each.attributes.get(name, "")) for name in ("units", "long_name"))
+            about = {"units": units, "meaning": meaning}
             held.append({"group": group, "name": name, "dims": each.dims, "shape": each.shape, **about})
     attributes = result.attributes
     known = {name: attributes.get(name) for name in ("status", "kind", "title", "format_version")}

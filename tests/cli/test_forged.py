@@ -133,6 +133,14 @@ def test_a_dollar_sign_in_a_unit_or_a_name_begins_no_formula(results: Path, tmp_
     assert tried(tmp_path, "f.h5", ["plot"]).code == 0
 
 
+def test_a_unit_that_is_a_number_is_named_in_json(results: Path, tmp_path: Path) -> None:
+    shutil.copy(results / "run.h5", tmp_path / "f.h5")
+    with h5py.File(tmp_path / "f.h5", "r+") as file:
+        file["history/state"].attrs["units"] = np.inf
+    held = tried(tmp_path, "f.h5", ["info", "--json"]).json["variables"]
+    assert "inf" in [each["units"] for each in held]
+
+
 def test_a_history_in_half_precision_is_computed_with_in_double(results: Path, tmp_path: Path) -> None:
     shutil.copy(results / "run.h5", tmp_path / "f.h5")
     with h5py.File(tmp_path / "f.h5", "r+") as file:
