@@ -5,6 +5,7 @@ from typing import Any
 
 from brakecli.cli.tables import grid, text_of, two_columns
 from brakecli.errors import value_text
+from brakecli.files.field import plain_units
 
 _ASIDE = ("regime/", "adjustments", "reasons", "warnings", "modelled", "left_out")  # long, and in --json
 
@@ -40,19 +41,23 @@ def diff_table(files: Mapping[str, str], numbers: Mapping[str, Any]) -> str:
             parts.append(grid(columns))
         if more := len(numbers[name]) - len(shown):
             parts.append(f"{more} more with reasons and evidence differ; --json lists them")
-    if variables := numbers["variables"]:
+    alike = [each for each in numbers["variables"] if each["compared"] and not each["different"]]
+    if variables := [each for each in numbers["variables"] if each not in alike]:
         columns = {
-            "variable": [f"{each['group']}/{each['name']}".replace("//", "") for each in variables],
+            "variable": [_place(each) for each in variables],
             "differ": [f"{each['different']} of {each['compared']}" for each in variables],
             "by at most": [_text(each["largest"], each["units"], ".3g") for each in variables],
             "of the largest": [text_of(each["relative"], form=".2%") for each in variables],
-            "shapes": [" and ".join(map(_shape, each["shapes"])) for each in variables],
+            "shapes": [_shapes(each) for each in variables],
         }
         if all(each["shapes"][0] == each["shapes"][1] for each in variables):
             del columns["shapes"]
         parts.append(grid(columns))
-        if along := {each["interpolated"]: None for each in variables if each["interpolated"]}:
-            parts.append(f"compared at equal {' and '.join(along)}; the finer result is interpolated")
+    if alike:
+        named = ", ".join(f"{_place(each)} ({_shapes(each)})" for each in alike)
+        parts.append(f"the same where both have values, of different lengths: {named}")
+    if along := {each["interpolated"]: None for each in numbers["variables"] if each["interpolated"]}:
+        parts.append(f"compared at equal {' and '.join(along)}; the finer result is interpolated")
     if numbers["same"]:
         parts.append("no difference in case, numbers and variables")
     if files["output"]:
@@ -62,8 +67,16 @@ def diff_table(files: Mapping[str, str], numbers: Mapping[str, Any]) -> str:
 
 def _text(value: Any, units: str | None = None, form: str = ".6g") -> str:
     if isinstance(value, float):
-        return text_of(value, "" if units in (None, "1") else str(units), form)
+        return text_of(value, "" if units in (None, "1") else plain_units(str(units)), form)
     return "-" if value is None else value_text(value).strip('"')
+
+
+def _place(variable: Mapping[str, Any]) -> str:
+    return f"{variable['group']}/{variable['name']}".replace("//", "")
+
+
+def _shapes(variable: Mapping[str, Any]) -> str:
+    return " and ".join(map(_shape, variable["shapes"]))
 
 
 def _shape(shape: Any) -> str:

@@ -63,5 +63,8 @@ def command(
         where = ", ".join(f"{key} = {value}" for key, value in failure["parameters"].items())
         say(f"point {failure['point']}{f' ({where})' if where else ''}: {failure['reason']}")
     if found.failed:
-        failed = f"{found.failed} of {found.points} points failed"
-        raise BrakecliError(f"{report.output}: {failed}; all others were written")
+        failed = f"{found.failed} of {found.points} points failed; all others were written"
+        if found.failed == found.points:
+            which = "its only point" if found.points == 1 else f"all {found.points} points"
+            failed = f"{which} failed; correct the case or the sweep, as the reasons above say"
+        raise BrakecliError(f"{report.output}: {failed}")

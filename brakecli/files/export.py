@@ -3,7 +3,6 @@
 import csv
 import io
 import math
-import re
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from pathlib import Path
@@ -14,6 +13,7 @@ import numpy as np
 from brakecli.errors import UnreadableResultError, UsageError
 from brakecli.files import fields
 from brakecli.files.atomic import check_target, new_output
+from brakecli.files.field import plain_units
 from brakecli.files.read import StoredResult, Variable
 from brakecli.files.write import FILL
 
@@ -127,8 +127,7 @@ def _checked(names: Sequence[str], there: Sequence[str], result: StoredResult) -
 
 
 def _head(name: str, variable: Variable) -> str:
-    units = re.sub(r"^\(([^/ ]*)\)2 Hz-1", r"\1^2/Hz", str(variable.attributes.get("units", "")))
-    units = units.replace("2 Hz-1", "^2/Hz")
+    units = plain_units(str(variable.attributes.get("units", "")))
     return name if units in ("", "1") else f"{name} ({units})"
 
 

@@ -1,5 +1,6 @@
 """How a number or text of a result is declared and read; `brakecli.files.fields` declares them all."""
 
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, is_dataclass, replace
 from functools import cached_property
@@ -46,6 +47,12 @@ class Field:
         if self.rows:
             return values_of(self.rows, value)
         return int(value) if self.kind == "i8" else plain(value)
+
+
+def plain_units(units: str) -> str:
+    """A unit of a file as people write it: `N^2/Hz` and `(m/s)^2/Hz` for `(N)2 Hz-1` and `(m/s)2 Hz-1`."""
+    units = re.sub(r"^\(([^/ ]*)\)2 Hz-1", r"\1^2/Hz", units).replace("2 Hz-1", "^2/Hz")
+    return units.replace("1^2/Hz", "1/Hz")
 
 
 def integer(name: str, meaning: str, at: str = "", **more: Any) -> Field:

@@ -25,8 +25,7 @@ def draw(picture: SweepPicture) -> Figure:
         panels = {partial(_draw_motion, name=picture.shown): 1.0}
     elif picture.critical is not None:
         panels = {_draw_critical: 3.2}
-        compared = np.isfinite(picture["critical"] - picture["critical_eigenvalue"]).any()
-        if compared and picture.critical.method == "simulation":
+        if _simulated(picture) and np.isfinite(picture["critical"] - picture["critical_eigenvalue"]).any():
             panels[_draw_difference] = 1.0
     figure = picture.figure(sweep.WIDTH, 5.2 if len(panels) == 1 else 6.4)
     rows = figure.subplots(len(panels), 1, sharex=True, height_ratios=[*panels.values()], squeeze=False)
@@ -49,7 +48,8 @@ def _draw_critical(axes: Axes, picture: SweepPicture) -> None:
     axes.plot(x, eigenvalue, color=style.DARK, lw=1.1, label="by eigenvalues", marker=marker, ms=ms, ls=ls)
     regained = picture["critical_status"][0] == Outcome.REGAINED
     if critical.method == "simulation":
-        for chosen, face, label in ((~regained, style.BLUE, "by simulation"), (regained, "white", "stable above")):
+        found = "by simulation" if _simulated(picture) else "with its error bar"
+        for chosen, face, label in ((~regained, style.BLUE, found), (regained, "white", "stable above")):
             if (there := chosen & np.isfinite(value)).any():
                 error = picture["critical_error"][0][there]
                 axes.errorbar(x[there], value[there], error, mfc=face, label=label, **_bars(size))
@@ -74,6 +74,13 @@ def _draw_critical(axes: Axes, picture: SweepPicture) -> None:
     else:
         axes.set_ylim(critical.lower, critical.upper)
     _mark(axes, x, picture.missing())
+
+
+def _simulated(picture: SweepPicture) -> bool:
+    """Whether runs measured a critical value: where steps are exact, all are those of the eigenvalues."""
+    critical, value = picture.critical, picture["critical"]
+    apart = np.isfinite(value) & (value != picture["critical_eigenvalue"])
+    return critical is not None and critical.method == "simulation" and bool(apart.any())
 
 
 def _draw_difference(axes: Axes, picture: SweepPicture) -> None:

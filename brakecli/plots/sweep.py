@@ -40,7 +40,7 @@ _CRITICAL = (
     *("critical_eigenvalue", "critical_sustained", "sustained_status"),
 )
 _WINDOWS = ("critical_windows_lower", "critical_windows_upper")
-_FIRST = (*map(str, REGIMES), "by simulation", "by eigenvalues")  # in the legend
+_FIRST = (*map(str, REGIMES), "by simulation", "with its error bar", "by eigenvalues")  # in the legend
 _WIDE = 20.0  # ratio of lasting amplitudes from which on their scale is logarithmic
 
 Sign = tuple[style.Array, dict[str, Any]]  # points without a value that could be drawn, the look of their marker

@@ -1,19 +1,20 @@
 """What a sweep will cost, before anything is computed."""
 
 import os
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 
 from brakecli.case.read import key_path
 from brakecli.case.system import system_of
-from brakecli.errors import CaseError, RefusedError
+from brakecli.errors import CaseError, RefusedError, key_text
 from brakecli.runs.cost import duration_text, steps_and_seconds
 from brakecli.runs.limits import MOST_BYTES, check, refuse, within_range
 from brakecli.runs.together import TOGETHER, seconds_together
 from brakecli.sweeps.early import may_be_early
 from brakecli.sweeps.growth import sliding, with_step
 from brakecli.sweeps.periodic import common_period, exponent_length
-from brakecli.sweeps.plan import Plan, Settings
+from brakecli.sweeps.plan import Plan, Settings, label
 from brakecli.sweeps.tables import Critical
 
 MOST_POINTS = 10_000_000
@@ -46,6 +47,7 @@ class Estimate:
     file_size: float
     at_least: bool = False  # motions may have to be looked for many times
     together: int = 1  # points that a task should hold, as they are computed side by side
+    refused: tuple[str, ...] = ()  # points that were looked at and will fail, each with its reason
 
     def sentence(self) -> str:
         """The estimate in words."""
@@ -59,9 +61,9 @@ class Estimate:
 
 def estimate(plan: Plan, workers: int) -> Estimate:
     """Estimate a sweep by two corners of its grid."""
-    times, samples, forced, together = [], 0, 0.0, 1
+    times, samples, forced, together, failing = [], 0, 0.0, 1, list[str]()
     for point in sorted({0, plan.points - 1}):
-        with suppress(CaseError, RefusedError), within_range():  # the point fails when its turn comes
+        with _noted(plan, point, failing), within_range():
             system = system_of(plan.case(plan.settings(point)))
             checked = check(system)
             refuse(checked)
@@ -89,7 +91,18 @@ def estimate(plan: Plan, workers: int) -> Estimate:
         file_size=_RECORD_BYTES * records + 1e5,
         at_least=forced > 0.0,
         together=together,
+        refused=tuple(failing),
     )
+
+
+@contextmanager
+def _noted(plan: Plan, point: int, failing: list[str]) -> Iterator[None]:
+    """Within the block a point that fails when its turn comes is added to a list, with its reason."""
+    try:
+        yield
+    except (CaseError, RefusedError) as error:
+        where = ", ".join(f"{key_text(path)} = {label(value)}" for path, value in plan.settings(point).items())
+        failing.append(f"point {point}{f' ({where})' if where else ''} will fail: {error}")
 
 
 def _forced_seconds(plan: Plan, settings: Settings, critical: Critical) -> float:

@@ -134,12 +134,18 @@ def test_options_that_do_not_fit_are_bad_usage(here: Path) -> None:
             ["classify", "run.h5", "--column", "1"],
             ["classify", "saw.csv", "--quantity", "speed", "--time-column", "t"],
             ["classify", "saw.csv", "--quantity", "force", "--sample-rate", "-5"],
+            ["classify", "saw.csv", "--quantity", "force"],
+            ["classify", "saw.csv", "--quantity", "force", "--sample-rate", "5", "--time-column", "t"],
             ["stability", RELAXATION, "--vary", "link2.angle_deg=1:2"],
             ["stability", RELAXATION, "--vary", "link2.angle_deg=80:100:3"],
             ["stability", RELAXATION, "--vary", "link2.angle=1:2:2"],
         ],
     )
-    words = ["--quantity", "displacement", "above 0 Hz", "START:STOP:NUM", "from -90 to 90", "angle_deg"]
+    once = [
+        f"of the samples are {given}; give --sample-rate HZ or --time-column NAME"
+        for given in ("not given", "given twice")
+    ]
+    words = ["--quantity", "displacement", "above 0 Hz", *once, "START:STOP:NUM", "from -90 to 90", "angle_deg"]
     assert len(done) == len(words)
     for result, word in zip(done, words, strict=True):
         result.told(2, word)

@@ -362,6 +362,12 @@ def test_samples_are_compared_at_the_same_time_and_lines_at_the_same_frequency(
     assert numbers["amplitude"] == "m"
     shown = " ".join(brakecli("diff", fine, coarse, cwd=folder).out.split())
     assert "compared at equal time and frequency; the finer result is interpolated" in shown
+    table, same, lengths = shown.partition("the same where both have values, of different lengths: ")
+    assert same
+    assert " 0 of " not in table
+    assert f"history/time (5001 and {len(times)})" in lengths
+    assert "N^2/Hz" in table
+    assert "(N)2" not in table
 
 
 def test_results_of_two_kinds_are_not_compared(folder: Path) -> None:

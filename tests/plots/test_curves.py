@@ -61,6 +61,16 @@ def test_a_search_by_eigenvalues_alone_has_no_error_bars(tmp_path: Path) -> None
     assert legend(figure) == ["by eigenvalues"]
 
 
+def test_a_search_that_no_run_measured_is_not_called_a_simulation(tmp_path: Path) -> None:
+    values = columns((8,), critical=True)
+    values["critical"] = values["critical_eigenvalue"]
+    values["critical"][3] = values["critical_eigenvalue"][3] = np.nan
+    result = write(tmp_path / "r.h5", {"axis": [ANGLE], "critical": CRITICAL}, values)
+    assert len(panels(result)) == 1
+    assert {"with its error bar", "by eigenvalues"} < set(legend(drawn(result)))
+    assert "by simulation" not in legend(drawn(result))
+
+
 def test_every_point_has_the_colour_of_its_regime(tmp_path: Path) -> None:
     values = columns((8,), critical=False)
     values["status"][5] = "failed"

@@ -298,6 +298,29 @@ def test_a_sweep_comes_from_standard_input_as_well(tmp_path: Path) -> None:
     assert left_in(tmp_path) == {"tiny.toml", "sweep.h5"}
 
 
+def test_check_names_points_that_will_fail_and_a_sweep_of_them_says_that_all_have_failed(tmp_path: Path) -> None:
+    (tmp_path / "tiny.toml").write_text(CASE)
+    (tmp_path / "s.toml").write_text(
+        'case = "tiny.toml"\n[[axis]]\nparameter = "solver.step"\nvalues = [1e-5, 2e-5]\n'
+    )
+    settings = (
+        'solver.scheme="three-layer"',
+        "solver.theta=[0.0, 0.1, 0.9]",
+        "link1.damping=0",
+        "link2.damping=0",
+    )
+    unstable = [word for each in settings for word in ("--set", each)]
+    refused = "will fail: solver.theta: at this step the scheme is unstable"
+    check = brakecli("check", "s.toml", *unstable, "--json", cwd=tmp_path)
+    check.told(0, *(f"point {n} (solver.step = {step}) {refused}" for n, step in enumerate(("1e-05", "2e-05"))))
+    assert [refused in each for each in check.json["refused"]] == [True, True]
+    assert brakecli("check", "s.toml", "--json", cwd=tmp_path).json["refused"] == []
+    done = brakecli("sweep", "s.toml", *unstable, cwd=tmp_path)
+    assert "written" not in done.told(
+        1, "point 1 (solver.step = 2e-05): solver.theta", "s.h5: all 2 points failed; correct"
+    )
+
+
 def test_check_reports_what_a_sweep_would_cost(tmp_path: Path) -> None:
     (tmp_path / "tiny.toml").write_text(CASE)
     (tmp_path / "s.toml").write_text(GRID)

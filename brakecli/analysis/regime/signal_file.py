@@ -64,8 +64,8 @@ def read_signal(
             values, sample_rate = _sound(path, column, sample_rate)
             return Signal(_numbers(values) * _size(None, unit, *_SI[quantity]), 1.0 / sample_rate)
         if (sample_rate is None) == (time_column is None):
-            what = "the times of the samples are needed once"
-            raise UsageError(f"{what}; give either --sample-rate HZ or --time-column")
+            given = "are not given" if time_column is None else "are given twice"
+            raise UsageError(f"the times of the samples {given}; give --sample-rate HZ or --time-column NAME")
         if inside is not None:
             if column is not None or time_column is not None:
                 raise UsageError("a dataset has no columns; leave out --column, and give --sample-rate HZ")
