@@ -223,6 +223,10 @@ def test_errors_are_those_of_the_commands(tmp_path: Path) -> None:
     for given in ("sample_rate", "stiffness"):
         with pytest.raises(UsageError, match=f"{given} 1000: is not a number"):
             brakecli.classify(CASE, "force", **{given: "1000"})  # type: ignore[arg-type]
+    for given in ("sample_rate", "stiffness", "belt_speed"):
+        for huge in (10**400, -(10**5000)):
+            with pytest.raises(UsageError, match=f"^{given}: is too large for a number"):
+                brakecli.classify(CASE, "force", **{given: huge})  # type: ignore[arg-type]
     with pytest.raises(UsageError, match="output 5: is no path"):
         brakecli.run(CASE, SHORT, output=5)  # type: ignore[arg-type]
     (tmp_path / "own.toml").write_text(TINY)
