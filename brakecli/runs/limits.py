@@ -170,6 +170,10 @@ def _warnings(found: Check) -> Iterator[str]:
         remedy = f"take at least {math.ceil(system.nodes * _COARSE_NODES / per_wave)}, or leave nodes out"
         yield f"contact.nodes: {per_wave:.3g} nodes per shortest wavelength; {remedy}"
     yield from _of_the_scheme(system, found.limits, found.steps)
+    pad, around = 2.0 * system.half_length, 2.0 * math.pi * system.radius
+    if pad > around:
+        longer = f"the pad of {pad:.3g} m is longer than the wheel's circumference of {around:.3g} m"
+        yield f"contact.half_length: {longer}; check their units"
     if system.load["value"].min() < 0.0:
         yield "load: the force is negative at times, it lifts the shoe off the wheel"
 
