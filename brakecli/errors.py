@@ -78,6 +78,10 @@ class UnreadableResultError(BrakecliError, exit_code=4):
     """A result file cannot be read, or must not be trusted."""
 
 
+class OtherKindError(UnreadableResultError, exit_code=4):
+    """A result file is of another kind than the one that is needed."""
+
+
 class CannotWriteError(BrakecliError, exit_code=os.EX_IOERR):
     """An output cannot be written."""
 

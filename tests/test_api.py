@@ -223,6 +223,10 @@ def test_errors_are_those_of_the_commands(tmp_path: Path) -> None:
     for given in ("sample_rate", "stiffness"):
         with pytest.raises(UsageError, match=f"{given} 1000: is not a number"):
             brakecli.classify(CASE, "force", **{given: "1000"})  # type: ignore[arg-type]
+    for given in ("sample_rate", "stiffness", "belt_speed"):
+        for huge in (10**400, -(10**5000)):
+            with pytest.raises(UsageError, match=f"^{given}: is too large for a number"):
+                brakecli.classify(CASE, "force", **{given: huge})  # type: ignore[arg-type]
     with pytest.raises(UsageError, match="output 5: is no path"):
         brakecli.run(CASE, SHORT, output=5)  # type: ignore[arg-type]
     (tmp_path / "own.toml").write_text(TINY)
@@ -261,7 +265,7 @@ SAID = [
         lambda: brakecli.run(CASE, SHORT, output="kept"),
         "replace it with force=True, or choose another output with output$",
     ),
-    (lambda: brakecli.classify("kept", "velocity"), "give either sample_rate HZ or time_column$"),
+    (lambda: brakecli.classify("kept", "velocity"), "give sample_rate HZ or time_column NAME$"),
     (lambda: brakecli.classify("kept", belt_speed=3.0), "^belt_speed: is only .* state with quantity what was"),
     (lambda: brakecli.classify("kept.h5", thresholds={"few": 1}), "^thresholds few=1: there is no threshold few"),
     (lambda: brakecli.sweep(CASE), "simulate it with: brakecli.run$"),

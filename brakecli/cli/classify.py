@@ -11,7 +11,7 @@ from typing import Annotated, Any
 from brakecli.cli.measured import UNMEASURED, Measured, with_measured
 from brakecli.cli.options import AsJson, Quiet, option, source_argument
 from brakecli.cli.output import announce_compilation, progress, say, show_result, warn
-from brakecli.errors import UnreadableResultError, UsageError
+from brakecli.errors import OtherKindError, UnreadableResultError, UsageError
 
 SOURCES = (
     "Results of runs; with --quantity measured signals: text files, .wav, datasets of HDF5 files (FILE.h5:/path)."
@@ -94,6 +94,8 @@ class Options:
             tell: Callable[[str], None] = (lambda text: None) if self.quiet else say
             with progress(self.quiet) as show_progress:
                 return classify_twice(Path(source), limits, tell, show_progress)
+        except OtherKindError:
+            raise
         except UnreadableResultError as error:
             remedy = "for a measured signal, state with --quantity what was measured"
             raise UnreadableResultError(f"{error}; {remedy}") from error

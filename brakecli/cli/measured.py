@@ -45,6 +45,8 @@ class Measured:
                 raise UsageError(f"{where}: is only for a measured signal; {remedy}")
             if name in NUMBERS and not isinstance(value, Real | None):
                 raise UsageError(f"{where} {printable(str(value))}: is not a number; give one in SI units")
+            if name in NUMBERS and _overflows(value):
+                raise UsageError(f"{where}: is too large for a number; give one in SI units")
             if name == "stiffness" and value is not None and not 0.0 < value < math.inf:
                 raise UsageError(f"{where} {value}: is not a positive number; give one in SI units")
             if name == "belt_speed" and value is not None and not math.isfinite(value):
@@ -70,6 +72,15 @@ class Measured:
         machine = {key: reading.pop(key) for key in ("belt_speed", "stiffness")}
         signal = read_signal(source, Measurand(name), **reading)
         return look(signal, Measurand(name), **machine, thresholds=thresholds or SignalThresholds())
+
+
+def _overflows(value: Real | None) -> bool:
+    """Whether a number, as a whole number of Python's may, exceeds the largest that is computed with."""
+    try:
+        float(value or 0.0)
+    except OverflowError:
+        return True
+    return False
 
 
 UNMEASURED = Measured()

@@ -53,16 +53,16 @@ def warn(*warnings: str) -> None:
 
 
 def announce_compilation(quiet: bool) -> None:
-    """Report that kernels will be compiled, which takes seconds once for each version.
+    """Report that kernels will be compiled, which may take half a minute, once for each version.
 
     They are compiled as they are imported: a command calls this before it imports them.
     """
     if quiet:
         return
-    from brakecli.solver.compile import cache_is_cold
+    from brakecli.solver.compile import CACHE_IS_COLD
 
-    if cache_is_cold():
-        say("compiling kernels, once for this version …")
+    if CACHE_IS_COLD:
+        say("compiling the numerical kernels, once for this version; this may take half a minute")
 
 
 @contextmanager

@@ -24,7 +24,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.errors import UnreadableResultError, printable
+from brakecli.errors import OtherKindError, UnreadableResultError, printable
 from brakecli.files import valid
 
 FORMAT = "brakecli"
@@ -146,7 +146,9 @@ def open_result(path: Path, kind: str | None = None) -> Iterator[StoredResult]:
             if attributes.get("complete") != 1:
                 raise ValueError("it is incomplete, attribute complete is not 1")
             if kind is not None and attributes.get("kind") != kind:
-                raise ValueError(f"it holds a result of kind {printable(repr(its_kind))}, and {kind!r} is needed")
+                what = f"{path}: holds a result of kind {printable(repr(its_kind))}, and {kind!r} is needed"
+                remedy = f"name the result of a {kind}, or see what this one holds by brakecli report or plot"
+                raise OtherKindError(f"{what}; {remedy}")
             length = path.stat().st_size
             valid.check_variables(file, its_kind, length)
         yield StoredResult(path, file, attributes, length, sealed)
@@ -210,6 +212,8 @@ def _explained(path: Path) -> Iterator[None]:
     """Turn whatever h5py raises on a damaged file into UnreadableResultError."""
     try:
         yield
+    except OtherKindError:
+        raise
     except Exception as error:
         reason = getattr(error, "strerror", None) or str(error)
         what = f"{path}: cannot be read as a result: {' '.join(reason.split())}"

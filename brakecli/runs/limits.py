@@ -19,12 +19,11 @@ from brakecli.analysis.stability.discrete import (
 from brakecli.analysis.stability.modes import eigensystem
 from brakecli.analysis.stability.search import bisect
 from brakecli.errors import RefusedError
-from brakecli.runs.cost import duration_text, stability_seconds, steps_and_seconds
+from brakecli.runs.cost import beside_seconds, duration_text, held_bytes, stability_seconds, steps_and_seconds
 from brakecli.runs.pilot import Price, measured
 from brakecli.solver.contact.pad import NODES_PER_WAVE
 from brakecli.solver.history import ROW_BYTES
 from brakecli.solver.links import natural_frequencies
-from brakecli.solver.quantities import HISTORY
 from brakecli.solver.system import MOST_TABLE_BYTES, WHOLE, System
 
 MOST_STEPS = 1e11
@@ -56,8 +55,11 @@ class Check:
     warnings: tuple[str, ...] = ()
 
 
-def check(system: System, *, begin: bool = False) -> Check:
-    """Look at a case; where `begin`, or where it seems too long, run it for a moment to see what it costs."""
+def check(system: System, *, begin: bool = False, written: bool = True) -> Check:
+    """Look at a case; where `begin`, or where it seems too long, run it for a moment to see what it costs.
+
+    Unless `written`, the seconds are those of the loop alone.
+    """
     own, fastest = system.method.own_steps, system.natural_frequencies[1]
     waves = 2.0 * system.half_length * system.most_turns
     price = Price(*steps_and_seconds(system), at_least=False)
@@ -72,9 +74,9 @@ def check(system: System, *, begin: bool = False) -> Check:
         steps_per_period=math.inf if own or not fastest > 0.0 else 1.0 / (fastest * system.step),
         limits=step_limits(system),
         nodes_per_wave=system.nodes / waves if system.nodes and waves > 0.0 else None,
-        seconds=price.seconds,
+        seconds=price.seconds + (beside_seconds(system) if written else 0.0),
         at_least=price.at_least,
-        memory=2.0e8 + system.table_bytes,
+        memory=2.0e8 + system.table_bytes + held_bytes(system),
         file_size=float(system.samples) * ROW_BYTES + 1e5,
         adjustments=tuple(adjustments(system)),
     )
@@ -94,11 +96,10 @@ def refuse(found: Check, free_bytes: float = math.inf) -> None:
     if found.file_size > min(MOST_BYTES, free_bytes):
         raise RefusedError(f"the file would be too large, {free_bytes / 1e6:.3g} MB are free: {size}; {remedy}")
     system.refuse_tables()
-    compared = 2.0 * 8.0 * len(HISTORY) * system.samples
-    if system.method.step is None and compared > MOST_TABLE_BYTES:
-        what = f"two histories of {system.samples:.3g} samples are compared to keep the tolerance, which takes"
+    if (held := held_bytes(system)) > MOST_TABLE_BYTES:
+        what = f"histories of {system.samples:.3g} samples are held to keep the tolerance, which takes"
         instead = "increase output.sample_interval, or give solver.step instead"
-        raise RefusedError(f"{what} {compared / 1e9:.3g} GB of memory; {instead}")
+        raise RefusedError(f"{what} {held / 1e9:.3g} GB of memory; {instead}")
     if _blows_up(growth, found.steps):
         longest = _longest_stable_step(system)
         shorter = f"take a solver.step of at most {_down(longest)} s" if longest else "reduce solver.step"
@@ -170,6 +171,10 @@ def _warnings(found: Check) -> Iterator[str]:
         remedy = f"take at least {math.ceil(system.nodes * _COARSE_NODES / per_wave)}, or leave nodes out"
         yield f"contact.nodes: {per_wave:.3g} nodes per shortest wavelength; {remedy}"
     yield from _of_the_scheme(system, found.limits, found.steps)
+    pad, around = 2.0 * system.half_length, 2.0 * math.pi * system.radius
+    if pad > around:
+        longer = f"the pad of {pad:.3g} m is longer than the wheel's circumference of {around:.3g} m"
+        yield f"contact.half_length: {longer}; check their units"
     if system.load["value"].min() < 0.0:
         yield "load: the force is negative at times, it lifts the shoe off the wheel"
 

@@ -56,11 +56,8 @@ def _cache_directory() -> Path | None:
 
 
 CACHE = _cache_directory()
-
-
-def cache_is_cold() -> bool:
-    """Whether kernels have to be compiled first, which takes some seconds."""
-    return not config.DISABLE_JIT and (CACHE is None or not any(CACHE.iterdir()))
+CACHE_IS_COLD = not config.DISABLE_JIT and (CACHE is None or not any(CACHE.iterdir()))
+"""Whether kernels have to be compiled, which may take half a minute; asked before this file compiles its own."""
 
 
 class _ForKernels(CPUDispatcher):

@@ -65,7 +65,7 @@ def estimate(plan: Plan, workers: int) -> Estimate:
     for point in sorted({0, plan.points - 1}):
         with _noted(plan, point, failing), within_range():
             system = system_of(plan.case(plan.settings(point)))
-            checked = check(system)
+            checked = check(system, written=False)
             refuse(checked)
             in_lanes, seconds = seconds_together(system) if plan.followed is None else None, checked.seconds
             if in_lanes is not None:

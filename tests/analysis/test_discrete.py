@@ -96,6 +96,14 @@ def test_check_is_silent_about_a_case_that_is_resolved() -> None:
     assert check(system_of(make(ROUGH, contact__nodes=None, output__sample_interval=2e-5))).warnings == ()
 
 
+@pytest.mark.parametrize(("half_length", "warned"), [(1.57, False), (1.58, True), (50.0, True)])
+def test_a_pad_longer_than_the_circumference_is_told_of(half_length: float, warned: bool) -> None:
+    case = make(SQUEAL, contact__half_length=half_length, wheel__radius=0.5, solver__step=1e-7)
+    pad = f"contact.half_length: the pad of {2.0 * half_length:.3g} m"
+    said = f"{pad} is longer than the wheel's circumference of 3.14 m; check their units"
+    assert any(said == each for each in check(system_of(case)).warnings) == warned
+
+
 def test_check_changes_the_step_and_the_duration_as_the_samples_need() -> None:
     system = system_of(make(SQUEAL, solver__step=3e-5, solver__duration=0.10005))
     assert (system.per_sample, system.samples) == (4, 1001)

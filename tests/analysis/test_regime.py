@@ -205,6 +205,19 @@ def test_too_few_cycles_and_too_coarse_samples_are_undecided() -> None:
     assert slow.regime is coarse.regime is Regime.UNDECIDED
 
 
+@pytest.mark.parametrize(("step", "also"), [(0.0, ""), (0.1, ""), (0.6, "solver.step and ")])
+def test_more_samples_than_steps_are_not_asked_for(step: float, also: str) -> None:
+    coarse = classify(made(np.sin(2 * np.pi * 2500.0 * TIME + 0.3)), Context(1.0, step=step * INTERVAL))
+    assert coarse.reasons[0].endswith(f"; reduce {also}output.sample_interval")
+
+
+@pytest.mark.parametrize(("growth", "longer"), [(10.0, True), (1e80, False)])
+def test_a_rest_that_is_unstable_is_not_to_be_run_for_a_shorter_time(growth: float, longer: bool) -> None:
+    (reason,) = classify(made(1e-12 * np.sin(TIME)), Context(1.0, quiet=1e-9, growth=lambda: growth)).reasons
+    assert "start beside steady sliding" in reason
+    assert ("run at least" in reason) == longer
+
+
 def test_a_motion_without_a_cycle_is_undecided_whatever_the_thresholds() -> None:
     lenient = Thresholds(fewest_cycles=0.0, settled_within=1e9, reach_within=1e9, decayed_to=0.0)
     verdict = classify(made(np.sin(np.pi * TIME / TIME[-1])), Context(1.0), lenient)

@@ -101,9 +101,9 @@ def test_a_missing_column_is_reported_with_those_there_are(tmp_path: Path) -> No
 
 def test_wrong_options_differ_from_a_wrong_file(tmp_path: Path) -> None:
     path = written(tmp_path, "a,b,c\n0,1,2\n1,2,4\n")
-    with pytest.raises(UsageError, match="--sample-rate HZ or --time-column"):
+    with pytest.raises(UsageError, match="are not given; give --sample-rate HZ or --time-column"):
         read(path, "a")
-    with pytest.raises(UsageError, match="give either"):
+    with pytest.raises(UsageError, match="are given twice; give --sample-rate"):
         read(path, "b", "a", 1.0)
     with pytest.raises(UsageError, match="which column"):
         read(path, time="a")

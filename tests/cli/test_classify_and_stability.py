@@ -64,6 +64,18 @@ def test_thresholds_are_options_and_are_reported(here: Path) -> None:
     again.told(2, "fewest_cycles=few: is not a number of at least 0")
 
 
+def test_a_result_that_is_no_run_is_told_from_a_damaged_one(here: Path) -> None:
+    along = ["--vary", "friction.coefficient=0:1:3", "-o", "curves.h5"]
+    brakecli("stability", MODE_COUPLING, *along, "--quiet", cwd=here).told(0)
+    for command in ("classify", "run"):
+        done = brakecli(command, "curves.h5", cwd=here)
+        done.told(
+            4, "curves.h5: holds a result of kind 'stability', and 'run' is needed; name the result of a run"
+        )
+        assert "intact" not in done.err
+        assert "--quantity" not in done.err
+
+
 def test_a_measured_signal_is_classified(here: Path) -> None:
     options = ["--quantity", "force", "--time-column", "t", "--column", "force"]
     done = brakecli("classify", "saw.csv", *options, "--json", cwd=here)

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brakecli.errors import CannotWriteError, UsageError
+from brakecli.errors import CannotWriteError, UsageError, escaped
 from brakecli.files.field import Field
 from brakecli.files.write import new_result
 from tests.commands import ROOT
@@ -51,7 +51,7 @@ def test_an_output_that_cannot_be_written_is_refused_at_once(tmp_path: Path, nam
     path = tmp_path / name
     with pytest.raises(CannotWriteError, match=reason) as caught, new_result(path, force=True):
         raise AssertionError
-    assert str(caught.value).startswith(f"{path}: ")
+    assert str(caught.value).startswith(f"{escaped(str(path))}: ")
     assert "-o" in str(caught.value)
     assert set(tmp_path.iterdir()) == before
 

@@ -5,17 +5,20 @@ import os
 import random
 import resource
 import time
+import tracemalloc
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from brakecli.case.case import resolved_toml
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError, RefusedError
 from brakecli.runs.cost import stability_seconds
 from brakecli.runs.limits import check, sliding_text
 from brakecli.runs.pilot import measured
-from brakecli.runs.run import motion_of
+from brakecli.runs.run import load_kernels, motion_of, run
 from brakecli.solver.system import System
 from tests.campaign import campaign
 from tests.examples import ROUGH, SQUEAL, make
@@ -120,12 +123,12 @@ def outcome(seed: int) -> tuple[float, float, bool] | None:
     """Seconds said, seconds spent, whether "at least" was said; None where it cannot start, or not soon."""
     target = geometric(random.Random(-1 - seed), 0.03, 0.5)
     try:
-        said = check(case(seed, 1.0), begin=True)
+        said = check(case(seed, 1.0), begin=True, written=False)
     except CaseError:  # self-locking
         return None
     for _ in range(2):  # the end of a long run may be slower than its start
         system = case(seed, said.system.duration * target / max(said.seconds, 1e-3))
-        said = check(system, begin=True)
+        said = check(system, begin=True, written=False)
         if said.seconds < MOST_SECONDS:
             most = 1.0 + (1.0 if said.at_least else FACTOR) * said.seconds
             return said.seconds, spent(system, most), said.at_least
@@ -161,6 +164,33 @@ def test_a_case_that_ends_within_the_pilot_run_is_counted_and_not_guessed() -> N
         said = measured(system)
         assert said is not None
         assert (said.steps, said.at_least) == (motion_of(system)[0].work.steps, False)
+
+
+EXACT = {"solver__step": None, "solver__tolerance": 1e-6}
+MANY = 300_000
+
+
+@pytest.mark.parametrize("changes", [EXACT, {"solver__step": 1e-8}], ids=["tolerance", "step"])
+def test_many_samples_are_priced_with_their_file_and_their_verdict(
+    tmp_path: Path, changes: dict[str, Any]
+) -> None:
+    case = make(SQUEAL, solver__duration=1e-8 * MANY, output__sample_interval=1e-8, **changes)
+    loaded = parse_case(resolved_toml(case), "case")
+    said = check(load_kernels(loaded), begin=True)
+    begin = time.process_time()
+    run(loaded, tmp_path / "r.h5", force=False)
+    assert right(said.seconds, time.process_time() - begin, at_least=False)
+
+
+@pytest.mark.parametrize("scheme", ["piecewise-exact", "event-driven", "two-layer"])
+def test_the_memory_of_histories_that_are_compared_is_priced(scheme: str) -> None:
+    fine = {"solver__duration": 1e-7 * MANY, "output__sample_interval": 1e-7}
+    system = system_of(make(SQUEAL, **EXACT, **fine, solver__scheme=scheme))
+    tracemalloc.start()
+    motion_of(system)
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert 0.5 * most < check(system).memory - 2e8 < 2.0 * most
 
 
 def test_what_may_cost_more_is_said_to_cost_at_least_so_much() -> None:

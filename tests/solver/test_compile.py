@@ -20,7 +20,7 @@ signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 from brakecli.solver import friction
 from brakecli.solver import compile as kernels
 print(friction.minimise(1.0, 0.0, 1.0, 3.0, 0.0, 1.0, 0.0))
-print(kernels.cache_is_cold())
+print(kernels.CACHE_IS_COLD)
 """
 
 
@@ -51,6 +51,10 @@ def test_a_second_process_finds_the_machine_code_of_the_first(cache: Path) -> No
     assert stored
     python(COUNT.format(limit=""), cache)
     assert {path: path.stat().st_mtime_ns for path in cache.rglob("*.nbc")} == stored
+
+
+def test_a_cache_is_cold_for_the_process_that_fills_it_alone(tmp_path: Path) -> None:
+    assert [python(COUNT.format(limit=""), tmp_path).split()[-1] for _ in range(2)] == ["True", "False"]
 
 
 def test_kernels_compile_without_a_cache_where_the_disk_is_full(tmp_path: Path) -> None:

@@ -196,8 +196,9 @@ def test_one_mistake_brings_one_message(tmp_path: Path, text: str, words: str) -
     assert problems(tmp_path, head + text) == [f"sweep.toml:{words}"]
 
 
-def test_a_base_case_that_is_missing_or_wrong_is_named_by_its_own_file(tmp_path: Path) -> None:
-    assert "other.toml: cannot be read" in problems(tmp_path, GRID.replace("tiny", "other"))[0]
+def test_a_base_case_that_is_missing_is_named_at_its_key_and_a_wrong_one_by_its_own_file(tmp_path: Path) -> None:
+    assert "case: " in problems(tmp_path, GRID.replace("tiny", "other"))[0]
+    assert "other.toml cannot be read" in problems(tmp_path, GRID.replace("tiny", "other"))[0]
     (tmp_path / "wrong.toml").write_text(TINY.replace("mass = 10.0", "mass = -1"))
     assert "wrong.toml:2: shoe.mass: is out of range" in problems(tmp_path, GRID.replace("tiny", "wrong"))[0]
 

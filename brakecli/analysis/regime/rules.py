@@ -81,8 +81,8 @@ class Rules(LinearRules):
             return None
         if (growth := self.context.growth()) > 0.0:
             text = f"nothing moves yet, but sliding is unstable: a disturbance grows at {growth:.3g} 1/s"
-            advice = f"start beside steady sliding, or run at least {GROWN / growth:.2g} s"
-            return Decision(text, advice=advice)
+            longer = f", or run at least {GROWN / growth:.2g} s" if growth * self.duration < GROWN else ""
+            return Decision(text, advice=f"start beside steady sliding{longer}")
         return Decision("nothing moves beyond rounding: the shoe slides steadily or rests", Regime.DAMPED)
 
     def died_out(self) -> Decision | None:
@@ -153,7 +153,9 @@ class Rules(LinearRules):
         names = ("samples_per_cycle", "stick_cycles", "harmonic_share")
         period, stick, harmonic = (found.evidence[name] for name in names)
         if period < self.limits.samples_per_cycle:
-            return Decision(f"only {period:.1f} samples a cycle", advice="reduce output.sample_interval")
+            at_most = period * self.history.interval / known.step if known.step else math.inf
+            both = "solver.step and " if at_most < self.limits.samples_per_cycle else ""  # one sample a step
+            return Decision(f"only {period:.1f} samples a cycle", advice=f"reduce {both}output.sample_interval")
         if self._settled_seconds < 2.0 * (slow := self._slowest(found.amplitude)):
             return self._too_short(slow)
         if theory and (decision := self._unfounded(theory, found)):
