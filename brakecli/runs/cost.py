@@ -26,10 +26,7 @@ _START_EVALUATIONS = 6.0  # at each place of the wheel
 # Beside the loop, measured on runs of 4 to 15 million samples: 0.6 to 0.8 µs of processor time for the file, the
 # spectra and the verdict, most of it to compress the file; and the peak of memory where histories are held.
 _SAMPLE_SECONDS = 8e-7
-_HELD, _HELD_EXACT = (
-    4.0,
-    2.0,
-)  # histories in memory at once: two with what compares them, or one while it is joined
+_HELD, _HELD_EXACT = 4.0, 2.0  # histories: two with what compares them, or one while it is joined
 
 
 def steps_and_seconds(system: System) -> tuple[int, float]:
