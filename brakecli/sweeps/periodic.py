@@ -93,7 +93,8 @@ class Segments:
         """The derivative of each end by the state where its segment begins."""
         beside = [state + DISTURBANCE * np.eye(4) for state in states]
         moved = [[self.end(k, state) for state in each] for k, each in enumerate(beside)]  # they share tables
-        return (np.array(moved).transpose(0, 2, 1) - ends[:, :, None]) / DISTURBANCE
+        columns: Floats = (np.array(moved) - ends[:, None, :]) / DISTURBANCE
+        return np.ascontiguousarray(columns.transpose(0, 2, 1))
 
     def settled(self, state: Floats, time: float) -> Floats:
         """The states of the last period, after so many whole ones that a time (s) has passed."""
