@@ -361,8 +361,8 @@ def test_without_dashpots_the_bar_of_an_end_where_a_motion_ends_is_that_of_a_fol
     (lower, upper), (bar, wide) = answer.windows[0], answer.window_errors[0]
     assert abs(lower - 0.89866) <= bar < 0.01
     assert abs(upper - 0.93812) <= wide
-    # A 32nd, and half the bracket. Beside the end Newton's method finds no motion at some values, by rounding at others
-    # on another machine: then the bracket has the tolerance, 1e-3 of the range, on either side of its middle.
+    # A 32nd, and half the bracket. Beside the end Newton's method finds no motion at some values, which depend on
+    # rounding: the bracket then has the tolerance, 1e-3 of the range, on either side of its middle.
     assert 3.3 / 32.0 <= wide <= 3.3 / 32.0 + 1e-3 * 3.3
 
 
