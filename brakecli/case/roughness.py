@@ -32,6 +32,8 @@ class Spectrum(Table):
     def _broken_rules(self) -> Iterator[Problem]:
         if self.shortest >= self.longest:
             yield self.wrong("shortest", "is not below longest", "give a range of wavelengths")
+        if self.rms > 0.5 * tables.LARGEST:  # a sine has at most 2^(1/2) of it
+            yield self.wrong("rms", "is too large for the amplitudes of its sines", "check its unit, m")
 
     def sines(self) -> dict[str, Any]:
         """The lists of its sines, the longest wave first; the sum of their mean squares is that of the heights."""

@@ -238,6 +238,11 @@ def test_a_result_repeats_without_the_profile_and_tells_what_was_lost(tmp_path: 
     assert note.endswith(" % of the RMS of 1.44e-05 m")  # sqrt((20^2 + 4^2) / 2) um
 
 
+def test_heights_whose_sines_are_beyond_all_numbers_are_reported() -> None:
+    (line,) = messages(SPECTRA, "roughness.wheel.spectrum.rms=9e99")
+    assert "spectrum.rms: is too large for the amplitudes of its sines" in line
+
+
 WRONG = {
     "a;b\n1;2\n2;3\n": "has 2 rows; measure four places or more",
     "": "the file is empty",
