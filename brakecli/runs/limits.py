@@ -5,6 +5,7 @@ import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
+from decimal import ROUND_DOWN, Context
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +27,7 @@ from brakecli.solver.history import ROW_BYTES
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.system import MOST_TABLE_BYTES, WHOLE, System
 
+_TWO_DIGITS = Context(prec=2, rounding=ROUND_DOWN)
 MOST_STEPS = 1e11
 MOST_SECONDS = 24 * 3600.0
 MOST_BYTES = 1e11
@@ -134,8 +136,7 @@ def _longest_stable_step(system: System) -> float | None:
 
 def _down(number: float) -> str:
     """Two digits of a number, rounded down: what is advised is not more than what helps."""
-    digit: float = 10.0 ** (math.floor(math.log10(number)) - 1)
-    return f"{math.floor(number / digit) * digit:.2g}"
+    return f"{float(_TWO_DIGITS.create_decimal_from_float(number)):.2g}"
 
 
 def adjustments(system: System) -> list[str]:

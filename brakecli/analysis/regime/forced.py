@@ -26,6 +26,7 @@ _ERRORS = 2.0  # standard errors of a mean power
 _LARGER = 5.0  # times what the waves force in full contact: a larger motion needs more proof that it is forced
 _OFTEN = 0.1  # part of the time that shows that stick or flight holds a vibration within its limits
 _RING_DOWN = 0.5  # of the own vibration's decay, and of what dashpots take, that is kept up by nothing
+TO_TOUCH = "check load.force, and the angles of the links"
 _ON_LINES = "of the energy of vx lies on the lines of the roughness"
 _TRACE = 0.1  # part of the energy of vx on the lines themselves, without which nothing is their subharmonic
 
@@ -220,7 +221,7 @@ class ForcedRules:
         """Forced, as seen in a settled part of two periods of the slowest wave, and as `what` shows."""
         if self._open and not self.context.touches():
             text = "sliding steadily the shoe would not touch the wheel: it bounces, and may leave it for good"
-            return Decision(text, advice="check load.force, and the angles of the links")
+            return Decision(text, advice=TO_TOUCH)
         growth = self.context.growth()
         fading = 0.25 * self.duration * growth > -_RELAXED  # too slowly to be seen within a quarter of the run
         falls = 0.0

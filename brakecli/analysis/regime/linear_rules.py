@@ -17,11 +17,8 @@ if TYPE_CHECKING:  # a measured signal needs no compiled code
 
 _REST = 0.3  # of a forced motion, by which its closed form may be off
 _LONGER = 1.4  # a run whose last quarter and the window before it are settled, over what comes before
-_FEWEST_PIECES, _PIECES, _WIDER = (
-    4,
-    16,
-    1.02,
-)  # of the force: least and most; by how much more its transient swings
+_FEWEST_PIECES, _PIECES = 4, 16  # of a settled part, in which the friction force is compared
+_WIDER = 1.02  # times as far as in the last half of them, a transient swings
 _FAR = 0.3  # rad, of a wave, by which what the shoe adds moves it
 DASHPOT = "a dashpot would decide"
 

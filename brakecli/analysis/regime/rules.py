@@ -17,7 +17,7 @@ from brakecli.analysis.regime.cycles import (
     swings,
 )
 from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, Envelope
-from brakecli.analysis.regime.forced import GROWN, QUARTER
+from brakecli.analysis.regime.forced import GROWN, QUARTER, TO_TOUCH
 from brakecli.analysis.regime.linear_rules import DASHPOT, LinearRules
 from brakecli.analysis.regime.verdict import Decision, Excitation, Feeds, Regime
 from brakecli.solver.quantities import ContactState
@@ -52,7 +52,7 @@ class Rules(LinearRules):
         if self.settled_part.fraction(ContactState.SEPARATED) == 1.0:
             never = self.whole.fraction(ContactState.SEPARATED) == 1.0
             text = "never touched the wheel" if never else "lost contact for good"
-            return Decision(f"the shoe has {text}", advice="check load.force, and the angles of the links")
+            return Decision(f"the shoe has {text}", advice=TO_TOUCH)
         if self.last.fraction(ContactState.SEPARATED) == 1.0:
             return Decision("the shoe has left the wheel", advice="run longer, to see whether it comes back")
         if (self.last if standing else self.settled_part).fraction(ContactState.STICK) < 1.0:
@@ -152,9 +152,8 @@ class Rules(LinearRules):
             return Decision(text, advice=_LONG)
         names = ("samples_per_cycle", "stick_cycles", "harmonic_share")
         period, stick, harmonic = (found.evidence[name] for name in names)
-        if period < self.limits.samples_per_cycle:
-            at_most = period * self.history.interval / known.step if known.step else math.inf
-            both = "solver.step and " if at_most < self.limits.samples_per_cycle else ""  # one sample a step
+        if period < (few := self.limits.samples_per_cycle):
+            both = "solver.step and " if period * self.history.interval < few * known.step else ""
             return Decision(f"only {period:.1f} samples a cycle", advice=f"reduce {both}output.sample_interval")
         if self._settled_seconds < 2.0 * (slow := self._slowest(found.amplitude)):
             return self._too_short(slow)
