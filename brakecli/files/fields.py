@@ -172,7 +172,7 @@ CRITICAL = (
     Field("critical", "", "critical value: steady sliding loses its stability there", at="value"),
     Field("critical_lower", "", "lower end of the bracket of the critical value", at="lower"),
     Field("critical_upper", "", "upper end of the bracket of the critical value", at="upper"),
-    Field("critical_error", "", "error bar of the critical value, bias included", at="error", label="±"),
+    Field("critical_error", "", "error bar of the critical value", at="error", label="±"),
     Field("critical_bias", "", "critical value of the scheme at its step less the exact one", at="bias"),
     Field("critical_eigenvalue", "", "critical value by eigenvalues", at="eigenvalue"),
     Field("critical_windows_lower", "", "where each interval of instability begins", WINDOWS, at="columns.lower"),

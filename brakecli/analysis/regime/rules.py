@@ -129,8 +129,8 @@ class Rules(LinearRules):
         if self.context.growth() > 0.0 and 0.5 * abs(slope) * self.duration <= _NEAR:
             return None  # a vibration that has reached its limits, cannot die out, and comes near its amplitude
         text = f"still {'growing' if slope > 0.0 else 'decaying'} at {abs(slope):.3g} 1/s"
-        if slope < 0.0 and self.context.undamped:
-            text += ", though no dashpot damps the shoe"
+        if self.context.undamped and (slope < 0.0 or self.context.growth() <= 0.0):  # it wanders
+            text += f", {'and' if slope > 0.0 else 'though'} no dashpot damps the shoe"
             return Decision(text, advice="run four times as long, or add a dashpot")
         more = 3.0 / abs(slope)
         if slope < 0.0:  # until what is left is forced, has died out, or lasts
