@@ -128,6 +128,8 @@ class SweepPicture:
         yield sign(status == Outcome.UNSTABLE, f"unstable from {low} on", "v", style.BLUE, style.BLUE)
         yield sign(status == Outcome.NO_SLIDING, "no steady sliding", "s", style.DARK, "white")
         yield sign(always, f"vibration lasts from {low} on", "v", style.VERMILION, "white")
+        in_part = f"vibration lasts at {low}, fades at {high}"
+        yield sign(sustained == Outcome.IN_PART, in_part, "D", style.VERMILION, "white")
         yield sign(never, f"vibration fades up to {high}", "^", style.VERMILION, "white")
         several = np.isfinite(self["critical_windows_lower"]).sum(axis=-1) > 1
         yield sign(several, "several windows of instability", "+", style.DARK, style.DARK)

@@ -262,8 +262,10 @@ def _sustained(critical: Critical, fades: Answer, found: Search) -> tuple[float 
             stride *= GALLOP
     if fades(low) is None or fades(high) is None:
         return None, Outcome.UNDECIDED
-    if not fades(low) or fades(high):
-        return None, Outcome.DAMPED if fades(low) else Outcome.SUSTAINED
+    if not fades(low):
+        return None, Outcome.IN_PART if fades(high) else Outcome.SUSTAINED
+    if fades(high):
+        return None, Outcome.DAMPED
     # Right beside the value sought a vibration dies out, or settles, too slowly to be decided.
     fading, _ = bisect(lambda value: fades(value) is True, low, high, width=tolerance)
     _, lasting = bisect(lambda value: fades(value) is not False, fading, high, width=tolerance)

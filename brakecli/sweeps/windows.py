@@ -22,6 +22,7 @@ class Outcome(StrEnum):
     NONE = "not searched"
     DAMPED = "damped throughout"
     SUSTAINED = "sustained throughout"
+    IN_PART = "sustained in part"
     UNDECIDED = "undecided"
 
 

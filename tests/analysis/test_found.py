@@ -540,7 +540,11 @@ def test_where_an_amplitude_ends_is_not_said_of_a_run_that_does_not_show_it(name
         ("a beat opens the pad again", "which may open the pad again", None),
         ("without friction, ahead of the wheel", "full contact without friction makes .* linear", "one side"),
         ("falls without a dashpot", "though no dashpot damps the shoe; run four times as long", "at least"),
-        ("grows without a dashpot", "growing at .*, and no dashpot damps the shoe; run four times as long", "at least"),
+        (
+            "grows without a dashpot",
+            "growing at .*, and no dashpot damps the shoe; run four times as long",
+            "at least",
+        ),
     ],
 )
 def test_a_reason_says_no_more_than_is_known(name: str, says: str, not_this: str | None) -> None:

@@ -35,6 +35,18 @@ RESTING: dict[str, Any] = {  # lives from between 157.4 and 157.7 kN/m on
     "solver": {"duration": 3.0244, "tolerance": 1e-4},
     "output": {"sample_interval": 0.00025533},
 }
+ANGLED: dict[str, Any] = {  # the less the second link leans, the less it vibrates
+    "shoe": {"mass": 4.0499},
+    "wheel": {"radius": 0.4, "angular_speed": 0.041197},
+    "link1": {"stiffness": 2451000.0, "damping": 34.863, "angle_deg": -66.824},
+    "link2": {"stiffness": 1117370.0, "damping": 5.1527, "angle_deg": -19.103},
+    "load": {"force": 1109.6},
+    "friction": {"coefficient": 0.20764},
+    "contact": {"half_length": 0.013333, "stiffness": 91291000.0},
+    "initial": {"at": "rest"},
+    "solver": {"scheme": "two-layer", "theta": [0.5, 0.5], "step": 3.5087e-05, "duration": 0.60724},
+    "output": {"sample_interval": 0.00017543},
+}
 SHAKEN: dict[str, Any] = {  # full contact: fades at 1.4955 … 1.742, more slowly the nearer to the critical 1.7439
     "shoe": {"mass": 1.13},
     "wheel": {"radius": 0.33, "angular_speed": 87.94},
@@ -113,6 +125,13 @@ def test_slow_decay_on_a_smooth_pad_is_no_hysteresis(
     assert answer.sustained_outcome is Outcome.FOUND
     assert answer.sustained is not None
     assert lives[0] - tolerance < answer.sustained < lives[1] + tolerance
+
+
+def test_what_lasts_at_the_lower_bound_only_does_not_last_throughout() -> None:
+    """Beyond -13.95 degrees sliding is stable, and runs of another integrator die out at -12.56 and -11.10."""
+    answer = found(ANGLED, -27.1, -11.1, "link2__angle_deg", tolerance=0.05)
+    assert answer.outcome is Outcome.REGAINED
+    assert (answer.sustained, answer.sustained_outcome) == (None, Outcome.IN_PART)
 
 
 @campaign
