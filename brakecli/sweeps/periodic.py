@@ -133,11 +133,17 @@ class Orbit:
     def sure(self) -> bool:
         """Whether its growth is more than its error.
 
-        While the shoe slips volumes of states shrink as its dashpots say (Liouville); the multipliers may not.
+        While the shoe slips volumes of states shrink as its dashpots say (Liouville); the maps' may not. Those of
+        segments count: those of a period may be rounding. Steps of the trapezoidal rule make volumes
+        shrink more slowly, by 1 + (ωh/2)² at the most, or faster, with the third power of their decay in a step.
         """
-        c = self.segments.systems[0].coefficients
-        error = abs(float(self.exponents.real.sum()) / self.segments.time + (c.b_xx + c.b_yy) / c.m)
-        return abs(self.rate) > error or error * self.segments.time > STICKS
+        system, time = self.segments.systems[0], self.segments.time
+        c, h = system.coefficients, system.step
+        lost, fast = (c.b_xx + c.b_yy) / c.m, natural_frequencies(c, system.contact_stiffness)[1]
+        shrinks = -float(np.linalg.slogdet(self.maps)[1].sum()) / time
+        least, most = lost / (1.0 + (math.pi * fast * h) ** 2), lost * (1.0 + (lost * h) ** 2 / 12.0)
+        error = max(least - shrinks, shrinks - most, 0.0)
+        return abs(self.rate) > error or error * time > STICKS
 
     @property
     def folds(self) -> bool:

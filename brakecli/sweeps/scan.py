@@ -57,6 +57,9 @@ def scanned(
     hidden = {place for pair in pairwise(values) for place in _hidden(at, *pair)}
     for place in hidden:
         at.known.setdefault(place, Growth(at.orbits[place].rate, 0.0, 0.0, opened=True))
+    for end in (lower, upper):
+        if not _sure(at, end):
+            at.known[end] = None
     return [value for value in sorted({*values, *hidden}) if _sure(at, value)]
 
 

@@ -16,6 +16,8 @@ from scipy.integrate import solve_ivp
 
 from brakecli.case.system import system_of
 from brakecli.sweeps.critical import search
+from brakecli.sweeps.floquet import Disturbances
+from brakecli.sweeps.growth import sliding
 from brakecli.sweeps.tables import Critical
 from brakecli.sweeps.windows import Edge, Outcome, Search, of_edges
 from tests.campaign import campaign
@@ -252,6 +254,24 @@ FOLDS: dict[str, dict[str, Any]] = {
         "output": {"sample_interval": 0.0013},
         "solver": {"duration": 1.5, "scheme": "event-driven"},
     },
+    "strong dashpot": {  # its scheme takes 0.2 1/s less from a mode than dashpots do, as much as sliding loses
+        "shoe": {"mass": 23.132},
+        "wheel": {"radius": 0.39521, "angular_speed": -2.138},
+        "link1": {"stiffness": 15085000.0, "damping": 6247.9, "angle_deg": 4.3122},
+        "link2": {"stiffness": 50936000.0, "damping": 1053.3, "angle_deg": -51.048},
+        "load": {"force": 4024.0},
+        "friction": {"coefficient": 0.6174},
+        "contact": {"half_length": 0.03041, "stiffness": 1426500000.0},
+        "roughness": {
+            "shoe": {"amplitudes": [2.18e-06, 3.72e-06, 1.35e-06], "wavelengths": [0.01802, 0.0452, 0.00988]},
+            "wheel": {
+                "amplitudes": [3.5e-05, 1.57e-05],
+                "wavelengths": [0.171 / 11, 0.171 / 29],
+            },
+        },
+        "output": {"sample_interval": 7.8e-05},
+        "solver": {"step": 3.9e-05, "duration": 0.067},
+    },
     "stable again": {
         "shoe": {"mass": 1.973},
         "wheel": {"radius": 0.5, "angular_speed": -8.699},
@@ -301,6 +321,22 @@ def test_a_stable_motion_is_followed_until_it_ends(
     assert answer.windows[-1] == ((answer.value, ends[1]) if lost else (ends[0], answer.value))
 
 
+def test_a_growth_is_sure_where_the_scheme_damps_another_mode_less_than_its_dashpots() -> None:
+    """By another integrator the largest multipliers of the motion at 10 kN are 0.8856 ± 0.0001 in 0.20179 s."""
+    at = Disturbances(lambda value: sliding(system_of(make(FOLDS["strong dashpot"], load__force=value))))
+    at.periodic = True
+    measured = at.at(10000.0)
+    assert measured is not None
+    assert measured.rate == pytest.approx(math.log(0.8856) / at.orbits[10000.0].segments.time, abs=0.01)
+    assert at.orbits[10000.0].sure
+
+
+def test_no_answer_is_given_at_a_bound_whose_growth_is_not_certain(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("brakecli.sweeps.scan._sure", lambda at, value: not at.at(value) or value < 1.4)
+    answer = followed("never", "friction__coefficient", (1.3, 1.5))
+    assert answer.outcome is Outcome.UNDECIDED
+
+
 @pytest.mark.parametrize("ends", [(0.0, 2.5), (1.0, 1.6)])
 def test_a_motion_that_full_contact_would_have_does_not_count_where_it_would_open(
     ends: tuple[float, float],
@@ -316,17 +352,24 @@ def test_a_motion_that_full_contact_would_have_does_not_count_where_it_would_ope
 @campaign
 @pytest.mark.parametrize(
     ("name", "key", "range_", "truth", "most"),
-    [  # its weights take away 0.5 1/s, more than the growth; that is 0.018 1/s half a kilogram above 17.16 kg, and
-        # half the step takes 0.011 of it, so that twice this is more until 17.74 kg: the bar is 1.5 times the way
+    [  # its weights take away 0.5 1/s, more than the growth; at 17.157 kg that jumps by 0.003 1/s, as where
+        # a motion ends: the bar is a 32nd of the range, 1.034 kg, and half the bracket
         (
             "weights that damp",
             "shoe__mass",
             (6.304, 39.4),
             [8.82, 17.35, 28.02, 29.85, 39.4],
-            [0.6, 0.9, 0.6, 0.6, 0.6],
+            [0.6, 1.06, 0.6, 0.6, 0.6],
         ),
         ("beside", "friction__coefficient", (0.0, 1.1), [0.67342, 0.68719, 0.74487, 1.1], 0.005),
         ("stable again", "link2__stiffness", (8.21e5, 2.791e6), [1.7233e6, 1.8384e6, 1.90733e6], 7e4),
+        (  # the seventh end is a fold
+            "strong dashpot",
+            "load__force",
+            (2776.0, 11900.0),
+            [3392.982, 3429.524, 3553.108, 4458.478, 4687.264, 6454.39, 6473.367, 6935.641],
+            [50.0, 50.0, 50.0, 50.0, 50.0, 50.0, 300.0, 50.0],
+        ),
         (  # ends soon after it has doubled its period; the motion that the shoe falls onto is unstable once more
             "doubling",
             "link2__stiffness",
