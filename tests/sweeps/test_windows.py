@@ -332,8 +332,8 @@ def test_a_growth_is_sure_where_the_scheme_damps_another_mode_less_than_its_dash
 
 
 def test_no_answer_is_given_at_a_bound_whose_growth_is_not_certain(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("brakecli.sweeps.scan._sure", lambda at, value: not at.at(value) or value < 1.4)
-    answer = followed("never", "friction__coefficient", (1.3, 1.5))
+    monkeypatch.setattr("brakecli.sweeps.scan._sure", lambda at, value: not at.at(value) or value < 1.3)
+    answer = followed("never", "friction__coefficient", (1.0, 1.6))
     assert answer.outcome is Outcome.UNDECIDED
 
 
