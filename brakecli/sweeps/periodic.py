@@ -134,14 +134,16 @@ class Orbit:
         """Whether its growth is more than its error.
 
         While the shoe slips volumes of states shrink as its dashpots say (Liouville); the maps' may not. Those of
-        segments count: those of a period may be rounding. Steps of the trapezoidal rule make volumes
-        shrink more slowly, by 1 + (ωh/2)² at the most, or faster, with the third power of their decay in a step.
+        segments count, as the least multipliers of a period may be rounding. In steps h of the trapezoidal rule
+        volumes shrink by tr(B (m + h²S/4)⁻¹), to first order in the dashpots B; the norm of the stiffness S is at
+        most m ω² √(1 + φ²), with ω in full contact. The next order is the third power of their decay in a step.
         """
         system, time = self.segments.systems[0], self.segments.time
         c, h = system.coefficients, system.step
         lost, fast = (c.b_xx + c.b_yy) / c.m, natural_frequencies(c, system.contact_stiffness)[1]
         shrinks = -float(np.linalg.slogdet(self.maps)[1].sum()) / time
-        least, most = lost / (1.0 + (math.pi * fast * h) ** 2), lost * (1.0 + (lost * h) ** 2 / 12.0)
+        stepped = (math.pi * fast * h) ** 2 * math.hypot(1.0, c.phi)
+        least, most = lost / (1.0 + stepped), lost * (1.0 + stepped + (lost * h) ** 2 / 12.0)
         error = max(least - shrinks, shrinks - most, 0.0)
         return abs(self.rate) > error or error * time > STICKS
 
