@@ -133,7 +133,7 @@ def check_table(title: str, found: Check) -> str:
         ("natural frequencies", f"{low:.5g} and {high:.5g} Hz in full contact"),
         ("without contact", f"{link_low:.5g} and {link_high:.5g} Hz"),
         ("shortest wave passes at", text_of(system.passing_frequency, "Hz")),
-        ("step", (f"{found.step:.6g} s, " if has_step else "its own, about ") + f"{found.steps} steps"),
+        ("step", (f"{found.step:.6g} s, " if has_step else "its own, about ") + f"{found.steps:.15g} steps"),
         ("steps per period", [f"{found.steps_per_period:.4g} of the fastest motion"] * has_step),
         ("fixed-point contraction", [f"{limits.contraction:.3g} (1 or more: it may diverge)"] * has_step),
         ("solution of each step", [f"{'unique' if limits.unique else 'perhaps not unique'}"] * has_step),

@@ -4,7 +4,7 @@ The motion is stable while all its multipliers lie inside the unit circle; `peri
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -177,13 +177,20 @@ class Disturbances:
         return forced if close else None
 
     def _near(self, value: float) -> tuple[float, Orbit | None]:
-        """The nearest motion; where one side is stable and the other is not, the stable one: it may go on."""
-        below = max((other for other in self.orbits if other <= value), default=-math.inf)
-        above = min((other for other in self.orbits if other >= value), default=math.inf)
+        """The nearest motion; or the only one that is known on both sides of a value, and stable on one of them.
+
+        Where one side is stable and the other is not, the stable one counts: it may go on.
+        """
+        motions: dict[float, list[float]] = {}
+        for place, branch in self.branches.items():
+            motions.setdefault(branch, []).append(place)
+        ends = [each for own in motions.values() if math.isfinite(sum(each := _around(value, own)))]
+        stable = [each for each in ends if min(self.orbits[at].rate for at in each) < 0.0]
+        below, above = stable[0] if len(stable) == 1 else _around(value, self.orbits)
         near = below if value - below <= above - value else above
         if below in self.branches and above in self.branches:
-            ends = sorted((below, above), key=lambda other: self.orbits[other].rate)
-            near = ends[0] if self.orbits[ends[0]].rate < 0.0 < self.orbits[ends[1]].rate else near
+            one, other = sorted((below, above), key=lambda at: self.orbits[at].rate)
+            near = one if self.orbits[one].rate < 0.0 < self.orbits[other].rate else near
         return near, self.orbits.get(near)
 
     def _segments(self, value: float, found: Sliding, period: float) -> Segments:
@@ -260,6 +267,13 @@ class Disturbances:
         waited = segments.settled(start, min(RELAXED / slow, LONGEST) if slow > 0.0 else LONGEST)
         forced = orbit(segments, waited, None)
         return None if forced and near and forced.size > DEPARTED * near.size else forced
+
+
+def _around(value: float, places: Iterable[float]) -> tuple[float, float]:
+    """The nearest places below and above a value, or both the place at it; infinite where there is none."""
+    places = list(places)
+    below = max((each for each in places if each <= value), default=-math.inf)
+    return below, min((each for each in places if each >= value), default=math.inf)
 
 
 def _same(one: Orbit, other: Orbit) -> bool:

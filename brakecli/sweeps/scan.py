@@ -15,7 +15,7 @@ PARTS = 4  # of each interval between them, where surfaces open in a run
 REFINED = 4  # times that values are added beside one at which stability is nearly lost or regained
 BUMP = 20.0  # how much nearer to zero that rate may be than it changes there
 SAME, FINE = 1e-3, 1e-4  # of the range: nearer to a value no other one is put; least width of a window
-ROUNDS, MOST = 12, 200  # of narrowing down where multipliers may meet, and of values that this may take
+ROUNDS, MOST = 12, 400  # of narrowing down where multipliers may meet, and of values that this may take
 
 
 def scanned(

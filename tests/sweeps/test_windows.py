@@ -196,6 +196,23 @@ FOLDS: dict[str, dict[str, Any]] = {
         "roughness": {"wheel": {"amplitudes": [1.837e-05], "wavelengths": [0.041]}},
         "solver": {"duration": 0.23, "scheme": "three-layer", "step": 1.9e-05, "theta": [0.25, 0.5, 0.25]},
     },
+    "stable for a while": {
+        "shoe": {"mass": 17.462},
+        "wheel": {"radius": 0.39593, "angular_speed": 3.3306},
+        "link1": {"stiffness": 4889800.0, "damping": 166.02, "angle_deg": -10.744},
+        "link2": {"stiffness": 10687000.0, "damping": 196.64, "angle_deg": 19.845},
+        "load": {"force": 75.747},
+        "friction": {"coefficient": 0.39},
+        "contact": {"half_length": 0.029609, "stiffness": 119700000.0},
+        "roughness": {
+            "wheel": {
+                "amplitudes": [1.77e-06, 7.14e-06, 2.57e-06],
+                "wavelengths": [0.02255, 0.0056375, 0.005011111111111111],
+            },
+            "shoe": {"amplitudes": [4.79e-06, 4.2e-06], "wavelengths": [0.03357, 0.03749]},
+        },
+        "solver": {"duration": 0.065, "step": 2.7e-05},
+    },
     "weights that damp": {
         "shoe": {"mass": 15.76},
         "wheel": {"radius": 0.5, "angular_speed": -16.26},
@@ -363,6 +380,13 @@ def test_a_motion_that_full_contact_would_have_does_not_count_where_it_would_ope
         ),
         ("beside", "friction__coefficient", (0.0, 1.1), [0.67342, 0.68719, 0.74487, 1.1], 0.005),
         ("stable again", "link2__stiffness", (8.21e5, 2.791e6), [1.7233e6, 1.8384e6, 1.90733e6], 7e4),
+        (  # the last end is a fold; on both sides another motion is followed that is unstable
+            "stable for a while",
+            "friction__coefficient",
+            (0.0, 1.5),
+            [0.8768877, 0.9665873, 0.9702961, 1.5],
+            [0.003, 0.003, 0.05, 0.003],
+        ),
         (  # the seventh end is a fold
             "strong dashpot",
             "load__force",
