@@ -4,7 +4,7 @@ The motion is stable while all its multipliers lie inside the unit circle; `peri
 """
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection
 from dataclasses import replace
 
 import numpy as np
@@ -55,6 +55,14 @@ class Disturbances:
         """Whether disturbances grow or steady sliding has ended; None where no forced motion is known."""
         measured = self.at(value)
         return measured.unstable if measured else True if self.sliding_at(value) is None else None
+
+    @property
+    def motions(self) -> list[list[float]]:
+        """The values at which each motion was found, in order."""
+        found: dict[float, list[float]] = {}
+        for value, branch in sorted(self.branches.items()):
+            found.setdefault(branch, []).append(value)
+        return [*found.values()]
 
     def scan(self, values: list[float]) -> None:
         """Measure in order, and where no periodic motion was found, look again from the ones above."""
@@ -177,14 +185,12 @@ class Disturbances:
         return forced if close else None
 
     def _near(self, value: float) -> tuple[float, Orbit | None]:
-        """The nearest motion; or the only one that is known on both sides of a value, and stable on one of them.
+        """The motion to follow to a value: the nearest, unless a single one is known on both sides of the value
+        and stable on one side.
 
-        Where one side is stable and the other is not, the stable one counts: it may go on.
+        Of a stable place and an unstable one beside the value the stable one counts: the motion may go on.
         """
-        motions: dict[float, list[float]] = {}
-        for place, branch in self.branches.items():
-            motions.setdefault(branch, []).append(place)
-        ends = [each for own in motions.values() if math.isfinite(sum(each := _around(value, own)))]
+        ends = [each for own in self.motions if math.isfinite(sum(each := _around(value, own)))]
         stable = [each for each in ends if min(self.orbits[at].rate for at in each) < 0.0]
         below, above = stable[0] if len(stable) == 1 else _around(value, self.orbits)
         near = below if value - below <= above - value else above
@@ -269,9 +275,8 @@ class Disturbances:
         return None if forced and near and forced.size > DEPARTED * near.size else forced
 
 
-def _around(value: float, places: Iterable[float]) -> tuple[float, float]:
-    """The nearest places below and above a value, or both the place at it; infinite where there is none."""
-    places = list(places)
+def _around(value: float, places: Collection[float]) -> tuple[float, float]:
+    """The nearest places below and above a value, which is both if it is one; infinite where there is none."""
     below = max((each for each in places if each <= value), default=-math.inf)
     return below, min((each for each in places if each >= value), default=math.inf)
 

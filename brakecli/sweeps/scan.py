@@ -71,11 +71,8 @@ def _sure(at: Disturbances, value: float) -> bool:
 
 def _meetings(at: Disturbances, finest: float) -> list[float]:
     """Values at which multipliers of a motion may meet, the likeliest to hide a window first."""
-    by_motion: dict[float, list[float]] = {}
-    for value, branch in sorted(at.branches.items()):  # without dashpots all meetings open windows
-        by_motion.setdefault(branch, []).append(value)
     places: dict[float, float] = {}
-    for own in by_motion.values():
+    for own in at.motions:  # of shoes with dashpots; without, all meetings open windows
         slides = {value: found for value in own if (found := at.sliding_at(value))}
         if len(slides) > 1:
             places |= meetings([*slides.values()], [at.orbits[value] for value in slides], [*slides], finest)

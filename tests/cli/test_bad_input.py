@@ -91,6 +91,9 @@ def test_a_run_that_is_too_large_is_refused_with_its_size(here: Path) -> None:
         )
         assert done.out == ""
         assert told.count("\n") == 1
+    check = brakecli("check", "tiny.toml", "--set", "solver.duration=1e100", cwd=here)
+    check.told(3, "the run is too long")
+    assert "e+105 steps" in check.out  # no number of a hundred digits
     check = brakecli("check", "tiny.toml", "--set", "solver.duration=1e7", cwd=here)
     # 41.7 hours for the steps, at 0.15 µs, and 22.2 for 1e11 samples, at 0.8 µs
     check.told(3, "about 1e+12 steps", "2.66 days", "6.5e+06 MB")
