@@ -1,8 +1,9 @@
 """How far histories may be off, and how that is known: by what two runs of different fineness differ by."""
 
 import math
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -11,6 +12,9 @@ from brakecli.solver.motion import Motion
 from brakecli.solver.system import System
 
 ROUNDING = 1e-12  # least estimate: runs that share their rounding agree better than they are right
+ORDER = 8  # of the steps of event-driven runs
+DISPLACED = 64.0 * float(np.finfo(float).eps)
+"""How far a replica starts away, over its distances: the roundings of 64² steps add up to that at random."""
 
 
 @dataclass(frozen=True)
@@ -38,25 +42,88 @@ class Certified(NamedTuple):
     certificate: Certificate
 
 
-def compare(coarse: Motion, fine: Motion, tolerance: float) -> tuple[float, float]:
-    """Until when (s) two runs differ by no more than the tolerance, and by how much they differ at most.
+@dataclass(frozen=True)
+class Apart:
+    """What two runs of one case differ by at the samples that they share."""
 
-    What never exceeds the rounding of the motion does not count, as velocities of a shoe that stays where it is.
+    interval: float  # s
+    of: Floats  # |difference| of x, y, vx and vy (rows) at each sample
+    size: Floats  # their largest values
+    whole: bool = True  # False where one of the runs ended early
+
+    @cached_property
+    def error(self) -> float:
+        """The largest relative difference, but no less than rounding."""
+        return max(float((self.of.max(axis=1) / self.size).max()), ROUNDING) if self.whole else 1.0
+
+    def until(self, limit: float) -> float:
+        """Until when (s) they differ by no more than a limit."""
+        if not self.whole:
+            return 0.0
+        late = np.flatnonzero((self.of.T > limit * self.size).any(axis=1)) if self.error > limit else ()
+        return max((int(late[0]) if len(late) else self.of.shape[1]) - 1, 0) * self.interval
+
+
+def coarser(ratio: float) -> float:
+    """The error of the coarser of two event-driven runs, over what they differ by; `ratio` of their tolerances.
+
+    Local errors are as large as the tolerance, and steps are as long as its eighth root. The errors of a motion thus
+    fall as its power 7/8, and |e| <= |e - e'| + |e'|.
+    """
+    return 1.0 / (1.0 - ratio ** (1.0 - 1.0 / ORDER))
+
+
+def replica(system: System) -> System:
+    """The system with a start that is a few roundings away.
+
+    Runs of one start share its rounding, and in part that of their steps. They agree on it, however much the motion
+    makes of it: a shoe that is put on an unstable equilibrium stays there in all of them. What a run differs by
+    from its replica is rounding times the amplification of the motion.
+    """
+    c, initial, load = system.coefficients, system.initial, float(np.abs(system.load["value"]).max())
+    heights = sum(float(np.abs(each.g).sum()) for each in (system.shoe, system.wheel))
+    pressed = load / (c.c_yy + system.contact_stiffness) + heights
+    pulled = load * (abs(c.sin_beta) + c.phi) / c.c_xx if initial.from_equilibrium and c.c_xx > 0.0 else 0.0
+    x = initial.x + DISPLACED * max(abs(initial.x), pressed, pulled)
+    return replace(system, initial=replace(initial, x=x, y=initial.y + DISPLACED * max(abs(initial.y), pressed)))
+
+
+def compare(coarse: Motion, fine: Motion, until: float = math.inf) -> Apart:
+    """What two runs differ by up to a time (s), relative to the latter.
+
+    Components below rounding, such as the velocity of a resting shoe, are ignored.
     """
     system = max(coarse.system, fine.system, key=lambda each: each.interval)
     every = (round(system.interval / each.system.interval) for each in (coarse, fine))
     one, other = (
         np.ascontiguousarray(each.rows[::n, :4].T) for each, n in zip((coarse, fine), every, strict=True)
     )
-    count = other.shape[1]
-    if one.shape[1] < count:
-        return 0.0, 1.0
-    one = one[:, :count]  # x, y, vx, vy
-    size, apart = sizes(system, *(np.abs(each).max(axis=1) for each in (one, other))), np.abs(one - other)
-    error = float((apart.max(axis=1) / size).max())
-    late = np.flatnonzero((tolerance * size < apart.T).any(axis=1)) if error > tolerance else np.zeros(0)
-    until: float = (int(late[0]) - 1 if len(late) else count - 1) * system.interval
-    return max(until, 0.0), max(error, ROUNDING)
+    count = other.shape[1] if until == math.inf else min(other.shape[1], 1 + round(until / system.interval))
+    whole = one.shape[1] >= count
+    one, other = one[:, :count], other[:, : one.shape[1]][:, :count]  # x, y, vx, vy
+    size = sizes(system, *(np.abs(each).max(axis=1) for each in (one, other)))
+    return Apart(system.interval, np.abs(one - other), size, whole)
+
+
+@dataclass(frozen=True)
+class Rounding:
+    """What a motion makes of rounding, and what that leaves of a promise."""
+
+    error: float  # part of the estimate
+    until: float  # s, up to which a promise can be kept at all
+    left: float  # of the promise, for all other errors up to that time
+
+    @classmethod
+    def of(cls, beside: Motion, run: Motion, wanted: float) -> Self:
+        """By what a run and its replica differ by: twice that, as other roundings have other directions.
+
+        Where too little is left of the promise, it is to be kept as long as rounding takes no more than half.
+        """
+        apart = compare(beside, run)
+        error = 2.0 * apart.error
+        if error < 0.5 * wanted:
+            return cls(error, run.system.sampled_duration, wanted - error)
+        return cls(error, apart.until(0.25 * wanted), 0.5 * wanted)
 
 
 def sizes(system: System, one: Floats, other: Floats) -> Floats:

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from brakecli.runs.certificate import ROUNDING, Certificate, Certified, compare
+from brakecli.runs.certificate import ROUNDING, Certificate, Certified, Rounding, coarser, compare, replica
 from brakecli.solver.contact import EVALUATORS
 from brakecli.solver.contact.pad import default_nodes
 from brakecli.solver.motion import Motion
@@ -91,6 +91,7 @@ class _Tolerances(_Axis):
     """Of steps that are found: local tolerances, each a tenth of the one before."""
 
     growth: ClassVar[float] = 0.2
+    margin: ClassVar[float] = coarser(NODES_RATIO)
 
     @property
     def error(self) -> float:
@@ -98,7 +99,7 @@ class _Tolerances(_Axis):
 
         Two may agree by luck: no less is left than a twentieth of what the two before differed by.
         """
-        return max(self.last, self.before / 20.0) if self.before < math.inf else self.last
+        return self.margin * (max(self.last, self.before / 20.0) if self.before < math.inf else self.last)
 
 
 def ladder(
@@ -107,23 +108,30 @@ def ladder(
     """Runs with steps half as long, or a tenth of the local tolerance, or twice the nodes: what is needed more.
 
     It yields what is to be run, receives its motion, and returns the last one with its certificate. The errors of
-    steps and of nodes add up, and each is estimated apart. The first steps may pass over samples, the last ones
+    steps and of nodes add up, and each is estimated apart. A replica of the first run shows what the motion makes of
+    rounding, and up to when the promise can be kept. The first steps may pass over samples, the last ones
     may not, nor over what speed or load do between two knots, as no run would see it.
     """
     wanted, events = system.method.tolerance, system.method.own_steps
     (first, every), fineness = first_rung(system, kind), "tolerance" if events else "step"
     longest = min(_shortest_span(system) / STEPS_BETWEEN_KNOTS, system.interval) * (1.0 + 1e-9)
     nodes, steps, quadrature = first_nodes(system), _Tolerances() if events else kind(), _Nodes()
-    before, finer, seconds = None, steps, 0.0
+    before, finer, seconds, rounding = None, steps, 0.0, Rounding(0.0, system.sampled_duration, wanted)
     while True:
         at = first * (NODES_RATIO if events else 0.5) ** steps.doublings
         changes: dict[str, Any] = {"nodes": nodes << quadrature.doublings, fineness: at}
         interval = max(1, every >> steps.doublings) * system.interval
-        run = yield replace(system, interval=interval, method=replace(system.method, **changes))
+        rung = replace(system, interval=interval, method=replace(system.method, **changes))
+        # Steps that are found differ in a replica by as much as their tolerance: one run is its own replica there.
+        beside = (yield replica(rung)) if before is None and not events else None
+        run = yield replica(rung) if before is None and events else rung
         spent, failed = run.work.solve_seconds, run.work.failed
+        if beside:
+            seconds, failed = seconds + beside.work.solve_seconds, failed or beside.work.failed
+            rounding = rounding if failed else Rounding.of(beside, run, wanted)
         run.work.solve_seconds = seconds = seconds + spent
         if before is not None and not failed:
-            finer.before, finer.last = finer.last, compare(before, run, math.inf)[1]
+            finer.before, finer.last = finer.last, compare(before, run, rounding.until).error
         before = before if failed else run
         opens = set(run.work.evaluators) != {"closed-form"}
         used = quadrature if nodes and opens else _Axis(0, 0.0, 0.0)
@@ -131,23 +139,23 @@ def ladder(
         jump = _jump_error(run)
         error = math.inf if failed else margin * steps.error + used.error + jump
         short = events or run.system.step <= longest
-        if certified := short and error <= wanted:
+        if kept := short and error <= rounding.left:
             break
-        coarse = failed or not short or jump > 0.5 * wanted
+        coarse = failed or not short or jump > 0.5 * rounding.left
         # Found steps are nearly the same on other nodes: the first tolerance is enough to tell nodes apart.
         finer = steps if coarse or (margin * steps.error, not events) > (used.error, False) else quadrature
         late = run.system.interval == system.interval and seconds + 2.2 * spent > MOST_SECONDS
-        more = 2.0 * steps.more(0.5 * wanted / margin) * used.more(0.5 * wanted)
+        more = 2.0 * steps.more(0.5 * rounding.left / margin) * used.more(0.5 * rounding.left)
         if finer.doublings == MOST_DOUBLINGS or late or is_left(run, more):
             break
         finer.doublings += 1
-    until = system.sampled_duration if certified else 0.0
-    if not certified:
+    error += rounding.error
+    if not (certified := kept and error <= wanted):
         error = max(error, wanted * 1.0000001) if short and error < math.inf else 1.0
     with_nodes = f" and {run.system.nodes} nodes" if used is quadrature else ""
     finest = f"local tolerances of {at:.0e}" if events else f"steps of {run.system.step:.3g} s"
-    how = f"{system.method.scheme} runs down to {finest}{with_nodes}"
-    return Certified(run, Certificate(wanted, certified, error, until, how))
+    how = f"{system.method.scheme} runs down to {finest}{with_nodes}, and a replica of the first"
+    return Certified(run, Certificate(wanted, certified, error, rounding.until if kept else 0.0, how))
 
 
 def _shortest_span(system: System) -> float:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from brakecli.runs.cost import evaluation_seconds, start_seconds
 from brakecli.runs.ladder import first_nodes, first_rung
-from brakecli.runs.tolerance import EVENT_RATIO, NODES_FROM, first_event_tolerance
+from brakecli.runs.tolerance import NODES_FROM, SECOND_RUN, first_event_tolerance
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.motion import Stepping
 from brakecli.solver.system import System
@@ -15,9 +15,8 @@ SECONDS = 0.15
 """Processor time (s) after which a pilot run stops, at the end of its step. Other programs do not change it."""
 MOST_EVALUATION, MOST_AT_NODES = 0.02, 2e-3
 """Guessed time (s) of an evaluation of the contact, exact and by nodes, beyond which no step is tried."""
-SECOND_RUN = EVENT_RATIO**-0.125  # what the second of two event-driven runs costs over the first
-FINER, RUNGS = 4, 15.0  # steps of the last run of a ladder, and time of all of its runs, over the first one's
-FINER_FOUND, RUNGS_FOUND = 2, 8.0  # the same where steps are found
+FINER, RUNGS = 4, 16.0  # steps of the last run of a ladder, and time of all of its runs, over the first one's
+FINER_FOUND, RUNGS_FOUND = 2, 9.0  # the same where steps are found
 FEW = 20  # steps, the first of which are shorter than those that follow
 SLOWER = 2.0  # pace of the latter half of a pilot run over the mean pace, beyond which the rest may be slower yet
 

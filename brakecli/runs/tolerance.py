@@ -13,15 +13,27 @@ from typing import Any
 
 import numpy as np
 
-from brakecli.runs.certificate import ROUNDING, Certificate, Certified, compare, sizes
+from brakecli.runs.certificate import (
+    DISPLACED,
+    ORDER,
+    ROUNDING,
+    Certificate,
+    Certified,
+    Rounding,
+    coarser,
+    compare,
+    replica,
+    sizes,
+)
 from brakecli.runs.cost import evaluation_seconds
 from brakecli.runs.ladder import MOST_SECONDS, ladder
 from brakecli.solver.motion import Motion, Progress, solve
 from brakecli.solver.system import System
 
-FIRST_EVENT_TOLERANCE, LEAST_EVENT_TOLERANCE = 1e-6, 1e-13
-EVENT_RATIO = 1e-2  # from one tolerance of the event-driven scheme to the next: its errors fall by about as much
-EVENT_MARGIN = 1e-3  # largest first tolerance over the requested one: no event may be missed twice
+FIRST_EVENT_DIGITS, MOST_EVENT_DIGITS = 6, 13  # tolerances of the event-driven scheme are powers of ten
+EVENT_DIGITS = 2  # from one tolerance to the next
+EVENT_MARGIN = 3  # digits of the first tolerance beyond the requested one, at least: no event may be missed twice
+SECOND_RUN = 10.0 ** (EVENT_DIGITS / ORDER)  # what a run costs over the one before
 NODES_FROM = 1e-5  # tolerance from which on events with nodes may be cheaper than with the exact contact
 WORTH_A_PILOT = 1.0  # guessed time (s) of the next runs from which on they are weighed against event-driven ones
 PILOT = 32  # duration of the case over that of the event-driven pilot run, which counts the work of such runs
@@ -89,7 +101,7 @@ def slower_than_events(system: System, progress: Progress) -> Callable[[Motion, 
         samples = max(1, system.samples // PILOT)
         part, tolerance = replace(system, duration=samples * system.interval), first_event_tolerance(system)
         work = _run(part, lambda samples: progress(0), tolerance=tolerance).work
-        number = work.contact_evaluations * system.samples / samples * (1.0 + EVENT_RATIO**-0.125)
+        number = work.contact_evaluations * system.samples / samples * (1.0 + SECOND_RUN)
         return math.inf if work.failed else number
 
     def too_slow(run: Motion, more: float) -> bool:
@@ -103,17 +115,21 @@ def slower_than_events(system: System, progress: Progress) -> Callable[[Motion, 
     return too_slow
 
 
+def first_event_digits(system: System) -> int:
+    """The digits of the tolerance of the first event-driven run; a second one with more can follow."""
+    digits = EVENT_MARGIN - math.floor(math.log10(system.method.tolerance) + 1e-9)
+    return min(max(FIRST_EVENT_DIGITS, digits), MOST_EVENT_DIGITS - EVENT_DIGITS)
+
+
 def first_event_tolerance(system: System) -> float:
     """The tolerance of the first event-driven run."""
-    # Two tolerances at least, as runs to the same one agree in any case.
-    largest = min(FIRST_EVENT_TOLERANCE, EVENT_MARGIN * system.method.tolerance)
-    return max(largest, LEAST_EVENT_TOLERANCE / EVENT_RATIO)
+    return float(f"1e-{first_event_digits(system)}")
 
 
 def _by_phases(system: System, progress: Progress) -> Certified:
     """A piecewise-exact run, whose only error is rounding: each step adds some to what it carries along.
 
-    Where that may be too much, a second run with other steps shows what the motion makes of it. Where samples are
+    Where that may be too much, a replica with other steps shows what the motion makes of it. Where samples are
     close, a step of this run passes over several of them.
     """
     wanted, run, longest = system.method.tolerance, _run(system, progress), SHORTER * system.longest_step
@@ -125,28 +141,48 @@ def _by_phases(system: System, progress: Progress) -> Certified:
     every = max(n for n in range(1, 1 + max(1, int(longest / system.interval))) if system.samples % n == 0)
     share = min(1.0, run.system.step / system.longest_step) if every == 1 else 1.0
     sparse = replace(system, interval=every * system.interval, duration=system.sampled_duration)
-    other = _run(sparse, lambda samples: None, share=SHORTER * share)
+    other = _run(replica(sparse), lambda samples: None, share=SHORTER * share)
     run.work.solve_seconds += other.work.solve_seconds
-    until, difference = compare(run, other, wanted / ROUNDING_MARGIN)
-    error, failed = ROUNDING_MARGIN * difference, run.work.failed or other.work.failed
-    how = f"piecewise-exact runs with steps of {run.system.step:.3g} and {other.system.step:.3g} s"
-    return Certified(run, Certificate(wanted, error <= wanted and not failed, error, until, how))
+    apart = compare(run, other)
+    error, failed = ROUNDING_MARGIN * apart.error, run.work.failed or other.work.failed
+    certified = error <= wanted and not failed
+    until = system.sampled_duration if certified else apart.until(wanted / ROUNDING_MARGIN)
+    steps = f"{run.system.step:.3g} and {other.system.step:.3g} s (displaced by {DISPLACED:.0e})"
+    how = f"piecewise-exact runs with steps of {steps}"
+    return Certified(run, Certificate(wanted, certified, error, until, how))
 
 
 def _by_events(system: System, progress: Progress) -> Certified:
-    """Event-driven runs, each to a hundredth of the tolerance of the one before."""
-    wanted, tolerance = system.method.tolerance, first_event_tolerance(system)
-    run = _run(system, progress, tolerance=tolerance)
+    """Event-driven runs, each to a hundredth of the tolerance of the one before, as long as that helps.
+
+    The first one is a replica: what the second one differs by holds what the motion makes of rounding, too. Where
+    that is too much, a run of the first kind tells rounding apart, and up to where the promise can be kept at all.
+    """
+    wanted, first = system.method.tolerance, first_event_digits(system)
+    runs, names, rounding = list[Motion](), list[str](), Rounding(0.0, system.sampled_duration, wanted)
+
+    def run(digits: int, system: System = system, name: str = "") -> Motion:
+        runs.append(_run(system, progress, tolerance=float(f"1e-{digits}")))
+        names.append(f"1e-{digits:02}{name}")
+        return runs[-1]
+
+    coarse, fine = first, first + EVENT_DIGITS
+    before = run(first, replica(system), f" (displaced by {DISPLACED:.0e})")
     while True:
-        before, tolerance = run, max(EVENT_RATIO * tolerance, LEAST_EVENT_TOLERANCE)
-        run = _run(system, progress, tolerance=tolerance)
-        run.work.solve_seconds += before.work.solve_seconds
-        until, error = compare(before, run, wanted)
-        failed, late = run.work.failed, run.work.solve_seconds > MOST_SECONDS
-        if error <= wanted or failed or late or tolerance <= LEAST_EVENT_TOLERANCE:
+        now = run(fine)
+        factor = coarser(10.0 ** (coarse - fine))
+        until = compare(before, now, rounding.until).until(rounding.left / factor)
+        seconds, failed = sum(each.work.solve_seconds for each in runs), now.work.failed or before.work.failed
+        if until >= rounding.until or failed or seconds > MOST_SECONDS or fine == MOST_EVENT_DIGITS:
             break
-    how = f"event-driven runs to {tolerance / EVENT_RATIO:.0e} and {tolerance:.0e}"
-    return Certified(run, Certificate(wanted, error <= wanted and not failed, error, until, how))
+        if len(runs) == 2:
+            rounding = Rounding.of(before, run(first), wanted)
+        before, coarse, fine = now, fine, min(fine + EVENT_DIGITS, MOST_EVENT_DIGITS)
+    error = factor * compare(before, now).error + rounding.error
+    certified = error <= wanted and not failed
+    now.work.solve_seconds = seconds
+    how = f"event-driven runs to {', '.join(names[:-1])} and {names[-1]}"
+    return Certified(now, Certificate(wanted, certified, error, until, how))
 
 
 def _by_steps(
