@@ -85,8 +85,6 @@ class AdviceReport:
             return
         if report.equilibrium is None:
             yield f"at {own:g} {report.no_equilibrium}"
-        elif report.contact_stiffness == 0.0:
-            yield "the shoe does not touch the wheel: give a load that presses it on"
         elif own == 0.0:
             yield "without friction nothing squeals"
         elif not report.stable:

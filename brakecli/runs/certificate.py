@@ -60,15 +60,15 @@ class Apart:
         """Until when (s) they differ by no more than a limit."""
         if not self.whole:
             return 0.0
-        late = np.flatnonzero((self.of.T > limit * self.size).any(axis=1)) if self.error > limit else ()
+        late = np.flatnonzero((limit * self.size < self.of.T).any(axis=1)) if self.error > limit else ()
         return max((int(late[0]) if len(late) else self.of.shape[1]) - 1, 0) * self.interval
 
 
 def coarser(ratio: float) -> float:
     """The error of the coarser of two event-driven runs, over what they differ by; `ratio` of their tolerances.
 
-    Local errors are as large as the tolerance, and steps are as long as its eighth root. The errors of a motion thus
-    fall as its power 7/8, and |e| <= |e - e'| + |e'|.
+    Local errors are as large as the tolerance, and steps are as long as its eighth root. The errors of a motion
+    thus fall as its power 7/8, and |e| <= |e - e'| + |e'|.
     """
     return 1.0 / (1.0 - ratio ** (1.0 - 1.0 / ORDER))
 
@@ -76,9 +76,9 @@ def coarser(ratio: float) -> float:
 def replica(system: System) -> System:
     """The system with a start that is a few roundings away.
 
-    Runs of one start share its rounding, and in part that of their steps. They agree on it, however much the motion
-    makes of it: a shoe that is put on an unstable equilibrium stays there in all of them. What a run differs by
-    from its replica is rounding times the amplification of the motion.
+    Runs of one start share its rounding, and in part that of their steps. They agree on it, however much the
+    motion makes of it: a shoe that is put on an unstable equilibrium stays there in all of them. What a run
+    differs by from its replica is rounding times the amplification of the motion.
     """
     c, initial, load = system.coefficients, system.initial, float(np.abs(system.load["value"]).max())
     heights = sum(float(np.abs(each.g).sum()) for each in (system.shoe, system.wheel))

@@ -108,9 +108,9 @@ def ladder(
     """Runs with steps half as long, or a tenth of the local tolerance, or twice the nodes: what is needed more.
 
     It yields what is to be run, receives its motion, and returns the last one with its certificate. The errors of
-    steps and of nodes add up, and each is estimated apart. A replica of the first run shows what the motion makes of
-    rounding, and up to when the promise can be kept. The first steps may pass over samples, the last ones
-    may not, nor over what speed or load do between two knots, as no run would see it.
+    steps and of nodes add up, and each is estimated apart. A replica of the first run shows what the motion makes
+    of rounding, and up to when the promise can be kept. The first steps may pass over samples, the last ones may
+    not, nor over what speed or load do between two knots, as no run would see it.
     """
     wanted, events = system.method.tolerance, system.method.own_steps
     (first, every), fineness = first_rung(system, kind), "tolerance" if events else "step"

@@ -20,6 +20,12 @@ PLACES = 1024
 """Positions of the wheel that an average takes, over 50 of its longest waves."""
 _LONGEST = 50.0
 TABLE = 129
+PRESSED = 1e-6
+"""Least normal force of a pressed shoe, as a part of the load. Below it the force is a difference of numbers that
+are a million times as large, and a small change of any of them lifts the shoe off."""
+UNPRESSED = (
+    "there is no steady sliding: nothing presses the shoe on the wheel; change the load, or the angle of link 1"
+)
 
 _evaluate_at = at_address(EVALUATE)
 
@@ -29,13 +35,17 @@ Mean = Callable[[float], tuple[float, float, float]]
 
 @dataclass(frozen=True)
 class SteadySliding:
-    """Steady sliding: position (m), normal force (N), mean stiffness -∂F_y/∂y (N/m), part that touches."""
+    """Steady sliding: position (m), normal force (N), mean stiffness -∂F_y/∂y (N/m), part that touches.
+
+    Where the shoe is not `pressed` on the wheel, it rests there all the same, but nothing slides.
+    """
 
     x: float
     y: float
     normal_force: float
     stiffness: float
     contact_fraction: float
+    pressed: bool
 
 
 @kernel(void(float64, vector, vector, LAYER, vector))
@@ -164,7 +174,7 @@ def steady_sliding(
             raise _none("the friction force lifts more than the load presses (self-locking)")
     force, stiffness, fraction = mean(float(y))
     x = (grip * force - q_x) / c.c_xx - lean * y if c.c_xx > 0.0 else 0.0
-    return SteadySliding(float(x), float(y), force, stiffness, fraction)
+    return SteadySliding(float(x), float(y), force, stiffness, fraction, force > PRESSED * abs(load))
 
 
 def _none(reason: str) -> CaseError:

@@ -203,7 +203,7 @@ ZERO["link2__stiffness"] = 2e6 * math.sin(math.radians(40.0)) / math.sin(math.ra
         ({"friction__coefficient": 0.3}, ["stable up to 0.575, 92 % above the case's 0.3"]),
         ({"friction__coefficient": 0.0}, ["without friction nothing squeals; stable up to 0.575"]),
         ({"wheel__angular_speed": 0.0}, ["the wheel stands, so that nothing slides"]),
-        ({"load__force": -100.0}, ["the shoe does not touch the wheel"]),
+        ({"load__force": -100.0}, ["nothing presses the shoe on the wheel"]),
         ({"link2__angle_deg": 0.0}, ["stable: no friction makes it unstable"]),
         (
             {"link2__angle_deg": -5.0, "friction__coefficient": 80.0, "solver__duration": 0.05},

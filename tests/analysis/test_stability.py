@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from brakecli.analysis.stability.modes import crossings, eigensystem, growth, modes
-from brakecli.analysis.stability.report import stability, step_limit, undamped_critical
+from brakecli.analysis.stability.report import is_stable, stability, step_limit, undamped_critical
 from brakecli.case.system import system_of
 from brakecli.solver.links import coefficients, natural_frequencies
 from brakecli.solver.records import Coefficients
+from brakecli.solver.system import System
 from tests.campaign import counts
 from tests.examples import MODE_COUPLING, ROUGH, SQUEAL, make, simulate
 
@@ -154,13 +155,45 @@ def test_a_standing_wheel_has_no_critical_friction() -> None:
 
 def test_a_shoe_that_clears_the_wheel_says_so() -> None:
     lifted = stability(system_of(make(SQUEAL, load__force=-1.0)))
-    assert lifted.equilibrium is not None
-    assert lifted.equilibrium.contact_fraction == 0.0
-    assert lifted.critical is None
+    assert lifted.equilibrium is None
+    assert "nothing presses the shoe" in str(lifted.no_equilibrium)
+    assert (lifted.critical, lifted.stable, lifted.contact_stiffness) == (None, None, 0.0)
     free = stability(system_of(make(SQUEAL, load__force=-1.0, link1__stiffness=0.0, link2__angle_deg=0.0)))
     assert free.equilibrium is None
     assert "lifts the shoe" in str(free.no_equilibrium)
     assert free.stable is None
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"load__force": 0.0},
+        {"link1__angle_deg": 90.0, "link2__angle_deg": 0.0},  # cos 90° is 6e-17, and not 0
+        {"load__force": -100.0},
+    ],
+)
+def test_a_shoe_that_nothing_presses_is_not_called_stable(changes: dict[str, Any]) -> None:
+    system = system_of(make(SQUEAL, **changes))
+    found = stability(system)
+    assert found.stable is None
+    assert is_stable(system) is None
+    assert found.equilibrium is None
+    assert "nothing presses the shoe" in str(found.no_equilibrium)
+
+
+def test_a_shoe_is_pressed_from_a_millionth_of_its_load_on() -> None:
+    """Link 1 is turned to the friction plane but for an angle δ, to which F_y is proportional."""
+
+    def shoe(delta: float) -> System:
+        return system_of(make(SQUEAL, link1__angle_deg=90.0 - math.degrees(delta), link2__angle_deg=0.0))
+
+    system = shoe(1e-3)
+    c, k, load = system.coefficients, system.contact_stiffness, system.load_at_start
+    equations = [[c.c_xx, c.c_xy + c.phi * k], [c.c_xy, c.c_yy + k]]  # Eqs. (6) and (7) without motion
+    _, y = np.linalg.solve(equations, [-load * c.sin_beta, -load * c.cos_beta])
+    least = 1e-6 * load * 1e-3 / (-k * y)  # to the curvature of that, some parts in a thousand
+    assert stability(shoe(0.98 * least)).stable is None
+    assert stability(shoe(1.02 * least)).stable is not None
 
 
 @pytest.mark.parametrize(("theta", "critical"), [((1.0, 1.0), 0.8115), ((0.5, 0.5), 0.75)])

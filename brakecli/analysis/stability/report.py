@@ -15,7 +15,7 @@ from brakecli.analysis.stability.search import bisect
 from brakecli.errors import CaseError
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.records import Coefficients
-from brakecli.solver.steady_sliding import SteadySliding, steady_sliding, tabulated
+from brakecli.solver.steady_sliding import UNPRESSED, SteadySliding, steady_sliding, tabulated
 from brakecli.solver.system import System
 
 LARGEST_FRICTION = 10.0  # to which rough surfaces are searched, whose stiffness depends on friction
@@ -66,6 +66,8 @@ def stability(system: System) -> StabilityReport:
     except CaseError as error:
         reason = error.problems[0].what
     k = rest.stiffness if rest else system.contact_stiffness
+    if rest and not rest.pressed:
+        rest, reason, k = None, UNPRESSED, 0.0
     stiffness_at = mean_stiffness(system, k)
     found = changes(system, stiffness_at)
     critical = next((crossing for crossing in found if crossing.lost), None)
@@ -103,10 +105,11 @@ def is_stable(system: System) -> bool | None:
     """Whether steady sliding is stable at the system's own friction; None where there is none."""
     c, belt = system.coefficients, system.belt_speed
     try:
-        k = steady_sliding(system).stiffness
+        rest = steady_sliding(system)
     except CaseError:
         return None
-    return _all_decay(c, eigensystem(c, k, math.copysign(c.phi, belt) if belt else 0.0)[0])
+    grip = math.copysign(c.phi, belt) if belt else 0.0
+    return _all_decay(c, eigensystem(c, rest.stiffness, grip)[0]) if rest.pressed else None
 
 
 def _all_decay(c: Coefficients, eigenvalues: Complex) -> bool:
@@ -138,7 +141,8 @@ def mean_stiffness(system: System, smooth: float) -> StiffnessAt:
     @cache
     def at(phi: float) -> float:
         with suppress(CaseError):
-            return steady_sliding(system, phi=phi, mean=mean).stiffness
+            rest = steady_sliding(system, phi=phi, mean=mean)
+            return rest.stiffness if rest.pressed else math.nan
         return math.nan
 
     return at
