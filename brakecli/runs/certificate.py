@@ -54,14 +54,15 @@ class Apart:
     @cached_property
     def error(self) -> float:
         """The largest relative difference, but no less than rounding."""
-        return max(float((self.of.max(axis=1) / self.size).max()), ROUNDING) if self.whole else 1.0
+        return max(float(np.max(self.of.max(axis=1) / self.size)), ROUNDING) if self.whole else 1.0
 
     def until(self, limit: float) -> float:
         """Until when (s) they differ by no more than a limit."""
         if not self.whole:
             return 0.0
-        late = np.flatnonzero((limit * self.size < self.of.T).any(axis=1)) if self.error > limit else ()
-        return max((int(late[0]) if len(late) else self.of.shape[1]) - 1, 0) * self.interval
+        late = np.flatnonzero((limit * self.size < self.of.T).any(axis=1)) if self.error > limit else np.zeros(0)
+        last: int = (int(late[0]) if len(late) else len(self.of.T)) - 1
+        return float(max(last, 0) * self.interval)
 
 
 def coarser(ratio: float) -> float:

@@ -35,17 +35,17 @@ Mean = Callable[[float], tuple[float, float, float]]
 
 @dataclass(frozen=True)
 class SteadySliding:
-    """Steady sliding: position (m), normal force (N), mean stiffness -∂F_y/∂y (N/m), part that touches.
-
-    Where the shoe is not `pressed` on the wheel, it rests there all the same, but nothing slides.
-    """
+    """Steady sliding: position (m), normal force (N), mean stiffness -∂F_y/∂y (N/m), part that touches."""
 
     x: float
     y: float
     normal_force: float
     stiffness: float
     contact_fraction: float
-    pressed: bool
+
+    def is_pressed(self, load: float) -> bool:
+        """Whether a load (N) presses the shoe on the wheel. If not, it rests there, but nothing slides."""
+        return self.normal_force > PRESSED * abs(load)
 
 
 @kernel(void(float64, vector, vector, LAYER, vector))
@@ -174,7 +174,7 @@ def steady_sliding(
             raise _none("the friction force lifts more than the load presses (self-locking)")
     force, stiffness, fraction = mean(float(y))
     x = (grip * force - q_x) / c.c_xx - lean * y if c.c_xx > 0.0 else 0.0
-    return SteadySliding(float(x), float(y), force, stiffness, fraction, force > PRESSED * abs(load))
+    return SteadySliding(float(x), float(y), force, stiffness, fraction)
 
 
 def _none(reason: str) -> CaseError:

@@ -153,7 +153,7 @@ def sliding(system: System) -> Sliding | None:
     if system.belt_speed == 0.0 or system.coefficients.c_xx == 0.0:
         return None
     rest = steady_sliding(system)
-    return Sliding(**vars(rest), system=system) if rest.pressed else None
+    return Sliding(**vars(rest), system=system) if rest.is_pressed(system.load_at_start) else None
 
 
 def held(system: System) -> System:

@@ -101,7 +101,7 @@ def answer(case: Case, up_to: float = LARGEST_FRICTION) -> Answer | None:
         c, belt, k = system.coefficients, system.belt_speed, system.contact_stiffness
         with suppress(CaseError):
             rest = steady_sliding(system, mean=tabulated(system))
-            k = rest.stiffness if rest.pressed else 0.0
+            k = rest.stiffness if rest.is_pressed(system.load_at_start) else 0.0
         if belt != 0.0 and k > 0.0:
             found = changes(system, mean_stiffness(system, k), up_to)
             rate = growth(c, k, math.copysign(c.phi, belt)) if rest else None

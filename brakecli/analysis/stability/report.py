@@ -66,7 +66,7 @@ def stability(system: System) -> StabilityReport:
     except CaseError as error:
         reason = error.problems[0].what
     k = rest.stiffness if rest else system.contact_stiffness
-    if rest and not rest.pressed:
+    if rest and not rest.is_pressed(system.load_at_start):
         rest, reason, k = None, UNPRESSED, 0.0
     stiffness_at = mean_stiffness(system, k)
     found = changes(system, stiffness_at)
@@ -109,7 +109,9 @@ def is_stable(system: System) -> bool | None:
     except CaseError:
         return None
     grip = math.copysign(c.phi, belt) if belt else 0.0
-    return _all_decay(c, eigensystem(c, rest.stiffness, grip)[0]) if rest.pressed else None
+    return (
+        _all_decay(c, eigensystem(c, rest.stiffness, grip)[0]) if rest.is_pressed(system.load_at_start) else None
+    )
 
 
 def _all_decay(c: Coefficients, eigenvalues: Complex) -> bool:
@@ -142,7 +144,7 @@ def mean_stiffness(system: System, smooth: float) -> StiffnessAt:
     def at(phi: float) -> float:
         with suppress(CaseError):
             rest = steady_sliding(system, phi=phi, mean=mean)
-            return rest.stiffness if rest.pressed else math.nan
+            return rest.stiffness if rest.is_pressed(system.load_at_start) else math.nan
         return math.nan
 
     return at
