@@ -71,7 +71,7 @@ def coarser(ratio: float) -> float:
     Local errors are as large as the tolerance, and steps are as long as its eighth root. The errors of a motion
     thus fall as its power 7/8, and |e| <= |e - e'| + |e'|.
     """
-    return 1.0 / (1.0 - ratio ** (1.0 - 1.0 / ORDER))
+    return 1.0 / (1.0 - math.pow(ratio, 1.0 - 1.0 / ORDER))
 
 
 def replica(system: System) -> System:
