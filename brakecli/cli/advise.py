@@ -4,7 +4,7 @@ from typing import Annotated
 
 from brakecli.cli.inputs import load_case
 from brakecli.cli.options import AsJson, CaseArgument, Overrides, Quiet, option
-from brakecli.cli.output import announce_compilation, progress, say, show_result
+from brakecli.cli.output import progress, say, show_result
 
 KEYS = "Keys that may be advised, with * for any part; masses, stiffnesses, dampings, angles and load if left out."
 MARGIN = "Part of its friction by which the case is to stay stable above it."
@@ -20,7 +20,6 @@ def command(
 ) -> None:
     """What moves the critical friction, and what to change."""
     loaded = load_case(case, overrides)
-    announce_compilation(quiet)
     from brakecli.analysis.stability.advice import KEYS as USUAL
     from brakecli.cli.stability_tables import advice_table
     from brakecli.runs.advise import advise, advise_seconds

@@ -15,9 +15,10 @@ import typer
 from brakecli import __version__
 from brakecli.cli.inputs import as_argument
 from brakecli.cli.options import option
-from brakecli.cli.output import say, show
+from brakecli.cli.output import announce_compilation, say, show
 from brakecli.errors import BrakecliError, RefusedError
 from brakecli.files.os_signals import Interrupted
+from brakecli.solver import compiling
 
 COMMANDS = (
     *("run", "sweep", "classify", "compare-schemes", "stability", "advise", "check"),
@@ -76,6 +77,7 @@ VERSION = option("Print the version and exit.", None, "--version", callback=_pri
 
 @app.callback()
 def _common(version: Annotated[bool, VERSION] = False) -> None:
+    compiling.set_notice(announce_compilation)
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)
     if limit == resource.RLIM_INFINITY:
         return

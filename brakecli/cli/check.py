@@ -6,7 +6,7 @@ from typing import Annotated
 
 from brakecli.cli.inputs import is_sweep, load_case, load_sweep
 from brakecli.cli.options import AsJson, Overrides, Quiet, source_argument
-from brakecli.cli.output import announce_compilation, show_result, warn
+from brakecli.cli.output import show_result, warn
 
 OF_SYSTEM = ("belt_speed", "contact_stiffness", "natural_frequencies", "passing_frequency", "evaluator", "nodes")
 
@@ -20,7 +20,6 @@ def command(
     """Validate a case or a sweep; estimate its cost and limits."""
     if is_sweep(file):
         sweep = load_sweep(file, overrides)
-        announce_compilation(quiet)
         from brakecli.cli.tables import estimate_table
         from brakecli.runs.limits import free_bytes
         from brakecli.sweeps.cost import estimate, refuse_sweep
@@ -33,7 +32,6 @@ def command(
         refuse_sweep(cost, free_bytes(Path()))
         return
     loaded = load_case(file, overrides)
-    announce_compilation(quiet)
     from brakecli.case.system import system_of
     from brakecli.cli.tables import check_table
     from brakecli.runs.limits import check, free_bytes, refuse, within_range

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from brakecli.cli.measured import UNMEASURED, Measured, with_measured
 from brakecli.cli.options import AsJson, Quiet, option, source_argument
-from brakecli.cli.output import announce_compilation, progress, say, show_result, warn
+from brakecli.cli.output import progress, say, show_result, warn
 from brakecli.errors import OtherKindError, UnreadableResultError, UsageError
 
 SOURCES = (
@@ -69,7 +69,6 @@ class Options:
         quantity = self.measured.quantity_of(source)
         if self.second_run and quantity is not None:
             raise UsageError("--second-run: is for the result of a run, whose case can be run again; leave it out")
-        announce_compilation(self.quiet or quantity is not None)
         if quantity is None:
             numbers = self._of_result(source)
         else:

@@ -5,7 +5,7 @@ from typing import Annotated
 
 from brakecli.cli.inputs import load_case, result_path
 from brakecli.cli.options import AsJson, CaseArgument, Force, Overrides, Quiet, option, output_option
-from brakecli.cli.output import announce_compilation, progress, show_result
+from brakecli.cli.output import progress, show_result
 from brakecli.solver.schemes import SCHEMES
 
 STEPS = "Time steps in s; the largest is a whole multiple of each."
@@ -27,7 +27,6 @@ def command(
     """Compare all schemes by error and cost; recommend one."""
     loaded = load_case(case, overrides)
     target = result_path(output, case, ending="-schemes.h5")
-    announce_compilation(quiet)
     from brakecli.cli.tables import comparison_table
     from brakecli.comparison.compare import compare
     from brakecli.comparison.methods import parse_schemes, parse_steps

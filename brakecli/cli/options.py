@@ -4,6 +4,8 @@ from typing import Annotated, Any
 
 import typer
 
+from brakecli.solver import compiling
+
 
 def source_argument(metavar: str, content: str) -> Any:
     """The file that a command reads."""
@@ -24,5 +26,14 @@ CaseArgument = Annotated[str, source_argument("CASE.toml", 'Case file, or "-" fo
 SET = "KEY.PATH=VALUE", "--set"
 Overrides = Annotated[list[str] | None, option("Set a key of the case, the value in TOML; repeatable.", *SET)]
 AsJson = Annotated[bool, option("Print one JSON object on standard output, nothing else.", None, "--json")]
-Quiet = Annotated[bool, option("Print nothing but warnings and errors.", None, "--quiet", "-q")]
+
+
+def _compile_in_silence(quiet: bool) -> bool:
+    if quiet:
+        compiling.set_notice(None)
+    return quiet
+
+
+QUIET = option("Print nothing but warnings and errors.", None, "--quiet", "-q", callback=_compile_in_silence)
+Quiet = Annotated[bool, QUIET]
 Force = Annotated[bool, option("Replace an existing output.", None, "--force")]

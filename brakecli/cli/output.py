@@ -52,17 +52,9 @@ def warn(*warnings: str) -> None:
     say(*(f"warning: {warning}" for warning in warnings))
 
 
-def announce_compilation(quiet: bool) -> None:
-    """Report that kernels will be compiled, which may take half a minute, once for each version.
-
-    They are compiled as they are imported: a command calls this before it imports them.
-    """
-    if quiet:
-        return
-    from brakecli.solver.compile import CACHE_IS_COLD
-
-    if CACHE_IS_COLD:
-        say("compiling the numerical kernels, once for this version; this may take half a minute")
+def announce_compilation() -> None:
+    """Say that kernels are being compiled."""
+    say("compiling the numerical kernels, once for this version; this may take half a minute")
 
 
 @contextmanager

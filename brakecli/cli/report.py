@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Annotated
 
 from brakecli.cli.options import Force, Quiet, output_option, source_argument
-from brakecli.cli.output import announce_compilation, progress, show
+from brakecli.cli.output import progress, show
 
 RESULTS = "Results of runs, sweeps, comparisons or stability."
 
@@ -16,7 +16,6 @@ def command(
     quiet: Quiet = False,
 ) -> None:
     """Put results on one page, answer first (needs jinja2)."""
-    announce_compilation(quiet)
     from brakecli.reports.page import write_report
     from brakecli.runs.limits import within_range
 

@@ -5,7 +5,7 @@ from typing import Annotated
 
 from brakecli.cli.inputs import load_case, result_path
 from brakecli.cli.options import AsJson, Force, Overrides, Quiet, output_option, source_argument
-from brakecli.cli.output import announce_compilation, progress, say, show_result, warn
+from brakecli.cli.output import progress, say, show_result, warn
 from brakecli.errors import BrakecliError
 
 SOURCE = 'Case file, "-" for standard input, or a result file, whose case is run again.'
@@ -22,7 +22,6 @@ def command(
     """Simulate one case; write motion and regime to HDF5."""
     loaded = load_case(case, overrides)
     target = result_path(output, case)
-    announce_compilation(quiet)
     from brakecli.cli.tables import run_table
     from brakecli.runs.run import load_kernels, origin, run
 

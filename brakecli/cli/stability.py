@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from brakecli.cli.inputs import load_case, result_path
 from brakecli.cli.options import AsJson, CaseArgument, Force, Overrides, Quiet, option, output_option
-from brakecli.cli.output import announce_compilation, progress, say, show_result
+from brakecli.cli.output import progress, say, show_result
 from brakecli.errors import UsageError, printable
 
 if TYPE_CHECKING:
@@ -31,7 +31,6 @@ def command(
         raise UsageError(f"{output}: holds what --vary finds; give --vary, and a name that ends in .h5 or .csv")
     loaded = load_case(case, overrides)
     target = result_path(output, case) if output is not None else None
-    announce_compilation(quiet)
     from brakecli.analysis.stability.report import stability
     from brakecli.case.system import system_of
     from brakecli.cli.stability_tables import stability_table

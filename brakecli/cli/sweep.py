@@ -5,7 +5,7 @@ from typing import Annotated
 
 from brakecli.cli.inputs import load_sweep, result_path
 from brakecli.cli.options import SET, AsJson, Quiet, option, output_option, source_argument
-from brakecli.cli.output import announce_compilation, progress, say, show_result, warn
+from brakecli.cli.output import progress, say, show_result, warn
 from brakecli.errors import BrakecliError
 
 JOBS = "Worker processes  [default: one for each core]"
@@ -34,7 +34,6 @@ def command(
     """
     loaded = load_sweep(file, overrides)
     target = result_path(output, file, kind="sweep")
-    announce_compilation(quiet)
     from brakecli.cli.tables import sweep_table
     from brakecli.runs.run import load_kernels
     from brakecli.sweeps.cost import Estimate

@@ -20,9 +20,12 @@ from numba import boolean, float64, int64, njit, types
 from numba.core import caching as numba_caching
 from numba.core import cgutils
 from numba.core import config as numba_config
+from numba.core import event as numba_events
 from numba.core.registry import CPUDispatcher
 from numba.extending import intrinsic
 from numpy.typing import NDArray
+
+from brakecli.solver import compiling
 
 Floats = NDArray[np.float64]
 vector = float64[::1]
@@ -32,6 +35,7 @@ FAST = frozenset({"reassoc", "contract", "nsz"})
 
 config: Any = numba_config  # its settings come from the environment, so type checkers know none of them
 caching: Any = numba_caching  # has no types
+events: Any = numba_events  # has no types
 F = TypeVar("F", bound=Callable[..., Any])
 
 
@@ -56,8 +60,19 @@ def _cache_directory() -> Path | None:
 
 
 CACHE = _cache_directory()
-CACHE_IS_COLD = not config.DISABLE_JIT and (CACHE is None or not any(CACHE.iterdir()))
-"""Whether kernels have to be compiled, which may take half a minute; asked before this file compiles its own."""
+
+
+class _Compiling(events.Listener):  # type: ignore[misc]
+    """Hears of every kernel that Numba compiles; one that the cache holds is loaded instead."""
+
+    def on_start(self, event: Any) -> None:
+        compiling.begins()
+
+    def on_end(self, event: Any) -> None:
+        pass
+
+
+events.register("numba:compile", _Compiling())
 
 
 class _ForKernels(CPUDispatcher):

@@ -44,6 +44,18 @@ def test_without_a_place_for_compiled_code_everything_works_but_slower(here: Pat
     assert done.json["steps"] == 2000
 
 
+def test_a_command_says_that_it_compiles_when_it_does_and_only_then(good: Path, here: Path) -> None:
+    def told(*arguments: str | Path) -> str:
+        return brakecli(*arguments, cwd=here, XDG_CACHE_HOME=str(here / "cache")).told(0)
+
+    assert told("info", good / "tiny.h5") == ""
+    assert not (here / "cache").exists()  # nothing has been compiled
+    assert told("classify", good / "tiny.h5", "--quiet") == ""
+    assert any((here / "cache").rglob("*.nbc"))
+    assert told("check", "tiny.toml") == COMPILING  # the cache holds another kind of kernels
+    assert told("check", "tiny.toml") == ""
+
+
 def test_paths_may_hold_spaces_and_letters_of_any_script_or_none(good: Path, tmp_path: Path) -> None:
     folder = tmp_path / "Größe 轮 [x]"
     folder.mkdir()
