@@ -2,27 +2,34 @@
 
 import math
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
 from brakecli.solver.records import Coefficients
+
+Pair = tuple[Any, Any]
 
 
 def coefficients(
     *, mass: float, c_1: float, b_1: float, beta_deg: float, c_2: float, b_2: float, alpha_deg: float, phi: float
 ) -> Coefficients:
     """Coefficients for link 1 at `beta_deg` to the vertical and link 2 at `alpha_deg` to the friction plane."""
-    sin_beta, cos_beta = _sin_cos(beta_deg)
-    sin_alpha, cos_alpha = _sin_cos(alpha_deg)
+    beta, alpha = sin_cos(beta_deg), sin_cos(alpha_deg)
+    return Coefficients(mass, *tensor(b_1, b_2, beta, alpha), *tensor(c_1, c_2, beta, alpha), *beta, phi)
 
-    def tensor(one: float, two: float) -> tuple[float, float, float]:  # xx, xy, yy
-        return (
-            one * sin_beta**2 + two * cos_alpha**2,
-            one * sin_beta * cos_beta - two * sin_alpha * cos_alpha,
-            one * cos_beta**2 + two * sin_alpha**2,
-        )
 
-    return Coefficients(mass, *tensor(b_1, b_2), *tensor(c_1, c_2), sin_beta, cos_beta, phi)
+def tensor(one: Any, two: Any, beta: Pair, alpha: Pair) -> tuple[Any, Any, Any]:
+    """What two links with these stiffnesses, or dampings, make of them: xx, xy, yy; angles by sine and cosine.
+
+    It takes all that can be added and multiplied.
+    """
+    (sin_beta, cos_beta), (sin_alpha, cos_alpha) = beta, alpha
+    return (
+        one * sin_beta**2 + two * cos_alpha**2,
+        one * sin_beta * cos_beta - two * sin_alpha * cos_alpha,
+        one * cos_beta**2 + two * sin_alpha**2,
+    )
 
 
 @lru_cache(maxsize=256)  # the points of a block are asked for again and again
@@ -33,7 +40,7 @@ def natural_frequencies(c: Coefficients, contact_stiffness: float) -> tuple[floa
     return float(low), float(high)
 
 
-def _sin_cos(degrees: float) -> tuple[float, float]:
+def sin_cos(degrees: float) -> tuple[float, float]:
     """Sine and cosine, exact at 0 and ±90 degrees, where the links decouple x from y."""
     if abs(degrees) == 90.0:
         return math.copysign(1.0, degrees), 0.0

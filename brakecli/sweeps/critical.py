@@ -9,6 +9,7 @@ from typing import cast
 import numpy as np
 
 from brakecli.analysis.regime.verdict import Verdict
+from brakecli.analysis.stability.certain import EPSILON, Rounded, conditions, links_of
 from brakecli.analysis.stability.discrete import spectral_radius
 from brakecli.analysis.stability.modes import growth as eigenvalue_growth
 from brakecli.analysis.stability.modes import is_undamped
@@ -37,6 +38,8 @@ PATIENT = 128.0  # durations that it may take to die out on smooth surfaces; on 
 
 
 SlidingAt = Callable[[float], Sliding | None]
+Signs = list[Rounded] | None
+"""What is positive where sliding is stable; None where there is no steady sliding."""
 EdgeIn = Callable[[float, float], Edge]
 Answer = Callable[[float], bool | None]
 """The answer to a question at a value of the parameter; None where it is not known."""
@@ -46,6 +49,7 @@ def search(
     critical: Critical, case_at: Callable[[float], Case], verdict_of: Callable[[Case], Verdict | Known | None]
 ) -> Search:
     """Look for the critical value of the parameter that `case_at` sets; `verdict_of` runs a case."""
+    case_at = cache(case_at)
     exact_steps = all(has_exact_steps(case_at, end) for end in (critical.lower, critical.upper))
 
     @cache
@@ -56,10 +60,10 @@ def search(
             return None
 
     if critical.parameter == "friction.coefficient":
-        system = with_step(system_of(case_at(critical.lower)), unless=exact_steps)
-        exact = _friction_by_eigenvalues(critical, system)
+        case = case_at(critical.lower)
+        exact = _friction_by_eigenvalues(critical, case, with_step(system_of(case), unless=exact_steps))
     else:
-        exact = _by_eigenvalues(critical, sliding_at)
+        exact = _by_eigenvalues(critical, case_at, sliding_at)
     if critical.method == "eigenvalue":
         return exact
     found = _bracketed(critical, exact) if exact_steps else _by_simulation(critical, sliding_at, exact)
@@ -93,18 +97,29 @@ def search(
 
 def _bracketed(critical: Critical, exact: Search) -> Search:
     """The answer of the eigenvalues with a bracket as wide as one of runs."""
-    if exact.value is None:
+    if exact.value is None or exact.error is None:
         return exact
-    half = 0.4 * critical.tolerance
+    half = max(0.4 * critical.tolerance, exact.error)
     lower, upper = max(critical.lower, exact.value - half), min(critical.upper, exact.value + half)
-    return exact._replace(lower=lower, upper=upper, error=0.5 * (upper - lower))
+    return exact._replace(lower=lower, upper=upper, error=max(0.5 * (upper - lower), exact.error))
 
 
-def _by_eigenvalues(critical: Critical, sliding_at: SlidingAt) -> Search:
+def _by_eigenvalues(critical: Critical, case_at: Callable[[float], Case], sliding_at: SlidingAt) -> Search:
     """Where the eigenvalues of steady sliding pass zero, and by how much the scheme at its step moves that."""
 
-    def grows(value: float) -> bool:
-        return (found := sliding_at(value)) is None or _grows(found)
+    @cache
+    def signs_at(value: float) -> Signs:
+        try:
+            system, links = system_of(case_at(value)), links_of(case_at(value))
+        except CaseError:
+            return None
+        if not system.smooth:
+            return conditions(links, found.stiffness, found.grip) if (found := sliding_at(value)) else None
+        if system.belt_speed == 0.0 or system.coefficients.c_xx == 0.0:
+            return None
+        grip = math.copysign(system.coefficients.phi, system.belt_speed)
+        pressed = links.pressed * Rounded(system.load_at_start)
+        return [*conditions(links, system.contact_stiffness, grip), pressed]
 
     def grows_in_steps(value: float) -> bool:
         found = sliding_at(value)
@@ -120,31 +135,74 @@ def _by_eigenvalues(critical: Critical, sliding_at: SlidingAt) -> Search:
         low, high = bisect(lambda value: unstable(value) is not lost, low, high, width=width)
         return Edge(0.5 * (low + high), low, high, 0.5 * (high - low), lost)
 
-    def found(unstable: Callable[[float], bool], count: int, values: list[float]) -> Search:
+    def found(unstable: Callable[[float], bool], edge: EdgeIn, count: int, values: list[float]) -> Search:
         values = sorted({*np.linspace(critical.lower, critical.upper, count).tolist(), *values})
-        return _answer(critical, sliding_at, cache(unstable), values, partial(edge, unstable))
+        return _answer(critical, sliding_at, unstable, values, edge)
 
-    exact = found(grows, SCANNED_WHERE_OPEN if opens else SCANNED_BY_EIGENVALUES, [])
+    scanned = SCANNED_WHERE_OPEN if opens else SCANNED_BY_EIGENVALUES
+    exact = found(
+        lambda value: _grows(signs_at(value)), partial(_certain, critical, signs_at, width=width), scanned, []
+    )
     exact = exact._replace(eigenvalue=exact.value)
-    if first is not None and first.system.method.own_steps:
-        return exact._replace(bias=None if exact.value is None else 0.0)
-    own = found(grows_in_steps, SCANNED_WHERE_OPEN, between(critical.lower, critical.upper, exact.windows))
-    if exact.value is None or own.value is None or exact.outcome is not own.outcome:
+    if exact.value is None:
+        return exact
+    beside = sliding_at(exact.lower) or sliding_at(exact.upper)
+    if beside is None or beside.system.method.own_steps:
+        return exact._replace(bias=0.0)
+    in_steps = cache(grows_in_steps)
+    middles = between(critical.lower, critical.upper, exact.windows)
+    own = found(in_steps, partial(edge, in_steps), SCANNED_WHERE_OPEN, middles)
+    if own.value is None or exact.outcome is not own.outcome:
         return exact
     return exact._replace(bias=own.value - exact.value)
 
 
-def _grows(found: Sliding) -> bool:
-    """Whether disturbances of steady sliding grow, by its eigenvalues."""
-    c, k = found.system.coefficients, found.stiffness
-    return eigenvalue_growth(c, k, found.grip) > 1e-12 * math.sqrt((abs(c.c_xx) + abs(c.c_yy) + k) / c.m)
+def _grows(signs: Signs) -> bool:
+    """Whether disturbances surely grow, or there is no steady sliding."""
+    return signs is None or any(each.negative for each in signs)
 
 
-def _friction_by_eigenvalues(critical: Critical, system: System) -> Search:
+def _certain(
+    critical: Critical, signs_at: Callable[[float], Signs], low: float, high: float, *, width: float = 0.0
+) -> Edge:
+    """The change between two values, in a bracket at whose ends its side is sure, whatever rounding does."""
+    lost = _grows(signs_at(high))
+    low, high = bisect(lambda value: _grows(signs_at(value)) is not lost, low, high, width=width)
+    stable, bound = (low, critical.lower) if lost else (high, critical.upper)
+    passing = {k for k, each in enumerate(signs_at(high if lost else low) or ()) if each.negative}
+
+    def hidden(value: float) -> bool:
+        """Whether rounding may hide what passes zero; where steady sliding ends that may be anything.
+
+        It was not surely negative at the end of the bracket: there its true value is above -2 errors, and rounding
+        alone takes none nearby below -4.
+        """
+        signs = [each for k, each in enumerate(signs_at(value) or ()) if k in passing or not passing]
+        return any(-4.0 * each.error <= each.value <= each.error for each in signs)
+
+    stride = math.copysign(max(high - low, EPSILON * abs(stable)), bound - stable)
+    while hidden(stable) and stable != bound:
+        stable, stride = (max if lost else min)(stable + stride, bound), 2.0 * stride
+    low, high = (stable, high) if lost else (low, stable)
+    return Edge(0.5 * (low + high), low, high, 0.5 * (high - low), lost)
+
+
+def _friction_by_eigenvalues(critical: Critical, case: Case, system: System) -> Search:
     """The first loss of stability within the range of φ, otherwise the first regain."""
-    report = stability(system)
-    within = [each for each in report.crossings if critical.lower <= each.friction <= critical.upper]
-    edges = [Edge(each.friction, each.friction, each.friction, 0.0, each.lost) for each in within]
+    report, links = stability(system), links_of(case)
+
+    @cache
+    def signs_at(phi: float) -> Signs:
+        k = report.stiffness_at(phi)
+        return conditions(links, k, math.copysign(phi, report.belt_speed)) if math.isfinite(k) else None
+
+    within = [each.friction for each in report.crossings if critical.lower <= each.friction <= critical.upper]
+    edges = []
+    for phi, (low, high) in zip(within, pairwise(between(critical.lower, critical.upper, [within])), strict=True):
+        if _grows(signs_at(low)) is not _grows(signs_at(high)):  # otherwise rounding hides both ends of a window
+            edge = _certain(critical, signs_at, low, high)
+            low, high = min(edge.lower, phi), max(edge.upper, phi)
+            edges.append(edge._replace(value=phi, lower=low, upper=high, error=max(phi - low, high - phi)))
     held = system.coefficients.c_xx > 0.0  # otherwise there is steady sliding without friction only
     if not edges and (report.stable is None or report.belt_speed == 0.0 or not held):
         return Search(Outcome.NO_SLIDING)
@@ -189,7 +247,10 @@ def _answer(
 
 def _may_grow(found: Sliding | None) -> bool:
     """Whether disturbances may grow where no motion is known."""
-    return found is None or not is_undamped(found.system.coefficients) or _grows(found)
+    if found is None or not is_undamped(c := found.system.coefficients):
+        return True
+    size = math.sqrt((c.c_xx + c.c_yy + found.stiffness) / c.m)
+    return eigenvalue_growth(c, found.stiffness, found.grip) > 1e-12 * size
 
 
 def _by_simulation(critical: Critical, sliding_at: SlidingAt, exact: Search) -> Search:
@@ -201,8 +262,9 @@ def _by_simulation(critical: Critical, sliding_at: SlidingAt, exact: Search) -> 
     @cache
     def edge(low: float, high: float) -> Edge:
         found = _narrowed(at, low, high, critical, exact.bias)
-        same = exact.columns["lower" if found.lost else "upper"]
-        away = min((abs(each - found.value) for each in same), default=0.0)
+        end, columns = "lower" if found.lost else "upper", exact.columns
+        same = zip(columns[end], columns[f"{end}_error"], strict=True)
+        away = min((abs(each - found.value) + bar for each, bar in same), default=0.0)
         # Eigenvalues of linear motions are exact: what the bar does not hold is rounding near self-locking.
         return found._replace(error=max(found.error, 1.001 * away)) if by_runs else found
 

@@ -91,7 +91,7 @@ def _hidden(at: Disturbances, low: float, high: float) -> list[float]:
     return found
 
 
-def between(lower: float, upper: float, windows: Iterable[tuple[float, float]]) -> list[float]:
+def between(lower: float, upper: float, windows: Iterable[Iterable[float]]) -> list[float]:
     """The middle of each of the windows within a range, and of what lies between them."""
     ends = [lower, *(end for window in windows for end in window), upper]
     return [0.5 * (low + high) for low, high in pairwise(ends)]

@@ -1,0 +1,100 @@
+"""Whether disturbances of steady sliding decay, and where rounding leaves that open.
+
+Routh and Hurwitz's conditions are polynomials of a case's numbers, so that the rounding of each is known. That of
+eigenvalues has no useful bound where two of them meet, as those of lightly damped shoes nearly do.
+"""
+
+import math
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from brakecli.case.case import Case
+from brakecli.solver.links import sin_cos, tensor
+
+EPSILON = float(np.finfo(float).eps)  # twice what a rounding may be off by, so that bounds hold their own rounding
+
+
+class Rounded:
+    """A number and how far it may be from the one that exact arithmetic gives."""
+
+    __slots__ = ("error", "value")
+
+    def __init__(self, value: float, error: float = 0.0) -> None:
+        """Hold an exact number, or one with a bound of its error."""
+        self.value, self.error = value, error
+
+    def __add__(self, other: Self) -> "Rounded":
+        """Both errors add up."""
+        value = self.value + other.value
+        return Rounded(value, self.error + other.error + EPSILON * abs(value))
+
+    def __sub__(self, other: Self) -> "Rounded":
+        """Both errors add up."""
+        value = self.value - other.value
+        return Rounded(value, self.error + other.error + EPSILON * abs(value))
+
+    def __mul__(self, other: Self) -> "Rounded":
+        """Relative errors add up."""
+        value = self.value * other.value
+        spread = abs(self.value) * other.error + self.error * (abs(other.value) + other.error)
+        return Rounded(value, spread + EPSILON * abs(value))
+
+    def __pow__(self, power: int) -> "Rounded":
+        """Only the square."""
+        return self * self if power == 2 else NotImplemented
+
+    @property
+    def negative(self) -> bool:
+        """Whether it is surely below zero."""
+        return self.value < -self.error
+
+
+class Links(NamedTuple):
+    """What the conditions take of a case, rounded; b and c: xx, xy and yy, as in (6)-(7)."""
+
+    m: Rounded
+    b: tuple[Rounded, Rounded, Rounded]
+    c: tuple[Rounded, Rounded, Rounded]
+    pressed: Rounded  # the load that is left on a contact without friction, over Q/cxx
+
+
+def links_of(case: Case) -> Links:
+    """The links of a case; a force that points away from the wheel presses nothing."""
+    one, two = case.link1, case.link2
+    beta, alpha = _inclined(one.angle_deg), _inclined(two.angle_deg)
+    b = tensor(Rounded(one.damping), Rounded(two.damping), beta, alpha)
+    c = tensor(Rounded(one.stiffness), Rounded(two.stiffness), beta, alpha)
+    return Links(Rounded(case.shoe.mass), b, c, c[0] * beta[1] - c[1] * beta[0])
+
+
+def _inclined(degrees: float) -> tuple[Rounded, Rounded]:
+    """Sine and cosine of an angle, whose conversion to radians is rounded, too."""
+    (sine, cosine), angle = sin_cos(degrees), abs(math.radians(degrees))
+    if degrees in (0.0, 90.0, -90.0):
+        return Rounded(sine), Rounded(cosine)
+    off = EPSILON * angle
+    return (
+        Rounded(sine, EPSILON * abs(sine) + off * abs(cosine)),
+        Rounded(cosine, EPSILON * abs(cosine) + off * abs(sine)),
+    )
+
+
+def conditions(links: Links, contact_stiffness: float, grip: float) -> list[Rounded]:
+    """What is positive where all disturbances decay, U ≠ 0; the contact stiffness K in N/m, grip = sign(U) φ.
+
+    With S as in `modes`: its determinant; and Hurwitz' a1 a2 a3 - a1² a4 - a0 a3² over a4, in which a3 > 0, so
+    ordered that nothing cancels but the difference of the stiffnesses. Without dashpots nothing decays, and two
+    frequencies must not meet.
+    """
+    m, (b_xx, b_xy, b_yy), (c_xx, c_xy, c_yy), _ = links
+    k = Rounded(contact_stiffness, EPSILON * contact_stiffness)
+    s_xy, s_yy = c_xy + Rounded(grip) * k, c_yy + k
+    product, both, gap = s_xy * c_xy, s_xy + c_xy, c_xx - s_yy
+    trace = b_xx + b_yy
+    if trace.value == 0.0:
+        apart = gap**2 + Rounded(4.0) * product
+    else:
+        quick = (b_xx * b_yy - b_xy**2) * trace * (b_xx * s_yy + b_yy * c_xx - b_xy * both)
+        apart = m * ((b_xx * gap + b_xy * both) * (b_yy * gap - b_xy * both) + product * trace**2) + quick
+    return [c_xx * s_yy - product, apart]
