@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from brakecli.analysis.stability.advice import rounded
 from brakecli.cli.tables import Row, grid, text_of, two_columns
 from brakecli.files import fields
 
 if TYPE_CHECKING:
+    from brakecli.analysis.stability.advice import Change
     from brakecli.analysis.stability.modes import Crossing
     from brakecli.analysis.stability.report import StabilityReport
     from brakecli.runs.advise import AdviceReport
@@ -75,6 +77,13 @@ def _crossing(crossing: Crossing) -> str:
     return f"{crossing.friction:.7g}: stability {change} by {crossing.instability}{where}"
 
 
+def _until(change: Change) -> str:
+    """Where safe values end, rounded towards them; or where there are none."""
+    if change.to is None:
+        return f"none in {change.lowest:.4g} to {change.highest:.4g}"
+    return "-" if change.until is None else rounded(change.until, change.until < change.to)
+
+
 def advice_table(report: AdviceReport) -> str:
     """What moves the critical friction, what to change, and the answer in a sentence."""
     found, check, margin = report.stability, report.check, report.margin
@@ -91,7 +100,8 @@ def advice_table(report: AdviceReport) -> str:
         "from": [text_of(each.start) for each in report.advice],
         "to": [each.rounded for each in report.advice],
         "critical φ": [text_of(each.critical_friction, form=".4g") for each in report.advice],
-        "tried from": [f"{each.lowest:.4g} to {each.highest:.4g}" for each in report.advice],
+        "safe until": [_until(each) for each in report.advice],
+        "a run is": [each.check or "-" for each in report.advice],
     }
     rows: list[Row] = [
         ("critical friction", _crossing(found.critical) if found.critical else "none"),

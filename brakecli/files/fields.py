@@ -307,9 +307,11 @@ CHANGE = (
     Field("parameter", "", "key of the case", TEXT),
     Field("from", "of the key", "its value", at="start"),
     Field("to", "of the key", "the nearest value with the margin; null where there is none"),
+    Field("until", "of the key", "the end of the interval of safe values; null on rough pads"),
     ratio("critical_friction", "critical friction there; null where no friction makes it unstable"),
-    Field("lowest", "of the key", "least value that was tried"),
-    Field("highest", "of the key", "largest value that was tried"),
+    Field("check", "", "regime of a run with this advice followed; null where none was made", TEXT),
+    Field("lowest", "of the key", "least value that may be advised"),
+    Field("highest", "of the key", "largest value that may be advised"),
 )
 CHECK_RUN = (
     Field("parameter", "", "key that was changed", TEXT),
@@ -326,7 +328,13 @@ ADVICE = (
     ratio("wanted_margin", "the margin that is asked for"),
     Field("stable", "", "whether steady sliding is stable at φ", "?", "stability."),
     Field("sensitivities", "", "all numbers of the case, those that move it most first", OBJECT, rows=SENSITIVITY),
-    Field("advice", "", "all keys that may be advised, the smallest change first", OBJECT, rows=CHANGE),
+    Field(
+        "advice",
+        "",
+        "all keys that may be advised: those that a run confirms, the smallest change first",
+        OBJECT,
+        rows=CHANGE,
+    ),
     Field("check", "", "a run of the case with the first advice followed", OBJECT, rows=CHECK_RUN),
     Field("notes", "", "what the answer rests on", OBJECT),
     Field("conclusion", "", "the answer in a sentence", TEXT),

@@ -22,7 +22,12 @@ from brakecli.runs.run import motion_of, verdict_in_memory
 from brakecli.solver.motion import Counted
 from brakecli.solver.system import System
 
-CHECK_SECONDS, _CHECK_SAMPLES = 5.0, 1_000_000  # of the run that checks, which is cut short beyond
+CHECK_SECONDS, _CHECK_SAMPLES = 5.0, 1_000_000  # of a run that checks, which is cut short beyond
+_DECAYED, _DECAYED_SAMPLES = (
+    15.0,
+    100_000,
+)  # powers of e by which disturbances decay in such a run; samples for that
+_ALL_CHECKS_SECONDS = 10.0  # estimated time of all runs that check after which no more is begun
 
 
 @dataclass(frozen=True)
@@ -112,8 +117,12 @@ class AdviceReport:
         critical = best.critical_friction
         effect = f"gives {critical:.3g}" if critical is not None else "takes the instability away"
         yield f"{best.parameter} {best.start:.4g} → {best.rounded} {effect}"
-        if self.check and self.check.verdict.regime not in (Regime.DAMPED, Regime.UNDECIDED):
-            yield f"but from the case's own start it still vibrates: {self.check.verdict.regime}"
+        if best.check is None:
+            yield "no run has checked that"
+        elif best.check == Regime.UNDECIDED:
+            yield "but a run from the case's own start is undecided"
+        elif best.check != Regime.DAMPED:
+            yield f"but from the case's own start it still vibrates: {best.check}"
 
 
 def _far(margin: float | None, own: float) -> str:
@@ -139,7 +148,7 @@ def advise(
     A case that has the margin (a part of its friction) needs no advice; what takes more than `most` seconds is
     left out. Raises UsageError.
     """
-    case, advice, check = loaded.case, list[Change](), None
+    case, advice = loaded.case, list[Change]()
     keys, everything = of_case.advised_keys(case, patterns), of_case.numbers(case)
     system = system_of(case)
     report, found = stability(system), of_case.answer(case)
@@ -155,23 +164,51 @@ def advise(
             for done, path in enumerate(keys):
                 advice.append(of_case.advised(case, path, margin, partial(progress, "keys", done, len(keys))))
     sensitivities.sort(key=lambda each: -abs(each.elasticity or 0.0))
-    advice.sort(key=lambda each: each.size)
-    if advice and advice[0].to is not None:
-        check = _checked(case, advice[0], progress)
+    advice, check = _ranked(case, advice, progress)
     return AdviceReport(case.title, system, report, critical, margin, sensitivities, advice, check, left_out)
 
 
-def _checked(case: Case, best: Change, progress: Counted) -> CheckRun | None:
-    """Run the case with an advised value, from its own start and for its own time if that is short."""
-    there = of_case.changed(case, key_path(best.parameter), best.to or 0.0)
+def _ranked(case: Case, advice: list[Change], progress: Counted) -> tuple[list[Change], CheckRun | None]:
+    """Advice that a run confirms first, what still vibrates last, small changes first; and the run of the first.
+
+    Runs are made for small changes first.
+    """
+    checks, spent = dict[str, CheckRun](), 0.0
+    for each in sorted(advice, key=lambda each: each.size):
+        if each.to is None or spent > _ALL_CHECKS_SECONDS or (part := _to_check(case, each)) is None:
+            continue
+        system, seconds = part
+        checks[each.parameter], spent = _checked(system, each, progress), spent + seconds
+    regimes = {key: str(check.verdict.regime) for key, check in checks.items()}
+    places: dict[str | None, int] = {Regime.DAMPED: 0, Regime.UNDECIDED: 1, None: 1}
+
+    def rank(change: Change) -> tuple[bool, int, float]:
+        return change.to is None, places.get(change.check, 2), change.size
+
+    found = sorted((replace(each, check=regimes.get(each.parameter)) for each in advice), key=rank)
+    return found, checks.get(found[0].parameter) if found else None
+
+
+def _to_check(case: Case, change: Change) -> tuple[System, float] | None:
+    """The case with an advised value, until disturbances have decayed, and the time (s) that its run costs.
+
+    It is cut short where that takes long. None where the value, with the digits that are shown, is not valid.
+    """
+    there = of_case.changed(case, key_path(change.parameter), float(change.rounded))
     if there is None:
         return None
-    system = system_of(there)
+    system, found = system_of(there), of_case.answer(there, 0.0)
     _, seconds = steps_and_seconds(system)
-    part = min(1.0, CHECK_SECONDS / max(seconds, 1e-9), _CHECK_SAMPLES / system.samples)
-    system = replace(system, duration=part * system.duration)
+    decays = -found.growth if found and found.growth and system.steady else 0.0
+    long = min(_DECAYED / (decays * system.duration), _DECAYED_SAMPLES / system.samples) if decays > 0.0 else 1.0
+    part = min(max(long, 1.0), CHECK_SECONDS / max(seconds, 1e-9), _CHECK_SAMPLES / system.samples)
+    return replace(system, duration=part * system.duration), part * seconds
+
+
+def _checked(system: System, change: Change, progress: Counted) -> CheckRun:
+    """Run a system with an advised value."""
     start = time.perf_counter()
     motion, _ = motion_of(system, lambda done: progress("steps of the check", done, system.steps))
     verdict = verdict_in_memory(motion, system)
     spent = time.perf_counter() - start
-    return CheckRun(best.parameter, best.to or 0.0, verdict, system.sampled_duration, spent)
+    return CheckRun(change.parameter, float(change.rounded), verdict, system.sampled_duration, spent)

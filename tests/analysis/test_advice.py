@@ -293,3 +293,76 @@ def test_an_angle_that_helps_at_0_alone_is_advised_so_exactly() -> None:
     case = make(SQUEAL, link1__damping=0.0, link2__angle_deg=0.7)
     found = advised(case, ("link2", "angle_deg"), 0.2, tell)
     assert (found.to, found.rounded, found.critical_friction) == (0.0, "0", None)
+
+
+@pytest.mark.parametrize("shoes", counts(3, 20))
+def test_no_safe_value_lies_nearer_than_the_advised_one(shoes: int) -> None:
+    """400 values of each key, by growth rates at φ = 0 and at the margin of matrices that are built here."""
+    helped = 0
+    for case, tables in islice(unstable_shoes(6), shoes):
+        target = 1.2 * tables["friction"]["coefficient"]
+        for path in advised_keys(case, ("shoe.mass", "link*.angle_deg", "link*.stiffness", "link*.damping")):
+            found = advised(case, path, 0.2, tell)
+            angle, start = path[1] == "angle_deg", found.start
+            grid = np.linspace(-89.0, 89.0, 357) if angle else start * np.logspace(-0.999, 0.999, 400)
+            for value in grid.tolist():
+                there = {**tables, path[0]: {**tables[path[0]], path[1]: value}}
+                shoe = Shoe.of(there)
+                rounding = 1e-7 * 2.0 * math.pi * shoe.fast
+                rates = [replace(shoe, phi=phi).rate for phi in (0.0, target)]
+                determinant = np.linalg.det(replace(shoe, phi=target).stiffness)
+                if max(rates) < -rounding and determinant > 0.0 and presses(there):
+                    assert found.to is not None, (path, value)
+                    assert found.size <= (
+                        math.radians(abs(value - start)) if angle else abs(math.log(value / start))
+                    )
+                if found.to is not None and found.until is not None and min(rates) > -math.inf:
+                    inside = min(found.to, found.until) < value < max(found.to, found.until)
+                    assert not inside or max(rates) < rounding, (path, value, found)
+            helped += found.to is not None
+    assert helped > 2 * shoes
+
+
+def presses(tables: Tables) -> bool:
+    """Whether the load presses the shoe on: F_y det(S)/(Q K) is c2 cos(α) cos(α - β)."""
+    alpha, beta = (math.radians(tables[link].get("angle_deg", 0.0)) for link in ("link2", "link1"))
+    return math.cos(alpha) * math.cos(alpha - beta) > 1e-3
+
+
+def with_a_narrow_interval() -> list[Case]:
+    """Shoes whose damping of link 1 is 0; from 5e-5 to 5e-4 of critical damping it helps, more does not."""
+    return [
+        make(
+            SQUEAL,
+            shoe__mass=mass,
+            link1__stiffness=c_1,
+            link2__stiffness=c_2,
+            contact__stiffness=k / 0.1,
+            link1__damping=0.0,
+            link2__damping=b_2,
+            link1__angle_deg=beta,
+            link2__angle_deg=alpha,
+            friction__coefficient=phi,
+        )
+        for mass, c_1, c_2, k, b_2, beta, alpha, phi in (
+            (0.5795, 1.0689e6, 1.3112e6, 1.4625e5, 0.11542, 2.8966, 6.0083, 0.54396),
+            (30.586, 2.1066e6, 1.835e6, 3.9682e6, 0.84585, 33.027, 31.66, 1.1749),
+            (24.644, 1.0908e6, 1.649e6, 3.3557e6, 3.2486, 25.4, 20.877, 1.043),
+        )
+    ]
+
+
+def test_a_safe_decade_of_a_damping_that_is_zero_is_found_between_its_roots() -> None:
+    """A thousandth of critical damping and less; both ends by eigenvalues on a fine grid."""
+    for case in with_a_narrow_interval():
+        found = advised(case, ("link1", "damping"), 0.2, tell)
+        assert found.to is not None
+        assert found.until is not None
+        assert found.until < 20.0 * found.to
+        least = 1.2 * case.friction.coefficient
+        for value, safe in ((0.99 * found.to, False), (1.01 * found.to, True), (0.99 * found.until, True)):
+            there = changed(case, ("link1", "damping"), value)
+            assert there is not None
+            reached = answer(there)
+            assert reached is not None
+            assert reached.safe(least) is safe

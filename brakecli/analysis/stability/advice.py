@@ -6,11 +6,13 @@ from contextlib import suppress
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import cache
-from typing import Any
+from itertools import pairwise, takewhile
+from typing import Any, NamedTuple
 
 import numpy as np
 from pydantic import ValidationError
 
+from brakecli.analysis.stability.edges import edges
 from brakecli.analysis.stability.modes import growth
 from brakecli.analysis.stability.report import LARGEST_FRICTION, changes, mean_stiffness
 from brakecli.analysis.stability.search import bisect
@@ -23,8 +25,9 @@ from brakecli.solver.steady_sliding import steady_sliding, tabulated
 
 KEYS = ("*.mass", "*.stiffness", "*.damping", "*.angle_deg", "load.*")
 """What may be advised: masses, stiffnesses, dampings, angles and the load."""
-FACTOR, RUNGS = 10.0, 40  # values are tried up to this factor away, in so many steps each way
-DEGREE = 1.0  # step of angles, which are tried up to ±90°
+FACTOR, RUNGS = 10.0, 40  # values may be advised up to this factor away; steps of a ladder each way
+DEGREE = 1.0  # step of angles on a ladder, which may be advised up to ±90°
+_DECOUPLED = (-90.0, 0.0, 90.0)  # °, where a link does not couple x and y
 _IDLE = ("initial", "solver", "output")  # steady sliding does not depend on these tables
 _STEP, _ROUGH_STEP = 1e-3, 0.1  # of a derivative, as a part of the value; averages over roughness are noisy
 _ROUNDING = 1e-12  # of an answer
@@ -72,26 +75,17 @@ class Change:
     parameter: str
     start: float
     to: float | None
+    until: float | None  # the end of the interval of safe values that begins at `to`; not looked for on rough pads
     critical_friction: float | None  # None also where friction alone never makes it unstable
     lowest: float
     highest: float
-
-    @property
-    def rounded(self) -> str:
-        """The value to four digits, rounded away from where it was, so that it is still as safe."""
-        if self.to is None:
-            return "no help"
-        unit = 10.0 ** (math.floor(math.log10(abs(self.to))) - 3) if self.to else 1.0
-        return f"{unit * (math.ceil if self.to > self.start else math.floor)(self.to / unit):.4g}"
+    rounded: str  # `to`, or "no help"
+    check: str | None = None  # regime of a run with the change; None where there was none
 
     @property
     def size(self) -> float:
         """How large the change is: a logarithm, or radians; infinite where there is none."""
-        if self.to is None:
-            return math.inf
-        if self.parameter.endswith("_deg"):
-            return math.radians(abs(self.to - self.start))
-        return abs(math.log(self.to / self.start)) if self.start else FACTOR
+        return math.inf if self.to is None else _distance(self.parameter, self.start, self.to)
 
 
 def answer(case: Case, up_to: float = LARGEST_FRICTION) -> Answer | None:
@@ -171,11 +165,15 @@ def sensitivity(case: Case, path: Path, critical: float | None, tell: Tell) -> S
 
 
 def advised(case: Case, path: Path, margin: float, tell: Tell) -> Change:
-    """The nearest value at which the case is stable up to (1 + margin) times its friction, found by bisection."""
+    """The nearest value at which the case is stable up to (1 + margin) times its friction.
+
+    Stability changes at edges only: on smooth pads real roots of its conditions, on rough ones the steps of a
+    ladder. So one value between each two edges is asked, and an angle at which a link does not couple x and y.
+    """
     value, parameter = numbers(case)[path], ".".join(path)
     assert isinstance(value, float)
-    ways = [*_ladders(case, parameter, value)]
-    ends = [value, *(way[-1] for way in ways)]
+    low, high = _bounds(case, parameter, value)
+    decoupled = _DECOUPLED if _is_angle(parameter) else ()
 
     @cache
     def safe(x: float) -> bool:
@@ -188,15 +186,91 @@ def advised(case: Case, path: Path, margin: float, tell: Tell) -> Change:
         reached = answer(there, 1.01 * least + 0.01)
         return reached is not None and reached.safe(least)
 
-    for rung in range(1, max(map(len, ways))):
-        for way in ways:
-            if rung < len(way) and safe(way[rung]):
-                to = _first(safe, way[rung - 1], way[rung])
-                there = changed(case, path, to)
-                reached = answer(there) if there else None
-                critical = reached.critical if reached else None
-                return Change(parameter, value, to, critical, min(ends), max(ends))
-    return Change(parameter, value, None, None, min(ends), max(ends))
+    def last(there: float, beyond: float) -> float:
+        """The last safe value on the way from one that is to one that is not."""
+        if there < beyond:
+            return bisect(safe, there, beyond, halvings=45)[0]
+        return bisect(lambda x: not safe(x), beyond, there, halvings=45)[1]
+
+    inner = {each for each in (*decoupled, *_edges(case, path, value, margin)) if low < each < high}
+    ordered = sorted({low, high, value, *inner})
+    at = ordered.index(value)
+    both = [_asked(way, decoupled, _is_angle(parameter)) for way in (ordered[at:], ordered[at::-1])]
+    places = [(way, number) for way in both for number in range(1, len(way))]
+    for way, number in sorted(places, key=lambda each: _distance(parameter, value, each[0][each[1]].edge)):
+        if not safe(there := way[number].value):
+            continue
+        before = way[number - 1].value
+        to, until = last(there, before), None
+        if there in decoupled and abs(to - there) < 1e-6 * abs(before - there):
+            to = there
+        if not _rough(case):
+            after = list(takewhile(lambda each: safe(each.value), way[number:]))
+            ends = way[number + len(after) :]
+            until = last(after[-1].value, ends[0].value) if ends else high if there > value else low
+        reached = answer(changed(case, path, to) or case)
+        critical = reached.critical if reached else None
+        return Change(parameter, value, to, until, critical, low, high, _shown(to, to > value, safe))
+    return Change(parameter, value, None, None, None, low, high, "no help")
+
+
+class _Asked(NamedTuple):
+    """A value that is asked, for all behind the edge next to it on the way there."""
+
+    edge: float
+    value: float
+
+
+def _asked(way: Sequence[float], special: Sequence[float], angle: bool) -> list[_Asked]:
+    """The values to ask on a way over edges, first of all where it begins."""
+    found = [_Asked(way[0], way[0])]
+    for near, far in pairwise(way):
+        if near in special and near != way[0]:
+            found.append(_Asked(near, near))
+        middle = 0.5 * (near + far) if angle or near * far <= 0.0 else math.copysign(math.sqrt(near * far), near)
+        found.append(_Asked(near, middle))
+    return found
+
+
+def _edges(case: Case, path: Path, value: float, margin: float) -> list[float]:
+    """Where the safety of a value may change; a ladder where the mean stiffness depends on it, too."""
+    parameter = ".".join(path)
+    if _rough(case):
+        return [each for way in _ladders(case, parameter, value) for each in way]
+    system = system_of(case)
+    sign = math.copysign(1.0, system.belt_speed)
+    return edges(case, parameter, value or _scale(case, parameter), system.contact_stiffness, sign, margin)
+
+
+def _distance(parameter: str, start: float, to: float) -> float:
+    """How large a change is: radians, or a logarithm."""
+    if _is_angle(parameter):
+        return math.radians(abs(to - start))
+    return abs(math.log(to / start)) if start else FACTOR
+
+
+def _shown(to: float, up: bool, safe: Callable[[float], bool]) -> str:
+    """A safe value in four digits, rounded onwards, or in as many as it takes to be safe."""
+    texts = (rounded(to, up, digits) for digits in range(4, 17))
+    return next((text for text in texts if safe(float(text))), repr(to))
+
+
+def rounded(value: float, up: bool, digits: int = 4) -> str:
+    """A number in so many digits, rounded up or down."""
+    unit = 10.0 ** (math.floor(math.log10(abs(value))) + 1 - digits) if value else 1.0
+    return f"{unit * (math.ceil if up else math.floor)(value / unit):.{digits}g}"
+
+
+def _is_angle(parameter: str) -> bool:
+    return parameter.endswith("_deg")
+
+
+def _bounds(case: Case, parameter: str, value: float) -> tuple[float, float]:
+    """The least and the largest value that may be advised."""
+    if _is_angle(parameter):
+        return -90.0, 90.0
+    low, high = sorted((value / FACTOR, value * FACTOR))
+    return (low, high) if value else (0.0, _scale(case, parameter))
 
 
 def _rough(case: Case) -> bool:
@@ -207,15 +281,6 @@ def _grows(case: Case) -> bool:
     """Whether sliding is not steady, or not stable, at the case's own friction."""
     found = answer(case, 0.0)
     return found is None or found.growth is None or found.critical == 0.0
-
-
-def _first(safe: Callable[[float], bool], before: float, after: float) -> float:
-    """The first value that is safe on the way from one that is not to one that is."""
-    if before < after:
-        to = bisect(lambda x: not safe(x), before, after, halvings=45)[1]
-    else:
-        to = bisect(safe, after, before, halvings=45)[0]
-    return 0.0 if abs(to) < 1e-6 * abs(after - before) and safe(0.0) else to  # where two links decouple
 
 
 def _ladders(case: Case, parameter: str, value: float) -> Iterator[list[float]]:

@@ -9,6 +9,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
+from brakecli.analysis.stability.modes import routh_hurwitz
 from brakecli.case.case import Case
 from brakecli.solver.links import sin_cos, tensor
 
@@ -81,20 +82,7 @@ def _inclined(degrees: float) -> tuple[Rounded, Rounded]:
 
 
 def conditions(links: Links, contact_stiffness: float, grip: float) -> list[Rounded]:
-    """What is positive where all disturbances decay, U ≠ 0; the contact stiffness K in N/m, grip = sign(U) φ.
-
-    With S as in `modes`: its determinant; and Hurwitz' a1 a2 a3 - a1² a4 - a0 a3² over a4, in which a3 > 0, so
-    ordered that nothing cancels but the difference of the stiffnesses. Without dashpots nothing decays, and two
-    frequencies must not meet.
-    """
-    m, (b_xx, b_xy, b_yy), (c_xx, c_xy, c_yy), _ = links
+    """What is positive where all disturbances decay, U ≠ 0; the contact stiffness K in N/m, grip = sign(U) φ."""
     k = Rounded(contact_stiffness, EPSILON * contact_stiffness)
-    s_xy, s_yy = c_xy + Rounded(grip) * k, c_yy + k
-    product, both, gap = s_xy * c_xy, s_xy + c_xy, c_xx - s_yy
-    trace = b_xx + b_yy
-    if trace.value == 0.0:
-        apart = gap**2 + Rounded(4.0) * product
-    else:
-        quick = (b_xx * b_yy - b_xy**2) * trace * (b_xx * s_yy + b_yy * c_xx - b_xy * both)
-        apart = m * ((b_xx * gap + b_xy * both) * (b_yy * gap - b_xy * both) + product * trace**2) + quick
-    return [c_xx * s_yy - product, apart]
+    damped = links.b[0].value + links.b[2].value != 0.0
+    return routh_hurwitz(links.m, links.b, links.c, k, Rounded(grip), damped=damped)

@@ -9,6 +9,7 @@ import math
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from brakecli.solver.records import Coefficients
 
 Complex = NDArray[np.complex128]
+Tensor = tuple[Any, Any, Any]
 
 
 @dataclass(frozen=True)
@@ -119,6 +121,26 @@ def modes(c: Coefficients, contact_stiffness: float, grip: float) -> list[Mode]:
         damping_ratio = float(-value.real / abs(value)) + 0.0 if value != 0.0 else 0.0
         found.append(Mode(float(value.real), float(value.imag / (2.0 * math.pi)), damping_ratio, *shape))
     return sorted(found, key=lambda mode: -mode.growth)
+
+
+def routh_hurwitz(m: Any, b: Tensor, c: Tensor, k: Any, grip: Any, *, damped: bool) -> list[Any]:
+    """What is positive where all disturbances decay, U ≠ 0; b and c: xx, xy and yy of (6)-(7), grip = sign(U) φ.
+
+    It takes all that can be added and multiplied. With S as in `modes`: its determinant; and Hurwitz'
+    a1 a2 a3 - a1² a4 - a0 a3² over m, so ordered that nothing cancels but the difference of the
+    stiffnesses. Without dashpots nothing decays, and two frequencies must not meet.
+    """
+    (b_xx, b_xy, b_yy), (c_xx, c_xy, c_yy) = b, c
+    s_xy, s_yy = c_xy + grip * k, c_yy + k
+    product, both, gap = s_xy * c_xy, s_xy + c_xy, c_xx - s_yy
+    trace = b_xx + b_yy
+    if damped:
+        quick = (b_xx * b_yy - b_xy**2) * trace * (b_xx * s_yy + b_yy * c_xx - b_xy * both)
+        apart = m * ((b_xx * gap + b_xy * both) * (b_yy * gap - b_xy * both) + product * trace**2) + quick
+    else:
+        twice = product + product
+        apart = gap**2 + (twice + twice)
+    return [c_xx * s_yy - product, apart]
 
 
 def growth(c: Coefficients, contact_stiffness: float, grip: float) -> float:
