@@ -230,7 +230,7 @@ def _amplifying(rng: np.random.Generator) -> Tables:
     tables = _flat(rng, (-2.0, 0.3), (0.5, 1.2))
     tables["link1"]["angle_deg"], tables["link2"]["angle_deg"] = rng.uniform(-10.0, 40.0), rng.uniform(0.0, 40.0)
     if rng.uniform() < 0.3:
-        return _timed(_rough(tables, rng, -0.5, 0.3), rng, 4.0, 10.0)
+        return _timed(_rough(tables, rng, -0.5, 0.3), rng, 3.0, 6.0)
     return _timed(_settled(tables, rng, 10.0 ** rng.uniform(-6.0, 0.0)), rng, 40.0, 250.0)
 
 

@@ -39,7 +39,7 @@ GRAZING = 1e-3  # of what an event function would fall by along its slopes: room
 NARROWEST = 1e-8  # width of a part of the pad that is not divided further, over the half length
 MOST_PARTS = 64
 ROUNDING = 1e-13  # of an event function, over what it falls by within a step
-MOST_STEPS = 50_000_000
+MOST_STEPS = 3_000_000
 
 
 class Shoe(NamedTuple):

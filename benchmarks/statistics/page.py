@@ -38,7 +38,7 @@ or of the start. The *amplifying* motions are self-excited, for up to 250 period
 
 
 def page(found: Sequence[Judged], unknown: int) -> str:
-    """The page; `unknown` is the number of cases without a reference, whose motion grows beyond all bounds."""
+    """The page; `unknown` is the number of cases without a reference."""
     parts = [INTRODUCTION.format(runs=len(found) + unknown, better=BETTER), _summary(found, unknown)]
     parts += ["## By kind\n", _by(found, "kind", KINDS, lambda each: each.drawn.kind)]
     scales = tuple(f"{10.0**-n:g} to {10.0 ** -(n + 2):g}" for n in (2, 4, 6, 8))
@@ -78,7 +78,7 @@ def _summary(found: Sequence[Judged], unknown: int) -> str:
         "There the error of the reference takes its place in the ratios.",
     ]
     if unknown:
-        words.append(f"{unknown} more cases grow beyond all bounds and have no reference.")
+        words.append(f"{unknown} more cases have no reference: they grow beyond bounds or take too many steps.")
     return "\n".join(words) + "\n"
 
 

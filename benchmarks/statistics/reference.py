@@ -21,6 +21,7 @@ SHARE = 1e-9  # of the promise, in such an error on pads that open, where the ex
 COARSER, SHORTER = 10.0, 1.6  # such errors of the second run over those of the first; its longest step, too
 LONGEST, PER_WAVE = 0.3, 0.5  # rad of the fastest motion and of a passing wave, in a step
 CELLS = 16.0  # to the shortest wave
+NOISE = 4e-18  # rounding of a step over the largest motion: no error of a step can be set below it
 REST = 1e-12  # of a motion: below it a quantity is rounding, and counts as none
 NAMES = ("x", "y", "vx", "vy")
 
@@ -191,9 +192,9 @@ def reference(tables: Tables, promise: float = 0.0) -> Reference | None:
     largest = np.array([1.0, 1.0, rate, rate]) * max(sizes[:2].max(), sizes[2:].max() / rate)
     if not largest.all():
         return None
-    scale = np.maximum(sizes, 1e-6 * largest)
     # The coarser one has other steps and, by a rounding, another start: both show what grows of such errors.
     fine = min(max(SHARE * promise, TIGHTEST), LOOSEST) if found[1][3] else TIGHTEST
+    scale = np.maximum(sizes, NOISE / fine * largest)
     runs = [motion(tables, COARSER * fine, scale, 2.0**-52), motion(tables, fine, scale, 0.0, SHORTER)]
     if runs[0] is None or runs[1] is None:
         return None
