@@ -21,7 +21,7 @@ PYTEST_ARGS ?=
 .DELETE_ON_ERROR:
 .NOTPARALLEL: # two installations into one .venv at a time would collide
 .PHONY: help demo test campaign lowest lint format types imports derivations tables docs cases check \
-    accuracy promises promise-cost picture lock-in paper extremes bench bench-sweep bench-million bench-contact clean
+    accuracy promises promise-cost statistics picture lock-in paper extremes bench bench-sweep bench-million bench-contact clean
 
 help: ## list the targets (this text)
 	@echo "make TARGET, where TARGET is one of"
@@ -150,6 +150,9 @@ promises: $(DEV_STAMP) ## random cases at five tolerances: the tables of docs/ac
 
 promise-cost: $(DEV_STAMP) ## a tolerance beside the cheapest entry that keeps it: a table of docs/accuracy.md (some minutes)
 	$(BIN)/python -m benchmarks.promise_cost
+
+statistics: $(DEV_STAMP) ## random runs beside a reference that shares no code: docs/statistics.md (a quarter of an hour)
+	$(BIN)/python -m benchmarks.statistics
 
 bench: $(PEERS_STAMP) ## measure brakecli beside general solvers and write docs/performance.md (ten minutes)
 	$(PEERS)/bin/python -m benchmarks.performance

@@ -74,6 +74,17 @@ def coarser(ratio: float) -> float:
     return 1.0 / (1.0 - math.pow(ratio, 1.0 - 1.0 / ORDER))
 
 
+def not_finer(coarse: Motion, fine: Motion) -> float:
+    """The error of the coarser of two event-driven runs, over what they differ by, from the steps that they took.
+
+    Steps may be limited by passing waves and not by the tolerance. Two runs then take the same steps, share their
+    errors, and differ by next to nothing. Errors fall with the seventh power of the number of steps, which is the
+    power 7/8 of the tolerance where that alone sets them. Infinite where the finer run takes no more steps.
+    """
+    fall = math.pow(coarse.work.steps / max(fine.work.steps, 1), ORDER - 1.0)
+    return 1.0 / (1.0 - fall) if fall < 1.0 else math.inf
+
+
 def replica(system: System) -> System:
     """The system with a start that is a few roundings away.
 

@@ -22,6 +22,7 @@ from brakecli.runs.certificate import (
     Rounding,
     coarser,
     compare,
+    not_finer,
     replica,
     sizes,
 )
@@ -171,6 +172,8 @@ def _by_events(system: System, progress: Progress) -> Certified:
     while True:
         now = run(fine)
         factor = coarser(10.0 ** (coarse - fine))
+        if fine < MOST_EVENT_DIGITS:  # the last run needs no finer one: no step of it is wrong by more than that
+            factor = max(factor, not_finer(before, now))
         until = compare(before, now, rounding.until).until(rounding.left / factor)
         seconds, failed = sum(each.work.solve_seconds for each in runs), now.work.failed or before.work.failed
         if until >= rounding.until or failed or seconds > MOST_SECONDS or fine == MOST_EVENT_DIGITS:
@@ -178,7 +181,7 @@ def _by_events(system: System, progress: Progress) -> Certified:
         if len(runs) == 2:
             rounding = Rounding.of(before, run(first), wanted)
         before, coarse, fine = now, fine, min(fine + EVENT_DIGITS, MOST_EVENT_DIGITS)
-    error = factor * compare(before, now).error + rounding.error
+    error = (factor * compare(before, now).error if factor < math.inf else 1.0) + rounding.error
     certified = error <= wanted and not failed
     now.work.solve_seconds = seconds
     how = f"event-driven runs to {', '.join(names[:-1])} and {names[-1]}"

@@ -17,7 +17,7 @@ from brakecli.comparison.compare import errors
 from brakecli.errors import CaseError
 from brakecli.runs import ladder
 from brakecli.runs import tolerance as module
-from brakecli.runs.certificate import Certified, coarser
+from brakecli.runs.certificate import Certified, coarser, not_finer
 from brakecli.runs.modelled import modelled
 from brakecli.runs.tolerance import certify
 from brakecli.solver.motion import Motion, solve
@@ -375,6 +375,36 @@ def test_the_difference_of_two_runs_bounds_the_error_of_the_coarser_one() -> Non
         finer = ratio ** (7.0 / 8.0)
         assert coarser(ratio) * (1.0 - finer) == pytest.approx(1.0)
         assert coarser(ratio) * (1.0 + finer) > 1.0
+
+
+def test_runs_whose_steps_are_limited_by_passing_waves_do_not_vouch_for_each_other() -> None:
+    """They take the same steps and share their errors: what they differ by may be far less than either is off."""
+    wave = {"wheel": {"amplitudes": [2e-6], "wavelengths": [0.004]}}
+    case = promised(
+        {**WAVE, "roughness": wave, "initial": {"at": "equilibrium", "x": 1e-6}},
+        1e-2,
+        wheel__angular_speed=12.0,
+        friction__coefficient=0.0,
+    )
+    system = system_of(case)
+    loose, tight = (solve(system, replace(system.method, tolerance=each)) for each in (1e-6, 1e-8))
+    assert tight.work.steps < 1.02 * loose.work.steps
+    assert coarser(1e-2) * errors(loose.rows, tight.rows).error < errors(tight.rows, truth(case, 1e-13)).error
+    found = certify(system)
+    assert "1e-10" in found.certificate.method
+    assert found.certificate.certified
+    assert kept(found, case, 1e-13) <= 1e-2
+
+
+def test_steps_that_the_tolerance_sets_are_as_good_as_the_tolerance() -> None:
+    motion = simulate(promised(SQUEAL, 1e-3, solver__duration=0.001))
+
+    def of(steps: int) -> Motion:
+        return replace(motion, work=replace(motion.work, steps=steps))
+
+    assert not_finer(of(1000), of(round(1000 * 100 ** (1 / 8)))) == pytest.approx(coarser(1e-2), rel=1e-4)
+    assert math.isinf(not_finer(of(1000), of(1000)))
+    assert math.isinf(not_finer(of(1000), of(900)))
 
 
 @pytest.mark.parametrize(("scheme", "promise"), [("event-driven", 1e-2), ("event-driven", 1e-8), ("auto", 1e-10)])

@@ -1,0 +1,122 @@
+"""docs/statistics.md, from all that was judged."""
+
+import math
+from collections import Counter
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.statistics.cases import KINDS
+from benchmarks.statistics.judging import BETTER, Judged
+
+PAGE = Path(__file__).parents[2] / "docs" / "statistics.md"
+QUANTILES = (0.0, 0.05, 0.5, 0.95)
+BAR = 40  # signs of the longest bar
+INTRODUCTION = """# Estimates and errors
+
+`make statistics` writes this page. It draws {runs} random cases of ten kinds. Each has a random tolerance
+between 1e-2 and 1e-10 and is run as `brakecli run` runs it. The result is compared with a reference.
+
+The reference shares no code with `brakecli`. It integrates the contact force exactly, between the roots of the
+gap. Its steps have order 8 and compensated sums. It repeats a step until it ends at an event. It runs twice:
+the second run may be wrong by ten times as much in a step, and starts one rounding away. What the two differ by
+counts as the error of the reference.
+
+- The **error** of a run is the largest deviation of $x$, $y$, $\\dot x$ and $\\dot y$ over all samples, each
+  relative to its largest value.
+- The **estimate** is the `estimated_error` of the run.
+- A promise is **broken** if the run is certified and the error exceeds the tolerance. It is also broken if the
+  run is not certified and the error exceeds the tolerance before `certified_until`.
+- An estimate is **low** if the error exceeds it by more than the error of the reference.
+
+A run is compared as long as the reference is {better:g} times better than the tolerance. Cases are drawn until
+they do what their kind says: a kind with stick sticks, and a kind without stick does not. The cases *near
+grazing* are bisected. They just reach stick or lift-off, or just miss it, by 1e-2 to 1e-10 of the wheel's speed
+or of the start. The *amplifying* motions are self-excited, for up to 250 periods.
+"""
+
+
+def page(found: Sequence[Judged], unknown: int) -> str:
+    """The page; `unknown` is the number of cases without a reference."""
+    parts = [INTRODUCTION.format(runs=len(found) + unknown, better=BETTER), _summary(found, unknown)]
+    parts += ["## By kind\n", _by(found, "kind", KINDS, lambda each: each.drawn.kind)]
+    scales = tuple(f"{10.0**-n:g} to {10.0 ** -(n + 2):g}" for n in (2, 4, 6, 8))
+    parts += ["## By tolerance\n", _by(found, "tolerance", scales, lambda each: scales[_scale(each)])]
+    parts += ["## By method\n", _by(found, "method", tuple(sorted({_method(each) for each in found})), _method)]
+    parts += ["## The ratio of estimate to error\n", _histogram(found)]
+    if faults := [each for each in found if each.faulty]:
+        parts += ["## Exceptions\n", *(f"- {each}" for each in faults), ""]
+    return "\n".join(parts)
+
+
+def _scale(each: Judged) -> int:
+    """Which pair of decades holds the tolerance."""
+    return min(3, int((-math.log10(each.drawn.tolerance) - 2.0) // 2.0))
+
+
+def _method(each: Judged) -> str:
+    """How the error was estimated."""
+    for sign, name in (
+        ("nodes", "events on nodes"),
+        ("rounding", "exact steps"),
+        ("piecewise", "exact steps, twice"),
+    ):
+        if sign in each.method:
+            return name
+    return "events, exact or closed-form contact" if each.method.startswith("event-driven") else "steps"
+
+
+def _summary(found: Sequence[Judged], unknown: int) -> str:
+    """The result in a few sentences."""
+    broken, low = (sum(each.broken or each.broken_early for each in found), sum(each.low for each in found))
+    sure, part = sum(each.certified for each in found), sum(each.compared < 1.0 for each in found)
+    hidden = sum(each.error <= each.own for each in found)
+    words = [
+        f"Of {len(found)} runs {sure} are certified. Broken promises: **{broken}**. Low estimates: **{low}**.",
+        f"In {part} runs only a part is compared. In {hidden} runs the error is below that of the reference.",
+        "There the error of the reference takes its place in the ratios.",
+    ]
+    if unknown:
+        words.append(f"{unknown} more cases have no reference: they grow beyond bounds or take too many steps.")
+    return "\n".join(words) + "\n"
+
+
+def _by(found: Sequence[Judged], head: str, names: Sequence[str], name_of: Callable[[Judged], str]) -> str:
+    """A table with one row for each name."""
+    quantiles = ["least estimate / error", *(f"{100 * q:.0f} %" for q in QUANTILES[1:])]
+    lines = [
+        f"| {head} | runs | certified | broken | low | largest error / tolerance | "
+        + " | ".join(quantiles)
+        + " |",
+        "|---" * (6 + len(quantiles)) + "|",
+    ]
+    for name in names:
+        rows = [each for each in found if name_of(each) == name]
+        if not rows:
+            continue
+        sure = [each.error / each.drawn.tolerance for each in rows if each.certified]
+        numbers = [
+            len(rows),
+            len(sure),
+            sum(each.broken or each.broken_early for each in rows),
+            sum(each.low for each in rows),
+        ]
+        ratios = np.quantile([each.ratio for each in rows], QUANTILES)
+        texts = [*map(str, numbers), f"{max(sure):.2g}" if sure else "", *(f"{each:.2g}" for each in ratios)]
+        lines.append(f"| {name} | " + " | ".join(texts) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def _histogram(found: Sequence[Judged]) -> str:
+    """How many runs have a ratio in each half decade. Errors that the reference cannot see stand apart."""
+    seen = Counter(math.floor(2.0 * math.log10(each.ratio)) for each in found if each.error > each.own)
+    unseen = Counter(math.floor(2.0 * math.log10(each.ratio)) for each in found if each.error <= each.own)
+    most = max(seen[n] + unseen[n] for n in {*seen, *unseen})
+    lines = ["| estimate / error | runs | of these at least | |", "|---|---|---|---|"]
+    for n in range(min({*seen, *unseen}), max({*seen, *unseen}) + 1):
+        bar = "█" * math.ceil(BAR * (seen[n] + unseen[n]) / most)
+        low, high = 10.0 ** (n / 2.0), 10.0 ** ((n + 1) / 2.0)
+        lines.append(f"| {low:.2g} to {high:.2g} | {seen[n] + unseen[n]} | {unseen[n]} | {bar} |")
+    note = "The third column counts errors below that of the reference: their ratio is larger."
+    return "\n".join([*lines, "", note, ""])
