@@ -20,12 +20,13 @@ from brakecli.runs.together import TOGETHER, certify_together, loops
 from brakecli.solver.lanes import LANES
 from brakecli.sweeps.early import may_be_early
 from brakecli.sweeps.plan import Plan
-from brakecli.sweeps.point import FAULTS, Begun, begun, computed, followed, judged, line_points
+from brakecli.sweeps.point import FAULTS, Begun, begun, computed, followed, judged
 
 SECONDS = 1.0
 """Processor time (s) after which no further place is drawn. Other programs do not change it."""
 PART = 0.05  # of the time of the sweep, as far as it is known, that the pilot may take
-START_SECONDS = 2.0  # until workers compute
+START_SECONDS = 2.0  # of the command and its workers, until they load kernels; and to end
+MOST_LOADING = 1.5  # s, which both take to load kernels: what takes longer has compiled them, and stays
 LONGEST = 0.3  # guessed time (s) of a point beyond which its run is only begun
 FEWEST, MOST = 3, 32  # places
 DRAWN = 0.25  # of the points, at most
@@ -49,6 +50,7 @@ class Pilot:
     in_lanes: int = 0  # points that have begun in lanes,
     alone: int = 0  # and how many of them were not certified there
     begun: bool = False  # runs were only begun, and may take longer
+    start: float = START_SECONDS  # s, beside the points
 
     @property
     def seconds(self) -> float:
@@ -63,7 +65,7 @@ class Pilot:
 
     def sweep_seconds(self, each: float) -> float:
         """The time (s) of the sweep where a point takes `each`: no unit is shared by two workers."""
-        return START_SECONDS + math.ceil(self.plan.units / self.workers) * self.plan.unit_length * each
+        return self.start + math.ceil(self.plan.units / self.workers) * self.plan.unit_length * each
 
     def look(self) -> None:
         """Draw places and compute their points until that has taken its time."""
@@ -72,7 +74,9 @@ class Pilot:
         enough = max(1.0, DRAWN * math.prod(shape))
         for place in itertools.islice(drawn(shape), MOST):
             if not self.times:  # the kernels are loaded first
+                begin = process_time()
                 self._place(shape, place, most=LOADING)
+                self.start += 2.0 * min(process_time() - begin, MOST_LOADING)
                 self.points.clear()
             begin = process_time()
             self.times.append(self._place(shape, place))
@@ -81,6 +85,7 @@ class Pilot:
             few = len(self.times) < FEWEST and spent < SECONDS
             if len(self.points) >= enough or (spent >= limit and not few):
                 break
+        self.start += spent
 
     def _place(self, shape: Sequence[int], place: Sequence[int], most: int = LANES) -> float:
         """The processor time (s) of a point at a place; one that fails takes none."""
@@ -140,17 +145,20 @@ class Pilot:
 
     def _line(self, unit: int, at: int) -> float:
         """Of a point that is followed along a line, from some place of it on."""
-        line = line_points(self.plan, unit)
-        points = line[max(0, min(at, len(line) - FOLLOWED)) :][:FOLLOWED]
+        plan, size = self.plan, self.plan.unit_length
+        inner = math.prod(plan.shape[(plan.followed or 0) + 1 :])
+        outer, rest = divmod(unit % (plan.points // size), inner)
+        first = max(0, min(at, size - FOLLOWED))
+        points = [(outer * size + place) * inner + rest for place in range(first, min(first + FOLLOWED, size))]
         self.points += points
-        first = begun(self.plan, self.plan.settings(points[0]))
-        if not isinstance(first, Begun):
+        start = begun(plan, plan.settings(points[0]))
+        if not isinstance(start, Begun):
             return 0.0
-        self.samples = max(self.samples, first.check.system.samples)
-        if self._guess(first.check) > LONGEST:
-            return self._alone(first)
+        self.samples = max(self.samples, start.check.system.samples)
+        if self._guess(start.check) > LONGEST:
+            return self._alone(start)
         times = list[float]()
-        records = followed(self.plan, points)
+        records = followed(plan, points)
         for _ in points:
             begin = process_time()
             next(records)

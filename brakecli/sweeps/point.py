@@ -15,6 +15,7 @@ from brakecli.analysis.regime.verdict import Verdict
 from brakecli.case.case import Case
 from brakecli.case.read import key_path
 from brakecli.case.system import system_of
+from brakecli.case.tables import SMALLEST
 from brakecli.errors import BrakecliError
 from brakecli.files import fields
 from brakecli.files.field import values_of
@@ -164,7 +165,7 @@ def line_points(plan: Plan, line: int) -> list[int]:
 
 def next_start(outcome: PointRun) -> Settings:
     """The start of a case where another has ended."""
-    x, y, v_x, v_y = (float(value) for value in outcome.motion.rows[-1, :4])
+    x, y, v_x, v_y = (_started(float(value)) for value in outcome.motion.rows[-1, :4])
     start: Settings = {("initial",): {"x": x, "y": y, "vx": v_x, "vy": v_y}}
     wheel = outcome.case.roughness.wheel
     if wheel is not None:
@@ -178,6 +179,11 @@ def next_start(outcome: PointRun) -> Settings:
         else:
             start["roughness", "wheel"] = {**wheel.sines(), "phases_deg": turned}
     return start
+
+
+def _started(value: float) -> float:
+    """A number as a case takes it: a motion that dies out comes to smaller ones than those but 0."""
+    return value if abs(value) >= SMALLEST else 0.0
 
 
 def verdict_of(case: Case) -> Verdict | Known | None:
