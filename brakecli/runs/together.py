@@ -1,6 +1,7 @@
 """The promises of many cases at once: their ladders of runs are climbed side by side, in lanes."""
 
-from collections import defaultdict
+import math
+from collections import Counter, defaultdict
 from collections.abc import Generator, Hashable, Sequence
 from dataclasses import replace
 
@@ -9,17 +10,15 @@ import numpy as np
 from brakecli.errors import BrakecliError
 from brakecli.runs.certificate import Certified
 from brakecli.runs.ladder import InLanes, ladder
-from brakecli.runs.pilot import RUNGS
 from brakecli.runs.tolerance import begins_with_steps, slower_than_events
 from brakecli.solver.ensemble import fits, run_together
+from brakecli.solver.lanes import LANES
 from brakecli.solver.motion import Motion
 from brakecli.solver.schemes import NUMEROV
 from brakecli.solver.system import System
 
 TOGETHER = 32
 """Cases that are certified side by side."""
-LANE_STEP_SECONDS = 3e-8
-"""Of a step of the first rung or of another, in lanes that are full; a rough guess."""
 
 
 def _ladder(system: System) -> Generator[System, Motion, Certified]:
@@ -27,11 +26,10 @@ def _ladder(system: System) -> Generator[System, Motion, Certified]:
     return ladder(replace(system, method=method), slower_than_events(system, lambda samples: None), InLanes)
 
 
-def seconds_together(system: System) -> float | None:
-    """A rough guess at the time that a case takes among others; None where it has to be certified alone."""
-    if not begins_with_steps(system) or fits(first := next(_ladder(system))) is None:
-        return None
-    return RUNGS * first.steps * LANE_STEP_SECONDS
+def loops(systems: Sequence[System]) -> int:
+    """How many loops of lanes begin the ladders of systems; 0 where all have to be certified alone."""
+    alike = Counter(fits(next(_ladder(system))) for system in systems if begins_with_steps(system))
+    return sum(math.ceil(number / LANES) for key, number in alike.items() if key is not None)
 
 
 def certify_together(systems: Sequence[System]) -> list[Certified | None]:

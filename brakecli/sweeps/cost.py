@@ -10,28 +10,26 @@ from brakecli.case.system import system_of
 from brakecli.errors import CaseError, RefusedError, key_text
 from brakecli.runs.cost import duration_text, steps_and_seconds
 from brakecli.runs.limits import MOST_BYTES, check, refuse, within_range
-from brakecli.runs.together import TOGETHER, seconds_together
 from brakecli.sweeps.early import may_be_early
 from brakecli.sweeps.growth import sliding, with_step
 from brakecli.sweeps.periodic import common_period, exponent_length
+from brakecli.sweeps.pilot import Pilot
 from brakecli.sweeps.plan import Plan, Settings, label
 from brakecli.sweeps.tables import Critical
 
 MOST_POINTS = 10_000_000
 MOST_SECONDS = 30 * 86400.0
 
-# Seconds and bytes, measured with `make bench-sweep`; rough guesses that tell minutes from days.
-_POINT_SECONDS = 5e-3  # of a run, beside its steps
-_SAMPLE_SECONDS = 1e-7
+# Of a search by simulation on surfaces that force a motion or whose runs go to their end; rough guesses that tell
+# minutes from days.
 _SEARCH_RUNS = 12.0  # for the least sustained value
 _SEARCH_GROWTHS = 20.0
 _GROWTH_SECONDS = 0.03
 _FORCED_RUNS = 1000.0  # over a period of the wheel, in a search that follows a forced motion
 _EXPONENT_RUNS = 200.0  # of as long as an exponent needs
-_EIGENVALUE_SECONDS = 0.1
+# Bytes, measured with `make bench-sweep`.
 _WORKER_BYTES = 1.8e8
 _SAMPLE_BYTES = 8.0 * 24
-_EARLY_SECONDS = 1e-3  # of a point whose verdict comes before the end of its run
 _RECORD_BYTES = 150.0  # of a point in the journal, and in the result
 _POINT_BYTES, _FOLLOWED_BYTES = 20.0, 400.0  # in the parent, which writes lines that are followed all at once
 
@@ -45,7 +43,7 @@ class Estimate:
     seconds: float
     memory: float
     file_size: float
-    at_least: bool = False  # motions may have to be looked for many times
+    at_least: bool = False  # points that were not computed, or their searches, may well take longer
     together: int = 1  # points that a task should hold, as they are computed side by side
     refused: tuple[str, ...] = ()  # points that were looked at and will fail, each with its reason
 
@@ -60,37 +58,36 @@ class Estimate:
 
 
 def estimate(plan: Plan, workers: int) -> Estimate:
-    """Estimate a sweep by two corners of its grid."""
-    times, samples, forced, together, failing = [], 0, 0.0, 1, list[str]()
+    """Estimate a sweep by computing some of its points; the first and the last one are looked at.
+
+    Searches are computed with them where verdicts come early, or eigenvalues answer; others take too long, and are
+    guessed.
+    """
+    samples, forced, early, failing, critical = 0, 0.0, True, list[str](), plan.sweep.critical
+    by_simulation = critical is not None and critical.method == "simulation"
     for point in sorted({0, plan.points - 1}):
         with _noted(plan, point, failing), within_range():
             system = system_of(plan.case(plan.settings(point)))
-            checked = check(system, written=False)
-            refuse(checked)
-            in_lanes, seconds = seconds_together(system) if plan.followed is None else None, checked.seconds
-            if in_lanes is not None:
-                seconds = in_lanes
-                together = max(1, min(TOGETHER, plan.units // workers))
-            seconds += _SAMPLE_SECONDS * system.samples
-            times.append(_EARLY_SECONDS - _POINT_SECONDS if may_be_early(system) else seconds)
-            samples = max(samples, system.samples)
-            if (critical := plan.sweep.critical) is not None and critical.method == "simulation":
+            refuse(check(system))
+            samples, early = max(samples, system.samples), early and may_be_early(system)
+            if critical is not None and by_simulation:
                 forced = max(forced, _forced_seconds(plan, plan.settings(point), critical))
-    run = sum(times) / max(len(times), 1) + _POINT_SECONDS
-    each = run
-    if (critical := plan.sweep.critical) is not None:
-        each += _EIGENVALUE_SECONDS
-        if critical.method == "simulation":
-            each += _SEARCH_RUNS * run + _SEARCH_GROWTHS * _GROWTH_SECONDS + forced
+    guessed = by_simulation and (forced > 0.0 or not early)
+    pilot = Pilot(plan, workers, with_searches=not guessed)
+    pilot.look()
+    each, samples = pilot.seconds, max(samples, pilot.samples)
+    if guessed:
+        each += _SEARCH_RUNS * each + _SEARCH_GROWTHS * _GROWTH_SECONDS + forced
     records, in_parent = plan.passes * plan.points, _POINT_BYTES if plan.followed is None else _FOLLOWED_BYTES
+    held = _SAMPLE_BYTES * samples * workers * pilot.together
     return Estimate(
         points=records,
         workers=workers,
-        seconds=2.0 + records * each / min(workers, records),
-        memory=_WORKER_BYTES * (workers + 1) + _SAMPLE_BYTES * samples * workers * together + in_parent * records,
+        seconds=pilot.sweep_seconds(each),
+        memory=_WORKER_BYTES * (workers + 1) + held + in_parent * records,
         file_size=_RECORD_BYTES * records + 1e5,
-        at_least=forced > 0.0,
-        together=together,
+        at_least=guessed or pilot.at_least,
+        together=pilot.together,
         refused=tuple(failing),
     )
 

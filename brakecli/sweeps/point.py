@@ -1,7 +1,7 @@
 """One point of a sweep: its run, its verdict, its critical parameter, as a record of fixed size."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from enum import StrEnum
@@ -15,6 +15,7 @@ from brakecli.analysis.regime.verdict import Verdict
 from brakecli.case.case import Case
 from brakecli.case.read import key_path
 from brakecli.case.system import system_of
+from brakecli.case.tables import SMALLEST
 from brakecli.errors import BrakecliError
 from brakecli.files import fields
 from brakecli.files.field import values_of
@@ -31,7 +32,7 @@ from brakecli.sweeps.plan import Plan, Settings
 
 OUT_OF_MEMORY = "out of memory; sample less often, or reduce contact.nodes"
 _UNTOLD = ("torque_variation", "settled")  # no number of a sweep, and a column of its own
-_FAULTS = (BrakecliError, FloatingPointError, MemoryError)
+FAULTS = (BrakecliError, FloatingPointError, MemoryError)
 
 
 class Status(StrEnum):
@@ -67,7 +68,7 @@ def simulate(case: Case, *, whole: bool = True) -> PointRun:
 
     Raises RefusedError, and CaseError where it has no start.
     """
-    return _judged(case, checked(case), None, whole=whole)
+    return judged(case, checked(case), None, whole=whole)
 
 
 def checked(case: Case) -> Check:
@@ -78,7 +79,7 @@ def checked(case: Case) -> Check:
     return found
 
 
-def _judged(case: Case, found: Check, certified: Certified | None, *, whole: bool) -> PointRun:
+def judged(case: Case, found: Check, certified: Certified | None, *, whole: bool) -> PointRun:
     """The end of `simulate`, by a motion that is known already or by one that is computed."""
     verdict: Verdict | Known
     motion: Motion | Ending
@@ -115,29 +116,36 @@ def compute(plan: Plan, first: int, count: int) -> NDArray[Any]:
         return np.concatenate([_line(plan, unit) for unit in range(first, first + count)])
     records = list[NDArray[Any]]()
     for start in range(first, first + count, TOGETHER):
-        points = [_begun(plan, plan.settings(each)) for each in range(start, min(start + TOGETHER, first + count))]
+        points = [begun(plan, plan.settings(each)) for each in range(start, min(start + TOGETHER, first + count))]
         ready = [each for each in points if isinstance(each, Begun)]
         with within_range():
             found = certify_together([each.check.system for each in ready])
         certified = dict(zip(map(id, ready), found, strict=True))
-        records += [_computed(plan, each, certified.get(id(each)))[0] for each in points]
+        records += [computed(plan, each, certified.get(id(each)))[0] for each in points]
     return np.concatenate(records)
 
 
 def _line(plan: Plan, unit: int) -> NDArray[Any]:
-    """The records of a line.
-
-    Each point starts from the end of the one before. The wheel goes on turning: its waves keep the phases that
-    they have come to.
-    """
-    points, start, outcome = line_points(plan, unit), Settings(), None
+    """The records of a line, in the order of the grid."""
+    points = line_points(plan, unit)
     found = np.zeros(len(points), record_type(plan))
     places = {point: place for place, point in enumerate(sorted(points))}
+    for point, record in zip(points, followed(plan, points), strict=True):
+        found[places[point]] = record
+    return found
+
+
+def followed(plan: Plan, points: Sequence[int]) -> Iterator[NDArray[Any]]:
+    """The records of points, each of which starts from the end of the one before.
+
+    The wheel goes on turning: its waves keep the phases that they have come to.
+    """
+    start, outcome = Settings(), None
     for point in points:
         if outcome is not None and not outcome.motion.work.failed:
             start = next_start(outcome)
-        found[places[point]], outcome = _computed(plan, _begun(plan, {**plan.settings(point), **start}))
-    return found
+        record, outcome = computed(plan, begun(plan, {**plan.settings(point), **start}))
+        yield record
 
 
 def line_points(plan: Plan, line: int) -> list[int]:
@@ -157,7 +165,7 @@ def line_points(plan: Plan, line: int) -> list[int]:
 
 def next_start(outcome: PointRun) -> Settings:
     """The start of a case where another has ended."""
-    x, y, v_x, v_y = (float(value) for value in outcome.motion.rows[-1, :4])
+    x, y, v_x, v_y = (_started(float(value)) for value in outcome.motion.rows[-1, :4])
     start: Settings = {("initial",): {"x": x, "y": y, "vx": v_x, "vy": v_y}}
     wheel = outcome.case.roughness.wheel
     if wheel is not None:
@@ -171,6 +179,11 @@ def next_start(outcome: PointRun) -> Settings:
         else:
             start["roughness", "wheel"] = {**wheel.sines(), "phases_deg": turned}
     return start
+
+
+def _started(value: float) -> float:
+    """A number as a case takes it: a motion that dies out comes to smaller ones than those but 0."""
+    return value if abs(value) >= SMALLEST else 0.0
 
 
 def verdict_of(case: Case) -> Verdict | Known | None:
@@ -189,30 +202,30 @@ class Begun(NamedTuple):
     check: Check
 
 
-def _begun(plan: Plan, settings: Settings) -> Begun | Exception:
+def begun(plan: Plan, settings: Settings) -> Begun | Exception:
     """A point, or why it cannot be computed."""
     try:
         case = plan.case(settings)
         return Begun(settings, case, checked(case))
-    except _FAULTS as error:
+    except FAULTS as error:
         return error
 
 
-def _computed(
+def computed(
     plan: Plan, point: Begun | Exception, certified: Certified | None = None
 ) -> tuple[NDArray[Any], PointRun | None]:
     """The record of a point and its run, which is None where it was not possible."""
     try:
         if isinstance(point, Exception):
             raise point
-        outcome = _judged(point.case, point.check, certified, whole=False)
+        outcome = judged(point.case, point.check, certified, whole=False)
         values = values_of(fields.POINT, outcome)
         if (critical := plan.sweep.critical) is not None:
             path = key_path(critical.parameter)
             with within_range():
                 found = search(critical, lambda value: plan.case({**point.settings, path: value}), verdict_of)
             values |= values_of(fields.CRITICAL, found)
-    except _FAULTS as error:
+    except FAULTS as error:
         reason = OUT_OF_MEMORY if isinstance(error, MemoryError) else "; ".join(str(error).splitlines())
         return blank(record_type(plan), Status.FAILED, reason), None
     return _filled(record_type(plan), values), outcome
