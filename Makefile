@@ -85,7 +85,7 @@ demo: $(RUN_STAMP) ## install into .venv and run one real case, cases/relaxation
 test: $(DEV_STAMP) ## run the tests; PYTEST_ARGS='-k friction' narrows them down
 	$(BIN)/python $(PYTEST) $(PYTEST_ARGS)
 
-campaign: $(DEV_STAMP) docs ## run the long statistics, of which make test has a smaller part (some minutes)
+campaign: $(DEV_STAMP) docs ## run the long statistics, of which make test has a smaller part (20 minutes)
 	$(BIN)/python $(PYTEST) -m campaign $(PYTEST_ARGS)
 
 lowest: $(LOWEST_STAMP) ## run the tests with every dependency at the lowest version that pyproject.toml declares
@@ -151,8 +151,9 @@ promises: $(DEV_STAMP) ## random cases at five tolerances: the tables of docs/ac
 promise-cost: $(DEV_STAMP) ## a tolerance beside the cheapest entry that keeps it: a table of docs/accuracy.md (some minutes)
 	$(BIN)/python -m benchmarks.promise_cost
 
-statistics: $(DEV_STAMP) ## random runs beside a reference that shares no code: docs/statistics.md (a quarter of an hour)
+statistics: $(DEV_STAMP) ## large draws, once per change that may move them, and docs/statistics.md (an hour)
 	$(BIN)/python -m benchmarks.statistics
+	$(BIN)/python $(PYTEST) -m statistics $(PYTEST_ARGS)
 
 bench: $(PEERS_STAMP) ## measure brakecli beside general solvers and write docs/performance.md (ten minutes)
 	$(PEERS)/bin/python -m benchmarks.performance

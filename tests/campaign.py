@@ -1,4 +1,4 @@
-"""Which cases of a test run in `make test`, all others being left to `make campaign`; and pages computed again."""
+"""Which cases of a test run in `make test`, `make campaign` and `make statistics`; pages computed again."""
 
 import re
 from itertools import zip_longest
@@ -6,12 +6,13 @@ from typing import Any
 
 import pytest
 
-campaign = pytest.mark.campaign
+campaign, statistics = pytest.mark.campaign, pytest.mark.statistics
 
 
-def counts(few: int, many: int) -> list[Any]:
-    """How many cases a test draws, as its parameters: a few in `make test`, many in the campaign."""
-    return [few, pytest.param(many, marks=campaign)]
+def counts(few: int, many: int, most: int = 0) -> list[Any]:
+    """How many cases a test draws, as its parameters: in `make test`, the campaign, and `make statistics`."""
+    large = [pytest.param(most, marks=statistics)] if most else []
+    return [few, pytest.param(many, marks=campaign), *large]
 
 
 NUMBER = re.compile(r"(?<![\w.])[-−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.]*\.\w)")

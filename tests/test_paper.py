@@ -23,7 +23,7 @@ from brakecli.sweeps.plan import kind_of
 from brakecli.sweeps.point import simulate
 from brakecli.sweeps.tables import Critical
 from brakecli.sweeps.windows import Outcome, Search
-from tests.campaign import campaign, differences
+from tests.campaign import campaign, differences, statistics
 from tests.commands import ROOT
 
 FOLDER = ROOT / "cases" / "paper"
@@ -216,7 +216,7 @@ def determined(page: str) -> str:
     return "\n".join(lines)
 
 
-@campaign
+@statistics
 def test_the_page_is_what_the_sweeps_of_the_paper_give(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(ROOT / "docs")  # where `make paper` finds these modules
     results = importlib.import_module("paper_results").compute()

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from brakecli.files.read import open_result
-from tests.campaign import campaign
+from tests.campaign import campaign, statistics
 from tests.commands import TINY, Done, brakecli, forked
 from tests.files.forger import forge
 
@@ -64,7 +64,10 @@ def tried(folder: Path, name: str, command: list[str]) -> Done:
     return forked(first, name, *rest, *more, cwd=folder, memory=MEMORY)
 
 
-@pytest.mark.parametrize(("number", "spared"), [(24, 0.9), pytest.param(500, 0.0, marks=campaign)])
+MANY = pytest.param(100, 0.0, marks=campaign), pytest.param(500, 0.0, marks=statistics)
+
+
+@pytest.mark.parametrize(("number", "spared"), [(24, 0.9), *MANY])
 def test_a_forged_result_is_refused_with_a_sentence_or_used(
     results: Path, tmp_path: Path, number: int, spared: float
 ) -> None:
