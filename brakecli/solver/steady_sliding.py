@@ -163,7 +163,7 @@ def steady_sliding(
     y = -(push + uplift * stiffness * pad.shoe_mean) / whole if whole != 0.0 else np.inf
     if not y <= full:
         if unbalanced(top) < 0.0:
-            if spring == 0.0:
+            if spring <= 0.0:  # links in one line leave none across it, but for rounding of either sign
                 raise _none("the load lifts the shoe off the wheel and no link holds it")
             y = -push / spring
         elif unbalanced(full) < 0.0:

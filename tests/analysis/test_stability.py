@@ -181,6 +181,22 @@ def test_a_shoe_that_nothing_presses_is_not_called_stable(changes: dict[str, Any
     assert "nothing presses the shoe" in str(found.no_equilibrium)
 
 
+def test_links_in_one_line_press_nothing_whatever_rounding_makes_of_what_they_leave() -> None:
+    """Link 2 is along link 1: across both there is no spring and no load, but for rounding."""
+    rng = np.random.default_rng(3)
+    for _ in range(200):
+        beta = float(rng.uniform(1.0, 89.0))
+        c_1, c_2 = (10.0 ** rng.uniform(5.0, 8.0, 2)).tolist()
+        changes = {
+            "link1__stiffness": c_1,
+            "link2__stiffness": c_2,
+            "wheel__angular_speed": float(rng.choice([-4.0, 4.0])),
+        }
+        found = stability(system_of(make(SQUEAL, link1__angle_deg=beta, link2__angle_deg=beta - 90.0, **changes)))
+        assert (found.stable, found.equilibrium) == (None, None)
+        assert found.no_equilibrium
+
+
 def test_a_shoe_is_pressed_from_a_millionth_of_its_load_on() -> None:
     """Link 1 is turned to the friction plane but for an angle δ, to which F_y is proportional."""
 
