@@ -174,7 +174,8 @@ def _by_events(system: System, progress: Progress) -> Certified:
         factor = coarser(10.0 ** (coarse - fine))
         if fine < MOST_EVENT_DIGITS:  # the last run needs no finer one: no step of it is wrong by more than that
             factor = max(factor, not_finer(before, now))
-        until = compare(before, now, rounding.until).until(rounding.left / factor)
+        apart = compare(before, now, rounding.until)
+        until = apart.until(rounding.left / factor) if factor < math.inf else 0.0
         seconds, failed = sum(each.work.solve_seconds for each in runs), now.work.failed or before.work.failed
         if until >= rounding.until or failed or seconds > MOST_SECONDS or fine == MOST_EVENT_DIGITS:
             break
