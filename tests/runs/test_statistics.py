@@ -9,7 +9,7 @@ from scipy.linalg import expm
 from benchmarks.statistics.cases import KINDS, draw
 from benchmarks.statistics.judging import judge
 from benchmarks.statistics.kernels import contact
-from benchmarks.statistics.reference import Tables, reference, shoe_of
+from benchmarks.statistics.reference import QUICK_SHARE, Tables, reference, shoe_of
 from tests.campaign import counts
 
 SMOOTH: Tables = {
@@ -65,22 +65,22 @@ def test_reference_comes_to_rest_as_the_coulomb_oscillator() -> None:
     found = reference(tables)
     assert found is not None
     assert found.rows[-1] == pytest.approx([0.6821789367236466, -1.0, 0.0, 0.0], abs=1e-13)
-    assert (found.sticks, found.turns) == (1, 6)
+    assert (found.sticks, found.turns) == (1, 7)  # peaks above 1: -1 + √205 - 2n for n from 0 to 6
     assert found.sizes[3] == math.inf  # it never moves along y
 
 
 def test_exact_contact_agrees_with_a_fine_sum_and_its_length_with_the_slope() -> None:
     shoe = shoe_of({**SMOOTH, "roughness": WAVES})
     rng, seen = np.random.default_rng(4), 0
-    xi = shoe.a * ((2.0 * np.arange(400_000) + 1.0) / 400_000 - 1.0)
-    for _ in range(20):
+    xi = shoe.a * ((2.0 * np.arange(100_000) + 1.0) / 100_000 - 1.0)
+    for _ in range(12):
         theta, y = rng.uniform(0.0, 2.0 * math.pi, 2), rng.uniform(-1.1, 1.1) * shoe.height
         gap = sum(g * np.sin(q * xi + p) for g, q, p in zip(shoe.g_2, shoe.q_2, theta, strict=True)) - y
         gap -= sum(g * np.sin(q * xi + p) for g, q, p in zip(shoe.g_1, shoe.q_1, shoe.p_1, strict=True))
         force, length = contact(shoe, theta, y)
         cell = xi[1] - xi[0]
         most = shoe.k * np.abs(gap).max() * 2.0 * shoe.a
-        assert force == pytest.approx(shoe.k * np.maximum(gap, 0.0).sum() * cell, abs=1e-8 * most)
+        assert force == pytest.approx(shoe.k * np.maximum(gap, 0.0).sum() * cell, abs=1e-7 * most)
         assert length == pytest.approx((gap > 0.0).sum() * cell, abs=100.0 * cell)
         seen += 0.0 < length < 2.0 * shoe.a
     assert seen > 5
@@ -99,9 +99,10 @@ def test_reference_in_full_contact_does_not_see_roots_that_are_none() -> None:
     assert forces[0] == pytest.approx(forces[1], rel=1e-9)
 
 
-@pytest.mark.parametrize("many", counts(1, 6))
+@pytest.mark.parametrize("many", counts(1, 4))
 def test_no_estimate_is_below_the_error_and_no_promise_is_broken(many: int) -> None:
-    judged = [judge(draw(kind, 2, number)) for kind in KINDS for number in range(many)]
+    work = [(kind, 2, number) for kind in KINDS for number in range(1, 1 + many)]
+    judged = [judge(draw(*each), QUICK_SHARE) for each in work]
     faults = [str(each) for each in judged if each is None or each.faulty]
     assert faults == []
     assert len(judged) == many * len(KINDS)

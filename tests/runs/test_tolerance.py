@@ -397,7 +397,7 @@ def test_runs_whose_steps_are_limited_by_passing_waves_do_not_vouch_for_each_oth
 
 
 def test_steps_that_the_tolerance_sets_are_as_good_as_the_tolerance() -> None:
-    motion = simulate(promised(SQUEAL, 1e-3, solver__duration=0.001))
+    motion = solve(system_of(promised(SQUEAL, 1e-3, solver__duration=0.001)))
 
     def of(steps: int) -> Motion:
         return replace(motion, work=replace(motion.work, steps=steps))
