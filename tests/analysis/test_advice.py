@@ -366,3 +366,30 @@ def test_a_safe_decade_of_a_damping_that_is_zero_is_found_between_its_roots() ->
             reached = answer(there)
             assert reached is not None
             assert reached.safe(least) is safe
+
+
+def test_an_interval_ends_where_the_shoe_locks_though_rounding_leaves_a_power_too_much() -> None:
+    """det(S) is linear in the stiffness of a link, but computed as a difference of squares."""
+    case = make(
+        SQUEAL,
+        shoe__mass=12.098,
+        wheel__angular_speed=-0.94722,
+        link1__stiffness=6973400.0,
+        link1__damping=1.5145,
+        link1__angle_deg=-24.495,
+        link2__stiffness=8633700.0,
+        link2__damping=9.8552,
+        link2__angle_deg=-44.531,
+        friction__coefficient=1.4944,
+        contact__half_length=0.011912,
+        contact__stiffness=424610000.0,
+    )
+    found = advised(case, ("link2", "stiffness"), 0.2, tell)
+    beta, alpha = math.radians(-24.495), math.radians(-44.531)
+    k, grip, c_1 = 2.0 * 0.011912 * 424610000.0, -1.2 * 1.4944, 6973400.0
+    # det(S) = c1 c2 cos²(α - β) + K (cxx - grip cxy)
+    slope = c_1 * math.cos(alpha - beta) ** 2 + k * math.cos(alpha) * (math.cos(alpha) + grip * math.sin(alpha))
+    root = -k * c_1 * math.sin(beta) * (math.sin(beta) - grip * math.cos(beta)) / slope
+    assert found.to is not None
+    assert root < found.to < found.start
+    assert found.until == pytest.approx(root, rel=1e-9)

@@ -10,7 +10,7 @@ from contextlib import suppress
 from typing import Any
 
 import numpy as np
-from numpy.polynomial import Polynomial
+from numpy.polynomial import Polynomial, polynomial
 
 from brakecli.analysis.stability.modes import routh_hurwitz
 from brakecli.case.case import Case
@@ -18,8 +18,9 @@ from brakecli.solver.links import sin_cos, tensor
 from brakecli.solver.steady_sliding import PRESSED
 
 _REAL = (
-    1e-3  # largest imaginary part of a root, over its size: one too many does no harm, double ones are not real
+    1e-3  # largest imaginary part of a root over its size: rounding moves double ones; one too many is harmless
 )
+_LEFT = 1e-13  # largest coefficient that rounding may have left, over the largest one
 
 
 def edges(case: Case, key: str, size: float, contact_stiffness: float, sign: float, margin: float) -> list[float]:
@@ -72,9 +73,15 @@ def edges(case: Case, key: str, size: float, contact_stiffness: float, sign: flo
 
 
 def _real_roots(condition: Any) -> list[float]:
-    """Real roots of a polynomial, or of a number."""
-    coefficients = np.trim_zeros(getattr(condition, "coef", np.zeros(1)), "b")
-    with suppress(np.linalg.LinAlgError):  # numbers beyond all bounds
-        roots = np.polynomial.polynomial.polyroots(coefficients) if len(coefficients) > 1 else np.zeros(0)
-        return [float(root.real) for root in roots if abs(root.imag) <= _REAL * abs(root)]
-    return []
+    """Real roots of a polynomial, or of a number.
+
+    Where products of rank one cancel, rounding leaves coefficients of too high a power. They add roots far away
+    and spoil all others, so that small coefficients of high powers are kept once, and once left out.
+    """
+    coefficients = np.atleast_1d(getattr(condition, "coef", 0.0))
+    size, found = float(np.abs(coefficients).max()), list[float]()
+    for least in (0.0, _LEFT * size):
+        with suppress(np.linalg.LinAlgError):  # numbers beyond all bounds
+            roots = polynomial.polyroots(polynomial.polytrim(coefficients, least))
+            found += [float(root.real) for root in roots if abs(root.imag) <= _REAL * abs(root)]
+    return found
