@@ -156,11 +156,12 @@ def advise(
     sensitivities, left_out = list[Sensitivity](), ""
     if (seconds := advise_seconds(loaded)) > most:
         left_out = f"what to change is left out: `brakecli advise` takes about {duration_text(seconds)}"
-    elif found is not None:
-        for done, path in enumerate(everything):
+    else:
+        for done, path in enumerate(everything if found else ()):
             tell = partial(progress, "derivatives", done, len(everything))
             sensitivities.append(of_case.sensitivity(case, path, critical, tell))
-        if not found.safe((1.0 + margin) * report.friction):
+        slides = found is not None or (system.smooth and system.belt_speed != 0.0)
+        if slides and not (found and found.safe((1.0 + margin) * report.friction)):
             for done, path in enumerate(keys):
                 advice.append(of_case.advised(case, path, margin, partial(progress, "keys", done, len(keys))))
     sensitivities.sort(key=lambda each: -abs(each.elasticity or 0.0))

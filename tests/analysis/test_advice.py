@@ -157,6 +157,48 @@ def test_a_damping_of_zero_has_a_derivative_where_the_other_link_is_damped_and_n
     )  # one dashpot alone, however weak, moves it at once
 
 
+def test_a_shoe_that_nothing_presses_is_advised_an_angle_at_which_it_is_pressed_up_to_the_margin() -> None:
+    """F_y det(S)/(Q K) is c2 cos(α) cos(α - β): F_y ends at |α - β| = 90°, and is a millionth of Q just before."""
+    case = make(
+        SQUEAL, link1__angle_deg=51.0, link2__angle_deg=-42.3, friction__coefficient=0.7, solver__duration=0.02
+    )
+    report = advice_on(case, 0.05)
+    assert report.stability.equilibrium is None
+    angles = {each.parameter: each for each in report.advice if each.to is not None}
+    assert set(angles) == {"link1.angle_deg", "link2.angle_deg"}
+    assert angles["link1.angle_deg"].to == pytest.approx(47.7, abs=1e-3)
+    for name, found in angles.items():
+        for value in (found.to, found.until):
+            assert value is not None
+            there = changed(case, tuple(name.split(".")), value)
+            assert there is not None
+            for phi in (0.0, 0.735):
+                given = changed(there, ("friction", "coefficient"), phi)
+                assert given is not None
+                assert presses_by(given) > 1e-6 * (1.0 - 1e-6), (name, value, phi)
+
+
+def presses_by(case: Case) -> float:
+    """F_y over the load in steady sliding."""
+    alpha, beta = math.radians(case.link2.angle_deg), math.radians(case.link1.angle_deg)
+    c_1, c_2, k = (
+        case.link1.stiffness,
+        case.link2.stiffness,
+        2.0 * case.contact.half_length * case.contact.stiffness,
+    )
+    slides = math.cos(alpha) + case.friction.coefficient * math.sin(alpha)
+    leans = math.sin(beta) - case.friction.coefficient * math.cos(beta)
+    determinant = c_1 * c_2 * math.cos(alpha - beta) ** 2
+    determinant += k * (c_1 * math.sin(beta) * leans + c_2 * math.cos(alpha) * slides)
+    return k * c_2 * math.cos(alpha) * math.cos(alpha - beta) / determinant
+
+
+def test_a_value_of_zero_is_not_advised_to_be_next_to_nothing() -> None:
+    found = advised(make(SQUEAL, link2__stiffness=0.0), ("link2", "stiffness"), 0.2, tell)
+    assert found.to is not None
+    assert found.to >= 1e-6 * found.highest
+
+
 def test_what_cannot_help_is_no_help_within_bounds_that_are_told() -> None:
     case = make(MODE_COUPLING)
     mass = advised(case, ("shoe", "mass"), 0.2, tell)  # φ of flutter does not depend on the mass

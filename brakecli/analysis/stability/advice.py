@@ -27,6 +27,7 @@ KEYS = ("*.mass", "*.stiffness", "*.damping", "*.angle_deg", "load.*")
 """What may be advised: masses, stiffnesses, dampings, angles and the load."""
 FACTOR, RUNGS = 10.0, 40  # values may be advised up to this factor away; steps of a ladder each way
 DEGREE = 1.0  # step of angles on a ladder, which may be advised up to ±90°
+_LEAST = 1e-6  # least advice where the value is 0, over what is large for it
 _DECOUPLED = (-90.0, 0.0, 90.0)  # °, where a link does not couple x and y
 _IDLE = ("initial", "solver", "output")  # steady sliding does not depend on these tables
 _STEP, _ROUGH_STEP = 1e-3, 0.1  # of a derivative, as a part of the value; averages over roughness are noisy
@@ -184,7 +185,7 @@ def advised(case: Case, path: Path, margin: float, tell: Tell) -> Change:
         if there is None or slower is None or (_rough(case) and _grows(slower)):  # a search takes long there
             return False
         reached = answer(there, 1.01 * least + 0.01)
-        return reached is not None and reached.safe(least)
+        return reached is not None and reached.safe(least) and _is_pressed(there, least)
 
     def last(there: float, beyond: float) -> float:
         """The last safe value on the way from one that is to one that is not."""
@@ -204,6 +205,8 @@ def advised(case: Case, path: Path, margin: float, tell: Tell) -> Change:
         to, until = last(there, before), None
         if there in decoupled and abs(to - there) < 1e-6 * abs(before - there):
             to = there
+        if value == 0.0 and not decoupled:  # the least value may be as small as one likes
+            to = max(to, min(there, _LEAST * high))
         if not _rough(case):
             after = list(takewhile(lambda each: safe(each.value), way[number:]))
             ends = way[number + len(after) :]
@@ -271,6 +274,16 @@ def _bounds(case: Case, parameter: str, value: float) -> tuple[float, float]:
         return -90.0, 90.0
     low, high = sorted((value / FACTOR, value * FACTOR))
     return (low, high) if value else (0.0, _scale(case, parameter))
+
+
+def _is_pressed(case: Case, up_to: float) -> bool:
+    """Whether the load presses the shoe on, on smooth pads up to a friction coefficient: F_y is monotonic in φ."""
+    if _rough(case):  # its search asks for that at every friction coefficient
+        return True
+    system = system_of(case)
+    with suppress(CaseError):
+        return all(steady_sliding(system, phi=phi).is_pressed(system.load_at_start) for phi in (0.0, up_to))
+    return False
 
 
 def _rough(case: Case) -> bool:
