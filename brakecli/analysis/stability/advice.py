@@ -209,8 +209,8 @@ def advised(case: Case, path: Path, margin: float, tell: Tell) -> Change:
             to = max(to, min(there, _LEAST * high))
         if not _rough(case):
             after = list(takewhile(lambda each: safe(each.value), way[number:]))
-            ends = way[number + len(after) :]
-            until = last(after[-1].value, ends[0].value) if ends else high if there > value else low
+            ends = [each.value for each in way[number + len(after) :]] or [high if there > value else low]
+            until = ends[0] if safe(ends[0]) else last(after[-1].value, ends[0])
         reached = answer(changed(case, path, to) or case)
         critical = reached.critical if reached else None
         return Change(parameter, value, to, until, critical, low, high, _shown(to, to > value, safe))
