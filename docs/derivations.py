@@ -515,6 +515,21 @@ def unique_step() -> None:
             at_least_zero(-(-1 - w * K * e_slope).subs(a_11, coupling + spare))
 
 
+@check
+def routh_hurwitz() -> None:
+    """Steady sliding: Hurwitz' condition over m as the code has it; concave in phi, and det(S) is linear."""
+    from brakecli.analysis.stability.modes import routh_hurwitz as conditions
+
+    m, k, phi, s = sp.symbols("m K phi s", positive=True)
+    b, c = sp.symbols("b_xx b_xy b_yy", real=True), sp.symbols("c_xx c_xy c_yy", real=True)
+    determinant, apart = conditions(m, b, c, k, phi, damped=True)
+    matrix = m * s**2 * sp.eye(2) + sp.Matrix([[0, phi * k], [0, k]])
+    matrix += sp.Matrix(2, 2, lambda i, j: s * b[int(i + j)] + c[int(i + j)])
+    a4, a3, a2, a1, a0 = sp.Poly(matrix.det(), s).all_coeffs()
+    zero(a0 - determinant, a1 * a2 * a3 - a1**2 * a4 - a0 * a3**2 - m * apart)
+    zero(sp.diff(apart, phi, 2) + 2 * m * (b[1] * k) ** 2, sp.diff(determinant, phi, 2))
+
+
 def main() -> int:
     """Run all checks; 1 if any fails."""
     failed = 0

@@ -23,10 +23,8 @@ from brakecli.solver.motion import Counted
 from brakecli.solver.system import System
 
 CHECK_SECONDS, _CHECK_SAMPLES = 5.0, 1_000_000  # of a run that checks, which is cut short beyond
-_DECAYED, _DECAYED_SAMPLES = (
-    15.0,
-    100_000,
-)  # powers of e by which disturbances decay in such a run; samples for that
+_DECAYED, _DECAYED_SAMPLES = 15.0, 100_000
+"""Powers of e by which disturbances are to decay in such a run, and the most samples for that."""
 _ALL_CHECKS_SECONDS = 10.0  # estimated time of all runs that check after which no more is begun
 
 

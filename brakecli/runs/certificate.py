@@ -74,7 +74,7 @@ def coarser(ratio: float) -> float:
     return 1.0 / (1.0 - math.pow(ratio, 1.0 - 1.0 / ORDER))
 
 
-def not_finer(coarse: Motion, fine: Motion) -> float:
+def coarser_by_steps(coarse: Motion, fine: Motion) -> float:
     """The error of the coarser of two event-driven runs, over what they differ by, from the steps that they took.
 
     Steps may be limited by passing waves and not by the tolerance. Two runs then take the same steps, share their

@@ -21,8 +21,8 @@ from brakecli.runs.certificate import (
     Certified,
     Rounding,
     coarser,
+    coarser_by_steps,
     compare,
-    not_finer,
     replica,
     sizes,
 )
@@ -173,7 +173,7 @@ def _by_events(system: System, progress: Progress) -> Certified:
         now = run(fine)
         factor = coarser(10.0 ** (coarse - fine))
         if fine < MOST_EVENT_DIGITS:  # the last run needs no finer one: no step of it is wrong by more than that
-            factor = max(factor, not_finer(before, now))
+            factor = max(factor, coarser_by_steps(before, now))
         apart = compare(before, now, rounding.until)
         until = apart.until(rounding.left / factor) if factor < math.inf else 0.0
         seconds, failed = sum(each.work.solve_seconds for each in runs), now.work.failed or before.work.failed

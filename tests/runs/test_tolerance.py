@@ -17,7 +17,7 @@ from brakecli.comparison.compare import errors
 from brakecli.errors import CaseError
 from brakecli.runs import ladder
 from brakecli.runs import tolerance as module
-from brakecli.runs.certificate import Certified, coarser, not_finer
+from brakecli.runs.certificate import Certified, coarser, coarser_by_steps
 from brakecli.runs.modelled import modelled
 from brakecli.runs.tolerance import certify
 from brakecli.solver.motion import Motion, solve
@@ -402,9 +402,9 @@ def test_steps_that_the_tolerance_sets_are_as_good_as_the_tolerance() -> None:
     def of(steps: int) -> Motion:
         return replace(motion, work=replace(motion.work, steps=steps))
 
-    assert not_finer(of(1000), of(round(1000 * 100 ** (1 / 8)))) == pytest.approx(coarser(1e-2), rel=1e-4)
-    assert math.isinf(not_finer(of(1000), of(1000)))
-    assert math.isinf(not_finer(of(1000), of(900)))
+    assert coarser_by_steps(of(1000), of(round(1000 * 100 ** (1 / 8)))) == pytest.approx(coarser(1e-2), rel=1e-4)
+    assert math.isinf(coarser_by_steps(of(1000), of(1000)))
+    assert math.isinf(coarser_by_steps(of(1000), of(900)))
 
 
 @pytest.mark.parametrize(("scheme", "promise"), [("event-driven", 1e-2), ("event-driven", 1e-8), ("auto", 1e-10)])

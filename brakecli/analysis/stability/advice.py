@@ -28,7 +28,7 @@ KEYS = ("*.mass", "*.stiffness", "*.damping", "*.angle_deg", "load.*")
 FACTOR, RUNGS = 10.0, 40  # values may be advised up to this factor away; steps of a ladder each way
 DEGREE = 1.0  # step of angles on a ladder, which may be advised up to ±90°
 _LEAST = 1e-6  # least advice where the value is 0, over what is large for it
-_DECOUPLED = (-90.0, 0.0, 90.0)  # °, where a link does not couple x and y
+_DECOUPLED = 0.0  # °, where a link does not couple x and y: a shoe may be stable there alone
 _IDLE = ("initial", "solver", "output")  # steady sliding does not depend on these tables
 _STEP, _ROUGH_STEP = 1e-3, 0.1  # of a derivative, as a part of the value; averages over roughness are noisy
 _ROUNDING = 1e-12  # of an answer
@@ -174,7 +174,7 @@ def advised(case: Case, path: Path, margin: float, tell: Tell) -> Change:
     value, parameter = numbers(case)[path], ".".join(path)
     assert isinstance(value, float)
     low, high = _bounds(case, parameter, value)
-    decoupled = _DECOUPLED if _is_angle(parameter) else ()
+    decoupled = (_DECOUPLED,) if _is_angle(parameter) else ()
 
     @cache
     def safe(x: float) -> bool:

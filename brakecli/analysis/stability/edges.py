@@ -17,9 +17,8 @@ from brakecli.case.case import Case
 from brakecli.solver.links import sin_cos, tensor
 from brakecli.solver.steady_sliding import PRESSED
 
-_REAL = (
-    1e-3  # largest imaginary part of a root over its size: rounding moves double ones; one too many is harmless
-)
+_REAL = 1e-3
+"""Largest imaginary part of a root over its size: rounding moves double ones, and one too many is harmless."""
 _LEFT = 1e-13  # largest coefficient that rounding may have left, over the largest one
 
 
