@@ -265,8 +265,10 @@ def _case(source: "Source | LoadedSweep", settings: "Settings | None") -> "Loade
     from brakecli.cli.inputs import load_case
 
     if isinstance(source, LoadedCase):
-        changed = parse_case(given_toml(source.case), "the case", _overrides(settings)) if settings else source
-        return replace(changed, text=source.text)
+        if settings:
+            changed = parse_case(given_toml(source.case), "the case", _overrides(settings), source.records)
+            return replace(changed, text=source.text)
+        return source
     if resolved := getattr(source, "attrs", {}).get("resolved_toml"):  # a result
         return parse_resolved(str(resolved), "its case", _overrides(settings))
     if not isinstance(source, str | PathLike):

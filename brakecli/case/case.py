@@ -12,7 +12,7 @@ import tomli_w
 from pydantic import Field
 
 from brakecli.case import tables
-from brakecli.case.roughness import NEEDLESS, Roughness
+from brakecli.case.roughness import NEEDLESS, Roughness, record_of
 from brakecli.case.tables import NonNegative, Number, Positive, Schedule, Table, described, one_of, quantity
 from brakecli.errors import BrakecliError, Problem, found
 from brakecli.solver.contact import EVALUATORS
@@ -224,8 +224,9 @@ class Case(Table):
             pad = self.contact.half_length if side == "shoe" else None
             error = 0.01 if given.profile_error is None else given.profile_error
             try:
-                sines = dict(type(given)(**sines_of(Path(given.profile), error, self.wheel.radius, pad)))
-                written = {"profile": str(Path(given.profile).absolute()), "profile_error": given.profile_error}
+                path, record = Path(given.profile), record_of(given.profile)
+                sines = dict(type(given)(**sines_of(path.name, record, error, self.wheel.radius, pad)))
+                written = {"profile": str(path.absolute()), "profile_error": given.profile_error}
                 surface = given.model_construct(given.model_fields_set, **sines | written)
                 self.__dict__["roughness"] = self.roughness.model_copy(update={side: surface})
             except OSError as failure:

@@ -2,12 +2,12 @@
 
 import math
 import stat
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from brakecli.case.roughness import Record
 from brakecli.case.tables import MOST_SINES
 from brakecli.errors import UsageError, printable
 from brakecli.files.table import Array, TextTable, require
@@ -21,16 +21,15 @@ _FARTHEST, _FLATTEST = 1e9, 1e-15  # m; no wheel is larger, and no height less
 _FEWEST = 8  # places in a turn: fewer show none of its waves but the longest three
 
 
-def sines_of(path: Path, error: float, radius: float, pad: float | None) -> dict[str, Any]:
-    """The keys of a surface that leaves out a part `error` of the RMS of a measured profile.
+def sines_of(name: str, record: Record, error: float, radius: float, pad: float | None) -> dict[str, Any]:
+    """The keys of a surface that leaves out a part `error` of the RMS of a measured profile of some name.
 
     `radius` (m) makes angles lengths. `pad` is the half length of a shoe (m); without one it is the profile of a
     wheel, of which whole turns are averaged. Otherwise the profile is repeated beyond what was measured. Raises
-    UnreadableResultError, UsageError and OSError.
+    UnreadableResultError and UsageError.
     """
-    status = path.stat()
-    place, height, is_angle = _read(path, (status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns))
-    place = place * radius if is_angle else place
+    place, height = np.frombuffer(record.place), np.frombuffer(record.height)
+    place = place * radius if record.is_angle else place
     turn, step = 2.0 * math.pi * radius, float(np.median(np.diff(place)))
     apart = f"its places lie {step:.3g} m apart, as a rule"
     require(step >= _NEAREST, f"{apart}; check their unit")
@@ -70,16 +69,12 @@ def sines_of(path: Path, error: float, radius: float, pad: float | None) -> dict
     phases = (phases - 360.0 * (chosen * place[0] / length % 1.0)) % 360.0
     note = f"{len(chosen)} of {count // 2} sines leave out {100.0 * lost:.3g} % of the RMS of {rms:.3g} m{how}"
     waves = {"orders": chosen.astype(float).tolist()} if turns else {"wavelengths": (length / chosen).tolist()}
-    note = f"{printable(path.name)}: {note}"
+    note = f"{printable(name)}: {note}"
     return {"amplitudes": amplitudes.tolist(), **waves, "phases_deg": phases.tolist(), "note": note}
 
 
-@lru_cache(maxsize=2)
-def _read(path: Path, stamp: tuple[int, ...]) -> tuple[Array, Array, bool]:
-    """Places along the surface, rising, and heights there, m; whether the places are angles, rad.
-
-    The same file serves all points of a sweep; `stamp` tells when it has changed.
-    """
+def read(path: Path) -> Record:
+    """The measured profile that a file holds; raises UnreadableResultError and OSError."""
     require(stat.S_ISREG(path.stat().st_mode), "this is not a regular file; name a CSV file")
     table = TextTable(path)
     columns = f"{table.columns} column{'s' * (table.columns > 1)}"
@@ -107,7 +102,7 @@ def _read(path: Path, stamp: tuple[int, ...]) -> tuple[Array, Array, bool]:
     high = float(np.ptp(height))
     require(high > 0.0, "all heights are equal; leave the surface out, which is smooth")
     require(high >= _FLATTEST, f"its heights differ by {high:.3g} m; check their unit")
-    return place, height, bool(along and along[1] == "radian")
+    return Record(place.tobytes(), height.tobytes(), bool(along and along[1] == "radian"))
 
 
 def _turns(place: Array, step: float, turn: float) -> tuple[int, float]:

@@ -4,9 +4,9 @@ import json
 import re
 import shlex
 import sys
-from collections.abc import Container, Sequence
+from collections.abc import Container, Mapping, Sequence
 from contextlib import nullcontext, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from importlib import resources
 from pathlib import Path
@@ -14,22 +14,28 @@ from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
-from brakecli.case import toml_lines, wording
+from brakecli.case import wording
 from brakecli.case.case import Case, resolved_toml
+from brakecli.case.roughness import Record, Records, reading
 from brakecli.case.tables import MISSING, Table, tables_within
-from brakecli.case.toml_lines import WRITING, Located, check_size, innermost, parse, split, unfit
 from brakecli.errors import CaseError, KeyPath, Problem, key_text, printable
+from brakecli.files import toml_lines
+from brakecli.files.toml_lines import WRITING, Located, check_size, innermost, parse, split, unfit
 
 _Table = TypeVar("_Table", bound=Table)
 
 
 @dataclass(frozen=True)
 class LoadedCase:
-    """A case with the text it was read from, and the same case as TOML with overrides and defaults filled in."""
+    """A case with the text it was read from, and the same case as TOML with overrides and defaults filled in.
+
+    `records` are the measured profiles of its surfaces, as they were when it was read.
+    """
 
     case: Case
     text: str
     resolved: str
+    records: Mapping[str, Record] = field(default_factory=dict)
 
 
 def starters() -> dict[str, str]:
@@ -62,15 +68,22 @@ def read_text(source: str) -> tuple[str, str]:
         raise unfit(what, "save the file as UTF-8", name, line) from error
 
 
-def parse_case(text: str, label: str, overrides: Sequence[str] = ()) -> LoadedCase:
+def parse_case(
+    text: str, label: str, overrides: Sequence[str] = (), known: Mapping[str, Record] | None = None
+) -> LoadedCase:
     """Make a case of a TOML text, which messages call `label`. Raises `CaseError`, which holds every problem.
 
     An override reads `key.path=VALUE`, the value in TOML. It replaces what the text says, creates the tables that
     it needs, and takes effect before anything is checked. Of two keys that exclude each other, such as a constant
-    load and a schedule, an override of one removes the other from the text.
+    load and a schedule, an override of one removes the other from the text. Measured profiles are read unless they
+    are `known`.
     """
-    case = parse_table(Case, text, label, overrides)
-    return LoadedCase(case, text, resolved_toml(case))
+    records = Records(known or {})
+    with reading(records):
+        case = parse_table(Case, text, label, overrides)
+    resolved = resolved_toml(case)
+    split(resolved, f"{label}, with every default filled in")  # whoever reads the result must be able to read it
+    return LoadedCase(case, text, resolved, records)
 
 
 def parse_resolved(text: str, label: str, overrides: Sequence[str] = ()) -> LoadedCase:

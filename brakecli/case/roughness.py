@@ -1,20 +1,68 @@
 """Rough surfaces as users know them: sines, orders of a turn, or a self-affine spectrum."""
 
-from collections.abc import Iterator
-from typing import Annotated, Any, ClassVar
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 from pydantic import Field
 
 from brakecli.case import tables
 from brakecli.case.tables import MOST_SINES, SMALLEST, NonNegative, Positive, Table, Weight, described, quantity
-from brakecli.errors import Problem
+from brakecli.errors import Problem, UsageError
 
+MOST_MEASURED = 2.5e8  # bytes of all measured profiles of a case or sweep, which travel to every worker
 NEEDLESS = {
     **dict.fromkeys(("amplitudes", "wavelengths", "wavenumbers", "orders"), ("note",)),
     **dict.fromkeys(("profile", "spectrum"), ("note", "phases_deg")),
 }
 """Keys of a surface that an override of one replaces, beside those that exclude each other."""
 _SINES = ("amplitudes", "wavelengths", "wavenumbers", "orders", "phases_deg")
+
+
+class Record(NamedTuple):
+    """A measured profile: places, which rise, and heights, as float64 in bytes, in m, or of angles in rad."""
+
+    place: bytes
+    height: bytes
+    is_angle: bool
+
+
+class Records(dict[str, Record]):
+    """Measured profiles by path. Each is read when it is first asked for, and never again: a file may change."""
+
+    def __missing__(self, path: str) -> Record:
+        """Read a profile, which other spellings of its path then have in common."""
+        from brakecli.case.profile import read
+
+        whole = str(Path(path).absolute())
+        self[path] = found = self[whole] if whole != path else read(Path(path))
+        if sum(2 * len(each.place) for name, each in self.items() if Path(name).is_absolute()) > MOST_MEASURED:
+            what = f"the measured profiles take more than {MOST_MEASURED / 1e6:g} MB"
+            raise UsageError(f"{what}; measure fewer places")
+        return found
+
+
+_known = ContextVar[Mapping[str, Record]]("measured profiles")
+
+
+@contextmanager
+def reading(records: Mapping[str, Record]) -> Iterator[None]:
+    """Within the block measured profiles are those of `records`."""
+    before = _known.set(records)
+    try:
+        yield
+    finally:
+        _known.reset(before)
+
+
+def record_of(path: str) -> Record:
+    """A measured profile; raises UnreadableResultError, UsageError and OSError."""
+    try:
+        return _known.get(Records())[path]
+    except KeyError:
+        raise UsageError("was not read when the sweep began; name it in the case, or in an axis") from None
 
 
 class Spectrum(Table):

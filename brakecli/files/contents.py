@@ -1,7 +1,6 @@
 """What a result file holds, and how two of them differ."""
 
 import math
-import tomllib
 from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -9,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from brakecli.errors import UnreadableResultError, UsageError, printable
+from brakecli.errors import CaseError, UnreadableResultError, UsageError, printable
 from brakecli.files.field import flat, plain
 from brakecli.files.fields import COMPARISON, LOCK_IN, RUN, SWEEP, WELCH
 from brakecli.files.read import StoredResult, Variable
+from brakecli.files.toml_lines import parse
 from brakecli.files.write import FILL
 
 _CASES = ("resolved_toml", "resolved_sweep_toml")
@@ -82,10 +82,10 @@ def _keys(result: StoredResult) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for name in _CASES:
         try:
-            found |= flat(tomllib.loads(str(result.attributes.get(name, "")), parse_float=_finite))
-        except (ValueError, RecursionError) as error:
-            what = f"{result.path}: the case in it is not valid"
-            raise UnreadableResultError(f"{what}; name an intact file") from error
+            found |= flat(parse(str(result.attributes.get(name, "")), number=_finite))
+        except (CaseError, ValueError, RecursionError) as error:
+            what = f"{result.path}: the case in it is not valid: {error}"
+            raise UnreadableResultError(f"{what.partition('; ')[0]}; name an intact file") from error
     return found
 
 

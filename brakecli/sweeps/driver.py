@@ -13,14 +13,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.errors import CannotWriteError
+from brakecli.errors import BrakecliError, CannotWriteError
 from brakecli.files.os_signals import Interrupted
 from brakecli.files.write import new_result
 from brakecli.runs.limits import free_bytes
 from brakecli.sweeps.cost import Estimate, estimate, refuse_sweep
 from brakecli.sweeps.journal import Journal, open_journal
 from brakecli.sweeps.plan import LoadedSweep, Plan
-from brakecli.sweeps.point import Status, blank
+from brakecli.sweeps.point import Status, blank, unsound
 from brakecli.sweeps.result import Findings, SweepReport, write
 from brakecli.sweeps.workers.local import LocalEngine
 from brakecli.sweeps.workers.task import Engine, Task, compute_units
@@ -116,6 +116,9 @@ def sweep(
             begin(found, resumed)
             queue = TaskQueue(journal.finished, task_size, order, engine.workers, found.together)
             notes = _compute(engine, journal, queue, progress)
+            if missing := int((~journal.finished).sum()):
+                lost = f"{output}: {missing} of {plan.units} points or lines are missing"
+                raise BrakecliError(f"{lost}; run the same command again")
             report = SweepReport(output, loaded, Findings(journal), resumed, notes, queue.units * plan.unit_length)
             write(result, report, journal)
             result.commit()
@@ -150,6 +153,8 @@ def _compute(
     ends: list[str] = []
     progress(journal.done, journal.failed)
     for task, records, seconds, failure in engine.run(queue.next_task):
+        if task is not None and records is not None and (wrong := unsound(journal.plan, records, task.size)):
+            records, failure = None, f"it returned {wrong}"
         if records is None:
             ends.append(failure)
             if task is not None and not queue.retry(task):

@@ -8,14 +8,12 @@ import json
 import math
 import os
 import struct
-import tomllib
 import zlib
 from bisect import bisect_right, insort
+from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
-from enum import StrEnum
 from io import FileIO
-from itertools import chain
 from operator import itemgetter
 from pathlib import Path
 from typing import Any
@@ -23,19 +21,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.analysis.regime.verdict import Excitation, Regime
 from brakecli.errors import BrakecliError, CannotWriteError, RefusedError, value_text
 from brakecli.files.atomic import explained, open_own
 from brakecli.files.field import flat
+from brakecli.files.toml_lines import parse
 from brakecli.sweeps.plan import Plan
-from brakecli.sweeps.point import Status, record_type
+from brakecli.sweeps.point import Status, record_type, unsound
 from brakecli.sweeps.workers.task import fingerprint
 
 _PLACE = struct.Struct("<qqI")  # first unit, units, bytes of their records, which are packed
 _HEAD = struct.Struct("<qqII")  # the place, checksum of the place and the packed records
 _LEVEL = 1  # of packing: texts are alike, and numbers hardly smaller at the others
 _AT_ONCE = 1 << 14  # points read at a time
-_KNOWN: dict[str, type[StrEnum]] = {"status": Status, "regime": Regime, "excitation": Excitation}
 _LONGEST_HEADER, _FIRST_KEY = 5_000_000, b"brakecli_version"
 MOST_DIFFERENCES = 5
 
@@ -50,14 +47,15 @@ class Journal:
         self.done, self.failed = 0, 0  # points
         self._file = file
         self._unit_bytes = plan.unit_length * self.kind.itemsize
-        self._blocks: list[tuple[int, int, int, int]] = []  # first unit, units, where their records begin and end
+        # first unit, units, where their records begin and end, and their checksum
+        self._blocks: list[tuple[int, int, int, int, int]] = []
         self._longest = {name: 1 for name in self.kind.names or () if self.kind[name].kind == "S"}  # bytes
         self._block = 0, b""  # read last: where it begins, and its records
         # Lines read last: the first and the last, and their records.
         self._slab: tuple[int, int, NDArray[Any]] | None = None
 
     def add(self, first: int, records: bytes) -> None:
-        """Append the records of finished units."""
+        """Append the records of finished units, which are sound."""
         count, packed = len(records) // self._unit_bytes, zlib.compress(records, _LEVEL)
         place = first, count, len(packed)
         offset = self._file.seek(0, os.SEEK_END)
@@ -69,7 +67,7 @@ class Journal:
             with suppress(OSError):
                 os.ftruncate(self._file.fileno(), offset)
             raise
-        self._note(place, offset + _HEAD.size, records)
+        self._note(place, offset + _HEAD.size, records, packed)
 
     @property
     def stored(self) -> np.dtype[Any]:
@@ -112,22 +110,22 @@ class Journal:
         """The records of some units, in their order."""
         length, kind = self.plan.unit_length, self.stored
         records = np.empty((last - first) * length, kind)
-        for begin, count, start, end in self._blocks[bisect_right(self._blocks, first, key=itemgetter(0)) - 1 :]:
+        for begin, count, *block in self._blocks[bisect_right(self._blocks, first, key=itemgetter(0)) - 1 :]:
             if begin >= last:
                 break
-            data = self._unpacked(start, end)
+            data = self._unpacked(*block)
             low, high = max(begin, first), min(begin + count, last)
             found = np.frombuffer(data, self.kind)[(low - begin) * length : (high - begin) * length]
             records[(low - first) * length : (high - first) * length] = found
         return records
 
-    def _unpacked(self, start: int, end: int) -> bytes:
-        """The records of a block, which may be read in pieces."""
+    def _unpacked(self, start: int, end: int, checksum: int) -> bytes:
+        """The records of a block, which may be read in pieces: those that were sound when it was noted."""
         if self._block[0] != start:
-            try:
-                self._block = start, zlib.decompress(os.pread(self._file.fileno(), end - start, start))
-            except zlib.error:
-                raise BrakecliError(f"{self.path}: was changed while in use; run the same command again") from None
+            packed = os.pread(self._file.fileno(), end - start, start)
+            if zlib.crc32(packed) != checksum:
+                raise BrakecliError(f"{self.path}: was changed while in use; run the same command again")
+            self._block = start, zlib.decompress(packed)
         return self._block[1]
 
     def discard(self) -> None:
@@ -167,32 +165,24 @@ class Journal:
             if len(packed) < length or _checksum((first, count, length), packed) != checksum:
                 break
             if not self.finished[first : first + count].any():  # a copy of a block brings nothing new
-                if (records := self._sound(packed, count * self._unit_bytes)) is None:
+                if (records := self._sound(packed, count)) is None:
                     break
-                self._note((first, count, length), offset + _HEAD.size, records)
+                self._note((first, count, length), offset + _HEAD.size, records, packed)
             offset = self._file.tell()
         os.ftruncate(self._file.fileno(), offset)
 
-    def _sound(self, packed: bytes, size: int) -> bytes | None:
-        """The records of a block of so many bytes; None where they are not what belongs there."""
+    def _sound(self, packed: bytes, count: int) -> bytes | None:
+        """The records of a block of so many units; None where they are not what belongs there."""
+        stream = zlib.decompressobj()
         try:
-            stream = zlib.decompressobj()
-            records = stream.decompress(packed, size + 1)
-            found = np.frombuffer(records, self.kind)
-            for name in self.kind.names or ():
-                if self.kind[name].kind == "S":
-                    known = {each.decode() for each in np.unique(found[name]).tolist()}
-                    if not known <= {*_KNOWN.get(name, known)}:
-                        return None
-                elif self.kind[name].base.kind == "f" and np.isinf(found[name]).any():
-                    return None
-        except (zlib.error, ValueError):  # also texts that are not UTF-8
+            records = stream.decompress(packed, count * self._unit_bytes + 1)
+        except zlib.error:
             return None
-        return records if len(records) == size and stream.eof else None
+        return records if stream.eof and not unsound(self.plan, records, count) else None
 
-    def _note(self, place: tuple[int, int, int], offset: int, records: bytes) -> None:
+    def _note(self, place: tuple[int, int, int], offset: int, records: bytes, packed: bytes) -> None:
         first, count, length = place
-        insort(self._blocks, (first, count, offset, offset + length))
+        insort(self._blocks, (first, count, offset, offset + length, zlib.crc32(packed)))
         self.finished[first : first + count] = True
         found = np.frombuffer(records, self.kind)
         self.done += len(found)
@@ -234,22 +224,14 @@ def _checksum(place: tuple[int, int, int], packed: bytes) -> int:
 def identity(plan: Plan) -> dict[str, Any]:
     """What makes a sweep this one: every key of the sweep and its case, and the versions it is computed with.
 
-    Of measured profiles, also those that points read, the contents count.
+    Of the measured profiles that points need, the contents count.
     """
-    sweep, case = dict(flat(tomllib.loads(plan.sweep_text))), dict(flat(plan.case_keys))
-    values = [(key, value) for axis in plan.sweep.axis for key in axis.parameter for value in axis.values or ()]
-    given = chain(case.items(), *(flat(value, key) for key, value in values))
-    read = sorted({Path(text) for key, text in given if key.endswith(".profile") and isinstance(text, str)})
-    named = {path.name: [each for each in read if each.name == path.name] for path in read}
-    measured = {f"checksum of {name}": [_contents(each) for each in paths] for name, paths in named.items()}
+    sweep, case = dict(flat(parse(plan.sweep_text))), dict(flat(plan.case_keys))
+    measured = defaultdict[str, list[int]](list)
+    for path, record in sorted({str(Path(path).absolute()): each for path, each in plan.records.items()}.items()):
+        checksum = zlib.crc32(record.height, zlib.crc32(record.place, record.is_angle))
+        measured[f"checksum of {Path(path).name}"].append(checksum)
     return {**fingerprint(), **case, **measured, **{f"sweep {key}": each for key, each in sweep.items()}}
-
-
-def _contents(path: Path) -> int | None:
-    """A checksum of a file; None where it cannot be read."""
-    with suppress(OSError, ValueError):
-        return zlib.crc32(path.read_bytes()) if path.is_file() else None
-    return None
 
 
 def _refusal(found: bytes, own: Mapping[str, Any]) -> str:

@@ -14,6 +14,7 @@ from brakecli.analysis.stability.report import is_stable, stability
 from brakecli.analysis.stability.search import bisect
 from brakecli.case.case import given_toml
 from brakecli.case.read import LoadedCase
+from brakecli.case.roughness import Records
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError
 from brakecli.files import fields
@@ -45,7 +46,7 @@ class LockIn:
 def lock_in(loaded: LoadedCase, axis: Axis, option: str, progress: Counted) -> LockIn:
     """Modes and critical friction at each value of an axis; messages call the axis `option`. Raises CaseError."""
     sweep = {"case": "-", "axis": [axis.model_dump(exclude_unset=True)]}
-    plan = Plan(tomli_w.dumps(sweep), given_toml(loaded.case))
+    plan = Plan(tomli_w.dumps(sweep), given_toml(loaded.case), Records(loaded.records))
 
     def system_at(value: float) -> System:
         settings = dict.fromkeys(plan.settings(0), value)

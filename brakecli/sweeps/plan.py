@@ -2,11 +2,11 @@
 
 import json
 import math
-import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import tomli_w
@@ -15,13 +15,14 @@ from pydantic import ValidationError
 from brakecli.case import wording
 from brakecli.case.case import Case, given_toml
 from brakecli.case.read import LoadedCase, key_path, parse_case, parse_table, put, read_text
+from brakecli.case.roughness import Record, Records, reading
 from brakecli.case.tables import Table
-from brakecli.case.toml_lines import Located, innermost
 from brakecli.errors import CaseError, KeyPath, Problem
 from brakecli.files import fields
+from brakecli.files.toml_lines import Located, innermost, parse
 from brakecli.sweeps.tables import Axis, Sweep
 
-MOST_TRIED = 1000  # listed values of an axis that are tried before the sweep starts; of a range it is both ends
+MOST_TRIED = 1000  # listed numbers of an axis that are tried before the sweep starts; of a range it is both ends
 
 _ALONE = ("shoe", "wheel", "link1", "link2", "load", "friction", "contact", "solver")
 """Tables of a case that hold nothing which follows from another table."""
@@ -34,13 +35,16 @@ class Plan:
     """A sweep with its base case: all that a worker needs.
 
     Both texts hold the keys that were given, overrides applied: a default that follows from another key follows it
-    at every point.
+    at every point. `records` are the measured profiles that points need: no file is opened where points are
+    computed, and what becomes of a file meanwhile does not matter.
     """
 
-    def __init__(self, sweep_text: str, case_text: str) -> None:
+    def __init__(
+        self, sweep_text: str, case_text: str, records: Mapping[str, Record] = MappingProxyType({})
+    ) -> None:
         """Read the sweep and the keys of its case."""
-        self.sweep_text, self.case_text = sweep_text, case_text
-        self.sweep, self.case_keys = parse_table(Sweep, sweep_text, "the sweep"), tomllib.loads(case_text)
+        self.sweep_text, self.case_text, self.records = sweep_text, case_text, records
+        self.sweep, self.case_keys = parse_table(Sweep, sweep_text, "the sweep"), parse(case_text, "the case")
         axes = self.sweep.axis
         self.shape = tuple(axis.size for axis in axes)
         self.points = math.prod(self.shape)  # of the grid
@@ -56,8 +60,8 @@ class Plan:
         self.units = self.passes * self.points // self.unit_length
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Travel as two texts."""
-        return plan_of, (self.sweep_text, self.case_text)
+        """Travel as two texts and the measured profiles."""
+        return plan_of, (self.sweep_text, self.case_text, tuple(self.records.items()))
 
     def places(self, point: int) -> tuple[int, ...]:
         """Where a point lies along each axis; points are counted with the last axis fastest."""
@@ -80,7 +84,8 @@ class Plan:
         same = [name for name in _ALONE if name not in touched and data.get(name) == self.case_keys.get(name)]
         data |= {name: self._valid[name] for name in same if name in self._valid}
         try:
-            case = Case.model_validate(data)
+            with reading(self.records):
+                case = Case.model_validate(data)
             self._valid |= {name: getattr(case, name) for name in same}
             return case
         except ValidationError as error:
@@ -107,9 +112,10 @@ def _tables(data: dict[str, Any]) -> dict[str, Any]:
 
 
 @lru_cache(maxsize=4)
-def plan_of(sweep_text: str, case_text: str) -> Plan:
-    """The plan of the texts of a sweep and of its case; a worker meets the same ones again and again."""
-    return Plan(sweep_text, case_text)  # `lru_cache(Plan)` would inherit `__reduce__`, and could not be sent
+def plan_of(sweep_text: str, case_text: str, records: tuple[tuple[str, Record], ...]) -> Plan:
+    """The plan of what travels; a worker meets the same one again and again."""
+    # `lru_cache(Plan)` would inherit `__reduce__`, and could not be sent
+    return Plan(sweep_text, case_text, dict(records))
 
 
 @dataclass(frozen=True)
@@ -156,12 +162,12 @@ def _checked(sweep: Sweep, text: str, name: str, base: LoadedCase) -> LoadedSwee
     given = tomli_w.dumps(sweep.model_dump(mode="json", exclude_unset=True, exclude_none=True))
     keys = [key_path(text) for axis in sweep.axis if not axis.direction for text in axis.parameter]
     keys += [key_path(sweep.critical.parameter)] if sweep.critical else []
-    # Other keys leave the sines of a measured profile as they are: workers elsewhere do without its file. Along a
-    # line the wheel keeps its waves.
+    # Other keys leave the sines of a measured profile as they are, and along a line the wheel keeps its waves.
     anew = any(path[0] == "roughness" or path in (("wheel",), ("wheel", "radius")) for path in keys)
-    plan = Plan(given, given_toml(base.case, profiles=anew))
+    plan = Plan(given, given_toml(base.case, profiles=anew), Records(base.records if anew else {}))
     if problems := _wrong_values(plan, text, name):
         raise CaseError(problems)
+    plan.records = dict(plan.records)  # which reads nothing any more
     resolved = tomli_w.dumps(sweep.model_dump(mode="json", exclude_none=True))
     return LoadedSweep(sweep, text, resolved, base, plan)
 
@@ -193,13 +199,14 @@ def _wrong_values(plan: Plan, text: str, name: str) -> list[Problem]:
     if (critical := plan.sweep.critical) is not None:
         axes["critical",] = Axis(parameter=(critical.parameter,), values=(critical.lower, critical.upper))
     lines = Located(text, name).lines
-    corners = [{}, plan.settings(0), plan.settings(plan.points - 1)]
+    corners = [plan.settings(0), plan.settings(plan.points - 1)]
     problems: dict[tuple[int, str], Problem] = {}
     for path, axis in axes.items():
         line = innermost(lines, (*path, "parameter"), 0)
-        for value in (axis.start, axis.stop) if axis.values is None else axis.values[:MOST_TRIED]:
+        tried = (axis.start, axis.stop) if axis.values is None else axis.values
+        for value in tried[: MOST_TRIED if axis.numeric else None]:  # all profiles are read
             settings = {key_path(parameter): value for parameter in axis.parameter}
-            found = [plan.problems(corner | settings) for corner in corners]
-            for problem in found[0] if all(found) else ():
+            found = plan.problems(settings)
+            for problem in found if found and all(plan.problems(corner | settings) for corner in corners) else ():
                 problems.setdefault((line, problem.key), replace(problem, source=name, line=line))
     return list(problems.values())

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.analysis.regime.verdict import Verdict
+from brakecli.analysis.regime.verdict import Excitation, Regime, Verdict
 from brakecli.case.case import Case
 from brakecli.case.read import key_path
 from brakecli.case.system import system_of
@@ -19,6 +19,7 @@ from brakecli.case.tables import SMALLEST
 from brakecli.errors import BrakecliError
 from brakecli.files import fields
 from brakecli.files.field import values_of
+from brakecli.files.valid import LARGEST
 from brakecli.runs.certificate import Certificate, Certified
 from brakecli.runs.limits import Check, check, refuse, within_range
 from brakecli.runs.run import motion_of, verdict_in_memory
@@ -43,10 +44,32 @@ class Status(StrEnum):
     CRASHED = "crashed"
 
 
+_KNOWN: dict[str, type[StrEnum]] = {"status": Status, "regime": Regime, "excitation": Excitation}
+
+
 @lru_cache(maxsize=4)
 def record_type(plan: Plan) -> np.dtype[Any]:
     """The record of a point of the sweep."""
     return np.dtype([(field.name, field.kind) for field in plan.fields])
+
+
+def unsound(plan: Plan, records: bytes, units: int) -> str:
+    """Why these are not the records of so many units, wherever they come from; empty where they are."""
+    kind, size = record_type(plan), len(records)
+    if size != units * plan.unit_length * kind.itemsize:
+        return f"{size} bytes in place of {units * plan.unit_length} records of {kind.itemsize}"
+    found = np.frombuffer(records, kind)
+    return next((f"a {name} that no point has" for name in kind.names or () if not _fits(name, found[name])), "")
+
+
+def _fits(name: str, values: NDArray[Any]) -> bool:
+    """Whether points may have these values; numbers may be missing, counts not."""
+    if values.dtype.kind != "S":
+        return bool((values >= 0).all()) if values.dtype.kind == "i" else not (np.abs(values) > LARGEST).any()
+    with suppress(UnicodeDecodeError):
+        texts = {each.decode() for each in np.unique(values).tolist()}
+        return texts <= {*_KNOWN.get(name, texts)}
+    return False
 
 
 @dataclass(frozen=True)
@@ -225,6 +248,8 @@ def computed(
             with within_range():
                 found = search(critical, lambda value: plan.case({**point.settings, path: value}), verdict_of)
             values |= values_of(fields.CRITICAL, found)
+        if large := [name for name, each in values.items() if isinstance(each, float) and abs(each) > LARGEST]:
+            raise FloatingPointError(f"{large[0]} is too large for a result")
     except FAULTS as error:
         reason = OUT_OF_MEMORY if isinstance(error, MemoryError) else "; ".join(str(error).splitlines())
         return blank(record_type(plan), Status.FAILED, reason), None

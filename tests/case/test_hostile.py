@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from brakecli.case.read import parse_case, read_text
-from brakecli.case.toml_lines import LARGEST_TEXT, MOST_MARKS, MOST_PARTS, MOST_STATEMENTS
 from brakecli.errors import CaseError
+from brakecli.files.toml_lines import LARGEST_TEXT, MOST_MARKS, MOST_PARTS, MOST_STATEMENTS
 from tests.case.examples import CONSTANT, change, messages, problems, put
 
 HOSTILE = {

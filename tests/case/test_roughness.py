@@ -377,10 +377,13 @@ def test_a_profile_that_was_changed_is_read_again_and_ends_a_continuation(tmp_pa
     path = profiled(tmp_path)
     text = "case = 'case.toml'\n[[axis]]\nparameter = 'wheel.radius'\nvalues = [0.5, 0.6]\n"
     plan, before = parse_sweep(text, "sweep.toml", tmp_path).plan, parse_case(*read_text(str(path))).resolved
-    was = identity(plan)
+    was, surfaces = identity(plan), [plan.case(plan.settings(point)) for point in range(2)]
     saved(tmp_path / "runout.csv", "s_m,h_um", RADIUS * np.radians(ANGLES), 2.0 * RUNOUT)
     assert parse_case(*read_text(str(path))).resolved != before
-    assert {key for key, value in identity(plan).items() if was[key] != value} == {"checksum of runout.csv"}
+    assert identity(plan) == was
+    assert [plan.case(plan.settings(point)) for point in range(2)] == surfaces
+    again = identity(parse_sweep(text, "sweep.toml", tmp_path).plan)
+    assert {key for key, value in again.items() if was[key] != value} == {"checksum of runout.csv"}
 
 
 def test_a_result_says_why_it_does_not_take_what_its_surface_was_made_of(tmp_path: Path) -> None:

@@ -2,10 +2,11 @@
 
 import json
 import os
+import pickle
 import random
 import re
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +15,15 @@ import pytest
 
 from brakecli import __version__
 from brakecli.cli.inputs import load_sweep
-from brakecli.errors import CannotWriteError, RefusedError
+from brakecli.errors import BrakecliError, CannotWriteError, RefusedError
 from brakecli.solver.compile import source_hash
+from brakecli.sweeps.driver import sweep
 from brakecli.sweeps.journal import open_journal
-from brakecli.sweeps.plan import LoadedSweep
-from brakecli.sweeps.workers.task import compute_units, fingerprint
+from brakecli.sweeps.plan import LoadedSweep, Plan
+from brakecli.sweeps.point import record_type
+from brakecli.sweeps.workers.task import Finished, NextTask, compute_units, fingerprint
 from tests.commands import ROOT, TINY, brakecli, left_in
-from tests.sweeps.helpers import axis, frictions, inline, interrupted, write_sweep
+from tests.sweeps.helpers import Inline, axis, frictions, inline, interrupted, quick, write_sweep
 
 pytestmark = pytest.mark.usefixtures("compiled")
 
@@ -180,20 +183,33 @@ def forged(name: str, value: Any) -> Callable[[bytes, np.dtype[Any]], bytes]:
         forged("status", b"relaxati"),
         forged("regime", b"nonsense"),
         forged("amplitude", np.inf),
+        forged("frequency", 1e308),
+        forged("steps", -1),
         forged("reason", b"\xff\xfe"),
         lambda records, kind: records[:-1],
         lambda records, kind: records[: -kind.itemsize],
         lambda records, kind: records + records,
         lambda records, kind: b"",
     ],
-    ids=["status", "regime", "infinite", "not UTF-8", "cut", "fewer", "more", "none"],
+    ids=["status", "regime", "infinite", "too large", "negative", "not UTF-8", "cut", "fewer", "more", "none"],
 )
+@pytest.mark.parametrize("by", ["a journal", "a worker"])
 def test_a_block_that_holds_something_else_is_computed_again(
-    tmp_path: Path, forge: Callable[[bytes, np.dtype[Any]], bytes], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, forge: Callable[[bytes, np.dtype[Any]], bytes], by: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its checksum is right: somebody has made it."""
-    loaded = write_sweep(tmp_path, frictions(4))
+    loaded, tried = write_sweep(tmp_path, frictions(4)), set[int]()
     inline(loaded, tmp_path / "expected.h5")
+
+    def wrong_once(plan: Plan, first: int, count: int) -> bytes:
+        wrong = first not in tried
+        tried.update(range(first, first + count))
+        return forge(quick(plan, first, count), record_type(plan)) if wrong else quick(plan, first, count)
+
+    if by == "a worker":
+        assert len(inline(loaded, tmp_path / "s.h5", wrong_once, task_size=2).notes) == 1
+        assert (tmp_path / "s.h5").read_bytes() == (tmp_path / "expected.h5").read_bytes()
+        return
     with open_journal(tmp_path / "s.h5.partial", loaded.plan, force=False) as journal:
         pack = zlib.compress
         monkeypatch.setattr(zlib, "compress", lambda records, level: pack(forge(records, journal.kind), level))
@@ -232,9 +248,31 @@ def test_points_of_profiles_that_were_measured_anew_are_refused(
     interrupted(loaded, Path("s.h5"), limit=2, task_size=1)
     Path(changed).write_text(PROFILE.replace("5,1", "5,1.1"))
     with pytest.raises(RefusedError, match=f"checksum of {Path(changed).name} was "):
-        inline(loaded, Path("s.h5"))
-    Path(changed).write_text(PROFILE)
-    assert inline(loaded, Path("s.h5")).resumed == 2
+        inline(load_sweep("s.toml", None), Path("s.h5"))
+    assert inline(loaded, Path("s.h5")).resumed == 2  # what was read before goes on as it was
+
+
+def test_a_profile_that_changes_or_goes_while_a_sweep_runs_changes_no_point(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also in workers whose working directory is another one."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("p.csv", "q.csv"):
+        Path(name).write_text(PROFILE)
+    surface = "\n[roughness]\nwheel.profile = 'p.csv'\n"
+    profiles, radii = axis("roughness.wheel.profile", "values = ['p.csv', 'q.csv']"), "values = [0.5, 0.6]"
+    loaded = write_sweep(Path(), profiles, axis("wheel.radius", radii), case=TINY + surface)
+    inline(loaded, tmp_path / "whole.h5", compute_units)
+
+    def careless(plan: Plan, first: int, count: int) -> bytes:
+        records = compute_units(pickle.loads(pickle.dumps(plan)), first, count)
+        Path("p.csv").write_text(PROFILE.replace("5,1", "5,1.1"))
+        Path("q.csv").unlink(missing_ok=True)
+        monkeypatch.chdir("/")
+        return records
+
+    inline(loaded, tmp_path / "edited.h5", careless, task_size=1)
+    assert (tmp_path / "edited.h5").read_bytes() == (tmp_path / "whole.h5").read_bytes()
 
 
 def test_every_bit_of_the_place_of_a_block_is_part_of_its_checksum(tmp_path: Path) -> None:
@@ -275,3 +313,22 @@ def test_what_is_no_journal_is_named_and_left_alone(tmp_path: Path, kind: str, f
         inline(loaded, tmp_path / "s.h5", compute_units, force=force)
     assert (place.lstat().st_mode, place.lstat().st_size) == (before.st_mode, before.st_size)
     assert (tmp_path / "precious").read_bytes() == b"kept\n"
+
+
+def test_nothing_is_written_while_a_point_is_missing(tmp_path: Path) -> None:
+    loaded = write_sweep(tmp_path, frictions(6))
+
+    class Forgetful(Inline):
+        """An engine that loses its second task."""
+
+        def run(self, next_task: NextTask) -> Iterator[Finished]:
+            for number, finished in enumerate(super().run(next_task)):
+                if number != 1:
+                    yield finished
+
+    with pytest.raises(
+        BrakecliError, match=r"s\.h5: 2 of 6 points or lines are missing; run the same command again"
+    ):
+        sweep(loaded, tmp_path / "s.h5", Forgetful(loaded.plan, quick), force=False, task_size=2)
+    assert left_in(tmp_path) == {"tiny.toml", "s.toml", "s.h5.partial"}
+    assert inline(loaded, tmp_path / "s.h5").resumed == 4

@@ -81,7 +81,7 @@ class ClusterEngine(Engine):
                 task = running.pop(future)
                 seen = time.monotonic()
                 if finished is not None:
-                    yield finished
+                    yield finished._replace(task=task)
                 elif task.last_try and task is not alone:
                     suspects.append(task)
                 else:

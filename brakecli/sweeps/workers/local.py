@@ -99,7 +99,7 @@ class LocalEngine(Engine):
             return Finished(task, failure=_cause_of_death(worker.process.exitcode or 0))
         if finished.records is None:  # it ends itself after that
             self._remove(worker)
-        return finished
+        return finished._replace(task=task)
 
 
 def _cause_of_death(code: int) -> str:

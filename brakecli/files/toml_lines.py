@@ -6,7 +6,7 @@ into its statements, and each of them is parsed by itself.
 
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
 from brakecli.errors import CaseError, KeyPath, Problem, key_text, printable
@@ -161,10 +161,14 @@ class Located:
         self.problems.append(Problem(path, what, "keep one of the two", self._source, line))
 
 
-def parse(text: str, source: str = "", line: int = 1) -> dict[str, Any]:
-    """The data of a text that begins in a line of a file; raises `CaseError`."""
+def parse(text: str, source: str = "", line: int = 1, number: Callable[[str], Any] = float) -> dict[str, Any]:
+    """The data of a text, given or stored, that begins in a line of a file; raises `CaseError`.
+
+    `number` makes something of what is written with a point or an exponent.
+    """
+    split(text, source)
     try:
-        return tomllib.loads(text)
+        return tomllib.loads(text, parse_float=number)
     except RecursionError:
         remedy = "case files hold no list or table of more than two levels"
         raise unfit("is nested too deep", remedy, source, line) from None

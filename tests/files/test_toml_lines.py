@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from brakecli.case.read import parse_case
-from brakecli.case.toml_lines import Located
 from brakecli.errors import CaseError
+from brakecli.files.toml_lines import Located
 from tests.case.examples import CONSTANT, change, messages, where
 
 
