@@ -25,10 +25,9 @@ from brakecli.runs.pilot import Price, measured
 from brakecli.solver.contact.pad import NODES_PER_WAVE
 from brakecli.solver.history import ROW_BYTES
 from brakecli.solver.links import natural_frequencies
-from brakecli.solver.system import MOST_TABLE_BYTES, WHOLE, System
+from brakecli.solver.system import MOST_STEPS, WHOLE, System
 
 _TWO_DIGITS = Context(prec=2, rounding=ROUND_DOWN)
-MOST_STEPS = 1e11
 MOST_SECONDS = 24 * 3600.0
 MOST_BYTES = 1e11
 UNSTABLE = 1e-5  # growth per step that no rounding of the eigenvalues explains
@@ -98,10 +97,7 @@ def refuse(found: Check, free_bytes: float = math.inf) -> None:
     if found.file_size > min(MOST_BYTES, free_bytes):
         raise RefusedError(f"the file would be too large, {free_bytes / 1e6:.3g} MB are free: {size}; {remedy}")
     system.refuse_tables()
-    if (held := held_bytes(system)) > MOST_TABLE_BYTES:
-        what = f"histories of {system.samples:.3g} samples are held to keep the tolerance, which takes"
-        instead = "increase output.sample_interval, or give solver.step instead"
-        raise RefusedError(f"{what} {held / 1e9:.3g} GB of memory; {instead}")
+    system.refuse_steps(held_bytes(system))
     if _blows_up(growth, found.steps):
         longest = _longest_stable_step(system)
         shorter = f"take a solver.step of at most {_down(longest)} s" if longest else "reduce solver.step"

@@ -14,16 +14,15 @@ from brakecli.analysis.regime.forced import GROWN
 from brakecli.analysis.regime.of_run import context, numbers_of, stored_run, verdict_on
 from brakecli.analysis.regime.verdict import Excitation, Feeds, Regime, Thresholds
 from brakecli.analysis.stability.modes import crossings, growth
-from brakecli.errors import CaseError, RefusedError
+from brakecli.errors import CaseError
 from brakecli.runs.cost import duration_text
 from brakecli.runs.limits import check, refuse
 from brakecli.runs.run import motion_of
 from brakecli.solver.history import History, array_history
 from brakecli.solver.motion import Counted, Progress
-from brakecli.solver.quantities import HISTORY
 from brakecli.solver.roughness import surface
 from brakecli.solver.steady_sliding import steady_sliding
-from brakecli.solver.system import MOST_TABLE_BYTES, Initial, System
+from brakecli.solver.system import Initial, System
 
 _REDUCED = 1.0 / 3.0  # of the critical friction: far below it also where surfaces that open move it
 _LOST = 4.0  # powers of e by which what is not forced has decayed
@@ -56,9 +55,6 @@ def classify_twice(
         second = second_system(system, history)
         found = check(second.system)
         refuse(found)
-        if (size := 8.0 * len(HISTORY) * found.system.samples) > MOST_TABLE_BYTES:
-            remedy = "run the case with a shorter solver.duration or a larger output.sample_interval"
-            raise RefusedError(f"--second-run: its history would take {size / 1e9:.3g} GB of memory; {remedy}")
         say(f"second run, {second.change}, four times as long: about {duration_text(found.seconds)}")
         feeds, sticks, shown = compared(second, history, lambda done: progress("steps", done, second.system.steps))
         verdict = verdict_on(history, system, failure, thresholds, feeds, sticks)

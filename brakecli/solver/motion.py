@@ -112,7 +112,8 @@ class Stepping:
     """
 
     def __init__(self, system: System) -> None:
-        """Put the shoe at its start."""
+        """Put the shoe at its start; raises RefusedError where the way to the end is too long."""
+        system.refuse_steps(0.0)
         self.system, self.scheme = system, system.scheme
         self.work = Work()
         self.events = np.zeros((EVENTS, 2))
@@ -142,6 +143,7 @@ class Stepping:
         self, sink: Sink | None = None, progress: Progress = lambda steps: None, first_block: int = 1
     ) -> Motion:
         """Step to the end or to a failure; the arguments are those of `solve`."""
+        self.system.refuse_steps(0.0 if sink else 8.0 * len(HISTORY) * self.system.samples)
         lag, work, kept = self.scheme.LAG, self.work, [np.zeros((0, len(HISTORY)))]
         sink = sink or kept.append
         last, most = self.system.steps + lag, BLOCK_ROWS * self.system.per_sample

@@ -17,6 +17,7 @@ from brakecli.solver.records import Coefficients, Grid, Weights
 from brakecli.solver.roughness import Surface
 from brakecli.solver.schedules import Schedule, value_at
 
+MOST_STEPS = 1e11
 MOST_TABLE_BYTES = 4e9
 WHOLE = 1e-9
 """A ratio this close to a whole number is whole."""
@@ -156,6 +157,16 @@ class System:
     def most_turns(self) -> float:
         """Waves per metre of the shortest wave of both surfaces, 1/m; 0 where they are smooth."""
         return max([*self.shoe.turns, *self.wheel.turns], default=0.0)
+
+    def refuse_steps(self, held: float) -> None:
+        """Raise RefusedError where a run would not end, or hold samples of too many bytes in memory."""
+        if self.steps > MOST_STEPS:
+            remedy = "reduce solver.duration and output.sample_interval, or increase solver.step"
+            raise RefusedError(f"the run is too long: {self.steps:.3g} steps; {remedy}")
+        if held > MOST_TABLE_BYTES:
+            what = f"histories of {self.samples:.3g} samples are held in memory, which takes {held / 1e9:.3g} GB"
+            remedy = "reduce solver.duration, or increase output.sample_interval"
+            raise RefusedError(f"{what}; {remedy}")
 
     @cached_property
     def natural_frequencies(self) -> tuple[float, float]:

@@ -326,9 +326,7 @@ def test_nothing_is_written_while_a_point_is_missing(tmp_path: Path) -> None:
                 if number != 1:
                     yield finished
 
-    with pytest.raises(
-        BrakecliError, match=r"s\.h5: 2 of 6 points or lines are missing; run the same"
-    ):
+    with pytest.raises(BrakecliError, match=r"s\.h5: 2 of 6 points or lines are missing; run the same"):
         sweep(loaded, tmp_path / "s.h5", Forgetful(loaded.plan, quick), force=False, task_size=2)
     assert left_in(tmp_path) == {"tiny.toml", "s.toml", "s.h5.partial"}
     assert inline(loaded, tmp_path / "s.h5").resumed == 4
