@@ -1,6 +1,7 @@
 """`import brakecli`: cases in, xarray objects out, as on the command line. Large imports wait for a call."""
 
 import multiprocessing
+import os
 import signal
 import tempfile
 import threading
@@ -144,7 +145,8 @@ def sweep(
 ) -> "xr.Dataset":
     """Simulate a grid of cases, or search for critical values: a dataset with a dimension for each axis.
 
-    A script that calls this needs `if __name__ == "__main__":` around its work, as workers are new processes.
+    A script that calls this needs `if __name__ == "__main__":` around its work, as workers are new processes that
+    run it anew; not with `jobs=1`, which computes in this process.
 
     Args:
         source: path of a sweep file, or what `load` gave; with `axes` or `critical` a case.
@@ -152,7 +154,8 @@ def sweep(
         axes: values of each key, as `{"friction.coefficient": [0.3, 0.5]}`; a tuple of keys takes the same values.
         critical: the keys of `[critical]`, as `{"parameter": "friction.coefficient", "lower": 0, "upper": 2}`.
         output: a result file to keep; with it, an interrupted sweep goes on where it was.
-        jobs: worker processes; one for each core if left out.
+        jobs: worker processes; one for each core if left out. Where the environment names a dask cluster in
+            `DASK_SCHEDULER_ADDRESS`, its workers compute.
         force: replace that file if it exists.
 
     Raises:
@@ -161,7 +164,7 @@ def sweep(
     if jobs is not None and not (isinstance(jobs, int) and 1 <= jobs <= 4096):
         raise UsageError(f"jobs {jobs}: is no number of workers from 1 to 4096")
     if getattr(multiprocessing.current_process(), "_inheriting", False):  # a worker that is being started
-        raise UsageError('brakecli.sweep: in a script, call it below  if __name__ == "__main__":')
+        os._exit(os.EX_USAGE)  # which tells the caller that there is no guard
     with _interruptible(), _target(output) as path:
         from brakecli.cli.inputs import load_sweep
         from brakecli.files.as_xarray import opened
@@ -178,7 +181,8 @@ def sweep(
         else:
             loaded = load_sweep(str(source), _overrides(settings))
         load_kernels(loaded.base)
-        with choose_engine(loaded.plan, jobs) as engine:
+        scheduler = os.environ.get("DASK_SCHEDULER_ADDRESS") or None
+        with choose_engine(loaded.plan, jobs, scheduler, in_caller=True) as engine:
             report = sweep(loaded, path, engine, force=force)
         _warn(report.notes)
         if found := report.findings.failures:

@@ -22,7 +22,7 @@ from brakecli.sweeps.journal import Journal, open_journal
 from brakecli.sweeps.plan import LoadedSweep, Plan
 from brakecli.sweeps.point import Status, blank, unsound
 from brakecli.sweeps.result import Findings, SweepReport, write
-from brakecli.sweeps.workers.local import LocalEngine
+from brakecli.sweeps.workers.local import CallerEngine, LocalEngine
 from brakecli.sweeps.workers.task import Engine, Task, compute_units
 
 TASK_SECONDS = 0.2  # of work in a task, so that handing it out costs little,
@@ -71,12 +71,21 @@ class TaskQueue:
 
 
 def choose_engine(
-    plan: Plan, jobs: int | None, scheduler: str | None = None, scheduler_file: str | None = None
+    plan: Plan,
+    jobs: int | None,
+    scheduler: str | None = None,
+    scheduler_file: str | None = None,
+    *,
+    in_caller: bool = False,
 ) -> Engine:
-    """The engine for a sweep: workers here, or those of a dask scheduler. Raises UsageError."""
+    """The engine for a sweep: workers here, or those of a dask scheduler. Raises UsageError.
+
+    `in_caller`: a single worker is this process itself.
+    """
     compute = partial(compute_units, plan)
     if scheduler is None and scheduler_file is None:
-        return LocalEngine(compute, min(jobs or cores(), plan.units))
+        workers = min(jobs or cores(), plan.units)
+        return CallerEngine(compute) if in_caller and jobs == 1 else LocalEngine(compute, workers)
     from brakecli.sweeps.workers.dask import ClusterEngine
 
     return ClusterEngine(compute, scheduler, scheduler_file)

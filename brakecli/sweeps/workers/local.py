@@ -12,7 +12,7 @@ from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 
 from brakecli import ONE_THREAD
-from brakecli.errors import BrakecliError
+from brakecli.errors import BrakecliError, UsageError
 from brakecli.files.os_signals import signals_deferred
 from brakecli.sweeps.workers.task import Compute, Engine, Finished, NextTask, Task, attempt
 
@@ -27,6 +27,24 @@ class Worker:
     process: SpawnProcess
     pipe: Connection
     task: Task | None = None
+
+
+class CallerEngine(Engine):
+    """This process itself: nothing is started, so that a script needs no guard."""
+
+    workers = 1
+
+    def __init__(self, compute: Compute) -> None:
+        """Remember what computes."""
+        self._compute = compute
+
+    def __exit__(self, *error: object) -> None:
+        """Nothing was started."""
+
+    def run(self, next_task: NextTask) -> Iterator[Finished]:
+        """Compute until there are no more tasks."""
+        while (task := next_task()) is not None:
+            yield attempt(self._compute, task)
 
 
 class LocalEngine(Engine):
@@ -96,6 +114,10 @@ class LocalEngine(Engine):
             finished: Finished = worker.pipe.recv()
         except (EOFError, OSError):
             self._remove(worker)
+            if worker.process.exitcode == os.EX_USAGE:
+                remedy = 'call it below  if __name__ == "__main__":  , or with jobs=1'
+                what = "brakecli.sweep: its workers run the script anew, up to this call"
+                raise UsageError(f"{what}; {remedy}") from None
             return Finished(task, failure=_cause_of_death(worker.process.exitcode or 0))
         if finished.records is None:  # it ends itself after that
             self._remove(worker)
