@@ -45,7 +45,10 @@ def starters() -> dict[str, str]:
 
 
 def read_text(source: str) -> tuple[str, str]:
-    """The text of a file, or of standard input where the path is "-", and its name; line ends stay as they are."""
+    """The text of a file, or of standard input where the path is "-", and its name; line ends stay as they are.
+
+    A byte order mark, with which some editors begin a file, is no part of it.
+    """
     name = "standard input" if source == "-" else source
     try:
         with nullcontext(sys.stdin.buffer) if source == "-" else Path(source).open("rb") as file:
@@ -60,7 +63,7 @@ def read_text(source: str) -> tuple[str, str]:
         raise unfit("is a result, not TOML", "name the TOML file that it was computed from", name)
     check_size(data, name)
     try:
-        return data.decode("utf-8"), name
+        return data.decode("utf-8-sig"), name
     except UnicodeDecodeError as error:
         utf_16 = data.startswith((b"\xff\xfe", b"\xfe\xff"))
         what = "is UTF-16, not UTF-8" if utf_16 else f"is not UTF-8 (found byte 0x{data[error.start]:02x})"

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from brakecli.analysis.regime.of_signal import SignalLook
     from brakecli.analysis.regime.signal_rules import SignalThresholds
 
-WHAT = "What was measured: displacement, velocity, force, acceleration or pressure (of a .wav, if left out)."
+WHAT = "What was measured: displacement, velocity, acceleration, force, torque or pressure (of .wav, if left out)."
 UNIT = "Unit of the signal, as mm/s or g; SI, or that of the file, if left out."
 TIME_UNIT = "Unit of the time column, as ms; that of the file, or s, if left out."
 NUMBERS = ("sample_rate", "belt_speed", "stiffness")

@@ -47,7 +47,8 @@ VERDICT = within(
     Field("evidence", "", "numbers by which the rules decided", OBJECT, group="regime/evidence"),
     Field("thresholds", "", "limits of the rules", OBJECT, group="regime/thresholds"),
 )
-MEASURED_UNITS = {"displacement": "m", "velocity": "m/s", "force": "N", "acceleration": "m/s²", "pressure": "Pa"}
+MEASURED_UNITS = {"displacement": "m", "velocity": "m/s", "force": "N", "torque": "N m"}
+MEASURED_UNITS |= {"acceleration": "m/s²", "pressure": "Pa"}
 EVIDENCE_UNITS = {"envelope_slope": "1/s", "seconds": "s", "frequency_": "Hz", "line_freq": "Hz", "power_": "W"}
 EVIDENCE_UNITS |= dict.fromkeys(("envelope_final", "envelope_largest", "amplitude_v"), "m/s")
 EVIDENCE_UNITS |= {"amplitude_": "m", "force_": "N"}

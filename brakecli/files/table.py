@@ -6,6 +6,7 @@ Whatever is wrong in the file is an UnreadableResultError.
 
 import re
 import warnings
+from codecs import getincrementaldecoder
 from contextlib import suppress
 from functools import cache, partial
 from pathlib import Path
@@ -42,7 +43,12 @@ class TextTable:
             head = file.read(_HEAD)
         require(head.strip() != b"", "the file is empty; name a file with numbers")
         require(b"\0" not in head, f"this is not text; name {wanted}")
-        lines = head.decode("utf-8-sig", errors="replace").splitlines()
+        try:
+            getincrementaldecoder("utf-8")().decode(head)  # which may end within a character
+            self.encoding = "utf-8-sig"
+        except UnicodeDecodeError:
+            self.encoding = "latin-1"
+        lines = head.decode(self.encoding, errors="replace").splitlines()
         lines = lines[:-1] if len(head) == _HEAD and len(lines) > 1 else lines
         self.names: list[str] = []
         self.units: list[str] = []  # as they are written in a line of their own
@@ -133,8 +139,8 @@ class TextTable:
             warnings.simplefilter("ignore")
             if not self.decimal_comma:
                 with suppress(ValueError, IndexError):  # perhaps because of an empty cell
-                    return load(self.path, skiprows=self.skip, encoding="utf-8-sig")
-            text = self.path.read_text(encoding="utf-8-sig", errors="replace")
+                    return load(self.path, skiprows=self.skip, encoding=self.encoding)
+            text = self.path.read_text(encoding=self.encoding, errors="replace")
             lines = (text.replace(",", ".") if self.decimal_comma else text).split("\n")
             try:
                 return load(lines[self.skip :], converters=lambda cell: float(cell.strip().strip('"') or "nan"))
@@ -166,7 +172,8 @@ def si(unit: str) -> tuple[float, str] | None:
         return None
     registry = _registry()
     try:
-        size, base = registry.get_base_units(registry.parse_units(unit))
+        # Nm is a torque, and not the fineness of a yarn
+        size, base = registry.get_base_units(registry.parse_units(re.sub(r"N(?=[cm]?m\b)", "N*", unit)))
     except Exception:  # whatever the parser meets
         return None
     return float(size), str(base)

@@ -21,6 +21,8 @@ from brakecli.files.read import StoredResult
 from brakecli.plots import style
 from brakecli.plots.quantities import VARIABLES, Scaled, scaled
 from brakecli.plots.stop import Stop, draw_amplitude, draw_spectrogram
+from brakecli.runs.cost import stability_seconds
+from brakecli.runs.limits import WORTH_SAYING
 from brakecli.solver.quantities import ContactState
 from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import System
@@ -30,6 +32,7 @@ MOST_DETAIL = 100_000  # samples drawn one by one
 FEW = 4000  # samples of the detail where no frequency says how long a cycle is
 COLUMNS = 1200  # columns of the envelope: about the width of its panel in pixels
 BLOCK = 1 << 20  # samples read at a time
+TABLE_SECONDS = 1e-8  # to build a byte of the tables of the contact
 FEW_LINES = 5  # waves of the wheel that have a line each in the spectrum; more have a tick each
 _SHADES = ((ContactState.STICK, style.ORANGE, "stick"), (ContactState.SEPARATED, style.GREY, "no contact"))
 _BELT: dict[str, Any] = {"color": style.VERMILION, "ls": style.DASHES}
@@ -101,7 +104,9 @@ def case_of(result: StoredResult) -> LoadedCase:
 
 
 def _mode_frequencies(system: System) -> list[float]:
-    """Frequencies (Hz) of the modes of steady sliding, as far as they turn."""
+    """Frequencies (Hz) of the modes of steady sliding, as far as they turn; none where they would take long."""
+    if stability_seconds(system) + TABLE_SECONDS * system.table_bytes > WORTH_SAYING:
+        return []
     stiffness = system.contact_stiffness
     with suppress(CaseError):
         stiffness = steady_sliding(system).stiffness

@@ -12,7 +12,11 @@ from brakecli.files.fields import MEASURED_UNITS
 from brakecli.plots import style
 from brakecli.plots.run import COLUMNS, CYCLES, FEW, MOST_DETAIL, envelope
 
-_VELOCITY = {Measurand.FORCE: ("rate of the force", "N/s"), Measurand.PRESSURE: ("pressure", "Pa")}
+_VELOCITY = {
+    Measurand.FORCE: ("rate of the force", "N/s"),
+    Measurand.TORQUE: ("rate of the torque", "N m/s"),
+    Measurand.PRESSURE: ("pressure", "Pa"),
+}
 _LABELLED = 4  # bursts whose frequency is written into the record
 
 

@@ -2,7 +2,7 @@
 
 import math
 import shlex
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import partial
 from typing import Any
 
@@ -56,7 +56,7 @@ def part_of_run(result: StoredResult, progress: Counted) -> Part:
         Section("Stability of steady sliding", [*_stability(advice)]),
         Section("Regime, and its evidence", _regime(result)),
         Section("Pictures", [picture(PICTURE, partial(draw, result))]),
-        Section("Accuracy", _accuracy(result)),
+        Section("Accuracy", [*_accuracy(result), Texts(_sentences("left out: ", found.get("left_out", ())))]),
         Section("Warnings", [Texts(_warnings(found, advice))]),
         Section("How to repeat it", repeat(result, again, result.text("case_toml"))),
     ]
@@ -197,8 +197,11 @@ def _accuracy(result: StoredResult) -> list[Any]:
 
 def _warnings(found: Mapping[str, Any], advice: AdviceReport) -> list[str]:
     lines = [str(each) for name in ("warnings", "adjustments") for each in found.get(name, ())]
-    lines += [f"left out: {each}" for each in found.get("left_out", ())] + advice.notes()
-    return [f"{line[:1].upper()}{line[1:]}." for line in lines] or ["There are none."]
+    return _sentences("", [*lines, *advice.notes()]) or ["There are none."]
+
+
+def _sentences(begin: str, lines: Iterable[str]) -> list[str]:
+    return [f"{line[:1].upper()}{line[1:]}." for line in (f"{begin}{each}" for each in lines)]
 
 
 def _meaning(key: str) -> str:

@@ -23,12 +23,14 @@ _SUSTAINED = (Regime.RELAXATION, Regime.QUASI_HARMONIC)
 class Measurand(StrEnum):
     """What was measured.
 
-    A force is that of a spring between the belt's friction and the frame, a pressure that of the sound nearby.
+    A force is that of a spring between the belt's friction and the frame, a torque the same at an unknown lever, a
+    pressure that of the sound nearby.
     """
 
     DISPLACEMENT = "displacement"
     VELOCITY = "velocity"
     FORCE = "force"
+    TORQUE = "torque"
     ACCELERATION = "acceleration"
     PRESSURE = "pressure"
 
@@ -120,7 +122,7 @@ def _judge(
     size = float(np.nanmax(np.abs(signal.values), initial=0.0)) or 1.0  # squares of the smallest must not vanish
     order, step = quantity.order, signal.interval
     velocity, notes = cleaned(signal.values / size, order)
-    spring = np.nan if quantity is Measurand.PRESSURE else 1.0
+    spring = np.nan if quantity in (Measurand.PRESSURE, Measurand.TORQUE) else 1.0
     if quantity is Measurand.FORCE:
         spring = np.nan if stiffness is None else stiffness
     belt = np.nan if belt_speed is None else abs(belt_speed) * spring * step ** (1 - order) / size

@@ -21,6 +21,7 @@ _SI = {
     Measurand.DISPLACEMENT: ("meter",),
     Measurand.VELOCITY: ("meter / second",),
     Measurand.FORCE: ("kilogram * meter / second ** 2",),
+    Measurand.TORQUE: ("kilogram * meter ** 2 / second ** 2",),
     Measurand.ACCELERATION: ("meter / second ** 2", "kilogram"),  # g, a gram to pint, is taken for gravity
     Measurand.PRESSURE: ("kilogram / meter / second ** 2",),
 }
@@ -163,11 +164,11 @@ def _dataset(path: Path, inside: str) -> tuple[Array, str]:
                 file.visit(names.append)
                 names = [f"/{name}" for name in names if isinstance(member(file, name), h5py.Dataset)]
                 raise ValueError(f"there is no dataset {inside}, only {', '.join(names[:12]) or 'none'}")
-            if node.ndim != 1 or node.dtype.kind not in "iuf":
+            if sum(size != 1 for size in node.shape) > 1 or not node.shape or node.dtype.kind not in "iuf":
                 raise ValueError(f"{inside} is not a row of numbers, found shape {node.shape}, {node.dtype}")
             check_size(node, path.stat().st_size, f"dataset {inside}")  # HDF5 crashes on a virtual one of itself
             units = node.attrs.get("units", "")
-            return np.asarray(node[:], dtype=np.float64), units if isinstance(units, str) else ""
+            return np.asarray(node[:], dtype=np.float64).ravel(), units if isinstance(units, str) else ""
     except Exception as error:
         what = f"cannot be read: {' '.join(str(error).split())}"
         raise UnreadableResultError(f"{what}; name an intact HDF5 file and a dataset in it") from error

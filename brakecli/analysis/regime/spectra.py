@@ -19,6 +19,7 @@ SHORTEST_SEGMENT = 16
 FEWEST_CYCLES = 5  # of a line in the record, and bins below it: what is slower is not told from drift
 _FEWEST_BINS = 3
 _MOST_COMBINED = 6  # waves whose frequencies are combined by threes
+_MOST_PAIRED = 2000  # waves; sums of two are lines where there are no more
 _COMBINATIONS = [(i, j, k) for i in range(-2, 3) for j in range(-2, 3) for k in (-1, 0, 1)]
 SPECTRAL = ("x", "y", "vx", "vy", "friction_force", "normal_force", "contact_fraction")
 
@@ -117,11 +118,15 @@ def line_share(power: Array) -> float:
 
 @lru_cache(maxsize=4)  # the points of a sweep ask for the same ones
 def forced_lines(belt_speed: float, waves_per_metre: tuple[float, ...], highest: float) -> tuple[float, ...]:
-    """Frequencies (Hz, up to `highest`) of the passing waves, their multiples, and sums and differences of two."""
-    base = [abs(belt_speed) * waves for waves in waves_per_metre]
-    multiples = {n * f for f in base for n in range(1, 11)}
-    pairs = {abs(f + sign * g) for f in base for g in base for sign in (1, -1)}
-    return tuple(sorted(f for f in multiples | pairs if 0.0 < f <= highest))
+    """Frequencies (Hz, up to `highest`) of the passing waves, their multiples, and sums and differences of two.
+
+    Those of two would fill the spectrum, and the memory, where there are very many waves.
+    """
+    base = abs(belt_speed) * np.array(waves_per_metre)
+    few = base[: len(base) * (len(base) <= _MOST_PAIRED)]
+    found = [np.outer(np.arange(1, 11), base), np.add.outer(few, few), np.abs(np.subtract.outer(few, few))]
+    lines = np.unique(np.concatenate([each.ravel() for each in found]))
+    return tuple(lines[(lines > 0.0) & (lines <= highest)].tolist())
 
 
 @lru_cache(maxsize=4)
