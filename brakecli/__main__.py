@@ -3,8 +3,13 @@
 import atexit
 import gc
 import os
+import sys
 
 from brakecli import ONE_THREAD
+
+if os.name == "nt":  # before anything is imported that Windows lacks
+    sys.stderr.write("brakecli: does not run on Windows itself; use its Subsystem for Linux (WSL)\n")
+    sys.exit(2)
 from brakecli.files.os_signals import guard_streams, handle_signals
 
 

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Annotated
 
+from brakecli.cli.inputs import as_argument, is_sweep
 from brakecli.cli.measured import UNMEASURED, Measured, with_measured
 from brakecli.cli.options import Force, Quiet, option, output_option, source_argument
 from brakecli.cli.output import show, warn
@@ -28,6 +29,9 @@ def command(
 ) -> None:
     """Draw a result, or a measured signal (needs matplotlib)."""
     target = output or Path(f"{Path(result).stem}.png")
+    if Path(result).suffix == ".toml":
+        remedy = f"run it first, with: brakecli {'sweep' if is_sweep(result) else 'run'} {as_argument(result)}"
+        raise UsageError(f"{result}: is no result yet; {remedy}")
     if measured.quantity_of(result) is not None:
         if select or variable:
             raise UsageError("--select and --variable: are for results; leave them out for a measured signal")

@@ -30,7 +30,7 @@ def command(
     if output is not None and (axis is None or output.suffix.lower() not in (".h5", ".csv")):
         raise UsageError(f"{output}: holds what --vary finds; give --vary, and a name that ends in .h5 or .csv")
     loaded = load_case(case, overrides)
-    target = result_path(output, case) if output is not None else None
+    target = result_path(output, case, ending=".csv") if output is not None else None
     from brakecli.analysis.stability.report import stability
     from brakecli.case.system import system_of
     from brakecli.cli.stability_tables import stability_table
