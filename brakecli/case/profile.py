@@ -1,7 +1,6 @@
 """A measured profile as a sum of sines."""
 
 import math
-import stat
 from pathlib import Path
 from typing import Any
 
@@ -75,7 +74,6 @@ def sines_of(name: str, record: Record, error: float, radius: float, pad: float 
 
 def read(path: Path) -> Record:
     """The measured profile that a file holds; raises UnreadableResultError and OSError."""
-    require(stat.S_ISREG(path.stat().st_mode), "this is not a regular file; name a CSV file")
     table = TextTable(path)
     columns = f"{table.columns} column{'s' * (table.columns > 1)}"
     require(table.columns == 2, f"has {columns}; give two: position or angle, and height")

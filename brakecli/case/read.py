@@ -9,6 +9,7 @@ from contextlib import nullcontext, suppress
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from importlib import resources
+from io import BufferedReader
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -21,6 +22,7 @@ from brakecli.case.tables import MISSING, Table, tables_within
 from brakecli.errors import CaseError, KeyPath, Problem, key_text, printable
 from brakecli.files import toml_lines
 from brakecli.files.toml_lines import WRITING, Located, check_size, innermost, parse, split, unfit
+from brakecli.files.opening import SIGNATURE, opened
 
 _Table = TypeVar("_Table", bound=Table)
 
@@ -44,14 +46,15 @@ def starters() -> dict[str, str]:
     return {each.name.removesuffix(".toml"): each.read_text(encoding="utf-8") for each in sorted(files, key=str)}
 
 
-def read_text(source: str) -> tuple[str, str]:
+def read_text(source: str, *, pipes: bool = False) -> tuple[str, str]:
     """The text of a file, or of standard input where the path is "-", and its name; line ends stay as they are.
 
-    A byte order mark, with which some editors begin a file, is no part of it.
+    A byte order mark, with which some editors begin a file, is no part of it. With `pipes`, also of a pipe that
+    the shell has opened.
     """
     name = "standard input" if source == "-" else source
     try:
-        with nullcontext(sys.stdin.buffer) if source == "-" else Path(source).open("rb") as file:
+        with nullcontext(sys.stdin.buffer) if source == "-" else BufferedReader(opened(source, pipes=pipes)) as file:
             data = file.read(toml_lines.LARGEST_TEXT + 1)
     except (OSError, ValueError, AttributeError) as error:
         # ValueError: a NUL in the path, or standard input is closed; AttributeError: there is no standard input.
@@ -59,7 +62,7 @@ def read_text(source: str) -> tuple[str, str]:
         reason = "it is closed" if closed else getattr(error, "strerror", None) or str(error)
         what = f"cannot be read: {reason[0].lower()}{reason[1:]}"
         raise unfit(what, "name a TOML file", name) from error
-    if data.startswith(b"\x89HDF"):
+    if data.startswith(SIGNATURE):
         raise unfit("is a result, not TOML", "name the TOML file that it was computed from", name)
     check_size(data, name)
     try:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from brakecli.errors import CaseError, UnreadableResultError, UsageError
 from brakecli.files.atomic import refuse_source
+from brakecli.files.opening import is_hdf5
 
 if TYPE_CHECKING:
     from brakecli.case.read import LoadedCase
@@ -80,7 +81,7 @@ def _text(source: str) -> tuple[str, str]:
 def _of_pipe(source: str) -> tuple[str, str]:
     from brakecli.case.read import read_text
 
-    return read_text(source)
+    return read_text(source, pipes=True)
 
 
 def result_path(output: Path | None, source: str, kind: str = "case", ending: str = ".h5") -> Path:
@@ -100,7 +101,5 @@ def is_result(source: str) -> bool:
     """Whether this is a result file, or was one: by its name, or by its content."""
     if source == "-" or Path(source).suffix == ".toml":
         return False
-    from brakecli.files.read import is_hdf5
-
     named = Path(source).suffix == ".h5" and os.path.isfile(source)  # noqa: PTH113 - pathlib's may raise
     return named or is_hdf5(Path(source))

@@ -9,40 +9,43 @@ import h5py
 import xarray as xr
 
 from brakecli.errors import UnreadableResultError
+from brakecli.files import trust, valid
 from brakecli.files.field import Field
-from brakecli.files.read import open_result
+from brakecli.files.read import StoredResult, open_result
 
 
-def opened(path: Path) -> xr.DataTree:
-    """A result file in memory, checked; what other programs have put there may be more than xarray takes."""
+def opened(path: Path, *, own: bool = False) -> xr.DataTree:
+    """A result file in memory, checked; what other programs have put there may be more than xarray takes.
+
+    One of our `own`, just written, may be as large as it is.
+    """
     try:
         with open_result(path) as result:
-            _once(result.file)
-            for group in result.groups:
-                result.variables(group)  # damaged axes end xarray without a word
-        with xr.open_datatree(path, engine="h5netcdf", phony_dims="access") as tree:
-            return tree.load()
-    except (ValueError, TypeError, LookupError, AttributeError, OSError, RuntimeError) as error:
+            _check(result, own=own)
+            result.stream.seek(0)
+            with xr.open_datatree(result.stream, engine="h5netcdf", phony_dims="access") as tree:  # type: ignore[arg-type]
+                found: xr.DataTree = tree.load()
+            found.attrs |= trust.noted()
+            return found
+    except (ValueError, TypeError, LookupError, AttributeError, OSError, RuntimeError, MemoryError) as error:
         what = f"{path}: xarray cannot read what it holds: {error}"
         raise UnreadableResultError(f"{what}; compute the result again") from error
 
 
-def _once(root: Any) -> None:
-    """Raise ValueError where a group holds one that was seen before: xarray would read on without an end.
-
-    So it would behind a link to another file, which is no part of the result.
-    """
-    seen, groups = {root}, [root]
-    while groups:
-        group = groups.pop()
-        for name in group:
-            if isinstance(group.get(name, getlink=True), h5py.ExternalLink):
-                raise ValueError(f"the group {group.name} holds {name}, which is a link to another file")
-        for inner in (each for name in group if hasattr(each := group.get(name), "keys")):
-            if inner in seen:
-                raise ValueError(f"the group {group.name} holds {inner.name}, which stands elsewhere, too")
-            seen.add(inner)
-            groups.append(inner)
+def _check(result: StoredResult, *, own: bool) -> None:
+    """Raise ValueError where xarray would follow links, or need more memory than the file can stand for."""
+    needed = 0
+    for name, node in result.nodes.items():
+        if isinstance(node, h5py.Group):
+            result.variables(name)  # damaged axes end xarray without a word
+            for inner in node:
+                if (found := valid.member(node, inner)) is None or found not in result.nodes.values():
+                    raise ValueError(f"the group {name} holds {inner}, which is a link, or stands elsewhere, too")
+        elif isinstance(node, h5py.Dataset):
+            valid.check_size(node, result.length, name)
+            each = node.dtype.itemsize + 64 * (node.dtype.kind in "SO")  # a text is an object
+            needed += 0 if own else node.size * each * valid.packed(node)
+    valid.check_memory(needed, "all of it")
 
 
 def dataset(declared: Iterable[Field], numbers: Mapping[str, Any]) -> xr.Dataset:

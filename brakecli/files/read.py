@@ -4,19 +4,20 @@ A result is HDF5 that opens as netCDF-4, followed by 32 bytes: the SHA-256 of ev
 these bytes. A reader compares them before the library sees the file, and so knows that it is as it was written.
 The checksums inside the file are weaker: they leave out texts, and a hole of zeros passes them. A program that
 edits the file cuts the 32 bytes off; then only the checksums inside remain.
+
+Damage that a digest was made to fit ends or blocks HDF5 itself. So another process looks at each file first.
 """
 
 import hashlib
 import os
 import resource
 import signal
-import stat
 import warnings
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
-from functools import cached_property
-from io import RawIOBase
+from functools import partial
+from io import FileIO, RawIOBase
 from pathlib import Path
 from typing import Any
 
@@ -25,13 +26,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.errors import OtherKindError, UnreadableResultError, printable
-from brakecli.files import valid
+from brakecli.files import trust, valid
+from brakecli.files.opening import SIGNATURE, opened
 
 FORMAT = "brakecli"
 FORMAT_VERSION = 1
 
 SHORTEST_TRIAL = 5.0  # s of processor time, and 0.1 s for each MB, to read a file that may be damaged
-_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+_WAITING = 10.0  # times as long may it take where other processes or a slow disk hold it up
 
 
 @dataclass(frozen=True)
@@ -50,18 +52,17 @@ class StoredResult:
 
     path: Path
     file: h5py.File
+    stream: FileIO  # from which `file` reads
+    nodes: dict[str, Any]  # all groups and variables
     attributes: dict[str, Any]
     length: int  # bytes
     sealed: bool  # whether the whole file is as it was written, by its digest
     _variables: dict[str, dict[str, Variable]] = field(default_factory=dict)  # that were looked at
 
-    @cached_property
+    @property
     def groups(self) -> dict[str, None]:
         """All groups, the root first."""
-        with _explained(self.path):
-            names = ["/"]
-            self.file.visit(names.append)
-            return {name: None for name in names if isinstance(valid.member(self.file, name), h5py.Group)}
+        return {name: None for name, node in self.nodes.items() if isinstance(node, h5py.Group)}
 
     def group_attributes(self, group: str) -> dict[str, Any]:
         """The attributes of a group."""
@@ -105,6 +106,10 @@ class StoredResult:
             if node.dtype.kind not in "iufS":
                 raise ValueError(f"{where} holds no numbers")
             valid.check_size(node, self.length, where)
+            rows = len(range(*slice(start, stop).indices(node.shape[0])))
+            copies = 5 if node.dtype.kind == "S" else 2  # a character takes four bytes, and limits are checked
+            needed = copies * rows * node.dtype.itemsize * int(np.prod(node.shape[1:], dtype=object))
+            valid.check_memory(needed * valid.packed(node), where)
             values = np.asarray(node[start:stop])
             if values.dtype.kind == "S":
                 return np.char.decode(values, "utf-8")
@@ -130,13 +135,13 @@ def open_result(path: Path, kind: str | None = None) -> Iterator[StoredResult]:
     """
     with ExitStack() as stack:
         with _explained(path):
-            if not stat.S_ISREG(path.stat().st_mode):  # a pipe would block forever
-                raise ValueError("this is not a regular file")
-            stream = stack.enter_context(path.open("rb", buffering=0))
-            if not (sealed := _has_digest(stream)):
-                _try_out(path)
-            # h5py gets the very file that was verified, and does without the file locks of HDF5
-            file = stack.enter_context(h5py.File(stream, "r"))
+            stream = stack.enter_context(opened(path))
+            length, state = os.fstat(stream.fileno()).st_size, _digest_of(stream)
+            if not trust.admits(path, state):
+                what = "the file is truncated, damaged or was altered by another program"
+                raise ValueError(f"{what}, and only --force-read looks at it all the same")
+            look = partial(valid.look_through, length=length, everything=bool(state))
+            file = stack.enter_context(open_hdf5(stream, look))
             its_kind = str(valid.plain_attribute(file, "kind"))
             attributes = valid.attributes_of(file, its_kind)
             if attributes.get("format") != FORMAT:
@@ -149,16 +154,20 @@ def open_result(path: Path, kind: str | None = None) -> Iterator[StoredResult]:
                 what = f"{path}: holds a result of kind {printable(repr(its_kind))}, and {kind!r} is needed"
                 remedy = f"name the result of a {kind}, or see what this one holds by brakecli report or plot"
                 raise OtherKindError(f"{what}; {remedy}")
-            length = path.stat().st_size
             valid.check_variables(file, its_kind, length)
-        yield StoredResult(path, file, attributes, length, sealed)
+            nodes = valid.tree(file)
+        yield StoredResult(path, file, stream, nodes, attributes, length, not state)
 
 
-def is_hdf5(path: Path) -> bool:
-    """Whether this is a regular file with the signature of HDF5, behind a user block or not."""
-    with suppress(OSError, ValueError):  # looking into a pipe would use up what it holds
-        return stat.S_ISREG(path.stat().st_mode) and bool(h5py.is_hdf5(path))
-    return False
+@contextmanager
+def open_hdf5(stream: FileIO, look: Callable[[h5py.File], object]) -> Iterator[h5py.File]:
+    """An HDF5 file of any program, after another process has looked at it without harm; raises ValueError.
+
+    h5py gets the very file that was looked at, and does without the file locks of HDF5.
+    """
+    _try_out(stream, look)
+    with h5py.File(stream, "r") as file:
+        yield file
 
 
 def digest(file: RawIOBase, length: int) -> bytes:
@@ -171,39 +180,44 @@ def digest(file: RawIOBase, length: int) -> bytes:
     return total.digest()
 
 
-def _has_digest(file: RawIOBase) -> bool:
-    """Whether the digest stands behind the end of the HDF5 part; raises ValueError where it does not fit."""
+def _digest_of(file: RawIOBase) -> str:
+    """What is wrong with the digest behind the end of the HDF5 part: nothing, or one of `trust`."""
     file.seek(0)
     superblock = file.read(36) or b""
-    if not superblock.startswith(_SIGNATURE):
+    if not superblock.startswith(SIGNATURE):
         raise ValueError("this is not an HDF5 file" if superblock else "the file is empty")
-    if superblock[8:9] != b"\x02":  # other versions have other layouts; this program does not write them
-        raise ValueError("it was not written by this program; a copy that xarray writes has another form")
+    if superblock[8:9] != b"\x02":  # other programs write other versions, which have other layouts
+        return trust.MISSING
     end = int.from_bytes(superblock[28:36], "little")
-    behind = file.seek(0, 2) - end
-    if behind and (behind != 32 or digest(file, end) != file.read(32)):
-        raise ValueError("the file is truncated, damaged or was altered by another program")
-    return behind > 0
+    behind = file.seek(0, os.SEEK_END) - end
+    fits = behind == 32 and digest(file, end) == file.read(32)
+    return "" if fits else trust.DIFFERS if behind else trust.MISSING
 
 
-def _try_out(path: Path) -> None:
-    """Read a file that no digest vouches for in another process first: some damage ends or blocks HDF5 itself."""
+def _try_out(stream: FileIO, look: Callable[[h5py.File], object]) -> None:
+    """Look at a file in another process first: some damage ends or blocks HDF5 itself."""
     with warnings.catch_warnings():  # Python 3.12 warns where there are threads; the child uses none of them
         warnings.simplefilter("ignore")
         child = os.fork()
     if not child:
         try:
-            for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGALRM):
                 signal.signal(number, signal.SIG_DFL)
+            seconds = int(SHORTEST_TRIAL + os.fstat(stream.fileno()).st_size / 1e7)
+            signal.alarm(int(_WAITING * seconds))
             resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-            size = path.stat().st_size
-            seconds = int(SHORTEST_TRIAL + size / 1e7)
             resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
-            with h5py.File(path, "r", locking=False) as file:
-                valid.read_everything(file, size)
+            with h5py.File(stream, "r") as file:
+                look(file)
         finally:
             os._exit(0)  # what fails here with an exception will do so again
-    if os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) < 0:
+    try:
+        status = os.waitpid(child, 0)[1]
+    except BaseException:  # a signal, which ends the trial, too
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+        raise
+    if os.waitstatus_to_exitcode(status) < 0:
         raise ValueError("the file is damaged, and HDF5 cannot read it")
 
 

@@ -6,9 +6,11 @@ Whatever is wrong in the file is an UnreadableResultError.
 
 import re
 import warnings
-from codecs import getincrementaldecoder
+from collections.abc import Iterable
 from contextlib import suppress
 from functools import cache, partial
+from io import BytesIO, TextIOWrapper
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.errors import UnreadableResultError, UsageError, printable
+from brakecli.files.opening import contents
 
 Array = NDArray[Any]
 
 _COMMENTS = ("#", "%")
+LARGEST = 500_000_000  # bytes of a file of measured numbers
 _HEAD = 1 << 16  # bytes of a text file from which its layout is found
 _ONE = r"[^\W\d_]+|[°%]"  # name of a unit
 _LONGEST = 80  # characters of a unit
@@ -37,18 +41,17 @@ class TextTable:
     """A text file of columns. Its first lines show separator, decimal sign and header."""
 
     def __init__(self, path: Path, wanted: str = "a CSV file") -> None:
-        """Read the first lines; the numbers are read when they are asked for."""
-        self.path = path
-        with path.open("rb") as file:
-            head = file.read(_HEAD)
+        """Read the file, and its first lines; the numbers are found when they are asked for."""
+        self._data = contents(path, LARGEST)
+        head = self._data[:_HEAD]
         require(head.strip() != b"", "the file is empty; name a file with numbers")
         require(b"\0" not in head, f"this is not text; name {wanted}")
         try:
-            getincrementaldecoder("utf-8")().decode(head)  # which may end within a character
-            self.encoding = "utf-8-sig"
+            self._data.decode()
+            self._encoding = "utf-8-sig"
         except UnicodeDecodeError:
-            self.encoding = "latin-1"
-        lines = head.decode(self.encoding, errors="replace").splitlines()
+            self._encoding = "latin-1"
+        lines = head.decode(self._encoding, errors="replace").splitlines()
         lines = lines[:-1] if len(head) == _HEAD and len(lines) > 1 else lines
         self.names: list[str] = []
         self.units: list[str] = []  # as they are written in a line of their own
@@ -139,15 +142,18 @@ class TextTable:
             warnings.simplefilter("ignore")
             if not self.decimal_comma:
                 with suppress(ValueError, IndexError):  # perhaps because of an empty cell
-                    return load(self.path, skiprows=self.skip, encoding=self.encoding)
-            text = self.path.read_text(encoding=self.encoding, errors="replace")
-            lines = (text.replace(",", ".") if self.decimal_comma else text).split("\n")
+                    return load(self._lines())
+            lines = (line.replace(",", ".") for line in self._lines()) if self.decimal_comma else self._lines()
             try:
-                return load(lines[self.skip :], converters=lambda cell: float(cell.strip().strip('"') or "nan"))
+                return load(lines, converters=lambda cell: float(cell.strip().strip('"') or "nan"))
             except (ValueError, IndexError) as error:
                 what = f"from line {self.skip + 1} on: {' '.join(str(error).split())}"
                 remedy = "give every row the same columns, and every cell a number, nothing or nan"
                 raise UnreadableResultError(f"{what}; {remedy}") from error
+
+    def _lines(self) -> Iterable[str]:
+        """The lines from the first numbers on."""
+        return islice(TextIOWrapper(BytesIO(self._data), encoding=self._encoding), self.skip, None)
 
 
 def _is_number(cell: str, decimal_comma: bool) -> bool:

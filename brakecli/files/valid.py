@@ -18,6 +18,8 @@ from brakecli.files.field import Field
 LARGEST, LARGEST_IN_HISTORY = 1e300, 1e150  # magnitudes; the squares of the latter are finite
 _BLOCK = 1 << 20  # rows read at a time
 _RATIO = 1100  # no filter of HDF5 makes data smaller than this
+DEEPEST, _MOST_NODES = 8, 10_000  # levels of groups and their variables, and the number of both
+MOST_MEMORY = 1_250_000_000  # bytes of unpacked values: a variable of the largest sweep takes nearly as many
 _TEXTS = ("format", "kind", "title", "case_toml", "resolved_toml", "sweep_toml", "resolved_sweep_toml")
 _ATTRIBUTES = {
     ("run", "/"): fields.RUN,
@@ -70,35 +72,64 @@ def check_variables(file: h5py.File, kind: str, length: int) -> None:
                 _check_rising(node, where)
 
 
-def read_everything(file: h5py.File, length: int) -> None:
-    """Read all attributes and variables, also where some of them cannot be read."""
-    names = ["/"]
-    with suppress(Exception):
-        file.visit(names.append)
-    for name in names:
+def tree(file: h5py.File) -> dict[str, Any]:
+    """All groups and variables by their names, each once, the root first.
+
+    Raises ValueError where there are too many, or groups too deep in others.
+    """
+    found, seen, groups = {"/": file["/"]}, {file["/"]}, [("", file["/"])]
+    for path, group in groups:
+        for key in group:
+            node, name = member(group, key), path + key
+            if node is not None and node not in seen:
+                if name.count("/") >= DEEPEST or len(found) > _MOST_NODES:
+                    limits = f"more than {_MOST_NODES} groups and variables, or groups of more than {DEEPEST} levels"
+                    raise ValueError(f"it holds {limits}")
+                seen.add(node)
+                found[name] = node
+                if isinstance(node, h5py.Group):
+                    groups.append((f"{name}/", node))
+    return found
+
+
+def look_through(file: h5py.File, length: int, *, everything: bool) -> None:
+    """Read all attributes, also where some cannot be read, and of variables their axes and sizes, or everything."""
+    for name, node in tree(file).items():
         with suppress(Exception):
-            node = member(file, name)
             for attribute in node.attrs:
                 with suppress(Exception):
                     plain_attribute(node, attribute)
             if isinstance(node, h5py.Dataset):
                 axes_of(node, name)
                 check_size(node, length, name)
-                for _ in _blocks(node):
+                for _ in _blocks(node) if everything else ():
                     pass
 
 
 def check_size(node: h5py.Dataset, length: int, where: str) -> None:
     """Raise ValueError for a dataset that claims more than a file of this length (bytes) can hold."""
     plist, stored = node.id.get_create_plist(), node.id.get_storage_size()
-    filters = {plist.get_filter(number)[0] for number in range(plist.get_nfilters())}
-    ratio = 1 if filters <= {h5z.FILTER_FLETCHER32, h5z.FILTER_SHUFFLE} else _RATIO
+    ratio = _RATIO if packed(node) else 1
     room, chunk = node.size * node.dtype.itemsize, 0
     if plist.get_layout() == h5d.CHUNKED:
         chunk = int(np.prod(node.chunks, dtype=object)) * node.dtype.itemsize
     own = plist.get_layout() in (h5d.CHUNKED, h5d.CONTIGUOUS, h5d.COMPACT) and not plist.get_external_count()
     if not own or stored > length or max(room, chunk * bool(room)) > ratio * stored:
         raise ValueError(f"{where} claims {node.size} values, which are not in the file")
+    check_memory(chunk * packed(node), f"a chunk of {where}")
+
+
+def packed(node: h5py.Dataset) -> bool:
+    """Whether a filter makes the data of a dataset smaller, so that the length of the file is no bound for them."""
+    plist = node.id.get_create_plist()
+    filters = {plist.get_filter(number)[0] for number in range(plist.get_nfilters())}
+    return not filters <= {h5z.FILTER_FLETCHER32, h5z.FILTER_SHUFFLE}
+
+
+def check_memory(needed: int, where: str) -> None:
+    """Raise ValueError for what takes more bytes in memory, once it is unpacked, than are spent on it."""
+    if needed > MOST_MEMORY:
+        raise ValueError(f"{where} takes {needed} bytes in memory, and {MOST_MEMORY} are the most")
 
 
 def axes_of(node: h5py.Dataset, name: str) -> tuple[str, ...]:
@@ -199,5 +230,8 @@ def _check_rising(node: h5py.Dataset, where: str) -> None:
 
 def _blocks(node: h5py.Dataset) -> Iterator[Any]:
     """The rows of a dataset in pieces, each beginning with the last row of the one before."""
-    for start in range(0, node.shape[0], _BLOCK):
-        yield np.asarray(node[max(start - 1, 0) : start + _BLOCK])
+    row = int(np.prod(node.shape[1:], dtype=object))
+    check_memory(row * node.dtype.itemsize * packed(node), f"a row of {node.name}")
+    rows = max(1, _BLOCK // max(1, row))
+    for start in range(0, node.shape[0], rows):
+        yield np.asarray(node[max(start - 1, 0) : start + rows])

@@ -15,7 +15,8 @@ import xarray as xr
 
 from brakecli.errors import UnreadableResultError, UsageError
 from brakecli.files.field import Field
-from brakecli.files.read import is_hdf5, open_result
+from brakecli.files.opening import is_hdf5
+from brakecli.files.read import open_result
 from brakecli.files.write import ResultFile, new_result
 
 STATES: dict[str, Any] = {

@@ -3,18 +3,22 @@
 Columns are named as in the header, or counted from 1. Whatever is wrong in the file is an UnreadableResultError.
 """
 
+import os
 import re
-import stat
 import warnings
 from dataclasses import replace
+from functools import partial
+from io import BytesIO
 from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 
 from brakecli.analysis.regime.of_signal import Measurand, Signal
 from brakecli.analysis.regime.spectra import Array
 from brakecli.errors import UnreadableResultError, UsageError, printable
-from brakecli.files.table import TextTable, si
+from brakecli.files.opening import contents, opened
+from brakecli.files.table import LARGEST, TextTable, si
 from brakecli.files.table import require as _require
 
 _SI = {
@@ -27,6 +31,8 @@ _SI = {
 }
 _GRAVITY = 9.80665e3  # m/s² over the gram's size in kg
 _UNEVEN = 0.01  # part of the step by which steps may differ before the signal is resampled
+_MOST_SAMPLES = 50_000_000
+_PART = "give a part of the record"
 _GAP = 1.5  # steps of this many times the usual one are gaps
 _LONGEST = 10.0  # gaps may make a signal so many times as long; a record with longer gaps is mostly gap
 
@@ -56,7 +62,6 @@ def read_signal(
     if not path.exists() and (found := re.fullmatch(r"(.+?):(/.*)", source)):
         path, inside = Path(found[1]), found[2]
     try:
-        _require(stat.S_ISREG(path.stat().st_mode), "this is not a regular file; name a file")
         if time_unit is not None and time_column is None:
             raise UsageError("--time-unit: is for a column of times; leave it out, or name one with --time-column")
         if path.suffix.lower() in (".wav", ".wave") and inside is None:
@@ -126,10 +131,12 @@ def _sound(path: Path, column: str | None, sample_rate: float | None) -> tuple[A
     """A channel of a WAV file, whole numbers over the largest, and its samples per second."""
     from scipy.io import wavfile
 
+    data = contents(path, LARGEST)
+    _check_chunks(data)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # chunks that it does not know
-            rate, values = wavfile.read(path)
+            rate, values = wavfile.read(BytesIO(data))
     except Exception as error:
         known = isinstance(error, ValueError | OSError)  # others are of SciPy's own code
         what = ": " + " ".join(str(error).split()) if known else ""
@@ -137,6 +144,7 @@ def _sound(path: Path, column: str | None, sample_rate: float | None) -> tuple[A
     _require(rate > 0, "it has no sampling rate; name an intact WAV file")
     if sample_rate not in (None, rate):
         raise UsageError(f"--sample-rate {sample_rate:g}: the file has {rate} Hz; leave the option out")
+    _require(len(values) <= _MOST_SAMPLES, f"it has {len(values)} samples, {_MOST_SAMPLES} are the most; {_PART}")
     channels = 1 if values.ndim == 1 else values.shape[1]
     number = int(column) if column is not None and column.isascii() and column.isdigit() else 0
     if column is None and channels == 1:
@@ -150,28 +158,52 @@ def _sound(path: Path, column: str | None, sample_rate: float | None) -> tuple[A
     return (chosen - middle) / (128.0 if middle else -float(np.iinfo(values.dtype).min)), float(rate)
 
 
+def _check_chunks(data: bytes) -> None:
+    """Raise UnreadableResultError where a sound file declares more samples than it holds."""
+    order: Literal["big", "little"] = "big" if data[:4] == b"RIFX" else "little"
+    place, many = 12, 0
+    while place + 8 <= len(data):
+        size = int.from_bytes(data[place + 4 : place + 8], order)
+        if data[place : place + 4] == b"ds64":  # of RF64: the true size of the samples
+            many = int.from_bytes(data[place + 16 : place + 24], order)
+        if data[place : place + 4] == b"data":
+            size, held = many or size, len(data) - place - 8
+            what = f"it declares {size} bytes of sound and holds {held}"
+            _require(size <= held, f"{what}; record it anew, or repair its header")
+        place += 8 + size + size % 2
+
+
 def _dataset(path: Path, inside: str) -> tuple[Array, str]:
     """A row of numbers with its attribute `units`; whatever h5py raises on damage is reported."""
-    import h5py
+    from brakecli.files.read import open_hdf5
 
-    from brakecli.files.valid import check_size, member
+    with opened(path) as stream:
+        row = partial(_row, inside=inside, length=os.fstat(stream.fileno()).st_size)
+        try:
+            with open_hdf5(stream, row) as file:
+                return row(file)
+        except Exception as error:
+            what = f"cannot be read: {' '.join(str(error).split())}"
+            raise UnreadableResultError(f"{what}; name an intact HDF5 file and a dataset in it") from error
 
-    try:
-        with h5py.File(path, "r", locking=False) as file:
-            node = member(file, inside)  # links to other files may lead to a pipe
-            if not isinstance(node, h5py.Dataset):
-                names: list[str] = []
-                file.visit(names.append)
-                names = [f"/{name}" for name in names if isinstance(member(file, name), h5py.Dataset)]
-                raise ValueError(f"there is no dataset {inside}, only {', '.join(names[:12]) or 'none'}")
-            if sum(size != 1 for size in node.shape) > 1 or not node.shape or node.dtype.kind not in "iuf":
-                raise ValueError(f"{inside} is not a row of numbers, found shape {node.shape}, {node.dtype}")
-            check_size(node, path.stat().st_size, f"dataset {inside}")  # HDF5 crashes on a virtual one of itself
-            units = node.attrs.get("units", "")
-            return np.asarray(node[:], dtype=np.float64).ravel(), units if isinstance(units, str) else ""
-    except Exception as error:
-        what = f"cannot be read: {' '.join(str(error).split())}"
-        raise UnreadableResultError(f"{what}; name an intact HDF5 file and a dataset in it") from error
+
+def _row(file: Any, inside: str, length: int) -> tuple[Array, str]:
+    """That row of an HDF5 file of this length (bytes); raises ValueError for anything else."""
+    from brakecli.files import valid
+
+    if inside.count("/") > valid.DEEPEST:
+        raise ValueError(f"{printable(inside)} lies in groups of more than {valid.DEEPEST} levels")
+    node = valid.member(file, inside)  # links to other files may lead to a pipe
+    if not hasattr(node, "dtype") or not hasattr(node, "shape"):
+        names = [f"/{name}" for name, each in valid.tree(file).items() if hasattr(each, "shape")]
+        raise ValueError(f"there is no dataset {inside}, only {', '.join(names[:12]) or 'none'}")
+    if sum(size != 1 for size in node.shape) > 1 or not node.shape or node.dtype.kind not in "iuf":
+        raise ValueError(f"{inside} is not a row of numbers, found shape {node.shape}, {node.dtype}")
+    valid.check_size(node, length, f"dataset {inside}")  # HDF5 crashes on a virtual one of itself
+    if node.size > _MOST_SAMPLES:
+        raise ValueError(f"dataset {inside} has {node.size} samples, and {_MOST_SAMPLES} are the most")
+    units = valid.plain_attribute(node, "units")
+    return np.asarray(node[:], dtype=np.float64).ravel(), units if isinstance(units, str) else ""
 
 
 def _numbers(values: Array) -> Array:

@@ -6,10 +6,10 @@ import time
 from collections import deque
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
-from pathlib import Path
 from typing import Any
 
 from brakecli.errors import BrakecliError, RefusedError, UsageError
+from brakecli.files.opening import contents
 from brakecli.sweeps.workers.task import Compute, Engine, Finished, NextTask, Task, attempt, fingerprint, headline
 
 CONNECT_SECONDS = 20
@@ -17,6 +17,7 @@ WAIT_SECONDS = 60.0  # for a worker to come, or to come back
 FETCH_SECONDS = 5.0  # for a finished result, whose worker may have died with it: dask then computes it again
 LOOK_SECONDS = 1.0  # from one look at which workers there are to the next
 TASKS_PER_THREAD = 3
+LARGEST_FILE = 1_000_000  # bytes of a scheduler's file
 NOISY = ("distributed", "tornado", "asyncio")  # packages whose logs do not belong on standard error
 KEPT = "; finished points are kept, run the same command again"
 INSTALL = "; install the same version there"
@@ -139,7 +140,7 @@ class ClusterEngine(Engine):
     def _address_in(self, scheduler_file: str) -> str:
         """The address in a scheduler's file; dask itself would wait for ever for the file to come."""
         try:
-            return str(json.loads(Path(scheduler_file).read_text())["address"])
+            return str(json.loads(contents(scheduler_file, LARGEST_FILE))["address"])
         except OSError as error:
             reason = (error.strerror or str(error)).lower()
         except (ValueError, KeyError, TypeError, RecursionError):
