@@ -9,9 +9,10 @@ import h5py
 import xarray as xr
 
 from brakecli.errors import UnreadableResultError
-from brakecli.files import trust, valid
+from brakecli.files import valid
 from brakecli.files.field import Field
 from brakecli.files.read import StoredResult, open_result
+from brakecli.files.trust import readings
 
 
 def opened(path: Path, *, own: bool = False) -> xr.DataTree:
@@ -25,7 +26,7 @@ def opened(path: Path, *, own: bool = False) -> xr.DataTree:
             result.stream.seek(0)
             with xr.open_datatree(result.stream, engine="h5netcdf", phony_dims="access") as tree:  # type: ignore[arg-type]
                 found: xr.DataTree = tree.load()
-            found.attrs |= trust.noted()
+            found.attrs |= readings.noted()
             return found
     except (ValueError, TypeError, LookupError, AttributeError, OSError, RuntimeError, MemoryError) as error:
         what = f"{path}: xarray cannot read what it holds: {error}"

@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from brakecli.errors import UnreadableResultError, UsageError
+from brakecli.errors import UnreadableResultError, UsageError, escaped
 from brakecli.files import fields
 from brakecli.files.atomic import check_target, new_output
 from brakecli.files.field import plain_units
@@ -23,6 +24,7 @@ _BLOCK = 1 << 16  # rows read at a time
 _LONGEST = 3600.0  # s of sound
 _QUIET = 1e-3  # part of the power that may be left out unsaid
 _HEARD = 20.0  # Hz
+_FORMULAS = ("=", "+", "-", "@")  # what begins one in a spreadsheet
 _UNEVEN = 1e-3  # of the time between two samples, by which it may vary
 _TABLES = (fields.HISTORY, fields.POINT, fields.CRITICAL, fields.VARIED, fields.MODES, fields.ENTRY)
 _ORDER = [field.name for rows in _TABLES for field in rows]  # of columns
@@ -82,7 +84,7 @@ def _rows(result: StoredResult, group: str, names: Sequence[str]) -> Iterator[li
     for name, kept in chosen.items():
         inner = known[name].dims[len(axes) :]
         header += [_head(f"{name} of {inner[0]} {number + 1}" if inner else name, known[name]) for number in kept]
-    yield [header]
+    yield [_cells(np.array(header))]
     places = [result.read(group, axis) for axis in axes]
     rows = max(1, _BLOCK // math.prod(shape[1:]))
     for start in range(0, shape[0], rows):
@@ -94,8 +96,14 @@ def _rows(result: StoredResult, group: str, names: Sequence[str]) -> Iterator[li
             else:
                 values = result.read(group, name, start, start + rows)
             columns += [*values.reshape(len(columns[0]), -1).T[kept]]
-        lists = ([None if value == FILL else value for value in each.tolist()] for each in columns)
-        yield [*zip(*lists, strict=True)]
+        yield [*zip(*map(_cells, columns), strict=True)]
+
+
+def _cells(column: NDArray[Any]) -> list[Any]:
+    """What stands in a column: numbers, or nothing; texts that no spreadsheet takes for formulas or controls."""
+    if column.dtype.kind == "U":
+        return ["'" * text.lstrip().startswith(_FORMULAS) + escaped(text) for text in column.tolist()]
+    return [None if value == FILL else value for value in column.tolist()]
 
 
 def _lies_along(variable: Variable, axes: tuple[str, ...], shape: tuple[int, ...]) -> bool:

@@ -8,27 +8,27 @@ import os
 import stat
 from contextlib import suppress
 from io import BufferedReader, FileIO
-from pathlib import Path
+from os import PathLike
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
-_OPEN_PIPES = ("/dev/fd", "/proc/self/fd")  # where a shell names the pipes of `<(command)`
+_OPEN_PIPES = ("/dev/fd/", "/dev/stdin", "/proc/self/fd/")  # where a shell names the pipes of `<(command)`
 
 
-def opened(path: str | Path, *, pipes: bool = False) -> FileIO:
+def opened(path: str | PathLike[str], *, pipes: bool = False) -> FileIO:
     """A regular file, open for reading; anything else is refused at once, as a pipe may never end.
 
     With `pipes`, also one that the shell has opened for this process. Raises OSError, and ValueError for a NUL.
     """
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC)
     kind = os.fstat(descriptor).st_mode
-    if not stat.S_ISREG(kind) and not (pipes and stat.S_ISFIFO(kind) and _is_ours(path)):
+    if not stat.S_ISREG(kind) and not (pipes and stat.S_ISFIFO(kind) and os.fspath(path).startswith(_OPEN_PIPES)):
         os.close(descriptor)
         raise OSError("this is not a regular file")
-    os.set_blocking(descriptor, True)
+    os.set_blocking(descriptor, True)  # a pipe, which was not to be waited for
     return FileIO(descriptor)
 
 
-def contents(path: str | Path, most: int) -> bytes:
+def contents(path: str | PathLike[str], most: int) -> bytes:
     """All bytes of a regular file; raises OSError where it has more than `most`."""
     with BufferedReader(opened(path)) as file:
         data = file.read(most + 1)
@@ -37,15 +37,10 @@ def contents(path: str | Path, most: int) -> bytes:
     return data
 
 
-def is_hdf5(path: str | Path) -> bool:
+def is_hdf5(path: str | PathLike[str]) -> bool:
     """Whether this is a regular file with the signature of HDF5, behind a user block or not."""
     with suppress(OSError, ValueError), opened(path) as file:
         size = file.seek(0, os.SEEK_END)
         places = (0, *(1 << power for power in range(9, size.bit_length())))
         return any(file.seek(place) == place and file.read(8) == SIGNATURE for place in places)
     return False
-
-
-def _is_ours(path: str | Path) -> bool:
-    """Whether a path names a file that this process has open already."""
-    return str(path) == "/dev/stdin" or os.path.dirname(path) in _OPEN_PIPES  # noqa: PTH120 - of a text as well

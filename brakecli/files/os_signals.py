@@ -52,6 +52,12 @@ def handle_signals() -> None:
     show_signals()
 
 
+def ignore_signals() -> None:
+    """Let no signal change how a process ends that is about to do so."""
+    for number in _handlers():
+        signal.signal(number, signal.SIG_IGN)
+
+
 @contextmanager
 def unwinding() -> Iterator[None]:
     """Within the block, the first signal raises `Interrupted`, so that unfinished files are removed.

@@ -137,11 +137,13 @@ def open_result(path: Path, kind: str | None = None) -> Iterator[StoredResult]:
         with _explained(path):
             stream = stack.enter_context(opened(path))
             length, state = os.fstat(stream.fileno()).st_size, _digest_of(stream)
-            if not trust.admits(path, state):
+            if not trust.readings.admit(str(path), state):
                 what = "the file is truncated, damaged or was altered by another program"
                 raise ValueError(f"{what}, and only --force-read looks at it all the same")
             look = partial(valid.look_through, length=length, everything=bool(state))
-            file = stack.enter_context(open_hdf5(stream, look))
+            try_out(stream, look)
+            # h5py gets the very file that was looked at, and does without the file locks of HDF5
+            file = stack.enter_context(h5py.File(stream, "r"))
             its_kind = str(valid.plain_attribute(file, "kind"))
             attributes = valid.attributes_of(file, its_kind)
             if attributes.get("format") != FORMAT:
@@ -157,17 +159,6 @@ def open_result(path: Path, kind: str | None = None) -> Iterator[StoredResult]:
             valid.check_variables(file, its_kind, length)
             nodes = valid.tree(file)
         yield StoredResult(path, file, stream, nodes, attributes, length, not state)
-
-
-@contextmanager
-def open_hdf5(stream: FileIO, look: Callable[[h5py.File], object]) -> Iterator[h5py.File]:
-    """An HDF5 file of any program, after another process has looked at it without harm; raises ValueError.
-
-    h5py gets the very file that was looked at, and does without the file locks of HDF5.
-    """
-    _try_out(stream, look)
-    with h5py.File(stream, "r") as file:
-        yield file
 
 
 def digest(file: RawIOBase, length: int) -> bytes:
@@ -194,8 +185,11 @@ def _digest_of(file: RawIOBase) -> str:
     return "" if fits else trust.DIFFERS if behind else trust.MISSING
 
 
-def _try_out(stream: FileIO, look: Callable[[h5py.File], object]) -> None:
-    """Look at a file in another process first: some damage ends or blocks HDF5 itself."""
+def try_out(stream: FileIO, look: Callable[[h5py.File], object]) -> None:
+    """Look at an HDF5 file in another process first: some damage ends or blocks HDF5 itself.
+
+    Raises ValueError where that process is ended; its exceptions are left to those who look next.
+    """
     with warnings.catch_warnings():  # Python 3.12 warns where there are threads; the child uses none of them
         warnings.simplefilter("ignore")
         child = os.fork()
@@ -211,13 +205,7 @@ def _try_out(stream: FileIO, look: Callable[[h5py.File], object]) -> None:
                 look(file)
         finally:
             os._exit(0)  # what fails here with an exception will do so again
-    try:
-        status = os.waitpid(child, 0)[1]
-    except BaseException:  # a signal, which ends the trial, too
-        os.kill(child, signal.SIGKILL)
-        os.waitpid(child, 0)
-        raise
-    if os.waitstatus_to_exitcode(status) < 0:
+    if os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) < 0:
         raise ValueError("the file is damaged, and HDF5 cannot read it")
 
 

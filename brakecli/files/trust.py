@@ -4,52 +4,42 @@ Only the standard library is imported here.
 """
 
 from collections.abc import Callable
-from pathlib import Path
-from typing import Any
+from dataclasses import dataclass, field
 
 MISSING, DIFFERS = "missing", "does not fit"
 _SAID = {
     MISSING: "has no digest, as files that another program has saved; what it holds is unchecked",
     DIFFERS: "its digest does not fit: it is damaged or was altered; nothing that is made of it can be trusted",
 }
-_forced = False
-_tell: Callable[[str], None] | None = None
-_read: dict[str, str] = {}  # path and digest of the files for which none vouches
 
 
-def begin(tell: Callable[[str], None], forced: bool = False) -> None:
-    """Forget what was read, and have `tell` say what no digest vouches for."""
-    global _tell
-    _tell = tell
-    _read.clear()
-    force(forced)
+@dataclass
+class Readings:
+    """The results that a command, or a call of a function, has read."""
+
+    tell: Callable[[str], object] = len  # what says that a file is unchecked; nobody, if left out
+    forced: bool = False  # whether files whose digest does not fit are read all the same
+    unchecked: dict[str, str] = field(default_factory=dict)  # path and digest of those for which none vouches
+
+    def force(self, wanted: bool) -> bool:
+        """Have files whose digest does not fit read from now on, if that is wanted."""
+        self.forced = wanted
+        return wanted
+
+    def admit(self, path: str, digest: str) -> bool:
+        """Whether a file with such a digest may be read; that it is unchecked is said once."""
+        if digest and self.unchecked.get(path) != digest and (self.forced or digest == MISSING):
+            self.unchecked[path] = digest
+            self.tell(f"{path}: {_SAID[digest]}")
+        return self.forced or digest != DIFFERS
+
+    def noted(self) -> dict[str, str]:
+        """What `--json` and a file say of it; nothing where digests vouch for all that was read."""
+        return {"digest": min(self.unchecked.values())} if self.unchecked else {}
+
+    def mark(self) -> str:
+        """What stands on a picture, or a page, that is made of a file whose digest does not fit."""
+        return "read by force: a digest does not fit" if DIFFERS in self.unchecked.values() else ""
 
 
-def force(wanted: bool) -> bool:
-    """Whether files whose digest does not fit are read all the same from now on."""
-    global _forced
-    _forced = wanted
-    return wanted
-
-
-def admits(path: Path, digest: str) -> bool:
-    """Whether a file with such a digest may be read; it is remembered, and said once."""
-    if digest == DIFFERS and not _forced:
-        return False
-    if digest and str(path) not in _read:
-        _read[str(path)] = digest
-        if _tell is not None:
-            _tell(f"{path}: {_SAID[digest]}")
-    return True
-
-
-def noted() -> dict[str, Any]:
-    """What `--json` and a file say of the files that were read; nothing where digests vouch for all of them."""
-    found = next((digest for digest in (DIFFERS, MISSING) if digest in _read.values()), "")
-    return {"digest": found} if found else {}
-
-
-def mark() -> str:
-    """What a picture or a page says where it is made of a file whose digest does not fit."""
-    names = ", ".join(Path(path).name for path, digest in _read.items() if digest == DIFFERS)
-    return f"read by force, the digest does not fit: {names}" if names else ""
+readings = Readings()

@@ -77,19 +77,16 @@ def tree(file: h5py.File) -> dict[str, Any]:
 
     Raises ValueError where there are too many, or groups too deep in others.
     """
-    found, seen, groups = {"/": file["/"]}, {file["/"]}, [("", file["/"])]
+    names, groups = {file["/"]: "/"}, [("", file["/"])]
     for path, group in groups:
         for key in group:
-            node, name = member(group, key), path + key
-            if node is not None and node not in seen:
-                if name.count("/") >= DEEPEST or len(found) > _MOST_NODES:
-                    limits = f"more than {_MOST_NODES} groups and variables, or groups of more than {DEEPEST} levels"
-                    raise ValueError(f"it holds {limits}")
-                seen.add(node)
-                found[name] = node
-                if isinstance(node, h5py.Group):
-                    groups.append((f"{name}/", node))
-    return found
+            if (node := member(group, key)) is not None and node not in names:
+                names[node] = path + key
+                if names[node].count("/") >= DEEPEST or len(names) > _MOST_NODES:
+                    limits = f"{_MOST_NODES} groups and variables, or groups of more than {DEEPEST} levels"
+                    raise ValueError(f"it holds more than {limits}")
+                groups += [(f"{path}{key}/", node)] * isinstance(node, h5py.Group)
+    return {name: node for node, name in sorted(names.items(), key=lambda each: each[1])}
 
 
 def look_through(file: h5py.File, length: int, *, everything: bool) -> None:

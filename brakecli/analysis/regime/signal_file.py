@@ -10,7 +10,7 @@ from dataclasses import replace
 from functools import partial
 from io import BytesIO
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -32,6 +32,7 @@ _SI = {
 _GRAVITY = 9.80665e3  # m/s² over the gram's size in kg
 _UNEVEN = 0.01  # part of the step by which steps may differ before the signal is resampled
 _MOST_SAMPLES = 50_000_000
+_CHUNK_NAME = 4  # bytes, of which there are none at the end
 _PART = "give a part of the record"
 _GAP = 1.5  # steps of this many times the usual one are gaps
 _LONGEST = 10.0  # gaps may make a signal so many times as long; a record with longer gaps is mostly gap
@@ -127,16 +128,25 @@ def _written(text: str, option: str | None, quantity: Measurand) -> tuple[float,
     return found
 
 
+class _Sound(BytesIO):
+    """A sound file that refuses to give more than it holds, as its header may declare."""
+
+    def read(self, size: int | None = -1) -> bytes:
+        data = super().read(size)
+        if len(data) < (size or 0) and size != _CHUNK_NAME:
+            raise ValueError(f"a part of it declares {size} bytes and holds {len(data)}")
+        return data
+
+
 def _sound(path: Path, column: str | None, sample_rate: float | None) -> tuple[Array, float]:
     """A channel of a WAV file, whole numbers over the largest, and its samples per second."""
     from scipy.io import wavfile
 
-    data = contents(path, LARGEST)
-    _check_chunks(data)
+    sound = _Sound(contents(path, LARGEST))
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # chunks that it does not know
-            rate, values = wavfile.read(BytesIO(data))
+            rate, values = wavfile.read(sound)
     except Exception as error:
         known = isinstance(error, ValueError | OSError)  # others are of SciPy's own code
         what = ": " + " ".join(str(error).split()) if known else ""
@@ -158,33 +168,21 @@ def _sound(path: Path, column: str | None, sample_rate: float | None) -> tuple[A
     return (chosen - middle) / (128.0 if middle else -float(np.iinfo(values.dtype).min)), float(rate)
 
 
-def _check_chunks(data: bytes) -> None:
-    """Raise UnreadableResultError where a sound file declares more samples than it holds."""
-    order: Literal["big", "little"] = "big" if data[:4] == b"RIFX" else "little"
-    place, many = 12, 0
-    while place + 8 <= len(data):
-        size = int.from_bytes(data[place + 4 : place + 8], order)
-        if data[place : place + 4] == b"ds64":  # of RF64: the true size of the samples
-            many = int.from_bytes(data[place + 16 : place + 24], order)
-        if data[place : place + 4] == b"data":
-            size, held = many or size, len(data) - place - 8
-            what = f"it declares {size} bytes of sound and holds {held}"
-            _require(size <= held, f"{what}; record it anew, or repair its header")
-        place += 8 + size + size % 2
-
-
 def _dataset(path: Path, inside: str) -> tuple[Array, str]:
     """A row of numbers with its attribute `units`; whatever h5py raises on damage is reported."""
-    from brakecli.files.read import open_hdf5
+    import h5py
 
-    with opened(path) as stream:
-        row = partial(_row, inside=inside, length=os.fstat(stream.fileno()).st_size)
-        try:
-            with open_hdf5(stream, row) as file:
+    from brakecli.files.read import try_out
+
+    try:
+        with opened(path) as stream:
+            row = partial(_row, inside=inside, length=os.fstat(stream.fileno()).st_size)
+            try_out(stream, row)
+            with h5py.File(stream, "r") as file:
                 return row(file)
-        except Exception as error:
-            what = f"cannot be read: {' '.join(str(error).split())}"
-            raise UnreadableResultError(f"{what}; name an intact HDF5 file and a dataset in it") from error
+    except Exception as error:
+        what = f"cannot be read: {' '.join(str(error).split())}"
+        raise UnreadableResultError(f"{what}; name an intact HDF5 file and a dataset in it") from error
 
 
 def _row(file: Any, inside: str, length: int) -> tuple[Array, str]:
