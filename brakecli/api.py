@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from brakecli.errors import BrakecliError, UsageError, in_python
 from brakecli.files.os_signals import Interrupted, unwinding
+from brakecli.files.trust import readings
 from brakecli.stop import signals_shown
 
 if TYPE_CHECKING:
@@ -30,12 +31,13 @@ if TYPE_CHECKING:
     Settings = Mapping[str, Any]
 
 
-def load(source: "str | PathLike[str]", settings: "Settings | None" = None) -> Any:
+def load(source: "str | PathLike[str]", settings: "Settings | None" = None, *, force_read: bool = False) -> Any:
     """What a file holds: a case or a sweep, for the other functions, or a result as an `xarray.DataTree`.
 
     Args:
         source: path of a case file, a sweep file, or a result file.
         settings: keys of the case to change, as `{"friction.coefficient": 0.4}`; of a result none.
+        force_read: look at a result whose digest does not fit; its attribute `digest` and a warning say so.
 
     Raises:
         CaseError: the case or a setting is wrong; holds every problem.
@@ -44,7 +46,7 @@ def load(source: "str | PathLike[str]", settings: "Settings | None" = None) -> A
     from brakecli.cli.inputs import is_result, is_sweep, load_case, load_sweep
 
     name = str(source)
-    with in_python():
+    with in_python(), _readings(force_read=force_read):
         if is_result(name):
             if settings:
                 raise UsageError(f"{name}: holds a result, which has no settings; give them to brakecli.run")
@@ -88,7 +90,7 @@ def run(
         _warn(report.warnings)
         if report.motion.work.failed:
             raise BrakecliError(str(report.motion.work.failure_sentence))
-        return opened(path)
+        return opened(path, own=True)
 
 
 def stability(
@@ -130,7 +132,7 @@ def stability(
         with _target(None) as path:
             found = lock_in(loaded, _axis(vary), "vary", lambda what, done, total: None)
             write(path, loaded, found, force=False)
-            return opened(path).to_dataset()
+            return opened(path, own=True).to_dataset()
 
 
 def sweep(
@@ -188,7 +190,7 @@ def sweep(
         if found := report.findings.failures:
             failed = f"{report.findings.failed} of {report.findings.points} points failed"
             _warn([f"{failed}, the first: {found[0]['reason']}"])
-        return opened(path).to_dataset()
+        return opened(path, own=True).to_dataset()
 
 
 def classify(
@@ -199,6 +201,7 @@ def classify(
     stiffness: float | None = None,
     thresholds: "Mapping[str, float] | None" = None,
     second_run: bool = False,
+    force_read: bool = False,
     **reading: Any,
 ) -> "xr.Dataset":
     """Regime of a stored run, or of a measured signal, with evidence.
@@ -210,6 +213,7 @@ def classify(
         stiffness: stiffness behind a measured force (N/m), if known.
         thresholds: limits of the rules to change.
         second_run: where friction or roughness may keep a vibration up, run the case once more to decide.
+        force_read: look at a result whose digest does not fit; a warning says so.
         reading: how a file is read: `column`, `time_column`, `sample_rate` (Hz), `unit`, `time_unit`.
 
     Returns:
@@ -230,10 +234,23 @@ def classify(
     given = {"quantity": quantity, "belt_speed": belt_speed, "stiffness": stiffness, **reading}
     texts = {name: str(each) for name, each in given.items() if each is not None and name not in NUMBERS}
     measured = Measured(**given | texts)
-    with _interruptible():
+    with _interruptible(), _readings(force_read=force_read):
         numbers = Options(measured, changes, second_run, quiet=True).verdict(str(source))
     _warn(numbers.get("warnings", ()))
     return dataset(VERDICT, numbers)
+
+
+@contextmanager
+def _readings(*, force_read: bool) -> Iterator[None]:
+    """Warn of results that no digest vouches for, and forget them at the end."""
+    said = list[str]()
+    readings.forced, readings.tell = force_read, said.append
+    try:
+        yield
+    finally:
+        readings.forced, readings.tell = False, len
+        readings.unchecked.clear()
+    _warn(said)
 
 
 @contextmanager

@@ -86,7 +86,13 @@ class CannotWriteError(BrakecliError, exit_code=os.EX_IOERR):
     """An output cannot be written."""
 
 
-_ARGUMENTS = {"--force": "force=True", "-o": "output", "--set": "setting", "--threshold": "thresholds"}
+_ARGUMENTS = {
+    "--force": "force=True",
+    "--force-read": "force_read=True",
+    "-o": "output",
+    "--set": "setting",
+    "--threshold": "thresholds",
+}
 
 
 def _for_python(text: str) -> str:

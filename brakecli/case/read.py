@@ -54,7 +54,8 @@ def read_text(source: str, *, pipes: bool = False) -> tuple[str, str]:
     """
     name = "standard input" if source == "-" else source
     try:
-        with nullcontext(sys.stdin.buffer) if source == "-" else BufferedReader(opened(source, pipes=pipes)) as file:
+        stream = nullcontext(sys.stdin.buffer) if source == "-" else BufferedReader(opened(source, pipes=pipes))
+        with stream as file:
             data = file.read(toml_lines.LARGEST_TEXT + 1)
     except (OSError, ValueError, AttributeError) as error:
         # ValueError: a NUL in the path, or standard input is closed; AttributeError: there is no standard input.

@@ -3,7 +3,7 @@
 from typing import Annotated
 
 from brakecli.cli.inputs import load_case
-from brakecli.cli.options import AsJson, CaseArgument, Overrides, Quiet, option
+from brakecli.cli.options import AsJson, CaseArgument, ForceRead, Overrides, Quiet, option
 from brakecli.cli.output import progress, say, show_result
 
 KEYS = "Keys that may be advised, with * for any part; masses, stiffnesses, dampings, angles and load if left out."
@@ -15,6 +15,7 @@ def command(
     overrides: Overrides = None,
     keys: Annotated[str | None, option(KEYS, "KEY,…")] = None,
     margin: Annotated[float, option(MARGIN, "PART", min=0.0, max=10.0)] = 0.2,
+    force_read: ForceRead = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:

@@ -15,9 +15,10 @@ import typer
 from brakecli import __version__
 from brakecli.cli.inputs import as_argument
 from brakecli.cli.options import option
-from brakecli.cli.output import announce_compilation, say, show
+from brakecli.cli.output import announce_compilation, say, show, warn
 from brakecli.errors import BrakecliError, RefusedError
 from brakecli.files.os_signals import Interrupted
+from brakecli.files.trust import readings
 from brakecli.solver import compiling
 
 COMMANDS = (
@@ -78,6 +79,7 @@ VERSION = option("Print the version and exit.", None, "--version", callback=_pri
 @app.callback()
 def _common(version: Annotated[bool, VERSION] = False) -> None:
     compiling.set_notice(announce_compilation)
+    readings.tell = warn
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)
     if limit == resource.RLIM_INFINITY:
         return

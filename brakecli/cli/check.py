@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Annotated
 
 from brakecli.cli.inputs import is_sweep, load_case, load_sweep
-from brakecli.cli.options import AsJson, Overrides, Quiet, source_argument
+from brakecli.cli.options import AsJson, ForceRead, Overrides, Quiet, source_argument
 from brakecli.cli.output import show_result, warn
 
 OF_SYSTEM = ("belt_speed", "contact_stiffness", "natural_frequencies", "passing_frequency", "evaluator", "nodes")
@@ -14,6 +14,7 @@ OF_SYSTEM = ("belt_speed", "contact_stiffness", "natural_frequencies", "passing_
 def command(
     file: Annotated[str, source_argument("FILE.toml", 'Case or sweep file, or "-" for standard input.')],
     overrides: Overrides = None,
+    force_read: ForceRead = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:

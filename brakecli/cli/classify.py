@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from brakecli.cli.measured import UNMEASURED, Measured, with_measured
-from brakecli.cli.options import AsJson, Quiet, option, source_argument
+from brakecli.cli.options import AsJson, ForceRead, Quiet, option, source_argument
 from brakecli.cli.output import progress, say, show_result, warn
 from brakecli.errors import OtherKindError, UnreadableResultError, UsageError
 
@@ -26,6 +26,7 @@ def command(
     measured: Measured = UNMEASURED,
     thresholds: Annotated[list[str] | None, THRESHOLD] = None,
     second_run: Annotated[bool, option(SECOND, None, "--second-run")] = False,
+    force_read: ForceRead = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Annotated
 
 from brakecli.cli.inputs import load_case, result_path
-from brakecli.cli.options import AsJson, CaseArgument, Force, Overrides, Quiet, option, output_option
+from brakecli.cli.options import AsJson, CaseArgument, Force, ForceRead, Overrides, Quiet, option, output_option
 from brakecli.cli.output import progress, show_result
 from brakecli.solver.schemes import SCHEMES
 
@@ -20,6 +20,7 @@ def command(
     steps: Annotated[str | None, option(STEPS, "H,…")] = None,
     budget: Annotated[float, option("Approximate time to spend.", "SECONDS", min=1.0, max=86400.0)] = 60.0,
     target_error: Annotated[float, option(TARGET, "E", min=1e-12, max=1.0)] = 1e-3,
+    force_read: ForceRead = False,
     force: Force = False,
     as_json: AsJson = False,
     quiet: Quiet = False,

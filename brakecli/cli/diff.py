@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated
 
-from brakecli.cli.options import AsJson, Force, Quiet, option, output_option, source_argument
+from brakecli.cli.options import AsJson, Force, ForceRead, Quiet, option, output_option, source_argument
 from brakecli.cli.output import show_result
 from brakecli.files.os_signals import unwinding
 
@@ -15,6 +15,7 @@ def command(
     second: Annotated[Path, source_argument("B.h5", "Result of the same kind.")],
     output: Annotated[Path | None, output_option("Picture of both", "none")] = None,
     variable: Annotated[str | None, option(VARIABLE, "NAME")] = None,
+    force_read: ForceRead = False,
     force: Force = False,
     as_json: AsJson = False,
     quiet: Quiet = False,

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Annotated
 
 from brakecli.cli.inputs import result_path
-from brakecli.cli.options import Force, Quiet, option, output_option, source_argument
+from brakecli.cli.options import Force, ForceRead, Quiet, option, output_option, source_argument
 from brakecli.cli.output import show, warn
 from brakecli.files.os_signals import unwinding
 
@@ -17,6 +17,7 @@ def command(
     output: Annotated[Path | None, output_option("File, .csv or .wav", "FILE.csv, here")] = None,
     variables: Annotated[list[str] | None, option(VARIABLE, "NAME", "--variable")] = None,
     group: Annotated[str | None, option(GROUP, "GROUP")] = None,
+    force_read: ForceRead = False,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:

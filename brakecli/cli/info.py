@@ -3,12 +3,13 @@
 from pathlib import Path
 from typing import Annotated
 
-from brakecli.cli.options import AsJson, source_argument
+from brakecli.cli.options import AsJson, ForceRead, source_argument
 from brakecli.cli.output import show_result
 
 
 def command(
     result: Annotated[Path, source_argument("FILE.h5", "Result of any kind.")],
+    force_read: ForceRead = False,
     as_json: AsJson = False,
 ) -> None:
     """What a result holds, whether it is whole, what made it."""

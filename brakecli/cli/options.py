@@ -4,6 +4,8 @@ from typing import Annotated, Any
 
 import typer
 
+from brakecli.cli.output import warn
+from brakecli.files.trust import readings
 from brakecli.solver import compiling
 
 
@@ -30,10 +32,12 @@ AsJson = Annotated[bool, option("Print one JSON object on standard output, nothi
 
 def _compile_in_silence(quiet: bool) -> bool:
     if quiet:
-        compiling.set_notice(None)
+        compiling.set_notice(lambda trouble: warn(*filter(None, [trouble])))
     return quiet
 
 
 QUIET = option("Print nothing but warnings and errors.", None, "--quiet", "-q", callback=_compile_in_silence)
 Quiet = Annotated[bool, QUIET]
+FORCE_READ = "Look at a result whose digest does not fit, as of a damaged file; what is made of it says so."
+ForceRead = Annotated[bool, option(FORCE_READ, None, "--force-read", callback=readings.force)]
 Force = Annotated[bool, option("Replace an existing output.", None, "--force")]

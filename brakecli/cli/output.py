@@ -10,6 +10,7 @@ from textwrap import wrap
 from typing import Any, TextIO, cast
 
 from brakecli.files.os_signals import Styled, unwinding
+from brakecli.files.trust import readings
 
 FIRST_LINE, LAST_LINES = 20.0, 600.0
 """Seconds to the first line on long work without a terminal, and between the last ones; in between they double."""
@@ -31,7 +32,7 @@ def show_result(
 ) -> None:
     """Print what a command has found: its numbers as JSON, or the table of what was found, or nothing."""
     if as_json:
-        show_json({"command": command, **numbers})
+        show_json({"command": command, **readings.noted(), **numbers})
     elif not quiet:
         print(table(*found), file=Styled(sys.stdout), flush=True)  # it escapes what is in its cells
 
@@ -52,9 +53,10 @@ def warn(*warnings: str) -> None:
     say(*(f"warning: {warning}" for warning in warnings))
 
 
-def announce_compilation() -> None:
-    """Say that kernels are being compiled."""
+def announce_compilation(trouble: str) -> None:
+    """Say that kernels are being compiled, and what keeps the cache from being used."""
     say("compiling the numerical kernels, once for this version; this may take half a minute")
+    warn(*filter(None, [trouble]))
 
 
 @contextmanager

@@ -5,7 +5,7 @@ from typing import Annotated
 
 from brakecli.cli.inputs import as_argument, is_sweep
 from brakecli.cli.measured import UNMEASURED, Measured, with_measured
-from brakecli.cli.options import Force, Quiet, option, output_option, source_argument
+from brakecli.cli.options import Force, ForceRead, Quiet, option, output_option, source_argument
 from brakecli.cli.output import show, warn
 from brakecli.errors import UsageError
 from brakecli.files.os_signals import unwinding
@@ -24,6 +24,7 @@ def command(
     select: Annotated[list[str] | None, option(SELECT, "KEY=VALUE")] = None,
     variable: Annotated[str | None, option(VARIABLE, "NAME")] = None,
     measured: Measured = UNMEASURED,
+    force_read: ForceRead = False,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated
 
-from brakecli.cli.options import Force, Quiet, output_option, source_argument
+from brakecli.cli.options import Force, ForceRead, Quiet, output_option, source_argument
 from brakecli.cli.output import progress, show
 
 RESULTS = "Results of runs, sweeps, comparisons or stability."
@@ -12,6 +12,7 @@ RESULTS = "Results of runs, sweeps, comparisons or stability."
 def command(
     results: Annotated[list[Path], source_argument("FILE.h5…", RESULTS)],
     output: Annotated[Path | None, output_option("Page", "report.html, here")] = None,
+    force_read: ForceRead = False,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Annotated
 
 from brakecli.cli.inputs import load_case, result_path
-from brakecli.cli.options import AsJson, Force, Overrides, Quiet, output_option, source_argument
+from brakecli.cli.options import AsJson, Force, ForceRead, Overrides, Quiet, output_option, source_argument
 from brakecli.cli.output import progress, say, show_result, warn
 from brakecli.errors import BrakecliError
 
@@ -15,6 +15,7 @@ def command(
     case: Annotated[str, source_argument("CASE.toml", SOURCE)],
     output: Annotated[Path | None, output_option("Result file", "the case's name with .h5, here")] = None,
     overrides: Overrides = None,
+    force_read: ForceRead = False,
     force: Force = False,
     as_json: AsJson = False,
     quiet: Quiet = False,

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from brakecli.cli.inputs import load_case, result_path
-from brakecli.cli.options import AsJson, CaseArgument, Force, Overrides, Quiet, option, output_option
+from brakecli.cli.options import AsJson, CaseArgument, Force, ForceRead, Overrides, Quiet, option, output_option
 from brakecli.cli.output import progress, say, show_result
 from brakecli.errors import UsageError, printable
 
@@ -21,6 +21,7 @@ def command(
     output: Annotated[Path | None, output_option("File of --vary: .h5 or .csv", "none")] = None,
     overrides: Overrides = None,
     vary: Annotated[str | None, option(VARY, "KEY[,KEY]=START:STOP:NUM")] = None,
+    force_read: ForceRead = False,
     force: Force = False,
     as_json: AsJson = False,
     quiet: Quiet = False,

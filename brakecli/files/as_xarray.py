@@ -24,7 +24,7 @@ def opened(path: Path, *, own: bool = False) -> xr.DataTree:
         with open_result(path) as result:
             _check(result, own=own)
             result.stream.seek(0)
-            with xr.open_datatree(result.stream, engine="h5netcdf", phony_dims="access") as tree:  # type: ignore[arg-type]
+            with xr.open_datatree(result.stream, engine="h5netcdf", phony_dims="access") as tree:
                 found: xr.DataTree = tree.load()
             found.attrs |= readings.noted()
             return found

@@ -1,7 +1,7 @@
 """The one door to every file that is read: regular files alone, and no more bytes than a bound.
 
-A library gets the bytes or the stream that come from here. By its path it might open another file than the one that
-was checked, unpack it because of its name, or wait for a pipe. Only the standard library is imported here.
+A library gets the bytes or the stream that come from here. By its path it might open another file than the one
+that was checked, unpack it because of its name, or wait for a pipe. Only the standard library is imported here.
 """
 
 import os

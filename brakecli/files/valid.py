@@ -90,7 +90,7 @@ def tree(file: h5py.File) -> dict[str, Any]:
 
 
 def look_through(file: h5py.File, length: int, *, everything: bool) -> None:
-    """Read all attributes, also where some cannot be read, and of variables their axes and sizes, or everything."""
+    """Read all attributes that can be read, and of variables their axes and sizes, or everything."""
     for name, node in tree(file).items():
         with suppress(Exception):
             for attribute in node.attrs:
@@ -117,7 +117,7 @@ def check_size(node: h5py.Dataset, length: int, where: str) -> None:
 
 
 def packed(node: h5py.Dataset) -> bool:
-    """Whether a filter makes the data of a dataset smaller, so that the length of the file is no bound for them."""
+    """Whether a filter makes data smaller, so that the length of the file is no bound for them."""
     plist = node.id.get_create_plist()
     filters = {plist.get_filter(number)[0] for number in range(plist.get_nfilters())}
     return not filters <= {h5z.FILTER_FLETCHER32, h5z.FILTER_SHUFFLE}

@@ -18,8 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 from brakecli.errors import UsageError
 from brakecli.files.atomic import OutputFile, new_output
 from brakecli.files.field import Field
-from brakecli.files.os_signals import signals_deferred
 from brakecli.files.opening import is_hdf5
+from brakecli.files.os_signals import signals_deferred
 from brakecli.files.read import FORMAT, FORMAT_VERSION, digest
 
 FILL = 9.969209968386869e36  # what netCDF puts where a number is missing; the attribute `_FillValue` names it

@@ -11,6 +11,7 @@ from brakecli import __version__
 from brakecli.errors import UsageError, installed, printable
 from brakecli.files.atomic import check_target, new_output
 from brakecli.files.read import StoredResult, open_result
+from brakecli.files.trust import readings
 
 if TYPE_CHECKING:
     from brakecli.reports.blocks import Part
@@ -55,7 +56,7 @@ def write_report(results: Sequence[Path], target: Path, *, force: bool, progress
         environment.policies["json.dumps_kwargs"] = {"ensure_ascii": False}  # in order, and short
         digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
         page = environment.get_template("report.html").render(
-            parts=parts, script=script, digest=digest, version=__version__
+            parts=parts, script=script, digest=digest, version=__version__, mark=readings.mark()
         )
         data = page.encode()
         if len(data) >= LARGEST:

@@ -21,6 +21,7 @@ from brakecli.case.read import LoadedCase
 from brakecli.case.system import system_of
 from brakecli.files import fields
 from brakecli.files.field import values_of
+from brakecli.files.trust import readings
 from brakecli.files.write import ResultFile, new_result
 from brakecli.runs.certificate import Certificate
 from brakecli.runs.limits import Check, check, free_bytes, refuse, within_range
@@ -200,7 +201,7 @@ def _write_unconverged(result: ResultFile, events: NDArray[np.float64]) -> None:
 
 def origin(kind: str, title: str, loaded: LoadedCase) -> dict[str, Any]:
     """The attributes that say where a result comes from: the case and the versions."""
-    case = {"case_toml": loaded.text, "resolved_toml": loaded.resolved}
+    case = {"case_toml": loaded.text, "resolved_toml": loaded.resolved, **readings.noted()}
     return {"kind": kind, "title": title, **case, "brakecli_version": __version__, **versions()}
 
 

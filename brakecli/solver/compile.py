@@ -4,13 +4,16 @@ A scheme or a contact evaluator is handed to the time loop as the address of its
 loop serves them all and stays in the cache. Kernels neither allocate, raise nor print: they return a status.
 """
 
+import errno
+import fcntl
 import hashlib
 import io
 import os
 import stat
+import time
 import zlib
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
@@ -52,14 +55,27 @@ def _cache_directory() -> Path | None:
         directory = (Path(base) if base else Path.home() / ".cache") / "brakecli" / source_hash()
         directory.parent.mkdir(parents=True, exist_ok=True)
         directory.mkdir(mode=0o700, exist_ok=True)
-        found = [each.lstat() for each in (directory.parent, directory)]
-    except (OSError, RuntimeError):
+        for each in (directory.parent, directory):
+            found = each.lstat()
+            if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.geteuid() or directory.stat().st_mode & 0o022:
+                raise PermissionError(errno.EPERM, "it is not a folder in which this user alone writes", str(each))
+        os.close(_open_lock(directory))
+    except (OSError, RuntimeError) as error:
+        reason = f"{getattr(error, 'strerror', None) or error} (found {getattr(error, 'filename', None) or base})"
+        what = f"the cache of compiled kernels cannot be used: {reason[0].lower()}{reason[1:]}"
+        compiling.set_trouble(f"{what}; name a folder of your own with XDG_CACHE_HOME")
         return None
-    own = all(stat.S_ISDIR(each.st_mode) and each.st_uid == os.geteuid() for each in found)
-    return directory if own and not found[1].st_mode & 0o022 and os.access(directory, os.W_OK) else None
+    return directory
+
+
+def _open_lock(folder: Path) -> int:
+    """The lock of a cache, in its folder, in which nobody else can write."""
+    return os.open(folder / "lock", os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
 
 
 CACHE = _cache_directory()
+PATIENCE = 60.0  # s that another process may take to compile a kernel
+_held: list[int] = []  # the lock, while this process compiles a kernel
 
 
 class _Compiling(events.Listener):  # type: ignore[misc]
@@ -89,6 +105,13 @@ class _CheckedFiles(caching.IndexDataCacheFile):  # type: ignore[misc]
     A damaged file counts as missing, so that it is written anew: damaged machine code would end the process.
     """
 
+    def load(self, key: Any) -> Any:
+        found = super().load(key)
+        if found is None and not _held:
+            _wait_for_others()
+            found = super().load(key)  # another process may have compiled it meanwhile
+        return found
+
     def _load_index(self) -> Any:
         return super()._load_index() if _is_whole(self._index_path) else {}
 
@@ -103,6 +126,24 @@ class _CheckedFiles(caching.IndexDataCacheFile):  # type: ignore[misc]
             contents = io.BytesIO()
             yield contents
             file.write(contents.getvalue() + _checksum(filepath, contents.getvalue()))
+
+
+def _wait_for_others() -> None:
+    """Take the lock of the cache, so that one process at a time compiles a kernel, and keeps it."""
+    global PATIENCE
+    assert CACHE is not None
+    _held.append(_open_lock(CACHE))
+    end = time.monotonic() + PATIENCE
+    with suppress(OSError):  # a disk without locks: do without
+        while True:
+            with suppress(BlockingIOError):
+                return fcntl.flock(_held[0], fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if time.monotonic() > end:
+                what = f"{CACHE / 'lock'}: another process has compiled a kernel for more than {PATIENCE:g} s"
+                compiling.set_trouble(f"{what}, and is no longer waited for; end it if it hangs")
+                PATIENCE = 0.0  # nor for the other kernels
+                return None
+            time.sleep(0.02)
 
 
 def _is_whole(path: str) -> bool:
@@ -129,6 +170,8 @@ def _compiled(signature: Any, function: Any, options: dict[str, Any]) -> Any:
             pass
         finally:
             config.CACHE_DIR, caching.IndexDataCacheFile = before
+            while _held:
+                os.close(_held.pop())
     return njit(signature, **options)(function)
 
 

@@ -19,7 +19,7 @@ signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 {limit}
 from brakecli.solver import compiling
 told = []
-compiling.set_notice(lambda: told.append(1))
+compiling.set_notice(lambda trouble: told.append(1))
 from brakecli.solver import friction
 print(friction.minimise(1.0, 0.0, 1.0, 3.0, 0.0, 1.0, 0.0))
 print(bool(told))
@@ -63,7 +63,7 @@ def test_the_notice_comes_once_and_before_the_first_kernel_is_kept(tmp_path: Pat
     program = """
 from pathlib import Path
 from brakecli.solver import compiling
-compiling.set_notice(lambda: print([*Path("FOLDER").rglob("*.nbc")]))
+compiling.set_notice(lambda trouble: print([*Path("FOLDER").rglob("*.nbc")]))
 from brakecli.solver import friction
 """
     assert python(program.replace("FOLDER", str(tmp_path)), tmp_path) == "[]\n"

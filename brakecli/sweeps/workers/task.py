@@ -4,11 +4,9 @@ An engine takes tasks and gives back their records in any order. It reports of w
 records do not depend on the engine, nor on how the units of a sweep were cut into tasks.
 """
 
-import fcntl
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, suppress
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple, Self
@@ -79,18 +77,8 @@ def headline(error: object) -> str:
 
 
 def compute_units(plan: Plan, first: int, count: int) -> bytes:
-    """The records of some units of a sweep.
-
-    One process at a time loads kernels: several that fill one cold cache get into each other's way.
-    """
-    from brakecli.solver.compile import CACHE
-
-    with ExitStack() as stack:
-        if CACHE is not None:
-            with suppress(OSError):  # a disk without locks: do without
-                file = stack.enter_context(Path(f"{CACHE}.lock").open("w"))
-                fcntl.flock(file, fcntl.LOCK_EX)
-        from brakecli.sweeps.point import compute
+    """The records of some units of a sweep; the kernels are loaded when the first one is computed."""
+    from brakecli.sweeps.point import compute
 
     return compute(plan, first, count).tobytes()
 
