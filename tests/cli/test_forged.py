@@ -84,7 +84,8 @@ def test_a_forged_result_is_refused_with_a_sentence_or_used(
         # 1: a run fails; 2: there is nothing to draw in what was left
         assert done.code in ((0, 2, 4) if command[0] == "plot" else (0, 1, 4)), (what, command, done)
         assert "Traceback" not in done.err, (what, command, done)
-        assert done.code == 0 or done.err.count("\n") == 1, (what, command, done)
+        told = [line for line in done.err.splitlines() if "has no digest" not in line]
+        assert done.code == 0 or len(told) == 1, (what, command, done)
         found += done.code == 4
     assert number / 5 < found < number
 

@@ -1,0 +1,121 @@
+"""What is opened: regular files alone, at once, and no more of them than a bound."""
+
+import io
+import os
+import struct
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from brakecli.analysis.regime.of_signal import Measurand
+from brakecli.analysis.regime.signal_file import read_signal
+from brakecli.errors import UnreadableResultError
+from brakecli.files import read
+from brakecli.files.as_xarray import opened as as_xarray
+from brakecli.files.opening import contents, opened
+from brakecli.files.read import digest, open_result
+from brakecli.files.table import TextTable
+from brakecli.files.trust import readings
+from tests.files.results import write
+
+
+def seal(path: Path) -> None:
+    """Give a file a digest that fits."""
+    data = path.read_bytes()
+    path.write_bytes(data + digest(io.BytesIO(data), len(data)))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("make", [os.mkfifo, os.mkdir, lambda path: os.symlink("/dev/zero", path)])
+def test_what_is_no_regular_file_is_refused_at_once(tmp_path: Path, make: object) -> None:
+    make(tmp_path / "x")  # type: ignore[operator]
+    with pytest.raises(OSError, match="not a regular file"):
+        opened(tmp_path / "x")
+
+
+def test_more_bytes_than_the_bound_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "x").write_bytes(b"12345")
+    assert contents(tmp_path / "x", 5) == b"12345"
+    with pytest.raises(OSError, match="larger than 4 bytes"):
+        contents(tmp_path / "x", 4)
+
+
+def test_a_table_is_read_as_it_is_whatever_its_name(tmp_path: Path) -> None:
+    (tmp_path / "x.gz").write_text("1,2\n3,4\n")
+    assert [column.tolist() for column in TextTable(tmp_path / "x.gz").numbers()] == [[1.0, 3.0], [2.0, 4.0]]
+
+
+def test_a_sound_that_declares_more_than_it_holds_says_so(tmp_path: Path) -> None:
+    head = b"WAVEfmt " + struct.pack("<IHHIIHH", 16, 1, 1, 8000, 16000, 2, 16)
+    data = b"data" + struct.pack("<I", 2**31) + np.arange(20_000, dtype="<i2").tobytes()
+    (tmp_path / "x.wav").write_bytes(b"RIFF" + struct.pack("<I", 2**31 + 36) + head + data)
+    with pytest.raises(UnreadableResultError, match="declares 2147483648 bytes and holds 40000"):
+        read_signal(str(tmp_path / "x.wav"), Measurand.PRESSURE)
+
+
+def test_groups_of_more_than_eight_levels_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "r.h5"
+    write(path, 10)
+    path.write_bytes(path.read_bytes()[:-32])
+    with h5py.File(path, "r+") as file:
+        file.create_group("/".join("g" * 9))
+    with pytest.raises(UnreadableResultError, match="more than 8 levels"), open_result(path):
+        raise AssertionError
+
+
+def test_xarray_follows_no_link(tmp_path: Path) -> None:
+    path = tmp_path / "r.h5"
+    write(path, 10)
+    path.write_bytes(path.read_bytes()[:-32])
+    with h5py.File(path, "r+") as file:
+        file["history/x"] = h5py.ExternalLink("/dev/zero", "/")
+    seal(path)
+    with pytest.raises(UnreadableResultError, match="which is a link"):
+        as_xarray(path)
+
+
+def test_damage_on_which_hdf5_never_ends_is_refused_though_its_digest_fits(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "r.h5"
+    write(path, 10)
+    data = bytearray(path.read_bytes()[:-32])
+    place = data.index(b"GCOL") + 16
+    while int.from_bytes(data[place : place + 2], "little"):
+        place += 16 + (int.from_bytes(data[place + 8 : place + 16], "little") + 7) // 8 * 8
+    data[place + 8 : place + 16] = bytes(8)
+    path.write_bytes(data)
+    seal(path)
+    monkeypatch.setattr(read, "SHORTEST_TRIAL", 1.0)
+    with pytest.raises(UnreadableResultError, match="HDF5 cannot read it"), open_result(path):
+        raise AssertionError
+
+
+def test_a_digest_that_does_not_fit_needs_force_and_is_noted(tmp_path: Path) -> None:
+    path = tmp_path / "r.h5"
+    write(path, 10)
+    path.write_bytes(path.read_bytes()[:-1] + b"x")
+    with pytest.raises(UnreadableResultError, match="only --force-read"), open_result(path):
+        raise AssertionError
+    try:
+        readings.force(True)
+        with open_result(path) as result:
+            assert not result.sealed
+        assert readings.noted() == {"digest": "does not fit"}
+        assert readings.mark()
+    finally:
+        readings.force(False)
+        readings.unchecked.clear()
+
+
+def test_variables_of_libraries_are_fixed() -> None:
+    program = "import os, brakecli; brakecli.fix_environment(); print(sorted(os.environ.items()))"
+    given = {"HDF5_DRIVER": "no", "MPLBACKEND": "module://x", "NUMBA_OPT": "0", "HDF5_USE_FILE_LOCKING": "FALSE"}
+    done = subprocess.run([sys.executable, "-c", program], env=given, capture_output=True, text=True, check=True)
+    assert "HDF5_DRIVER" not in done.stdout
+    assert "NUMBA_OPT" not in done.stdout
+    assert "('MPLBACKEND', 'agg')" in done.stdout
+    assert "('HDF5_USE_FILE_LOCKING', 'FALSE')" in done.stdout
