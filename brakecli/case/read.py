@@ -21,8 +21,8 @@ from brakecli.case.roughness import Record, Records, reading
 from brakecli.case.tables import MISSING, Table, tables_within
 from brakecli.errors import CaseError, KeyPath, Problem, key_text, printable
 from brakecli.files import toml_lines
-from brakecli.files.toml_lines import WRITING, Located, check_size, innermost, parse, split, unfit
 from brakecli.files.opening import SIGNATURE, opened
+from brakecli.files.toml_lines import WRITING, Located, check_size, innermost, parse, split, unfit
 
 _Table = TypeVar("_Table", bound=Table)
 

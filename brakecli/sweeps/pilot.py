@@ -14,10 +14,11 @@ from time import process_time
 
 from brakecli.runs.certificate import Certified
 from brakecli.runs.cost import beside_seconds, stability_seconds
-from brakecli.runs.limits import MOST_STEPS, Check, within_range
+from brakecli.runs.limits import Check, within_range
 from brakecli.runs.pilot import measured
 from brakecli.runs.together import TOGETHER, certify_together, loops
 from brakecli.solver.lanes import LANES
+from brakecli.solver.system import MOST_STEPS
 from brakecli.sweeps.early import may_be_early
 from brakecli.sweeps.plan import Plan
 from brakecli.sweeps.point import FAULTS, Begun, begun, computed, followed, judged
