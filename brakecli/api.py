@@ -250,7 +250,7 @@ def _readings(*, force_read: bool) -> Iterator[None]:
     finally:
         readings.forced, readings.tell = False, len
         readings.unchecked.clear()
-    _warn(said)
+    _warn(said, 5)  # the caller of who uses this block
 
 
 @contextmanager
@@ -348,6 +348,6 @@ def _plain(value: Any, key: str) -> Any:
     return str(value) if isinstance(value, PathLike) else value
 
 
-def _warn(texts: Iterable[str]) -> None:
+def _warn(texts: Iterable[str], frames: int = 3) -> None:
     for text in texts:
-        warnings.warn(text, stacklevel=3)
+        warnings.warn(text, stacklevel=frames)

@@ -65,7 +65,7 @@ def read_text(source: str, *, pipes: bool = False) -> tuple[str, str]:
         raise unfit(what, "name a TOML file", name) from error
     if data.startswith(SIGNATURE):
         raise unfit("is a result, not TOML", "name the TOML file that it was computed from", name)
-    check_size(data, name)
+    check_size(data, name, toml_lines.LARGEST_TEXT)
     try:
         return data.decode("utf-8-sig"), name
     except UnicodeDecodeError as error:

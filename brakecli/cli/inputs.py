@@ -90,10 +90,10 @@ def result_path(output: Path | None, source: str, kind: str = "case", ending: st
     Raises UsageError if that is the source itself; a result file may be replaced by the same run again.
     """
     target = output or Path((kind if source == "-" else Path(source).stem) + ending)
-    if target.suffix.lower() in (".txt", ".csv", ".json", ".png", ".pdf", ".svg", ".toml") and ending == ".h5":
-        raise UsageError(f"{target}: a result is HDF5, not {target.suffix}; name a file that ends in .h5 with -o")
     if source != "-" and not is_result(source):
         refuse_source(target, source, kind)
+    if target.suffix.lower() in (".txt", ".csv", ".json", ".png", ".pdf", ".svg", ".toml") and ending == ".h5":
+        raise UsageError(f"{target}: a result is HDF5, not {target.suffix}; name a file that ends in .h5 with -o")
     return target
 
 

@@ -105,7 +105,7 @@ def advice_table(report: AdviceReport) -> str:
     }
     rows: list[Row] = [
         ("critical friction", _crossing(found.critical) if found.critical else "none"),
-        (f"at φ = {found.friction:g}", _STATE[found.stable]),
+        (f"at φ = {found.friction:g}", _STATE[report.stable]),
         ("margin", "-" if margin is None else f"{margin:.1%}; {report.wanted_margin:.1%} is wanted"),
     ]
     ends: list[Row] = [("note", report.notes())]

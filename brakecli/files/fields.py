@@ -327,7 +327,7 @@ ADVICE = (
     ratio("friction_coefficient", "friction coefficient φ of the case", "stability.friction"),
     ratio("margin", "`critical_friction` over `friction_coefficient`, less 1"),
     ratio("wanted_margin", "the margin that is asked for"),
-    Field("stable", "", "whether steady sliding is stable at φ", "?", "stability."),
+    Field("stable", "", "whether steady sliding is stable at φ; missing where nothing slides", "?"),
     Field("sensitivities", "", "all numbers of the case, those that move it most first", OBJECT, rows=SENSITIVITY),
     Field(
         "advice",

@@ -91,9 +91,10 @@ class StoredResult:
             parent = self._group(group)
             for name in parent:
                 node = valid.member(parent, name)
-                if isinstance(node, h5py.Dataset):
-                    dims, attributes = valid.axes_of(node, name), valid.attributes_of(node, "")
-                    found[name] = Variable(dims, node.shape, attributes, node.dtype.kind)
+                if isinstance(node, h5py.Dataset) and not valid.is_axis_alone(node):
+                    shape, attributes = valid.shape_of(node), valid.attributes_of(node, "")
+                    dims = valid.axes_of(node, name)[: len(shape)]
+                    found[name] = Variable(dims, shape, attributes, node.dtype.kind)
         self._variables[group] = found
         return found
 
@@ -111,6 +112,8 @@ class StoredResult:
             needed = copies * rows * node.dtype.itemsize * int(np.prod(node.shape[1:], dtype=object))
             valid.check_memory(needed * valid.packed(node), where)
             values = np.asarray(node[start:stop])
+            if values.ndim > len(valid.shape_of(node)):
+                values = values.view(f"S{max(1, values.shape[-1])}")[..., 0]
             if values.dtype.kind == "S":
                 return np.char.decode(values, "utf-8")
             if values.dtype == np.float16:  # its squares are infinite from 256 on

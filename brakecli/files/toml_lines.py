@@ -12,10 +12,11 @@ from typing import Any, TypeVar
 from brakecli.errors import CaseError, KeyPath, Problem, key_text, printable
 
 # Within these limits every problem of a file is reported within half a second.
-LARGEST_TEXT = 500_000  # bytes
+LARGEST_TEXT = 500_000  # bytes of a file that is given
 MOST_PARTS = 32  # of a dotted key: the time that tomllib takes grows with their square
 MOST_STATEMENTS = 1000  # keys and table headers
 MOST_MARKS = 50_000  # commas, brackets and signs of equality outside texts; so many entries may all lists have
+LARGEST_STORED = 1_250_000  # bytes with all defaults: an entry gets 7 of indentation, and a phase of 9 at the most
 
 _OPAQUE = re.compile(  # texts and comments, also those that do not end
     r'"""(?:\\.|[^\\])*?(?:"{3,5}|\\?\Z)'
@@ -40,10 +41,10 @@ def unfit(what: str, remedy: str, source: str = "", line: int = 0) -> CaseError:
     return CaseError([Problem((), what, remedy, source, line)])
 
 
-def check_size(text: str | bytes, source: str = "") -> None:
-    """Raise `CaseError` for more than `LARGEST_TEXT` bytes."""
-    if len(text) > LARGEST_TEXT:
-        raise unfit(f"is larger than {LARGEST_TEXT} bytes", "give a shorter file", source)
+def check_size(text: str | bytes, source: str, most: int) -> None:
+    """Raise `CaseError` for more than so many bytes."""
+    if len(text) > most:
+        raise unfit(f"is larger than {most} bytes", "give a shorter file", source)
 
 
 def innermost(values: Mapping[KeyPath, _Value], path: KeyPath, default: _Value) -> _Value:
@@ -66,7 +67,7 @@ def split(text: str, source: str = "") -> list[tuple[int, str]]:
 
     Raises `CaseError` for a text that tomllib must not get.
     """
-    check_size(text, source)
+    check_size(text, source, LARGEST_STORED)
     text = text.replace("\r\n", "\n")
     bare = _OPAQUE.sub(lambda found: (" " if found[0][0] == "#" else "_") * len(found[0]), text)
     for searched, pattern, what, remedy in (

@@ -63,11 +63,12 @@ def check_variables(file: h5py.File, kind: str, length: int) -> None:
                 raise ValueError(f"{where} is not what belongs there: {field.meaning}")
             check_size(node, length, where)
             axis = declared[0].name if kind != "sweep" else "status"
-            shape = found[axis][1].shape if axis in found and field is not fields.FREQUENCY else node.shape
+            own = shape_of(node)
+            shape = shape_of(found[axis][1]) if axis in found and field is not fields.FREQUENCY else own
             if kind == "sweep" and field in (fields.DIRECTION, *fields.DIFFERENCE):
                 shape = shape[1:] if field is not fields.DIRECTION else shape[:1]
-            if node.shape[: node.ndim - field.kind.startswith("(")] != shape:
-                raise ValueError(f"{where} has the shape {node.shape}, and {axis} has {shape}")
+            if own[: len(own) - field.kind.startswith("(")] != shape:
+                raise ValueError(f"{where} has the shape {own}, and {axis} has {shape}")
             if kind == "run" and name in _RISING and field not in fields.OVER_TIME:
                 _check_rising(node, where)
 
@@ -146,6 +147,17 @@ def axes_of(node: h5py.Dataset, name: str) -> tuple[str, ...]:
     return tuple([each.rpartition("/")[2] for each in names])
 
 
+def is_axis_alone(node: h5py.Dataset) -> bool:
+    """Whether it names an axis of other variables and has no values, by the mark of netCDF-4."""
+    return str(plain_attribute(node, "NAME")).startswith("This is a netCDF dimension but not a netCDF variable")
+
+
+def shape_of(node: h5py.Dataset) -> tuple[int, ...]:
+    """The shape of a variable, whose texts xarray may have saved as rows of letters along an axis of their own."""
+    letters = node.dtype == "S1" and node.ndim and axes_of(node, "")[-1] == f"string{node.shape[-1]}"
+    return tuple(node.shape[:-1] if letters else node.shape)
+
+
 def member(group: h5py.Group, name: str) -> Any:
     """What a group holds under a name; None where there is nothing, or only a link or a view of something else.
 
@@ -170,7 +182,8 @@ def attributes_of(node: h5py.HLObject, kind: str) -> dict[str, Any]:
     declared: Iterable[Field] = _ATTRIBUTES.get((kind, str(node.name)), ())
     texts = [Field(name, "", name, fields.TEXT) for name in _TEXTS if node.name == "/"]
     known = {field.name: field for field in (*texts, *declared)}
-    found = {name: plain_attribute(node, name) for name in node.attrs if name not in _MACHINERY}
+    given = {name: plain_attribute(node, name) for name in node.attrs if name not in _MACHINERY}
+    found = {name: _formed(known.get(name), value) for name, value in given.items()}
     for name, field in known.items():
         if name in found and not _fits(field, found[name]):
             raise ValueError(f"attribute {name} is not what belongs there: {field.meaning}")
@@ -201,6 +214,13 @@ def _decoded(value: Any) -> Any:
     if isinstance(value, str):
         value.encode()  # h5py marks what is not UTF-8
     return value.decode() if isinstance(value, bytes) else value
+
+
+def _formed(field: Field | None, value: Any) -> Any:
+    """An attribute as it is declared: xarray saves an array of one for a number, and a text for a list of one."""
+    if field is not None and field.kind == fields.OBJECT:
+        return [value] if isinstance(value, str) else value
+    return value.item() if isinstance(value, np.ndarray) and value.shape == (1,) else value
 
 
 def _fits(field: Field, value: Any) -> bool:

@@ -59,6 +59,11 @@ class AdviceReport:
         critical, own = self.critical_friction, self.stability.friction
         return critical / own - 1.0 if critical is not None and own > 0.0 else None
 
+    @property
+    def stable(self) -> bool | None:
+        """Whether sliding is stable; None where the wheel stands, or nothing presses the shoe."""
+        return self.stability.stable if self.stability.belt_speed else None
+
     def numbers(self) -> dict[str, Any]:
         """Names and values as `--json` gives them."""
         return values_of(fields.ADVICE, self)

@@ -112,7 +112,7 @@ def _tables(data: dict[str, Any]) -> dict[str, Any]:
 
 
 @lru_cache(maxsize=4)
-def plan_of(sweep_text: str, case_text: str, records: tuple[tuple[str, Record], ...]) -> Plan:
+def plan_of(sweep_text: str, case_text: str, records: tuple[tuple[str, Record], ...] = ()) -> Plan:
     """The plan of what travels; a worker meets the same one again and again."""
     # `lru_cache(Plan)` would inherit `__reduce__`, and could not be sent
     return Plan(sweep_text, case_text, dict(records))

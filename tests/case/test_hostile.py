@@ -9,7 +9,7 @@ import pytest
 
 from brakecli.case.read import parse_case, read_text
 from brakecli.errors import CaseError
-from brakecli.files.toml_lines import LARGEST_TEXT, MOST_MARKS, MOST_PARTS, MOST_STATEMENTS
+from brakecli.files.toml_lines import LARGEST_STORED, LARGEST_TEXT, MOST_MARKS, MOST_PARTS, MOST_STATEMENTS
 from tests.case.examples import CONSTANT, change, messages, problems, put
 
 HOSTILE = {
@@ -69,7 +69,7 @@ def test_dots_in_texts_and_lists_of_numbers_are_no_deep_key() -> None:
 @pytest.mark.parametrize(
     ("text", "what"),
     [
-        ("#" * (LARGEST_TEXT + 1), f"is larger than {LARGEST_TEXT} bytes"),
+        ("#" * (LARGEST_STORED + 1), f"is larger than {LARGEST_STORED} bytes"),
         ("a = [" + "1," * (MOST_MARKS + 1) + "]", f"there are more than {MOST_MARKS} commas and brackets"),
         (
             "".join(f"a{i} = 1\n" for i in range(MOST_STATEMENTS + 1)),
@@ -98,7 +98,6 @@ def test_of_a_long_list_the_first_wrong_entries_are_reported_and_their_number() 
     [
         (CONSTANT.encode("utf-16"), "1", "is UTF-16, not UTF-8"),
         (CONSTANT.encode("utf-16-be"), "1", "holds a NUL character"),
-        (CONSTANT.encode("utf-8-sig"), "1", "begins with a byte order mark"),
         (CONSTANT.replace("[shoe]", "[shoe] # für").encode("latin-1"), "2", "is not UTF-8 (found byte 0xfc)"),
         (b"\x89HDF\r\n\x1a\n" + bytes(1000), "", "is a result, not TOML"),
         (b"#" * (LARGEST_TEXT + 5), "", f"is larger than {LARGEST_TEXT} bytes"),
@@ -113,6 +112,11 @@ def test_bytes_that_are_not_utf_8_text_are_refused(tmp_path: Path, data: bytes, 
     (problem,) = caught.value.problems
     assert problem.where == (f"{path}:{place}" if place else str(path))
     assert problem.what == what
+
+
+def test_a_byte_order_mark_is_no_part_of_the_text(tmp_path: Path) -> None:
+    (tmp_path / "case.toml").write_bytes(CONSTANT.encode("utf-8-sig"))
+    assert parse_case(*read_text(str(tmp_path / "case.toml"))).text == CONSTANT
 
 
 def test_a_file_without_end_is_refused_at_once() -> None:
