@@ -305,10 +305,10 @@ def test_a_copy_that_xarray_has_saved_opens_and_is_said_to_be_unchecked(tmp_path
             copy = brakecli.load(tmp_path / f"{name}.nc")
         assert copy.attrs.pop("digest") == "missing"
         for node in copy.subtree:
-            before = result[node.path].to_dataset() if name == "run" else result
+            before: Any = result[node.path].to_dataset() if name == "run" else result
             for key, values in before.variables.items():
-                assert node[key].dims == values.dims
-                assert (node[key].values.astype(str) == values.values.astype(str)).all(), key
+                assert node[str(key)].dims == values.dims
+                assert (node[str(key)].values.astype(str) == values.values.astype(str)).all(), key
         drawn = command("plot", f"{name}.nc", "-o", f"{name}.png", cwd=tmp_path)
         assert "unchecked" in drawn.told(0)
 
