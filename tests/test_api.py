@@ -294,7 +294,7 @@ def test_errors_name_arguments_and_no_options(
 
 
 def test_a_copy_that_xarray_has_saved_opens_and_is_said_to_be_unchecked(tmp_path: Path) -> None:
-    results = {
+    results: dict[str, Any] = {
         "run": brakecli.run(CASE, SHORT),
         "sweep": brakecli.sweep(CASE, SHORT, axes={"friction.coefficient": [0.1, 0.2]}, jobs=1),
         "vary": brakecli.stability(CASE, vary={"friction.coefficient": [0.1, 0.2, 0.3]}),

@@ -16,6 +16,7 @@ from brakecli.files import fields
 from brakecli.files.atomic import check_target, new_output
 from brakecli.files.field import plain_units
 from brakecli.files.read import StoredResult, Variable
+from brakecli.files.trust import readings
 from brakecli.files.write import FILL
 
 RATE = 44_100  # samples of sound per second
@@ -56,8 +57,12 @@ def export(
     if suffix == ".wav" and (group not in (None, "history") or len(names) > 1):
         remedy = "give one --variable and no other group"
         raise UsageError(f"{target}: a sound is one variable of the history; {remedy}")
+    mark = readings.mark()
+    if suffix == ".wav" and mark:
+        raise UsageError(f"{target}: a sound cannot say that it was {mark}; export .csv")
     with new_output(target, force=force) as file:
         notes = list[str]()
+        file.write(f"# {mark}\n".encode() * bool(mark))
         if suffix == ".wav":
             sound, notes = _sound(result, names[0] if names else "vx")
             file.write(sound)

@@ -4,7 +4,7 @@ Only the standard library is imported here.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from threading import local
 
 MISSING, DIFFERS = "missing", "does not fit"
 _SAID = {
@@ -13,13 +13,14 @@ _SAID = {
 }
 
 
-@dataclass
-class Readings:
-    """The results that a command, or a call of a function, has read."""
+class Readings(local):
+    """The results that a command, or a call of a function, has read; each thread has its own."""
 
-    tell: Callable[[str], object] = len  # what says that a file is unchecked; nobody, if left out
-    forced: bool = False  # whether files whose digest does not fit are read all the same
-    unchecked: dict[str, str] = field(default_factory=dict)  # path and digest of those for which none vouches
+    def __init__(self) -> None:
+        """Nothing was read, and nobody is told."""
+        self.tell: Callable[[str], object] = len  # what says that a file is unchecked
+        self.forced = False  # whether files whose digest does not fit are read all the same
+        self.unchecked: dict[str, str] = {}  # path and digest of those for which none vouches
 
     def force(self, wanted: bool) -> bool:
         """Have files whose digest does not fit read from now on, if that is wanted."""

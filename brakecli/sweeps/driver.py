@@ -176,5 +176,5 @@ def _compute(
         progress(journal.done, journal.failed)
     if not ends:
         return ()
-    times = "a worker process has ended" if len(ends) == 1 else f"{len(ends)} times a worker process has ended"
-    return (f"{times} before its time ({ends[0]}); its points were computed again",)
+    times = "a worker process has failed" if len(ends) == 1 else f"{len(ends)} times a worker process has failed"
+    return (f"{times} ({ends[0]}); its points were computed again",)

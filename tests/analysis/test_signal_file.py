@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.io import wavfile
 
+from brakecli.analysis.regime import signal_file
 from brakecli.analysis.regime.of_signal import Measurand, Signal, look
 from brakecli.analysis.regime.signal_file import read_signal
 from brakecli.errors import UnreadableResultError, UsageError
@@ -240,3 +241,43 @@ def test_the_unit_of_a_dataset_counts(tmp_path: Path) -> None:
         with pytest.raises((UsageError, UnreadableResultError), match=word):
             read_signal(f"{path}:/{name}", Measurand(quantity), sample_rate=1.0, unit=unit)
     read_signal(f"{path}:/odd", Measurand.DISPLACEMENT, sample_rate=1.0, unit="mm")
+
+
+def test_a_torque_has_its_own_unit_and_no_displacement(tmp_path: Path) -> None:
+    path = written(tmp_path, "time_s,torque_Nm\n0,1\n0.1,2.5\n0.2,4\n")
+    signal = read_signal(str(path), Measurand.TORQUE, column="torque_Nm", time_column="time_s")
+    assert signal.values.tolist() == [1.0, 2.5, 4.0]
+    path = written(tmp_path, "time_s,torque_kNm\n0,1\n0.1,2.5\n0.2,4\n")
+    kilo = read_signal(str(path), Measurand.TORQUE, column="torque_kNm", time_column="time_s")
+    assert kilo.values.tolist() == [1000.0, 2500.0, 4000.0]
+    with pytest.raises(UnreadableResultError, match="torque"):
+        read(path, "torque_kNm", "time_s")
+
+
+@pytest.mark.parametrize("filler", [0, 70_000])
+def test_a_text_in_latin_1_keeps_its_units(tmp_path: Path, filler: int) -> None:
+    comment = "# " + "x" * filler + "\n"
+    text = f"t,a\ns,m/s²\n0,1\n0.1,2.5\n{comment * bool(filler)}0.2,4\n# für alle\n"
+    signal = read_signal(
+        str(written(tmp_path, text.encode("latin-1"))), Measurand.ACCELERATION, column="a", time_column="t"
+    )
+    assert signal.values.tolist() == [1.0, 2.5, 4.0]
+
+
+def test_a_row_of_a_mat_file_is_a_signal_and_a_matrix_is_none(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "m.mat", "w", userblock_size=512) as file:
+        file["row"], file["column"], file["matrix"] = np.eye(1, 5), np.eye(5, 1), np.eye(2, 5)
+    for name in ("row", "column"):
+        assert read(f"{tmp_path}/m.mat:/{name}", rate=10.0).values.tolist() == [1.0, 0.0, 0.0, 0.0, 0.0]
+    with pytest.raises(UnreadableResultError, match="not a row of numbers"):
+        read(f"{tmp_path}/m.mat:/matrix", rate=10.0)
+
+
+def test_more_samples_than_the_bound_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with h5py.File(tmp_path / "s.h5", "w") as file:
+        file["v"] = np.zeros(101)
+    wavfile.write(tmp_path / "s.wav", 1000, np.zeros(101, dtype=np.int16))
+    monkeypatch.setattr(signal_file, "_MOST_SAMPLES", 100)
+    for path in (f"{tmp_path}/s.h5:/v", f"{tmp_path}/s.wav"):
+        with pytest.raises(UnreadableResultError, match=r"101 samples, (and )?100 are the most"):
+            read_signal(path, Measurand.PRESSURE, sample_rate=1000.0)

@@ -140,9 +140,7 @@ def test_a_killed_worker_costs_a_warning_and_no_point(good: Path, here: Path, na
             victims = children(crew[0].pid) if nanny == "--nanny" else {crew[0].pid}
             for pid in victims:
                 os.kill(pid, signal.SIGKILL)
-            told = ended(process).told(
-                0, "brakecli: warning: a worker process has ended before its time (the worker"
-            )
+            told = ended(process).told(0, "brakecli: warning: a worker process has failed (the worker")
     assert victims
     assert told.count("\n") == 1
     assert (here / "s.h5").read_bytes() == (good / "s.h5").read_bytes()

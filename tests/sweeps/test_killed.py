@@ -87,7 +87,7 @@ def test_a_killed_worker_costs_a_warning_and_no_point(good: Path, here: Path) ->
         wait_until(lambda: journal_size(here) > 2000)
         os.kill(min(workers(process.pid)), signal.SIGKILL)
         done = ended(process)
-    told = done.told(0, "brakecli: warning: a worker process has ended before its time (its process was killed by")
+    told = done.told(0, "brakecli: warning: a worker process has failed (its process was killed by")
     assert told.count("\n") == 1
     assert (here / "s.h5").read_bytes() == (good / "s.h5").read_bytes()
     assert left_in(here) == {"tiny.toml", "s.toml", "s.h5"}
