@@ -167,13 +167,12 @@ def test_a_small_file_that_unpacks_to_very_much_is_refused(good: Path, here: Pat
     brakecli("classify", "s.h5:/g", *reading, cwd=here).told(4, "groups of more than 8 levels")
 
 
-@campaign
 def test_a_table_is_not_unpacked_because_of_its_name(here: Path) -> None:
-    data = b"time (s),v (m/s)\n" + b"0.001,0.002\n" * 20_000_000
+    data = b"time (s),v (m/s)\n" + b"0.001,0.002\n" * 100
     for name, pack in (("gz", gzip.compress), ("bz2", bz2.compress), ("xz", lzma.compress)):
         (here / f"v.csv.{name}").write_bytes(pack(data))
-        words = ["classify", f"v.csv.{name}", "--quantity", "velocity"]
-        forked(*words, cwd=here, memory=500_000_000).told(4)
+        words = ["classify", f"v.csv.{name}", "--quantity", "velocity", "--sample-rate", "1000"]
+        brakecli(*words, cwd=here).told(4, "this is not text; name a CSV file")
 
 
 def test_small_helps(here: Path) -> None:
@@ -223,12 +222,12 @@ def test_python_looks_for_the_cluster_that_the_environment_names(here: Path) -> 
 def test_first_runs_side_by_side_compile_once(here: Path) -> None:
     cache = str(here / "cache")
     with (
-        started("run", "tiny.toml", "-q", "-o", "a.h5", cwd=here, XDG_CACHE_HOME=cache) as one,
-        started("run", "tiny.toml", "-q", "-o", "b.h5", cwd=here, XDG_CACHE_HOME=cache) as two,
+        started("run", "tiny.toml", "-o", "a.h5", cwd=here, XDG_CACHE_HOME=cache) as one,
+        started("run", "tiny.toml", "-o", "b.h5", cwd=here, XDG_CACHE_HOME=cache) as two,
     ):
         told = [ended(one, 300.0).told(0), ended(two, 300.0).told(0)]
     assert (here / "a.h5").read_bytes() == (here / "b.h5").read_bytes()
-    assert any("compiling" in each_ for each_ in told)
+    assert any("compiling" in said for said in told)
     (folder,) = (here / "cache" / "brakecli").iterdir()
     assert folder.stat().st_mode & 0o777 == 0o700
     stems = [path.name.rpartition(".")[0] for path in folder.rglob("*.nbc")]
