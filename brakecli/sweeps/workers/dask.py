@@ -28,7 +28,7 @@ class ClusterEngine(Engine):
 
     def __init__(self, compute: Compute, address: str | None, scheduler_file: str | None) -> None:
         """Connect to a scheduler and compare versions; raises UsageError or RefusedError."""
-        self._compute, self._versions = compute, fingerprint()
+        self._compute, self._versions, self._shared = compute, fingerprint(), None
         option, name = ("--scheduler", address) if scheduler_file is None else ("--scheduler-file", scheduler_file)
         self._where = f"{option} {name}"
         address = str(address) if scheduler_file is None else self._address_in(scheduler_file)
@@ -95,7 +95,9 @@ class ClusterEngine(Engine):
                 raise BrakecliError(f"{self._where}: has no workers any more{KEPT}")
 
     def _submit(self, task: Task) -> Any:
-        return self._client.submit(_attempt, self._compute, task, self._versions, pure=False)
+        # What computes, measured profiles included, is a task as well: it travels once, and survives its worker.
+        self._shared = self._shared or self._client.submit(_itself, self._compute, pure=False)
+        return self._client.submit(_attempt, self._shared, task, self._versions, pure=False)
 
     def _collect(self, future: Any) -> Finished | None:
         """The end of a task, None if its workers have died. Raises TimeoutError while dask computes it again."""
@@ -174,6 +176,10 @@ class ClusterEngine(Engine):
         for worker, theirs in sorted(found.items()):
             if difference := _difference(self._versions, theirs, f"the worker at {worker}"):
                 raise RefusedError(f"{self._where}: {difference}{INSTALL}")
+
+
+def _itself(compute: Compute) -> Compute:
+    return compute
 
 
 def _attempt(compute: Compute, task: Task, versions: Mapping[str, str]) -> Finished | str:
