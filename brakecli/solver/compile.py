@@ -55,9 +55,9 @@ def _cache_directory() -> Path | None:
         directory = (Path(base) if base else Path.home() / ".cache") / "brakecli" / source_hash()
         directory.parent.mkdir(parents=True, exist_ok=True)
         directory.mkdir(mode=0o700, exist_ok=True)
-        for each in (directory.parent, directory):
+        for each, others in ((directory.parent, 0), (directory, 0o022)):
             found = each.lstat()
-            if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.geteuid() or directory.stat().st_mode & 0o022:
+            if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.geteuid() or found.st_mode & others:
                 raise PermissionError(errno.EPERM, "it is not a folder in which this user alone writes", str(each))
         os.close(_open_lock(directory))
     except (OSError, RuntimeError) as error:

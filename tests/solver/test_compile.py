@@ -1,5 +1,6 @@
 """Compiling kernels, with a cache that works and with one that does not."""
 
+import fcntl
 import os
 import random
 import shutil
@@ -144,3 +145,45 @@ def test_a_cache_that_others_may_write_is_not_used(cache: Path, tmp_path: Path) 
     folder.rename(tmp_path / "elsewhere")
     folder.symlink_to(tmp_path / "elsewhere")
     assert python(COUNT.format(limit=""), cache).splitlines()[1] == "True"
+
+
+TROUBLE = """
+from brakecli.solver import compiling
+compiling.set_notice(lambda trouble: print("trouble:", trouble))
+from brakecli.solver import compile
+compile.PATIENCE = 0.1
+from brakecli.solver import friction
+"""
+
+
+def test_a_process_that_keeps_the_lock_is_waited_for_no_longer_than_a_limit_and_is_named(tmp_path: Path) -> None:
+    python("from brakecli.solver import compile", tmp_path)
+    (folder,) = (tmp_path / "brakecli").iterdir()
+    assert folder.stat().st_mode & 0o777 == 0o700
+    with (folder / "lock").open("r+") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        said = python(TROUBLE, tmp_path)
+    assert said.startswith(f"trouble: {folder}/lock: another process has compiled a kernel for more than 0.1 s")
+    assert said.count("\n") == 1
+    assert any(folder.rglob("*.nbc"))
+
+
+@pytest.mark.parametrize("kind", ["a file", "a link", "read-only", "of others"])
+def test_a_cache_that_cannot_be_used_is_named_with_the_remedy(tmp_path: Path, kind: str) -> None:
+    python("from brakecli.solver import compile", tmp_path)
+    (folder,) = (tmp_path / "brakecli").iterdir()
+    if kind == "of others":
+        folder.chmod(0o722)
+    else:
+        folder.rename(tmp_path / "elsewhere")
+    if kind == "a file":
+        folder.write_text("")
+    elif kind == "a link":
+        folder.symlink_to(tmp_path / "elsewhere")
+    elif kind == "read-only":
+        folder.mkdir()
+        (folder / "lock").mkdir()  # root may write everywhere; this cannot be opened by anybody
+    said = python(TROUBLE, tmp_path)
+    assert said.startswith("trouble: the cache of compiled kernels cannot be used: ")
+    assert str(folder) in said
+    assert "name a folder of your own with XDG_CACHE_HOME" in said
