@@ -31,6 +31,6 @@ def command(
     load_kernels(loaded)
     with progress(quiet) as show_progress, within_range():
         if (seconds := advise_seconds(loaded)) > WORTH_SAYING and not quiet:
-            say(f"a pad that opens: this takes about {duration_text(seconds)}")
+            say(f"a rough pad: this takes about {duration_text(seconds)}")
         report = advise(loaded, keys.split(",") if keys is not None else USUAL, margin, show_progress)
     show_result("advise", report.numbers(), advice_table, report, as_json=as_json, quiet=quiet)

@@ -32,7 +32,6 @@ MOST_DETAIL = 100_000  # samples drawn one by one
 FEW = 4000  # samples of the detail where no frequency says how long a cycle is
 COLUMNS = 1200  # columns of the envelope: about the width of its panel in pixels
 BLOCK = 1 << 20  # samples read at a time
-TABLE_SECONDS = 1e-8  # to build a byte of the tables of the contact
 FEW_LINES = 5  # waves of the wheel that have a line each in the spectrum; more have a tick each
 _SHADES = ((ContactState.STICK, style.ORANGE, "stick"), (ContactState.SEPARATED, style.GREY, "no contact"))
 _BELT: dict[str, Any] = {"color": style.VERMILION, "ls": style.DASHES}
@@ -105,7 +104,7 @@ def case_of(result: StoredResult) -> LoadedCase:
 
 def _mode_frequencies(system: System) -> list[float]:
     """Frequencies (Hz) of the modes of steady sliding, as far as they turn; none where they would take long."""
-    if stability_seconds(system) + TABLE_SECONDS * system.table_bytes > WORTH_SAYING:
+    if stability_seconds(system) > WORTH_SAYING:
         return []
     stiffness = system.contact_stiffness
     with suppress(CaseError):

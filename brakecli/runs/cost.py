@@ -23,6 +23,7 @@ _OWN_STEP_SECONDS = 4e-6
 _OWN_EVALUATIONS = 27.0
 _EXACT_STEP_SECONDS = 1e-7  # events included
 _START_EVALUATIONS = 6.0  # at each place of the wheel
+_TABLE_SECONDS = 4e-9  # to fill a byte of the tables of the contact
 # Beside the loop, measured on runs of 4 to 15 million samples: 0.6 to 0.8 µs of processor time for the file, the
 # spectra and the verdict, most of it to compress the file; and the peak of memory where histories are held.
 _SAMPLE_SECONDS = 8e-7
@@ -80,10 +81,10 @@ def start_seconds(system: System) -> float:
 
 def stability_seconds(system: System) -> float:
     """A rough guess at the time to find steady sliding at every friction coefficient of `stability`."""
-    tried = np.linspace(0.0, LARGEST_FRICTION, 41).tolist()
+    tried, tables = np.linspace(0.0, LARGEST_FRICTION, 41).tolist(), _TABLE_SECONDS * system.table_bytes
     if system.belt_speed == 0.0 or not any(_opens(system, phi) for phi in tried):
-        return 0.0
-    return (TABLE + _START_EVALUATIONS) * _average_seconds(system)
+        return tables
+    return tables + (TABLE + _START_EVALUATIONS) * _average_seconds(system)
 
 
 def _average_seconds(system: System) -> float:

@@ -63,13 +63,14 @@ def estimate(plan: Plan, workers: int) -> Estimate:
     Searches are computed with them where verdicts come early, or eigenvalues answer; others take too long, and are
     guessed.
     """
-    samples, forced, early, failing, critical = 0, 0.0, True, list[str](), plan.sweep.critical
+    samples, tables, forced, early, failing, critical = 0, 0.0, 0.0, True, list[str](), plan.sweep.critical
     by_simulation = critical is not None and critical.method == "simulation"
     for point in sorted({0, plan.points - 1}):
         with _noted(plan, point, failing), within_range():
             system = system_of(plan.case(plan.settings(point)))
             refuse(check(system))
             samples, early = max(samples, system.samples), early and may_be_early(system)
+            tables = max(tables, system.table_bytes)
             if critical is not None and by_simulation:
                 forced = max(forced, _forced_seconds(plan, plan.settings(point), critical))
     guessed = by_simulation and (forced > 0.0 or not early)
@@ -84,7 +85,7 @@ def estimate(plan: Plan, workers: int) -> Estimate:
         points=records,
         workers=workers,
         seconds=pilot.sweep_seconds(each),
-        memory=_WORKER_BYTES * (workers + 1) + held + in_parent * records,
+        memory=(_WORKER_BYTES + tables) * (workers + 1) + held + in_parent * records,
         file_size=_RECORD_BYTES * records + 1e5,
         at_least=guessed or pilot.at_least,
         together=pilot.together,

@@ -1,5 +1,6 @@
 """Reading a measured signal: every usual layout is read, every broken file is a named error."""
 
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -281,3 +282,46 @@ def test_more_samples_than_the_bound_are_refused(tmp_path: Path, monkeypatch: py
     for path in (f"{tmp_path}/s.h5:/v", f"{tmp_path}/s.wav"):
         with pytest.raises(UnreadableResultError, match=r"101 samples, (and )?100 are the most"):
             read_signal(path, Measurand.PRESSURE, sample_rate=1000.0)
+
+
+@pytest.mark.parametrize(("block", "bits"), [(1, 16), (0, 16), (2, 0), (3, 32)])
+def test_a_sound_whose_header_contradicts_itself_is_refused(tmp_path: Path, block: int, bits: int) -> None:
+    head = b"WAVEfmt " + struct.pack("<IHHIIHH", 16, 1, 1, 2000, 2000 * block, block, bits)
+    data = b"data" + struct.pack("<I", 4000) + np.arange(2000, dtype="<i2").tobytes()
+    (tmp_path / "x.wav").write_bytes(b"RIFF" + struct.pack("<I", 4036) + head + data)
+    with pytest.raises(UnreadableResultError, match="its header contradicts itself"):
+        read_signal(f"{tmp_path}/x.wav", Measurand.PRESSURE)
+
+
+@pytest.mark.parametrize("step", ["5e-324", "1e-309", "1e14"])
+def test_times_in_a_wrong_unit_are_refused(tmp_path: Path, step: str) -> None:
+    rows = "".join(f"{n * float(step)!r},{n % 3}\n" for n in range(20))
+    with pytest.raises(UnreadableResultError, match="check the unit of the times"):
+        read(written(tmp_path, rows), "2", "1")
+    with pytest.raises(UsageError, match="1e-12 to 1e12"):
+        read(written(tmp_path, rows), "2", rate=1e308)
+
+
+def test_very_large_values_are_refused_without_a_warning_of_numpy(tmp_path: Path) -> None:
+    with pytest.raises(UnreadableResultError, match="beyond 1e100"):
+        read(written(tmp_path, "1e308\n-1e308\n1e308\n"), rate=10.0)
+
+
+def test_what_is_wrong_with_a_dataset_is_said_in_words(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "s.h5", "w") as file:
+        file["empty"] = h5py.Empty("f8")
+    with pytest.raises(UnreadableResultError, match="not a row of numbers"):
+        read(f"{tmp_path}/s.h5:/empty", rate=10.0)
+    with pytest.raises(UnreadableResultError, match="there is no dataset"):
+        read(f"{tmp_path}/s.h5:/{'d' * 5000}", rate=10.0)
+    with pytest.raises(UnreadableResultError, match=r"absent\.h5:/v: no such file"):
+        read(f"{tmp_path}/absent.h5:/v", rate=10.0)
+
+
+def test_a_wrong_unit_in_the_file_is_the_files_fault_and_one_of_an_option_the_users(tmp_path: Path) -> None:
+    path = str(written(tmp_path, "t,a\ns,kg\n0,1\n1,2\n2,4\n"))
+    with pytest.raises(UnreadableResultError, match="not in kilograms"):
+        read_signal(path, Measurand.ACCELERATION, column="a", time_column="t")
+    path = str(written(tmp_path, "0,1\n1,2\n2,4\n"))
+    with pytest.raises(UsageError, match="not in kilograms"):
+        read_signal(path, Measurand.ACCELERATION, column="2", time_column="1", unit="kg")

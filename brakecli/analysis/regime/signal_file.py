@@ -5,6 +5,7 @@ Columns are named as in the header, or counted from 1. Whatever is wrong in the 
 
 import os
 import re
+import struct
 import warnings
 from dataclasses import replace
 from functools import partial
@@ -33,7 +34,9 @@ _GRAVITY = 9.80665e3  # m/s² over the gram's size in kg
 _UNEVEN = 0.01  # part of the step by which steps may differ before the signal is resampled
 _MOST_SAMPLES = 50_000_000
 _CHUNK_NAME = 4  # bytes, of which there are none at the end
+_PLAIN = (1, 3, 0xFFFE)  # formats of a sound whose samples are numbers
 _PART = "give a part of the record"
+_NEAREST, _FARTHEST = 1e-12, 1e12  # s between samples
 _GAP = 1.5  # steps of this many times the usual one are gaps
 _LONGEST = 10.0  # gaps may make a signal so many times as long; a record with longer gaps is mostly gap
 
@@ -57,10 +60,13 @@ def read_signal(
 
     Units come from the file and from `unit` and `time_unit`. Raises UnreadableResultError and UsageError.
     """
-    if sample_rate is not None and not 0.0 < sample_rate < np.inf:
-        raise UsageError(f"--sample-rate {sample_rate}: is not a number above 0 Hz; give samples per second")
+    if sample_rate is not None and not 1.0 / _FARTHEST <= sample_rate <= 1.0 / _NEAREST:
+        raise UsageError(
+            f"--sample-rate {sample_rate}: is not a number above 0 Hz (1e-12 to 1e12); give samples per second"
+        )
     path, inside = Path(source), None
-    if not path.exists() and (found := re.fullmatch(r"(.+?):(/.*)", source)):
+    there = os.path.exists(path)  # noqa: PTH110 - pathlib's may raise
+    if not there and (found := re.fullmatch(r"(.+?):(/.*)", source)):
         path, inside = Path(found[1]), found[2]
     try:
         if time_unit is not None and time_column is None:
@@ -89,6 +95,8 @@ def read_signal(
         signal = Signal(values, 1.0 / sample_rate) if sample_rate is not None else _evenly(values, *times)
         of_contact = any(word in name for word in ("friction_force", "normal_force"))
         jumps = [_JUMPS] * (of_contact and quantity is Measurand.FORCE)
+        near = f"its samples lie {signal.interval:g} s apart; check the unit of the times"
+        _require(_NEAREST <= signal.interval <= _FARTHEST, near)
         return replace(signal, notes=(*signal.notes, *jumps))
     except (UsageError, UnreadableResultError) as error:
         raise type(error)(f"{source}: {error}") from error
@@ -112,7 +120,8 @@ def _size(found: tuple[float, str] | None, option: str | None, *wanted: str) -> 
         found = given
     size, base = found or (1.0, "")
     if base == "kilogram" and size > 1e-3:
-        raise UsageError("acceleration is in m/s^2 or g, not in kilograms; correct the unit, or --quantity")
+        what = "acceleration is in m/s^2 or g, not in kilograms; correct the unit, or --quantity"
+        raise UsageError(what) if option else UnreadableResultError(what)
     return size * _GRAVITY if base == "kilogram" else size
 
 
@@ -142,15 +151,22 @@ def _sound(path: Path, column: str | None, sample_rate: float | None) -> tuple[A
     """A channel of a WAV file, whole numbers over the largest, and its samples per second."""
     from scipy.io import wavfile
 
-    sound = _Sound(contents(path, LARGEST))
+    sound = _Sound(data := contents(path, LARGEST))
+    if (place := data.find(b"fmt ") + 8) > 8 and len(data) >= place + 16:
+        kind, channels, _, block, bits = struct.unpack_from(
+            f"{'>' if data[:4] == b'RIFX' else '<'}HHQHH", data, place
+        )
+        held = f"{channels} channels of {bits} bits are in blocks of {block} bytes"
+        damaged = kind in _PLAIN and not 0 < channels * bits <= 8 * block
+        _require(not damaged, f"its header contradicts itself, as {held}; name an intact WAV file")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # chunks that it does not know
             rate, values = wavfile.read(sound)
     except Exception as error:
         known = isinstance(error, ValueError | OSError)  # others are of SciPy's own code
-        what = ": " + " ".join(str(error).split()) if known else ""
-        raise UnreadableResultError(f"cannot be read{what}; name an intact WAV file") from error
+        what = " ".join(str(error).split()) if known else "its header is damaged"
+        raise UnreadableResultError(f"cannot be read: {what}; name an intact WAV file") from error
     _require(rate > 0, "it has no sampling rate; name an intact WAV file")
     if sample_rate not in (None, rate):
         raise UsageError(f"--sample-rate {sample_rate:g}: the file has {rate} Hz; leave the option out")
@@ -174,15 +190,15 @@ def _dataset(path: Path, inside: str) -> tuple[Array, str]:
 
     from brakecli.files.read import try_out
 
-    try:
-        with opened(path) as stream:
-            row = partial(_row, inside=inside, length=os.fstat(stream.fileno()).st_size)
+    with opened(path) as stream:
+        row = partial(_row, inside=inside, length=os.fstat(stream.fileno()).st_size)
+        try:
             try_out(stream, row)
             with h5py.File(stream, "r") as file:
                 return row(file)
-    except Exception as error:
-        what = f"cannot be read: {' '.join(str(error).split())}"
-        raise UnreadableResultError(f"{what}; name an intact HDF5 file and a dataset in it") from error
+        except Exception as error:
+            what = f"cannot be read: {' '.join(str(error).split())}"
+            raise UnreadableResultError(f"{what}; name an intact HDF5 file and a dataset in it") from error
 
 
 def _row(file: Any, inside: str, length: int) -> tuple[Array, str]:
@@ -195,7 +211,7 @@ def _row(file: Any, inside: str, length: int) -> tuple[Array, str]:
     if not hasattr(node, "dtype") or not hasattr(node, "shape"):
         names = [f"/{name}" for name, each in valid.tree(file).items() if hasattr(each, "shape")]
         raise ValueError(f"there is no dataset {inside}, only {', '.join(names[:12]) or 'none'}")
-    if sum(size != 1 for size in node.shape) > 1 or not node.shape or node.dtype.kind not in "iuf":
+    if not node.shape or sum(size != 1 for size in node.shape) > 1 or node.dtype.kind not in "iuf":
         raise ValueError(f"{inside} is not a row of numbers, found shape {node.shape}, {node.dtype}")
     valid.check_size(node, length, f"dataset {inside}")  # HDF5 crashes on a virtual one of itself
     if node.size > _MOST_SAMPLES:
@@ -210,9 +226,9 @@ def _numbers(values: Array) -> Array:
     numbers = values[good]
     _require(len(numbers) > 0, "the column holds no numbers; name another column")
     _require(len(numbers) > 1, "there is only one sample; measure longer")
-    _require(np.ptp(numbers) != 0.0, f"the signal is constant, all values are {numbers[0]:g}; name another column")
     limit = "values beyond 1e100 cannot be measured; name another column, or use SI units"
     _require(np.abs(numbers).max() <= 1e100, limit)
+    _require(np.ptp(numbers) != 0.0, f"the signal is constant, all values are {numbers[0]:g}; name another column")
     return np.where(good, values, np.nan)
 
 
