@@ -81,7 +81,7 @@ def run(
 
     A run that is not sure to keep its tolerance warns, as all that `brakecli run` warns of is a `UserWarning`.
     """
-    with _interruptible(), _target(output) as path:
+    with _interruptible(), _readings(), _target(output) as path:
         loaded = _case(case, settings)
         from brakecli.files.as_xarray import opened
         from brakecli.runs.run import run
@@ -114,7 +114,7 @@ def stability(
     Raises:
         CaseError, UsageError, RefusedError: as `brakecli stability`.
     """
-    with _interruptible():
+    with _interruptible(), _readings():
         loaded = _case(case, settings)
         from brakecli.files.as_xarray import dataset, opened
         from brakecli.files.field import values_of
@@ -167,7 +167,7 @@ def sweep(
         raise UsageError(f"jobs {jobs}: is no number of workers from 1 to 4096")
     if getattr(multiprocessing.current_process(), "_inheriting", False):  # a worker that is being started
         os._exit(os.EX_USAGE)  # which tells the caller that there is no guard
-    with _interruptible(), _target(output) as path:
+    with _interruptible(), _readings(), _target(output) as path:
         from brakecli.cli.inputs import load_sweep
         from brakecli.files.as_xarray import opened
         from brakecli.runs.run import load_kernels
@@ -241,15 +241,14 @@ def classify(
 
 
 @contextmanager
-def _readings(*, force_read: bool) -> Iterator[None]:
+def _readings(*, force_read: bool = False) -> Iterator[None]:
     """Warn of results that no digest vouches for, and forget them at the end."""
     said = list[str]()
-    readings.forced, readings.tell = force_read, said.append
+    readings.forced, readings.tell, readings.unchecked = force_read, said.append, {}
     try:
         yield
     finally:
-        readings.forced, readings.tell = False, len
-        readings.unchecked.clear()
+        readings.forced, readings.tell, readings.unchecked = False, len, {}
     _warn(said, 5)  # the caller of who uses this block
 
 

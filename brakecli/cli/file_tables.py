@@ -16,7 +16,7 @@ def info_table(numbers: Mapping[str, Any]) -> str:
     for each in numbers["variables"]:
         sizes = " x ".join(f"{name} {size}" for name, size in zip(each["dims"], each["shape"], strict=True))
         groups.setdefault(f"{each['group']}: {sizes}", []).append(each["name"])
-    changed = "complete, but another program has changed it"
+    changed = "unchecked: no digest vouches for its bytes"
     made = ", ".join(f"{name} {version}" for name, version in numbers["versions"].items())
     rows = [
         ("kind", str(numbers["kind"]) + (f", {numbers['status']}" if numbers["status"] else "")),

@@ -27,9 +27,13 @@ def opened(path: Path, *, own: bool = False) -> xr.DataTree:
             with xr.open_datatree(result.stream, engine="h5netcdf", phony_dims="access") as tree:
                 found: xr.DataTree = tree.load()
             found.attrs |= readings.noted()
+            for node in found.subtree:  # of results that xarray has saved; those of ours are read as str
+                for name in [str(name) for name, each in node.variables.items() if each.dtype.kind == "S"]:
+                    node[name] = node[name].astype(str).astype(object)
             return found
     except (ValueError, TypeError, LookupError, AttributeError, OSError, RuntimeError, MemoryError) as error:
-        what = f"{path}: xarray cannot read what it holds: {error}"
+        reason = repr(error) if isinstance(error, LookupError) else error
+        what = f"{path}: xarray cannot read what it holds: {reason}"
         raise UnreadableResultError(f"{what}; compute the result again") from error
 
 

@@ -82,7 +82,7 @@ def _keys(result: StoredResult) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for name in _CASES:
         try:
-            found |= flat(parse(str(result.attributes.get(name, "")), number=_finite))
+            found |= flat(parse(str(result.attributes.get(name, "")), name, number=_finite))
         except (CaseError, ValueError, RecursionError) as error:
             what = f"{result.path}: the case in it is not valid: {error}"
             raise UnreadableResultError(f"{what.partition('; ')[0]}; name an intact file") from error

@@ -169,7 +169,7 @@ def _sound(result: StoredResult, name: str) -> tuple[bytes, list[str]]:
         if lost > _QUIET:
             notes.append(f"{lost:.2%} of the power of {name} is above {0.5 * RATE:g} Hz and not in the sound")
     ratio = Fraction(RATE / rate).limit_denominator(10_000)
-    sound = resample_poly(values, ratio.numerator, ratio.denominator)
+    sound = resample_poly(values, ratio.numerator, ratio.denominator) if ratio else np.zeros(1)
     if not (peak := float(np.abs(sound).max())) > 1e-6 * float(np.abs(values).max()):
         above = f"all of {name} is above {0.5 * RATE:g} Hz, which no sound holds"
         raise UsageError(f"{result.path}: {above}; export .csv")

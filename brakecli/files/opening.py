@@ -7,7 +7,7 @@ that was checked, unpack it because of its name, or wait for a pipe. Only the st
 import os
 import stat
 from contextlib import suppress
-from io import BufferedReader, FileIO
+from io import BufferedReader, FileIO, RawIOBase
 from os import PathLike
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
@@ -40,7 +40,14 @@ def contents(path: str | PathLike[str], most: int) -> bytes:
 def is_hdf5(path: str | PathLike[str]) -> bool:
     """Whether this is a regular file with the signature of HDF5, behind a user block or not."""
     with suppress(OSError, ValueError), opened(path) as file:
-        size = file.seek(0, os.SEEK_END)
-        places = (0, *(1 << power for power in range(9, size.bit_length())))
-        return any(file.seek(place) == place and file.read(8) == SIGNATURE for place in places)
+        return hdf5_begin(file) is not None
     return False
+
+
+def hdf5_begin(file: RawIOBase) -> int | None:
+    """Where HDF5 begins in a file: behind a user block, if there is one; None where it does not."""
+    size = file.seek(0, os.SEEK_END)
+    for place in (0, *(1 << power for power in range(9, size.bit_length()))):
+        if file.seek(place) == place and file.read(8) == SIGNATURE:
+            return place
+    return None

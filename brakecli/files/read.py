@@ -13,7 +13,7 @@ import os
 import resource
 import signal
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from functools import partial
@@ -27,13 +27,28 @@ from numpy.typing import NDArray
 
 from brakecli.errors import OtherKindError, UnreadableResultError, printable
 from brakecli.files import trust, valid
-from brakecli.files.opening import SIGNATURE, opened
+from brakecli.files.opening import SIGNATURE, hdf5_begin, opened
 
 FORMAT = "brakecli"
 FORMAT_VERSION = 1
 
+_LONGEST = 2000  # characters of what is wrong
 SHORTEST_TRIAL = 5.0  # s of processor time, and 0.1 s for each MB, to read a file that may be damaged
+_FIRST_LETTER = 32  # what is less controls a terminal
 _WAITING = 10.0  # times as long may it take where other processes or a slow disk hold it up
+
+
+class _Named(dict[str, Any]):
+    """What a file holds, by name; raises UnreadableResultError for a name that is not there."""
+
+    def __init__(self, path: Path, items: Mapping[str, Any]) -> None:
+        """Hold the items."""
+        super().__init__(items)
+        self._path = path
+
+    def __missing__(self, name: str) -> Any:
+        """Tell that it is missing."""
+        raise UnreadableResultError(f"{self._path}: {printable(name)} is missing; name an intact result file")
 
 
 @dataclass(frozen=True)
@@ -67,7 +82,8 @@ class StoredResult:
     def group_attributes(self, group: str) -> dict[str, Any]:
         """The attributes of a group."""
         with _explained(self.path):
-            return valid.attributes_of(self._group(group), str(self.attributes.get("kind")))
+            found = valid.attributes_of(self._group(group), str(self.attributes.get("kind")))
+            return _Named(self.path, found)
 
     def text(self, name: str) -> str:
         """A text among the attributes of the root."""
@@ -95,8 +111,12 @@ class StoredResult:
                     shape, attributes = valid.shape_of(node), valid.attributes_of(node, "")
                     dims = valid.axes_of(node, name)[: len(shape)]
                     found[name] = Variable(dims, shape, attributes, node.dtype.kind)
-        self._variables[group] = found
-        return found
+            for name, each in found.items():
+                for axis, size in zip(each.dims, each.shape, strict=False):
+                    if axis in found and found[axis].shape != (size,):
+                        raise ValueError(f"axis {axis} of {name} has the shape {found[axis].shape}, not {(size,)}")
+        self._variables[group] = named = _Named(self.path, found)
+        return named
 
     def read(self, group: str, name: str, start: int = 0, stop: int | None = None) -> NDArray[Any]:
         """The rows `start` to `stop` of a variable, checked: no damage, and no number that is not finite."""
@@ -115,7 +135,11 @@ class StoredResult:
             if values.ndim > len(valid.shape_of(node)):
                 values = values.view(f"S{max(1, values.shape[-1])}")[..., 0]
             if values.dtype.kind == "S":
-                return np.char.decode(values, "utf-8")
+                texts = np.char.decode(values, "utf-8")
+                controls = values.view(np.uint8)
+                if ((controls < _FIRST_LETTER) & (controls > 0)).any():
+                    texts = np.vectorize(valid.plain_text, otypes=[np.str_])(texts)
+                return texts
             if values.dtype == np.float16:  # its squares are infinite from 256 on
                 values = values.astype(np.float64)
             limit = valid.LARGEST_IN_HISTORY if group == "history" else valid.LARGEST
@@ -161,7 +185,7 @@ def open_result(path: Path, kind: str | None = None) -> Iterator[StoredResult]:
                 raise OtherKindError(f"{what}; {remedy}")
             valid.check_variables(file, its_kind, length)
             nodes = valid.tree(file)
-        yield StoredResult(path, file, stream, nodes, attributes, length, not state)
+        yield StoredResult(path, file, stream, nodes, _Named(path, attributes), length, not state)
 
 
 def digest(file: RawIOBase, length: int) -> bytes:
@@ -178,9 +202,9 @@ def _digest_of(file: RawIOBase) -> str:
     """What is wrong with the digest behind the end of the HDF5 part: nothing, or one of `trust`."""
     file.seek(0)
     superblock = file.read(36) or b""
-    if not superblock.startswith(SIGNATURE):
+    if not (begin := hdf5_begin(file)) and not superblock.startswith(SIGNATURE):
         raise ValueError("this is not an HDF5 file" if superblock else "the file is empty")
-    if superblock[8:9] != b"\x02":  # other programs write other versions, which have other layouts
+    if begin or superblock[8:9] != b"\x02":  # other programs write other versions, which have other layouts
         return trust.MISSING
     end = int.from_bytes(superblock[28:36], "little")
     behind = file.seek(0, os.SEEK_END) - end
@@ -189,10 +213,11 @@ def _digest_of(file: RawIOBase) -> str:
 
 
 def try_out(stream: FileIO, look: Callable[[h5py.File], object]) -> None:
-    """Look at an HDF5 file in another process first: some damage ends or blocks HDF5 itself.
+    """Look at an HDF5 file in another process first: some damage ends or blocks HDF5 itself, or takes all memory.
 
-    Raises ValueError where that process is ended; its exceptions are left to those who look next.
+    Raises ValueError where that process is ended, and for its exceptions.
     """
+    reading, writing = os.pipe()
     with warnings.catch_warnings():  # Python 3.12 warns where there are threads; the child uses none of them
         warnings.simplefilter("ignore")
         child = os.fork()
@@ -204,12 +229,23 @@ def try_out(stream: FileIO, look: Callable[[h5py.File], object]) -> None:
             signal.alarm(int(_WAITING * seconds))
             resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
             resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
+            held = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+            hard = resource.getrlimit(resource.RLIMIT_AS)[1]
+            most = held + 2 * valid.MOST_MEMORY
+            resource.setrlimit(resource.RLIMIT_AS, (most if hard < 0 else min(most, hard), hard))
             with h5py.File(stream, "r") as file:
                 look(file)
+        except BaseException as error:
+            os.write(writing, (str(error) or type(error).__name__)[:_LONGEST].encode(errors="replace"))
         finally:
-            os._exit(0)  # what fails here with an exception will do so again
+            os._exit(0)
+    os.close(writing)
+    with FileIO(reading) as pipe:
+        wrong = pipe.read(_LONGEST).decode(errors="replace")
     if os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) < 0:
         raise ValueError("the file is damaged, and HDF5 cannot read it")
+    if wrong:
+        raise ValueError(wrong)
 
 
 @contextmanager

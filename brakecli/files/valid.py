@@ -4,7 +4,8 @@ HDF5 ends the process on some attributes of a wrong type, and makes room for wha
 and sizes are looked at first, and references are followed here.
 """
 
-from collections.abc import Iterable, Iterator
+import re
+from collections.abc import Iterator
 from contextlib import suppress
 from typing import Any
 
@@ -12,15 +13,19 @@ import h5py
 import numpy as np
 from h5py import h5a, h5d, h5s, h5t, h5z
 
+from brakecli.errors import escaped
 from brakecli.files import fields
 from brakecli.files.field import Field
 
 LARGEST, LARGEST_IN_HISTORY = 1e300, 1e150  # magnitudes; the squares of the latter are finite
 _BLOCK = 1 << 20  # rows read at a time
+_CONTROLS = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f]")
 _RATIO = 1100  # no filter of HDF5 makes data smaller than this
 DEEPEST, _MOST_NODES = 8, 10_000  # levels of groups and their variables, and the number of both
+_MOST_ATTRIBUTES = 1000  # of a group or a variable
 MOST_MEMORY = 1_250_000_000  # bytes of unpacked values: a variable of the largest sweep takes nearly as many
 _TEXTS = ("format", "kind", "title", "case_toml", "resolved_toml", "sweep_toml", "resolved_sweep_toml")
+_WHOLE = ("format_version", "complete")
 _ATTRIBUTES = {
     ("run", "/"): fields.RUN,
     ("run", "/spectrum"): fields.WELCH,
@@ -39,7 +44,9 @@ _VARIABLES = {  # the first of a kind, of a sweep its status, has the length of 
     ("comparison", "/"): (fields.ENTRY_PLACE, *fields.ENTRY),
     ("stability", "/"): (*fields.VARIED, *fields.MODES),
 }
+_OBJECTS = {f"/{each.group}": each for each in fields.RUN if each.group}  # whose items are attributes of a group
 _RISING = ("time", "frequency")
+_BRIEFEST = 1e-100  # between two of these: no case holds smaller numbers
 _MACHINERY = {"CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_Encoding", "_FillValue"}  # of netCDF-4
 
 
@@ -55,6 +62,8 @@ def check_variables(file: h5py.File, kind: str, length: int) -> None:
         if not isinstance(parent, h5py.Group):
             raise ValueError(f"{group} is not a group")
         members = {field.name: (field, member(parent, field.name)) for field in declared}
+        if linked := [name for name, (_, node) in members.items() if node is None and name in {*parent}]:
+            raise ValueError(f"variable {linked[0]} in group {group} is a link, or a view of something else")
         found = {name: (field, node) for name, (field, node) in members.items() if node is not None}
         for name, (field, node) in found.items():
             where = f"variable {name} in group {group}"
@@ -83,6 +92,8 @@ def tree(file: h5py.File) -> dict[str, Any]:
         for key in group:
             if (node := member(group, key)) is not None and node not in names:
                 names[node] = path + key
+                if len(node.attrs) > _MOST_ATTRIBUTES:
+                    raise ValueError(f"{path}{key} has more than {_MOST_ATTRIBUTES} attributes")
                 if names[node].count("/") >= DEEPEST or len(names) > _MOST_NODES:
                     limits = f"{_MOST_NODES} groups and variables, or groups of more than {DEEPEST} levels"
                     raise ValueError(f"it holds more than {limits}")
@@ -91,16 +102,18 @@ def tree(file: h5py.File) -> dict[str, Any]:
 
 
 def look_through(file: h5py.File, length: int, *, everything: bool) -> None:
-    """Read all attributes that can be read, and of variables their axes and sizes, or everything."""
+    """Read all attributes of known types, and of variables their axes and sizes, or everything.
+
+    Texts of any length are not read but as attributes: each of them may be the same, very long one.
+    """
     for name, node in tree(file).items():
+        for attribute in node.attrs:
+            plain_attribute(node, attribute)
         with suppress(Exception):
-            for attribute in node.attrs:
-                with suppress(Exception):
-                    plain_attribute(node, attribute)
             if isinstance(node, h5py.Dataset):
                 axes_of(node, name)
                 check_size(node, length, name)
-                for _ in _blocks(node) if everything else ():
+                for _ in _blocks(node) if everything and node.dtype.kind in "iufS" else ():
                     pass
 
 
@@ -132,7 +145,7 @@ def check_memory(needed: int, where: str) -> None:
 
 def axes_of(node: h5py.Dataset, name: str) -> tuple[str, ...]:
     """The names of the axes of a variable; empty where it has none."""
-    if plain_attribute(node, "CLASS") == "DIMENSION_SCALE":
+    if plain_attribute(node, "CLASS") == "DIMENSION_SCALE" and node.ndim < 2:
         return (name,)
     if "DIMENSION_LIST" not in node.attrs:
         return tuple("" for _ in node.shape)
@@ -149,7 +162,8 @@ def axes_of(node: h5py.Dataset, name: str) -> tuple[str, ...]:
 
 def is_axis_alone(node: h5py.Dataset) -> bool:
     """Whether it names an axis of other variables and has no values, by the mark of netCDF-4."""
-    return str(plain_attribute(node, "NAME")).startswith("This is a netCDF dimension but not a netCDF variable")
+    mark = "This is a netCDF dimension but not a netCDF variable"
+    return not node.id.get_storage_size() and str(plain_attribute(node, "NAME")).startswith(mark)
 
 
 def shape_of(node: h5py.Dataset) -> tuple[int, ...]:
@@ -179,11 +193,20 @@ def attributes_of(node: h5py.HLObject, kind: str) -> dict[str, Any]:
 
     Raises ValueError for a declared one that is not what was declared.
     """
-    declared: Iterable[Field] = _ATTRIBUTES.get((kind, str(node.name)), ())
-    texts = [Field(name, "", name, fields.TEXT) for name in _TEXTS if node.name == "/"]
-    known = {field.name: field for field in (*texts, *declared)}
+    declared = [*_ATTRIBUTES.get((kind, str(node.name)), ())]
     given = {name: plain_attribute(node, name) for name in node.attrs if name not in _MACHINERY}
+    if node.name == "/":
+        declared += [Field(name, "", "a text", fields.TEXT) for name in _TEXTS]
+        declared += [Field(name, "", "a whole number", "i8") for name in _WHOLE]
+    elif kind == "run" and (item := _OBJECTS.get(str(node.name))):  # of numbers; evidence also has lists and words
+        free = {name for name, value in given.items() if isinstance(value, str) or np.ndim(value) == 1}
+        free = free if item.name == "evidence" else set()
+        declared = [Field(name, "", item.meaning) for name in given if name not in free]
+    known = {field.name: field for field in declared}
     found = {name: _formed(known.get(name), value) for name, value in given.items()}
+    for name, value in found.items() if isinstance(node, h5py.Group) else ():
+        if not isinstance(value, str | list) and value is not None and not np.isfinite(value).all():
+            raise ValueError(f"attribute {name} holds numbers that are not finite")
     for name, field in known.items():
         if name in found and not _fits(field, found[name]):
             raise ValueError(f"attribute {name} is not what belongs there: {field.meaning}")
@@ -211,14 +234,23 @@ def plain_attribute(node: h5py.HLObject, name: str) -> Any:
 def _decoded(value: Any) -> Any:
     if isinstance(value, list):
         return [_decoded(each) for each in value]
-    if isinstance(value, str):
+    if isinstance(value, bytes | str):
+        value = value.decode() if isinstance(value, bytes) else value
         value.encode()  # h5py marks what is not UTF-8
-    return value.decode() if isinstance(value, bytes) else value
+        return plain_text(value)
+    return value
+
+
+def plain_text(text: str) -> str:
+    """A text without control characters but ends of lines: neither pages nor pictures in SVG may hold them."""
+    return _CONTROLS.sub(lambda found: escaped(found[0]), text)
 
 
 def _formed(field: Field | None, value: Any) -> Any:
     """An attribute as it is declared: xarray saves an array of one for a number, and a text for a list of one."""
-    if field is not None and field.kind == fields.OBJECT:
+    if field is None:
+        return value
+    if field.kind == fields.OBJECT and not field.rows:
         return [value] if isinstance(value, str) else value
     return value.item() if isinstance(value, np.ndarray) and value.shape == (1,) else value
 
@@ -241,7 +273,7 @@ def _check_rising(node: h5py.Dataset, where: str) -> None:
     for block in _blocks(node):
         if not np.isfinite(block).all() or np.abs(block).max(initial=0.0) > LARGEST_IN_HISTORY:
             raise ValueError(f"{where} holds values that are not finite, or too large")
-        if not (np.diff(block) > 0.0).all():
+        if not (np.diff(block) > _BRIEFEST).all():
             raise ValueError(f"{where} does not increase")
 
 

@@ -200,7 +200,7 @@ def view_of_itself(name: str) -> Callable[[h5py.File], object]:
 @pytest.mark.parametrize(
     ("change", "reason"),
     [
-        (view_of_itself("history/x"), "there is no variable x in group history"),
+        (view_of_itself("history/x"), "variable x in group history is a link, or a view of something else"),
         (dims("i8"), "attribute DIMENSION_LIST of x holds no references"),
         (replaced("history/x", np.zeros(7)), "variable x in group history has the shape (7,)"),
         (replaced("history/time", np.zeros(201)), "variable time in group history does not increase"),
@@ -236,3 +236,28 @@ def test_a_view_of_itself_is_no_signal_and_does_no_harm_in_a_result(results: Pat
         4, "there is no dataset /history/own, only /history/contact"
     )
     assert told.count("/history/own") == 2
+
+
+@pytest.mark.parametrize(
+    "command", [["info"], ["plot", "-q"], ["export", "-o", "o.csv"], ["report", "-o", "o.html"]]
+)
+def test_an_axis_that_does_not_fit_its_variables_is_told(
+    results: Path, tmp_path: Path, command: list[str]
+) -> None:
+    shutil.copy(results / "stability.h5", tmp_path / "f.h5")
+    with h5py.File(tmp_path / "f.h5", "r+") as file:
+        about = dict(file["friction_coefficient"].attrs)
+        del file["friction_coefficient"]
+        file["friction_coefficient"] = np.ones((3, 2))
+        file["friction_coefficient"].attrs.update(
+            {name: about[name] for name in ("units", "long_name", "parameters")}
+        )
+    tried(tmp_path, "f.h5", command).told(4, "axis friction_coefficient of", "has the shape (3, 2)")
+
+
+def test_a_quantity_that_is_a_link_is_not_left_out_without_a_word(results: Path, tmp_path: Path) -> None:
+    shutil.copy(results / "sweep.h5", tmp_path / "f.h5")
+    with h5py.File(tmp_path / "f.h5", "r+") as file:
+        del file["frequency"]
+        file["frequency"] = h5py.ExternalLink(str(results / "sweep.h5"), "/frequency")
+    tried(tmp_path, "f.h5", ["export", "-o", "o.csv"]).told(4, "variable frequency in group / is a link")

@@ -2,9 +2,11 @@
 
 import io
 import os
+import resource
 import struct
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import h5py
@@ -73,7 +75,7 @@ def test_xarray_follows_no_link(tmp_path: Path) -> None:
     with h5py.File(path, "r+") as file:
         file["history/x"] = h5py.ExternalLink("/dev/zero", "/")
     seal(path)
-    with pytest.raises(UnreadableResultError, match="which is a link"):
+    with pytest.raises(UnreadableResultError, match="is a link, or a view"):
         as_xarray(path)
 
 
@@ -119,3 +121,94 @@ def test_variables_of_libraries_are_fixed() -> None:
     assert "NUMBA_OPT" not in done.stdout
     assert "('MPLBACKEND', 'agg')" in done.stdout
     assert "('HDF5_USE_FILE_LOCKING', 'FALSE')" in done.stdout
+
+
+def changed(path: Path, change: Callable[[h5py.File], object]) -> None:
+    """A result with a change, and a digest that fits."""
+    write(path, 10)
+    path.write_bytes(path.read_bytes()[:-32])
+    with h5py.File(path, "r+") as file:
+        change(file)
+    seal(path)
+
+
+def the_same_text(file: h5py.File) -> None:
+    """Many names for one long text."""
+    data = file.create_dataset("history/z", (100_000,), h5py.string_dtype(), chunks=(100_000,))
+    data[0] = "A" * 1_000_000
+    file.flush()
+    place = data.id.get_chunk_info(0).byte_offset
+    with Path(file.filename).open("rb") as raw:
+        raw.seek(place)
+        data.id.write_direct_chunk((0,), raw.read(16) * 100_000)
+
+
+def many_attributes(file: h5py.File) -> None:
+    for number in range(1001):
+        file["history"].attrs[f"a{number}"] = number
+
+
+def in_energy(value: object) -> Callable[[h5py.File], None]:
+    def change(file: h5py.File) -> None:
+        file.require_group("energy").attrs["belt"] = value
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        (many_attributes, "more than 1000 attributes"),
+        (in_energy(np.nan), "not finite"),
+        (in_energy("12"), "is not what belongs there"),
+        (in_energy(np.ones((2, 2))), "is not what belongs there"),
+        (
+            lambda file: file.attrs.__setitem__("complete", np.ones(2)),
+            "complete is not what belongs there: a whole number",
+        ),
+    ],
+)
+def test_what_does_not_belong_there_is_named(
+    tmp_path: Path, change: Callable[[h5py.File], object], reason: str
+) -> None:
+    path = tmp_path / "r.h5"
+    changed(path, change)
+    with pytest.raises(UnreadableResultError, match=reason), open_result(path) as result:
+        result.group_attributes("energy")
+
+
+def test_texts_of_any_length_under_other_names_are_not_read(tmp_path: Path) -> None:
+    changed(tmp_path / "r.h5", the_same_text)
+    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
+    with open_result(tmp_path / "r.h5") as result:
+        assert result.variables("history")["z"].kind == "O"
+    assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss < before + 1_000_000  # kB
+
+
+def test_a_name_that_is_missing_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "r.h5"
+    write(path, 10)
+    with open_result(path) as result:
+        with pytest.raises(UnreadableResultError, match=r"r\.h5: z is missing"):
+            result.variables("history")["z"]
+        with pytest.raises(UnreadableResultError, match="z is missing"):
+            result.attributes["z"]
+
+
+def test_no_control_character_of_a_file_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "r.h5"
+    changed(path, lambda file: file.attrs.modify("title", "\x1b[31mred\x07\nend"))
+    with open_result(path) as result:
+        assert result.attributes["title"] == "\\u001b[31mred\\u0007\nend"
+
+
+def test_a_user_block_makes_a_file_unchecked_and_not_unreadable(tmp_path: Path) -> None:
+    path = tmp_path / "r.h5"
+    write(path, 10)
+    with h5py.File(path) as old, h5py.File(tmp_path / "b.h5", "w", userblock_size=512) as new:
+        new.attrs.update(old.attrs)
+        for name in old:
+            old.copy(name, new)
+    with open_result(tmp_path / "b.h5") as result:
+        assert not result.sealed
+    readings.unchecked.clear()
