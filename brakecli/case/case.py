@@ -229,8 +229,8 @@ class Case(Table):
                 written = {"profile": str(path.absolute()), "profile_error": given.profile_error}
                 surface = given.model_construct(given.model_fields_set, **sines | written)
                 self.__dict__["roughness"] = self.roughness.model_copy(update={side: surface})
-            except OSError as failure:
-                what = f"cannot be read: {(failure.strerror or str(failure)).lower()}"
+            except (OSError, ValueError) as failure:  # ValueError: a NUL in the path
+                what = f"cannot be read: {(getattr(failure, 'strerror', None) or str(failure)).lower()}"
                 yield self.wrong(f"roughness.{side}.profile", what, "name a CSV file")
             except BrakecliError as failure:
                 what, _, remedy = str(failure).rpartition("; ")

@@ -1,5 +1,6 @@
 """Rough surfaces as users know them: sines, orders of a turn, or a self-affine spectrum."""
 
+import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -36,9 +37,9 @@ class Records(dict[str, Record]):
         """Read a profile, which other spellings of its path then have in common."""
         from brakecli.case.profile import read
 
-        whole = str(Path(path).absolute())
+        whole = os.path.realpath(path)  # one reading serves all names of a file
         self[path] = found = self[whole] if whole != path else read(Path(path))
-        if sum(2 * len(each.place) for name, each in self.items() if Path(name).is_absolute()) > MOST_MEASURED:
+        if sum(2 * len(each.place) for each in {*self.values()}) > MOST_MEASURED:
             what = f"the measured profiles take more than {MOST_MEASURED / 1e6:g} MB"
             raise UsageError(f"{what}; measure fewer places")
         return found

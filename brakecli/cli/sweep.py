@@ -65,5 +65,7 @@ def command(
         failed = f"{found.failed} of {found.points} points failed; all others were written"
         if found.failed == found.points:
             which = "its only point" if found.points == 1 else f"all {found.points} points"
-            failed = f"{which} failed; correct the case or the sweep, as the reasons above say"
+            failed = (
+                f"{which} failed; the reasons above say what to change in the case, the sweep or on the machine"
+            )
         raise BrakecliError(f"{report.output}: {failed}")

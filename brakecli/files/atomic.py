@@ -18,6 +18,8 @@ from typing import Any
 from brakecli.errors import CannotWriteError, UsageError
 from brakecli.files.os_signals import signals_deferred
 
+_FREE = "free some space there, or "
+
 
 class OutputFile(FileIO):
     """The temporary file, open for reading and writing; a failed write is remembered here instead of raised.
@@ -227,8 +229,8 @@ def explained(path: Path) -> Iterator[None]:
         yield
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
         reason = getattr(error, "strerror", None) or str(error)
-        full = getattr(error, "errno", None) in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-        remedy = "free some space there, or " if full else ""
+        limits = {errno.ENOSPC: _FREE, errno.EDQUOT: _FREE, errno.EFBIG: "free some space there, raise ulimit -f, or "}
+        remedy = limits.get(getattr(error, "errno", None) or 0, "")
         raise _refused(path, reason[:1].lower() + reason[1:], remedy) from error
 
 

@@ -123,7 +123,8 @@ def refuse_sweep(found: Estimate, free_bytes: float) -> None:
         raise RefusedError(f"the sweep is too large: {found.sentence()}; take fewer points, or shorter runs")
     if 2.0 * found.file_size > min(MOST_BYTES, free_bytes):  # finished points and the result, side by side
         free = f"{free_bytes / 1e6:.3g} MB are free"
-        raise RefusedError(f"the file would be too large, {free}: {found.sentence()}; take fewer points")
+        remedy = "free some space, or take fewer points"
+        raise RefusedError(f"the file would be too large, {free}: {found.sentence()}; {remedy}")
     with suppress(ValueError, OSError):  # systems that do not say how much memory they have
         if found.memory > os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"):
             remedy = "take fewer --jobs, or sample less often"

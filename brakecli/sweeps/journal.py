@@ -124,7 +124,8 @@ class Journal:
         if self._block[0] != start:
             packed = os.pread(self._file.fileno(), end - start, start)
             if zlib.crc32(packed) != checksum:
-                raise BrakecliError(f"{self.path}: was changed while in use; run the same command again")
+                again = "run the same command again, with --force if it is refused"
+                raise BrakecliError(f"{self.path}: was changed while in use; {again}")
             self._block = start, zlib.decompress(packed)
         return self._block[1]
 
@@ -240,7 +241,7 @@ def _refusal(found: bytes, own: Mapping[str, Any]) -> str:
         there = json.loads(found)
         keys = [key for key in {**there, **own} if there.get(key) != own.get(key)]
     except (ValueError, TypeError, AttributeError, RecursionError):
-        return "holds no finished points; remove it, or start again with --force"
+        return "holds no finished points, or its first line is damaged; remove it, or start again with --force"
     if not keys:
         return ""
     were, are = ({key: value_text(held.get(key, "not set")).strip('"') for key in keys} for held in (there, own))

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from brakecli.analysis.stability.report import LARGEST_FRICTION, changes, mean_stiffness
 from brakecli.case.system import system_of
-from brakecli.errors import CaseError
+from brakecli.errors import CaseError, RefusedError
+from brakecli.runs.limits import within_range
 from brakecli.sweeps.plan import Plan
 
 MOST, MOST_ROUGH = 2500, 64
@@ -18,7 +19,8 @@ _FRICTION = ("friction", "coefficient")
 def margins(plan: Plan) -> NDArray[np.float64] | None:
     """Critical friction less friction at every point of the grid, by eigenvalues; None where it would take long.
 
-    What no friction makes unstable is critical at the largest friction searched; with a wheel at rest it is NaN.
+    What no friction makes unstable is critical at the largest friction searched; with a wheel at rest, or numbers
+    out of range, it is NaN.
     """
     settings = [plan.settings(point) for point in range(prod(plan.shape))] if plan.points <= 10**5 else []
     others = {tuple(value for path, value in each.items() if path != _FRICTION): each for each in settings}
@@ -39,5 +41,9 @@ def _critical(plan: Plan, settings: dict[tuple[str, ...], object]) -> float:
     system = system_of(plan.case(settings))
     if system.belt_speed == 0.0:
         return np.nan
-    found = changes(system, mean_stiffness(system, system.contact_stiffness))
+    try:
+        with within_range():
+            found = changes(system, mean_stiffness(system, system.contact_stiffness))
+    except RefusedError:
+        return np.nan
     return next((each.friction for each in found if each.lost), LARGEST_FRICTION)

@@ -144,3 +144,8 @@ def test_a_closed_standard_input_is_a_usage_error(
     monkeypatch.setattr(sys, "stdin", stream)
     with pytest.raises(CaseError, match="standard input: cannot be read"):
         parse_case(*read_text("-"))
+
+
+def test_a_nul_in_the_path_of_a_profile_is_told() -> None:
+    first, *_ = problems(CONSTANT + '\n[roughness.wheel]\nprofile = "a\\u0000b"\n')
+    assert "null byte" in first.what

@@ -14,6 +14,8 @@ import numpy as np
 import pytest
 
 from brakecli import __version__
+from brakecli.case import profile
+from brakecli.case.roughness import Record
 from brakecli.cli.inputs import load_sweep
 from brakecli.errors import BrakecliError, CannotWriteError, RefusedError
 from brakecli.solver.compile import source_hash
@@ -54,7 +56,7 @@ def edited(path: Path, old: str, new: str) -> Callable[[Path], None]:
         (edited(Path("s.h5.partial"), '"numpy_version": "', '"numpy_version": "7'), "numpy_version was 7"),
         (
             edited(Path("s.h5.partial"), '{"brakecli_version', '[{"brakecli_version'),
-            "holds no finished points",
+            "holds no finished points, or its first line is damaged",
         ),
     ],
     ids=["case", "default", "sweep", "version", "sources", "library", "foreign"],
@@ -273,6 +275,24 @@ def test_a_profile_that_changes_or_goes_while_a_sweep_runs_changes_no_point(
 
     inline(loaded, tmp_path / "edited.h5", careless, task_size=1)
     assert (tmp_path / "edited.h5").read_bytes() == (tmp_path / "whole.h5").read_bytes()
+
+
+def test_all_names_of_a_profile_have_one_reading(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its file may be replaced while a sweep begins."""
+    monkeypatch.chdir(tmp_path)
+    Path("p.csv").write_text(PROFILE)
+    Path("link.csv").symlink_to("p.csv")
+    read = profile.read
+
+    def replaced(path: Path) -> Record:
+        found = read(path)
+        Path("p.csv").write_text(PROFILE.replace("5,1", "5,1.1"))
+        return found
+
+    monkeypatch.setattr(profile, "read", replaced)
+    names = ["p.csv", "./p.csv", "link.csv", str(tmp_path / "p.csv"), f"../{tmp_path.name}/link.csv"]
+    loaded = write_sweep(Path(), axis("roughness.wheel.profile", f"values = {names}"))
+    assert len({*loaded.plan.records.values()}) == 1
 
 
 def test_every_bit_of_the_place_of_a_block_is_part_of_its_checksum(tmp_path: Path) -> None:
