@@ -18,7 +18,10 @@ from typing import Any
 from brakecli.errors import CannotWriteError, UsageError
 from brakecli.files.os_signals import signals_deferred
 
-_FREE = "free some space there, or "
+_REMEDIES = {
+    **dict.fromkeys((errno.ENOSPC, errno.EDQUOT), "free some space there, or "),
+    errno.EFBIG: "free some space there, raise ulimit -f, or ",
+}
 
 
 class OutputFile(FileIO):
@@ -229,8 +232,7 @@ def explained(path: Path) -> Iterator[None]:
         yield
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
         reason = getattr(error, "strerror", None) or str(error)
-        limits = {errno.ENOSPC: _FREE, errno.EDQUOT: _FREE, errno.EFBIG: "free some space there, raise ulimit -f, or "}
-        remedy = limits.get(getattr(error, "errno", None) or 0, "")
+        remedy = _REMEDIES.get(getattr(error, "errno", None) or 0, "")
         raise _refused(path, reason[:1].lower() + reason[1:], remedy) from error
 
 
