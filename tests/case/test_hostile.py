@@ -11,6 +11,7 @@ from brakecli.case.read import parse_case, read_text
 from brakecli.errors import CaseError
 from brakecli.files.toml_lines import LARGEST_STORED, LARGEST_TEXT, MOST_MARKS, MOST_PARTS, MOST_STATEMENTS
 from tests.case.examples import CONSTANT, change, messages, problems, put
+from tests.commands import TINY
 
 HOSTILE = {
     "5000 nested tables": "\n".join("[" + ".".join(["a"] * depth) + "]" for depth in range(1, 5000, 100)),
@@ -147,5 +148,5 @@ def test_a_closed_standard_input_is_a_usage_error(
 
 
 def test_a_nul_in_the_path_of_a_profile_is_told() -> None:
-    first, *_ = problems(CONSTANT + '\n[roughness.wheel]\nprofile = "a\\u0000b"\n')
-    assert "null byte" in first.what
+    with pytest.raises(CaseError, match="null byte"):
+        parse_case(TINY, "tiny.toml", ['roughness.wheel.profile="a\\u0000b"'])
