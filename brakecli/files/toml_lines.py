@@ -7,6 +7,7 @@ into its statements, and each of them is parsed by itself.
 import re
 import tomllib
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 from typing import Any, TypeVar
 
 from brakecli.errors import CaseError, KeyPath, Problem, key_text, printable
@@ -62,6 +63,7 @@ def only_path(data: Any) -> tuple[tuple[str, ...], Any]:
     return path, data
 
 
+@lru_cache(maxsize=4)  # who shows the lines of a text and then its data asks twice
 def split(text: str, source: str = "") -> list[tuple[int, str]]:
     """Headers and keys with their values, valid or not, each with the line where it begins.
 
