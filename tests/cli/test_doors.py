@@ -12,6 +12,9 @@ import h5py
 import numpy as np
 import pytest
 
+import brakecli as brakecli_in_python
+from brakecli.errors import UsageError
+from brakecli.sweeps import driver
 from tests.campaign import campaign
 from tests.commands import TINY, brakecli, each, ended, forked, run, started
 
@@ -67,6 +70,17 @@ def test_no_command_waits_for_what_is_no_file(here: Path, kind: str) -> None:
         assert NO_FILE in done.err or (kind in ("folder", "socket") and "x" in done.err), done
 
 
+def test_a_result_whose_digest_does_not_fit_needs_force_and_a_table_of_it_is_marked(
+    good: Path, here: Path
+) -> None:
+    name = damaged(good, here).name
+    brakecli("export", name, "-o", "b.csv", cwd=here).told(4, "only --force-read looks at it")
+    assert not (here / "b.csv").exists()
+    brakecli("export", name, "--force-read", "-o", "b.csv", cwd=here).told(0, "bad.h5: its digest does not fit")
+    assert (here / "b.csv").read_text().startswith("# read by force: a digest does not fit\ntime (s),")
+
+
+@campaign
 def test_a_result_whose_digest_does_not_fit_is_looked_at_by_force_and_all_of_it_is_marked(
     good: Path, here: Path
 ) -> None:
@@ -83,7 +97,6 @@ def test_a_result_whose_digest_does_not_fit_is_looked_at_by_force_and_all_of_it_
     for command, *words in made:
         brakecli(command, name, "--force-read", *words, cwd=here).told(0, said)
         assert "read by force" in (here / words[1]).read_text(), command
-    assert (here / "b.csv").read_text().startswith("# read by force: a digest does not fit\ntime (s),")
     brakecli("export", name, "--force-read", "-o", "b.wav", cwd=here).told(
         2, "cannot say that it was read by force"
     )
@@ -100,6 +113,7 @@ def test_a_result_without_a_digest_is_read_and_said_to_be_unchecked(good: Path, 
     brakecli("plot", name, cwd=here).told(0, "unchecked")
 
 
+@campaign
 def test_no_variable_of_a_library_changes_a_picture_or_ends_it(good: Path, here: Path) -> None:
     (here / "matplotlibrc").write_text("lines.linewidth: 20\nbackend: none\n")
     brakecli("plot", good / "tiny.h5", "-o", "usual.png", cwd=here).told(0)
@@ -195,6 +209,7 @@ def test_windows_gets_a_sentence_from_the_first_command(here: Path) -> None:
     assert done.err.count("\n") == 1
 
 
+@campaign
 def test_a_script_without_a_guard_computes_with_one_job_and_is_told_with_more(here: Path) -> None:
     (here / "sweep.toml").write_text(SWEEP.format("tiny.toml"))
     script = "import brakecli\nfound = brakecli.sweep('sweep.toml', jobs={})\nprint(found.status.values)\n"
@@ -209,13 +224,17 @@ def test_a_script_without_a_guard_computes_with_one_job_and_is_told_with_more(he
     assert two.out == ""
 
 
-def test_python_looks_for_the_cluster_that_the_environment_names(here: Path) -> None:
+def test_python_looks_for_the_cluster_that_the_environment_names(
+    here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def chosen(plan: object, jobs: object, scheduler: object, **more: object) -> None:
+        raise UsageError(f"of {scheduler}")
+
+    monkeypatch.setenv("DASK_SCHEDULER_ADDRESS", "nowhere:1")
+    monkeypatch.setattr(driver, "choose_engine", chosen)
     (here / "sweep.toml").write_text(SWEEP.format("tiny.toml"))
-    (here / "s.py").write_text("import brakecli\nbrakecli.sweep('sweep.toml')\n")
-    done = run("s.py", cwd=here, command=[sys.executable], DASK_SCHEDULER_ADDRESS="nowhere:1")
-    assert done.code == 1
-    assert "UsageError" in done.err
-    assert "nowhere:1" in done.err
+    with pytest.raises(UsageError, match="of nowhere:1"):
+        brakecli_in_python.sweep(here / "sweep.toml")
 
 
 @campaign

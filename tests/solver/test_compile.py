@@ -168,7 +168,9 @@ def test_a_process_that_keeps_the_lock_is_waited_for_no_longer_than_a_limit_and_
     assert any(folder.rglob("*.nbc"))
 
 
-@pytest.mark.parametrize("kind", ["a file", "a link", "read-only", "of others"])
+@pytest.mark.parametrize(
+    "kind", ["of others", *(pytest.param(kind, marks=campaign) for kind in ("a file", "a link", "read-only"))]
+)
 def test_a_cache_that_cannot_be_used_is_named_with_the_remedy(tmp_path: Path, kind: str) -> None:
     python("from brakecli.solver import compile", tmp_path)
     (folder,) = (tmp_path / "brakecli").iterdir()
