@@ -33,12 +33,17 @@ class Record(NamedTuple):
 class Records(dict[str, Record]):
     """Measured profiles by path. Each is read when it is first asked for, and never again: a file may change."""
 
+    def __init__(self, known: Mapping[str, Record]) -> None:
+        """Begin with those that are known."""
+        super().__init__(known)
+        self._files = {os.path.realpath(path): record for path, record in known.items()}
+
     def __missing__(self, path: str) -> Record:
-        """Read a profile, which other spellings of its path then have in common."""
+        """Read a profile, which other names of its file then have in common."""
         from brakecli.case.profile import read
 
-        whole = os.path.realpath(path)  # one reading serves all names of a file
-        self[path] = found = self[whole] if whole != path else read(Path(path))
+        file = os.path.realpath(path)
+        self[path] = self._files[file] = found = self._files.get(file) or read(Path(file))
         if sum(2 * len(each.place) for each in {*self.values()}) > MOST_MEASURED:
             what = f"the measured profiles take more than {MOST_MEASURED / 1e6:g} MB"
             raise UsageError(f"{what}; measure fewer places")
@@ -61,7 +66,7 @@ def reading(records: Mapping[str, Record]) -> Iterator[None]:
 def record_of(path: str) -> Record:
     """A measured profile; raises UnreadableResultError, UsageError and OSError."""
     try:
-        return _known.get(Records())[path]
+        return _known.get(Records({}))[path]
     except KeyError:
         raise UsageError("was not read when the sweep began; name it in the case, or in an axis") from None
 

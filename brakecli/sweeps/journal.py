@@ -225,9 +225,10 @@ def _checksum(place: tuple[int, int, int], packed: bytes) -> int:
 def identity(plan: Plan) -> dict[str, Any]:
     """What makes a sweep this one: every key of the sweep and its case, and the versions it is computed with.
 
-    Of the measured profiles that points need, the contents count.
+    Of the measured profiles that points need, names and contents count: a folder may have been moved.
     """
-    sweep, case = dict(flat(parse(plan.sweep_text))), dict(flat(plan.case_keys))
+    sweep = dict(flat(parse(plan.sweep_text)))
+    case = {key: value for key, value in flat(plan.case_keys) if not key.endswith(".profile")}
     measured = defaultdict[str, list[int]](list)
     for path, record in sorted({str(Path(path).absolute()): each for path, each in plan.records.items()}.items()):
         checksum = zlib.crc32(record.height, zlib.crc32(record.place, record.is_angle))

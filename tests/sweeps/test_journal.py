@@ -295,6 +295,19 @@ def test_all_names_of_a_profile_have_one_reading(tmp_path: Path, monkeypatch: py
     assert len({*loaded.plan.records.values()}) == 1
 
 
+def test_a_sweep_goes_on_in_a_folder_that_was_moved_and_behind_a_new_link(tmp_path: Path) -> None:
+    before, after = tmp_path / "before", tmp_path / "after"
+    before.mkdir()
+    (before / "p.csv").write_text(PROFILE)
+    surface = "\n[roughness]\nwheel.profile = 'p.csv'\n"
+    radii = axis("wheel.radius", "values = [0.5, 0.6, 0.7]")
+    interrupted(write_sweep(before, radii, case=TINY + surface), before / "s.h5", limit=2, task_size=1)
+    before.rename(after)
+    (after / "p.csv").rename(after / "real.csv")
+    (after / "p.csv").symlink_to("real.csv")
+    assert inline(load_sweep(str(after / "s.toml"), None), after / "s.h5").resumed == 2
+
+
 def test_every_bit_of_the_place_of_a_block_is_part_of_its_checksum(tmp_path: Path) -> None:
     loaded = write_sweep(tmp_path, frictions(20))
     interrupted(loaded, tmp_path / "s.h5", limit=4, task_size=1)
