@@ -309,6 +309,9 @@ def test_a_copy_that_xarray_has_saved_opens_and_is_said_to_be_unchecked(tmp_path
             for key, values in before.variables.items():
                 assert node[str(key)].dims == values.dims
                 assert (node[str(key)].values.astype(str) == values.values.astype(str)).all(), key
+        (copy if name == "run" else copy.to_dataset()).to_netcdf(tmp_path / "again.nc", engine="h5netcdf")
+        with pytest.warns(UserWarning, match="has no digest"):
+            assert brakecli.load(tmp_path / "again.nc")["/"].attrs["kind"] == copy.attrs["kind"]
         drawn = command("plot", f"{name}.nc", "-o", f"{name}.png", cwd=tmp_path)
         assert "unchecked" in drawn.told(0)
 

@@ -29,7 +29,9 @@ def opened(path: Path, *, own: bool = False) -> xr.DataTree:
             found.attrs |= readings.noted()
             for node in found.subtree:  # of results that xarray has saved; those of ours are read as str
                 for name in [str(name) for name, each in node.variables.items() if each.dtype.kind == "S"]:
-                    node[name] = node[name].astype(str).astype(object)
+                    texts = node[name].astype(str).astype(object)
+                    texts.encoding["dtype"] = "S1"  # so that a copy of the copy has the same form
+                    node[name] = texts
             return found
     except (ValueError, TypeError, LookupError, AttributeError, OSError, RuntimeError, MemoryError) as error:
         reason = repr(error) if isinstance(error, LookupError) else error
@@ -47,8 +49,10 @@ def _check(result: StoredResult, *, own: bool) -> None:
                 if valid.member(node, inner) is None or f"{name}/{inner}".lstrip("/") not in result.nodes:
                     raise ValueError(f"the group {name} holds {inner}, which is a link, or stands elsewhere, too")
         elif isinstance(node, h5py.Dataset) and not valid.is_axis_alone(node):
+            if node.dtype.kind == "O":  # each of them may be the same, very long one
+                raise ValueError(f"{name} holds texts or lists of any length")
             valid.check_size(node, result.length, name)
-            each = node.dtype.itemsize + 64 * (node.dtype.kind in "SO")  # a text is an object
+            each = node.dtype.itemsize + 64 * (node.dtype.kind == "S")  # a text is an object
             needed += 0 if own else node.size * each * valid.packed(node)
     valid.check_memory(needed, "all of it")
 

@@ -182,6 +182,8 @@ def test_texts_of_any_length_under_other_names_are_not_read(tmp_path: Path) -> N
     before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
     with open_result(tmp_path / "r.h5") as result:
         assert result.variables("history")["z"].kind == "O"
+    with pytest.raises(UnreadableResultError, match="history/z holds texts or lists of any length"):
+        as_xarray(tmp_path / "r.h5")
     assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss < before + 1_000_000  # kB
 
 
