@@ -65,7 +65,5 @@ def command(
         failed = f"{found.failed} of {found.points} points failed; all others were written"
         if found.failed == found.points:
             which = "its only point" if found.points == 1 else f"all {found.points} points"
-            failed = (
-                f"{which} failed; the reasons above say what to change in the case, the sweep or on the machine"
-            )
+            failed = f"{which} failed; correct the case, the sweep or the machine, as the reasons above say"
         raise BrakecliError(f"{report.output}: {failed}")

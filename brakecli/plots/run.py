@@ -21,7 +21,7 @@ from brakecli.files.read import StoredResult
 from brakecli.plots import style
 from brakecli.plots.quantities import VARIABLES, Scaled, scaled
 from brakecli.plots.stop import Stop, draw_amplitude, draw_spectrogram
-from brakecli.runs.cost import stability_seconds
+from brakecli.runs.cost import stability_seconds, table_seconds
 from brakecli.runs.limits import WORTH_SAYING
 from brakecli.solver.quantities import ContactState
 from brakecli.solver.steady_sliding import steady_sliding
@@ -104,7 +104,7 @@ def case_of(result: StoredResult) -> LoadedCase:
 
 def _mode_frequencies(system: System) -> list[float]:
     """Frequencies (Hz) of the modes of steady sliding, as far as they turn; none where they would take long."""
-    if stability_seconds(system) > WORTH_SAYING:
+    if stability_seconds(system) + table_seconds(system) > WORTH_SAYING:
         return []
     stiffness = system.contact_stiffness
     with suppress(CaseError):

@@ -17,7 +17,7 @@ from brakecli.case.read import LoadedCase, key_path
 from brakecli.case.system import system_of
 from brakecli.files import fields
 from brakecli.files.field import values_of
-from brakecli.runs.cost import duration_text, stability_seconds, steps_and_seconds
+from brakecli.runs.cost import duration_text, stability_seconds, steps_and_seconds, table_seconds
 from brakecli.runs.run import motion_of, verdict_in_memory
 from brakecli.solver.motion import Counted
 from brakecli.solver.system import System
@@ -140,7 +140,8 @@ def _far(margin: float | None, own: float) -> str:
 
 def advise_seconds(loaded: LoadedCase) -> float:
     """A rough guess at the time of `advise`: each number of a case is changed to find critical friction anew."""
-    return len(of_case.numbers(loaded.case)) * stability_seconds(system_of(loaded.case))
+    system = system_of(loaded.case)
+    return len(of_case.numbers(loaded.case)) * (stability_seconds(system) + table_seconds(system))
 
 
 def advise(

@@ -81,10 +81,15 @@ def start_seconds(system: System) -> float:
 
 def stability_seconds(system: System) -> float:
     """A rough guess at the time to find steady sliding at every friction coefficient of `stability`."""
-    tried, tables = np.linspace(0.0, LARGEST_FRICTION, 41).tolist(), _TABLE_SECONDS * system.table_bytes
+    tried = np.linspace(0.0, LARGEST_FRICTION, 41).tolist()
     if system.belt_speed == 0.0 or not any(_opens(system, phi) for phi in tried):
-        return tables
-    return tables + (TABLE + _START_EVALUATIONS) * _average_seconds(system)
+        return 0.0
+    return (TABLE + _START_EVALUATIONS) * _average_seconds(system)
+
+
+def table_seconds(system: System) -> float:
+    """A rough guess at the time to fill the tables of the contact, which very many waves make long."""
+    return _TABLE_SECONDS * system.table_bytes
 
 
 def _average_seconds(system: System) -> float:

@@ -109,7 +109,7 @@ def refuse(found: Check, free_bytes: float = math.inf) -> None:
 def sliding_text(system: System) -> str | None:
     """How long `stability` will take, where the pad opens; raises RefusedError where that is too long."""
     seconds = stability_seconds(system)
-    text = f"steady sliding on this pad takes about {duration_text(seconds)}"
+    text = f"steady sliding on a pad that opens takes about {duration_text(seconds)}"
     if seconds > MOST_SECONDS:
         raise RefusedError(f"{text}; reduce contact.nodes, or the number of waves in roughness")
     return text if seconds > WORTH_SAYING else None
