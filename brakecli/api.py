@@ -244,11 +244,11 @@ def classify(
 def _readings(*, force_read: bool = False) -> Iterator[None]:
     """Warn of results that no digest vouches for, and forget them at the end."""
     said = list[str]()
-    readings.forced, readings.tell, readings.unchecked = force_read, said.append, {}
+    readings.begin(said.append, forced=force_read)
     try:
         yield
     finally:
-        readings.forced, readings.tell, readings.unchecked = False, len, {}
+        readings.begin()
     _warn(said, 5)  # the caller of who uses this block
 
 

@@ -79,7 +79,7 @@ VERSION = option("Print the version and exit.", None, "--version", callback=_pri
 @app.callback()
 def _common(version: Annotated[bool, VERSION] = False) -> None:
     compiling.set_notice(announce_compilation)
-    readings.tell = warn
+    readings.begin(warn)
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)
     if limit == resource.RLIM_INFINITY:
         return

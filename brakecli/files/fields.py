@@ -356,7 +356,7 @@ INFO = (
     *named(RUN, "status"),
     Field("kind", "", "run, sweep, comparison or stability", TEXT),
     Field("title", "", "title of the case or of the sweep", TEXT),
-    Field("whole", "", "whether every byte is as it was written; false where another program has changed it", "?"),
+    Field("whole", "", "whether every byte is as it was written; false where no digest vouches for that", "?"),
     integer("bytes", "size of the file"),
     integer("format_version", "version of the form of the file"),
     Field("versions", "", "versions of brakecli and of the libraries that made it", OBJECT),

@@ -14,12 +14,18 @@ _SAID = {
 
 
 class Readings(local):
-    """The results that a command, or a call of a function, has read; each thread has its own."""
+    """The results that a command, or a call of a function, has read; each thread has its own.
+
+    Where nobody is told, nothing is remembered: the next result of the process would be marked for another's sake.
+    """
 
     def __init__(self) -> None:
         """Nothing was read, and nobody is told."""
-        self.tell: Callable[[str], object] = len  # what says that a file is unchecked
-        self.forced = False  # whether files whose digest does not fit are read all the same
+        self.begin()
+
+    def begin(self, tell: Callable[[str], object] | None = None, *, forced: bool = False) -> None:
+        """Forget what was read; `tell` says from now on that a file is unchecked."""
+        self.tell, self.forced = tell, forced  # forced: files whose digest does not fit are read all the same
         self.unchecked: dict[str, str] = {}  # path and digest of those for which none vouches
 
     def force(self, wanted: bool) -> bool:
@@ -29,7 +35,7 @@ class Readings(local):
 
     def admit(self, path: str, digest: str) -> bool:
         """Whether a file with such a digest may be read; that it is unchecked is said once."""
-        if digest and self.unchecked.get(path) != digest and (self.forced or digest == MISSING):
+        if self.tell and digest and self.unchecked.get(path) != digest and (self.forced or digest == MISSING):
             self.unchecked[path] = digest
             self.tell(f"{path}: {_SAID[digest]}")
         return self.forced or digest != DIFFERS

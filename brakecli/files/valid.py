@@ -19,7 +19,7 @@ from brakecli.files.field import Field
 
 LARGEST, LARGEST_IN_HISTORY = 1e300, 1e150  # magnitudes; the squares of the latter are finite
 _BLOCK = 1 << 20  # rows read at a time
-_CONTROLS = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f]")
+_CONTROLS = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")  # which neither XML nor TOML may hold
 _RATIO = 1100  # no filter of HDF5 makes data smaller than this
 DEEPEST, _MOST_NODES = 8, 10_000  # levels of groups and their variables, and the number of both
 _MOST_ATTRIBUTES = 1000  # of a group or a variable

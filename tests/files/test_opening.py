@@ -102,15 +102,16 @@ def test_a_digest_that_does_not_fit_needs_force_and_is_noted(tmp_path: Path) -> 
     path.write_bytes(path.read_bytes()[:-1] + b"x")
     with pytest.raises(UnreadableResultError, match="only --force-read"), open_result(path):
         raise AssertionError
+    said = list[str]()
     try:
-        readings.force(True)
+        readings.begin(said.append, forced=True)
         with open_result(path) as result:
             assert not result.sealed
         assert readings.noted() == {"digest": "does not fit"}
         assert readings.mark()
+        assert len(said) == 1
     finally:
-        readings.force(False)
-        readings.unchecked.clear()
+        readings.begin()
 
 
 def test_variables_of_libraries_are_fixed() -> None:
@@ -213,4 +214,4 @@ def test_a_user_block_makes_a_file_unchecked_and_not_unreadable(tmp_path: Path) 
             old.copy(name, new)
     with open_result(tmp_path / "b.h5") as result:
         assert not result.sealed
-    readings.unchecked.clear()
+    assert readings.noted() == {}  # nobody is told, and so no later result is marked

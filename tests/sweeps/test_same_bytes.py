@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from brakecli.files.read import open_result
 from brakecli.sweeps.workers.task import compute_units
 from tests.commands import brakecli, left_in
 from tests.sweeps.helpers import axis, frictions, inline, interrupted, local, write_sweep
@@ -59,3 +60,14 @@ def test_a_critical_value_by_simulation_does_not_depend_on_the_workers(tmp_path:
     inline(loaded, tmp_path / "one.h5", compute_units)
     local(loaded, tmp_path / "two.h5", compute_units, task_size=1)
     assert (tmp_path / "one.h5").read_bytes() == (tmp_path / "two.h5").read_bytes()
+
+
+def test_a_file_that_was_read_before_marks_no_later_result(tmp_path: Path) -> None:
+    """Nobody is told here that it has no digest, as no command reads it."""
+    loaded = write_sweep(tmp_path, frictions(4))
+    inline(loaded, tmp_path / "before.h5")
+    (tmp_path / "other.h5").write_bytes((tmp_path / "before.h5").read_bytes()[:-32])
+    with open_result(tmp_path / "other.h5") as other:
+        assert not other.sealed
+    inline(loaded, tmp_path / "after.h5")
+    assert (tmp_path / "after.h5").read_bytes() == (tmp_path / "before.h5").read_bytes()
