@@ -23,7 +23,7 @@ _SINES = ("amplitudes", "wavelengths", "wavenumbers", "orders", "phases_deg")
 
 
 class Record(NamedTuple):
-    """A measured profile: places, which rise, and heights, as float64 in bytes, in m, or of angles in rad."""
+    """A measured profile: rising places (m, or rad if `is_angle`) and heights (m), each as bytes of float64."""
 
     place: bytes
     height: bytes

@@ -18,7 +18,7 @@ from brakecli.files.trust import readings
 def opened(path: Path, *, own: bool = False) -> xr.DataTree:
     """A result file in memory, checked; what other programs have put there may be more than xarray takes.
 
-    One of our `own`, just written, may be as large as it is.
+    A file that this program has just written (`own`) has no limit of memory.
     """
     try:
         with open_result(path) as result:
@@ -49,7 +49,7 @@ def _check(result: StoredResult, *, own: bool) -> None:
                 if valid.member(node, inner) is None or f"{name}/{inner}".lstrip("/") not in result.nodes:
                     raise ValueError(f"the group {name} holds {inner}, which is a link, or stands elsewhere, too")
         elif isinstance(node, h5py.Dataset) and not valid.is_axis_alone(node):
-            if node.dtype.kind == "O":  # each of them may be the same, very long one
+            if node.dtype.kind == "O":  # all entries may refer to one very long text
                 raise ValueError(f"{name} holds texts or lists of any length")
             valid.check_size(node, result.length, name)
             each = node.dtype.itemsize + 64 * (node.dtype.kind == "S")  # a text is an object

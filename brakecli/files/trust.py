@@ -1,4 +1,4 @@
-"""Which of the results that were read no digest vouches for: all that is made of them says so.
+"""Results that no digest vouches for. Everything that is made from them says so.
 
 Only the standard library is imported here.
 """
@@ -16,7 +16,8 @@ _SAID = {
 class Readings(local):
     """The results that a command, or a call of a function, has read; each thread has its own.
 
-    Where nobody is told, nothing is remembered: the next result of the process would be marked for another's sake.
+    Outside of a command or a call nothing is remembered. Otherwise a later result of the same process would be
+    marked because of another file.
     """
 
     def __init__(self) -> None:

@@ -104,7 +104,7 @@ def tree(file: h5py.File) -> dict[str, Any]:
 def look_through(file: h5py.File, length: int, *, everything: bool) -> None:
     """Read all attributes of known types, and of variables their axes and sizes, or everything.
 
-    Texts of any length are not read but as attributes: each of them may be the same, very long one.
+    Variables with texts of any length are not read: all entries may refer to one very long text.
     """
     for name, node in tree(file).items():
         for attribute in node.attrs:

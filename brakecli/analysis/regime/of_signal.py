@@ -23,8 +23,8 @@ _SUSTAINED = (Regime.RELAXATION, Regime.QUASI_HARMONIC)
 class Measurand(StrEnum):
     """What was measured.
 
-    A force is that of a spring between the belt's friction and the frame, a torque the same at an unknown lever, a
-    pressure that of the sound nearby.
+    A force is that of the spring between the belt's friction and the frame. A torque is such a force times a lever
+    that is not known. A pressure is that of the sound nearby.
     """
 
     DISPLACEMENT = "displacement"

@@ -202,7 +202,7 @@ def _dataset(path: Path, inside: str) -> tuple[Array, str]:
 
 
 def _row(file: Any, inside: str, length: int) -> tuple[Array, str]:
-    """That row of an HDF5 file of this length (bytes); raises ValueError for anything else."""
+    """A row of numbers in an open HDF5 file of this length (bytes), and its unit; raises ValueError."""
     from brakecli.files import valid
 
     if inside.count("/") > valid.DEEPEST:

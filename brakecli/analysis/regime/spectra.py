@@ -120,7 +120,7 @@ def line_share(power: Array) -> float:
 def forced_lines(belt_speed: float, waves_per_metre: tuple[float, ...], highest: float) -> tuple[float, ...]:
     """Frequencies (Hz, up to `highest`) of the passing waves, their multiples, and sums and differences of two.
 
-    Those of two would fill the spectrum, and the memory, where there are very many waves.
+    With more than 2000 waves the sums and differences are left out: they would fill the spectrum, and memory.
     """
     base = abs(belt_speed) * np.array(waves_per_metre)
     few = base[: len(base) * (len(base) <= _MOST_PAIRED)]
