@@ -191,6 +191,16 @@ def test_many_signals_at_once_leave_nothing_either(here: Path) -> None:
     assert left_in(here) == {"tiny.toml"}
 
 
+def test_a_second_ctrl_c_ends_with_the_same_code(here: Path) -> None:
+    with started("run", "tiny.toml", *LONG, cwd=here) as process:
+        wait_until((here / ".tiny.h5.part").exists)
+        process.send_signal(signal.SIGINT)
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=LIMIT)
+    assert (process.returncode, err) == (130, b"brakecli: interrupted; nothing unfinished was left behind\n")
+    assert left_in(here) == {"tiny.toml"}
+
+
 @pytest.mark.parametrize("times", counts(2, 4))
 def test_an_interruption_at_any_time_of_a_short_run_leaves_nothing_or_the_result(
     good: Path, here: Path, times: int

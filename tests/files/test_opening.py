@@ -6,6 +6,7 @@ import resource
 import struct
 import subprocess
 import sys
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -144,6 +145,14 @@ def the_same_text(file: h5py.File) -> None:
         data.id.write_direct_chunk((0,), raw.read(16) * 100_000)
 
 
+def much_in_little(file: h5py.File) -> None:
+    """1.6 GB of zeros in as many MB."""
+    data = file.create_dataset("history/z", (200_000_000,), "f8", chunks=(1_000_000,), compression="gzip")
+    packed = zlib.compress(bytes(8_000_000), 9)
+    for start in range(0, 200_000_000, 1_000_000):
+        data.id.write_direct_chunk((start,), packed)
+
+
 def many_attributes(file: h5py.File) -> None:
     for number in range(1001):
         file["history"].attrs[f"a{number}"] = number
@@ -186,6 +195,18 @@ def test_texts_of_any_length_under_other_names_are_not_read(tmp_path: Path) -> N
     with pytest.raises(UnreadableResultError, match="history/z holds texts or lists of any length"):
         as_xarray(tmp_path / "r.h5")
     assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss < before + 1_000_000  # kB
+
+
+def test_what_unpacks_to_more_than_the_bound_is_not_read(tmp_path: Path) -> None:
+    path = tmp_path / "r.h5"
+    changed(path, much_in_little)
+    assert path.stat().st_size < 4_000_000
+    with pytest.raises(UnreadableResultError, match=r"takes \d+ bytes in memory, and \d+ are the most"):
+        as_xarray(path)
+    with open_result(path) as result:
+        assert result.read("history", "z", 0, 5).tolist() == [0.0] * 5
+        with pytest.raises(UnreadableResultError, match="bytes in memory"):
+            result.read("history", "z")
 
 
 def test_a_name_that_is_missing_is_told(tmp_path: Path) -> None:

@@ -136,6 +136,16 @@ def test_a_report_of_a_run_answers_first_and_holds_all_that_is_promised(results:
     assert "critical friction for 1 % more" in text
 
 
+def test_what_a_scene_does_not_require_is_no_warning(tmp_path: Path, compiled: None) -> None:
+    loaded = parse_case((ROOT / "cases" / "damped.toml").read_text(encoding="utf-8"), "case")
+    left_out = run(loaded, tmp_path / "r.h5", force=False).left_out
+    assert left_out
+    text = " ".join(reported(tmp_path / "r.h5").texts)
+    accuracy, warnings = text.index("Accuracy"), text.rindex("Warnings")
+    assert all(accuracy < text.index(f"Left out: {each}.") < warnings for each in left_out)
+    assert "Left out" not in text[warnings:]
+
+
 def test_a_map_holds_the_values_of_every_point(found: Page) -> None:
     (data,) = found.data
     values = columns((8, 7), critical=False)
