@@ -77,9 +77,10 @@ VERSION = option("Print the version and exit.", None, "--version", callback=_pri
 
 
 @app.callback()
-def _common(version: Annotated[bool, VERSION] = False) -> None:
+def _common(context: typer.Context, version: Annotated[bool, VERSION] = False) -> None:
     compiling.set_notice(announce_compilation)
     readings.begin(warn)
+    context.call_on_close(readings.begin)  # a later call of the same process forgets what this one has read
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)
     if limit == resource.RLIM_INFINITY:
         return
