@@ -146,7 +146,6 @@ STAGES, POWERS, POWERED = 16, 7, 5
 MOTION = record(
     "x y v_x v_y",  # motion reached, at which the next step begins, m and m/s
     "force",  # normal force at the start, N
-    "side",  # sign of the sliding velocity, 0 in stick
     "time tau",  # when the sample interval that has been reached began, and time since then, s
     "belt belt_slope",  # U, m/s, and its slope, m/s²
     "travel travel_low",  # of the wheel, a sum of two doubles, m
@@ -156,10 +155,10 @@ MOTION = record(
     "pressed_x pressed_y pressed",  # where full contact has been computed in this step, and its force, N
     "step",  # to try next, s
     "events_time",  # since which `events` are counted, s
-    "step_done time_done tau_done side_done",  # the step of the continuous solution, its begin and its phase,
-    "belt_done belt_slope_done load_done load_slope_done",  # and what acted from outside at its begin
-    touching_done=int,
-    touching=int,  # 0 where the pad is clear of the wheel for sure
+    "step_done time_done tau_done",  # the step of the continuous solution and its begin,
+    "belt_done belt_slope_done load_done load_slope_done",  # what acted from outside at its begin,
+    phase_done=int,  # and its phase
+    phase=int,  # flight: the pad is clear of the wheel for sure
     pair=int,  # 0: steps of order eight, 1: of order five
     light=int,  # 1 where the contact finds the force alone
     started=int,  # 0 before the phase of the start is known

@@ -23,11 +23,11 @@ from brakecli.analysis.regime.linear import Linear, linear_theory
 from brakecli.analysis.regime.verdict import Excitation, Regime
 from brakecli.analysis.stability.modes import slowest_of_cycles
 from brakecli.runs.certificate import ROUNDING, Certificate
+from brakecli.solver.automaton import BACKWARD, FORWARD, OPEN, STICK
 from brakecli.solver.compile import Floats
 from brakecli.solver.motion import Work
 from brakecli.solver.records import BELT, FLOW, LOAD, new
 from brakecli.solver.schemes.piecewise_exact.orbit import ORBIT
-from brakecli.solver.schemes.piecewise_exact.phases import BACKWARD, FORWARD, OPEN, STICK
 from brakecli.solver.schemes.piecewise_exact.seek import FOUND, GOING_ON, LINEAR, seek, swing
 from brakecli.solver.system import System
 

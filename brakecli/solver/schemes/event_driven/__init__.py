@@ -7,6 +7,7 @@ slip, lift-off and touch-down end a step: nothing is smoothed, nothing stepped o
 from numba import float64, int64, void
 
 from brakecli.solver import own_steps
+from brakecli.solver.automaton import STICK, side_of
 from brakecli.solver.compile import Floats, at_address, from_memory, into_memory, kernel
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.friction import observed
@@ -42,11 +43,11 @@ def _sample(p: Shoe, interval: float, level: int) -> None:
     """Put the sample of a level that the motion has reached into the state, with the forces at its time."""
     c, m = p.c, p.motion
     t = interval * level
-    side, touching = m.side, m.touching
+    phase = m.phase
     at, x, y, v_x, v_y = m.x, m.x, m.y, m.v_x, m.v_y
     belt, belt_slope, load = m.belt, m.belt_slope, m.load
     if m.level > level or m.tau > 4.0 * EPSILON * t:
-        side, touching = m.side_done, m.touching_done
+        phase = m.phase_done
         since = (t - m.time_done) - m.tau_done
         theta, rest, belt_slope = since / m.step_done, (m.time - t) + m.tau, m.belt_slope_done
         belt, load = m.belt_done + belt_slope * since, m.load_done + m.load_slope_done * since
@@ -54,14 +55,14 @@ def _sample(p: Shoe, interval: float, level: int) -> None:
         x, y = interpolated(m, X, theta), interpolated(m, Y, theta)
         v_x, v_y = interpolated(m, V_X, theta), interpolated(m, V_Y, theta)
         at = x - passed
-        if side == 0.0:
+        if phase == STICK:
             at, x, v_x = m.x, m.x + passed, belt
-    normal = max(press(p, at, y, touching), 0.0)
+    normal = max(press(p, at, y, phase), 0.0)
     bound = c.phi * normal
     against_x, _ = resistance(c, load, x, y, v_x, v_y)
     needed = c.m * belt_slope + against_x  # Eq. (6) in stick
-    holds = side == 0.0 and abs(needed) <= bound * (1.0 + 1e-12)  # by the rounding of the cone it still sticks
-    state, friction = observed(side, holds, needed, normal, bound)
+    holds = phase == STICK and abs(needed) <= bound * (1.0 + 1e-12)  # by the rounding of the cone it still sticks
+    state, friction = observed(side_of(phase), holds, needed, normal, bound)
     m.row[0], m.row[1], m.row[2], m.row[3] = x, y, v_x, v_y
     m.row[4], m.row[5], m.row[6], m.row[7] = friction, normal, p.layer.contact.fraction, state
 

@@ -4,6 +4,7 @@ import math
 
 from numba import float64, int64, types
 
+from brakecli.solver.automaton import OPEN, STICK, side_of
 from brakecli.solver.compile import kernel
 from brakecli.solver.records import V_X, Y
 from brakecli.solver.schemes.event_driven.phases import EPSILON, SHOE, Shoe, margins, rounding
@@ -22,11 +23,11 @@ def _allowances(p: Shoe) -> tuple[float, float, float]:
     """How far each margin may be below zero by rounding alone."""
     m = p.motion
     height = 4.0 * EPSILON * (abs(m.y) + p.layer.pad.clear_from)
-    if m.side != 0.0:
+    if m.phase != STICK:
         late = abs(m.belt_slope) * (m.time + m.tau)  # the wheel's velocity at a time that is rounded
-        return 4.0 * EPSILON * (abs(m.v_x) + abs(m.belt) + late), 0.0, height
+        return height, 4.0 * EPSILON * (abs(m.v_x) + abs(m.belt) + late), 0.0
     along, _ = rounding(p)
-    return 2.0 * along, 2.0 * along, height
+    return height, 2.0 * along, 2.0 * along
 
 
 @kernel(float64(SHOE, int64, float64, float64, float64), inlined=False)
@@ -86,9 +87,9 @@ def first_event(p: Shoe, h: float) -> tuple[int, float]:
     None does where the continuous solution cannot get that far from the begin of the step. Between three places a
     margin may also dip below zero: it is followed down where a parabola says that it may.
     """
-    m, sliding = p.motion, p.motion.side * (p.motion.begin[V_X] - p.motion.belt)
+    m, sliding = p.motion, side_of(p.motion.phase) * (p.motion.begin[V_X] - p.motion.belt)
     stays = abs(m.begin[Y] - p.layer.pad.clear_from) > reach(m, Y)
-    if m.side != 0.0 and stays and sliding > reach(m, V_X) + abs(m.belt_slope) * h:
+    if stays and (m.phase == OPEN or (m.phase != STICK and sliding > reach(m, V_X) + abs(m.belt_slope) * h)):
         return NONE, 1.0
     allowed = _allowances(p)
     before_last = last = margins(p, h, 0.0)

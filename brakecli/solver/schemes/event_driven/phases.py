@@ -1,9 +1,8 @@
-"""Phases of the motion between two events: what acts on the shoe in each, how long it lasts, what follows.
+"""The phases of the automaton on any surfaces: what acts on the shoe in each, and how far its margins reach.
 
-A phase is a side of the friction law (stick, or slip in one direction) on a pad that may touch or that is clear of
-the wheel. Within a phase the forces on a flat pad are smooth: its normal force is continued linearly beyond zero,
-and an event ends the phase where it vanishes. On a rough pad patches that appear, merge or vanish make kinks of
-the order gap^(3/2) inside a phase; the control of the step finds them.
+Within a phase the normal force of a flat pad is continued linearly beyond zero, and an event ends the phase where
+it vanishes. On a rough pad patches that appear, merge or vanish make kinks of the order gap^(3/2) inside a phase;
+the control of the step finds them.
 """
 
 import math
@@ -12,10 +11,21 @@ from typing import Any, NamedTuple
 from numba import float64, int64, types, void
 
 from brakecli.solver import records
+from brakecli.solver.automaton import (
+    HEIGHT,
+    OPEN,
+    PULL,
+    STICK,
+    UNDECIDED,
+    anchored,
+    carried,
+    following,
+    held,
+    side_of,
+)
 from brakecli.solver.compile import at_address, kernel
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.contact.closed_form import FULL, clear, coverage, full_contact, full_press
-from brakecli.solver.double_double import two_sum
 from brakecli.solver.records import COEFFICIENTS, V_X, V_Y, Coefficients, Drive, Layer, Y
 from brakecli.solver.roughness import turn
 from brakecli.solver.schedules import integral_at, slope_at, value_at
@@ -57,7 +67,7 @@ def rounding(p: Shoe) -> tuple[float, float]:
     c, pad, m = p.c, p.layer.pad, p.motion
     x, y, v_x, v_y = abs(m.x), abs(m.y), abs(m.v_x), abs(m.v_y)
     load, normal = abs(m.load), 0.0
-    if m.touching != 0:
+    if m.phase != OPEN:
         normal = 2.0 * pad.half_length * pad.k * (y + pad.wheel_bound + pad.shoe_bound)
     along = c.b_xx * v_x + abs(c.b_xy) * v_y + c.c_xx * x + abs(c.c_xy) * y + load * abs(c.sin_beta)
     across = abs(c.b_xy) * v_x + c.b_yy * v_y + abs(c.c_xy) * x + c.c_yy * y + load * c.cos_beta
@@ -76,18 +86,18 @@ def arrive(p: Shoe, drive: Drive) -> None:
     if p.layer.pad.wheel_terms > 0:
         turn(m.travel, m.travel_low, p.layer)
     m.pressed_x = math.nan
-    if m.started != 0 and m.side == 0.0:  # no drift can build up
-        m.x, m.v_x = (m.anchor + m.travel) + (m.anchor_low + m.travel_low), m.belt
+    if m.started != 0 and m.phase == STICK:
+        m.x, m.v_x = carried(m.anchor, m.anchor_low, m.travel, m.travel_low), m.belt
 
 
 @kernel(float64(SHOE, float64, float64, int64))
-def press(p: Shoe, x: float, y: float, touching: int) -> float:
+def press(p: Shoe, x: float, y: float, phase: int) -> float:
     """F_y (N) in the phase and the rest of `contact`; the closed form while a bound proves full contact.
 
     x is less what the wheel has travelled since the time that `angles` belong to.
     """
     pad, contact = p.layer.pad, p.layer.contact
-    if touching == 0:
+    if phase == OPEN:
         clear(contact)
         return 0.0
     p.counts.evaluations += 1
@@ -121,17 +131,17 @@ def find_slopes(p: Shoe, stage: int, since: float, x: float, y: float, v_x: floa
     In stick x and its velocity are the wheel's, whatever is given.
     """
     c, m = p.c, p.motion
-    side, load = m.side, m.load + m.load_slope * since
+    side, stuck, load = side_of(m.phase), m.phase == STICK, m.load + m.load_slope * since
     belt, travel = m.belt + m.belt_slope * since, (m.belt + 0.5 * m.belt_slope * since) * since
     at = x - travel
-    if side == 0.0:
+    if stuck:
         at, x, v_x = m.x, m.x + travel, belt
-    normal = press(p, at, y, m.touching)
+    normal = press(p, at, y, m.phase)
     against_x, against_y = resistance(c, load, x, y, v_x, v_y)
-    friction = -side * c.phi * normal if side != 0.0 else c.m * m.belt_slope + against_x  # Eq. (5), Eq. (4)
+    friction = c.m * m.belt_slope + against_x if stuck else -side * c.phi * normal  # Eq. (4), Eq. (5)
     sliding = v_x - belt
     m.slopes[stage, 0], m.slopes[stage, 1] = v_x, v_y
-    m.slopes[stage, 2] = (friction - against_x) / c.m if side != 0.0 else m.belt_slope  # Eq. (6)
+    m.slopes[stage, 2] = m.belt_slope if stuck else (friction - against_x) / c.m  # Eq. (6)
     m.slopes[stage, 3] = (normal - against_y) / c.m  # Eq. (7)
     m.work_rates[stage, 0] = friction * belt
     m.work_rates[stage, 1] = -friction * sliding
@@ -143,66 +153,59 @@ def find_slopes(p: Shoe, stage: int, since: float, x: float, y: float, v_x: floa
 
 @kernel(_TRIPLE(SHOE, float64, float64), inlined=False)
 def margins(p: Shoe, h: float, theta: float) -> tuple[float, float, float]:
-    """What is positive while the phase lasts, at the part theta of the step h.
-
-    In slip the sliding velocity (m/s) and nothing; in stick how far the force needed is within the friction cone
-    (N), on the side of backward slip and of forward slip; then the height (m) before the pad is clear, or is not.
-    """
+    """The margins of the phase at the part theta of the step h; one that the phase does not have is 1."""
     c, m, since = p.c, p.motion, theta * h
     y = interpolated(m, Y, theta)
-    height = p.layer.pad.clear_from - y if m.touching != 0 else y - p.layer.pad.clear_from
-    belt = m.belt + m.belt_slope * since
-    if m.side != 0.0:
-        return m.side * (interpolated(m, V_X, theta) - belt), 1.0, height
+    if m.phase == OPEN:
+        return y - p.layer.pad.clear_from, 1.0, 1.0
+    height, belt = p.layer.pad.clear_from - y, m.belt + m.belt_slope * since
+    if m.phase != STICK:
+        return height, side_of(m.phase) * (interpolated(m, V_X, theta) - belt), 1.0
     x = m.x + (m.belt + 0.5 * m.belt_slope * since) * since
-    bound = c.phi * press(p, m.x, y, m.touching)
+    bound = c.phi * press(p, m.x, y, m.phase)
     v_y = interpolated(m, V_Y, theta)
     against_x, _ = resistance(c, m.load + m.load_slope * since, x, y, belt, v_y)
     needed = c.m * m.belt_slope + against_x
-    return bound - needed, bound + needed, height
+    return height, bound - needed, bound + needed
 
 
 @kernel(float64(SHOE, int64), inlined=False)
 def margin_slope(p: Shoe, which: int) -> float:
     """Rate of a margin at the end of a step, from the slopes and the contact there."""
     c, m = p.c, p.motion
-    if which == 2:
-        return -m.slopes[END_STAGE, 1] if m.touching != 0 else m.slopes[END_STAGE, 1]  # type: ignore[no-any-return]
-    if m.side != 0.0:
-        return m.side * (m.slopes[END_STAGE, 2] - m.belt_slope)  # type: ignore[no-any-return]
-    bound = -c.phi * p.layer.contact.stiffness * m.slopes[END_STAGE, 1]
     x, y, v_x, v_y = m.slopes[END_STAGE, 0], m.slopes[END_STAGE, 1], m.slopes[END_STAGE, 2], m.slopes[END_STAGE, 3]
+    if which == HEIGHT:
+        return y if m.phase == OPEN else -y  # type: ignore[no-any-return]
+    if m.phase != STICK:
+        return side_of(m.phase) * (v_x - m.belt_slope)  # type: ignore[no-any-return]
+    bound = -c.phi * p.layer.contact.stiffness * y
     needed, _ = resistance(c, m.load_slope, x, y, v_x, v_y)
-    return bound - needed if which == 0 else bound + needed  # type: ignore[no-any-return]
+    return bound - needed if which == PULL else bound + needed  # type: ignore[no-any-return]
 
 
 @kernel(void(SHOE), inlined=False)
 def take_hold(p: Shoe) -> None:
-    """The side where the shoe moves with the wheel: stick if friction can hold it there, else slip, (3)-(5).
+    """The phase of a touching shoe that moves with the wheel: stick if friction can hold it, Eqs. (3)-(5).
 
     A shoe that slips on keeps its velocity: the wheel's is as uncertain as the time, however fast it changes.
     """
     c, m = p.c, p.motion
-    normal = press(p, m.x, m.y, m.touching)
+    bound = c.phi * press(p, m.x, m.y, STICK)
     against_x, _ = resistance(c, m.load, m.x, m.y, m.belt, m.v_y)
     needed, (along, _) = c.m * m.belt_slope + against_x, rounding(p)
-    if abs(needed) <= c.phi * normal + along:
-        anchor, anchor_low = two_sum(m.x, -m.travel)
-        m.anchor, m.anchor_low, m.v_x = anchor, anchor_low - m.travel_low, m.belt
-        m.side = 0.0
-    else:
-        m.side = -1.0 if needed > 0.0 else 1.0
+    m.phase = held(bound - needed, bound + needed, along, along)
+    if m.phase == STICK:
+        m.anchor, m.anchor_low = anchored(m.x, m.travel, m.travel_low)
+        m.v_x = m.belt
 
 
 @kernel(void(SHOE, int64), inlined=False)
 def switch(p: Shoe, which: int) -> None:
     """Enter the phase that follows where a margin has run out."""
     m = p.motion
-    if which == 2:
+    if which == HEIGHT:
         m.y = p.layer.pad.clear_from  # 0 on smooth surfaces, as it must be
-        m.touching = 1 - m.touching
-    elif m.side == 0.0:
-        m.side = -1.0 if which == 0 else 1.0  # friction cannot pull that hard, or cannot push
-    else:
+    m.phase = following(m.phase, which, m.v_x - m.belt)
+    if m.phase == UNDECIDED:
         take_hold(p)
     find_slopes(p, 0, 0.0, m.x, m.y, m.v_x, m.v_y)

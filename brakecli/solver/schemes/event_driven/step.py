@@ -5,6 +5,7 @@ from typing import Any
 
 from numba import float64, int64, void
 
+from brakecli.solver.automaton import OPEN, STICK, UNDECIDED, counted, sliding_phase, stalled
 from brakecli.solver.compile import kernel
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.quantities import BOUND, Failure
@@ -29,8 +30,8 @@ _DECAY = 4.0
 """Largest step times decay rate: steps are stable up to 6, but inaccurate beyond 4."""
 _FIRST = 0.05
 """The first step over the longest; on nodes five times that."""
-_MOST_SWITCHES, _MOST_EVENTS, _NO_PROGRESS = 60, 1000, 1e-6
-"""A run ends after so many phases that end at once, or so many events within a part of the longest step."""
+_MOST_SWITCHES = 60
+"""A run ends after so many phases that end at once."""
 _LOOSE = 2e-5
 """Tolerance from which on steps of order five are cheaper, where the contact is that of nodes."""
 _TINY = 1e-300  # no division by zero where nothing moves
@@ -51,7 +52,7 @@ def _to_knot(s: Schedule, t: float) -> float:
 def _longest(p: Shoe, duration: float) -> float:
     """The longest step (s), by the fastest motion and the passing waves; `duration` where nothing limits it."""
     c, m, pad = p.c, p.motion, p.layer.pad
-    stiffness = (1.0 + c.phi) * (2.0 * pad.half_length * pad.k) if m.touching != 0 else 0.0
+    stiffness = (1.0 + c.phi) * (2.0 * pad.half_length * pad.k) if m.phase != OPEN else 0.0
     bound = c.c_xx + c.c_yy + 2.0 * abs(c.c_xy) + stiffness  # of the largest eigenvalue of the stiffness
     longest = duration
     if bound * longest * longest > _RADIANS * _RADIANS * c.m:
@@ -59,7 +60,7 @@ def _longest(p: Shoe, duration: float) -> float:
     rate = (c.b_xx + c.b_yy) / c.m  # at least that of the fastest decay
     if rate * longest > _DECAY:
         longest = _DECAY / rate
-    if pad.wheel_terms > 0 and m.touching != 0 and m.side != 0.0:
+    if pad.wheel_terms > 0 and m.phase != OPEN and m.phase != STICK:
         # A fourth of the shortest wave, so that no patch comes and goes unseen; on nodes half of it.
         slide = abs(m.v_x - m.belt) + abs(m.slopes[0, V_X] - m.belt_slope) * m.step
         wave = pad.cell if m.light == 0 else 2.0 * pad.cell
@@ -78,11 +79,9 @@ def first_step(p: Shoe, drive: Drive, grid: Grid) -> None:
     phases.arrive(p, drive)
     m.largest[X], m.largest[Y], m.largest[V_X], m.largest[V_Y] = abs(m.x), abs(m.y), abs(m.v_x), abs(m.v_y)
     height = m.y - p.layer.pad.clear_from
-    m.touching = 0 if height > 0.0 or (height == 0.0 and m.v_y > 0.0) else 1
-    if m.v_x == m.belt:
+    m.phase = OPEN if height > 0.0 or (height == 0.0 and m.v_y > 0.0) else sliding_phase(m.v_x - m.belt)
+    if m.phase == UNDECIDED:
         phases.take_hold(p)
-    else:
-        m.side = 1.0 if m.v_x > m.belt else -1.0
     phases.find_slopes(p, 0, 0.0, m.x, m.y, m.v_x, m.v_y)
     m.step = (_FIRST if m.light == 0 else 5.0 * _FIRST) * _longest(p, grid.samples * grid.interval)
 
@@ -100,7 +99,7 @@ def _defect(p: Shoe, h: float) -> float:
         v_x, v_y = runge_kutta.interpolated(m, V_X, theta), runge_kutta.interpolated(m, V_Y, theta)
         phases.find_slopes(p, STAGES - 1, theta * h, x, y, v_x, v_y)
         for i in (V_X, V_Y):
-            if m.side == 0.0 and i == V_X:
+            if m.phase == STICK and i == V_X:
                 continue
             defect = abs(runge_kutta.interpolated_slope(m, i, theta) - h * m.slopes[STAGES - 1, i])
             noise = _DENSE_ROUNDING * h * (along if i == V_X else across) / p.c.m
@@ -125,7 +124,7 @@ def _try(p: Shoe, h: float, allowed: float) -> float:
             along, across = phases.rounding(p)
             for i in range(4):
                 tangential = i in (X, V_X)
-                if m.side == 0.0 and tangential:
+                if m.phase == STICK and tangential:
                     continue
                 noise = h * (along if tangential else across) / p.c.m
                 floor = noise if i >= V_X else h * noise
@@ -184,7 +183,7 @@ def _passed(m: Any, item: int) -> float:
 def _take(p: Shoe, drive: Drive, grid: Grid, h: float, last: int) -> None:
     """Take the step that has been made; `last` is 1 where it reaches the end of the run."""
     m, work, interval = p.motion, p.work, grid.interval
-    m.time_done, m.tau_done, m.side_done, m.touching_done = m.time, m.tau, m.side, m.touching
+    m.time_done, m.tau_done, m.phase_done = m.time, m.tau, m.phase
     m.belt_done, m.belt_slope_done, m.load_done, m.load_slope_done = m.belt, m.belt_slope, m.load, m.load_slope
     work.belt += h * _passed(m, 0)
     work.friction += h * _passed(m, 1)
@@ -213,12 +212,9 @@ def _take(p: Shoe, drive: Drive, grid: Grid, h: float, last: int) -> None:
 def _enter(p: Shoe, which: int, longest: float) -> int:
     """Enter the phase after an event, and see that events do not pile up without progress; a `Failure`."""
     m = p.motion
-    t = m.time + m.tau
     phases.switch(p, which)
-    if t - m.events_time > _NO_PROGRESS * longest:
-        m.events_time, m.events = t, 0
-    m.events += 1
-    return _STALLED if m.events > _MOST_EVENTS else _NONE
+    m.events_time, m.events = counted(m.events_time, m.events, m.time + m.tau, longest)
+    return _STALLED if stalled(m.events) else _NONE
 
 
 @kernel(STEP, inlined=False)

@@ -11,9 +11,9 @@ from typing import Any
 from numba import float64, int64, void
 
 from brakecli.solver import own_steps
+from brakecli.solver.automaton import OPEN, STICK, anchored, carried, counted, side_of, stalled
 from brakecli.solver.compile import Floats, from_memory, into_memory, kernel
 from brakecli.solver.contact import CLOSED_FORM
-from brakecli.solver.double_double import two_sum
 from brakecli.solver.friction import observed
 from brakecli.solver.quantities import BOUND, Failure
 from brakecli.solver.records import (
@@ -39,7 +39,7 @@ from brakecli.solver.records import (
 from brakecli.solver.schedules import integral_at, segment, slope_at, value_at
 from brakecli.solver.schemes.piecewise_exact import phases
 from brakecli.solver.schemes.piecewise_exact.locate import NO_EVENT, first_event
-from brakecli.solver.schemes.piecewise_exact.phases import OPEN, STICK, add_works
+from brakecli.solver.schemes.piecewise_exact.phases import add_works
 from brakecli.solver.schemes.piecewise_exact.switch import place, switch
 
 STATE = FLOW
@@ -47,7 +47,6 @@ LAG, MEMORY, VELOCITIES = own_steps.LAG, own_steps.MEMORY, own_steps.VELOCITIES
 begin, sample, weighted_time = own_steps.begin, own_steps.sample, own_steps.weighted_time
 mechanical_energy = own_steps.mechanical_energy
 
-_MOST_EVENTS, _NO_PROGRESS = 1000, 1e-6  # a run ends after so many events within that part of a step
 _FLAT = 1e-12  # fall of a margin over its rise, by which it dips by 1e-18 of this at most
 _ROUNDING = 4.0 * 2.220446049250313e-16  # of a step, beside the motion
 _ERROR_TERMS = 9  # of the series of an error, which is known to a few digits only
@@ -168,8 +167,7 @@ def _anchor(p: Plant, t: float, tau: float) -> None:
     m = p.state
     if m.phase == STICK:
         travel, travel_low = integral_at(p.drive.belt, t, tau)
-        m.anchor, anchor_low = two_sum(m.z[X], -travel)
-        m.anchor_low = anchor_low - travel_low
+        m.anchor, m.anchor_low = anchored(m.z[X], travel, travel_low)
 
 
 @kernel(void(_PLANT), inlined=False)
@@ -218,10 +216,8 @@ def _through(p: Plant, t: float, to_sample: int) -> int:
             _carry_part(m, theta * span)
         tau += theta * span
         if which != NO_EVENT:
-            if t + tau - m.events_time > _NO_PROGRESS * h:
-                m.events_time, m.events = t + tau, 0
-            m.events += 1
-            if m.events > _MOST_EVENTS:
+            m.events_time, m.events = counted(m.events_time, m.events, t + tau, h)
+            if stalled(m.events):
                 return _STALLED
             add_works(p.c, m, p.work, p.s.h)
             switch(p.c, m, which, p.s.h)
@@ -244,7 +240,7 @@ def _sample(p: Plant, t: float) -> None:
     if m.phase == STICK:
         travel, travel_low = integral_at(belt, t, 0.0)
         z[BELT] = z[V_X] = value_at(belt, t)
-        z[X] = (m.anchor + travel) + (m.anchor_low + travel_low)
+        z[X] = carried(m.anchor, m.anchor_low, travel, travel_low)
         m.error[V_X] = 0.0
     for i in range(4):
         m.worst[i], m.largest[i] = max(m.worst[i], abs(m.error[i])), max(m.largest[i], abs(z[i]))
@@ -253,7 +249,7 @@ def _sample(p: Plant, t: float) -> None:
     for i in range(SIZE if m.phase == STICK else 0):
         needed += m.needed[i] * z[i]
     holds = m.phase == STICK and abs(needed) <= c.phi * normal * (1.0 + 1e-12)  # by the rounding it still sticks
-    state, friction = observed(float(m.phase - STICK), holds, needed, normal, c.phi * normal)
+    state, friction = observed(side_of(m.phase), holds, needed, normal, c.phi * normal)
     m.row[0], m.row[1], m.row[2], m.row[3] = z[X], z[Y], z[V_X], z[V_Y]
     m.row[4], m.row[5], m.row[6], m.row[7] = friction, normal, 1.0 if normal > 0.0 else 0.0, state
 

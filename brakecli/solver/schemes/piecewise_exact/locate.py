@@ -4,9 +4,9 @@ from typing import Any
 
 from numba import float64, int64, types
 
+from brakecli.solver.automaton import STICK
 from brakecli.solver.compile import kernel
 from brakecli.solver.records import BELT, FLOW_TYPE, LOAD, MARGINS, SIZE, TERMS, V_X, V_Y, X, Y
-from brakecli.solver.schemes.piecewise_exact.phases import STICK
 
 NO_EVENT = -1
 _EPSILON = 2.220446049250313e-16

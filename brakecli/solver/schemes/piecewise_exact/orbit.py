@@ -24,6 +24,7 @@ from typing import Any
 import numba
 from numba import float64, int64, types, void
 
+from brakecli.solver.automaton import OPEN
 from brakecli.solver.compile import kernel
 from brakecli.solver.records import (
     BELT,
@@ -42,7 +43,6 @@ from brakecli.solver.records import (
 from brakecli.solver.roughness import TWO_PI
 from brakecli.solver.schemes.piecewise_exact import look, phases, whole
 from brakecli.solver.schemes.piecewise_exact.locate import NO_EVENT, first_event, root
-from brakecli.solver.schemes.piecewise_exact.phases import OPEN
 from brakecli.solver.schemes.piecewise_exact.switch import place, switch
 
 _REACH = 0.1  # of the size of a cycle: step of Newton's iteration beyond which it may lead elsewhere

@@ -1,7 +1,7 @@
-"""The phases of a motion on smooth surfaces: what moves the shoe in each, and the matrices of a step.
+"""The phases of the automaton on smooth surfaces: what moves the shoe in each, and the matrices of a step.
 
-A phase is a side of the friction law, or a pad that is clear of the wheel. With U, Q and their slopes as further
-components, the motion is z' = A z in each, what keeps the phase up is linear in z, and powers are quadratic in z.
+With U, Q and their slopes as further components, the motion is z' = A z in each phase, its margins are linear in
+z, and powers are quadratic in z.
 """
 
 from typing import Any
@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numba import float64, int64, types, void
 
+from brakecli.solver.automaton import HEIGHT, OPEN, PULL, PUSH, SLIDING, STICK, side_of
 from brakecli.solver.compile import Floats, kernel
 from brakecli.solver.records import (
     BELT,
@@ -19,7 +20,6 @@ from brakecli.solver.records import (
     LOAD_SLOPE,
     MARGINS,
     NODES,
-    PHASES,
     SIZE,
     TERMS,
     V_X,
@@ -29,12 +29,6 @@ from brakecli.solver.records import (
     X,
     Y,
 )
-
-BACKWARD, STICK, FORWARD, OPEN = range(PHASES)
-"""The sign of the sliding velocity plus one, or the pad that is clear."""
-HEIGHT, SLIDING = 0, 1
-"""Margins: how far the pad is pressed in, or clear; then, in slip, the sliding speed; in stick, how far the force
-needed is within the friction cone, on the side of backward slip and, third, on that of forward slip."""
 
 _NODES = 0.5 + 0.5 * np.polynomial.legendre.leggauss(NODES)[0]
 _SHARES = 0.5 * np.polynomial.legendre.leggauss(NODES)[1]
@@ -76,7 +70,7 @@ def _describe(c: Coefficients, m: Any, phase: int) -> None:
     """The generator of a phase, its friction force and margins."""
     a, force, needed, margin = m.generator[phase], m.friction[phase], m.needed, m.margins[phase, :, 4:]
     pressed = m.stiffness if phase != OPEN else 0.0  # F_y = -pressed y, Eq. (2)
-    side = phase - STICK if phase != OPEN else 0
+    side = side_of(phase)
     for j in range(4):
         m.margins[phase, j, j] = 1.0
     # Eq. (6) with the velocity and the acceleration of the wheel
@@ -90,8 +84,8 @@ def _describe(c: Coefficients, m: Any, phase: int) -> None:
         a[V_X, BELT_SLOPE] = 1.0
         for j in range(SIZE):
             force[j] = needed[j]  # Eq. (4)
-            margin[j, 1], margin[j, 2] = -needed[j], needed[j]
-        margin[Y, 1], margin[Y, 2] = margin[Y, 1] - c.phi * pressed, margin[Y, 2] - c.phi * pressed
+            margin[j, PULL], margin[j, PUSH] = -needed[j], needed[j]
+        margin[Y, PULL], margin[Y, PUSH] = margin[Y, PULL] - c.phi * pressed, margin[Y, PUSH] - c.phi * pressed
     else:
         force[Y] = side * c.phi * pressed  # Eq. (5)
         a[V_X, X], a[V_X, Y], a[V_X, LOAD] = -c.c_xx / c.m, (force[Y] - c.c_xy) / c.m, -c.sin_beta / c.m  # Eq. (6)

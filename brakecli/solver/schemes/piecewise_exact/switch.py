@@ -2,41 +2,38 @@
 
 from typing import Any
 
-from numba import boolean, float64, int64, void
+from numba import boolean, float64, int64, types, void
 
+from brakecli.solver.automaton import HEIGHT, OPEN, PULL, PUSH, STICK, UNDECIDED, following, held, sliding_phase
 from brakecli.solver.compile import kernel
-from brakecli.solver.records import BELT, COEFFICIENTS, FLOW_TYPE, MARGINS, SIZE, TERMS, V_X, V_Y, Coefficients, Y
+from brakecli.solver.records import BELT, COEFFICIENTS, FLOW_TYPE, SIZE, TERMS, V_X, V_Y, Coefficients, Y
 from brakecli.solver.schemes.piecewise_exact import phases
 from brakecli.solver.schemes.piecewise_exact.locate import ROUNDING
-from brakecli.solver.schemes.piecewise_exact.phases import BACKWARD, FORWARD, HEIGHT, OPEN, STICK
 
 
-@kernel(void(COEFFICIENTS, FLOW_TYPE, float64), inlined=False)
-def _take_hold(c: Coefficients, m: Any, h: float) -> None:
-    """The phase of a touching shoe at the wheel's velocity: stick if friction can hold it, else slip, (3)-(5).
+@kernel(types.UniTuple(float64, 2)(FLOW_TYPE, int64))
+def _margin(m: Any, which: int) -> tuple[float, float]:
+    """A margin in stick (N), and by how much it may miss zero through rounding."""
+    total, terms = 0.0, 0.0
+    for i in range(SIZE):
+        part = m.margins[STICK, i, 4 + which] * m.z[i]
+        total, terms = total + part, terms + abs(part)
+    return total, 0.5 * ROUNDING * terms
 
-    It has this velocity exactly: what rounding leaves of an event may be more than a short rest of a step allows.
+
+@kernel(void(COEFFICIENTS, FLOW_TYPE, int64, float64), inlined=False)
+def _enter(c: Coefficients, m: Any, phase: int, h: float) -> None:
+    """Enter a phase; where it is undecided the shoe has the wheel's velocity exactly, and the forces decide.
+
+    What rounding leaves of an event may be more than a short rest of a step allows.
     """
-    phases.make(c, m, STICK, h)
-    m.z[V_X] = m.z[BELT]
-    for which in range(1, MARGINS):
-        total, terms = 0.0, 0.0
-        for i in range(SIZE):
-            part = m.margins[STICK, i, 4 + which] * m.z[i]
-            total, terms = total + part, terms + abs(part)
-        if total < -0.5 * ROUNDING * terms:
-            m.phase = BACKWARD if which == 1 else FORWARD
-            return
-    m.phase = STICK
-
-
-@kernel(void(COEFFICIENTS, FLOW_TYPE, float64), inlined=False)
-def _land(c: Coefficients, m: Any, h: float) -> None:
-    """The phase of a shoe that touches, by its sliding velocity."""
-    if m.z[V_X] == m.z[BELT]:
-        _take_hold(c, m, h)
-    else:
-        m.phase = FORWARD if m.z[V_X] > m.z[BELT] else BACKWARD
+    if phase == UNDECIDED:
+        phases.make(c, m, STICK, h)
+        m.z[V_X] = m.z[BELT]
+        (pull, its_rounding), (push, rounding) = _margin(m, PULL), _margin(m, PUSH)
+        phase = held(pull, push, its_rounding, rounding)
+    m.phase = phase
+    phases.make(c, m, phase, h)
 
 
 @kernel(boolean(COEFFICIENTS, FLOW_TYPE, float64), inlined=False)
@@ -60,11 +57,8 @@ def _rises(c: Coefficients, m: Any, h: float) -> bool:
 def place(c: Coefficients, m: Any, h: float) -> None:
     """Find the phase of a motion."""
     touches = m.z[Y] == 0.0
-    if m.z[Y] > 0.0 or (touches and (m.z[V_Y] > 0.0 or (m.z[V_Y] == 0.0 and _rises(c, m, h)))):
-        m.phase = OPEN
-    else:
-        _land(c, m, h)
-    phases.make(c, m, m.phase, h)
+    clear = m.z[Y] > 0.0 or (touches and (m.z[V_Y] > 0.0 or (m.z[V_Y] == 0.0 and _rises(c, m, h))))
+    _enter(c, m, OPEN if clear else sliding_phase(m.z[V_X] - m.z[BELT]), h)
 
 
 @kernel(void(COEFFICIENTS, FLOW_TYPE, int64, float64), inlined=False)
@@ -72,12 +66,4 @@ def switch(c: Coefficients, m: Any, which: int, h: float) -> None:
     """Enter the phase that follows where a margin has run out."""
     if which == HEIGHT:
         m.z[Y] = 0.0
-        if m.phase == OPEN:
-            _land(c, m, h)
-        else:
-            m.phase = OPEN
-    elif m.phase == STICK:
-        m.phase = BACKWARD if which == 1 else FORWARD  # friction cannot pull that hard, or cannot push
-    else:
-        _take_hold(c, m, h)
-    phases.make(c, m, m.phase, h)
+    _enter(c, m, following(m.phase, which, m.z[V_X] - m.z[BELT]), h)

@@ -1,0 +1,84 @@
+"""The automaton of a motion: its phases, the margins that keep each up, and the phase that follows an event.
+
+A phase is a side of the friction law, stick or slip in one direction, on a pad that may touch the wheel; or it is
+flight, in which the pad is clear of the wheel. A margin is positive while the phase lasts, and the first one that
+runs out is the event that ends it. Two flows carry a motion through a phase and find that event: matrix
+exponentials on smooth surfaces (`schemes.piecewise_exact`), and Runge-Kutta steps on all surfaces
+(`schemes.event_driven`). Everything else that they do at an event stands here.
+"""
+
+from numba import boolean, float64, int64, types
+
+from brakecli.solver.compile import kernel
+from brakecli.solver.double_double import two_sum
+
+BACKWARD, STICK, FORWARD, OPEN = range(4)
+"""The phases: the sign of the sliding velocity plus one, and flight."""
+HEIGHT, SLIDING, PULL, PUSH = 0, 1, 1, 2
+"""The margins. Of each phase: how far the pad is from being clear, or is clear (m). Of slip: the sliding speed
+(m/s). Of stick: how far the force that it takes is within the friction cone (N), on the side where friction would
+have to pull harder, so that backward slip follows, and on the side where it would have to push."""
+UNDECIDED = -1
+"""Not a phase: the shoe touches at the velocity of the wheel, and the forces decide (`held`)."""
+
+_MOST_EVENTS, _NO_PROGRESS = 1000, 1e-6
+
+
+@kernel(float64(int64))
+def side_of(phase: int) -> float:
+    """The sign of the sliding velocity in a phase; 0 in stick, and in flight."""
+    return float(phase - STICK) if phase != OPEN else 0.0
+
+
+@kernel(int64(float64))
+def sliding_phase(velocity: float) -> int:
+    """The phase of a touching shoe with this sliding velocity; at 0 it is undecided."""
+    if velocity == 0.0:
+        return UNDECIDED
+    return FORWARD if velocity > 0.0 else BACKWARD
+
+
+@kernel(int64(float64, float64, float64, float64))
+def held(pull: float, push: float, pull_rounding: float, push_rounding: float) -> int:
+    """The phase of a touching shoe at the wheel's velocity, by its margins in stick, Eqs. (3)-(5).
+
+    It sticks if friction can hold it, up to rounding. Otherwise it slips the way that friction cannot prevent.
+    """
+    if pull < -pull_rounding:
+        return BACKWARD
+    return FORWARD if push < -push_rounding else STICK
+
+
+@kernel(int64(int64, int64, float64))
+def following(phase: int, which: int, velocity: float) -> int:
+    """The phase after a margin has run out at a sliding velocity (m/s); `UNDECIDED` where the forces decide."""
+    if which == HEIGHT:
+        return sliding_phase(velocity) if phase == OPEN else OPEN
+    if phase == STICK:
+        return BACKWARD if which == PULL else FORWARD
+    return UNDECIDED
+
+
+@kernel(types.UniTuple(float64, 2)(float64, float64, float64))
+def anchored(x: float, travel: float, travel_low: float) -> tuple[float, float]:
+    """Where a shoe holds on to the wheel: x less what the wheel has travelled, as a sum of two doubles (m)."""
+    anchor, low = two_sum(x, -travel)
+    return anchor, low - travel_low
+
+
+@kernel(float64(float64, float64, float64, float64))
+def carried(anchor: float, anchor_low: float, travel: float, travel_low: float) -> float:
+    """The place x (m) of a shoe in stick: that of its anchor, without any drift."""
+    return (anchor + travel) + (anchor_low + travel_low)
+
+
+@kernel(types.Tuple((float64, int64))(float64, int64, float64, float64))
+def counted(since: float, events: int, time: float, step: float) -> tuple[float, int]:
+    """Since when events are counted, and how many there are, after one more: those within 1e-6 of a step."""
+    return (time, 1) if time - since > _NO_PROGRESS * step else (since, events + 1)
+
+
+@kernel(boolean(int64))
+def stalled(events: int) -> bool:
+    """Whether so many events came without progress that they will never end."""
+    return events > _MOST_EVENTS
