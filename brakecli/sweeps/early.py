@@ -1,6 +1,6 @@
 """A verdict as soon as it is known, on smooth pads at constant speed and load: what a sweep needs of a point.
 
-The motion is followed without samples (`solver.schemes.piecewise_exact.seek`) until one of two things is
+The motion is followed without samples (`solver.flow.seek`) until one of two things is
 certain.
 
 - It slides to one side, and the sum of its modes can neither reach the speed of the wheel nor open the contact
@@ -25,10 +25,11 @@ from brakecli.analysis.stability.modes import slowest_of_cycles
 from brakecli.runs.certificate import ROUNDING, Certificate
 from brakecli.solver.automaton import BACKWARD, FORWARD, OPEN, STICK
 from brakecli.solver.compile import Floats
+from brakecli.solver.flow.orbit import ORBIT
+from brakecli.solver.flow.seek import FOUND, GOING_ON, LINEAR, seek, swing
+from brakecli.solver.flow.smooth import PATH
 from brakecli.solver.motion import Work
 from brakecli.solver.records import BELT, FLOW, LOAD, new
-from brakecli.solver.schemes.piecewise_exact.orbit import ORBIT
-from brakecli.solver.schemes.piecewise_exact.seek import FOUND, GOING_ON, LINEAR, seek, swing
 from brakecli.solver.system import System
 
 _SETTLED = 0.02  # of the size of a cycle: a motion so near to its orbit is settled
@@ -82,7 +83,7 @@ def early(system: System, *, seen: bool = True) -> Early | None:
     theory = _theory(system)
     if theory is None:
         return None
-    c, flow = system.coefficients, new(FLOW)
+    c, flow, path = system.coefficients, new(FLOW), new(PATH)
     try:
         o = _prepared(system, theory)
     except np.linalg.LinAlgError:  # modes that are alike
@@ -90,16 +91,17 @@ def early(system: System, *, seen: bool = True) -> Early | None:
     rest, start = theory.rest if system.initial.from_equilibrium else (0.0, 0.0), system.initial
     flow.x, flow.y, flow.v_x, flow.v_y = start.x + rest[0], start.y + rest[1], start.vx, start.vy
     flow.stiffness, flow.z[BELT], flow.z[LOAD] = system.contact_stiffness, system.belt_speed, system.load_at_start
-    while (outcome := seek(c, flow, o)) == GOING_ON:
+    path.h = system.longest_step
+    while (outcome := seek(c, flow, path, o)) == GOING_ON:
         pass
     if outcome == LINEAR:
-        found = _linear(system, theory, flow, o)
+        found = _linear(system, theory, flow, path, o)
     else:
         found = _cycle(system, theory, flow, o, seen) if outcome == FOUND else None
     if found is None:
         return None
     verdict, end = found
-    work = Work(steps=int(o.steps), contact_evaluations=int(o.evaluations))
+    work = Work(steps=int(path.steps), contact_evaluations=int(path.evaluations))
     error = max(float(o.error), ROUNDING) if outcome == FOUND else ROUNDING  # not that of an orbit given up
     certificate = Certificate(system.method.tolerance, True, error, system.sampled_duration, "the orbit itself")
     row = np.array([end])
@@ -122,7 +124,7 @@ def _theory(system: System) -> Linear | None:
 def _prepared(system: System, theory: Linear) -> Any:
     """The record that a motion is followed with."""
     o, inverse = new(ORBIT), np.linalg.inv(theory.vectors)
-    o.h, o.duration = system.longest_step, system.sampled_duration
+    o.duration = system.sampled_duration
     o.sliding = BACKWARD if theory.belt > 0.0 else FORWARD
     o.rest[:2], o.room[:] = theory.rest, (theory.depth, abs(theory.belt))
     o.into[0], o.into[1], o.growth[:] = inverse.real, inverse.imag, theory.values.real
@@ -130,7 +132,7 @@ def _prepared(system: System, theory: Linear) -> Any:
     return o
 
 
-def _linear(system: System, theory: Linear, flow: Any, o: Any) -> tuple[Known, list[float]] | None:
+def _linear(system: System, theory: Linear, flow: Any, path: Any, o: Any) -> tuple[Known, list[float]] | None:
     """The verdict on a motion that is linear from its first half on, and its last state."""
     start, end = (system.samples + 1) // 2 * system.interval, system.sampled_duration
     if o.time > start:
@@ -144,7 +146,7 @@ def _linear(system: System, theory: Linear, flow: Any, o: Any) -> tuple[Known, l
     last = at(end)
     o.low = o.high = float(last[0])
     flow.z[:4] = at(start)
-    swing(system.coefficients, flow, o, end - start)
+    swing(system.coefficients, flow, path, o, end - start)
     fades = np.exp(values * (end - o.time)) - np.exp(values * (start - o.time))
     height = rest[1] + (vectors[1] @ (parts * fades / values)).real / (end - start)
     force = math.copysign(system.coefficients.phi, theory.belt) * -system.contact_stiffness * float(height)

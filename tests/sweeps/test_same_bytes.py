@@ -64,7 +64,9 @@ def test_a_critical_value_by_simulation_does_not_depend_on_the_workers(tmp_path:
     assert (tmp_path / "one.h5").read_bytes() == (tmp_path / "two.h5").read_bytes()
 
 
-@pytest.mark.parametrize("command", [[], ["check", "tiny.toml"], ["info", "other.h5"]], ids=["none", "check", "info"])
+@pytest.mark.parametrize(
+    "command", [[], ["check", "tiny.toml"], ["info", "other.h5"]], ids=["none", "check", "info"]
+)
 def test_a_file_that_was_read_before_marks_no_later_result(tmp_path: Path, command: list[str]) -> None:
     """Neither one that a command of the same process has read, nor one that no command reads."""
     loaded = write_sweep(tmp_path, frictions(4))

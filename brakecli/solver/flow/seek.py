@@ -13,19 +13,10 @@ from typing import Any
 from numba import float64, int64, void
 
 from brakecli.solver.compile import kernel
+from brakecli.solver.flow.orbit import MOST_TURNS, ORBIT_TYPE, closed, note_event, sizes
+from brakecli.solver.flow.smooth import MOST_EVENTS, MOST_STEPS, PATH_TYPE, step, zero_of_velocity
 from brakecli.solver.records import COEFFICIENTS, FLOW_TYPE, SIZE, V_X, V_Y, Coefficients, X, Y
 from brakecli.solver.schemes.piecewise_exact import look, phases
-from brakecli.solver.schemes.piecewise_exact.orbit import (
-    MOST_EVENTS,
-    MOST_STEPS,
-    MOST_TURNS,
-    ORBIT_TYPE,
-    closed,
-    note_event,
-    sizes,
-    step,
-    zero_of_velocity,
-)
 from brakecli.solver.schemes.piecewise_exact.switch import place
 
 GOING_ON, LINEAR, FOUND, ENDED = range(4)
@@ -81,13 +72,13 @@ def _returned(m: Any, o: Any, fall: float) -> int:
     return 0
 
 
-@kernel(int64(COEFFICIENTS, FLOW_TYPE, ORBIT_TYPE), inlined=False)
-def _try(c: Coefficients, m: Any, o: Any) -> int:
+@kernel(int64(COEFFICIENTS, FLOW_TYPE, PATH_TYPE, ORBIT_TYPE), inlined=False)
+def _try(c: Coefficients, m: Any, path: Any, o: Any) -> int:
     """Seek an orbit near the last return. Where there is none the motion goes on as if nothing had been sought."""
     phase, way, events, low = m.phase, o.way, o.events, o.low
     for i in range(SIZE):
         o.saved[i] = m.z[i]
-    found = closed(c, m, o)
+    found = closed(c, m, path, o)
     for i in range(SIZE):
         m.z[i] = o.saved[i]
     m.phase, o.way, o.events, o.low = phase, way, events, low
@@ -96,12 +87,12 @@ def _try(c: Coefficients, m: Any, o: Any) -> int:
     return found
 
 
-@kernel(int64(COEFFICIENTS, FLOW_TYPE, ORBIT_TYPE))
-def seek(c: Coefficients, m: Any, o: Any) -> int:
+@kernel(int64(COEFFICIENTS, FLOW_TYPE, PATH_TYPE, ORBIT_TYPE))
+def seek(c: Coefficients, m: Any, path: Any, o: Any) -> int:
     """Follow the motion until something is known of all that is to come; what that is, or `GOING_ON`."""
     if o.started == 0:
         m.z[X], m.z[Y], m.z[V_X], m.z[V_Y], o.low = m.x, m.y, m.v_x, m.v_y, m.x
-        place(c, m, o.h)
+        place(c, m, path.h)
         look(m)
         o.started = 1
         if _stays_linear(m, o) == 1:
@@ -109,34 +100,34 @@ def seek(c: Coefficients, m: Any, o: Any) -> int:
     for _ in range(MOST_STEPS):
         if o.time >= o.duration or o.events > MOST_EVENTS:
             return ENDED
-        step(c, m, o, 0)
-        o.low, near, falls = min(o.low, m.z[X]), 0, o.begin[V_X] > 0.0 >= m.z[V_X]
+        step(c, m, path, 0)
+        o.low, near, falls = min(o.low, m.z[X]), 0, path.begin[V_X] > 0.0 >= m.z[V_X]
         if falls:
-            near = _returned(m, o, o.time + zero_of_velocity(m, o, 1.0) * o.h)
-        o.time += o.part * o.h
-        note_event(o, m.phase)
-        if near == 1 and _try(c, m, o) == 1:
+            near = _returned(m, o, o.time + zero_of_velocity(m, path, 1.0) * path.h)
+        o.time += path.part * path.h
+        note_event(path, o, m.phase)
+        if near == 1 and _try(c, m, path, o) == 1:
             return FOUND
         if falls and _stays_linear(m, o) == 1:
             return LINEAR
     return GOING_ON
 
 
-@kernel(void(COEFFICIENTS, FLOW_TYPE, ORBIT_TYPE, float64))
-def swing(c: Coefficients, m: Any, o: Any, seconds: float) -> None:
+@kernel(void(COEFFICIENTS, FLOW_TYPE, PATH_TYPE, ORBIT_TYPE, float64))
+def swing(c: Coefficients, m: Any, path: Any, o: Any, seconds: float) -> None:
     """Widen `low` and `high` to the least and largest x of a linear motion from `m.z` on, for some time.
 
     It ends early where the modes that are left can reach no further.
     """
     m.phase = o.sliding
-    phases.make(c, m, m.phase, o.h)
+    phases.make(c, m, m.phase, path.h)
     look(m)
     o.low, o.high = min(o.low, m.z[X]), max(o.high, m.z[X])
-    for number in range(math.ceil(seconds / o.h)):
-        step(c, m, o, 0)
-        if o.begin[V_X] * m.z[V_X] < 0.0:
-            part = zero_of_velocity(m, o, 1.0 if o.begin[V_X] > 0.0 else -1.0)
-            if (number + part) * o.h > seconds:
+    for number in range(math.ceil(seconds / path.h)):
+        step(c, m, path, 0)
+        if path.begin[V_X] * m.z[V_X] < 0.0:
+            part = zero_of_velocity(m, path, 1.0 if path.begin[V_X] > 0.0 else -1.0)
+            if (number + part) * path.h > seconds:
                 return
             o.low, o.high = min(o.low, m.at[X]), max(o.high, m.at[X])
             _bound(m, o, seconds)
