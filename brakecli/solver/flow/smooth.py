@@ -246,8 +246,8 @@ def flow(c: Coefficients, m: Any, o: Any, span: float, tangents: int) -> int:
 class SmoothFlow:
     """The flow of a system on smooth pads, at constant speed and load; one call after the other.
 
-    After a call `path` holds what is known of the way, `state` its end (x, y, v_x, v_y), and `derivative` that of the
-    end by the begin: one row for each component of the end.
+    After a call `path` holds what is known of the way, `state` its end (x, y, v_x, v_y), and `derivative` that of
+    the end by the begin: one row for each component of the end.
     """
 
     def __init__(self, system: System) -> None:
@@ -271,7 +271,7 @@ class SmoothFlow:
 
     @property
     def derivative(self) -> Floats:
-        """Derivative of the last end by its begin, (4, 4): 1 where both are lengths or both are velocities, s or 1/s."""
+        """Derivative of the last end by its begin, (4, 4), in SI units."""
         return np.array(self.path.tangents.T)
 
     @property
