@@ -21,6 +21,10 @@ LEAST_LOOP = 8
 """A closed branch turns by 2π, so it has more points than this: each stride turns by at most 0.7 rad."""
 SAME_PLACE = 1e-7
 """Distance at which two points are one; corrections end at about 1e-12."""
+CARRIED = 1e-4
+"""The same where a point is carried to another chart by the problem, before it is corrected."""
+LEAST_SLOPE = 1e-3
+"""Slope dp/ds at the first point from which on p says where a branch in another chart passes it."""
 SAME_WAY = 0.999
 """Cosine of the angle between their tangents."""
 
@@ -303,7 +307,7 @@ class _Walk:
         if here.chart is not new.chart or here.word != new.word or here is first:
             return None, None
         foreign = new.chart is not first.chart
-        if foreign and abs(first.tangent[-1]) < 0.1:
+        if foreign and abs(first.tangent[-1]) < LEAST_SLOPE:
             return None, None  # the parameter alone does not say where it passes the first point
 
         def ahead(point: Point) -> float:
@@ -340,6 +344,8 @@ class _Walk:
         place = place - first.tangent * ((place - first.z) @ first.tangent)
         crossing = self.newton.solved(place, first.tangent, onward, nearest.s, exact=True)
         if crossing is None or crossing.word != first.word:
+            return None, None
+        if float(np.abs(crossing.z - place).max()) > (CARRIED if foreign else SAME_PLACE):
             return None, None
         if float(np.abs(crossing.z - first.z).max()) > SAME_PLACE:
             return None, None

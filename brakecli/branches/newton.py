@@ -9,6 +9,9 @@ from brakecli.branches.multipliers import spectrum
 from brakecli.branches.point import Point
 from brakecli.branches.problem import Array, Problem, Seen
 
+ROUNDING = 1e-9
+"""Gap that may grow from one correction to the next."""
+
 
 @dataclass(frozen=True, slots=True)
 class Settings:
@@ -31,11 +34,12 @@ class Settings:
     change: float = 0.4
     """Change of asinh of the coefficients of the characteristic polynomial in a stride: a half of large ones."""
     near: float = 1e-5
-    """Correction that is the last one; the error left is of the order of its square."""
+    """Correction that is the last one; the error left is of the order of its square.
+
+    Multipliers and facts are those of the place before it.
+    """
     exact: float = 1e-9
     """The same where a special point is located."""
-    closed: float = 1e-10
-    """Gap below which the correction is the last one in any case."""
     iterations: int = 6
     """Evaluations for one correction."""
     trust: float = 0.3
@@ -94,7 +98,7 @@ class Newton:
         n = len(guess) - 1
         matrix, right = np.empty((n + 1, n + 1)), np.zeros((n + 1, 2))
         matrix[n], right[n, 1] = normal, 1.0
-        z, last = guess.copy(), math.inf
+        z, last, before = guess.copy(), math.inf, math.inf
         by_p, word, taken = None, None, z
         near = settings.exact if exact else settings.near
         slack = 1e-9 * (settings.high - settings.low)
@@ -110,7 +114,7 @@ class Newton:
             if seen.by_p is not None:
                 by_p, word, taken = seen.by_p, seen.word, z
             gap = float(np.abs(seen.gap).max())
-            if not gap <= 4.0 * last:
+            if not gap <= 4.0 * last + ROUNDING:
                 break
             last = gap
             matrix[:n, :n], matrix[:n, n] = seen.by_u, by_p
@@ -123,7 +127,10 @@ class Newton:
             size = float(np.abs(step).max())
             if not size <= settings.trust or not length < math.inf:
                 break
-            if gap > settings.closed and size > near:
+            # rounding of the gap may keep corrections from becoming still smaller
+            stalled = size <= settings.near and size > 0.3 * before
+            before = size
+            if size > near and not stalled:
                 z = z + step
                 continue
             # The last correction is made without another evaluation: its error is of the order of its square.

@@ -47,6 +47,12 @@ def special_points(newton: Newton, points: list[Point], over: Over) -> tuple[lis
             return specials, unsearched or end.reason
         newton.problem.use(one.chart)
         specials += _changes(newton, one, other)
+    places = [special.s for special in specials if special.kind == "branch point"]
+    specials = [
+        special
+        for special in specials
+        if special.kind != "fold" or all(abs(special.s - s) >= ONE_PLACE for s in places)
+    ]
     return specials, unsearched
 
 
@@ -82,24 +88,28 @@ def _borders(newton: Newton, points: list[Point], over: Over) -> tuple[list[Spec
 
 def _bracket(newton: Newton, near: Point, far: Point) -> tuple[Point, Point]:
     """Bisect: the last point of the word of `near`, and the first one of another word."""
-    while far.s - near.s > newton.settings.shortest:
-        middle = newton.between(near, far, 0.5)
-        if middle is None:  # the chord may leave a corner too far: look on the near side only
-            middle = _ahead(newton, near, 0.5 * (far.s - near.s))
-            if middle is None:
-                break
+    while True:
+        chord = far.z - near.z
+        if math.sqrt(chord @ chord) <= newton.settings.shortest:
+            return near, far
+        # the chord may leave a sharp corner too far: then along the tangent of one side, if it stays on that side
+        middle = (
+            newton.between(near, far, 0.5) or _beside(newton, near, far, near) or _beside(newton, near, far, far)
+        )
+        if middle is None:
+            return near, far
         if middle.word == near.word:
             near = middle
         else:
             far = middle
-    return near, far
 
 
-def _ahead(newton: Newton, near: Point, stride: float) -> Point | None:
-    """A point ahead along the tangent, if the word is still the same there."""
-    for _ in range(3):
-        found = newton.solved(near.z + stride * near.tangent, near.tangent, near.tangent, near.s + stride)
-        if found is not None and found.word == near.word:
+def _beside(newton: Newton, near: Point, far: Point, base: Point) -> Point | None:
+    """A point between two of different words, on the side of one of them."""
+    stride = 0.5 * (far.s - near.s) * (1.0 if base is near else -1.0)
+    for _ in range(4):
+        found = newton.solved(base.z + stride * base.tangent, base.tangent, base.tangent, base.s + stride)
+        if found is not None and found.word == base.word:
             return found
         stride *= 0.25
     return None
@@ -198,20 +208,13 @@ def _near_zeros(s: Array, tests: Array, everywhere: bool) -> list[tuple[int, flo
 def _changes(newton: Newton, one: Point, other: Point) -> list[Special]:
     """The special points between two neighbours of one smooth piece."""
     found = []
-    fold = branching = None
-    if _differ(one, other, TURN):
-        fold = _located(newton, one, other, "fold", lambda point: point.tests[TURN])
-    if one.orientation[0] * other.orientation[0] < 0.0:
+    turns = _differ(one, other, TURN)
+    if turns:
+        found.append(_located(newton, one, other, "fold", lambda point: point.tests[TURN]))
+    # otherwise the multipliers know nothing of it
+    if one.orientation[0] * other.orientation[0] < 0.0 and (turns or _differ(one, other, FOLD)):
         top = max(one.orientation[1], other.orientation[1])
-        branching = _located(newton, one, other, "branch point", lambda point: _determinant(point, top))
-    if fold is not None and branching is not None and abs(fold.s - branching.s) < ONE_PLACE:
-        fold = None
-    elif branching is not None and fold is None and not _differ(one, other, FOLD):
-        branching = None  # the multipliers know nothing of it
-    if fold is not None:
-        found.append(fold)
-    if branching is not None:
-        found.append(branching)
+        found.append(_located(newton, one, other, "branch point", lambda point: _determinant(point, top)))
     if _differ(one, other, FLIP):
         found.append(_located(newton, one, other, "flip", lambda point: point.tests[FLIP]))
     if _differ(one, other, TORUS) and not (_saddle(one) and _saddle(other)):
@@ -242,9 +245,13 @@ def _located(newton: Newton, one: Point, other: Point, kind: str, test: Callable
     low, high = test(one), test(other)
     best, error, side = one, abs(other.p - one.p), 0
     for _ in range(MOST_STEPS):
-        part = low / (low - high)
-        new = newton.between(one, other, min(max(part, 1e-3), 1.0 - 1e-3))
-        if new is None or new.word != one.word:  # at a branch point Newton's method fails in the end
+        part = min(max(low / (low - high), 1e-7), 1.0 - 1e-7)
+        # Newton's method fails very near a branch point: then a little before it, or behind it
+        for place in (part, 0.9 * part, 0.1 + 0.9 * part):
+            new = newton.between(one, other, place)
+            if new is not None:
+                break
+        if new is None or new.word != one.word:
             break
         error, moved = abs(new.p - best.p), abs(new.s - best.s)
         best, value = new, test(new)

@@ -101,3 +101,48 @@ def henon(b: float) -> Step:
         )
 
     return step
+
+
+class Given(Problem):
+    """The motion u = 0 with maps that are given as functions of the parameter."""
+
+    def __init__(self, maps: Callable[[float], list[list[float]]]) -> None:
+        self.maps = maps
+
+    def evaluate(self, u: Array, p: float, with_parameter: bool) -> Seen | str | None:
+        by_p = np.zeros(1) if with_parameter else None
+        return Seen(u.copy(), np.eye(1), by_p, np.array([self.maps(p)]), "", None)
+
+
+class Scaled(Problem):
+    """The curve (u - 2)² + (p - 0.5)² = 0.04 in charts that count u from the place where each was made.
+
+    The unknown is the distance from that place, ten times as large.
+    """
+
+    def __init__(self, carries: bool) -> None:
+        self.chart: object = (2.0,)
+        self.charts: list[object] = []
+        self.carries = carries
+
+    def origin(self) -> float:
+        assert isinstance(self.chart, tuple)
+        return float(self.chart[0])
+
+    def evaluate(self, u: Array, p: float, with_parameter: bool) -> Seen | str | None:
+        x, q = self.origin() + 0.1 * u - 2.0, p - 0.5
+        by_u = 0.2 * x[:, None]
+        by_p = np.array([2.0 * q]) if with_parameter else None
+        return Seen(x**2 + q**2 - 0.04, by_u, by_p, np.array([np.eye(1) + by_u]), "", self.origin() + 0.1 * u[0])
+
+    def renewed(self, point: Point) -> Guess | None:
+        if abs(point.u[0]) < 1.0:
+            return None
+        self.chart = (self.origin() + 0.1 * point.u[0],)
+        self.charts.append(self.chart)
+        return np.zeros(1), point.tangent
+
+    def carried(self, point: Point, chart: object) -> Guess | None:
+        assert isinstance(chart, tuple)
+        assert isinstance(point.chart, tuple)
+        return (point.u + 10.0 * (point.chart[0] - chart[0]), point.tangent) if self.carries else None
