@@ -19,6 +19,11 @@ Stop = Callable[[], bool]
 
 LEAST_LOOP = 8
 """A closed branch turns by 2π, so it has more points than this: each stride turns by at most 0.7 rad."""
+RECENT = 20
+"""Points among which one is sought over which the branch runs back."""
+TURNED_BACK = End("lost", "it is lost: it has turned back on itself")
+SHARP = 0.7
+"""Cosine of the angle by which a branch turns at a sharp corner."""
 SAME_PLACE = 1e-7
 """Distance at which two points are one; corrections end at about 1e-12."""
 CARRIED = 1e-4
@@ -130,6 +135,8 @@ class _Walk:
             turning = self._beyond_turn(here, new)
             if turning is not None:
                 new = turning
+            if self._turned_back(points, new):
+                return points, TURNED_BACK
             points.append(new)
             self.count += 1
             reason = self.until(new) if self.until is not None else None
@@ -177,7 +184,11 @@ class _Walk:
         if math.sqrt(off @ off) > 0.5 * stride + 1e-7:
             newton.why = "Newton's method leaves the branch"
             return None
-        return self._placed(here, new)
+        self._placed(here, new)
+        if new.word != here.word and float(new.tangent @ here.tangent) < SHARP:
+            # at a sharp corner the last tangent does not say which way the branch goes on
+            return self._led_on(here, new, stride) or new
+        return new
 
     @staticmethod
     def _predicted(points: list[Point], stride: float) -> Array:
@@ -277,13 +288,36 @@ class _Walk:
                             continue
                         chord = new.z - here.z
                         distance = math.sqrt(chord @ chord)
-                        inside = self.settings.low <= new.p <= self.settings.high
-                        if distance < 5.0 * length + reach and inside:
-                            new.s = here.s + distance
-                            return new
+                        new.s = here.s + distance
+                        led = self._led_on(here, new, length) if distance < 5.0 * length + reach else None
+                        if led is not None:
+                            return led
                 place = here.z + reach * onward
             newton.seen = seen
         return None
+
+    def _led_on(self, here: Point, new: Point, length: float) -> Point | None:
+        """A point just beyond a border, with its tangent away from the border; None if neither way leads on."""
+        one = new.z - here.z
+        for point in (new, replace(new.turned(), s=new.s)):
+            guess = point.z + length * point.tangent
+            further = self.newton.solved(guess, point.tangent, point.tangent, 0.0)
+            if further is not None and further.word == new.word:
+                other = further.z - here.z
+                if float(other @ other) > float(one @ one):
+                    return point
+        return None
+
+    def _turned_back(self, points: list[Point], new: Point) -> bool:
+        """Whether the branch has come back across a border and runs back over itself."""
+        if new.word == points[-1].word:
+            return False
+        reach = 10.0 * self.settings.border
+        for point in points[: -1 - RECENT : -1]:
+            if point.chart is new.chart and point.word == new.word:
+                chord = new.z - point.z
+                return bool(math.sqrt(chord @ chord) < reach and new.tangent @ point.tangent < -SAME_WAY)
+        return False
 
     def _renewed(self, point: Point) -> Point | None:
         """The point in a new chart, where the problem wants one and the motion is found in it."""
@@ -353,5 +387,5 @@ class _Walk:
         if cosine > SAME_WAY:
             return crossing, End("closed", "it is closed: it comes back to its first point")
         if cosine < -SAME_WAY:
-            return None, End("lost", "it is lost: it has turned back on itself")
+            return None, TURNED_BACK
         return None, None

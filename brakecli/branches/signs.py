@@ -19,7 +19,7 @@ SOUGHT = 1e-9
 STILL = 1e-6
 """Change of s below which a zero is located."""
 MOST_STEPS = 40
-"""Steps for one zero; some ten are needed."""
+"""Steps for one zero or border; some ten are needed."""
 ROUNDING = 1e-11
 """Least error of a located p."""
 NOTHING = 1e-9
@@ -88,20 +88,19 @@ def _borders(newton: Newton, points: list[Point], over: Over) -> tuple[list[Spec
 
 def _bracket(newton: Newton, near: Point, far: Point) -> tuple[Point, Point]:
     """Bisect: the last point of the word of `near`, and the first one of another word."""
-    while True:
+    for _ in range(MOST_STEPS):
         chord = far.z - near.z
         if math.sqrt(chord @ chord) <= newton.settings.shortest:
-            return near, far
+            break
         # the chord may leave a sharp corner too far: then along the tangent of one side, if it stays on that side
-        middle = (
-            newton.between(near, far, 0.5) or _beside(newton, near, far, near) or _beside(newton, near, far, far)
-        )
+        middle = newton.between(near, far, 0.5) or _beside(newton, near, far, near) or _beside(newton, near, far, far)
         if middle is None:
-            return near, far
+            break
         if middle.word == near.word:
             near = middle
         else:
             far = middle
+    return near, far
 
 
 def _beside(newton: Newton, near: Point, far: Point, base: Point) -> Point | None:
