@@ -119,11 +119,16 @@ class _Walk:
             here = points[-1]
             new = self._step(points, stride)
             if new is None:
-                stride *= 0.5
-                if stride >= settings.shortest:
+                seen = self.newton.seen
+                beyond = seen is not None and seen.word != here.word
+                before, stride = stride, stride * (0.25 if beyond else 0.5)
+                # a corner is tried as soon as the border is near, and at last in any case
+                if stride >= settings.shortest and not (beyond and stride < settings.border <= before):
                     continue
                 new = self._corner(here)
                 if new is None:
+                    if stride >= settings.shortest:
+                        continue
                     return points, self._lost(here)
                 stride = settings.border
             else:
