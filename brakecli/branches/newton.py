@@ -178,6 +178,7 @@ class Newton:
             facts=seen.facts,
             chart=self.problem.chart,
             maps=seen.maps,
+            margins=seen.margins,
         )
 
     def at_parameter(self, guess: Array, p: float, onward: Array, s: float, exact: bool = False) -> Point | None:

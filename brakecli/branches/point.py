@@ -33,6 +33,7 @@ class Point:
     facts: Any
     chart: object
     maps: Array
+    margins: tuple[float, ...]
 
     @property
     def u(self) -> Array:

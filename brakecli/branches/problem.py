@@ -31,6 +31,11 @@ class Seen(NamedTuple):
     """The sequence of events. The gap is smooth where the word does not change."""
     facts: Any
     """What the problem wants to know of this motion later; the engine does not look at it."""
+    margins: tuple[float, ...] = ()
+    """Smooth values that fall to zero where the word changes, with one meaning for each place within a word.
+
+    They are optional. With them a word that holds only between two neighbouring points is found as well.
+    """
 
 
 Guess = tuple[Array, Array]

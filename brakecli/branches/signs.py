@@ -26,17 +26,21 @@ NOTHING = 1e-9
 """A test that is smaller at both ends of a stride vanishes identically, as in area-preserving maps."""
 ONE_PLACE = 1e-4
 """Length over which a turn and a branch point are the same, as on the outer branch of a pitchfork."""
-GRID = np.linspace(0.0, 1.0, 17)[1:-1]
+GRID = np.linspace(0.0, 1.0, 17)
 """Parts of a stride at which the cubic is looked at."""
 
 
 def special_points(newton: Newton, points: list[Point], over: Over) -> tuple[list[Special], str]:
     """Locate all special points. Points are inserted into the list; the text says why that is incomplete.
 
-    First borders are located, so that each word has its points up to its borders. Then points are inserted where
-    a test may vanish twice between two neighbours. Then each change of sign is located.
+    First points are inserted where another word may hold between two neighbours. Then borders are located, so that
+    each word has its points up to its borders. Then points are inserted where a test may vanish twice between two
+    neighbours. Then each change of sign is located.
     """
-    specials, unsearched = _borders(newton, points, over)
+    unsearched = _insert(newton, points, over, margins=True)
+    specials: list[Special] = []
+    if not unsearched:
+        specials, unsearched = _borders(newton, points, over)
     if not unsearched:
         unsearched = _insert(newton, points, over)
     for one, other in pairwise(list(points)):
@@ -93,7 +97,9 @@ def _bracket(newton: Newton, near: Point, far: Point) -> tuple[Point, Point]:
         if math.sqrt(chord @ chord) <= newton.settings.shortest:
             break
         # the chord may leave a sharp corner too far: then along the tangent of one side, if it stays on that side
-        middle = newton.between(near, far, 0.5) or _beside(newton, near, far, near) or _beside(newton, near, far, far)
+        middle = (
+            newton.between(near, far, 0.5) or _beside(newton, near, far, near) or _beside(newton, near, far, far)
+        )
         if middle is None:
             break
         if middle.word == near.word:
@@ -114,15 +120,15 @@ def _beside(newton: Newton, near: Point, far: Point, base: Point) -> Point | Non
     return None
 
 
-def _insert(newton: Newton, points: list[Point], over: Over) -> str:
-    """Insert points until no test may vanish twice between two neighbours."""
+def _insert(newton: Newton, points: list[Point], over: Over, margins: bool = False) -> str:
+    """Insert points until no test, or no margin of the word, may vanish twice between two neighbours."""
     settings, left = newton.settings, newton.settings.insertions
     finished: set[tuple[int, int]] = set()  # pairs, by identity, that need no further look
     held = list(points)  # keeps every point alive, so that identities stay unique
     while True:
         wanted = [
             (k, part)
-            for k, part in _suspects(points, settings.everywhere)
+            for k, part in _suspects(points, settings.everywhere, margins)
             if (id(points[k]), id(points[k + 1])) not in finished and points[k + 1].s - points[k].s > settings.gap
         ]
         if not wanted:
@@ -136,7 +142,7 @@ def _insert(newton: Newton, points: list[Point], over: Over) -> str:
             one, other = points[k], points[k + 1]
             newton.problem.use(one.chart)
             new = newton.between(one, other, part) or newton.between(one, other, 0.5)
-            if new is None or new.word != one.word:
+            if new is None or (new.word != one.word and not margins):
                 finished.add((id(one), id(other)))
                 continue
             points.insert(k + 1, new)
@@ -144,16 +150,17 @@ def _insert(newton: Newton, points: list[Point], over: Over) -> str:
             left -= 1
 
 
-def _suspects(points: list[Point], everywhere: bool) -> list[tuple[int, float]]:
+def _suspects(points: list[Point], everywhere: bool, margins: bool) -> list[tuple[int, float]]:
     """Strides in which a test may vanish twice, with the part of the stride at which that is likeliest."""
     found: list[tuple[int, float]] = []
     begin = 0
     for k in range(1, len(points) + 1):
         if k == len(points) or not _one_piece(points[k - 1], points[k]):
-            if k - begin > 1:
-                s = np.array([point.s for point in points[begin:k]])
-                tests = np.array([point.tests for point in points[begin:k]])
-                found += [(begin + j, part) for j, part in _near_zeros(s, tests, everywhere)]
+            piece = points[begin:k]
+            if len(piece) > 1 and (piece[0].margins or not margins):
+                s = np.array([point.s for point in piece])
+                tests = np.array([point.margins if margins else point.tests for point in piece])
+                found += [(begin + j, part) for j, part in _near_zeros(s, tests, everywhere or margins)]
             begin = k
     return found
 
@@ -192,15 +199,24 @@ def _near_zeros(s: Array, tests: Array, everywhere: bool) -> list[tuple[int, flo
     else:
         error = 0.6 * np.abs(last - first)[:, None, :] * np.ones_like(model)
     side = np.where(first >= 0.0, 1.0, -1.0)[:, None, :]
-    least = side * model - error
-    suspect = same & (least <= 0.0).any(axis=1)
+    floor = side * model - error
+    inner = floor[:, 1:-1]
+    middle = np.argmin(inner, axis=1)[:, None]
+    before, least, after = (np.take_along_axis(floor, middle + j, axis=1)[:, 0] for j in range(3))
+    # the bottom of the parabola through the least value and its neighbours: a window may lie between two places
+    bend, slope = after - 2.0 * least + before, after - before
+    round_ = bend > np.abs(slope) / 2.0
+    offset = np.where(round_, -0.5 * slope / np.where(round_, bend, 1.0), 0.0)
+    least = least + 0.25 * slope * offset
+    place = (middle[:, 0] + 1 + offset) / (len(GRID) - 1)
+    suspect = same & (least <= 0.0)
     if not everywhere:  # a test of the multipliers that is negative all along proves the motion unstable
-        negative = same & (first < 0.0) & (least > 0.0).all(axis=1)
+        negative = same & (first < 0.0) & (least > 0.0)
         suspect &= ~negative[:, FOLD:].any(axis=1)[:, None]
     found = []
     for k in np.flatnonzero(suspect.any(axis=1)).tolist():
         test = int(np.flatnonzero(suspect[k])[0])
-        found.append((k, min(max(float(GRID[int(np.argmin(least[k, :, test]))]), 0.1), 0.9)))
+        found.append((k, min(max(float(place[k, test]), 0.1), 0.9)))
     return found
 
 

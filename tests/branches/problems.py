@@ -104,14 +104,21 @@ def henon(b: float) -> Step:
 
 
 class Given(Problem):
-    """The motion u = 0 with maps that are given as functions of the parameter."""
+    """The motion u = 0 with maps that are given as functions of the parameter.
 
-    def __init__(self, maps: Callable[[float], list[list[float]]]) -> None:
-        self.maps = maps
+    The word is whether the margin is positive.
+    """
+
+    def __init__(
+        self, maps: Callable[[float], list[list[float]]], margin: Callable[[float], float] | None = None
+    ) -> None:
+        self.maps, self.margin = maps, margin
 
     def evaluate(self, u: Array, p: float, with_parameter: bool) -> Seen | str | None:
         by_p = np.zeros(1) if with_parameter else None
-        return Seen(u.copy(), np.eye(1), by_p, np.array([self.maps(p)]), "", None)
+        margins = () if self.margin is None else (self.margin(p),)
+        word = bool(margins and margins[0] > 0.0)
+        return Seen(u.copy(), np.eye(1), by_p, np.array([self.maps(p)]), word, None, margins)
 
 
 class Scaled(Problem):

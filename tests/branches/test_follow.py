@@ -1,6 +1,7 @@
 """Branches of equations with closed forms: that they are followed to their ends, and why they end."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -30,6 +31,15 @@ def circle() -> Roots:
         lambda u, p: [u[0] ** 2 + (p - 0.5) ** 2 - 0.04],
         lambda u, p: [[2.0 * u[0]]],
         lambda u, p: [2.0 * (p - 0.5)],
+    )
+
+
+def lemniscate(a: float) -> Roots:
+    """(q² + u²)² = a² (q² - u²) with q = p - 0.5: it crosses itself at its middle and is 5.24411510858 a long."""
+    return Roots(
+        lambda u, p: [((p - 0.5) ** 2 + u[0] ** 2) ** 2 - a * a * ((p - 0.5) ** 2 - u[0] ** 2)],
+        lambda u, p: [[4.0 * u[0] * ((p - 0.5) ** 2 + u[0] ** 2) + 2.0 * a * a * u[0]]],
+        lambda u, p: [4.0 * (p - 0.5) * ((p - 0.5) ** 2 + u[0] ** 2) - 2.0 * a * a * (p - 0.5)],
     )
 
 
@@ -123,17 +133,21 @@ def test_a_helix_that_passes_its_start_is_not_closed(pitch: float) -> None:
 
 
 def test_a_figure_eight_is_closed_after_both_loops() -> None:
-    # (q² + u²)² = a² (q² - u²) crosses itself at its middle and is 5.24411510858 a long
     a = 0.3
-    problem = Roots(
-        lambda u, p: [((p - 0.5) ** 2 + u[0] ** 2) ** 2 - a * a * ((p - 0.5) ** 2 - u[0] ** 2)],
-        lambda u, p: [[4.0 * u[0] * ((p - 0.5) ** 2 + u[0] ** 2) + 2.0 * a * a * u[0]]],
-        lambda u, p: [4.0 * (p - 0.5) * ((p - 0.5) ** 2 + u[0] ** 2) - 2.0 * a * a * (p - 0.5)],
-    )
+    problem = lemniscate(a)
     branch = follow(problem, first_of(problem, [0.004], 0.504))
     assert branch.ended[1].kind == "closed"
     assert branch.points[-1].s == pytest.approx(5.24411510858 * a, rel=1e-3)
     assert kinds(branch).count("branch point") == 2
+
+
+def test_a_figure_eight_begun_in_its_middle_is_not_closed_where_it_crosses_itself() -> None:
+    # begun at the crossing itself, the branch comes back to the same place in another direction
+    problem = lemniscate(0.3)
+    beside = first_of(problem, [0.004], 0.504)
+    first = replace(beside, z=np.array([0.0, 0.5]), tangent=np.array([1.0, 1.0]) / math.sqrt(2.0))
+    branch = follow(problem, first, settings=Settings(points=60))
+    assert branch.points[-1].s > 1.1 * 0.5 * 5.24411510858 * 0.3
 
 
 @pytest.mark.parametrize("carries", [True, False])

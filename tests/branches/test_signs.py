@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from brakecli.branches.follow import both_ways, follow
-from brakecli.branches.newton import Settings
+from brakecli.branches.newton import Settings, start
 from brakecli.branches.point import Branch, Special
 from brakecli.branches.switch import switch
 from tests.branches.problems import Given, Orbits, Roots, delayed_logistic, henon, logistic
@@ -179,3 +179,32 @@ def test_stability_changes_only_at_special_points() -> None:
         if one.stable != other.stable:
             assert any(one.s <= special.s <= other.s for special in branch.specials)
     assert np.all([point.stable == (problem.value(point.p) < 2.0) for point in branch.points])
+
+
+@pytest.mark.parametrize("width", [1.0 / 200.0, 1.0 / 2000.0])
+def test_a_word_that_holds_only_between_two_points_is_found_by_its_margin(width: float) -> None:
+    half = 0.5 * width
+    problem = Given(lambda p: [[0.5]], margin=lambda p: math.cosh(3.0 * (p - 0.4321)) - math.cosh(3.0 * half))
+    branch = follow(problem, first_of(problem, [0.0], 0.0))
+    grazing = located(branch, "grazing")
+    assert [special.p for special in grazing] == pytest.approx([0.4321 - half, 0.4321 + half], abs=1e-6)
+    # half of the bracket of 1e-6, and its length times the slope
+    assert all(special.error <= 1.5e-6 for special in grazing)
+    assert len(branch.points) < 100
+
+
+def test_a_fold_at_the_first_point_is_located_once() -> None:
+    problem = parabola(0.3)
+    first = start(problem, np.array([1e-9]), 0.3, np.array([1.0, 0.0]))
+    assert first is not None
+    branch = both_ways(problem, first)
+    assert kinds(branch) == ["end", "fold", "end"]
+    assert branch.specials[1].p == pytest.approx(0.3, abs=1e-8)
+    assert [branch.points[0].p, branch.points[-1].p] == [1.0, 1.0]
+
+
+def test_a_branch_point_behind_the_first_point_is_located_once() -> None:
+    problem = Roots(
+        lambda u, p: [u[0] * (p - 0.4 - u[0])], lambda u, p: [[p - 0.4 - 2.0 * u[0]]], lambda u, p: [u[0]]
+    )
+    assert kinds(both_ways(problem, first_of(problem, [0.0], 0.7))) == ["end", "branch point", "end"]
