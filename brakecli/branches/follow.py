@@ -1,0 +1,396 @@
+"""Follow a branch: predictor, corrector, length of stride, corners at borders, and why it ends."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from time import perf_counter
+
+import numpy as np
+
+from brakecli.branches.newton import Newton, Settings
+from brakecli.branches.point import Branch, End, Point, Special
+from brakecli.branches.problem import Array, Problem
+from brakecli.branches.signs import special_points
+
+Until = Callable[[Point], str | None]
+"""Called with each point; a reason ends the branch there."""
+Stop = Callable[[], bool]
+"""Called before each stride; True ends the branch with the points found so far."""
+
+LEAST_LOOP = 8
+"""A closed branch turns by 2π, so it has more points than this: each stride turns by at most 0.7 rad."""
+RECENT = 20
+"""Points among which one is sought over which the branch runs back."""
+TURNED_BACK = End("lost", "it is lost: it has turned back on itself")
+SHARP = 0.7
+"""Cosine of the angle by which a branch turns at a sharp corner."""
+SAME_PLACE = 1e-7
+"""Distance at which two points are one; corrections end at about 1e-12."""
+CARRIED = 1e-4
+"""The same where a point is carried to another chart by the problem, before it is corrected."""
+LEAST_SLOPE = 1e-3
+"""Slope dp/ds at the first point from which on p says where a branch in another chart passes it."""
+SAME_WAY = 0.999
+"""Cosine of the angle between their tangents."""
+
+
+def follow(
+    problem: Problem,
+    first: Point,
+    sign: float | None = 1.0,
+    settings: Settings | None = None,
+    until: Until | None = None,
+    stop: Stop | None = None,
+) -> Branch:
+    """Follow a branch from a first point, and locate its special points.
+
+    With sign 1 it is followed towards larger p, with -1 towards smaller p, and with None along the tangent of the
+    first point. Where the first tangent is vertical, 1 means along it and -1 against it.
+    """
+    walk = _Walk(problem, settings or Settings(), until, stop)
+    direction = first if sign is None else _directed(first, sign)
+    points, end = walk.followed(direction)
+    return _finished(walk, points, (End("start", "the branch was begun here"), end))
+
+
+def both_ways(
+    problem: Problem,
+    first: Point,
+    settings: Settings | None = None,
+    until: Until | None = None,
+    stop: Stop | None = None,
+) -> Branch:
+    """Follow a branch from a point within it both ways, as one branch with s = 0 at that point."""
+    walk = _Walk(problem, settings or Settings(), until, stop)
+    points, end = walk.followed(_directed(first, 1.0))
+    begin = end
+    if end.kind != "closed":
+        back, begin = walk.followed(_directed(first, -1.0))
+        points = [point.turned() for point in back[:0:-1]] + points
+    return _finished(walk, points, (begin, end))
+
+
+def _directed(first: Point, sign: float) -> Point:
+    slope = first.tangent[-1]
+    upward = slope > 0.0 or abs(slope) < 1e-9
+    directed = first if upward == (sign > 0.0) else first.turned()
+    return replace(directed, s=0.0)
+
+
+def _finished(walk: "_Walk", points: list[Point], ended: tuple[End, End]) -> Branch:
+    specials, unsearched = special_points(walk.newton, points, walk.over)
+    for point, end in ((points[0], ended[0]), (points[-1], ended[1])):
+        if end.kind != "start":
+            error = 0.0 if end.kind in ("range", "closed", "stopped") else walk.settings.shortest
+            specials.append(Special("end", point.p, error, point, point.s, end.reason))
+    specials.sort(key=lambda special: special.s)
+    return Branch(points, specials, ended, walk.newton.evaluations, unsearched)
+
+
+class _Walk:
+    """The walk along one branch, with its budgets."""
+
+    def __init__(self, problem: Problem, settings: Settings, until: Until | None, stop: Stop | None) -> None:
+        self.problem, self.settings, self.until, self.stop = problem, settings, until, stop
+        self.newton = Newton(problem, settings)
+        self.deadline = perf_counter() + settings.seconds
+        self.count = 0
+
+    def over(self) -> End | None:
+        """Why nothing more may be computed, if so."""
+        if self.stop is not None and self.stop():
+            return End("interrupted", "it was interrupted")
+        if perf_counter() > self.deadline:
+            return End("seconds", f"the budget of {self.settings.seconds:g} s is spent")
+        return None
+
+    def followed(self, first: Point) -> tuple[list[Point], End]:
+        """The points in one direction, and why they end."""
+        settings, points, stride = self.settings, [first], self.settings.first
+        self.problem.use(first.chart)
+        if self._at_bound(first):
+            return points, self._range_end(first.p)
+        while True:
+            end = self.over()
+            if end is not None:
+                return points, end
+            if self.count >= settings.points:
+                return points, End("points", f"the budget of {settings.points} points is spent")
+            here = points[-1]
+            new = self._step(points, stride)
+            if new is None:
+                seen = self.newton.seen
+                beyond = seen is not None and seen.word != here.word
+                before, stride = stride, stride * (0.25 if beyond else 0.5)
+                # a corner is tried as soon as the border is near, and at last in any case
+                if stride >= settings.shortest and not (beyond and stride < settings.border <= before):
+                    continue
+                new = self._corner(here)
+                if new is None:
+                    if stride >= settings.shortest:
+                        continue
+                    return points, self._lost(here)
+                stride = settings.border
+            else:
+                shorter, longer = self._stride(here, new, stride)
+                if shorter:
+                    stride = shorter
+                    continue
+                stride = longer
+            turning = self._beyond_turn(here, new)
+            if turning is not None:
+                new = turning
+            if self._turned_back(points, new):
+                return points, TURNED_BACK
+            points.append(new)
+            self.count += 1
+            reason = self.until(new) if self.until is not None else None
+            if reason:
+                return points, End("stopped", reason)
+            if self._at_bound(new):
+                return points, self._range_end(new.p)
+            if len(points) > LEAST_LOOP:
+                closing, end = self._closing(first, here, new)
+                if end is not None:
+                    points[-1:] = [closing] if closing is not None else []
+                    return points, end
+                self.problem.use(new.chart)
+            renewed = self._renewed(new)
+            if renewed is not None:
+                points.append(renewed)
+
+    def _range_end(self, p: float) -> End:
+        return End("range", f"it reaches the {'lower' if p == self.settings.low else 'upper'} end of the range")
+
+    def _at_bound(self, point: Point) -> bool:
+        slope = point.tangent[-1]
+        return (point.p == self.settings.high and slope > 0.0) or (point.p == self.settings.low and slope < 0.0)
+
+    def _lost(self, here: Point) -> End:
+        seen = self.newton.seen
+        where = ""
+        if seen is not None and seen.word != here.word:
+            where = f" at a border: {self.problem.border(here.word, seen.word)}"
+        return End("lost", f"it is lost{where} ({self.newton.why})")
+
+    def _step(self, points: list[Point], stride: float) -> Point | None:
+        """One stride: the next point, or None where it must be shorter."""
+        here, newton, settings = points[-1], self.newton, self.settings
+        guess = self._predicted(points, stride)
+        p = guess[-1]
+        if not settings.low <= p <= settings.high:
+            return self._end_point(here, guess)
+        new = newton.solved(guess, here.tangent, here.tangent, 0.0)
+        if new is None:
+            return None if newton.outside is None else self._end_point(here, newton.outside)
+        if not settings.low <= new.p <= settings.high:
+            return self._end_point(here, new.z)
+        off = new.z - guess
+        if math.sqrt(off @ off) > 0.5 * stride + 1e-7:
+            newton.why = "Newton's method leaves the branch"
+            return None
+        self._placed(here, new)
+        if new.word != here.word and float(new.tangent @ here.tangent) < SHARP:
+            # at a sharp corner the last tangent does not say which way the branch goes on
+            return self._led_on(here, new, stride) or new
+        return new
+
+    @staticmethod
+    def _predicted(points: list[Point], stride: float) -> Array:
+        """The place one stride ahead: on the tangent, or on the cubic through the last two points and tangents."""
+        here = points[-1]
+        if len(points) > 1:
+            back = points[-2]
+            way = here.s - back.s
+            if way > 0.0 and back.chart is here.chart and back.word == here.word:
+                bend = here.tangent - back.tangent  # the curvature, times the way
+                if math.sqrt(bend @ bend) * stride < 0.5 * way and stride < 4.0 * way:
+                    x = stride / way
+                    second = back.z - here.z + way * here.tangent
+                    third = 2.0 * second - way * bend
+                    return here.z + stride * here.tangent + x * x * (second + (x + 1.0) * third)
+        return here.z + stride * here.tangent
+
+    @staticmethod
+    def _placed(here: Point, new: Point) -> Point:
+        """Set s: the chord, made longer by the bend between its ends."""
+        chord = new.z - here.z
+        cosine = min(max(float(here.tangent @ new.tangent), -1.0), 1.0)
+        new.s = here.s + math.sqrt(chord @ chord) * (1.0 + (1.0 - cosine) / 12.0)
+        return new
+
+    def _end_point(self, here: Point, beyond: Array) -> Point | None:
+        """The point at the bound of the range, on the way to a place beyond it; None where it is elsewhere."""
+        bound = self.settings.high if beyond[-1] > here.z[-1] else self.settings.low
+        part = (bound - here.z[-1]) / (beyond[-1] - here.z[-1])
+        if not 0.0 < part <= 1.0:
+            return None
+        guess = here.z + part * (beyond - here.z)
+        new = self.newton.at_parameter(guess, bound, here.tangent, 0.0, exact=True)
+        if new is None or not self._at_bound(new):
+            return None
+        off, chord = new.z - guess, new.z - here.z
+        way = math.sqrt(chord @ chord)
+        if math.sqrt(off @ off) > 0.5 * way + 1e-7 or not float(chord @ here.tangent) > 0.0:
+            return None
+        return self._placed(here, new)
+
+    def _beyond_turn(self, here: Point, new: Point) -> Point | None:
+        """The end point where the branch leaves the range, and turns outside of it, between two points inside."""
+        if here.tangent[-1] * new.tangent[-1] >= 0.0 or here.word != new.word:
+            return None
+        t = np.linspace(0.0, 1.0, 17)
+        rise, way = new.p - here.p, new.s - here.s
+        cubic = here.p + (3.0 * t**2 - 2.0 * t**3) * rise
+        cubic += t * (1.0 - t) * way * ((1.0 - t) * here.tangent[-1] - t * new.tangent[-1])
+        outside = np.flatnonzero((cubic > self.settings.high) | (cubic < self.settings.low))
+        if not len(outside):
+            return None
+        part = t[outside[0]]
+        guess = here.z + part * (new.z - here.z)
+        guess[-1] = cubic[outside[0]]
+        return self._end_point(here, guess)
+
+    def _stride(self, here: Point, new: Point, stride: float) -> tuple[float, float]:
+        """A shorter stride with which this one must be repeated, or 0; and the length of the next one."""
+        settings = self.settings
+        cosine = min(max(float(here.tangent @ new.tangent), -1.0), 1.0)
+        angle = math.acos(cosine) / settings.turn
+        # Very large coefficients belong to a motion that stays unstable whatever they do.
+        change = max(
+            abs(a - b) / max(1.0, 0.2 * min(abs(a), abs(b)))
+            for a, b in zip(here.coefficients, new.coefficients, strict=True)
+        )
+        ratio = max(angle, change / settings.change, 0.1)
+        if here.word == new.word:
+            if ratio > 2.0 and (stride > 30.0 * settings.shortest or angle > 2.0):
+                return max(0.3, 0.8 / ratio) * stride, 0.0
+        elif stride > settings.border and ratio > 0.5:
+            return 0.3 * stride, 0.0
+        return 0.0, min(settings.longest, stride * min(2.0, max(0.3, 0.9 / ratio)))
+
+    def _corner(self, here: Point) -> Point | None:
+        """Go on beyond a border at which the branch turns sharply.
+
+        Just beyond the border the tangent of the other side is the null vector of the derivatives. Only one of its
+        two directions stays on the other side.
+        """
+        newton = self.newton
+        for reach in (1e-5, 1e-4, 1e-3, 5e-3):
+            place = here.z + reach * here.tangent
+            for _ in range(2):  # the second time, from a place on the tangent of the other side
+                seen = newton.evaluate(place, True)
+                if seen is None or seen.by_p is None or seen.word == here.word:
+                    break
+                rows = np.column_stack([seen.by_u, seen.by_p])
+                if not np.isfinite(rows).all():
+                    break
+                onward = np.linalg.svd(rows)[2][-1]
+                for length in (0.1 * reach, reach, 10.0 * reach):
+                    for way in (onward, -onward):
+                        new = newton.solved(here.z + length * way, way, way, 0.0)
+                        if new is None or new.word != seen.word:
+                            continue
+                        chord = new.z - here.z
+                        distance = math.sqrt(chord @ chord)
+                        new.s = here.s + distance
+                        led = self._led_on(here, new, length) if distance < 5.0 * length + reach else None
+                        if led is not None:
+                            return led
+                place = here.z + reach * onward
+            newton.seen = seen
+        return None
+
+    def _led_on(self, here: Point, new: Point, length: float) -> Point | None:
+        """A point just beyond a border, with its tangent away from the border; None if neither way leads on."""
+        one = new.z - here.z
+        for point in (new, replace(new.turned(), s=new.s)):
+            guess = point.z + length * point.tangent
+            further = self.newton.solved(guess, point.tangent, point.tangent, 0.0)
+            if further is not None and further.word == new.word:
+                other = further.z - here.z
+                if float(other @ other) > float(one @ one):
+                    return point
+        return None
+
+    def _turned_back(self, points: list[Point], new: Point) -> bool:
+        """Whether the branch has come back across a border and runs back over itself."""
+        if new.word == points[-1].word:
+            return False
+        reach = 10.0 * self.settings.border
+        for point in points[: -1 - RECENT : -1]:
+            if point.chart is new.chart and point.word == new.word:
+                chord = new.z - point.z
+                return bool(math.sqrt(chord @ chord) < reach and new.tangent @ point.tangent < -SAME_WAY)
+        return False
+
+    def _renewed(self, point: Point) -> Point | None:
+        """The point in a new chart, where the problem wants one and the motion is found in it."""
+        guess = self.problem.renewed(point)
+        if guess is None:
+            return None
+        u, direction = guess
+        onward = direction / math.sqrt(direction @ direction)
+        new = self.newton.solved(np.append(u, point.p), onward, onward, point.s, exact=True, most=15)
+        if new is None or abs(new.p - point.p) > 1e-6:
+            self.problem.use(point.chart)
+            return None
+        return new
+
+    def _closing(self, first: Point, here: Point, new: Point) -> tuple[Point | None, End | None]:
+        """The last point and the end of a branch that has come back to its first point; None where it has not.
+
+        Where a stride crosses the plane across the first tangent, the crossing is bracketed on this branch until
+        no other one can be mistaken for it, and then compared with the first point: place and direction.
+        """
+        if here.chart is not new.chart or here.word != new.word or here is first:
+            return None, None
+        foreign = new.chart is not first.chart
+        if foreign and abs(first.tangent[-1]) < LEAST_SLOPE:
+            return None, None  # the parameter alone does not say where it passes the first point
+
+        def ahead(point: Point) -> float:
+            if foreign:
+                return float((point.z[-1] - first.z[-1]) * first.tangent[-1])
+            return float((point.z - first.z) @ first.tangent)
+
+        if ahead(here) * ahead(new) > 0.0:
+            return None, None
+        if not foreign:
+            away = here.z - first.z
+            if math.sqrt(away @ away) > 4.0 * (new.s - here.s):
+                return None, None
+        one, other = here, new
+        for _ in range(7):
+            low, high = ahead(one), ahead(other)
+            middle = self.newton.between(
+                one, other, min(max(low / (low - high), 0.02), 0.98) if low != high else 0.5
+            )
+            if middle is None or middle.word != here.word:
+                return None, None
+            if ahead(middle) == 0.0 or other.s - one.s < 1e-7:
+                one = middle
+                break
+            one, other = (middle, other) if low * ahead(middle) > 0.0 else (one, middle)
+        nearest = min((one, other), key=lambda point: abs(ahead(point)))
+        place, onward, chart = nearest.z, nearest.tangent, new.chart
+        if foreign:
+            guess = self.problem.carried(nearest, first.chart)
+            if guess is None:
+                return None, None
+            place, onward, chart = np.append(guess[0], nearest.p), guess[1], first.chart
+        self.problem.use(chart)
+        place = place - first.tangent * ((place - first.z) @ first.tangent)
+        crossing = self.newton.solved(place, first.tangent, onward, nearest.s, exact=True)
+        if crossing is None or crossing.word != first.word:
+            return None, None
+        if float(np.abs(crossing.z - place).max()) > (CARRIED if foreign else SAME_PLACE):
+            return None, None
+        if float(np.abs(crossing.z - first.z).max()) > SAME_PLACE:
+            return None, None
+        cosine = float(crossing.tangent @ first.tangent)
+        if cosine > SAME_WAY:
+            return crossing, End("closed", "it is closed: it comes back to its first point")
+        if cosine < -SAME_WAY:
+            return None, TURNED_BACK
+        return None, None

@@ -1,0 +1,228 @@
+"""Newton's method across a branch: from a guess to a point."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from brakecli.branches.multipliers import spectrum
+from brakecli.branches.point import Point
+from brakecli.branches.problem import Array, Problem, Seen
+
+ROUNDING = 1e-9
+"""Gap that may grow from one correction to the next."""
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """How finely a branch is followed. Lengths are those of the scaled unknowns and the parameter."""
+
+    low: float = 0.0
+    """The branch ends where the parameter reaches this value,"""
+    high: float = 1.0
+    """or this one."""
+    first: float = 0.005
+    """First stride."""
+    longest: float = 0.05
+    """Longest stride."""
+    shortest: float = 1e-6
+    """Shortest stride; where Newton's method fails even with it, the branch is lost."""
+    border: float = 1e-4
+    """Stride with which a border is crossed at which the branch turns."""
+    turn: float = 0.35
+    """Angle, rad, by which the tangent may turn in a stride."""
+    change: float = 0.4
+    """Change of asinh of the coefficients of the characteristic polynomial in a stride: a half of large ones."""
+    near: float = 1e-5
+    """Correction that is the last one; the error left is of the order of its square.
+
+    Multipliers and facts are those of the place before it.
+    """
+    exact: float = 1e-9
+    """The same where a special point is located."""
+    iterations: int = 6
+    """Evaluations for one correction."""
+    trust: float = 0.3
+    """Longest correction."""
+    stale: float = 1e-3
+    """Length over which a derivative by the parameter may be used again."""
+    steep: float = 0.02
+    """Slope dp/ds below which that derivative is taken at the point, so that the sign of the slope is right."""
+    points: int = 1500
+    """Budget of points."""
+    seconds: float = math.inf
+    """Budget of time."""
+    gap: float = 2e-5
+    """Distance of two points between which no further point is inserted: narrower windows are not found."""
+    insertions: int = 600
+    """Budget of inserted points."""
+    everywhere: bool = False
+    """Insert points also where a motion is certainly unstable on both sides and between."""
+
+
+class Newton:
+    """Newton's method for one problem. It counts evaluations and remembers why it failed."""
+
+    def __init__(self, problem: Problem, settings: Settings) -> None:
+        """Nothing is evaluated yet."""
+        self.problem, self.settings = problem, settings
+        self.evaluations = 0
+        self.why = ""
+        """Why the last correction failed."""
+        self.seen: Seen | None = None
+        """What was evaluated last, also where the correction failed."""
+        self.outside: Array | None = None
+        """Where the last correction left the range of the parameter, if it failed for that."""
+
+    def evaluate(self, z: Array, with_parameter: bool) -> Seen | None:
+        """Evaluate a place; None, with the reason in `why`, where that is impossible."""
+        settings = self.settings
+        self.evaluations += 1
+        found = self.problem.evaluate(z[:-1], min(max(float(z[-1]), settings.low), settings.high), with_parameter)
+        if isinstance(found, Seen):
+            self.seen = found
+            return found
+        self.why = found or "the motion cannot be computed there"
+        return None
+
+    def solved(
+        self, guess: Array, normal: Array, onward: Array, s: float, exact: bool = False, most: int | None = None
+    ) -> Point | None:
+        """Find the point of the branch in the hyperplane through a guess.
+
+        The tangent points to the side of `onward`. The derivative by the parameter is taken again only where the
+        word changes, the place moves far, or the branch is steep; `exact` takes it in every iteration.
+        """
+        settings = self.settings
+        self.seen = self.outside = None
+        n = len(guess) - 1
+        matrix, right = np.empty((n + 1, n + 1)), np.zeros((n + 1, 2))
+        matrix[n], right[n, 1] = normal, 1.0
+        z, last, before = guess.copy(), math.inf, math.inf
+        by_p, word, taken = None, None, z
+        near = settings.exact if exact else settings.near
+        slack = 1e-9 * (settings.high - settings.low)
+        for _ in range(most or settings.iterations):
+            if not settings.low - slack <= z[n] <= settings.high + slack:
+                self.outside, self.why = z, "the parameter leaves its range"
+                return None
+            seen = self.evaluate(z, by_p is None or exact)
+            if seen is not None and seen.by_p is None and seen.word != word:
+                seen = self.evaluate(z, True)
+            if seen is None:
+                return None
+            if seen.by_p is not None:
+                by_p, word, taken = seen.by_p, seen.word, z
+            gap = float(np.abs(seen.gap).max())
+            if not gap <= 4.0 * last + ROUNDING:
+                break
+            last = gap
+            matrix[:n, :n], matrix[:n, n] = seen.by_u, by_p
+            right[:n, 0], right[n, 0] = -seen.gap, normal @ (guess - z)
+            solution = self._solution(matrix, right)
+            if solution is None:
+                break
+            step, tangent = solution[:, 0], solution[:, 1]
+            length = math.sqrt(tangent @ tangent)
+            size = float(np.abs(step).max())
+            if not size <= settings.trust or not length < math.inf:
+                break
+            # rounding of the gap may keep corrections from becoming still smaller
+            stalled = size <= settings.near and size > 0.3 * before
+            before = size
+            if size > near and not stalled:
+                z = z + step
+                continue
+            # The last correction is made without another evaluation: its error is of the order of its square.
+            if taken is not z and (
+                abs(tangent[n]) < settings.steep * length or float(np.abs(z - taken).max()) > settings.stale
+            ):
+                seen = self.evaluate(z, True)
+                if seen is None:
+                    return None
+                matrix[:n, n] = seen.by_p
+                solution = self._solution(matrix, right)
+                if solution is None:
+                    break
+                step, tangent = solution[:, 0], solution[:, 1]
+                length = math.sqrt(tangent @ tangent)
+            return self._point(z + step, tangent / length, length, matrix, onward, s, seen)
+        self.why = "Newton's method does not converge"
+        return None
+
+    @staticmethod
+    def _solution(matrix: Array, right: Array) -> Array | None:
+        try:
+            return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
+        except np.linalg.LinAlgError:
+            return None
+
+    def _point(
+        self, z: Array, tangent: Array, length: float, matrix: Array, onward: Array, s: float, seen: Seen
+    ) -> Point:
+        sign, log = np.linalg.slogdet(matrix)
+        if tangent @ onward < 0.0:
+            tangent, sign = -tangent, -sign
+        multipliers = spectrum(seen.maps)
+        return Point(
+            z=z,
+            tangent=tangent,
+            s=s,
+            multipliers=multipliers.multipliers,
+            stable=multipliers.stable,
+            tests=(float(tangent[-1]), *multipliers.tests),
+            coefficients=multipliers.coefficients,
+            # the normal in the last row becomes the tangent, whose part along the normal is 1 / length
+            orientation=(float(sign), float(log) + math.log(length)),
+            word=seen.word,
+            facts=seen.facts,
+            chart=self.problem.chart,
+            maps=seen.maps,
+            margins=seen.margins,
+        )
+
+    def at_parameter(self, guess: Array, p: float, onward: Array, s: float, exact: bool = False) -> Point | None:
+        """Find the point at a value of the parameter."""
+        guess = guess.copy()
+        guess[-1] = p
+        normal = np.zeros(len(guess))
+        normal[-1] = 1.0
+        found = self.solved(guess, normal, onward, s, exact)
+        if found is not None:
+            found.z[-1] = p
+        return found
+
+    def between(self, one: Point, other: Point, part: float) -> Point | None:
+        """Find the point at a part of the way between two neighbours, which share a chart."""
+        chord = other.z - one.z
+        length = math.sqrt(chord @ chord)
+        if length == 0.0:
+            return None
+        t, way = part, other.s - one.s
+        if one.word == other.word:
+            onward = one.tangent + other.tangent
+            guess = one.z + (3.0 * t**2 - 2.0 * t**3) * chord
+            guess += (t * (1.0 - t) * way) * ((1.0 - t) * one.tangent - t * other.tangent)
+        else:
+            onward, guess = chord, one.z + t * chord
+        # the direction of a very short chord is mostly rounding
+        normal = chord / length if length > 1e-6 else one.tangent
+        found = self.solved(guess, normal, onward, one.s + t * way, exact=True)
+        if found is not None:
+            off = found.z - guess
+            if off @ off > 0.25 * length * length + 1e-14:
+                self.why = "another branch lies beside this one"
+                return None
+        return found
+
+
+def start(
+    problem: Problem, u: Array, p: float, onward: Array | None = None, settings: Settings | None = None
+) -> Point | None:
+    """Return a first point near a guess: at the given p, or in the hyperplane across the direction `onward`."""
+    newton = Newton(problem, settings or Settings())
+    normal = np.zeros(len(u) + 1)
+    normal[-1] = 1.0
+    if onward is not None:
+        normal = np.asarray(onward, float) / np.linalg.norm(onward)
+    return newton.solved(np.append(u, p), normal, normal, 0.0, exact=True, most=15)

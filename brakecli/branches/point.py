@@ -1,0 +1,100 @@
+"""A point of a branch, and a branch."""
+
+from collections.abc import Hashable
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+from brakecli.branches.multipliers import Complex
+from brakecli.branches.problem import Array
+
+TURN, FOLD, FLIP, TORUS = range(4)
+"""Places in `Point.tests`."""
+
+
+@dataclass(slots=True, eq=False)
+class Point:
+    """A motion on a branch."""
+
+    z: Array
+    """(n + 1,), the unknowns and the parameter."""
+    tangent: Array
+    """(n + 1,), of length one, in the direction of rising s."""
+    s: float
+    """Length along the branch from its first point, in the charts of the points."""
+    multipliers: Complex
+    stable: bool
+    tests: tuple[float, float, float, float]
+    """dp/ds; asinh of det(I - M), of det(I + M), and of the bialternate product."""
+    coefficients: tuple[float, ...]
+    """asinh of the coefficients of the characteristic polynomial."""
+    orientation: tuple[float, float]
+    """Sign, and logarithm of the modulus, of the determinant of the derivatives bordered by the tangent."""
+    word: Hashable
+    facts: Any
+    chart: object
+    maps: Array
+    margins: tuple[float, ...]
+
+    @property
+    def u(self) -> Array:
+        """The unknowns."""
+        return self.z[:-1]
+
+    @property
+    def p(self) -> float:
+        """The parameter, 0..1."""
+        return float(self.z[-1])
+
+    def turned(self) -> "Point":
+        """The same point of the branch walked the other way."""
+        turn, *others = self.tests
+        sign, log = self.orientation
+        return replace(
+            self,
+            tangent=-self.tangent,
+            s=-self.s,
+            tests=(-turn, others[0], others[1], others[2]),
+            orientation=(-sign, log),
+        )
+
+
+class End(NamedTuple):
+    """Why a branch ends."""
+
+    kind: str
+    """range, closed, lost, stopped, points, seconds, interrupted, or start, where it was not followed further."""
+    reason: str
+    """For a reader."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Special:
+    """A point at which something changes."""
+
+    kind: str
+    """fold, branch point, flip, torus, grazing or end."""
+    p: float
+    error: float
+    """Bound or estimate of the error of p, by the bracket or by the last change."""
+    point: Point
+    s: float
+    name: str = ""
+    """What is grazed, or the reason of the end."""
+    turns: bool = False
+    """Whether the parameter turns here."""
+
+
+@dataclass(slots=True, eq=False)
+class Branch:
+    """A followed branch.
+
+    Where the problem took a new chart, the same motion stands twice, once in each chart, at the same s.
+    """
+
+    points: list[Point]
+    specials: list[Special]
+    ended: tuple[End, End]
+    """At the first point and at the last one."""
+    evaluations: int
+    unsearched: str = ""
+    """Why the search for special points is incomplete; empty where it is complete."""
