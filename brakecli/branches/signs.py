@@ -166,7 +166,7 @@ def _suspects(points: list[Point], everywhere: bool, margins: bool) -> list[tupl
 
 
 def _near_zeros(s: Array, tests: Array, everywhere: bool) -> list[tuple[int, float]]:
-    """The same for one smooth piece.
+    """Strides of one smooth piece, its parts as above.
 
     The model is the cubic through the four nearest points, and its doubt is twice its distance from the two
     parabolas through three of them. With fewer points the model is of lower degree and compared with the degree
@@ -205,8 +205,8 @@ def _near_zeros(s: Array, tests: Array, everywhere: bool) -> list[tuple[int, flo
     before, least, after = (np.take_along_axis(floor, middle + j, axis=1)[:, 0] for j in range(3))
     # the bottom of the parabola through the least value and its neighbours: a window may lie between two places
     bend, slope = after - 2.0 * least + before, after - before
-    round_ = bend > np.abs(slope) / 2.0
-    offset = np.where(round_, -0.5 * slope / np.where(round_, bend, 1.0), 0.0)
+    curved = bend > np.abs(slope) / 2.0
+    offset = np.where(curved, -0.5 * slope / np.where(curved, bend, 1.0), 0.0)
     least = least + 0.25 * slope * offset
     place = (middle[:, 0] + 1 + offset) / (len(GRID) - 1)
     suspect = same & (least <= 0.0)
@@ -226,7 +226,7 @@ def _changes(newton: Newton, one: Point, other: Point) -> list[Special]:
     turns = _differ(one, other, TURN)
     if turns:
         found.append(_located(newton, one, other, "fold", lambda point: point.tests[TURN]))
-    # otherwise the multipliers know nothing of it
+    # a change of the bordered determinant that neither p nor det(I - M) shows is none of the motion
     if one.orientation[0] * other.orientation[0] < 0.0 and (turns or _differ(one, other, FOLD)):
         top = max(one.orientation[1], other.orientation[1])
         found.append(_located(newton, one, other, "branch point", lambda point: _determinant(point, top)))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from brakecli.branches.follow import both_ways, follow
-from brakecli.branches.newton import Settings, start
+from brakecli.branches.newton import Newton, Settings, start
 from brakecli.branches.point import Branch, Point
 from brakecli.branches.problem import Array, Problem, Seen
 from tests.branches.problems import Roots, Scaled
@@ -182,6 +182,26 @@ def test_a_border_is_passed_where_the_branch_bends_or_turns(
     assert abs(grazing.p - 0.5) <= grazing.error <= 2e-6
     assert branch.points[-1].p == ends
     assert branch.points[-1].u[0] == pytest.approx((ends - 0.5) / (1.0 - right), rel=1e-9)
+
+
+def test_the_derivative_by_the_parameter_is_that_of_the_new_word() -> None:
+    # u = p - 0.5 below the border and u = 3 (p - 0.5) above it: only the derivative by p changes
+    problem = Roots(
+        lambda u, p: [u[0] - (3.0 if p > 0.5 else 1.0) * (p - 0.5)],
+        lambda u, p: [[1.0]],
+        lambda u, p: [-3.0 if p > 0.5 else -1.0],
+        word=lambda u, p: p > 0.5,
+    )
+    branch = follow(problem, first_of(problem, [-0.25], 0.25), 1.0)
+    assert kinds(branch) == ["grazing", "end"]
+    for point in branch.points:
+        slope = 3.0 if point.p > 0.5 else 1.0
+        assert point.tangent[0] == pytest.approx(slope * point.tangent[1], rel=1e-9)
+    # from a guess below the border to the point above it at u = 0.05
+    across = np.array([1.0, 0.0])
+    found = Newton(problem, Settings()).solved(np.array([0.05, 0.49]), across, across, 0.0)
+    assert found is not None
+    assert found.p == pytest.approx(0.5 + 0.05 / 3.0, abs=1e-12)
 
 
 def test_a_branch_that_jumps_is_lost_at_the_border() -> None:
