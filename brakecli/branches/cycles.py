@@ -1,0 +1,275 @@
+"""Limit cycles of a shoe on smooth pads, as motions that the engine follows.
+
+The unknowns are a state on the cycle and the period T. The gap is the state after T less the state before, and
+where the state lies along the cycle: on the plane of a chart across the flow. That takes the place of a section
+ẋ = 0, whose crossings appear and vanish along a branch. States count from steady sliding at the same parameter, in
+sizes of the motion, so that a branch is straight where the cycle moves along with steady sliding.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from brakecli.branches.line import Line
+from brakecli.branches.point import Point
+from brakecli.branches.problem import Array, Guess, Problem, Seen
+from brakecli.errors import CaseError
+from brakecli.solver.automaton import BACKWARD, FORWARD, OPEN, STICK
+from brakecli.solver.flow.smooth import DONE, EVENTFUL, GRAZED, SmoothFlow
+from brakecli.solver.steady_sliding import steady_sliding
+
+DIFFERENCE = 1e-6
+"""Change of the parameter for derivatives by it. They are exact to its square, and to 1e-10 by rounding."""
+LEANS = 0.9
+"""Cosine between the flow and the normal of its plane below which a new plane is taken."""
+NEAR = 0.03
+"""Part of the period within which no event may lie beside the anchor, as a border would be seen there."""
+GROWN = 2.0
+"""Change of size after which a new chart is taken."""
+SHIFT = 1e-6
+"""Length along the branch by which a point is moved to carry its direction to another chart."""
+PERIODS = 1e-3, 400.0
+"""Periods of a chart between which a period is sought."""
+
+
+class Cycle(NamedTuple):
+    """What a limit cycle shows (SI units)."""
+
+    period: float
+    amplitude: float  # half of peak to peak of x
+    stick_fraction: float
+    contact_loss_fraction: float
+    state: tuple[float, ...]  # x, y, v_x and v_y at its anchor
+    times: tuple[float, ...]  # of its events, from there
+    word: tuple[int, ...]  # phases, from there
+    lean: float  # cosine between the flow and the normal of the plane
+
+    @property
+    def frequency(self) -> float:
+        """Hz."""
+        return 1.0 / self.period
+
+
+@dataclass(frozen=True, eq=False)
+class Chart:
+    """How unknowns are to be read: the plane through `place` across `normal`, scales, time (s), size (m)."""
+
+    place: Array
+    normal: Array
+    scales: Array
+    time: float
+    size: float
+    basis: Array  # (4, 3), of the plane
+
+
+def cyclic(word: tuple[int, ...]) -> tuple[int, ...]:
+    """The phases of a cycle, whichever of them it is read from."""
+    word = word[:-1] if len(word) > 1 and word[-1] == word[0] else word
+    return min(word[k:] + word[:k] for k in range(len(word)))
+
+
+class Cycles(Problem):
+    """Limit cycles along a line of cases on smooth pads."""
+
+    chart: Chart
+
+    def __init__(self, line: Line, periods: int = 1) -> None:
+        """`periods`: of the motions from which these have been doubled."""
+        self.line, self.periods = line, periods
+        self.flow = lru_cache(maxsize=16)(lambda p: SmoothFlow(line.system(p)))
+        self.rest = lru_cache(maxsize=64)(self._rest)
+
+    def _rest(self, p: float) -> Array:
+        found = steady_sliding(self.line.system(p))
+        return np.array([found.x, found.y, 0.0, 0.0])
+
+    def _flown(self, u: Array, p: float, chart: Chart, derivative: bool = True) -> SmoothFlow | str:
+        """The flow over the period that is sought, or why there is none."""
+        periods = u[4]
+        if not PERIODS[0] < periods < PERIODS[1]:
+            return "the period vanishes, or grows without bound"
+        try:
+            flow, rest = self.flow(p), self.rest(p)
+        except CaseError as error:
+            return str(error)
+        how = flow(rest + u[:4] * chart.scales, periods * chart.time, derivative)
+        if how == DONE:
+            return flow
+        return {GRAZED: "an event is grazed", EVENTFUL: "there are too many events in a period"}.get(
+            how, "the period grows without bound"
+        )
+
+    def evaluate(self, u: Array, p: float, with_parameter: bool) -> Seen | str | None:
+        """Carry the state over the period; the gap, its derivatives and M across the flow."""
+        chart, flow = self.chart, self._flown(u, p, self.chart)
+        if isinstance(flow, str):
+            return flow
+        rest, path, scales = self.rest(p), flow.path, chart.scales
+        matrix = flow.derivative * scales / scales[:, None]
+        end = (flow.state - rest) / scales
+        speed, begin = path.velocity / scales, path.start / scales
+        by_u, gap = np.zeros((5, 5)), np.empty(5)
+        by_u[:4, :4], by_u[:4, 4], by_u[4, :4] = matrix, speed * chart.time, chart.normal
+        by_u[0, 0], by_u[1, 1], by_u[2, 2], by_u[3, 3] = (matrix[k, k] - 1.0 for k in range(4))
+        gap[:4], gap[4] = end - u[:4], chart.normal @ (u[:4] - chart.place)
+        across = float(chart.normal @ speed)
+        if across == 0.0:
+            return "the flow runs along its plane"
+        moved = matrix @ chart.basis
+        on_plane = moved - np.outer(speed / across, chart.normal @ moved)
+        word, spent, period = flow.word, path.spent, path.time
+        facts = Cycle(
+            period,
+            0.5 * float(path.high[0] - path.low[0]),
+            float(spent[STICK]) / period,
+            float(spent[OPEN]) / period,
+            tuple((rest + u[:4] * scales).tolist()),
+            flow.times,
+            word,
+            float(chart.normal @ begin) / math.sqrt(begin @ begin),
+        )
+        margins = self._margins(p, word, path.low, path.high)
+        by_p = self._by_p(u, p, end, word) if with_parameter else None
+        if with_parameter and by_p is None:
+            return "the derivative by the parameter meets a border, or the end of what is valid"
+        return Seen(gap, by_u, by_p, (chart.basis.T @ on_plane)[None], cyclic(word), facts, margins)
+
+    def _by_p(self, u: Array, p: float, end: Array, word: tuple[int, ...]) -> Array | None:
+        """The derivative of the gap by p, of the same sequence of events: central, or else to one side."""
+        sides = {}
+        for step in (DIFFERENCE, -DIFFERENCE, 0.03 * DIFFERENCE, -0.03 * DIFFERENCE):
+            if not 0.0 <= p + step <= 1.0:
+                continue
+            flow = self._flown(u, p + step, self.chart, derivative=False)
+            if isinstance(flow, str) or flow.word != word:
+                continue
+            sides[step] = (flow.state - self.rest(p + step)) / self.chart.scales
+            if -step in sides:
+                return np.append((sides[abs(step)] - sides[-abs(step)]) / (2.0 * abs(step)), 0.0)
+        for step, there in sides.items():
+            return np.append((there - end) / step, 0.0)
+        return None
+
+    def _margins(self, p: float, word: tuple[int, ...], low: Array, high: Array) -> tuple[float, ...]:
+        """How far a cycle in slip alone is from stick, and one that does not fly from flight, of order one."""
+        found, system = [], self.line.system(p)
+        sliding = BACKWARD if system.belt_speed > 0.0 else FORWARD
+        if not set(word) - {sliding, OPEN}:
+            fastest = high[2] if sliding == BACKWARD else low[2]
+            found.append(1.0 - float(fastest) / system.belt_speed)
+        if OPEN not in word:
+            found.append(float(high[1]) / float(self.rest(p)[1]))
+        return tuple(found)
+
+    def chart_at(self, u: Array, p: float, scales: Array, time: float, size: float) -> Chart | None:
+        """A chart whose plane lies across the flow at a place; None where nothing moves there."""
+        try:
+            flow = self.flow(p)
+        except CaseError:
+            return None
+        flow(self.rest(p) + u[:4] * scales, 1e-9 * time, False)
+        speed = flow.path.start / scales
+        length = math.sqrt(speed @ speed)
+        if not length > 0.0:
+            return None
+        normal = speed / length
+        basis = np.linalg.svd(normal[None])[2][1:].T
+        return Chart(u[:4].copy(), normal, scales, time, size, basis)
+
+    def renewed(self, point: Point) -> Guess | None:
+        """A chart of the present size, with its anchor far from events, where either has become necessary."""
+        cycle, chart = point.facts, point.chart
+        assert isinstance(cycle, Cycle)
+        assert isinstance(chart, Chart)
+        times = cycle.times or (cycle.period,)
+        near = min(times[0], cycle.period - times[-1] if cycle.times else cycle.period) < NEAR * cycle.period
+        grown = cycle.amplitude / chart.size
+        if not near and 1.0 / GROWN < grown < GROWN and cycle.lean > LEANS:
+            return None
+        ahead = _longest_slip(cycle) if near else 0.0
+        if ahead is None:
+            return None
+        scales = chart.scales * grown
+        u = self._moved(point.z, chart, ahead, scales, cycle.period)
+        beside = self._moved(point.z + SHIFT * point.tangent, chart, ahead, scales, cycle.period)
+        if u is None or beside is None:
+            return None
+        new = self.chart_at(u, point.p, scales, cycle.period, cycle.amplitude)
+        if new is None:
+            return None
+        self.chart = new
+        direction = np.append((beside - u) / SHIFT, point.tangent[5])
+        speed = new.normal  # of length one: what the plane takes away of the direction lies along it
+        direction[:4] -= speed * (new.normal @ direction[:4])
+        return u, direction
+
+    def _moved(self, z: Array, chart: Chart, ahead: float, scales: Array, time: float) -> Array | None:
+        """A point of a chart, carried ahead (s) by the flow, in other scales."""
+        p = min(max(float(z[5]), 0.0), 1.0)
+        state = self.rest(p) + z[:4] * chart.scales
+        if ahead > 0.0:
+            flow = self.flow(p)
+            if flow(state, ahead, False) != DONE:
+                return None
+            state = flow.state
+        return np.append((state - self.rest(p)) / scales, z[4] * chart.time / time)
+
+    def carried(self, point: Point, chart: object) -> Guess | None:
+        """A point in another chart: the place where its cycle passes that plane nearest to the chart's anchor."""
+        assert isinstance(chart, Chart)
+        cycle, flow, rest = point.facts, self.flow(point.p), self.rest(point.p)
+        assert isinstance(cycle, Cycle)
+        state, best = np.array(cycle.state), (math.inf, 0.0)
+        for part in np.linspace(0.0, 1.0, 257)[:-1]:
+            if flow(state, max(part, 1e-12) * cycle.period, False) != DONE:
+                return None
+            off = (flow.state - rest) / chart.scales - chart.place
+            best = min(best, (float(off @ off), float(part)))
+        ahead = best[1] * cycle.period
+        for _ in range(8):  # Newton's method for the time at which the plane is passed
+            if flow(state, max(ahead % cycle.period, 1e-12 * cycle.period), False) != DONE:
+                return None
+            off, speed = (flow.state - rest) / chart.scales - chart.place, flow.path.velocity / chart.scales
+            ahead -= float(chart.normal @ off) / float(chart.normal @ speed)
+        ahead %= cycle.period
+        if flow(state, max(ahead, 1e-12 * cycle.period), False) != DONE:
+            return None
+        u = np.append((flow.state - rest) / chart.scales, cycle.period / chart.time)
+        old = point.chart
+        assert isinstance(old, Chart)
+        beside = self._moved(point.z + SHIFT * point.tangent, old, ahead, chart.scales, chart.time)
+        if beside is None:
+            return None
+        direction = np.append((beside - u) / SHIFT, point.tangent[5])
+        speed = flow.path.velocity / chart.scales
+        direction[:4] -= speed * (chart.normal @ direction[:4]) / (chart.normal @ speed)
+        return u, direction
+
+    def border(self, before: object, after: object) -> str:
+        """What one of two sequences of phases has more of: stick, or flight."""
+        assert isinstance(before, tuple)
+        assert isinstance(after, tuple)
+        changes = [(after.count(phase) - before.count(phase), phase) for phase in (STICK, OPEN)]
+        if changes[1][0]:
+            return "grazing flight"
+        return "grazing stick" if changes[0][0] or before != after else "sequence of events changes"
+
+    def doubled(self, point: Point, vector: Array) -> Guess:
+        """The motion of twice the period, displaced along the eigenvector of -1."""
+        chart = point.chart
+        assert isinstance(chart, Chart)
+        self.chart = replace(chart, time=2.0 * chart.time)
+        return point.u, np.append(chart.basis @ vector, [0.0, 0.0])
+
+
+def _longest_slip(cycle: Cycle) -> float | None:
+    """The time (s) from the anchor to the middle of the longest phase in which the shoe does not stick."""
+    times = [*cycle.times, cycle.period + (cycle.times[0] if cycle.times else 0.0)]
+    spans = [(times[k + 1] - times[k], times[k]) for k in range(len(cycle.times)) if cycle.word[k + 1] != STICK]
+    if not spans:
+        return None
+    length, begin = max(spans)
+    return (begin + 0.5 * length) % cycle.period

@@ -1,0 +1,168 @@
+"""Steady sliding along a line of cases: its eigenvalues, where it flutters or diverges, and the cycles born there."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
+
+import numpy as np
+
+from brakecli.analysis.stability.modes import Complex, eigensystem, is_undamped, routh_hurwitz
+from brakecli.branches.cycles import Cycles
+from brakecli.branches.line import Line
+from brakecli.branches.newton import start
+from brakecli.branches.point import Point
+from brakecli.errors import CaseError
+from brakecli.solver.steady_sliding import SteadySliding, steady_sliding, tabulated
+
+PLACES = 129
+"""Places at which steady sliding is looked at; between them a test that may vanish twice is followed down."""
+HALVINGS = 50
+SEARCHES = 30
+GOLDEN = 0.3819660112501051
+BELOW_GRAZING = 0.9
+"""Part of the amplitude that grazes at which the family of linear vibrations is begun."""
+PHASES = 720
+"""Phases of a linear vibration at which its extremes are looked at."""
+
+
+@dataclass(frozen=True, slots=True)
+class Slide:
+    """Steady sliding at a place of the line; no eigenvalues (1/s) where there is none."""
+
+    p: float
+    eigenvalues: Complex | None
+    vectors: Complex | None
+    rest: SteadySliding | None
+    tests: tuple[float, float]
+    """Of divergence and of flutter: smooth, and positive where there is neither; NaN without steady sliding."""
+
+    @property
+    def stable(self) -> bool:
+        """Whether all disturbances decay."""
+        return min(self.tests) > 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """A place at which steady sliding changes its stability."""
+
+    kind: str  # flutter or divergence
+    p: float
+    error: float  # half the width of its bracket
+    frequency: float  # Hz; 0 for divergence
+    lost: bool  # as p grows, or regained
+
+
+class Sliding:
+    """Steady sliding along a line of cases, on a wheel that turns."""
+
+    def __init__(self, line: Line) -> None:
+        """Nothing is computed yet."""
+        self.line = line
+        self.at = lru_cache(maxsize=1024)(self._at)
+
+    def _at(self, p: float) -> Slide:
+        """Steady sliding at a place."""
+        nothing = Slide(p, None, None, None, (math.nan, math.nan))
+        try:
+            system = self.line.system(p)
+            rest = steady_sliding(system, mean=None if system.smooth else tabulated(system))
+        except CaseError:
+            return nothing
+        if system.belt_speed == 0.0 or not rest.is_pressed(system.load_at_start):
+            return nothing
+        c, grip = system.coefficients, math.copysign(system.coefficients.phi, system.belt_speed)
+        b, links = (c.b_xx, c.b_xy, c.b_yy), (c.c_xx, c.c_xy, c.c_yy)
+        determinant, apart = routh_hurwitz(c.m, b, links, rest.stiffness, grip, damped=not is_undamped(c))
+        values, vectors = eigensystem(c, rest.stiffness, grip)
+        return Slide(p, values, vectors, rest, (float(determinant), float(apart)))
+
+    def along(self, places: int = PLACES) -> list[Slide]:
+        """Steady sliding along the whole line, with further places where a test has its extremes."""
+        found = [self.at(k / (places - 1)) for k in range(places)]
+        more = []
+        for one, middle, other in zip(found, found[1:], found[2:], strict=False):
+            for test in range(2):
+                a, b, c = (each.tests[test] for each in (one, middle, other))
+                if math.copysign(1.0, a) == math.copysign(1.0, b) == math.copysign(1.0, c) and abs(b) < min(
+                    abs(a), abs(c)
+                ):
+                    more.append(self._extreme(one.p, other.p, test, math.copysign(1.0, b)))
+        return sorted([*found, *more], key=lambda slide: slide.p)
+
+    def _extreme(self, left: float, right: float, test: int, sign: float) -> Slide:
+        """The place between two at which a test is nearest to zero, or beyond it; by the golden section."""
+
+        def height(p: float) -> float:
+            return sign * self.at(p).tests[test]
+
+        a, b = left + GOLDEN * (right - left), right - GOLDEN * (right - left)
+        at_a, at_b = height(a), height(b)
+        for _ in range(SEARCHES):
+            if min(at_a, at_b) < 0.0:
+                break
+            if at_a < at_b:
+                right, b, at_b = b, a, at_a
+                a = left + GOLDEN * (right - left)
+                at_a = height(a)
+            else:
+                left, a, at_a = a, b, at_b
+                b = right - GOLDEN * (right - left)
+                at_b = height(b)
+        return self.at(a if at_a < at_b else b)
+
+    def changes(self, slides: list[Slide]) -> list[Change]:
+        """Where stability is lost or regained, in the order of p."""
+        found = []
+        for one, other in pairwise(slides):
+            if one.eigenvalues is None or other.eigenvalues is None or one.stable == other.stable:
+                continue
+            low, high = _bisected(lambda p: self.at(p).stable, one.p, other.p)
+            lost = self.at(high if one.stable else low)
+            assert lost.eigenvalues is not None
+            fastest = lost.eigenvalues[int(np.argmax(lost.eigenvalues.real))]
+            flutters = min(lost.tests) == lost.tests[1] or lost.tests[0] > 0.0
+            frequency = abs(float(fastest.imag)) / (2.0 * math.pi) if flutters else 0.0
+            kind = "flutter" if flutters else "divergence"
+            found.append(Change(kind, 0.5 * (low + high), 0.5 * (high - low), frequency, one.stable))
+        return found
+
+    def vibration(self, cycles: Cycles, change: Change) -> Point | None:
+        """A motion of the family of linear vibrations that a smooth pad has where it flutters.
+
+        All amplitudes exist there, up to that which grazes the wheel's velocity or the clear pad. The tangent of the
+        point leads to larger ones.
+        """
+        slide, system = self.at(change.p), self.line.system(change.p)
+        if slide.eigenvalues is None or slide.vectors is None or slide.rest is None:
+            return None
+        which = int(np.argmin(np.abs(slide.eigenvalues - 2j * math.pi * change.frequency)))
+        omega, shape = float(slide.eigenvalues[which].imag), slide.vectors[:, which]
+        turning = np.exp(2j * math.pi * np.arange(PHASES) / PHASES)
+        w = (np.concatenate([shape, 1j * omega * shape])[:, None] * turning).real
+        ahead = w[2] * math.copysign(1.0, system.belt_speed)
+        stick, flight = abs(system.belt_speed) / ahead.max(), -slide.rest.y / w[1].max()
+        size = BELOW_GRAZING * min(stick, flight)
+        touch = int(np.argmax(ahead if stick < flight else w[1]))
+        mode = size * w[:, (touch + PHASES // 2) % PHASES]  # far from where it will graze
+        length = size * float(np.abs(w[:2]).max())
+        scales = length * np.array([1.0, 1.0, omega, omega])
+        u, time = np.append(mode / scales, 1.0), 2.0 * math.pi / omega
+        chart = cycles.chart_at(u, change.p, scales, time, 0.5 * size * float(np.ptp(w[0])))
+        if chart is None:
+            return None
+        cycles.use(chart)
+        return start(cycles, u, change.p, np.append(mode / scales, [0.0, 0.0]))
+
+
+def _bisected(test: Callable[[float], bool], low: float, high: float) -> tuple[float, float]:
+    """The bracket of a change of a test between two places, halved to rounding."""
+    at_low = test(low)
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        if not low < middle < high:
+            break
+        low, high = (middle, high) if test(middle) == at_low else (low, middle)
+    return low, high
