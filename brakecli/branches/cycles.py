@@ -19,10 +19,11 @@ from brakecli.branches.problem import Array, Guess, Problem, Seen
 from brakecli.errors import CaseError
 from brakecli.solver.automaton import BACKWARD, FORWARD, OPEN, STICK
 from brakecli.solver.flow.smooth import DONE, EVENTFUL, GRAZED, SmoothFlow
-from brakecli.solver.steady_sliding import steady_sliding
+from brakecli.solver.system import longest_step
 
-DIFFERENCE = 1e-6
-"""Change of the parameter for derivatives by it. They are exact to its square, and to 1e-10 by rounding."""
+DIFFERENCE = 1e-7
+"""Change of the parameter for derivatives by it, to one side: straddling a border would mix two motions. Newton's
+method needs them to some digits only, and folds are where the derivative by the unknowns is singular."""
 LEANS = 0.9
 """Cosine between the flow and the normal of its plane below which a new plane is taken."""
 NEAR = 0.03
@@ -79,12 +80,17 @@ class Cycles(Problem):
     def __init__(self, line: Line, periods: int = 1) -> None:
         """`periods`: of the motions from which these have been doubled."""
         self.line, self.periods = line, periods
-        self.flow = lru_cache(maxsize=16)(lambda p: SmoothFlow(line.system(p)))
+        self.flow = lru_cache(maxsize=16)(self._flow)
         self.rest = lru_cache(maxsize=64)(self._rest)
 
+    def _flow(self, p: float) -> SmoothFlow:
+        shoe = self.line.shoe(p)
+        return SmoothFlow(*shoe, longest_step(shoe.coefficients, shoe.stiffness))
+
     def _rest(self, p: float) -> Array:
-        found = steady_sliding(self.line.system(p))
-        return np.array([found.x, found.y, 0.0, 0.0])
+        """Steady sliding, from which states count."""
+        x, y = self.line.shoe(p).rest or (math.nan, math.nan)
+        return np.array([x, y, 0.0, 0.0])
 
     def _flown(self, u: Array, p: float, chart: Chart, derivative: bool = True) -> SmoothFlow | str:
         """The flow over the period that is sought, or why there is none."""
@@ -138,28 +144,21 @@ class Cycles(Problem):
         return Seen(gap, by_u, by_p, (chart.basis.T @ on_plane)[None], cyclic(word), facts, margins)
 
     def _by_p(self, u: Array, p: float, end: Array, word: tuple[int, ...]) -> Array | None:
-        """The derivative of the gap by p, of the same sequence of events: central, or else to one side."""
-        sides = {}
+        """The derivative of the gap by p to the side on which the sequence of events is the same."""
         for step in (DIFFERENCE, -DIFFERENCE, 0.03 * DIFFERENCE, -0.03 * DIFFERENCE):
-            if not 0.0 <= p + step <= 1.0:
-                continue
-            flow = self._flown(u, p + step, self.chart, derivative=False)
-            if isinstance(flow, str) or flow.word != word:
-                continue
-            sides[step] = (flow.state - self.rest(p + step)) / self.chart.scales
-            if -step in sides:
-                return np.append((sides[abs(step)] - sides[-abs(step)]) / (2.0 * abs(step)), 0.0)
-        for step, there in sides.items():
-            return np.append((there - end) / step, 0.0)
+            if 0.0 <= p + step <= 1.0:
+                flow = self._flown(u, p + step, self.chart, derivative=False)
+                if not isinstance(flow, str) and flow.word == word:
+                    return np.append(((flow.state - self.rest(p + step)) / self.chart.scales - end) / step, 0.0)
         return None
 
     def _margins(self, p: float, word: tuple[int, ...], low: Array, high: Array) -> tuple[float, ...]:
         """How far a cycle in slip alone is from stick, and one that does not fly from flight, of order one."""
-        found, system = [], self.line.system(p)
-        sliding = BACKWARD if system.belt_speed > 0.0 else FORWARD
+        found, belt = [], self.line.shoe(p).belt
+        sliding = BACKWARD if belt > 0.0 else FORWARD
         if not set(word) - {sliding, OPEN}:
             fastest = high[2] if sliding == BACKWARD else low[2]
-            found.append(1.0 - float(fastest) / system.belt_speed)
+            found.append(1.0 - float(fastest) / belt)
         if OPEN not in word:
             found.append(float(high[1]) / float(self.rest(p)[1]))
         return tuple(found)

@@ -1,10 +1,13 @@
 """A case along a line: keys that take the same value, from one end of a range to the other."""
 
+import math
 from collections.abc import Sequence
 from copy import deepcopy
 from dataclasses import replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
+from typing import NamedTuple
 
+import numpy as np
 from pydantic import ValidationError
 
 from brakecli.case import wording
@@ -12,10 +15,46 @@ from brakecli.case.case import Case
 from brakecli.case.read import key_path, put
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError
+from brakecli.solver.compile import Floats
+from brakecli.solver.records import Coefficients
 from brakecli.solver.system import System
 
 MOST_KEPT = 64
 """Systems that are kept: those of one step of a branch, and of the differences around it."""
+ALONE = {"shoe", "wheel", "link1", "link2", "load", "friction", "contact"}
+"""Tables of a case that need not be read again where no key of theirs changes."""
+
+NODES = 33
+"""Chebyshev's nodes between which the numbers of shoes are interpolated."""
+_PLACES = 0.5 + 0.5 * np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
+_WEIGHTS = np.sin(np.pi * (np.arange(NODES) + 0.5) / NODES) * (-1.0) ** np.arange(NODES)
+
+EXACT = 1e-13
+"""Error of the interpolated numbers, relative to their largest, beyond which they are not used."""
+
+
+class Shoe(NamedTuple):
+    """The numbers that a shoe on smooth pads moves by, at constant speed and load (SI units)."""
+
+    coefficients: Coefficients
+    stiffness: float  # of the contact
+    belt: float  # speed
+    load: float
+
+    @classmethod
+    def of(cls, system: System) -> "Shoe":
+        """Those of a system."""
+        return cls(system.coefficients, system.contact_stiffness, system.belt_speed, system.load_at_start)
+
+    @property
+    def rest(self) -> tuple[float, float] | None:
+        """x and y (m) of steady sliding: (6)-(7) without motion are linear in full contact. None where it locks."""
+        c, k = self.coefficients, self.stiffness
+        s_xy, s_yy = c.c_xy + math.copysign(c.phi, self.belt) * k, c.c_yy + k
+        determinant, q_x, q_y = c.c_xx * s_yy - s_xy * c.c_xy, self.load * c.sin_beta, self.load * c.cos_beta
+        if not determinant > 0.0:
+            return None
+        return (s_xy * q_y - s_yy * q_x) / determinant, (c.c_xy * q_x - c.c_xx * q_y) / determinant
 
 
 class Line:
@@ -25,8 +64,12 @@ class Line:
         """`label` is what messages of problems call the line."""
         self.case, self.keys, self.low, self.high, self.label = case, tuple(keys), low, high, label
         self._paths = [key_path(key) for key in keys]
-        self._given = case.model_dump(exclude_unset=True)
+        given, touched = case.model_dump(exclude_unset=True), {path[0] for path in self._paths if path}
+        self._given = {
+            name: getattr(case, name) if name in ALONE - touched else table for name, table in given.items()
+        }
         self.system = lru_cache(maxsize=MOST_KEPT)(self._system)
+        self.smooth = case.roughness.shoe is None and case.roughness.wheel is None
 
     def value(self, p: float) -> float:
         """The value of the keys at p; both ends are met exactly."""
@@ -38,7 +81,9 @@ class Line:
 
     def case_at(self, p: float) -> Case:
         """The case at p; raises CaseError where it is not valid."""
-        data = deepcopy(self._given)
+        data = dict(self._given)
+        for path in self._paths:
+            data[path[0]] = deepcopy(self._given.get(path[0], {}))
         for path in self._paths:
             put(data, path, self.value(p), Case, kept=self._paths)
         try:
@@ -50,3 +95,37 @@ class Line:
     def _system(self, p: float) -> System:
         """The system at p; raises CaseError where the case is not valid."""
         return system_of(self.case_at(p))
+
+    def shoe(self, p: float) -> Shoe:
+        """The numbers of the shoe at p: interpolated where that is exact to rounding; reading a case takes longer.
+
+        Raises CaseError where the case is not valid.
+        """
+        if self._table is None:
+            return Shoe.of(self.system(p))
+        row = _interpolated(self._table, p).tolist()
+        return Shoe(Coefficients(*row[:-3]), *row[-3:])
+
+    @cached_property
+    def _table(self) -> Floats | None:
+        """The numbers at Chebyshev's nodes; None where they do not follow a polynomial through them."""
+        between = 0.5 * (_PLACES[1:] + _PLACES[:-1])[:: NODES // 6]
+        try:
+            table, exact = (
+                np.array([[*shoe.coefficients, *shoe[1:]] for shoe in map(Shoe.of, map(self.system, where))])
+                for where in (_PLACES.tolist(), between.tolist())
+            )
+        except CaseError:
+            return None
+        found = np.array([_interpolated(table, p) for p in between.tolist()])
+        return table if np.all(np.abs(found - exact) <= EXACT * np.abs(table).max(axis=0)) else None
+
+
+def _interpolated(table: Floats, p: float) -> Floats:
+    """The polynomial through a table's rows at Chebyshev's nodes, by the barycentric formula."""
+    away = p - _PLACES
+    nearest = int(np.argmin(np.abs(away)))
+    if away[nearest] == 0.0:
+        return np.asarray(table[nearest])
+    weights = _WEIGHTS / away
+    return np.asarray(weights @ table / weights.sum())

@@ -1,7 +1,6 @@
-"""Steady sliding along a line of cases: its eigenvalues, where it flutters or diverges, and the cycles born there."""
+"""Steady sliding along a line of cases: eigenvalues, where it flutters or diverges, and the cycles born there."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
@@ -14,11 +13,12 @@ from brakecli.branches.line import Line
 from brakecli.branches.newton import start
 from brakecli.branches.point import Point
 from brakecli.errors import CaseError
-from brakecli.solver.steady_sliding import SteadySliding, steady_sliding, tabulated
+from brakecli.solver.steady_sliding import PRESSED, steady_sliding, tabulated
 
 PLACES = 129
 """Places at which steady sliding is looked at; between them a test that may vanish twice is followed down."""
-HALVINGS = 50
+LOCATED = 1e-14
+"""Width of the bracket of a change."""
 SEARCHES = 30
 GOLDEN = 0.3819660112501051
 BELOW_GRAZING = 0.9
@@ -34,7 +34,7 @@ class Slide:
     p: float
     eigenvalues: Complex | None
     vectors: Complex | None
-    rest: SteadySliding | None
+    rest: tuple[float, float] | None
     tests: tuple[float, float]
     """Of divergence and of flutter: smooth, and positive where there is neither; NaN without steady sliding."""
 
@@ -65,18 +65,24 @@ class Sliding:
 
     def _at(self, p: float) -> Slide:
         """Steady sliding at a place."""
-        nothing = Slide(p, None, None, None, (math.nan, math.nan))
+        nothing, line = Slide(p, None, None, None, (math.nan, math.nan)), self.line
         try:
-            system = self.line.system(p)
-            rest = steady_sliding(system, mean=None if system.smooth else tabulated(system))
+            if line.smooth:
+                c, stiffness, belt, load = shoe = line.shoe(p)
+                pressed = (rest := shoe.rest) is not None and -stiffness * rest[1] > PRESSED * abs(load)
+            else:
+                system = line.system(p)
+                found = steady_sliding(system, mean=tabulated(system))
+                c, stiffness, belt = system.coefficients, found.stiffness, system.belt_speed
+                rest, pressed = (found.x, found.y), found.is_pressed(system.load_at_start)
         except CaseError:
             return nothing
-        if system.belt_speed == 0.0 or not rest.is_pressed(system.load_at_start):
+        if belt == 0.0 or not pressed:
             return nothing
-        c, grip = system.coefficients, math.copysign(system.coefficients.phi, system.belt_speed)
+        grip = math.copysign(c.phi, belt)
         b, links = (c.b_xx, c.b_xy, c.b_yy), (c.c_xx, c.c_xy, c.c_yy)
-        determinant, apart = routh_hurwitz(c.m, b, links, rest.stiffness, grip, damped=not is_undamped(c))
-        values, vectors = eigensystem(c, rest.stiffness, grip)
+        determinant, apart = routh_hurwitz(c.m, b, links, stiffness, grip, damped=not is_undamped(c))
+        values, vectors = eigensystem(c, stiffness, grip)
         return Slide(p, values, vectors, rest, (float(determinant), float(apart)))
 
     def along(self, places: int = PLACES) -> list[Slide]:
@@ -119,31 +125,37 @@ class Sliding:
         for one, other in pairwise(slides):
             if one.eigenvalues is None or other.eigenvalues is None or one.stable == other.stable:
                 continue
-            low, high = _bisected(lambda p: self.at(p).stable, one.p, other.p)
-            lost = self.at(high if one.stable else low)
+            test = 0 if one.tests[0] * other.tests[0] < 0.0 else 1
+            p, error = self._zero(test, one.p, other.p)
+            lost = self.at(p)
             assert lost.eigenvalues is not None
             fastest = lost.eigenvalues[int(np.argmax(lost.eigenvalues.real))]
-            flutters = min(lost.tests) == lost.tests[1] or lost.tests[0] > 0.0
-            frequency = abs(float(fastest.imag)) / (2.0 * math.pi) if flutters else 0.0
-            kind = "flutter" if flutters else "divergence"
-            found.append(Change(kind, 0.5 * (low + high), 0.5 * (high - low), frequency, one.stable))
+            frequency = abs(float(fastest.imag)) / (2.0 * math.pi) if test == 1 else 0.0
+            found.append(Change("divergence" if test == 0 else "flutter", p, error, frequency, one.stable))
         return found
+
+    def _zero(self, test: int, low: float, high: float) -> tuple[float, float]:
+        """Where a test passes zero between two places, and half the width of its bracket."""
+        from scipy.optimize import brentq
+
+        p = brentq(lambda p: self.at(p).tests[test], low, high, xtol=LOCATED, rtol=4.0 * math.ulp(1.0))
+        return float(p), LOCATED
 
     def vibration(self, cycles: Cycles, change: Change) -> Point | None:
         """A motion of the family of linear vibrations that a smooth pad has where it flutters.
 
-        All amplitudes exist there, up to that which grazes the wheel's velocity or the clear pad. The tangent of the
-        point leads to larger ones.
+        All amplitudes exist there, up to that which grazes the wheel's velocity or the clear pad. The tangent of
+        the point leads to larger ones.
         """
-        slide, system = self.at(change.p), self.line.system(change.p)
+        slide, belt = self.at(change.p), self.line.shoe(change.p).belt
         if slide.eigenvalues is None or slide.vectors is None or slide.rest is None:
             return None
         which = int(np.argmin(np.abs(slide.eigenvalues - 2j * math.pi * change.frequency)))
         omega, shape = float(slide.eigenvalues[which].imag), slide.vectors[:, which]
         turning = np.exp(2j * math.pi * np.arange(PHASES) / PHASES)
         w = (np.concatenate([shape, 1j * omega * shape])[:, None] * turning).real
-        ahead = w[2] * math.copysign(1.0, system.belt_speed)
-        stick, flight = abs(system.belt_speed) / ahead.max(), -slide.rest.y / w[1].max()
+        ahead = w[2] * math.copysign(1.0, belt)
+        stick, flight = abs(belt) / ahead.max(), -slide.rest[1] / w[1].max()
         size = BELOW_GRAZING * min(stick, flight)
         touch = int(np.argmax(ahead if stick < flight else w[1]))
         mode = size * w[:, (touch + PHASES // 2) % PHASES]  # far from where it will graze
@@ -155,14 +167,3 @@ class Sliding:
             return None
         cycles.use(chart)
         return start(cycles, u, change.p, np.append(mode / scales, [0.0, 0.0]))
-
-
-def _bisected(test: Callable[[float], bool], low: float, high: float) -> tuple[float, float]:
-    """The bracket of a change of a test between two places, halved to rounding."""
-    at_low = test(low)
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        if not low < middle < high:
-            break
-        low, high = (middle, high) if test(middle) == at_low else (low, middle)
-    return low, high

@@ -40,6 +40,12 @@ class Initial:
     from_equilibrium: bool = False
 
 
+def longest_step(c: Coefficients, stiffness: float) -> float:
+    """The longest exact step, s, by bounds of the fastest motion and of the fastest decay; stiffness in N/m."""
+    bound = c.c_xx + c.c_yy + 2.0 * abs(c.c_xy) + (1.0 + c.phi) * stiffness
+    return RADIANS / (math.sqrt(bound / c.m) + (c.b_xx + c.b_yy) / c.m)
+
+
 @dataclass(frozen=True, eq=False)
 class System:
     """What moves, for how long, and how that is solved; tables and kernels follow when they are first asked for.
@@ -182,10 +188,8 @@ class System:
 
     @property
     def longest_step(self) -> float:
-        """The longest exact step, s, by bounds of the fastest motion and of the fastest decay."""
-        c = self.coefficients
-        bound = c.c_xx + c.c_yy + 2.0 * abs(c.c_xy) + (1.0 + c.phi) * self.contact_stiffness
-        return RADIANS / (math.sqrt(bound / c.m) + (c.b_xx + c.b_yy) / c.m)
+        """The longest exact step, s."""
+        return longest_step(self.coefficients, self.contact_stiffness)
 
     @property
     def step(self) -> float:

@@ -53,7 +53,7 @@ def test_the_derivative_is_that_of_central_differences(number: int) -> None:
     chance, checked, seen = np.random.default_rng(25), 0, set[int]()
     while checked < number:
         for _, system in shoes(50):
-            (state, span), scales, flow = drawn(system, chance), scales_of(system), SmoothFlow(system)
+            (state, span), scales, flow = drawn(system, chance), scales_of(system), SmoothFlow.of(system)
             if flow(state, span) != DONE:
                 continue
             word, exact = flow.word, flow.derivative * scales / scales[:, None]
@@ -89,7 +89,7 @@ def test_the_derivative_is_that_of_central_differences(number: int) -> None:
 def test_within_one_phase_the_derivative_is_the_matrix_exponential() -> None:
     tables, system = shoes(1)[0]
     shoe, rest, span = Shoe.of(tables), steady_sliding(system), 1e-3
-    flow = SmoothFlow(system)
+    flow = SmoothFlow.of(system)
     assert flow(np.array([rest.x, rest.y, 0.0, 0.0]), span) == DONE
     a = np.zeros((4, 4))
     a[:2, 2:], a[2:, :2], a[2:, 2:] = np.eye(2), -shoe.stiffness / shoe.m, -shoe.b / shoe.m
@@ -106,7 +106,7 @@ def test_a_span_ends_where_a_run_of_the_other_scheme_does(number: int) -> None:
     chance = np.random.default_rng(26)
     for tables, system in shoes(number):
         state, span = drawn(system, chance)
-        flow, scales = SmoothFlow(system), scales_of(system)
+        flow, scales = SmoothFlow.of(system), scales_of(system)
         if flow(state, span, False) != DONE:
             continue
         x, y, vx, vy = state.tolist()
@@ -123,7 +123,7 @@ def test_a_span_ends_where_a_run_of_the_other_scheme_does(number: int) -> None:
 def test_a_flow_composes_of_its_parts_and_so_does_its_derivative() -> None:
     chance = np.random.default_rng(27)
     for _, system in shoes(20):
-        (state, span), flow, scales = drawn(system, chance), SmoothFlow(system), scales_of(system)
+        (state, span), flow, scales = drawn(system, chance), SmoothFlow.of(system), scales_of(system)
         if flow(state, span) != DONE:
             continue
         end, derivative, spent, part = flow.state, flow.derivative, flow.path.spent.sum(), chance.uniform(0.2, 0.8)
@@ -139,7 +139,7 @@ def test_a_flow_composes_of_its_parts_and_so_does_its_derivative() -> None:
 def test_the_velocity_at_both_ends_is_that_of_the_forces() -> None:
     """Eqs. (6) and (7) in steady sliding, from which nothing moves."""
     _, system = shoes(1)[0]
-    rest, flow, scales = steady_sliding(system), SmoothFlow(system), scales_of(system)
+    rest, flow, scales = steady_sliding(system), SmoothFlow.of(system), scales_of(system)
     assert flow(np.array([rest.x, rest.y, 0.0, 0.0]), 0.01) == DONE
     omega = 2.0 * np.pi * system.natural_frequencies[1]
     for velocity in (flow.path.start, flow.path.velocity):
@@ -149,7 +149,7 @@ def test_the_velocity_at_both_ends_is_that_of_the_forces() -> None:
 def test_least_margins_tell_how_near_a_motion_comes_to_stick_and_to_flight() -> None:
     """A motion of one mode in slip alone: its margins are least where a dense run of the same flow has them."""
     _, system = shoes(1)[0]
-    rest, flow = steady_sliding(system), SmoothFlow(system)
+    rest, flow = steady_sliding(system), SmoothFlow.of(system)
     start = np.array([rest.x + 0.05 * abs(rest.y), rest.y, 0.0, 0.0])
     span = 3.0 / system.natural_frequencies[0]
     assert flow(start, span) == DONE
@@ -170,7 +170,7 @@ def test_least_margins_tell_how_near_a_motion_comes_to_stick_and_to_flight() -> 
 def test_a_motion_of_too_many_events_is_given_up() -> None:
     """Stick-slip at a hundredth of the natural period and less would not end in 60 events."""
     for _, system in shoes(50):
-        flow, rest = SmoothFlow(system), steady_sliding(system)
+        flow, rest = SmoothFlow.of(system), steady_sliding(system)
         start = np.array([rest.x, rest.y, 0.0, 3.0 * abs(rest.y) * 2.0 * np.pi * system.natural_frequencies[1]])
         if flow(start, 1e3 / system.natural_frequencies[0]) == EVENTFUL:
             assert flow.path.events == MOST_EVENTS
@@ -180,4 +180,4 @@ def test_a_motion_of_too_many_events_is_given_up() -> None:
 
 def test_rough_pads_and_changing_speeds_are_refused() -> None:
     with pytest.raises(ValueError, match="smooth pads"):
-        SmoothFlow(system_of(make(ROUGH)))
+        SmoothFlow.of(system_of(make(ROUGH)))

@@ -244,20 +244,26 @@ def flow(c: Coefficients, m: Any, o: Any, span: float, tangents: int) -> int:
 
 
 class SmoothFlow:
-    """The flow of a system on smooth pads, at constant speed and load; one call after the other.
+    """The flow of a shoe on smooth pads, at constant speed and load; one call after the other.
 
     After a call `path` holds what is known of the way, `state` its end (x, y, v_x, v_y), and `derivative` that of
     the end by the begin: one row for each component of the end.
     """
 
-    def __init__(self, system: System) -> None:
-        """Raises ValueError where surfaces are rough, or where speed or load change."""
+    def __init__(self, c: Coefficients, stiffness: float, belt: float, load: float, step: float) -> None:
+        """From the contact's stiffness (N/m), U (m/s), Q (N) and the longest exact step (s)."""
+        self._coefficients, self._motion, self.path = c, new(FLOW), new(PATH)
+        self._motion.stiffness, self.path.h = stiffness, step
+        self._motion.z[BELT], self._motion.z[LOAD] = belt, load
+        self._state = self._motion.z[:4]
+
+    @classmethod
+    def of(cls, system: System) -> "SmoothFlow":
+        """The flow of a system; raises ValueError where surfaces are rough, or where speed or load change."""
         if not (system.smooth and system.steady):
             raise ValueError("the exact flow needs smooth pads, a constant speed and a constant load")
-        self._coefficients, self._motion, self.path = system.coefficients, new(FLOW), new(PATH)
-        self._motion.stiffness, self.path.h = system.contact_stiffness, system.longest_step
-        self._motion.z[BELT], self._motion.z[LOAD] = system.belt_speed, system.load_at_start
-        self._state = self._motion.z[:4]
+        acting = system.contact_stiffness, system.belt_speed, system.load_at_start
+        return cls(system.coefficients, *acting, system.longest_step)
 
     def __call__(self, state: Floats, span: float, tangents: bool = True) -> int:
         """Carry a state over a span (s), with its derivative unless that is not needed; how it ends, as `DONE`."""
