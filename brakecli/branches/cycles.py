@@ -21,9 +21,10 @@ from brakecli.solver.automaton import BACKWARD, FORWARD, OPEN, STICK
 from brakecli.solver.flow.smooth import DONE, EVENTFUL, GRAZED, SmoothFlow
 from brakecli.solver.system import longest_step
 
-DIFFERENCE = 1e-7
-"""Change of the parameter for derivatives by it, to one side: straddling a border would mix two motions. Newton's
-method needs them to some digits only, and folds are where the derivative by the unknowns is singular."""
+DIFFERENCE = 3e-6
+"""Change of the parameter for derivatives by it. Central ones are exact to 1e-10, which a shoe needs whose dashpots
+are so light that a multiplier stays near 1: the direction of its branch hangs on it. Straddling a border would mix
+two motions, so that there they are taken to one side."""
 LEANS = 0.9
 """Cosine between the flow and the normal of its plane below which a new plane is taken."""
 NEAR = 0.03
@@ -144,12 +145,19 @@ class Cycles(Problem):
         return Seen(gap, by_u, by_p, (chart.basis.T @ on_plane)[None], cyclic(word), facts, margins)
 
     def _by_p(self, u: Array, p: float, end: Array, word: tuple[int, ...]) -> Array | None:
-        """The derivative of the gap by p to the side on which the sequence of events is the same."""
+        """The derivative of the gap by p, of the same sequence of events: central, or else to one side."""
+        sides = {}
         for step in (DIFFERENCE, -DIFFERENCE, 0.03 * DIFFERENCE, -0.03 * DIFFERENCE):
-            if 0.0 <= p + step <= 1.0:
-                flow = self._flown(u, p + step, self.chart, derivative=False)
-                if not isinstance(flow, str) and flow.word == word:
-                    return np.append(((flow.state - self.rest(p + step)) / self.chart.scales - end) / step, 0.0)
+            if not 0.0 <= p + step <= 1.0:
+                continue
+            flow = self._flown(u, p + step, self.chart, derivative=False)
+            if isinstance(flow, str) or flow.word != word:
+                continue
+            sides[step] = (flow.state - self.rest(p + step)) / self.chart.scales
+            if -step in sides:
+                return np.append((sides[abs(step)] - sides[-abs(step)]) / (2.0 * abs(step)), 0.0)
+        for step, there in sides.items():
+            return np.append((there - end) / step, 0.0)
         return None
 
     def _margins(self, p: float, word: tuple[int, ...], low: Array, high: Array) -> tuple[float, ...]:

@@ -48,7 +48,7 @@ class Shoe(NamedTuple):
 
     @property
     def rest(self) -> tuple[float, float] | None:
-        """x and y (m) of steady sliding: (6)-(7) without motion are linear in full contact. None where it locks."""
+        """x and y (m) of steady sliding: (6)-(7) without motion, linear in full contact. None where it locks."""
         c, k = self.coefficients, self.stiffness
         s_xy, s_yy = c.c_xy + math.copysign(c.phi, self.belt) * k, c.c_yy + k
         determinant, q_x, q_y = c.c_xx * s_yy - s_xy * c.c_xy, self.load * c.sin_beta, self.load * c.cos_beta

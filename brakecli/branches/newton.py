@@ -40,12 +40,14 @@ class Settings:
     """
     exact: float = 1e-9
     """The same where a special point is located."""
+    clear: float = 1e-3
+    """Correction, times the ratio of corrections to gaps, that is the last one: about the error of the tangent."""
     iterations: int = 6
     """Evaluations for one correction."""
     trust: float = 0.3
     """Longest correction."""
-    stale: float = 1e-3
-    """Length over which a derivative by the parameter may be used again."""
+    stale: float = 3e-3
+    """Length, times that ratio, over which a derivative by the parameter may be used again."""
     steep: float = 0.02
     """Slope dp/ds below which that derivative is taken at the point, so that the sign of the slope is right."""
     points: int = 1500
@@ -98,7 +100,7 @@ class Newton:
         n = len(guess) - 1
         matrix, right = np.empty((n + 1, n + 1)), np.zeros((n + 1, 2))
         matrix[n], right[n, 1] = normal, 1.0
-        z, last, before = guess.copy(), math.inf, math.inf
+        z, last, before, lever = guess.copy(), math.inf, math.inf, 1.0
         by_p, word, taken = None, None, z
         near = settings.exact if exact else settings.near
         slack = 1e-9 * (settings.high - settings.low)
@@ -130,12 +132,15 @@ class Newton:
             # rounding of the gap may keep corrections from becoming still smaller
             stalled = size <= settings.near and size > 0.3 * before
             before = size
-            if size > near and not stalled:
+            # where two branches almost meet, a small gap asks for a long step, and the tangent turns as quickly
+            lever = max(lever, size / gap if gap > ROUNDING else 0.0)
+            if (size > near or size * lever > settings.clear) and not stalled:
                 z = z + step
                 continue
             # The last correction is made without another evaluation: its error is of the order of its square.
             if taken is not z and (
-                abs(tangent[n]) < settings.steep * length or float(np.abs(z - taken).max()) > settings.stale
+                abs(tangent[n]) < settings.steep * length
+                or float(np.abs(z - taken).max()) * lever > settings.stale
             ):
                 seen = self.evaluate(z, True)
                 if seen is None:
