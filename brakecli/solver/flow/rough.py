@@ -3,25 +3,26 @@
 The number of steps does not depend on the state, so the end is a smooth function of the state, of the span and of
 the parameters, as long as the sequence of phases is the same.
 
-**Contact.** The pad is cut into cells of equal length, and the gap f2 - f1 - y is a straight line in each of them.
-The force (2), its derivatives by x and y and the length that touches are then closed forms, and the force is
+**Contact.** The pad is cut into cells of equal length, and the gap f2 - f1 - y is a straight line in each of
+them. The force (2), its derivatives by x and y and the length that touches are then closed forms, and the force is
 continuously differentiable. The heights at the nodes are those of the surfaces times tan(ωc/2) / (ωc/2) for a cell
-of length c. With this factor the force of a pad that touches everywhere is exact. In partial contact the cells
-in which contact begins or ends have an error of order c³, which cancels on average as the edge passes through a cell.
-The end of a flow has an error of order c⁴. A wave is even or odd about the middle of the pad, so tables of one half
-are enough.
+of length c. With this factor the force of a pad that touches everywhere is exact. In partial contact the cells in
+which contact begins or ends have an error of order c³, which cancels on average as the edge passes through a
+cell. The end of a flow has an error of order c⁴. A wave is even or odd about the middle of the pad, so tables of
+one half are enough.
 
 **Events.** A phase ends where a margin becomes zero: in slip the sliding speed, in stick how far the friction that
-is needed lies within the friction cone. The event is located inside the step and divides it into two parts. Lift-off
-is no event, because the normal force is continuous. A margin that dips below zero and returns within one step is
-found by the cubic through its values and slopes.
+is needed lies within the friction cone. The event is located inside the step and divides it into two parts.
+Lift-off is no event, because the normal force is continuous. A margin that dips below zero and returns within one
+step is found by the cubic through its values and slopes.
 
-**Derivative.** Columns hold the derivatives of x, y, v_x and v_y by each component of the first state. They obey the
-variational equations, and the steps for them are the derivatives of the steps for the state. At an event the length
-p of a part of a step depends on the state: margin(z(p)) = 0 gives dp = -dm / (∂m/∂p). The disturbed motion then has
-dz + (∂z/∂p) dp, and reaches the event dp later. The next part begins later by dp and is shorter by dp. For short
-steps this is the saltation matrix (R. I. Leine, H. Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical
-Systems, Springer 2004, ch. 7). Here it is the exact derivative of the computed flow, whatever the step is.
+**Derivative.** Columns hold the derivatives of x, y, v_x and v_y by each component of the first state. They obey
+the variational equations, and their steps are the derivatives of the steps of the state. At an event the length p
+of a part of a step depends on the state: margin(z(p)) = 0 gives dp = -dm / (∂m/∂p). The disturbed motion then has
+dz + (∂z/∂p) dp, and reaches the event later by dp. The next part begins later by dp and is shorter by dp. For
+short steps this is the saltation matrix (R. I. Leine, H. Nijmeijer, Dynamics and Bifurcations of Non-Smooth
+Mechanical Systems, Springer 2004, ch. 7). Here it is the exact derivative of the computed flow, whatever the step
+is.
 """
 
 import math
@@ -52,8 +53,8 @@ STEPS_PER_PERIOD = 20  # of the fastest mode, or of the shortest wave that passe
 _STAGES = int(USED[1])
 _A, _B, _C = A[1, :_STAGES, :_STAGES].copy(), A[1, END_STAGE, :_STAGES].copy(), NODES[1, :_STAGES].copy()
 """DOPRI5, of order five. On 60 random rough pads its median error is a seventh of that of the classical method of
-order four at 160 evaluations of the contact to a period, and a fourth at 320. DOP853 is worse than both from 80 on,
-because the force of partial contact has kinks in its second derivative."""
+order four at 160 evaluations of the contact to a period, and a fourth at 320. From 320 on DOP853 is worse than
+both, because the force of partial contact has kinks in its second derivative."""
 
 _COLUMNS, _EIGHT, _FOUR = 4, 8, 4
 """Columns of the derivative; lanes of sines, and of nodes and waves in the tables."""
@@ -554,7 +555,7 @@ def _carry_to_event(c: Coefficients, f: Any, tables: Floats, h: float) -> int:
 
 @kernel(void(COEFFICIENTS, ROUGH_TYPE), inlined=False)
 def _take_hold(c: Coefficients, f: Any) -> None:
-    """The phase at `end`, where the shoe moves with the wheel: stick if friction can hold it, else slip, (3)-(5)."""
+    """The phase at `end`, where the shoe moves with the wheel: stick where friction can hold it, (3)-(5)."""
     f.end[V_X] = f.belt
     needed, bound = _needed(c, f, f.end[X], f.end[Y], f.belt, f.end[V_Y]), c.phi * f.force
     f.phase = STICK  # `_noise` is that of forces
@@ -655,11 +656,12 @@ def fly(c: Coefficients, f: Any, tables: Floats, h: float, steps: int) -> int:
 class Margins:
     """How near a flow comes to another sequence of phases, and how its pad touches; infinite where nothing counts.
 
-    `slide`: least sliding speed (m/s) inside phases of slip and at both ends of the span. `hold`: least distance (N)
-    of the force that stick takes from the friction cone, as stick begins, inside it, and at both ends of the span.
-    `pass_by`: least force (N) by which stick failed where slip reversed. Zeros at events do not count.
-    `contact` and `most_contact`: least and largest part of the pad that touches, at the ends of steps. `open_share`
-    and `stick_share`: parts of the span in which nothing touches, to half a step, and in which the shoe sticks.
+    `slide`: least sliding speed (m/s) inside phases of slip and at both ends of the span. `hold`: least distance
+    (N) of the force that stick takes from the friction cone, as stick begins, inside it, and at both ends of the
+    span. `pass_by`: least force (N) by which stick failed where slip reversed. Zeros at events do not count.
+    `contact` and `most_contact`: least and largest part of the pad that touches, at the ends of steps.
+    `open_share` and `stick_share`: parts of the span in which nothing touches, to half a step, and in which the
+    shoe sticks.
     """
 
     slide: float
