@@ -4,6 +4,7 @@ import math
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from brakecli.solver.motion import Motion, solve
 from brakecli.solver.period import common_period
 from brakecli.solver.schemes.piecewise_exact.phases import BACKWARD, FORWARD, STICK
 from brakecli.solver.system import Initial, System
+from tests.analysis.shoes import random_shoes
 from tests.campaign import counts
 from tests.examples import ROUGH, SQUEAL, make
 from tests.sweeps.shoes import drawn
@@ -286,7 +288,7 @@ def test_margins_are_those_of_samples() -> None:
 def test_a_phase_that_a_step_would_miss_is_found() -> None:
     """A stick that a coarse flow passes within one step has the times of a fine one."""
     system, state, span = slow()
-    fine, coarse = (RoughFlow(system)(state, 0.0, span, steps) for steps in (4000, 150))
+    fine, coarse = (RoughFlow(system)(state, 0.0, span, steps) for steps in (4000, 120))
     assert coarse.word == fine.word
     np.testing.assert_allclose(coarse.times, fine.times, atol=1e-3 * span)
 
@@ -319,3 +321,16 @@ def test_what_the_flow_cannot_do_is_refused() -> None:
         RoughFlow(system_of(changing))
     with pytest.raises(ValueError, match="cells are too few"):
         RoughFlow(system_of(make(ROUGH)), 10)
+
+
+@pytest.mark.parametrize("many", counts(15, 150))
+def test_no_flow_of_a_random_shoe_fails(many: int) -> None:
+    """Neither do phases that begin and end within one step pile up, nor do they graze."""
+    for seed, tables in enumerate(islice(random_shoes("open", 1), many)):
+        system, rng = system_of(Case.model_validate(tables)), np.random.default_rng(seed)
+        fast, passing = system.natural_frequencies[1], system.passing_frequency
+        span = min(20.0 / fast, 1500.0 / max(passing, fast))
+        start = np.array([system.initial.x, system.initial.y, system.initial.vx, system.initial.vy])
+        state = start + np.abs(scales(system)) * rng.normal(size=4)
+        found = RoughFlow(system)(state, 0.0, span, default_steps(system, span))
+        assert found.status is Status.DONE, seed

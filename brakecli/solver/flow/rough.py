@@ -430,13 +430,20 @@ def _margin_at(c: Coefficients, f: Any, tables: Floats, h: float, which: int) ->
 def _located(c: Coefficients, f: Any, tables: Floats, h: float, high: float, which: int) -> float:
     """The part of the step h at which a margin is zero; at its part `high` it is negative.
 
-    Newton's method, kept inside a bracket.
+    Newton's method, kept inside a bracket. A phase begins where its margin is zero: it must have risen before.
     """
     low, noise, begin = 0.0, _noise(c, f), f.margin[which]
-    if begin <= 0.0 and f.margin_rate[which] <= 0.0:
-        return 0.0
-    end = _margin_at(c, f, tables, high * h, which)
-    part = high * (begin / (begin - end) if begin > 0.0 else 0.5)
+    if begin > noise:
+        part = high * begin / (begin - _margin_at(c, f, tables, high * h, which))
+    else:
+        for _ in range(_SEEKS):
+            part = 0.5 * high
+            if _margin_at(c, f, tables, part * h, which) > 0.0:
+                low, part = part, 0.75 * high
+                break
+            high = part
+        if low == 0.0:
+            return 0.0
     for _ in range(_SEEKS):
         value = _margin_at(c, f, tables, part * h, which)
         if value > 0.0:
