@@ -28,14 +28,14 @@ is.
 import math
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
 from numba import float64, int64, types, void
 
 from brakecli import stop
-from brakecli.solver.compile import FAST, Floats, kernel, stopped, vector
+from brakecli.solver.compile import FAST, LARGEST, Floats, from_memory, into_memory, kernel, stopped, vector
 from brakecli.solver.contact.pad import aligned
 from brakecli.solver.double_double import two_product
 from brakecli.solver.records import COEFFICIENTS, V_X, V_Y, Coefficients, X, Y, new, record
@@ -609,9 +609,23 @@ def _begin(c: Coefficients, f: Any, tables: Floats) -> None:
     _advance(f)
 
 
-@kernel(int64(COEFFICIENTS, ROUGH_TYPE, vector, float64, int64))
-def fly(c: Coefficients, f: Any, tables: Floats, h: float, steps: int) -> int:
+class Parts(NamedTuple):
+    """What a flow works with: what is given, the record that it changes, and tables with scratch."""
+
+    c: Coefficients
+    f: Any
+    tables: Floats
+
+
+_PARTS = types.NamedTuple([COEFFICIENTS, ROUGH_TYPE, vector], Parts)
+_hold, _parts_at = into_memory(_PARTS), from_memory(_PARTS)
+
+
+@kernel(int64(int64, float64, int64))
+def fly(address: int, h: float, steps: int) -> int:
     """Take so many steps h (s) from the state `z`; a `Status`. The end is `end`, its derivatives `t_end`."""
+    p: Parts = _parts_at(address)
+    c, f, tables = p.c, p.f, p.tables
     _begin(c, f, tables)
     for n in range(steps):
         f.since, left = n * h, h
@@ -727,18 +741,20 @@ class RoughFlow:
         if not cell * system.most_turns < 0.5:
             raise ValueError(f"{cells} cells are too few: two and more to each wave are needed")
         self.system, self.cells = system, cells
-        self._coefficients, self._wheel = system.coefficients, system.wheel
         self._flow, self._tables = _prepared(system, cells)
         n, at = system.wheel.g.size, int(self._flow["angles_at"])
-        self._waves, self._angles = system.wheel.waves, self._tables[at : at + n]
+        self._belt, self._waves, self._angles = system.belt_speed, system.wheel.waves, self._tables[at : at + n]
+        self._memory = np.zeros(LARGEST, np.int8)
+        self._address = self._memory.ctypes.data
+        _hold(Parts(system.coefficients, self._flow, self._tables), self._address)
 
     def __call__(self, state: Floats, begin_time: float, span: float, steps: int, tangents: bool = True) -> Flown:
         """The flow from a state (x, y, v_x, v_y) at a time (s), over a span (s) in so many equal steps."""
         f = self._flow
-        travel, travel_low = two_product(self.system.belt_speed, begin_time)
+        travel, travel_low = two_product(self._belt, begin_time)
         wheel_angles(self._waves, travel, travel_low, self._angles)
         f["z"], f["tangents"] = state, int(tangents)
-        status = Status(fly(self._coefficients, f, self._tables, span / steps, steps))
+        status = Status(fly(self._address, span / steps, steps))
         events = int(f["events"])
         return Flown(
             status,
