@@ -197,6 +197,28 @@ def test_a_common_period_later_everything_is_the_same() -> None:
         assert np.abs((one.state - third.state) / size).max() > 1e-6
 
 
+@pytest.mark.parametrize("cells", [40, 96])
+@pytest.mark.parametrize("deeper", [1.2, 0.96])
+def test_the_force_of_a_pad_that_touches_everywhere_is_exact(cells: int, deeper: float) -> None:
+    """2ak (-y + Σ g2 sin(ω2 a) / (ω2 a) sin(ω2 (x - Ut) + phase) - mean of f1), by cells and in closed form."""
+    waves = {"amplitudes": [3e-5, 2e-5], "wavelengths": [0.03, 0.011], "phases_deg": [40.0, -75.0]}
+    shoe = {"amplitudes": [2e-5], "wavelengths": [0.019], "phases_deg": [65.0]}
+    system = system_of(make(ROUGH, roughness__wheel=waves, roughness__shoe=shoe))
+    c, a, time = system.coefficients, system.half_length, 0.705
+    x, y = 1e-5, -deeper * 7e-5  # the crests make 7e-5 m; a little less is not proved to touch, but it does
+    found = RoughFlow(system, cells)(np.array([x, y, 0.0, 0.0]), time, 1e-15, 1)
+    assert found.margins.contact == pytest.approx(1.0, abs=1e-15)
+    gap = -y
+    for sign, surface, at in ((1.0, system.wheel, x - system.belt_speed * time), (-1.0, system.shoe, 0.0)):
+        mean = np.sin(surface.omega * a) / (surface.omega * a)
+        gap += sign * float(np.sum(surface.g * mean * np.sin(surface.omega * at + surface.phase)))
+    along, across = c.phi * system.contact_stiffness * gap, system.contact_stiffness * gap
+    load = system.load_at_start
+    along -= c.c_xx * x + c.c_xy * y + load * c.sin_beta
+    across -= c.c_xy * x + c.c_yy * y + load * c.cos_beta
+    np.testing.assert_allclose(c.m * found.velocity[2:], [along, across], rtol=1e-9)
+
+
 def test_two_spans_are_one_after_the_other() -> None:
     system, state, span, _ = rough_shoe(3)
     flow = RoughFlow(system)

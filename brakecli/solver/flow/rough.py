@@ -177,22 +177,33 @@ def _sum_waves(f: Any, tables: Floats, even: Floats, odd: Floats, at: int) -> No
         i += 1
 
 
+@kernel(types.UniTuple(float64, 2)(float64, float64), fastmath=FAST)
+def _cell(one: float, two: float) -> tuple[float, float]:
+    """The part of a cell that touches, and twice the mean gap there, from the gaps at both ends."""
+    high, low = (one, two) if one > two else (two, one)
+    press, rest = (high if high > 0.0 else 0.0), (low if low > 0.0 else 0.0)
+    return np.divide(press, press - (low - rest) + _TINY), press + rest
+
+
 @kernel(types.UniTuple(float64, 2)(float64, vector, vector, vector, vector, int64), fastmath=FAST)
 def _pressed(y: float, even: Floats, odd: Floats, right: Floats, left: Floats, cells: int) -> tuple[float, float]:
     """Twice the force over k and the cell, and twice the number of cells that touch; `right` and `left` are f1."""
     force, touching = 0.0, 0.0
     for j in range(cells):
         one, two = even[j] + odd[j] - right[j] - y, even[j + 1] + odd[j + 1] - right[j + 1] - y
-        high, low = (one, two) if one > two else (two, one)
-        press, rest = (high if high > 0.0 else 0.0), (low if low > 0.0 else 0.0)
-        part = np.divide(press, press - (low - rest) + _TINY)
-        force, touching = force + part * (press + rest), touching + 2.0 * part
+        part, gap = _cell(one, two)
+        force, touching = force + part * gap, touching + 2.0 * part
         one, two = even[j] - odd[j] - left[j] - y, even[j + 1] - odd[j + 1] - left[j + 1] - y
-        high, low = (one, two) if one > two else (two, one)
-        press, rest = (high if high > 0.0 else 0.0), (low if low > 0.0 else 0.0)
-        part = np.divide(press, press - (low - rest) + _TINY)
-        force, touching = force + part * (press + rest), touching + 2.0 * part
+        part, gap = _cell(one, two)
+        force, touching = force + part * gap, touching + 2.0 * part
     return force, touching
+
+
+@kernel(float64(float64, float64, float64, float64, float64), fastmath=FAST)
+def _slope(part: float, one: float, two: float, steep: float, steeper: float) -> float:
+    """The derivative of a cell's force by x: from the part that touches, gaps and slopes of f2 at both ends."""
+    of_high, of_low = (steep, steeper) if one > two else (steeper, steep)
+    return part * (2.0 - part) * of_high + part * part * of_low
 
 
 @kernel(types.UniTuple(float64, 3)(float64, vector, vector, vector, vector, vector, vector, int64), fastmath=FAST)
@@ -203,21 +214,13 @@ def _pressed_steeply(
     force, touching, slope = 0.0, 0.0, 0.0
     for j in range(cells):
         one, two = even[j] + odd[j] - right[j] - y, even[j + 1] + odd[j + 1] - right[j + 1] - y
-        steep, steeper = rise[j] + turn[j], rise[j + 1] + turn[j + 1]
-        high, low = (one, two) if one > two else (two, one)
-        of_high, of_low = (steep, steeper) if one > two else (steeper, steep)
-        press, rest = (high if high > 0.0 else 0.0), (low if low > 0.0 else 0.0)
-        part = np.divide(press, press - (low - rest) + _TINY)
-        force, touching = force + part * (press + rest), touching + 2.0 * part
-        slope += part * (2.0 - part) * of_high + part * part * of_low
+        part, gap = _cell(one, two)
+        force, touching = force + part * gap, touching + 2.0 * part
+        slope += _slope(part, one, two, rise[j] + turn[j], rise[j + 1] + turn[j + 1])
         one, two = even[j] - odd[j] - left[j] - y, even[j + 1] - odd[j + 1] - left[j + 1] - y
-        steep, steeper = rise[j] - turn[j], rise[j + 1] - turn[j + 1]
-        high, low = (one, two) if one > two else (two, one)
-        of_high, of_low = (steep, steeper) if one > two else (steeper, steep)
-        press, rest = (high if high > 0.0 else 0.0), (low if low > 0.0 else 0.0)
-        part = np.divide(press, press - (low - rest) + _TINY)
-        force, touching = force + part * (press + rest), touching + 2.0 * part
-        slope += part * (2.0 - part) * of_high + part * part * of_low
+        part, gap = _cell(one, two)
+        force, touching = force + part * gap, touching + 2.0 * part
+        slope += _slope(part, one, two, rise[j] - turn[j], rise[j + 1] - turn[j + 1])
     return force, touching, slope
 
 
@@ -225,12 +228,9 @@ def _pressed_steeply(
 def _turn(f: Any, tables: Floats, place: float) -> None:
     """Sines and cosines of the waves where x - U since is `place`, times amplitudes, and times ω as well."""
     n, eights = f.waves, (f.waves + _EIGHT - 1) // _EIGHT * _EIGHT
-    sines, cosines = (
-        tables[f.sines_at : f.sines_at + eights],
-        tables[f.sines_at + eights : f.sines_at + 2 * eights],
-    )
-    rises = tables[f.sines_at + 2 * eights : f.sines_at + 3 * eights]
-    turns = tables[f.sines_at + 3 * eights : f.sines_at + 4 * eights]
+    at = f.sines_at
+    sines, cosines = tables[at : at + eights], tables[at + eights : at + 2 * eights]
+    rises, turns = tables[at + 2 * eights : at + 3 * eights], tables[at + 3 * eights : at + 4 * eights]
     for i in range(n):
         sines[i] = tables[f.omega_at + i] * place + tables[f.angles_at + i]
     for i in range(eights):
@@ -285,15 +285,17 @@ def _press(f: Any, tables: Floats, place: float, y: float, steeply: int) -> None
 @kernel(void(COEFFICIENTS, ROUGH_TYPE, int64), inlined=False)
 def _find_tangents(c: Coefficients, f: Any, stage: int) -> None:
     """The variational equations at a stage, for the disturbances `t_w` and the contact found there."""
-    grip, node, slips = (1 - f.phase) * c.phi, _C[stage], 1.0 if f.phase != STICK else 0.0
+    grip, node, mass = (1 - f.phase) * c.phi, _C[stage], 1.0 / c.m
+    slips = mass if f.phase != STICK else 0.0
     for j in range(_COLUMNS):
         x, y, v_x, v_y = f.t_w[X, j], f.t_w[Y, j], f.t_w[V_X, j], f.t_w[V_Y, j]
         moved = x - f.belt * (f.late[j] + node * f.stretch[j])
         pressed = f.slope * moved - f.touching * y
         f.t_k[stage, X, j], f.t_k[stage, Y, j] = v_x, v_y
         along = grip * pressed - (c.b_xx * v_x + c.b_xy * v_y + c.c_xx * x + c.c_xy * y)  # Eq. (6)
-        f.t_k[stage, V_X, j] = slips * along / c.m
-        f.t_k[stage, V_Y, j] = (pressed - (c.b_xy * v_x + c.b_yy * v_y + c.c_xy * x + c.c_yy * y)) / c.m  # Eq. (7)
+        f.t_k[stage, V_X, j] = slips * along
+        across = pressed - (c.b_xy * v_x + c.b_yy * v_y + c.c_xy * x + c.c_yy * y)  # Eq. (7)
+        f.t_k[stage, V_Y, j] = mass * across
 
 
 @kernel(void(COEFFICIENTS, ROUGH_TYPE, int64))
@@ -306,9 +308,8 @@ def _find_rates(c: Coefficients, f: Any, stage: int) -> None:
         f.k[stage, V_X] = ((1 - f.phase) * c.phi * f.force - against) / c.m  # Eq. (6) with Eq. (5)
     else:
         f.k[stage, V_X] = 0.0
-    f.k[stage, V_Y] = (
-        f.force - (c.b_xy * v_x + c.b_yy * v_y + c.c_xy * x + c.c_yy * y + f.pull_y)
-    ) / c.m  # Eq. (7)
+    against = c.b_xy * v_x + c.b_yy * v_y + c.c_xy * x + c.c_yy * y + f.pull_y
+    f.k[stage, V_Y] = (f.force - against) / c.m  # Eq. (7)
 
 
 @kernel(void(COEFFICIENTS, ROUGH_TYPE, vector, float64, int64), inlined=False)
