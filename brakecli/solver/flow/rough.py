@@ -460,7 +460,7 @@ def _located(c: Coefficients, f: Any, tables: Floats, h: float, high: float, whi
         if part + rest == part:
             break
         part += rest
-    return part
+    return part  # type: ignore[no-any-return]
 
 
 @kernel(types.UniTuple(float64, 2)(COEFFICIENTS, ROUGH_TYPE, vector, float64), inlined=False)
