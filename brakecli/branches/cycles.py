@@ -22,9 +22,9 @@ from brakecli.solver.flow.smooth import DONE, EVENTFUL, GRAZED, SmoothFlow
 from brakecli.solver.system import longest_step
 
 DIFFERENCE = 3e-6
-"""Change of the parameter for derivatives by it. Central ones are exact to 1e-10, which a shoe needs whose dashpots
-are so light that a multiplier stays near 1: the direction of its branch hangs on it. Straddling a border would mix
-two motions, so that there they are taken to one side."""
+"""Change of the parameter for derivatives by it. Central ones are exact to 1e-10. A shoe needs that whose dashpots
+are so light that a multiplier stays near 1, as the direction of its branch hangs on it. Straddling a border would
+mix two motions, so that there they are taken to one side."""
 LEANS = 0.9
 """Cosine between the flow and the normal of its plane below which a new plane is taken."""
 NEAR = 0.03

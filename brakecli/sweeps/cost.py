@@ -10,9 +10,10 @@ from brakecli.case.system import system_of
 from brakecli.errors import CaseError, RefusedError, key_text
 from brakecli.runs.cost import duration_text, steps_and_seconds
 from brakecli.runs.limits import MOST_BYTES, check, refuse, within_range
+from brakecli.solver.period import common_period
 from brakecli.sweeps.early import may_be_early
 from brakecli.sweeps.growth import sliding, with_step
-from brakecli.sweeps.periodic import common_period, exponent_length
+from brakecli.sweeps.periodic import exponent_length
 from brakecli.sweeps.pilot import Pilot
 from brakecli.sweeps.plan import Plan, Settings, label
 from brakecli.sweeps.tables import Critical

@@ -10,8 +10,9 @@ import numpy as np
 
 from brakecli.analysis.stability.modes import growth as eigenvalue_growth
 from brakecli.analysis.stability.search import bisect
+from brakecli.solver.period import common_period
 from brakecli.sweeps.floquet import Disturbances
-from brakecli.sweeps.periodic import Orbit, Segments, common_period, exponents, orbit
+from brakecli.sweeps.periodic import Orbit, Segments, exponents, orbit
 from brakecli.sweeps.tables import Critical
 from brakecli.sweeps.windows import FOLD
 

@@ -11,12 +11,11 @@ import numpy as np
 
 from brakecli.analysis.stability.modes import is_undamped
 from brakecli.solver.links import natural_frequencies
+from brakecli.solver.period import LONGEST, common_period
 from brakecli.sweeps.growth import DEPARTED, Growth, Sliding, growth
 from brakecli.sweeps.periodic import (
-    LONGEST,
     Orbit,
     Segments,
-    common_period,
     lyapunov,
     orbit,
 )

@@ -8,7 +8,6 @@ same derivatives along a long run give Lyapunov's exponent.
 
 import math
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -17,14 +16,12 @@ from numpy.typing import NDArray
 from brakecli.analysis.stability.modes import first_order, modes, stiffness_matrix
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.motion import solve
+from brakecli.solver.period import LONGEST
 from brakecli.solver.quantities import Failure
 from brakecli.solver.roughness import wheel_angles
 from brakecli.solver.system import Initial, System
 from brakecli.sweeps.growth import DEPARTED, Growth, Sliding, held
 
-LONGEST = 10.0  # s, of a period that is worth computing
-LARGEST_DENOMINATOR = 10**6  # of the ratio of two wavelengths
-SAME = 1e-15  # relative difference of ratios that are the same but for rounding
 DISTURBANCE = 1e-6  # in static compressions: the rounding of a run is 1e-10 of it
 CLOSED = 1e-7  # largest gap, in static compressions, between the end of a segment and the next one
 ITERATIONS = 10
@@ -35,19 +32,6 @@ STICKS = 1.0  # neper that a volume shrinks in a period beyond what dashpots tak
 CERTAIN = 3.5  # standard errors of the mean of eight batches: 99 % of Student's distribution
 
 Floats = NDArray[np.float64]
-
-
-def common_period(system: System) -> float | None:
-    """The time (s) after which all waves of the wheel repeat; None where there is none, or none short enough."""
-    turns, belt = system.wheel.turns, abs(system.belt_speed)
-    if belt == 0.0 or not turns.size:
-        return None
-    ratios = [Fraction(turn / turns[0]).limit_denominator(LARGEST_DENOMINATOR) for turn in turns.tolist()]
-    if any(abs(float(ratio) * turns[0] - turn) > SAME * turn for ratio, turn in zip(ratios, turns, strict=True)):
-        return None
-    common = math.gcd(*(each.numerator for each in ratios)) / math.lcm(*(each.denominator for each in ratios))
-    period = 1.0 / (turns[0] * common * belt) if common > 0.0 else math.inf
-    return float(period) if period <= LONGEST else None
 
 
 class Segments:

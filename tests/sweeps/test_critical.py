@@ -14,12 +14,12 @@ from brakecli.case.system import system_of
 from brakecli.cli.inputs import load_sweep
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.motion import solve
+from brakecli.solver.period import common_period
 from brakecli.solver.system import Initial
 from brakecli.sweeps.critical import LONGER, search
 from brakecli.sweeps.error_bar import OTHERS
 from brakecli.sweeps.floquet import Disturbances
 from brakecli.sweeps.growth import Sliding, growth, sliding, with_step
-from brakecli.sweeps.periodic import common_period
 from brakecli.sweeps.point import verdict_of
 from brakecli.sweeps.tables import Critical
 from brakecli.sweeps.windows import Outcome, Search
