@@ -127,7 +127,7 @@ class Cycles(Problem):
             return "the flow runs along its plane"
         moved = matrix @ chart.basis
         on_plane = moved - np.outer(speed / across, chart.normal @ moved)
-        word, spent, period = flow.word, path.spent, path.time
+        word, spent, period = flow.word, path.spent, float(path.time)
         facts = Cycle(
             period,
             0.5 * float(path.high[0] - path.low[0]),

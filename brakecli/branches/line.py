@@ -71,6 +71,24 @@ class Line:
         self.system = lru_cache(maxsize=MOST_KEPT)(self._system)
         self.smooth = case.roughness.shoe is None and case.roughness.wheel is None
 
+    @property
+    def case_coefficients(self) -> Coefficients:
+        """Those of the case itself."""
+        return system_of(self.case).coefficients
+
+    @property
+    def own(self) -> float | None:
+        """The value that all keys have in the case itself; None where they differ, or lie outside of the range."""
+        values = set[object]()
+        for path in self._paths:
+            table: object = self.case
+            for part in path:
+                table = getattr(table, part, None)
+            values.add(table)
+        (value,) = values if len(values) == 1 else (None,)
+        inside = isinstance(value, int | float) and min(self.low, self.high) <= value <= max(self.low, self.high)
+        return float(value) if inside and isinstance(value, int | float) else None
+
     def value(self, p: float) -> float:
         """The value of the keys at p; both ends are met exactly."""
         return self.low + p * (self.high - self.low) if p != 1.0 else self.high

@@ -294,6 +294,53 @@ LOCK_IN = (
     Field("critical_values", "of the key", "where along the key sliding stops being stable, or starts", OBJECT),
 )
 
+# Branches along a key
+
+BRANCH_POINT = (
+    Field("value", "of the key", "value of the key"),
+    Field("amplitude", "m", "half of peak to peak of x; 0 in steady sliding"),
+    Field("frequency", "Hz", "frequency of the motion; of steady sliding that of its least stable mode"),
+    ratio("stick_fraction", "part of the time in stick"),
+    ratio("contact_loss_fraction", "part of the time without contact"),
+    integer("stable", "whether disturbances die out (0, 1)"),
+    Field(
+        "multipliers",
+        "1",
+        "Floquet multipliers, real and imaginary part, the largest first; of steady sliding those of one period of its "
+        "least stable mode, or of one second",
+        "(4,2)f8",
+    ),
+)
+SPECIAL = (
+    Field("kind", "", "what changes there", "S16"),
+    Field("value", "of the key", "value of the key"),
+    Field("error", "of the key", "error of that value"),
+    Field("amplitude", "m", "half of peak to peak of x"),
+    Field("frequency", "Hz", "frequency of the motion"),
+    Field("reason", "", "of an end: why the branch ends there", TEXT),
+)
+ONE_BRANCH = (
+    Field("kind", "", "steady sliding, limit cycle or forced motion", TEXT),
+    Field("note", "", "where it was begun, if not where steady sliding flutters", TEXT),
+    Field("special", "", "special points along it", OBJECT, in_file=False, rows=SPECIAL),
+    Field("points", "", "its motions in order", OBJECT, in_file=False, rows=BRANCH_POINT),
+)
+BRANCH = (
+    Field("parameter", "", "the key, or the keys that take the same value", TEXT),
+    Field("lower", "of the key", "lower end of the range"),
+    Field("upper", "of the key", "upper end of the range"),
+    Field(
+        "critical", "of the key", "least value at which the motion that continues steady sliding loses stability"
+    ),
+    Field("critical_error", "of the key", "error of that value"),
+    Field("critical_windows_lower", "of the key", "lower ends of the intervals in which it is unstable", OBJECT),
+    Field("critical_windows_upper", "of the key", "their upper ends", OBJECT),
+    Field("coexists_from", "of the key", "least value with a stable vibration beside stable sliding"),
+    Field("barrier", "m", "half of peak to peak of x of the unstable cycle at the value of the case itself"),
+    Field("sentence", "", "the answer in words", TEXT),
+    Field("branches", "", "all branches", OBJECT, in_file=False, rows=ONE_BRANCH),
+)
+
 # Advice, in JSON alone
 
 SENSITIVITY = (

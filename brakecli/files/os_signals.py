@@ -103,18 +103,18 @@ def unwinding() -> Iterator[None]:
 
 
 @contextmanager
-def signals_deferred() -> Iterator[None]:
-    """Hold back Ctrl-C, SIGTERM, SIGHUP and the timer of `unwinding` until the block has ended.
+def signals_deferred() -> Iterator[list[int]]:
+    """Hold back Ctrl-C, SIGTERM, SIGHUP and the timer of `unwinding` until the block has ended; yields those held.
 
     An exception out of a handler must not cut through HDF5, which calls back into Python, nor through a clean-up.
     """
-    if threading.current_thread() is not threading.main_thread():  # Python runs handlers in the main thread only
-        yield
-        return
     waiting: list[int] = []
+    if threading.current_thread() is not threading.main_thread():  # Python runs handlers in the main thread only
+        yield waiting
+        return
     try:
         with _handled_by(lambda number, _frame: waiting.append(number)):
-            yield
+            yield waiting
     finally:
         for number in waiting:
             signal.raise_signal(number)

@@ -7,6 +7,7 @@ and sizes are looked at first, and references are followed here.
 import re
 from collections.abc import Iterator
 from contextlib import suppress
+from fnmatch import fnmatchcase
 from typing import Any
 
 import h5py
@@ -32,6 +33,8 @@ _ATTRIBUTES = {
     ("sweep", "/"): fields.SWEEP,
     ("comparison", "/"): fields.COMPARISON,
     ("stability", "/"): fields.LOCK_IN,
+    ("branch", "/"): fields.BRANCH,
+    ("branch", "/branch_*"): fields.ONE_BRANCH,
 }
 _VARIABLES = {  # the first of a kind, of a sweep its status, has the length of all
     ("run", "history"): fields.HISTORY,
@@ -43,6 +46,8 @@ _VARIABLES = {  # the first of a kind, of a sweep its status, has the length of 
     ("sweep", "/"): (*fields.POINT, *fields.CRITICAL, *fields.DIFFERENCE, fields.DIRECTION),
     ("comparison", "/"): (fields.ENTRY_PLACE, *fields.ENTRY),
     ("stability", "/"): (*fields.VARIED, *fields.MODES),
+    ("branch", "branch_*"): fields.BRANCH_POINT,
+    ("branch", "branch_*/special"): fields.SPECIAL,
 }
 _OBJECTS = {f"/{each.group}": each for each in fields.RUN if each.group}  # whose items are attributes of a group
 _RISING = ("time", "frequency")
@@ -55,8 +60,15 @@ def check_variables(file: h5py.File, kind: str, length: int) -> None:
 
     `length`: of the file in bytes.
     """
-    for (its_kind, group), declared in _VARIABLES.items():
-        parent = member(file, group) if its_kind == kind else None
+    named = [(group, declared) for (its_kind, group), declared in _VARIABLES.items() if its_kind == kind]
+    numbered = [
+        (group.replace("branch_*", name), declared)
+        for name in file
+        for group, declared in named
+        if "*" in group and fnmatchcase(name, "branch_*")
+    ]
+    for group, declared in [each for each in named if "*" not in each[0]] + numbered:
+        parent = member(file, group)
         if parent is None:
             continue
         if not isinstance(parent, h5py.Group):
@@ -76,7 +88,7 @@ def check_variables(file: h5py.File, kind: str, length: int) -> None:
             shape = shape_of(found[axis][1]) if axis in found and field is not fields.FREQUENCY else own
             if kind == "sweep" and field in (fields.DIRECTION, *fields.DIFFERENCE):
                 shape = shape[1:] if field is not fields.DIRECTION else shape[:1]
-            if own[: len(own) - field.kind.startswith("(")] != shape:
+            if own[: len(own) - (len(np.dtype(field.kind).shape) if field.kind[0] == "(" else 0)] != shape:
                 raise ValueError(f"{where} has the shape {own}, and {axis} has {shape}")
             if kind == "run" and name in _RISING and field not in fields.OVER_TIME:
                 _check_rising(node, where)
@@ -193,7 +205,8 @@ def attributes_of(node: h5py.HLObject, kind: str) -> dict[str, Any]:
 
     Raises ValueError for a declared one that is not what was declared.
     """
-    declared = [*_ATTRIBUTES.get((kind, str(node.name)), ())]
+    name = "/branch_*" if fnmatchcase(str(node.name), "/branch_*") else str(node.name)
+    declared = [*_ATTRIBUTES.get((kind, name), ())]
     given = {name: plain_attribute(node, name) for name in node.attrs if name not in _MACHINERY}
     if node.name == "/":
         declared += [Field(name, "", "a text", fields.TEXT) for name in _TEXTS]

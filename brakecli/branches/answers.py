@@ -1,0 +1,198 @@
+"""What branches of a case answer: where it squeals by itself, and where it can vibrate beside stable sliding."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from brakecli.branches.explore import LIMIT_CYCLE, Explored, Followed, Mark, Row, crossing
+from brakecli.branches.line import Line
+
+NARROWEST = 1e-6
+"""Part of the range below which an interval is that of rounding."""
+Span = tuple[float, float]
+"""Two places of the line, the lower one first."""
+ENDS = {"fold", "flip", "torus", "branch point", "grazing stick", "grazing flight", "flutter"}
+"""Special points at which a stable part of a branch may end."""
+
+
+@dataclass(frozen=True)
+class Answers:
+    """The branches of a case along keys, and what they answer; values in the unit of the keys."""
+
+    explored: Explored
+    own: float | None  # value of the keys in the case itself; None where they differ
+
+    @property
+    def line(self) -> Line:
+        """Along which it was looked."""
+        return self.explored.line
+
+    @property
+    def parameter(self) -> str:
+        """The key, or the keys."""
+        return ",".join(self.line.keys)
+
+    @property
+    def branches(self) -> list[Followed]:
+        """All of them, steady sliding first."""
+        return self.explored.branches
+
+    @cached_property
+    def windows(self) -> list[Span]:
+        """Where steady sliding is unstable."""
+        slides, found = [each for each in self.explored.slides if each.eigenvalues is not None], list[Span]()
+        if not slides:
+            return found
+        begin = None if slides[0].stable else slides[0].p
+        for change in self.explored.changes:
+            if change.lost:
+                begin = change.p
+            elif begin is not None:
+                found.append((begin, change.p))
+                begin = None
+        return found if begin is None else [*found, (begin, slides[-1].p)]
+
+    @property
+    def critical_windows_lower(self) -> list[float]:
+        """Lower ends of the intervals in which steady sliding is unstable."""
+        return [self.line.value(low) for low, _ in self.windows]
+
+    @property
+    def critical_windows_upper(self) -> list[float]:
+        """Their upper ends."""
+        return [self.line.value(high) for _, high in self.windows]
+
+    @cached_property
+    def critical(self) -> float | None:
+        """The least value at which steady sliding, stable below, loses its stability."""
+        lost = [change for change in self.explored.changes if change.lost]
+        return self.line.value(lost[0].p) if lost else None
+
+    @property
+    def critical_error(self) -> float | None:
+        """Half the width of its bracket."""
+        lost = [change for change in self.explored.changes if change.lost]
+        return lost[0].error * (self.line.high - self.line.low) if lost else None
+
+    @cached_property
+    def stable_spans(self) -> list[Span]:
+        """Where steady sliding is stable."""
+        slides = [each for each in self.explored.slides if each.eigenvalues is not None]
+        if not slides:
+            return []
+        edges = [slides[0].p, *(p for window in self.windows for p in window), slides[-1].p]
+        return [(low, high) for low, high in zip(edges[::2], edges[1::2], strict=True) if high > low]
+
+    @cached_property
+    def coexisting(self) -> list[tuple[float, float, float]]:
+        """Intervals with a stable vibration beside stable sliding, and its frequency (Hz) at the lower end."""
+        found = []
+        for followed in self.branches:
+            if followed.kind != LIMIT_CYCLE:
+                continue
+            for low, high, frequency in self._stable_parts(followed):
+                for begin, end in self.stable_spans:
+                    left, right = max(low, begin), min(high, end)
+                    if right > left + NARROWEST:
+                        found.append((left, right, frequency))
+        return sorted(found)
+
+    def _stable_parts(self, followed: Followed) -> list[tuple[float, float, float]]:
+        """The stable parts of a branch by their ends in p, each up to the special point behind its last motion."""
+        found, part = [], list[Row]()
+        places = [mark.value for mark in followed.special if mark.kind in ENDS]
+        ends = [self.line.place(value) for value in places]
+        for k, row in enumerate([*followed.points, None]):
+            if row is not None and row.stable:
+                part.append(row)
+                continue
+            if part:
+                low, high = (self.line.place(pick(each.value for each in part)) for pick in (min, max))
+                before = followed.points[k - len(part) - 1] if k > len(part) else None
+                for beyond in (before, row):
+                    if beyond is not None:
+                        near = [p for p in ends if self._beside(p, beyond, part)]
+                        low, high = min([low, *near]), max([high, *near])
+                slowest = min(part, key=lambda each: each.value)
+                found.append((low, high, slowest.frequency))
+                part = []
+        return found
+
+    def _beside(self, p: float, beyond: Row, part: list[Row]) -> bool:
+        """Whether a special point lies next to a stable part, on the way to an unstable motion."""
+        ends = [self.line.place(row.value) for row in (part[0], part[-1], beyond)]
+        room = 1e-6 + 2.0 * min(abs(ends[2] - ends[0]), abs(ends[2] - ends[1]))
+        return min(abs(p - each) for each in ends) <= room
+
+    @property
+    def coexists_from(self) -> float | None:
+        """The least value with a stable vibration beside stable sliding."""
+        return self.line.value(self.coexisting[0][0]) if self.coexisting else None
+
+    @cached_property
+    def barrier(self) -> float | None:
+        """Half of peak to peak of x (m) of the smallest unstable cycle at the case's own value; None without one."""
+        if self.own is None:
+            return None
+        p = self.line.place(self.own)
+        if not any(low <= p <= high for low, high in self.stable_spans):
+            return None
+        found = [
+            point.facts.amplitude
+            for followed in self.branches
+            if followed.kind == LIMIT_CYCLE
+            for point in crossing(followed, p)
+            if not point.stable
+        ]
+        return min(found, default=None)
+
+    @property
+    def cut(self) -> list[Mark]:
+        """The ends of branches that do not reach an end of the range, or steady sliding, or themselves."""
+        known = ("it reaches", "it is closed")
+        marks = [mark for followed in self.branches[1:] for mark in followed.ended]
+        return [mark for mark in marks if not mark.reason.startswith(known)]
+
+    @cached_property
+    def sentence(self) -> str:
+        """The answer in words."""
+        parts = [self._self_excited(), *self._beside_sliding()]
+        if self.barrier is not None:
+            parts.append(
+                f"at the case's {self.own:.4g} an unstable cycle of {_metres(self.barrier)} lies between the two"
+            )
+        parts += [f"the branch is cut at {mark.value:.6g}: {mark.reason}" for mark in self.cut[:2]]
+        return "; ".join([*parts, *self.explored.notes])
+
+    def _self_excited(self) -> str:
+        slides = [each for each in self.explored.slides if each.eigenvalues is not None]
+        if not slides:
+            return "nothing slides steadily"
+        words = []
+        for low, high in self.windows:
+            begin, end = (f"{self.line.value(p):.4g}" for p in (low, high))
+            if low == slides[0].p and high == slides[-1].p:
+                words.append("throughout")
+            elif high == slides[-1].p:
+                words.append(f"from {begin} on")
+            elif low == slides[0].p:
+                words.append(f"up to {end}")
+            else:
+                words.append(f"from {begin} to {end}")
+        return f"squeals by itself {' and '.join(words)}" if words else "steady sliding is stable throughout"
+
+    def _beside_sliding(self) -> list[str]:
+        if not self.coexisting:
+            return []
+        low, _, frequency = self.coexisting[0]
+        until = max(end for _, end, _ in self.coexisting)
+        begin, end = (f"{self.line.value(p):.4g}" for p in (low, until))
+        reaches = any(abs(until - edge) < 1e-9 for edge in (1.0, *(begin for begin, _ in self.windows)))
+        where = f"from {begin} on" if reaches else f"from {begin} to {end}"
+        return [f"{where} a vibration at {frequency:.4g} Hz can exist beside stable sliding"]
+
+
+def _metres(length: float) -> str:
+    for exponent, unit in ((0, "m"), (-3, "mm"), (-6, "µm"), (-9, "nm")):
+        if length >= 10.0**exponent:
+            return f"{length * 10.0**-exponent:.3g} {unit}"
+    return f"{length:.3g} m"

@@ -1,0 +1,301 @@
+"""All branches of a case along a line: steady sliding, and the motions that are born where it loses stability."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from brakecli.analysis.stability.modes import is_undamped
+from brakecli.branches.begin import settled
+from brakecli.branches.cycles import Cycle, Cycles
+from brakecli.branches.follow import Stop, both_ways, follow
+from brakecli.branches.line import Line
+from brakecli.branches.newton import Newton, Settings
+from brakecli.branches.point import Branch, End, Point, Special
+from brakecli.branches.sliding import Change, Slide, Sliding
+from brakecli.branches.switch import switch
+
+SLIDING, LIMIT_CYCLE, FORCED = "steady sliding", "limit cycle", "forced motion"
+LARGEST = 1e4
+"""Amplitude over that at the begin of a branch beyond which it is not followed."""
+MOST = 12
+"""Branches of one command."""
+LONGEST = 0.25
+"""Longest stride, in sizes of the motion and of the range."""
+POINTS, SECONDS = 3000, 60.0
+SAME = 1e-6
+"""Relative difference of amplitude and period by which two motions at one value are the same."""
+IN_SLIDING = "it ends in steady sliding, where that flutters"
+LARGE = "its amplitude is ten thousand times that of its begin"
+UNDAMPED = "no dashpot damps the shoe: all multipliers stay on the unit circle, so that no limit cycle is followed"
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A motion on a branch, as files and `--json` give it (SI units)."""
+
+    value: float
+    amplitude: float
+    frequency: float
+    stick_fraction: float
+    contact_loss_fraction: float
+    stable: bool
+    multipliers: tuple[complex, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """A special point of a branch; error in the unit of the value, and why, where the branch ends."""
+
+    kind: str
+    value: float
+    error: float
+    amplitude: float
+    frequency: float
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Followed:
+    """A branch, its motions in order, and what is special on it."""
+
+    kind: str
+    points: list[Row]
+    special: list[Mark]
+    branch: Branch | None = None
+    problem: Any = None
+    note: str = ""
+
+    @property
+    def ended(self) -> list[Mark]:
+        """Why it ends, at either end."""
+        return [mark for mark in self.special if mark.kind in ("end", "budget")]
+
+
+@dataclass(frozen=True)
+class Explored:
+    """What there is along a line."""
+
+    line: Line
+    slides: list[Slide]
+    changes: list[Change]
+    branches: list[Followed]
+    notes: list[str]
+    interrupted: bool = False
+
+
+Tell = Callable[[str, int, int], None]
+
+
+class Explorer:
+    """Follows one branch after another, within a budget of time, until it is stopped."""
+
+    def __init__(self, line: Line, tell: Tell, stop: Stop, seconds: float = SECONDS) -> None:
+        """`tell` shows how many points there are; `stop` ends the work, and keeps what was found."""
+        self.line, self.tell, self.stop = line, tell, stop
+        self.end, self.count = perf_counter() + seconds, 0
+        self.branches: list[Followed] = []
+        self.notes: list[str] = []
+
+    def explore(self, states: Sequence[tuple[float, Any]] = (), switches: bool = False) -> Explored:
+        """Follow everything: from flutter, from given states (p and state), and from flips if that is wanted."""
+        sliding = Sliding(self.line)
+        slides = sliding.along()
+        changes = sliding.changes(slides)
+        self.branches.append(self._sliding(slides, changes))
+        if self.line.smooth:
+            self._cycles(sliding, changes, states)
+        if switches:
+            self._doubled()
+        return Explored(self.line, slides, changes, self.branches, self.notes, bool(self.stop()))
+
+    def _sliding(self, slides: list[Slide], changes: list[Change]) -> Followed:
+        """Steady sliding: its multipliers are those of a period of its least stable mode, or of a second."""
+        rows, marks = [], []
+        there = [slide for slide in slides if slide.eigenvalues is not None]
+        for slide in there:
+            assert slide.eigenvalues is not None
+            fastest = slide.eigenvalues[int(np.argmax(slide.eigenvalues.real))]
+            frequency = abs(float(fastest.imag)) / (2.0 * math.pi)
+            factors = np.exp(np.clip((slide.eigenvalues / (frequency or 1.0)).real, -700.0, 700.0)) * np.exp(
+                1j * (slide.eigenvalues / (frequency or 1.0)).imag
+            )
+            rows.append(
+                Row(self.line.value(slide.p), 0.0, frequency, 0.0, 0.0, slide.stable, tuple(factors.tolist()))
+            )
+        for change in changes:
+            width = abs(self.line.high - self.line.low)
+            marks.append(Mark(change.kind, self.line.value(change.p), change.error * width, 0.0, change.frequency))
+        if there:
+            for slide, end in ((there[0], "lower"), (there[-1], "upper")):
+                whole = slide.p == (0.0 if end == "lower" else 1.0)
+                why = f"it reaches the {end} end of the range" if whole else "there is no steady sliding beyond"
+                marks.append(Mark("end", self.line.value(slide.p), 0.0, 0.0, 0.0, why))
+        else:
+            self.notes.append("there is no steady sliding in the range")
+        return Followed(SLIDING, rows, sorted(marks, key=lambda mark: mark.value))
+
+    def _settings(self) -> Settings:
+        return Settings(longest=LONGEST, points=POINTS, seconds=max(self.end - perf_counter(), 0.0))
+
+    def _until(self, first: Point) -> Callable[[Point], str | None]:
+        """Ends a branch that has come back to steady sliding, or grown beyond all bounds."""
+        limit, left = LARGEST * first.facts.amplitude, [False]
+
+        def until(point: Point) -> str | None:
+            self.count += 1
+            self.tell("points of branches", self.count, 0)
+            if len(set(point.facts.word)) > 1:
+                left[0] = True
+            elif left[0]:
+                return IN_SLIDING
+            return LARGE if point.facts.amplitude > limit else None
+
+        return until
+
+    def _cycles(self, sliding: Sliding, changes: list[Change], states: Sequence[tuple[float, Any]]) -> None:
+        """Limit cycles on smooth pads, from each flutter and from given states."""
+        if is_undamped(self.line.case_coefficients):
+            self.notes.append(UNDAMPED)
+            return
+        for change in changes:
+            if change.kind != "flutter" or self._over():
+                continue
+            if any(mark.kind == "flutter" and mark.value == self.line.value(change.p) for mark in self._marks()):
+                continue  # a branch from another flutter has ended here
+            problem = Cycles(self.line)
+            first = sliding.vibration(problem, change)
+            value = self.line.value(change.p)
+            if first is None:
+                self.notes.append(f"no limit cycle was found at the flutter at {value:.6g}")
+                continue
+            branch = follow(problem, first, None, self._settings(), self._until(first), self.stop)
+            self.branches.append(self._followed(branch, problem, change, changes))
+
+        for p, state in states:
+            if self._over():
+                return
+            self._from_state(sliding, p, state)
+
+    def _from_state(self, sliding: Sliding, p: float, state: Any) -> None:
+        """The branch of the cycle that a motion comes to; none where it is known already."""
+        values = sliding.at(p).eigenvalues
+        frequency = 0.0 if values is None else float(np.abs(values.imag).max()) / (2.0 * math.pi)
+        if values is not None:
+            least_stable = values[int(np.argmax(values.real))]
+            frequency = abs(float(least_stable.imag)) / (2.0 * math.pi) or frequency
+        value, problem = self.line.value(p), Cycles(self.line)
+        first = settled(problem, p, state, frequency) if frequency else None
+        if first is None:
+            self.notes.append(f"the motion given for {value:.6g} comes to no limit cycle")
+            return
+        for followed in self.branches:
+            for point in crossing(followed, p):
+                one, other = point.facts, first.facts
+                if math.isclose(one.amplitude, other.amplitude, rel_tol=SAME) and any(
+                    math.isclose(k * one.period, other.period, rel_tol=SAME) for k in (1, 2, 3)
+                ):
+                    self.notes.append(
+                        f"the motion given for {value:.6g} comes to a cycle of a branch from flutter"
+                    )
+                    return
+        branch = both_ways(problem, first, self._settings(), self._until(first), self.stop)
+        note = f"from the motion given for {value:.6g}"
+        self.branches.append(replace(self._followed(branch, problem), note=note))
+
+    def _marks(self) -> list[Mark]:
+        return [mark for followed in self.branches if followed.kind == LIMIT_CYCLE for mark in followed.special]
+
+    def _over(self) -> bool:
+        return self.stop() or perf_counter() > self.end or len(self.branches) >= MOST
+
+    def _doubled(self) -> None:
+        """The motions of twice the period that are born at flips."""
+        for followed in list(self.branches):
+            for special in followed.branch.specials if followed.branch is not None else ():
+                if special.kind != "flip" or self._over():
+                    continue
+                problem = type(followed.problem)(self.line, 2 * followed.problem.periods)
+                first = switch(problem, special.point, self._settings())
+                value = self.line.value(special.p)
+                if first is None:
+                    self.notes.append(f"no motion of twice the period was found at the flip at {value:.6g}")
+                    continue
+                branch = follow(problem, first, None, self._settings(), self._until(first), self.stop)
+                note = f"twice the period, from the flip at {value:.6g}"
+                self.branches.append(replace(self._followed(branch, problem), kind=followed.kind, note=note))
+
+    def _followed(
+        self, branch: Branch, problem: Any, change: Change | None = None, changes: Sequence[Change] = ()
+    ) -> Followed:
+        """A branch as rows and marks; of the linear vibrations at its flutter only the largest one is kept."""
+        points, specials = branch.points, branch.specials
+        marks = []
+        if change is not None:
+            begin = next((k for k, point in enumerate(points) if len(set(point.facts.word)) > 1), len(points))
+            begin = max(begin - 1, 0)
+            points = points[begin:]
+            specials = [special for special in specials if special.s > points[0].s + 1e-5 or special.kind == "end"]
+            marks.append(self._mark(Special("flutter", change.p, change.error, points[0], points[0].s)))
+        for special in specials:
+            if special.kind == "end" and special.name == IN_SLIDING and changes:
+                near = min(changes, key=lambda each: abs(each.p - special.p))
+                marks.append(self._mark(Special("flutter", near.p, near.error, special.point, special.s)))
+            else:
+                marks.append(self._mark(special, branch.ended))
+        rows = [self._row(point) for point in points]
+        return Followed(LIMIT_CYCLE, rows, marks, replace_points(branch, points), problem)
+
+    def _row(self, point: Point) -> Row:
+        cycle: Cycle = point.facts
+        return Row(
+            self.line.value(point.p),
+            cycle.amplitude,
+            cycle.frequency,
+            cycle.stick_fraction,
+            cycle.contact_loss_fraction,
+            point.stable,
+            tuple(point.multipliers.tolist()),
+        )
+
+    def _mark(self, special: Special, ended: Sequence[End] = ()) -> Mark:
+        kind = special.name if special.kind == "grazing" else special.kind
+        if kind.startswith("sequence"):
+            kind = "grazing stick"
+        cut = [
+            end for end in ended if end.reason == special.name and end.kind in ("points", "seconds", "interrupted")
+        ]
+        facts, width = special.point.facts, abs(self.line.high - self.line.low)
+        return Mark(
+            "budget" if special.kind == "end" and cut else kind,
+            self.line.value(special.p),
+            special.error * width,
+            facts.amplitude,
+            facts.frequency,
+            special.name if special.kind == "end" else "",
+        )
+
+
+def replace_points(branch: Branch, points: list[Point]) -> Branch:
+    """The branch with other points."""
+    return Branch(points, branch.specials, branch.ended, branch.evaluations, branch.unsearched)
+
+
+def crossing(followed: Followed, p: float) -> list[Point]:
+    """The motions of a branch at a place of the line."""
+    found: list[Point] = []
+    if followed.branch is None:
+        return found
+    newton = Newton(followed.problem, Settings())
+    for one, other in zip(followed.branch.points, followed.branch.points[1:], strict=False):
+        if one.chart is not other.chart or not (one.p - p) * (other.p - p) <= 0.0 or one.p == other.p:
+            continue
+        followed.problem.use(one.chart)
+        part = (p - one.p) / (other.p - one.p)
+        point = newton.at_parameter(one.z + part * (other.z - one.z), p, other.z - one.z, one.s, exact=True)
+        if point is not None:
+            found.append(point)
+    return found

@@ -1,0 +1,126 @@
+"""The branches of a case along keys: looked at beforehand, followed, and written to a file."""
+
+import math
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from brakecli.branches.answers import Answers
+from brakecli.branches.explore import Explorer, Followed
+from brakecli.branches.line import Line
+from brakecli.case.read import LoadedCase, key_path, parse_resolved
+from brakecli.errors import CaseError, UsageError, printable
+from brakecli.files import fields
+from brakecli.files.field import values_of
+from brakecli.files.read import open_result
+from brakecli.files.write import ResultFile, new_result
+from brakecli.runs.run import origin
+from brakecli.solver.compile import Floats
+from brakecli.solver.motion import Counted
+
+MULTIPLIERS = 4
+
+
+@dataclass(frozen=True)
+class Start:
+    """The end of a run, from which a branch is begun."""
+
+    state: Floats  # x, y, v_x and v_y
+    value: float | None  # of the keys in the case of the run; None where they differ
+
+
+def line_of(loaded: LoadedCase, keys: Sequence[str], low: float, high: float, option: str) -> Line:
+    """The line of cases that an option asks for; raises CaseError and UsageError where there is none."""
+    line = Line(loaded.case, keys, low, high, option)
+    for p in (0.0, 1.0):
+        system = line.system(p)  # so that a wrong end is known before anything is computed
+        if not system.steady:
+            raise UsageError(f"{option}: branches need a constant speed and a constant load; leave times out")
+    return line
+
+
+def parsed(text: str, option: str = "--parameter") -> tuple[tuple[str, ...], float, float]:
+    """Keys and both ends of KEY[,KEY]=LOW:HIGH; raises UsageError."""
+    keys, _, numbers = text.partition("=")
+    names = tuple(keys.split(","))
+    with suppress(ValueError):
+        low, high = (float(each) for each in numbers.split(":"))
+        paths = [key_path(name) for name in names]
+        if (
+            math.isfinite(low)
+            and math.isfinite(high)
+            and low < high
+            and all(paths)
+            and len({*paths}) == len(paths)
+        ):
+            return names, low, high
+    what = "is not KEY[,KEY]=LOW:HIGH with LOW below HIGH, and no key twice"
+    raise UsageError(f"{option} {printable(text)}: {what}; write, for instance, friction.coefficient=0:1.5")
+
+
+def start_of(path: Path, keys: Sequence[str]) -> Start:
+    """The last state of a run, and the value of the keys in its case; raises UnreadableResultError."""
+    with open_result(path, kind="run") as result:
+        row = [float(result.read("history", name, -1)[0]) for name in ("x", "y", "vx", "vy")]
+        case = parse_resolved(result.text("resolved_toml"), f"{path} (its resolved case)").case
+    whole = Line(case, keys, -math.inf, math.inf)
+    return Start(np.array(row), whole.own)
+
+
+def branch(
+    line: Line, tell: Counted, stop: Callable[[], bool], starts: Sequence[Start] = (), switch: bool = False
+) -> Answers:
+    """Follow all branches of a line. `stop` ends the work and keeps what there is."""
+    states = []
+    for start in starts:
+        value = line.own if start.value is None else start.value
+        if value is None or not line.low <= value <= line.high:
+            raise UsageError(
+                f"--start: the value of {', '.join(line.keys)} in its case is not in the range; widen --parameter"
+            )
+        states.append((line.place(value), start.state))
+    return Answers(Explorer(line, tell, stop).explore(states, switch), line.own)
+
+
+def write(path: Path, loaded: LoadedCase, found: Answers, units: str, *, force: bool) -> None:
+    """Write all branches, each as a group; raises UsageError or CannotWriteError."""
+    with new_result(path, force=force) as result:
+        result.set_attributes(origin("branch", loaded.case.title, loaded))
+        result.set_fields(fields.BRANCH, values_of(fields.BRANCH, found))
+        for number, each in enumerate(found.branches):
+            _write_one(result, f"branch_{number}", each, units)
+        result.commit()
+
+
+def _write_one(result: ResultFile, group: str, found: Followed, units: str) -> None:
+    """A branch: its motions over `point`, and a group of its special points."""
+    result.axis(group, fields.integer("point", "number of the motion along the branch"), range(len(found.points)))
+    result.set_attributes({"kind": found.kind, "note": found.note}, group)
+    if found.points:
+        result.axis(group, fields.integer("multiplier", "number of the multiplier"), range(1, MULTIPLIERS + 1))
+        result.axis(group, fields.Field("part", "", "of a complex number", "S"), ["real", "imaginary"])
+    for field in fields.BRANCH_POINT:
+        own = replace(field, units=units or "1") if field.units == "of the key" else field
+        if field.name == "multipliers":
+            if found.points:
+                values = np.full((len(found.points), MULTIPLIERS, 2), np.nan)
+                for row, point in zip(values, found.points, strict=True):
+                    for k, factor in enumerate(point.multipliers):
+                        row[k] = _finite(factor.real), _finite(factor.imag)
+                result.column(replace(own, kind="f8"), ("point", "multiplier", "part"), values, group)
+            continue
+        column = [getattr(point, field.name) for point in found.points]
+        result.column(own, ("point",), column, group)
+    inner, marks = f"{group}/special", found.special
+    result.axis(inner, fields.integer("special", "number of the special point"), range(len(marks)))
+    for field in fields.SPECIAL:
+        own = replace(field, units=units or "1") if field.units == "of the key" else field
+        result.column(own, ("special",), [getattr(mark, field.name) for mark in marks], inner)
+
+
+def _finite(number: float) -> float:
+    """A number, or that of the largest size that a file takes."""
+    return math.copysign(min(abs(number), 1e300), number)
