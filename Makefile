@@ -21,7 +21,7 @@ PYTEST_ARGS ?=
 .DELETE_ON_ERROR:
 .NOTPARALLEL: # two installations into one .venv at a time would collide
 .PHONY: help demo test campaign lowest lint format types imports derivations tables docs cases check \
-    accuracy promises promise-cost statistics picture lock-in paper extremes bench bench-sweep bench-million bench-contact clean
+    accuracy promises promise-cost statistics picture lock-in branch-picture paper extremes bench bench-sweep bench-million bench-contact clean
 
 help: ## list the targets (this text)
 	@echo "make TARGET, where TARGET is one of"
@@ -141,6 +141,12 @@ lock-in: $(DEV_STAMP) ## draw docs/lock-in.png, from cases/mode-coupling.toml
 	@mkdir -p results
 	$(BIN)/brakecli stability cases/mode-coupling.toml --vary friction.coefficient=0:1.5:151 --force --quiet -o results/lock-in.h5
 	$(BIN)/brakecli plot results/lock-in.h5 --force --output docs/lock-in.png
+
+branch-picture: $(DEV_STAMP) ## draw docs/branch.png, from the starter of branches
+	@mkdir -p results
+	$(BIN)/brakecli new branch --output results/branch.toml --force --quiet
+	$(BIN)/brakecli branch results/branch.toml --parameter friction.coefficient=0:1 --force --quiet -o results/branch.h5
+	$(BIN)/brakecli plot results/branch.h5 --force --output docs/branch.png
 
 paper: $(DEV_STAMP) ## reproduce the paper's claims into docs/paper-claims.md, with pictures (some minutes)
 	$(BIN)/python docs/paper_claims.py

@@ -135,6 +135,65 @@ def stability(
             return opened(path, own=True).to_dataset()
 
 
+def branch(
+    case: "Source",
+    settings: "Settings | None" = None,
+    *,
+    parameter: "Mapping[str | tuple[str, ...], tuple[float, float]]",
+    start: "str | PathLike[str] | None" = None,
+    switch: bool = False,
+    output: "str | PathLike[str] | None" = None,
+    force: bool = False,
+) -> "xr.DataTree":
+    """Every motion along a key, stable or not: a tree with a group `branch_0`, `branch_1`, … for each branch.
+
+    The first one is steady sliding. A group holds its motions over `point`: value, amplitude (m), frequency (Hz),
+    whether it is stable, Floquet multipliers; its group `special` holds folds, flips and all that is special.
+    Attributes of the root are critical, coexists_from, barrier (m), sentence and all else that
+    `docs/result-format.md` names.
+
+    Args:
+        case: path of a case file or of a result, or what `load` gave.
+        settings: keys of the case to change.
+        parameter: one key with both ends of its range, as `{"friction.coefficient": (0.0, 1.0)}`; a tuple of keys
+            takes the same value.
+        start: result of a run, whose end comes to a motion that is followed, too.
+        switch: also follow the motions of twice the period from each flip.
+        output: a result file to keep; none if left out.
+        force: replace that file if it exists.
+
+    Raises:
+        CaseError, UsageError, RefusedError, CannotWriteError, UnreadableResultError: as `brakecli branch`.
+    """
+    with _interruptible(), _readings(), _target(output) as path:
+        loaded = _case(case, settings)
+        from brakecli.files.as_xarray import opened
+        from brakecli.runs.branch import branch, line_of, parsed, start_of, write
+        from brakecli.runs.limits import within_range
+        from brakecli.sweeps.result import unit
+
+        if len(_mapping(parameter, "parameter")) != 1:
+            raise UsageError("parameter: takes one key with both ends of its range, or one tuple of keys")
+        [(names, ends)] = parameter.items()
+        low, high = _ends(ends)
+        text = f"{names if isinstance(names, str) else ','.join(names)}={low!r}:{high!r}"
+        keys, low, high = parsed(text, "parameter")
+        with within_range():
+            line = line_of(loaded, keys, low, high, "parameter")
+        starts = [start_of(Path(start), keys)] if start is not None else []
+        found = branch(line, lambda what, done, total: None, lambda: False, starts, switch)
+        write(path, loaded, found, unit(keys[0]), force=force)
+        return opened(path, own=True)
+
+
+def _ends(given: Any) -> tuple[float, float]:
+    try:
+        low, high = map(float, given)
+    except (TypeError, ValueError):
+        raise UsageError(f"parameter: {given!r} is not both ends of a range; give two numbers") from None
+    return low, high
+
+
 def sweep(
     source: "Source | LoadedSweep",
     settings: "Settings | None" = None,

@@ -11,7 +11,7 @@ from pathlib import Path
 from brakecli.files import fields
 
 PLACE = re.compile(r"(<!-- fields ([A-Z_ ]+) -->\n).*?(<!-- end of fields -->)", re.DOTALL)
-PAGES = ("result-format", "results", "regimes", "sweeps", "accuracy", "stability")
+PAGES = ("result-format", "results", "regimes", "sweeps", "accuracy", "stability", "branches")
 
 
 def table(names: str) -> str:

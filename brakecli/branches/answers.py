@@ -32,6 +32,16 @@ class Answers:
         return ",".join(self.line.keys)
 
     @property
+    def lower(self) -> float:
+        """The lower end of the range."""
+        return self.line.low
+
+    @property
+    def upper(self) -> float:
+        """The upper end of the range."""
+        return self.line.high
+
+    @property
     def branches(self) -> list[Followed]:
         """All of them, steady sliding first."""
         return self.explored.branches
@@ -130,7 +140,7 @@ class Answers:
 
     @cached_property
     def barrier(self) -> float | None:
-        """Half of peak to peak of x (m) of the smallest unstable cycle at the case's own value; None without one."""
+        """Half of peak to peak of x (m) of the smallest unstable cycle at the case's value; None without one."""
         if self.own is None:
             return None
         p = self.line.place(self.own)

@@ -43,5 +43,7 @@ def command(
             file.write(content.encode())
             file.publish()
     if not quiet:
-        how = f"brakecli {'sweep' if is_sweep else 'run'} {as_argument(path)}"
+        shown = f"brakecli branch {as_argument(path)} --parameter friction.coefficient=0:1"
+        follows = text == texts["branch"]
+        how = shown if follows else f"brakecli {'sweep' if is_sweep else 'run'} {as_argument(path)}"
         show(f"{' and '.join(map(str, written))}: written; run it with: {how}")

@@ -10,7 +10,7 @@ from brakecli.cli.output import show, warn
 from brakecli.errors import UsageError
 from brakecli.files.os_signals import unwinding
 
-SOURCE = "Result of a run, a sweep, a comparison or stability; with --quantity a measured signal, as for classify."
+SOURCE = "Result of any kind; with --quantity a measured signal, as for classify."
 SELECT = "Draw the nearest value of a sweep's axis; repeatable."
 VARIABLE = (
     "Draw this number of a sweep; of a run x, y, vx, vy, friction_force, normal_force, torque or contact_fraction."

@@ -27,7 +27,15 @@ _QUIET = 1e-3  # part of the power that may be left out unsaid
 _HEARD = 20.0  # Hz
 _FORMULAS = ("=", "+", "-", "@")  # what begins one in a spreadsheet
 _UNEVEN = 1e-3  # of the time between two samples, by which it may vary
-_TABLES = (fields.HISTORY, fields.POINT, fields.CRITICAL, fields.VARIED, fields.MODES, fields.ENTRY)
+_TABLES = (
+    fields.HISTORY,
+    fields.POINT,
+    fields.CRITICAL,
+    fields.VARIED,
+    fields.MODES,
+    fields.ENTRY,
+    fields.BRANCH_POINT,
+)
 _ORDER = [field.name for rows in _TABLES for field in rows]  # of columns
 _AXES = {
     "history": ("time",),
@@ -47,10 +55,16 @@ def export(
     """
     check_target(target, "a kind of file", (".csv", ".wav"), [result.path])
     suffix, kind = target.suffix.lower(), result.attributes.get("kind")
-    if kind != "run" and (group or suffix == ".wav"):
+    numbered = kind == "branch" and suffix == ".csv"
+    if numbered:
+        group = group or ("branch_1" if "branch_1" in result.groups else "branch_0")
+        if not group.startswith("branch_") or "/" in group or group not in result.groups:
+            branches = ", ".join(name for name in result.groups if name.startswith("branch_") and "/" not in name)
+            raise UsageError(f"--group {group}: there is none; give one of {branches}")
+    elif kind != "run" and (group or suffix == ".wav"):
         what = f"--group {group}" if group else str(target)
         raise UsageError(f"{what}: is for runs, and {result.path} is a {kind}; export it as .csv without --group")
-    if group not in (None, *_AXES):
+    if not numbered and group not in (None, *_AXES):
         raise UsageError(f"--group {group}: there is none; give one of {', '.join(_AXES)}")
     if group and group not in result.file:
         raise UsageError(f"--group {group}: this run has none; it has one where speed or load change")
@@ -67,7 +81,7 @@ def export(
             sound, notes = _sound(result, names[0] if names else "vx")
             file.write(sound)
         else:
-            for rows in _rows(result, (group or "history") if kind == "run" else "/", names):
+            for rows in _rows(result, group or ("history" if kind == "run" else "/"), names):
                 stream = io.StringIO()
                 csv.writer(stream, lineterminator="\n").writerows(rows)
                 file.write(stream.getvalue().encode())
@@ -78,7 +92,7 @@ def export(
 def _rows(result: StoredResult, group: str, names: Sequence[str]) -> Iterator[list[Sequence[Any]]]:
     """The header and blocks of rows of a table: one row for each place along the axes of the group."""
     known = result.variables(group)
-    axes = _AXES[group] if group != "/" else _main(known)
+    axes = ("point",) if group.startswith("branch_") else _AXES[group] if group != "/" else _main(known)
     if not axes or any(axis not in known for axis in axes):
         raise UnreadableResultError(f"{result.path}: {group} lacks its axes; name an intact result file")
     shape = tuple(known[axis].shape[0] for axis in axes)
@@ -113,7 +127,10 @@ def _cells(column: NDArray[Any]) -> list[Any]:
 
 def _lies_along(variable: Variable, axes: tuple[str, ...], shape: tuple[int, ...]) -> bool:
     """Whether a variable has a value, or several, at each place, or at each of both directions of a sweep."""
-    return variable.shape[: len(axes)] == shape or (axes[0] == "direction" and variable.dims == axes[1:])
+    deep = len(variable.shape) > len(axes) + 1  # complex numbers of several: they are in the file
+    return (variable.shape[: len(axes)] == shape and not deep) or (
+        axes[0] == "direction" and variable.dims == axes[1:]
+    )
 
 
 def _kept(result: StoredResult, group: str, name: str, axes: int) -> list[int]:

@@ -302,12 +302,11 @@ BRANCH_POINT = (
     Field("frequency", "Hz", "frequency of the motion; of steady sliding that of its least stable mode"),
     ratio("stick_fraction", "part of the time in stick"),
     ratio("contact_loss_fraction", "part of the time without contact"),
-    integer("stable", "whether disturbances die out (0, 1)"),
+    Field("stable", "1", "whether disturbances die out", "?"),
     Field(
         "multipliers",
         "1",
-        "Floquet multipliers, real and imaginary part, the largest first; of steady sliding those of one period of its "
-        "least stable mode, or of one second",
+        "Floquet multipliers; of steady sliding for a period of its least stable mode, or for 1 s",
         "(4,2)f8",
     ),
 )

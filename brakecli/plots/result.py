@@ -69,14 +69,15 @@ def _opened(
 
 def draw(result: StoredResult, select: Sequence[str] = (), variable: str = "") -> "Figure":
     """The picture of an open result, drawn with the style that is set."""
-    from brakecli.plots import comparison, curves, lock_in, maps, run, sweep
+    from brakecli.plots import branch, comparison, curves, lock_in, maps, run, sweep
 
     kind = str(result.attributes.get("kind"))
     if kind == "sweep":
         picture = sweep.gather(result, select, variable)
         return curves.draw(picture) if len(picture.axes) == 1 else maps.draw(picture)
-    if kind not in ("run", "comparison", "stability"):
-        known = "a run, of a sweep, of a comparison or of stability"
+    others = {"comparison": comparison.draw, "stability": lock_in.draw, "branch": branch.draw}
+    if kind != "run" and kind not in others:
+        known = "a run, of a sweep, of a comparison, of stability or of branches"
         raise UsageError(f"{result.path}: holds a result of kind {printable(kind)}; name the result of {known}")
     if select:
         raise UsageError(f"{result.path}: --select is for sweeps (found {select[0]!r}); leave it out for a {kind}")
@@ -84,4 +85,4 @@ def draw(result: StoredResult, select: Sequence[str] = (), variable: str = "") -
         return run.draw(run.RunPicture(result, variable or "vx"))
     if variable:
         raise UsageError(f"{result.path}: --variable is for runs and sweeps (found {variable!r}); leave it out")
-    return comparison.draw(result) if kind == "comparison" else lock_in.draw(result)
+    return others[kind](result)

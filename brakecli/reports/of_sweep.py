@@ -1,4 +1,4 @@
-"""The parts of a page about sweeps, comparisons of schemes, and stability along a key."""
+"""The parts of a page about sweeps, comparisons of schemes, stability along a key, and branches."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -27,11 +27,13 @@ _COMMANDS = {
     "sweep": "sweep SWEEP.toml",
     "comparison": "compare-schemes CASE.toml",
     "stability": "stability CASE.toml --vary …",
+    "branch": "branch CASE.toml --parameter …",
 }
 _QUESTIONS = {
     "sweep": "Where does this shoe vibrate, and in which way?",
     "critical": "From which value of {} on does steady sliding lose its stability?",
     "stability": "Which modes meet, where, and how fast does the motion grow?",
+    "branch": "From which value on does it squeal by itself, and from which on can it squeal?",
     "comparison": "Which scheme and which step reach the wanted error at the least cost?",
 }
 
@@ -92,16 +94,20 @@ def _answer(found: SweepPicture) -> Iterator[str]:
 
 
 def part_of_other(result: StoredResult) -> Part:
-    """What the page says of a comparison, or of stability along a key. Raises UnreadableResultError."""
+    """What a page says of a comparison, of stability along a key, or of branches; raises UnreadableResultError."""
     kind = str(result.attributes["kind"])
-    known = fields.LOCK_IN if kind == "stability" else fields.COMPARISON
-    rows = rows_of((each for each in known if each.name not in ("title", "recommended")), result.attributes)
+    known = {"stability": fields.LOCK_IN, "branch": fields.BRANCH}.get(kind, fields.COMPARISON)
+    apart = ("title", "recommended", "sentence")
+    rows = rows_of((each for each in known if each.name not in apart and each.in_file), result.attributes)
     drawn = picture("Picture of the result", partial(draw, result))
     answer = ["No entry meets the wanted error."]
     if kind == "stability":
         where = ", ".join(f"{value:.6g}" for value in np.ravel(result.attributes.get("critical_values", ())))
         key = ", ".join(map(str, result.attributes.get("parameters", ())))
         answer = [f"Along {key}, stability {f'changes at {where}' if where else 'does not change'}."]
+    if kind == "branch":
+        sentence = str(result.attributes.get("sentence", ""))
+        answer = [f"{sentence[:1].upper()}{sentence[1:]}."]
     best = result.attributes.get("recommended")
     if kind == "comparison" and isinstance(best, int):
         method, step, error = (style.read_column(result, name)[best] for name in ("method", "step", "error"))

@@ -12,9 +12,9 @@ from brakecli.branches.answers import Answers
 from brakecli.branches.explore import Explorer, Followed
 from brakecli.branches.line import Line
 from brakecli.case.read import LoadedCase, key_path, parse_resolved
-from brakecli.errors import CaseError, UsageError, printable
+from brakecli.errors import UsageError, printable
 from brakecli.files import fields
-from brakecli.files.field import values_of
+from brakecli.files.field import Field, integer, values_of
 from brakecli.files.read import open_result
 from brakecli.files.write import ResultFile, new_result
 from brakecli.runs.run import origin
@@ -97,11 +97,11 @@ def write(path: Path, loaded: LoadedCase, found: Answers, units: str, *, force: 
 
 def _write_one(result: ResultFile, group: str, found: Followed, units: str) -> None:
     """A branch: its motions over `point`, and a group of its special points."""
-    result.axis(group, fields.integer("point", "number of the motion along the branch"), range(len(found.points)))
+    result.axis(group, integer("point", "number of the motion along the branch"), range(len(found.points)))
     result.set_attributes({"kind": found.kind, "note": found.note}, group)
     if found.points:
-        result.axis(group, fields.integer("multiplier", "number of the multiplier"), range(1, MULTIPLIERS + 1))
-        result.axis(group, fields.Field("part", "", "of a complex number", "S"), ["real", "imaginary"])
+        result.axis(group, integer("multiplier", "number of the multiplier"), range(1, MULTIPLIERS + 1))
+        result.axis(group, Field("part", "", "of a complex number", "S"), ["real", "imaginary"])
     for field in fields.BRANCH_POINT:
         own = replace(field, units=units or "1") if field.units == "of the key" else field
         if field.name == "multipliers":
@@ -112,10 +112,10 @@ def _write_one(result: ResultFile, group: str, found: Followed, units: str) -> N
                         row[k] = _finite(factor.real), _finite(factor.imag)
                 result.column(replace(own, kind="f8"), ("point", "multiplier", "part"), values, group)
             continue
-        column = [getattr(point, field.name) for point in found.points]
-        result.column(own, ("point",), column, group)
+        own = replace(own, kind="i8") if field.kind == "?" else own
+        result.column(own, ("point",), [1 * getattr(point, field.name) for point in found.points], group)
     inner, marks = f"{group}/special", found.special
-    result.axis(inner, fields.integer("special", "number of the special point"), range(len(marks)))
+    result.axis(inner, integer("special", "number of the special point"), range(len(marks)))
     for field in fields.SPECIAL:
         own = replace(field, units=units or "1") if field.units == "of the key" else field
         result.column(own, ("special",), [getattr(mark, field.name) for mark in marks], inner)

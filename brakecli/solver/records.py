@@ -304,6 +304,17 @@ class Plant(NamedTuple):
     counts: Any
 
 
+class Parts(NamedTuple):
+    """What a flow on rough pads works with: what is given, the record that it changes, and tables with scratch.
+
+    It stands here because the cache names the module of each type: loading a kernel may import no other kernels.
+    """
+
+    c: Coefficients
+    f: Any
+    tables: Floats
+
+
 STATE_TYPE, MOTION_TYPE, FLOW_TYPE, PROBLEM_TYPE, CONTACT_TYPE, WORK_TYPE, COUNTS_TYPE, PAD_TYPE, WINDOW_TYPE = (
     numba.from_dtype(each) for each in (STATE, MOTION, FLOW, PROBLEM, CONTACT, WORK, COUNTS, PAD, WINDOW)
 )

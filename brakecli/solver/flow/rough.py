@@ -28,7 +28,7 @@ is.
 import math
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any, NamedTuple
+from typing import Any
 
 import numba
 import numpy as np
@@ -39,7 +39,7 @@ from brakecli.solver.automaton import PULL, STICK, UNDECIDED, following, held, s
 from brakecli.solver.compile import FAST, LARGEST, Floats, from_memory, into_memory, kernel, stopped, vector
 from brakecli.solver.contact.pad import aligned
 from brakecli.solver.double_double import two_product
-from brakecli.solver.records import COEFFICIENTS, V_X, V_Y, Coefficients, X, Y, new, record
+from brakecli.solver.records import COEFFICIENTS, V_X, V_Y, Coefficients, Parts, X, Y, new, record
 from brakecli.solver.roughness import Surface, wheel_angles
 from brakecli.solver.schemes.event_driven.runge_kutta import END_STAGE, NODES, USED, A
 from brakecli.solver.sine import sine_cosine
@@ -609,14 +609,6 @@ def _begin(c: Coefficients, f: Any, tables: Floats) -> None:
     f.least_contact = f.most_contact = part
     _note_border(f)
     _advance(f)
-
-
-class Parts(NamedTuple):
-    """What a flow works with: what is given, the record that it changes, and tables with scratch."""
-
-    c: Coefficients
-    f: Any
-    tables: Floats
 
 
 _PARTS = types.NamedTuple([COEFFICIENTS, ROUGH_TYPE, vector], Parts)

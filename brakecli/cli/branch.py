@@ -1,0 +1,59 @@
+"""`brakecli branch`."""
+
+from contextlib import nullcontext
+from pathlib import Path
+from typing import Annotated
+
+from brakecli.cli.inputs import load_case, result_path
+from brakecli.cli.options import AsJson, CaseArgument, Force, ForceRead, Overrides, Quiet, option, output_option
+from brakecli.cli.output import progress, show_result
+from brakecli.files.os_signals import Interrupted, signals_deferred
+
+PARAMETER = "Follow all motions along a key, or along several that take the same value."
+START = "Also follow the motion that the end of this run comes to; repeatable."
+SWITCH = "Also follow the motions of twice the period from each flip."
+
+
+def command(
+    case: CaseArgument,
+    parameter: Annotated[str, option(PARAMETER, "KEY[,KEY]=LOW:HIGH", "--parameter", show_default=False)],
+    output: Annotated[Path | None, output_option("Result file, .h5", "none")] = None,
+    overrides: Overrides = None,
+    start: Annotated[list[Path] | None, option(START, "FILE.h5")] = None,
+    switch: Annotated[bool, option(SWITCH, None, "--switch")] = False,
+    force_read: ForceRead = False,
+    force: Force = False,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+) -> None:
+    """Every motion along a key, stable or not: where it squeals, where it can, and what lies between."""
+    from brakecli.runs.branch import parsed
+
+    keys, low, high = parsed(parameter)
+    loaded = load_case(case, overrides)
+    target = result_path(output, case) if output is not None else None
+    from brakecli.cli.branch_table import branch_table
+    from brakecli.files.atomic import new_output
+    from brakecli.files.field import values_of
+    from brakecli.files.fields import BRANCH
+    from brakecli.runs.branch import branch, line_of, start_of, write
+    from brakecli.runs.limits import within_range
+    from brakecli.sweeps.result import unit
+
+    units = unit(keys[0])
+    with progress(quiet) as tell:
+        with within_range():
+            line = line_of(loaded, keys, low, high, f"--parameter {parameter}")
+        starts = [start_of(path, keys) for path in start or ()]
+        with new_output(target, force=force) if target else nullcontext():  # whether it can be written
+            pass
+        try:
+            with signals_deferred() as waiting:
+                found = branch(line, tell, lambda: bool(waiting), starts, switch)
+                if target:
+                    write(target, loaded, found, units, force=force)
+        except Interrupted as error:
+            error.left = f"what was followed up to here is in {target}" if target else error.left
+            raise
+    numbers = {**values_of(BRANCH, found), "output": target and str(target)}
+    show_result("branch", numbers, branch_table, loaded.case.title, found, units, as_json=as_json, quiet=quiet)

@@ -1,0 +1,113 @@
+"""Branches along a key: amplitude above, frequency below; stable motions full, unstable ones dashed."""
+
+import math
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from brakecli.errors import UsageError
+from brakecli.files.read import StoredResult
+from brakecli.plots import style
+
+_WIDTH, _HEIGHT = 8.8, 6.6  # inches
+_COLOURS = style.BLUE, style.VERMILION, style.GREEN, style.ORANGE
+_MARKERS = {
+    "flutter": "o",
+    "divergence": "X",
+    "fold": "s",
+    "flip": "D",
+    "torus": "^",
+    "branch point": "P",
+    "grazing stick": "v",
+    "grazing flight": "d",
+    "end": "|",
+    "budget": "x",
+}
+_SLIDING = "steady sliding"
+_WIDE = 30.0  # ratio of amplitudes from which on their axis is logarithmic
+
+
+def draw(result: StoredResult) -> Figure:
+    """The figure. Raises UsageError where there is no motion at all, and UnreadableResultError."""
+    groups = sorted(
+        (name for name in result.groups if name.startswith("branch_") and "/" not in name), key=_number
+    )
+    attributes, branches = result.attributes, []
+    for group in groups:
+        names = ("value", "amplitude", "frequency", "stable")
+        columns = {name: np.asarray(result.read(group, name), float) for name in names}
+        inner = f"{group}/special"
+        marks = {name: result.read(inner, name) for name in ("kind", "value", "amplitude", "frequency")}
+        branches.append((str(result.group_attributes(group).get("kind", "")), columns, marks))
+    if not groups or not any(len(columns["value"]) for _, columns, _ in branches):
+        raise UsageError(f"{result.path}: holds no motion, so there is nothing to draw")
+    units = style.unit_of(result.variables(groups[0])["value"].attributes)
+    key, sentence = str(attributes.get("parameter", "")), str(attributes.get("sentence", ""))
+    figure = style.headed(_WIDTH, _HEIGHT, str(attributes.get("title", "")), sentence, hspace=0.05)
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[1.6, 1.0])
+    sizes = np.concatenate([np.zeros(0), *(each["amplitude"] for kind, each, _ in branches if kind != _SLIDING)])
+    sizes = sizes[sizes > 0.0]
+    wide = len(sizes) > 0 and sizes.max() > _WIDE * sizes.min()
+    shown = set[str]()
+    for number, (kind, columns, marks) in enumerate(branches):
+        colour = style.DARK if kind == _SLIDING else _COLOURS[(number - 1) % len(_COLOURS)]
+        for axes, name in ((upper, "amplitude"), (lower, "frequency")):
+            if not (wide and name == "amplitude" and kind == _SLIDING):
+                _line(axes, columns, name, colour, kind if axes is upper else "")
+            _marks(axes, marks, name, colour, shown if axes is upper else None, wide and kind == _SLIDING)
+    if wide:
+        upper.set_yscale("log")
+    for name, text in (("critical", "squeals by itself"), ("coexists_from", "can vibrate")):
+        value = attributes.get(name)
+        if isinstance(value, int | float) and math.isfinite(value):
+            for axes in (upper, lower):
+                look: dict[str, Any] = {"label": f"{text} from {value:.4g} on"} if axes is upper else {}
+                axes.axvline(float(value), color=style.GREY, lw=1.1, ls=style.DOTS, zorder=1.5, **look)
+    low = float(sizes.min()) if wide else 0.0
+    style.set_ticks(upper.yaxis, low, style.largest(sizes), "m", "amplitude of x")
+    frequencies = np.concatenate([columns["frequency"] for _, columns, _ in branches])
+    style.set_ticks(lower.yaxis, 0.0, style.largest(frequencies), "Hz", "frequency")
+    values = np.concatenate([columns["value"] for _, columns, _ in branches])
+    style.set_ticks(lower.xaxis, float(values.min()), float(values.max()), units, key)
+    figure.align_ylabels()
+    upper.legend(loc="best")
+    return figure
+
+
+def _number(group: str) -> int:
+    digits = group.rpartition("_")[2]
+    return int(digits) if digits.isdigit() else 0
+
+
+def _line(axes: Axes, columns: dict[str, Any], name: str, colour: str, label: str) -> None:
+    """One quantity of a branch: stable parts full, unstable ones dashed, which begin where the other part ends."""
+    places = range(len(columns["value"]))
+    for stable, part in groupby(places, lambda place: bool(columns["stable"][place])):
+        inside = list(part)
+        inside = [max(inside[0] - 1, 0), *inside] if not stable else [*inside, min(inside[-1] + 1, places[-1])]
+        look: dict[str, Any] = {"ls": "-", "lw": 1.8} if stable else {"ls": style.DASHES, "lw": 1.2}
+        axes.plot(columns["value"][inside], columns[name][inside], color=colour, label=label or None, **look)
+        label = ""
+
+
+def _marks(
+    axes: Axes, marks: dict[str, Any], name: str, colour: str, shown: set[str] | None, hidden: bool
+) -> None:
+    """The special points; each kind is named once in the legend."""
+    for kind, value, height in zip(marks["kind"], marks["value"], marks[name], strict=True):
+        if str(kind) not in _MARKERS or str(kind) == "end" or (hidden and name == "amplitude") or height <= 0.0:
+            continue
+        label = None if shown is None or str(kind) in shown else str(kind)
+        if shown is not None:
+            shown.add(str(kind))
+        look: dict[str, Any] = {
+            "marker": _MARKERS[str(kind)],
+            "ms": 5.5,
+            "mfc": "white",
+            "ls": "none",
+            "zorder": 3.0,
+        }
+        axes.plot([float(value)], [float(height)], color=colour, label=label, **look)
