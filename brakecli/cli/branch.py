@@ -40,10 +40,10 @@ def command(
     from brakecli.runs.limits import within_range
     from brakecli.sweeps.result import unit
 
-    units = unit(keys[0])
     with progress(quiet) as tell:
         with within_range():
             line = line_of(loaded, keys, low, high, f"--parameter {parameter}")
+        units = unit(keys[0])
         starts = [start_of(path, keys) for path in start or ()]
         with new_output(target, force=force) if target else nullcontext():  # whether it can be written
             pass

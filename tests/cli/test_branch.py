@@ -1,0 +1,209 @@
+"""`brakecli branch`: its answers, its file, its pictures, and what it refuses."""
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import brakecli
+from brakecli.errors import UsageError
+from tests.analysis.shoes import Shoe
+from tests.commands import brakecli as command
+from tests.commands import environment
+
+pytestmark = pytest.mark.usefixtures("compiled")
+
+FRICTION = ("--parameter", "friction.coefficient=0:1")
+
+
+def answer_of(here: Path, *words: str) -> dict[str, Any]:
+    """What a command says as JSON, once it has ended well."""
+    done = command(*words, "--json", cwd=here)
+    done.told(0)
+    return done.json
+
+
+@pytest.fixture(scope="module")
+def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("branch")
+    command("new", "branch", cwd=folder).told(0)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def found(here: Path) -> dict[str, Any]:
+    return answer_of(here, "branch", "branch.toml", *FRICTION, "-o", "branch.h5")
+
+
+def test_the_starter_can_vibrate_below_its_critical_friction(here: Path, found: dict[str, Any]) -> None:
+    """Critical friction against the roots of Hurwitz' polynomial, and the fold below it."""
+    import tomllib
+
+    shoe = Shoe.of(tomllib.loads((here / "branch.toml").read_text()))
+    assert shoe.critical is not None
+    assert found["critical"] == pytest.approx(shoe.critical, rel=1e-9)
+    sliding, cycle = found["branches"]
+    assert [branch["kind"] for branch in found["branches"]] == ["steady sliding", "limit cycle"]
+    assert [mark["kind"] for mark in sliding["special"]] == ["end", "flutter", "end"]
+    assert [mark["kind"] for mark in cycle["special"]] == ["flutter", "fold", "end"]
+    fold = cycle["special"][1]
+    assert found["coexists_from"] == fold["value"] < found["critical"]
+    assert "can exist beside stable sliding" in found["sentence"]
+    assert found["critical_windows_lower"] == [found["critical"]]
+    assert found["critical_windows_upper"] == [1.0]
+
+
+def test_runs_that_start_on_either_side_of_the_barrier_end_apart(here: Path, found: dict[str, Any]) -> None:
+    """A fifth of the push that the unstable cycle stands for dies out, and five times it lasts."""
+    points = found["branches"][1]["points"]
+    lasting = min((point for point in points if point["stable"]), key=lambda point: abs(point["value"] - 0.4))
+    words = []
+    for factor in (0.2, 5.0):
+        push = factor * 2.0 * np.pi * 200.0 * found["barrier"]
+        settings = (
+            "--set",
+            f"initial.vy={-push}",
+            "--set",
+            'initial.at="equilibrium"',
+            "--set",
+            "solver.duration=40.0",
+        )
+        words.append(answer_of(here, "run", "branch.toml", *settings, "-o", "r.h5", "--force"))
+    assert words[0]["amplitude"] < 0.1 * found["barrier"]
+    assert words[1]["amplitude"] == pytest.approx(lasting["amplitude"], rel=0.05)
+    assert words[1]["frequency"] == pytest.approx(lasting["frequency"], rel=0.01)
+
+
+def test_the_file_holds_what_json_says_and_opens_in_xarray(here: Path, found: dict[str, Any]) -> None:
+    for number, branch in enumerate(found["branches"]):
+        group = f"branch_{number}"
+        with xr.open_dataset(here / "branch.h5", group=group, engine="h5netcdf") as data:
+            assert data.attrs["kind"] == branch["kind"]
+            for name in ("value", "amplitude", "frequency", "stick_fraction", "contact_loss_fraction", "stable"):
+                assert data[name].values.tolist() == [point[name] for point in branch["points"]]
+            first = [pair for pair in data["multipliers"].values[0].tolist() if not np.isnan(pair[0])]
+            assert first == branch["points"][0]["multipliers"]
+        with xr.open_dataset(here / "branch.h5", group=f"{group}/special", engine="h5netcdf") as data:
+            assert data["kind"].values.tolist() == [mark["kind"] for mark in branch["special"]]
+            assert data["value"].values.tolist() == [mark["value"] for mark in branch["special"]]
+    tree = brakecli.load(here / "branch.h5")
+    assert tree.attrs["kind"] == "branch"
+    assert tree.attrs["coexists_from"] == found["coexists_from"]
+
+
+def test_the_file_is_drawn_reported_exported_and_compared(here: Path, found: dict[str, Any]) -> None:
+    command("plot", "branch.h5", "-o", "a.png", cwd=here).told(0)
+    command("report", "branch.h5", "-o", "a.html", cwd=here).told(0)
+    assert "can exist beside stable sliding" in (here / "a.html").read_text()
+    command("export", "branch.h5", "-o", "a.csv", cwd=here).told(0)
+    assert len((here / "a.csv").read_text().splitlines()) == 1 + len(found["branches"][1]["points"])
+    command("export", "branch.h5", "-o", "b.csv", "--group", "branch_7", cwd=here).told(2, "branch_0, branch_1")
+    same = command("diff", "branch.h5", "branch.h5", cwd=here)
+    same.told(0)
+    assert "no difference" in same.out
+    shown = command("branch", "branch.toml", *FRICTION, cwd=here)
+    shown.told(0)
+    assert "limit cycle" in shown.out
+
+
+def test_the_same_case_gives_the_same_bytes(here: Path, found: dict[str, Any]) -> None:
+    command("branch", "branch.toml", *FRICTION, "-q", "-o", "again.h5", cwd=here).told(0)
+    assert (here / "again.h5").read_bytes() == (here / "branch.h5").read_bytes()
+
+
+def test_the_function_gives_the_same_branches(here: Path, found: dict[str, Any]) -> None:
+    tree = brakecli.branch(here / "branch.toml", parameter={"friction.coefficient": (0.0, 1.0)})
+    assert tree.attrs["critical"] == found["critical"]
+    assert tree["branch_1/value"].to_numpy().tolist() == [each["value"] for each in found["branches"][1]["points"]]
+    with pytest.raises(UsageError, match="two numbers"):
+        brakecli.branch(here / "branch.toml", parameter={"friction.coefficient": 3.0})  # type: ignore[dict-item]
+
+
+def test_a_run_leads_to_its_cycle_and_one_that_is_known_is_said_to_be(here: Path, found: dict[str, Any]) -> None:
+    settings = ("--set", "friction.coefficient=0.6", "--set", "solver.duration=2.0")
+    command("run", "branch.toml", *settings, "-q", "-o", "from.h5", cwd=here).told(0)
+    again = answer_of(here, "branch", "branch.toml", *FRICTION, "--start", "from.h5")
+    assert "comes to a cycle of a branch from flutter" in again["sentence"]
+    assert len(again["branches"]) == len(found["branches"])
+    narrow = (
+        "--parameter",
+        "friction.coefficient=0.2:0.45",
+    )  # flutter lies outside, so that it leads to the branch
+    command(
+        "run",
+        "branch.toml",
+        "--set",
+        "solver.duration=20.0",
+        "--set",
+        "initial.vy=-0.01",
+        "-q",
+        "-o",
+        "hard.h5",
+        cwd=here,
+    ).told(0)
+    answer = answer_of(here, "branch", "branch.toml", *narrow, "--start", "hard.h5")
+    assert [branch["kind"] for branch in answer["branches"]] == ["steady sliding", "limit cycle"]
+    assert answer["critical"] is None
+    assert answer["coexists_from"] == 0.2
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--parameter", "friction.coefficient=1:0"), "LOW below HIGH"),
+        (("--parameter", "friction.coefficient=0:nan"), "LOW below HIGH"),
+        (("--parameter", "friction.coeff=0:1"), "friction.coeff"),
+        (("--parameter", "friction.coefficient,friction.coefficient=0:1"), "no key twice"),
+        (("--parameter", "link2.angle_deg=0:95"), "link2.angle_deg"),
+        (("--parameter", "friction.coefficient=0:1", "-o", "a.txt"), ".h5"),
+    ],
+)
+def test_bad_input_is_told_in_a_sentence(here: Path, words: tuple[str, ...], said: str) -> None:
+    command("branch", "branch.toml", *words, cwd=here).told(2, said)
+
+
+def test_a_start_that_is_no_result_is_refused(here: Path) -> None:
+    command("branch", "branch.toml", *FRICTION, "--start", "none.h5", cwd=here).told(4, "none.h5")
+
+
+def test_on_a_standing_wheel_nothing_slides(here: Path) -> None:
+    answer = answer_of(here, "branch", "branch.toml", *FRICTION, "--set", "wheel.angular_speed=0.0")
+    assert "nothing slides steadily" in answer["sentence"]
+    assert answer["critical"] is None
+
+
+def test_without_dashpots_it_says_that_no_cycle_is_followed(here: Path) -> None:
+    none = ("--set", "link1.damping=0.0", "--set", "link2.damping=0.0")
+    answer = answer_of(here, "branch", "branch.toml", *FRICTION, *none)
+    assert "no dashpot" in answer["sentence"]
+    assert len(answer["branches"]) == 1
+
+
+INTERRUPTED = """
+import os, signal
+from brakecli.branches import explore
+
+begin = explore.Explorer.__init__
+
+def interrupted(self, line, tell, stop, seconds=60.0):
+    begin(self, line, lambda what, done, total: os.kill(os.getpid(), signal.SIGINT) if done == 30 else None, stop)
+
+explore.Explorer.__init__ = interrupted
+from brakecli.__main__ import main
+main()
+"""
+
+
+def test_an_interruption_leaves_a_whole_file_that_ends_in_budget(here: Path) -> None:
+    """The signal comes at the thirtieth motion."""
+    words = [sys.executable, "-c", INTERRUPTED, "branch", "branch.toml", *FRICTION, "-o", "cut.h5", "-q"]
+    done = subprocess.run(words, cwd=here, env=environment(), capture_output=True, text=True)
+    assert done.returncode == 130
+    assert done.stderr == "brakecli: interrupted; what was followed up to here is in cut.h5\n"
+    tree = brakecli.load(here / "cut.h5")
+    assert tree["branch_1/special/kind"].values.tolist()[-1] == "budget"
+    assert 10 < tree["branch_1"].sizes["point"] < 31
