@@ -27,6 +27,7 @@ ALONE = {"shoe", "wheel", "link1", "link2", "load", "friction", "contact"}
 NODES = 33
 """Chebyshev's nodes between which the numbers of shoes are interpolated."""
 _PLACES = 0.5 + 0.5 * np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
+_NUMBERS = {place: number for number, place in enumerate(_PLACES.tolist())}
 _WEIGHTS = np.sin(np.pi * (np.arange(NODES) + 0.5) / NODES) * (-1.0) ** np.arange(NODES)
 
 EXACT = 1e-13
@@ -69,6 +70,7 @@ class Line:
             name: getattr(case, name) if name in ALONE - touched else table for name, table in given.items()
         }
         self.system = lru_cache(maxsize=MOST_KEPT)(self._system)
+        self.shoe = lru_cache(maxsize=MOST_KEPT)(self._shoe)
         self.smooth = case.roughness.shoe is None and case.roughness.wheel is None
 
     @property
@@ -114,7 +116,7 @@ class Line:
         """The system at p; raises CaseError where the case is not valid."""
         return system_of(self.case_at(p))
 
-    def shoe(self, p: float) -> Shoe:
+    def _shoe(self, p: float) -> Shoe:
         """The numbers of the shoe at p: interpolated where that is exact to rounding; reading a case takes longer.
 
         Raises CaseError where the case is not valid.
@@ -141,9 +143,8 @@ class Line:
 
 def _interpolated(table: Floats, p: float) -> Floats:
     """The polynomial through a table's rows at Chebyshev's nodes, by the barycentric formula."""
-    away = p - _PLACES
-    nearest = int(np.argmin(np.abs(away)))
-    if away[nearest] == 0.0:
-        return np.asarray(table[nearest])
-    weights = _WEIGHTS / away
+    node = _NUMBERS.get(p)
+    if node is not None:
+        return np.asarray(table[node])
+    weights = _WEIGHTS / (p - _PLACES)
     return np.asarray(weights @ table / weights.sum())
