@@ -1,0 +1,344 @@
+"""Periodic motions that the waves of a wheel force on a shoe, as motions that the engine follows.
+
+The unknowns are the states at the begin of each segment of the common period of the waves (multiple shooting). The
+gap is where a segment ends less where the next one begins. States count from steady sliding at the same parameter, in
+depths that the load presses the shoe in by. Each segment takes the same number of steps over the whole range, and
+the pad has the same cells, so the gap is a smooth function of the parameter as long as the sequence of phases is the
+same.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from brakecli.branches.cycles import cyclic
+from brakecli.branches.follow import follow
+from brakecli.branches.line import Line
+from brakecli.branches.newton import Settings, start
+from brakecli.branches.point import Point
+from brakecli.branches.problem import Array, Doubled, Guess, Seen
+from brakecli.errors import CaseError
+from brakecli.errors import Problem as Wrong
+from brakecli.solver.automaton import STICK
+from brakecli.solver.flow.rough import STEPS_PER_PERIOD, Flown, RoughFlow, Status, default_cells, default_steps
+from brakecli.solver.period import LONGEST, common_period
+from brakecli.solver.roughness import surface
+from brakecli.solver.steady_sliding import steady_sliding, tabulated
+from brakecli.solver.system import System
+
+DIFFERENCE = 1e-6
+"""Change of the parameter for derivatives by it, to one side. The rounding of a flow is 1e-13, so these are exact to
+about 1e-6, as is the direction of a branch."""
+SLOW_PERIODS = 10.0
+"""Periods of the slowest mode in a segment: disturbances stay far above rounding and below the bound of a run."""
+PLACES = 33
+"""Places of the range at which periods, frequencies and steady sliding are looked at."""
+SNAP = 1e-6
+"""Difference from the wheel's velocity, in the unit of velocities, from which a segment begins in stick. The end of a
+segment that sticks has the wheel's velocity exactly, but Newton's method gives the next begin with rounding."""
+FIRST_WAVES = 1e-6
+"""Part of the amplitude of the waves with which a motion begins that grows with them."""
+WAITED = 50
+"""Periods for which a run goes on before a motion is sought at its end."""
+AT_REPEAT = 0.1
+"""Distance, in depths, of two states of a run from which Newton's method is begun."""
+REASONS = {
+    Status.GRAZED: "an event is grazed",
+    Status.TOO_MANY_EVENTS: "there are too many events in a segment",
+    Status.NOT_FINITE: "the motion grows without bound",
+    Status.STOPPED: "it was interrupted",
+}
+NO_PERIOD = "the waves of the wheel have no common period"
+
+
+class Motion(NamedTuple):
+    """What a forced motion shows (SI units)."""
+
+    period: float
+    amplitude: float  # half of peak to peak of x
+    stick_fraction: float
+    contact_loss_fraction: float
+    state: tuple[float, ...]  # x, y, v_x and v_y at t = 0
+    word: tuple[int, ...]  # phases, from there
+
+    @property
+    def frequency(self) -> float:
+        """Hz."""
+        return 1.0 / self.period
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """How motions are computed and counted, the same over the whole range."""
+
+    segments: int  # of a common period
+    steps: int  # of a segment
+    cells: int  # of the pad
+    scales: Array  # units of x, y, v_x and v_y
+    origins: Array  # (places, 2), x and y of steady sliding at equal distances in p
+
+    def origin(self, p: float) -> Array:
+        """The state from which states count: steady sliding, between the places by cubics with equal slopes."""
+        xy = self.origins
+        last = len(xy) - 1
+        if last == 0:
+            return np.append(xy[0], [0.0, 0.0])
+        k = min(max(int(p * last), 0), last - 1)
+        t = p * last - k
+        here, there = xy[k], xy[k + 1]
+        begin = 0.5 * (there - xy[k - 1]) if k > 0 else there - here
+        end = 0.5 * (xy[k + 2] - here) if k + 2 <= last else there - here
+        chord = there - here
+        cubic = here + t * chord + t * (1.0 - t) * ((1.0 - t) * (begin - chord) - t * (end - chord))
+        return np.append(cubic, [0.0, 0.0])
+
+
+class _Flown(NamedTuple):
+    """All segments of a motion."""
+
+    runs: list[Flown]
+    ends: Array  # (segments, 4), scaled
+    word: tuple[int, ...]
+    period: float
+
+
+class Forced(Doubled):
+    """Motions forced by a rough wheel at constant speed and load, over a range of a parameter."""
+
+    def __init__(self, system: Callable[[float], System], frame: Frame, periods: int = 1) -> None:
+        """`system` raises CaseError where a place is not valid; `periods`: common periods until a motion repeats."""
+        self.system, self.frame, self.periods = system, frame, periods
+        self.flow = lru_cache(maxsize=16)(self._flow)
+        self.origin = lru_cache(maxsize=64)(frame.origin)
+
+    @classmethod
+    def along(cls, line: Line, periods: int = 1, per_period: float = STEPS_PER_PERIOD) -> "Forced":
+        """Those along a line of cases, with so many steps to the fastest period.
+
+        Raises CaseError where none of the places looked at is valid, has a wheel that turns at constant speed under
+        a constant load, and has waves with a common period.
+        """
+        return cls(line.system, _frame(line, per_period), periods)
+
+    def of_periods(self, periods: int) -> "Forced":
+        """The problem of motions that repeat after so many common periods, with the same steps and cells."""
+        return Forced(self.system, self.frame, periods)
+
+    @property
+    def segments(self) -> int:
+        """Segments of a motion."""
+        return self.periods * self.frame.segments
+
+    def _flow(self, p: float) -> tuple[RoughFlow, float]:
+        """The flow and the common period (s) at a place; raises CaseError or ValueError where there is none."""
+        system = self.system(p)
+        period = common_period(system)
+        if period is None:
+            raise ValueError(NO_PERIOD)
+        return RoughFlow(system, self.frame.cells), period
+
+    def _flown(self, u: Array, p: float, derivative: bool = True) -> _Flown | str:
+        """The flow over all segments, or why there is none."""
+        try:
+            flow, period = self.flow(p)
+        except (CaseError, ValueError) as error:
+            return str(error)
+        frame, origin, belt = self.frame, self.origin(p), flow.system.belt_speed
+        states = origin + u.reshape(-1, 4) * frame.scales
+        length, runs, word = period / frame.segments, list[Flown](), list[int]()
+        for k, state in enumerate(states):
+            if abs(state[2] - belt) <= SNAP * frame.scales[2]:
+                state[2] = belt
+            run = flow(state, k % frame.segments * length, length, frame.steps, derivative)
+            if run.status is not Status.DONE:
+                return REASONS[run.status]
+            runs.append(run)
+            word += run.word[1:] if word and word[-1] == run.word[0] else run.word
+        ends = (np.array([run.state for run in runs]) - origin) / frame.scales
+        return _Flown(runs, ends, cyclic(tuple(word)), self.periods * period)
+
+    def evaluate(self, u: Array, p: float, with_parameter: bool) -> Seen | str | None:
+        """Carry the state of each segment to its end; the gaps and their derivatives."""
+        found = self._flown(u, p)
+        if isinstance(found, str):
+            return found
+        m, scales, runs = self.segments, self.frame.scales, found.runs
+        maps = np.array([run.derivative for run in runs]) * (scales / scales[:, None])
+        if not np.isfinite(maps).all():
+            return "disturbances grow without bound"
+        by_u = np.zeros((m, 4, m, 4))
+        for k in range(m):
+            by_u[k, :, k] += maps[k]
+            by_u[k, :, (k + 1) % m] -= np.eye(4)
+        gap = (found.ends - np.roll(u.reshape(m, 4), -1, axis=0)).ravel()
+        by_p = self._by_p(u, p, found) if with_parameter else None
+        if with_parameter and by_p is None:
+            return "the derivative by the parameter meets a border, or the end of what is valid"
+        return Seen(
+            gap,
+            by_u.reshape(4 * m, 4 * m),
+            by_p,
+            maps,
+            found.word,
+            self._facts(u, p, found),
+            self._margins(p, found),
+        )
+
+    def _facts(self, u: Array, p: float, found: _Flown) -> Motion:
+        runs = found.runs
+        margins = [run.margins for run in runs]
+        return Motion(
+            found.period,
+            0.5 * (max(run.x[1] for run in runs) - min(run.x[0] for run in runs)),
+            sum(each.stick_share for each in margins) / len(runs),
+            sum(each.open_share for each in margins) / len(runs),
+            tuple((self.origin(p) + u[:4] * self.frame.scales).tolist()),
+            found.word,
+        )
+
+    def _margins(self, p: float, found: _Flown) -> tuple[float, ...]:
+        """How far a motion in slip alone is from stick: its least sliding speed over that of the wheel."""
+        if len(found.word) > 1 or found.word[0] == STICK:
+            return ()
+        belt = self.flow(p)[0].system.belt_speed
+        return (min(run.margins.slide for run in found.runs) / abs(belt),)
+
+    def _by_p(self, u: Array, p: float, found: _Flown) -> Array | None:
+        """The derivative of the gaps by p, of the same sequence of phases, to the first side that has it."""
+        inward = DIFFERENCE if p < 0.5 else -DIFFERENCE
+        for step in (inward, -inward, 0.03 * inward, -0.03 * inward):
+            if not 0.0 <= p + step <= 1.0:
+                continue
+            beside = self._flown(u, p + step, derivative=False)
+            if not isinstance(beside, str) and beside.word == found.word:
+                return np.asarray(((beside.ends - found.ends) / step).ravel())
+        return None
+
+    def border(self, before: object, after: object) -> str:
+        """What one of two sequences of phases has more of. Lift-off is no border, as the force is continuous."""
+        assert isinstance(before, tuple)
+        assert isinstance(after, tuple)
+        return "sequence of events changes" if before.count(STICK) == after.count(STICK) else "grazing stick"
+
+    def doubled(self, point: Point, vector: Array) -> Guess:
+        """The motion of half the periods, twice, displaced along the eigenvector of -1."""
+        shifts = [vector]
+        for matrix in [*point.maps, *point.maps][:-1]:
+            shifts.append(matrix @ shifts[-1])
+        return np.tile(point.u, 2), np.append(np.concatenate(shifts), 0.0)
+
+    # --- first points ---------------------------------------------------------------------------------------------
+
+    def grown(self, p: float, settings: Settings | None = None) -> Point | None:
+        """The motion at p that continues steady sliding as the waves grow from nothing; None where it is lost.
+
+        Steady sliding counts in full contact here, as it is that of the wheel without waves.
+        """
+        try:
+            system = self.system(p)
+        except CaseError:
+            return None
+        wheel = system.wheel
+
+        def with_waves(part: float) -> System:
+            return replace(system, wheel=wheel._replace(g=part * wheel.g))
+
+        here = replace(self.frame, origins=self.frame.origin(p)[None, :2])
+        problem = Forced(with_waves, here, self.periods)
+        smooth = _resting(replace(system, wheel=surface()))
+        if smooth is None:
+            return None
+        u = np.tile((smooth - here.origin(0.0)) / here.scales, self.segments)
+        first = start(problem, u, FIRST_WAVES)
+        if first is None:
+            return None
+        branch = follow(
+            problem, first, 1.0, replace(settings or Settings(seconds=30.0), low=FIRST_WAVES, high=1.0)
+        )
+        last = branch.points[-1]
+        return start(self, last.u, p) if last.p == 1.0 else None
+
+    def settled(
+        self, p: float, state: Array, most: int = 4, waited: int = WAITED
+    ) -> "tuple[Forced, Point] | None":
+        """The motion that a run from a state (x, y, v_x, v_y) at t = 0 has come to, and the problem of its periods.
+
+        The run goes on for so many common periods. Then motions of 1, 2, ... and at most `most` of them are sought.
+        """
+        origin, frame = self.origin(p), self.frame
+        one = self.of_periods(1)
+        visited = [(np.asarray(state, float) - origin) / frame.scales]
+        for n in range((waited + most) * frame.segments):
+            end = one._segment(visited[-1], p, n % frame.segments)
+            if end is None:
+                return None
+            visited.append(end)
+        begin = waited * frame.segments
+        for count in range(1, most + 1):
+            problem, end = self.of_periods(count), begin + count * frame.segments
+            away = visited[end] - visited[begin]
+            if not math.sqrt(away @ away) < AT_REPEAT:
+                continue
+            guess = np.concatenate(visited[begin:end])
+            point = start(problem, guess, p)
+            if point is not None and float(np.abs(point.u - guess).max()) < 2.0 * AT_REPEAT:
+                return problem, point
+        return None
+
+    def _segment(self, u: Array, p: float, k: int) -> Array | None:
+        """Where a segment ends that begins at a scaled state."""
+        flow, period = self.flow(p)
+        frame, origin = self.frame, self.origin(p)
+        length = period / frame.segments
+        run = flow(origin + u * frame.scales, k * length, length, frame.steps, False)
+        return (run.state - origin) / frame.scales if run.status is Status.DONE else None
+
+
+def _resting(system: System) -> Array | None:
+    """Steady sliding as a state; None where there is none."""
+    try:
+        found = steady_sliding(system, mean=tabulated(system))
+    except CaseError:
+        return None
+    return np.array([found.x, found.y, 0.0, 0.0])
+
+
+def _frame(line: Line, per_period: float) -> Frame:
+    """Segments, steps and cells that are enough over the whole range, and steady sliding along it."""
+    systems, failed = list[tuple[int, System]](), None
+    for k in range(PLACES):
+        try:
+            systems.append((k, line.system(k / (PLACES - 1))))
+        except CaseError as error:
+            failed = error
+    if not systems and failed is not None:
+        raise failed
+    if not systems[0][1].steady:
+        raise _refused(
+            line, ("wheel",), "the speed of the wheel or the load changes in time", "give constant ones"
+        )
+    periods = [(system, period) for _, system in systems if (period := common_period(system)) is not None]
+    if not periods:
+        what = f"{NO_PERIOD} of at most {LONGEST:g} s, so no motion that they force repeats"
+        raise _refused(line, ("roughness", "wheel"), what, "choose wavelengths with a short common multiple")
+    segments = max(math.ceil(period * system.natural_frequencies[0] / SLOW_PERIODS) for system, period in periods)
+    segments = max(segments, 1)
+    steps = max(default_steps(system, period / segments, per_period) for system, period in periods)
+    cells = max(default_cells(system) for system, _ in periods)
+    middle = periods[len(periods) // 2][0]
+    depth = abs(middle.load_at_start) / (middle.coefficients.c_yy + middle.contact_stiffness)
+    fast = 2.0 * math.pi * middle.natural_frequencies[1]
+    known = {k: rest[:2] for k, system in systems if (rest := _resting(system)) is not None}
+    places = np.array(sorted(known))
+    origins = np.zeros((PLACES, 2))
+    for k in range(PLACES if known else 0):
+        origins[k] = known[int(places[np.argmin(np.abs(places - k))])]
+    return Frame(segments, steps, cells, depth * np.array([1.0, 1.0, fast, fast]), origins)
+
+
+def _refused(line: Line, path: tuple[str, ...], what: str, remedy: str) -> CaseError:
+    return CaseError([Wrong(path, what, remedy, source=line.label)])
