@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from functools import cached_property
 
-from brakecli.branches.explore import LIMIT_CYCLE, Explored, Followed, Mark, Row, crossing
+from brakecli.branches.explore import FORCED, SLIDING, Explored, Followed, Mark, Row, crossing
 from brakecli.branches.line import Line
 
 NARROWEST = 1e-6
@@ -47,8 +47,27 @@ class Answers:
         return self.explored.branches
 
     @cached_property
+    def base(self) -> Followed | None:
+        """The forced motion that continues steady sliding as the waves grow; None where nothing forces it."""
+        forced = (each for each in self.branches if each.kind == FORCED)
+        return next((each for each in forced if not each.note), None)
+
+    @cached_property
+    def range(self) -> Span | None:
+        """Where the motion is known that continues steady sliding; None where there is none."""
+        if self.base is not None:
+            places = [self.line.place(row.value) for row in self.base.points]
+            return min(places), max(places)
+        slides = [each.p for each in self.explored.slides if each.eigenvalues is not None]
+        return (slides[0], slides[-1]) if slides else None
+
+    @cached_property
     def windows(self) -> list[Span]:
-        """Where steady sliding is unstable."""
+        """Where the motion that continues steady sliding is unstable; a forced one on all of its sheets."""
+        if self.base is not None and self.range is not None:
+            edges = [self.range[0], *(p for span in self.stable_spans for p in span), self.range[1]]
+            gaps = zip(edges[::2], edges[1::2], strict=True)
+            return [(low, high) for low, high in gaps if high > low + NARROWEST]
         slides, found = [each for each in self.explored.slides if each.eigenvalues is not None], list[Span]()
         if not slides:
             return found
@@ -73,19 +92,23 @@ class Answers:
 
     @cached_property
     def critical(self) -> float | None:
-        """The least value at which steady sliding, stable below, loses its stability."""
-        lost = [change for change in self.explored.changes if change.lost]
-        return self.line.value(lost[0].p) if lost else None
+        """The least value at which the motion that continues steady sliding, stable below, loses its stability."""
+        lost = [low for low, _ in self.windows if self.range is not None and low > self.range[0]]
+        return self.line.value(lost[0]) if lost else None
 
     @property
     def critical_error(self) -> float | None:
-        """Half the width of its bracket."""
-        lost = [change for change in self.explored.changes if change.lost]
-        return lost[0].error * (self.line.high - self.line.low) if lost else None
+        """The error of that value, as that of the special point there."""
+        marks = [mark for mark in (self.base or self.branches[0]).special if mark.kind not in ("end", "budget")]
+        if self.critical is None or not marks:
+            return None
+        return min(marks, key=lambda mark: abs(mark.value - (self.critical or 0.0))).error
 
     @cached_property
     def stable_spans(self) -> list[Span]:
-        """Where steady sliding is stable."""
+        """Where the motion that continues steady sliding is stable; a forced one on one of its sheets."""
+        if self.base is not None:
+            return _merged([(low, high) for low, high, _ in self._stable_parts(self.base)])
         slides = [each for each in self.explored.slides if each.eigenvalues is not None]
         if not slides:
             return []
@@ -97,7 +120,7 @@ class Answers:
         """Intervals with a stable vibration beside stable sliding, and its frequency (Hz) at the lower end."""
         found = []
         for followed in self.branches:
-            if followed.kind != LIMIT_CYCLE:
+            if followed.kind == SLIDING or followed is self.base:
                 continue
             for low, high, frequency in self._stable_parts(followed):
                 for begin, end in self.stable_spans:
@@ -149,7 +172,7 @@ class Answers:
         found = [
             point.facts.amplitude
             for followed in self.branches
-            if followed.kind == LIMIT_CYCLE
+            if followed.kind != SLIDING
             for point in crossing(followed, p)
             if not point.stable
         ]
@@ -174,21 +197,24 @@ class Answers:
         return "; ".join([*parts, *self.explored.notes])
 
     def _self_excited(self) -> str:
-        slides = [each for each in self.explored.slides if each.eigenvalues is not None]
-        if not slides:
+        if self.range is None:
             return "nothing slides steadily"
+        first, last = self.range
         words = []
         for low, high in self.windows:
             begin, end = (f"{self.line.value(p):.4g}" for p in (low, high))
-            if low == slides[0].p and high == slides[-1].p:
+            if low == first and high == last:
                 words.append("throughout")
-            elif high == slides[-1].p:
+            elif high == last:
                 words.append(f"from {begin} on")
-            elif low == slides[0].p:
+            elif low == first:
                 words.append(f"up to {end}")
             else:
                 words.append(f"from {begin} to {end}")
-        return f"squeals by itself {' and '.join(words)}" if words else "steady sliding is stable throughout"
+        if words:
+            return f"squeals by itself {' and '.join(words)}"
+        what = "steady sliding" if self.base is None else "the motion that the waves force"
+        return f"{what} is stable throughout"
 
     def _beside_sliding(self) -> list[str]:
         if not self.coexisting:
@@ -198,7 +224,19 @@ class Answers:
         begin, end = (f"{self.line.value(p):.4g}" for p in (low, until))
         reaches = any(abs(until - edge) < 1e-9 for edge in (1.0, *(begin for begin, _ in self.windows)))
         where = f"from {begin} on" if reaches else f"from {begin} to {end}"
-        return [f"{where} a vibration at {frequency:.4g} Hz can exist beside stable sliding"]
+        what = "stable sliding" if self.base is None else "the motion that the waves force"
+        return [f"{where} a vibration at {frequency:.4g} Hz can exist beside {what}"]
+
+
+def _merged(spans: list[Span]) -> list[Span]:
+    """The union of spans, in order."""
+    found = list[Span]()
+    for low, high in sorted(spans):
+        if found and low <= found[-1][1] + NARROWEST:
+            found[-1] = found[-1][0], max(high, found[-1][1])
+        else:
+            found.append((low, high))
+    return found
 
 
 def _metres(length: float) -> str:

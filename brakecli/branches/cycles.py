@@ -84,6 +84,10 @@ class Cycles(Problem):
         self.flow = lru_cache(maxsize=16)(self._flow)
         self.rest = lru_cache(maxsize=64)(self._rest)
 
+    def of_periods(self, periods: int) -> "Cycles":
+        """The problem of motions that repeat after so many periods."""
+        return Cycles(self.line, periods)
+
     def _flow(self, p: float) -> SmoothFlow:
         shoe = self.line.shoe(p)
         return SmoothFlow(*shoe, longest_step(shoe.coefficients, shoe.stiffness))

@@ -12,11 +12,13 @@ from brakecli.analysis.stability.modes import is_undamped
 from brakecli.branches.begin import settled
 from brakecli.branches.cycles import Cycle, Cycles
 from brakecli.branches.follow import Stop, both_ways, follow
+from brakecli.branches.forced import Forced
 from brakecli.branches.line import Line
 from brakecli.branches.newton import Newton, Settings
 from brakecli.branches.point import Branch, End, Point, Special
 from brakecli.branches.sliding import Change, Slide, Sliding
 from brakecli.branches.switch import switch
+from brakecli.errors import CaseError
 
 SLIDING, LIMIT_CYCLE, FORCED = "steady sliding", "limit cycle", "forced motion"
 LARGEST = 1e4
@@ -26,6 +28,8 @@ MOST = 12
 LONGEST = 0.25
 """Longest stride, in sizes of the motion and of the range."""
 POINTS, SECONDS = 3000, 60.0
+GROWN_AT = 0.0, 0.5, 1.0, 0.25, 0.75
+"""Places of the line at which a forced motion is sought that grows with the waves."""
 SAME = 1e-6
 """Relative difference of amplitude and period by which two motions at one value are the same."""
 IN_SLIDING = "it ends in steady sliding, where that flutters"
@@ -108,6 +112,10 @@ class Explorer:
         self.branches.append(self._sliding(slides, changes))
         if self.line.smooth:
             self._cycles(sliding, changes, states)
+        elif self.line.case.roughness.wheel is not None:
+            self._forced(states)
+        else:
+            self.notes.append("on a rough shoe that slides on a smooth wheel limit cycles are not followed")
         if switches:
             self._doubled()
         return Explored(self.line, slides, changes, self.branches, self.notes, bool(self.stop()))
@@ -148,10 +156,11 @@ class Explorer:
         def until(point: Point) -> str | None:
             self.count += 1
             self.tell("points of branches", self.count, 0)
-            if len(set(point.facts.word)) > 1:
-                left[0] = True
-            elif left[0]:
-                return IN_SLIDING
+            if isinstance(point.facts, Cycle):
+                if len(set(point.facts.word)) > 1:
+                    left[0] = True
+                elif left[0]:
+                    return IN_SLIDING
             return LARGE if point.facts.amplitude > limit else None
 
         return until
@@ -180,6 +189,44 @@ class Explorer:
                 return
             self._from_state(sliding, p, state)
 
+    def _forced(self, states: Sequence[tuple[float, Any]]) -> None:
+        """Motions that a rough wheel forces: the one that grows with the waves, and those from given states."""
+        try:
+            problem = Forced.along(self.line)
+        except CaseError as error:
+            self.notes.append("; ".join(each.what for each in error.problems))
+            return
+        for p in GROWN_AT:
+            first = None if self._over() else problem.grown(p, replace(self._settings(), points=300))
+            if first is not None:
+                branch = both_ways(problem, first, self._settings(), self._until(first), self.stop)
+                self.branches.append(self._followed(branch, problem, kind=FORCED))
+                break
+        else:
+            self.notes.append("no forced motion was found that grows out of steady sliding with the waves")
+        for p, state in states:
+            value = self.line.value(p)
+            found = None if self._over() else problem.settled(p, state)
+            if found is None:
+                self.notes.append(f"the motion given for {value:.6g} comes to no periodic motion")
+            elif self._known(p, found[1]):
+                self.notes.append(f"the motion given for {value:.6g} comes to one of a branch that is known")
+            else:
+                branch = both_ways(*found, self._settings(), self._until(found[1]), self.stop)
+                note = f"from the motion given for {value:.6g}"
+                self.branches.append(replace(self._followed(branch, found[0], kind=FORCED), note=note))
+
+    def _known(self, p: float, first: Point) -> bool:
+        """Whether a motion at p lies on a branch that has been followed, perhaps as several of its periods."""
+        for followed in self.branches:
+            for point in crossing(followed, p):
+                one, other = point.facts, first.facts
+                if math.isclose(one.amplitude, other.amplitude, rel_tol=SAME) and any(
+                    math.isclose(k * one.period, other.period, rel_tol=SAME) for k in (1, 2, 3, 4)
+                ):
+                    return True
+        return False
+
     def _from_state(self, sliding: Sliding, p: float, state: Any) -> None:
         """The branch of the cycle that a motion comes to; none where it is known already."""
         values = sliding.at(p).eigenvalues
@@ -192,16 +239,9 @@ class Explorer:
         if first is None:
             self.notes.append(f"the motion given for {value:.6g} comes to no limit cycle")
             return
-        for followed in self.branches:
-            for point in crossing(followed, p):
-                one, other = point.facts, first.facts
-                if math.isclose(one.amplitude, other.amplitude, rel_tol=SAME) and any(
-                    math.isclose(k * one.period, other.period, rel_tol=SAME) for k in (1, 2, 3)
-                ):
-                    self.notes.append(
-                        f"the motion given for {value:.6g} comes to a cycle of a branch from flutter"
-                    )
-                    return
+        if self._known(p, first):
+            self.notes.append(f"the motion given for {value:.6g} comes to a cycle of a branch from flutter")
+            return
         branch = both_ways(problem, first, self._settings(), self._until(first), self.stop)
         note = f"from the motion given for {value:.6g}"
         self.branches.append(replace(self._followed(branch, problem), note=note))
@@ -218,7 +258,7 @@ class Explorer:
             for special in followed.branch.specials if followed.branch is not None else ():
                 if special.kind != "flip" or self._over():
                     continue
-                problem = type(followed.problem)(self.line, 2 * followed.problem.periods)
+                problem = followed.problem.of_periods(2 * followed.problem.periods)
                 first = switch(problem, special.point, self._settings())
                 value = self.line.value(special.p)
                 if first is None:
@@ -226,10 +266,15 @@ class Explorer:
                     continue
                 branch = follow(problem, first, None, self._settings(), self._until(first), self.stop)
                 note = f"twice the period, from the flip at {value:.6g}"
-                self.branches.append(replace(self._followed(branch, problem), kind=followed.kind, note=note))
+                self.branches.append(replace(self._followed(branch, problem, kind=followed.kind), note=note))
 
     def _followed(
-        self, branch: Branch, problem: Any, change: Change | None = None, changes: Sequence[Change] = ()
+        self,
+        branch: Branch,
+        problem: Any,
+        change: Change | None = None,
+        changes: Sequence[Change] = (),
+        kind: str = LIMIT_CYCLE,
     ) -> Followed:
         """A branch as rows and marks; of the linear vibrations at its flutter only the largest one is kept."""
         points, specials = branch.points, branch.specials
@@ -247,10 +292,10 @@ class Explorer:
             else:
                 marks.append(self._mark(special, branch.ended))
         rows = [self._row(point) for point in points]
-        return Followed(LIMIT_CYCLE, rows, marks, replace_points(branch, points), problem)
+        return Followed(kind, rows, marks, replace_points(branch, points), problem)
 
     def _row(self, point: Point) -> Row:
-        cycle: Cycle = point.facts
+        cycle = point.facts
         return Row(
             self.line.value(point.p),
             cycle.amplitude,
