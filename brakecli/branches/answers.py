@@ -214,7 +214,9 @@ class Answers:
         if words:
             return f"squeals by itself {' and '.join(words)}"
         what = "steady sliding" if self.base is None else "the motion that the waves force"
-        return f"{what} is stable throughout"
+        begin, end = (f"{self.line.value(p):.4g}" for p in (first, last))
+        where = "throughout" if (first, last) == (0.0, 1.0) else f"from {begin} to {end}, as far as it is known"
+        return f"{what} is stable {where}"
 
     def _beside_sliding(self) -> list[str]:
         if not self.coexisting:
