@@ -21,7 +21,7 @@ PYTEST_ARGS ?=
 .DELETE_ON_ERROR:
 .NOTPARALLEL: # two installations into one .venv at a time would collide
 .PHONY: help demo test campaign lowest lint format types imports derivations tables docs cases check \
-    accuracy promises promise-cost statistics picture lock-in branch-picture paper extremes bench bench-sweep bench-million bench-contact clean
+    accuracy promises promise-cost statistics picture lock-in branch-picture paper extremes bench bench-sweep bench-million bench-contact bench-branch clean
 
 help: ## list the targets (this text)
 	@echo "make TARGET, where TARGET is one of"
@@ -172,6 +172,9 @@ bench-million: $(DEV_STAMP) ## a million made-up points over two dask workers: w
 
 bench-contact: $(DEV_STAMP) ## what the contact costs, against C; needs gcc and an idle core (some minutes)
 	$(BIN)/python -m benchmarks.contact
+
+bench-branch: $(DEV_STAMP) ## what branches of 200 random shoes cost, and how many get through; needs an idle core (a minute)
+	$(BIN)/python -m benchmarks.branches
 
 extremes: $(DEV_STAMP) ## compute the extremes of all inputs and write docs/extremes.md (a minute)
 	$(BIN)/python -m benchmarks.extremes
