@@ -52,6 +52,8 @@ REASONS = {
     Status.NOT_FINITE: "the motion grows without bound",
     Status.STOPPED: "it was interrupted",
 }
+GROWING = Settings(low=FIRST_WAVES, first=0.05, longest=1.0, change=math.inf, seconds=60.0, insertions=0)
+"""How a motion is followed as the waves grow. Its multipliers do not matter on the way."""
 NO_PERIOD = "the waves of the wheel have no common period"
 
 
@@ -256,9 +258,7 @@ class Forced(Doubled):
         first = start(problem, u, FIRST_WAVES)
         if first is None:
             return None
-        branch = follow(
-            problem, first, 1.0, replace(settings or Settings(seconds=30.0), low=FIRST_WAVES, high=1.0)
-        )
+        branch = follow(problem, first, 1.0, settings or GROWING)
         last = branch.points[-1]
         return start(self, last.u, p) if last.p == 1.0 else None
 
@@ -279,11 +279,11 @@ class Forced(Doubled):
             visited.append(end)
         begin = waited * frame.segments
         for count in range(1, most + 1):
-            problem, end = self.of_periods(count), begin + count * frame.segments
-            away = visited[end] - visited[begin]
+            problem, last = self.of_periods(count), begin + count * frame.segments
+            away = visited[last] - visited[begin]
             if not math.sqrt(away @ away) < AT_REPEAT:
                 continue
-            guess = np.concatenate(visited[begin:end])
+            guess = np.concatenate(visited[begin:last])
             point = start(problem, guess, p)
             if point is not None and float(np.abs(point.u - guess).max()) < 2.0 * AT_REPEAT:
                 return problem, point
