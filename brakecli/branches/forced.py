@@ -1,10 +1,10 @@
 """Periodic motions that the waves of a wheel force on a shoe, as motions that the engine follows.
 
 The unknowns are the states at the begin of each segment of the common period of the waves (multiple shooting). The
-gap is where a segment ends less where the next one begins. States count from steady sliding at the same parameter, in
-depths that the load presses the shoe in by. Each segment takes the same number of steps over the whole range, and
-the pad has the same cells, so the gap is a smooth function of the parameter as long as the sequence of phases is the
-same.
+gap is the end of each segment less the begin of the next one. States count from steady sliding at the same
+parameter, in units of the depth that the load presses the shoe in by. Over the whole range each segment takes the
+same number of steps, and the pad has the same cells. So the gap is a smooth function of the parameter as long as the
+sequence of phases is the same.
 """
 
 import math
@@ -31,15 +31,15 @@ from brakecli.solver.steady_sliding import steady_sliding, tabulated
 from brakecli.solver.system import System
 
 DIFFERENCE = 1e-6
-"""Change of the parameter for derivatives by it, to one side. The rounding of a flow is 1e-13, so these are exact to
-about 1e-6, as is the direction of a branch."""
+"""Change of the parameter for derivatives by it, to one side. The rounding of a flow is about 1e-13, so derivatives
+are exact to about 1e-6, as is the direction of a branch."""
 SLOW_PERIODS = 10.0
 """Periods of the slowest mode in a segment: disturbances stay far above rounding and below the bound of a run."""
 PLACES = 33
 """Places of the range at which periods, frequencies and steady sliding are looked at."""
 SNAP = 1e-6
-"""Difference from the wheel's velocity, in the unit of velocities, from which a segment begins in stick. The end of a
-segment that sticks has the wheel's velocity exactly, but Newton's method gives the next begin with rounding."""
+"""Difference from the wheel's velocity, in the unit of velocities, below which a segment begins with that velocity.
+A segment that sticks ends with it exactly, but Newton's method gives the next begin with rounding."""
 FIRST_WAVES = 1e-6
 """Part of the amplitude of the waves with which a motion begins that grows with them."""
 WAITED = 50
@@ -112,7 +112,7 @@ class Forced(Doubled):
     """Motions forced by a rough wheel at constant speed and load, over a range of a parameter."""
 
     def __init__(self, system: Callable[[float], System], frame: Frame, periods: int = 1) -> None:
-        """`system` raises CaseError where a place is not valid; `periods`: common periods until a motion repeats."""
+        """`system` raises CaseError where a place is invalid; `periods`: common periods until a motion repeats."""
         self.system, self.frame, self.periods = system, frame, periods
         self.flow = lru_cache(maxsize=16)(self._flow)
         self.origin = lru_cache(maxsize=64)(frame.origin)
@@ -121,8 +121,8 @@ class Forced(Doubled):
     def along(cls, line: Line, periods: int = 1, per_period: float = STEPS_PER_PERIOD) -> "Forced":
         """Those along a line of cases, with so many steps to the fastest period.
 
-        Raises CaseError where none of the places looked at is valid, has a wheel that turns at constant speed under
-        a constant load, and has waves with a common period.
+        Raises CaseError where no place is valid, where speed or load change, and where the waves have no common
+        period.
         """
         return cls(line.system, _frame(line, per_period), periods)
 
@@ -233,12 +233,12 @@ class Forced(Doubled):
             shifts.append(matrix @ shifts[-1])
         return np.tile(point.u, 2), np.append(np.concatenate(shifts), 0.0)
 
-    # --- first points ---------------------------------------------------------------------------------------------
+    # --- first points ------------------------------------------------------------------------------------------
 
     def grown(self, p: float, settings: Settings | None = None) -> Point | None:
         """The motion at p that continues steady sliding as the waves grow from nothing; None where it is lost.
 
-        Steady sliding counts in full contact here, as it is that of the wheel without waves.
+        It begins with the steady sliding of a smooth wheel.
         """
         try:
             system = self.system(p)
@@ -265,9 +265,10 @@ class Forced(Doubled):
     def settled(
         self, p: float, state: Array, most: int = 4, waited: int = WAITED
     ) -> "tuple[Forced, Point] | None":
-        """The motion that a run from a state (x, y, v_x, v_y) at t = 0 has come to, and the problem of its periods.
+        """The motion that a run from a state (x, y, v_x, v_y) at t = 0 comes to, and the problem of its periods.
 
-        The run goes on for so many common periods. Then motions of 1, 2, ... and at most `most` of them are sought.
+        The run goes on for `waited` common periods. Then motions of 1, 2, ... and at most `most` of them are
+        sought.
         """
         origin, frame = self.origin(p), self.frame
         one = self.of_periods(1)
