@@ -2,9 +2,9 @@
 
 The unknowns are the states at the begin of each segment of the common period of the waves (multiple shooting). The
 gap is the end of each segment less the begin of the next one. States count from steady sliding at the same
-parameter, in units of the depth that the load presses the shoe in by. Over the whole range each segment takes the
-same number of steps, and the pad has the same cells. So the gap is a smooth function of the parameter as long as the
-sequence of phases is the same.
+parameter, in units of the depth that the load presses the shoe in by. Over the whole range each segment takes
+the same number of steps, and the pad has the same cells. So the gap is a smooth function of the parameter as long
+as the sequence of phases is the same.
 """
 
 import math
@@ -31,15 +31,17 @@ from brakecli.solver.steady_sliding import steady_sliding, tabulated
 from brakecli.solver.system import System
 
 DIFFERENCE = 1e-6
-"""Change of the parameter for derivatives by it, to one side. The rounding of a flow is about 1e-13, so derivatives
-are exact to about 1e-6, as is the direction of a branch."""
+"""Change of the parameter for derivatives by it, to one side. The rounding of a flow is about 1e-13, so they are
+exact to about 1e-6, as is the direction of a branch."""
 SLOW_PERIODS = 10.0
 """Periods of the slowest mode in a segment: disturbances stay far above rounding and below the bound of a run."""
 PLACES = 33
 """Places of the range at which periods, frequencies and steady sliding are looked at."""
 SNAP = 1e-6
-"""Difference from the wheel's velocity, in the unit of velocities, below which a segment begins with that velocity.
+"""Difference from the wheel's velocity, in the unit of velocities, below which a segment begins with just that.
 A segment that sticks ends with it exactly, but Newton's method gives the next begin with rounding."""
+LEAST_STEPS = 100
+"""Steps of a common period, which are cheap: the more, the smoother are kinks of the force at edges of contact."""
 FIRST_WAVES = 1e-6
 """Part of the amplitude of the waves with which a motion begins that grows with them."""
 WAITED = 50
@@ -329,6 +331,7 @@ def _frame(line: Line, per_period: float) -> Frame:
     segments = max(math.ceil(period * system.natural_frequencies[0] / SLOW_PERIODS) for system, period in periods)
     segments = max(segments, 1)
     steps = max(default_steps(system, period / segments, per_period) for system, period in periods)
+    steps = max(steps, math.ceil(LEAST_STEPS / segments))
     cells = max(default_cells(system) for system, _ in periods)
     middle = periods[len(periods) // 2][0]
     depth = abs(middle.load_at_start) / (middle.coefficients.c_yy + middle.contact_stiffness)

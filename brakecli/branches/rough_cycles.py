@@ -1,7 +1,8 @@
 """Limit cycles of a rough shoe on a smooth wheel, as motions that the engine follows.
 
-All is as on smooth pads, except for the flow. It takes the same number of steps for each period of a chart, so that
-the end is a smooth function of the state and of the period. Lift-off is not an event, as the force is continuous.
+All is as on smooth pads, except for the flow. It takes the same number of steps for each period of a chart, so
+that the end is a smooth function of the state and of the period. Lift-off is not an event, as the force is
+continuous.
 """
 
 import math
