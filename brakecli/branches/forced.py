@@ -48,6 +48,10 @@ WAITED = 50
 """Periods for which a run goes on before a motion is sought at its end."""
 AT_REPEAT = 0.1
 """Distance, in depths, of two states of a run from which Newton's method is begun."""
+AS_ONE = 1e-7
+"""Distance of two states of a run below which they are not told apart."""
+SAME = 1e-6
+"""Distance, in depths, of periods of a motion that are one."""
 REASONS = {
     Status.GRAZED: "an event is grazed",
     Status.TOO_MANY_EVENTS: "there are too many events in a segment",
@@ -281,16 +285,31 @@ class Forced(Doubled):
                 return None
             visited.append(end)
         begin = waited * frame.segments
+        gaps = {}
         for count in range(1, most + 1):
-            problem, last = self.of_periods(count), begin + count * frame.segments
-            away = visited[last] - visited[begin]
-            if not math.sqrt(away @ away) < AT_REPEAT:
-                continue
-            guess = np.concatenate(visited[begin:last])
-            point = start(problem, guess, p)
-            if point is not None and float(np.abs(point.u - guess).max()) < 2.0 * AT_REPEAT:
-                return problem, point
+            away = visited[begin + count * frame.segments] - visited[begin]
+            gaps[count] = max(math.sqrt(away @ away), AS_ONE)
+        for count in sorted(gaps, key=lambda count: (gaps[count], count)):
+            if not gaps[count] < AT_REPEAT:
+                break
+            found = self._repeating(np.concatenate(visited[begin : begin + count * frame.segments]), p, count)
+            if found is not None:
+                return found
         return None
+
+    def _repeating(self, guess: Array, p: float, count: int) -> "tuple[Forced, Point] | None":
+        """The motion near a guess of so many common periods, and the problem of the fewest in which it repeats."""
+        problem = self.of_periods(count)
+        point = start(problem, guess, p)
+        if point is None or not float(np.abs(point.u - guess).max()) < 2.0 * AT_REPEAT:
+            return None
+        for fewer in (each for each in range(1, count) if count % each == 0):
+            part = point.u[: len(point.u) // count * fewer]
+            if float(np.abs(np.tile(part, count // fewer) - point.u).max()) < SAME:
+                less = self._repeating(part, p, fewer)
+                if less is not None:
+                    return less
+        return problem, point
 
     def _segment(self, u: Array, p: float, k: int) -> Array | None:
         """Where a segment ends that begins at a scaled state."""
