@@ -1,4 +1,4 @@
-"""Limit cycles of a shoe on smooth pads, as motions that the engine follows.
+"""Limit cycles of a shoe on a smooth wheel, as motions that the engine follows.
 
 The unknowns are a state on the cycle and the period T. The gap is the state after T less the state before, and
 where the state lies along the cycle: on the plane of a chart across the flow. That takes the place of a section
@@ -9,7 +9,7 @@ sizes of the motion, so that a branch is straight where the cycle moves along wi
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -55,6 +55,33 @@ class Cycle(NamedTuple):
         return 1.0 / self.period
 
 
+class Flow(Protocol):
+    """What carries a state over a span; what it says is that of the last span. `SmoothFlow` says it in full."""
+
+    @property
+    def path(self) -> Any:
+        """Its `start` and `velocity` (the begin and the end by time), `time`, `spent`, `low` and `high`."""
+
+    @property
+    def state(self) -> Array:
+        """x, y (m), v_x and v_y (m/s) at the end."""
+
+    @property
+    def derivative(self) -> Array:
+        """Derivative of the end by the begin, (4, 4)."""
+
+    @property
+    def word(self) -> tuple[int, ...]:
+        """The phases."""
+
+    @property
+    def times(self) -> tuple[float, ...]:
+        """When they change, s."""
+
+    def __call__(self, state: Array, span: float, tangents: bool = True) -> int:
+        """Carry a state over a span (s), with its derivative unless that is not needed; how it ends, as `DONE`."""
+
+
 @dataclass(frozen=True, eq=False)
 class Chart:
     """How unknowns are to be read: the plane through `place` across `normal`, scales, time (s), size (m)."""
@@ -86,9 +113,9 @@ class Cycles(Problem):
 
     def of_periods(self, periods: int) -> "Cycles":
         """The problem of motions that repeat after so many periods."""
-        return Cycles(self.line, periods)
+        return type(self)(self.line, periods)
 
-    def _flow(self, p: float) -> SmoothFlow:
+    def _flow(self, p: float) -> Flow:
         shoe = self.line.shoe(p)
         return SmoothFlow(*shoe, longest_step(shoe.coefficients, shoe.stiffness))
 
@@ -97,7 +124,11 @@ class Cycles(Problem):
         x, y = self.line.shoe(p).rest or (math.nan, math.nan)
         return np.array([x, y, 0.0, 0.0])
 
-    def _flown(self, u: Array, p: float, chart: Chart, derivative: bool = True) -> SmoothFlow | str:
+    def _over_period(self, flow: Flow, state: Array, periods: float, chart: Chart, derivative: bool) -> int:
+        """Carry a state over so many periods of a chart, so that the end is a smooth function of their number."""
+        return flow(state, periods * chart.time, derivative)
+
+    def _flown(self, u: Array, p: float, chart: Chart, derivative: bool = True) -> Flow | str:
         """The flow over the period that is sought, or why there is none."""
         periods = u[4]
         if not PERIODS[0] < periods < PERIODS[1]:
@@ -106,7 +137,7 @@ class Cycles(Problem):
             flow, rest = self.flow(p), self.rest(p)
         except CaseError as error:
             return str(error)
-        how = flow(rest + u[:4] * chart.scales, periods * chart.time, derivative)
+        how = self._over_period(flow, rest + u[:4] * chart.scales, periods, chart, derivative)
         if how == DONE:
             return flow
         return {GRAZED: "an event is grazed", EVENTFUL: "there are too many events in a period"}.get(
@@ -198,7 +229,8 @@ class Cycles(Problem):
         times = cycle.times or (cycle.period,)
         near = min(times[0], cycle.period - times[-1] if cycle.times else cycle.period) < NEAR * cycle.period
         grown = cycle.amplitude / chart.size
-        if not near and 1.0 / GROWN < grown < GROWN and cycle.lean > LEANS:
+        fits = 1.0 / GROWN < grown < GROWN and cycle.lean > LEANS and self._fits(float(point.u[4]))
+        if not near and fits:
             return None
         ahead = _longest_slip(cycle) if near else 0.0
         if ahead is None:
@@ -216,6 +248,10 @@ class Cycles(Problem):
         speed = new.normal  # of length one: what the plane takes away of the direction lies along it
         direction[:4] -= speed * (new.normal @ direction[:4])
         return u, direction
+
+    def _fits(self, periods: float) -> bool:
+        """Whether a chart may be kept with whose time so many periods are made."""
+        return True
 
     def _moved(self, z: Array, chart: Chart, ahead: float, scales: Array, time: float) -> Array | None:
         """A point of a chart, carried ahead (s) by the flow, in other scales."""

@@ -16,11 +16,14 @@ from brakecli.branches.forced import Forced
 from brakecli.branches.line import Line
 from brakecli.branches.newton import Newton, Settings
 from brakecli.branches.point import Branch, End, Point, Special
+from brakecli.branches.rough_cycles import RoughCycles
 from brakecli.branches.sliding import Change, Slide, Sliding
 from brakecli.branches.switch import switch
 from brakecli.errors import CaseError
 
 SLIDING, LIMIT_CYCLE, FORCED = "steady sliding", "limit cycle", "forced motion"
+SMALLEST = 0.5
+"""Amplitude over that at the begin below which a cycle of a rough shoe ends in steady sliding."""
 LARGEST = 1e4
 """Amplitude over that at the begin of a branch beyond which it is not followed."""
 MOST = 12
@@ -110,12 +113,10 @@ class Explorer:
         slides = sliding.along()
         changes = sliding.changes(slides)
         self.branches.append(self._sliding(slides, changes))
-        if self.line.smooth:
-            self._cycles(sliding, changes, states)
-        elif self.line.case.roughness.wheel is not None:
+        if self.line.case.roughness.wheel is not None:
             self._forced(states)
         else:
-            self.notes.append("on a rough shoe that slides on a smooth wheel limit cycles are not followed")
+            self._cycles(sliding, changes, states)
         if switches:
             self._doubled()
         return Explored(self.line, slides, changes, self.branches, self.notes, bool(self.stop()))
@@ -156,17 +157,19 @@ class Explorer:
         def until(point: Point) -> str | None:
             self.count += 1
             self.tell("points of branches", self.count, 0)
-            if isinstance(point.facts, Cycle):
-                if len(set(point.facts.word)) > 1:
-                    left[0] = True
-                elif left[0]:
-                    return IN_SLIDING
+            if not isinstance(point.facts, Cycle):
+                pass
+            elif len(set(point.facts.word)) > 1:
+                left[0] = True
+            elif left[0] and (self.line.smooth or point.facts.amplitude < SMALLEST * first.facts.amplitude):
+                return IN_SLIDING
+            left[0] |= point.facts.amplitude > first.facts.amplitude and not self.line.smooth
             return LARGE if point.facts.amplitude > limit else None
 
         return until
 
     def _cycles(self, sliding: Sliding, changes: list[Change], states: Sequence[tuple[float, Any]]) -> None:
-        """Limit cycles on smooth pads, from each flutter and from given states."""
+        """Limit cycles on a smooth wheel, from each flutter and from given states."""
         if is_undamped(self.line.case_coefficients):
             self.notes.append(UNDAMPED)
             return
@@ -175,7 +178,7 @@ class Explorer:
                 continue
             if any(mark.kind == "flutter" and mark.value == self.line.value(change.p) for mark in self._marks()):
                 continue  # a branch from another flutter has ended here
-            problem = Cycles(self.line)
+            problem = self._problem()
             first = sliding.vibration(problem, change)
             value = self.line.value(change.p)
             if first is None:
@@ -234,7 +237,7 @@ class Explorer:
         if values is not None:
             least_stable = values[int(np.argmax(values.real))]
             frequency = abs(float(least_stable.imag)) / (2.0 * math.pi) or frequency
-        value, problem = self.line.value(p), Cycles(self.line)
+        value, problem = self.line.value(p), self._problem()
         first = settled(problem, p, state, frequency) if frequency else None
         if first is None:
             self.notes.append(f"the motion given for {value:.6g} comes to no limit cycle")
@@ -245,6 +248,9 @@ class Explorer:
         branch = both_ways(problem, first, self._settings(), self._until(first), self.stop)
         note = f"from the motion given for {value:.6g}"
         self.branches.append(replace(self._followed(branch, problem), note=note))
+
+    def _problem(self) -> Cycles:
+        return Cycles(self.line) if self.line.smooth else RoughCycles(self.line)
 
     def _marks(self) -> list[Mark]:
         return [mark for followed in self.branches if followed.kind == LIMIT_CYCLE for mark in followed.special]
@@ -279,7 +285,10 @@ class Explorer:
         """A branch as rows and marks; of the linear vibrations at its flutter only the largest one is kept."""
         points, specials = branch.points, branch.specials
         marks = []
-        if change is not None:
+        if change is not None and not self.line.smooth:
+            specials = [special for special in specials if special.s > 0.0 or special.kind == "end"]
+            marks.append(self._mark(Special("flutter", change.p, change.error, points[0], points[0].s)))
+        elif change is not None:
             begin = next((k for k, point in enumerate(points) if len(set(point.facts.word)) > 1), len(points))
             begin = max(begin - 1, 0)
             points = points[begin:]

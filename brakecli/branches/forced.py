@@ -1,10 +1,10 @@
 """Periodic motions that the waves of a wheel force on a shoe, as motions that the engine follows.
 
 The unknowns are the states at the begin of each segment of the common period of the waves (multiple shooting). The
-gap is where a segment ends less where the next one begins. States count from steady sliding at the same parameter, in
-depths that the load presses the shoe in by. Each segment takes the same number of steps over the whole range, and
-the pad has the same cells, so the gap is a smooth function of the parameter as long as the sequence of phases is the
-same.
+gap is the end of each segment less the begin of the next one. States count from steady sliding at the same
+parameter, in units of the depth that the load presses the shoe in by. Over the whole range each segment takes
+the same number of steps, and the pad has the same cells. So the gap is a smooth function of the parameter as long
+as the sequence of phases is the same.
 """
 
 import math
@@ -31,27 +31,35 @@ from brakecli.solver.steady_sliding import steady_sliding, tabulated
 from brakecli.solver.system import System
 
 DIFFERENCE = 1e-6
-"""Change of the parameter for derivatives by it, to one side. The rounding of a flow is 1e-13, so these are exact to
-about 1e-6, as is the direction of a branch."""
+"""Change of the parameter for derivatives by it, to one side. The rounding of a flow is about 1e-13, so they are
+exact to about 1e-6, as is the direction of a branch."""
 SLOW_PERIODS = 10.0
 """Periods of the slowest mode in a segment: disturbances stay far above rounding and below the bound of a run."""
 PLACES = 33
 """Places of the range at which periods, frequencies and steady sliding are looked at."""
 SNAP = 1e-6
-"""Difference from the wheel's velocity, in the unit of velocities, from which a segment begins in stick. The end of a
-segment that sticks has the wheel's velocity exactly, but Newton's method gives the next begin with rounding."""
+"""Difference from the wheel's velocity, in the unit of velocities, below which a segment begins with just that.
+A segment that sticks ends with it exactly, but Newton's method gives the next begin with rounding."""
+LEAST_STEPS = 100
+"""Steps of a common period, which are cheap: the more, the smoother are kinks of the force at edges of contact."""
 FIRST_WAVES = 1e-6
 """Part of the amplitude of the waves with which a motion begins that grows with them."""
 WAITED = 50
 """Periods for which a run goes on before a motion is sought at its end."""
 AT_REPEAT = 0.1
 """Distance, in depths, of two states of a run from which Newton's method is begun."""
+AS_ONE = 1e-7
+"""Distance of two states of a run below which they are not told apart."""
+SAME = 1e-6
+"""Distance, in depths, of periods of a motion that are one."""
 REASONS = {
     Status.GRAZED: "an event is grazed",
     Status.TOO_MANY_EVENTS: "there are too many events in a segment",
     Status.NOT_FINITE: "the motion grows without bound",
     Status.STOPPED: "it was interrupted",
 }
+GROWING = Settings(low=FIRST_WAVES, first=0.05, longest=1.0, change=math.inf, seconds=60.0, insertions=0)
+"""How a motion is followed as the waves grow. Its multipliers do not matter on the way."""
 NO_PERIOD = "the waves of the wheel have no common period"
 
 
@@ -110,7 +118,7 @@ class Forced(Doubled):
     """Motions forced by a rough wheel at constant speed and load, over a range of a parameter."""
 
     def __init__(self, system: Callable[[float], System], frame: Frame, periods: int = 1) -> None:
-        """`system` raises CaseError where a place is not valid; `periods`: common periods until a motion repeats."""
+        """`system` raises CaseError where a place is invalid; `periods`: common periods until a motion repeats."""
         self.system, self.frame, self.periods = system, frame, periods
         self.flow = lru_cache(maxsize=16)(self._flow)
         self.origin = lru_cache(maxsize=64)(frame.origin)
@@ -119,8 +127,8 @@ class Forced(Doubled):
     def along(cls, line: Line, periods: int = 1, per_period: float = STEPS_PER_PERIOD) -> "Forced":
         """Those along a line of cases, with so many steps to the fastest period.
 
-        Raises CaseError where none of the places looked at is valid, has a wheel that turns at constant speed under
-        a constant load, and has waves with a common period.
+        Raises CaseError where no place is valid, where speed or load change, and where the waves have no common
+        period.
         """
         return cls(line.system, _frame(line, per_period), periods)
 
@@ -231,12 +239,12 @@ class Forced(Doubled):
             shifts.append(matrix @ shifts[-1])
         return np.tile(point.u, 2), np.append(np.concatenate(shifts), 0.0)
 
-    # --- first points ---------------------------------------------------------------------------------------------
+    # --- first points ------------------------------------------------------------------------------------------
 
     def grown(self, p: float, settings: Settings | None = None) -> Point | None:
         """The motion at p that continues steady sliding as the waves grow from nothing; None where it is lost.
 
-        Steady sliding counts in full contact here, as it is that of the wheel without waves.
+        It begins with the steady sliding of a smooth wheel.
         """
         try:
             system = self.system(p)
@@ -256,18 +264,17 @@ class Forced(Doubled):
         first = start(problem, u, FIRST_WAVES)
         if first is None:
             return None
-        branch = follow(
-            problem, first, 1.0, replace(settings or Settings(seconds=30.0), low=FIRST_WAVES, high=1.0)
-        )
+        branch = follow(problem, first, 1.0, settings or GROWING)
         last = branch.points[-1]
         return start(self, last.u, p) if last.p == 1.0 else None
 
     def settled(
         self, p: float, state: Array, most: int = 4, waited: int = WAITED
     ) -> "tuple[Forced, Point] | None":
-        """The motion that a run from a state (x, y, v_x, v_y) at t = 0 has come to, and the problem of its periods.
+        """The motion that a run from a state (x, y, v_x, v_y) at t = 0 comes to, and the problem of its periods.
 
-        The run goes on for so many common periods. Then motions of 1, 2, ... and at most `most` of them are sought.
+        The run goes on for `waited` common periods. Then motions of 1, 2, ... and at most `most` of them are
+        sought.
         """
         origin, frame = self.origin(p), self.frame
         one = self.of_periods(1)
@@ -278,16 +285,31 @@ class Forced(Doubled):
                 return None
             visited.append(end)
         begin = waited * frame.segments
+        gaps = {}
         for count in range(1, most + 1):
-            problem, end = self.of_periods(count), begin + count * frame.segments
-            away = visited[end] - visited[begin]
-            if not math.sqrt(away @ away) < AT_REPEAT:
-                continue
-            guess = np.concatenate(visited[begin:end])
-            point = start(problem, guess, p)
-            if point is not None and float(np.abs(point.u - guess).max()) < 2.0 * AT_REPEAT:
-                return problem, point
+            away = visited[begin + count * frame.segments] - visited[begin]
+            gaps[count] = max(math.sqrt(away @ away), AS_ONE)
+        for count in sorted(gaps, key=lambda count: (gaps[count], count)):
+            if not gaps[count] < AT_REPEAT:
+                break
+            found = self._repeating(np.concatenate(visited[begin : begin + count * frame.segments]), p, count)
+            if found is not None:
+                return found
         return None
+
+    def _repeating(self, guess: Array, p: float, count: int) -> "tuple[Forced, Point] | None":
+        """The motion near a guess of so many common periods, and the problem of the fewest in which it repeats."""
+        problem = self.of_periods(count)
+        point = start(problem, guess, p)
+        if point is None or not float(np.abs(point.u - guess).max()) < 2.0 * AT_REPEAT:
+            return None
+        for fewer in (each for each in range(1, count) if count % each == 0):
+            part = point.u[: len(point.u) // count * fewer]
+            if float(np.abs(np.tile(part, count // fewer) - point.u).max()) < SAME:
+                less = self._repeating(part, p, fewer)
+                if less is not None:
+                    return less
+        return problem, point
 
     def _segment(self, u: Array, p: float, k: int) -> Array | None:
         """Where a segment ends that begins at a scaled state."""
@@ -328,6 +350,7 @@ def _frame(line: Line, per_period: float) -> Frame:
     segments = max(math.ceil(period * system.natural_frequencies[0] / SLOW_PERIODS) for system, period in periods)
     segments = max(segments, 1)
     steps = max(default_steps(system, period / segments, per_period) for system, period in periods)
+    steps = max(steps, math.ceil(LEAST_STEPS / segments))
     cells = max(default_cells(system) for system, _ in periods)
     middle = periods[len(periods) // 2][0]
     depth = abs(middle.load_at_start) / (middle.coefficients.c_yy + middle.contact_stiffness)

@@ -23,6 +23,8 @@ SEARCHES = 30
 GOLDEN = 0.3819660112501051
 BELOW_GRAZING = 0.9
 """Part of the amplitude that grazes at which the family of linear vibrations is begun."""
+SMALL = 0.03
+"""Part of its height by which a shoe rises in the first vibration where it touches in part."""
 PHASES = 720
 """Phases of a linear vibration at which its extremes are looked at."""
 
@@ -141,11 +143,19 @@ class Sliding:
         p = brentq(lambda p: self.at(p).tests[test], low, high, xtol=LOCATED, rtol=4.0 * math.ulp(1.0))
         return float(p), LOCATED
 
-    def vibration(self, cycles: Cycles, change: Change) -> Point | None:
-        """A motion of the family of linear vibrations that a smooth pad has where it flutters.
+    def _rises(self, p: float, y: float) -> float:
+        """How far (m) the shoe may rise from a height y (m) until the stiffness of the contact changes."""
+        if self.line.smooth:
+            return -y
+        full = float(self.line.system(p).pad.constants.full_up_to)
+        return full - y if y < full else SMALL * abs(y)
 
-        All amplitudes exist there, up to that which grazes the wheel's velocity or the clear pad. The tangent of
-        the point leads to larger ones.
+    def vibration(self, cycles: Cycles, change: Change) -> Point | None:
+        """A motion of the family of linear vibrations that a shoe on a smooth wheel has where it flutters.
+
+        In full contact all amplitudes exist there, up to that which grazes the wheel's velocity or the clear pad.
+        Where a rough shoe touches in part they are born there, and a small one is taken. The tangent of the point
+        leads to larger ones.
         """
         slide, belt = self.at(change.p), self.line.shoe(change.p).belt
         if slide.eigenvalues is None or slide.vectors is None or slide.rest is None:
@@ -155,7 +165,7 @@ class Sliding:
         turning = np.exp(2j * math.pi * np.arange(PHASES) / PHASES)
         w = (np.concatenate([shape, 1j * omega * shape])[:, None] * turning).real
         ahead = w[2] * math.copysign(1.0, belt)
-        stick, flight = abs(belt) / ahead.max(), -slide.rest[1] / w[1].max()
+        stick, flight = abs(belt) / ahead.max(), self._rises(change.p, slide.rest[1]) / w[1].max()
         size = BELOW_GRAZING * min(stick, flight)
         touch = int(np.argmax(ahead if stick < flight else w[1]))
         mode = size * w[:, (touch + PHASES // 2) % PHASES]  # far from where it will graze

@@ -1,0 +1,151 @@
+"""Limit cycles of a rough shoe on a smooth wheel, as motions that the engine follows.
+
+All is as on smooth pads, except for the flow. It takes the same number of steps for each period of a chart, so
+that the end is a smooth function of the state and of the period. Lift-off is not an event, as the force is
+continuous.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from brakecli.branches.cycles import Chart, Cycles, Flow
+from brakecli.branches.line import Line
+from brakecli.branches.problem import Array
+from brakecli.errors import CaseError, Problem
+from brakecli.solver.automaton import BACKWARD, OPEN, STICK
+from brakecli.solver.flow.rough import Flown, RoughFlow, Status, default_cells, default_steps
+from brakecli.solver.flow.smooth import DONE, EVENTFUL, GRAZED, LONG
+from brakecli.solver.steady_sliding import steady_sliding, tabulated
+
+PLACES = 9
+"""Places of the range at which the cells are counted that are enough."""
+STEPS = 80.0
+"""Steps to the fastest period: a period is short, and the pad lifts off and lands in few of them."""
+KEPT = 0.6, 1.6
+"""Periods of a chart between which its number of steps fits."""
+INSTANT = 1e-12
+"""Part of the fastest period after which the velocity of the begin is read."""
+_ENDS = {Status.DONE: DONE, Status.GRAZED: GRAZED, Status.TOO_MANY_EVENTS: EVENTFUL}
+
+
+class Way(NamedTuple):
+    """The way of a motion through a span, as that on smooth pads is described (SI units)."""
+
+    start: Array
+    velocity: Array
+    time: float
+    spent: Array
+    low: Array  # of x, y and v_x; v_x counts in slip alone
+    high: Array
+
+
+class Span:
+    """The flow of a rough shoe on a smooth wheel, which begins at any time."""
+
+    def __init__(self, flow: RoughFlow, per_period: float) -> None:
+        """With so many steps to the fastest period."""
+        self._flow, self._per_period = flow, per_period
+        self._instant = INSTANT / flow.system.natural_frequencies[1]
+        self._run: Flown | None = None
+        self._begin, self._time = np.zeros(4), 0.0
+
+    def __call__(self, state: Array, span: float, tangents: bool = True) -> int:
+        """Carry a state over a span (s); see `Flow`."""
+        return self.over(state, span, self.steps(span), tangents)
+
+    def steps(self, span: float) -> int:
+        """Steps that are enough for a span (s)."""
+        return default_steps(self._flow.system, span, self._per_period)
+
+    def over(self, state: Array, span: float, steps: int, tangents: bool) -> int:
+        """The same in so many steps."""
+        self._begin, self._time = np.array(state), span
+        self._run = self._flow(self._begin, 0.0, span, steps, tangents)
+        return _ENDS.get(self._run.status, LONG)
+
+    @property
+    def _last(self) -> Flown:
+        assert self._run is not None
+        return self._run
+
+    @property
+    def state(self) -> Array:
+        """See `Flow`."""
+        return self._last.state
+
+    @property
+    def derivative(self) -> Array:
+        """See `Flow`."""
+        assert self._last.derivative is not None
+        return self._last.derivative
+
+    @property
+    def word(self) -> tuple[int, ...]:
+        """See `Flow`."""
+        return self._last.word
+
+    @property
+    def times(self) -> tuple[float, ...]:
+        """See `Flow`."""
+        return self._last.times
+
+    @property
+    def path(self) -> Way:
+        """See `Flow`."""
+        run, belt = self._last, self._flow.system.belt_speed
+        start = self._flow(self._begin, 0.0, self._instant, 1, False).velocity
+        spent, least = np.zeros(4), run.margins.slide
+        spent[STICK], spent[OPEN] = run.margins.stick_share * self._time, run.margins.open_share * self._time
+        low, high = np.array([run.x[0], run.y[0], belt + least]), np.array([run.x[1], run.y[1], belt - least])
+        return Way(start, run.velocity, self._time, spent, low, high)
+
+
+class RoughCycles(Cycles):
+    """Limit cycles along a line of cases whose shoe is rough and whose wheel is smooth."""
+
+    def __init__(self, line: Line, periods: int = 1, per_period: float = STEPS) -> None:
+        """`periods`: of the motions from which these have been doubled; steps to the fastest period.
+
+        Raises CaseError where no place is valid, where the wheel is rough, and where speed or load change.
+        """
+        super().__init__(line, periods)
+        self.per_period, self.cells, failed = per_period, 0, None
+        for k in range(PLACES):
+            try:
+                system = line.system(k / (PLACES - 1))
+            except CaseError as error:
+                failed = error
+                continue
+            if system.wheel.g.size:
+                wrong = "the wheel is rough, so no motion repeats but those that its waves force"
+                raise CaseError([Problem(("roughness", "wheel"), wrong, "make it smooth", source=line.label)])
+            if not system.steady:
+                wrong = "the speed of the wheel or the load changes in time"
+                raise CaseError([Problem(("wheel",), wrong, "give constant ones", source=line.label)])
+            self.cells = max(self.cells, default_cells(system))
+        if not self.cells and failed is not None:
+            raise failed
+
+    def _flow(self, p: float) -> Flow:
+        return Span(RoughFlow(self.line.system(p), self.cells), self.per_period)
+
+    def _rest(self, p: float) -> Array:
+        system = self.line.system(p)
+        found = steady_sliding(system, mean=tabulated(system))
+        return np.array([found.x, found.y, 0.0, 0.0])
+
+    def _over_period(self, flow: Flow, state: Array, periods: float, chart: Chart, derivative: bool) -> int:
+        assert isinstance(flow, Span)
+        return flow.over(state, periods * chart.time, flow.steps(chart.time), derivative)
+
+    def _fits(self, periods: float) -> bool:
+        return KEPT[0] < periods < KEPT[1]
+
+    def _margins(self, p: float, word: tuple[int, ...], low: Array, high: Array) -> tuple[float, ...]:
+        if len(word) > 1 or word[0] == STICK:
+            return ()
+        belt = self.line.shoe(p).belt
+        fastest = high[2] if word[0] == BACKWARD else low[2]
+        return (abs(1.0 - float(fastest) / belt),) if math.isfinite(fastest) else ()
