@@ -26,7 +26,7 @@ def command(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Every motion along a key, stable or not: where it squeals, where it can, and what lies between."""
+    """Follow every motion along a key, stable or not."""
     from brakecli.runs.branch import parsed
 
     keys, low, high = parsed(parameter)
