@@ -288,7 +288,11 @@ class _Walk:
                 onward = np.linalg.svd(rows)[2][-1]
                 for length in (0.1 * reach, reach, 10.0 * reach):
                     for way in (onward, -onward):
-                        new = newton.solved(here.z + length * way, way, way, 0.0)
+                        # Newton's method begins beyond the border: from this side it would find this side again
+                        guess = place + (length - (place - here.z) @ way) * way
+                        new = newton.solved(guess, way, way, 0.0)
+                        if new is None or new.word != seen.word:
+                            new = newton.solved(here.z + length * way, way, way, 0.0)
                         if new is None or new.word != seen.word:
                             continue
                         chord = new.z - here.z
