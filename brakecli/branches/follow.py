@@ -190,6 +190,9 @@ class _Walk:
             newton.why = "Newton's method leaves the branch"
             return None
         self._placed(here, new)
+        if new.word != here.word and not newton.holds(new):
+            newton.why = "Newton's method ends on a border"
+            return None
         if new.word != here.word and float(new.tangent @ here.tangent) < SHARP:
             # at a sharp corner the last tangent does not say which way the branch goes on
             return self._led_on(here, new, stride) or new
@@ -293,7 +296,7 @@ class _Walk:
                         new = newton.solved(guess, way, way, 0.0)
                         if new is None or new.word != seen.word:
                             new = newton.solved(here.z + length * way, way, way, 0.0)
-                        if new is None or new.word != seen.word:
+                        if new is None or new.word != seen.word or not newton.holds(new):
                             continue
                         chord = new.z - here.z
                         distance = math.sqrt(chord @ chord)
@@ -311,7 +314,7 @@ class _Walk:
         for point in (new, replace(new.turned(), s=new.s)):
             guess = point.z + length * point.tangent
             further = self.newton.solved(guess, point.tangent, point.tangent, 0.0)
-            if further is not None and further.word == new.word:
+            if further is not None and further.word == new.word and self.newton.holds(further):
                 other = further.z - here.z
                 if float(other @ other) > float(one @ one):
                     return point

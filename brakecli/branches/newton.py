@@ -186,6 +186,11 @@ class Newton:
             margins=seen.margins,
         )
 
+    def holds(self, point: Point) -> bool:
+        """Whether the word of a point is that of its place: its last correction may have led across a border."""
+        seen = self.evaluate(point.z, False)
+        return seen is not None and seen.word == point.word
+
     def at_parameter(self, guess: Array, p: float, onward: Array, s: float, exact: bool = False) -> Point | None:
         """Find the point at a value of the parameter."""
         guess = guess.copy()

@@ -100,7 +100,7 @@ def _bracket(newton: Newton, near: Point, far: Point) -> tuple[Point, Point]:
         middle = (
             newton.between(near, far, 0.5) or _beside(newton, near, far, near) or _beside(newton, near, far, far)
         )
-        if middle is None:
+        if middle is None or not newton.holds(middle):
             break
         if middle.word == near.word:
             near = middle
