@@ -97,9 +97,10 @@ def _bracket(newton: Newton, near: Point, far: Point) -> tuple[Point, Point]:
         if math.sqrt(chord @ chord) <= newton.settings.shortest:
             break
         # the chord may leave a sharp corner too far: then along the tangent of one side, if it stays on that side
-        middle = (
-            newton.between(near, far, 0.5) or _beside(newton, near, far, near) or _beside(newton, near, far, far)
-        )
+        middle = newton.between(near, far, 0.5)
+        if middle is not None and not _ordered(near, middle, far):
+            middle = None
+        middle = middle or _beside(newton, near, far, near) or _beside(newton, near, far, far)
         if middle is None or not newton.holds(middle):
             break
         if middle.word == near.word:
@@ -107,6 +108,18 @@ def _bracket(newton: Newton, near: Point, far: Point) -> tuple[Point, Point]:
         else:
             far = middle
     return near, far
+
+
+def _ordered(near: Point, middle: Point, far: Point) -> bool:
+    """Whether a point lies ahead of the one before it, or before the one behind it, if their word is the same.
+
+    Where a branch turns by more than a right angle, the chord leads back along it.
+    """
+    if middle.word == near.word:
+        return float((middle.z - near.z) @ near.tangent) > 0.0 and float(middle.tangent @ near.tangent) > 0.0
+    if middle.word == far.word:
+        return float((far.z - middle.z) @ far.tangent) > 0.0 and float(middle.tangent @ far.tangent) > 0.0
+    return True
 
 
 def _beside(newton: Newton, near: Point, far: Point, base: Point) -> Point | None:
