@@ -1,7 +1,8 @@
 """Steady sliding along a line of cases: eigenvalues, where it flutters or diverges, and the cycles born there."""
 
 import math
-from dataclasses import dataclass
+import sys
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
 
@@ -38,7 +39,10 @@ class Slide:
     vectors: Complex | None
     rest: tuple[float, float] | None
     tests: tuple[float, float]
-    """Of divergence and of flutter: smooth, and positive where there is neither; NaN without steady sliding."""
+    """Of divergence and of flutter: smooth, and positive where there is neither; NaN without steady sliding.
+
+    Where a shoe on smooth pads locks, the first one is negative.
+    """
 
     @property
     def stable(self) -> bool:
@@ -79,11 +83,14 @@ class Sliding:
                 rest, pressed = (found.x, found.y), found.is_pressed(system.load_at_start)
         except CaseError:
             return nothing
-        if belt == 0.0 or not pressed:
+        locks = line.smooth and rest is None
+        if belt == 0.0 or not (pressed or locks):
             return nothing
         grip = math.copysign(c.phi, belt)
         b, links = (c.b_xx, c.b_xy, c.b_yy), (c.c_xx, c.c_xy, c.c_yy)
         determinant, apart = routh_hurwitz(c.m, b, links, stiffness, grip, damped=not is_undamped(c))
+        if locks:  # beyond divergence there is no steady sliding, and the determinant says where it ended
+            return replace(nothing, tests=(min(float(determinant), -sys.float_info.min), math.nan))
         values, vectors = eigensystem(c, stiffness, grip)
         return Slide(p, values, vectors, rest, (float(determinant), float(apart)))
 
@@ -125,14 +132,15 @@ class Sliding:
         """Where stability is lost or regained, in the order of p."""
         found = []
         for one, other in pairwise(slides):
-            if one.eigenvalues is None or other.eigenvalues is None or one.stable == other.stable:
+            if math.isnan(one.tests[0]) or math.isnan(other.tests[0]) or one.stable == other.stable:
                 continue
             test = 0 if one.tests[0] * other.tests[0] < 0.0 else 1
             p, error = self._zero(test, one.p, other.p)
-            lost = self.at(p)
-            assert lost.eigenvalues is not None
-            fastest = lost.eigenvalues[int(np.argmax(lost.eigenvalues.real))]
-            frequency = abs(float(fastest.imag)) / (2.0 * math.pi) if test == 1 else 0.0
+            frequency = 0.0
+            if test == 1:
+                values = self.at(p).eigenvalues
+                assert values is not None
+                frequency = abs(float(values[int(np.argmax(values.real))].imag)) / (2.0 * math.pi)
             found.append(Change("divergence" if test == 0 else "flutter", p, error, frequency, one.stable))
         return found
 

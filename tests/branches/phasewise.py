@@ -1,7 +1,7 @@
 """Motions of a shoe on smooth pads phase by phase, from the page on the model: another scheme than the package's.
 
-In each phase (open, stick, slip either way) the motion is linear, so its state on a grid of times is a product with
-powers of one matrix exponential. The instant at which a phase ends is a root of the series within one step.
+In each phase (open, stick, slip either way) the motion is linear, so its state on a grid of times is a product
+with powers of one matrix exponential. The instant at which a phase ends is a root of the series within one step.
 """
 
 import math
@@ -88,7 +88,8 @@ class Phasewise:
         """Carry a state over a span (s)."""
         z, time = np.append(state, 1.0), 0.0
         phase = self.phase(z)
-        word, times, zero = [phase], [], (-1, 0)
+        word, zero = [phase], (-1, 0)
+        times: list[float] = []
         low = high = z[:4]
         while True:
             left = span - time
@@ -117,8 +118,10 @@ class Phasewise:
         new = self.phase(z)
         return new, ((-1, 0) if new == STICK else (1, 1))
 
-    def _phase(self, phase: str, z: Vector, left: float, zero: tuple[int, int]) -> tuple[float, int, Vector, Vector]:
-        """Follow one phase: how long it lasts, which margin ends it (-1: none does), the state there, and others."""
+    def _phase(
+        self, phase: str, z: Vector, left: float, zero: tuple[int, int]
+    ) -> tuple[float, int, Vector, Vector]:
+        """Follow one phase: how long it lasts, which margin ends it (-1: none), the state there, and others."""
         a, rows, stack = self.generators[phase], self.rows[phase], self.stacks[phase]
         gone, seen = 0.0, [z[None]]
         first = True

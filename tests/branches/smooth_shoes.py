@@ -75,8 +75,7 @@ class Followed:
 
 def word_of(point: Point) -> tuple[int, ...]:
     """The phases of a cycle."""
-    word = cycle_of(point).word
-    return word
+    return cycle_of(point).word
 
 
 def cycle_of(point: Point) -> Cycle:

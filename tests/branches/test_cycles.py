@@ -2,17 +2,22 @@
 
 import math
 from itertools import islice
+from typing import cast
 
 import numpy as np
 import pytest
 
+from brakecli.branches.cycles import Cycles
 from brakecli.branches.line import Line
+from brakecli.branches.newton import Newton, Settings
 from brakecli.branches.point import Point
+from brakecli.branches.problem import Doubled
 from brakecli.branches.sliding import Sliding
-from tests.analysis.shoes import Array, Shoe
+from brakecli.branches.switch import switch
+from tests.analysis.shoes import Array, Shoe, random_shoes
 from tests.branches.phasewise import Phasewise, apart, differences, multipliers
-from tests.branches.smooth_shoes import FRICTION, Followed, branches, changed, cycle_of, drawn, followed
-from tests.campaign import counts
+from tests.branches.smooth_shoes import FRICTION, Followed, branches, changed, cycle_of, drawn, followed, word_of
+from tests.campaign import campaign, counts
 from tests.examples import make
 
 pytestmark = pytest.mark.usefixtures("compiled")
@@ -23,7 +28,9 @@ CLOSED = 1e-8
 
 
 def spread(points: list[Point], number: int = PER_BRANCH) -> list[Point]:
-    return [points[k] for k in sorted({round(k) for k in np.linspace(0, len(points) - 1, number)})] if points else []
+    return (
+        [points[k] for k in sorted({round(k) for k in np.linspace(0, len(points) - 1, number)})] if points else []
+    )
 
 
 def told(found: Followed, point: Point) -> bool | None:
@@ -46,8 +53,8 @@ def told(found: Followed, point: Point) -> bool | None:
 def test_multipliers_are_those_of_differences_of_another_scheme(number: int) -> None:
     """Points end with a correction of up to 1e-5 whose multipliers are not computed again.
 
-    Beside a border, where they change like the square root of the distance, that may be more than 1e-4: such a point
-    must agree once it has been corrected until it stands still. The one or other lies on the border itself.
+    Beside a border, where they change like the square root of the distance, that may be more than 1e-4: such a
+    point must agree once it has been corrected until it stands still. One or other lies on the border itself.
     """
     compared, beside_border, wrong = 0, 0, 0
     for found in branches(101, number):
@@ -78,34 +85,35 @@ def swing(motion: Phasewise, state: Array, span: float) -> tuple[float, Array]:
     return 0.5 * float(way.high[0] - way.low[0]), way.end
 
 
-def settled(motion: Phasewise, state: Array, period: float) -> tuple[float, float]:
-    """Amplitudes over spans of five periods: the last one, and the largest change among the last three."""
-    seen: list[float] = []
+def settled(motion: Phasewise, state: Array, period: float) -> float:
+    """The amplitude over five periods to which a motion comes, or after two thousand."""
+    before = math.inf
     for _ in range(400):
         amplitude, state = swing(motion, state, 5.0 * period)
-        seen.append(amplitude)
-        if len(seen) > 3 and max(seen[-3:]) - min(seen[-3:]) < 1e-9 * seen[-1]:
+        if abs(amplitude - before) < 1e-9 * amplitude:
             break
-    return seen[-1], max(seen[-3:]) - min(seen[-3:])
+        before = amplitude
+    return amplitude
 
 
 DISPLACED = 1e-3
 
 
-@pytest.mark.parametrize("number", counts(2, 12, 60))
+@pytest.mark.parametrize("number", counts(1, 12, 60))
 def test_runs_beside_an_unstable_cycle_part_from_it_as_its_multiplier_says(number: int) -> None:
     """A displacement e along the eigenvector grows to λ e after a period, but for terms of the order of e².
 
-    The second derivative is of the order of λ over the distance to the next fold or border, on which the two sides
-    differ: their mean has the e² taken away. One side comes to less vibration than the cycle has, the other one to
-    more, except where the cycle lies nearer than the displacement to a fold or a border.
+    The mean of the two sides has the e² taken away. The two sides come to different motions. Cycles are left out
+    with a border nearer than the displacement, behind which the derivative is another one.
     """
     seen = wrong = 0
     for found in branches(202, number):
         unstable = [
             point
             for point in found.inner
-            if point.multipliers[0].imag == 0.0 and point.multipliers[0].real > 1.03 and abs(point.multipliers[1]) < 1.0
+            if point.multipliers[0].imag == 0.0
+            and point.multipliers[0].real > 1.03
+            and abs(point.multipliers[1]) < 1.0
         ]
         for point in spread(unstable, 2):
             state, period, scales = found.cycle(point)
@@ -116,26 +124,31 @@ def test_runs_beside_an_unstable_cycle_part_from_it_as_its_multiplier_says(numbe
             values, right, left = modes
             k = int(np.argmax(np.abs(values)))
             growth, along, across = values[k].real, right[:, k].real, left[k].real
-            size = cycle_of(point).amplitude / scales[0]
-            step = DISPLACED * size * along / np.abs(along).max()
-            parts, ends = [], []
-            for sign in (1.0, -1.0):
-                moved = state + sign * step * scales
-                after = motion(moved, period).end
-                parts.append(across @ ((after - state) / scales) / (across @ (sign * step)))
-                ends.append(settled(motion, moved, period)[0])
-            seen += 1
             amplitude = cycle_of(point).amplitude
-            grows = abs(0.5 * sum(parts) - growth) < 0.02 * growth
-            parted = min(ends) < 0.999 * amplitude and max(ends) > 1.001 * amplitude
-            wrong += not (grows and parted)
-    assert seen > 0
+            step = DISPLACED * amplitude / scales[0] * along / np.abs(along).max()
+            word, parts, begins = motion(state, period).word, [], []
+            for sign in (1.0, -1.0):
+                begins.append(state + sign * step * scales)
+                after = motion(begins[-1], period)
+                if after.word != word:
+                    break
+                parts.append(across @ ((after.end - state) / scales) / (across @ (sign * step)))
+            if len(parts) < 2:
+                continue
+            one, other = (settled(motion, begin, period) for begin in begins)
+            seen += 1
+            grows = abs(0.5 * sum(parts) - growth) < 0.01 * growth
+            wrong += not (grows and abs(one - other) > DISPLACED * amplitude)
+    assert seen > 0 or number < 5
     assert wrong <= 0.02 * seen
 
 
 @pytest.mark.parametrize("number", counts(2, 12, 60))
 def test_runs_beside_a_stable_cycle_return_to_it(number: int) -> None:
-    """After n periods |λ|ⁿ of a displacement is left, times the condition of the eigenvectors."""
+    """After n periods |λ|ⁿ of a displacement is left, times the condition of the eigenvectors.
+
+    The displacement is so small that it leaves the sequence of phases of 20 periods as it is.
+    """
     seen = wrong = 0
     for found in branches(203, number):
         stable = [point for point in found.inner if point.stable and abs(point.multipliers[0]) < 0.97]
@@ -143,7 +156,12 @@ def test_runs_beside_a_stable_cycle_return_to_it(number: int) -> None:
             state, period, scales = found.cycle(point)
             motion, chance = found.motion(point.p), np.random.default_rng(1)
             size = cycle_of(point).amplitude / scales[0]
-            moved = state + DISPLACED * size * scales * chance.uniform(-1.0, 1.0, 4)
+            away, word = size * scales * chance.uniform(-1.0, 1.0, 4), motion(state, 20.0 * period).word
+            sizes = DISPLACED, 1e-4, 1e-5
+            near = [part for part in sizes if motion(state + part * away, 20.0 * period).word == word]
+            if not near:
+                continue  # a border lies nearer
+            moved = state + near[0] * away
             wait = math.ceil(math.log(1e-7) / math.log(max(abs(point.multipliers[0]), 0.1))) + 3
             end = motion(moved, wait * period).end
             # the phase along the cycle is not restored: the end is compared with the cycle's nearest place
@@ -169,7 +187,9 @@ def beside(motion: Phasewise, end: Array, state: Array, period: float, scales: A
     return float(np.abs((end - here) / scales).max())
 
 
-def zeros(tables: dict[str, dict[str, float]], key: str, low: float, high: float) -> list[tuple[float, float, bool]]:
+def zeros(
+    tables: dict[str, dict[str, float]], key: str, low: float, high: float
+) -> list[tuple[float, float, bool]]:
     """Where the growth of steady sliding passes zero: value, frequency (Hz) and whether it is lost there."""
 
     def rate(value: float) -> float:
@@ -194,8 +214,8 @@ RANGES = {"link2.angle_deg": (-40.0, 40.0), "link1.damping": (0.05, 20.0)}
 
 @pytest.mark.parametrize("number", counts(6, 60, 300))
 def test_steady_sliding_changes_where_the_eigenvalues_of_another_formula_do(number: int) -> None:
-    """Eigenvalues are exact to rounding times their condition: near a defective pair they pass zero within 1e-9."""
-    seen = {kind: 0 for kind in ("flutter", "divergence", "regained")}
+    """Eigenvalues are exact to rounding times their condition: so zeros agree within 1e-9."""
+    seen = dict.fromkeys(("flutter", "divergence", "regained"), 0)
     chance = np.random.default_rng(7)
     for k, (tables, critical) in enumerate(islice(drawn(304), number)):
         key = (FRICTION, *KEYS)[k % 7]
@@ -210,9 +230,8 @@ def test_steady_sliding_changes_where_the_eigenvalues_of_another_formula_do(numb
                 continue
         sliding = Sliding(Line(make(tables), [key], low, high))
         slides = sliding.along()
-        valid = [slide.p for slide in slides if slide.eigenvalues is not None]
-        if len(valid) < len(slides):
-            continue  # somewhere there is no steady sliding in contact
+        if any(math.isnan(slide.tests[0]) for slide in slides):
+            continue  # somewhere sliding leaves the pad open
         own = zeros(tables, key, low, high)
         changes = sliding.changes(slides)
         assert len(changes) == len(own), (k, key)
@@ -226,3 +245,113 @@ def test_steady_sliding_changes_where_the_eigenvalues_of_another_formula_do(numb
     assert seen["flutter"] > 0
     if number > 50:
         assert all(seen.values())
+
+
+@pytest.mark.parametrize("number", counts(3, 20, 60))
+def test_both_sheets_meet_at_a_fold_like_a_square_root_and_no_cycle_is_left_beyond_it(number: int) -> None:
+    """Four times as far from the fold the sheets lie twice as far apart, but for the next term of the series.
+
+    A run from the cycle of the fold, a little beyond the fold, passes the place where the cycle was and goes away.
+    """
+    seen = 0
+    for found in branches(204, number):
+        for fold in found.branch.specials:
+            if fold.kind != "fold" or len(set(word_of(fold.point))) < 2 or not 0.05 < fold.p < 0.95:
+                continue
+            sheets = beside_fold(found, fold.point)
+            if sheets is None:
+                continue  # a border or another fold lies nearer
+            seen += 1
+            (near, far), side = sheets, math.copysign(1.0, sheets[0][0].p - fold.p)
+            apart_near, apart_far = (np.abs(b.z - a.z).max() for a, b in (near, far))
+            assert apart_far == pytest.approx(2.0 * apart_near, rel=0.05)
+            gaps = [abs(cycle_of(b).period - cycle_of(a).period) for a, b in (near, far)]
+            assert gaps[1] == pytest.approx(2.0 * gaps[0], rel=0.1, abs=1e-9 * cycle_of(fold.point).period)
+            state, period, scales = found.cycle(fold.point)
+            gap = np.abs((found.motion(fold.p)(state, period).end - state) / scales).max()
+            missing = found.motion(fold.p - side * abs(near[0].p - fold.p))
+            state = state + np.append(
+                missing_rest(found, fold.p, fold.p - side * abs(near[0].p - fold.p)), [0.0, 0.0]
+            )
+            assert np.abs((missing(state, period).end - state) / scales).max() > 100.0 * gap
+            assert fold.error < 1e-7
+    assert seen > 0
+
+
+def missing_rest(found: Followed, here: float, there: float) -> Array:
+    """How far steady sliding moves from one p to another."""
+    return np.asarray(found.shoe(there).rest - found.shoe(here).rest)
+
+
+def beside_fold(found: Followed, fold: Point) -> tuple[tuple[Point, Point], tuple[Point, Point]] | None:
+    """Both sheets at two places, the second one four times as far from the fold; None if a word changes."""
+    found.cycles.use(fold.chart)
+    newton = Newton(found.cycles, Settings(exact=1e-11))
+    pairs = []
+    for length in (5e-3, 1e-2):
+        points = [
+            newton.solved(fold.z + way * length * fold.tangent, fold.tangent, fold.tangent, 0.0, exact=True)
+            for way in (1.0, -1.0)
+        ]
+        if points[0] is None or points[1] is None or {points[0].word, points[1].word} != {fold.word}:
+            return None
+        p = points[0].p
+        other = newton.at_parameter(points[1].z, p, -points[1].tangent, 0.0, exact=True)
+        if other is None or other.word != fold.word:
+            return None
+        pairs.append((points[0], other))
+    near, far = pairs
+    if abs((far[0].p - fold.p) / (near[0].p - fold.p) - 4.0) > 0.1:
+        return None  # not yet the parabola of the fold
+    return near, far
+
+
+@pytest.mark.parametrize("number", counts(6, 40, 200))
+def test_branches_reach_the_end_of_the_range(number: int) -> None:
+    lost = [
+        found.branch.ended[1].reason for found in branches(404, number) if found.branch.ended[1].kind != "range"
+    ]
+    assert len(lost) <= 0.03 * number, lost
+
+
+CORNERS = {
+    (303, 89): "stick begins at flutter, and growth is weak",
+    (303, 166): "the same",
+    (303, 178): "the same, with two short sticks just beyond the border",
+    (404, 30): "stick begins during flight's decay, and the branch turns by more than a right angle",
+    (404, 155): "the same beyond a fold",
+}
+
+
+@pytest.mark.parametrize(
+    ("seed", "which"), [pytest.param(*each, marks=[] if each == (404, 30) else campaign) for each in CORNERS]
+)
+def test_a_branch_goes_on_beyond_a_sharp_corner(seed: int, which: int) -> None:
+    tables = next(islice(random_shoes("smooth", seed), which, None))
+    critical = Shoe.of(tables).critical
+    assert critical is not None
+    found = followed(tables, FRICTION, 0.0, 2.0 * critical)
+    assert found is not None
+    assert found.branch.ended[1].kind == "range"
+    assert "branch point" not in {special.kind for special in found.branch.specials}
+
+
+@campaign
+def test_the_motion_of_a_flip_closes_after_two_periods_and_not_after_one() -> None:
+    """Its displacement from the flip is 3e-4 at least, and the single period carries it to the other side."""
+    seen = 0
+    for found in islice(branches(205, 18), 17, None):
+        for flip in found.branch.specials:
+            if flip.kind != "flip":
+                continue
+            new = switch(cast(Doubled, Cycles(found.line, 2)), flip.point)
+            assert new is not None
+            state, period, scales = found.cycle(new)
+            motion = found.motion(new.p)
+            twice, once = (
+                np.abs((motion(state, part * period).end - state) / scales).max() for part in (1.0, 0.5)
+            )
+            assert twice < CLOSED
+            assert once > 3e-4
+            seen += 1
+    assert seen == 2
