@@ -42,7 +42,7 @@ SNAP = 1e-6
 A segment that sticks ends with it exactly, but Newton's method gives the next begin with rounding."""
 LEAST_STEPS = 100
 """Steps of a common period, which are cheap: the more, the smoother are kinks of the force at edges of contact."""
-FIRST_WAVES = 1e-6
+FIRST_WAVES = 1e-3
 """Part of the amplitude of the waves with which a motion begins that grows with them."""
 WAITED = 50
 """Periods for which a run goes on before a motion is sought at its end."""
@@ -58,7 +58,7 @@ REASONS = {
     Status.NOT_FINITE: "the motion grows without bound",
     Status.STOPPED: "it was interrupted",
 }
-GROWING = Settings(low=FIRST_WAVES, first=0.05, longest=1.0, change=math.inf, seconds=60.0, insertions=0)
+GROWING = Settings(low=FIRST_WAVES, first=0.05, longest=1.0, change=math.inf, seconds=20.0, insertions=0)
 """How a motion is followed as the waves grow. Its multipliers do not matter on the way."""
 NO_PERIOD = "the waves of the wheel have no common period"
 
@@ -241,8 +241,17 @@ class Forced(Doubled):
 
     # --- first points ------------------------------------------------------------------------------------------
 
+    def begun(self, p: float, settings: Settings | None = None) -> Point | None:
+        """A motion at p: one that grows with the waves, or else one to which a run from steady sliding comes."""
+        point = self.grown(p, settings)
+        if point is None:
+            run = self.settled(p, self.origin(p), most=self.periods)
+            if run is not None and run[0].periods == self.periods:
+                point = run[1]
+        return point
+
     def grown(self, p: float, settings: Settings | None = None) -> Point | None:
-        """The motion at p that continues steady sliding as the waves grow from nothing; None where it is lost.
+        """The motion at p that continues steady sliding as the waves grow from nothing; None where that fails.
 
         It begins with the steady sliding of a smooth wheel.
         """
@@ -312,8 +321,11 @@ class Forced(Doubled):
         return problem, point
 
     def _segment(self, u: Array, p: float, k: int) -> Array | None:
-        """Where a segment ends that begins at a scaled state."""
-        flow, period = self.flow(p)
+        """Where a segment ends that begins at a scaled state; None where there is no flow to its end."""
+        try:
+            flow, period = self.flow(p)
+        except (CaseError, ValueError):
+            return None
         frame, origin = self.frame, self.origin(p)
         length = period / frame.segments
         run = flow(origin + u * frame.scales, k * length, length, frame.steps, False)
