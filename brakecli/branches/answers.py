@@ -1,10 +1,12 @@
 """What branches of a case answer: where it squeals by itself, and where it can vibrate beside stable sliding."""
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
 from brakecli.branches.explore import FORCED, SLIDING, Explored, Followed, Mark, Row, crossing
 from brakecli.branches.line import Line
+from brakecli.branches.sliding import Slide
 
 NARROWEST = 1e-6
 """Part of the range below which an interval is that of rounding."""
@@ -58,8 +60,13 @@ class Answers:
         if self.base is not None:
             places = [self.line.place(row.value) for row in self.base.points]
             return min(places), max(places)
-        slides = [each.p for each in self.explored.slides if each.eigenvalues is not None]
-        return (slides[0], slides[-1]) if slides else None
+        slides = self._slides
+        return (slides[0].p, slides[-1].p) if slides else None
+
+    @property
+    def _slides(self) -> list[Slide]:
+        """Where there is steady sliding, or a shoe that locks."""
+        return [slide for slide in self.explored.slides if not math.isnan(slide.tests[0])]
 
     @cached_property
     def windows(self) -> list[Span]:
@@ -68,7 +75,7 @@ class Answers:
             edges = [self.range[0], *(p for span in self.stable_spans for p in span), self.range[1]]
             gaps = zip(edges[::2], edges[1::2], strict=True)
             return [(low, high) for low, high in gaps if high > low + NARROWEST]
-        slides, found = [each for each in self.explored.slides if each.eigenvalues is not None], list[Span]()
+        slides, found = self._slides, list[Span]()
         if not slides:
             return found
         begin = None if slides[0].stable else slides[0].p
@@ -109,7 +116,7 @@ class Answers:
         """Where the motion that continues steady sliding is stable; a forced one on one of its sheets."""
         if self.base is not None:
             return _merged([(low, high) for low, high, _ in self._stable_parts(self.base)])
-        slides = [each for each in self.explored.slides if each.eigenvalues is not None]
+        slides = self._slides
         if not slides:
             return []
         edges = [slides[0].p, *(p for window in self.windows for p in window), slides[-1].p]
@@ -200,19 +207,21 @@ class Answers:
         if self.range is None:
             return "nothing slides steadily"
         first, last = self.range
-        words = []
+        words = list[str]()
+        diverges = {change.p for change in self.explored.changes if change.kind == "divergence"}
         for low, high in self.windows:
+            verb = "locks" if low in diverges and self.base is None else "squeals by itself"
             begin, end = (f"{self.line.value(p):.4g}" for p in (low, high))
             if low == first and high == last:
-                words.append("throughout")
+                words.append(f"{verb} throughout")
             elif high == last:
-                words.append(f"from {begin} on")
+                words.append(f"{verb} from {begin} on")
             elif low == first:
-                words.append(f"up to {end}")
+                words.append(f"{verb} up to {end}")
             else:
-                words.append(f"from {begin} to {end}")
+                words.append(f"{verb} from {begin} to {end}")
         if words:
-            return f"squeals by itself {' and '.join(words)}"
+            return " and ".join(words).replace("and squeals by itself ", "and ")
         what = "steady sliding" if self.base is None else "the motion that the waves force"
         begin, end = (f"{self.line.value(p):.4g}" for p in (first, last))
         where = "throughout" if (first, last) == (0.0, 1.0) else f"from {begin} to {end}, as far as it is known"

@@ -309,7 +309,7 @@ def beside_fold(found: Followed, fold: Point) -> tuple[tuple[Point, Point], tupl
 @pytest.mark.parametrize("number", counts(6, 40, 200))
 def test_branches_reach_the_end_of_the_range(number: int) -> None:
     lost = [
-        found.branch.ended[1].reason for found in branches(404, number) if found.branch.ended[1].kind != "range"
+        found.branch.ended[1].reason for found in branches(707, number) if found.branch.ended[1].kind != "range"
     ]
     assert len(lost) <= 0.03 * number, lost
 

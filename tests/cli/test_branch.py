@@ -207,3 +207,19 @@ def test_an_interruption_leaves_a_whole_file_that_ends_in_budget(here: Path) -> 
     tree = brakecli.load(here / "cut.h5")
     assert tree["branch_1/special/kind"].values.tolist()[-1] == "budget"
     assert 10 < tree["branch_1"].sizes["point"] < 31
+
+
+def test_a_shoe_that_locks_is_said_to_lock(here: Path) -> None:
+    """Divergence where the determinant cxx (cyy + K) - (cxy + φ K) cxy vanishes; a short range has no flutter."""
+    import tomllib
+
+    tables = tomllib.loads((here / "branch.toml").read_text())
+    tables["wheel"]["angular_speed"] *= -1.0
+    c, k = Shoe.of(tables).c, Shoe.of(tables).k
+    locks = abs((c[0, 0] * (c[1, 1] + k) - c[0, 1] ** 2) / (k * c[0, 1]))
+    words = ("--parameter", f"friction.coefficient=0:{1.2 * locks}")
+    side = "-0.025" if c[0, 1] < 0.0 else "0.025"
+    answer = answer_of(here, "branch", "branch.toml", *words, "--set", f"wheel.angular_speed={side}")
+    assert answer["critical"] == pytest.approx(locks, rel=1e-9)
+    assert answer["sentence"].startswith(f"locks from {locks:.4g} on")
+    assert [mark["kind"] for mark in answer["branches"][0]["special"]].count("divergence") == 1
