@@ -242,7 +242,7 @@ class Forced(Doubled):
     # --- first points ------------------------------------------------------------------------------------------
 
     def begun(self, p: float, settings: Settings | None = None) -> Point | None:
-        """A motion at p: that which grows with the waves, or else that to which a run from steady sliding comes."""
+        """A motion at p: one that grows with the waves, or else one to which a run from steady sliding comes."""
         point = self.grown(p, settings)
         if point is None:
             run = self.settled(p, self.origin(p), most=self.periods)

@@ -144,7 +144,7 @@ def test_a_low_wave_forces_the_linear_response_and_its_multipliers_are_those_of_
 
 @pytest.mark.parametrize("many", counts(1, 10))
 def test_the_critical_value_of_the_search_is_an_end_of_stability(many: int) -> None:
-    """Windows narrower than its tolerance are not found by the search."""
+    """To its tolerance and error bar. Windows narrower than its tolerance are not found by the search."""
     seeds = (seed for seed in range(9000, 9100) if line_of(seed)[1].keys == (FRICTION,))
     for seed in islice(seeds, many):
         tables, line = line_of(seed)
@@ -155,7 +155,7 @@ def test_the_critical_value_of_the_search_is_an_end_of_stability(many: int) -> N
         found = search(step, lambda value: make(tables, friction__coefficient=value), lambda case: None)  # noqa: B023
         if found.upper is not None and branch.points[0].stable:
             away = [abs(line.value(p) - found.windows[0][0]) for p in ends]
-            assert min(away) < 3e-3 * line.high, seed
+            assert min(away) < 3e-3 * line.high + found.window_errors[0][0], seed
             assert all(point.stable for point in branch.points if point.p < 0.9 * min(ends))
 
 
