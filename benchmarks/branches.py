@@ -1,7 +1,7 @@
 """Costs of branches, and how many get through: `make bench-branch` prints both, for docs/branches.md.
 
 Smooth shoes with dashpots on a turning wheel, friction from nothing to twice the critical value. A branch gets
-through where it reaches an end of the range, or closes. Start-up is left out.
+through where it reaches an end of the range, or closes. Start-up and steady sliding are left out.
 """
 
 import sys
@@ -14,6 +14,7 @@ import numpy as np
 
 from brakecli.branches.explore import LIMIT_CYCLE, Explorer
 from brakecli.branches.line import Line
+from brakecli.branches.sliding import Sliding
 from tests.analysis.shoes import Shoe, random_shoes
 from tests.examples import make
 
@@ -40,6 +41,10 @@ def main(number: int = SHOES, seed: int = SEED) -> None:
         line = Line(make(tables), ["friction.coefficient"], 0.0, 2.0 * critical)
         explored = Explorer(line, lambda what, done, total: None, lambda: False).explore()
         spent = time.perf_counter() - begin
+        begin = time.perf_counter()
+        sliding = Sliding(Line(make(tables), ["friction.coefficient"], 0.0, 2.0 * critical))
+        sliding.changes(sliding.along())
+        spent -= time.perf_counter() - begin  # of the cycles alone
         cycles = [branch for branch in explored.branches if branch.kind == LIMIT_CYCLE]
         if not cycles:
             flutters = any(change.kind == "flutter" for change in explored.changes)

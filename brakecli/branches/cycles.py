@@ -155,13 +155,13 @@ class Cycles(Problem):
         speed, begin = path.velocity / scales, path.start / scales
         by_u, gap = np.zeros((5, 5)), np.empty(5)
         by_u[:4, :4], by_u[:4, 4], by_u[4, :4] = matrix, speed * chart.time, chart.normal
-        by_u[0, 0], by_u[1, 1], by_u[2, 2], by_u[3, 3] = (matrix[k, k] - 1.0 for k in range(4))
+        by_u.ravel()[0:24:6] -= 1.0
         gap[:4], gap[4] = end - u[:4], chart.normal @ (u[:4] - chart.place)
         across = float(chart.normal @ speed)
         if across == 0.0:
             return "the flow runs along its plane"
         moved = matrix @ chart.basis
-        on_plane = moved - np.outer(speed / across, chart.normal @ moved)
+        on_plane = moved - (speed / across)[:, None] * (chart.normal @ moved)
         word, spent, period = flow.word, path.spent, float(path.time)
         facts = Cycle(
             period,

@@ -200,13 +200,13 @@ class Explorer:
             self.notes.append("; ".join(each.what for each in error.problems))
             return
         for p in GROWN_AT:
-            first = None if self._over() else problem.grown(p, replace(self._settings(), points=300))
+            first = None if self._over() else problem.begun(p, replace(self._settings(), points=300))
             if first is not None:
                 branch = both_ways(problem, first, self._settings(), self._until(first), self.stop)
                 self.branches.append(self._followed(branch, problem, kind=FORCED))
                 break
         else:
-            self.notes.append("no forced motion was found that grows out of steady sliding with the waves")
+            self.notes.append("no motion was found that the waves force")
         for p, state in states:
             value = self.line.value(p)
             found = None if self._over() else problem.settled(p, state)

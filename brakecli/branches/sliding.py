@@ -16,7 +16,7 @@ from brakecli.branches.point import Point
 from brakecli.errors import CaseError
 from brakecli.solver.steady_sliding import PRESSED, steady_sliding, tabulated
 
-PLACES = 129
+PLACES = 65
 """Places at which steady sliding is looked at; between them a test that may vanish twice is followed down."""
 LOCATED = 1e-14
 """Width of the bracket of a change."""
