@@ -12,6 +12,7 @@ NARROWEST = 1e-6
 """Part of the range below which an interval is that of rounding."""
 Span = tuple[float, float]
 """Two places of the line, the lower one first."""
+NONE_BEGINS = "no vibration begins in the range; --start follows one that a run has come to"
 ENDS = {"fold", "flip", "torus", "branch point", "grazing stick", "grazing flight", "flutter"}
 """Special points at which a stable part of a branch may end."""
 
@@ -196,7 +197,7 @@ class Answers:
     def sentence(self) -> str:
         """The answer in words."""
         parts = [self._self_excited(), *self._beside_sliding()]
-        if self.barrier is not None:
+        if self.barrier is not None and self.coexisting:
             parts.append(
                 f"at the case's {self.own:.4g} an unstable cycle of {_metres(self.barrier)} lies between the two"
             )
@@ -229,7 +230,8 @@ class Answers:
 
     def _beside_sliding(self) -> list[str]:
         if not self.coexisting:
-            return []
+            followed = any(each.kind != SLIDING for each in self.branches)
+            return [] if followed or self.range is None or self.explored.notes else [NONE_BEGINS]
         low, _, frequency = self.coexisting[0]
         until = max(end for _, end, _ in self.coexisting)
         begin, end = (f"{self.line.value(p):.4g}" for p in (low, until))
