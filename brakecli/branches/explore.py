@@ -152,19 +152,19 @@ class Explorer:
 
     def _until(self, first: Point) -> Callable[[Point], str | None]:
         """Ends a branch that has come back to steady sliding, or grown beyond all bounds."""
-        limit, left = LARGEST * first.facts.amplitude, [False]
+        begun, smooth, left = first.facts.amplitude, self.line.smooth, [False]
 
         def until(point: Point) -> str | None:
             self.count += 1
             self.tell("points of branches", self.count, 0)
-            if not isinstance(point.facts, Cycle):
-                pass
-            elif len(set(point.facts.word)) > 1:
-                left[0] = True
-            elif left[0] and (self.line.smooth or point.facts.amplitude < SMALLEST * first.facts.amplitude):
-                return IN_SLIDING
-            left[0] |= point.facts.amplitude > first.facts.amplitude and not self.line.smooth
-            return LARGE if point.facts.amplitude > limit else None
+            amplitude = point.facts.amplitude
+            if isinstance(point.facts, Cycle):
+                slips = len(set(point.facts.word)) == 1
+                if left[0] and slips and (smooth or amplitude < SMALLEST * begun):
+                    return IN_SLIDING
+                # on smooth pads slip alone is linear; a rough shoe slips in larger cycles, too
+                left[0] |= not slips or (amplitude > begun and not smooth)
+            return LARGE if amplitude > LARGEST * begun else None
 
         return until
 
@@ -301,7 +301,7 @@ class Explorer:
             else:
                 marks.append(self._mark(special, branch.ended))
         rows = [self._row(point) for point in points]
-        return Followed(kind, rows, marks, replace_points(branch, points), problem)
+        return Followed(kind, rows, marks, replace(branch, points=points), problem)
 
     def _row(self, point: Point) -> Row:
         cycle = point.facts
@@ -331,11 +331,6 @@ class Explorer:
             facts.frequency,
             special.name if special.kind == "end" else "",
         )
-
-
-def replace_points(branch: Branch, points: list[Point]) -> Branch:
-    """The branch with other points."""
-    return Branch(points, branch.specials, branch.ended, branch.evaluations, branch.unsearched)
 
 
 def crossing(followed: Followed, p: float) -> list[Point]:
