@@ -3,8 +3,11 @@
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import groupby
+from typing import NamedTuple
 
-from brakecli.branches.explore import FORCED, SLIDING, Explored, Followed, Mark, Row, crossing
+from brakecli.branches.bar import Bound
+from brakecli.branches.explore import FORCED, SLIDING, Explored, Followed, Mark, crossing, span
 from brakecli.branches.line import Line
 from brakecli.branches.sliding import Slide
 
@@ -13,8 +16,16 @@ NARROWEST = 1e-6
 Span = tuple[float, float]
 """Two places of the line, the lower one first."""
 NONE_BEGINS = "no vibration begins in the range; --start follows one that a run has come to"
-ENDS = {"fold", "flip", "torus", "branch point", "grazing stick", "grazing flight", "flutter"}
-"""Special points at which a stable part of a branch may end."""
+CUT = {"lost", "points", "seconds", "interrupted", "start"}
+"""Ends of a branch beyond which the motion goes on, unknown."""
+
+
+class Part(NamedTuple):
+    """A stable part of one or more branches, and its frequency (Hz) at the lower end."""
+
+    low: Bound
+    high: Bound
+    frequency: float
 
 
 @dataclass(frozen=True)
@@ -50,19 +61,22 @@ class Answers:
         return self.explored.branches
 
     @cached_property
-    def base(self) -> Followed | None:
-        """The forced motion that continues steady sliding as the waves grow; None where nothing forces it."""
-        forced = (each for each in self.branches if each.kind == FORCED)
-        return next((each for each in forced if not each.note), None)
+    def bases(self) -> list[Followed]:
+        """The forced motions that grow with the waves out of steady sliding; none where nothing forces any."""
+        return [each for each in self.branches if each.kind == FORCED and not each.note]
 
     @cached_property
-    def range(self) -> Span | None:
-        """Where the motion is known that continues steady sliding; None where there is none."""
-        if self.base is not None:
-            places = [self.line.place(row.value) for row in self.base.points]
-            return min(places), max(places)
+    def known(self) -> list[Span]:
+        """Where the motion is known that continues steady sliding."""
+        if self.bases:
+            return _merged([span(each) for each in self.bases])
         slides = self._slides
-        return (slides[0].p, slides[-1].p) if slides else None
+        return [(slides[0].p, slides[-1].p)] if slides else []
+
+    @property
+    def range(self) -> Span | None:
+        """From the first place to the last one at which that motion is known; None where there is none."""
+        return (self.known[0][0], self.known[-1][1]) if self.known else None
 
     @property
     def _slides(self) -> list[Slide]:
@@ -70,99 +84,114 @@ class Answers:
         return [slide for slide in self.explored.slides if not math.isnan(slide.tests[0])]
 
     @cached_property
-    def windows(self) -> list[Span]:
+    def windows(self) -> list[tuple[Bound, Bound]]:
         """Where the motion that continues steady sliding is unstable; a forced one on all of its sheets."""
-        if self.base is not None and self.range is not None:
-            edges = [self.range[0], *(p for span in self.stable_spans for p in span), self.range[1]]
-            gaps = zip(edges[::2], edges[1::2], strict=True)
-            return [(low, high) for low, high in gaps if high > low + NARROWEST]
-        slides, found = self._slides, list[Span]()
-        if not slides:
-            return found
-        begin = None if slides[0].stable else slides[0].p
-        for change in self.explored.changes:
-            if change.lost:
-                begin = change.p
-            elif begin is not None:
-                found.append((begin, change.p))
-                begin = None
-        return found if begin is None else [*found, (begin, slides[-1].p)]
+        found = list[tuple[Bound, Bound]]()
+        for first, last in self.known:
+            own = [part for part in self._stable if first <= part.low.p <= last]
+            edges = [Bound(first), *(bound for part in own for bound in (part.low, part.high)), Bound(last)]
+            for low, high in zip(edges[::2], edges[1::2], strict=True):
+                if high.p > low.p + NARROWEST:
+                    found.append((low, high))
+        return found
 
     @property
     def critical_windows_lower(self) -> list[float]:
         """Lower ends of the intervals in which steady sliding is unstable."""
-        return [self.line.value(low) for low, _ in self.windows]
+        return [self.line.value(low.p) for low, _ in self.windows]
 
     @property
     def critical_windows_upper(self) -> list[float]:
         """Their upper ends."""
-        return [self.line.value(high) for _, high in self.windows]
+        return [self.line.value(high.p) for _, high in self.windows]
 
     @cached_property
+    def lost(self) -> Bound | None:
+        """The least place at which the motion that continues steady sliding, stable below, loses its stability."""
+        return next((low for low, _ in self.windows if self.range and low.p > self.range[0]), None)
+
+    @property
     def critical(self) -> float | None:
-        """The least value at which the motion that continues steady sliding, stable below, loses its stability."""
-        lost = [low for low, _ in self.windows if self.range is not None and low > self.range[0]]
-        return self.line.value(lost[0]) if lost else None
+        """The value there."""
+        return self.line.value(self.lost.p) if self.lost else None
 
     @property
     def critical_error(self) -> float | None:
-        """The error of that value, as that of the special point there."""
-        marks = [mark for mark in (self.base or self.branches[0]).special if mark.kind not in ("end", "budget")]
-        if self.critical is None or not marks:
-            return None
-        return min(marks, key=lambda mark: abs(mark.value - (self.critical or 0.0))).error
+        """Its error bar."""
+        return self.lost.bar * abs(self.upper - self.lower) if self.lost else None
+
+    @cached_property
+    def _stable(self) -> list[Part]:
+        """Where the motion that continues steady sliding is stable; a forced one on one of its sheets."""
+        if self.bases:
+            return _united([part for each in self.bases for part in self._stable_parts(each)])
+        found, slides = list[Part](), self._slides
+        if not slides:
+            return found
+        changes = self.explored.changes
+        edges = [Bound(each.p, each.error) for each in changes]
+        edges = [Bound(slides[0].p)] * slides[0].stable + edges
+        edges += [Bound(slides[-1].p)] * (len(edges) % 2)
+        return [Part(low, high, 0.0) for low, high in zip(edges[::2], edges[1::2], strict=True) if high.p > low.p]
 
     @cached_property
     def stable_spans(self) -> list[Span]:
-        """Where the motion that continues steady sliding is stable; a forced one on one of its sheets."""
-        if self.base is not None:
-            return _merged([(low, high) for low, high, _ in self._stable_parts(self.base)])
-        slides = self._slides
-        if not slides:
-            return []
-        edges = [slides[0].p, *(p for window in self.windows for p in window), slides[-1].p]
-        return [(low, high) for low, high in zip(edges[::2], edges[1::2], strict=True) if high > low]
+        """Where it is stable, by the ends."""
+        return [(part.low.p, part.high.p) for part in self._stable]
 
     @cached_property
     def coexisting(self) -> list[tuple[float, float, float]]:
         """Intervals with a stable vibration beside stable sliding, and its frequency (Hz) at the lower end."""
         found = []
         for followed in self.branches:
-            if followed.kind == SLIDING or followed is self.base:
+            if followed.kind == SLIDING or followed in self.bases:
                 continue
-            for low, high, frequency in self._stable_parts(followed):
+            for part in self._stable_parts(followed):
                 for begin, end in self.stable_spans:
-                    left, right = max(low, begin), min(high, end)
+                    left, right = max(part.low.p, begin), min(part.high.p, end)
                     if right > left + NARROWEST:
-                        found.append((left, right, frequency))
+                        found.append((left, right, part.frequency))
         return sorted(found)
 
-    def _stable_parts(self, followed: Followed) -> list[tuple[float, float, float]]:
-        """The stable parts of a branch by their ends in p, each up to the special point behind its last motion."""
-        found, part = [], list[Row]()
-        places = [mark.value for mark in followed.special if mark.kind in ENDS]
-        ends = [self.line.place(value) for value in places]
-        for k, row in enumerate([*followed.points, None]):
-            if row is not None and row.stable:
-                part.append(row)
+    def _stable_parts(self, followed: Followed) -> list[Part]:
+        """The stable parts of a branch, each up to the special point behind its last motion."""
+        found = list[Part]()
+        branch = followed.branch
+        points = branch.points if branch else []
+        for stable, group in groupby(range(len(points)), lambda k: points[k].stable):
+            if not stable:
                 continue
-            if part:
-                low, high = (self.line.place(pick(each.value for each in part)) for pick in (min, max))
-                before = followed.points[k - len(part) - 1] if k > len(part) else None
-                for beyond in (before, row):
-                    if beyond is not None:
-                        near = [p for p in ends if self._beside(p, beyond, part)]
-                        low, high = min([low, *near]), max([high, *near])
-                slowest = min(part, key=lambda each: each.value)
-                found.append((low, high, slowest.frequency))
-                part = []
+            places = [*group]
+            part = [points[k] for k in places]
+            bounds = [
+                *(Bound(point.p) for point in part),
+                self._bound(followed, places[0], -1),
+                self._bound(followed, places[-1], 1),
+            ]
+            slowest = min(part, key=lambda point: point.p)
+            ends = (pick(bounds[::-1], key=lambda bound: bound.p) for pick in (min, max))
+            found.append(Part(*ends, slowest.facts.frequency))
         return found
 
-    def _beside(self, p: float, beyond: Row, part: list[Row]) -> bool:
-        """Whether a special point lies next to a stable part, on the way to an unstable motion."""
-        ends = [self.line.place(row.value) for row in (part[0], part[-1], beyond)]
-        room = 1e-6 + 2.0 * min(abs(ends[2] - ends[0]), abs(ends[2] - ends[1]))
-        return min(abs(p - each) for each in ends) <= room
+    def _bound(self, followed: Followed, k: int, way: int) -> Bound:
+        """Where the stable part ends whose last point that way is the one at k."""
+        branch = followed.branch
+        assert branch is not None
+        point = branch.points[k]
+        if not 0 <= k + way < len(branch.points):
+            end = branch.ended[1 if way > 0 else 0]
+            return Bound(point.p, known=end.kind not in CUT)
+        beyond = branch.points[k + way]
+        between = [
+            special
+            for special in branch.specials
+            if special.kind != "end" and 0.0 <= way * (special.s - point.s) <= way * (beyond.s - point.s)
+        ]
+        if not between:
+            half = 0.5 * abs(beyond.p - point.p)
+            return Bound(0.5 * (point.p + beyond.p), half, point, followed.problem)
+        special = min(between, key=lambda each: abs(each.s - point.s))
+        return Bound(special.p, special.error, point, followed.problem, special)
 
     @property
     def coexists_from(self) -> float | None:
@@ -210,8 +239,8 @@ class Answers:
         first, last = self.range
         words = list[str]()
         diverges = {change.p for change in self.explored.changes if change.kind == "divergence"}
-        for low, high in self.windows:
-            verb = "locks" if low in diverges and self.base is None else "squeals by itself"
+        for low, high in ((low.p, high.p) for low, high in self.windows):
+            verb = "locks" if low in diverges and not self.bases else "squeals by itself"
             begin, end = (f"{self.line.value(p):.4g}" for p in (low, high))
             if low == first and high == last:
                 words.append(f"{verb} throughout")
@@ -223,7 +252,7 @@ class Answers:
                 words.append(f"{verb} from {begin} to {end}")
         if words:
             return " and ".join(words).replace("and squeals by itself ", "and ")
-        what = "steady sliding" if self.base is None else "the motion that the waves force"
+        what = "the motion that the waves force" if self.bases else "steady sliding"
         begin, end = (f"{self.line.value(p):.4g}" for p in (first, last))
         where = "throughout" if (first, last) == (0.0, 1.0) else f"from {begin} to {end}, as far as it is known"
         return f"{what} is stable {where}"
@@ -235,20 +264,26 @@ class Answers:
         low, _, frequency = self.coexisting[0]
         until = max(end for _, end, _ in self.coexisting)
         begin, end = (f"{self.line.value(p):.4g}" for p in (low, until))
-        reaches = any(abs(until - edge) < 1e-9 for edge in (1.0, *(begin for begin, _ in self.windows)))
+        reaches = any(abs(until - edge) < 1e-9 for edge in (1.0, *(low.p for low, _ in self.windows)))
         where = f"from {begin} on" if reaches else f"from {begin} to {end}"
-        what = "stable sliding" if self.base is None else "the motion that the waves force"
+        what = "the motion that the waves force" if self.bases else "stable sliding"
         return [f"{where} a vibration at {frequency:.4g} Hz can exist beside {what}"]
 
 
 def _merged(spans: list[Span]) -> list[Span]:
     """The union of spans, in order."""
-    found = list[Span]()
-    for low, high in sorted(spans):
-        if found and low <= found[-1][1] + NARROWEST:
-            found[-1] = found[-1][0], max(high, found[-1][1])
+    return [(part.low.p, part.high.p) for part in _united([Part(Bound(a), Bound(b), 0.0) for a, b in spans])]
+
+
+def _united(parts: list[Part]) -> list[Part]:
+    """The union of parts, in order."""
+    found = list[Part]()
+    for part in sorted(parts, key=lambda part: part.low.p):
+        if found and part.low.p <= found[-1].high.p + NARROWEST:
+            if part.high.p > found[-1].high.p:
+                found[-1] = found[-1]._replace(high=part.high)
         else:
-            found.append((low, high))
+            found.append(part)
     return found
 
 

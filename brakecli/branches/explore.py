@@ -31,8 +31,8 @@ MOST = 12
 LONGEST = 0.25
 """Longest stride, in sizes of the motion and of the range."""
 POINTS, SECONDS = 3000, 60.0
-GROWN_AT = 0.0, 0.5, 1.0, 0.25, 0.75
-"""Places of the line at which a forced motion is sought that grows with the waves."""
+GROWN_AT = 0.0, 1.0, 0.5, 0.25, 0.75
+"""Places of the line at which a forced motion is sought that grows with the waves, where none is known yet."""
 SAME = 1e-6
 """Relative difference of amplitude and period by which two motions at one value are the same."""
 IN_SLIDING = "it ends in steady sliding, where that flutters"
@@ -200,12 +200,13 @@ class Explorer:
             self.notes.append("; ".join(each.what for each in error.problems))
             return
         for p in GROWN_AT:
-            first = None if self._over() else problem.begun(p, replace(self._settings(), points=300))
+            if self._over() or any(low <= p <= high for low, high in map(span, self.branches[1:])):
+                continue
+            first = problem.begun(p, replace(self._settings(), points=300))
             if first is not None:
                 branch = both_ways(problem, first, self._settings(), self._until(first), self.stop)
                 self.branches.append(self._followed(branch, problem, kind=FORCED))
-                break
-        else:
+        if len(self.branches) == 1:
             self.notes.append("no motion was found that the waves force")
         for p, state in states:
             value = self.line.value(p)
@@ -331,6 +332,13 @@ class Explorer:
             facts.frequency,
             special.name if special.kind == "end" else "",
         )
+
+
+def span(followed: Followed) -> tuple[float, float]:
+    """The least place and the largest one of a followed branch."""
+    assert followed.branch is not None
+    places = [point.p for point in followed.branch.points]
+    return min(places), max(places)
 
 
 def crossing(followed: Followed, p: float) -> list[Point]:

@@ -22,6 +22,7 @@ LEAST_LOOP = 8
 RECENT = 20
 """Points among which one is sought over which the branch runs back."""
 TURNED_BACK = End("lost", "it is lost: it has turned back on itself")
+RUNS_AGAIN = End("lost", "it is lost: it runs along itself again")
 SHARP = 0.7
 """Cosine of the angle by which a branch turns at a sharp corner."""
 SAME_PLACE = 1e-7
@@ -154,6 +155,9 @@ class _Walk:
                 if end is not None:
                     points[-1:] = [closing] if closing is not None else []
                     return points, end
+                self.problem.use(new.chart)
+                if any(self._closing(passed, here, new)[0] for passed in self._passed(points)):
+                    return points, RUNS_AGAIN
                 self.problem.use(new.chart)
             renewed = self._renewed(new)
             if renewed is not None:
@@ -330,6 +334,26 @@ class _Walk:
                 chord = new.z - point.z
                 return bool(math.sqrt(chord @ chord) < reach and new.tangent @ point.tangent < -SAME_WAY)
         return False
+
+    @staticmethod
+    def _passed(points: list[Point]) -> list[Point]:
+        """The earlier point, if any, that the last stride passes on its way along the same stretch of the branch.
+
+        Newton's method may go over to another branch where two cross. Then a closed one is entered, and its first
+        point is not that of the walk.
+        """
+        here, new = points[-2:]
+        way = new.s - here.s
+        beside = [
+            point
+            for point in points[1:-LEAST_LOOP]
+            if abs(point.p - new.p) <= way
+            and point.chart is new.chart
+            and point.word == new.word
+            and float(point.tangent @ new.tangent) > SHARP
+            and float(np.abs(point.z - new.z).max()) <= way
+        ]
+        return beside[-1:]
 
     def _renewed(self, point: Point) -> Point | None:
         """The point in a new chart, where the problem wants one and the motion is found in it."""

@@ -20,7 +20,7 @@ from brakecli.branches.follow import follow
 from brakecli.branches.line import Line
 from brakecli.branches.newton import Settings, start
 from brakecli.branches.point import Point
-from brakecli.branches.problem import Array, Doubled, Guess, Seen
+from brakecli.branches.problem import Array, Doubled, Guess, Problem, Seen
 from brakecli.errors import CaseError
 from brakecli.errors import Problem as Wrong
 from brakecli.solver.automaton import STICK
@@ -135,6 +135,12 @@ class Forced(Doubled):
     def of_periods(self, periods: int) -> "Forced":
         """The problem of motions that repeat after so many common periods, with the same steps and cells."""
         return Forced(self.system, self.frame, periods)
+
+    def finer(self, factor: float) -> "list[Problem]":
+        """The same motions with so many times more steps, and with so many times more cells."""
+        steps = replace(self.frame, steps=math.ceil(factor * self.frame.steps))
+        cells = replace(self.frame, cells=2 * math.ceil(0.5 * factor * self.frame.cells))
+        return [Forced(self.system, each, self.periods) for each in (steps, cells)]
 
     @property
     def segments(self) -> int:

@@ -51,6 +51,10 @@ class Problem(Protocol):
     def evaluate(self, u: Array, p: float, with_parameter: bool) -> Seen | str | None:
         """Evaluate a place. A string says why the motion cannot be computed there; None gives no reason."""
 
+    def finer(self, factor: float) -> "list[Problem]":
+        """The same motions, computed so many times more finely in one way each; none where they are exact."""
+        return []
+
     def use(self, chart: object) -> None:
         """Return to the chart of a point."""
         self.chart = chart

@@ -51,6 +51,7 @@ def special_points(newton: Newton, points: list[Point], over: Over) -> tuple[lis
             return specials, unsearched or end.reason
         newton.problem.use(one.chart)
         specials += _changes(newton, one, other)
+    _between(newton, points, specials)
     places = [special.s for special in specials if special.kind == "branch point"]
     specials = [
         special
@@ -58,6 +59,19 @@ def special_points(newton: Newton, points: list[Point], over: Over) -> tuple[lis
         if special.kind != "fold" or all(abs(special.s - s) >= ONE_PLACE for s in places)
     ]
     return specials, unsearched
+
+
+def _between(newton: Newton, points: list[Point], specials: list[Special]) -> None:
+    """Insert a point between two special points of one stride: what lies between may be stable on its own."""
+    for k in range(len(points) - 2, -1, -1):
+        one, other = points[k], points[k + 1]
+        if not _one_piece(one, other):
+            continue
+        places = sorted(special.s for special in specials if one.s < special.s < other.s)
+        newton.problem.use(one.chart)
+        parts = [(0.5 * (a + b) - one.s) / (other.s - one.s) for a, b in pairwise(places)]
+        middles = [newton.between(one, other, part) for part in parts]
+        points[k + 1 : k + 1] = [middle for middle in middles if middle is not None and middle.word == one.word]
 
 
 def _one_piece(one: Point, other: Point) -> bool:
