@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from time import perf_counter
 from typing import Any
 
@@ -30,7 +31,8 @@ MOST = 12
 """Branches of one command."""
 LONGEST = 0.25
 """Longest stride, in sizes of the motion and of the range."""
-POINTS, SECONDS = 3000, 60.0
+POINTS, ALL_POINTS, SECONDS = 3000, 10_000, 60.0
+"""Budgets: of points of one branch and of all of them, and of time."""
 GROWN_AT = 0.0, 1.0, 0.5, 0.25, 0.75
 """Places of the line at which a forced motion is sought that grows with the waves, where none is known yet."""
 SAME = 1e-6
@@ -100,26 +102,48 @@ Tell = Callable[[str, int, int], None]
 class Explorer:
     """Follows one branch after another, within a budget of time, until it is stopped."""
 
-    def __init__(self, line: Line, tell: Tell, stop: Stop, seconds: float = SECONDS) -> None:
-        """`tell` shows how many points there are; `stop` ends the work, and keeps what was found."""
+    def __init__(
+        self, line: Line, tell: Tell, stop: Stop, seconds: float = SECONDS, points: int = ALL_POINTS
+    ) -> None:
+        """`tell` shows how many points there are; `stop` ends the work, and keeps what was found.
+
+        The budget of `points` is that of all branches; that of `seconds` is for a user who waits. Where the same
+        bytes must come out again, it is infinite.
+        """
         self.line, self.tell, self.stop = line, tell, stop
-        self.end, self.count = perf_counter() + seconds, 0
+        self.end, self.count, self.points = perf_counter() + seconds, 0, points
+        self.sliding = Sliding(line)
+        self.slides = self.sliding.along()
+        self.changes = self.sliding.changes(self.slides)
         self.branches: list[Followed] = []
         self.notes: list[str] = []
 
     def explore(self, states: Sequence[tuple[float, Any]] = (), switches: bool = False) -> Explored:
         """Follow everything: from flutter, from given states (p and state), and from flips if that is wanted."""
-        sliding = Sliding(self.line)
-        slides = sliding.along()
-        changes = sliding.changes(slides)
-        self.branches.append(self._sliding(slides, changes))
+        self.branches.append(self._sliding(self.slides, self.changes))
         if self.line.case.roughness.wheel is not None:
-            self._forced(states)
+            self._forced()
         else:
-            self._cycles(sliding, changes, states)
+            self._cycles(self.sliding, self.changes)
+        for p, state in states:
+            self.begin_at(p, state)
         if switches:
             self._doubled()
-        return Explored(self.line, slides, changes, self.branches, self.notes, bool(self.stop()))
+        return self.explored
+
+    @property
+    def explored(self) -> Explored:
+        """What has been found so far."""
+        found = [*self.branches], [*self.notes]
+        return Explored(self.line, self.slides, self.changes, *found, bool(self.stop()))
+
+    def begin_at(self, p: float, state: Any) -> None:
+        """Follow the branch of the motion that a state at a place comes to, if it is not known."""
+        if self.line.case.roughness.wheel is None:
+            if not self._over() and not is_undamped(self.line.case_coefficients):
+                self._from_state(self.sliding, p, state)
+        elif self.waves is not None:
+            self._forced_from(self.waves, p, state)
 
     def _sliding(self, slides: list[Slide], changes: list[Change]) -> Followed:
         """Steady sliding: its multipliers are those of a period of its least stable mode, or of a second."""
@@ -148,7 +172,8 @@ class Explorer:
         return Followed(SLIDING, rows, sorted(marks, key=lambda mark: mark.value))
 
     def _settings(self) -> Settings:
-        return Settings(longest=LONGEST, points=POINTS, seconds=max(self.end - perf_counter(), 0.0))
+        left = max(self.end - perf_counter(), 0.0)
+        return Settings(longest=LONGEST, points=min(POINTS, max(self.points - self.count, 0)), seconds=left)
 
     def _until(self, first: Point) -> Callable[[Point], str | None]:
         """Ends a branch that has come back to steady sliding, or grown beyond all bounds."""
@@ -168,8 +193,8 @@ class Explorer:
 
         return until
 
-    def _cycles(self, sliding: Sliding, changes: list[Change], states: Sequence[tuple[float, Any]]) -> None:
-        """Limit cycles on a smooth wheel, from each flutter and from given states."""
+    def _cycles(self, sliding: Sliding, changes: list[Change]) -> None:
+        """Limit cycles on a smooth wheel, from each flutter."""
         if is_undamped(self.line.case_coefficients):
             self.notes.append(UNDAMPED)
             return
@@ -187,17 +212,19 @@ class Explorer:
             branch = follow(problem, first, None, self._settings(), self._until(first), self.stop)
             self.branches.append(self._followed(branch, problem, change, changes))
 
-        for p, state in states:
-            if self._over():
-                return
-            self._from_state(sliding, p, state)
-
-    def _forced(self, states: Sequence[tuple[float, Any]]) -> None:
-        """Motions that a rough wheel forces: the one that grows with the waves, and those from given states."""
+    @cached_property
+    def waves(self) -> Forced | None:
+        """The problem of motions that a rough wheel forces; None where there are none that repeat."""
         try:
-            problem = Forced.along(self.line)
+            return Forced.along(self.line)
         except CaseError as error:
             self.notes.append("; ".join(each.what for each in error.problems))
+            return None
+
+    def _forced(self) -> None:
+        """Motions that a rough wheel forces: those that grow with the waves."""
+        problem = self.waves
+        if problem is None:
             return
         for p in GROWN_AT:
             if self._over() or any(low <= p <= high for low, high in map(span, self.branches[1:])):
@@ -208,17 +235,19 @@ class Explorer:
                 self.branches.append(self._followed(branch, problem, kind=FORCED))
         if len(self.branches) == 1:
             self.notes.append("no motion was found that the waves force")
-        for p, state in states:
-            value = self.line.value(p)
-            found = None if self._over() else problem.settled(p, state)
-            if found is None:
-                self.notes.append(f"the motion given for {value:.6g} comes to no periodic motion")
-            elif self._known(p, found[1]):
-                self.notes.append(f"the motion given for {value:.6g} comes to one of a branch that is known")
-            else:
-                branch = both_ways(*found, self._settings(), self._until(found[1]), self.stop)
-                note = f"from the motion given for {value:.6g}"
-                self.branches.append(replace(self._followed(branch, found[0], kind=FORCED), note=note))
+
+    def _forced_from(self, problem: Forced, p: float, state: Any) -> None:
+        """The branch of the forced motion that a run comes to; none where it is known already."""
+        value = self.line.value(p)
+        found = None if self._over() else problem.settled(p, state)
+        if found is None:
+            self.notes.append(f"the motion given for {value:.6g} comes to no periodic motion")
+        elif self._known(p, found[1]):
+            self.notes.append(f"the motion given for {value:.6g} comes to one of a branch that is known")
+        else:
+            branch = both_ways(*found, self._settings(), self._until(found[1]), self.stop)
+            note = f"from the motion given for {value:.6g}"
+            self.branches.append(replace(self._followed(branch, found[0], kind=FORCED), note=note))
 
     def _known(self, p: float, first: Point) -> bool:
         """Whether a motion at p lies on a branch that has been followed, perhaps as several of its periods."""
@@ -257,7 +286,8 @@ class Explorer:
         return [mark for followed in self.branches if followed.kind == LIMIT_CYCLE for mark in followed.special]
 
     def _over(self) -> bool:
-        return self.stop() or perf_counter() > self.end or len(self.branches) >= MOST
+        spent = perf_counter() > self.end or self.count >= self.points
+        return self.stop() or spent or len(self.branches) >= MOST
 
     def _doubled(self) -> None:
         """The motions of twice the period that are born at flips."""

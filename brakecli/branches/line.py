@@ -1,7 +1,7 @@
 """A case along a line: keys that take the same value, from one end of a range to the other."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from copy import deepcopy
 from dataclasses import replace
 from functools import cached_property, lru_cache
@@ -61,8 +61,17 @@ class Shoe(NamedTuple):
 class Line:
     """The systems of a case whose keys go from `low` (p = 0) to `high` (p = 1)."""
 
-    def __init__(self, case: Case, keys: Sequence[str], low: float, high: float, label: str = "it") -> None:
-        """`label` is what messages of problems call the line."""
+    def __init__(
+        self,
+        case: Case,
+        keys: Sequence[str],
+        low: float,
+        high: float,
+        label: str = "it",
+        adapted: Callable[[System], System] = lambda system: system,
+    ) -> None:
+        """`label` is what messages of problems call the line; `adapted` changes each system of it."""
+        self._adapted = adapted
         self.case, self.keys, self.low, self.high, self.label = case, tuple(keys), low, high, label
         self._paths = [key_path(key) for key in keys]
         given, touched = case.model_dump(exclude_unset=True), {path[0] for path in self._paths if path}
@@ -114,7 +123,7 @@ class Line:
 
     def _system(self, p: float) -> System:
         """The system at p; raises CaseError where the case is not valid."""
-        return system_of(self.case_at(p))
+        return self._adapted(system_of(self.case_at(p)))
 
     def _shoe(self, p: float) -> Shoe:
         """The numbers of the shoe at p: interpolated where that is exact to rounding; reading a case takes longer.

@@ -1,110 +1,83 @@
-"""The critical value of a parameter: where steady sliding loses its stability, and from where on it vibrates."""
+"""The critical value of a parameter: where steady sliding loses its stability, and from where on it vibrates.
+
+On smooth pads, and on a smooth wheel, the eigenvalues of steady sliding say the first. On a rough wheel it is read
+off the branch of the motion that the waves force (`branches`); where their waves have no common period, Lyapunov's
+exponent is measured instead.
+"""
 
 import math
 from collections.abc import Callable
 from functools import cache, partial
 from itertools import pairwise
-from typing import cast
 
 import numpy as np
 
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.stability.certain import EPSILON, Rounded, conditions, links_of
 from brakecli.analysis.stability.discrete import spectral_radius
-from brakecli.analysis.stability.modes import growth as eigenvalue_growth
-from brakecli.analysis.stability.modes import is_undamped
 from brakecli.analysis.stability.report import MARGIN, stability
 from brakecli.analysis.stability.search import bisect
-from brakecli.case.case import Case, changed
+from brakecli.branches.answers import Answers
+from brakecli.case.case import Case
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError
-from brakecli.runs.limits import within_range
+from brakecli.solver.period import common_period
+from brakecli.solver.steady_sliding import SteadySliding, steady_sliding
 from brakecli.solver.system import System
-from brakecli.sweeps.early import Known, early
-from brakecli.sweeps.error_bar import left_open
-from brakecli.sweeps.floquet import Disturbances
-from brakecli.sweeps.growth import Sliding, has_exact_steps, sliding, stepped, with_step
-from brakecli.sweeps.scan import between, scanned
-from brakecli.sweeps.sustained import fades_linearly, lasting, settling, verdict_fades
+from brakecli.sweeps.early import Known
+from brakecli.sweeps.lyapunov import Steady, by_exponents
+from brakecli.sweeps.read_off import explored, on_waves
 from brakecli.sweeps.tables import Critical
-from brakecli.sweeps.windows import Edge, Outcome, Search, no_edge, of_edges
+from brakecli.sweeps.windows import Edge, Outcome, Piece, Search, joined, of_edges
 
-EDGES = 4  # halvings towards the ends of a range of the parameter in which the answer is not known
 SCANNED_BY_EIGENVALUES = 129
 SCANNED_WHERE_OPEN = 17  # by eigenvalues where surfaces open: their mean stiffness takes time
-GALLOP = 4.0  # factor from one stride to the next in looking for the end of sustained vibration
-LONGER = 8.0  # durations of the case that vibration beside stable sliding has to last
-PATIENT = 128.0  # durations that it may take to die out on smooth surfaces; on rough ones twice `LONGER`
 
-
-SlidingAt = Callable[[float], Sliding | None]
 Signs = list[Rounded] | None
 """What is positive where sliding is stable; None where there is no steady sliding."""
 EdgeIn = Callable[[float, float], Edge]
-Answer = Callable[[float], bool | None]
-"""The answer to a question at a value of the parameter; None where it is not known."""
 
 
 def search(
-    critical: Critical, case_at: Callable[[float], Case], verdict_of: Callable[[Case], Verdict | Known | None]
+    critical: Critical,
+    case_at: Callable[[float], Case],
+    verdict_of: Callable[[Case], Verdict | Known | None],
+    own: float | None = None,
 ) -> Search:
-    """Look for the critical value of the parameter that `case_at` sets; `verdict_of` runs a case."""
+    """Look for the critical value of the parameter that `case_at` sets; `verdict_of` runs a case.
+
+    `own`: the value of the parameter in the case itself.
+    """
     case_at = cache(case_at)
-    exact_steps = all(has_exact_steps(case_at, end) for end in (critical.lower, critical.upper))
-
-    @cache
-    def sliding_at(value: float) -> Sliding | None:
-        try:
-            return sliding(with_step(system_of(case_at(value)), unless=exact_steps))
-        except CaseError:  # no equilibrium, or a value that no case can have, between two that it can
-            return None
-
+    steady_at = cache(partial(_steady, case_at))
     if critical.parameter == "friction.coefficient":
-        case = case_at(critical.lower)
-        exact = _friction_by_eigenvalues(critical, case, with_step(system_of(case), unless=exact_steps))
+        exact = _friction_by_eigenvalues(critical, case_at(critical.lower))
     else:
-        exact = _by_eigenvalues(critical, case_at, sliding_at)
-    if critical.method == "eigenvalue":
+        exact = _by_eigenvalues(critical, case_at, steady_at)
+    if critical.method == "eigenvalue" or exact.outcome is Outcome.NO_SLIDING:
         return exact
-    found = _bracketed(critical, exact) if exact_steps else _by_simulation(critical, sliding_at, exact)
+    explorer = explored(critical, case_at(critical.lower))
+    answers = Answers(explorer.explored, own)
+    system, found = system_of(case_at(critical.lower)), exact
+    if system.wheel.g.size:
+        found = on_waves(critical, answers) if common_period(system) else by_exponents(critical, steady_at)
+        found = found._replace(bias=exact.bias, eigenvalue=exact.eigenvalue)
+    return found._replace(coexists_from=answers.coexists_from, barrier=answers.barrier, sentence=answers.sentence)
 
-    @cache
-    def fades(value: float) -> bool | None:
-        unstable = value >= found.upper if found.outcome is Outcome.FOUND else None
-        steady, case = sliding_at(value), stepped(case_at(value))
-        linear, rate = steady is not None and fades_linearly(steady), settling(steady)
-        # Beside stable sliding it may yet fade away, or has not yet come to where it lasts.
-        times, before, longest = 1.0, cast("Verdict | Known | None", None), LONGER * case.solver.duration
-        with within_range():
-            known = early(system_of(changed(case, solver={"duration": longest})), seen=False)
-        answer = verdict_fades(known.verdict, longest, unstable, linear, rate) if known is not None else None
-        if answer is not None:
-            return answer
-        patience, answer = PATIENT if system_of(case).smooth else 2.0 * LONGER, None
-        while times <= LONGER or (answer is None and times <= patience):
-            duration = times * case.solver.duration
-            verdict = verdict_of(changed(case, solver={"duration": duration}))
-            answer = verdict_fades(verdict, duration, unstable, linear, rate)
-            last = times >= LONGER or unstable is not False
-            if verdict is not None and answer is not None and (last or lasting(answer, before, verdict, linear)):
-                return answer
-            times, before = 2.0 * times, verdict
+
+def _steady(case_at: Callable[[float], Case], value: float) -> tuple[System, SteadySliding] | None:
+    """Steady sliding at a value; None where the wheel does not turn, and no load, or no link, holds the shoe."""
+    try:
+        system = system_of(case_at(value))
+        if system.belt_speed == 0.0 or system.coefficients.c_xx == 0.0:
+            return None
+        rest = steady_sliding(system)
+    except CaseError:  # no equilibrium, or a value that no case can have, between two that it can
         return None
-
-    sustained, outcome = _sustained(critical, fades, found)
-    return found._replace(sustained=sustained, sustained_outcome=outcome)
+    return (system, rest) if rest.is_pressed(system.load_at_start) else None
 
 
-def _bracketed(critical: Critical, exact: Search) -> Search:
-    """The answer of the eigenvalues with a bracket as wide as one of runs."""
-    if exact.value is None or exact.error is None:
-        return exact
-    half = max(0.4 * critical.tolerance, exact.error)
-    lower, upper = max(critical.lower, exact.value - half), min(critical.upper, exact.value + half)
-    return exact._replace(lower=lower, upper=upper, error=max(0.5 * (upper - lower), exact.error))
-
-
-def _by_eigenvalues(critical: Critical, case_at: Callable[[float], Case], sliding_at: SlidingAt) -> Search:
+def _by_eigenvalues(critical: Critical, case_at: Callable[[float], Case], steady_at: Steady) -> Search:
     """Where the eigenvalues of steady sliding pass zero, and by how much the scheme at its step moves that."""
 
     @cache
@@ -113,48 +86,49 @@ def _by_eigenvalues(critical: Critical, case_at: Callable[[float], Case], slidin
             system, links = system_of(case_at(value)), links_of(case_at(value))
         except CaseError:
             return None
+        grip = math.copysign(system.coefficients.phi, system.belt_speed)
         if not system.smooth:
-            return conditions(links, found.stiffness, found.grip) if (found := sliding_at(value)) else None
+            return conditions(links, found[1].stiffness, grip) if (found := steady_at(value)) else None
         if system.belt_speed == 0.0 or system.coefficients.c_xx == 0.0:
             return None
-        grip = math.copysign(system.coefficients.phi, system.belt_speed)
         pressed = links.pressed * Rounded(system.load_at_start)
         return [*conditions(links, system.contact_stiffness, grip), pressed]
 
     def grows_in_steps(value: float) -> bool:
-        found = sliding_at(value)
-        phi = found.system.coefficients.phi if found else 0.0
-        return found is None or spectral_radius(found.system, found.stiffness, phi) > 1.0 + MARGIN
+        if (found := steady_at(value)) is None:
+            return True
+        system, rest = found
+        return spectral_radius(system, rest.stiffness, system.coefficients.phi) > 1.0 + MARGIN
 
-    first = sliding_at(critical.lower)
-    opens = first is not None and first.opens
+    first = steady_at(critical.lower)
+    opens = first is not None and first[1].stiffness < 0.999 * first[0].contact_stiffness
     width = critical.tolerance * (1e-2 if opens else 1e-9)
 
-    def edge(unstable: Callable[[float], bool], low: float, high: float) -> Edge:
-        lost = unstable(high)
-        low, high = bisect(lambda value: unstable(value) is not lost, low, high, width=width)
-        return Edge(0.5 * (low + high), low, high, 0.5 * (high - low), lost)
+    def searched(unstable: Callable[[float], bool], edge: EdgeIn, count: int, middles: list[float]) -> Search:
+        values = sorted({*np.linspace(critical.lower, critical.upper, count).tolist(), *middles})
+        if all(steady_at(value) is None for value in values):
+            return Search(Outcome.NO_SLIDING)
+        return joined(critical, [Piece(value, value, unstable(value)) for value in values], edge)
 
-    def found(unstable: Callable[[float], bool], edge: EdgeIn, count: int, values: list[float]) -> Search:
-        values = sorted({*np.linspace(critical.lower, critical.upper, count).tolist(), *values})
-        return _answer(critical, sliding_at, unstable, values, edge)
+    def in_steps(low: float, high: float) -> Edge:
+        lost = grows_in_steps(high)
+        ends = bisect(lambda value: grows_in_steps(value) is not lost, low, high, width=width)
+        return Edge(0.5 * sum(ends), 0.5 * (ends[1] - ends[0]))
 
     scanned = SCANNED_WHERE_OPEN if opens else SCANNED_BY_EIGENVALUES
-    exact = found(
-        lambda value: _grows(signs_at(value)), partial(_certain, critical, signs_at, width=width), scanned, []
-    )
+    certain = partial(_certain, critical, signs_at, width=width)
+    exact = searched(lambda value: _grows(signs_at(value)), certain, scanned, [])
     exact = exact._replace(eigenvalue=exact.value)
-    if exact.value is None:
+    beside = exact.value and (steady_at(exact.lower) or steady_at(exact.upper))
+    if not beside or beside[0].method.own_steps:
+        return exact._replace(bias=0.0) if beside else exact
+    if beside[0].method.step is None:
         return exact
-    beside = sliding_at(exact.lower) or sliding_at(exact.upper)
-    if beside is None or beside.system.method.own_steps:
-        return exact._replace(bias=0.0)
-    in_steps = cache(grows_in_steps)
-    middles = between(critical.lower, critical.upper, exact.windows)
-    own = found(in_steps, partial(edge, in_steps), SCANNED_WHERE_OPEN, middles)
-    if own.value is None or exact.outcome is not own.outcome:
-        return exact
-    return exact._replace(bias=own.value - exact.value)
+    ends = [critical.lower, *(end for window in exact.windows for end in window), critical.upper]
+    middles = [0.5 * (low + high) for low, high in pairwise(ends)]
+    own = searched(cache(grows_in_steps), in_steps, SCANNED_WHERE_OPEN, middles)
+    same = own.value is not None and exact.value is not None and exact.outcome is own.outcome
+    return exact._replace(bias=own.value - exact.value) if same else exact  # type: ignore[operator]
 
 
 def _grows(signs: Signs) -> bool:
@@ -184,11 +158,12 @@ def _certain(
     while hidden(stable) and stable != bound:
         stable, stride = (max if lost else min)(stable + stride, bound), 2.0 * stride
     low, high = (stable, high) if lost else (low, stable)
-    return Edge(0.5 * (low + high), low, high, 0.5 * (high - low), lost)
+    return Edge(0.5 * (low + high), 0.5 * (high - low))
 
 
-def _friction_by_eigenvalues(critical: Critical, case: Case, system: System) -> Search:
+def _friction_by_eigenvalues(critical: Critical, case: Case) -> Search:
     """The first loss of stability within the range of φ, otherwise the first regain."""
+    system = system_of(case)
     report, links = stability(system), links_of(case)
 
     @cache
@@ -197,139 +172,18 @@ def _friction_by_eigenvalues(critical: Critical, case: Case, system: System) -> 
         return conditions(links, k, math.copysign(phi, report.belt_speed)) if math.isfinite(k) else None
 
     within = [each.friction for each in report.crossings if critical.lower <= each.friction <= critical.upper]
-    edges = []
-    for phi, (low, high) in zip(within, pairwise(between(critical.lower, critical.upper, [within])), strict=True):
+    ends, edges, unstable = [critical.lower, *within, critical.upper], list[Edge](), not report.stable
+    middles = [0.5 * (low + high) for low, high in pairwise(ends)]
+    for phi, (low, high) in zip(within, pairwise(middles), strict=True):
         if _grows(signs_at(low)) is not _grows(signs_at(high)):  # otherwise rounding hides both ends of a window
             edge = _certain(critical, signs_at, low, high)
-            low, high = min(edge.lower, phi), max(edge.upper, phi)
-            edges.append(edge._replace(value=phi, lower=low, upper=high, error=max(phi - low, high - phi)))
+            unstable = _grows(signs_at(low)) if not edges else unstable
+            edges.append(Edge(phi, abs(phi - edge.value) + edge.error))
     held = system.coefficients.c_xx > 0.0  # otherwise there is steady sliding without friction only
     if not edges and (report.stable is None or report.belt_speed == 0.0 or not held):
         return Search(Outcome.NO_SLIDING)
-    found = of_edges(critical, not edges[0].lost if edges else not report.stable, edges)
+    found = of_edges(critical, unstable, edges)
     if found.value is None:
         return found
     lost = report.critical is not None and found.value == report.critical.friction
     return found._replace(eigenvalue=found.value, bias=report.discrete.bias if report.discrete and lost else None)
-
-
-def _answer(
-    critical: Critical, sliding_at: SlidingAt, unstable: Answer, values: list[float], edge: EdgeIn
-) -> Search:
-    """What the answers at some values say; `edge` narrows a change between two of them down.
-
-    Stability is lost, too, where steady sliding ends. Where there is no answer it may be lost, as the bars say;
-    without dashpots no motion leads through a resonance, and there eigenvalues say whether it may.
-    """
-    if all(sliding_at(value) is None for value in values):
-        return Search(Outcome.NO_SLIDING)
-    answers = [(value, unstable(value)) for value in values]
-    decided = [(value, answer) for value, answer in answers if answer is not None]
-    if not decided:
-        return Search(Outcome.UNDECIDED)
-    unknown = [value for value, answer in answers if answer is None and _may_grow(sliding_at(value))]
-    (first, begun), (last, ended), edges = decided[0], decided[-1], list[Edge]()
-    if unknown and unknown[0] < first:
-        edges += [no_edge(values[0], first, lost=True), *[no_edge(first, values[0], lost=False)] * (not begun)]
-    for (one, before), (other, after) in pairwise(decided):
-        if before is not after:
-            edges.append(edge(one, other))
-            if unstable(one) is unstable(other):  # a motion was found to go on
-                return _answer(critical, sliding_at, unstable, values, edge)
-        elif not before and any(one < value < other for value in unknown):
-            edges += [no_edge(one, other, lost=True), no_edge(other, one, lost=False)]
-    if unknown and unknown[-1] > last:
-        edges += [no_edge(values[-1], last, lost=False) if ended else no_edge(last, values[-1], lost=True)]
-    if not edges and len(decided) < len(answers):
-        return Search(Outcome.UNDECIDED)
-    return of_edges(critical, begun and not (unknown and unknown[0] < first), edges)
-
-
-def _may_grow(found: Sliding | None) -> bool:
-    """Whether disturbances may grow where no motion is known."""
-    if found is None or not is_undamped(c := found.system.coefficients):
-        return True
-    size = math.sqrt((c.c_xx + c.c_yy + found.stiffness) / c.m)
-    return eigenvalue_growth(c, found.stiffness, found.grip) > 1e-12 * size
-
-
-def _by_simulation(critical: Critical, sliding_at: SlidingAt, exact: Search) -> Search:
-    """Where the growth of small disturbances passes zero, by Brent's method, between two values on either side."""
-    at = Disturbances(sliding_at)
-    values = scanned(at, critical.lower, critical.upper, critical.tolerance, exact.windows)
-    by_runs = not any(measured.opened or measured.exact for measured in at.known.values() if measured)
-
-    @cache
-    def edge(low: float, high: float) -> Edge:
-        found = _narrowed(at, low, high, critical, exact.bias)
-        end, columns = "lower" if found.lost else "upper", exact.columns
-        same = zip(columns[end], columns[f"{end}_error"], strict=True)
-        away = min((abs(each - found.value) + bar for each, bar in same), default=0.0)
-        # Eigenvalues of linear motions are exact: what the bar does not hold is rounding near self-locking.
-        return found._replace(error=max(found.error, 1.001 * away)) if by_runs else found
-
-    found = _answer(critical, sliding_at, at.unstable, values, edge)
-    value, error = (math.inf, 0.0) if found.value is None else (found.value, found.error or 0.0)
-    if by_runs and exact.value is not None and abs(value - exact.value) > error:  # weights that damp hide it
-        found = Search(Outcome.UNDECIDED)
-    return found._replace(bias=exact.bias, eigenvalue=exact.eigenvalue)
-
-
-def _narrowed(at: Disturbances, low: float, high: float, critical: Critical, bias: float | None) -> Edge:
-    """The change between two values with opposite answers, in a bracket as narrow as the tolerance if possible."""
-    below, tolerance, wide = at.unstable(low), critical.tolerance, (low, high)
-    ends = [measured for measured in (at.at(low), at.at(high)) if measured is not None]
-    value, largest = None, max(abs(measured.rate) for measured in ends)
-    if not any(measured.bar for measured in ends):
-        from scipy.optimize import brentq
-
-        def excess(value: float) -> float:  # where steady sliding has ended: as far beyond as the growth is large
-            measured = at.at(value)
-            return largest if measured is None else measured.rate - measured.noise
-
-        value = float(brentq(excess, low, high, xtol=0.05 * tolerance))
-        for end in (value - 0.4 * tolerance, value + 0.4 * tolerance):
-            if low < end < high and (answer := at.unstable(end)) is not None:
-                low, high = (end, high) if answer == below else (low, end)
-
-    def as_below(value: float) -> bool | None:
-        return None if (answer := at.unstable(value)) is None else answer == below
-
-    low, high = bisect(as_below, low, high, width=tolerance)
-    if at.goes_on(low, high, wide) and at.unstable(low) is at.unstable(high):
-        if at.unstable(wide[0]) is at.unstable(wide[1]):
-            return no_edge(*wide, lost=not below)
-        return _narrowed(at, *((wide[0], low) if below else (high, wide[1])), critical, bias)
-    if high - low > tolerance:  # not known in the middle
-        middle = 0.5 * (low + high)
-        low = bisect(lambda value: at.unstable(value) is below, low, middle, width=tolerance, halvings=EDGES)[0]
-        high = bisect(lambda value: as_below(value) is not False, middle, high, width=tolerance, halvings=EDGES)[1]
-    value = value if value is not None and low <= value <= high else 0.5 * (low + high)
-    bar = left_open(at, (low, high), wide, bias, critical)
-    error = 0.5 * (high - low) + min(bar, critical.upper - critical.lower)
-    return Edge(value, low, high, error, not below)
-
-
-def _sustained(critical: Critical, fades: Answer, found: Search) -> tuple[float | None, Outcome]:
-    """The least value at which vibration lasts from the case's own start, as far as it lasts above it.
-
-    From where stability is lost the search strides down, ever faster, and then narrows down by halves.
-    """
-    low, high, tolerance = critical.lower, critical.upper, critical.tolerance
-    if found.outcome is Outcome.FOUND:
-        low, high = max(low, found.lower), min(high, found.upper)
-        stride = tolerance
-        while not fades(low) and low > critical.lower:
-            low, high = max(critical.lower, low - stride), low if fades(low) is False else high
-            stride *= GALLOP
-    if fades(low) is None or fades(high) is None:
-        return None, Outcome.UNDECIDED
-    if not fades(low):
-        return None, Outcome.IN_PART if fades(high) else Outcome.SUSTAINED
-    if fades(high):
-        return None, Outcome.DAMPED
-    # Right beside the value sought a vibration dies out, or settles, too slowly to be decided.
-    fading, _ = bisect(lambda value: fades(value) is True, low, high, width=tolerance)
-    _, lasting = bisect(lambda value: fades(value) is not False, fading, high, width=tolerance)
-    known = lasting - fading <= 2.0 * tolerance
-    return (0.5 * (fading + lasting), Outcome.FOUND) if known else (None, Outcome.UNDECIDED)

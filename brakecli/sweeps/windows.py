@@ -1,6 +1,7 @@
 """Windows of instability along a parameter, and what a search for a critical value has come to."""
 
 import math
+from collections.abc import Callable
 from enum import StrEnum
 from itertools import pairwise
 from typing import NamedTuple
@@ -8,7 +9,6 @@ from typing import NamedTuple
 from brakecli.sweeps.tables import Critical
 
 WIDEST = 1.0 / 3.0  # of the range, that an error bar with an answer may have
-FOLD = 1.0 / 32.0  # of the range: least bar at a fold, for steps move it, too, by an amount that is not measured
 
 
 class Outcome(StrEnum):
@@ -29,9 +29,11 @@ class Outcome(StrEnum):
 class Search(NamedTuple):
     """The answer for one point; None, or NaN, stands for what there is not.
 
-    `error` is the half width of the bracket, plus the bias of the scheme at its step, plus what the growth
-    measured leaves open. `bias`: the scheme's own critical value less the exact one. `windows`: both ends of every
-    interval of instability; `window_errors`: their error bars, 0 where a bound of the range cuts it.
+    `error` is the half width of the bracket, plus what steps leave open. `bias`: the critical value of the case's
+    scheme less the exact one. `windows`: both ends of every interval of instability; `window_errors`: their error
+    bars, 0 where a bound of the range cuts it. `coexists_from`: the least value with a stable vibration beside
+    stable sliding; `barrier`: half of peak to peak of x (m) of the unstable cycle at the case's own value;
+    `sentence`: all of this in words.
     """
 
     outcome: Outcome
@@ -43,6 +45,9 @@ class Search(NamedTuple):
     eigenvalue: float | None = None
     sustained: float | None = None
     sustained_outcome: Outcome = Outcome.NONE
+    coexists_from: float | None = None
+    barrier: float | None = None
+    sentence: str = ""
     windows: tuple[tuple[float, float], ...] = ()
     window_errors: tuple[tuple[float, float], ...] = ()
 
@@ -55,23 +60,56 @@ class Search(NamedTuple):
 
 
 class Edge(NamedTuple):
-    """Where stability is lost, or regained, with its bracket and error bar; or where it is not known any more."""
+    """Where stability is lost, or regained, with its error bar; or where it is not known any more."""
 
     value: float
-    lower: float
-    upper: float
     error: float
-    lost: bool
     known: bool = True
 
 
-def no_edge(value: float, other: float, lost: bool) -> Edge:
+class Piece(NamedTuple):
+    """A part of the range, or a single value, and whether it is unstable; None where nobody knows."""
+
+    low: float
+    high: float
+    unstable: bool | None
+
+
+def joined(critical: Critical, pieces: list[Piece], edge: Callable[[float, float], Edge]) -> Search:
+    """The critical value and all windows of instability; `edge` says where between two values stability changes.
+
+    Stability may be lost where nothing is known: a window may then begin, or end, anywhere there.
+    """
+    decided = [k for k, piece in enumerate(pieces) if piece.unstable is not None]
+    if not decided:
+        return Search(Outcome.UNDECIDED)
+    first, last, edges = pieces[decided[0]], pieces[decided[-1]], list[Edge]()
+    begun = first.unstable and decided[0] == 0
+    if decided[0] > 0:
+        edges += [
+            _anywhere(critical.lower, first.low),
+            *[_anywhere(first.low, critical.lower)] * (not first.unstable),
+        ]
+    for one, other in pairwise(decided):
+        before, after = pieces[one], pieces[other]
+        if before.unstable is not after.unstable:
+            edges.append(edge(before.high, after.low))
+        elif not before.unstable and other > one + 1:
+            edges += [_anywhere(before.high, after.low), _anywhere(after.low, before.high)]
+    if decided[-1] < len(pieces) - 1:
+        edges += (
+            [_anywhere(critical.upper, last.high)] if last.unstable else [_anywhere(last.high, critical.upper)]
+        )
+    return of_edges(critical, bool(begun), edges)
+
+
+def _anywhere(value: float, other: float) -> Edge:
     """An end of what may be a window of instability: at a value, or anywhere on the way to another one."""
-    return Edge(value, min(value, other), max(value, other), abs(other - value), lost, known=False)
+    return Edge(value, abs(other - value), known=False)
 
 
 def of_edges(critical: Critical, unstable: bool, edges: list[Edge]) -> Search:
-    """The critical value and all windows of instability; `unstable`: whether the range begins in one.
+    """The critical value and all windows, by the edges in order; `unstable`: whether the range begins in one.
 
     One that is narrower than its bars, of which one is wide, may be none; so may what lies between two.
     """
@@ -80,19 +118,17 @@ def of_edges(critical: Critical, unstable: bool, edges: list[Edge]) -> Search:
         bars = one.error, other.error
         if one.known and other.known and max(bars) >= wide and other.value - one.value < min(bars):
             return of_edges(critical, unstable, [each for each in edges if each not in (one, other)])
-        if one.lost and other.value - one.value < max(bars) < FOLD * (critical.upper - critical.lower):
-            # A resonance is at another place with another step: both ends of its window move.
-            edges = [each._replace(error=max(bars)) if each in (one, other) else each for each in edges]
     ends = [(critical.lower, 0.0)] * unstable + [(each.value, each.error) for each in edges]
     ends += [(critical.upper, 0.0)] * (len(ends) % 2)
     columns = ([each[k] for each in ends] for k in (0, 1))
     windows, errors = (tuple(zip(each[::2], each[1::2], strict=True)) for each in columns)
     if not edges:
         return Search(Outcome.UNSTABLE if unstable else Outcome.STABLE, windows=windows, window_errors=errors)
-    first = next((each for each in edges if each.lost), edges[0])
+    first = edges[min(unstable, len(edges) - 1)]  # where stability is lost; else where it is regained
     if not first.known:
         return Search(Outcome.UNDECIDED, windows=windows, window_errors=errors)
     if first.error >= wide:  # almost any value of the range may be it
         return Search(Outcome.UNDECIDED)
-    outcome = Outcome.FOUND if first.lost else Outcome.REGAINED
-    return Search(outcome, *first[:4], windows=windows, window_errors=errors)
+    outcome = Outcome.REGAINED if unstable and len(edges) == 1 else Outcome.FOUND
+    lower, upper = max(first.value - first.error, critical.lower), min(first.value + first.error, critical.upper)
+    return Search(outcome, first.value, lower, upper, first.error, windows=windows, window_errors=errors)

@@ -79,88 +79,6 @@ def bracket(answer: Search) -> tuple[float, float, float, float]:
     return answer.value, answer.lower, answer.upper, answer.error
 
 
-def rates(case: Case) -> tuple[float, float]:
-    """Growth rate by neighbouring runs and by eigenvalues, 1/s."""
-    steady = sliding(system_of(case))
-    assert steady is not None
-    measured = growth(steady)
-    assert measured is not None
-    return measured.rate, eigenvalue_growth(steady.system.coefficients, steady.stiffness, steady.grip)
-
-
-@pytest.mark.parametrize("friction", [0.0, 0.3, 0.57, 0.58, 0.9])
-@pytest.mark.parametrize("scheme", ["two-layer", "three-layer"])
-def test_growth_of_differences_is_that_of_the_eigenvalues(friction: float, scheme: str) -> None:
-    case = make(SQUEAL, friction__coefficient=friction, solver__step=2e-6, solver__scheme=scheme)
-    by_runs, by_eigenvalues = rates(case)
-    # Both schemes are of second order: relative error (ωh)²/12 of ω and likewise of the growth, ω = 6900 1/s here;
-    # times 10, as growth is a small difference of larger rates.
-    assert by_runs == pytest.approx(by_eigenvalues, abs=10.0 * (6900.0 * 2e-6) ** 2 / 12.0 * 50.0)
-
-
-@pytest.mark.parametrize("start", ["consistent", "paper"])
-def test_growth_does_not_depend_on_the_start_of_the_scheme(start: str) -> None:
-    by_runs, by_eigenvalues = rates(
-        make(SQUEAL, solver__scheme="three-layer", solver__start=start, solver__step=2e-6)
-    )
-    assert by_runs == pytest.approx(by_eigenvalues, rel=1e-3)
-
-
-def test_growth_on_a_wheel_that_turns_backwards_is_that_of_the_mirror_image() -> None:
-    forward = rates(make(SQUEAL))[0]
-    changes = {"wheel__angular_speed": -0.1, "link2__angle_deg": -5.0}
-    assert rates(make(SQUEAL, **changes))[0] == pytest.approx(forward, rel=1e-6)
-
-
-def test_roughness_in_full_contact_does_not_change_the_growth_of_disturbances() -> None:
-    flat = rates(make(SQUEAL))[0]
-    rough = rates(make(SQUEAL, roughness__shoe=WAVES, roughness__wheel=WAVES))[0]
-    # Differences of runs are linear to DISTURBANCE; what is left is the rounding of runs, 1e-9 of them over 30 ms.
-    assert rough == pytest.approx(flat, abs=1e-3)
-
-
-def test_strong_dashpots_that_hide_modes_within_rounding_do_not_hide_the_growth() -> None:
-    case = make(SQUEAL, link1__damping=3e4, link2__damping=1e3, friction__coefficient=0.2)
-    by_runs, by_eigenvalues = rates(case)
-    assert by_runs == pytest.approx(by_eigenvalues, rel=1e-2)
-
-
-def test_an_unstable_shoe_on_open_surfaces_is_not_measured_on_its_limit_cycle() -> None:
-    """The contact is softer by a tenth; growth by the mean stiffness is right to some per cent away from zero."""
-    case = make(
-        SQUEAL,
-        load__force=50.0,
-        wheel__angular_speed=4.0,
-        link2__angle_deg=20.0,
-        friction__coefficient=3.125,
-        roughness__shoe={"amplitudes": [2e-6, 1e-6], "wavelengths": [0.020, 0.011]},
-        roughness__wheel={"amplitudes": [4e-6, 2e-6], "wavelengths": [0.030, 0.017]},
-        solver__step=2e-5,
-        solver__duration=0.5,
-        output__sample_interval=2e-4,
-    )
-    by_runs, by_eigenvalues = rates(case)
-    assert by_runs == pytest.approx(by_eigenvalues, rel=0.1)
-
-
-def test_the_speed_and_the_load_of_the_start_are_held() -> None:
-    moving = make(
-        SQUEAL,
-        wheel__angular_speed=None,
-        wheel__times=[0.0, 0.01],
-        wheel__angular_speeds=[0.1, 5.0],
-        load__force=None,
-        load__times=[0.0, 0.01],
-        load__forces=[5000.0, 100.0],
-    )
-    assert rates(moving)[0] == rates(make(SQUEAL))[0]
-
-
-def test_no_steady_sliding_has_no_growth() -> None:
-    assert sliding(system_of(make(SQUEAL, wheel__angular_speed=0.0))) is None
-    assert sliding(system_of(make(SQUEAL, load__force=-5000.0))) is None
-
-
 @pytest.mark.parametrize("shoes", counts(4, 20))
 def test_the_critical_friction_of_random_flat_damped_shoes_is_bracketed(shoes: int) -> None:
     rng = np.random.default_rng(5)
@@ -198,25 +116,6 @@ def test_the_error_bar_holds_the_bias_of_the_scheme() -> None:
     assert answer.bias == pytest.approx(0.8115433 - 0.75, abs=1e-6)
     value, _, _, error = bracket(answer)
     assert abs(value - 0.75) <= error
-
-
-def test_weights_that_hide_what_eigenvalues_show_decide_nothing() -> None:
-    """Damping of the scheme alone keeps sliding stable throughout."""
-    tables: dict[str, Any] = {
-        "shoe": {"mass": 15.6},
-        "wheel": {"radius": 0.5, "angular_speed": 3.87},
-        "link1": {"stiffness": 202000.0, "damping": 8.03},
-        "link2": {"stiffness": 237000.0, "damping": 15.7, "angle_deg": 2.34},
-        "load": {"force": 3.04},
-        "friction": {"coefficient": 1.05},
-        "contact": {"half_length": 0.02, "stiffness": 1900000.0},
-        "solver": {"duration": 2.8, "scheme": "two-layer", "step": 0.0012, "theta": [1.0, 0.6]},
-    }
-    damped = found(tables, 1.9e5, 7.6e6, "contact__stiffness", tolerance=70.0)
-    assert damped.outcome is Outcome.UNDECIDED
-    neutral = found(tables, 1.9e5, 7.6e6, "contact__stiffness", tolerance=70.0, solver__theta=[0.5, 0.5])
-    assert neutral.outcome is Outcome.FOUND
-    assert neutral.value == pytest.approx(damped.eigenvalue, abs=neutral.error)
 
 
 def test_divergence_is_found_where_steady_sliding_ends() -> None:
@@ -400,23 +299,6 @@ def event_driven_growth(friction: float) -> float:
         state = state + np.linalg.solve(np.eye(4) - derivative, after - state)
     assert np.abs(end(state) - state).max() < 1e-6
     return math.log(float(np.abs(np.linalg.eigvals(derivative)).max())) / period
-
-
-@pytest.mark.parametrize("friction", [1.943, 1.98, pytest.param(2.01, marks=campaign), 2.1])
-def test_multipliers_of_a_motion_that_opens_are_those_of_the_event_driven_scheme(friction: float) -> None:
-    def rate(finer: float) -> float:
-        system = system_of(make(OPENS, friction__coefficient=friction))
-        method = replace(system.method, step=system.step / finer, nodes=int(finer * system.nodes))
-        measured = Disturbances(lambda _: sliding(replace(system, method=method))).at(friction)
-        assert measured is not None
-        return measured.rate
-
-    exact, (coarse, own, half, quarter) = event_driven_growth(friction), map(rate, (0.5, 1.0, 2.0, 4.0))
-    others = {0.5: coarse, 2.0: half}  # other steps say how wrong it may be, as in an error bar
-    assert abs(own - exact) <= max(abs(part * times * (own - others[finer])) for finer, part, times in OTHERS)
-    assert abs(own - exact) < 0.1 * abs(exact)
-    # An error of first order at least: half of the step takes half of it away, the double one adds all of it
-    assert abs(half - exact) <= max(2.0 * abs(half - quarter), 0.5 * abs(own - half))
 
 
 @pytest.mark.parametrize("friction", [0.6, 1.2, 1.8, 1.9, 2.1])

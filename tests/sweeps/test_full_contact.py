@@ -8,7 +8,6 @@ import pytest
 
 from brakecli.case.system import system_of
 from brakecli.sweeps.critical import search
-from brakecli.sweeps.growth import Sliding, sliding
 from brakecli.sweeps.tables import Critical
 from brakecli.sweeps.windows import Outcome, Search
 from tests.examples import make
@@ -70,22 +69,3 @@ def test_growth_by_theory_is_known_where_the_wheel_has_many_waves() -> None:
     assert answer.outcome is Outcome.FOUND
     assert answer.value == pytest.approx(one.value, abs=1e-4)
     assert (answer.error or 1.0) < 1e-3
-
-
-@pytest.mark.parametrize(("part", "linear"), [(0.9, True), (1.1, False)])
-def test_a_motion_is_linear_as_long_as_it_slips(part: float, linear: bool) -> None:
-    """`part`: of the belt's speed that the forced velocity reaches, where the wave meets a natural frequency."""
-    m, (cxx, cxy, cyy), _, contact, _, grip = held_by(BARE)
-    stiffness = np.array([[cxx, cxy + grip * contact], [cxy, cyy + contact]])
-    slow = math.sqrt(np.linalg.eigvals(stiffness / m).real.min()) / (2.0 * math.pi)
-    wheel = {"radius": 0.5, "angular_speed": -slow * (1.0 + 1e-5) * 0.085 / 0.5}
-
-    def steady(amplitude: float) -> Sliding:
-        rough = {"wheel": {"amplitudes": [amplitude], "wavelengths": [0.085]}}
-        there = sliding(system_of(make({**BARE, "wheel": wheel, "load": {"force": 1e8}, "roughness": rough})))
-        assert there is not None
-        return there
-
-    times, small = np.linspace(0.0, 1.0 / slow, 1000), 1e-9
-    fastest = np.abs(steady(small).in_full_contact(times)[:, 2]).max()
-    assert (steady(part * small * slow * 0.085 / fastest).linear is not None) is linear

@@ -1,0 +1,108 @@
+"""Growth of disturbances where the waves of a wheel have no common period: Lyapunov's exponent of a long motion.
+
+Such a motion never repeats, so that no branch can be followed. The exponent is measured at single values, and known
+within an error bar only.
+"""
+
+import math
+from collections.abc import Callable
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+
+from brakecli.analysis.stability.search import bisect
+from brakecli.solver.flow.rough import RoughFlow, Status, default_cells, default_steps
+from brakecli.solver.links import natural_frequencies
+from brakecli.solver.period import LONGEST
+from brakecli.solver.steady_sliding import SteadySliding
+from brakecli.solver.system import System
+from brakecli.sweeps.tables import Critical
+from brakecli.sweeps.windows import Edge, Outcome, Piece, Search, joined
+
+VALUES = 33  # of the parameter, between which a change is looked for
+EDGES = 4  # halvings towards the ends of a range in which the answer is not known
+BATCHES, BATCH, TRANSIENT = 8, 4, 16  # batches of a long run, segments of a batch, segments before the first
+FEWEST = 4  # batches without which an error is not known
+DEPARTED = 2.0  # times as far from steady sliding as roughness alone takes a motion
+CERTAIN = 3.5  # standard errors of the mean of eight batches: 99 % of Student's distribution
+
+Steady = Callable[[float], tuple[System, SteadySliding] | None]
+
+
+class Exponent(NamedTuple):
+    """Lyapunov's exponent (1/s), and an error that it hardly exceeds."""
+
+    rate: float
+    error: float
+
+    @property
+    def unstable(self) -> bool | None:
+        """Whether disturbances grow; None where zero lies within the error."""
+        return None if abs(self.rate) <= self.error else self.rate > 0.0
+
+
+def length(system: System, stiffness: float) -> float:
+    """The time (s) of a segment: two periods of the slowest mode, or the passing of the longest wave."""
+    slow = natural_frequencies(system.coefficients, stiffness)[0]
+    passing = abs(system.belt_speed) * float(system.wheel.turns.min())
+    return min(max(2.0 / slow if slow > 0.0 else 0.0, 1.0 / passing), LONGEST / BATCH)
+
+
+def exponent(system: System, rest: SteadySliding) -> Exponent | None:
+    """Lyapunov's exponent of the motion from steady sliding, by means over batches of a long run.
+
+    A motion that leaves what roughness forces on it is on its way to another one, whose exponent says nothing: what
+    comes then is left out. None where too little is left.
+    """
+    flow, span = RoughFlow(system, default_cells(system)), length(system, rest.stiffness)
+    steps = default_steps(system, span)
+    begin = np.array([rest.x, rest.y, 0.0, 0.0])
+    fast = 2.0 * math.pi * system.natural_frequencies[1]
+    scales = np.array([1.0, 1.0, fast, fast])
+    state, frame, logs, away = begin, np.eye(4), list[float](), list[float]()
+    for k in range(TRANSIENT + BATCHES * BATCH):
+        run = flow(state, k * span, span, steps, True)
+        if run.status is not Status.DONE or run.derivative is None:
+            return None
+        state = run.state
+        away.append(float(np.abs((state - begin) * scales).max()))
+        if k >= TRANSIENT and away[-1] > DEPARTED * max(away[: TRANSIENT // 2]):
+            break
+        frame, triangle = np.linalg.qr(run.derivative * (scales[:, None] / scales) @ frame)
+        logs.append(math.log(max(abs(float(triangle[0, 0])), 1e-300)))
+    batches = (len(logs) - TRANSIENT) // BATCH
+    if batches < FEWEST:
+        return None
+    means = np.reshape(logs[TRANSIENT : TRANSIENT + batches * BATCH], (batches, BATCH)).mean(axis=1) / span
+    return Exponent(float(means.mean()), CERTAIN * float(means.std(ddof=1)) / math.sqrt(batches))
+
+
+def by_exponents(critical: Critical, steady_at: Steady) -> Search:
+    """Where the exponent changes its sign, between values at which it is certain."""
+
+    @cache
+    def unstable(value: float) -> bool | None:
+        found = steady_at(value)
+        if found is None:
+            return True
+        measured = exponent(*found)
+        return measured.unstable if measured else None
+
+    def edge(low: float, high: float) -> Edge:
+        below, tolerance = unstable(low), critical.tolerance
+
+        def as_below(value: float) -> bool | None:
+            return None if (answer := unstable(value)) is None else answer is below
+
+        low, high = bisect(as_below, low, high, width=tolerance)
+        if high - low > tolerance:  # not known in the middle
+            middle = 0.5 * (low + high)
+            low = bisect(lambda value: unstable(value) is below, low, middle, width=tolerance, halvings=EDGES)[0]
+            high = bisect(lambda v: as_below(v) is not False, middle, high, width=tolerance, halvings=EDGES)[1]
+        return Edge(0.5 * (low + high), 0.5 * (high - low))
+
+    values = np.linspace(critical.lower, critical.upper, VALUES).tolist()
+    if all(steady_at(value) is None for value in values):
+        return Search(Outcome.NO_SLIDING)
+    return joined(critical, [Piece(value, value, unstable(value)) for value in values], edge)

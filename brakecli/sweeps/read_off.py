@@ -1,0 +1,82 @@
+"""Critical values read off branches: where the motion that continues steady sliding is stable, and what lies beside.
+
+On a rough wheel that motion is the one which grows with the waves. It is followed through the parameter over all
+its folds, so that a value is stable where one of its sheets is.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+
+from brakecli.analysis.stability.modes import is_undamped
+from brakecli.branches.answers import Answers
+from brakecli.branches.explore import Explorer
+from brakecli.branches.line import Line
+from brakecli.case.case import Case
+from brakecli.solver.links import natural_frequencies
+from brakecli.solver.schedules import schedule
+from brakecli.solver.system import System
+from brakecli.sweeps.tables import Critical
+from brakecli.sweeps.windows import Edge, Outcome, Piece, Search, joined
+
+POINTS = 1500
+"""Budget of points of all branches. A time would make results depend on the machine."""
+LIGHT = 1e-5
+"""Damping ratio of the slowest mode that a shoe without dashpots is given: slower growth counts as none. Without
+any nothing decays, and passing waves let almost every motion grow a little, over minutes."""
+
+
+def explored(critical: Critical, case: Case) -> Explorer:
+    """The branches of a case along the parameter, at the speed and load of its start, within a budget of points."""
+    line = Line(case, [critical.parameter], critical.lower, critical.upper, adapted=_adapted)
+    explorer = Explorer(line, lambda *_: None, lambda: False, math.inf, POINTS)
+    explorer.explore()
+    return explorer
+
+
+def on_waves(critical: Critical, answers: Answers) -> Search:
+    """The windows of the motion that a rough wheel forces."""
+    line = answers.line
+    width = line.high - line.low
+    bounds = {
+        line.value(bound.p): (bound, high.p - low.p) for low, high in answers.windows for bound in (low, high)
+    }
+
+    def edge(low: float, high: float) -> Edge:
+        if low != high or low not in bounds:
+            return Edge(0.5 * (low + high), 0.5 * (high - low))
+        bound, window = bounds[low]
+        return Edge(low, width * (bound.bar if bound.known else window), bound.known)
+
+    return joined(critical, pieces(answers), edge)
+
+
+def pieces(answers: Answers) -> list[Piece]:
+    """The range in parts: stable, unstable, or not known. Where nothing slides steadily, stability has been lost."""
+    found, last = list[tuple[float, float, bool | None]](), 0.0
+    slides = [slide.p for slide in answers.explored.slides if not math.isnan(slide.tests[0])]
+    ends = (slides[0], slides[-1]) if slides else (1.0, 0.0)
+    spans = [(low.p, high.p, True) for low, high in answers.windows]
+    spans += [(low, high, False) for low, high in answers.stable_spans]
+    for low, high, unstable in [*sorted(spans), (1.0, 1.0, None)]:
+        cuts = sorted({last, low, *(end for end in ends if last < end < low)})
+        for a, b in pairwise(cuts):
+            found.append((a, b, None if ends[0] <= 0.5 * (a + b) <= ends[1] else True))
+        if high > low:
+            found.append((low, high, unstable))
+        last = max(last, high)
+    value = answers.line.value
+    return [Piece(value(low), value(high), unstable) for low, high, unstable in found]
+
+
+def _adapted(system: System) -> System:
+    """The system at the speed and load of its start throughout, with dashpots as light as can be if it has none."""
+    belt = schedule((0.0,), (system.belt_speed / system.radius,), system.radius)
+    held = replace(system, belt=belt, load=schedule((0.0,), (system.load_at_start,)))
+    c = system.coefficients
+    if not is_undamped(c):
+        return held
+    slow, fast = natural_frequencies(c, system.contact_stiffness)
+    damping = 2.0 * LIGHT * 2.0 * math.pi * (slow or fast) * c.m
+    return replace(held, coefficients=c._replace(b_xx=damping, b_yy=damping))
