@@ -4,7 +4,6 @@ import math
 from collections.abc import Callable
 from functools import cache, partial
 from itertools import pairwise
-from typing import cast
 
 import numpy as np
 
@@ -15,26 +14,25 @@ from brakecli.analysis.stability.modes import growth as eigenvalue_growth
 from brakecli.analysis.stability.modes import is_undamped
 from brakecli.analysis.stability.report import MARGIN, stability
 from brakecli.analysis.stability.search import bisect
-from brakecli.case.case import Case, changed
+from brakecli.branches.forced import Forced
+from brakecli.branches.line import Line
+from brakecli.branches.problem import Array
+from brakecli.case.case import Case
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError
-from brakecli.runs.limits import within_range
 from brakecli.solver.system import System
-from brakecli.sweeps.early import Known, early
+from brakecli.sweeps.early import Known
 from brakecli.sweeps.error_bar import left_open
 from brakecli.sweeps.floquet import Disturbances
-from brakecli.sweeps.growth import Sliding, has_exact_steps, sliding, stepped, with_step
+from brakecli.sweeps.growth import Sliding, has_exact_steps, sliding, with_step
 from brakecli.sweeps.scan import between, scanned
-from brakecli.sweeps.sustained import fades_linearly, lasting, settling, verdict_fades
+from brakecli.sweeps.sustained import sustained
 from brakecli.sweeps.tables import Critical
 from brakecli.sweeps.windows import Edge, Outcome, Search, no_edge, of_edges
 
 EDGES = 4  # halvings towards the ends of a range of the parameter in which the answer is not known
 SCANNED_BY_EIGENVALUES = 129
 SCANNED_WHERE_OPEN = 17  # by eigenvalues where surfaces open: their mean stiffness takes time
-GALLOP = 4.0  # factor from one stride to the next in looking for the end of sustained vibration
-LONGER = 8.0  # durations of the case that vibration beside stable sliding has to last
-PATIENT = 128.0  # durations that it may take to die out on smooth surfaces; on rough ones twice `LONGER`
 
 
 SlidingAt = Callable[[float], Sliding | None]
@@ -68,31 +66,24 @@ def search(
         return exact
     found = _bracketed(critical, exact) if exact_steps else _by_simulation(critical, sliding_at, exact)
 
-    @cache
-    def fades(value: float) -> bool | None:
-        unstable = value >= found.upper if found.outcome is Outcome.FOUND else None
-        steady, case = sliding_at(value), stepped(case_at(value))
-        linear, rate = steady is not None and fades_linearly(steady), settling(steady)
-        # Beside stable sliding it may yet fade away, or has not yet come to where it lasts.
-        times, before, longest = 1.0, cast("Verdict | Known | None", None), LONGER * case.solver.duration
-        with within_range():
-            known = early(system_of(changed(case, solver={"duration": longest})), seen=False)
-        answer = verdict_fades(known.verdict, longest, unstable, linear, rate) if known is not None else None
-        if answer is not None:
-            return answer
-        patience, answer = PATIENT if system_of(case).smooth else 2.0 * LONGER, None
-        while times <= LONGER or (answer is None and times <= patience):
-            duration = times * case.solver.duration
-            verdict = verdict_of(changed(case, solver={"duration": duration}))
-            answer = verdict_fades(verdict, duration, unstable, linear, rate)
-            last = times >= LONGER or unstable is not False
-            if verdict is not None and answer is not None and (last or lasting(answer, before, verdict, linear)):
-                return answer
-            times, before = 2.0 * times, verdict
-        return None
+    def unstable(value: float) -> bool | None:
+        if found.outcome is Outcome.FOUND:
+            return value >= found.upper
+        known = found.outcome in (Outcome.REGAINED, Outcome.STABLE, Outcome.UNSTABLE)
+        return any(low <= value <= high for low, high in found.windows) if known else None
 
-    sustained, outcome = _sustained(critical, fades, found)
-    return found._replace(sustained=sustained, sustained_outcome=outcome)
+    line = Line(case_at(critical.lower), [critical.parameter], critical.lower, critical.upper)
+    problem = cache(lambda: Forced.along(line))
+
+    def calm(value: float) -> list[Array]:
+        try:
+            point = problem().begun(line.place(value))
+        except CaseError:
+            return []
+        return [np.array(point.facts.state)] if point is not None and point.stable else []
+
+    lasting = sustained(line, critical.tolerance, found, unstable, calm, verdict_of)
+    return found._replace(sustained=lasting.value, sustained_outcome=lasting.outcome)
 
 
 def _bracketed(critical: Critical, exact: Search) -> Search:
@@ -308,28 +299,3 @@ def _narrowed(at: Disturbances, low: float, high: float, critical: Critical, bia
     bar = left_open(at, (low, high), wide, bias, critical)
     error = 0.5 * (high - low) + min(bar, critical.upper - critical.lower)
     return Edge(value, low, high, error, not below)
-
-
-def _sustained(critical: Critical, fades: Answer, found: Search) -> tuple[float | None, Outcome]:
-    """The least value at which vibration lasts from the case's own start, as far as it lasts above it.
-
-    From where stability is lost the search strides down, ever faster, and then narrows down by halves.
-    """
-    low, high, tolerance = critical.lower, critical.upper, critical.tolerance
-    if found.outcome is Outcome.FOUND:
-        low, high = max(low, found.lower), min(high, found.upper)
-        stride = tolerance
-        while not fades(low) and low > critical.lower:
-            low, high = max(critical.lower, low - stride), low if fades(low) is False else high
-            stride *= GALLOP
-    if fades(low) is None or fades(high) is None:
-        return None, Outcome.UNDECIDED
-    if not fades(low):
-        return None, Outcome.IN_PART if fades(high) else Outcome.SUSTAINED
-    if fades(high):
-        return None, Outcome.DAMPED
-    # Right beside the value sought a vibration dies out, or settles, too slowly to be decided.
-    fading, _ = bisect(lambda value: fades(value) is True, low, high, width=tolerance)
-    _, lasting = bisect(lambda value: fades(value) is not False, fading, high, width=tolerance)
-    known = lasting - fading <= 2.0 * tolerance
-    return (0.5 * (fading + lasting), Outcome.FOUND) if known else (None, Outcome.UNDECIDED)
