@@ -101,12 +101,15 @@ def _end(
 ) -> End:
     """What the case's own start comes to: by the flow of the equations, whatever scheme the case has.
 
-    Runs of the case decide where no motion repeats, where no dashpot damps, and where speed or load change.
+    Runs of the case decide where no motion repeats, no dashpot damps, no link holds the shoe or the wheel rests,
+    and where speed or load change.
     """
     with within_range():
         system = system_of(case)
     waves = bool(system.wheel.g.size)
-    if is_undamped(system.coefficients) or not system.steady or (waves and common_period(system) is None):
+    slides = system.belt_speed != 0.0 and system.natural_frequencies[0] > 0.0  # and links hold it
+    repeats = system.steady and (not waves or common_period(system) is not None)
+    if is_undamped(system.coefficients) or not (slides and repeats):
         return _by_runs(case, system, verdict_of)
     if system.smooth:
         shoe = Shoe.of(system)
