@@ -10,6 +10,7 @@ import numpy as np
 
 from brakecli.errors import RefusedError
 from brakecli.solver import contact, schemes
+from brakecli.solver.compile import Floats
 from brakecli.solver.contact.pad import Pad, build_pad, default_nodes, window_rows, window_width
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.method import MOST, Method
@@ -38,6 +39,11 @@ class Initial:
     vx: float = 0.0
     vy: float = 0.0
     from_equilibrium: bool = False
+
+    def beside(self, rest: tuple[float, float] | Floats) -> Floats:
+        """x, y, v_x and v_y, where steady sliding is at `rest` (x, y)."""
+        x, y = rest if self.from_equilibrium else (0.0, 0.0)
+        return np.array([self.x + x, self.y + y, self.vx, self.vy])
 
 
 def longest_step(c: Coefficients, stiffness: float) -> float:

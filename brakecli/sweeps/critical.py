@@ -26,7 +26,8 @@ from brakecli.solver.steady_sliding import SteadySliding, steady_sliding
 from brakecli.solver.system import System
 from brakecli.sweeps.early import Known
 from brakecli.sweeps.lyapunov import Steady, by_exponents
-from brakecli.sweeps.read_off import explored, on_waves
+from brakecli.sweeps.read_off import calm, explored, on_waves
+from brakecli.sweeps.sustained import sustained
 from brakecli.sweeps.tables import Critical
 from brakecli.sweeps.windows import Edge, Outcome, Piece, Search, joined, of_edges
 
@@ -56,13 +57,32 @@ def search(
         exact = _by_eigenvalues(critical, case_at, steady_at)
     if critical.method == "eigenvalue" or exact.outcome is Outcome.NO_SLIDING:
         return exact
-    explorer = explored(critical, case_at(critical.lower))
+    case = case_at(critical.lower)
+    explorer, found, waves = explored(critical, case), exact, bool(system_of(case).wheel.g.size)
     answers = Answers(explorer.explored, own)
-    system, found = system_of(case_at(critical.lower)), exact
-    if system.wheel.g.size:
-        found = on_waves(critical, answers) if common_period(system) else by_exponents(critical, steady_at)
+    if waves:
+        found = (
+            on_waves(critical, answers) if common_period(system_of(case)) else by_exponents(critical, steady_at)
+        )
         found = found._replace(bias=exact.bias, eigenvalue=exact.eigenvalue)
-    return found._replace(coexists_from=answers.coexists_from, barrier=answers.barrier, sentence=answers.sentence)
+
+    def unstable(value: float) -> bool | None:
+        if found.outcome is Outcome.FOUND:
+            return value >= found.upper
+        known = found.outcome in (Outcome.REGAINED, Outcome.STABLE, Outcome.UNSTABLE)
+        return any(low <= value <= high for low, high in found.windows) if known else None
+
+    lasting = sustained(explorer.line, critical.tolerance, found, unstable, partial(calm, answers), verdict_of)
+    if lasting.at is not None and unstable(lasting.at) is not True:
+        explorer.begin_at(explorer.line.place(lasting.at), lasting.state)
+        answers = Answers(explorer.explored, own)
+    return found._replace(
+        sustained=lasting.value,
+        sustained_outcome=lasting.outcome,
+        coexists_from=answers.coexists_from,
+        barrier=answers.barrier,
+        sentence=answers.sentence,
+    )
 
 
 def _steady(case_at: Callable[[float], Case], value: float) -> tuple[System, SteadySliding] | None:

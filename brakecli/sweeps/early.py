@@ -23,13 +23,10 @@ from brakecli.analysis.regime.linear import Linear, linear_theory
 from brakecli.analysis.regime.verdict import Excitation, Regime
 from brakecli.analysis.stability.modes import slowest_of_cycles
 from brakecli.runs.certificate import ROUNDING, Certificate
-from brakecli.solver.automaton import BACKWARD, FORWARD, OPEN, STICK
+from brakecli.solver.automaton import OPEN, STICK
 from brakecli.solver.compile import Floats
-from brakecli.solver.flow.orbit import ORBIT
-from brakecli.solver.flow.seek import FOUND, GOING_ON, LINEAR, seek, swing
-from brakecli.solver.flow.smooth import PATH
+from brakecli.solver.flow.seek import FOUND, GOING_ON, LINEAR, Pursuit
 from brakecli.solver.motion import Work
-from brakecli.solver.records import BELT, FLOW, LOAD, new
 from brakecli.solver.system import System
 
 _SETTLED = 0.02  # of the size of a cycle: a motion so near to its orbit is settled
@@ -75,29 +72,25 @@ class Early(NamedTuple):
     certificate: Certificate | None
 
 
-def early(system: System, *, seen: bool = True) -> Early | None:
-    """The verdict on the motion of a system before its end; None where none is certain.
-
-    Unless it has to be `seen` by a whole run, too, an orbit counts however its samples would show it.
-    """
+def early(system: System) -> Early | None:
+    """The verdict on the motion of a system before its end; None where none is certain."""
     theory = _theory(system)
     if theory is None:
         return None
-    c, flow, path = system.coefficients, new(FLOW), new(PATH)
+    acting = system.contact_stiffness, system.belt_speed, system.load_at_start
+    modes = theory.values, theory.vectors
     try:
-        o = _prepared(system, theory)
+        begin, seconds = system.initial.beside(theory.rest), system.sampled_duration
+        motion = Pursuit(system.coefficients, acting, begin, theory.rest, modes, seconds)
     except np.linalg.LinAlgError:  # modes that are alike
         return None
-    rest, start = theory.rest if system.initial.from_equilibrium else (0.0, 0.0), system.initial
-    flow.x, flow.y, flow.v_x, flow.v_y = start.x + rest[0], start.y + rest[1], start.vx, start.vy
-    flow.stiffness, flow.z[BELT], flow.z[LOAD] = system.contact_stiffness, system.belt_speed, system.load_at_start
-    path.h = system.longest_step
-    while (outcome := seek(c, flow, path, o)) == GOING_ON:
+    while (outcome := motion.seek()) == GOING_ON:
         pass
+    path, o = motion.path, motion.orbit
     if outcome == LINEAR:
-        found = _linear(system, theory, flow, path, o)
+        found = _linear(system, theory, motion)
     else:
-        found = _cycle(system, theory, flow, o, seen) if outcome == FOUND else None
+        found = _cycle(system, theory, motion) if outcome == FOUND else None
     if found is None:
         return None
     verdict, end = found
@@ -121,32 +114,21 @@ def _theory(system: System) -> Linear | None:
     return theory if theory is not None and theory.direction != 0 else None
 
 
-def _prepared(system: System, theory: Linear) -> Any:
-    """The record that a motion is followed with."""
-    o, inverse = new(ORBIT), np.linalg.inv(theory.vectors)
-    o.duration = system.sampled_duration
-    o.sliding = BACKWARD if theory.belt > 0.0 else FORWARD
-    o.rest[:2], o.room[:] = theory.rest, (theory.depth, abs(theory.belt))
-    o.into[0], o.into[1], o.growth[:] = inverse.real, inverse.imag, theory.values.real
-    o.reach[:] = np.abs(theory.vectors[:3]).T
-    return o
-
-
-def _linear(system: System, theory: Linear, flow: Any, path: Any, o: Any) -> tuple[Known, list[float]] | None:
+def _linear(system: System, theory: Linear, motion: Pursuit) -> tuple[Known, list[float]] | None:
     """The verdict on a motion that is linear from its first half on, and its last state."""
+    o = motion.orbit
     start, end = (system.samples + 1) // 2 * system.interval, system.sampled_duration
     if o.time > start:
         return None
     rest, values, vectors = np.array(o.rest), theory.values, theory.vectors
-    parts = np.linalg.solve(vectors, np.array(flow.z[:4]) - rest)
+    parts = np.linalg.solve(vectors, motion.state - rest)
 
     def at(time: float) -> Floats:
         return np.asarray(rest + (vectors @ (parts * np.exp(values * (time - o.time)))).real)
 
     last = at(end)
     o.low = o.high = float(last[0])
-    flow.z[:4] = at(start)
-    swing(system.coefficients, flow, path, o, end - start)
+    motion.swing(at(start), end - start)
     fades = np.exp(values * (end - o.time)) - np.exp(values * (start - o.time))
     height = rest[1] + (vectors[1] @ (parts * fades / values)).real / (end - start)
     force = math.copysign(system.coefficients.phi, theory.belt) * -system.contact_stiffness * float(height)
@@ -161,10 +143,10 @@ def _linear(system: System, theory: Linear, flow: Any, path: Any, o: Any) -> tup
     return Known(regime, Excitation.NONE, (reason,), None, *numbers, False, start, slope), last.tolist()
 
 
-def _cycle(system: System, theory: Linear, flow: Any, o: Any, seen: bool) -> tuple[Known, list[float]] | None:
+def _cycle(system: System, theory: Linear, motion: Pursuit) -> tuple[Known, list[float]] | None:
     """The verdict on an orbit that the motion has come to well before the end of the run, and a state on it."""
+    o, factor = motion.orbit, motion.multiplier
     end, period, interval = system.sampled_duration, float(o.period), system.interval
-    factor = float(np.abs(np.linalg.eigvals(o.map)).max())
     if not factor < 1.0:
         return None
     rate = -math.log(max(factor, 1e-300)) / period
@@ -180,10 +162,10 @@ def _cycle(system: System, theory: Linear, flow: Any, o: Any, seen: bool) -> tup
         or (stick == 0.0 and abs(float(o.fastest) - 1.0) < _GRAZES)
         or o.beaten.tolist() != [1, 1]
     )
-    if rate * part < _POWERS or (seen and hidden):
+    if rate * part < _POWERS or hidden:
         return None
     lasts = slow * (part - _WINDOW * end) >= 1.0
-    if seen and not lasts and (theory.direction < 0 or slow * end >= 1.0):
+    if not lasts and (theory.direction < 0 or slow * end >= 1.0):
         return None  # whether the vibration lasts depends on where exactly a whole run sees it settled
     c, how = system.coefficients, "with" if stick > 0.0 else "without"
     force = (c.c_xx * float(o.mean_x) + c.c_xy * float(o.mean_y)) / period + system.load_at_start * c.sin_beta
@@ -191,5 +173,4 @@ def _cycle(system: System, theory: Linear, flow: Any, o: Any, seen: bool) -> tup
     regime = Regime.RELAXATION if stick > 0.0 else Regime.QUASI_HARMONIC
     numbers = float(o.amplitude), stick / period, clear / period, force, system.radius * force
     excited, shown = (regime, Excitation.SELF_EXCITED, (reason,), 1.0 / period), {"largest_multiplier": factor}
-    x, y, v_y = o.point.tolist()
-    return Known(*excited, *numbers, lasts, start, shown), [x, y, 0.0, v_y]
+    return Known(*excited, *numbers, lasts, start, shown), motion.start.tolist()

@@ -9,16 +9,19 @@ from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 
+import numpy as np
+
 from brakecli.analysis.stability.modes import is_undamped
 from brakecli.branches.answers import Answers
-from brakecli.branches.explore import Explorer
+from brakecli.branches.explore import Explorer, crossing
 from brakecli.branches.line import Line
+from brakecli.branches.problem import Array
 from brakecli.case.case import Case
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.schedules import schedule
 from brakecli.solver.system import System
 from brakecli.sweeps.tables import Critical
-from brakecli.sweeps.windows import Edge, Outcome, Piece, Search, joined
+from brakecli.sweeps.windows import Edge, Piece, Search, joined
 
 POINTS = 1500
 """Budget of points of all branches. A time would make results depend on the machine."""
@@ -50,6 +53,13 @@ def on_waves(critical: Critical, answers: Answers) -> Search:
         return Edge(low, width * (bound.bar if bound.known else window), bound.known)
 
     return joined(critical, pieces(answers), edge)
+
+
+def calm(answers: Answers, value: float) -> list[Array]:
+    """The states (x, y, v_x, v_y) at t = 0 of the stable motions that a rough wheel forces at a value."""
+    p = answers.line.place(value)
+    points = [point for followed in answers.bases for point in crossing(followed, p)]
+    return [np.array(point.facts.state) for point in points if point.stable]
 
 
 def pieces(answers: Answers) -> list[Piece]:

@@ -1,68 +1,146 @@
-"""Whether a vibration beside steady sliding lasts or dies out, by the verdict on a run of it."""
+"""From which value of a parameter on vibration lasts from the case's own start."""
 
 import math
+from collections.abc import Callable, Sequence
+from functools import cache
+from typing import NamedTuple
 
+import numpy as np
+
+from brakecli.analysis.regime.linear import linear_theory
 from brakecli.analysis.regime.verdict import Regime, Verdict
-from brakecli.analysis.stability.modes import growth as eigenvalue_growth
-from brakecli.analysis.stability.modes import is_undamped, slowest_of_cycles
+from brakecli.analysis.stability.modes import is_undamped
+from brakecli.analysis.stability.search import bisect
+from brakecli.branches.begin import FADES, UNKNOWN, End, on_rough_pads, on_smooth_pads
+from brakecli.branches.line import Line, Shoe
+from brakecli.branches.problem import Array
+from brakecli.case.case import Case, changed
+from brakecli.case.system import system_of
+from brakecli.errors import CaseError
+from brakecli.runs.limits import within_range
+from brakecli.solver.period import common_period
+from brakecli.solver.steady_sliding import steady_sliding
+from brakecli.solver.system import System
 from brakecli.sweeps.early import Known
-from brakecli.sweeps.growth import Sliding
+from brakecli.sweeps.windows import Outcome, Search
 
-STEADY = 0.01  # relative change of the amplitude in a run twice as long that shows that a vibration lasts
+GALLOP = 2.0
+"""Factor from one stride to the next in looking for the end of sustained vibration."""
+DURATIONS = 1.0, 2.0, 4.0, 8.0
+"""Durations of the case for which it is run where the equations say nothing."""
+SAME = 0.01
+"""Relative change of the amplitude in a run twice as long that shows that a vibration lasts."""
+
+LASTS = End(True)
 
 
-def lasting(answer: bool, before: Verdict | Known | None, verdict: Verdict | Known, linear: bool) -> bool:
-    """Whether the answer of a run beside stable sliding is that of a longer one, too.
+class Lasting(NamedTuple):
+    """The least value, how the search for it has ended, and the vibration that was seen to last lowest down.
 
-    It is once the shoe has come to rest or moves by `linear` equations, where its orbit is known, and where the
-    vibration is the same as in a run half as long.
+    `state`: x, y, v_x and v_y of that, at t = 0 of the waves, and `at` the value; None where no run showed one.
     """
-    if isinstance(verdict, Known):
-        return True
-    if answer:
-        free = verdict.stick_fraction + verdict.contact_loss_fraction == 0.0
-        return verdict.regime is Regime.DAMPED or (linear and free)
-    if before is None or before.regime is not verdict.regime:
-        return False
-    return abs(before.amplitude - verdict.amplitude) <= STEADY * verdict.amplitude
+
+    value: float | None
+    outcome: Outcome
+    state: Array | None = None
+    at: float | None = None
 
 
-def fades_linearly(steady: Sliding) -> bool:
-    """Whether a motion that neither sticks nor lifts off follows linear equations, by which it does not grow."""
-    c, k = steady.system.coefficients, steady.stiffness
-    return not (steady.opens or steady.forced) and eigenvalue_growth(c, k, steady.grip) <= 0.0
+def sustained(
+    line: Line,
+    tolerance: float,
+    found: Search,
+    unstable: Callable[[float], bool | None],
+    calm: Callable[[float], Sequence[Array]],
+    verdict_of: Callable[[Case], Verdict | Known | None],
+) -> Lasting:
+    """Look for the least value at which vibration lasts from the case's own start, as far as it lasts above it.
 
-
-def settling(steady: Sliding | None) -> float:
-    """The rate (1/s) at which vibration beside stable sliding dies out or settles, at most; else infinite."""
-    if steady is None or is_undamped(c := steady.system.coefficients):
-        return math.inf
-    own = eigenvalue_growth(c, steady.stiffness, steady.grip)
-    return min(-own, slowest_of_cycles(c)) if own < 0.0 else math.inf
-
-
-def verdict_fades(
-    verdict: Verdict | Known | None, duration: float, unstable: bool | None, linear: bool, rate: float
-) -> bool | None:
-    """Whether the vibration of a run dies out; None where the run does not answer that.
-
-    `unstable`: what is known of steady sliding. Where it is unstable no vibration can die out. A `linear` motion
-    that neither sticks nor lifts off is on its way by the same equations: it lasts if sliding is unstable. One
-    that does fades if it loses a factor e in its `duration` (s); as long as it loses less, nobody knows. One that
-    keeps its amplitude, or grows, lasts if it had the time to change at its `rate` (1/s).
+    From where stability is lost, as was `found`, the search strides down, ever faster, and then narrows down by
+    halves. `unstable` says of a value whether sliding is known to be: vibration lasts there without a run. `calm`
+    gives the states at t = 0 of the stable motions that a rough wheel forces there and that are no vibrations.
     """
-    if verdict is None or verdict.contact_loss_fraction == 1.0 or verdict.stick_fraction == 1.0:
-        return None
-    linear &= verdict.stick_fraction + verdict.contact_loss_fraction == 0.0
-    if unstable or (unstable is False and linear):
-        return not unstable
-    if verdict.regime is not Regime.UNDECIDED:
-        return verdict.regime is Regime.DAMPED
-    slope, error = (verdict.evidence.get(f"envelope_slope{what}", 0.0) for what in ("", "_error"))
-    slope = slope if abs(slope) > 3.0 * error else 0.0
-    if isinstance(verdict, Verdict) and verdict.decision.second_run:  # the roughness may keep it up as well
-        return True if slope < 0.0 and linear else None
-    if slope < 0.0:
-        return True if linear or slope * duration < -1.0 else None
-    kept = not linear or slope > 0.0
-    return False if kept and rate * (duration - verdict.settled_from) >= 1.0 else None
+    low, high = line.low, line.high
+
+    @cache
+    def end(value: float) -> End:
+        return LASTS if unstable(value) else _end(line.case_at(line.place(value)), calm, value, verdict_of)
+
+    def ended(value: float | None, outcome: Outcome) -> Lasting:
+        shown = [each for each in seen if end(each).state is not None]
+        return Lasting(value, outcome, end(min(shown)).state, min(shown)) if shown else Lasting(value, outcome)
+
+    def lasts(value: float) -> bool | None:
+        seen.add(value)
+        return end(value).lasts
+
+    seen = set[float]()
+    if found.outcome is Outcome.FOUND:
+        # the bracket of a loss of stability may be far narrower than is asked here, and runs there take long
+        low, high, stride = max(low, found.lower - 0.5 * tolerance), min(high, found.upper), tolerance
+        while lasts(low) is not False and low > line.low:
+            low, high = max(line.low, low - stride), low if lasts(low) else high
+            stride *= GALLOP
+    if lasts(low) is None or lasts(high) is None:
+        return ended(None, Outcome.UNDECIDED)
+    if lasts(low):
+        return ended(None, Outcome.SUSTAINED if lasts(high) else Outcome.IN_PART)
+    if not lasts(high):
+        return ended(None, Outcome.DAMPED)
+    # Right beside the value sought a vibration dies out, or settles, too slowly to be decided.
+    fading, _ = bisect(lambda value: lasts(value) is False, low, high, width=tolerance)
+    _, lasting = bisect(lambda value: not lasts(value), fading, high, width=tolerance)
+    known = lasting - fading <= 2.0 * tolerance
+    return ended(0.5 * (fading + lasting), Outcome.FOUND) if known else ended(None, Outcome.UNDECIDED)
+
+
+def _end(
+    case: Case,
+    calm: Callable[[float], Sequence[Array]],
+    value: float,
+    verdict_of: Callable[[Case], Verdict | Known | None],
+) -> End:
+    """What the case's own start comes to: by the flow of the equations, whatever scheme the case has.
+
+    Runs of the case decide where no motion repeats, no dashpot damps, no link holds the shoe or the wheel rests,
+    and where speed or load change.
+    """
+    with within_range():
+        system = system_of(case)
+    waves = bool(system.wheel.g.size)
+    slides = system.belt_speed != 0.0 and system.natural_frequencies[0] > 0.0  # and links hold it
+    repeats = system.steady and (not waves or common_period(system) is not None)
+    if is_undamped(system.coefficients) or not (slides and repeats):
+        return _by_runs(case, system, verdict_of)
+    if system.smooth:
+        shoe = Shoe.of(system)
+        return UNKNOWN if shoe.rest is None else on_smooth_pads(shoe, system.initial.beside(shoe.rest))
+    try:
+        rest = steady_sliding(system)
+    except CaseError:
+        return UNKNOWN
+    known = calm(value) if waves else [np.array([rest.x, rest.y, 0.0, 0.0])]
+    return on_rough_pads(system, system.initial.beside((rest.x, rest.y)), known)
+
+
+def _by_runs(case: Case, system: System, verdict_of: Callable[[Case], Verdict | Known | None]) -> End:
+    """Whether vibration lasts by the verdicts on runs, each twice as long as the one before.
+
+    It is asked where sliding is not known to be unstable. So in full contact what neither sticks nor lifts off
+    does not grow, as it is linear, and counts as fading; without dashpots it stays as it is.
+    """
+    theory = linear_theory(system, system.belt_speed)
+    linear = theory is not None and not theory.opens
+    regime, amplitude = Regime.UNDECIDED, math.inf  # of the run before
+    for times in DURATIONS:
+        verdict = verdict_of(changed(case, solver={"duration": times * case.solver.duration}))
+        if verdict is None or verdict.contact_loss_fraction == 1.0 or verdict.stick_fraction == 1.0:
+            break
+        free = verdict.contact_loss_fraction == verdict.stick_fraction == 0.0
+        if verdict.regime is Regime.DAMPED or (free and linear):
+            return FADES
+        known = verdict.regime is regime is not Regime.UNDECIDED
+        if known and abs(amplitude - verdict.amplitude) <= SAME * verdict.amplitude:
+            return LASTS
+        regime, amplitude = verdict.regime, verdict.amplitude
+    return UNKNOWN

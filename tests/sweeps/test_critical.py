@@ -16,7 +16,7 @@ from brakecli.solver.links import natural_frequencies
 from brakecli.solver.motion import solve
 from brakecli.solver.period import common_period
 from brakecli.solver.system import Initial
-from brakecli.sweeps.critical import LONGER, search
+from brakecli.sweeps.critical import search
 from brakecli.sweeps.error_bar import OTHERS
 from brakecli.sweeps.floquet import Disturbances
 from brakecli.sweeps.growth import Sliding, growth, sliding, with_step
@@ -435,16 +435,3 @@ def test_a_shoe_that_no_link_holds_has_no_critical_friction(angle: float, method
     assert report.critical is None
     answer = found(SQUEAL, 0.0, 1.0, method=method, **rough)
     assert (answer.outcome, answer.value, answer.windows) == (Outcome.NO_SLIDING, None, ())
-
-
-def test_runs_for_the_least_sustained_value_end_once_they_are_decided() -> None:
-    durations = []
-
-    def counted(case: Case) -> Any:
-        durations.append(case.solver.duration)
-        return verdict_of(case)
-
-    critical = Critical(parameter="friction.coefficient", lower=0.3, upper=0.9, tolerance=1e-2)
-    answer = search(critical, lambda value: make(SQUEAL, friction__coefficient=value), counted)
-    assert answer.sustained == pytest.approx(answer.value, abs=1e-2)
-    assert max(durations) < LONGER * SQUEAL["solver"]["duration"]

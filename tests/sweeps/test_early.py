@@ -101,17 +101,6 @@ def test_a_map_of_regimes_is_known_early_but_for_one_point_in_fifty(points: int)
     assert found >= 0.98 * points - 1.0
 
 
-def test_an_orbit_whose_sticks_no_sample_sees_is_an_answer_for_a_critical_value() -> None:
-    """Just above the critical friction the shoe sticks for a third of a sample in each cycle."""
-    system = system_of(case_of(RELAXATION, EXACT, "friction.coefficient=0.5755"))
-    assert early(system) is None
-    found = early(system, seen=False)
-    assert found is not None
-    assert 0.0 < found.verdict.stick_fraction < system.interval * (found.verdict.frequency or 0.0)
-    rows = one_cycle(system, found, 2000).rows
-    np.testing.assert_array_less(np.abs(rows[-1, :4] - rows[0, :4]), 1e-8 * 0.5 * np.ptp(rows[:, :4], axis=0))
-
-
 @pytest.mark.parametrize("friction", [0.4, 0.577, 0.62, 0.9])
 @pytest.mark.parametrize("speed", [-0.1, 0.08, 0.6, 2.0])
 def test_a_map_of_regimes_is_known_early(friction: float, speed: float) -> None:

@@ -1,11 +1,19 @@
 """From which value on vibration lasts: held against runs of 64 durations by an integrator of its own."""
 
+import math
 from typing import Any
 
 import pytest
 
-from brakecli.sweeps.windows import Outcome
+from brakecli.analysis.regime.verdict import Excitation, Regime
+from brakecli.branches.begin import settled
+from brakecli.branches.cycles import Cycles
+from brakecli.branches.line import Line
+from brakecli.sweeps.early import Known
+from brakecli.sweeps.sustained import _end, sustained
+from brakecli.sweeps.windows import Outcome, Search
 from tests.campaign import campaign
+from tests.examples import SQUEAL, make
 from tests.sweeps.test_critical import found
 from tests.sweeps.test_windows import FOLDS
 
@@ -169,3 +177,38 @@ def test_what_bounces_longer_than_a_run_beside_stable_sliding_does_not_last(
     assert answer.outcome is Outcome.STABLE
     assert answer.sustained_outcome in (Outcome.DAMPED, Outcome.UNDECIDED)
     assert answer.sustained is None
+
+
+def verdict(amplitude: float, regime: Regime = Regime.RELAXATION) -> Known:
+    """The verdict on a run of a vibration with stick."""
+    return Known(regime, Excitation.NONE, ("",), None, amplitude, 0.5, 0.0, 0.0, 0.0, True, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("amplitudes", "lasts"), [((1.0, 1.005), True), ((1.0, 1.02, 1.01), True), ((1.0, 0.9, 0.8, 0.7), None)]
+)
+def test_without_a_common_period_a_vibration_lasts_that_keeps_its_amplitude(
+    amplitudes: tuple[float, ...], lasts: bool | None
+) -> None:
+    waves = {"amplitudes": [1e-6, 1e-6], "wavelengths": [0.02, 0.02 / math.sqrt(2.0)]}
+    case, told = make(SQUEAL, roughness__wheel=waves), iter(amplitudes)
+    end = _end(case, lambda value: [], 0.5, lambda case: verdict(next(told)))
+    assert end.lasts is lasts
+    undecided = _end(case, lambda value: [], 0.5, lambda case: verdict(1.0, Regime.UNDECIDED))
+    damped = _end(case, lambda value: [], 0.5, lambda case: verdict(1.0, Regime.DAMPED))
+    assert (undecided.lasts, damped.lasts) == (None, False)
+
+
+def test_the_vibration_that_lasts_lowest_down_is_handed_on() -> None:
+    line = Line(make(SQUEAL), ["friction.coefficient"], 0.3, 0.9)
+    answer = sustained(
+        line, 1e-2, Search(Outcome.UNSTABLE), lambda value: None, lambda value: [], lambda case: None
+    )
+    assert answer.outcome is Outcome.FOUND
+    assert answer.value is not None
+    assert answer.state is not None
+    assert answer.at is not None
+    assert 0.0 < answer.at - answer.value < 1e-2
+    point = settled(Cycles(line), line.place(answer.at), answer.state, 1.0)
+    assert point is not None
+    assert point.stable

@@ -10,17 +10,37 @@ they grow.
 import math
 from typing import Any
 
+import numpy as np
 from numba import float64, int64, void
+from numpy.typing import NDArray
 
-from brakecli.solver.compile import kernel
-from brakecli.solver.flow.orbit import MOST_TURNS, ORBIT_TYPE, closed, note_event, sizes
-from brakecli.solver.flow.smooth import MOST_EVENTS, MOST_STEPS, PATH_TYPE, step, zero_of_velocity
-from brakecli.solver.records import COEFFICIENTS, FLOW_TYPE, SIZE, V_X, V_Y, Coefficients, X, Y
+from brakecli.solver.automaton import BACKWARD, FORWARD
+from brakecli.solver.compile import Floats, kernel
+from brakecli.solver.flow.orbit import MOST_TURNS, ORBIT, ORBIT_TYPE, closed, note_event, sizes
+from brakecli.solver.flow.smooth import MOST_EVENTS, MOST_STEPS, PATH, PATH_TYPE, step, zero_of_velocity
+from brakecli.solver.records import (
+    BELT,
+    COEFFICIENTS,
+    FLOW,
+    FLOW_TYPE,
+    LOAD,
+    SIZE,
+    V_X,
+    V_Y,
+    Coefficients,
+    X,
+    Y,
+    new,
+)
 from brakecli.solver.schemes.piecewise_exact import look, phases
 from brakecli.solver.schemes.piecewise_exact.switch import place
+from brakecli.solver.system import longest_step
 
 GOING_ON, LINEAR, FOUND, ENDED = range(4)
 """What `seek` has come to: nothing yet; no event can follow; an orbit; the end of the time, or of the progress."""
+
+FOREVER = 1e300
+"""A time (s) that no motion reaches: finite, as a mode that decays does not grow in it at all."""
 
 _NEAR = 0.02  # of the size of a cycle: distance of two returns at which an orbit is sought
 
@@ -133,3 +153,59 @@ def swing(c: Coefficients, m: Any, path: Any, o: Any, seconds: float) -> None:
             _bound(m, o, seconds)
             if o.rest[X] + o.bound[0] <= o.high and o.rest[X] - o.bound[0] >= o.low:
                 return
+
+
+class Pursuit:
+    """A motion on smooth pads, at constant speed and load, which is followed to what becomes of it.
+
+    `orbit` holds how far it has come, and the orbit once it is found; `path` counts its steps.
+    """
+
+    def __init__(
+        self,
+        c: Coefficients,
+        acting: tuple[float, float, float],
+        state: Floats,
+        rest: Floats,
+        modes: tuple[NDArray[np.complex128], NDArray[np.complex128]],
+        duration: float = FOREVER,
+    ) -> None:
+        """Begin from a state (x, y, v_x, v_y), with what acts: the contact's stiffness (N/m), U (m/s), Q (N).
+
+        `rest`: x and y of steady sliding. `modes`: its eigenvalues, and the vectors of position and velocity in
+        columns. Raises LinAlgError where two of them are alike.
+        """
+        self._coefficients, self._flow, self.path, self.orbit = c, new(FLOW), new(PATH), new(ORBIT)
+        flow, o, (values, vectors), inverse = self._flow, self.orbit, modes, np.linalg.inv(modes[1])
+        flow.stiffness, flow.z[BELT], flow.z[LOAD] = acting
+        flow.x, flow.y, flow.v_x, flow.v_y = state
+        self.path.h, belt = longest_step(c, acting[0]), acting[1]
+        o.duration, o.sliding = duration, BACKWARD if belt > 0.0 else FORWARD
+        o.rest[:2], o.room[:] = rest, (-rest[1], abs(belt))
+        o.into[0], o.into[1], o.growth[:] = inverse.real, inverse.imag, values.real
+        o.reach[:] = np.abs(vectors[:3]).T
+
+    def seek(self) -> int:
+        """Go on for some time; what the motion has come to, see `seek`."""
+        return int(seek(self._coefficients, self._flow, self.path, self.orbit))
+
+    def swing(self, begin: Floats, seconds: float) -> None:
+        """Find the least and the largest x of a linear motion from a state on, for some time (s), see `swing`."""
+        self._flow.z[:4] = begin
+        swing(self._coefficients, self._flow, self.path, self.orbit, seconds)
+
+    @property
+    def state(self) -> Floats:
+        """x, y (m), v_x and v_y (m/s) that the motion has reached."""
+        return np.array(self._flow.z[:4])
+
+    @property
+    def start(self) -> Floats:
+        """A state on the orbit."""
+        x, y, v_y = self.orbit.point
+        return np.array([x, y, 0.0, v_y])
+
+    @property
+    def multiplier(self) -> float:
+        """Largest part of its size that a disturbance of the orbit keeps in a cycle; an orbit attracts below 1."""
+        return float(np.abs(np.linalg.eigvals(self.orbit.map)).max())
