@@ -12,6 +12,8 @@ FINER = 1.5
 LEFT_OPEN = 4.0
 """Times by which the error may exceed the change with finer steps. An error of second order is 1.8 times the
 change, but kinks of the contact force, as patches open, let it fall unevenly; twice was exceeded once, at a fold."""
+KNOWN = 1e-6
+"""Least bar, in parts of the range, where steps are taken: multipliers are checked to so much."""
 STRIDES = 1e-4, 1e-3, 1e-2
 """Lengths to either side of an end between which it is located with finer steps."""
 AROUND = Settings(points=60, seconds=10.0)
@@ -32,8 +34,10 @@ class Bound(NamedTuple):
     def bar(self) -> float:
         """The error of p: that of the bracket, and what steps leave open."""
         finer = self.problem.finer(FINER) if self.point is not None else []
+        if not finer:
+            return self.error
         moved = [self._moved(each) for each in finer]
-        return self.error + sum(LEFT_OPEN * abs(p - self.p) if p is not None else 1.0 for p in moved)
+        return max(self.error, KNOWN) + sum(LEFT_OPEN * abs(p - self.p) if p is not None else 1.0 for p in moved)
 
     def _moved(self, finer: Any) -> float | None:
         """Where the end is with finer steps; None where it is not found."""

@@ -182,6 +182,9 @@ CRITICAL = (
     Field("critical_windows_upper_error", "", "error bars of these ends", WINDOWS, at="columns.upper_error"),
     Field("critical_sustained", "", "least value at which vibration lasts from the case's start", at="sustained"),
     Field("sustained_status", "", "how the search for that value has ended", "S24", at="sustained_outcome"),
+    Field("coexists_from", "", "least value with a stable vibration beside stable sliding"),
+    Field("barrier", "m", "half of peak to peak of x of the unstable cycle at the case's own value"),
+    Field("critical_sentence", "", "all of this in words", SENTENCE, at="sentence"),
 )
 """Numbers have the unit of the parameter that is looked for."""
 DIFFERENCE = (integer("hysteresis", "whether the motions on the way up and down differ (0, 1)"),)

@@ -3,17 +3,17 @@
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from brakecli.case.read import key_path
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError, RefusedError, key_text
-from brakecli.runs.cost import duration_text, steps_and_seconds
+from brakecli.runs.cost import duration_text
 from brakecli.runs.limits import MOST_BYTES, check, refuse, within_range
+from brakecli.solver.flow.rough import default_steps
 from brakecli.solver.period import common_period
 from brakecli.sweeps.early import may_be_early
-from brakecli.sweeps.growth import sliding, with_step
-from brakecli.sweeps.periodic import exponent_length
+from brakecli.sweeps.lyapunov import exponent_length
 from brakecli.sweeps.pilot import Pilot
 from brakecli.sweeps.plan import Plan, Settings, label
 from brakecli.sweeps.tables import Critical
@@ -24,10 +24,10 @@ MOST_SECONDS = 30 * 86400.0
 # Of a search by simulation on surfaces that force a motion or whose runs go to their end; rough guesses that tell
 # minutes from days.
 _SEARCH_RUNS = 12.0  # for the least sustained value
-_SEARCH_GROWTHS = 20.0
-_GROWTH_SECONDS = 0.03
-_FORCED_RUNS = 1000.0  # over a period of the wheel, in a search that follows a forced motion
-_EXPONENT_RUNS = 200.0  # of as long as an exponent needs
+_SMOOTH_SECONDS = 0.15  # of the branches on a smooth wheel
+_FORCED_PERIODS = 500.0  # over which motions are carried that a rough wheel forces
+_EXPONENTS = 50.0  # where they have no period
+_STEP_SECONDS = 1.1e-5  # of a motion on rough pads, with its derivative
 # Bytes, measured with `make bench-sweep`.
 _WORKER_BYTES = 1.8e8
 _SAMPLE_BYTES = 8.0 * 24
@@ -79,7 +79,7 @@ def estimate(plan: Plan, workers: int) -> Estimate:
     pilot.look()
     each, samples = pilot.seconds, max(samples, pilot.samples)
     if guessed:
-        each += _SEARCH_RUNS * each + _SEARCH_GROWTHS * _GROWTH_SECONDS + forced
+        each += _SEARCH_RUNS * each + _SMOOTH_SECONDS + forced
     records, in_parent = plan.passes * plan.points, _POINT_BYTES if plan.followed is None else _FOLLOWED_BYTES
     held = _SAMPLE_BYTES * samples * workers * pilot.together
     return Estimate(
@@ -105,16 +105,15 @@ def _noted(plan: Plan, point: int, failing: list[str]) -> Iterator[None]:
 
 
 def _forced_seconds(plan: Plan, settings: Settings, critical: Critical) -> float:
-    """The time (s) of a search that follows the motion which a rough wheel forces; 0 where it forces none."""
+    """The time (s) of a search along what a rough wheel forces; 0 where it forces nothing."""
     seconds = 0.0
     for value in (critical.lower, critical.upper):
         with suppress(CaseError):
-            case = plan.case({**settings, key_path(critical.parameter): value})
-            found = sliding(with_step(system_of(case)))
-            if found is not None and found.forced:
-                period = common_period(found.system)
-                length, runs = (period, _FORCED_RUNS) if period else (exponent_length(found), _EXPONENT_RUNS)
-                seconds = max(seconds, runs * steps_and_seconds(replace(found.system, duration=length))[1])
+            system = system_of(plan.case({**settings, key_path(critical.parameter): value}))
+            if system.wheel.g.size and system.belt_speed:
+                period = common_period(system)
+                span, runs = (period, _FORCED_PERIODS) if period else (exponent_length(system), _EXPONENTS)
+                seconds = max(seconds, runs * default_steps(system, span) * _STEP_SECONDS)
     return seconds
 
 

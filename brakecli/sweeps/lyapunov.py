@@ -13,7 +13,6 @@ import numpy as np
 
 from brakecli.analysis.stability.search import bisect
 from brakecli.solver.flow.rough import RoughFlow, Status, default_cells, default_steps
-from brakecli.solver.links import natural_frequencies
 from brakecli.solver.period import LONGEST
 from brakecli.solver.steady_sliding import SteadySliding
 from brakecli.solver.system import System
@@ -42,11 +41,16 @@ class Exponent(NamedTuple):
         return None if abs(self.rate) <= self.error else self.rate > 0.0
 
 
-def length(system: System, stiffness: float) -> float:
+def length(system: System) -> float:
     """The time (s) of a segment: two periods of the slowest mode, or the passing of the longest wave."""
-    slow = natural_frequencies(system.coefficients, stiffness)[0]
+    slow = system.natural_frequencies[0]
     passing = abs(system.belt_speed) * float(system.wheel.turns.min())
     return min(max(2.0 / slow if slow > 0.0 else 0.0, 1.0 / passing), LONGEST / BATCH)
+
+
+def exponent_length(system: System) -> float:
+    """The time (s) of the motion that an exponent is measured in."""
+    return (TRANSIENT + BATCHES * BATCH) * length(system)
 
 
 def exponent(system: System, rest: SteadySliding) -> Exponent | None:
@@ -55,7 +59,7 @@ def exponent(system: System, rest: SteadySliding) -> Exponent | None:
     A motion that leaves what roughness forces on it is on its way to another one, whose exponent says nothing: what
     comes then is left out. None where too little is left.
     """
-    flow, span = RoughFlow(system, default_cells(system)), length(system, rest.stiffness)
+    flow, span = RoughFlow(system, default_cells(system)), length(system)
     steps = default_steps(system, span)
     begin = np.array([rest.x, rest.y, 0.0, 0.0])
     fast = 2.0 * math.pi * system.natural_frequencies[1]

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.analysis.regime.verdict import Excitation, Regime, Verdict
+from brakecli.branches.line import Line
 from brakecli.case.case import Case
 from brakecli.case.read import key_path
 from brakecli.case.system import system_of
@@ -246,7 +247,8 @@ def computed(
         if (critical := plan.sweep.critical) is not None:
             path = key_path(critical.parameter)
             with within_range():
-                found = search(critical, lambda value: plan.case({**point.settings, path: value}), verdict_of)
+                own = Line(point.case, [critical.parameter], critical.lower, critical.upper).own
+                found = search(critical, lambda value: plan.case({**point.settings, path: value}), verdict_of, own)
             values |= values_of(fields.CRITICAL, found)
         if large := [name for name, each in values.items() if isinstance(each, float) and abs(each) > LARGEST]:
             raise FloatingPointError(f"{large[0]} is too large for a result")

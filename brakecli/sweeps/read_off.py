@@ -5,7 +5,6 @@ its folds, so that a value is stable where one of its sheets is.
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 

@@ -21,7 +21,7 @@ from brakecli.runs.run import origin
 from brakecli.sweeps.journal import Journal
 from brakecli.sweeps.plan import LoadedSweep, Plan, label
 from brakecli.sweeps.point import Status
-from brakecli.sweeps.scan import PARTS, SCANNED
+from brakecli.sweeps.read_off import LIGHT
 from brakecli.sweeps.tables import Axis
 
 MOST_FAILURES = 100
@@ -121,7 +121,7 @@ def write(result: ResultFile, report: SweepReport, journal: Journal) -> None:
         result.axis("/", fields.WINDOW, np.arange(float(windows)))
     for field in plan.fields:
         attributes, kind, dimensions = {}, journal.stored[field.name], found.dimensions
-        if critical is not None and field in fields.CRITICAL and "f8" in field.kind:
+        if critical is not None and field in fields.CRITICAL and "f8" in field.kind and not field.units:
             attributes, field = {"parameter": critical.parameter}, replace(field, units=unit(critical.parameter))
         if kind.shape:
             dimensions = (*dimensions, fields.WINDOW.name)
@@ -195,7 +195,7 @@ def _on_wide_bars(journal: Journal, lower: float, upper: float) -> Iterator[str]
     undecided = int((journal.column("critical_status") == b"undecided").sum())
     unsure = int((np.nan_to_num(journal.column("critical_error"), nan=0.0) > wide).sum())
     wheel = "or waves of the wheel that have a common period"
-    remedy = f"try a narrower range, finer steps of the two-layer scheme, {wheel}"
+    remedy = f"try a narrower range, {wheel}"
     for count, what in (
         (undecided, "no critical value is decided"),
         (unsure, "the error bar is a tenth of the range or wider"),
@@ -213,12 +213,12 @@ def _on_wide_bars(journal: Journal, lower: float, upper: float) -> Iterator[str]
 
 
 def _on_no_dashpots(plan: Plan) -> Iterator[str]:
-    """What a search does not find where nothing damps: the places at which multipliers meet are not looked at."""
+    """What counts as growth where nothing damps."""
     system = system_of(plan.case({}))
     by_runs = plan.sweep.critical is not None and plan.sweep.critical.method == "simulation"
     if by_runs and len(system.wheel.g) and is_undamped(system.coefficients):
-        missed = f"windows of instability narrower than a {PARTS * (SCANNED - 1)}nd of the range may be missed"
-        yield f"no dashpot acts: where the pad opens, {missed}; give the links the damping that they have"
+        none = f"growth that a damping ratio of {LIGHT:g} would stop counts as none"
+        yield f"no dashpot acts: {none}; give the links the damping that they have"
 
 
 def _parameters(plan: Plan, index: int) -> dict[str, Any]:

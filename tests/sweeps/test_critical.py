@@ -7,19 +7,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brakecli.analysis.stability.modes import growth as eigenvalue_growth
 from brakecli.analysis.stability.report import stability
+from brakecli.branches.forced import Forced
+from brakecli.branches.line import Line
 from brakecli.case.case import Case, changed
 from brakecli.case.system import system_of
 from brakecli.cli.inputs import load_sweep
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.motion import solve
 from brakecli.solver.period import common_period
+from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import Initial
 from brakecli.sweeps.critical import search
-from brakecli.sweeps.error_bar import OTHERS
-from brakecli.sweeps.floquet import Disturbances
-from brakecli.sweeps.growth import Sliding, growth, sliding, with_step
+from brakecli.sweeps.lyapunov import exponent
 from brakecli.sweeps.point import verdict_of
 from brakecli.sweeps.tables import Critical
 from brakecli.sweeps.windows import Outcome, Search
@@ -269,30 +269,26 @@ def test_roughness_that_opens_the_contact_moves_the_critical_friction() -> None:
     assert math.isfinite(rough.value)
 
 
-def sliding_on_opening_surfaces(friction: float) -> Sliding | None:
-    return sliding(system_of(make(OPENS, friction__coefficient=friction)))
-
-
 def event_driven_growth(friction: float) -> float:
     """Growth (1/s) by the event-driven scheme with the exact contact, over a whole period of the wheel.
 
     Newton's method on the map over the period finds the forced motion; its derivative has the multipliers.
     """
-    values = Disturbances(sliding_on_opening_surfaces)
-    values.at(friction)
-    start = values.orbits[friction]
+    point = Forced.along(Line(make(OPENS), ["friction.coefficient"], 0.0, 3.0)).begun(friction / 3.0)
+    assert point is not None
     solver = {"scheme": "event-driven", "tolerance": 1e-11, "duration": 1.0}
     system = system_of(
         make({**OPENS, "solver": solver, "output": {"sample_interval": 1e-4}}, friction__coefficient=friction)
     )
-    period, scales = common_period(system), start.segments.scales
+    period, depth = common_period(system), 1e-6
     assert period is not None
+    scales = depth * np.array([1.0, 1.0, *[2.0 * math.pi * system.natural_frequencies[1]] * 2])
     system = replace(system, interval=period, duration=period)
 
     def end(state: Any) -> Any:
         return solve(replace(system, initial=Initial(*(state * scales).tolist()))).rows[-1, :4] / scales
 
-    state = start.states[0]
+    state = np.array(point.facts.state) / scales
     for _ in range(4):
         after = end(state)
         derivative = np.array([end(state + 1e-5 * direction) - after for direction in np.eye(4)]).T / 1e-5
@@ -308,16 +304,13 @@ def test_an_exponent_without_a_common_period_agrees_with_multipliers_or_is_undec
     """A second wave of 10⁻¹³ m takes the period away and changes nothing else."""
     wheel = {"amplitudes": [2.1238e-5, 1e-13], "wavelengths": [0.038, 0.038 * math.sqrt(2.0)]}
     tables = {**OPENS, "roughness": {**OPENS["roughness"], "wheel": wheel}}
-    assert common_period(system_of(make(tables, friction__coefficient=friction))) is None
-    exponent = Disturbances(lambda value: sliding(system_of(make(tables, friction__coefficient=value)))).at(
-        friction
-    )
-    multiplier = Disturbances(sliding_on_opening_surfaces).at(friction)
-    assert exponent is not None
-    assert multiplier is not None
-    assert exponent.unstable in (multiplier.unstable, None)
-    if exponent.unstable is not None or multiplier.rate < 0.0:
-        assert abs(exponent.rate - multiplier.rate) <= exponent.bar
+    system = system_of(make(tables, friction__coefficient=friction))
+    assert common_period(system) is None
+    measured, rate = exponent(system, steady_sliding(system)), event_driven_growth(friction)
+    assert measured is not None
+    assert measured.unstable in (rate > 0.0, None)
+    if measured.unstable is not None or rate < 0.0:
+        assert abs(measured.rate - rate) <= measured.error + 0.1
 
 
 @pytest.mark.parametrize(
@@ -331,14 +324,9 @@ def test_multipliers_of_one_are_no_instability_without_dashpots(
     """
     case = load_sweep(str(ROOT / "cases/paper/alpha-open.toml"), None).plan.case({})
     bare = changed(case, link1={"damping": 0.0}, link2={"damping": 0.0, "angle_deg": angle})
-
-    def sliding_at(value: float) -> Sliding | None:
-        return sliding(with_step(system_of(changed(bare, friction={"coefficient": value}))))
-
-    values = Disturbances(sliding_at)
-    values.at(0.05)
-    assert sliding_at(friction) is not None
-    assert values.unstable(friction) is unstable
+    critical = Critical(parameter="friction.coefficient", lower=0.05, upper=2.0)
+    answer = search(critical, lambda value: changed(bare, friction={"coefficient": value}), lambda case: None)
+    assert any(low < friction < high for low, high in answer.windows) is unstable
 
 
 def test_the_error_bar_on_surfaces_that_open_holds_where_the_multiplier_passes_one() -> None:

@@ -1,17 +1,15 @@
 """Critical values on rough wheels in full contact: the motion there is linear, and theory gives its growth."""
 
-import math
 from typing import Any
 
 import numpy as np
 import pytest
 
-from brakecli.case.system import system_of
 from brakecli.sweeps.critical import search
 from brakecli.sweeps.tables import Critical
 from brakecli.sweeps.windows import Outcome, Search
 from tests.examples import make
-from tests.sweeps.independent import held_by, smooth_is_unstable
+from tests.sweeps.independent import smooth_is_unstable
 from tests.sweeps.shoes import flat_critical
 
 BARE: dict[str, Any] = {  # no dashpots; near a friction of 0.3 the wave meets a natural frequency
