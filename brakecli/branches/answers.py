@@ -9,6 +9,7 @@ from typing import NamedTuple
 from brakecli.branches.bar import Bound
 from brakecli.branches.explore import FORCED, SLIDING, Explored, Followed, Mark, crossing, span
 from brakecli.branches.line import Line
+from brakecli.branches.point import Point
 from brakecli.branches.sliding import Slide
 
 NARROWEST = 1e-6
@@ -162,16 +163,24 @@ class Answers:
             if not stable:
                 continue
             places = [*group]
+            ends = [self._bound(followed, places[0], -1), self._bound(followed, places[-1], 1)]
             part = [points[k] for k in places]
-            bounds = [
-                *(Bound(point.p) for point in part),
-                self._bound(followed, places[0], -1),
-                self._bound(followed, places[-1], 1),
-            ]
             slowest = min(part, key=lambda point: point.p)
-            ends = (pick(bounds[::-1], key=lambda bound: bound.p) for pick in (min, max))
-            found.append(Part(*ends, slowest.facts.frequency))
+            low, high = (
+                min([*ends, *self._turns(followed, part, way)], key=lambda bound: way * bound.p) for way in (1, -1)
+            )
+            found.append(Part(low, high, slowest.facts.frequency))
         return found
+
+    def _turns(self, followed: Followed, part: list[Point], way: int) -> list[Bound]:
+        """The inner point of a stable part that lies furthest in p, where one does: folds that rounding makes."""
+        furthest = min(part, key=lambda point: way * point.p)
+        branch = followed.branch
+        folds = [special for special in branch.specials if special.kind == "fold"] if branch else []
+        if furthest in (part[0], part[-1]) or not folds:
+            return [Bound(furthest.p)]
+        fold = min(folds, key=lambda special: abs(special.s - furthest.s))
+        return [Bound(furthest.p, abs(fold.p - furthest.p), furthest, followed.problem, fold)]
 
     def _bound(self, followed: Followed, k: int, way: int) -> Bound:
         """Where the stable part ends whose last point that way is the one at k."""

@@ -137,10 +137,11 @@ class Forced(Doubled):
         return Forced(self.system, self.frame, periods)
 
     def finer(self, factor: float) -> "list[Problem]":
-        """The same motions with so many times more steps, and with so many times more cells."""
-        steps = replace(self.frame, steps=math.ceil(factor * self.frame.steps))
-        cells = replace(self.frame, cells=2 * math.ceil(0.5 * factor * self.frame.cells))
-        return [Forced(self.system, each, self.periods) for each in (steps, cells)]
+        """The same motions with so many times more steps, with half of that more, and with more cells."""
+        frame = self.frame
+        steps = [replace(frame, steps=math.ceil(more * frame.steps)) for more in (factor, 0.5 + 0.5 * factor)]
+        cells = replace(frame, cells=2 * math.ceil(0.5 * factor * frame.cells))
+        return [Forced(self.system, each, self.periods) for each in (*steps, cells)]
 
     @property
     def segments(self) -> int:

@@ -1,7 +1,7 @@
 """Growth of disturbances where the waves of a wheel have no common period: Lyapunov's exponent of a long motion.
 
-Such a motion never repeats, so that no branch can be followed. The exponent is measured at single values, and known
-within an error bar only.
+Such a motion never repeats, so that no branch can be followed. The exponent is measured at single values, and it is
+known within an error bar only. In full contact the motion is linear, and theory gives the growth.
 """
 
 import math
@@ -16,6 +16,7 @@ from brakecli.solver.flow.rough import RoughFlow, Status, default_cells, default
 from brakecli.solver.period import LONGEST
 from brakecli.solver.steady_sliding import SteadySliding
 from brakecli.solver.system import System
+from brakecli.sweeps.read_off import in_full_contact
 from brakecli.sweeps.tables import Critical
 from brakecli.sweeps.windows import Edge, Outcome, Piece, Search, joined
 
@@ -56,8 +57,8 @@ def exponent_length(system: System) -> float:
 def exponent(system: System, rest: SteadySliding) -> Exponent | None:
     """Lyapunov's exponent of the motion from steady sliding, by means over batches of a long run.
 
-    A motion that leaves what roughness forces on it is on its way to another one, whose exponent says nothing: what
-    comes then is left out. None where too little is left.
+    A motion that leaves what roughness forces on it is on its way to another one, whose exponent says nothing: that
+    part is left out. None where too little is left.
     """
     flow, span = RoughFlow(system, default_cells(system)), length(system)
     steps = default_steps(system, span)
@@ -90,7 +91,9 @@ def by_exponents(critical: Critical, steady_at: Steady) -> Search:
         found = steady_at(value)
         if found is None:
             return True
-        measured = exponent(*found)
+        theory = in_full_contact(found[0])
+        known = Exponent(theory.mode.growth, theory.known_to) if theory else None
+        measured = known if known and known.unstable is not None else exponent(*found)
         return measured.unstable if measured else None
 
     def edge(low: float, high: float) -> Edge:

@@ -1,4 +1,4 @@
-"""Critical values read off branches: where the motion that continues steady sliding is stable, and what lies beside.
+"""Critical values read off branches: where the motion that continues steady sliding is stable.
 
 On a rough wheel that motion is the one which grows with the waves. It is followed through the parameter over all
 its folds, so that a value is stable where one of its sheets is.
@@ -6,11 +6,14 @@ its folds, so that a value is stable where one of its sheets is.
 
 import math
 from dataclasses import replace
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
 
+from brakecli.analysis.regime.linear import Linear, linear_theory
 from brakecli.analysis.stability.modes import is_undamped
+from brakecli.analysis.stability.search import bisect
 from brakecli.branches.answers import Answers
 from brakecli.branches.explore import Explorer, crossing
 from brakecli.branches.line import Line
@@ -24,13 +27,17 @@ from brakecli.sweeps.windows import Edge, Piece, Search, joined
 
 POINTS = 1500
 """Budget of points of all branches. A time would make results depend on the machine."""
+VALUES = 33
+"""Values at which a shoe without dashpots is looked at."""
+SLOPE = 1e-3
+"""Slopes of waves, in sum, that feed no disturbance."""
 LIGHT = 1e-5
 """Damping ratio of the slowest mode that a shoe without dashpots is given: slower growth counts as none. Without
 any nothing decays, and passing waves let almost every motion grow a little, over minutes."""
 
 
 def explored(critical: Critical, case: Case) -> Explorer:
-    """The branches of a case along the parameter, at the speed and load of its start, within a budget of points."""
+    """The branches of a case along the parameter, at the speed and load of its start."""
     line = Line(case, [critical.parameter], critical.lower, critical.upper, adapted=_adapted)
     explorer = Explorer(line, lambda *_: None, lambda: False, math.inf, POINTS)
     explorer.explore()
@@ -40,6 +47,8 @@ def explored(critical: Critical, case: Case) -> Explorer:
 def on_waves(critical: Critical, answers: Answers) -> Search:
     """The windows of the motion that a rough wheel forces."""
     line = answers.line
+    if is_undamped(line.case_coefficients):
+        return without_dashpots(critical, answers)
     width = line.high - line.low
     bounds = {
         line.value(bound.p): (bound, high.p - low.p) for low, high in answers.windows for bound in (low, high)
@@ -54,6 +63,45 @@ def on_waves(critical: Critical, answers: Answers) -> Search:
     return joined(critical, pieces(answers), edge)
 
 
+def in_full_contact(system: System) -> Linear | None:
+    """Theory of the motion that a rough wheel forces, where that surely touches everywhere and only slips.
+
+    The slopes of its waves must move the contact force by less than a thousandth of what compression does.
+    """
+    wheel = system.wheel
+    slopes = wheel.g * wheel.omega * np.sinc(wheel.omega * system.half_length / np.pi)
+    theory = linear_theory(system, system.belt_speed) if np.abs(slopes).sum() <= SLOPE else None
+    if theory is None or theory.opens:
+        return None
+    fastest = 2.0 * math.pi * float(np.abs(theory.waves[:, 0] * theory.passing).sum())
+    return theory.with_slopes() if fastest < abs(system.belt_speed) else None
+
+
+def without_dashpots(critical: Critical, answers: Answers) -> Search:
+    """The windows where nothing damps: by eigenvalues where the motion surely keeps in full contact.
+
+    Without dashpots no branch leads through a resonance, and a large motion beside may hide what full contact does.
+    """
+    known, line = pieces(answers), answers.line
+
+    @cache
+    def unstable(value: float) -> bool | None:
+        theory = in_full_contact(line.system(line.place(value)))
+        if theory is not None:
+            return theory.mode.growth > theory.known_to
+        return next((piece.unstable for piece in known if piece.low <= value <= piece.high), None)
+
+    def edge(low: float, high: float) -> Edge:
+        bounds = [bound for window in answers.windows for bound in window if low <= line.value(bound.p) <= high]
+        low, high = bisect(lambda v: unstable(v) is unstable(low), low, high, width=1e-2 * critical.tolerance)
+        bars = [each.bar for each in bounds if low <= line.value(each.p) <= high]
+        return Edge(0.5 * (low + high), 0.5 * (high - low) + (line.high - line.low) * max(bars, default=0.0))
+
+    middles = {0.5 * (piece.low + piece.high) for piece in known}
+    values = sorted({*np.linspace(line.low, line.high, VALUES).tolist(), *middles})
+    return joined(critical, [Piece(value, value, unstable(value)) for value in values], edge)
+
+
 def calm(answers: Answers, value: float) -> list[Array]:
     """The states (x, y, v_x, v_y) at t = 0 of the stable motions that a rough wheel forces at a value."""
     p = answers.line.place(value)
@@ -62,7 +110,7 @@ def calm(answers: Answers, value: float) -> list[Array]:
 
 
 def pieces(answers: Answers) -> list[Piece]:
-    """The range in parts: stable, unstable, or not known. Where nothing slides steadily, stability has been lost."""
+    """The range in parts: stable, unstable, or not known. Where nothing slides steadily stability has been lost."""
     found, last = list[tuple[float, float, bool | None]](), 0.0
     slides = [slide.p for slide in answers.explored.slides if not math.isnan(slide.tests[0])]
     ends = (slides[0], slides[-1]) if slides else (1.0, 0.0)
@@ -80,7 +128,7 @@ def pieces(answers: Answers) -> list[Piece]:
 
 
 def _adapted(system: System) -> System:
-    """The system at the speed and load of its start throughout, with dashpots as light as can be if it has none."""
+    """The system at the speed and load of its start throughout; without dashpots it gets very light ones."""
     belt = schedule((0.0,), (system.belt_speed / system.radius,), system.radius)
     held = replace(system, belt=belt, load=schedule((0.0,), (system.load_at_start,)))
     c = system.coefficients

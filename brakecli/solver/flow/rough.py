@@ -48,6 +48,8 @@ from brakecli.solver.system import System
 MOST_EVENTS = 256  # in a span
 BOUND = 1e100  # of a state, beyond which the motion has run away
 CELLS_PER_WAVE, LEAST_CELLS = 24, 96
+LANDING = 16  # parts of a step in which the whole pad lands or lifts off: the force has a kink there
+_ROUNDED = 1e-9  # of a step, that may be left of it by rounding
 STEPS_PER_PERIOD = 20  # of the fastest mode, or of the shortest wave that passes
 
 _STAGES = int(USED[1])
@@ -611,6 +613,16 @@ def _begin(c: Coefficients, f: Any, tables: Floats) -> None:
     _advance(f)
 
 
+@kernel(float64(ROUGH_TYPE, float64, float64))
+def _next_part(f: Any, end: float, longest: float) -> float:
+    """The length of the next part of a step until some time. The last one ends there, however late it begins."""
+    left = max(end - f.since, 0.0)
+    last = left <= 1.5 * longest
+    for j in range(_COLUMNS):
+        f.stretch[j] = -f.late[j] if last else 0.0
+    return left if last else longest  # type: ignore[no-any-return]
+
+
 _PARTS = types.NamedTuple([COEFFICIENTS, ROUGH_TYPE, vector], Parts)
 _hold, _parts_at = into_memory(_PARTS), from_memory(_PARTS)
 
@@ -622,17 +634,27 @@ def fly(address: int, h: float, steps: int) -> int:
     c, f, tables = p.c, p.f, p.tables
     _begin(c, f, tables)
     for n in range(steps):
-        f.since, left = n * h, h
+        f.since, left, longest = n * h, h, h
         for j in range(_COLUMNS):
             f.late[j] = f.stretch[j] = 0.0
         while True:
             _step(c, f, tables, left, f.tangents)
             _look(c, f, tables, f.tangents)
+            if longest == h and (f.before_touching == 0.0) != (f.touching == 0.0):
+                longest = h / LANDING
+                left = _next_part(f, (n + 1) * h, longest)
+                continue
             if not abs(f.end[X]) + abs(f.end[Y]) + abs(f.end[V_X]) + abs(f.end[V_Y]) < BOUND:
                 return _NOT_FINITE
             which, part = _first_crossing(c, f, tables, left)
-            if which < 0.0:
+            if which < 0.0 and (n + 1) * h - f.since - left < _ROUNDED * h:
                 break
+            if which < 0.0:
+                _note(f, left)
+                _advance(f)
+                f.since += left
+                left = _next_part(f, (n + 1) * h, longest)
+                continue
             if f.events == MOST_EVENTS:
                 return _TOO_MANY_EVENTS
             f.which, part = int(which), part * left
@@ -652,9 +674,7 @@ def fly(address: int, h: float, steps: int) -> int:
             f.times[f.events] = f.since
             f.events += 1
             f.word[f.events] = f.phase
-            left = max((n + 1) * h - f.since, 0.0)
-            for j in range(_COLUMNS):
-                f.stretch[j] = -f.late[j]
+            left = _next_part(f, (n + 1) * h, longest)
         _note(f, left)
         _advance(f)
         if n & _SIGNALS == _SIGNALS and stopped(f.signals):
