@@ -1,7 +1,6 @@
 """Both thresholds of friction, as `stability` and `advise` name them: against branches, and against runs."""
 
 import math
-from itertools import islice
 from typing import Any
 
 import pytest
@@ -16,7 +15,7 @@ from brakecli.case.system import system_of
 from brakecli.runs.branch import branch, line_of
 from brakecli.sweeps.point import PointRun, next_start, simulate
 from tests.analysis.shoes import Tables
-from tests.branches.smooth_shoes import changed, drawn
+from tests.branches.smooth_shoes import changed, first
 from tests.campaign import campaign
 from tests.examples import make
 
@@ -30,7 +29,7 @@ SUPERCRITICAL = 0  # of the same shoes
 
 
 def shoe(number: int) -> Tables:
-    return next(islice(drawn(SEED), number, None))[0]
+    return first(SEED, 78)[number]
 
 
 def found_of(tables: Tables) -> Thresholds:
