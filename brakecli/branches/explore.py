@@ -100,9 +100,9 @@ Tell = Callable[[str, int, int], None]
 class Explorer:
     """Follows one branch after another, within a budget of time, until it is stopped."""
 
-    def __init__(self, line: Line, tell: Tell, stop: Stop, seconds: float = SECONDS) -> None:
+    def __init__(self, line: Line, tell: Tell, stop: Stop, seconds: float = SECONDS, points: int = POINTS) -> None:
         """`tell` shows how many points there are; `stop` ends the work, and keeps what was found."""
-        self.line, self.tell, self.stop = line, tell, stop
+        self.line, self.tell, self.stop, self.points = line, tell, stop, points
         self.end, self.count = perf_counter() + seconds, 0
         self.branches: list[Followed] = []
         self.notes: list[str] = []
@@ -148,7 +148,7 @@ class Explorer:
         return Followed(SLIDING, rows, sorted(marks, key=lambda mark: mark.value))
 
     def _settings(self) -> Settings:
-        return Settings(longest=LONGEST, points=POINTS, seconds=max(self.end - perf_counter(), 0.0))
+        return Settings(longest=LONGEST, points=self.points, seconds=max(self.end - perf_counter(), 0.0))
 
     def _until(self, first: Point) -> Callable[[Point], str | None]:
         """Ends a branch that has come back to steady sliding, or grown beyond all bounds."""

@@ -19,6 +19,10 @@ through to there (`make bench-branch`)."""
 BEYOND = 1.05
 """The same, in the friction of the case, where that lies higher and sliding is stable there again."""
 
+POINTS = 500
+"""Motions of a branch. Nine branches of ten need fewer; a thousand may take most of a minute if cycles are long.
+It is a count and not a time, so that the same case gives the same answer."""
+
 
 @dataclass(frozen=True)
 class Thresholds:
@@ -65,7 +69,7 @@ def thresholds(
     own, highest = report.friction, UP_TO * lost.friction
     if report.stable:
         highest = max(highest, BEYOND * own)
-    explored = Explorer(Line(case, [FRICTION], 0.0, highest), tell, lambda: False).explore()
+    explored = Explorer(Line(case, [FRICTION], 0.0, highest), tell, lambda: False, points=POINTS).explore()
     answers = Answers(explored, own if own <= highest else None)
     return Thresholds(
         lost.friction, lost.instability, answers.coexists_from, answers.barrier, _beside(answers, lost.friction)
@@ -79,7 +83,11 @@ def _told(found: Thresholds, why: str) -> Thresholds:
 def _beside(answers: Answers, critical: float) -> str:
     """What vibrates beside stable sliding."""
     line, coexisting = answers.line, answers.coexisting
-    cut = [f"the branch is cut at {mark.value:.4g}: {mark.reason}" for mark in answers.cut[:1]]
+    further = {"budget": "; `brakecli branch` follows it further"}
+    cut = [
+        f"the branch is cut at {mark.value:.4g}: {mark.reason}{further.get(mark.kind, '')}"
+        for mark in answers.cut[:1]
+    ]
     cut += answers.explored.notes[:1]
     if not coexisting:
         if cut:

@@ -200,7 +200,9 @@ SWEEP = (
     Field("seconds", "s", "time of the command", in_file=False),
     Field("points_per_second", "1/s", "points computed, over the time of the command", in_file=False),
     ratio("overhead", "part of the workers' time that they did not spend on points", in_file=False),
-    Field("findings", "", "sentences on hysteresis, short runs and wide error bars", OBJECT, at="findings.sentences"),
+    Field(
+        "findings", "", "sentences on hysteresis, short runs and wide error bars", OBJECT, at="findings.sentences"
+    ),
     Field("warnings", "", "what a careful user should know", OBJECT, at="notes", in_file=False),
 )
 

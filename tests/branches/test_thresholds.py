@@ -145,9 +145,7 @@ def test_where_no_branch_is_followed_the_sentence_says_why(more: Tables, words: 
 
 @pytest.mark.parametrize(("points", "words"), [(60, "at least; it may begin lower"), (4, "is not known")])
 def test_a_branch_that_is_cut_is_said_to_be(points: int, words: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    from brakecli.branches import explore
-
-    monkeypatch.setattr(explore, "POINTS", points)
+    monkeypatch.setattr(module, "POINTS", points)
     found = found_of(shoe(SUBCRITICAL[0]))
     assert words in str(found.sentence)
     assert "the branch is cut at " in str(found.sentence)
@@ -159,9 +157,9 @@ def test_the_range_reaches_to_twice_the_critical_friction_and_to_the_case_where_
     highest = list[float]()
 
     class Noting(Explorer):
-        def __init__(self, line: Line, *others: Any) -> None:
+        def __init__(self, line: Line, *others: Any, **more: Any) -> None:
             highest.append(line.high)
-            super().__init__(line, *others)
+            super().__init__(line, *others, **more)
 
     monkeypatch.setattr(module, "Explorer", Noting)
     tables = shoe(SUBCRITICAL[0])
