@@ -99,7 +99,7 @@ def stability(
     *,
     vary: "Mapping[str | tuple[str, ...], Iterable[float]] | None" = None,
 ) -> "xr.Dataset":
-    """Critical friction, modes and growth of steady sliding, without time steps.
+    """Critical friction, modes and growth of steady sliding, and from which friction on a vibration can exist.
 
     Args:
         case: path of a case file or of a result, or what `load` gave.
@@ -109,7 +109,7 @@ def stability(
 
     Returns:
         A variable for each number that `brakecli stability --json` prints, NaN or an empty text if there is none;
-        lists as attributes, and objects, as JSON. With `vary` the lock-in diagram.
+        lists as attributes, and objects, as JSON. With `vary` the lock-in diagram, and no limit cycles.
 
     Raises:
         CaseError, UsageError, RefusedError: as `brakecli stability`.
@@ -118,15 +118,20 @@ def stability(
         loaded = _case(case, settings)
         from brakecli.files.as_xarray import dataset, opened
         from brakecli.files.field import values_of
-        from brakecli.files.fields import STABILITY
+        from brakecli.files.fields import STABILITY, THRESHOLDS
 
         if vary is None:
             from brakecli.analysis.stability.report import stability
+            from brakecli.branches.thresholds import thresholds
             from brakecli.case.system import system_of
             from brakecli.runs.limits import within_range
 
             with within_range():
-                return dataset(STABILITY, values_of(STABILITY, stability(system_of(loaded.case))))
+                system = system_of(loaded.case)
+                report = stability(system)
+                both = thresholds(loaded.case, system, report)
+            numbers = values_of(STABILITY, report) | values_of(THRESHOLDS, both)
+            return dataset((*STABILITY, *THRESHOLDS), numbers)
         from brakecli.sweeps.lock_in import lock_in, write
 
         with _target(None) as path:

@@ -237,7 +237,7 @@ class Answers:
         parts = [self._self_excited(), *self._beside_sliding()]
         if self.barrier is not None and self.coexisting:
             parts.append(
-                f"at the case's {self.own:.4g} an unstable cycle of {_metres(self.barrier)} lies between the two"
+                f"at the case's {self.own:.4g} an unstable cycle of {metres(self.barrier)} lies between the two"
             )
         parts += [f"the branch is cut at {mark.value:.6g}: {mark.reason}" for mark in self.cut[:2]]
         return "; ".join([*parts, *self.explored.notes])
@@ -296,7 +296,8 @@ def _united(parts: list[Part]) -> list[Part]:
     return found
 
 
-def _metres(length: float) -> str:
+def metres(length: float) -> str:
+    """A length with a unit that fits."""
     for exponent, unit in ((0, "m"), (-3, "mm"), (-6, "µm"), (-9, "nm")):
         if length >= 10.0**exponent:
             return f"{length * 10.0**-exponent:.3g} {unit}"

@@ -8,7 +8,7 @@ from brakecli.branches.point import Point, Special
 from brakecli.branches.signs import special_points
 
 FINER = 1.5
-"""Times as many steps, and then as many cells, with which an end is located once more: errors of both may cancel."""
+"""Times as many steps, and then as many cells, with which an end is located again: errors of both may cancel."""
 LEFT_OPEN = 4.0
 """Times by which the error may exceed the change with finer steps. An error of second order is 1.8 times that
 change, but kinks of the contact force let it fall unevenly: as patches open, and where a whole pad lands."""

@@ -26,24 +26,27 @@ def command(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Critical friction, modes and growth, without time steps."""
+    """Critical friction, modes and growth by eigenvalues, and from where on a shoe can vibrate."""
     axis = _parse_axis(vary) if vary is not None else None
     if output is not None and (axis is None or output.suffix.lower() not in (".h5", ".csv")):
         raise UsageError(f"{output}: holds what --vary finds; give --vary, and a name that ends in .h5 or .csv")
     loaded = load_case(case, overrides)
     target = result_path(output, case, ending=".csv") if output is not None else None
     from brakecli.analysis.stability.report import stability
+    from brakecli.branches.thresholds import thresholds
     from brakecli.case.system import system_of
     from brakecli.cli.stability_tables import stability_table
     from brakecli.files.field import values_of
-    from brakecli.files.fields import LOCK_IN, STABILITY
+    from brakecli.files.fields import LOCK_IN, STABILITY, THRESHOLDS
     from brakecli.runs.limits import sliding_text, within_range
 
     with progress(quiet) as show_progress, within_range():
         if (text := sliding_text(system := system_of(loaded.case))) and not quiet:
             say(text)
-        report, found = stability(system), None
-        if axis:
+        report, found, both = stability(system), None, None
+        if not axis:
+            both = thresholds(loaded.case, system, report, show_progress)
+        else:
             from brakecli.files.atomic import new_output
             from brakecli.sweeps.lock_in import lock_in, write
 
@@ -53,9 +56,11 @@ def command(
             if target:
                 write(target, loaded, found, force=force)
     numbers = values_of(STABILITY, report)
+    if both:
+        numbers |= values_of(THRESHOLDS, both)
     if found:
         numbers |= {"vary": found.entries, **values_of(LOCK_IN, found), "output": target and str(target)}
-    shown = loaded.case.title, report, found
+    shown = loaded.case.title, report, found, both
     show_result("stability", numbers, stability_table, *shown, as_json=as_json, quiet=quiet)
 
 

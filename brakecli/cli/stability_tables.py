@@ -12,14 +12,17 @@ if TYPE_CHECKING:
     from brakecli.analysis.stability.advice import Change
     from brakecli.analysis.stability.modes import Crossing
     from brakecli.analysis.stability.report import StabilityReport
+    from brakecli.branches.thresholds import Thresholds
     from brakecli.runs.advise import AdviceReport
     from brakecli.sweeps.lock_in import LockIn
 
 _STATE = {True: "stable", False: "unstable", None: "-"}
 
 
-def stability_table(title: str, report: StabilityReport, found: LockIn | None) -> str:
-    """Steady sliding, its modes and its critical friction; below that what there is along a key."""
+def stability_table(
+    title: str, report: StabilityReport, found: LockIn | None, both: Thresholds | None = None
+) -> str:
+    """Steady sliding, its modes and both thresholds of friction; below that what there is along a key."""
     rest, critical, discrete = report.equilibrium, report.critical, report.discrete
     undamped = {"flutter": report.undamped_flutter, "divergence": report.undamped_divergence}
     known = [f"{kind} at {friction:.7g}" for kind, friction in undamped.items() if friction is not None]
@@ -32,6 +35,7 @@ def stability_table(title: str, report: StabilityReport, found: LockIn | None) -
         ("steady sliding", sliding),
         ("contact stiffness K", text_of(report.contact_stiffness, "N/m")),
         ("critical friction", _crossing(critical) if critical else "none"),
+        *_coexisting(both),
         ("also changes at", [_crossing(each) for each in report.crossings if each is not critical]),
         ("without dashpots", ", ".join(known) or "neither flutter nor divergence"),
         (f"at φ = {report.friction:g}", _STATE[report.stable]),
@@ -49,7 +53,17 @@ def stability_table(title: str, report: StabilityReport, found: LockIn | None) -
             ("its critical friction", "none" if friction is None else f"{friction:.7g}{bias}"),
             ("its stable steps", "any" if limit is None else f"up to {limit:.4g} s" if limit else "none"),
         ]
+    if both and both.sentence:
+        rows.append(("in a sentence", both.sentence))
     return two_columns(title, rows) + (_lock_in(found) if found else "")
+
+
+def _coexisting(both: Thresholds | None) -> list[Row]:
+    """From where on a vibration can exist, and the push that it needs, where that is known."""
+    if both is None or both.coexists_from is None:
+        return []
+    barrier = [] if both.barrier is None else [("barrier", text_of(both.barrier, "m", ".4g"))]
+    return [("can vibrate from", f"{both.coexists_from:.7g}"), *barrier]
 
 
 def _lock_in(found: LockIn) -> str:
@@ -105,6 +119,7 @@ def advice_table(report: AdviceReport) -> str:
     }
     rows: list[Row] = [
         ("critical friction", _crossing(found.critical) if found.critical else "none"),
+        *_coexisting(report.thresholds),
         (f"at φ = {found.friction:g}", _STATE[report.stable]),
         ("margin", "-" if margin is None else f"{margin:.1%}; {report.wanted_margin:.1%} is wanted"),
     ]
@@ -114,5 +129,6 @@ def advice_table(report: AdviceReport) -> str:
         ends.append(("checked by a run", [ran, f"{check.verdict.regime}: {'; '.join(check.verdict.reasons)}"]))
     ends.append(("in a sentence", report.conclusion()))
     meant = "Critical friction for 1 % and for 1 unit of a value; growth rate (1/s) for 1 %:\n"
-    grids = [meant + grid(moves)] * bool(moving) + [grid(helps)] * bool(report.advice)
+    stays = "Advice moves the loss of stability alone; below it a vibration may still exist:\n"
+    grids = [meant + grid(moves)] * bool(moving) + [stays + grid(helps)] * bool(report.advice)
     return "\n\n".join((two_columns(report.title, rows), *grids, two_columns("", ends)))

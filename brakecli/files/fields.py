@@ -203,7 +203,9 @@ SWEEP = (
     Field("seconds", "s", "time of the command", in_file=False),
     Field("points_per_second", "1/s", "points computed, over the time of the command", in_file=False),
     ratio("overhead", "part of the workers' time that they did not spend on points", in_file=False),
-    Field("findings", "", "sentences on hysteresis and on wide error bars", OBJECT, at="findings.sentences"),
+    Field(
+        "findings", "", "sentences on hysteresis, short runs and wide error bars", OBJECT, at="findings.sentences"
+    ),
     Field("warnings", "", "what a careful user should know", OBJECT, at="notes", in_file=False),
 )
 
@@ -276,6 +278,15 @@ STABILITY = (
     Field("no_equilibrium", "", "why there is no steady sliding", TEXT),
     Field("discrete", "", "stability of the difference scheme at its step", OBJECT),
 )
+THRESHOLDS = (
+    ratio(
+        "coexists_from",
+        "least friction coefficient with a stable vibration beside stable sliding; null where none is known",
+    ),
+    Field("barrier", "m", "half of peak to peak of x of the unstable cycle at φ; null without one"),
+    Field("sentence", "", "both thresholds in words; null where stability is not lost", TEXT),
+)
+"""Of limit cycles along friction, beside linear stability."""
 VARIED = (
     *named(STABILITY, "critical_friction", "instability"),
     ratio(
@@ -373,6 +384,7 @@ CHECK_RUN = (
 ADVICE = (
     ratio("critical_friction", "least friction coefficient at which stability ends; 0 where there is none"),
     Field("instability", "", "how it is lost: flutter or divergence", TEXT, "stability.critical."),
+    *within("thresholds.", *named(THRESHOLDS, "coexists_from", "barrier")),
     ratio("friction_coefficient", "friction coefficient φ of the case", "stability.friction"),
     ratio("margin", "`critical_friction` over `friction_coefficient`, less 1"),
     ratio("wanted_margin", "the margin that is asked for"),

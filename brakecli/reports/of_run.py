@@ -113,6 +113,11 @@ def _stability(advice: AdviceReport) -> Iterator[Any]:
     for each in report.crossings:
         change, how = "lost" if each.lost else "regained", f"by {each.instability}, {shown(each.frequency, 'Hz')}"
         rows.append((f"stability {change}", f"at φ = {each.friction:.6g}", how))
+    if (least := advice.thresholds.coexists_from) is not None:
+        rows.append(("a vibration can exist", f"from φ = {least:.6g} on", "beside stable sliding"))
+    if (barrier := advice.thresholds.barrier) is not None:
+        what = "half of peak to peak of x of the unstable cycle"
+        rows.append((f"barrier at φ = {report.friction:g}", shown(float(f"{barrier:.4g}"), "m"), what))
     for mode in report.modes:
         growth = f"{'grows' if mode.growth > 0.0 else 'decays'} at {abs(mode.growth):.4g} 1/s"
         ratio = style.readable(float(f"{mode.damping_ratio:.3g}"))

@@ -12,6 +12,7 @@ from brakecli.analysis.stability import advice as of_case
 from brakecli.analysis.stability.advice import Change, Sensitivity
 from brakecli.analysis.stability.modes import is_undamped
 from brakecli.analysis.stability.report import LARGEST_FRICTION, StabilityReport, stability
+from brakecli.branches.thresholds import Thresholds, thresholds
 from brakecli.case.case import Case
 from brakecli.case.read import LoadedCase, key_path
 from brakecli.case.system import system_of
@@ -51,6 +52,7 @@ class AdviceReport:
     sensitivities: list[Sensitivity]
     advice: list[Change]
     check: CheckRun | None
+    thresholds: Thresholds
     left_out: str = ""  # what was not asked, as it takes too long
 
     @property
@@ -106,6 +108,8 @@ class AdviceReport:
                 changes = (("lost" if each.lost else "regained", each.friction) for each in report.crossings)
                 turns = ", ".join(f"{change} at {friction:.3g}" for change, friction in changes)
                 yield f"the case lies above a range of instability, as stability is {turns}"
+            if self.thresholds.beside:
+                yield self.thresholds.beside
         elif report.equilibrium is not None and report.contact_stiffness > 0.0:
             searched = "" if self.system.smooth else f", up to {LARGEST_FRICTION:g}"
             yield f"stable: no friction makes it unstable{searched}"
@@ -170,7 +174,8 @@ def advise(
                 advice.append(of_case.advised(case, path, margin, partial(progress, "keys", done, len(keys))))
     sensitivities.sort(key=lambda each: -abs(each.elasticity or 0.0))
     advice, check = _ranked(case, advice, progress)
-    return AdviceReport(case.title, system, report, critical, margin, sensitivities, advice, check, left_out)
+    both = thresholds(case, system, report, progress)
+    return AdviceReport(case.title, system, report, critical, margin, sensitivities, advice, check, both, left_out)
 
 
 def _ranked(case: Case, advice: list[Change], progress: Counted) -> tuple[list[Change], CheckRun | None]:

@@ -1,7 +1,7 @@
 """Growth of disturbances where the waves of a wheel have no common period: Lyapunov's exponent of a long motion.
 
-Such a motion never repeats, so that no branch can be followed. The exponent is measured at single values, and it is
-known within an error bar only. In full contact the motion is linear, and theory gives the growth.
+Such a motion never repeats, so that no branch can be followed. The exponent is measured at single values, within an
+error bar. In full contact the motion is linear, and theory gives the growth.
 """
 
 import math
@@ -57,8 +57,8 @@ def exponent_length(system: System) -> float:
 def exponent(system: System, rest: SteadySliding) -> Exponent | None:
     """Lyapunov's exponent of the motion from steady sliding, by means over batches of a long run.
 
-    A motion that leaves what roughness forces on it is on its way to another one, whose exponent says nothing: that
-    part is left out. None where too little is left.
+    A motion that leaves what roughness forces on it is on its way to another one, whose exponent says nothing:
+    that part is left out. None where too little is left.
     """
     flow, span = RoughFlow(system, default_cells(system)), length(system)
     steps = default_steps(system, span)

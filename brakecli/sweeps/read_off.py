@@ -18,6 +18,7 @@ from brakecli.branches.answers import Answers
 from brakecli.branches.explore import Explorer, crossing
 from brakecli.branches.line import Line
 from brakecli.branches.problem import Array
+from brakecli.branches.thresholds import POINTS as SMOOTH_POINTS
 from brakecli.case.case import Case
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.schedules import schedule
@@ -26,7 +27,7 @@ from brakecli.sweeps.tables import Critical
 from brakecli.sweeps.windows import Edge, Piece, Search, joined
 
 POINTS = 1500
-"""Budget of points of all branches. A time would make results depend on the machine."""
+"""Budget of points of all branches on a rough wheel. A time would make results depend on the machine."""
 VALUES = 33
 """Values at which a shoe without dashpots is looked at."""
 SLOPE = 1e-3
@@ -39,7 +40,8 @@ any nothing decays, and passing waves let almost every motion grow a little, ove
 def explored(critical: Critical, case: Case) -> Explorer:
     """The branches of a case along the parameter, at the speed and load of its start."""
     line = Line(case, [critical.parameter], critical.lower, critical.upper, adapted=_adapted)
-    explorer = Explorer(line, lambda *_: None, lambda: False, math.inf, POINTS)
+    points = POINTS if case.roughness.wheel is not None else SMOOTH_POINTS
+    explorer = Explorer(line, lambda *_: None, lambda: False, math.inf, points)
     explorer.explore()
     return explorer
 
@@ -80,7 +82,7 @@ def in_full_contact(system: System) -> Linear | None:
 def without_dashpots(critical: Critical, answers: Answers) -> Search:
     """The windows where nothing damps: by eigenvalues where the motion surely keeps in full contact.
 
-    Without dashpots no branch leads through a resonance, and a large motion beside may hide what full contact does.
+    No branch leads through a resonance then, and a large motion beside may hide what full contact does.
     """
     known, line = pieces(answers), answers.line
 
@@ -110,7 +112,7 @@ def calm(answers: Answers, value: float) -> list[Array]:
 
 
 def pieces(answers: Answers) -> list[Piece]:
-    """The range in parts: stable, unstable, or not known. Where nothing slides steadily stability has been lost."""
+    """The range in parts: stable, unstable, or not known. Where nothing slides steadily it counts as unstable."""
     found, last = list[tuple[float, float, bool | None]](), 0.0
     slides = [slide.p for slide in answers.explored.slides if not math.isnan(slide.tests[0])]
     ends = (slides[0], slides[-1]) if slides else (1.0, 0.0)

@@ -22,6 +22,7 @@ from brakecli.sweeps.journal import Journal
 from brakecli.sweeps.plan import LoadedSweep, Plan, label
 from brakecli.sweeps.point import Status
 from brakecli.sweeps.read_off import LIGHT
+from brakecli.sweeps.short_runs import on_short_runs
 from brakecli.sweeps.tables import Axis
 
 MOST_FAILURES = 100
@@ -58,6 +59,7 @@ class Findings:
         self.sentences: list[str] = []
         if plan.passes == 2:
             self.hysteresis, self.sentences = _hysteresis(journal)
+        self.sentences += on_short_runs(journal)
         if plan.sweep.critical is not None:
             values = journal.column("critical")
             known = values[~np.isnan(values)]

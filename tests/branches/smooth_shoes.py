@@ -2,6 +2,8 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -28,6 +30,12 @@ def drawn(seed: int) -> Iterator[tuple[Tables, float]]:
         critical = shoe.critical
         if critical and shoe.belt != 0.0 and shoe.b.any():
             yield tables, critical
+
+
+@cache
+def first(seed: int, number: int) -> tuple[Tables, ...]:
+    """The first of these shoes; they take a seventh of a second each."""
+    return tuple(tables for tables, _ in islice(drawn(seed), number))
 
 
 def changed(tables: Tables, key: str, value: float) -> Tables:

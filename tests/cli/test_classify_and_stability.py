@@ -227,3 +227,44 @@ def test_a_force_of_the_contact_is_not_taken_for_that_of_the_spring_without_a_wo
     )
     said = ["a force of the contact jumps where slip ends" in each.err for each in done]
     assert said == [True, True, True, False, False]
+
+
+def test_stability_and_advise_name_both_thresholds_as_branch_does(here: Path) -> None:
+    brakecli("new", "branch", cwd=here).told(0)
+    along = ["--parameter", "friction.coefficient=0:1"]
+    table, stable, advised, branch = each(
+        here,
+        [
+            ["stability", "branch.toml"],
+            ["stability", "branch.toml", "--json"],
+            ["advise", "branch.toml", "--json"],
+            ["branch", "branch.toml", *along, "--json"],
+        ],
+    )
+    for found in (stable.json, advised.json):
+        assert found["coexists_from"] == pytest.approx(branch.json["coexists_from"], rel=1e-8)
+        assert found["barrier"] == pytest.approx(branch.json["barrier"], rel=1e-6)
+    words = "a vibration can exist from 0.1688 on, at the case's 0.4 after a push beyond 1.4 µm"
+    assert stable.json["sentence"] == f"sliding loses stability at 0.4877; {words}"
+    assert words in advised.json["conclusion"]
+    assert words in " ".join(table.out.split())
+
+
+def test_where_no_vibration_exists_below_both_names_are_null(here: Path) -> None:
+    standing = ["--set", "wheel.angular_speed=0"]
+    stable, stands, advised, varied = each(
+        here,
+        [
+            ["stability", RELAXATION, "--json"],
+            ["stability", RELAXATION, *standing, "--json"],
+            ["advise", RELAXATION, "--set", "solver.duration=0.1", "--json"],
+            ["stability", RELAXATION, "--vary", "link2.angle_deg=1:5:2", "--json"],
+        ],
+    )
+    for found in (stable.json, stands.json, advised.json):
+        assert (found["coexists_from"], found["barrier"]) == (None, None)
+    below = "the vibration that begins there does not exist below it"
+    assert stable.json["sentence"] == f"sliding loses stability at 0.5754; {below}"
+    assert stands.json["sentence"] is None
+    assert below in advised.json["conclusion"]
+    assert not {"coexists_from", "barrier", "sentence"} & varied.json.keys()
