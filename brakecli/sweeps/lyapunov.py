@@ -1,6 +1,6 @@
 """Growth of disturbances where the waves of a wheel have no common period: Lyapunov's exponent of a long motion.
 
-Such a motion never repeats, so that no branch can be followed. The exponent is measured at single values, within an
+Such a motion never repeats, so that no branch can be followed. The exponent is measured at single values, with an
 error bar. In full contact the motion is linear, and theory gives the growth.
 """
 
@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from brakecli.analysis.stability.search import bisect
+from brakecli.solver.compile import Floats
 from brakecli.solver.flow.rough import RoughFlow, Status, default_cells, default_steps
 from brakecli.solver.period import LONGEST
 from brakecli.solver.steady_sliding import SteadySliding
@@ -54,18 +55,19 @@ def exponent_length(system: System) -> float:
     return (TRANSIENT + BATCHES * BATCH) * length(system)
 
 
-def exponent(system: System, rest: SteadySliding) -> Exponent | None:
+def exponent(system: System, rest: SteadySliding, linear: bool = False) -> Exponent | None:
     """Lyapunov's exponent of the motion from steady sliding, by means over batches of a long run.
 
     A motion that leaves what roughness forces on it is on its way to another one, whose exponent says nothing:
-    that part is left out. None where too little is left.
+    that part is left out. None where too little is left. The maps of a `linear` motion hardly change: there the
+    eigenvalues of their product count, which do not swing as lengths of disturbances do.
     """
     flow, span = RoughFlow(system, default_cells(system)), length(system)
     steps = default_steps(system, span)
     begin = np.array([rest.x, rest.y, 0.0, 0.0])
     fast = 2.0 * math.pi * system.natural_frequencies[1]
     scales = np.array([1.0, 1.0, fast, fast])
-    state, frame, logs, away = begin, np.eye(4), list[float](), list[float]()
+    state, frame, logs, away, maps = begin, np.eye(4), list[float](), list[float](), list[Floats]()
     for k in range(TRANSIENT + BATCHES * BATCH):
         run = flow(state, k * span, span, steps, True)
         if run.status is not Status.DONE or run.derivative is None:
@@ -74,13 +76,24 @@ def exponent(system: System, rest: SteadySliding) -> Exponent | None:
         away.append(float(np.abs((state - begin) * scales).max()))
         if k >= TRANSIENT and away[-1] > DEPARTED * max(away[: TRANSIENT // 2]):
             break
-        frame, triangle = np.linalg.qr(run.derivative * (scales[:, None] / scales) @ frame)
+        maps.append(run.derivative * (scales[:, None] / scales))
+        frame, triangle = np.linalg.qr(maps[-1] @ frame)
         logs.append(math.log(max(abs(float(triangle[0, 0])), 1e-300)))
     batches = (len(logs) - TRANSIENT) // BATCH
     if batches < FEWEST:
         return None
+    if linear:
+        half = len(maps) // 2
+        one, other = (_growth(part) / (len(part) * span) for part in (maps[:half], maps[half:]))
+        return Exponent(0.5 * (one + other), 0.5 * abs(one - other))
     means = np.reshape(logs[TRANSIENT : TRANSIENT + batches * BATCH], (batches, BATCH)).mean(axis=1) / span
     return Exponent(float(means.mean()), CERTAIN * float(means.std(ddof=1)) / math.sqrt(batches))
+
+
+def _growth(maps: list[Floats]) -> float:
+    """ln of the largest eigenvalue of the product of all maps, the last one on the left."""
+    product = maps[0] if len(maps) == 1 else np.linalg.multi_dot(maps[::-1])
+    return math.log(max(float(np.abs(np.linalg.eigvals(product)).max()), 1e-300))
 
 
 def by_exponents(critical: Critical, steady_at: Steady) -> Search:
@@ -93,7 +106,7 @@ def by_exponents(critical: Critical, steady_at: Steady) -> Search:
             return True
         theory = in_full_contact(found[0])
         known = Exponent(theory.mode.growth, theory.known_to) if theory else None
-        measured = known if known and known.unstable is not None else exponent(*found)
+        measured = known if known and known.unstable is not None else exponent(*found, linear=known is not None)
         return measured.unstable if measured else None
 
     def edge(low: float, high: float) -> Edge:

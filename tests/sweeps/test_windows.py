@@ -314,7 +314,8 @@ def followed(name: str, key: str, ends: tuple[float, float]) -> Search:
 @pytest.mark.parametrize(
     ("name", "key", "ends", "truth", "least"),
     [
-        ("unstable beside", "friction__coefficient", (0.0, 7.5), 4.86, 2.7),
+        # at 4.95 another integrator finds it stable still, with a largest multiplier of exp(-4.06 1/s)
+        ("unstable beside", "friction__coefficient", (0.0, 7.5), 4.954, 2.7),
         ("resonance", "friction__coefficient", (0.0, 2.5), 2.326, 1.6),
         pytest.param("over a gap", "friction__coefficient", (0.0, 2.4), 1.8876, 1.7, marks=campaign),
         pytest.param("both sides", "shoe__mass", (1.491, 9.317), 3.691, 3.6, marks=campaign),

@@ -620,7 +620,7 @@ def _next_part(f: Any, end: float, longest: float) -> float:
     last = left <= 1.5 * longest
     for j in range(_COLUMNS):
         f.stretch[j] = -f.late[j] if last else 0.0
-    return left if last else longest  # type: ignore[no-any-return]
+    return left if last else longest
 
 
 _PARTS = types.NamedTuple([COEFFICIENTS, ROUGH_TYPE, vector], Parts)
