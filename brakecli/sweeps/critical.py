@@ -73,15 +73,20 @@ def search(
         return any(low <= value <= high for low, high in found.windows) if known else None
 
     lasting = sustained(explorer.line, critical.tolerance, found, unstable, partial(calm, answers), verdict_of)
-    if lasting.at is not None and unstable(lasting.at) is not True:
+    words = [answers.sentence]
+    if lasting.value is not None:
+        words.append(f"from its own start it vibrates from {lasting.value:.4g} on")
+    coexists = [answers.coexists_from]
+    if lasting.at is not None and unstable(lasting.at) is False:
         explorer.begin_at(explorer.line.place(lasting.at), lasting.state)
         answers = Answers(explorer.explored, own)
+        coexists += [answers.coexists_from, lasting.at]  # it need not be periodic
     return found._replace(
         sustained=lasting.value,
         sustained_outcome=lasting.outcome,
-        coexists_from=answers.coexists_from,
+        coexists_from=min((each for each in coexists if each is not None), default=None),
         barrier=answers.barrier,
-        sentence=answers.sentence,
+        sentence="; ".join(words),
     )
 
 

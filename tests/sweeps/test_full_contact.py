@@ -60,7 +60,7 @@ def test_growth_so_fast_that_a_run_leaves_full_contact_shows_no_gap_of_stability
 
 
 def test_growth_by_theory_is_known_where_the_wheel_has_many_waves() -> None:
-    """Of thirty waves theory takes up four: near zero, where others might change the sign, a long motion decides."""
+    """Of thirty waves theory takes up four: near zero, where others might count, a long motion decides."""
     wheel = {"amplitudes": [7.67e-6 / 30] * 30, "wavelengths": np.linspace(0.03, 0.09, 30).round(5).tolist()}
     answer = found({**FAST, "roughness": {"wheel": wheel}, "solver": {"duration": 0.2, "step": 2.6e-5}}, 1.9, 1e-3)
     one = found(FAST, 1.9, 1e-3)

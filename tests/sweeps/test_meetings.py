@@ -97,9 +97,8 @@ def test_windows_that_multipliers_open_where_they_meet_are_found(
 
 
 def test_a_value_is_stable_where_one_sheet_of_the_branch_is_and_all_ends_are_listed() -> None:
-    """From 1.71369 to 1.74247 the small motion is unstable, by another integrator. There one of twice its
-    amplitude is stable: at 1.73 its largest multiplier is 0.99452 by that integrator, that of the small one 1.00356
-    and it ends in a fold at 1.76694.
+    """By another integrator the small motion is unstable from 1.71369 to 1.74247, and it ends at 1.76694. One of
+    twice its amplitude is stable there. At 1.73 the largest multipliers are 0.99452 for it and 1.00356.
     """
     line = Line(make(REGAINED), ["friction.coefficient"], 0.0, 7.1)
     found = Answers(Explorer(line, lambda *_: None, lambda: False).explore(), None)
