@@ -42,7 +42,7 @@ _CLOSED = 1e-11  # of the size of a cycle, by which an orbit may fail to close
 _FOLLOWS = 0.25  # part by which a return to the orbit may differ from what the multipliers say
 _BANDS = (0.25, 0.35)  # of the standard deviation of v_x: a whole run counts the rises through one of 0.3
 MOST_TURNS = 6  # falls in a cycle
-_PRIME = 1_000_003
+_MANY = 1000  # more often no phase is entered in a cycle
 
 ORBIT = record(
     "duration",  # of the run, s
@@ -58,7 +58,7 @@ ORBIT = record(
     events=int,  # since the last fall
     falls=int,
     next_try=int,  # fall from which on an orbit is sought again
-    way=int,  # phases entered since the last fall
+    way=int,  # how often each phase was entered since the last fall, as one number
     sliding=int,  # phase of steady sliding
     kept=(float, 3),  # the point of return
     saved=(float, SIZE),  # motion to go on with
@@ -66,8 +66,7 @@ ORBIT = record(
     returns=(float, (MOST_TURNS + 1, 3)),  # the last points of the section, the latest first
     fell=(float, MOST_TURNS + 1),  # when, s
     lows=(float, MOST_TURNS),  # least x before each of them, m
-    ways=(int, MOST_TURNS),  # phases entered before each, as numbers that other ways hardly share
-    strange=int,  # ways of the cycle that the motion has not taken
+    ways=(int, MOST_TURNS),  # the same before each
     beaten=(int, 2),  # rises of v_x from below a band to above it in the cycle, for a narrow band and a wide one
     side=(int, 2),  # 1 where v_x was below the band last
     point=(float, 3),  # of the orbit
@@ -89,7 +88,7 @@ ORBIT_TYPE = numba.from_dtype(ORBIT)
 def note_event(path: Any, o: Any, phase: int) -> None:
     """Note the phase that the last step has ended in."""
     if path.which != NO_EVENT:
-        o.events, o.way = o.events + 1, (o.way * 5 + phase + 1) % _PRIME
+        o.events, o.way = o.events + 1, o.way + _MANY**phase
 
 
 @kernel(int64(COEFFICIENTS, FLOW_TYPE, PATH_TYPE, ORBIT_TYPE), inlined=False)
@@ -134,12 +133,17 @@ def _add_up(m: Any, path: Any, o: Any, part: float, band: float, falls: int) -> 
 
 @kernel(int64(COEFFICIENTS, FLOW_TYPE, PATH_TYPE, ORBIT_TYPE), inlined=False)
 def _around(c: Coefficients, m: Any, path: Any, o: Any) -> int:
-    """From `point` once round, for the numbers of the cycle; 0 where it does not close."""
+    """From `point` over a period, for the numbers of the cycle; 0 where it takes another way than the motion did.
+
+    Its falls are not counted: of a short rise and fall of ẋ within a step the motion may have seen nothing.
+    """
     m.z[X], m.z[Y], m.z[V_X], m.z[V_Y] = o.point[0], o.point[1], 0.0, o.point[2]
     place(c, m, path.h)
     look(m)
-    band, turns = math.sqrt(o.square / o.period), 0  # of the round before
-    o.period, o.mean_x, o.mean_y, o.square, o.events, o.way, o.strange = 0.0, 0.0, 0.0, 0.0, 0, 0, 0
+    band, way, passed, last = math.sqrt(o.square / o.period), 0, 0.0, False  # band: of the round before
+    for k in range(o.turns):
+        way += o.ways[k]
+    o.mean_x, o.mean_y, o.square, o.events, o.way = 0.0, 0.0, 0.0, 0, 0
     o.low, o.high, o.fastest = o.point[0], o.point[0], 0.0
     for k in range(2):
         o.beaten[k], o.side[k] = 0, 0
@@ -148,22 +152,18 @@ def _around(c: Coefficients, m: Any, path: Any, o: Any) -> int:
     for _ in range(MOST_STEPS):
         step(c, m, path, 1)
         falls, part = 1 if path.begin[V_X] > 0.0 >= m.z[V_X] else 0, path.part
-        turns += falls
-        last = falls == 1 and turns == o.turns
+        last = passed + part * path.h >= o.period * (1.0 - _CLOSED)
         if last:
-            part = zero_of_velocity(m, path, 1.0)
-        o.period, o.spent[path.old] = o.period + part * path.h, o.spent[path.old] + part * path.h
+            part = (o.period - passed) / path.h
+        passed, o.spent[path.old] = passed + part * path.h, o.spent[path.old] + part * path.h
         _add_up(m, path, o, part, band, falls)
-        if falls == 1:
-            o.strange += 1 if o.way != o.ways[o.turns - turns] else 0
-            o.way = 0
         if last:
             break
         note_event(path, o, m.phase)
         if o.events > MOST_EVENTS:
             return 0
     o.amplitude = 0.5 * (o.high - o.low)
-    return 1 if turns == o.turns and o.strange == 0 else 0
+    return 1 if last and o.way == way else 0
 
 
 @kernel(float64(ORBIT_TYPE, float64, float64, float64))
