@@ -178,7 +178,7 @@ class Answers:
         branch = followed.branch
         folds = [special for special in branch.specials if special.kind == "fold"] if branch else []
         if furthest in (part[0], part[-1]) or not folds:
-            return [Bound(furthest.p)]
+            return []
         fold = min(folds, key=lambda special: abs(special.s - furthest.s))
         return [Bound(furthest.p, abs(fold.p - furthest.p), furthest, followed.problem, fold)]
 
