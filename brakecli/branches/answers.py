@@ -6,9 +6,10 @@ from functools import cached_property
 from itertools import groupby
 from typing import NamedTuple
 
-from brakecli.branches.bar import Bound
+from brakecli.branches.bar import Bound, located
 from brakecli.branches.explore import FORCED, SLIDING, Explored, Followed, Mark, crossing, span
 from brakecli.branches.line import Line
+from brakecli.branches.newton import Newton, Settings
 from brakecli.branches.point import Point
 from brakecli.branches.sliding import Slide
 
@@ -175,16 +176,14 @@ class Answers:
     def _turns(self, followed: Followed, part: list[Point], way: int) -> list[Bound]:
         """The inner point of a stable part that lies furthest in p, where one does: folds that rounding makes."""
         furthest = min(part, key=lambda point: way * point.p)
-        branch = followed.branch
-        folds = [special for special in branch.specials if special.kind == "fold"] if branch else []
-        if furthest in (part[0], part[-1]) or not folds:
+        if furthest in (part[0], part[-1]):
             return []
-        fold = min(folds, key=lambda special: abs(special.s - furthest.s))
-        return [Bound(furthest.p, abs(fold.p - furthest.p), furthest, followed.problem, fold)]
+        near = part[part.index(furthest) - 1]
+        return [Bound(furthest.p, abs(near.p - furthest.p), furthest, None, followed.problem)]
 
     def _bound(self, followed: Followed, k: int, way: int) -> Bound:
         """Where the stable part ends whose last point that way is the one at k."""
-        branch = followed.branch
+        branch, problem = followed.branch, followed.problem
         assert branch is not None
         point = branch.points[k]
         if not 0 <= k + way < len(branch.points):
@@ -197,10 +196,14 @@ class Answers:
             if special.kind != "end" and 0.0 <= way * (special.s - point.s) <= way * (beyond.s - point.s)
         ]
         if not between:
-            half = 0.5 * abs(beyond.p - point.p)
-            return Bound(0.5 * (point.p + beyond.p), half, point, followed.problem)
+            p = 0.5 * (point.p + beyond.p)
+            if point.chart is beyond.chart:
+                problem.use(point.chart)
+                pair = (point, beyond) if way > 0 else (beyond, point)
+                p = located(Newton(problem, Settings()), *pair)
+            return Bound(p, 0.0, point, beyond, problem)
         special = min(between, key=lambda each: abs(each.s - point.s))
-        return Bound(special.p, special.error, point, followed.problem, special)
+        return Bound(special.p, special.error, point, beyond, problem)
 
     @property
     def coexists_from(self) -> float | None:

@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from time import perf_counter
 from typing import Any
 
@@ -189,7 +190,8 @@ class Explorer:
                     return IN_SLIDING
                 # on smooth pads slip alone is linear; a rough shoe slips in larger cycles, too
                 left[0] |= not slips or (amplitude > begun and not smooth)
-            return LARGE if amplitude > LARGEST * begun else None
+            grown = isinstance(point.facts, Cycle) and amplitude > LARGEST * begun  # waves may begin at nothing
+            return LARGE if grown else None
 
         return until
 
@@ -377,7 +379,9 @@ def crossing(followed: Followed, p: float) -> list[Point]:
     if followed.branch is None:
         return found
     newton = Newton(followed.problem, Settings())
-    for one, other in zip(followed.branch.points, followed.branch.points[1:], strict=False):
+    turns = [special.point for special in followed.branch.specials if special.kind == "fold"]
+    along = sorted([*followed.branch.points, *turns], key=lambda point: point.s)  # stable, where charts change
+    for one, other in pairwise(along):
         if one.chart is not other.chart or not (one.p - p) * (other.p - p) <= 0.0 or one.p == other.p:
             continue
         followed.problem.use(one.chart)

@@ -201,7 +201,8 @@ def _near_zeros(s: Array, tests: Array, everywhere: bool) -> list[tuple[int, flo
     """
     n = len(s)
     first, last = tests[:-1], tests[1:]
-    same = ((first >= 0.0) == (last >= 0.0)) & (np.maximum(np.abs(first), np.abs(last)) > NOTHING)
+    apart = np.diff(s) > 0.0  # a corner may leave two points at one place
+    same = apart[:, None] & ((first >= 0.0) == (last >= 0.0)) & (np.maximum(np.abs(first), np.abs(last)) > NOTHING)
     x = s[:-1, None] + np.diff(s)[:, None] * GRID  # (strides, places)
     size = min(n, 4)
     window = np.clip(np.arange(n - 1) - 1, 0, n - size)[:, None] + np.arange(size)
@@ -210,7 +211,7 @@ def _near_zeros(s: Array, tests: Array, everywhere: bool) -> list[tuple[int, flo
     levels = [values]
     for level in range(1, size):
         width = (nodes[:, level:] - nodes[:, :-level])[:, :, None]
-        levels.append(np.diff(levels[-1], axis=1) / width)
+        levels.append(np.diff(levels[-1], axis=1) / np.where(width == 0.0, 1.0, width))
     away = [x - nodes[:, j, None] for j in range(size)]
     model = np.repeat(values[:, 0, None, :], len(GRID), axis=1)
     weight = np.ones_like(x)

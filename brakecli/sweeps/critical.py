@@ -15,13 +15,13 @@ import numpy as np
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.stability.certain import EPSILON, Rounded, conditions, links_of
 from brakecli.analysis.stability.discrete import spectral_radius
+from brakecli.analysis.stability.modes import is_undamped
 from brakecli.analysis.stability.report import MARGIN, stability
 from brakecli.analysis.stability.search import bisect
 from brakecli.branches.answers import Answers
 from brakecli.case.case import Case
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError
-from brakecli.solver.period import common_period
 from brakecli.solver.steady_sliding import SteadySliding, steady_sliding
 from brakecli.solver.system import System
 from brakecli.sweeps.early import Known
@@ -61,9 +61,8 @@ def search(
     explorer, found, waves = explored(critical, case), exact, bool(system_of(case).wheel.g.size)
     answers = Answers(explorer.explored, own)
     if waves:
-        found = (
-            on_waves(critical, answers) if common_period(system_of(case)) else by_exponents(critical, steady_at)
-        )
+        repeats = explorer.waves is not None
+        found = on_waves(critical, answers) if repeats else by_exponents(critical, steady_at)
         found = found._replace(bias=exact.bias, eigenvalue=exact.eigenvalue)
 
     def unstable(value: float) -> bool | None:
@@ -73,7 +72,9 @@ def search(
         return any(low <= value <= high for low, high in found.windows) if known else None
 
     lasting = sustained(explorer.line, critical.tolerance, found, unstable, partial(calm, answers), verdict_of)
-    words = [answers.sentence]
+    undamped = is_undamped(system_of(case).coefficients)
+    told = not waves or not (explorer.waves is None or undamped or found.outcome is Outcome.UNDECIDED)
+    words = [answers.sentence] if told else []
     if lasting.value is not None:
         words.append(f"from its own start it vibrates from {lasting.value:.4g} on")
     coexists = [answers.coexists_from]

@@ -819,7 +819,8 @@ def _prepared(system: System, cells: int) -> tuple[Any, Floats]:
     table["omega_at"][:], table["g_at"][:] = wheel.omega, g
     angle = np.outer(wheel.omega, xi)
     table["waves_at"][:, 0], table["waves_at"][:, 1] = np.sin(angle), np.cos(angle)
-    table["full_at"][:] = system.contact_stiffness * np.sinc(wheel.omega * a / np.pi) * wheel.g / g
+    steeper = np.divide(wheel.g, g, out=np.ones_like(g), where=g != 0.0)
+    table["full_at"][:] = system.contact_stiffness * np.sinc(wheel.omega * a / np.pi) * steeper
     f["belt"], f["stiffness"] = system.belt_speed, system.contact_stiffness
     load, c = system.load_at_start, system.coefficients
     f["pull_x"], f["pull_y"] = load * c.sin_beta, load * c.cos_beta
