@@ -16,6 +16,7 @@ from brakecli.case.case import Case
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
 from brakecli.errors import BrakecliError
+from brakecli.solver.flow.smooth import DONE, SmoothFlow
 from brakecli.solver.motion import solve
 from brakecli.solver.quantities import ContactState
 from brakecli.solver.system import Initial, System
@@ -225,3 +226,16 @@ def test_an_orbit_that_is_given_up_leaves_no_error_to_a_motion_that_fades() -> N
     assert found.verdict.frequency is None
     assert found.certificate is not None
     assert found.certificate.estimated_error < 1e-4
+
+
+def test_a_short_rise_of_the_velocity_that_steps_do_not_show_is_no_end_of_a_cycle() -> None:
+    """The orbit has a rise and a fall of ẋ within a step. Its period is the time after which it closes."""
+    text = (ROOT / "brakecli" / "case" / "starters" / "branch.toml").read_text()
+    case = case_of(text, "friction.coefficient=0.6", "solver.duration=20.0")
+    system, found = known(case)
+    frequency = found.verdict.frequency
+    assert frequency is not None
+    assert frequency == pytest.approx(134.94026, abs=1e-5)
+    flow, (x, y, v_x, v_y) = SmoothFlow.of(system), found.motion.rows[0]
+    assert flow(np.array([x, y, v_x, v_y]), 1.0 / frequency) == DONE
+    np.testing.assert_allclose(flow.state, [x, y, v_x, v_y], atol=1e-9 * found.verdict.amplitude * 850.0)
