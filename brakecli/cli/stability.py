@@ -26,7 +26,7 @@ def command(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Critical friction, modes and growth by eigenvalues, and from where on a shoe can vibrate."""
+    """Critical friction, modes, least friction that vibrates."""
     axis = _parse_axis(vary) if vary is not None else None
     if output is not None and (axis is None or output.suffix.lower() not in (".h5", ".csv")):
         raise UsageError(f"{output}: holds what --vary finds; give --vary, and a name that ends in .h5 or .csv")
