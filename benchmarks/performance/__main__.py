@@ -63,8 +63,8 @@ REASONS = {
     "numbalsoda": _ON_ROUGH,
     "SciPy": "SciPy has a compiled right-hand side and its cheapest method at each error, LSODA on S.",
     "critical: a smooth point": (
-        "Critical values: following limit cycles, for what can coexist, takes nearly all of the time; by eigenvalues"
-        " a point takes 3 ms."
+        "Critical values: following limit cycles, for what can coexist, takes nearly all of the time; by"
+        " eigenvalues a point takes 3 ms."
     ),
     "heyoka.py: relaxation": (
         "relaxation.toml: 694 events and 4,400 steps take 0.55 ms, setting up and closing the account 0.1 to 0.2."
