@@ -174,6 +174,8 @@ def sweep_table(report: SweepReport) -> str:
         count, least, largest = found.critical
         span = f"{least:.6g} to {largest:.6g}, " if count else ""
         rows.append((f"critical {critical.parameter}", f"{span}found at {count} of {found.points} points"))
+        told = (found.variables or {})["critical_sentence"] if found.points == 1 else []
+        rows.append(("in a sentence", [str(each) for each in told if each]))
     speed = report.points_per_second
     cost = f": {speed:.3g} points/s, {report.overhead:.0%} of the workers' time not on points" if speed else ""
     rows += [
