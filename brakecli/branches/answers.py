@@ -10,7 +10,6 @@ from brakecli.branches.bar import Bound, located
 from brakecli.branches.explore import FORCED, SLIDING, Explored, Followed, Mark, crossing, span
 from brakecli.branches.line import Line
 from brakecli.branches.newton import Newton, Settings
-from brakecli.branches.point import Point
 from brakecli.branches.sliding import Slide
 
 NARROWEST = 1e-6
@@ -168,18 +167,25 @@ class Answers:
             part = [points[k] for k in places]
             slowest = min(part, key=lambda point: point.p)
             low, high = (
-                min([*ends, *self._turns(followed, part, way)], key=lambda bound: way * bound.p) for way in (1, -1)
+                min([*ends, *self._turns(followed, places, way)], key=lambda bound: way * bound.p)
+                for way in (1, -1)
             )
             found.append(Part(low, high, slowest.facts.frequency))
         return found
 
-    def _turns(self, followed: Followed, part: list[Point], way: int) -> list[Bound]:
-        """The inner point of a stable part that lies furthest in p, where one does: folds that rounding makes."""
-        furthest = min(part, key=lambda point: way * point.p)
-        if furthest in (part[0], part[-1]):
+    def _turns(self, followed: Followed, places: list[int], way: int) -> list[Bound]:
+        """The inner point of a stable part that lies furthest in p, where one does: folds that rounding makes.
+
+        Finer steps make other ones. What they move is seen at the nearest motion that is not stable.
+        """
+        points = followed.branch.points if followed.branch else []
+        furthest = min(places, key=lambda k: way * points[k].p)
+        if furthest in (places[0], places[-1]):
             return []
-        near = part[part.index(furthest) - 1]
-        return [Bound(furthest.p, abs(near.p - furthest.p), furthest, None, followed.problem)]
+        inner = points[furthest]
+        others = [k for k, point in enumerate(points) if not point.stable and point.chart is inner.chart]
+        beyond = points[min(others, key=lambda k: abs(k - furthest))] if others else None
+        return [Bound(inner.p, abs(points[furthest - 1].p - inner.p), inner, beyond, followed.problem)]
 
     def _bound(self, followed: Followed, k: int, way: int) -> Bound:
         """Where the stable part ends whose last point that way is the one at k."""

@@ -87,9 +87,7 @@ def on_smooth_pads(shoe: Shoe, state: Array) -> End:
             return FADES
         if outcome == FOUND and motion.multiplier < 1.0:
             return End(True, motion.start, float(motion.orbit.period))
-        motion.orbit.events = (
-            0  # many between two falls of the velocity are too many for a cycle, not for a motion
-        )
+        motion.orbit.events = 0  # many between two falls are too many for a cycle, not for a motion
     return UNKNOWN
 
 

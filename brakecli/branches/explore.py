@@ -27,7 +27,7 @@ SLIDING, LIMIT_CYCLE, FORCED = "steady sliding", "limit cycle", "forced motion"
 SMALLEST = 0.5
 """Amplitude over that at the begin below which a cycle of a rough shoe ends in steady sliding."""
 LARGEST = 1e4
-"""Amplitude over that at the begin of a branch beyond which it is not followed."""
+"""Amplitude of a cycle over that at the begin of its branch, beyond which it is not followed."""
 MOST = 12
 """Branches of one command."""
 LONGEST = 0.25

@@ -72,16 +72,18 @@ def search(
         return any(low <= value <= high for low, high in found.windows) if known else None
 
     lasting = sustained(explorer.line, critical.tolerance, found, unstable, partial(calm, answers), verdict_of)
+    coexists = [answers.coexists_from]
+    if lasting.at is not None and unstable(lasting.at) is False:
+        notes = [*explorer.notes]
+        explorer.begin_at(explorer.line.place(lasting.at), lasting.state)
+        explorer.notes = notes  # a user has given no motion
+        answers = Answers(explorer.explored, own)
+        coexists += [answers.coexists_from, lasting.at]  # it need not be periodic
     undamped = is_undamped(system_of(case).coefficients)
     told = not waves or not (explorer.waves is None or undamped or found.outcome is Outcome.UNDECIDED)
     words = [answers.sentence] if told else []
     if lasting.value is not None:
         words.append(f"from its own start it vibrates from {lasting.value:.4g} on")
-    coexists = [answers.coexists_from]
-    if lasting.at is not None and unstable(lasting.at) is False:
-        explorer.begin_at(explorer.line.place(lasting.at), lasting.state)
-        answers = Answers(explorer.explored, own)
-        coexists += [answers.coexists_from, lasting.at]  # it need not be periodic
     return found._replace(
         sustained=lasting.value,
         sustained_outcome=lasting.outcome,

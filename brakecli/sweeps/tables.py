@@ -90,9 +90,9 @@ class Critical(Table):
     parameter: str = described("key path of the case, such as friction.coefficient")
     lower: Number = described("where the search begins")
     upper: Number = described("where the search ends")
-    tolerance: Positive = described("largest width of the bracket at the end of the search", 1e-3)
+    tolerance: Positive = described("width of the bracket of the least value from the own start", 1e-3)
     method: Literal["simulation", "eigenvalue"] = described(
-        "by the growth of small disturbances in runs, or only by eigenvalues", "simulation"
+        "by branches and runs, or only by eigenvalues", "simulation"
     )
 
     def _broken_rules(self) -> Iterator[Problem]:
