@@ -12,6 +12,7 @@ from brakecli.branches.line import Shoe
 from brakecli.branches.newton import start
 from brakecli.branches.point import Point
 from brakecli.branches.problem import Array
+from brakecli.solver.flow.repeating import Orbit
 from brakecli.solver.flow.rough import RoughFlow, Status, default_steps
 from brakecli.solver.flow.seek import FOUND, LINEAR, Pursuit
 from brakecli.solver.flow.smooth import DONE
@@ -56,12 +57,12 @@ AT_REST = 1e-3
 class End(NamedTuple):
     """What a motion comes to: whether vibration `lasts`, None where that is not known.
 
-    `state`: x, y, v_x and v_y on the vibration, at t = 0 of the waves; `period` (s) where it is a limit cycle.
+    `state`: x, y, v_x and v_y on the vibration, at t = 0 of the waves; `orbit` where it is a limit cycle.
     """
 
     lasts: bool | None
     state: Array | None = None
-    period: float = math.nan
+    orbit: Orbit | None = None
 
 
 FADES, UNKNOWN = End(False), End(None)
@@ -86,8 +87,8 @@ def on_smooth_pads(shoe: Shoe, state: Array) -> End:
         if outcome == LINEAR:
             return FADES
         if outcome == FOUND and motion.multiplier < 1.0:
-            return End(True, motion.start, float(motion.orbit.period))
-        motion.orbit.events = 0  # many between two falls are too many for a cycle, not for a motion
+            return End(True, np.array(motion.orbit.state), motion.orbit)
+        motion.way.events = 0  # many between two falls are too many for a cycle, not for a motion
     return UNKNOWN
 
 
@@ -198,12 +199,15 @@ def settled(problem: Cycles, p: float, state: Array, frequency: float) -> Point 
     if not problem.line.smooth:
         return _returning(problem, p, state, frequency)
     end, flow = on_smooth_pads(problem.line.shoe(p), state), problem.flow(p)
-    if end.state is None or flow(end.state, end.period, False) != DONE:
+    if end.orbit is None:
+        return None
+    state, period = np.array(end.orbit.state), end.orbit.period
+    if flow(state, period, False) != DONE:
         return None
     sizes = 0.5 * (flow.path.high - flow.path.low)
-    omega = 2.0 * math.pi / end.period
+    omega = 2.0 * math.pi / period
     scales = float(sizes[:2].max()) * np.array([1.0, 1.0, omega, omega])
-    return _started(problem, p, end.state, end.period, scales, end.period, float(sizes[0]))
+    return _started(problem, p, state, period, scales, period, float(sizes[0]))
 
 
 def _started(

@@ -9,7 +9,7 @@ sizes of the motion, so that a branch is straight where the cycle moves along wi
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from brakecli.branches.point import Point
 from brakecli.branches.problem import Array, Guess, Problem, Seen
 from brakecli.errors import CaseError
 from brakecli.solver.automaton import BACKWARD, FORWARD, OPEN, STICK
+from brakecli.solver.flow.repeating import Orbit
 from brakecli.solver.flow.smooth import DONE, EVENTFUL, GRAZED, SmoothFlow
 from brakecli.solver.system import longest_step
 
@@ -35,24 +36,6 @@ SHIFT = 1e-6
 """Length along the branch by which a point is moved to carry its direction to another chart."""
 PERIODS = 1e-3, 400.0
 """Periods of a chart between which a period is sought."""
-
-
-class Cycle(NamedTuple):
-    """What a limit cycle shows (SI units)."""
-
-    period: float
-    amplitude: float  # half of peak to peak of x
-    stick_fraction: float
-    contact_loss_fraction: float
-    state: tuple[float, ...]  # x, y, v_x and v_y at its anchor
-    times: tuple[float, ...]  # of its events, from there
-    word: tuple[int, ...]  # phases, from there
-    lean: float  # cosine between the flow and the normal of the plane
-
-    @property
-    def frequency(self) -> float:
-        """Hz."""
-        return 1.0 / self.period
 
 
 class Flow(Protocol):
@@ -152,7 +135,7 @@ class Cycles(Problem):
         rest, path, scales = self.rest(p), flow.path, chart.scales
         matrix = flow.derivative * scales / scales[:, None]
         end = (flow.state - rest) / scales
-        speed, begin = path.velocity / scales, path.start / scales
+        speed = path.velocity / scales
         by_u, gap = np.zeros((5, 5)), np.empty(5)
         by_u[:4, :4], by_u[:4, 4], by_u[4, :4] = matrix, speed * chart.time, chart.normal
         by_u.ravel()[0:24:6] -= 1.0
@@ -163,15 +146,14 @@ class Cycles(Problem):
         moved = matrix @ chart.basis
         on_plane = moved - (speed / across)[:, None] * (chart.normal @ moved)
         word, spent, period = flow.word, path.spent, float(path.time)
-        facts = Cycle(
+        facts = Orbit(
             period,
             0.5 * float(path.high[0] - path.low[0]),
             float(spent[STICK]) / period,
             float(spent[OPEN]) / period,
             tuple((rest + u[:4] * scales).tolist()),
-            flow.times,
             word,
-            float(chart.normal @ begin) / math.sqrt(begin @ begin),
+            flow.times,
         )
         margins = self._margins(p, word, path.low, path.high)
         by_p = self._by_p(u, p, end, word) if with_parameter else None
@@ -209,29 +191,34 @@ class Cycles(Problem):
     def chart_at(self, u: Array, p: float, scales: Array, time: float, size: float) -> Chart | None:
         """A chart whose plane lies across the flow at a place; None where nothing moves there."""
         try:
-            flow = self.flow(p)
+            normal = self._along(u, p, scales, time)
         except CaseError:
             return None
+        if normal is None:
+            return None
+        basis = np.linalg.svd(normal[None])[2][1:].T
+        return Chart(u[:4].copy(), normal, scales, time, size, basis)
+
+    def _along(self, u: Array, p: float, scales: Array, time: float) -> Array | None:
+        """The direction of the flow at a place, of length one; None where nothing moves there."""
+        flow = self.flow(p)
         flow(self.rest(p) + u[:4] * scales, 1e-9 * time, False)
         speed = flow.path.start / scales
         length = math.sqrt(speed @ speed)
-        if not length > 0.0:
-            return None
-        normal = speed / length
-        basis = np.linalg.svd(normal[None])[2][1:].T
-        return Chart(u[:4].copy(), normal, scales, time, size, basis)
+        return speed / length if length > 0.0 else None
 
     def renewed(self, point: Point) -> Guess | None:
         """A chart of the present size, with its anchor far from events, where either has become necessary."""
         cycle, chart = point.facts, point.chart
-        assert isinstance(cycle, Cycle)
+        assert isinstance(cycle, Orbit)
         assert isinstance(chart, Chart)
         times = cycle.times or (cycle.period,)
         near = min(times[0], cycle.period - times[-1] if cycle.times else cycle.period) < NEAR * cycle.period
         grown = cycle.amplitude / chart.size
-        fits = 1.0 / GROWN < grown < GROWN and cycle.lean > LEANS and self._fits(float(point.u[4]))
-        if not near and fits:
-            return None
+        if not near and 1.0 / GROWN < grown < GROWN and self._fits(float(point.u[4])):
+            along = self._along(point.u, point.p, chart.scales, cycle.period)
+            if along is not None and chart.normal @ along > LEANS:
+                return None
         ahead = _longest_slip(cycle) if near else 0.0
         if ahead is None:
             return None
@@ -268,7 +255,7 @@ class Cycles(Problem):
         """A point in another chart: the place where its cycle passes that plane nearest to the chart's anchor."""
         assert isinstance(chart, Chart)
         cycle, flow, rest = point.facts, self.flow(point.p), self.rest(point.p)
-        assert isinstance(cycle, Cycle)
+        assert isinstance(cycle, Orbit)
         state, best = np.array(cycle.state), (math.inf, 0.0)
         for part in np.linspace(0.0, 1.0, 257)[:-1]:
             if flow(state, max(part, 1e-12) * cycle.period, False) != DONE:
@@ -312,7 +299,7 @@ class Cycles(Problem):
         return point.u, np.append(chart.basis @ vector, [0.0, 0.0])
 
 
-def _longest_slip(cycle: Cycle) -> float | None:
+def _longest_slip(cycle: Orbit) -> float | None:
     """The time (s) from the anchor to the middle of the longest phase in which the shoe does not stick."""
     times = [*cycle.times, cycle.period + (cycle.times[0] if cycle.times else 0.0)]
     spans = [(times[k + 1] - times[k], times[k]) for k in range(len(cycle.times)) if cycle.word[k + 1] != STICK]

@@ -12,12 +12,13 @@ import numpy as np
 
 from brakecli.analysis.stability.modes import is_undamped
 from brakecli.branches.begin import settled
-from brakecli.branches.cycles import Cycle, Cycles
+from brakecli.branches.cycles import Cycles
 from brakecli.branches.follow import Stop, both_ways, follow
 from brakecli.branches.forced import Forced
 from brakecli.branches.line import Line
 from brakecli.branches.newton import Newton, Settings
 from brakecli.branches.point import Branch, End, Point, Special
+from brakecli.branches.problem import Problem
 from brakecli.branches.rough_cycles import RoughCycles
 from brakecli.branches.sliding import Change, Slide, Sliding
 from brakecli.branches.switch import switch
@@ -176,22 +177,22 @@ class Explorer:
         left = max(self.end - perf_counter(), 0.0)
         return Settings(longest=LONGEST, points=min(POINTS, max(self.points - self.count, 0)), seconds=left)
 
-    def _until(self, first: Point) -> Callable[[Point], str | None]:
+    def _until(self, problem: Problem, first: Point) -> Callable[[Point], str | None]:
         """Ends a branch that has come back to steady sliding, or grown beyond all bounds."""
         begun, smooth, left = first.facts.amplitude, self.line.smooth, [False]
+        cycles = isinstance(problem, Cycles)
 
         def until(point: Point) -> str | None:
             self.count += 1
             self.tell("points of branches", self.count, 0)
             amplitude = point.facts.amplitude
-            if isinstance(point.facts, Cycle):
+            if cycles:
                 slips = len(set(point.facts.word)) == 1
                 if left[0] and slips and (smooth or amplitude < SMALLEST * begun):
                     return IN_SLIDING
                 # on smooth pads slip alone is linear; a rough shoe slips in larger cycles, too
                 left[0] |= not slips or (amplitude > begun and not smooth)
-            grown = isinstance(point.facts, Cycle) and amplitude > LARGEST * begun  # waves may begin at nothing
-            return LARGE if grown else None
+            return LARGE if cycles and amplitude > LARGEST * begun else None  # waves may begin at nothing
 
         return until
 
@@ -211,7 +212,7 @@ class Explorer:
             if first is None:
                 self.notes.append(f"no limit cycle was found at the flutter at {value:.6g}")
                 continue
-            branch = follow(problem, first, None, self._settings(), self._until(first), self.stop)
+            branch = follow(problem, first, None, self._settings(), self._until(problem, first), self.stop)
             self.branches.append(self._followed(branch, problem, change, changes))
 
     @cached_property
@@ -233,7 +234,7 @@ class Explorer:
                 continue
             first = problem.begun(p, replace(self._settings(), points=300))
             if first is not None:
-                branch = both_ways(problem, first, self._settings(), self._until(first), self.stop)
+                branch = both_ways(problem, first, self._settings(), self._until(problem, first), self.stop)
                 self.branches.append(self._followed(branch, problem, kind=FORCED))
         if len(self.branches) == 1:
             self.notes.append("no motion was found that the waves force")
@@ -247,7 +248,7 @@ class Explorer:
         elif self._known(p, found[1]):
             self.notes.append(f"the motion given for {value:.6g} comes to one of a branch that is known")
         else:
-            branch = both_ways(*found, self._settings(), self._until(found[1]), self.stop)
+            branch = both_ways(*found, self._settings(), self._until(*found), self.stop)
             note = f"from the motion given for {value:.6g}"
             self.branches.append(replace(self._followed(branch, found[0], kind=FORCED), note=note))
 
@@ -277,7 +278,7 @@ class Explorer:
         if self._known(p, first):
             self.notes.append(f"the motion given for {value:.6g} comes to a cycle of a branch from flutter")
             return
-        branch = both_ways(problem, first, self._settings(), self._until(first), self.stop)
+        branch = both_ways(problem, first, self._settings(), self._until(problem, first), self.stop)
         note = f"from the motion given for {value:.6g}"
         self.branches.append(replace(self._followed(branch, problem), note=note))
 
@@ -303,7 +304,7 @@ class Explorer:
                 if first is None:
                     self.notes.append(f"no motion of twice the period was found at the flip at {value:.6g}")
                     continue
-                branch = follow(problem, first, None, self._settings(), self._until(first), self.stop)
+                branch = follow(problem, first, None, self._settings(), self._until(problem, first), self.stop)
                 note = f"twice the period, from the flip at {value:.6g}"
                 self.branches.append(replace(self._followed(branch, problem, kind=followed.kind), note=note))
 

@@ -24,6 +24,7 @@ from brakecli.branches.problem import Array, Doubled, Guess, Problem, Seen
 from brakecli.errors import CaseError
 from brakecli.errors import Problem as Wrong
 from brakecli.solver.automaton import STICK
+from brakecli.solver.flow.repeating import Orbit
 from brakecli.solver.flow.rough import STEPS_PER_PERIOD, Flown, RoughFlow, Status, default_cells, default_steps
 from brakecli.solver.period import LONGEST, common_period
 from brakecli.solver.roughness import surface
@@ -61,22 +62,6 @@ REASONS = {
 GROWING = Settings(low=FIRST_WAVES, first=0.05, longest=1.0, change=math.inf, seconds=20.0, insertions=0)
 """How a motion is followed as the waves grow. Its multipliers do not matter on the way."""
 NO_PERIOD = "the waves of the wheel have no common period"
-
-
-class Motion(NamedTuple):
-    """What a forced motion shows (SI units)."""
-
-    period: float
-    amplitude: float  # half of peak to peak of x
-    stick_fraction: float
-    contact_loss_fraction: float
-    state: tuple[float, ...]  # x, y, v_x and v_y at t = 0
-    word: tuple[int, ...]  # phases, from there
-
-    @property
-    def frequency(self) -> float:
-        """Hz."""
-        return 1.0 / self.period
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,16 +188,17 @@ class Forced(Doubled):
             self._margins(p, found),
         )
 
-    def _facts(self, u: Array, p: float, found: _Flown) -> Motion:
+    def _facts(self, u: Array, p: float, found: _Flown) -> Orbit:
         runs = found.runs
-        margins = [run.margins for run in runs]
-        return Motion(
+        margins, segment = [run.margins for run in runs], found.period / len(runs)
+        return Orbit(
             found.period,
             0.5 * (max(run.x[1] for run in runs) - min(run.x[0] for run in runs)),
             sum(each.stick_share for each in margins) / len(runs),
             sum(each.open_share for each in margins) / len(runs),
             tuple((self.origin(p) + u[:4] * self.frame.scales).tolist()),
             found.word,
+            tuple(k * segment + time for k, run in enumerate(runs) for time in run.times),
         )
 
     def _margins(self, p: float, found: _Flown) -> tuple[float, ...]:

@@ -23,7 +23,6 @@ from brakecli.analysis.regime.linear import Linear, linear_theory
 from brakecli.analysis.regime.verdict import Excitation, Regime
 from brakecli.analysis.stability.modes import slowest_of_cycles
 from brakecli.runs.certificate import ROUNDING, Certificate
-from brakecli.solver.automaton import OPEN, STICK
 from brakecli.solver.compile import Floats
 from brakecli.solver.flow.seek import FOUND, GOING_ON, LINEAR, Pursuit
 from brakecli.solver.motion import Work
@@ -86,7 +85,7 @@ def early(system: System) -> Early | None:
         return None
     while (outcome := motion.seek()) == GOING_ON:
         pass
-    path, o = motion.path, motion.orbit
+    path, o = motion.path, motion.way
     if outcome == LINEAR:
         found = _linear(system, theory, motion)
     else:
@@ -116,7 +115,7 @@ def _theory(system: System) -> Linear | None:
 
 def _linear(system: System, theory: Linear, motion: Pursuit) -> tuple[Known, list[float]] | None:
     """The verdict on a motion that is linear from its first half on, and its last state."""
-    o = motion.orbit
+    o = motion.way
     start, end = (system.samples + 1) // 2 * system.interval, system.sampled_duration
     if o.time > start:
         return None
@@ -145,14 +144,14 @@ def _linear(system: System, theory: Linear, motion: Pursuit) -> tuple[Known, lis
 
 def _cycle(system: System, theory: Linear, motion: Pursuit) -> tuple[Known, list[float]] | None:
     """The verdict on an orbit that the motion has come to well before the end of the run, and a state on it."""
-    o, factor = motion.orbit, motion.multiplier
-    end, period, interval = system.sampled_duration, float(o.period), system.interval
+    o, orbit, factor = motion.way, motion.orbit, motion.multiplier
+    end, period, interval = system.sampled_duration, orbit.period, system.interval
     if not factor < 1.0:
         return None
     rate = -math.log(max(factor, 1e-300)) / period
     start = float(o.fell[0]) + max(math.log(max(float(o.away), 1e-300) / _SETTLED), 0.0) / rate
     part, slow = end - start, min(abs(theory.mode.growth), slowest_of_cycles(system.coefficients))
-    stick, clear = float(o.spent[STICK]), float(o.spent[OPEN])
+    stick, clear = orbit.stick_fraction * period, orbit.contact_loss_fraction * period
     limited = period - float(o.spent[o.sliding])
     hidden = (
         part < _SETTLED_PART * end
@@ -171,6 +170,6 @@ def _cycle(system: System, theory: Linear, motion: Pursuit) -> tuple[Known, list
     force = (c.c_xx * float(o.mean_x) + c.c_xy * float(o.mean_y)) / period + system.load_at_start * c.sin_beta
     reason = f"sustained: a limit cycle {how} stick; a disturbance keeps {factor:.2g} of its size in a cycle"
     regime = Regime.RELAXATION if stick > 0.0 else Regime.QUASI_HARMONIC
-    numbers = float(o.amplitude), stick / period, clear / period, force, system.radius * force
-    excited, shown = (regime, Excitation.SELF_EXCITED, (reason,), 1.0 / period), {"largest_multiplier": factor}
-    return Known(*excited, *numbers, lasts, start, shown), motion.start.tolist()
+    numbers = orbit.amplitude, orbit.stick_fraction, orbit.contact_loss_fraction, force, system.radius * force
+    excited, shown = (regime, Excitation.SELF_EXCITED, (reason,), orbit.frequency), {"largest_multiplier": factor}
+    return Known(*excited, *numbers, lasts, start, shown), list(orbit.state)

@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from brakecli.branches.cycles import Chart, Cycle, Cycles
+from brakecli.branches.cycles import Chart, Cycles
 from brakecli.branches.follow import follow
 from brakecli.branches.line import Line
 from brakecli.branches.newton import Newton, Settings
 from brakecli.branches.point import Branch, Point
 from brakecli.branches.sliding import Change, Sliding
+from brakecli.solver.flow.repeating import Orbit
 from tests.analysis.shoes import Array, Shoe, Tables, random_shoes
 from tests.branches.phasewise import Phasewise
 from tests.examples import make
@@ -86,10 +87,10 @@ def word_of(point: Point) -> tuple[int, ...]:
     return cycle_of(point).word
 
 
-def cycle_of(point: Point) -> Cycle:
+def cycle_of(point: Point) -> Orbit:
     """What a point shows."""
     facts: Any = point.facts
-    assert isinstance(facts, Cycle)
+    assert isinstance(facts, Orbit)
     return facts
 
 

@@ -16,7 +16,7 @@ from brakecli.case.system import system_of
 from brakecli.solver.steady_sliding import steady_sliding
 from tests.analysis.shoes import Shoe as Drawn
 from tests.analysis.shoes import Tables
-from tests.branches.phasewise import Phasewise
+from tests.branches.phasewise import AHEAD, BEHIND, OPEN, STICK, Phasewise
 from tests.branches.smooth_shoes import FRICTION, changed, cycle_of, drawn
 from tests.examples import make
 from tests.sweeps.shoes import drawn as rough_drawn
@@ -47,10 +47,13 @@ def test_a_motion_on_smooth_pads_comes_to_what_another_scheme_shows(friction: fl
             state = way.end
         assert not way.times
         return
-    way = motion(end.state, end.period)
+    orbit = end.orbit
+    assert orbit is not None
+    way = motion(end.state, orbit.period)
     sizes = 0.5 * (way.high - way.low)
     np.testing.assert_array_less(np.abs(way.end - end.state), 1e-7 * sizes)
-    assert way.times
+    assert [(BEHIND, STICK, AHEAD, OPEN)[phase] for phase in orbit.word] == list(way.word)
+    assert orbit.times == pytest.approx(way.times, abs=1e-9 * orbit.period)
 
 
 @pytest.mark.parametrize("friction", [0.18, 0.4])
@@ -60,7 +63,9 @@ def test_a_branch_begins_at_the_cycle_that_a_motion_comes_to(friction: float) ->
     point = settled(Cycles(line), p, of_smooth(friction)[1], math.nan)
     assert point is not None
     assert point.stable
-    assert cycle_of(point).period == pytest.approx(on_smooth_pads(*of_smooth(friction)).period, rel=1e-9)
+    orbit = on_smooth_pads(*of_smooth(friction)).orbit
+    assert orbit is not None
+    assert cycle_of(point).period == pytest.approx(orbit.period, rel=1e-9)
 
 
 def test_a_motion_that_dies_out_begins_no_branch() -> None:

@@ -190,7 +190,8 @@ def test_what_bounces_ever_higher_beside_stable_sliding_lasts() -> None:
     assert shoe.rest is not None
     end = on_smooth_pads(shoe, system_of(case).initial.beside(shoe.rest))
     assert end.state is not None
-    flow(end.state, end.period)
+    assert end.orbit is not None
+    flow(end.state, end.orbit.period)
     np.testing.assert_allclose(flow.state, end.state, atol=1e-12)
     sizes = sorted(np.abs(np.linalg.eigvals(flow.derivative)))
     assert sizes[-1] == pytest.approx(1.0, abs=1e-9)

@@ -44,7 +44,7 @@ _BANDS = (0.25, 0.35)  # of the standard deviation of v_x: a whole run counts th
 MOST_TURNS = 6  # falls in a cycle
 _MANY = 1000  # more often no phase is entered in a cycle
 
-ORBIT = record(
+PURSUIT = record(
     "duration",  # of the run, s
     "time",  # reached, s
     "period late",  # of the last cycle, or of the orbit, and by how much it has just been corrected, s
@@ -80,18 +80,18 @@ ORBIT = record(
     bound=(float, 3),  # of the motion's distance from steady sliding in them
     room=(float, 2),  # of y and v_x until an event comes
 )
-"""A motion on its way to its orbit, and the orbit."""
-ORBIT_TYPE = numba.from_dtype(ORBIT)
+"""A motion on its way to its orbit, and what is measured there."""
+PURSUIT_TYPE = numba.from_dtype(PURSUIT)
 
 
-@kernel(void(PATH_TYPE, ORBIT_TYPE, int64))
+@kernel(void(PATH_TYPE, PURSUIT_TYPE, int64))
 def note_event(path: Any, o: Any, phase: int) -> None:
     """Note the phase that the last step has ended in."""
     if path.which != NO_EVENT:
         o.events, o.way = o.events + 1, o.way + _MANY**phase
 
 
-@kernel(int64(COEFFICIENTS, FLOW_TYPE, PATH_TYPE, ORBIT_TYPE), inlined=False)
+@kernel(int64(COEFFICIENTS, FLOW_TYPE, PATH_TYPE, PURSUIT_TYPE), inlined=False)
 def _returned(c: Coefficients, m: Any, path: Any, o: Any) -> int:
     """From `point` over a period, and on to the section: the return in `kept`, and M; 0 where there is none.
 
@@ -114,7 +114,7 @@ def _returned(c: Coefficients, m: Any, path: Any, o: Any) -> int:
     return 1
 
 
-@kernel(void(FLOW_TYPE, PATH_TYPE, ORBIT_TYPE, float64, float64, int64), inlined=False)
+@kernel(void(FLOW_TYPE, PATH_TYPE, PURSUIT_TYPE, float64, float64, int64), inlined=False)
 def _add_up(m: Any, path: Any, o: Any, part: float, band: float, falls: int) -> None:
     """Add a part of the last step to the numbers of the cycle."""
     for k in range(TERMS):
@@ -131,7 +131,7 @@ def _add_up(m: Any, path: Any, o: Any, part: float, band: float, falls: int) -> 
         o.low, o.high = min(o.low, m.at[X]), max(o.high, m.at[X])
 
 
-@kernel(int64(COEFFICIENTS, FLOW_TYPE, PATH_TYPE, ORBIT_TYPE), inlined=False)
+@kernel(int64(COEFFICIENTS, FLOW_TYPE, PATH_TYPE, PURSUIT_TYPE), inlined=False)
 def _around(c: Coefficients, m: Any, path: Any, o: Any) -> int:
     """From `point` over a period, for the numbers of the cycle; 0 where it takes another way than the motion did.
 
@@ -141,6 +141,7 @@ def _around(c: Coefficients, m: Any, path: Any, o: Any) -> int:
     place(c, m, path.h)
     look(m)
     band, way, passed, last = math.sqrt(o.square / o.period), 0, 0.0, False  # band: of the round before
+    path.word[0], path.events = m.phase, 0
     for k in range(o.turns):
         way += o.ways[k]
     o.mean_x, o.mean_y, o.square, o.events, o.way = 0.0, 0.0, 0.0, 0, 0
@@ -162,17 +163,20 @@ def _around(c: Coefficients, m: Any, path: Any, o: Any) -> int:
         note_event(path, o, m.phase)
         if o.events > MOST_EVENTS:
             return 0
+        if o.events > path.events:
+            path.times[path.events], path.events = passed, o.events
+            path.word[path.events] = m.phase
     o.amplitude = 0.5 * (o.high - o.low)
     return 1 if last and o.way == way else 0
 
 
-@kernel(float64(ORBIT_TYPE, float64, float64, float64))
+@kernel(float64(PURSUIT_TYPE, float64, float64, float64))
 def sizes(o: Any, x: float, y: float, v_y: float) -> float:
     """A distance on the section, in sizes of the cycle."""
     return max(abs(x), abs(y), abs(v_y) * o.period / TWO_PI) / o.amplitude  # type: ignore[no-any-return]
 
 
-@kernel(types.UniTuple(float64, 3)(ORBIT_TYPE, float64, float64, float64), inlined=False)
+@kernel(types.UniTuple(float64, 3)(PURSUIT_TYPE, float64, float64, float64), inlined=False)
 def _solved(o: Any, x: float, y: float, z: float) -> tuple[float, float, float]:
     """(I - M)⁻¹ of a vector, by Cramer's rule; far away where there is none."""
     a, b, c = 1.0 - o.map[0, 0], -o.map[0, 1], -o.map[0, 2]
@@ -187,7 +191,7 @@ def _solved(o: Any, x: float, y: float, z: float) -> tuple[float, float, float]:
     return one / whole, two / whole, three / whole
 
 
-@kernel(int64(COEFFICIENTS, FLOW_TYPE, PATH_TYPE, ORBIT_TYPE), inlined=False)
+@kernel(int64(COEFFICIENTS, FLOW_TYPE, PATH_TYPE, PURSUIT_TYPE), inlined=False)
 def closed(c: Coefficients, m: Any, path: Any, o: Any) -> int:
     """Find the orbit of `turns` falls near the last return; 0 where none is found that the motion comes to."""
     s, at, k = o.returns, o.point, o.turns

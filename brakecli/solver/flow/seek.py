@@ -14,9 +14,10 @@ import numpy as np
 from numba import float64, int64, void
 from numpy.typing import NDArray
 
-from brakecli.solver.automaton import BACKWARD, FORWARD
+from brakecli.solver.automaton import BACKWARD, FORWARD, OPEN, STICK
 from brakecli.solver.compile import Floats, kernel
-from brakecli.solver.flow.orbit import MOST_TURNS, ORBIT, ORBIT_TYPE, closed, note_event, sizes
+from brakecli.solver.flow.orbit import MOST_TURNS, PURSUIT, PURSUIT_TYPE, closed, note_event, sizes
+from brakecli.solver.flow.repeating import Orbit
 from brakecli.solver.flow.smooth import MOST_EVENTS, MOST_STEPS, PATH, PATH_TYPE, step, zero_of_velocity
 from brakecli.solver.records import (
     BELT,
@@ -45,7 +46,7 @@ FOREVER = 1e300
 _NEAR = 0.02  # of the size of a cycle: distance of two returns at which an orbit is sought
 
 
-@kernel(void(FLOW_TYPE, ORBIT_TYPE, float64), inlined=False)
+@kernel(void(FLOW_TYPE, PURSUIT_TYPE, float64), inlined=False)
 def _bound(m: Any, o: Any, seconds: float) -> None:
     """How far from steady sliding a linear motion can come within some time: the sum of its modes."""
     for k in range(3):
@@ -61,7 +62,7 @@ def _bound(m: Any, o: Any, seconds: float) -> None:
             o.bound[k] += size * o.reach[q, k]
 
 
-@kernel(int64(FLOW_TYPE, ORBIT_TYPE), inlined=False)
+@kernel(int64(FLOW_TYPE, PURSUIT_TYPE), inlined=False)
 def _stays_linear(m: Any, o: Any) -> int:
     """Whether the motion slides steadily, or beside that, and no event can come before the end."""
     if m.phase != o.sliding:
@@ -70,7 +71,7 @@ def _stays_linear(m: Any, o: Any) -> int:
     return 1 if o.bound[1] < o.room[0] and o.bound[2] < o.room[1] else 0
 
 
-@kernel(int64(FLOW_TYPE, ORBIT_TYPE, float64), inlined=False)
+@kernel(int64(FLOW_TYPE, PURSUIT_TYPE, float64), inlined=False)
 def _returned(m: Any, o: Any, fall: float) -> int:
     """Note a return to the section, which is in `m.at`; whether it lies close to the one `turns` before."""
     s = o.returns
@@ -92,7 +93,7 @@ def _returned(m: Any, o: Any, fall: float) -> int:
     return 0
 
 
-@kernel(int64(COEFFICIENTS, FLOW_TYPE, PATH_TYPE, ORBIT_TYPE), inlined=False)
+@kernel(int64(COEFFICIENTS, FLOW_TYPE, PATH_TYPE, PURSUIT_TYPE), inlined=False)
 def _try(c: Coefficients, m: Any, path: Any, o: Any) -> int:
     """Seek an orbit near the last return. Where there is none the motion goes on as if nothing had been sought."""
     phase, way, events, low = m.phase, o.way, o.events, o.low
@@ -107,7 +108,7 @@ def _try(c: Coefficients, m: Any, path: Any, o: Any) -> int:
     return found
 
 
-@kernel(int64(COEFFICIENTS, FLOW_TYPE, PATH_TYPE, ORBIT_TYPE))
+@kernel(int64(COEFFICIENTS, FLOW_TYPE, PATH_TYPE, PURSUIT_TYPE))
 def seek(c: Coefficients, m: Any, path: Any, o: Any) -> int:
     """Follow the motion until something is known of all that is to come; what that is, or `GOING_ON`."""
     if o.started == 0:
@@ -133,7 +134,7 @@ def seek(c: Coefficients, m: Any, path: Any, o: Any) -> int:
     return GOING_ON
 
 
-@kernel(void(COEFFICIENTS, FLOW_TYPE, PATH_TYPE, ORBIT_TYPE, float64))
+@kernel(void(COEFFICIENTS, FLOW_TYPE, PATH_TYPE, PURSUIT_TYPE, float64))
 def swing(c: Coefficients, m: Any, path: Any, o: Any, seconds: float) -> None:
     """Widen `low` and `high` to the least and largest x of a linear motion from `m.z` on, for some time.
 
@@ -158,7 +159,7 @@ def swing(c: Coefficients, m: Any, path: Any, o: Any, seconds: float) -> None:
 class Pursuit:
     """A motion on smooth pads, at constant speed and load, which is followed to what becomes of it.
 
-    `orbit` holds how far it has come, and the orbit once it is found; `path` counts its steps.
+    `way` holds how far it has come, and what is measured on the orbit once it is found; `path` counts its steps.
     """
 
     def __init__(
@@ -175,8 +176,8 @@ class Pursuit:
         `rest`: x and y of steady sliding. `modes`: its eigenvalues, and the vectors of position and velocity in
         columns. Raises LinAlgError where two of them are alike.
         """
-        self._coefficients, self._flow, self.path, self.orbit = c, new(FLOW), new(PATH), new(ORBIT)
-        flow, o, (values, vectors), inverse = self._flow, self.orbit, modes, np.linalg.inv(modes[1])
+        self._coefficients, self._flow, self.path, self.way = c, new(FLOW), new(PATH), new(PURSUIT)
+        flow, o, (values, vectors), inverse = self._flow, self.way, modes, np.linalg.inv(modes[1])
         flow.stiffness, flow.z[BELT], flow.z[LOAD] = acting
         flow.x, flow.y, flow.v_x, flow.v_y = state
         self.path.h, belt = longest_step(c, acting[0]), acting[1]
@@ -187,12 +188,12 @@ class Pursuit:
 
     def seek(self) -> int:
         """Go on for some time; what the motion has come to, see `seek`."""
-        return int(seek(self._coefficients, self._flow, self.path, self.orbit))
+        return int(seek(self._coefficients, self._flow, self.path, self.way))
 
     def swing(self, begin: Floats, seconds: float) -> None:
         """Find the least and the largest x of a linear motion from a state on, for some time (s), see `swing`."""
         self._flow.z[:4] = begin
-        swing(self._coefficients, self._flow, self.path, self.orbit, seconds)
+        swing(self._coefficients, self._flow, self.path, self.way, seconds)
 
     @property
     def state(self) -> Floats:
@@ -200,12 +201,16 @@ class Pursuit:
         return np.array(self._flow.z[:4])
 
     @property
-    def start(self) -> Floats:
-        """A state on the orbit."""
-        x, y, v_y = self.orbit.point
-        return np.array([x, y, 0.0, v_y])
+    def orbit(self) -> Orbit:
+        """The orbit, once it is found."""
+        o, path = self.way, self.path
+        (x, y, v_y), period = o.point.tolist(), float(o.period)
+        spent = (o.spent / period).tolist()
+        word, times = path.word[: path.events + 1].tolist(), path.times[: path.events].tolist()
+        state = x, y, 0.0, v_y
+        return Orbit(period, float(o.amplitude), spent[STICK], spent[OPEN], state, tuple(word), tuple(times))
 
     @property
     def multiplier(self) -> float:
         """Largest part of its size that a disturbance of the orbit keeps in a cycle; an orbit attracts below 1."""
-        return float(np.abs(np.linalg.eigvals(self.orbit.map)).max())
+        return float(np.abs(np.linalg.eigvals(self.way.map)).max())
