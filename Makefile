@@ -21,7 +21,7 @@ PYTEST_ARGS ?=
 .DELETE_ON_ERROR:
 .NOTPARALLEL: # two installations into one .venv at a time would collide
 .PHONY: help demo test campaign lowest lint format types imports derivations tables docs cases check \
-    accuracy promises promise-cost statistics picture lock-in branch-picture paper extremes bench bench-sweep bench-million bench-contact bench-branch clean
+    accuracy promises promise-cost statistics picture lock-in branch-picture loop-picture paper extremes bench bench-sweep bench-million bench-contact bench-branch clean
 
 help: ## list the targets (this text)
 	@echo "make TARGET, where TARGET is one of"
@@ -147,6 +147,12 @@ branch-picture: $(DEV_STAMP) ## draw docs/branch.png, from the starter of branch
 	$(BIN)/brakecli new branch --output results/branch.toml --force --quiet
 	$(BIN)/brakecli branch results/branch.toml --parameter friction.coefficient=0:1 --force --quiet -o results/branch.h5
 	$(BIN)/brakecli plot results/branch.h5 --force --output docs/branch.png
+
+loop-picture: $(DEV_STAMP) ## draw docs/loop.png, from the starter of branches, followed up and down
+	@mkdir -p results
+	$(BIN)/brakecli new branch --output results/branch.toml --force --quiet
+	$(BIN)/brakecli sweep docs/loop.toml --force --quiet -o results/loop.h5
+	$(BIN)/brakecli plot results/loop.h5 --select solver.duration=200 --force --output docs/loop.png
 
 paper: $(DEV_STAMP) ## reproduce the paper's claims into docs/paper-claims.md, with pictures (some minutes)
 	$(BIN)/python docs/paper_claims.py
