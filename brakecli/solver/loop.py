@@ -11,6 +11,8 @@ from brakecli.solver.quantities import BOUND, Failure
 from brakecli.solver.records import EVALUATE, FINISH, PLANT, PREPARE, SOLVE, Plant
 from brakecli.solver.roughness import turn
 from brakecli.solver.schedules import integral_at, slope_at, value_at
+from brakecli.solver.tangent import kept, meet, renew
+from brakecli.solver.tangent import solve as solve_disturbed
 
 _NONE, _UNCONVERGED, _DIVERGED, _NOT_CLOSED = (int(failure) for failure in tuple(Failure)[:4])
 
@@ -53,6 +55,40 @@ def sample(p: Plant, row: Floats) -> None:
     row[4], row[5], row[6], row[7] = friction, normal, contact.fraction, side
 
 
+@kernel(void(PLANT, float64), inlined=False)
+def _disturb(p: Plant, before: float) -> None:
+    """Carry the disturbance along the step that has been taken, with the sliding velocity at its begin."""
+    p = borrowed(p)
+    c, t, problem, contact, h, beside = p.c, p.tangent, p.problem, p.layer.contact, p.s.h, p.beside
+    side = problem.side
+    if side != t.side:
+        x, y, v_y, belt = p.state.x, p.state.y, p.state.v_y, problem.belt_next
+        needed = c.m * (belt - problem.belt_now) / h + c.b_xx * belt + c.b_xy * v_y + c.c_xx * x + c.c_xy * y
+        needed += problem.load * c.sin_beta
+        bound = c.phi * problem.normal_force
+        if side == 0.0 and abs(needed) > bound:  # the step holds, as the shoe turns in it, but friction could not
+            side = -math.copysign(1.0, needed)
+        if side != t.side and t.side != 0.0:
+            to_go, change = c.m * abs(before), h * (abs(needed) + bound)
+            meet(beside, kept(needed, bound), to_go / change if to_go < change else 1.0, h, p.grid.lag)
+        t.side = side
+    if side == 0.0:  # a scheme that lags has no other velocity
+        beside.state.x_old = beside.state.x
+    _prepare_at(p.plug.prepare)(c, p.s, beside.state, beside.problem)
+    solve_disturbed(c, beside, problem, side, contact.stiffness, contact.tangential)
+    _finish_at(p.plug.finish)(c, p.s, beside.state, beside.problem, beside.contact, beside.work)
+
+
+@kernel(void(PLANT, int64), inlined=False)
+def _renew(p: Plant, number: int) -> None:
+    """Note the growth of the disturbance up to a sample, and begin anew with one of size one."""
+    t, b = p.tangent, p.beside.state
+    t.x, t.y, t.v_x, t.v_y = b.x, b.y, b.v_x, b.v_y
+    part = renew(t, number, p.grid.samples)
+    b.x_old, b.y_old = t.x - part * (b.x - b.x_old), t.y - part * (b.y - b.y_old)
+    b.x, b.y, b.v_x, b.v_y = t.x, t.y, t.v_x, t.v_y
+
+
 @kernel(int64(int64, float64[:, ::1], float64[:, ::1], int64))
 def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
     """Step from the level reached to `stop`, filling `rows` with the samples before each step; a `Failure`.
@@ -70,6 +106,8 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
         if part == due:
             sample(p, rows[row])
             row += 1
+            if p.tangent.on == 1:
+                _renew(p, sampled)
         # A level's time is that of the sample before it plus whole steps: no rounding piles up.
         t, t_low = grid.interval * sampled, (part + grid.weighted) * s.h
         belt_now = belt_next
@@ -99,6 +137,8 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
             return _NOT_CLOSED
         before = state.v_x - belt_now
         finish(c, s, state, problem, layer.contact, p.work)
+        if p.tangent.on == 1:
+            _disturb(p, before)
         after = state.v_x - belt_next
         if before * after <= 0.0 and problem.normal_force > 0.0:
             counts.turns += 1

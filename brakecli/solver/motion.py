@@ -1,5 +1,6 @@
 """A motion: the start, the loop in blocks, and what the loop has counted."""
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -14,11 +15,27 @@ from brakecli.solver.energy import OPEN_ACCOUNT, EnergyAccount, account
 from brakecli.solver.friction import minimise
 from brakecli.solver.method import Method
 from brakecli.solver.quantities import HISTORY, Failure
-from brakecli.solver.records import COUNTS, EVALUATE, PLANT, PROBLEM, WORK, Drive, Pair, Plant, Plug, new
+from brakecli.solver.records import (
+    CONTACT,
+    COUNTS,
+    EVALUATE,
+    PLANT,
+    PROBLEM,
+    STATE,
+    TANGENT,
+    WORK,
+    Beside,
+    Drive,
+    Pair,
+    Plant,
+    Plug,
+    new,
+)
 from brakecli.solver.roughness import turn
 from brakecli.solver.schedules import integral_at, slope_at
 from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import System
+from brakecli.solver.tangent import Exponent, exponent, seed
 
 EVENTS = 1000
 """How many unconverged steps are kept with their time and residual; all are counted."""
@@ -86,6 +103,7 @@ class Motion:
     rows: Floats
     work: Work
     energy: EnergyAccount
+    exponent: Exponent | None = None  # of small disturbances, where they are carried along
 
 
 def solve(
@@ -119,6 +137,7 @@ class Stepping:
         self.events = np.zeros((EVENTS, 2))
         self.counts = new(COUNTS)
         self.counts.level = self.scheme.LAG
+        self.tangent = new(TANGENT)
         # the same place in memory, which is read in a tenth of the time
         self._level = np.frombuffer(self.counts, COUNTS)["level"]
         self.plant = Plant(
@@ -132,7 +151,12 @@ class Stepping:
             problem=new(PROBLEM),
             work=new(WORK),
             counts=self.counts,
+            tangent=self.tangent,
+            beside=Beside(new(STATE), new(PROBLEM), new(CONTACT), new(WORK)),
         )
+        if system.tangents:
+            fastest = 2.0 * math.pi * system.natural_frequencies[1]
+            seed(self.tangent, self.plant.beside.state, fastest, self.plant.s.h)
         self._memory = np.zeros(LARGEST, np.int8)
         self._plant_at = self._memory.ctypes.data
         self.scheme.hold(self.plant, self._plant_at)
@@ -167,7 +191,8 @@ class Stepping:
         energy = account(self._start_energy, end, self.plant.work)
         if not work.failed and not abs(energy.relative_closing_error) <= OPEN_ACCOUNT:
             work.failure = Failure.UNBALANCED
-        return Motion(self.system, np.concatenate(kept), work, energy)
+        found = exponent(self.tangent, self.system.sampled_duration) if self.system.tangents else None
+        return Motion(self.system, np.concatenate(kept), work, energy, None if work.failed else found)
 
     def block(self, stop: int) -> Floats:
         """Step to level `stop`; the samples on the way."""

@@ -90,6 +90,18 @@ COUNTS = record(
     kinds=(int, MOST_KINDS),  # steps that each of `contact.kinds()` took
 )
 
+PARTS = 512
+"""Parts of a run in which the growth of a disturbance is kept apart."""
+
+TANGENT = record(
+    "x y v_x v_y",  # a small disturbance of the motion, m and m/s
+    "rate",  # rad/s, by which places count beside velocities in its size
+    "side",  # of the friction law that the motion follows, 0 in stick
+    on=int,  # 1 where it is carried along
+    logs=(float, PARTS),  # ln of its growth in each part of the run
+)
+"""A disturbance that is carried along with a motion, see `solver.tangent`."""
+
 PAD = record(
     "k",  # stiffness per length, N/m²
     "half_length",  # a, m
@@ -170,6 +182,8 @@ MOTION = record(
     begin=(float, 4),  # both ends of the step
     end=(float, 4),
     slopes=(float, (STAGES, 4)),  # derivatives of the components by time, at each stage
+    touch=(float, (STAGES, 2)),  # stiffness of the contact and ∂F_y/∂x, N/m
+    disturbed=(float, (STAGES, 4)),  # slopes of a disturbance
     powers=(float, (POWERS, 4)),  # coefficients of the continuous solution
     work_rates=(float, (STAGES, POWERED)),  # powers of the energy account, W
 )
@@ -289,6 +303,15 @@ class Plug(NamedTuple):
     solve: int
 
 
+class Beside(NamedTuple):
+    """A step of a disturbance: the records of a step of the motion."""
+
+    state: Any
+    problem: Any
+    contact: Any
+    work: Any
+
+
 class Plant(NamedTuple):
     """Everything that the common loop works with: what is given, then the records that it changes."""
 
@@ -302,6 +325,8 @@ class Plant(NamedTuple):
     problem: Any
     work: Any
     counts: Any
+    tangent: Any
+    beside: Beside
 
 
 class Parts(NamedTuple):
@@ -318,19 +343,21 @@ class Parts(NamedTuple):
 STATE_TYPE, MOTION_TYPE, FLOW_TYPE, PROBLEM_TYPE, CONTACT_TYPE, WORK_TYPE, COUNTS_TYPE, PAD_TYPE, WINDOW_TYPE = (
     numba.from_dtype(each) for each in (STATE, MOTION, FLOW, PROBLEM, CONTACT, WORK, COUNTS, PAD, WINDOW)
 )
+TANGENT_TYPE: Any = numba.from_dtype(TANGENT)
 KNOTS = types.Array(numba.from_dtype(KNOT), 1, "C")
 COEFFICIENTS = types.NamedUniTuple(float64, len(Coefficients._fields), Coefficients)
 WEIGHTS = types.NamedUniTuple(float64, len(Weights._fields), Weights)
 GRID = types.NamedTuple([float64, int64, float64, int64, int64, int64, int64, float64], Grid)
 DRIVE = types.NamedUniTuple(KNOTS, len(Drive._fields), Drive)
 LAYER = types.NamedTuple([int64, int64, PAD_TYPE, vector, vector, vector, WINDOW_TYPE, CONTACT_TYPE], Layer)
+BESIDE = types.NamedTuple([STATE_TYPE, PROBLEM_TYPE, CONTACT_TYPE, WORK_TYPE], Beside)
 PLUG = types.NamedUniTuple(int64, 3, Plug)
 
 
 def plant_type(state: np.dtype[Any]) -> Any:
     """The type of a `Plant` whose scheme keeps its motion in this record."""
     members = [COEFFICIENTS, WEIGHTS, GRID, DRIVE, LAYER, PLUG, numba.from_dtype(state)]
-    return types.NamedTuple([*members, PROBLEM_TYPE, WORK_TYPE, COUNTS_TYPE], Plant)
+    return types.NamedTuple([*members, PROBLEM_TYPE, WORK_TYPE, COUNTS_TYPE, TANGENT_TYPE, BESIDE], Plant)
 
 
 PLANT = plant_type(STATE)

@@ -73,6 +73,7 @@ class System:
     duration: float
     method: Method
     notes: tuple[str, ...] = ()  # where surfaces come from
+    tangents: bool = False  # whether a small disturbance is carried along with a motion
 
     @cached_property
     def pad(self) -> Pad:

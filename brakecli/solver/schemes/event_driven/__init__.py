@@ -16,6 +16,7 @@ from brakecli.solver.records import MOTION, V_X, V_Y, Plant, Weights, X, Y, plan
 from brakecli.solver.schemes.event_driven.phases import EPSILON, SHOE, Shoe, press, resistance
 from brakecli.solver.schemes.event_driven.runge_kutta import interpolated
 from brakecli.solver.schemes.event_driven.step import STEP, first_step, step
+from brakecli.solver.tangent import renew
 
 STATE, solve = MOTION, step
 LAG, MEMORY, VELOCITIES = own_steps.LAG, own_steps.MEMORY, own_steps.VELOCITIES
@@ -76,7 +77,7 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
     p: Plant = _plant_at(address)
     m, counts, drive, grid, row, steps = p.state, p.counts, p.drive, p.grid, 0, 0
     waves = p.layer.pad.shoe_terms + p.layer.pad.wheel_terms if p.layer.window.rows == 0 else 0
-    shoe = Shoe(p.c, p.layer, m, p.work, counts)
+    shoe = Shoe(p.c, p.layer, m, p.work, counts, p.tangent)
     if m.started == 0:
         first_step(shoe, drive, grid)
         _sample(shoe, grid.interval, 0)
@@ -88,6 +89,8 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
             row += 1
             counts.level += 1
             _sample(shoe, grid.interval, counts.level)
+            if p.tangent.on == 1:
+                renew(p.tangent, counts.level, grid.samples)
         if counts.level == stop or steps >= _BUDGET:
             return _NONE
         failure: int = _step_at(p.plug.solve)(shoe, drive, grid)

@@ -30,6 +30,7 @@ from brakecli.solver.records import COEFFICIENTS, V_X, V_Y, Coefficients, Drive,
 from brakecli.solver.roughness import turn
 from brakecli.solver.schedules import integral_at, slope_at, value_at
 from brakecli.solver.schemes.event_driven.runge_kutta import END_STAGE, interpolated
+from brakecli.solver.tangent import kept
 
 EPSILON = 2.220446049250313e-16
 
@@ -42,11 +43,11 @@ class Shoe(NamedTuple):
     motion: Any
     work: Any
     counts: Any
+    tangent: Any
 
 
-SHOE = types.NamedTuple(
-    [COEFFICIENTS, records.LAYER, records.MOTION_TYPE, records.WORK_TYPE, records.COUNTS_TYPE], Shoe
-)
+_CHANGED = [records.MOTION_TYPE, records.WORK_TYPE, records.COUNTS_TYPE, records.TANGENT_TYPE]
+SHOE = types.NamedTuple([COEFFICIENTS, records.LAYER, *_CHANGED], Shoe)
 _evaluate_at = at_address(records.EVALUATE)
 _PAIR = types.UniTuple(float64, 2)
 _TRIPLE = types.UniTuple(float64, 3)
@@ -105,14 +106,15 @@ def press(p: Shoe, x: float, y: float, phase: int) -> float:
         contact.stiffness = 2.0 * pad.half_length * pad.k
         contact.normal_force = -contact.stiffness * y  # Eq. (2), continued: an event ends the phase at y = 0
         contact.fraction = 1.0 if y < 0.0 else 0.0
-        contact.store_x, contact.kind, contact.valid = 0.0, CLOSED_FORM, 1
+        contact.store_x, contact.tangential, contact.kind, contact.valid = 0.0, 0.0, CLOSED_FORM, 1
         return contact.normal_force  # type: ignore[no-any-return]
     full, m = coverage(y, pad) == FULL, p.motion
+    light = m.light == 1 and p.tangent.on == 0
     if not full or p.layer.window.rows > 0:
-        _evaluate_at(p.layer.press if m.light == 1 else p.layer.evaluate)(x, y, p.layer)
+        _evaluate_at(p.layer.press if light else p.layer.evaluate)(x, y, p.layer)
         if full:  # the sum over nodes is the closed form
             contact.kind = CLOSED_FORM
-    elif m.light == 0:
+    elif not light:
         full_contact(x, y, p.layer)
     elif x == m.pressed_x:  # in stick; the force is linear in y
         contact.stiffness, contact.fraction = 2.0 * pad.half_length * pad.k, 1.0
@@ -143,6 +145,7 @@ def find_slopes(p: Shoe, stage: int, since: float, x: float, y: float, v_x: floa
     m.slopes[stage, 0], m.slopes[stage, 1] = v_x, v_y
     m.slopes[stage, 2] = m.belt_slope if stuck else (friction - against_x) / c.m  # Eq. (6)
     m.slopes[stage, 3] = (normal - against_y) / c.m  # Eq. (7)
+    m.touch[stage, 0], m.touch[stage, 1] = p.layer.contact.stiffness, p.layer.contact.tangential
     m.work_rates[stage, 0] = friction * belt
     m.work_rates[stage, 1] = -friction * sliding
     m.work_rates[stage, 2] = c.b_xx * v_x * v_x + 2.0 * c.b_xy * v_x * v_y + c.b_yy * v_y * v_y
@@ -194,6 +197,7 @@ def take_hold(p: Shoe) -> None:
     against_x, _ = resistance(c, m.load, m.x, m.y, m.belt, m.v_y)
     needed, (along, _) = c.m * m.belt_slope + against_x, rounding(p)
     m.phase = held(bound - needed, bound + needed, along, along)
+    p.tangent.v_x *= kept(needed, bound)
     if m.phase == STICK:
         m.anchor, m.anchor_low = anchored(m.x, m.travel, m.travel_low)
         m.v_x = m.belt

@@ -3,9 +3,9 @@
 import math
 from typing import Any
 
-from numba import float64, int64, void
+from numba import float64, int64, types, void
 
-from brakecli.solver.automaton import OPEN, STICK, UNDECIDED, counted, sliding_phase, stalled
+from brakecli.solver.automaton import OPEN, STICK, UNDECIDED, counted, side_of, sliding_phase, stalled
 from brakecli.solver.compile import kernel
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.quantities import BOUND, Failure
@@ -37,6 +37,7 @@ _LOOSE = 2e-5
 _TINY = 1e-300  # no division by zero where nothing moves
 
 STEP = int64(SHOE, DRIVE, GRID)
+_SLOPES = types.UniTuple(float64, 2)
 
 _NONE, _, _DIVERGED, _NOT_CLOSED, _, _STALLED = (int(failure) for failure in Failure)
 
@@ -179,10 +180,40 @@ def _passed(m: Any, item: int) -> float:
     return total
 
 
+@kernel(_SLOPES(SHOE, int64, float64, float64, float64, float64))
+def _slopes(p: Shoe, stage: int, x: float, y: float, v_x: float, v_y: float) -> tuple[float, float]:
+    """Accelerations of a disturbance at a stage."""
+    c, m, (stiffness, tangential) = p.c, p.motion, p.motion.touch[stage]
+    force = tangential * x - stiffness * y
+    against_x, against_y = phases.resistance(c, 0.0, x, y, v_x, v_y)
+    along = -side_of(m.phase) * c.phi * force - against_x if m.phase != STICK else 0.0
+    return along / c.m, (force - against_y) / c.m
+
+
+@kernel(void(SHOE, float64), inlined=False)
+def _disturb(p: Shoe, h: float) -> None:
+    """Carry the disturbance along the step that has been made: by its derivative, and on to an event behind it."""
+    m, t, k, step = p.motion, p.tangent, p.motion.disturbed, p.motion.step_done
+    for stage in range(END_STAGE + 1):
+        if USED[m.pair] <= stage < END_STAGE:
+            continue
+        x, y, v_x, v_y = 0.0, 0.0, 0.0, 0.0
+        for j in range(min(stage, USED[m.pair])):
+            a = A[m.pair, stage, j]
+            x, y, v_x, v_y = x + a * k[j, X], y + a * k[j, Y], v_x + a * k[j, V_X], v_y + a * k[j, V_Y]
+        x, y, v_x, v_y = t.x + step * x, t.y + step * y, t.v_x + step * v_x, t.v_y + step * v_y
+        a_x, a_y = _slopes(p, stage, x, y, v_x, v_y)
+        k[stage, X], k[stage, Y], k[stage, V_X], k[stage, V_Y] = v_x, v_y, a_x, a_y
+    rest = h - step
+    t.x, t.y, t.v_x, t.v_y = x + rest * v_x, y + rest * v_y, v_x + rest * a_x, v_y + rest * a_y
+
+
 @kernel(void(SHOE, DRIVE, GRID, float64, int64))
 def _take(p: Shoe, drive: Drive, grid: Grid, h: float, last: int) -> None:
     """Take the step that has been made; `last` is 1 where it reaches the end of the run."""
     m, work, interval = p.motion, p.work, grid.interval
+    if p.tangent.on == 1:
+        _disturb(p, h)
     m.time_done, m.tau_done, m.phase_done = m.time, m.tau, m.phase
     m.belt_done, m.belt_slope_done, m.load_done, m.load_slope_done = m.belt, m.belt_slope, m.load, m.load_slope
     work.belt += h * _passed(m, 0)
@@ -194,6 +225,7 @@ def _take(p: Shoe, drive: Drive, grid: Grid, h: float, last: int) -> None:
     for i in range(4):
         m.largest[i] = max(m.largest[i], abs(m.end[i]))
         m.slopes[0, i] = m.slopes[END_STAGE, i]
+    m.touch[0, 0], m.touch[0, 1] = m.touch[END_STAGE, 0], m.touch[END_STAGE, 1]
     for item in range(POWERED):
         m.work_rates[0, item] = m.work_rates[END_STAGE, item]
     tau = m.tau + h

@@ -8,10 +8,10 @@ steps end on the grid of samples. Nothing is smoothed, and nothing is passed ove
 import math
 from typing import Any
 
-from numba import float64, int64, void
+from numba import float64, int64, types, void
 
 from brakecli.solver import own_steps
-from brakecli.solver.automaton import OPEN, STICK, anchored, carried, counted, side_of, stalled
+from brakecli.solver.automaton import OPEN, SLIDING, STICK, anchored, carried, counted, side_of, stalled
 from brakecli.solver.compile import Floats, from_memory, into_memory, kernel
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.friction import observed
@@ -20,6 +20,7 @@ from brakecli.solver.records import (
     AHEAD,
     BELT,
     BELT_SLOPE,
+    COEFFICIENTS,
     COUNTS_TYPE,
     FLOW,
     FLOW_TYPE,
@@ -27,9 +28,11 @@ from brakecli.solver.records import (
     LOAD_SLOPE,
     MARGINS,
     SIZE,
+    TANGENT_TYPE,
     TERMS,
     V_X,
     V_Y,
+    Coefficients,
     Plant,
     Weights,
     X,
@@ -41,6 +44,7 @@ from brakecli.solver.schemes.piecewise_exact import phases
 from brakecli.solver.schemes.piecewise_exact.locate import NO_EVENT, first_event
 from brakecli.solver.schemes.piecewise_exact.phases import add_works
 from brakecli.solver.schemes.piecewise_exact.switch import place, switch
+from brakecli.solver.tangent import kept, renew
 
 STATE = FLOW
 LAG, MEMORY, VELOCITIES = own_steps.LAG, own_steps.MEMORY, own_steps.VELOCITIES
@@ -52,6 +56,8 @@ _ROUNDING = 4.0 * 2.220446049250313e-16  # of a step, beside the motion
 _ERROR_TERMS = 9  # of the series of an error, which is known to a few digits only
 _KEPT = 4096  # levels from one sum of the works to the next, so that rounding does not add up
 
+Four = tuple[float, float, float, float]
+_FOUR = types.UniTuple(float64, 4)
 _PLANT = plant_type(FLOW)
 hold, _plant_at = into_memory(_PLANT), from_memory(_PLANT)
 _NONE, _, _DIVERGED, _, _, _STALLED = (int(failure) for failure in Failure)
@@ -119,10 +125,20 @@ def whole(m: Any, h: float) -> int:
     return 1
 
 
-@kernel(void(FLOW_TYPE, float64), inlined=False)
-def _carry_part(m: Any, seconds: float) -> None:
-    """The same along a part of a step, at whose end the motion is."""
-    a, phase, x, y, v_x, v_y = m.generator, m.phase, m.error[X], m.error[Y], m.error[V_X], m.error[V_Y]
+@kernel(void(FLOW_TYPE, TANGENT_TYPE), inlined=False)
+def _disturb(m: Any, t: Any) -> None:
+    """Move the disturbance along a whole step."""
+    a, x, y, v_x, v_y = m.now, t.x, t.y, t.v_x, t.v_y
+    t.x = (a[0, 0] * x + a[1, 0] * y) + (a[2, 0] * v_x + a[3, 0] * v_y)
+    t.y = (a[0, 1] * x + a[1, 1] * y) + (a[2, 1] * v_x + a[3, 1] * v_y)
+    t.v_x = (a[0, 2] * x + a[1, 2] * y) + (a[2, 2] * v_x + a[3, 2] * v_y)
+    t.v_y = (a[0, 3] * x + a[1, 3] * y) + (a[2, 3] * v_x + a[3, 3] * v_y)
+
+
+@kernel(_FOUR(FLOW_TYPE, float64, *_FOUR), inlined=False)
+def _moved(m: Any, seconds: float, x: float, y: float, v_x: float, v_y: float) -> Four:
+    """A disturbance after a part of a step in the present phase."""
+    a, phase = m.generator, m.phase
     moved_x, moved_y, moved_v_x, moved_v_y = x, y, v_x, v_y
     for k in range(1, _ERROR_TERMS):
         a_x = (a[phase, V_X, X] * x + a[phase, V_X, Y] * y) + (a[phase, V_X, V_X] * v_x + a[phase, V_X, V_Y] * v_y)
@@ -130,8 +146,26 @@ def _carry_part(m: Any, seconds: float) -> None:
         part = seconds / k
         x, y, v_x, v_y = part * v_x, part * v_y, part * a_x, part * a_y
         moved_x, moved_y, moved_v_x, moved_v_y = moved_x + x, moved_y + y, moved_v_x + v_x, moved_v_y + v_y
-    m.error[X], m.error[Y], m.error[V_X], m.error[V_Y] = moved_x, moved_y, moved_v_x, moved_v_y
+    return moved_x, moved_y, moved_v_x, moved_v_y
+
+
+@kernel(void(FLOW_TYPE, TANGENT_TYPE, float64), inlined=False)
+def _carry_part(m: Any, t: Any, seconds: float) -> None:
+    """The same along a part of a step, at whose end the motion is."""
+    e = m.error
+    e[X], e[Y], e[V_X], e[V_Y] = _moved(m, seconds, e[X], e[Y], e[V_X], e[V_Y])
     _round(m)
+    if t.on == 1:
+        t.x, t.y, t.v_x, t.v_y = _moved(m, seconds, t.x, t.y, t.v_x, t.v_y)
+
+
+@kernel(void(COEFFICIENTS, FLOW_TYPE, TANGENT_TYPE), inlined=False)
+def _meet(c: Coefficients, m: Any, t: Any) -> None:
+    """What becomes of the disturbance as the shoe comes to the velocity of the wheel."""
+    needed = 0.0
+    for i in range(SIZE):
+        needed += m.needed[i] * m.z[i]
+    t.v_x *= kept(needed, max(-c.phi * m.stiffness * m.z[Y], 0.0))
 
 
 @kernel(void(FLOW_TYPE), inlined=False)
@@ -213,14 +247,17 @@ def _through(p: Plant, t: float, to_sample: int) -> int:
         if theta > 0.0:
             phases.take_part(p.c, m, p.work, span, theta)
             _count(m, p.counts)
-            _carry_part(m, theta * span)
+            _carry_part(m, p.tangent, theta * span)
         tau += theta * span
         if which != NO_EVENT:
             m.events_time, m.events = counted(m.events_time, m.events, t + tau, h)
             if stalled(m.events):
                 return _STALLED
             add_works(p.c, m, p.work, p.s.h)
+            before = m.phase
             switch(p.c, m, which, p.s.h)
+            if p.tangent.on == 1 and which == SLIDING and before != OPEN and before != STICK:
+                _meet(p.c, m, p.tangent)
             _anchor(p, t, tau)
             if m.phase == STICK:
                 m.error[V_X] = 0.0
@@ -267,6 +304,8 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
         t = grid.interval * sampled + part * h
         if part == 0:
             _sample(p, t)
+            if p.tangent.on == 1:
+                renew(p.tangent, sampled, grid.samples)
         if counts.level == stop:
             break
         if part == 0:
@@ -275,6 +314,8 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
             row += 1
         if m.beyond == 0.0 and t + h < m.knot and whole(m, h) == 1:
             _count(m, counts)
+            if p.tangent.on == 1:
+                _disturb(m, p.tangent)
         else:
             failure = _through(p, t, int(part + 1 == grid.per_sample))
         if not abs(m.z[X]) + abs(m.z[Y]) + abs(m.z[V_X]) + abs(m.z[V_Y]) < BOUND:

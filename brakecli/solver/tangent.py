@@ -1,0 +1,117 @@
+"""A small disturbance of a motion, carried along with it: does it grow or fade, and how fast?
+
+Within a phase it follows the derivative of the steps of the motion. Where the shoe comes to the wheel's velocity,
+and nowhere else, a force jumps: there the disturbance of the sliding velocity is multiplied by the ratio of its
+accelerations behind and before, which is 0 where the shoe sticks. That is all of the saltation matrix (R. I. Leine
+and H. Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems, Springer 2004, chapter 7): the normal
+of the event is that of the sliding velocity, and only the acceleration along the wheel jumps.
+
+At such an event the derivative of a step of a difference scheme says nothing. The step knows of the event to a
+step only, so that its end is a saw of the state at its begin, whose slope is not that of the motion. Instead the
+disturbance moves on as before up to the event, and a shoe that sticks holds it still.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import float64, int64, void
+
+from brakecli.solver.compile import kernel
+from brakecli.solver.records import (
+    BESIDE,
+    COEFFICIENTS,
+    PARTS,
+    PROBLEM_TYPE,
+    TANGENT_TYPE,
+    Beside,
+    Coefficients,
+)
+
+BATCHES = 8
+"""Batches of the parts of the second half of a run."""
+_LEAST = 1e-280  # size of a disturbance
+
+
+class Exponent(NamedTuple):
+    """Growth rate of small disturbances of a motion (1/s), Lyapunov's exponent, with an error of it (1/s)."""
+
+    rate: float
+    error: float
+
+    @property
+    def unstable(self) -> bool | None:
+        """Whether disturbances grow; None where zero lies within the error."""
+        return None if abs(self.rate) <= self.error else self.rate > 0.0
+
+
+def seed(t: Any, state: Any, rate: float, h: float) -> None:
+    """Begin with a disturbance of size one in no particular direction; `state` is that of a difference scheme."""
+    t.on, t.rate = 1, rate
+    t.x, t.y, t.v_x, t.v_y = state.x, state.y, state.v_x, state.v_y = 0.5 / rate, 0.5 / rate, 0.5, -0.5
+    state.x_old, state.y_old = state.x - h * state.v_x, state.y - h * state.v_y
+
+
+def exponent(t: Any, duration: float) -> Exponent:
+    """The exponent in the second half of a run, with the standard error of the mean of its batches.
+
+    Within a cycle a disturbance swings: its size is a mean over a batch.
+    """
+    sizes = np.cumsum(t.logs)[PARTS // 2 :].reshape(BATCHES, -1).mean(axis=1)
+    rates = np.diff(sizes) * (2 * BATCHES / duration)
+    return Exponent(float(rates.mean()), float(rates.std(ddof=1)) / math.sqrt(len(rates)))
+
+
+@kernel(float64(float64, float64))
+def kept(needed: float, bound: float) -> float:
+    """The part of a disturbance of the sliding velocity that is left as the shoe comes to the wheel's velocity.
+
+    `needed` is the friction force (N) that it takes to stay there, `bound` the one that there is. Accelerations
+    before and behind are as |needed| + bound and |needed| - bound.
+    """
+    return max(abs(needed) - bound, 0.0) / (abs(needed) + bound) if bound > 0.0 else 1.0
+
+
+@kernel(void(BESIDE, float64, float64, float64, int64))
+def meet(beside: Beside, part: float, theta: float, h: float, lag: int) -> None:
+    """Keep a part of the disturbed velocity from an event on, which lies at the part theta of a step h.
+
+    The velocity of a scheme that lags is the change of the place in the step before, in which the event lies.
+    """
+    b = beside.state
+    if lag == 1:
+        change = b.x - b.x_old
+        b.x -= (1.0 - theta) * (1.0 - part) * change
+        b.x_old = b.x - part * change
+    else:
+        b.x += theta * (1.0 - part) * h * b.v_x
+        b.v_x *= part
+
+
+@kernel(void(COEFFICIENTS, BESIDE, PROBLEM_TYPE, float64, float64, float64))
+def solve(c: Coefficients, beside: Beside, of: Any, side: float, stiffness: float, tangential: float) -> None:
+    """The minimisation of a step, differentiated: velocities and normal force of the disturbance."""
+    b, grip = beside.problem, -side * c.phi
+    a_11, a_12, a_22 = of.a_11, of.a_12, of.a_22
+    if side == 0.0:
+        d, d_slope, e, e_slope = 0.0, 0.0, b.g_2 / a_22, 1.0 / a_22
+    else:
+        part = 1.0 / (a_11 * a_22 - a_12 * a_12)
+        d, e = part * (b.g_1 * a_22 - b.g_2 * a_12), part * (b.g_2 * a_11 - b.g_1 * a_12)
+        d_slope, e_slope = part * (grip * a_22 - a_12), part * (a_11 - grip * a_12)
+    x, y = b.x_0 + b.gain * d, b.y_0 + b.gain * e
+    force = (tangential * x - stiffness * y) / (1.0 - b.gain * (tangential * d_slope - stiffness * e_slope))
+    b.d, b.e, b.normal_force = d + d_slope * force, e + e_slope * force, force
+
+
+@kernel(float64(TANGENT_TYPE, int64, int64))
+def renew(t: Any, number: int, samples: int) -> float:
+    """Note the growth up to a sample, and go on with a disturbance of size one; what it was multiplied by."""
+    size = math.sqrt(t.rate * t.rate * (t.x * t.x + t.y * t.y) + (t.v_x * t.v_x + t.v_y * t.v_y))
+    if number > 0:
+        t.logs[(number - 1) * PARTS // samples] += math.log(max(size, _LEAST))
+    part = 1.0 / size if size > _LEAST else 0.0
+    t.x, t.y, t.v_x, t.v_y = part * t.x, part * t.y, part * t.v_x, part * t.v_y
+    if part == 0.0:
+        t.x = 1.0 / t.rate
+    return part
