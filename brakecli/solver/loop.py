@@ -55,9 +55,9 @@ def sample(p: Plant, row: Floats) -> None:
     row[4], row[5], row[6], row[7] = friction, normal, contact.fraction, side
 
 
-@kernel(void(PLANT, float64), inlined=False)
-def _disturb(p: Plant, before: float) -> None:
-    """Carry the disturbance along the step that has been taken, with the sliding velocity at its begin."""
+@kernel(void(PLANT, float64, float64), inlined=False)
+def _disturb(p: Plant, before: float, after: float) -> None:
+    """Carry the disturbance along the step that has been taken, with the sliding velocities at both ends."""
     p = borrowed(p)
     c, t, problem, contact, h, beside = p.c, p.tangent, p.problem, p.layer.contact, p.s.h, p.beside
     side = problem.side
@@ -68,8 +68,10 @@ def _disturb(p: Plant, before: float) -> None:
         bound = c.phi * problem.normal_force
         if side == 0.0 and abs(needed) > bound:  # the step holds, as the shoe turns in it, but friction could not
             side = -math.copysign(1.0, needed)
+        elif t.side == 0.0 and abs(needed) <= bound and abs(after) <= p.grid.lag * h * bound / c.m:  # see `sample`
+            side = 0.0
         if side != t.side and t.side != 0.0:
-            to_go, change = c.m * abs(before), h * (abs(needed) + bound)
+            to_go, change = c.m * abs(before), h * (bound + t.side * needed)
             meet(beside, kept(needed, bound), to_go / change if to_go < change else 1.0, h, p.grid.lag)
         t.side = side
     if side == 0.0:  # a scheme that lags has no other velocity
@@ -137,9 +139,9 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
             return _NOT_CLOSED
         before = state.v_x - belt_now
         finish(c, s, state, problem, layer.contact, p.work)
-        if p.tangent.on == 1:
-            _disturb(p, before)
         after = state.v_x - belt_next
+        if p.tangent.on == 1:
+            _disturb(p, before, after)
         if before * after <= 0.0 and problem.normal_force > 0.0:
             counts.turns += 1
         if after == 0.0:

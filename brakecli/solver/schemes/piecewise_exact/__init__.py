@@ -237,6 +237,8 @@ def _through(p: Plant, t: float, to_sample: int) -> int:
         to_knot, fits = m.knot - t - tau, to_sample == 0 or tau == 0.0
         if fits and h < to_knot and min(m.before[4], m.before[5], m.before[6]) >= 0.0 and whole(m, h) == 1:
             _count(m, p.counts)
+            if p.tangent.on == 1:
+                _disturb(m, p.tangent)
             tau += h
             continue
         span = max(min(h - tau if to_sample == 1 else h, to_knot), 0.0)
