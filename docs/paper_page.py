@@ -84,10 +84,11 @@ def agreement(results: Results) -> str:
             )
             beyond.append([f"`{name}`", f"`{settings}`", number(found), number(exact), number(error)])
     half = 100.0 * float(np.median(apart))
+    close = f"agree within {half:.1g} % of the value" if half > 1e-9 else "to rounding"
     text = (
         f"Simulation and eigenvalues were compared at {count} points. At {count - len(beyond)} they agree within\n"
         "the error bar of the simulation, or neither finds a critical coefficient in the range searched (half of\n"
-        f"them agree within {half:.1g} % of the value); at {len(beyond)} they do not"
+        f"them {close}); at {len(beyond)} they do not"
     )
     if not beyond:
         return text.replace("; at 0 they do not", "; there is no exception") + "."
