@@ -3,17 +3,24 @@
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import groupby
+from itertools import groupby, pairwise
 from typing import NamedTuple
+
+import numpy as np
 
 from brakecli.branches.bar import Bound, located
 from brakecli.branches.explore import FORCED, SLIDING, Explored, Followed, Mark, crossing, span
 from brakecli.branches.line import Line
 from brakecli.branches.newton import Newton, Settings
+from brakecli.branches.problem import Array
 from brakecli.branches.sliding import Slide
 
 NARROWEST = 1e-6
 """Part of the range below which an interval is that of rounding."""
+WIDEST = 1.0 / 3.0
+"""Part of the range that an error bar with an answer may have."""
+MEET = 1e-3
+"""Part of the range, and of their states, by which two ends of branches differ at most that are one motion."""
 Span = tuple[float, float]
 """Two places of the line, the lower one first."""
 NONE_BEGINS = "no vibration begins in the range; --start follows one that a run has come to"
@@ -70,7 +77,8 @@ class Answers:
     def known(self) -> list[Span]:
         """Where the motion is known that continues steady sliding."""
         if self.bases:
-            return _merged([span(each) for each in self.bases])
+            bridges = [(min(p, *others), max(p, *others)) for p, others in self._cut_ends if others]
+            return _merged([*map(span, self.bases), *bridges])
         slides = self._slides
         return [(slides[0].p, slides[-1].p)] if slides else []
 
@@ -86,15 +94,35 @@ class Answers:
 
     @cached_property
     def windows(self) -> list[tuple[Bound, Bound]]:
-        """Where the motion that continues steady sliding is unstable; a forced one on all of its sheets."""
-        found = list[tuple[Bound, Bound]]()
-        for first, last in self.known:
-            own = [part for part in self._stable if first <= part.low.p <= last]
-            edges = [Bound(first), *(bound for part in own for bound in (part.low, part.high)), Bound(last)]
+        """Where the motion that continues steady sliding is unstable; a forced one on all of its sheets.
+
+        The ends are not known of one in which a branch is lost: it may come back as a stable motion.
+        """
+        found, lost_at = list[tuple[Bound, Bound]](), [p for p, others in self._cut_ends if not others]
+        for (first, last), within in zip(self.known, self._edges, strict=True):
+            edges = [Bound(first), *within, Bound(last)]
             for low, high in zip(edges[::2], edges[1::2], strict=True):
                 if high.p > low.p + NARROWEST:
-                    found.append((low, high))
+                    lost = any(low.p - low.error < p < high.p + high.error for p in lost_at)
+                    ends = (low._replace(known=False), high._replace(known=False)) if lost else (low, high)
+                    found.append(ends)
         return found
+
+    @cached_property
+    def _cut_ends(self) -> list[tuple[float, list[float]]]:
+        """Where branches of the motion that continues steady sliding are cut, and where others go on with it."""
+        ends = [
+            (point.p, np.array(point.facts.state))
+            for each in self.bases
+            if each.branch and each.branch.points
+            for end, point in zip(each.branch.ended, (each.branch.points[0], each.branch.points[-1]), strict=True)
+            if end.kind in CUT
+        ]
+
+        def same(p: float, state: Array, other: float, there: Array) -> bool:
+            return abs(other - p) < MEET and bool(np.abs(there - state).max() <= MEET * np.abs(state).max())
+
+        return [(end[0], [other[0] for other in ends if other is not end and same(*end, *other)]) for end in ends]
 
     @property
     def critical_windows_lower(self) -> list[float]:
@@ -136,9 +164,18 @@ class Answers:
         return [Part(low, high, 0.0) for low, high in zip(edges[::2], edges[1::2], strict=True) if high.p > low.p]
 
     @cached_property
+    def _edges(self) -> list[list[Bound]]:
+        """Both ends of all stable parts in order, for each interval in which the motion is known."""
+        found = []
+        for first, last in self.known:
+            own = [part for part in self._stable if first <= part.low.p <= last]
+            found.append(told_apart([bound for part in own for bound in (part.low, part.high)]))
+        return found
+
+    @cached_property
     def stable_spans(self) -> list[Span]:
         """Where it is stable, by the ends."""
-        return [(part.low.p, part.high.p) for part in self._stable]
+        return [(a.p, b.p) for edges in self._edges for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
     @cached_property
     def coexisting(self) -> list[tuple[float, float, float]]:
@@ -286,6 +323,19 @@ class Answers:
         where = f"from {begin} on" if reaches else f"from {begin} to {end}"
         what = "the motion that the waves force" if self.bases else "stable sliding"
         return [f"{where} a vibration at {frequency:.4g} Hz can exist beside {what}"]
+
+
+def told_apart(bounds: list[Bound]) -> list[Bound]:
+    """The bounds in order, with their bars, without pairs that are closer than these, of which one is wide.
+
+    An interval that is so narrow may be none; so may what lies between two.
+    """
+    bounds = [bound._replace(error=bound.bar, inner=None) for bound in bounds]
+    for k, (one, other) in enumerate(pairwise(bounds)):
+        bars = one.error, other.error
+        if one.known and other.known and max(bars) >= WIDEST and other.p - one.p < min(bars):
+            return told_apart([*bounds[:k], *bounds[k + 2 :]])
+    return bounds
 
 
 def _merged(spans: list[Span]) -> list[Span]:

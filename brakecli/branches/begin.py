@@ -37,6 +37,9 @@ AT_CALM = 1e-9
 """Distance from a calm motion, over the compression of the pad, that is rounding."""
 KEPT = 0.99
 """Part of its distance from all calm motions that a vibration which lasts keeps in a time twice as long."""
+DRIFTS, STILL = 4.0, 1e-6
+"""Standard errors of its slope beyond which that distance falls, and a fall that is none. Beside a value at which
+a vibration vanishes a motion keeps nearly all of its distance for long, but it falls steadily."""
 SETTLING = 1.0
 """Powers of e by which the dashpots shrink a disturbance of a vibration before its distances are compared."""
 NOTICED = 0.2
@@ -185,9 +188,20 @@ def on_rough_pads(system: System, state: Array, calm: Sequence[Array]) -> End:
         far.append(min(each.distance(flown[0]) for each in known))
         quarter, rest = divmod(len(far), 4)
         whole = rest == 0 and quarter & (quarter - 1) == 0  # 4, 8, 16 … spans
-        if whole and quarter >= max(spans) and max(far[2 * quarter :]) >= KEPT * max(far[quarter : 2 * quarter]):
+        kept = whole and max(far[2 * quarter :]) >= KEPT * max(far[quarter : 2 * quarter])
+        if kept and quarter >= max(spans) and not _falls(far[quarter:]):
             return End(True, last)
     return UNKNOWN
+
+
+def _falls(far: list[float]) -> bool:
+    """Whether distances fall from span to span, by a line through the logarithms of the means of eighths."""
+    means = [math.log(float(np.mean(part))) for part in np.array_split(far, min(len(far), 8))]
+    places = np.arange(len(means)) - 0.5 * (len(means) - 1)
+    slope, square = float(places @ means / (places @ places)), float(places @ places)
+    rest = np.array(means) - np.mean(means) - slope * places
+    error = math.sqrt(float(rest @ rest) / (len(means) - 2) / square)
+    return slope < -max(DRIFTS * error, STILL / len(means))
 
 
 def settled(problem: Cycles, p: float, state: Array, frequency: float) -> Point | None:

@@ -6,9 +6,8 @@ from enum import StrEnum
 from itertools import pairwise
 from typing import NamedTuple
 
+from brakecli.branches.answers import WIDEST
 from brakecli.sweeps.tables import Critical
-
-WIDEST = 1.0 / 3.0  # of the range, that an error bar with an answer may have
 
 
 class Outcome(StrEnum):
@@ -109,15 +108,8 @@ def _anywhere(value: float, other: float) -> Edge:
 
 
 def of_edges(critical: Critical, unstable: bool, edges: list[Edge]) -> Search:
-    """The critical value and all windows, by the edges in order; `unstable`: whether the range begins in one.
-
-    One that is narrower than its bars, of which one is wide, may be none; so may what lies between two.
-    """
+    """The critical value and all windows, by the edges in order; `unstable`: whether the range begins in one."""
     wide = WIDEST * (critical.upper - critical.lower)
-    for one, other in pairwise(edges):
-        bars = one.error, other.error
-        if one.known and other.known and max(bars) >= wide and other.value - one.value < min(bars):
-            return of_edges(critical, unstable, [each for each in edges if each not in (one, other)])
     ends = [(critical.lower, 0.0)] * unstable + [(each.value, each.error) for each in edges]
     ends += [(critical.upper, 0.0)] * (len(ends) % 2)
     columns = ([each[k] for each in ends] for k in (0, 1))
