@@ -71,6 +71,7 @@ def _disturb(p: Plant, before: float, after: float) -> None:
         elif t.side == 0.0 and abs(needed) <= bound and abs(after) <= p.grid.lag * h * bound / c.m:  # see `sample`
             side = 0.0
         if side != t.side and t.side != 0.0:
+            t.placed += 1
             to_go, change = c.m * abs(before), h * (bound + t.side * needed)
             meet(beside, kept(needed, bound), to_go / change if to_go < change else 1.0, h, p.grid.lag)
         t.side = side

@@ -191,8 +191,9 @@ class Stepping:
         energy = account(self._start_energy, end, self.plant.work)
         if not work.failed and not abs(energy.relative_closing_error) <= OPEN_ACCOUNT:
             work.failure = Failure.UNBALANCED
-        found = exponent(self.tangent, self.system.sampled_duration) if self.system.tangents else None
-        return Motion(self.system, np.concatenate(kept), work, energy, None if work.failed else found)
+        carried = self.system.tangents and not work.failed
+        found = exponent(self.tangent, self.system.sampled_duration, self.plant.s.h) if carried else None
+        return Motion(self.system, np.concatenate(kept), work, energy, found)
 
     def block(self, stop: int) -> Floats:
         """Step to level `stop`; the samples on the way."""

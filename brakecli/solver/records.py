@@ -98,6 +98,7 @@ TANGENT = record(
     "rate",  # rad/s, by which places count beside velocities in its size
     "side",  # of the friction law that the motion follows, 0 in stick
     on=int,  # 1 where it is carried along
+    placed=int,  # events that were placed inside steps of a difference scheme
     logs=(float, PARTS),  # ln of its growth in each part of the run
 )
 """A disturbance that is carried along with a motion, see `solver.tangent`."""

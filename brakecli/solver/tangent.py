@@ -52,14 +52,17 @@ def seed(t: Any, state: Any, rate: float, h: float) -> None:
     state.x_old, state.y_old = state.x - h * state.v_x, state.y - h * state.v_y
 
 
-def exponent(t: Any, duration: float) -> Exponent:
+def exponent(t: Any, duration: float, h: float) -> Exponent:
     """The exponent in the second half of a run, with the standard error of the mean of its batches.
 
-    Within a cycle a disturbance swings: its size is a mean over a batch.
+    Within a cycle a disturbance swings: its size is a mean over a batch. The error contains a quarter of a step h
+    (s), in radians of the fastest motion, for each event that a difference scheme has placed: what forces change
+    within that step is not seen there. Limit cycles have shown up to two thirds of a step.
     """
     sizes = np.cumsum(t.logs)[PARTS // 2 :].reshape(BATCHES, -1).mean(axis=1)
     rates = np.diff(sizes) * (2 * BATCHES / duration)
-    return Exponent(float(rates.mean()), float(rates.std(ddof=1)) / math.sqrt(len(rates)))
+    error = float(rates.std(ddof=1)) / math.sqrt(len(rates))
+    return Exponent(float(rates.mean()), math.hypot(error, 0.25 * t.rate * h * t.placed / duration))
 
 
 @kernel(float64(float64, float64))

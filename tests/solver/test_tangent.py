@@ -1,0 +1,155 @@
+"""Small disturbances that are carried along: against closed forms, neighbours, multipliers, and others' results."""
+
+import math
+from dataclasses import replace
+from functools import cache
+from itertools import islice
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from brakecli.branches.forced import Forced
+from brakecli.branches.line import Line
+from brakecli.case.case import Case
+from brakecli.case.system import system_of
+from brakecli.solver.motion import Motion, Stepping, solve
+from brakecli.solver.period import common_period
+from brakecli.solver.system import System
+from tests.analysis.shoes import Tables, random_shoes
+from tests.examples import MODE_COUPLING, SQUEAL, make
+from tests.sweeps.shoes import drawn as opening
+
+pytestmark = pytest.mark.usefixtures("compiled")
+Array = Any
+FIRST = np.array([0.5, 0.5, 0.5, -0.5])
+"""The disturbance that each begins with: places times the angular frequency of the fast mode, and velocities."""
+
+
+def carried(system: System) -> tuple[Motion, Array]:
+    """A motion, and the disturbance at its end that has grown from `FIRST`."""
+    stepping = Stepping(replace(system, tangents=True))
+    motion, t = stepping.run(), stepping.tangent
+    at = t if system.method.own_steps else stepping.plant.beside.state
+    size = math.exp(float(np.sum(t.logs)))
+    return motion, size * np.array([t.rate * at.x, t.rate * at.y, at.v_x, at.v_y])
+
+
+def scales(system: System) -> Array:
+    """What a state is multiplied by for the size of a disturbance."""
+    rate = 2.0 * math.pi * system.natural_frequencies[1]
+    return np.array([rate, rate, 1.0, 1.0])
+
+
+def by_neighbours(system: System, size: float) -> Array:
+    """The same from two motions beside, on either side."""
+    ends, start = list[Array](), system.initial
+    for way in (size, -size):
+        x, y, vx, vy = way * FIRST / scales(system)
+        beside = replace(start, x=start.x + x, y=start.y + y, vx=start.vx + vx, vy=start.vy + vy)
+        ends.append(solve(replace(system, initial=beside)).rows[-1, :4])
+    return (ends[0] - ends[1]) / (2.0 * size) * scales(system)
+
+
+def by_scheme(tables: Tables, scheme: str, **changes: Any) -> Case:
+    """A case with another scheme, with the step of the case, or with a tolerance."""
+    solver = {name: tables["solver"][name] for name in ("duration", "step")}
+    if scheme == "event-driven":
+        solver |= {"step": None, "tolerance": 1e-10}
+    return make({**tables, "solver": {**solver, "scheme": scheme}}, **changes)
+
+
+@pytest.mark.parametrize(
+    ("scheme", "error"), [("piecewise-exact", 1e-11), ("event-driven", 1e-8), ("two-layer", 2e-3)]
+)
+def test_in_slip_a_disturbance_grows_as_the_matrix_exponential_says(scheme: str, error: float) -> None:
+    """Steps of the two-layer scheme turn a mode too little, by (ωh)²/12 of its angle: 1e-4 of 9 rad."""
+    case = by_scheme(SQUEAL, scheme, initial__at="equilibrium", initial__vx=1e-3, solver__duration=5e-3)
+    system = system_of(case)
+    c, k, grip = system.coefficients, system.contact_stiffness, system.coefficients.phi
+    a = np.zeros((4, 4))
+    a[0, 2] = a[1, 3] = 1.0
+    a[2] = -np.array([c.c_xx, c.c_xy + grip * k, c.b_xx, c.b_xy]) / c.m
+    a[3] = -np.array([c.c_xy, c.c_yy + k, c.b_xy, c.b_yy]) / c.m
+    end = expm(a * system.sampled_duration) @ (FIRST / scales(system)) * scales(system)
+    np.testing.assert_allclose(carried(system)[1], end, atol=error)
+
+
+@pytest.mark.parametrize("number", [0, 6])
+def test_it_follows_neighbours_on_pads_that_open_and_stick(number: int) -> None:
+    """Those of event-driven motions, 1e-7 m/s apart, whose errors are 1e-10 of the motion."""
+    tables = next(islice(random_shoes("open", 5), number, None))
+    duration = 400 * tables["output"]["sample_interval"]
+    system = system_of(by_scheme(tables, "event-driven", solver__duration=duration))
+    motion, found = carried(system)
+    assert (motion.rows[:, 7] == 0.0).any() if number else (motion.rows[:, 6] < 1.0).any()
+    np.testing.assert_allclose(found, by_neighbours(system, 1e-7), rtol=1e-3, atol=1e-3 * np.abs(found).max())
+
+
+@cache
+def sticking() -> Tables:
+    """A smooth shoe with a limit cycle that sticks."""
+    tables = next(islice(random_shoes("smooth", 5), 7, None))
+    return {**tables, "solver": {**tables["solver"], "duration": 4.0 * tables["solver"]["duration"]}}
+
+
+@pytest.mark.parametrize("scheme", ["piecewise-exact", "two-layer", "three-layer"])
+def test_a_limit_cycle_has_the_exponent_zero(scheme: str) -> None:
+    """Of a disturbance along itself, which neither grows nor fades; all others fade."""
+    motion = solve(replace(system_of(by_scheme(sticking(), scheme)), tangents=True))
+    assert (motion.rows[len(motion.rows) // 2 :, 7] == 0.0).mean() > 0.1
+    assert motion.exponent is not None
+    rate, error = motion.exponent
+    assert abs(rate) <= 3.0 * error
+    assert error < 0.03 * 3040.0  # Hz
+
+
+def test_a_step_that_does_not_see_an_event_is_not_differentiated() -> None:
+    """With eight times shorter steps the exponent of the same limit cycle is less than a thousandth of a cycle."""
+    case = by_scheme(sticking(), "two-layer", solver__step=sticking()["solver"]["step"] / 8.0)
+    motion = solve(replace(system_of(case), tangents=True))
+    assert motion.exponent is not None
+    assert abs(motion.exponent.rate) < 1e-3 * 3040.0
+
+
+def test_a_forced_motion_has_the_exponent_of_its_multiplier() -> None:
+    """ln |μ| / T, by the derivative of a common period of the waves, of a pad that opens."""
+    tables, key, low, high, _ = opening(6, "opening")
+    line = Line(make(tables), [key.replace("__", ".")], low, high)
+    p = line.place(1.0)
+    point, period = Forced.along(line).begun(p), common_period(line.system(p))
+    assert point is not None
+    assert period is not None
+    expected = math.log(float(np.abs(point.multipliers).max())) / period
+    names = dict(zip(("x", "y", "vx", "vy"), point.facts.state, strict=True))
+    table, name = key.split("__")
+    tables = {**tables, table: {**tables[table], name: 1.0}, "initial": names}
+    tables["solver"] = {"step": 2e-5, "duration": 500 * period}
+    tables["output"] = {"sample_interval": 1e-4}
+    motion = solve(replace(system_of(by_scheme(tables, "two-layer")), tangents=True))
+    assert (motion.rows[:, 6] < 1.0).any()
+    assert motion.exponent is not None
+    assert motion.exponent.rate == pytest.approx(expected, abs=3.0 * motion.exponent.error, rel=1e-3)
+    assert motion.exponent.error < 0.02 * abs(expected)
+
+
+@pytest.mark.parametrize("scheme", ["two-layer", "three-layer"])
+def test_it_grows_as_published_of_the_minimal_model_of_mode_coupling(scheme: str) -> None:
+    """N. Hoffmann et al., Mech. Res. Comm. 29 (2002) 197-205: ω² = 2 ± i √(1/3) where 4/3 φ = 4/3."""
+    motion = solve(
+        replace(system_of(by_scheme(MODE_COUPLING, scheme, solver__duration=60.0, initial__x=1e-6)), tangents=True)
+    )
+    published = (complex(2.0, math.sqrt(1.0 / 3.0)) ** 0.5).imag
+    assert motion.exponent is not None
+    assert motion.exponent.rate == pytest.approx(published, rel=1e-3)
+    assert motion.exponent.error < 1e-3 * published
+
+
+def test_the_disturbance_changes_nothing_of_the_motion() -> None:
+    for scheme in ("two-layer", "three-layer", "piecewise-exact", "event-driven"):
+        system = system_of(by_scheme(SQUEAL, scheme))
+        alone, beside = solve(system), solve(replace(system, tangents=True))
+        np.testing.assert_array_equal(alone.rows, beside.rows)
+        assert alone.exponent is None
+        assert beside.exponent is not None
