@@ -60,6 +60,7 @@ def run_table(report: RunReport) -> str:
         *_verdict_rows(numbers),
         ("peak of the spectrum of vx", f"{peak} ± {resolution:.2g} Hz" if peak else "not resolved"),
         *_rows(fields.RUN, numbers, "mean_friction_force", "braking_torque", "torque_variation"),
+        ("disturbances", disturbances(numbers)),
         ("settled part", f"{'' if numbers['settled'] else 'none; the numbers are those '}{since}"),
         ("scheme", method.scheme + how),
         ("tolerance", [report.certificate.sentence()] if report.certificate else []),
@@ -72,6 +73,16 @@ def run_table(report: RunReport) -> str:
         ("file", str(report.output)),
     ]
     return two_columns(report.title, rows)
+
+
+def disturbances(numbers: Mapping[str, Any]) -> list[str]:
+    """Whether neighbours of a motion come to it, where that was asked."""
+    rate, error = numbers.get("lyapunov_exponent"), numbers.get("lyapunov_error")
+    if rate is None or error is None:
+        return []
+    what = "fade" if rate < 0.0 else "grow"
+    known = "" if abs(rate) > 3.0 * error else ", which is not told from 0"
+    return [f"small ones {what} at {abs(rate):.3g} ± {error:.2g} 1/s{known}"]
 
 
 def verdict_table(source: str, numbers: Mapping[str, Any]) -> str:

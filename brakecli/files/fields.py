@@ -90,10 +90,22 @@ VIBRATIONS = Field(
     in_file=False,
     rows=VIBRATION,
 )
+EXPONENT = within(
+    "motion.exponent.",
+    Field(
+        "lyapunov_exponent",
+        "1/s",
+        "on a rough wheel, speed and load constant: growth rate of small disturbances in the second half",
+        at="rate",
+        label="disturbances grow at",
+    ),
+    Field("lyapunov_error", "1/s", "standard error of that rate", at="error"),
+)
 RUN = (
     Field("status", "", "how the run has ended: done or failed", TEXT),
     Field("failure", "", "time and reason of a failure", TEXT, at="motion.work.failure_sentence"),
     *VERDICT,
+    *EXPONENT,
     VIBRATIONS,
     Field(
         "spectrum_peak",

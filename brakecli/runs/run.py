@@ -83,6 +83,8 @@ def run(
     """
     with within_range():
         system = system_of(loaded.case)
+        shaken = system.steady and system.belt_speed != 0.0 and system.wheel.g.size > 0
+        system = replace(system, tangents=shaken)
         found = check(system)
         with new_result(output, force=force) as result:
             refuse(found, free_bytes(output.resolve().parent))

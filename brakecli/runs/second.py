@@ -47,7 +47,8 @@ def classify_twice(
     path: Path, thresholds: Thresholds, say: Callable[[str], None], progress: Counted
 ) -> dict[str, Any]:
     """The verdict on a stored run as `classify_result` gives it, by a second run where one is asked for."""
-    with stored_run(path) as (system, history, failure):
+    with stored_run(path) as (system, history, attributes):
+        failure = attributes.get("failure")
         verdict = verdict_on(history, system, failure, thresholds)
         if not verdict.decision.second_run:
             say("--second-run: this verdict asks for none; nothing was run")

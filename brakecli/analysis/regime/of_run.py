@@ -1,7 +1,7 @@
 """The regime of the run in a result file, found from its history: what `brakecli classify RESULT.h5` does."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache, partial
@@ -33,15 +33,17 @@ from brakecli.solver.system import System
 
 def classify_result(path: Path, thresholds: Thresholds) -> dict[str, Any]:
     """Names and values of the verdict on a stored run; raises UnreadableResultError for anything else."""
-    with stored_run(path) as (system, history, failure):
+    with stored_run(path) as (system, history, attributes):
+        failure = attributes.get("failure")
         found = {"over_time": None if failure else over_time(history, system)}
         verdict = verdict_on(history, system, failure, thresholds)
-        return {**numbers_of(verdict, failure), "vibrations": fields.VIBRATIONS.read(found)}
+        exponent = {field.name: attributes.get(field.name) for field in fields.EXPONENT}
+        return {**numbers_of(verdict, failure), **exponent, "vibrations": fields.VIBRATIONS.read(found)}
 
 
 @contextmanager
-def stored_run(path: Path) -> Iterator[tuple[System, History, str | None]]:
-    """System, history and failure of a stored run; raises UnreadableResultError for anything else."""
+def stored_run(path: Path) -> Iterator[tuple[System, History, Mapping[str, Any]]]:
+    """System, history and attributes of a stored run; raises UnreadableResultError for anything else."""
     with open_result(path, kind="run") as result:
         try:
             system = system_of(parse_case(result.text("resolved_toml"), str(path)).case)
@@ -51,7 +53,7 @@ def stored_run(path: Path) -> Iterator[tuple[System, History, str | None]]:
         if time is None or time.shape[0] < 1:
             raise UnreadableResultError(f"{path}: has no history; run its case again")
         history = History(system.interval, time.shape[0], partial(result.read, "history"))
-        yield system, history, result.attributes.get("failure")
+        yield system, history, result.attributes
 
 
 def numbers_of(verdict: Verdict, failure: str | None) -> dict[str, Any]:
