@@ -3,16 +3,17 @@
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import groupby, pairwise
+from itertools import combinations, groupby, pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from brakecli.branches.bar import Bound, located
 from brakecli.branches.explore import FORCED, SLIDING, Explored, Followed, Mark, crossing, span
+from brakecli.branches.follow import RUNS_AGAIN
 from brakecli.branches.line import Line
 from brakecli.branches.newton import Newton, Settings
-from brakecli.branches.problem import Array
+from brakecli.branches.point import End, Point
 from brakecli.branches.sliding import Slide
 
 NARROWEST = 1e-6
@@ -77,8 +78,7 @@ class Answers:
     def known(self) -> list[Span]:
         """Where the motion is known that continues steady sliding."""
         if self.bases:
-            bridges = [(min(p, *others), max(p, *others)) for p, others in self._cut_ends if others]
-            return _merged([*map(span, self.bases), *bridges])
+            return _merged([*map(span, self.bases), *self._bridges])
         slides = self._slides
         return [(slides[0].p, slides[-1].p)] if slides else []
 
@@ -98,31 +98,37 @@ class Answers:
 
         The ends are not known of one in which a branch is lost: it may come back as a stable motion.
         """
-        found, lost_at = list[tuple[Bound, Bound]](), [p for p, others in self._cut_ends if not others]
+        found = list[tuple[Bound, Bound]]()
         for (first, last), within in zip(self.known, self._edges, strict=True):
             edges = [Bound(first), *within, Bound(last)]
             for low, high in zip(edges[::2], edges[1::2], strict=True):
                 if high.p > low.p + NARROWEST:
-                    lost = any(low.p - low.error < p < high.p + high.error for p in lost_at)
+                    lost = any(low.p - low.error < p < high.p + high.error for p in self._lost_at)
                     ends = (low._replace(known=False), high._replace(known=False)) if lost else (low, high)
                     found.append(ends)
         return found
 
     @cached_property
-    def _cut_ends(self) -> list[tuple[float, list[float]]]:
-        """Where branches of the motion that continues steady sliding are cut, and where others go on with it."""
-        ends = [
-            (point.p, np.array(point.facts.state))
-            for each in self.bases
-            if each.branch and each.branch.points
-            for end, point in zip(each.branch.ended, (each.branch.points[0], each.branch.points[-1]), strict=True)
-            if end.kind in CUT
+    def _cut_ends(self) -> list[tuple[End, Point]]:
+        """The ends at which branches of the motion that continues steady sliding are cut."""
+        found = [each.branch for each in self.bases if each.branch and each.branch.points]
+        ends = [pair for each in found for pair in zip(each.ended, (each.points[0], each.points[-1]), strict=True)]
+        return [(end, point) for end, point in ends if end.kind in CUT]
+
+    @cached_property
+    def _lost_at(self) -> list[float]:
+        """Where it goes on from there, and nobody knows how."""
+        return [point.p for end, point in self._cut_ends if end != RUNS_AGAIN]
+
+    @cached_property
+    def _bridges(self) -> list[Span]:
+        """Between two such ends that are one motion."""
+        return [
+            (min(one.p, other.p), max(one.p, other.p))
+            for (_, one), (_, other) in combinations(self._cut_ends, 2)
+            if abs(one.p - other.p) < MEET
+            and np.allclose(one.facts.state, other.facts.state, MEET, MEET * np.abs(one.facts.state).max())
         ]
-
-        def same(p: float, state: Array, other: float, there: Array) -> bool:
-            return abs(other - p) < MEET and bool(np.abs(there - state).max() <= MEET * np.abs(state).max())
-
-        return [(end[0], [other[0] for other in ends if other is not end and same(*end, *other)]) for end in ends]
 
     @property
     def critical_windows_lower(self) -> list[float]:
