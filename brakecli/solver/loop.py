@@ -60,26 +60,36 @@ def _disturb(p: Plant, before: float, after: float) -> None:
     """Carry the disturbance along the step that has been taken, with the sliding velocities at both ends."""
     p = borrowed(p)
     c, t, problem, contact, h, beside = p.c, p.tangent, p.problem, p.layer.contact, p.s.h, p.beside
-    side = problem.side
-    if side != t.side:
-        x, y, v_y, belt = p.state.x, p.state.y, p.state.v_y, problem.belt_next
-        needed = c.m * (belt - problem.belt_now) / h + c.b_xx * belt + c.b_xy * v_y + c.c_xx * x + c.c_xy * y
-        needed += problem.load * c.sin_beta
+    side, was, part, theta, lag = problem.side, t.side, 1.0, 0.0, p.grid.lag
+    if side != was:
+        x, y, v_y, belt = p.state.x_old, p.state.y_old, p.state.v_y, problem.belt_now
+        if lag == 0:  # in the middle of the step, as the normal force is
+            x, y, belt = 0.5 * (x + p.state.x), 0.5 * (y + p.state.y), 0.5 * (belt + problem.belt_next)
+        needed = c.m * (problem.belt_next - problem.belt_now) / h + c.b_xx * belt + c.b_xy * v_y
+        needed += c.c_xx * x + c.c_xy * y + problem.load * c.sin_beta
         bound = c.phi * problem.normal_force
         if side == 0.0 and abs(needed) > bound:  # the step holds, as the shoe turns in it, but friction could not
             side = -math.copysign(1.0, needed)
-        elif t.side == 0.0 and abs(needed) <= bound and abs(after) <= p.grid.lag * h * bound / c.m:  # see `sample`
+        elif was == 0.0 and abs(needed) <= bound and abs(after) <= lag * h * bound / c.m:  # see `sample`
             side = 0.0
-        if side != t.side and t.side != 0.0:
+        if side != was and was != 0.0:
+            to_go, change = c.m * abs(before), h * (bound + was * needed)
+            part, theta = kept(needed, bound), to_go / change if to_go < change else 1.0
+            meet(beside, part, theta, h, lag)
             t.placed += 1
-            to_go, change = c.m * abs(before), h * (bound + t.side * needed)
-            meet(beside, kept(needed, bound), to_go / change if to_go < change else 1.0, h, p.grid.lag)
         t.side = side
     if side == 0.0:  # a scheme that lags has no other velocity
         beside.state.x_old = beside.state.x
+    b = beside.state
+    v_x = (b.x - b.x_old) / h if lag == 1 else b.v_x
     _prepare_at(p.plug.prepare)(c, p.s, beside.state, beside.problem)
     solve_disturbed(c, beside, problem, side, contact.stiffness, contact.tangential)
     _finish_at(p.plug.finish)(c, p.s, beside.state, beside.problem, beside.contact, beside.work)
+    if part > 0.0 and theta > 0.0:  # up to the event friction was that of the other side
+        behind = ((b.x - b.x_old) / h - v_x if lag == 1 else b.v_x - v_x) / h
+        ahead = behind + (side - was) * c.phi * beside.problem.normal_force / c.m
+        change = (theta - 0.5 * lag) * h * (part * ahead - behind)
+        b.x, b.v_x = b.x + lag * h * change, b.v_x + change
 
 
 @kernel(void(PLANT, int64), inlined=False)

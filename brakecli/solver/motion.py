@@ -192,7 +192,7 @@ class Stepping:
         if not work.failed and not abs(energy.relative_closing_error) <= OPEN_ACCOUNT:
             work.failure = Failure.UNBALANCED
         carried = self.system.tangents and not work.failed
-        found = exponent(self.tangent, self.system.sampled_duration, self.plant.s.h) if carried else None
+        found = exponent(self.tangent, self.system.sampled_duration, self.plant.s.h, lag) if carried else None
         return Motion(self.system, np.concatenate(kept), work, energy, found)
 
     def block(self, stop: int) -> Floats:
