@@ -98,7 +98,8 @@ def _renew(p: Plant, number: int) -> None:
     t, b = p.tangent, p.beside.state
     t.x, t.y, t.v_x, t.v_y = b.x, b.y, b.v_x, b.v_y
     part = renew(t, number, p.grid.samples)
-    b.x_old, b.y_old = t.x - part * (b.x - b.x_old), t.y - part * (b.y - b.y_old)
+    x_old, y_old = (part * (b.x - b.x_old), part * (b.y - b.y_old)) if part > 0.0 else (0.0, 0.0)
+    b.x_old, b.y_old = t.x - x_old, t.y - y_old
     b.x, b.y, b.v_x, b.v_y = t.x, t.y, t.v_x, t.v_y
 
 

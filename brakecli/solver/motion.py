@@ -35,7 +35,7 @@ from brakecli.solver.roughness import turn
 from brakecli.solver.schedules import integral_at, slope_at
 from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import System
-from brakecli.solver.tangent import Exponent, exponent, seed
+from brakecli.solver.tangent import FEWEST_SAMPLES, Exponent, exponent, seed
 
 EVENTS = 1000
 """How many unconverged steps are kept with their time and residual; all are counted."""
@@ -191,7 +191,7 @@ class Stepping:
         energy = account(self._start_energy, end, self.plant.work)
         if not work.failed and not abs(energy.relative_closing_error) <= OPEN_ACCOUNT:
             work.failure = Failure.UNBALANCED
-        carried = self.system.tangents and not work.failed
+        carried = self.system.tangents and not work.failed and self.system.samples >= FEWEST_SAMPLES
         found = exponent(self.tangent, self.system.sampled_duration, self.plant.s.h, lag) if carried else None
         return Motion(self.system, np.concatenate(kept), work, energy, found)
 

@@ -33,7 +33,9 @@ BATCHES = 8
 PLACED = 1 / 16, 1 / 4
 """Parts of a step by which the growth may be off at an event inside it, of a scheme whose velocity is that of the
 level reached, and of one that lags. Limit cycles, whose exponent is 0, have shown 0.06 and 0.34."""
-_LEAST = 1e-280  # size of a disturbance
+FEWEST_SAMPLES = 64
+"""Of a run with an exponent, at which its growth is noted."""
+_LEAST, _MOST = 1e-280, 1e280  # size of a disturbance
 
 
 class Exponent(NamedTuple):
@@ -114,9 +116,10 @@ def renew(t: Any, number: int, samples: int) -> float:
     """Note the growth up to a sample, and go on with a disturbance of size one; what it was multiplied by."""
     size = math.sqrt(t.rate * t.rate * (t.x * t.x + t.y * t.y) + (t.v_x * t.v_x + t.v_y * t.v_y))
     if number > 0:
-        t.logs[(number - 1) * PARTS // samples] += math.log(max(size, _LEAST))
-    part = 1.0 / size if size > _LEAST else 0.0
+        t.logs[(number - 1) * PARTS // samples] += math.log(min(max(size, _LEAST), _MOST))
+    if not _LEAST < size < _MOST:
+        t.x, t.y, t.v_x, t.v_y = 1.0 / t.rate, 0.0, 0.0, 0.0
+        return 0.0
+    part = 1.0 / size
     t.x, t.y, t.v_x, t.v_y = part * t.x, part * t.y, part * t.v_x, part * t.v_y
-    if part == 0.0:
-        t.x = 1.0 / t.rate
     return part

@@ -155,3 +155,21 @@ def test_the_disturbance_changes_nothing_of_the_motion() -> None:
         np.testing.assert_array_equal(alone.rows, beside.rows)
         assert alone.exponent is None
         assert beside.exponent is not None
+
+
+def test_a_disturbance_that_vanishes_between_samples_begins_anew() -> None:
+    """By dashpots near the critical damping, e^-1000 in a sample interval of 1 s, beyond what a double holds."""
+    system = system_of(by_scheme(SQUEAL, "two-layer", initial__at="equilibrium"))
+    strong = system.coefficients._replace(b_xx=2.2e4, b_xy=0.0, b_yy=2.2e4, phi=0.0)
+    system = replace(system, coefficients=strong, interval=1.0, duration=64.0, tangents=True)
+    stepping = Stepping(system)
+    stepping.run()
+    logs = np.array(stepping.tangent.logs)
+    assert np.isfinite(logs).all()
+    assert logs.min() < -600.0
+
+
+def test_few_samples_give_no_exponent() -> None:
+    for samples, known in ((63, False), (64, True)):
+        case = by_scheme(SQUEAL, "two-layer", solver__duration=1e-4 * samples)
+        assert (solve(replace(system_of(case), tangents=True)).exponent is not None) is known
