@@ -87,7 +87,7 @@ def disturbances(numbers: Mapping[str, Any]) -> list[str]:
 
 def verdict_table(source: str, numbers: Mapping[str, Any]) -> str:
     """A verdict, from the names and values that `--json` gives."""
-    rows = _verdict_rows(numbers)
+    rows = [*_verdict_rows(numbers), ("disturbances", disturbances(numbers))]
     si_unit = fields.MEASURED_UNITS.get(numbers.get("quantity", ""), "")
     tones = numbers.get("bursts", ())
     for tone in tones[:MOST_LISTED_BURSTS]:

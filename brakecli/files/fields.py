@@ -97,7 +97,6 @@ EXPONENT = within(
         "1/s",
         "on a rough wheel, speed and load constant: growth rate of small disturbances in the second half",
         at="rate",
-        label="disturbances grow at",
     ),
     Field("lyapunov_error", "1/s", "standard error of that rate", at="error"),
 )

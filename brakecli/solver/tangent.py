@@ -39,15 +39,10 @@ _LEAST, _MOST = 1e-280, 1e280  # size of a disturbance
 
 
 class Exponent(NamedTuple):
-    """Growth rate of small disturbances of a motion (1/s), Lyapunov's exponent, with an error of it (1/s)."""
+    """Growth rate of small disturbances of a motion (1/s), Lyapunov's exponent, with its standard error (1/s)."""
 
     rate: float
     error: float
-
-    @property
-    def unstable(self) -> bool | None:
-        """Whether disturbances grow; None where zero lies within the error."""
-        return None if abs(self.rate) <= self.error else self.rate > 0.0
 
 
 def seed(t: Any, state: Any, rate: float, h: float) -> None:

@@ -50,12 +50,13 @@ def test_classify_repeats_the_verdict_of_the_run(here: Path) -> None:
 def test_a_rough_wheel_is_asked_whether_neighbours_come_together(here: Path) -> None:
     """A forced motion in full contact is linear: they fade as its slowest mode does, by its eigenvalue."""
     rough, smooth = ROOT / "cases" / "rough-full-contact.toml", RELAXATION
-    said, told, again, none = each(
+    said, told, again, listed, none = each(
         here,
         [
             ["run", rough, "-o", "rough.h5", "--set", "solver.duration=0.5"],
             ["run", rough, "-o", "rough.h5", "--set", "solver.duration=0.5", "--force", "--json"],
             ["classify", "rough.h5", "--json"],
+            ["classify", "rough.h5"],
             ["run", smooth, "-o", "smooth.h5", "--set", "solver.duration=0.1", "--json"],
         ],
     )
@@ -63,6 +64,7 @@ def test_a_rough_wheel_is_asked_whether_neighbours_come_together(here: Path) -> 
     assert rate == pytest.approx(told.json["growth_rate"], abs=3.0 * error)
     assert f"small ones fade at {-rate:.3g}" in said.out
     assert again.json["lyapunov_exponent"] == rate
+    assert "small ones" in listed.out
     assert again.json["lyapunov_error"] == error
     assert none.json["lyapunov_exponent"] is None
 
