@@ -53,12 +53,12 @@ class EnergyAccount:
 
 def links_energy(c: Coefficients, x: float, y: float) -> float:
     """Energy of the stretched links, J."""
-    return float(0.5 * (c.c_xx * x * x + 2.0 * c.c_xy * x * y + c.c_yy * y * y))
+    return 0.5 * (c.c_xx * x * x + 2.0 * c.c_xy * x * y + c.c_yy * y * y)
 
 
 def energy_at_level(c: Coefficients, s: Weights, state: Any) -> Mechanical:
     """The energies of a motion whose position and velocity belong to one level."""
-    kinetic = 0.5 * c.m * float(state.v_x**2 + state.v_y**2)
+    kinetic = 0.5 * c.m * (state.v_x**2 + state.v_y**2)
     return kinetic, links_energy(c, state.x, state.y), (state.x, state.y), 0.0
 
 

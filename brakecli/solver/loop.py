@@ -4,6 +4,7 @@ import math
 
 from numba import float64, int64, void
 
+from brakecli.solver.automaton import FORWARD, OPEN, STICK, UNDECIDED
 from brakecli.solver.compile import Floats, at_address, borrowed, from_memory, into_memory, kernel, stopped, vector
 from brakecli.solver.friction import observed
 from brakecli.solver.implicit_step import SOLVED
@@ -13,6 +14,7 @@ from brakecli.solver.roughness import turn
 from brakecli.solver.schedules import integral_at, slope_at, value_at
 from brakecli.solver.tangent import kept, meet, renew
 from brakecli.solver.tangent import solve as solve_disturbed
+from brakecli.solver.track import enter, mark, put, turned
 
 _NONE, _UNCONVERGED, _DIVERGED, _NOT_CLOSED = (int(failure) for failure in tuple(Failure)[:4])
 
@@ -20,6 +22,21 @@ _evaluate_at, _prepare_at, _finish_at, _solve_at = (
     at_address(signature) for signature in (EVALUATE, PREPARE, FINISH, SOLVE)
 )
 hold, _plant_at = into_memory(PLANT), from_memory(PLANT)
+
+
+@kernel(void(PLANT, int64, float64), inlined=False)
+def _mark(p: Plant, number: int, t: float) -> None:
+    """Make a mark at a sample, whose contact has been evaluated, or where a scheme that lags has its energies."""
+    p = borrowed(p)
+    state, track, contact, lag = p.state, p.track, p.layer.contact, p.grid.lag
+    after = 0.5 * lag * p.s.h
+    if lag == 1:
+        if p.layer.pad.wheel_terms > 0:
+            travel, travel_low = integral_at(p.drive.belt, t, after)
+            turn(travel, travel_low, p.layer)
+        _evaluate_at(p.layer.evaluate)(0.5 * (state.x + state.x_old), 0.5 * (state.y + state.y_old), p.layer)
+    at = mark(track, p.work, number, p.grid.samples, t + after, contact.store)
+    at[0], at[1], at[2], at[3], at[4], at[5] = state.x, state.y, state.v_x, state.v_y, state.x_old, state.y_old
 
 
 @kernel(void(PLANT, vector))
@@ -32,7 +49,8 @@ def sample(p: Plant, row: Floats) -> None:
     """
     p = borrowed(p)
     c, grid, drive, state, contact = p.c, p.grid, p.drive, p.state, p.layer.contact
-    t = grid.interval * ((p.counts.level - grid.lag) // grid.per_sample)
+    number = (p.counts.level - grid.lag) // grid.per_sample
+    t = grid.interval * number
     x, y = (state.x, state.y) if grid.lag == 0 else (state.x_old, state.y_old)
     v_x, v_y, belt = state.v_x, state.v_y, value_at(drive.belt, t)
     if p.layer.pad.wheel_terms > 0:
@@ -53,6 +71,62 @@ def sample(p: Plant, row: Floats) -> None:
     side, friction = observed(sliding, holds, needed, normal, bound)
     row[0], row[1], row[2], row[3] = x, y, v_x, v_y
     row[4], row[5], row[6], row[7] = friction, normal, contact.fraction, side
+    if p.track.on == 1 and number >= p.track.next:
+        _mark(p, number, t)
+
+
+@kernel(float64(PLANT))
+def _needed(p: Plant) -> float:
+    """The friction force (N) that it takes to stick, where the step that has been taken has its forces."""
+    c, state, problem = p.c, p.state, p.problem
+    x, y, v_y, belt = state.x_old, state.y_old, state.v_y, problem.belt_now
+    if p.grid.lag == 0:  # in the middle of the step, as the normal force is
+        x, y, belt = 0.5 * (x + state.x), 0.5 * (y + state.y), 0.5 * (belt + problem.belt_next)
+    needed = c.m * (problem.belt_next - problem.belt_now) / p.s.h + c.b_xx * belt + c.b_xy * v_y
+    return needed + (c.c_xx * x + c.c_xy * y + problem.load * c.sin_beta)
+
+
+@kernel(void(PLANT, int64, float64, float64, float64), inlined=False)
+def _follow(p: Plant, phase: int, t: float, v_before: float, before: float) -> None:
+    """Note the events of the step from time t on, which has been taken, see `solver.track`.
+
+    `phase` is what its solution says, v_before the velocity before and `before` its excess over the wheel's (m/s).
+    """
+    p = borrowed(p)
+    c, track, state, problem, contact, h, lag = p.c, p.track, p.state, p.problem, p.layer.contact, p.s.h, p.grid.lag
+    was, v_x, force, margin = track.phase, state.v_x, problem.normal_force, 0.0
+    bound, sliding, at = c.phi * force, v_x - problem.belt, t + p.grid.weighted * h  # time of the forces
+    reached, x = t + (1 - lag) * h, state.x if lag == 0 else state.x_old  # where the velocity is
+    if phase == STICK or (was == STICK and phase != OPEN):
+        needed = _needed(p)
+        margin = bound - abs(needed)
+        flickers = lag == 1 and p.counts.stuck == p.counts.level and abs(sliding) <= h * bound / c.m  # see `sample`
+        if phase == STICK or flickers:
+            # A shoe that turns in a step may have the wheel's velocity at its end, though friction cannot hold it.
+            phase = STICK if margin >= 0.0 or (was == STICK and lag == 0) else FORWARD
+        if phase == STICK and was != STICK:
+            to_go, change = c.m * abs(before), h * (bound + math.copysign(1.0, before) * needed)
+            at = reached - h + (h * to_go / change if to_go < change else h)
+            track.began = at
+        elif phase != STICK and was == STICK:
+            before_slip = h * margin / (margin - max(track.margin, 0.0)) if margin < 0.0 else 0.0
+            at = max(at - before_slip, track.began)
+        track.margin = margin
+    if phase == OPEN and was != OPEN:
+        fall = state.force_earlier - state.force_before
+        at += h * (state.force_before / fall - 1.0) if fall > state.force_before else 0.0
+    elif phase != OPEN and was == OPEN:
+        rise = contact.tangential * sliding - contact.stiffness * state.v_y
+        at -= force / rise if force < h * rise else h
+    if phase != was:
+        rest = reached - at
+        enter(track, phase, at, x - rest * (v_x - 0.5 * rest * (v_x - v_before) / h))
+    if phase == STICK:
+        v_x = problem.belt
+    kind = turned(track, v_x)
+    if kind >= 0:
+        rest = h * v_x / (v_x - v_before) if v_before * v_x <= 0.0 else 0.0
+        put(track, kind, reached - rest, x - 0.5 * rest * v_x)
 
 
 @kernel(void(PLANT, float64, float64), inlined=False)
@@ -62,12 +136,7 @@ def _disturb(p: Plant, before: float, after: float) -> None:
     c, t, problem, contact, h, beside = p.c, p.tangent, p.problem, p.layer.contact, p.s.h, p.beside
     side, was, part, theta, lag = problem.side, t.side, 1.0, 0.0, p.grid.lag
     if side != was:
-        x, y, v_y, belt = p.state.x_old, p.state.y_old, p.state.v_y, problem.belt_now
-        if lag == 0:  # in the middle of the step, as the normal force is
-            x, y, belt = 0.5 * (x + p.state.x), 0.5 * (y + p.state.y), 0.5 * (belt + problem.belt_next)
-        needed = c.m * (problem.belt_next - problem.belt_now) / h + c.b_xx * belt + c.b_xy * v_y
-        needed += c.c_xx * x + c.c_xy * y + problem.load * c.sin_beta
-        bound = c.phi * problem.normal_force
+        needed, bound = _needed(p), c.phi * problem.normal_force
         if side == 0.0 and abs(needed) > bound:  # the step holds, as the shoe turns in it, but friction could not
             side = -math.copysign(1.0, needed)
         elif was == 0.0 and abs(needed) <= bound and abs(after) <= lag * h * bound / c.m:  # see `sample`
@@ -110,7 +179,8 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
     A failure leaves the state at the last good level. `events` gets time and residual of unconverged steps.
     """
     p: Plant = _plant_at(address)
-    c, s, grid, layer, state, problem, counts = p.c, p.s, p.grid, p.layer, p.state, p.problem, p.counts
+    c, s, grid, layer, state, problem = p.c, p.s, p.grid, p.layer, p.state, p.problem
+    counts, track = p.counts, p.track
     prepare, finish = _prepare_at(p.plug.prepare), _finish_at(p.plug.finish)
     solve, belt = _solve_at(p.plug.solve), p.drive.belt
     row, due = 0, grid.lag % grid.per_sample
@@ -149,11 +219,16 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
                 return _UNCONVERGED
         if layer.contact.valid == 0:
             return _NOT_CLOSED
-        before = state.v_x - belt_now
+        v_before = state.v_x
+        before = v_before - belt_now
         finish(c, s, state, problem, layer.contact, p.work)
         after = state.v_x - belt_next
         if p.tangent.on == 1:
             _disturb(p, before, after)
+        if track.on == 1:
+            phase = OPEN if not problem.normal_force > 0.0 else STICK if problem.side == 0.0 else FORWARD
+            if phase != track.phase or phase == STICK or not state.v_x * track.way > 0.0:
+                _follow(p, phase, t + part * s.h, v_before, before + grid.lag * (belt_next - belt_now))
         if before * after <= 0.0 and problem.normal_force > 0.0:
             counts.turns += 1
         if after == 0.0:

@@ -23,6 +23,7 @@ from brakecli.solver.records import (
     PROBLEM,
     STATE,
     TANGENT,
+    TRACK,
     WORK,
     Beside,
     Drive,
@@ -36,6 +37,7 @@ from brakecli.solver.schedules import integral_at, slope_at
 from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import System
 from brakecli.solver.tangent import FEWEST_SAMPLES, Exponent, exponent, seed
+from brakecli.solver.track import Track, follow, tracked
 
 EVENTS = 1000
 """How many unconverged steps are kept with their time and residual; all are counted."""
@@ -104,6 +106,7 @@ class Motion:
     work: Work
     energy: EnergyAccount
     exponent: Exponent | None = None  # of small disturbances, where they are carried along
+    track: Track | None = None  # works of parts, and events, where the loop notes them
 
 
 def solve(
@@ -137,7 +140,7 @@ class Stepping:
         self.events = np.zeros((EVENTS, 2))
         self.counts = new(COUNTS)
         self.counts.level = self.scheme.LAG
-        self.tangent = new(TANGENT)
+        self.tangent, self.track = new(TANGENT), new(TRACK)
         # the same place in memory, which is read in a tenth of the time
         self._level = np.frombuffer(self.counts, COUNTS)["level"]
         self.plant = Plant(
@@ -153,10 +156,13 @@ class Stepping:
             counts=self.counts,
             tangent=self.tangent,
             beside=Beside(new(STATE), new(PROBLEM), new(CONTACT), new(WORK)),
+            track=self.track,
         )
         if system.tangents:
             fastest = 2.0 * math.pi * system.natural_frequencies[1]
             seed(self.tangent, self.plant.beside.state, fastest, self.plant.s.h)
+        if system.tracked:
+            follow(self.track)
         self._memory = np.zeros(LARGEST, np.int8)
         self._plant_at = self._memory.ctypes.data
         self.scheme.hold(self.plant, self._plant_at)
@@ -186,14 +192,18 @@ class Stepping:
             sink(row[None, :])
         self._count()
         end = self._energy()
-        if self.system.method.own_steps and self.system.nodes:  # see `phases.find_slopes`
+        light = self.system.method.own_steps and self.system.nodes > 0  # see `phases.find_slopes`
+        if light:
             self.plant.work.roughness += end[2] - self._start_energy[2]
         energy = account(self._start_energy, end, self.plant.work)
         if not work.failed and not abs(energy.relative_closing_error) <= OPEN_ACCOUNT:
             work.failure = Failure.UNBALANCED
         carried = self.system.tangents and not work.failed and self.system.samples >= FEWEST_SAMPLES
         found = exponent(self.tangent, self.system.sampled_duration, self.plant.s.h, lag) if carried else None
-        return Motion(self.system, np.concatenate(kept), work, energy, found)
+        track = None
+        if self.system.tracked:
+            track = tracked(self.track, self.plant.c, self.plant.s, self.scheme.mechanical_energy, light)
+        return Motion(self.system, np.concatenate(kept), work, energy, found, track)
 
     def block(self, stop: int) -> Floats:
         """Step to level `stop`; the samples on the way."""
@@ -233,7 +243,7 @@ class Stepping:
         plant = self.plant
         kinetic, links, (x, y), back = self.scheme.mechanical_energy(plant.c, plant.s, plant.state)
         self._evaluate_at(x, y, int(self.counts.level) - back)
-        return kinetic, links, float(plant.layer.contact.store)
+        return float(kinetic), float(links), float(plant.layer.contact.store)
 
     def _count(self) -> None:
         counts, work = self.counts, self.work

@@ -91,7 +91,7 @@ COUNTS = record(
 )
 
 PARTS = 512
-"""Parts of a run in which the growth of a disturbance is kept apart."""
+"""Parts of a run in which the growth of a disturbance, and the works, are kept apart."""
 
 TANGENT = record(
     "x y v_x v_y",  # a small disturbance of the motion, m and m/s
@@ -102,6 +102,29 @@ TANGENT = record(
     logs=(float, PARTS),  # ln of its growth in each part of the run
 )
 """A disturbance that is carried along with a motion, see `solver.tangent`."""
+
+MOST_EVENTS = 1 << 15
+"""Events of a run that are kept, the last ones."""
+
+TRACK = record(
+    "way",  # sign of the last velocity v_x that was not 0
+    "margin",  # of stick in the last step that stuck, N
+    "began",  # time of the last stick's begin, s
+    "since",  # latest time of an event that is no longer kept, s
+    on=int,  # 1 where the loop notes anything
+    phase=int,  # of the automaton; without contact that of flight
+    marks=int,  # that have been made
+    next=int,  # sample at which the next one is due
+    events=int,  # that have been noted
+    counts=(int, 6),  # of each kind
+    times=(float, PARTS + 1),  # of the marks, s
+    works=(float, (PARTS + 1, 6)),  # passed up to there, as in `WORK`, J
+    states=(float, (PARTS + 1, 7)),  # there: x, y, v_x, v_y, x_old and y_old (m and m/s), energy of the contact (J)
+    event_times=(float, MOST_EVENTS),  # s
+    event_places=(float, MOST_EVENTS),  # x, m
+    event_kinds=(np.int8, MOST_EVENTS),
+)
+"""What a loop notes of a motion beside its samples, see `solver.track`."""
 
 PAD = record(
     "k",  # stiffness per length, N/m²
@@ -328,6 +351,7 @@ class Plant(NamedTuple):
     counts: Any
     tangent: Any
     beside: Beside
+    track: Any
 
 
 class Parts(NamedTuple):
@@ -345,6 +369,7 @@ STATE_TYPE, MOTION_TYPE, FLOW_TYPE, PROBLEM_TYPE, CONTACT_TYPE, WORK_TYPE, COUNT
     numba.from_dtype(each) for each in (STATE, MOTION, FLOW, PROBLEM, CONTACT, WORK, COUNTS, PAD, WINDOW)
 )
 TANGENT_TYPE: Any = numba.from_dtype(TANGENT)
+TRACK_TYPE: Any = numba.from_dtype(TRACK)
 KNOTS = types.Array(numba.from_dtype(KNOT), 1, "C")
 COEFFICIENTS = types.NamedUniTuple(float64, len(Coefficients._fields), Coefficients)
 WEIGHTS = types.NamedUniTuple(float64, len(Weights._fields), Weights)
@@ -358,7 +383,7 @@ PLUG = types.NamedUniTuple(int64, 3, Plug)
 def plant_type(state: np.dtype[Any]) -> Any:
     """The type of a `Plant` whose scheme keeps its motion in this record."""
     members = [COEFFICIENTS, WEIGHTS, GRID, DRIVE, LAYER, PLUG, numba.from_dtype(state)]
-    return types.NamedTuple([*members, PROBLEM_TYPE, WORK_TYPE, COUNTS_TYPE, TANGENT_TYPE, BESIDE], Plant)
+    return types.NamedTuple([*members, PROBLEM_TYPE, WORK_TYPE, COUNTS_TYPE, TANGENT_TYPE, BESIDE, TRACK_TYPE], Plant)
 
 
 PLANT = plant_type(STATE)

@@ -74,6 +74,7 @@ class System:
     method: Method
     notes: tuple[str, ...] = ()  # where surfaces come from
     tangents: bool = False  # whether a small disturbance is carried along with a motion
+    tracked: bool = False  # whether the loop notes works of parts, and events
 
     @cached_property
     def pad(self) -> Pad:

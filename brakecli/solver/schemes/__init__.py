@@ -9,7 +9,7 @@ Contract of every scheme module:
   in steps after the current level;
 - `order(weights, start)`: its order of accuracy on smooth motion;
 - `begin(...)`: fills the state from which the loop starts, at level `LAG`;
-- `mechanical_energy(...)`: kinetic energy and energy of the links that the scheme keeps;
+- `mechanical_energy(...)`: kinetic energy and energy of the links that the scheme keeps, also of states in arrays;
 - `hold` and `advance`, kernels, and `sample`: those of `solver.loop`, or its own, with the same arguments, where
   its steps are its own, held to a tolerance, on the grid of samples alone, or exact, on a grid between them;
 - in the first case kernels `prepare` and `finish`, of the signatures in `solver.records`: the minimisation that a

@@ -39,7 +39,7 @@ def mechanical_energy(c: Coefficients, s: Weights, state: Any) -> Mechanical:
     """
     dx, dy = state.x - state.x_old, state.y - state.y_old
     x, y = 0.5 * (state.x + state.x_old), 0.5 * (state.y + state.y_old)
-    kinetic = 0.5 * c.m * float(dx**2 + dy**2) / s.h**2
+    kinetic = 0.5 * c.m * (dx**2 + dy**2) / s.h**2
     links = links_energy(c, x, y) + (0.5 * (s.theta_1 + s.theta_3) - 0.25) * links_energy(c, dx, dy)
     return kinetic, links, (x, y), 0.5
 

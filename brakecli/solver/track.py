@@ -1,0 +1,190 @@
+"""What a loop notes of a motion beside its samples: works over parts of the run, and events where they happen.
+
+Works at a mark are those since the start, and the energies there are those that the scheme keeps, so that the
+account of every part closes as that of the run does. A mark is made at a sample; that of a scheme that lags lies
+half a step behind it, and that of an event-driven motion at the end of the step that reaches the sample.
+
+Events are placed inside steps. Difference schemes place a turning point where the velocity, linear between two
+levels, vanishes; the begin of a stick where the sliding velocity does with the acceleration before it, its end where
+the friction force that it takes is the one that there is; and contact by the rate of its force.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import float64, int64, types, void
+from numpy.typing import NDArray
+
+from brakecli.solver import automaton
+from brakecli.solver.compile import Floats, kernel
+from brakecli.solver.energy import Mechanical
+from brakecli.solver.quantities import ContactState
+from brakecli.solver.records import MOST_EVENTS, PARTS, TRACK_TYPE, WORK_TYPE, Coefficients, Weights
+
+MAX, MIN, STICK, SLIP, LIFT, TOUCH = range(6)
+"""Kinds of events: turning points of x, begin and end of a stick, the contact force becomes zero, and ceases to."""
+KINDS = ("max", "min", "stick", "slip", "lift", "touch")
+
+
+class Events(NamedTuple):
+    """Events in the order of time: time (s), kind, and x there (m)."""
+
+    time: Floats
+    kind: NDArray[np.int8]
+    x: Floats
+
+
+class Powers(NamedTuple):
+    """Mean powers over a part of a run, W; signs as in `energy.EnergyAccount`.
+
+    `friction` is what friction gives to the vibration, the mean of F_x ẋ: the belt's work less the heat. `stored`
+    is the change of kinetic energy and of the energies of links and contact, `closing` what does not add up.
+    """
+
+    friction: float
+    roughness: float
+    dashpots: float
+    load: float
+    scheme: float
+    stored: float
+    closing: float
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """What the loop has noted.
+
+    `works` has columns as `records.WORK`, `stored` kinetic energy and the energies of links and contact, one row for
+    each of the marks at `times`. `counts` has all events of each kind, also those that are no longer kept.
+    """
+
+    times: Floats  # s
+    works: Floats  # J
+    stored: Floats  # J
+    counts: NDArray[np.int64]
+    since: float  # all events later than that are kept, s
+    kept: Events
+
+    def events(self, begin: float = 0.0) -> Events:
+        """The events from a time (s) on, as far as they are kept."""
+        first = int(np.searchsorted(self.kept.time, begin))
+        return Events(*(each[first:] for each in self.kept))
+
+    def powers(self, begin: float, end: float) -> Powers:
+        """Mean powers between the marks nearest to two times (s), one part at least; NaN without any part."""
+        if len(self.times) < 2:
+            return Powers(*[math.nan] * len(Powers._fields))
+        first = min(int(np.abs(self.times - begin).argmin()), len(self.times) - 2)
+        last = max(int(np.abs(self.times - end).argmin()), first + 1)
+        span = float(self.times[last] - self.times[first])
+        belt, heat, dashpots, load, roughness, scheme = ((self.works[last] - self.works[first]) / span).tolist()
+        stored = float((self.stored[last] - self.stored[first]).sum()) / span
+        passed = (belt - heat) + roughness - dashpots - load - scheme
+        return Powers(belt - heat, roughness, dashpots, load, scheme, stored, stored - passed)
+
+
+def follow(t: Any) -> None:
+    """Note all from the start on."""
+    t.on, t.phase, t.since = 1, automaton.UNDECIDED, -math.inf
+
+
+def tracked(
+    t: Any, c: Coefficients, s: Weights, energies: Callable[..., Mechanical], light: bool
+) -> Track:
+    """What has been noted; `light` where the work of the roughness lacks the change of the contact's store."""
+    x, y, v_x, v_y, x_old, y_old, contact = t.states[: t.marks].T.copy()
+    state = SimpleNamespace(x=x, y=y, v_x=v_x, v_y=v_y, x_old=x_old, y_old=y_old)
+    kinetic, links, _, _ = energies(c, s, state)
+    works = t.works[: t.marks].copy()
+    if light:
+        works[:, 4] += contact - contact[:1]
+    n = min(int(t.events), MOST_EVENTS)
+    order = np.argsort(t.event_times[:n], kind="stable")
+    kept = Events(t.event_times[order], t.event_kinds[order], t.event_places[order])
+    stored = np.column_stack([kinetic, links, contact])
+    return Track(t.times[: t.marks].copy(), works, stored, t.counts.copy(), float(t.since), kept)
+
+
+def events_from_samples(time: Floats, x: Floats, vx: Floats, state: Floats) -> Events:
+    """Events by samples alone, at equal intervals: an extreme on the parabola through three samples, a change of the
+    contact's state in the middle between two. What begins and ends between two samples is not seen.
+    """
+    interval = float(time[1] - time[0])
+    ways = np.sign(vx)
+    moving = np.flatnonzero(ways)
+    before, after = moving[:-1], moving[1:]
+    turning = ways[before] * ways[after] < 0.0
+    before, after, way = before[turning], after[turning], ways[before[turning]]
+    middle = np.clip(np.where(way * x[before] >= way * x[after], before, after), 1, len(x) - 2)
+    rise, bend = x[middle + 1] - x[middle - 1], x[middle - 1] - 2.0 * x[middle] + x[middle + 1]
+    part = np.clip(-0.5 * rise / np.where(bend == 0.0, np.inf, bend), -1.0, 1.0)
+    found = [(time[middle] + part * interval, np.where(way > 0.0, MAX, MIN), x[middle] + 0.25 * part * rise)]
+    was, now = state[:-1], state[1:]
+    for kind, of, begins in (
+        (STICK, ContactState.STICK, True),
+        (SLIP, ContactState.STICK, False),
+        (LIFT, ContactState.SEPARATED, True),
+        (TOUCH, ContactState.SEPARATED, False),
+    ):
+        i = np.flatnonzero((was != now) & ((now if begins else was) == of))
+        found.append((time[i] + 0.5 * interval, np.full(len(i), kind), 0.5 * (x[i] + x[i + 1])))
+    times, kinds, places = (np.concatenate(each) for each in zip(*found, strict=True))
+    order = np.argsort(times, kind="stable")
+    return Events(times[order], kinds[order].astype(np.int8), places[order])
+
+
+@kernel(types.Array(float64, 1, "C")(TRACK_TYPE, WORK_TYPE, int64, int64, float64, float64), inlined=False)
+def mark(t: Any, work: Any, number: int, samples: int, time: float, store: float) -> Floats:
+    """Make a mark at a sample, and say when the next one is due; the row that gets the state there."""
+    at, parts = t.marks, min(PARTS, samples)
+    t.times[at] = time
+    w = t.works[at]
+    w[0], w[1], w[2], w[3], w[4], w[5] = (
+        work.belt, work.friction, work.dashpots, work.load, work.roughness, work.scheme,
+    )  # fmt: skip
+    t.states[at, 6] = store
+    t.marks = at + 1
+    t.next = ((number * parts // samples + 1) * samples + parts - 1) // parts
+    return t.states[at]  # type: ignore[no-any-return]
+
+
+@kernel(void(TRACK_TYPE, int64, float64, float64), inlined=False)
+def put(t: Any, kind: int, time: float, x: float) -> None:
+    """Note an event; the last ones are kept."""
+    at = t.events % MOST_EVENTS
+    if t.events >= MOST_EVENTS:
+        t.since = max(t.since, t.event_times[at])
+    t.event_times[at], t.event_kinds[at], t.event_places[at] = time, kind, x
+    t.events += 1
+    t.counts[kind] += 1
+
+
+@kernel(void(TRACK_TYPE, int64, float64, float64), inlined=False)
+def enter(t: Any, phase: int, time: float, x: float) -> None:
+    """Note the events with which a phase begins; the first one begins without any."""
+    was, t.phase = t.phase, phase
+    if was == automaton.UNDECIDED or was == phase:
+        return
+    if was == automaton.STICK:
+        put(t, SLIP, time, x)
+    if phase == automaton.OPEN:
+        put(t, LIFT, time, x)
+    elif was == automaton.OPEN:
+        put(t, TOUCH, time, x)
+    if phase == automaton.STICK:
+        put(t, STICK, time, x)
+
+
+@kernel(int64(TRACK_TYPE, float64))
+def turned(t: Any, v_x: float) -> int:
+    """The kind of a turning point that a velocity (m/s) on the other side of zero tells of; -1 if it does not."""
+    kind = -1
+    if v_x * t.way < 0.0:
+        kind = MAX if t.way > 0.0 else MIN
+    if v_x != 0.0:
+        t.way = math.copysign(1.0, v_x)
+    return kind
