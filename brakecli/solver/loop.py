@@ -26,16 +26,19 @@ hold, _plant_at = into_memory(PLANT), from_memory(PLANT)
 
 @kernel(void(PLANT, int64, float64), inlined=False)
 def _mark(p: Plant, number: int, t: float) -> None:
-    """Make a mark at a sample, whose contact has been evaluated, or where a scheme that lags has its energies."""
+    """Make a mark at a sample, whose contact has been evaluated.
+
+    A scheme that lags has its energies half a step behind. The contact's is continued up to there: another
+    evaluation would change what the next one begins with.
+    """
     p = borrowed(p)
     state, track, contact, lag = p.state, p.track, p.layer.contact, p.grid.lag
-    after = 0.5 * lag * p.s.h
+    after, slid, dy = 0.5 * lag * p.s.h, 0.0, 0.0
     if lag == 1:
-        if p.layer.pad.wheel_terms > 0:
-            travel, travel_low = integral_at(p.drive.belt, t, after)
-            turn(travel, travel_low, p.layer)
-        _evaluate_at(p.layer.evaluate)(0.5 * (state.x + state.x_old), 0.5 * (state.y + state.y_old), p.layer)
-    at = mark(track, p.work, number, p.grid.samples, t + after, contact.store)
+        slid, dy = 0.5 * (state.x - state.x_old) - after * value_at(p.drive.belt, t), 0.5 * (state.y - state.y_old)
+    store = contact.store + contact.store_x * slid - contact.normal_force * dy
+    store += (0.5 * contact.stiffness * dy - contact.tangential * slid) * dy
+    at = mark(track, p.work, number, p.grid.samples, t + after, store)
     at[0], at[1], at[2], at[3], at[4], at[5] = state.x, state.y, state.v_x, state.v_y, state.x_old, state.y_old
 
 

@@ -207,6 +207,7 @@ MOTION = record(
     end=(float, 4),
     slopes=(float, (STAGES, 4)),  # derivatives of the components by time, at each stage
     touch=(float, (STAGES, 2)),  # stiffness of the contact and ∂F_y/∂x, N/m
+    stores=(float, STAGES),  # energy of the contact, J, unless it is found without
     disturbed=(float, (STAGES, 4)),  # slopes of a disturbance
     powers=(float, (POWERS, 4)),  # coefficients of the continuous solution
     work_rates=(float, (STAGES, POWERED)),  # powers of the energy account, W

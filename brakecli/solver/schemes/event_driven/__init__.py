@@ -7,16 +7,17 @@ slip, lift-off and touch-down end a step: nothing is smoothed, nothing stepped o
 from numba import float64, int64, void
 
 from brakecli.solver import own_steps
-from brakecli.solver.automaton import STICK, side_of
+from brakecli.solver.automaton import OPEN, STICK, side_of
 from brakecli.solver.compile import Floats, at_address, from_memory, into_memory, kernel
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.friction import observed
 from brakecli.solver.quantities import Failure
-from brakecli.solver.records import MOTION, V_X, V_Y, Plant, Weights, X, Y, plant_type
+from brakecli.solver.records import EVALUATE, MOTION, V_X, V_Y, Plant, Weights, X, Y, plant_type
 from brakecli.solver.schemes.event_driven.phases import EPSILON, SHOE, Shoe, press, resistance
 from brakecli.solver.schemes.event_driven.runge_kutta import interpolated
 from brakecli.solver.schemes.event_driven.step import STEP, first_step, step
 from brakecli.solver.tangent import renew
+from brakecli.solver.track import mark
 
 STATE, solve = MOTION, step
 LAG, MEMORY, VELOCITIES = own_steps.LAG, own_steps.MEMORY, own_steps.VELOCITIES
@@ -25,6 +26,7 @@ mechanical_energy = own_steps.mechanical_energy
 
 _PLANT = plant_type(MOTION)
 hold, _plant_at = into_memory(_PLANT), from_memory(_PLANT)
+_evaluate_at = at_address(EVALUATE)
 _step_at = at_address(STEP)  # compiled in its own place: otherwise `advance` would compile it again
 
 _BUDGET, _EXACT = 4096, 64
@@ -68,6 +70,17 @@ def _sample(p: Shoe, interval: float, level: int) -> None:
     m.row[4], m.row[5], m.row[6], m.row[7] = friction, normal, p.layer.contact.fraction, state
 
 
+@kernel(void(SHOE, int64), inlined=False)
+def _mark(p: Shoe, samples: int) -> None:
+    """Make a mark where the motion is."""
+    m, store = p.motion, p.motion.stores[0]
+    if m.light == 1:
+        _evaluate_at(p.layer.evaluate)(m.x, m.y, p.layer)
+        store = p.layer.contact.store
+    at = mark(p.track, p.work, m.level, samples, m.time + m.tau, store)
+    at[0], at[1], at[2], at[3] = m.x, m.y, m.v_x, m.v_y
+
+
 @kernel(int64(int64, float64[:, ::1], float64[:, ::1], int64))
 def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
     """Step until the sample `stop` is reached, or until the budget of a call is spent; a `Failure`.
@@ -77,11 +90,14 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
     p: Plant = _plant_at(address)
     m, counts, drive, grid, row, steps = p.state, p.counts, p.drive, p.grid, 0, 0
     waves = p.layer.pad.shoe_terms + p.layer.pad.wheel_terms if p.layer.window.rows == 0 else 0
-    shoe = Shoe(p.c, p.layer, m, p.work, counts, p.tangent)
+    shoe, track = Shoe(p.c, p.layer, m, p.work, counts, p.tangent, p.track), p.track
     if m.started == 0:
         first_step(shoe, drive, grid)
         _sample(shoe, grid.interval, 0)
         m.started = 1
+        if track.on == 1:
+            track.phase = m.phase if m.touch[0, 0] > 0.0 else OPEN
+            _mark(shoe, grid.samples)
     while True:
         while counts.level < stop and counts.level < m.level:
             for column in range(rows.shape[1]):  # a slice would take seconds to compile
@@ -99,3 +115,5 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
             for column in range(rows.shape[1]):
                 rows[row, column] = m.row[column]
             return failure
+        if track.on == 1 and m.level >= track.next:
+            _mark(shoe, grid.samples)

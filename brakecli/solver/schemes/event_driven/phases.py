@@ -44,9 +44,10 @@ class Shoe(NamedTuple):
     work: Any
     counts: Any
     tangent: Any
+    track: Any
 
 
-_CHANGED = [records.MOTION_TYPE, records.WORK_TYPE, records.COUNTS_TYPE, records.TANGENT_TYPE]
+_CHANGED = [records.MOTION_TYPE, records.WORK_TYPE, records.COUNTS_TYPE, records.TANGENT_TYPE, records.TRACK_TYPE]
 SHOE = types.NamedTuple([COEFFICIENTS, records.LAYER, *_CHANGED], Shoe)
 _evaluate_at = at_address(records.EVALUATE)
 _PAIR = types.UniTuple(float64, 2)
@@ -107,6 +108,7 @@ def press(p: Shoe, x: float, y: float, phase: int) -> float:
         contact.normal_force = -contact.stiffness * y  # Eq. (2), continued: an event ends the phase at y = 0
         contact.fraction = 1.0 if y < 0.0 else 0.0
         contact.store_x, contact.tangential, contact.kind, contact.valid = 0.0, 0.0, CLOSED_FORM, 1
+        contact.store = 0.5 * contact.stiffness * y * y
         return contact.normal_force  # type: ignore[no-any-return]
     full, m = coverage(y, pad) == FULL, p.motion
     light = m.light == 1 and p.tangent.on == 0
@@ -146,6 +148,7 @@ def find_slopes(p: Shoe, stage: int, since: float, x: float, y: float, v_x: floa
     m.slopes[stage, 2] = m.belt_slope if stuck else (friction - against_x) / c.m  # Eq. (6)
     m.slopes[stage, 3] = (normal - against_y) / c.m  # Eq. (7)
     m.touch[stage, 0], m.touch[stage, 1] = p.layer.contact.stiffness, p.layer.contact.tangential
+    m.stores[stage] = p.layer.contact.store
     m.work_rates[stage, 0] = friction * belt
     m.work_rates[stage, 1] = -friction * sliding
     m.work_rates[stage, 2] = c.b_xx * v_x * v_x + 2.0 * c.b_xy * v_x * v_y + c.b_yy * v_y * v_y

@@ -15,6 +15,7 @@ from brakecli.solver.schemes.event_driven import phases, runge_kutta
 from brakecli.solver.schemes.event_driven.locate import NONE, first_event
 from brakecli.solver.schemes.event_driven.phases import EPSILON, SHOE, Shoe
 from brakecli.solver.schemes.event_driven.runge_kutta import END_STAGE, NODES, ORDER, USED, A
+from brakecli.solver.track import enter, put, turned
 
 _LOCAL = 0.05
 """Error of a step over the tolerance of the histories, to which the errors of all steps add up."""
@@ -208,12 +209,56 @@ def _disturb(p: Shoe, h: float) -> None:
     t.x, t.y, t.v_x, t.v_y = x + rest * v_x, y + rest * v_y, v_x + rest * a_x, v_y + rest * a_y
 
 
+@kernel(void(SHOE), inlined=False)
+def _meet(p: Shoe) -> None:
+    """Note where in the step that has been made a rough pad comes to the wheel or leaves it.
+
+    A contact that vanishes has a force that grows with its age to the power 3/2.
+    """
+    m, stage, meets = p.motion, END_STAGE, p.motion.touch[END_STAGE, 0] > 0.0
+    x, y, v_x, v_y, since = m.end[X], m.end[Y], m.end[V_X], m.end[V_Y], m.step_done
+    if not meets:
+        stage, x, y, v_x, v_y, since = 0, m.begin[X], m.begin[Y], m.begin[V_X], m.begin[V_Y], 0.0
+    _, against = phases.resistance(p.c, m.load + m.load_slope * since, x, y, v_x, v_y)
+    force = p.c.m * m.slopes[stage, V_Y] + against
+    rate = m.touch[stage, 1] * (v_x - m.belt - m.belt_slope * since) - m.touch[stage, 0] * v_y
+    age, part = 1.5 * force, 1.0
+    if age < abs(rate) * m.step_done:
+        part = max(age / abs(rate) / m.step_done, 0.0)
+    theta = 1.0 - part if meets else part
+    enter(
+        p.track,
+        m.phase if meets else OPEN,
+        m.time + m.tau + theta * m.step_done,
+        runge_kutta.interpolated(m, X, theta),
+    )
+
+
+@kernel(void(SHOE), inlined=False)
+def _follow(p: Shoe) -> None:
+    """Note a turning point in the step that has been made, on the continuous solution, and what a rough pad does."""
+    m, track = p.motion, p.track
+    kind = turned(track, m.end[V_X])
+    if kind >= 0:
+        first, last = m.begin[V_X], m.end[V_X]
+        theta = first / (first - last) if first * last < 0.0 else 0.0
+        for _ in range(2):
+            slope = runge_kutta.interpolated_slope(m, V_X, theta)
+            if slope != 0.0:
+                theta = min(max(theta - runge_kutta.interpolated(m, V_X, theta) / slope, 0.0), 1.0)
+        put(track, kind, m.time + m.tau + theta * m.step_done, runge_kutta.interpolated(m, X, theta))
+    if (m.touch[END_STAGE, 0] > 0.0) == (track.phase == OPEN):
+        _meet(p)
+
+
 @kernel(void(SHOE, DRIVE, GRID, float64, int64))
 def _take(p: Shoe, drive: Drive, grid: Grid, h: float, last: int) -> None:
     """Take the step that has been made; `last` is 1 where it reaches the end of the run."""
     m, work, interval = p.motion, p.work, grid.interval
     if p.tangent.on == 1:
         _disturb(p, h)
+    if p.track.on == 1:
+        _follow(p)
     m.time_done, m.tau_done, m.phase_done = m.time, m.tau, m.phase
     m.belt_done, m.belt_slope_done, m.load_done, m.load_slope_done = m.belt, m.belt_slope, m.load, m.load_slope
     work.belt += h * _passed(m, 0)
@@ -226,6 +271,7 @@ def _take(p: Shoe, drive: Drive, grid: Grid, h: float, last: int) -> None:
         m.largest[i] = max(m.largest[i], abs(m.end[i]))
         m.slopes[0, i] = m.slopes[END_STAGE, i]
     m.touch[0, 0], m.touch[0, 1] = m.touch[END_STAGE, 0], m.touch[END_STAGE, 1]
+    m.stores[0] = m.stores[END_STAGE]
     for item in range(POWERED):
         m.work_rates[0, item] = m.work_rates[END_STAGE, item]
     tau = m.tau + h
@@ -245,6 +291,8 @@ def _enter(p: Shoe, which: int, longest: float) -> int:
     """Enter the phase after an event, and see that events do not pile up without progress; a `Failure`."""
     m = p.motion
     phases.switch(p, which)
+    if p.track.on == 1:
+        enter(p.track, m.phase if m.touch[0, 0] > 0.0 else OPEN, m.time + m.tau, m.x)
     m.events_time, m.events = counted(m.events_time, m.events, m.time + m.tau, longest)
     return _STALLED if stalled(m.events) else _NONE
 

@@ -30,6 +30,7 @@ from brakecli.solver.records import (
     SIZE,
     TANGENT_TYPE,
     TERMS,
+    TRACK_TYPE,
     V_X,
     V_Y,
     Coefficients,
@@ -45,6 +46,7 @@ from brakecli.solver.schemes.piecewise_exact.locate import NO_EVENT, first_event
 from brakecli.solver.schemes.piecewise_exact.phases import add_works
 from brakecli.solver.schemes.piecewise_exact.switch import place, switch
 from brakecli.solver.tangent import kept, renew
+from brakecli.solver.track import enter, mark, put, turned
 
 STATE = FLOW
 LAG, MEMORY, VELOCITIES = own_steps.LAG, own_steps.MEMORY, own_steps.VELOCITIES
@@ -168,6 +170,47 @@ def _meet(c: Coefficients, m: Any, t: Any) -> None:
     t.v_x *= kept(needed, max(-c.phi * m.stiffness * m.z[Y], 0.0))
 
 
+@kernel(void(FLOW_TYPE, TRACK_TYPE, float64, float64, float64), inlined=False)
+def _turn(m: Any, track: Any, t: float, span: float, part: float) -> None:
+    """Note a turning point between the begin of the series, at time t (s), and a part of its span."""
+    kind, z, last = turned(track, m.z[V_X]), m.series, 0.0
+    if kind < 0:
+        return
+    for k in range(TERMS - 1, -1, -1):
+        last = last * part + z[k, V_X]
+    theta = part * z[0, V_X] / (z[0, V_X] - last) if z[0, V_X] * last < 0.0 else 0.0
+    for _ in range(2):
+        value, slope = 0.0, 0.0
+        for k in range(TERMS - 1, -1, -1):
+            slope = slope * theta + value
+            value = value * theta + z[k, V_X]
+        if slope != 0.0:
+            theta = min(max(theta - value / slope, 0.0), part)
+    x = 0.0
+    for k in range(TERMS - 1, -1, -1):
+        x = x * theta + z[k, X]
+    put(track, kind, t + theta * span, x)
+
+
+@kernel(void(FLOW_TYPE, TRACK_TYPE, float64, float64), inlined=False)
+def _turn_back(m: Any, track: Any, t: float, h: float) -> None:
+    """The same in the whole step that ends at time t (s), on the series from there back."""
+    for i in range(SIZE):
+        m.series[0, i] = m.z[i]
+    phases.expand(m, m.phase, -h)
+    _turn(m, track, t, -h, 1.0)
+
+
+@kernel(void(_PLANT, int64, float64), inlined=False)
+def _mark(p: Plant, number: int, t: float) -> None:
+    """Make a mark at a sample."""
+    m = p.state
+    add_works(p.c, m, p.work, p.s.h)
+    store = 0.5 * m.stiffness * m.z[Y] * m.z[Y] if m.phase != OPEN else 0.0
+    at = mark(p.track, p.work, number, p.grid.samples, t, store)
+    at[0], at[1], at[2], at[3] = m.z[X], m.z[Y], m.z[V_X], m.z[V_Y]
+
+
 @kernel(void(FLOW_TYPE), inlined=False)
 def look(m: Any) -> None:
     """The matrix of the phase, the margins of the motion reached, and their slopes."""
@@ -215,6 +258,7 @@ def _start(p: Plant) -> None:
     _anchor(p, 0.0, 0.0)
     look(m)
     m.started = 1
+    p.track.phase = m.phase
 
 
 @kernel(void(FLOW_TYPE, COUNTS_TYPE))
@@ -240,6 +284,8 @@ def _through(p: Plant, t: float, to_sample: int) -> int:
             if p.tangent.on == 1:
                 _disturb(m, p.tangent)
             tau += h
+            if p.track.on == 1 and not m.z[V_X] * p.track.way > 0.0:
+                _turn_back(m, p.track, t + tau, h)
             continue
         span = max(min(h - tau if to_sample == 1 else h, to_knot), 0.0)
         for i in range(SIZE):
@@ -250,6 +296,8 @@ def _through(p: Plant, t: float, to_sample: int) -> int:
             phases.take_part(p.c, m, p.work, span, theta)
             _count(m, p.counts)
             _carry_part(m, p.tangent, theta * span)
+            if p.track.on == 1 and not m.z[V_X] * p.track.way > 0.0:
+                _turn(m, p.track, t + tau, span, theta)
         tau += theta * span
         if which != NO_EVENT:
             m.events_time, m.events = counted(m.events_time, m.events, t + tau, h)
@@ -260,6 +308,8 @@ def _through(p: Plant, t: float, to_sample: int) -> int:
             switch(p.c, m, which, p.s.h)
             if p.tangent.on == 1 and which == SLIDING and before != OPEN and before != STICK:
                 _meet(p.c, m, p.tangent)
+            if p.track.on == 1:
+                enter(p.track, m.phase, t + tau, m.z[X])
             _anchor(p, t, tau)
             if m.phase == STICK:
                 m.error[V_X] = 0.0
@@ -308,6 +358,8 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
             _sample(p, t)
             if p.tangent.on == 1:
                 renew(p.tangent, sampled, grid.samples)
+            if p.track.on == 1 and sampled >= p.track.next:
+                _mark(p, sampled, t)
         if counts.level == stop:
             break
         if part == 0:
@@ -318,6 +370,8 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
             _count(m, counts)
             if p.tangent.on == 1:
                 _disturb(m, p.tangent)
+            if p.track.on == 1 and not m.z[V_X] * p.track.way > 0.0:
+                _turn_back(m, p.track, t + h, h)
         else:
             failure = _through(p, t, int(part + 1 == grid.per_sample))
         if not abs(m.z[X]) + abs(m.z[Y]) + abs(m.z[V_X]) + abs(m.z[V_Y]) < BOUND:
