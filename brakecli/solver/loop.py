@@ -89,24 +89,27 @@ def _needed(p: Plant) -> float:
     return needed + (c.c_xx * x + c.c_xy * y + problem.load * c.sin_beta)
 
 
-@kernel(void(PLANT, int64, float64, float64, float64), inlined=False)
-def _follow(p: Plant, phase: int, t: float, v_before: float, before: float) -> None:
+@kernel(void(PLANT, int64, float64, float64, float64, float64), inlined=False)
+def _follow(p: Plant, phase: int, margin: float, t: float, v_before: float, before: float) -> None:
     """Note the events of the step from time t on, which has been taken, see `solver.track`.
 
-    `phase` is what its solution says, v_before the velocity before and `before` its excess over the wheel's (m/s).
+    `phase` is what its solution says, with the margin of a stick (N); v_before is the velocity before, and `before`
+    its excess over the wheel's (m/s).
     """
     p = borrowed(p)
     c, track, state, problem, contact, h, lag = p.c, p.track, p.state, p.problem, p.layer.contact, p.s.h, p.grid.lag
-    was, v_x, force, margin = track.phase, state.v_x, problem.normal_force, 0.0
+    was, v_x, force = track.phase, state.v_x, problem.normal_force
     bound, sliding, at = c.phi * force, v_x - problem.belt, t + p.grid.weighted * h  # time of the forces
     reached, x = t + (1 - lag) * h, state.x if lag == 0 else state.x_old  # where the velocity is
     if phase == STICK or (was == STICK and phase != OPEN):
         needed = _needed(p)
-        margin = bound - abs(needed)
-        flickers = lag == 1 and p.counts.stuck == p.counts.level and abs(sliding) <= h * bound / c.m  # see `sample`
-        if phase == STICK or flickers:
-            # A shoe that turns in a step may have the wheel's velocity at its end, though friction cannot hold it.
-            phase = STICK if margin >= 0.0 or (was == STICK and lag == 0) else FORWARD
+        if phase != STICK:
+            margin = bound - abs(needed)
+            if lag == 1 and p.counts.stuck == p.counts.level and abs(sliding) <= h * bound / c.m:  # see `sample`
+                phase = STICK
+        # A shoe that turns in a step may have the wheel's velocity at its end, though friction cannot hold it.
+        if margin < 0.0 and (was != STICK or lag == 1):
+            phase = FORWARD
         if phase == STICK and was != STICK:
             to_go, change = c.m * abs(before), h * (bound + math.copysign(1.0, before) * needed)
             at = reached - h + (h * to_go / change if to_go < change else h)
@@ -230,8 +233,12 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
             _disturb(p, before, after)
         if track.on == 1:
             phase = OPEN if not problem.normal_force > 0.0 else STICK if problem.side == 0.0 else FORWARD
-            if phase != track.phase or phase == STICK or not state.v_x * track.way > 0.0:
-                _follow(p, phase, t + part * s.h, v_before, before + grid.lag * (belt_next - belt_now))
+            margin = c.phi * problem.normal_force - abs(_needed(p)) if phase == STICK else 0.0
+            if phase != track.phase or not state.v_x * track.way > 0.0 or (margin < 0.0 and grid.lag == 1):
+                sliding = before + grid.lag * (belt_next - belt_now)
+                _follow(p, phase, margin, t + part * s.h, v_before, sliding)
+            elif phase == STICK:
+                track.margin = margin
         if before * after <= 0.0 and problem.normal_force > 0.0:
             counts.turns += 1
         if after == 0.0:

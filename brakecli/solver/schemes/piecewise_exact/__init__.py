@@ -171,34 +171,29 @@ def _meet(c: Coefficients, m: Any, t: Any) -> None:
 
 
 @kernel(void(FLOW_TYPE, TRACK_TYPE, float64, float64, float64), inlined=False)
-def _turn(m: Any, track: Any, t: float, span: float, part: float) -> None:
-    """Note a turning point between the begin of the series, at time t (s), and a part of its span."""
-    kind, z, last = turned(track, m.z[V_X]), m.series, 0.0
+def _turn(m: Any, track: Any, t: float, span: float, v_before: float) -> None:
+    """Note a turning point in the step over a span (s) that ends at time t (s), where the motion is.
+
+    The secant, and one step of Newton's on the series from the end back: what is left is below 1e-4 of the step.
+    """
+    a, z, phase, kind = m.generator, m.z, m.phase, turned(track, m.z[V_X])
     if kind < 0:
         return
-    for k in range(TERMS - 1, -1, -1):
-        last = last * part + z[k, V_X]
-    theta = part * z[0, V_X] / (z[0, V_X] - last) if z[0, V_X] * last < 0.0 else 0.0
-    for _ in range(2):
-        value, slope = 0.0, 0.0
-        for k in range(TERMS - 1, -1, -1):
-            slope = slope * theta + value
-            value = value * theta + z[k, V_X]
-        if slope != 0.0:
-            theta = min(max(theta - value / slope, 0.0), part)
-    x = 0.0
-    for k in range(TERMS - 1, -1, -1):
-        x = x * theta + z[k, X]
-    put(track, kind, t + theta * span, x)
-
-
-@kernel(void(FLOW_TYPE, TRACK_TYPE, float64, float64), inlined=False)
-def _turn_back(m: Any, track: Any, t: float, h: float) -> None:
-    """The same in the whole step that ends at time t (s), on the series from there back."""
-    for i in range(SIZE):
-        m.series[0, i] = m.z[i]
-    phases.expand(m, m.phase, -h)
-    _turn(m, track, t, -h, 1.0)
+    x, y, v_x, v_y, load, belt_slope = z[X], z[Y], z[V_X], z[V_Y], z[LOAD], z[BELT_SLOPE]
+    back = -span * v_x / (v_x - v_before) if v_x * v_before <= 0.0 else 0.0
+    place, velocity, slope, power = x, v_x, 0.0, 1.0
+    for k in range(1, _ERROR_TERMS):
+        a_x = (a[phase, V_X, X] * x + a[phase, V_X, Y] * y) + (a[phase, V_X, V_X] * v_x + a[phase, V_X, V_Y] * v_y)
+        a_y = (a[phase, V_Y, X] * x + a[phase, V_Y, Y] * y) + (a[phase, V_Y, V_X] * v_x + a[phase, V_Y, V_Y] * v_y)
+        a_x += a[phase, V_X, LOAD] * load + a[phase, V_X, BELT_SLOPE] * belt_slope
+        a_y += a[phase, V_Y, LOAD] * load
+        x, y, v_x, v_y = v_x, v_y, a_x, a_y
+        load, belt_slope = z[LOAD_SLOPE] if k == 1 else 0.0, 0.0
+        slope += power * v_x
+        power *= back / k
+        place, velocity = place + power * x, velocity + power * v_x
+    rest = -velocity / slope if abs(velocity) < span * abs(slope) else 0.0
+    put(track, kind, t + min(back + rest, 0.0), place + 0.5 * rest * velocity)
 
 
 @kernel(void(_PLANT, int64, float64), inlined=False)
@@ -278,14 +273,14 @@ def _through(p: Plant, t: float, to_sample: int) -> int:
     """
     m, h, tau = p.state, p.s.h, p.state.beyond
     while tau < h:
-        to_knot, fits = m.knot - t - tau, to_sample == 0 or tau == 0.0
+        v_x, to_knot, fits = m.z[V_X], m.knot - t - tau, to_sample == 0 or tau == 0.0
         if fits and h < to_knot and min(m.before[4], m.before[5], m.before[6]) >= 0.0 and whole(m, h) == 1:
             _count(m, p.counts)
             if p.tangent.on == 1:
                 _disturb(m, p.tangent)
             tau += h
             if p.track.on == 1 and not m.z[V_X] * p.track.way > 0.0:
-                _turn_back(m, p.track, t + tau, h)
+                _turn(m, p.track, t + tau, h, v_x)
             continue
         span = max(min(h - tau if to_sample == 1 else h, to_knot), 0.0)
         for i in range(SIZE):
@@ -297,7 +292,7 @@ def _through(p: Plant, t: float, to_sample: int) -> int:
             _count(m, p.counts)
             _carry_part(m, p.tangent, theta * span)
             if p.track.on == 1 and not m.z[V_X] * p.track.way > 0.0:
-                _turn(m, p.track, t + tau, span, theta)
+                _turn(m, p.track, t + tau + theta * span, theta * span, v_x)
         tau += theta * span
         if which != NO_EVENT:
             m.events_time, m.events = counted(m.events_time, m.events, t + tau, h)
@@ -366,12 +361,13 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
             for column in range(8):  # a slice would take seconds to compile
                 rows[row, column] = m.row[column]
             row += 1
+        v_x = m.z[V_X]
         if m.beyond == 0.0 and t + h < m.knot and whole(m, h) == 1:
             _count(m, counts)
             if p.tangent.on == 1:
                 _disturb(m, p.tangent)
             if p.track.on == 1 and not m.z[V_X] * p.track.way > 0.0:
-                _turn_back(m, p.track, t + h, h)
+                _turn(m, p.track, t + h, h, v_x)
         else:
             failure = _through(p, t, int(part + 1 == grid.per_sample))
         if not abs(m.z[X]) + abs(m.z[Y]) + abs(m.z[V_X]) + abs(m.z[V_Y]) < BOUND:
