@@ -86,38 +86,56 @@ def _needed(p: Plant) -> float:
     if p.grid.lag == 0:  # in the middle of the step, as the normal force is
         x, y, belt = 0.5 * (x + state.x), 0.5 * (y + state.y), 0.5 * (belt + problem.belt_next)
     needed = c.m * (problem.belt_next - problem.belt_now) / p.s.h + c.b_xx * belt + c.b_xy * v_y
-    return needed + (c.c_xx * x + c.c_xy * y + problem.load * c.sin_beta)
+    return needed + (c.c_xx * x + c.c_xy * y + problem.load * c.sin_beta)  # type: ignore[no-any-return]
 
 
-@kernel(void(PLANT, int64, float64, float64, float64, float64), inlined=False)
-def _follow(p: Plant, phase: int, margin: float, t: float, v_before: float, before: float) -> None:
+@kernel(float64(PLANT, float64, float64))
+def _margin_rate(p: Plant, t: float, needed: float) -> float:
+    """How fast the force that a stuck shoe needs leaves the friction cone, where its margin runs out (N/s)."""
+    c, state, problem, h = p.c, p.state, p.problem, p.s.h
+    v_y, belt, force = state.v_y, problem.belt, problem.normal_force
+    belt_slope, load_slope = (problem.belt_next - problem.belt_now) / h, slope_at(p.drive.load, t)
+    against_y = c.b_xy * belt + c.b_yy * v_y + c.c_xy * state.x + c.c_yy * state.y + problem.load * c.cos_beta
+    change = c.c_xx * belt + c.c_xy * v_y + c.b_xx * belt_slope + c.b_xy * (force - against_y) / c.m
+    change += load_slope * c.sin_beta
+    return c.phi * (force - state.force_before) / h - math.copysign(1.0, needed) * change  # type: ignore[no-any-return]
+
+
+@kernel(void(PLANT, int64, float64, float64, float64), inlined=False)
+def _follow(p: Plant, phase: int, t: float, v_before: float, before: float) -> None:
     """Note the events of the step from time t on, which has been taken, see `solver.track`.
 
-    `phase` is what its solution says, with the margin of a stick (N); v_before is the velocity before, and `before`
-    its excess over the wheel's (m/s).
+    `phase` is what its solution says, v_before the velocity before and `before` its excess over the wheel's (m/s).
     """
     p = borrowed(p)
-    c, track, state, problem, contact, h, lag = p.c, p.track, p.state, p.problem, p.layer.contact, p.s.h, p.grid.lag
-    was, v_x, force = track.phase, state.v_x, problem.normal_force
+    c, track, state, problem, contact, h, lag = (
+        p.c,
+        p.track,
+        p.state,
+        p.problem,
+        p.layer.contact,
+        p.s.h,
+        p.grid.lag,
+    )
+    was: int = track.phase
+    v_x, force, needed = state.v_x, problem.normal_force, _needed(p)
     bound, sliding, at = c.phi * force, v_x - problem.belt, t + p.grid.weighted * h  # time of the forces
     reached, x = t + (1 - lag) * h, state.x if lag == 0 else state.x_old  # where the velocity is
-    if phase == STICK or (was == STICK and phase != OPEN):
-        needed = _needed(p)
-        if phase != STICK:
-            margin = bound - abs(needed)
-            if lag == 1 and p.counts.stuck == p.counts.level and abs(sliding) <= h * bound / c.m:  # see `sample`
-                phase = STICK
-        # A shoe that turns in a step may have the wheel's velocity at its end, though friction cannot hold it.
-        if margin < 0.0 and (was != STICK or lag == 1):
-            phase = FORWARD
-        if phase == STICK and was != STICK:
-            to_go, change = c.m * abs(before), h * (bound + math.copysign(1.0, before) * needed)
-            at = reached - h + (h * to_go / change if to_go < change else h)
-            track.began = at
-        elif phase != STICK and was == STICK:
-            before_slip = h * margin / (margin - max(track.margin, 0.0)) if margin < 0.0 else 0.0
-            at = max(at - before_slip, track.began)
-        track.margin = margin
+    margin = bound - abs(needed)
+    if was == UNDECIDED and phase == STICK and before != 0.0:  # it slipped at the start
+        was = track.phase = FORWARD
+    if phase == STICK and was != STICK and margin < 0.0:
+        phase = FORWARD  # it turns in the step, and has the wheel's velocity at its end, but nothing holds it
+    elif phase == FORWARD and was == STICK and lag == 1 and margin >= 0.0 and p.counts.stuck == p.counts.level:
+        phase = STICK if abs(sliding) <= h * bound / c.m else FORWARD  # see `sample`
+    if phase == STICK and was != STICK:
+        to_go, change = c.m * abs(before), h * (bound + math.copysign(1.0, before) * needed)
+        at = reached - h + (h * to_go / change if to_go < change else h)
+        track.began = at
+    elif phase == FORWARD and was == STICK:
+        rate = _margin_rate(p, t, needed)
+        late = min(margin / rate, 2.0 * h) if margin < 0.0 and rate < 0.0 else 0.0
+        at = max(at - late, track.began)
     if phase == OPEN and was != OPEN:
         fall = state.force_earlier - state.force_before
         at += h * (state.force_before / fall - 1.0) if fall > state.force_before else 0.0
@@ -233,12 +251,8 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
             _disturb(p, before, after)
         if track.on == 1:
             phase = OPEN if not problem.normal_force > 0.0 else STICK if problem.side == 0.0 else FORWARD
-            margin = c.phi * problem.normal_force - abs(_needed(p)) if phase == STICK else 0.0
-            if phase != track.phase or not state.v_x * track.way > 0.0 or (margin < 0.0 and grid.lag == 1):
-                sliding = before + grid.lag * (belt_next - belt_now)
-                _follow(p, phase, margin, t + part * s.h, v_before, sliding)
-            elif phase == STICK:
-                track.margin = margin
+            if phase != track.phase or not state.v_x * track.way > 0.0:
+                _follow(p, phase, t + part * s.h, v_before, before + grid.lag * (belt_next - belt_now))
         if before * after <= 0.0 and problem.normal_force > 0.0:
             counts.turns += 1
         if after == 0.0:

@@ -161,12 +161,12 @@ class Stepping:
         if system.tangents:
             fastest = 2.0 * math.pi * system.natural_frequencies[1]
             seed(self.tangent, self.plant.beside.state, fastest, self.plant.s.h)
-        if system.tracked:
-            follow(self.track)
         self._memory = np.zeros(LARGEST, np.int8)
         self._plant_at = self._memory.ctypes.data
         self.scheme.hold(self.plant, self._plant_at)
         self._begin()
+        if system.tracked:
+            follow(self.track, self.plant.state.v_x)
         self._start_energy = self._energy()
 
     def run(

@@ -108,7 +108,6 @@ MOST_EVENTS = 1 << 15
 
 TRACK = record(
     "way",  # sign of the last velocity v_x that was not 0
-    "margin",  # of stick in the last step that stuck, N
     "began",  # time of the last stick's begin, s
     "since",  # latest time of an event that is no longer kept, s
     on=int,  # 1 where the loop notes anything
@@ -119,7 +118,10 @@ TRACK = record(
     counts=(int, 6),  # of each kind
     times=(float, PARTS + 1),  # of the marks, s
     works=(float, (PARTS + 1, 6)),  # passed up to there, as in `WORK`, J
-    states=(float, (PARTS + 1, 7)),  # there: x, y, v_x, v_y, x_old and y_old (m and m/s), energy of the contact (J)
+    states=(
+        float,
+        (PARTS + 1, 7),
+    ),  # there: x, y, v_x, v_y, x_old and y_old (m and m/s), energy of the contact (J)
     event_times=(float, MOST_EVENTS),  # s
     event_places=(float, MOST_EVENTS),  # x, m
     event_kinds=(np.int8, MOST_EVENTS),
@@ -384,7 +386,9 @@ PLUG = types.NamedUniTuple(int64, 3, Plug)
 def plant_type(state: np.dtype[Any]) -> Any:
     """The type of a `Plant` whose scheme keeps its motion in this record."""
     members = [COEFFICIENTS, WEIGHTS, GRID, DRIVE, LAYER, PLUG, numba.from_dtype(state)]
-    return types.NamedTuple([*members, PROBLEM_TYPE, WORK_TYPE, COUNTS_TYPE, TANGENT_TYPE, BESIDE, TRACK_TYPE], Plant)
+    return types.NamedTuple(
+        [*members, PROBLEM_TYPE, WORK_TYPE, COUNTS_TYPE, TANGENT_TYPE, BESIDE, TRACK_TYPE], Plant
+    )
 
 
 PLANT = plant_type(STATE)

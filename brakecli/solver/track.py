@@ -5,8 +5,8 @@ account of every part closes as that of the run does. A mark is made at a sample
 half a step behind it, and that of an event-driven motion at the end of the step that reaches the sample.
 
 Events are placed inside steps. Difference schemes place a turning point where the velocity, linear between two
-levels, vanishes; the begin of a stick where the sliding velocity does with the acceleration before it, its end where
-the friction force that it takes is the one that there is; and contact by the rate of its force.
+levels, vanishes; the begin of a stick where the sliding velocity does, with the acceleration before it; its end
+where the friction force that it takes is the one that there is; and contact by the rate of its force.
 """
 
 import math
@@ -26,7 +26,7 @@ from brakecli.solver.quantities import ContactState
 from brakecli.solver.records import MOST_EVENTS, PARTS, TRACK_TYPE, WORK_TYPE, Coefficients, Weights
 
 MAX, MIN, STICK, SLIP, LIFT, TOUCH = range(6)
-"""Kinds of events: turning points of x, begin and end of a stick, the contact force becomes zero, and ceases to."""
+"""Kinds of events: turning points of x, begin and end of a stick, end and begin of contact."""
 KINDS = ("max", "min", "stick", "slip", "lift", "touch")
 
 
@@ -58,8 +58,8 @@ class Powers(NamedTuple):
 class Track:
     """What the loop has noted.
 
-    `works` has columns as `records.WORK`, `stored` kinetic energy and the energies of links and contact, one row for
-    each of the marks at `times`. `counts` has all events of each kind, also those that are no longer kept.
+    `works` has columns as `records.WORK`, `stored` kinetic energy and the energies of links and contact, with one
+    row for each of the marks at `times`. `counts` has all events of each kind, also those that are no longer kept.
     """
 
     times: Floats  # s
@@ -72,7 +72,7 @@ class Track:
     def events(self, begin: float = 0.0) -> Events:
         """The events from a time (s) on, as far as they are kept."""
         first = int(np.searchsorted(self.kept.time, begin))
-        return Events(*(each[first:] for each in self.kept))
+        return Events(self.kept.time[first:], self.kept.kind[first:], self.kept.x[first:])
 
     def powers(self, begin: float, end: float) -> Powers:
         """Mean powers between the marks nearest to two times (s), one part at least; NaN without any part."""
@@ -87,14 +87,12 @@ class Track:
         return Powers(belt - heat, roughness, dashpots, load, scheme, stored, stored - passed)
 
 
-def follow(t: Any) -> None:
-    """Note all from the start on."""
-    t.on, t.phase, t.since = 1, automaton.UNDECIDED, -math.inf
+def follow(t: Any, v_x: float) -> None:
+    """Note all from the start on, with the velocity there (m/s)."""
+    t.on, t.phase, t.way, t.since = 1, automaton.UNDECIDED, np.sign(v_x), -math.inf
 
 
-def tracked(
-    t: Any, c: Coefficients, s: Weights, energies: Callable[..., Mechanical], light: bool
-) -> Track:
+def tracked(t: Any, c: Coefficients, s: Weights, energies: Callable[..., Mechanical], light: bool) -> Track:
     """What has been noted; `light` where the work of the roughness lacks the change of the contact's store."""
     x, y, v_x, v_y, x_old, y_old, contact = t.states[: t.marks].T.copy()
     state = SimpleNamespace(x=x, y=y, v_x=v_x, v_y=v_y, x_old=x_old, y_old=y_old)
@@ -110,8 +108,10 @@ def tracked(
 
 
 def events_from_samples(time: Floats, x: Floats, vx: Floats, state: Floats) -> Events:
-    """Events by samples alone, at equal intervals: an extreme on the parabola through three samples, a change of the
-    contact's state in the middle between two. What begins and ends between two samples is not seen.
+    """The events that samples at equal intervals tell of.
+
+    An extreme lies on the parabola through three samples, a change of the contact's state midway between two. What
+    begins and ends between two samples is not seen.
     """
     interval = float(time[1] - time[0])
     ways = np.sign(vx)

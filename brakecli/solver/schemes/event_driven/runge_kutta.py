@@ -156,9 +156,9 @@ def reach(m: Any, component: int) -> float:
     return far  # type: ignore[no-any-return]
 
 
-@kernel(float64(MOTION_TYPE, int64, float64))
-def interpolated_slope(m: Any, component: int, theta: float) -> float:
-    """Derivative of `interpolated` by theta."""
+@kernel(types.UniTuple(float64, 2)(MOTION_TYPE, int64, float64))
+def interpolated_both(m: Any, component: int, theta: float) -> tuple[float, float]:
+    """`interpolated`, and its derivative by theta."""
     total, slope, rest = 0.0, 0.0, 1.0 - theta
     for p in range(TERMS[m.pair] - 1, -1, -1):
         total += m.powers[p, component]
@@ -166,4 +166,4 @@ def interpolated_slope(m: Any, component: int, theta: float) -> float:
             total, slope = total * theta, slope * theta + total
         else:
             total, slope = total * rest, slope * rest - total
-    return slope
+    return m.begin[component] + total, slope

@@ -35,6 +35,8 @@ _MOST_SWITCHES = 60
 """A run ends after so many phases that end at once."""
 _LOOSE = 2e-5
 """Tolerance from which on steps of order five are cheaper, where the contact is that of nodes."""
+_NEAR = 1e-3
+"""The last change of a place on the continuous solution by Newton's iteration, whose error is about its square."""
 _TINY = 1e-300  # no division by zero where nothing moves
 
 STEP = int64(SHOE, DRIVE, GRID)
@@ -103,7 +105,7 @@ def _defect(p: Shoe, h: float) -> float:
         for i in (V_X, V_Y):
             if m.phase == STICK and i == V_X:
                 continue
-            defect = abs(runge_kutta.interpolated_slope(m, i, theta) - h * m.slopes[STAGES - 1, i])
+            defect = abs(runge_kutta.interpolated_both(m, i, theta)[1] - h * m.slopes[STAGES - 1, i])
             noise = _DENSE_ROUNDING * h * (along if i == V_X else across) / p.c.m
             largest = max(m.largest[i], abs(m.end[i]))
             worst = max(worst, defect / (_DEFECT * m.tolerance * largest + noise + _TINY))
@@ -236,16 +238,18 @@ def _meet(p: Shoe) -> None:
 
 @kernel(void(SHOE), inlined=False)
 def _follow(p: Shoe) -> None:
-    """Note a turning point in the step that has been made, on the continuous solution, and what a rough pad does."""
+    """Note a turning point on the continuous solution of the step that has been made, and what the pad does."""
     m, track = p.motion, p.track
     kind = turned(track, m.end[V_X])
     if kind >= 0:
         first, last = m.begin[V_X], m.end[V_X]
         theta = first / (first - last) if first * last < 0.0 else 0.0
-        for _ in range(2):
-            slope = runge_kutta.interpolated_slope(m, V_X, theta)
-            if slope != 0.0:
-                theta = min(max(theta - runge_kutta.interpolated(m, V_X, theta) / slope, 0.0), 1.0)
+        for _ in range(6):
+            velocity, slope = runge_kutta.interpolated_both(m, V_X, theta)
+            new = min(max(theta - velocity / slope, 0.0), 1.0) if slope != 0.0 else theta
+            theta, moved = new, abs(new - theta)
+            if moved < _NEAR:
+                break
         put(track, kind, m.time + m.tau + theta * m.step_done, runge_kutta.interpolated(m, X, theta))
     if (m.touch[END_STAGE, 0] > 0.0) == (track.phase == OPEN):
         _meet(p)

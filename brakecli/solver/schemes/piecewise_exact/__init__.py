@@ -55,6 +55,7 @@ mechanical_energy = own_steps.mechanical_energy
 
 _FLAT = 1e-12  # fall of a margin over its rise, by which it dips by 1e-18 of this at most
 _ROUNDING = 4.0 * 2.220446049250313e-16  # of a step, beside the motion
+_NEAR = 0.03  # part of a step by which an iteration of third order may move a turning point at last
 _ERROR_TERMS = 9  # of the series of an error, which is known to a few digits only
 _KEPT = 4096  # levels from one sum of the works to the next, so that rounding does not add up
 
@@ -174,26 +175,39 @@ def _meet(c: Coefficients, m: Any, t: Any) -> None:
 def _turn(m: Any, track: Any, t: float, span: float, v_before: float) -> None:
     """Note a turning point in the step over a span (s) that ends at time t (s), where the motion is.
 
-    The secant, and one step of Newton's on the series from the end back: what is left is below 1e-4 of the step.
+    Chebyshev's iteration from the secant on, on the series from the end back: mostly the series is needed once.
     """
     a, z, phase, kind = m.generator, m.z, m.phase, turned(track, m.z[V_X])
     if kind < 0:
         return
-    x, y, v_x, v_y, load, belt_slope = z[X], z[Y], z[V_X], z[V_Y], z[LOAD], z[BELT_SLOPE]
-    back = -span * v_x / (v_x - v_before) if v_x * v_before <= 0.0 else 0.0
-    place, velocity, slope, power = x, v_x, 0.0, 1.0
-    for k in range(1, _ERROR_TERMS):
-        a_x = (a[phase, V_X, X] * x + a[phase, V_X, Y] * y) + (a[phase, V_X, V_X] * v_x + a[phase, V_X, V_Y] * v_y)
-        a_y = (a[phase, V_Y, X] * x + a[phase, V_Y, Y] * y) + (a[phase, V_Y, V_X] * v_x + a[phase, V_Y, V_Y] * v_y)
-        a_x += a[phase, V_X, LOAD] * load + a[phase, V_X, BELT_SLOPE] * belt_slope
-        a_y += a[phase, V_Y, LOAD] * load
-        x, y, v_x, v_y = v_x, v_y, a_x, a_y
-        load, belt_slope = z[LOAD_SLOPE] if k == 1 else 0.0, 0.0
-        slope += power * v_x
-        power *= back / k
-        place, velocity = place + power * x, velocity + power * v_x
-    rest = -velocity / slope if abs(velocity) < span * abs(slope) else 0.0
-    put(track, kind, t + min(back + rest, 0.0), place + 0.5 * rest * velocity)
+    back = -span * z[V_X] / (z[V_X] - v_before) if z[V_X] * v_before <= 0.0 else 0.0
+    place = 0.0
+    for _ in range(6):
+        x, y, v_x, v_y, load, belt_slope = z[X], z[Y], z[V_X], z[V_Y], z[LOAD], z[BELT_SLOPE]
+        velocity, slope, bend, power, before = v_x, 0.0, 0.0, 1.0, 0.0
+        place = x
+        for k in range(1, _ERROR_TERMS):
+            a_x = (a[phase, V_X, X] * x + a[phase, V_X, Y] * y) + (
+                a[phase, V_X, V_X] * v_x + a[phase, V_X, V_Y] * v_y
+            )
+            a_y = (a[phase, V_Y, X] * x + a[phase, V_Y, Y] * y) + (
+                a[phase, V_Y, V_X] * v_x + a[phase, V_Y, V_Y] * v_y
+            )
+            a_x += a[phase, V_X, LOAD] * load + a[phase, V_X, BELT_SLOPE] * belt_slope
+            a_y += a[phase, V_Y, LOAD] * load
+            x, y, v_x, v_y = v_x, v_y, a_x, a_y
+            load, belt_slope = z[LOAD_SLOPE] if k == 1 else 0.0, 0.0
+            slope, bend = slope + power * v_x, bend + before * v_x
+            before, power = power, power * (back / k)
+            place, velocity = place + power * x, velocity + power * v_x
+        rest = -velocity / slope if abs(velocity) < span * abs(slope) else 0.0
+        rest -= 0.5 * bend * rest * rest / slope if rest != 0.0 else 0.0
+        rest = min(max(rest, -span - back), -back)
+        place += (velocity + 0.5 * slope * rest) * rest
+        back += rest
+        if abs(rest) <= _NEAR * span:
+            break
+    put(track, kind, t + back, place)
 
 
 @kernel(void(_PLANT, int64, float64), inlined=False)
