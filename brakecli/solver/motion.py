@@ -52,6 +52,8 @@ Progress = Callable[[int], None]
 Counted = Callable[[str, int, int], None]
 """Called with what is counted, how many are done, and of how many; 0 where that is not known."""
 
+_NO_TRACK = new(TRACK)
+"""Of motions that are not tracked: nothing is written into it."""
 _plant_at, _evaluate_at = from_memory(PLANT), at_address(EVALUATE)
 
 
@@ -140,7 +142,7 @@ class Stepping:
         self.events = np.zeros((EVENTS, 2))
         self.counts = new(COUNTS)
         self.counts.level = self.scheme.LAG
-        self.tangent, self.track = new(TANGENT), new(TRACK)
+        self.tangent, self.track = new(TANGENT), new(TRACK) if system.tracked else _NO_TRACK
         # the same place in memory, which is read in a tenth of the time
         self._level = np.frombuffer(self.counts, COUNTS)["level"]
         self.plant = Plant(

@@ -6,6 +6,7 @@ The subprocess runs this very file as a script.
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -61,16 +62,20 @@ def case(scheme: str, evaluator: str) -> dict[str, Any]:
 
 
 def histories() -> dict[str, NDArray[np.float64]]:
-    """The samples of every scheme with every evaluator, and the evaluations that they took."""
+    """The samples of every scheme with every evaluator, the evaluations that they took, and what loops noted."""
     from brakecli.case.case import Case
     from brakecli.case.system import system_of
     from brakecli.solver.motion import solve
 
     found = {}
     for scheme, evaluator in PAIRS:
-        motion = solve(system_of(Case.model_validate(case(scheme, evaluator))))
+        motion = solve(replace(system_of(Case.model_validate(case(scheme, evaluator))), tracked=True))
         work, name = motion.work, f"{scheme} {evaluator}"
-        found[name] = motion.rows
+        found[name], track = motion.rows, motion.track
+        assert track is not None
+        found[f"{name} track"] = np.concatenate(
+            [*track.kept, track.times, track.works.ravel(), track.stored.ravel()]
+        )
         found[f"{name} work"] = np.array(
             [float(work.failure), work.steps, work.contact_evaluations, motion.system.window_rows]
         )
@@ -99,6 +104,7 @@ def test_compiled_and_interpreted_motions_are_the_same(
     same_sums = evaluator in ("closed-form", "exact") or scheme == "event-driven"
     if same_sums:
         np.testing.assert_array_equal(compiled, interpreted)
+        np.testing.assert_array_equal(*(each[f"{scheme} {evaluator} track"] for each in both))
     else:
         # The compiler may add the 32 nodes' gaps in another order, 32/2 units in the last place of F_y at most, in
         # each of 50 steps: 2e-13 of the largest value. Friction and dashpots do not let a difference grow.

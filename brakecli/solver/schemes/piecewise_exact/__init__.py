@@ -267,7 +267,8 @@ def _start(p: Plant) -> None:
     _anchor(p, 0.0, 0.0)
     look(m)
     m.started = 1
-    p.track.phase = m.phase
+    if p.track.on == 1:
+        p.track.phase = m.phase
 
 
 @kernel(void(FLOW_TYPE, COUNTS_TYPE))
