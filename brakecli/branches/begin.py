@@ -60,12 +60,14 @@ AT_REST = 1e-3
 class End(NamedTuple):
     """What a motion comes to: whether vibration `lasts`, None where that is not known.
 
-    `state`: x, y, v_x and v_y on the vibration, at t = 0 of the waves; `orbit` where it is a limit cycle.
+    `state`: x, y, v_x and v_y on the vibration, at t = 0 of the waves; `orbit` where it is a limit cycle, and the
+    `rate` (1/s) at which its slowest disturbance fades.
     """
 
     lasts: bool | None
     state: Array | None = None
     orbit: Orbit | None = None
+    rate: float | None = None
 
 
 FADES, UNKNOWN = End(False), End(None)
@@ -90,7 +92,8 @@ def on_smooth_pads(shoe: Shoe, state: Array) -> End:
         if outcome == LINEAR:
             return FADES
         if outcome == FOUND and motion.multiplier < 1.0:
-            return End(True, np.array(motion.orbit.state), motion.orbit)
+            rate = -math.log(max(motion.multiplier, 1e-300)) / motion.orbit.period
+            return End(True, np.array(motion.orbit.state), motion.orbit, rate)
         motion.way.events = 0  # many between two falls are too many for a cycle, not for a motion
     return UNKNOWN
 

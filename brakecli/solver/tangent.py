@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import float64, int64, void
 
-from brakecli.solver.compile import kernel
+from brakecli.solver.compile import Floats, kernel
 from brakecli.solver.records import (
     BESIDE,
     COEFFICIENTS,
@@ -43,6 +43,19 @@ class Exponent(NamedTuple):
 
     rate: float
     error: float
+    sizes: Floats = np.zeros(0)  # logarithm of the size of a disturbance at the end of each part of the run
+
+    def even(self, duration: float) -> tuple[float, float]:
+        """The rate by a line through all sizes but the first tenth, with its error: of a linear motion.
+
+        Its disturbances swing about an exponential function, and do not wander.
+        """
+        means = self.sizes[len(self.sizes) // 8 :].reshape(-1, 2 * BATCHES).mean(axis=1)
+        places = (np.arange(len(means)) - 0.5 * (len(means) - 1)) * (2 * BATCHES / PARTS * duration)
+        square = float(places @ places)
+        slope = float(places @ means) / square
+        rest = means - means.mean() - slope * places
+        return slope, math.sqrt(float(rest @ rest) / (len(means) - 2) / square)
 
 
 def seed(t: Any, state: Any, rate: float, h: float) -> None:
@@ -58,10 +71,10 @@ def exponent(t: Any, duration: float, h: float, lag: int) -> Exponent:
     Within a cycle a disturbance swings: its size is a mean over a batch. The error contains, for each event that a
     difference scheme has placed, the part `PLACED` of a step h (s) in radians of the fastest motion.
     """
-    sizes = np.cumsum(t.logs)[PARTS // 2 :].reshape(BATCHES, -1).mean(axis=1)
-    rates = np.diff(sizes) * (2 * BATCHES / duration)
+    sizes = np.cumsum(t.logs)
+    rates = np.diff(sizes[PARTS // 2 :].reshape(BATCHES, -1).mean(axis=1)) * (2 * BATCHES / duration)
     error = float(rates.std(ddof=1)) / math.sqrt(len(rates))
-    return Exponent(float(rates.mean()), math.hypot(error, PLACED[lag] * t.rate * h * t.placed / duration))
+    return Exponent(float(rates.mean()), math.hypot(error, PLACED[lag] * t.rate * h * t.placed / duration), sizes)
 
 
 @kernel(float64(float64, float64))

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.analysis.regime.verdict import Excitation, Regime, Verdict
+from brakecli.analysis.regime.table import Excitation, Regime
+from brakecli.analysis.regime.verdict import Verdict
 from brakecli.branches.line import Line
 from brakecli.case.case import Case
 from brakecli.case.read import key_path
@@ -23,7 +24,7 @@ from brakecli.files.field import values_of
 from brakecli.files.valid import LARGEST
 from brakecli.runs.certificate import Certificate, Certified
 from brakecli.runs.limits import Check, check, refuse, within_range
-from brakecli.runs.run import motion_of, verdict_in_memory
+from brakecli.runs.run import motion_of, shaken, verdict_in_memory
 from brakecli.runs.together import TOGETHER, certify_together
 from brakecli.solver.motion import Motion
 from brakecli.solver.roughness import TWO_PI, wheel_angles
@@ -112,7 +113,7 @@ def judged(case: Case, found: Check, certified: Certified | None, *, whole: bool
         if certified is None and not whole and (known := early(system)) is not None:
             verdict, motion, certificate = known
         else:
-            motion, certificate = certified or motion_of(system)
+            motion, certificate = certified or motion_of(replace(system, tangents=shaken(system)))
             verdict = verdict_in_memory(motion, system, in_full=whole)
             warnings += [note for about, note in verdict.notes.items() if about not in _UNTOLD]
     work = motion.work

@@ -1,16 +1,16 @@
 """Histories made by hand, and the verdict on the run of a case."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from brakecli.analysis.regime.classify import classify
-from brakecli.analysis.regime.of_run import context
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.case.system import system_of
+from brakecli.runs.run import shaken, verdict_in_memory
 from brakecli.solver.history import History, array_history
+from brakecli.solver.motion import solve
 from brakecli.solver.quantities import HISTORY
-from tests.examples import simulate
 
 INTERVAL = 1e-4
 
@@ -25,4 +25,6 @@ def history_of(samples: int, **columns: Any) -> History:
 
 def verdict_of(case: Any) -> Verdict:
     """The verdict on the run of a case."""
-    return classify(array_history(case.output.sample_interval, simulate(case).rows), context(system_of(case)))
+    system = system_of(case)
+    motion = solve(replace(system, tangents=shaken(system)))
+    return verdict_in_memory(motion, system)

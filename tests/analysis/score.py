@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 import tomli_w
+from brakecli.runs.second import classify_twice
 
-from brakecli.analysis.regime.verdict import Thresholds
+from brakecli.analysis.regime.table import Thresholds
 from brakecli.case.read import parse_case
 from brakecli.files.read import open_result
 from brakecli.runs.run import run
-from brakecli.runs.second import classify_twice
 from brakecli.solver.quantities import HISTORY
 from tests.analysis.answers import VX, Answer, X, answer, last_eighth, levels, sticks_per_cycle
 from tests.analysis.shoes import Array, Shoe, Tables, random_shoes

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brakecli.analysis.regime.verdict import Excitation, Regime, Verdict
+from brakecli.analysis.regime.table import Excitation, Regime
+from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.stability.report import stability
 from brakecli.case.system import system_of
 from brakecli.solver.motion import solve

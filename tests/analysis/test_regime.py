@@ -8,8 +8,9 @@ import pytest
 from numpy.typing import NDArray
 
 from brakecli.analysis.regime.classify import classify
+from brakecli.analysis.regime.context import Context
 from brakecli.analysis.regime.spectra import forced_lines
-from brakecli.analysis.regime.verdict import Context, Excitation, Regime, Thresholds
+from brakecli.analysis.regime.table import Excitation, Regime, Thresholds
 from brakecli.solver.history import History
 from tests.analysis.histories import INTERVAL, history_of, verdict_of
 from tests.examples import COULOMB, ROUGH, SQUEAL, make

@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from brakecli.analysis.regime.slopes import growth_with_slopes
 from scipy.integrate import solve_ivp
 
 from brakecli.analysis.regime.linear import linear_theory
-from brakecli.analysis.regime.slopes import growth_with_slopes
-from brakecli.analysis.regime.verdict import Excitation, Regime
+from brakecli.analysis.regime.table import Excitation, Regime
 from brakecli.case.system import system_of
 from tests.analysis.found import SHOES
 from tests.analysis.histories import verdict_of

@@ -6,11 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 import tomli_w
+from brakecli.analysis.regime.of_run import verdict_on
 
 from brakecli.analysis.regime.classify import classify
+from brakecli.analysis.regime.context import Context
 from brakecli.analysis.regime.linear import linear_theory
-from brakecli.analysis.regime.of_run import verdict_on
-from brakecli.analysis.regime.verdict import Context, Excitation, Regime
+from brakecli.analysis.regime.table import Excitation, Regime
 from brakecli.analysis.stability.report import stability
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of

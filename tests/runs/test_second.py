@@ -6,12 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 import tomli_w
-
 from brakecli.analysis.regime.of_run import context, verdict_on
-from brakecli.analysis.regime.verdict import Excitation, Feeds, Regime
+from brakecli.runs.second import compared, second_system
+
+from brakecli.analysis.regime.table import Excitation, Regime
+from brakecli.analysis.regime.verdict import Feeds
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
-from brakecli.runs.second import compared, second_system
 from brakecli.solver.history import array_history
 from brakecli.solver.motion import solve
 from tests.analysis.found import SHOES

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brakecli.analysis.regime.verdict import Excitation, Regime
+from brakecli.analysis.regime.table import Excitation, Regime
 from brakecli.branches.begin import on_smooth_pads, settled
 from brakecli.branches.cycles import Cycles
 from brakecli.branches.line import Line, Shoe

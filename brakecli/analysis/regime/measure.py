@@ -1,0 +1,182 @@
+"""The record of answers to the questions of `table`, from a history and what is known of its case."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from brakecli.analysis.regime.context import Context
+from brakecli.analysis.regime.cycles import Cycles, cycles_of
+from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, WINDOWS, Envelope, Part, line
+from brakecli.analysis.regime.linear import Linear
+from brakecli.analysis.regime.table import Answers, Fate, Thresholds
+from brakecli.solver.history import History
+from brakecli.solver.quantities import ContactState
+from brakecli.solver.tangent import Exponent
+
+_BATCHES = 10  # of the envelope's second half
+_NOTHING = 1e-3  # of a beat over the slowest wave, that is rounding
+_BANDS = 0.9  # least part of the energy in three bands: chaos may have less
+
+
+class Continued(NamedTuple):
+    """What the motion comes to on the smooth wheel: its fate, amplitude (m), rate (1/s)."""
+
+    fate: Fate = Fate.UNKNOWN
+    amplitude: float = math.nan
+    rate: float = math.nan
+
+
+class Shown:
+    """What a history shows."""
+
+    def __init__(self, history: History, context: Context, limits: Thresholds) -> None:
+        """Take a history and what is known of its case."""
+        self.history, self.context, self.limits = history, context, limits
+        self.duration = history.samples * history.interval
+        self.whole = Part(history, 0, history.samples)
+        self.half = replace(self.whole, start=history.samples // 2)
+        self.last = replace(self.whole, start=history.samples * (WINDOWS - 10) // WINDOWS)
+
+    @cached_property
+    def envelope(self) -> Envelope | None:
+        """The level of vx over time; None where samples are too few."""
+        return Envelope(self.history) if self.history.samples >= FEWEST_SAMPLES else None
+
+    @cached_property
+    def settled(self) -> Part | None:
+        """The settled part, if there is one."""
+        within = self.limits.settled_within
+        first = self.envelope.settled_window(within, within) if self.envelope else None
+        return None if first is None else replace(self.whole, start=first * self.history.samples // WINDOWS)
+
+    @property
+    def judged(self) -> Part:
+        """The settled part, or the second half."""
+        return self.settled or self.half
+
+    @cached_property
+    def linear(self) -> Linear | None:
+        """The theory, where the motion has long been linear at last."""
+        theory, slow = self.context.linear(), self.slowest(0.0)
+        if theory is None:
+            return None
+        start = max(min(self.last.start, self.history.samples - int(slow / self.history.interval)), 0)
+        slides = replace(self.last, start=start).slides(theory.slip) or theory.stays(self.end[1])
+        return theory.with_slopes() if slides else None
+
+    @property
+    def end(self) -> tuple[float, np.ndarray]:
+        """Time and state of the last sample."""
+        last = self.history.samples - 1
+        state = [float(self.history.read(name, last, last + 1)[0]) for name in ("x", "y", "vx", "vy")]
+        return last * self.history.interval, np.array(state)
+
+    @cached_property
+    def cycles(self) -> Cycles | None:
+        """The cycles of the part that is judged."""
+        known, theory = self.context, self.context.linear() if not self.context.forced else None
+        return cycles_of(self.judged, theory.slip if theory else None, known.step, known.belt_speed, known.waves)
+
+    def slowest(self, amplitude: float) -> float:
+        """Period (s) of the slowest wave that counts beside an amplitude of x (m) and beside the others; or 0."""
+        return 1.0 / min(counts) if (counts := self._counting(amplitude)) else 0.0
+
+    def beat(self, amplitude: float = 0.0) -> float:
+        """Period (s) of the slowest wave, or of the slowest beat of one that counts with a multiple of another."""
+        slow, counts = self.slowest(amplitude), self._counting(amplitude)
+        beats = [abs(f - n * g) for f in counts for g in counts for n in range(1, 11)]
+        return max([slow, *(1.0 / beat for beat in beats if beat * slow > _NOTHING)])
+
+    def _counting(self, amplitude: float) -> list[float]:
+        """Frequencies (Hz) of the waves that count beside an amplitude of x (m) and beside the others."""
+        least = max([amplitude, *(swing for _, swing in self.context.waves)])
+        return [f for f, swing in self.context.waves if swing >= self.limits.settled_within * least]
+
+    def change(self, envelope: Envelope) -> tuple[float, float]:
+        """Change of the logarithm of the level in the second half, with its error."""
+        means = envelope.vx[WINDOWS // 2 :].reshape(_BATCHES, -1).mean(axis=1)
+        if not means.min() > 0.0:
+            return math.nan, math.nan
+        return line((np.arange(_BATCHES) + 0.5) / _BATCHES, np.log(means))
+
+    def changes(self) -> float:
+        """By which part vx or x, whichever does more so, swings otherwise in the last quarter than before."""
+        before = replace(self.half, stop=3 * self.history.samples // 4)
+        sizes = [np.array([each.deviation("vx"), each.amplitude("x")]) for each in (before, self.last)]
+        return float(np.abs(sizes[0] / np.maximum(sizes[1], 1e-300) - 1.0).max())
+
+    def power(self) -> tuple[float, float, float]:
+        """Powers (W) that friction and the roughness give, and their error."""
+        friction, off = self.judged.power("friction_force", "vx")
+        roughness, off_too = self.judged.power("normal_force", "vy")
+        lost = self.context.powers(self.judged).get("power_dashpots", friction + roughness)
+        return friction, roughness, max(math.hypot(off, off_too), abs(friction + roughness - lost))
+
+
+def answers(
+    shown: Shown, exponent: Exponent | None, continued: Callable[[], Continued], failure: str = ""
+) -> Answers:
+    """The record of answers; `continued` is asked only where a row may need it."""
+    context, history, half, last = shown.context, shown.history, shown.half, shown.last
+    stands, waves = context.belt_speed == 0.0, bool(context.forced)
+    away, stick = ContactState.SEPARATED, ContactState.STICK
+    lost = half.fraction(away) == 1.0
+    found: dict[str, Any] = {
+        "failure": failure or "",
+        "duration": shown.duration,
+        "samples": history.samples,
+        "few_samples": shown.envelope is None,
+        "steady": context.steady,
+        "stands": stands,
+        "waves": waves,
+        "frictionless": context.frictionless,
+        "undamped": context.undamped,
+        "locks": math.nan if context.locks is None else context.locks,
+        "held": context.held,
+        "never": lost and shown.whole.fraction(away) == 1.0,
+        "lost": lost,
+        "left": last.fraction(away) == 1.0,
+        "carried": (last if stands else half).fraction(stick) == 1.0,
+    }
+    if exponent is not None:
+        found |= {"exponent": exponent.rate, "exponent_error": exponent.error}
+        found |= dict(zip(("even", "even_error"), exponent.even(shown.duration), strict=True))
+    if shown.envelope is None or not context.steady or failure:
+        return Answers(**found)
+    change, change_error = shown.change(shown.envelope)
+    found |= {
+        "moves": shown.envelope.largest > context.quiet,
+        "slowest": shown.slowest(half.amplitude("x")),
+        "change": change,
+        "change_error": change_error,
+        "amplitude": last.amplitude("x"),
+        "settled": shown.settled is not None,
+        "seconds": (history.samples - shown.judged.start) * history.interval,
+    }
+    if (theory := shown.linear) is not None:
+        found |= {"linear": True, "growth": theory.mode.growth, "growth_error": theory.known_to}
+        found |= {"ringing": theory.mode.frequency}
+        if theory.direction > 0:
+            found |= {"to_limit": theory.seconds_to_limit(*shown.end), "steadier": context.steadier()}
+        return Answers(**found)
+    found["growth"] = context.growth()
+    if not context.frictionless:
+        alone = continued()
+        found |= {
+            "without_waves": alone.fate,
+            "amplitude_without_waves": alone.amplitude,
+            "rate_without_waves": alone.rate,
+        }
+    if waves:
+        friction, roughness, error = shown.power()
+        found |= {"friction": friction, "roughness": roughness, "power_error": error, "touches": context.touches()}
+    if cycles := shown.cycles:
+        bands = shown.judged.narrow()
+        shares = cycles.evidence["harmonic_share"], bands if bands >= _BANDS else 0.0
+        found |= {name: cycles.evidence[name] for name in ("cycles", "samples_per_cycle", "stick_cycles")}
+        found |= {"harmonic_share": max(shares)}
+    return Answers(**found)
