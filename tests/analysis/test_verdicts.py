@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import pytest
 import tomli_w
-from brakecli.analysis.regime.of_run import verdict_on
 
 from brakecli.analysis.regime.classify import classify
 from brakecli.analysis.regime.context import Context
@@ -15,6 +14,7 @@ from brakecli.analysis.regime.table import Excitation, Regime
 from brakecli.analysis.stability.report import stability
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
+from brakecli.runs.judge import verdict_on
 from brakecli.solver.history import array_history
 from tests.analysis.found import SHOES
 from tests.analysis.histories import INTERVAL, history_of, verdict_of

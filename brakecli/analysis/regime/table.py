@@ -125,6 +125,16 @@ class Answers:
         return 4.0 / 3.0 * (self.duration + 3.0 / max(abs(self.exponent), 1e-300))
 
     @property
+    def decay(self) -> float:
+        """Rate (1/s) at which a disturbance fades."""
+        return -self.growth
+
+    @property
+    def sticks(self) -> str:
+        """How often the motion sticks."""
+        return f"with stick in {self.stick_cycles:.0%} of the cycles" if self.stick_cycles else "without stick"
+
+    @property
     def word(self) -> str:
         """Which way the level changes."""
         return "grows" if self.change > 0.0 else "falls"
@@ -290,7 +300,7 @@ SMOOTH = (
     Row(
         "linear, decays",
         lambda a, t: a.linear and _decays(a, t),
-        _LINEAR + ": the shoe's own vibration decays at {a.growth:.3g} 1/s ({a.ringing:.4g} Hz)",
+        _LINEAR + ": the shoe's own vibration decays at {a.decay:.3g} 1/s ({a.ringing:.4g} Hz)",
         "",
         _DAMPED,
     ),
@@ -492,7 +502,7 @@ LOOKS = (
     Row(
         "quasi-harmonic",
         lambda a, t: a.stick_cycles <= 1.0 - t.stick_cycles and a.harmonic_share >= t.harmonic_share,
-        "with stick in {a.stick_cycles:.0%} of the cycles: {a.harmonic_share:.0%} of the energy of vx in one line "
+        "{a.sticks}: {a.harmonic_share:.0%} of the energy of vx in one line "
         "and its harmonics, or in three narrow bands",
         "",
         Regime.QUASI_HARMONIC,
