@@ -73,7 +73,7 @@ def _tables(half_length: float, shoe: Surface, wheel: Surface, nodes: int) -> tu
 def run_together(systems: Sequence[System]) -> list[Motion | None]:
     """The motions of systems that fit together; None where one has to be solved alone.
 
-    Their energy is not accounted for.
+    Their energy is not accounted for. Where the systems ask for `tangents`, the motions have an exponent.
     """
     firsts = range(0, len(systems), LANES)
     return [found for first in firsts for found in _run_lanes(list(systems[first : first + LANES]))]

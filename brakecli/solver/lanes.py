@@ -230,9 +230,9 @@ def _finish(o: Any, shared: Shared) -> None:
 def _disturb(o: Any, shared: Shared) -> None:
     """Carry the disturbance to the older level of the motion, by the derivative of its steps.
 
-    Along the motion dF_y/dt = ∂F_y/∂x (v_x - U) + ∂F_y/∂y v_y: this gives ∂F_y/∂x, which no sum over nodes is
-    needed for. The sliding velocity never vanishes in a lane. All three rates are differences over two steps, so
-    that they give a constant ∂F_y/∂x exactly.
+    Along the motion dF_y/dt = ∂F_y/∂x (v_x - U) + ∂F_y/∂y v_y. This gives ∂F_y/∂x without another sum over nodes,
+    as the sliding velocity never vanishes in a lane. All three rates are differences over two steps: a constant
+    ∂F_y/∂x is exact, any other is right to h².
     """
     h, length = shared.h, shared.length
     for n in range(LANES):
@@ -249,8 +249,8 @@ def _disturb(o: Any, shared: Shared) -> None:
         d_slope = THETA_1 * (o.i_11[n] * o.grip[n] + o.i_12[n])  # by the force of the next level
         e_slope = THETA_1 * (o.i_12[n] * o.grip[n] + o.i_22[n])
         stiffness, sliding = o.k[n] * length * o.touched[n], o.d[n] - o.belt[n]
-        tangential = 0.5 / h * (o.force[n] - o.earlier[n]) + stiffness * o.e[n]  # times the sliding velocity, as
-        stiffness *= sliding
+        tangential = 0.5 / h * (o.force[n] - o.earlier[n]) + stiffness * o.e[n]
+        stiffness *= sliding  # both slopes are multiplied by the sliding velocity, which saves a division
         x, y = x_old + 2.0 * h * d, y_old + 2.0 * h * e
         feedback = sliding - 2.0 * h * (tangential * d_slope - stiffness * e_slope)
         force = (tangential * x - stiffness * y) / feedback if feedback != 0.0 else 0.0
