@@ -35,7 +35,8 @@ PLACED = 1 / 16, 1 / 4
 level reached, and of one that lags. Limit cycles, whose exponent is 0, have shown 0.06 and 0.34."""
 FEWEST_SAMPLES = 64
 """Of a run with an exponent, at which its growth is noted."""
-_LEAST, _MOST = 1e-280, 1e280  # size of a disturbance
+LEAST, MOST = 1e-280, 1e280
+"""Size of a disturbance."""
 
 
 class Exponent(NamedTuple):
@@ -65,16 +66,25 @@ def seed(t: Any, state: Any, rate: float, h: float) -> None:
     state.x_old, state.y_old = state.x - h * state.v_x, state.y - h * state.v_y
 
 
-def exponent(t: Any, duration: float, h: float, lag: int) -> Exponent:
-    """The exponent in the second half of a run, with the standard error of the mean of its batches.
+def mean_growth(logs: Floats, duration: float) -> tuple[Any, Any]:
+    """The exponent in the second half of runs, with the standard error of the mean of its batches.
 
-    Within a cycle a disturbance swings: its size is a mean over a batch. The error contains, for each event that a
-    difference scheme has placed, the part `PLACED` of a step h (s) in radians of the fastest motion.
+    Within a cycle a disturbance swings: its size is a mean over a batch. `logs` has a row for each part of runs.
     """
-    sizes = np.cumsum(t.logs)
-    rates = np.diff(sizes[PARTS // 2 :].reshape(BATCHES, -1).mean(axis=1)) * (2 * BATCHES / duration)
-    error = float(rates.std(ddof=1)) / math.sqrt(len(rates))
-    return Exponent(float(rates.mean()), math.hypot(error, PLACED[lag] * t.rate * h * t.placed / duration), sizes)
+    sizes = np.cumsum(logs, axis=0)[PARTS // 2 :].reshape(BATCHES, -1, *logs.shape[1:]).mean(axis=1)
+    rates = np.diff(sizes, axis=0) * (2 * BATCHES / duration)
+    return rates.mean(axis=0), rates.std(axis=0, ddof=1) / math.sqrt(len(rates))
+
+
+def exponent(t: Any, duration: float, h: float, lag: int) -> Exponent:
+    """The exponent of a run in the common loop.
+
+    The error also contains, for each event that a difference scheme has placed, the part `PLACED` of a step h (s)
+    in radians of the fastest motion.
+    """
+    rate, error = mean_growth(t.logs, duration)
+    placed = PLACED[lag] * t.rate * h * t.placed / duration
+    return Exponent(float(rate), math.hypot(error, placed), np.cumsum(t.logs))
 
 
 @kernel(float64(float64, float64))
@@ -124,8 +134,8 @@ def renew(t: Any, number: int, samples: int) -> float:
     """Note the growth up to a sample, and go on with a disturbance of size one; what it was multiplied by."""
     size = math.sqrt(t.rate * t.rate * (t.x * t.x + t.y * t.y) + (t.v_x * t.v_x + t.v_y * t.v_y))
     if number > 0:
-        t.logs[(number - 1) * PARTS // samples] += math.log(min(max(size, _LEAST), _MOST))
-    if not _LEAST < size < _MOST:
+        t.logs[(number - 1) * PARTS // samples] += math.log(min(max(size, LEAST), MOST))
+    if not LEAST < size < MOST:
         t.x, t.y, t.v_x, t.v_y = 1.0 / t.rate, 0.0, 0.0, 0.0
         return 0.0
     part = 1.0 / size
