@@ -20,7 +20,7 @@ from brakecli.case.system import system_of
 from brakecli.files import fields
 from brakecli.files.field import values_of
 from brakecli.runs.cost import duration_text, stability_seconds, steps_and_seconds, table_seconds
-from brakecli.runs.run import motion_of, shaken, verdict_in_memory
+from brakecli.runs.run import asked, motion_of, verdict_in_memory
 from brakecli.solver.motion import Counted
 from brakecli.solver.system import System
 
@@ -219,9 +219,7 @@ def _to_check(case: Case, change: Change) -> tuple[System, float] | None:
 def _checked(system: System, change: Change, progress: Counted) -> CheckRun:
     """Run a system with an advised value."""
     start = time.perf_counter()
-    motion, _ = motion_of(
-        replace(system, tangents=shaken(system)), lambda done: progress("steps of the check", done, system.steps)
-    )
+    motion, _ = motion_of(asked(system), lambda done: progress("steps of the check", done, system.steps))
     verdict = verdict_in_memory(motion, system)
     spent = time.perf_counter() - start
     return CheckRun(change.parameter, float(change.rounded), verdict, system.sampled_duration, spent)

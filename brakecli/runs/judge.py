@@ -76,7 +76,10 @@ def _stored(
     exponent = None if rate is None or error is None else Exponent(rate, error)
     if "without_waves" not in evidence:
         return exponent, None
-    numbers = (float(evidence.get(f"{name}_without_waves", math.nan)) for name in ("amplitude", "rate"))
+    numbers = (
+        float(evidence.get(f"{name}_without_waves", math.nan))
+        for name in ("amplitude", "rate", "period", "sticks")
+    )
     continued = Continued(Fate(evidence["without_waves"]), *numbers)
     return exponent, lambda: continued
 

@@ -82,8 +82,7 @@ def run(
     that fails numerically is written up to the failure and reported.
     """
     with within_range():
-        system = system_of(loaded.case)
-        system = replace(system, tangents=shaken(system))
+        system = asked(system_of(loaded.case))
         found = check(system)
         with new_result(output, force=force) as result:
             refuse(found, free_bytes(output.resolve().parent))
@@ -109,9 +108,9 @@ def run(
     return report
 
 
-def shaken(system: System) -> bool:
-    """Whether waves of the wheel shake the shoe for ever, so that a verdict asks what becomes of disturbances."""
-    return system.steady and system.belt_speed != 0.0 and system.wheel.g.size > 0
+def asked(system: System) -> System:
+    """The same, whose motion carries a disturbance along where waves shake it for ever: verdicts ask for that."""
+    return replace(system, tangents=system.steady and system.belt_speed != 0.0 and system.wheel.g.size > 0)
 
 
 def motion_of(

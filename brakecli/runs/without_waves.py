@@ -11,6 +11,7 @@ from brakecli.analysis.stability.modes import growth, is_undamped
 from brakecli.branches.begin import UNKNOWN, End, on_rough_pads, on_smooth_pads
 from brakecli.branches.line import Shoe
 from brakecli.errors import CaseError
+from brakecli.solver.automaton import STICK
 from brakecli.solver.compile import Floats
 from brakecli.solver.roughness import surface
 from brakecli.solver.steady_sliding import steady_sliding
@@ -20,15 +21,18 @@ from brakecli.solver.system import System
 def without_waves(system: System, state: Floats) -> Continued:
     """What the motion from a state (x, y, v_x, v_y) comes to on the smooth wheel, at constant speed and load.
 
-    Where steady sliding is unstable it lasts, whatever it comes to.
+    Where steady sliding is unstable, and it does not come near it, it lasts, whatever it comes to.
     """
     flat = replace(system, wheel=surface(), tangents=False)
+    if flat.belt_speed == 0.0:
+        return Continued()
     end = _on_a_rough_shoe(flat, state) if flat.shoe.g.size else on_smooth_pads(Shoe.of(flat), state)
     if end.lasts is None:
-        return Continued(Fate.LASTS if _unstable(flat) else Fate.UNKNOWN)
+        return Continued(Fate.UNKNOWN if end.state is None else Fate.LASTS)
     if end.orbit is None or end.rate is None:
         return Continued(Fate.LASTS if end.lasts else Fate.DIES)
-    return Continued(Fate.LASTS, end.orbit.amplitude, end.rate)
+    orbit = end.orbit
+    return Continued(Fate.LASTS, orbit.amplitude, end.rate, orbit.period, orbit.word.count(STICK))
 
 
 def _on_a_rough_shoe(flat: System, state: Floats) -> End:
@@ -39,17 +43,6 @@ def _on_a_rough_shoe(flat: System, state: Floats) -> End:
         rest = steady_sliding(flat)
     except CaseError:
         return UNKNOWN
-    stable = growth(flat.coefficients, rest.stiffness, _grip(flat)) < 0.0
-    return on_rough_pads(flat, state, [np.array([rest.x, rest.y, 0.0, 0.0])] if stable else [])
-
-
-def _unstable(flat: System) -> bool:
-    """Whether a small disturbance of steady sliding grows."""
-    try:
-        return growth(flat.coefficients, steady_sliding(flat).stiffness, _grip(flat)) > 0.0
-    except CaseError:
-        return False
-
-
-def _grip(flat: System) -> float:
-    return math.copysign(flat.coefficients.phi, flat.belt_speed)
+    if growth(flat.coefficients, rest.stiffness, math.copysign(flat.coefficients.phi, flat.belt_speed)) > 0.0:
+        return End(None, state)
+    return on_rough_pads(flat, state, [np.array([rest.x, rest.y, 0.0, 0.0])])

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -24,7 +24,7 @@ from brakecli.files.field import values_of
 from brakecli.files.valid import LARGEST
 from brakecli.runs.certificate import Certificate, Certified
 from brakecli.runs.limits import Check, check, refuse, within_range
-from brakecli.runs.run import motion_of, shaken, verdict_in_memory
+from brakecli.runs.run import asked, motion_of, verdict_in_memory
 from brakecli.runs.together import TOGETHER, certify_together
 from brakecli.solver.motion import Motion
 from brakecli.solver.roughness import TWO_PI, wheel_angles
@@ -99,7 +99,7 @@ def simulate(case: Case, *, whole: bool = True) -> PointRun:
 def checked(case: Case) -> Check:
     """What is known of a case before it runs; raises RefusedError where it should not."""
     with within_range():
-        found = check(system_of(case))
+        found = check(asked(system_of(case)))
         refuse(found)
     return found
 
@@ -113,7 +113,7 @@ def judged(case: Case, found: Check, certified: Certified | None, *, whole: bool
         if certified is None and not whole and (known := early(system)) is not None:
             verdict, motion, certificate = known
         else:
-            motion, certificate = certified or motion_of(replace(system, tangents=shaken(system)))
+            motion, certificate = certified or motion_of(system)
             verdict = verdict_in_memory(motion, system, in_full=whole)
             warnings += [note for about, note in verdict.notes.items() if about not in _UNTOLD]
     work = motion.work

@@ -1,13 +1,16 @@
 """Histories made by hand, and the verdict on the run of a case."""
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from brakecli.analysis.regime.classify import classify
+from brakecli.analysis.regime.context import Context
+from brakecli.analysis.regime.measure import Continued
+from brakecli.analysis.regime.table import Fate, Thresholds
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.case.system import system_of
-from brakecli.runs.run import shaken, verdict_in_memory
+from brakecli.runs.run import asked, verdict_in_memory
 from brakecli.solver.history import History, array_history
 from brakecli.solver.motion import solve
 from brakecli.solver.quantities import HISTORY
@@ -25,6 +28,12 @@ def history_of(samples: int, **columns: Any) -> History:
 
 def verdict_of(case: Any) -> Verdict:
     """The verdict on the run of a case."""
-    system = system_of(case)
-    motion = solve(replace(system, tangents=shaken(system)))
+    system = asked(system_of(case))
+    motion = solve(system)
     return verdict_in_memory(motion, system)
+
+
+def lasting(history: History, context: Context, thresholds: Thresholds | None = None) -> Verdict:
+    """The verdict on a history that is known to last where it is continued on the smooth wheel."""
+    lasts = Continued(Fate.LASTS)
+    return classify(history, context, thresholds or Thresholds(), continued=lambda: lasts)

@@ -143,7 +143,7 @@ def _forced(shown: Shown, answers: Answers) -> Lasting:
     if not found.settled and not fading:
         found.settled = shown.changes() <= shown.limits.settled_within
     seconds = (part.stop - part.start) * interval
-    if found.settled and not chaos and seconds * rate < _RELAXED:
+    if not chaos and (not found.settled or seconds * rate < _RELAXED):
         found.settled = False
         needed = QUARTER * (shown.duration + 3.0 / max(rate, 1e-300))
         text = f"what the shoe adds dies away at only {rate:.3g} 1/s"
@@ -201,7 +201,9 @@ def _self_excited(shown: Shown, answers: Answers, cycles: Cycles) -> Lasting:
     found = Lasting(part, lasts, cycles.amplitude, cycles=cycles, evidence=dict(cycles.evidence))
     changed = max((abs(drift.part) for drift in (cycles.drift, cycles.detuning) if drift.sure), default=0.0)
     off = abs(answers.amplitude - answers.amplitude_without_waves)
-    far = off > shown.limits.settled_within * answers.amplitude_without_waves  # nan: not known
+    turns = answers.period_without_waves * cycles.frequency
+    far = not off <= shown.limits.settled_within * answers.amplitude_without_waves  # also where it is not known
+    far |= abs(turns - round(turns)) > _DRIFT * turns if math.isfinite(turns) else True
     longer = f"run at least {QUARTER * (shown.duration + 3.0 / max(rate, 1e-9)):.3g} s for numbers that last"
     text: str | None = None
     if shift >= _SHIFTED:
@@ -211,7 +213,7 @@ def _self_excited(shown: Shown, answers: Answers, cycles: Cycles) -> Lasting:
     elif not lasts:
         text = f"this vibration may settle at only {rate:.2g} 1/s: {longer}" if answers.settled else None
     elif not answers.waves and far:
-        text = f"this vibration comes to an amplitude of {answers.amplitude_without_waves:.3g} m: {longer}"
+        text = f"continued, this vibration comes to {answers.limit}: {longer}"
     elif changed > _DRIFT:
         text = f"its amplitude or frequency still changes by {changed:.1%} within the settled part: {longer}"
     elif answers.waves and seconds < (beat := shown.beat(_MODULATES * cycles.amplitude)):
@@ -243,7 +245,7 @@ def _self_excited(shown: Shown, answers: Answers, cycles: Cycles) -> Lasting:
         found.spread = held(
             cycles.amplitude_spread + _KICKED[0] * shift * cycles.amplitude, cycles.amplitude, cycles.drift
         )
-        if far and not answers.waves and found.spread is not None:
+        if far and not answers.waves and found.spread is not None and math.isfinite(off):
             found.spread += off
     return found
 

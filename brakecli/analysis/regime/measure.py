@@ -19,15 +19,16 @@ from brakecli.solver.tangent import Exponent
 
 _BATCHES = 10  # of the envelope's second half
 _NOTHING = 1e-3  # of a beat over the slowest wave, that is rounding
-_BANDS = 0.9  # least part of the energy in three bands: chaos may have less
 
 
 class Continued(NamedTuple):
-    """What the motion comes to on the smooth wheel: its fate, amplitude (m), rate (1/s)."""
+    """What the motion comes to on the smooth wheel, in SI units; nan where it is no limit cycle."""
 
     fate: Fate = Fate.UNKNOWN
     amplitude: float = math.nan
-    rate: float = math.nan
+    rate: float = math.nan  # at which its slowest disturbance fades
+    period: float = math.nan
+    sticks: float = math.nan  # in a period
 
 
 class Shown:
@@ -50,7 +51,7 @@ class Shown:
     def settled(self) -> Part | None:
         """The settled part, if there is one."""
         within = self.limits.settled_within
-        first = self.envelope.settled_window(within, within) if self.envelope else None
+        first = self.envelope.settled_window(within, 0.4 * within) if self.envelope else None
         return None if first is None else replace(self.whole, start=first * self.history.samples // WINDOWS)
 
     @property
@@ -166,17 +167,16 @@ def answers(
     found["growth"] = context.growth()
     if not context.frictionless:
         alone = continued()
-        found |= {
-            "without_waves": alone.fate,
-            "amplitude_without_waves": alone.amplitude,
-            "rate_without_waves": alone.rate,
-        }
+        names = ("without_waves", *(f"{name}_without_waves" for name in Continued._fields[1:]))
+        found |= dict(zip(names, alone, strict=True))
     if waves:
         friction, roughness, error = shown.power()
         found |= {"friction": friction, "roughness": roughness, "power_error": error, "touches": context.touches()}
     if cycles := shown.cycles:
-        bands = shown.judged.narrow()
-        shares = cycles.evidence["harmonic_share"], bands if bands >= _BANDS else 0.0
-        found |= {name: cycles.evidence[name] for name in ("cycles", "samples_per_cycle", "stick_cycles")}
-        found |= {"harmonic_share": max(shares)}
+        names = ("cycles", "samples_per_cycle", "stick_cycles", "harmonic_share")
+        found |= {name: cycles.evidence[name] for name in names}
+        if cycles.evidence["frequency_spread"] <= shown.limits.settled_within * cycles.frequency:
+            found["band_share"] = shown.judged.narrow()
+        if context.step:
+            found["steps_per_cycle"] = 1.0 / (cycles.frequency * context.step)
     return Answers(**found)

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, NamedTuple
 
+_ROUNDING = math.log(1e9)  # powers of e from rounding to the size of a motion
+
 
 class Regime(StrEnum):
     """The paper's three regimes, and `undecided`."""
@@ -47,7 +49,8 @@ class Thresholds:
     fewest_cycles: float = 10.0  # in the settled part
     samples_per_cycle: float = 8.0
     stick_cycles: float = 0.8  # part of the cycles that stick in relaxation; in 1 less it, others may
-    harmonic_share: float = 0.8  # part of the energy on one line and its multiples, or in three bands
+    harmonic_share: float = 0.8  # part of the energy on one line and its multiples
+    band_share: float = 0.9  # part of it in three narrow bands, which chaos may have, too
 
 
 @dataclass(frozen=True)
@@ -87,7 +90,9 @@ class Answers:
     without_waves: Fate = Fate.UNKNOWN  # of the motion on the smooth wheel
     amplitude: float = math.nan  # of x at the end
     amplitude_without_waves: float = math.nan  # that it comes to on the smooth wheel
-    rate_without_waves: float = math.nan  # with which it does
+    rate_without_waves: float = math.nan  # at which it does
+    period_without_waves: float = math.nan  # of the limit cycle that this is
+    sticks_without_waves: float = math.nan  # in a period
     friction: float = math.nan  # power that friction gives, W
     roughness: float = math.nan  # that the roughness gives
     power_error: float = math.nan
@@ -95,8 +100,10 @@ class Answers:
     settled: bool = False  # whether such a part was found
     cycles: float = 0.0  # in it
     samples_per_cycle: float = 0.0
+    steps_per_cycle: float = math.inf  # where the case gives a step
     stick_cycles: float = math.nan
-    harmonic_share: float = math.nan  # of one line and its multiples, or of three bands
+    harmonic_share: float = math.nan  # of one line and its multiples
+    band_share: float = math.nan  # in three narrow bands, where the frequency does not wander
 
     def powers(self, rate: float) -> float:
         """Powers of e by which something changes in half of the run."""
@@ -133,6 +140,32 @@ class Answers:
     def sticks(self) -> str:
         """How often the motion sticks."""
         return f"with stick in {self.stick_cycles:.0%} of the cycles" if self.stick_cycles else "without stick"
+
+    @property
+    def two_waves(self) -> float:
+        """Duration whose settled part holds two periods of the slowest wave."""
+        return 2.8 * self.slowest
+
+    @property
+    def lines(self) -> str:
+        """Where the energy of vx lies."""
+        if self.band_share > self.harmonic_share:
+            return f"{self.band_share:.0%} of the energy of vx in three narrow bands"
+        return f"{self.harmonic_share:.0%} of the energy of vx in one line and its harmonics"
+
+    @property
+    def limit(self) -> str:
+        """What it comes to on the smooth wheel."""
+        if not math.isfinite(self.amplitude_without_waves):
+            return "no limit cycle that was found"
+        frequency = 1.0 / self.period_without_waves
+        return f"an amplitude of {self.amplitude_without_waves:.4g} m in a cycle of {frequency:.4g} Hz"
+
+    @property
+    def or_longer(self) -> str:
+        """How long it takes to grow from rounding to the size of a motion, if that is longer than the run."""
+        seconds = _ROUNDING / self.growth
+        return f", or run at least {seconds:.2g} s" if seconds > self.duration else ""
 
     @property
     def word(self) -> str:
@@ -188,6 +221,11 @@ def _same(a: Answers, t: Thresholds) -> bool:
     return abs(a.amplitude - a.amplitude_without_waves) <= t.same_level * a.amplitude_without_waves
 
 
+def _smaller(a: Answers, t: Thresholds) -> bool:
+    """The motion is smaller than it would be on the smooth wheel."""
+    return a.amplitude < (1.0 - t.same_level) * a.amplitude_without_waves
+
+
 def _gives(a: Answers, t: Thresholds) -> bool:
     return a.friction > t.sure_errors * a.power_error
 
@@ -198,6 +236,10 @@ def _friction_gives_more(a: Answers, t: Thresholds) -> bool:
 
 def _roughness_gives(a: Answers, t: Thresholds) -> bool:
     return a.roughness - max(a.friction, 0.0) > t.sure_errors * a.power_error
+
+
+def _regular(a: Answers, t: Thresholds) -> bool:
+    return a.harmonic_share >= t.harmonic_share or a.band_share >= t.band_share
 
 
 def _takes(a: Answers, t: Thresholds) -> bool:
@@ -220,7 +262,7 @@ _DASHPOT = "a dashpot would decide"
 _CHECK = "check load.force, and the angles of the links"
 _LINEAR = "full contact and slip to one side make the motion linear"
 
-CONTACT = (
+CONTACT: tuple[Row, ...] = (
     Row("failed", lambda a, t: a.failure, "the run failed: {a.failure}"),
     Row("never touched", lambda a, t: a.never, "the shoe has never touched the wheel", _CHECK),
     Row("lost", lambda a, t: a.lost, "the shoe has lost contact for good", _CHECK),
@@ -244,7 +286,7 @@ CONTACT = (
         "incline a link, by its angle_deg",
     ),
     Row(
-        "locked",
+        "locks itself",
         lambda a, t: a.carried and a.steady and math.isfinite(a.locks),
         "the shoe sticks throughout and is carried along by the wheel: it locks itself, as friction grows faster "
         "with x than the force that it needs, so that no longer run will see it slip",
@@ -256,7 +298,12 @@ CONTACT = (
         "the shoe sticks throughout and is carried along by the wheel",
         "run longer",
     ),
-    Row("few samples", lambda a, t: a.few_samples, "only {a.samples} samples", "run longer, or sample more often"),
+    Row(
+        "few samples",
+        lambda a, t: a.few_samples,
+        "only {a.samples} samples, too few",
+        "run longer, or sample more often",
+    ),
     Row(
         "changes",
         lambda a, t: not a.steady,
@@ -266,7 +313,7 @@ CONTACT = (
         "nothing moves yet",
         lambda a, t: not a.moves and a.growth > 0.0,
         "nothing moves yet, but sliding is unstable: a disturbance grows at {a.growth:.3g} 1/s",
-        "start beside steady sliding",
+        "start beside steady sliding{a.or_longer}",
     ),
     Row(
         "nothing moves",
@@ -284,7 +331,7 @@ CONTACT = (
     ),
     Row("standing wheel, no dashpots", lambda a, t: a.stands, "the wheel stands, but no dashpot damps", _DASHPOT),
 )
-SMOOTH = (
+SMOOTH: tuple[Row, ...] = (
     Row(
         "linear, held by the steps",
         lambda a, t: a.linear and _grows(a, t) and a.steadier,
@@ -347,8 +394,8 @@ SMOOTH = (
     ),
     Row(
         "lasts, irregular",
-        lambda a, t: a.growth > 0.0 and _steady(a, t),
-        "the vibration lasts, as sliding is unstable and its level does not change",
+        lambda a, t: a.without_waves == Fate.LASTS and _steady(a, t),
+        "the vibration lasts, as sliding is unstable, and its level does not change",
         "",
         *_OWN,
     ),
@@ -359,12 +406,12 @@ SMOOTH = (
         "run at least {a.longer:.3g} s",
     ),
 )
-ROUGH = (
+ROUGH: tuple[Row, ...] = (
     Row(
         "shorter than a wave",
         lambda a, t: a.duration < a.slowest,
         "the run is shorter than the period of the slowest wave, {a.slowest:.3g} s",
-        "run at least {a.slowest:.3g} s",
+        "run at least {a.two_waves:.3g} s",
     ),
     *SMOOTH[:1],
     Row(
@@ -426,6 +473,14 @@ ROUGH = (
         *_FORCED,
     ),
     Row(
+        "forced, held down",
+        lambda a, t: _together(a, t) and _steady(a, t) and _smaller(a, t) and not a.undamped,
+        "only the roughness shakes the shoe: neighbours come together at {a.exponent:.3g} 1/s, far below the "
+        "amplitude of {a.amplitude_without_waves:.3g} m that the vibration would come to without it",
+        "",
+        *_FORCED,
+    ),
+    Row(
         "dies out, not yet",
         lambda a, t: a.without_waves == Fate.DIES,
         "without the roughness the vibration dies out, but its level still {a.word} by e^{a.change:.2g} in the "
@@ -433,11 +488,17 @@ ROUGH = (
         "run at least {a.waited:.3g} s",
     ),
     Row(
+        "no dashpots, rough",
+        lambda a, t: a.undamped and not a.growth > 0.0,
+        "no dashpot damps what the shoe adds to what the waves force",
+        _DASHPOT,
+    ),
+    Row(
         "self-excited",
         lambda a, t: (
             a.without_waves == Fate.LASTS
             and not _together(a, t)
-            and _steady(a, t)
+            and (_steady(a, t) or a.growth > 0.0)
             and _gives(a, t)
             and not a.undamped
         ),
@@ -446,7 +507,7 @@ ROUGH = (
         *_OWN,
     ),
     Row(
-        "locked",
+        "locked to the waves",
         lambda a, t: (
             a.without_waves == Fate.LASTS
             and _together(a, t)
@@ -472,12 +533,18 @@ ROUGH = (
         "without the roughness it {a.without_waves}",
     ),
 )
-LOOKS = (
+LOOKS: tuple[Row, ...] = (
     Row(
         "few cycles",
-        lambda a, t: a.cycles < (1.0 if a.settled else 1.5) * t.fewest_cycles,
+        lambda a, t: not a.cycles or a.cycles < (1.0 if a.settled else 1.5) * t.fewest_cycles,
         "but only {a.cycles:.0f} cycles in {a.seconds:.3g} s",
         "run longer",
+    ),
+    Row(
+        "few steps in a cycle",
+        lambda a, t: a.steps_per_cycle < t.samples_per_cycle,
+        "but only {a.steps_per_cycle:.1f} steps a cycle",
+        "reduce solver.step and output.sample_interval",
     ),
     Row(
         "few samples in a cycle",
@@ -489,7 +556,7 @@ LOOKS = (
         "shorter than two waves",
         lambda a, t: a.seconds < 2.0 * a.slowest,
         "but the settled part holds less than two periods of the slowest wave, {a.slowest:.3g} s",
-        "run longer",
+        "run at least {a.two_waves:.3g} s",
     ),
     Row(
         "relaxation",
@@ -501,9 +568,8 @@ LOOKS = (
     ),
     Row(
         "quasi-harmonic",
-        lambda a, t: a.stick_cycles <= 1.0 - t.stick_cycles and a.harmonic_share >= t.harmonic_share,
-        "{a.sticks}: {a.harmonic_share:.0%} of the energy of vx in one line "
-        "and its harmonics, or in three narrow bands",
+        lambda a, t: a.stick_cycles <= 1.0 - t.stick_cycles and _regular(a, t),
+        "{a.sticks}: {a.lines}",
         "",
         Regime.QUASI_HARMONIC,
         Excitation.SELF_EXCITED,
@@ -511,8 +577,7 @@ LOOKS = (
     Row(
         "irregular",
         lambda a, t: True,
-        "irregular: stick in {a.stick_cycles:.0%} of the cycles, {a.harmonic_share:.0%} of the energy of vx in "
-        "one line and its harmonics, or in three narrow bands",
+        "irregular: stick in {a.stick_cycles:.0%} of the cycles, {a.lines}",
         "run longer, or look at the spectrum",
     ),
 )
