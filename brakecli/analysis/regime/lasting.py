@@ -193,9 +193,9 @@ def _settle_force(shown: Shown, found: Lasting, stop: int) -> None:
 def _self_excited(shown: Shown, answers: Answers, cycles: Cycles) -> Lasting:
     """A vibration that lasts by itself: medians of its cycles, with what a drift becomes in the spreads."""
     part, seconds, interval = shown.judged, answers.seconds, shown.history.interval
-    known = math.isfinite(answers.rate_without_waves) and not answers.waves
-    rate = answers.rate_without_waves if known else min(abs(answers.growth), shown.context.settles)
-    rate = 0.0 if answers.undamped else rate
+    rate = min(abs(answers.growth), shown.context.settles)
+    if math.isfinite(answers.rate_without_waves):
+        rate = min(rate, answers.rate_without_waves) if answers.waves else answers.rate_without_waves
     shift = cycles.kick * cycles.frequency / rate if rate > 0.0 else 0.0
     lasts = answers.settled and rate * seconds >= _RELAXED
     found = Lasting(part, lasts, cycles.amplitude, cycles=cycles, evidence=dict(cycles.evidence))

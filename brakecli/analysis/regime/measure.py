@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -122,6 +122,7 @@ def answers(
     shown: Shown, exponent: Exponent | None, continued: Callable[[], Continued], failure: str = ""
 ) -> Answers:
     """The record of answers; `continued` is asked only where a row may need it."""
+    continued = cache(continued)
     context, history, half, last = shown.context, shown.history, shown.half, shown.last
     stands, waves = context.belt_speed == 0.0, bool(context.forced)
     away, stick = ContactState.SEPARATED, ContactState.STICK
@@ -175,8 +176,19 @@ def answers(
     if cycles := shown.cycles:
         names = ("cycles", "samples_per_cycle", "stick_cycles", "harmonic_share")
         found |= {name: cycles.evidence[name] for name in names}
+        near = _sticks(continued(), cycles, found["amplitude"], shown.limits.settled_within)
+        if not waves and near is not None:
+            found["stick_cycles"] = near
         if cycles.evidence["frequency_spread"] <= shown.limits.settled_within * cycles.frequency:
             found["band_share"] = shown.judged.narrow()
         if context.step:
             found["steps_per_cycle"] = 1.0 / (cycles.frequency * context.step)
     return Answers(**found)
+
+
+def _sticks(limit: Continued, cycles: Cycles, amplitude: float, within: float) -> float | None:
+    """The part of the cycles that stick, where the motion has come to its limit cycle: samples may miss some."""
+    turns = limit.period * cycles.frequency
+    if not abs(amplitude - limit.amplitude) <= within * limit.amplitude or not turns >= 0.5:
+        return None
+    return min(limit.sticks / round(turns), 1.0)
