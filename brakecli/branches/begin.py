@@ -25,6 +25,9 @@ MOST_STEPS = 5_000_000
 NEARS = 1.0
 """Powers of e by which a disturbance of unstable sliding may grow without an event, of a motion that nears it."""
 
+AHEAD = 10_000
+"""Steps without an event, at least, of such a motion."""
+
 SPAN = 10.0
 """Periods of the slowest mode, at least, in a span of whole common periods, at whose ends motions on rough pads
 are compared. The waves and the shoe's own vibration meet in many ways within it."""
@@ -94,7 +97,7 @@ def on_smooth_pads(shoe: Shoe, state: Array) -> End:
     rate = float(values.real.max())
     while motion.path.steps < MOST_STEPS:
         if rate > 0.0:  # near steady sliding nothing happens for long, as a disturbance grows slowly
-            motion.way.duration = motion.way.time + NEARS / rate
+            motion.way.duration = motion.way.time + max(NEARS / rate, AHEAD * motion.path.h)
         outcome = motion.seek()
         if outcome == LINEAR:
             return UNKNOWN if rate > 0.0 else FADES

@@ -97,7 +97,8 @@ def verdict_table(source: str, numbers: Mapping[str, Any]) -> str:
         rows.append(("bursts", f"{len(tones) - MOST_LISTED_BURSTS} more, see --json"))
     for name, value in numbers["evidence"].items():
         unit = si_unit if name == "noise" else fields.evidence_unit(name)
-        shown = ", ".join(f"{each:.4g}" for each in value) if isinstance(value, list | tuple) else f"{value:.6g}"
+        shown = ", ".join(f"{each:.4g}" for each in value) if isinstance(value, list | tuple) else f"{value}"
+        shown = f"{value:.6g}" if isinstance(value, float) else shown
         rows.append((name.replace("_", " "), f"{shown} {unit}".rstrip() if shown else "-"))
     return two_columns(source, rows)
 

@@ -73,7 +73,8 @@ def _stored(
 ) -> tuple[Exponent | None, Callable[[], Continued] | None]:
     """What a run has asked of its case and stored; None where it has not."""
     rate, error = (attributes.get(field.name) for field in fields.EXPONENT)
-    exponent = None if rate is None or error is None else Exponent(rate, error)
+    even = (float(evidence.get(name, math.nan)) for name in ("even", "even_error"))
+    exponent = None if rate is None or error is None else Exponent(rate, error, *even)
     if "without_waves" not in evidence:
         return exponent, None
     numbers = (

@@ -27,7 +27,7 @@ from brakecli.solver.roughness import Surface
 from brakecli.solver.schemes import NUMEROV
 from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import Initial, System
-from brakecli.solver.tangent import FEWEST_SAMPLES, LEAST, MOST, Exponent, mean_growth
+from brakecli.solver.tangent import FEWEST_SAMPLES, LEAST, MOST, Exponent, exponents
 
 LEFT = 1e-3
 """What the iteration may leave of the force of a step, over load and tolerance; Newton's leaves far less."""
@@ -103,9 +103,7 @@ def _run_lanes(systems: list[System]) -> list[Motion | None]:
 def _exponents(sizes: Floats, duration: float) -> list[Exponent]:
     """The exponents of all lanes; they mean nothing where a lane is out."""
     with np.errstate(invalid="ignore"):
-        logs = np.log(np.clip(sizes, LEAST, MOST))
-        rates, errors = (each.tolist() for each in mean_growth(logs, duration))
-    return [Exponent(*each) for each in zip(rates, errors, np.cumsum(logs, axis=0).T, strict=True)]
+        return exponents(np.log(np.clip(sizes, LEAST, MOST)), duration)
 
 
 def _filled(systems: Sequence[System]) -> Any:

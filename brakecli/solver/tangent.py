@@ -44,19 +44,8 @@ class Exponent(NamedTuple):
 
     rate: float
     error: float
-    sizes: Floats = np.zeros(0)  # logarithm of the size of a disturbance at the end of each part of the run
-
-    def even(self, duration: float) -> tuple[float, float]:
-        """The rate by a line through all sizes but the first tenth, with its error: of a linear motion.
-
-        Its disturbances swing about an exponential function, and do not wander.
-        """
-        means = self.sizes[len(self.sizes) // 8 :].reshape(-1, 2 * BATCHES).mean(axis=1)
-        places = (np.arange(len(means)) - 0.5 * (len(means) - 1)) * (2 * BATCHES / PARTS * duration)
-        square = float(places @ places)
-        slope = float(places @ means) / square
-        rest = means - means.mean() - slope * places
-        return slope, math.sqrt(float(rest @ rest) / (len(means) - 2) / square)
+    even: float = math.nan  # the rate by a line through the size of a disturbance, which does not wander where the
+    even_error: float = math.nan  # motion is linear: it swings about an exponential function
 
 
 def seed(t: Any, state: Any, rate: float, h: float) -> None:
@@ -66,14 +55,22 @@ def seed(t: Any, state: Any, rate: float, h: float) -> None:
     state.x_old, state.y_old = state.x - h * state.v_x, state.y - h * state.v_y
 
 
-def mean_growth(logs: Floats, duration: float) -> tuple[Any, Any]:
-    """The exponent in the second half of runs, with the standard error of the mean of its batches.
+def exponents(logs: Floats, duration: float) -> list[Exponent]:
+    """The exponents in the second half of runs, with the standard error of the mean of their batches.
 
-    Within a cycle a disturbance swings: its size is a mean over a batch. `logs` has a row for each part of runs.
+    Within a cycle a disturbance swings: its size is a mean over a batch. `logs`: ln of the growth in each part, in
+    the columns of runs. `even` is by the whole of a run but its first eighth.
     """
-    sizes = np.cumsum(logs, axis=0)[PARTS // 2 :].reshape(BATCHES, -1, *logs.shape[1:]).mean(axis=1)
-    rates = np.diff(sizes, axis=0) * (2 * BATCHES / duration)
-    return rates.mean(axis=0), rates.std(axis=0, ddof=1) / math.sqrt(len(rates))
+    sizes = np.cumsum(logs, axis=0).reshape(4 * BATCHES, -1, logs.shape[1]).mean(axis=1)
+    late = sizes[2 * BATCHES :].reshape(BATCHES, 2, -1).mean(axis=1)
+    rates = np.diff(late, axis=0) * (2 * BATCHES / duration)
+    means, errors = rates.mean(axis=0), rates.std(axis=0, ddof=1) / math.sqrt(len(rates))
+    lined = sizes[len(sizes) // 8 :]
+    places = (np.arange(len(lined)) - 0.5 * (len(lined) - 1)) * (duration / len(sizes))
+    slopes = places @ lined / (places @ places)
+    rest = lined - lined.mean(axis=0) - np.outer(places, slopes)
+    off = np.sqrt((rest**2).sum(axis=0) / (len(lined) - 2) / (places @ places))
+    return [Exponent(*each) for each in np.stack([means, errors, slopes, off], axis=1).tolist()]
 
 
 def exponent(t: Any, duration: float, h: float, lag: int) -> Exponent:
@@ -82,9 +79,8 @@ def exponent(t: Any, duration: float, h: float, lag: int) -> Exponent:
     The error also contains, for each event that a difference scheme has placed, the part `PLACED` of a step h (s)
     in radians of the fastest motion.
     """
-    rate, error = mean_growth(t.logs, duration)
-    placed = PLACED[lag] * t.rate * h * t.placed / duration
-    return Exponent(float(rate), math.hypot(error, placed), np.cumsum(t.logs))
+    (found,) = exponents(t.logs[:, None], duration)
+    return found._replace(error=math.hypot(found.error, PLACED[lag] * t.rate * h * t.placed / duration))
 
 
 @kernel(float64(float64, float64))

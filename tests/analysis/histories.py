@@ -1,5 +1,6 @@
 """Histories made by hand, and the verdict on the run of a case."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -34,6 +35,7 @@ def verdict_of(case: Any) -> Verdict:
 
 
 def lasting(history: History, context: Context, thresholds: Thresholds | None = None) -> Verdict:
-    """The verdict on a history that is known to last where it is continued on the smooth wheel."""
-    lasts = Continued(Fate.LASTS)
+    """The verdict on a history that is known to last, as its end is, where it is continued on the smooth wheel."""
+    end = history.read("x", 3 * history.samples // 4, history.samples)
+    lasts = Continued(Fate.LASTS, 0.5 * float(np.ptp(end)), math.inf)
     return classify(history, context, thresholds or Thresholds(), continued=lambda: lasts)

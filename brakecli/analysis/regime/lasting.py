@@ -61,10 +61,11 @@ def lasting(shown: Shown, answers: Answers, decision: Decision, *, in_full: bool
     else:
         part = shown.judged
         return _with_force(shown, replace(Lasting(part, False, part.amplitude("x")), settled=answers.settled))
-    if in_full and found.forced is None and shown.context.forced:
-        split = found.part.split(shown.context.forced) if _holds_two(shown, found.part) else None
-        if split and not (found.cycles and split[0] > split[1]):
-            found.forced, found.own = split
+    if forced and found.settled and found.forced is None:  # its neighbours come together: nothing else is left
+        found.forced = found.amplitude
+    if in_full and found.cycles and shown.context.forced and _holds_two(shown, found.part):
+        split = found.part.split(shown.context.forced)
+        found.forced, found.own = split if split and split[0] <= split[1] else (None, None)
     _add_ripple(shown, found, lines)
     if found.spread is not None and 0.0 < found.amplitude <= found.spread:  # then not even its order is known
         found.notes["settled"] = found.notes.get("settled") or (_VAGUE if found.settled else None)
@@ -193,17 +194,18 @@ def _settle_force(shown: Shown, found: Lasting, stop: int) -> None:
 def _self_excited(shown: Shown, answers: Answers, cycles: Cycles) -> Lasting:
     """A vibration that lasts by itself: medians of its cycles, with what a drift becomes in the spreads."""
     part, seconds, interval = shown.judged, answers.seconds, shown.history.interval
-    rate = min(abs(answers.growth), shown.context.settles)
+    rate = 0.0 if answers.undamped else min(abs(answers.growth), shown.context.settles)
     if math.isfinite(answers.rate_without_waves):
         rate = min(rate, answers.rate_without_waves) if answers.waves else answers.rate_without_waves
     shift = cycles.kick * cycles.frequency / rate if rate > 0.0 else 0.0
     lasts = answers.settled and rate * seconds >= _RELAXED
-    found = Lasting(part, lasts, cycles.amplitude, cycles=cycles, evidence=dict(cycles.evidence))
+    found = Lasting(part, lasts, cycles.amplitude, cycles=cycles)
+    found.evidence = cycles.evidence | {"stick_cycles": answers.stick_cycles}
     changed = max((abs(drift.part) for drift in (cycles.drift, cycles.detuning) if drift.sure), default=0.0)
     off = abs(answers.amplitude - answers.amplitude_without_waves)
     turns = answers.period_without_waves * cycles.frequency
     far = not off <= shown.limits.settled_within * answers.amplitude_without_waves  # also where it is not known
-    far |= abs(turns - round(turns)) > _DRIFT * turns if math.isfinite(turns) else True
+    far |= math.isfinite(turns) and abs(turns - round(turns)) > _DRIFT * turns
     longer = f"run at least {QUARTER * (shown.duration + 3.0 / max(rate, 1e-9)):.3g} s for numbers that last"
     text: str | None = None
     if shift >= _SHIFTED:

@@ -145,8 +145,7 @@ def answers(
         "carried": (last if stands else half).fraction(stick) == 1.0,
     }
     if exponent is not None:
-        found |= {"exponent": exponent.rate, "exponent_error": exponent.error}
-        found |= dict(zip(("even", "even_error"), exponent.even(shown.duration), strict=True))
+        found |= dict(zip(("exponent", "exponent_error", "even", "even_error"), exponent, strict=True))
     if shown.envelope is None or not context.steady or failure:
         return Answers(**found)
     change, change_error = shown.change(shown.envelope)
@@ -172,7 +171,12 @@ def answers(
         found |= dict(zip(names, alone, strict=True))
     if waves:
         friction, roughness, error = shown.power()
-        found |= {"friction": friction, "roughness": roughness, "power_error": error, "touches": context.touches()}
+        found |= {
+            "power_of_friction": friction,
+            "power_of_roughness": roughness,
+            "power_error": error,
+            "touches": context.touches(),
+        }
     if cycles := shown.cycles:
         names = ("cycles", "samples_per_cycle", "stick_cycles", "harmonic_share")
         found |= {name: cycles.evidence[name] for name in names}

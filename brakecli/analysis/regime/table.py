@@ -93,8 +93,8 @@ class Answers:
     rate_without_waves: float = math.nan  # at which it does
     period_without_waves: float = math.nan  # of the limit cycle that this is
     sticks_without_waves: float = math.nan  # in a period
-    friction: float = math.nan  # power that friction gives, W
-    roughness: float = math.nan  # that the roughness gives
+    power_of_friction: float = math.nan  # power that friction gives, W
+    power_of_roughness: float = math.nan  # that the roughness gives
     power_error: float = math.nan
     seconds: float = math.nan  # of the settled part
     settled: bool = False  # whether such a part was found
@@ -227,15 +227,15 @@ def _smaller(a: Answers, t: Thresholds) -> bool:
 
 
 def _gives(a: Answers, t: Thresholds) -> bool:
-    return a.friction > t.sure_errors * a.power_error
+    return a.power_of_friction > t.sure_errors * a.power_error
 
 
 def _friction_gives_more(a: Answers, t: Thresholds) -> bool:
-    return a.friction - max(a.roughness, 0.0) > t.sure_errors * a.power_error
+    return a.power_of_friction - max(a.power_of_roughness, 0.0) > t.sure_errors * a.power_error
 
 
 def _roughness_gives(a: Answers, t: Thresholds) -> bool:
-    return a.roughness - max(a.friction, 0.0) > t.sure_errors * a.power_error
+    return a.power_of_roughness - max(a.power_of_friction, 0.0) > t.sure_errors * a.power_error
 
 
 def _regular(a: Answers, t: Thresholds) -> bool:
@@ -243,7 +243,7 @@ def _regular(a: Answers, t: Thresholds) -> bool:
 
 
 def _takes(a: Answers, t: Thresholds) -> bool:
-    return a.friction < -t.sure_errors * a.power_error
+    return a.power_of_friction < -t.sure_errors * a.power_error
 
 
 def _decays(a: Answers, t: Thresholds) -> bool:
@@ -460,15 +460,15 @@ ROUGH: tuple[Row, ...] = (
     Row(
         "forced, friction takes",
         lambda a, t: _takes(a, t) and _steady(a, t) and not a.undamped,
-        "only the roughness shakes the shoe: friction takes {a.friction:.2g} W from the vibration",
+        "only the roughness shakes the shoe: friction takes {a.power_of_friction:.2g} W from the vibration",
         "",
         *_FORCED,
     ),
     Row(
         "forced, roughness gives",
         lambda a, t: _together(a, t) and _steady(a, t) and _roughness_gives(a, t) and not a.undamped,
-        "only the roughness shakes the shoe: of the vibration's power it gives {a.roughness:.2g} W, friction "
-        "{a.friction:.2g} W, and neighbours come together at {a.exponent:.3g} 1/s",
+        "only the roughness shakes the shoe: of the vibration's power it gives {a.power_of_roughness:.2g} W, friction "
+        "{a.power_of_friction:.2g} W, and neighbours come together at {a.exponent:.3g} 1/s",
         "",
         *_FORCED,
     ),
@@ -529,7 +529,7 @@ ROUGH: tuple[Row, ...] = (
         "either",
         lambda a, t: True,
         "friction and the roughness may both keep the vibration up: of its power friction gives "
-        "{a.friction:.2g} W and the roughness {a.roughness:.2g} W; neighbours change at {a.exponent:.2g} 1/s; "
+        "{a.power_of_friction:.2g} W and the roughness {a.power_of_roughness:.2g} W; neighbours change at {a.exponent:.2g} 1/s; "
         "without the roughness it {a.without_waves}",
     ),
 )
