@@ -19,8 +19,8 @@ import numpy as np
 
 from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, WINDOWS
 from brakecli.analysis.regime.lasting import QUARTER
-from brakecli.analysis.regime.linear import Linear, linear_theory
 from brakecli.analysis.regime.table import Excitation, Regime
+from brakecli.analysis.stability.linear import Linear, linear_theory
 from brakecli.analysis.stability.modes import slowest_of_cycles
 from brakecli.runs.certificate import ROUNDING, Certificate
 from brakecli.solver.compile import Floats

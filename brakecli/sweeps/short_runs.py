@@ -6,8 +6,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from brakecli.analysis.regime.lasting import QUARTER
-from brakecli.analysis.regime.linear import Linear, linear_theory
 from brakecli.analysis.stability.advice import rounded
+from brakecli.analysis.stability.linear import Linear, linear_theory
 from brakecli.analysis.stability.modes import is_undamped
 from brakecli.case.system import system_of
 from brakecli.errors import BrakecliError

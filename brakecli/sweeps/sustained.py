@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from brakecli.analysis.regime.linear import linear_theory
 from brakecli.analysis.regime.table import Regime
 from brakecli.analysis.regime.verdict import Verdict
+from brakecli.analysis.stability.linear import linear_theory
 from brakecli.analysis.stability.modes import is_undamped
 from brakecli.analysis.stability.search import bisect
 from brakecli.branches.begin import FADES, UNKNOWN, End, on_rough_pads, on_smooth_pads

@@ -8,8 +8,8 @@ import pytest
 import tomli_w
 
 from brakecli.analysis.regime.context import Context
-from brakecli.analysis.regime.linear import linear_theory
 from brakecli.analysis.regime.table import Excitation, Regime
+from brakecli.analysis.stability.linear import linear_theory
 from brakecli.analysis.stability.report import stability
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of

@@ -8,10 +8,10 @@ from functools import cache, partial
 import numpy as np
 
 from brakecli.analysis.regime.evidence import Part
-from brakecli.analysis.regime.linear import Linear, linear_theory
 from brakecli.analysis.regime.ripple import Ripple, detuned, ripple
 from brakecli.analysis.regime.spectra import forced_lines
 from brakecli.analysis.stability.discrete import spectral_radius, without_damping
+from brakecli.analysis.stability.linear import Linear, linear_theory
 from brakecli.analysis.stability.modes import growth, is_undamped, locks_from, slowest_of_cycles
 from brakecli.errors import CaseError
 from brakecli.solver.schedules import value_at

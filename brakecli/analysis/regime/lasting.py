@@ -10,10 +10,10 @@ import numpy as np
 
 from brakecli.analysis.regime.cycles import SIZE_OFF, Cycles, Drift, contact_length, in_lines, median, swings
 from brakecli.analysis.regime.evidence import WINDOWS, Part, line
-from brakecli.analysis.regime.linear import Linear
 from brakecli.analysis.regime.measure import Shown
 from brakecli.analysis.regime.spectra import Array
 from brakecli.analysis.regime.table import Answers, Decision, Excitation
+from brakecli.analysis.stability.linear import Linear
 
 _RELAXED = 1.0  # power of e by which a disturbance fades within a settled part, which then shows what lasts
 _REST = 0.3  # of a forced motion, by which its closed form may be off

@@ -10,14 +10,13 @@ import numpy as np
 
 from brakecli.analysis.regime.context import Context
 from brakecli.analysis.regime.cycles import Cycles, cycles_of
-from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, WINDOWS, Envelope, Part, line
-from brakecli.analysis.regime.linear import Linear
+from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, WINDOWS, Envelope, Part, level_change
 from brakecli.analysis.regime.table import Answers, Fate, Thresholds
+from brakecli.analysis.stability.linear import Linear
 from brakecli.solver.history import History
 from brakecli.solver.quantities import ContactState
 from brakecli.solver.tangent import Exponent
 
-_BATCHES = 10  # of the envelope's second half
 _NOTHING = 1e-3  # of a beat over the slowest wave, that is rounding
 
 
@@ -97,13 +96,6 @@ class Shown:
         least = max([amplitude, *(swing for _, swing in self.context.waves)])
         return [f for f, swing in self.context.waves if swing >= self.limits.settled_within * least]
 
-    def change(self, envelope: Envelope) -> tuple[float, float]:
-        """Change of the logarithm of the level in the second half, with its error."""
-        means = envelope.vx[WINDOWS // 2 :].reshape(_BATCHES, -1).mean(axis=1)
-        if not means.min() > 0.0:
-            return math.nan, math.nan
-        return line((np.arange(_BATCHES) + 0.5) / _BATCHES, np.log(means))
-
     def changes(self) -> float:
         """By which part vx or x, whichever does more so, swings otherwise in the last quarter than before."""
         before = replace(self.half, stop=3 * self.history.samples // 4)
@@ -148,7 +140,7 @@ def answers(
         found |= dict(zip(("exponent", "exponent_error", "even", "even_error"), exponent, strict=True))
     if shown.envelope is None or not context.steady or failure:
         return Answers(**found)
-    change, change_error = shown.change(shown.envelope)
+    change, change_error = level_change(shown.envelope.vx[WINDOWS // 2 :])
     found |= {
         "moves": shown.envelope.largest > context.quiet,
         "slowest": shown.slowest(half.amplitude("x")),

@@ -467,7 +467,7 @@ ROUGH: tuple[Row, ...] = (
     Row(
         "forced, roughness gives",
         lambda a, t: _together(a, t) and _steady(a, t) and _roughness_gives(a, t) and not a.undamped,
-        "only the roughness shakes the shoe: of the vibration's power it gives {a.power_of_roughness:.2g} W, friction "
+        "only the roughness shakes the shoe: it gives {a.power_of_roughness:.2g} W, friction "
         "{a.power_of_friction:.2g} W, and neighbours come together at {a.exponent:.3g} 1/s",
         "",
         *_FORCED,
@@ -529,8 +529,8 @@ ROUGH: tuple[Row, ...] = (
         "either",
         lambda a, t: True,
         "friction and the roughness may both keep the vibration up: of its power friction gives "
-        "{a.power_of_friction:.2g} W and the roughness {a.power_of_roughness:.2g} W; neighbours change at {a.exponent:.2g} 1/s; "
-        "without the roughness it {a.without_waves}",
+        "{a.power_of_friction:.2g} W and the roughness {a.power_of_roughness:.2g} W; neighbours change at "
+        "{a.exponent:.2g} 1/s; without the roughness it {a.without_waves}",
     ),
 )
 LOOKS: tuple[Row, ...] = (

@@ -11,7 +11,6 @@ from functools import lru_cache
 
 import numpy as np
 
-from brakecli.analysis.regime.spectra import Array
 from brakecli.analysis.stability.modes import (
     Complex,
     Mode,
@@ -21,6 +20,7 @@ from brakecli.analysis.stability.modes import (
     modes,
     stiffness_matrix,
 )
+from brakecli.solver.compile import Floats as Array
 from brakecli.solver.quantities import ContactState
 from brakecli.solver.system import System
 
