@@ -21,6 +21,7 @@ VERDICT = within(
     Field("regime", "", "regime of the motion", "S16"),
     Field("excitation", "", "where the energy of a sustained motion comes from", "S16"),
     Field("frequency", "Hz", "fundamental frequency of vx of a sustained motion"),
+    Field("forced_frequency", "Hz", "frequency at which the wave passes that moves x most, of a forced motion"),
     Field(
         "growth_rate",
         "1/s",

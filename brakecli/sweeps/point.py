@@ -30,7 +30,7 @@ from brakecli.solver.motion import Motion
 from brakecli.solver.roughness import TWO_PI, wheel_angles
 from brakecli.solver.schedules import integral_at
 from brakecli.sweeps.critical import search
-from brakecli.sweeps.early import Ending, Known, early
+from brakecli.sweeps.early import Ending, early
 from brakecli.sweeps.plan import Plan, Settings
 
 OUT_OF_MEMORY = "out of memory; sample less often, or reduce contact.nodes"
@@ -78,7 +78,7 @@ def _fits(name: str, values: NDArray[Any]) -> bool:
 class PointRun:
     """A run in memory, as far as a sweep is interested in it. `fields.POINT` says where each number is."""
 
-    verdict: Verdict | Known
+    verdict: Verdict
     case: Case
     motion: Motion | Ending
     certificate: Certificate | None  # where the case gives no step
@@ -106,7 +106,6 @@ def checked(case: Case) -> Check:
 
 def judged(case: Case, found: Check, certified: Certified | None, *, whole: bool) -> PointRun:
     """The end of `simulate`, by a motion that is known already or by one that is computed."""
-    verdict: Verdict | Known
     motion: Motion | Ending
     system, warnings = found.system, [*found.warnings]
     with within_range():
@@ -211,7 +210,7 @@ def _started(value: float) -> float:
     return value if abs(value) >= SMALLEST else 0.0
 
 
-def verdict_of(case: Case) -> Verdict | Known | None:
+def verdict_of(case: Case) -> Verdict | None:
     """The verdict on a run in memory, as soon as it is known; None where the run fails."""
     with suppress(BrakecliError):
         outcome = simulate(case, whole=False)

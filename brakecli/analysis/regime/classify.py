@@ -48,13 +48,11 @@ def classify(
     friction = part.mean("friction_force")
     theory = shown.linear if found.linear else None
     return Verdict(
-        regime=decision.regime,
-        excitation=decision.excitation,
-        frequency=decision.frequency,
         amplitude=what.amplitude,
         amplitude_spread=what.spread,
         amplitude_forced=what.forced,
         amplitude_own=what.own,
+        forced_frequency=what.forced_frequency,
         growth_rate=theory.mode.growth if theory else None,
         ringing_frequency=theory.mode.frequency if theory else None,
         frequency_resolution=1.0 / (segment(part.stop - part.start) * history.interval),

@@ -15,6 +15,7 @@ from brakecli.analysis.regime.spectra import Array
 from brakecli.analysis.regime.table import Answers, Decision, Excitation
 from brakecli.analysis.stability.linear import Linear
 
+_LIKELY = 16  # waves, of which one moves x most
 _RELAXED = 1.0  # power of e by which a disturbance fades within a settled part, which then shows what lasts
 _REST = 0.3  # of a forced motion, by which its closed form may be off
 _LONGER = 1.4  # a run whose last quarter and the window before it are settled, over what comes before
@@ -40,6 +41,7 @@ class Lasting:
     spread: float | None = None
     forced: float | None = None  # half of peak to peak of x that the roughness forces
     own: float | None = None  # and that the shoe adds
+    forced_frequency: float | None = None  # of the wave that moves x most
     variation: float | None = None  # of the friction force, peak to peak
     frequency: float | None = None  # of cycles
     cycles: Cycles | None = None  # of a vibration that lasts by itself
@@ -66,11 +68,24 @@ def lasting(shown: Shown, answers: Answers, decision: Decision, *, in_full: bool
     if in_full and found.cycles and shown.context.forced and _holds_two(shown, found.part):
         split = found.part.split(shown.context.forced)
         found.forced, found.own = split if split and split[0] <= split[1] else (None, None)
+    if forced and in_full:
+        found.forced_frequency = _wave(shown, found.part)
     _add_ripple(shown, found, lines)
     if found.spread is not None and 0.0 < found.amplitude <= found.spread:  # then not even its order is known
         found.notes["settled"] = found.notes.get("settled") or (_VAGUE if found.settled else None)
         found.spread, found.settled = None, False
     return _with_force(shown, found)
+
+
+def _wave(shown: Shown, part: Part) -> float | None:
+    """The passing frequency (Hz) of the wave that moves x most; where many pass, of those that should do so."""
+    likely = sorted(shown.context.waves, key=lambda wave: -wave[1])[:_LIKELY]
+    if not likely:
+        return None
+    x, time = part.places()
+    lines = np.exp(-2j * np.pi * np.outer([frequency for frequency, _ in likely], time))
+    sizes = np.abs(lines @ ((x - x.mean()) * np.hanning(len(x))))
+    return likely[int(np.argmax(sizes))][0]
 
 
 def _holds_two(shown: Shown, part: Part) -> bool:

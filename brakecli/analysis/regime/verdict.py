@@ -1,6 +1,6 @@
-"""What a verdict says."""
+"""What a verdict says, of a run, of a point of a sweep, and in Python."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from brakecli.analysis.regime.table import Decision, Excitation, Regime, Thresholds
@@ -8,30 +8,43 @@ from brakecli.analysis.regime.table import Decision, Excitation, Regime, Thresho
 
 @dataclass(frozen=True)
 class Verdict:
-    """The regime of a history, its numbers (SI units) over the settled part, and the reasons in plain words."""
+    """The regime of a motion, its numbers (SI units) over the settled part, and the reasons in plain words."""
 
-    regime: Regime
-    excitation: Excitation
-    frequency: float | None  # Hz, fundamental of vx when sustained
+    decision: Decision
     amplitude: float  # m, half of peak to peak of x: median over the cycles
-    amplitude_spread: float | None  # m, of the amplitudes of the cycles
-    amplitude_forced: float | None  # m, on a rough wheel: what the roughness forces
-    amplitude_own: float | None  # m, on a rough wheel: what the shoe adds
-    growth_rate: float | None  # 1/s, of the slowest mode where the motion is linear
-    ringing_frequency: float | None  # Hz, of that mode
-    frequency_resolution: float  # Hz, to which a line of the spectrum is known
-    torque_variation: float | None  # N m, peak to peak
-    settled_from: float  # s; the middle where no settled part was found
-    start: int  # the sample there
-    settled: bool  # whether a settled part was found
     stick_fraction: float
     contact_loss_fraction: float
     mean_friction_force: float  # N
     braking_torque: float  # N m, its mean torque on the wheel's axis, R F_x
-    decision: Decision
-    notes: dict[str, str]  # on single numbers, by their names
+    settled_from: float  # s; the middle where no settled part was found
+    settled: bool  # whether the numbers are those of any longer run
     evidence: dict[str, Any]
-    thresholds: Thresholds
+    start: int = 0  # the sample from which on the numbers are taken
+    amplitude_spread: float | None = None  # m, of the amplitudes of the cycles
+    amplitude_forced: float | None = None  # m, on a rough wheel: what the roughness forces
+    amplitude_own: float | None = None  # m, on a rough wheel: what the shoe adds
+    forced_frequency: float | None = None  # Hz, of the wave that moves x most
+    growth_rate: float | None = None  # 1/s, of the slowest mode where the motion is linear
+    ringing_frequency: float | None = None  # Hz, of that mode
+    frequency_resolution: float | None = None  # Hz, to which a line of the spectrum is known
+    torque_variation: float | None = None  # N m, peak to peak
+    notes: dict[str, str] = field(default_factory=dict)  # on single numbers, by their names
+    thresholds: Thresholds = field(default_factory=Thresholds)
+
+    @property
+    def regime(self) -> Regime:
+        """How the motion looks, or `damped`."""
+        return self.decision.regime
+
+    @property
+    def excitation(self) -> Excitation:
+        """Where its energy comes from."""
+        return self.decision.excitation
+
+    @property
+    def frequency(self) -> float | None:
+        """Fundamental frequency of vx of a motion that lasts, Hz."""
+        return self.decision.frequency
 
     @property
     def reasons(self) -> tuple[str, ...]:
