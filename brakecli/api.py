@@ -264,7 +264,6 @@ def classify(
     belt_speed: float | None = None,
     stiffness: float | None = None,
     thresholds: "Mapping[str, float] | None" = None,
-    second_run: bool = False,
     force_read: bool = False,
     **reading: Any,
 ) -> "xr.Dataset":
@@ -276,7 +275,6 @@ def classify(
         belt_speed: speed of the wheel's surface (m/s), if known.
         stiffness: stiffness behind a measured force (N/m), if known.
         thresholds: limits of the rules to change.
-        second_run: where friction or roughness may keep a vibration up, run the case once more to decide.
         force_read: look at a result whose digest does not fit; a warning says so.
         reading: how a file is read: `column`, `time_column`, `sample_rate` (Hz), `unit`, `time_unit`.
 
@@ -292,6 +290,8 @@ def classify(
     from brakecli.files.fields import VERDICT
 
     how = ("column", "time_column", "sample_rate", "unit", "time_unit")
+    if "second_run" in reading:
+        raise UsageError("classify: second_run: there is none any more; every verdict asks what it asked")
     if unknown := sorted(reading.keys() - {*how}):
         raise UsageError(f"classify: there is no argument {unknown[0]}; give one of {', '.join(how)}")
     changes = [f"{name}={value}" for name, value in _mapping(thresholds, "thresholds").items()]
@@ -299,7 +299,7 @@ def classify(
     texts = {name: str(each) for name, each in given.items() if each is not None and name not in NUMBERS}
     measured = Measured(**given | texts)
     with _interruptible(), _readings(force_read=force_read):
-        numbers = Options(measured, changes, second_run, quiet=True).verdict(str(source))
+        numbers = Options(measured, changes).verdict(str(source))
     _warn(numbers.get("warnings", ()))
     return dataset(VERDICT, numbers)
 

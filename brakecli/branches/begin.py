@@ -22,6 +22,12 @@ from brakecli.solver.system import System
 MOST_STEPS = 5_000_000
 """Steps of a motion on smooth pads after which it is given up: about half a second."""
 
+NEARS = 1.0
+"""Powers of e by which a disturbance of unstable sliding may grow without an event, of a motion that nears it."""
+
+AHEAD = 10_000
+"""Steps without an event, at least, of such a motion."""
+
 SPAN = 10.0
 """Periods of the slowest mode, at least, in a span of whole common periods, at whose ends motions on rough pads
 are compared. The waves and the shoe's own vibration meet in many ways within it."""
@@ -60,12 +66,14 @@ AT_REST = 1e-3
 class End(NamedTuple):
     """What a motion comes to: whether vibration `lasts`, None where that is not known.
 
-    `state`: x, y, v_x and v_y on the vibration, at t = 0 of the waves; `orbit` where it is a limit cycle.
+    `state`: x, y, v_x and v_y on the vibration, at t = 0 of the waves; `orbit` where it is a limit cycle, and the
+    `rate` (1/s) at which its slowest disturbance fades.
     """
 
     lasts: bool | None
     state: Array | None = None
     orbit: Orbit | None = None
+    rate: float | None = None
 
 
 FADES, UNKNOWN = End(False), End(None)
@@ -75,9 +83,10 @@ def on_smooth_pads(shoe: Shoe, state: Array) -> End:
     """What the motion from a state (x, y, v_x, v_y) comes to at constant speed and load.
 
     It fades once its modes can bring about no event any more, and lasts once it nears an orbit that attracts it.
+    Where sliding is unstable it cannot fade; one that is still vibrating when it is given up has a `state`.
     """
     c, stiffness, belt, load = shoe
-    if shoe.rest is None:
+    if shoe.rest is None or not shoe.rest[1] < 0.0:  # it locks, or would hang off the wheel
         return UNKNOWN
     values, shapes = eigensystem(c, stiffness, math.copysign(c.phi, belt))
     modes = values, np.concatenate([shapes, shapes * values])
@@ -85,14 +94,18 @@ def on_smooth_pads(shoe: Shoe, state: Array) -> End:
         motion = Pursuit(c, (stiffness, belt, load), state, np.array(shoe.rest), modes)
     except np.linalg.LinAlgError:  # modes that are alike
         return UNKNOWN
+    rate = float(values.real.max())
     while motion.path.steps < MOST_STEPS:
+        if rate > 0.0:  # near steady sliding nothing happens for long, as a disturbance grows slowly
+            motion.way.duration = motion.way.time + max(NEARS / rate, AHEAD * motion.path.h)
         outcome = motion.seek()
         if outcome == LINEAR:
-            return FADES
+            return UNKNOWN if rate > 0.0 else FADES
         if outcome == FOUND and motion.multiplier < 1.0:
-            return End(True, np.array(motion.orbit.state), motion.orbit)
+            rate = -math.log(max(motion.multiplier, 1e-300)) / motion.orbit.period
+            return End(True, np.array(motion.orbit.state), motion.orbit, rate)
         motion.way.events = 0  # many between two falls are too many for a cycle, not for a motion
-    return UNKNOWN
+    return End(None) if rate <= 0.0 else End(None, motion.state)
 
 
 class _Span:

@@ -3,20 +3,25 @@
 import dataclasses
 import difflib
 import math
-from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any
 
 from brakecli.cli.measured import UNMEASURED, Measured, with_measured
 from brakecli.cli.options import AsJson, ForceRead, Quiet, option, source_argument
-from brakecli.cli.output import progress, say, show_result, warn
+from brakecli.cli.output import show_result, warn
 from brakecli.errors import OtherKindError, UnreadableResultError, UsageError
 
 SOURCES = (
     "Results of runs; with --quantity measured signals: text files, .wav, datasets of HDF5 files (FILE.h5:/path)."
 )
-SECOND = "Where friction or roughness may keep a vibration up, run the case once more to decide."
+_NO_SECOND = "there is none any more: every verdict asks what the motion comes to without the waves; leave it out"
+_GONE = {
+    "decayed_to": "what becomes of the motion is computed",
+    "reach_within": "settled_within holds for x, too",
+    "trend_errors": "it is called sure_errors",
+    "forced_share": "lines of the roughness decide nothing any more",
+}
 THRESHOLD = option("Change a threshold of the rules; repeatable.", "NAME=VALUE", "--threshold")
 
 
@@ -25,13 +30,15 @@ def command(
     sources: Annotated[list[str], source_argument("FILE", SOURCES)],
     measured: Measured = UNMEASURED,
     thresholds: Annotated[list[str] | None, THRESHOLD] = None,
-    second_run: Annotated[bool, option(SECOND, None, "--second-run")] = False,
+    second_run: Annotated[bool, option("Gone.", None, "--second-run", hidden=True)] = False,
     force_read: ForceRead = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
     """Regime of runs or of measured signals, with evidence."""
-    options = Options(measured, thresholds, second_run, quiet)
+    if second_run:
+        raise UsageError(f"--second-run: {_NO_SECOND}")
+    options = Options(measured, thresholds)
     if len(sources) == 1:
         from brakecli.cli.tables import verdict_table
 
@@ -62,14 +69,10 @@ class Options:
 
     measured: Measured
     thresholds: list[str] | None
-    second_run: bool
-    quiet: bool
 
     def verdict(self, source: str) -> dict[str, Any]:
         """The verdict on one file, by the names of `--json`."""
         quantity = self.measured.quantity_of(source)
-        if self.second_run and quantity is not None:
-            raise UsageError("--second-run: is for the result of a run, whose case can be run again; leave it out")
         if quantity is None:
             numbers = self._of_result(source)
         else:
@@ -82,18 +85,12 @@ class Options:
         return numbers
 
     def _of_result(self, source: str) -> dict[str, Any]:
-        from brakecli.analysis.regime.of_run import classify_result
-        from brakecli.analysis.regime.verdict import Thresholds
+        from brakecli.analysis.regime.table import Thresholds
+        from brakecli.runs.judge import classify_result
 
         try:
             limits = changed(Thresholds, self.thresholds)
-            if not self.second_run:
-                return classify_result(Path(source), limits)
-            from brakecli.runs.second import classify_twice
-
-            tell: Callable[[str], None] = (lambda text: None) if self.quiet else say
-            with progress(self.quiet) as show_progress:
-                return classify_twice(Path(source), limits, tell, show_progress)
+            return classify_result(Path(source), limits)
         except OtherKindError:
             raise
         except UnreadableResultError as error:
@@ -107,6 +104,8 @@ def changed(thresholds: type[Any], changes: list[str] | None) -> Any:
     found: dict[str, float] = {}
     for change in changes or ():
         name, _, text = change.partition("=")
+        if name in _GONE and thresholds.__name__ == "Thresholds":
+            raise UsageError(f"--threshold {change}: there is no threshold {name} any more; {_GONE[name]}")
         if name not in names:
             nearest = difflib.get_close_matches(name, names, 1)
             remedy = f"did you mean {nearest[0]}?" if nearest else f"give one of {', '.join(names)}"

@@ -23,7 +23,14 @@ if TYPE_CHECKING:  # what one command prints need not wait for the modules of th
 POINTS = named(fields.POINT, "regime", "frequency", "amplitude")
 CRITICAL_NAMES = ("critical", "critical_error", "critical_eigenvalue", "critical_sustained", "critical_status")
 CRITICAL_POINTS = (*named(fields.POINT, "regime"), *named(fields.CRITICAL, *CRITICAL_NAMES))
-IF_KNOWN = ("growth_rate", "ringing_frequency", "amplitude_spread", "amplitude_forced", "amplitude_own")
+IF_KNOWN = (
+    "forced_frequency",
+    "growth_rate",
+    "ringing_frequency",
+    "amplitude_spread",
+    "amplitude_forced",
+    "amplitude_own",
+)
 MOST_LISTED_POINTS, MOST_LISTED_BURSTS = 30, 12
 NARROWEST = 40  # columns of a table, whatever the terminal says: nothing can be read in fewer
 
@@ -97,7 +104,8 @@ def verdict_table(source: str, numbers: Mapping[str, Any]) -> str:
         rows.append(("bursts", f"{len(tones) - MOST_LISTED_BURSTS} more, see --json"))
     for name, value in numbers["evidence"].items():
         unit = si_unit if name == "noise" else fields.evidence_unit(name)
-        shown = ", ".join(f"{each:.4g}" for each in value) if isinstance(value, list | tuple) else f"{value:.6g}"
+        shown = ", ".join(f"{each:.4g}" for each in value) if isinstance(value, list | tuple) else f"{value}"
+        shown = f"{value:.6g}" if isinstance(value, float) else shown
         rows.append((name.replace("_", " "), f"{shown} {unit}".rstrip() if shown else "-"))
     return two_columns(source, rows)
 

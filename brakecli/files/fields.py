@@ -21,6 +21,7 @@ VERDICT = within(
     Field("regime", "", "regime of the motion", "S16"),
     Field("excitation", "", "where the energy of a sustained motion comes from", "S16"),
     Field("frequency", "Hz", "fundamental frequency of vx of a sustained motion"),
+    Field("forced_frequency", "Hz", "frequency at which the wave passes that moves x most, of a forced motion"),
     Field(
         "growth_rate",
         "1/s",
@@ -49,9 +50,9 @@ VERDICT = within(
 )
 MEASURED_UNITS = {"displacement": "m", "velocity": "m/s", "force": "N", "torque": "N m"}
 MEASURED_UNITS |= {"acceleration": "m/s²", "pressure": "Pa"}
-EVIDENCE_UNITS = {"envelope_slope": "1/s", "seconds": "s", "frequency_": "Hz", "line_freq": "Hz", "power_": "W"}
-EVIDENCE_UNITS |= dict.fromkeys(("envelope_final", "envelope_largest", "amplitude_v"), "m/s")
-EVIDENCE_UNITS |= {"amplitude_": "m", "force_": "N"}
+EVIDENCE_UNITS = dict.fromkeys(("growth", "exponent", "even", "rate_"), "1/s")
+EVIDENCE_UNITS |= {"frequency_": "Hz", "line_freq": "Hz", "power_": "W"}
+EVIDENCE_UNITS |= {"amplitude_v": "m/s", "amplitude_": "m", "period_": "s", "to_limit": "s"}
 """By how the names of the evidence begin; all others are pure numbers."""
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-from brakecli.analysis.regime.verdict import Regime
+from brakecli.analysis.regime.table import Regime
 from brakecli.case.read import parse_table
 from brakecli.errors import CaseError, UsageError
 from brakecli.files import fields

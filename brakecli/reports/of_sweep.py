@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from brakecli.analysis.regime.verdict import Regime
+from brakecli.analysis.regime.table import Regime
 from brakecli.errors import UsageError, escaped
 from brakecli.files import fields
 from brakecli.files.read import StoredResult

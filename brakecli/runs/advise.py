@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from brakecli.analysis.regime.verdict import Regime, Verdict
+from brakecli.analysis.regime.table import Regime
+from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.stability import advice as of_case
 from brakecli.analysis.stability.advice import Change, Sensitivity
 from brakecli.analysis.stability.modes import is_undamped
@@ -19,7 +20,7 @@ from brakecli.case.system import system_of
 from brakecli.files import fields
 from brakecli.files.field import values_of
 from brakecli.runs.cost import duration_text, stability_seconds, steps_and_seconds, table_seconds
-from brakecli.runs.run import motion_of, verdict_in_memory
+from brakecli.runs.run import asked, motion_of, verdict_in_memory
 from brakecli.solver.motion import Counted
 from brakecli.solver.system import System
 
@@ -218,7 +219,7 @@ def _to_check(case: Case, change: Change) -> tuple[System, float] | None:
 def _checked(system: System, change: Change, progress: Counted) -> CheckRun:
     """Run a system with an advised value."""
     start = time.perf_counter()
-    motion, _ = motion_of(system, lambda done: progress("steps of the check", done, system.steps))
+    motion, _ = motion_of(asked(system), lambda done: progress("steps of the check", done, system.steps))
     verdict = verdict_in_memory(motion, system)
     spent = time.perf_counter() - start
     return CheckRun(change.parameter, float(change.rounded), verdict, system.sampled_duration, spent)

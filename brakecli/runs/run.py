@@ -13,7 +13,6 @@ import scipy
 from numpy.typing import NDArray
 
 from brakecli import __version__
-from brakecli.analysis.regime.of_run import verdict_on
 from brakecli.analysis.regime.over_time import OverTime, over_time
 from brakecli.analysis.regime.spectra import peak, spectrum
 from brakecli.analysis.regime.verdict import Verdict
@@ -24,6 +23,7 @@ from brakecli.files.field import values_of
 from brakecli.files.trust import readings
 from brakecli.files.write import ResultFile, new_result
 from brakecli.runs.certificate import Certificate
+from brakecli.runs.judge import verdict_on
 from brakecli.runs.limits import Check, check, free_bytes, refuse, within_range
 from brakecli.runs.modelled import modelled
 from brakecli.runs.tolerance import certify
@@ -82,9 +82,7 @@ def run(
     that fails numerically is written up to the failure and reported.
     """
     with within_range():
-        system = system_of(loaded.case)
-        shaken = system.steady and system.belt_speed != 0.0 and system.wheel.g.size > 0
-        system = replace(system, tangents=shaken)
+        system = asked(system_of(loaded.case))
         found = check(system)
         with new_result(output, force=force) as result:
             refuse(found, free_bytes(output.resolve().parent))
@@ -94,7 +92,7 @@ def run(
             if not np.isfinite(astuple(motion.energy)).all():  # compiled code overflows silently
                 raise FloatingPointError("an energy overflows")
             history = History(system.interval, result.rows("history"), partial(result.read, "history"))
-            verdict = verdict_on(history, system, motion.work.failure_sentence)
+            verdict = verdict_on(history, system, motion.work.failure_sentence, motion.exponent)
             top = _write_spectrum(result, history, verdict)
             changing = None if motion.work.failed else over_time(history, system)
             if changing:
@@ -108,6 +106,11 @@ def run(
                 _write_unconverged(result, motion.work.unconverged)
             result.commit()
     return report
+
+
+def asked(system: System) -> System:
+    """The same, whose motion carries a disturbance along where waves shake it for ever: verdicts ask for that."""
+    return replace(system, tangents=system.steady and system.belt_speed != 0.0 and system.wheel.g.size > 0)
 
 
 def motion_of(
@@ -129,7 +132,7 @@ def verdict_in_memory(motion: Motion, system: System, *, in_full: bool = True) -
     """The verdict on a motion whose samples are in memory."""
     _refuse_overflow(motion.rows)
     history = array_history(system.interval, motion.rows)
-    return verdict_on(history, system, motion.work.failure_sentence, in_full=in_full)
+    return verdict_on(history, system, motion.work.failure_sentence, motion.exponent, in_full=in_full)
 
 
 def _refuse_overflow(rows: NDArray[np.float64]) -> None:

@@ -9,22 +9,25 @@ import math
 import time
 from collections.abc import Hashable, Sequence
 from functools import lru_cache
+from itertools import repeat
 from typing import Any
 
 import numpy as np
 
 from brakecli import stop
 from brakecli.errors import CaseError
+from brakecli.solver.compile import Floats
 from brakecli.solver.contact.pad import BESIDE, TILE, aligned, build_pad
 from brakecli.solver.energy import NOT_KEPT
 from brakecli.solver.lanes import LANE, LANES, THETA_1, WAVES, Shared, advance
 from brakecli.solver.motion import Motion, Work
 from brakecli.solver.quantities import HISTORY
-from brakecli.solver.records import Coefficients
+from brakecli.solver.records import PARTS, Coefficients
 from brakecli.solver.roughness import Surface
 from brakecli.solver.schemes import NUMEROV
 from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import Initial, System
+from brakecli.solver.tangent import FEWEST_SAMPLES, LEAST, MOST, Exponent, exponents
 
 LEFT = 1e-3
 """What the iteration may leave of the force of a step, over load and tolerance; Newton's leaves far less."""
@@ -47,7 +50,8 @@ def fits(system: System) -> Hashable | None:
         return None
     if system.passing_frequency * system.sampled_duration > _MOST_PASSED:
         return None
-    return system.half_length, system.shoe, wheel, system.nodes, system.interval, system.per_sample, system.samples
+    grid = system.interval, system.per_sample, system.samples
+    return system.half_length, system.shoe, wheel, system.nodes, *grid, system.tangents
 
 
 @lru_cache(maxsize=4)
@@ -69,7 +73,7 @@ def _tables(half_length: float, shoe: Surface, wheel: Surface, nodes: int) -> tu
 def run_together(systems: Sequence[System]) -> list[Motion | None]:
     """The motions of systems that fit together; None where one has to be solved alone.
 
-    Their energy is not accounted for.
+    Their energy is not accounted for. Where the systems ask for `tangents`, the motions have an exponent.
     """
     firsts = range(0, len(systems), LANES)
     return [found for first in firsts for found in _run_lanes(list(systems[first : first + LANES]))]
@@ -81,16 +85,25 @@ def _run_lanes(systems: list[System]) -> list[Motion | None]:
     surfaces = _tables(alike.half_length, alike.shoe, alike.wheel, alike.nodes)
     o = _filled([*systems, *systems[-1:] * (LANES - number)])
     rows = np.zeros((LANES, len(HISTORY), alike.samples + 1))
+    carried = alike.tangents and alike.samples >= FEWEST_SAMPLES
+    sizes = np.ones((PARTS if carried else 0, LANES))
     grid = alike.step, alike.interval, alike.per_sample, alike.nodes
-    advance(o, Shared._make((*grid, *surfaces, signals)), rows)
+    advance(o, Shared._make((*grid, *surfaces, signals)), rows, sizes)
+    exponents = _exponents(sizes, alike.sampled_duration) if carried else repeat(None)
     seconds, motions = (time.perf_counter() - begin) / number, list[Motion | None]()
-    for n, system in enumerate(systems):
+    for n, (system, exponent) in enumerate(zip(systems, exponents, strict=False)):
         steps, closed = system.steps, int(o.closed[n])
         kinds = {kind: count for kind, count in (("closed-form", closed), ("midpoint", steps - closed)) if count}
         work = Work(steps=steps, contact_evaluations=int(o.evaluations[n]), evaluators=kinds)
         work.solve_seconds = seconds
-        motions.append(Motion(system, rows[n].T, work, NOT_KEPT) if o.out[n] == 0.0 else None)
+        motions.append(Motion(system, rows[n].T, work, NOT_KEPT, exponent) if o.out[n] == 0.0 else None)
     return motions
+
+
+def _exponents(sizes: Floats, duration: float) -> list[Exponent]:
+    """The exponents of all lanes; they mean nothing where a lane is out."""
+    with np.errstate(invalid="ignore"):
+        return exponents(np.log(np.clip(sizes, LEAST, MOST)), duration)
 
 
 def _filled(systems: Sequence[System]) -> Any:
@@ -117,7 +130,17 @@ def _filled(systems: Sequence[System]) -> Any:
     for name, value in values.items():
         o[name] = value
     o.rate[: len(wheel.g)] = np.outer(wheel.turns, belt)
+    if systems[0].tangents:
+        _seed(o, np.sqrt((c.c_xx + c.c_yy + 2.0 * systems[0].half_length * k) / c.m), h)
     return o
+
+
+def _seed(o: Any, rate: Floats, h: float) -> None:
+    """Begin with disturbances as `tangent.seed` does; the forces of their first levels know nothing of them."""
+    o.t_x[:] = o.t_y[:] = 0.5 / rate
+    o.t_d[:] = o.t_d_old[:] = 0.5
+    o.t_e[:] = o.t_e_old[:] = -0.5
+    o.t_x_old[:], o.t_y_old[:] = o.t_x - 0.5 * h, o.t_y + 0.5 * h
 
 
 def _start(system: System) -> tuple[float, float, float, float]:

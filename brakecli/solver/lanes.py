@@ -8,6 +8,7 @@ A lane knows slip to one side at constant speed and load, and an iteration like 
 that is good enough for most steps. A run that sticks, turns, blows up or needs many evaluations is `out`.
 """
 
+import math
 from typing import Any, NamedTuple
 
 import numba
@@ -18,10 +19,11 @@ from numpy.typing import NDArray
 from brakecli.solver.compile import FAST, Floats, borrowed, kernel, stopped, vector
 from brakecli.solver.friction import observed
 from brakecli.solver.quantities import BOUND
-from brakecli.solver.records import Coefficients, record
+from brakecli.solver.records import PARTS, Coefficients, record
 from brakecli.solver.roughness import TWO_PI
 from brakecli.solver.schemes import NUMEROV
 from brakecli.solver.sine import sine_cosine
+from brakecli.solver.tangent import LEAST, MOST
 
 LANES, WAVES = 16, 5
 """Runs side by side, and waves of the wheel, at most."""
@@ -48,6 +50,9 @@ LANE = record(
     rate=(float, (WAVES, LANES)),  # waves that pass in a second
     sine=(float, (WAVES, LANES)),  # of a wave at the middle of the pad
     cosine=(float, (WAVES, LANES)),
+    **_lanes("t_x t_y t_x_old t_y_old t_d t_e t_d_old t_e_old"),  # a disturbance, a level behind the motion
+    **_lanes("t_force t_before"),  # its part of the normal force, at the same levels as t_x and t_x_old
+    **_lanes("t_kept"),  # part of it that is left at a sample
 )
 _LANE = numba.from_dtype(LANE)
 _PAIR = types.UniTuple(float64, 2)
@@ -221,6 +226,63 @@ def _finish(o: Any, shared: Shared) -> None:
         o.closed[n] += 1.0 - o.partly[n]
 
 
+@kernel(void(_LANE, _SHARED), fastmath=FAST, inlined=False)
+def _disturb(o: Any, shared: Shared) -> None:
+    """Carry the disturbance to the older level of the motion, by the derivative of its steps.
+
+    Along the motion dF_y/dt = ∂F_y/∂x (v_x - U) + ∂F_y/∂y v_y. This gives ∂F_y/∂x without another sum over nodes,
+    as the sliding velocity never vanishes in a lane. All three rates are differences over two steps: a constant
+    ∂F_y/∂x is exact, any other is right to h².
+    """
+    h, length = shared.h, shared.length
+    for n in range(LANES):
+        inertia, x_old, y_old = o.m[n] * (2.0 / (h * h)), o.t_x_old[n], o.t_y_old[n]
+        x = THETA_2 * o.t_x[n] + (THETA_3 + THETA_1) * x_old
+        y = THETA_2 * o.t_y[n] + (THETA_3 + THETA_1) * y_old
+        v_x, v_y = THETA_1 * (2.0 * o.t_d[n] - o.t_d_old[n]), THETA_1 * (2.0 * o.t_e[n] - o.t_e_old[n])
+        known = THETA_2 * o.t_force[n] + THETA_3 * o.t_before[n]
+        g_1 = inertia * (o.t_x[n] - x_old) - o.c_xx[n] * x - o.c_xy[n] * y
+        g_2 = inertia * (o.t_y[n] - y_old) - o.c_yy[n] * y - o.c_xy[n] * x
+        g_1 += o.grip[n] * known - o.b_xx[n] * v_x - o.b_xy[n] * v_y
+        g_2 += known - o.b_xy[n] * v_x - o.b_yy[n] * v_y
+        d, e = o.i_11[n] * g_1 + o.i_12[n] * g_2, o.i_12[n] * g_1 + o.i_22[n] * g_2
+        d_slope = THETA_1 * (o.i_11[n] * o.grip[n] + o.i_12[n])  # by the force of the next level
+        e_slope = THETA_1 * (o.i_12[n] * o.grip[n] + o.i_22[n])
+        stiffness, sliding = o.k[n] * length * o.touched[n], o.d[n] - o.belt[n]
+        tangential = 0.5 / h * (o.force[n] - o.earlier[n]) + stiffness * o.e[n]
+        stiffness *= sliding  # both slopes are multiplied by the sliding velocity, which saves a division
+        x, y = x_old + 2.0 * h * d, y_old + 2.0 * h * e
+        feedback = sliding - 2.0 * h * (tangential * d_slope - stiffness * e_slope)
+        force = (tangential * x - stiffness * y) / feedback if feedback != 0.0 else 0.0
+        d, e = d + d_slope * force, e + e_slope * force
+        o.t_x_old[n], o.t_y_old[n], o.t_d_old[n], o.t_e_old[n] = o.t_x[n], o.t_y[n], o.t_d[n], o.t_e[n]
+        o.t_x[n], o.t_y[n], o.t_d[n], o.t_e[n] = x_old + 2.0 * h * d, y_old + 2.0 * h * e, d, e
+        o.t_before[n], o.t_force[n] = o.t_force[n], force
+
+
+@kernel(void(_LANE, _SHARED, float64[:, ::1], int64, int64), inlined=False)
+def _renew(o: Any, shared: Shared, sizes: Floats, number: int, samples: int) -> None:
+    """At a sample that ends a part of the run, note the sizes, and go on with disturbances of size one.
+
+    The square of a size is twice the energy over the mass where the pad touches everywhere. It hardly swings then.
+    """
+    part = (number - 1) * PARTS // samples
+    if number == 0 or (number < samples and number * PARTS // samples == part):
+        return
+    for n in range(LANES):
+        x, y, d, e = o.t_x_old[n], o.t_y_old[n], o.t_d[n], o.t_e[n]
+        springs = o.c_xx[n] * x * x + 2.0 * o.c_xy[n] * x * y + (o.c_yy[n] + o.k[n] * shared.length) * y * y
+        size = math.sqrt(max(springs, 0.0) / o.m[n] + d * d + e * e)
+        sizes[part, n] = size
+        o.t_kept[n] = 1.0 / size if LEAST < size < MOST else 0.0
+    for each in (o.t_x, o.t_y, o.t_x_old, o.t_y_old, o.t_d, o.t_e, o.t_d_old, o.t_e_old, o.t_force, o.t_before):
+        for n in range(LANES):
+            each[n] = o.t_kept[n] * each[n] if o.t_kept[n] > 0.0 else 0.0
+    for n in range(LANES):
+        if o.t_kept[n] == 0.0:
+            o.t_d[n], o.t_x[n] = 1.0, shared.h
+
+
 @kernel(void(_LANE, _SHARED, float64[:, :, ::1], int64), fastmath=FAST)
 def _sample(o: Any, shared: Shared, rows: NDArray[np.float64], number: int) -> None:
     """The sample at the older level, as `loop.sample` has it; d without h²/6 of its second derivative."""
@@ -243,13 +305,18 @@ def _sample(o: Any, shared: Shared, rows: NDArray[np.float64], number: int) -> N
         row[4], row[5], row[6], row[7] = o.friction[n], o.before[n], o.touched[n], o.state[n]
 
 
-@kernel(void(_LANE, _SHARED, float64[:, :, ::1]))
-def advance(o: Any, shared: Shared, rows: NDArray[np.float64]) -> None:
-    """Run all lanes; `rows` gets the samples of each, variable by variable."""
+@kernel(void(_LANE, _SHARED, float64[:, :, ::1], float64[:, ::1]))
+def advance(o: Any, shared: Shared, rows: NDArray[np.float64], sizes: Floats) -> None:
+    """Run all lanes; `rows` gets the samples of each, variable by variable.
+
+    `sizes` gets the growth of each disturbance in each part of the run; without parts none is carried along.
+    """
     shared = borrowed(shared)
     _begin(o, shared)
     for number in range(rows.shape[2]):
         _sample(o, shared, rows, number)
+        if sizes.shape[0] > 0:
+            _renew(o, shared, sizes, number, rows.shape[2] - 1)
         left = 0.0
         for n in range(LANES):
             left += 1.0 - o.out[n]
@@ -259,3 +326,5 @@ def advance(o: Any, shared: Shared, rows: NDArray[np.float64]) -> None:
             _prepare(o, shared)
             _iterate(o, shared, number * shared.interval + (step + 2) * shared.h)
             _finish(o, shared)
+            if sizes.shape[0] > 0:
+                _disturb(o, shared)

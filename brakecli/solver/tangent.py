@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import float64, int64, void
 
-from brakecli.solver.compile import kernel
+from brakecli.solver.compile import Floats, kernel
 from brakecli.solver.records import (
     BESIDE,
     COEFFICIENTS,
@@ -35,7 +35,8 @@ PLACED = 1 / 16, 1 / 4
 level reached, and of one that lags. Limit cycles, whose exponent is 0, have shown 0.06 and 0.34."""
 FEWEST_SAMPLES = 64
 """Of a run with an exponent, at which its growth is noted."""
-_LEAST, _MOST = 1e-280, 1e280  # size of a disturbance
+LEAST, MOST = 1e-280, 1e280
+"""Size of a disturbance."""
 
 
 class Exponent(NamedTuple):
@@ -43,6 +44,8 @@ class Exponent(NamedTuple):
 
     rate: float
     error: float
+    even: float = math.nan  # the rate by a line through the size of a disturbance, which does not wander where the
+    even_error: float = math.nan  # motion is linear: it swings about an exponential function
 
 
 def seed(t: Any, state: Any, rate: float, h: float) -> None:
@@ -52,16 +55,32 @@ def seed(t: Any, state: Any, rate: float, h: float) -> None:
     state.x_old, state.y_old = state.x - h * state.v_x, state.y - h * state.v_y
 
 
-def exponent(t: Any, duration: float, h: float, lag: int) -> Exponent:
-    """The exponent in the second half of a run, with the standard error of the mean of its batches.
+def exponents(logs: Floats, duration: float) -> list[Exponent]:
+    """The exponents in the second half of runs, with the standard error of the mean of their batches.
 
-    Within a cycle a disturbance swings: its size is a mean over a batch. The error contains, for each event that a
-    difference scheme has placed, the part `PLACED` of a step h (s) in radians of the fastest motion.
+    Within a cycle a disturbance swings: its size is a mean over a batch. `logs`: ln of the growth in each part, in
+    the columns of runs. `even` is by the whole of a run but its first eighth.
     """
-    sizes = np.cumsum(t.logs)[PARTS // 2 :].reshape(BATCHES, -1).mean(axis=1)
-    rates = np.diff(sizes) * (2 * BATCHES / duration)
-    error = float(rates.std(ddof=1)) / math.sqrt(len(rates))
-    return Exponent(float(rates.mean()), math.hypot(error, PLACED[lag] * t.rate * h * t.placed / duration))
+    sizes = np.cumsum(logs, axis=0).reshape(4 * BATCHES, -1, logs.shape[1]).mean(axis=1)
+    late = sizes[2 * BATCHES :].reshape(BATCHES, 2, -1).mean(axis=1)
+    rates = np.diff(late, axis=0) * (2 * BATCHES / duration)
+    means, errors = rates.mean(axis=0), rates.std(axis=0, ddof=1) / math.sqrt(len(rates))
+    lined = sizes[len(sizes) // 8 :]
+    places = (np.arange(len(lined)) - 0.5 * (len(lined) - 1)) * (duration / len(sizes))
+    slopes = places @ lined / (places @ places)
+    rest = lined - lined.mean(axis=0) - np.outer(places, slopes)
+    off = np.sqrt((rest**2).sum(axis=0) / (len(lined) - 2) / (places @ places))
+    return [Exponent(*each) for each in np.stack([means, errors, slopes, off], axis=1).tolist()]
+
+
+def exponent(t: Any, duration: float, h: float, lag: int) -> Exponent:
+    """The exponent of a run in the common loop.
+
+    The error also contains, for each event that a difference scheme has placed, the part `PLACED` of a step h (s)
+    in radians of the fastest motion.
+    """
+    (found,) = exponents(t.logs[:, None], duration)
+    return found._replace(error=math.hypot(found.error, PLACED[lag] * t.rate * h * t.placed / duration))
 
 
 @kernel(float64(float64, float64))
@@ -111,8 +130,8 @@ def renew(t: Any, number: int, samples: int) -> float:
     """Note the growth up to a sample, and go on with a disturbance of size one; what it was multiplied by."""
     size = math.sqrt(t.rate * t.rate * (t.x * t.x + t.y * t.y) + (t.v_x * t.v_x + t.v_y * t.v_y))
     if number > 0:
-        t.logs[(number - 1) * PARTS // samples] += math.log(min(max(size, _LEAST), _MOST))
-    if not _LEAST < size < _MOST:
+        t.logs[(number - 1) * PARTS // samples] += math.log(min(max(size, LEAST), MOST))
+    if not LEAST < size < MOST:
         t.x, t.y, t.v_x, t.v_y = 1.0 / t.rate, 0.0, 0.0, 0.0
         return 0.0
     part = 1.0 / size

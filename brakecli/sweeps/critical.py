@@ -24,7 +24,6 @@ from brakecli.case.system import system_of
 from brakecli.errors import CaseError
 from brakecli.solver.steady_sliding import SteadySliding, steady_sliding
 from brakecli.solver.system import System
-from brakecli.sweeps.early import Known
 from brakecli.sweeps.lyapunov import Steady, by_exponents
 from brakecli.sweeps.read_off import calm, explored, on_waves
 from brakecli.sweeps.sustained import sustained
@@ -42,7 +41,7 @@ EdgeIn = Callable[[float, float], Edge]
 def search(
     critical: Critical,
     case_at: Callable[[float], Case],
-    verdict_of: Callable[[Case], Verdict | Known | None],
+    verdict_of: Callable[[Case], Verdict | None],
     own: float | None = None,
 ) -> Search:
     """Look for the critical value of the parameter that `case_at` sets; `verdict_of` runs a case.

@@ -13,15 +13,16 @@ stick, a settled part that is too short), there is no early verdict, and the run
 """
 
 import math
-from typing import Any, NamedTuple
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, WINDOWS
-from brakecli.analysis.regime.forced import QUARTER
-from brakecli.analysis.regime.linear import Linear, linear_theory
-from brakecli.analysis.regime.verdict import Excitation, Regime
-from brakecli.analysis.stability.modes import slowest_of_cycles
+from brakecli.analysis.regime.table import Answers, Fate, Thresholds, decide
+from brakecli.analysis.regime.verdict import Verdict
+from brakecli.analysis.stability.linear import Linear, linear_theory
+from brakecli.analysis.stability.modes import is_undamped, slowest_of_cycles
 from brakecli.runs.certificate import ROUNDING, Certificate
 from brakecli.solver.compile import Floats
 from brakecli.solver.flow.seek import FOUND, GOING_ON, LINEAR, Pursuit
@@ -38,23 +39,6 @@ _GRAZES = 0.01  # of the wheel's speed: nearer to it, samples leave open whether
 _WINDOW = 0.05  # of the run, by which a whole run may see the settled part begin earlier or later
 
 
-class Known(NamedTuple):
-    """A verdict on the motion itself: numbers of its orbit, or of its linear motion (SI units)."""
-
-    regime: Regime
-    excitation: Excitation
-    reasons: tuple[str]
-    frequency: float | None  # Hz
-    amplitude: float  # m
-    stick_fraction: float
-    contact_loss_fraction: float
-    mean_friction_force: float  # N
-    braking_torque: float  # N m
-    settled: bool
-    settled_from: float  # s
-    evidence: dict[str, Any] = {}  # noqa: RUF012
-
-
 class Ending(NamedTuple):
     """What stands for the motion of a whole run: its system, its last state as a row, its cost."""
 
@@ -66,7 +50,7 @@ class Ending(NamedTuple):
 class Early(NamedTuple):
     """An early verdict, with what a sweep goes on with."""
 
-    verdict: Known
+    verdict: Verdict
     motion: Ending
     certificate: Certificate | None
 
@@ -113,7 +97,7 @@ def _theory(system: System) -> Linear | None:
     return theory if theory is not None and theory.direction != 0 else None
 
 
-def _linear(system: System, theory: Linear, motion: Pursuit) -> tuple[Known, list[float]] | None:
+def _linear(system: System, theory: Linear, motion: Pursuit) -> tuple[Verdict, list[float]] | None:
     """The verdict on a motion that is linear from its first half on, and its last state."""
     o = motion.way
     start, end = (system.samples + 1) // 2 * system.interval, system.sampled_duration
@@ -131,18 +115,17 @@ def _linear(system: System, theory: Linear, motion: Pursuit) -> tuple[Known, lis
     fades = np.exp(values * (end - o.time)) - np.exp(values * (start - o.time))
     height = rest[1] + (vectors[1] @ (parts * fades / values)).real / (end - start)
     force = math.copysign(system.coefficients.phi, theory.belt) * -system.contact_stiffness * float(height)
-    reason = theory.sentence
+    answers = Answers(duration=end, linear=True, growth=theory.mode.growth, ringing=theory.mode.frequency)
     if theory.direction > 0:
-        more = theory.seconds_to_limit(end, last) + 3.0 / theory.mode.growth
-        reason += f"; run at least {QUARTER * (end + more):.3g} s"
-    regime, amplitude = Regime.DAMPED if theory.direction < 0 else Regime.UNDECIDED, 0.5 * float(o.high - o.low)
-    torque = system.radius * force
-    slope = {"envelope_slope": theory.mode.growth}
-    numbers = amplitude, 0.0, 0.0, force, torque
-    return Known(regime, Excitation.NONE, (reason,), None, *numbers, False, start, slope), last.tolist()
+        answers = replace(answers, to_limit=theory.seconds_to_limit(end, last))
+    decision, amplitude = decide(answers, Thresholds()), 0.5 * float(o.high - o.low)
+    evidence = {"row": decision.row, "growth": theory.mode.growth}
+    return Verdict(
+        decision, amplitude, 0.0, 0.0, force, system.radius * force, start, False, evidence
+    ), last.tolist()
 
 
-def _cycle(system: System, theory: Linear, motion: Pursuit) -> tuple[Known, list[float]] | None:
+def _cycle(system: System, theory: Linear, motion: Pursuit) -> tuple[Verdict, list[float]] | None:
     """The verdict on an orbit that the motion has come to well before the end of the run, and a state on it."""
     o, orbit, factor = motion.way, motion.orbit, motion.multiplier
     end, period, interval = system.sampled_duration, orbit.period, system.interval
@@ -166,10 +149,23 @@ def _cycle(system: System, theory: Linear, motion: Pursuit) -> tuple[Known, list
     lasts = slow * (part - _WINDOW * end) >= 1.0
     if not lasts and (theory.direction < 0 or slow * end >= 1.0):
         return None  # whether the vibration lasts depends on where exactly a whole run sees it settled
-    c, how = system.coefficients, "with" if stick > 0.0 else "without"
+    c = system.coefficients
     force = (c.c_xx * float(o.mean_x) + c.c_xy * float(o.mean_y)) / period + system.load_at_start * c.sin_beta
-    reason = f"sustained: a limit cycle {how} stick; a disturbance keeps {factor:.2g} of its size in a cycle"
-    regime = Regime.RELAXATION if stick > 0.0 else Regime.QUASI_HARMONIC
+    answers = Answers(
+        duration=end,
+        growth=theory.mode.growth,
+        undamped=is_undamped(c),
+        without_waves=Fate.LASTS,
+        amplitude=orbit.amplitude,
+        amplitude_without_waves=orbit.amplitude,
+        settled=True,
+        seconds=part,
+        cycles=part / period,
+        samples_per_cycle=period / interval,
+        stick_cycles=1.0 if stick > 0.0 else 0.0,
+        harmonic_share=1.0,
+    )
+    decision = decide(answers, Thresholds())._replace(frequency=orbit.frequency)
     numbers = orbit.amplitude, orbit.stick_fraction, orbit.contact_loss_fraction, force, system.radius * force
-    excited, shown = (regime, Excitation.SELF_EXCITED, (reason,), orbit.frequency), {"largest_multiplier": factor}
-    return Known(*excited, *numbers, lasts, start, shown), list(orbit.state)
+    evidence = {"row": decision.row, "rate_without_waves": rate}
+    return Verdict(decision, *numbers, start, lasts, evidence), list(orbit.state)

@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.analysis.regime.verdict import Excitation, Regime, Verdict
+from brakecli.analysis.regime.table import Excitation, Regime
+from brakecli.analysis.regime.verdict import Verdict
 from brakecli.branches.line import Line
 from brakecli.case.case import Case
 from brakecli.case.read import key_path
@@ -23,13 +24,13 @@ from brakecli.files.field import values_of
 from brakecli.files.valid import LARGEST
 from brakecli.runs.certificate import Certificate, Certified
 from brakecli.runs.limits import Check, check, refuse, within_range
-from brakecli.runs.run import motion_of, verdict_in_memory
+from brakecli.runs.run import asked, motion_of, verdict_in_memory
 from brakecli.runs.together import TOGETHER, certify_together
 from brakecli.solver.motion import Motion
 from brakecli.solver.roughness import TWO_PI, wheel_angles
 from brakecli.solver.schedules import integral_at
 from brakecli.sweeps.critical import search
-from brakecli.sweeps.early import Ending, Known, early
+from brakecli.sweeps.early import Ending, early
 from brakecli.sweeps.plan import Plan, Settings
 
 OUT_OF_MEMORY = "out of memory; sample less often, or reduce contact.nodes"
@@ -77,7 +78,7 @@ def _fits(name: str, values: NDArray[Any]) -> bool:
 class PointRun:
     """A run in memory, as far as a sweep is interested in it. `fields.POINT` says where each number is."""
 
-    verdict: Verdict | Known
+    verdict: Verdict
     case: Case
     motion: Motion | Ending
     certificate: Certificate | None  # where the case gives no step
@@ -98,14 +99,13 @@ def simulate(case: Case, *, whole: bool = True) -> PointRun:
 def checked(case: Case) -> Check:
     """What is known of a case before it runs; raises RefusedError where it should not."""
     with within_range():
-        found = check(system_of(case))
+        found = check(asked(system_of(case)))
         refuse(found)
     return found
 
 
 def judged(case: Case, found: Check, certified: Certified | None, *, whole: bool) -> PointRun:
     """The end of `simulate`, by a motion that is known already or by one that is computed."""
-    verdict: Verdict | Known
     motion: Motion | Ending
     system, warnings = found.system, [*found.warnings]
     with within_range():
@@ -210,7 +210,7 @@ def _started(value: float) -> float:
     return value if abs(value) >= SMALLEST else 0.0
 
 
-def verdict_of(case: Case) -> Verdict | Known | None:
+def verdict_of(case: Case) -> Verdict | None:
     """The verdict on a run in memory, as soon as it is known; None where the run fails."""
     with suppress(BrakecliError):
         outcome = simulate(case, whole=False)

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from brakecli.analysis.regime.linear import Linear, linear_theory
+from brakecli.analysis.stability.linear import Linear, linear_theory
 from brakecli.analysis.stability.modes import is_undamped
 from brakecli.analysis.stability.search import bisect
 from brakecli.branches.answers import Answers

@@ -5,9 +5,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from brakecli.analysis.regime.forced import QUARTER
-from brakecli.analysis.regime.linear import Linear, linear_theory
+from brakecli.analysis.regime.lasting import QUARTER
 from brakecli.analysis.stability.advice import rounded
+from brakecli.analysis.stability.linear import Linear, linear_theory
 from brakecli.analysis.stability.modes import is_undamped
 from brakecli.case.system import system_of
 from brakecli.errors import BrakecliError

@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from brakecli.analysis.regime.linear import linear_theory
-from brakecli.analysis.regime.verdict import Regime, Verdict
+from brakecli.analysis.regime.table import Regime
+from brakecli.analysis.regime.verdict import Verdict
+from brakecli.analysis.stability.linear import linear_theory
 from brakecli.analysis.stability.modes import is_undamped
 from brakecli.analysis.stability.search import bisect
 from brakecli.branches.begin import FADES, UNKNOWN, End, on_rough_pads, on_smooth_pads
@@ -21,7 +22,6 @@ from brakecli.runs.limits import within_range
 from brakecli.solver.period import common_period
 from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import System
-from brakecli.sweeps.early import Known
 from brakecli.sweeps.windows import Outcome, Search
 
 GALLOP = 2.0
@@ -52,7 +52,7 @@ def sustained(
     found: Search,
     unstable: Callable[[float], bool | None],
     calm: Callable[[float], Sequence[Array]],
-    verdict_of: Callable[[Case], Verdict | Known | None],
+    verdict_of: Callable[[Case], Verdict | None],
 ) -> Lasting:
     """Look for the least value at which vibration lasts from the case's own start, as far as it lasts above it.
 
@@ -98,7 +98,7 @@ def _end(
     case: Case,
     calm: Callable[[float], Sequence[Array]],
     value: float,
-    verdict_of: Callable[[Case], Verdict | Known | None],
+    verdict_of: Callable[[Case], Verdict | None],
 ) -> End:
     """What the case's own start comes to: by the flow of the equations, whatever scheme the case has.
 
@@ -123,7 +123,7 @@ def _end(
     return on_rough_pads(system, system.initial.beside((rest.x, rest.y)), known)
 
 
-def _by_runs(case: Case, system: System, verdict_of: Callable[[Case], Verdict | Known | None]) -> End:
+def _by_runs(case: Case, system: System, verdict_of: Callable[[Case], Verdict | None]) -> End:
     """Whether vibration lasts by the verdicts on runs, each twice as long as the one before.
 
     It is asked where sliding is not known to be unstable. So in full contact what neither sticks nor lifts off

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.analysis.regime.of_signal import Measurand, Signal, SignalVerdict, look
-from brakecli.analysis.regime.verdict import Regime
+from brakecli.analysis.regime.table import Regime
 
 Array = NDArray[np.float64]
 

@@ -1,7 +1,4 @@
-"""The score: what `brakecli run` says of random shoes, beside the answers, and what of it is wrong.
-
-Where it says `undecided` and names a second run, `brakecli classify --second-run` has the last word.
-"""
+"""The score: what `brakecli run` says of random shoes, beside the answers, and what of it is wrong."""
 
 import math
 from collections import Counter
@@ -15,11 +12,9 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from brakecli.analysis.regime.verdict import Thresholds
 from brakecli.case.read import parse_case
 from brakecli.files.read import open_result
 from brakecli.runs.run import run
-from brakecli.runs.second import classify_twice
 from brakecli.solver.quantities import HISTORY
 from tests.analysis.answers import VX, Answer, X, answer, last_eighth, levels, sticks_per_cycle
 from tests.analysis.shoes import Array, Shoe, Tables, random_shoes
@@ -115,8 +110,7 @@ class Score:
 
     said: Counter[tuple[str, str]]
     mistakes: list[tuple[Tables, dict[str, Any], Answer, str]]
-    undecided: list[tuple[Tables, str, Answer]]  # with the reason, where more might be said, after a second run
-    undecided_at_once: int = 0  # before it
+    undecided: list[tuple[Tables, str, Answer]]  # with the reason, where more might be said
     failed: int = 0
 
     @property
@@ -142,13 +136,8 @@ def score(stratum: str, count: int, seed: int) -> Score:
             found.said[true.name, said(numbers)] += 1
             neutral = Shoe.of(tables).rate == 0.0 and not Shoe.of(tables).b.any()
             more = not neutral and true.name not in BESIDE
-            found.undecided_at_once += more and said(numbers) == "undecided"
-            again = numbers
-            if said(numbers) == "undecided":
-                again = classify_twice(Path(folder) / RESULT, Thresholds(), lambda text: None, lambda *done: None)
-                if more and said(again) == "undecided":
-                    found.undecided.append((tables, again["reasons"][0], true))
-            for told_so in (numbers, again):
-                if why := wrong(tables, told_so, rows, true):
-                    found.mistakes.append((tables, told_so, true, why))
+            if more and said(numbers) == "undecided":
+                found.undecided.append((tables, numbers["reasons"][0], true))
+            if why := wrong(tables, numbers, rows, true):
+                found.mistakes.append((tables, numbers, true, why))
     return found

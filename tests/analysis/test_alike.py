@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brakecli.analysis.regime.classify import classify
+from brakecli.analysis.regime.context import Context
 from brakecli.analysis.regime.spectra import peak, spectrum
-from brakecli.analysis.regime.verdict import Context, Excitation, Regime
+from brakecli.analysis.regime.table import Excitation, Regime
 from brakecli.case.system import system_of
 from brakecli.solver.quantities import ContactState
-from tests.analysis.histories import INTERVAL, history_of, verdict_of
+from tests.analysis.histories import INTERVAL, history_of, lasting, verdict_of
 from tests.analysis.test_verdicts import DRUM
 from tests.campaign import campaign, counts
 from tests.examples import SQUEAL, make
@@ -64,7 +64,7 @@ def test_the_amplitude_is_that_which_lasts_and_not_its_transient(draws: int) -> 
         frequency, depth, rate = rng.uniform(50.0, 200.0), rng.uniform(-0.05, 0.1), rng.uniform(2.0, 8.0)
         vx = 1e-2 * (1.0 + depth * np.exp(-rate * time)) * np.sin(2 * np.pi * frequency * time)
         motion = history_of(len(vx), vx=vx, x=np.cumsum(vx) * INTERVAL, state=np.where(vx > 0.0099, 0.0, -1.0))
-        verdict = classify(motion, Context(1e-2))
+        verdict = lasting(motion, Context(1e-2))
         # The median cycle lies in the second half; fifty samples a cycle miss (π/50)²/2 of a crest.
         left = abs(depth) * math.exp(-rate * 0.5 * time[-1]) + 2e-3
         assert verdict.amplitude == pytest.approx(1e-2 / (2 * np.pi * frequency), rel=left)
@@ -103,6 +103,6 @@ def test_a_cycle_of_no_whole_number_of_samples_is_not_taken_for_several(draws: i
         x = np.where(sticks, place, (1.0 - slip) * 0.5 * (1.0 + np.cos(turn)))
         vx = np.where(sticks, 1.0, -(1.0 - slip) * 0.5 * np.pi / slip * np.sin(turn))
         state = np.where(sticks, ContactState.STICK, ContactState.BACKWARD_SLIP)
-        verdict = classify(history_of(len(x), x=x * cycle * INTERVAL, vx=vx, state=state), Context(1.0))
+        verdict = lasting(history_of(len(x), x=x * cycle * INTERVAL, vx=vx, state=state), Context(1.0))
         assert verdict.regime is Regime.RELAXATION, (cycle, slip)
         assert verdict.frequency == pytest.approx(1.0 / cycle / INTERVAL, rel=1e-3), (cycle, slip)

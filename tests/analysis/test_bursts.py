@@ -5,7 +5,7 @@ import pytest
 
 from brakecli.analysis.regime.bursts import bursts
 from brakecli.analysis.regime.of_signal import Measurand, Signal, look
-from brakecli.analysis.regime.verdict import Regime
+from brakecli.analysis.regime.table import Regime
 
 RATE = 20000.0
 TIME = np.arange(int(RATE)) / RATE

@@ -5,7 +5,7 @@ import pytest
 
 from brakecli.analysis.regime.of_signal import Measurand, Signal, SignalVerdict, look
 from brakecli.analysis.regime.signal_rules import SignalThresholds
-from brakecli.analysis.regime.verdict import Excitation, Regime
+from brakecli.analysis.regime.table import Excitation, Regime
 from tests.analysis.measured_signals import (
     Array,
     clipped,

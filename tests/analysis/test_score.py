@@ -101,7 +101,7 @@ def test_no_verdict_contradicts_an_independent_answer(stratum: str, count: int) 
 
 
 MOST_UNDECIDED = {"smooth": 0.08, "slow": 0.02, "full": 0.11, "open": 0.20, "frictionless": 0.02}
-"""Parts that may stay undecided after a second run, beside the neutral and those that still grow.
+"""Parts that may stay undecided, beside the neutral and those that still grow.
 
 What is left has no answer in a run of its length: a strong start that still decays (a run need not hold
 the few powers of e that this takes), an amplitude that drifts by more than 5 %, stick in a quarter to
@@ -120,8 +120,7 @@ def test_few_shoes_stay_undecided_that_are_neither_neutral_nor_still_growing() -
     table = [f"{true:18s} {word:10s} {count:4d}" for (true, word), count in sorted(said_of.items())]
     for stratum, found in scores.items():
         counts = f"{len(found.mistakes)} wrong, {len(found.undecided)} undecided of {found.judged}"
-        before = f"{found.undecided_at_once} before a second run"
-        table.append(f"{STRATA[stratum]}: {counts} ({before}); {found.failed} failed")
+        table.append(f"{STRATA[stratum]}: {counts}; {found.failed} failed")
     sys.stdout.write("\n".join(["", *table, ""]))
     assert sum(count for (true, _), count in said_of.items() if true != "no answer") >= 500
     for stratum, most in MOST_UNDECIDED.items():

@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brakecli.analysis.regime.verdict import Excitation, Regime
+from brakecli.analysis.regime.table import Decision, Regime
+from brakecli.analysis.regime.verdict import Verdict
 from brakecli.branches.begin import on_smooth_pads, settled
 from brakecli.branches.cycles import Cycles
 from brakecli.branches.line import Line, Shoe
 from brakecli.case.system import system_of
 from brakecli.solver.flow.smooth import SmoothFlow
-from brakecli.sweeps.early import Known
 from brakecli.sweeps.sustained import _end, sustained
 from brakecli.sweeps.windows import Outcome, Search
 from tests.campaign import campaign
@@ -198,9 +198,9 @@ def test_what_bounces_ever_higher_beside_stable_sliding_lasts() -> None:
     assert sizes[-2] < 0.999
 
 
-def verdict(amplitude: float, regime: Regime = Regime.RELAXATION) -> Known:
+def verdict(amplitude: float, regime: Regime = Regime.RELAXATION) -> Verdict:
     """The verdict on a run of a vibration with stick."""
-    return Known(regime, Excitation.NONE, ("",), None, amplitude, 0.5, 0.0, 0.0, 0.0, True, 0.0)
+    return Verdict(Decision("", regime), amplitude, 0.5, 0.0, 0.0, 0.0, 0.0, True, {})
 
 
 @pytest.mark.parametrize(

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 import tomli_w
 
-from brakecli.analysis.regime.of_run import verdict_on
 from brakecli.case.system import system_of
 from brakecli.files import fields
 from brakecli.files.field import values_of
+from brakecli.runs.judge import verdict_on
 from brakecli.runs.together import TOGETHER, certify_together
 from brakecli.runs.tolerance import certify
 from brakecli.solver.history import array_history

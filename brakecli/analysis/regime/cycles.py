@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.analysis.regime.evidence import LINE_BINS, Part, line
+from brakecli.analysis.regime.evidence import LINE_BINS, Part
 from brakecli.analysis.regime.spectra import Array, upward_crossings
 from brakecli.solver.quantities import ContactState
 
@@ -17,7 +17,6 @@ _GROUPS = 10  # of neighbouring cycles, of which a median is taken
 _ENDS = (ContactState.STICK, ContactState.SEPARATED)
 _MIDDLE = np.array([1.0 / 6.0, 0.5, 5.0 / 6.0])  # quantiles
 _TREND = 3.0  # standard errors of the slope of ten medians, beyond which an amplitude drifts
-_ALTERNATES, _PARTS = 0.3, 1.0  # powers of e by which odd and even cycles, or any neighbours, part
 _BANDS = (0.3, 0.5, 0.15)  # of the standard deviation of vx: ripple within it does not count
 _BETWEEN = 1e-3  # of the energy of vx, between the lines of one rise, that makes a cycle of several
 _SEEN = 0.85  # least part of a force's swing in every other sample that all samples see
@@ -66,7 +65,6 @@ class Cycles:
     limited: float  # part of the groups of cycles in which the shoe sticks, leaves the wheel or overtakes it
     drift: "Drift"  # of the amplitude
     detuning: "Drift"  # of the period
-    parting: tuple[float, float]  # powers of e by which neighbouring cycles surely part, and until they lie apart
     force_variation: float | None  # N, peak to peak of the friction force
 
 
@@ -135,7 +133,7 @@ def cycles_of(
     }
     limited = float(np.mean(shares(state != slip) > 0.0))
     sizes, periods = swings(part, crossings), np.diff(crossings)
-    changes = _drift(sizes), _drift(periods), _parting(sizes, periods)
+    changes = _drift(sizes), _drift(periods)
     force = part.history.read("friction_force", part.stop - len(velocity), part.stop)
     amplitude, spread = median(sizes)
     missed = 3.0 / 128.0 * (2.0 * np.pi / period) ** 4 * amplitude  # of a crest between two samples: parabola
@@ -272,23 +270,3 @@ def _drift(sizes: Array) -> Drift:
     rest = groups - groups.mean() - slope * places
     error = float(np.std(rest) / (np.std(places) * np.sqrt(max(len(groups) - 2, 1))))
     return Drift(last / first - 1.0 if first > 0.0 else 0.0, abs(slope) > _TREND * error)
-
-
-def _parting(*numbers: Array) -> tuple[float, float]:
-    """By how many powers of e neighbouring cycles part within the record, and until they lie apart; or zeros.
-
-    The difference of odd and even ones grows, or of each and the mean of its neighbours: surely in all numbers.
-    """
-    count = len(numbers[0]) - 2
-    if count < 4 * _GROUPS:
-        return 0.0, 0.0
-    bends = np.array([np.convolve(each / each.mean(), [0.5, -1.0, 0.5], "valid") for each in numbers])
-    odd, every = (np.array_split(each, _GROUPS, axis=1) for each in (bends * (-1.0) ** np.arange(count), bends))
-    alternating, typical = [each.mean(axis=1) for each in odd], [each.std(axis=1) for each in every]
-    for sizes, least in ((alternating, _ALTERNATES), (typical, _PARTS)):
-        logs = np.log(np.maximum(np.abs(sizes).T, 1e-300))
-        slopes = _GROUPS * np.array([line(np.arange(1.0 * _GROUPS), each) for each in logs])
-        surely = not np.ptp(np.sign(sizes), axis=0).any() and np.all(slopes @ [1.0, -_TREND] > 0.0)
-        if surely and (parted := float(slopes[:, 0].min())) > least:
-            return parted, max(-float(logs[:, -1].max()), 0.0)
-    return 0.0, 0.0

@@ -22,8 +22,7 @@ LINE_BINS = 4  # on either side of a line: the Hann window's main lobe, and the 
 _MOST_LINES = 8
 _LEAST_LINE = 1e-3  # part of the energy
 _MOST_PLACES = 1 << 16  # samples at which a forced motion is computed
-_FOLLOWS = 0.1  # part of the energy of vx and vy in which a motion differs that comes back with the waves
-_PROBES, _MOST_RETURNS, _APART = 400, 1 << 14, 5  # times compared, among how many, so many cycles of vx apart
+_BATCHES = 10
 _FULL = 1.0 - 1e-9  # part of the pad that touches in full contact, but for rounding
 _MOST_COVERED = 0.2  # part of the band on lines, beyond which they are not told from what lies beside them
 _LEAST_FORCED = 0.02  # of what lies beside the lines: that much of a decaying motion leaks onto them
@@ -216,34 +215,19 @@ def line(x: Array, y: Array) -> tuple[float, float]:
     return slope, math.sqrt(float(rest @ rest / (away @ away)) / (len(x) - 2))
 
 
-def follows(part: Part, waves: Sequence[tuple[float, float]]) -> bool:
-    """Whether vx and vy come back, at times far from one another, wherever the waves (Hz, m) do."""
-    from scipy.spatial import cKDTree
+def level_change(levels: Array) -> tuple[float, float]:
+    """Change of the logarithm of a level over its record, with its standard error; nan where there is none.
 
-    speeds = np.array([frequency * swing for frequency, swing in waves])
-    velocity = np.stack([part.last("vx"), part.last("vy")], axis=1)
-    rises = np.count_nonzero((velocity[:-1, 0] < 0.0) & (velocity[1:, 0] >= 0.0))
-    size = velocity.std(axis=0)
-    if rises <= 2 * _APART or not size.all():
-        return False
-    stride = -(-len(velocity) // _MOST_RETURNS)
-    places: NDArray[np.intp] = np.arange(0, len(velocity), stride)
-    turns = np.outer(places * part.history.interval, [frequency for frequency, _ in waves])
-    phases = speeds / speeds.max() * np.exp(2j * math.pi * turns)
-    points = np.concatenate([phases.real, phases.imag], axis=1)
-    probes = np.linspace(0, len(places) - 1, _PROBES).astype(int)
-    near = np.asarray(cKDTree(points).query(points[probes], k=min(_PROBES, len(places)))[1])
-    far = np.abs(near - probes[:, None]) * stride > _APART * len(velocity) / rises
-    found = far.any(axis=1)
-    if np.count_nonzero(found) < _PROBES // 2:
-        return False
-    pairs = probes[found], near[found, far[found].argmax(axis=1)]
-    apart = np.subtract(*(velocity[places[each]] / size for each in pairs))
-    return float(np.mean(apart**2)) <= 2.0 * _FOLLOWS
+    The error is that of the means of ten batches.
+    """
+    means = np.array([part.mean() for part in np.array_split(levels, _BATCHES)])
+    if not means.min() > 0.0:
+        return math.nan, math.nan
+    return line((np.arange(_BATCHES) + 0.5) / _BATCHES, np.log(means))
 
 
 class Envelope:
-    """Standard deviations of vx (m/s) in equal windows; `evidence`: the last, the largest and the slope (1/s)."""
+    """Standard deviations of vx (m/s) in equal windows, the last ones in the mean and the largest."""
 
     def __init__(self, history: History) -> None:
         """Take a history of at least `FEWEST_SAMPLES`."""
@@ -259,11 +243,6 @@ class Envelope:
             mean, square = (np.add.reduceat(each, starts) / counts for each in (away, away * away))
             self.vx = np.sqrt(np.maximum(square - mean**2, 0.0))
         self.final, self.largest = float(np.mean(self.vx[_LAST])), float(self.vx.max())
-        self.evidence = {"envelope_final": self.final, "envelope_largest": self.largest}
-        half, centres = slice(WINDOWS // 2, None), np.array(0.5 * (edges[:-1] + edges[1:]) * history.interval)
-        if self.vx[half].min() > 0.0:
-            slope, error = line(centres[half], np.log(self.vx[half]))
-            self.evidence |= {"envelope_slope": slope, "envelope_slope_error": error}
 
     def settled_window(self, within: float, reach: float) -> int | None:
         """The window, never the first, from which on all are settled; None if fewer than ten are."""

@@ -10,7 +10,7 @@ from brakecli.analysis.regime.cleaning import Velocity, cleaned, without_drift
 from brakecli.analysis.regime.signal_rules import FEWEST_SAMPLES, SignalRules, SignalThresholds
 from brakecli.analysis.regime.spectra import Array
 from brakecli.analysis.regime.stick import Slips, seek
-from brakecli.analysis.regime.verdict import Excitation, Regime
+from brakecli.analysis.regime.table import Excitation, Regime
 
 _MOST_OF_IT = 0.9  # of the record: a burst that fills as much is the record
 _MOST_ENERGY = 0.5  # of all bursts in one that speaks for the record

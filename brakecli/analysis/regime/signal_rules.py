@@ -9,7 +9,7 @@ import numpy as np
 from brakecli.analysis.regime.cleaning import CERTAIN, Velocity
 from brakecli.analysis.regime.spectra import interpolated, line_share
 from brakecli.analysis.regime.stick import Slips
-from brakecli.analysis.regime.verdict import Decision, Regime
+from brakecli.analysis.regime.table import Decision, Regime
 
 FEWEST_SAMPLES = 64
 _FINE = 1000.0  # samples of a cycle, after interpolation, among which a plateau is sought

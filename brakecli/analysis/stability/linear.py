@@ -2,7 +2,7 @@
 
 While the pad touches everywhere and the shoe slips to one side only, (6)-(7) are linear: m z̈ + B ż + S z = f.
 The waves of the wheel give f = (sign(U) φ, 1) 2ak Σ g sinc(ωa) sin(ω(x - Ut) + phase). The shoe's own small motion
-in that phase changes f by the slope of the surface times that motion: `slopes` says what this does to the growth.
+in that phase changes f by the slope of the surface times that motion: see `with_slopes`.
 """
 
 import math
@@ -11,8 +11,6 @@ from functools import lru_cache
 
 import numpy as np
 
-from brakecli.analysis.regime.slopes import growth_with_slopes
-from brakecli.analysis.regime.spectra import Array
 from brakecli.analysis.stability.modes import (
     Complex,
     Mode,
@@ -22,6 +20,7 @@ from brakecli.analysis.stability.modes import (
     modes,
     stiffness_matrix,
 )
+from brakecli.solver.compile import Floats as Array
 from brakecli.solver.quantities import ContactState
 from brakecli.solver.system import System
 
@@ -31,6 +30,7 @@ _SCATTERED: Array = np.arange(_MOST_DENSE, dtype=np.float64) * 0.618033988749894
 _NEAR: Array = np.linspace(-1.0, 1.0, 33) / 8.0  # periods of the fastest wave: a block has a time in each eighth
 _HIGHEST = 32  # blocks that are looked at so closely
 _ROUNDING = 1e-12  # of the largest eigenvalue: what a growth rate of zero may be off
+_WEAK = 0.25  # square of what waves answer a mode by, below which the second order is enough
 _ROUNDING_WITH_SLOPES = 1e-9  # the same where the passing waves enter it
 
 
@@ -74,14 +74,33 @@ class Linear:
         return self.depth < self.heights + float(np.abs(self.waves[:, 1]).sum())
 
     def with_slopes(self) -> "Linear":
-        """The same with the growth that the passing waves leave to the mode by their slopes."""
+        """The same with the growth that the passing waves leave to the mode by their slopes, to second order.
+
+        A small motion x(t) beside the forced one changes the normal force by S(t) x, S = Re Σ s e^{iΩt}. A mode λ
+        excites x at λ ± iΩ, by G(λ ± iΩ) s/2, which acts back on it. With the forced motion X in the phases of
+        the waves, S also has a mean, -1/2 Re Σ s conj(ωX). So λ moves by its residue in G times
+        1/4 Σ |s|² (G(λ + iΩ) + G(λ - iΩ)) + that mean. What is left is of fourth order; where a sum of a mode and
+        a wave comes near another mode, this says nothing.
+        """
         if not len(self.waves):
             return self
-        bends = np.outer(self.wavenumbers, self.waves[:, 0])
-        rate, off = growth_with_slopes(self.matrix, self.push, 2.0 * math.pi * self.passing, self.slopes, bends)
-        off += _ROUNDING_WITH_SLOPES * float(np.abs(self.values).max())
-        if not abs(rate) < math.inf:
+        into = np.linalg.lstsq(self.vectors, self.push.astype(complex), rcond=None)[0]
+        residues = self.vectors[0] * into
+        turns = 2j * math.pi * np.concatenate([self.passing, -self.passing])
+        slopes = np.abs(np.tile(self.slopes, 2))
+        bends = self.wavenumbers * self.waves[:, 0]
+        mean = -0.5 * float((self.slopes * bends.conj()).real.sum())
+        beside = self.values[:, None] + turns  # of each mode and wave
+        with np.errstate(divide="ignore", invalid="ignore"):
+            answers = (residues / (beside[:, :, None] - self.values)).sum(axis=2)
+            moved = residues * (mean + 0.25 * (answers * slopes**2).sum(axis=1))
+            strong = (0.5 * np.abs(answers) * slopes).sum(axis=1).max() + np.abs(bends).sum()
+        rates = (self.values + moved).real
+        fastest = int(np.argmax(rates))
+        if not (np.isfinite(rates).all() and strong**2 < _WEAK):
             return replace(self, direction=0, known_to=math.inf)
+        off = float(np.abs(moved).max() * strong**2 + _ROUNDING_WITH_SLOPES * np.abs(self.values).max())
+        rate = float(rates[fastest])
         direction = int(np.sign(rate)) if abs(rate) > off else 0
         return replace(self, mode=replace(self.mode, growth=rate), direction=direction, known_to=off)
 

@@ -1,0 +1,121 @@
+"""What the verdict has to know of the case behind a history."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cache, partial
+
+import numpy as np
+
+from brakecli.analysis.regime.evidence import Part
+from brakecli.analysis.regime.ripple import Ripple, detuned, ripple
+from brakecli.analysis.regime.spectra import forced_lines
+from brakecli.analysis.stability.discrete import spectral_radius, without_damping
+from brakecli.analysis.stability.linear import Linear, linear_theory
+from brakecli.analysis.stability.modes import growth, is_undamped, locks_from, slowest_of_cycles
+from brakecli.errors import CaseError
+from brakecli.solver.schedules import value_at
+from brakecli.solver.steady_sliding import steady_sliding
+from brakecli.solver.system import System
+
+
+@dataclass(frozen=True)
+class Context:
+    """What is known of the case behind a history."""
+
+    belt_speed: float  # U, m/s
+    steady: bool = True  # whether U and Q are constant
+    forced: tuple[float, ...] = ()  # Hz, lines of the roughness
+    waves: tuple[tuple[float, float], ...] = ()  # Hz and m: passing frequency, and the swing of x that it forces
+    quiet: float = 0.0  # m/s, size of vx that may come from rounding
+    frictionless: bool = False
+    undamped: bool = False
+    held: bool = True  # whether a link holds the shoe along the wheel
+    locks: float | None = None  # friction coefficient from which the shoe locks itself, where its own is larger
+    touches: Callable[[], bool] = lambda: True  # whether the shoe touches the wheel where it slides steadily
+    settles: float = math.inf  # 1/s: the slowest disturbance of a limit cycle without stick decays no faster
+    growth: Callable[[], float] = lambda: 0.0  # 1/s, of a small disturbance of steady sliding; below 0 it decays
+    linear: Callable[[], Linear | None] = lambda: None  # the theory of full contact
+    steadier: Callable[[], str] = str  # what to do where the steps damp what grows in theory; empty if they do not
+    ripple: Callable[[Part, Sequence[float]], Ripple | None] = lambda part, lines: None  # of the nodes
+    detuned: Callable[[Part, Sequence[float]], float] = lambda part, lines: 0.0  # part of a forced amplitude
+    powers: Callable[[Part], dict[str, float]] = lambda part: {}  # W, what becomes of the power of the belt
+    radius: float = 1.0  # R, m
+    step: float = 0.0  # s; 0 where steps are chosen to keep an error
+
+    @property
+    def pattern(self) -> float:
+        """Time (s) until the strong waves repeat: a turn or a part of it if they are orders, or the longest."""
+        strong = 0.01 * max((swing for _, swing in self.waves), default=0.0)
+        passing = [frequency for frequency, swing in self.waves if swing > strong]
+        turns = abs(self.belt_speed) / (2.0 * math.pi * self.radius)
+        orders = [round(each / turns) for each in passing]
+        whole = all(math.isclose(each, order * turns) for each, order in zip(passing, orders, strict=True))
+        slowest = turns * math.gcd(*orders) if whole else min(passing)
+        return 1.0 / slowest if passing else 0.0
+
+
+def context(system: System) -> Context:
+    """What the rules have to know of a system."""
+    belt, c = float(value_at(system.belt, system.sampled_duration)), system.coefficients
+    compression = float(np.abs(system.load["value"]).max()) / (c.c_yy + system.contact_stiffness)
+
+    grip = math.copysign(c.phi, belt) if belt else 0.0
+
+    @cache
+    def stiffness() -> float:  # in the mean, for which nodes are good enough, and thirty times cheaper
+        by_nodes = system.method.own_steps and system.finds_patches
+        on_nodes = replace(system, method=replace(system.method, evaluator="midpoint")) if by_nodes else system
+        try:
+            return steady_sliding(on_nodes, belt=belt).stiffness
+        except CaseError:  # none: a shoe that locks itself drifts away, by what full contact makes of it
+            return system.contact_stiffness
+
+    theory = cache(partial(linear_theory, system, belt))
+    turns, highest = tuple(system.wheel.turns.tolist()), 0.5 / system.interval
+    swings = np.abs(known.waves[:, 0]) if turns and (known := theory()) else np.ones(len(turns))
+    waves = tuple((abs(belt) * turn, float(swing)) for turn, swing in zip(turns, swings, strict=True))
+    fastest = compression * system.natural_frequencies[1]
+    return Context(
+        belt,
+        radius=system.radius,
+        step=0.0 if system.method.own_steps or system.method.step is None else system.step,
+        steady=system.steady,
+        forced=forced_lines(belt, turns, highest),
+        waves=waves if belt else (),
+        quiet=1e-9 * fastest,
+        frictionless=c.phi == 0.0,
+        undamped=is_undamped(c),
+        held=c.c_xx > 0.0,
+        locks=limit if c.phi > (limit := locks_from(c, system.contact_stiffness, belt)) else None,
+        touches=lambda: stiffness() > 0.0,
+        settles=slowest_of_cycles(c),
+        growth=lambda: growth(c, stiffness(), grip),
+        linear=theory,
+        steadier=lambda: _steadier(system),
+        ripple=lambda part, lines: ripple(system, belt, stiffness(), part, lines),
+        detuned=lambda part, lines: detuned(system, belt, stiffness(), part, lines),
+        powers=partial(_powers, system, belt),
+    )
+
+
+def _steadier(system: System) -> str:
+    """What to do where no disturbance grows by the scheme at its step; empty where one does."""
+    k, phi = system.contact_stiffness, system.coefficients.phi
+    grows = system.method.own_steps or spectral_radius(system, k, phi) > 1.0
+    return "" if grows else without_damping(system.method)
+
+
+def _powers(system: System, belt: float, part: Part) -> dict[str, float]:
+    """Mean powers (W) at constant U (m/s) and Q (N): the belt's, what becomes of it, and what is left."""
+    c, sums = system.coefficients, np.zeros(4)
+    for v_x, v_y, friction in zip(*map(part.pieces, ("vx", "vy", "friction_force")), strict=True):
+        sums += (
+            belt * friction.sum(),
+            -float(friction @ (v_x - belt)),
+            float(c.b_xx * v_x @ v_x + 2.0 * c.b_xy * v_x @ v_y + c.b_yy * v_y @ v_y),
+            system.load_at_start * (c.sin_beta * v_x.sum() + c.cos_beta * v_y.sum()),
+        )
+    means = sums / (part.stop - part.start)
+    names = ("power_belt", "power_friction", "power_dashpots", "power_load", "power_rest")
+    return dict(zip(names, [*means.tolist(), float(np.subtract.reduce(means))], strict=True))

@@ -1,0 +1,190 @@
+"""The record of answers to the questions of `table`, from a history and what is known of its case."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache, cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from brakecli.analysis.regime.context import Context
+from brakecli.analysis.regime.cycles import Cycles, cycles_of
+from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, WINDOWS, Envelope, Part, level_change
+from brakecli.analysis.regime.table import Answers, Fate, Thresholds
+from brakecli.analysis.stability.linear import Linear
+from brakecli.solver.history import History
+from brakecli.solver.quantities import ContactState
+from brakecli.solver.tangent import Exponent
+
+_NOTHING = 1e-3  # of a beat over the slowest wave, that is rounding
+
+
+class Continued(NamedTuple):
+    """What the motion comes to on the smooth wheel, in SI units; nan where it is no limit cycle."""
+
+    fate: Fate = Fate.UNKNOWN
+    amplitude: float = math.nan
+    rate: float = math.nan  # at which its slowest disturbance fades
+    period: float = math.nan
+    sticks: float = math.nan  # in a period
+
+
+class Shown:
+    """What a history shows."""
+
+    def __init__(self, history: History, context: Context, limits: Thresholds) -> None:
+        """Take a history and what is known of its case."""
+        self.history, self.context, self.limits = history, context, limits
+        self.duration = history.samples * history.interval
+        self.whole = Part(history, 0, history.samples)
+        self.half = replace(self.whole, start=history.samples // 2)
+        self.last = replace(self.whole, start=history.samples * (WINDOWS - 10) // WINDOWS)
+
+    @cached_property
+    def envelope(self) -> Envelope | None:
+        """The level of vx over time; None where samples are too few."""
+        return Envelope(self.history) if self.history.samples >= FEWEST_SAMPLES else None
+
+    @cached_property
+    def settled(self) -> Part | None:
+        """The settled part, if there is one."""
+        within = self.limits.settled_within
+        first = self.envelope.settled_window(within, 0.4 * within) if self.envelope else None
+        return None if first is None else replace(self.whole, start=first * self.history.samples // WINDOWS)
+
+    @property
+    def judged(self) -> Part:
+        """The settled part, or the second half."""
+        return self.settled or self.half
+
+    @cached_property
+    def linear(self) -> Linear | None:
+        """The theory, where the motion has long been linear at last."""
+        theory, slow = self.context.linear(), self.slowest(0.0)
+        if theory is None:
+            return None
+        start = max(min(self.last.start, self.history.samples - int(slow / self.history.interval)), 0)
+        slides = replace(self.last, start=start).slides(theory.slip) or theory.stays(self.end[1])
+        return theory.with_slopes() if slides else None
+
+    @property
+    def end(self) -> tuple[float, np.ndarray]:
+        """Time and state of the last sample."""
+        last = self.history.samples - 1
+        state = [float(self.history.read(name, last, last + 1)[0]) for name in ("x", "y", "vx", "vy")]
+        return last * self.history.interval, np.array(state)
+
+    @cached_property
+    def cycles(self) -> Cycles | None:
+        """The cycles of the part that is judged."""
+        known, theory = self.context, self.context.linear() if not self.context.forced else None
+        return cycles_of(self.judged, theory.slip if theory else None, known.step, known.belt_speed, known.waves)
+
+    def slowest(self, amplitude: float) -> float:
+        """Period (s) of the slowest wave that counts beside an amplitude of x (m) and beside the others; or 0."""
+        return 1.0 / min(counts) if (counts := self._counting(amplitude)) else 0.0
+
+    def beat(self, amplitude: float = 0.0) -> float:
+        """Period (s) of the slowest wave, or of the slowest beat of one that counts with a multiple of another."""
+        slow, counts = self.slowest(amplitude), self._counting(amplitude)
+        beats = [abs(f - n * g) for f in counts for g in counts for n in range(1, 11)]
+        return max([slow, *(1.0 / beat for beat in beats if beat * slow > _NOTHING)])
+
+    def _counting(self, amplitude: float) -> list[float]:
+        """Frequencies (Hz) of the waves that count beside an amplitude of x (m) and beside the others."""
+        least = max([amplitude, *(swing for _, swing in self.context.waves)])
+        return [f for f, swing in self.context.waves if swing >= self.limits.settled_within * least]
+
+    def changes(self) -> float:
+        """By which part vx or x, whichever does more so, swings otherwise in the last quarter than before."""
+        before = replace(self.half, stop=3 * self.history.samples // 4)
+        sizes = [np.array([each.deviation("vx"), each.amplitude("x")]) for each in (before, self.last)]
+        return float(np.abs(sizes[0] / np.maximum(sizes[1], 1e-300) - 1.0).max())
+
+    def power(self) -> tuple[float, float, float]:
+        """Powers (W) that friction and the roughness give, and their error."""
+        friction, off = self.judged.power("friction_force", "vx")
+        roughness, off_too = self.judged.power("normal_force", "vy")
+        lost = self.context.powers(self.judged).get("power_dashpots", friction + roughness)
+        return friction, roughness, max(math.hypot(off, off_too), abs(friction + roughness - lost))
+
+
+def answers(
+    shown: Shown, exponent: Exponent | None, continued: Callable[[], Continued], failure: str = ""
+) -> Answers:
+    """The record of answers; `continued` is asked only where a row may need it."""
+    continued = cache(continued)
+    context, history, half, last = shown.context, shown.history, shown.half, shown.last
+    stands, waves = context.belt_speed == 0.0, bool(context.forced)
+    away, stick = ContactState.SEPARATED, ContactState.STICK
+    lost = half.fraction(away) == 1.0
+    found: dict[str, Any] = {
+        "failure": failure or "",
+        "duration": shown.duration,
+        "samples": history.samples,
+        "few_samples": shown.envelope is None,
+        "steady": context.steady,
+        "stands": stands,
+        "waves": waves,
+        "frictionless": context.frictionless,
+        "undamped": context.undamped,
+        "locks": math.nan if context.locks is None else context.locks,
+        "held": context.held,
+        "never": lost and shown.whole.fraction(away) == 1.0,
+        "lost": lost,
+        "left": last.fraction(away) == 1.0,
+        "carried": (last if stands else half).fraction(stick) == 1.0,
+    }
+    if exponent is not None:
+        found |= dict(zip(("exponent", "exponent_error", "even", "even_error"), exponent, strict=True))
+    if shown.envelope is None or not context.steady or failure:
+        return Answers(**found)
+    change, change_error = level_change(shown.envelope.vx[WINDOWS // 2 :])
+    found |= {
+        "moves": shown.envelope.largest > context.quiet,
+        "slowest": shown.slowest(half.amplitude("x")),
+        "change": change,
+        "change_error": change_error,
+        "amplitude": last.amplitude("x"),
+        "settled": shown.settled is not None,
+        "seconds": (history.samples - shown.judged.start) * history.interval,
+    }
+    if (theory := shown.linear) is not None:
+        found |= {"linear": True, "growth": theory.mode.growth, "growth_error": theory.known_to}
+        found |= {"ringing": theory.mode.frequency}
+        if theory.direction > 0:
+            found |= {"to_limit": theory.seconds_to_limit(*shown.end), "steadier": context.steadier()}
+        return Answers(**found)
+    found["growth"] = context.growth()
+    if not context.frictionless:
+        alone = continued()
+        names = ("without_waves", *(f"{name}_without_waves" for name in Continued._fields[1:]))
+        found |= dict(zip(names, alone, strict=True))
+    if waves:
+        friction, roughness, error = shown.power()
+        found |= {
+            "power_of_friction": friction,
+            "power_of_roughness": roughness,
+            "power_error": error,
+            "touches": context.touches(),
+        }
+    if cycles := shown.cycles:
+        names = ("cycles", "samples_per_cycle", "stick_cycles", "harmonic_share")
+        found |= {name: cycles.evidence[name] for name in names}
+        near = _sticks(continued(), cycles, found["amplitude"], shown.limits.settled_within)
+        if not waves and near is not None:
+            found["stick_cycles"] = near
+        if cycles.evidence["frequency_spread"] <= shown.limits.settled_within * cycles.frequency:
+            found["band_share"] = shown.judged.narrow()
+        if context.step:
+            found["steps_per_cycle"] = 1.0 / (cycles.frequency * context.step)
+    return Answers(**found)
+
+
+def _sticks(limit: Continued, cycles: Cycles, amplitude: float, within: float) -> float | None:
+    """The part of the cycles that stick, where the motion has come to its limit cycle: samples may miss some."""
+    turns = limit.period * cycles.frequency
+    if not abs(amplitude - limit.amplitude) <= within * limit.amplitude or not turns >= 0.5:
+        return None
+    return min(limit.sticks / round(turns), 1.0)

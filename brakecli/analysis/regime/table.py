@@ -1,0 +1,596 @@
+"""The table: what is said of a motion, by one record of answers. Nothing here looks at a history.
+
+Rows are tried from the top, and the first whose condition holds decides; the last one always does. A row that
+says that the motion lasts by itself leaves it to the rows of `LOOKS` how it looks.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any, NamedTuple
+
+_ROUNDING = math.log(1e9)  # powers of e from rounding to the size of a motion
+
+
+class Regime(StrEnum):
+    """The paper's three regimes, and `undecided`."""
+
+    DAMPED = "damped"
+    RELAXATION = "relaxation"
+    QUASI_HARMONIC = "quasi-harmonic"
+    UNDECIDED = "undecided"
+
+
+class Excitation(StrEnum):
+    """Where the energy of a sustained motion comes from."""
+
+    SELF_EXCITED = "self-excited"
+    FORCED = "forced"
+    NONE = "none"
+
+
+class Fate(StrEnum):
+    """What becomes of a motion on the smooth wheel."""
+
+    DIES = "dies"
+    LASTS = "lasts"
+    UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """The only numbers that decide a verdict: see docs/regimes.md, and `make statistics` for what each moves."""
+
+    settled_within: float = 0.05  # part of its level by which a settled motion may change
+    sure_errors: float = 3.0  # standard errors beyond which a change is no chance
+    comes_together: float = 1.0  # powers of e by which neighbours that come together do so in half of the run
+    same_level: float = 0.3  # part by which two motions of the same level may differ
+    fewest_cycles: float = 10.0  # in the settled part
+    samples_per_cycle: float = 8.0
+    stick_cycles: float = 0.8  # part of the cycles that stick in relaxation; in 1 less it, others may
+    harmonic_share: float = 0.8  # part of the energy on one line and its multiples
+    band_share: float = 0.9  # part of it in three narrow bands, which chaos may have, too
+
+
+@dataclass(frozen=True)
+class Answers:
+    """What is known of a motion, in SI units; nan where a number is not known."""
+
+    failure: str = ""  # why the run has failed
+    duration: float = math.nan
+    samples: int = 0
+    few_samples: bool = False  # too few for an envelope
+    steady: bool = True  # whether the wheel's speed and the load are constant
+    stands: bool = False  # whether the wheel stands
+    waves: bool = False  # whether the roughness of a turning wheel shakes the shoe
+    slowest: float = 0.0  # period of the slowest wave that counts
+    frictionless: bool = False
+    undamped: bool = False
+    locks: float = math.nan  # friction coefficient from which on the shoe locks itself, where its own is larger
+    held: bool = True  # whether a link holds the shoe along the wheel
+    touches: bool = True  # whether the shoe touches the wheel where it slides steadily
+    growth: float = math.nan  # of a small disturbance of steady sliding, 1/s
+    growth_error: float = 0.0  # by which the slopes of the waves may change it
+    ringing: float = math.nan  # frequency of that disturbance
+    steadier: str = ""  # what to do where the steps damp what grows
+    never: bool = False  # the shoe has never touched the wheel
+    lost: bool = False  # no contact in the second half
+    left: bool = False  # no contact in the last quarter
+    carried: bool = False  # stick in the second half, of a standing wheel in the last quarter
+    moves: bool = True  # beyond rounding
+    linear: bool = False  # slips to one side in full contact, at last
+    to_limit: float = math.nan  # time until stick or loss of contact limits what grows
+    change: float = math.nan  # of the logarithm of the level within the second half
+    change_error: float = math.nan
+    exponent: float = math.nan  # of neighbours, 1/s
+    exponent_error: float = math.nan
+    even: float = math.nan  # the same of a linear motion, by a line
+    even_error: float = math.nan
+    without_waves: Fate = Fate.UNKNOWN  # of the motion on the smooth wheel
+    amplitude: float = math.nan  # of x at the end
+    amplitude_without_waves: float = math.nan  # that it comes to on the smooth wheel
+    rate_without_waves: float = math.nan  # at which it does
+    period_without_waves: float = math.nan  # of the limit cycle that this is
+    sticks_without_waves: float = math.nan  # in a period
+    power_of_friction: float = math.nan  # power that friction gives, W
+    power_of_roughness: float = math.nan  # that the roughness gives
+    power_error: float = math.nan
+    seconds: float = math.nan  # of the settled part
+    settled: bool = False  # whether such a part was found
+    cycles: float = 0.0  # in it
+    samples_per_cycle: float = 0.0
+    steps_per_cycle: float = math.inf  # where the case gives a step
+    stick_cycles: float = math.nan
+    harmonic_share: float = math.nan  # of one line and its multiples
+    band_share: float = math.nan  # in three narrow bands, where the frequency does not wander
+
+    def powers(self, rate: float) -> float:
+        """Powers of e by which something changes in half of the run."""
+        return 0.5 * rate * self.duration
+
+    def rate(self, errors: float) -> tuple[float, float]:
+        """Growth rate of what a linear motion holds beside the forced one, and how far it may be off."""
+        if abs(self.growth) > self.growth_error or not math.isfinite(self.even):
+            return self.growth, self.growth_error
+        return self.even, errors * self.even_error
+
+    @property
+    def longer(self) -> float:
+        """Duration after which a change has come to its end: its last quarter is judged."""
+        rate = abs(self.change) / (0.5 * self.duration)
+        return 4.0 / 3.0 * (self.duration + 3.0 / max(rate, 1e-300))
+
+    @property
+    def grown(self) -> float:
+        """Duration after which what grows has come to its limits."""
+        return 4.0 / 3.0 * (self.duration + self.to_limit + 3.0 / self.growth)
+
+    @property
+    def waited(self) -> float:
+        """Duration after which neighbours have come together."""
+        return 4.0 / 3.0 * (self.duration + 3.0 / max(abs(self.exponent), 1e-300))
+
+    @property
+    def decay(self) -> float:
+        """Rate (1/s) at which a disturbance fades."""
+        return -self.growth
+
+    @property
+    def sticks(self) -> str:
+        """How often the motion sticks."""
+        return f"with stick in {self.stick_cycles:.0%} of the cycles" if self.stick_cycles else "without stick"
+
+    @property
+    def two_waves(self) -> float:
+        """Duration whose settled part holds two periods of the slowest wave."""
+        return 2.8 * self.slowest
+
+    @property
+    def lines(self) -> str:
+        """Where the energy of vx lies."""
+        if self.band_share > self.harmonic_share:
+            return f"{self.band_share:.0%} of the energy of vx in three narrow bands"
+        return f"{self.harmonic_share:.0%} of the energy of vx in one line and its harmonics"
+
+    @property
+    def limit(self) -> str:
+        """What it comes to on the smooth wheel."""
+        if not math.isfinite(self.amplitude_without_waves):
+            return "no limit cycle that was found"
+        frequency = 1.0 / self.period_without_waves
+        return f"an amplitude of {self.amplitude_without_waves:.4g} m in a cycle of {frequency:.4g} Hz"
+
+    @property
+    def or_longer(self) -> str:
+        """How long it takes to grow from rounding to the size of a motion, if that is longer than the run."""
+        seconds = _ROUNDING / self.growth
+        return f", or run at least {seconds:.2g} s" if seconds > self.duration else ""
+
+    @property
+    def word(self) -> str:
+        """Which way the level changes."""
+        return "grows" if self.change > 0.0 else "falls"
+
+
+class Decision(NamedTuple):
+    """What a row decides, and why."""
+
+    reason: str
+    regime: Regime = Regime.UNDECIDED
+    excitation: Excitation = Excitation.NONE
+    frequency: float | None = None  # Hz
+    stick_fraction: float | None = None
+    advice: str = ""  # what to do
+    row: str = ""  # its name
+
+    @property
+    def sentence(self) -> str:
+        """The reason, and what to do."""
+        return f"{self.reason}; {self.advice}" if self.advice else self.reason
+
+
+class Row(NamedTuple):
+    """A row: its name, its condition, what it says, and what to do. `{…}` are attributes of the answers."""
+
+    name: str
+    holds: Callable[[Answers, Thresholds], Any]
+    sentence: str
+    remedy: str = ""
+    regime: Regime = Regime.UNDECIDED
+    excitation: Excitation = Excitation.NONE
+
+    def decision(self, answers: Answers) -> Decision:
+        """What it says of these answers."""
+        reason, advice = (text.format(a=answers) for text in (self.sentence, self.remedy))
+        return Decision(reason, self.regime, self.excitation, advice=advice, row=self.name)
+
+
+def _steady(a: Answers, t: Thresholds) -> bool:
+    """The level does not change, but for chance."""
+    return abs(a.change) <= max(t.sure_errors * a.change_error, 2.0 * t.settled_within)
+
+
+def _together(a: Answers, t: Thresholds) -> bool:
+    """Neighbours of the motion come together."""
+    return a.powers(a.exponent) < -max(t.comes_together, t.sure_errors * a.powers(a.exponent_error))
+
+
+def _same(a: Answers, t: Thresholds) -> bool:
+    """The motion has the amplitude that it would have on the smooth wheel."""
+    return abs(a.amplitude - a.amplitude_without_waves) <= t.same_level * a.amplitude_without_waves
+
+
+def _smaller(a: Answers, t: Thresholds) -> bool:
+    """The motion is smaller than it would be on the smooth wheel."""
+    return a.amplitude < (1.0 - t.same_level) * a.amplitude_without_waves
+
+
+def _gives(a: Answers, t: Thresholds) -> bool:
+    return a.power_of_friction > t.sure_errors * a.power_error
+
+
+def _friction_gives_more(a: Answers, t: Thresholds) -> bool:
+    return a.power_of_friction - max(a.power_of_roughness, 0.0) > t.sure_errors * a.power_error
+
+
+def _roughness_gives(a: Answers, t: Thresholds) -> bool:
+    return a.power_of_roughness - max(a.power_of_friction, 0.0) > t.sure_errors * a.power_error
+
+
+def _regular(a: Answers, t: Thresholds) -> bool:
+    return a.harmonic_share >= t.harmonic_share or a.band_share >= t.band_share
+
+
+def _takes(a: Answers, t: Thresholds) -> bool:
+    return a.power_of_friction < -t.sure_errors * a.power_error
+
+
+def _decays(a: Answers, t: Thresholds) -> bool:
+    rate, error = a.rate(t.sure_errors)
+    return rate < -error
+
+
+def _grows(a: Answers, t: Thresholds) -> bool:
+    rate, error = a.rate(t.sure_errors)
+    return rate > error
+
+
+_DAMPED, _FORCED = Regime.DAMPED, (Regime.DAMPED, Excitation.FORCED)
+_OWN = Regime.UNDECIDED, Excitation.SELF_EXCITED  # how it looks, `LOOKS` decides
+_DASHPOT = "a dashpot would decide"
+_CHECK = "check load.force, and the angles of the links"
+_LINEAR = "full contact and slip to one side make the motion linear"
+
+CONTACT: tuple[Row, ...] = (
+    Row("failed", lambda a, t: a.failure, "the run failed: {a.failure}"),
+    Row("never touched", lambda a, t: a.never, "the shoe has never touched the wheel", _CHECK),
+    Row("lost", lambda a, t: a.lost, "the shoe has lost contact for good", _CHECK),
+    Row(
+        "left",
+        lambda a, t: a.left,
+        "the shoe has left the wheel",
+        "run longer, to see whether it comes back",
+    ),
+    Row(
+        "at rest",
+        lambda a, t: a.carried and a.stands,
+        "the shoe has come to rest, sticking to the standing wheel",
+        "",
+        _DAMPED,
+    ),
+    Row(
+        "not held",
+        lambda a, t: a.carried and not a.held,
+        "the shoe sticks throughout and is carried along by the wheel: no link holds it along the wheel",
+        "incline a link, by its angle_deg",
+    ),
+    Row(
+        "locks itself",
+        lambda a, t: a.carried and a.steady and math.isfinite(a.locks),
+        "the shoe sticks throughout and is carried along by the wheel: it locks itself, as friction grows faster "
+        "with x than the force that it needs, so that no longer run will see it slip",
+        "it slips below a friction coefficient of {a.locks:.4g}",
+    ),
+    Row(
+        "carried",
+        lambda a, t: a.carried,
+        "the shoe sticks throughout and is carried along by the wheel",
+        "run longer",
+    ),
+    Row(
+        "few samples",
+        lambda a, t: a.few_samples,
+        "only {a.samples} samples, too few",
+        "run longer, or sample more often",
+    ),
+    Row(
+        "changes",
+        lambda a, t: not a.steady,
+        "the wheel's speed or the load changes with time, so the motion cannot settle",
+    ),
+    Row(
+        "nothing moves yet",
+        lambda a, t: not a.moves and a.growth > 0.0,
+        "nothing moves yet, but sliding is unstable: a disturbance grows at {a.growth:.3g} 1/s",
+        "start beside steady sliding{a.or_longer}",
+    ),
+    Row(
+        "nothing moves",
+        lambda a, t: not a.moves,
+        "nothing moves beyond rounding: the shoe slides steadily or rests",
+        "",
+        _DAMPED,
+    ),
+    Row(
+        "standing wheel",
+        lambda a, t: a.stands and not a.undamped,
+        "the wheel stands: friction and dashpots take the energy",
+        "",
+        _DAMPED,
+    ),
+    Row("standing wheel, no dashpots", lambda a, t: a.stands, "the wheel stands, but no dashpot damps", _DASHPOT),
+)
+SMOOTH: tuple[Row, ...] = (
+    Row(
+        "linear, held by the steps",
+        lambda a, t: a.linear and _grows(a, t) and a.steadier,
+        _LINEAR + ": it grows at {a.growth:.3g} 1/s, but the scheme's steps damp it",
+        "{a.steadier}",
+    ),
+    Row(
+        "linear, grows",
+        lambda a, t: a.linear and _grows(a, t),
+        _LINEAR + ": still growing at {a.growth:.3g} 1/s ({a.ringing:.4g} Hz)",
+        "run at least {a.grown:.3g} s",
+    ),
+    Row(
+        "linear, decays",
+        lambda a, t: a.linear and _decays(a, t),
+        _LINEAR + ": the shoe's own vibration decays at {a.decay:.3g} 1/s ({a.ringing:.4g} Hz)",
+        "",
+        _DAMPED,
+    ),
+    Row("linear, neutral", lambda a, t: a.linear, _LINEAR + ": it neither grows nor decays", _DASHPOT),
+    Row(
+        "no friction",
+        lambda a, t: a.frictionless and not a.undamped,
+        "without friction nothing excites the shoe, and the dashpots damp it",
+        "",
+        _DAMPED,
+    ),
+    Row(
+        "no friction, no dashpots",
+        lambda a, t: a.frictionless,
+        "without friction nothing excites the shoe, but no dashpot damps it",
+        _DASHPOT,
+    ),
+    Row(
+        "no dashpots",
+        lambda a, t: a.undamped and not a.growth > 0.0 and a.without_waves != Fate.LASTS,
+        "sliding is stable, and no dashpot makes a large vibration settle",
+        _DASHPOT,
+    ),
+    Row(
+        "fades",
+        lambda a, t: a.without_waves == Fate.DIES,
+        "the vibration dies out: continued, it comes to steady sliding",
+        "",
+        _DAMPED,
+    ),
+    Row(
+        "lasts",
+        lambda a, t: a.without_waves == Fate.LASTS and _same(a, t),
+        "the vibration lasts: continued, it comes to an amplitude of {a.amplitude_without_waves:.3g} m",
+        "",
+        *_OWN,
+    ),
+    Row(
+        "on its way",
+        lambda a, t: a.without_waves == Fate.LASTS and math.isfinite(a.amplitude_without_waves),
+        "the vibration lasts, and is still on its way to an amplitude of {a.amplitude_without_waves:.3g} m",
+        "",
+        *_OWN,
+    ),
+    Row(
+        "lasts, irregular",
+        lambda a, t: a.without_waves == Fate.LASTS and _steady(a, t),
+        "the vibration lasts, as sliding is unstable, and its level does not change",
+        "",
+        *_OWN,
+    ),
+    Row(
+        "undecided",
+        lambda a, t: True,
+        "the level {a.word} by e^{a.change:.2g} in the second half, and what it comes to is not known",
+        "run at least {a.longer:.3g} s",
+    ),
+)
+ROUGH: tuple[Row, ...] = (
+    Row(
+        "shorter than a wave",
+        lambda a, t: a.duration < a.slowest,
+        "the run is shorter than the period of the slowest wave, {a.slowest:.3g} s",
+        "run at least {a.two_waves:.3g} s",
+    ),
+    *SMOOTH[:1],
+    Row(
+        "linear, forced",
+        lambda a, t: a.linear and _decays(a, t) and not a.undamped,
+        "only the roughness shakes the shoe: " + SMOOTH[2].sentence,
+        "",
+        *_FORCED,
+    ),
+    SMOOTH[1],
+    Row(
+        "linear, open",
+        lambda a, t: a.linear,
+        _LINEAR + ": neighbours neither come together nor part surely, at {a.even:.2g} ± {a.even_error:.1g} 1/s",
+        "run longer; without dashpots, " + _DASHPOT,
+    ),
+    Row(
+        "forced, no friction",
+        lambda a, t: a.frictionless and not a.undamped,
+        "only the roughness shakes the shoe: without friction nothing else excites it",
+        "",
+        *_FORCED,
+    ),
+    SMOOTH[5],
+    Row(
+        "bounces",
+        lambda a, t: not a.touches,
+        "sliding steadily the shoe would not touch the wheel: it bounces, and may leave it for good",
+        _CHECK,
+    ),
+    Row(
+        "forced, neighbours",
+        lambda a, t: a.without_waves == Fate.DIES and _together(a, t),
+        "only the roughness shakes the shoe: without it the vibration dies out, and neighbours come together at "
+        "{a.exponent:.3g} 1/s",
+        "",
+        *_FORCED,
+    ),
+    Row(
+        "forced, steady",
+        lambda a, t: a.without_waves == Fate.DIES and _steady(a, t) and not a.undamped,
+        "only the roughness shakes the shoe: without it the vibration dies out, and its level does not change",
+        "",
+        *_FORCED,
+    ),
+    Row(
+        "forced, friction takes",
+        lambda a, t: _takes(a, t) and _steady(a, t) and not a.undamped,
+        "only the roughness shakes the shoe: friction takes {a.power_of_friction:.2g} W from the vibration",
+        "",
+        *_FORCED,
+    ),
+    Row(
+        "forced, roughness gives",
+        lambda a, t: _together(a, t) and _steady(a, t) and _roughness_gives(a, t) and not a.undamped,
+        "only the roughness shakes the shoe: it gives {a.power_of_roughness:.2g} W, friction "
+        "{a.power_of_friction:.2g} W, and neighbours come together at {a.exponent:.3g} 1/s",
+        "",
+        *_FORCED,
+    ),
+    Row(
+        "forced, held down",
+        lambda a, t: _together(a, t) and _steady(a, t) and _smaller(a, t) and not a.undamped,
+        "only the roughness shakes the shoe: neighbours come together at {a.exponent:.3g} 1/s, far below the "
+        "amplitude of {a.amplitude_without_waves:.3g} m that the vibration would come to without it",
+        "",
+        *_FORCED,
+    ),
+    Row(
+        "dies out, not yet",
+        lambda a, t: a.without_waves == Fate.DIES,
+        "without the roughness the vibration dies out, but its level still {a.word} by e^{a.change:.2g} in the "
+        "second half",
+        "run at least {a.waited:.3g} s",
+    ),
+    Row(
+        "no dashpots, rough",
+        lambda a, t: a.undamped and not a.growth > 0.0,
+        "no dashpot damps what the shoe adds to what the waves force",
+        _DASHPOT,
+    ),
+    Row(
+        "self-excited",
+        lambda a, t: (
+            a.without_waves == Fate.LASTS
+            and not _together(a, t)
+            and (_steady(a, t) or a.growth > 0.0)
+            and _gives(a, t)
+            and not a.undamped
+        ),
+        "the vibration lasts without the roughness, with a phase of its own",
+        "",
+        *_OWN,
+    ),
+    Row(
+        "locked to the waves",
+        lambda a, t: (
+            a.without_waves == Fate.LASTS
+            and _together(a, t)
+            and _steady(a, t)
+            and _same(a, t)
+            and _friction_gives_more(a, t)
+        ),
+        "the vibration lasts without the roughness at the same level, and is locked to it",
+        "",
+        *_OWN,
+    ),
+    Row(
+        "still changes",
+        lambda a, t: not _steady(a, t),
+        "the level {a.word} by e^{a.change:.2g} in the second half",
+        "run at least {a.longer:.3g} s",
+    ),
+    Row(
+        "either",
+        lambda a, t: True,
+        "friction and the roughness may both keep the vibration up: of its power friction gives "
+        "{a.power_of_friction:.2g} W and the roughness {a.power_of_roughness:.2g} W; neighbours change at "
+        "{a.exponent:.2g} 1/s; without the roughness it {a.without_waves}",
+    ),
+)
+LOOKS: tuple[Row, ...] = (
+    Row(
+        "few cycles",
+        lambda a, t: not a.cycles or a.cycles < (1.0 if a.settled else 1.5) * t.fewest_cycles,
+        "but only {a.cycles:.0f} cycles in {a.seconds:.3g} s",
+        "run longer",
+    ),
+    Row(
+        "few steps in a cycle",
+        lambda a, t: a.steps_per_cycle < t.samples_per_cycle,
+        "but only {a.steps_per_cycle:.1f} steps a cycle",
+        "reduce solver.step and output.sample_interval",
+    ),
+    Row(
+        "few samples in a cycle",
+        lambda a, t: a.samples_per_cycle < t.samples_per_cycle,
+        "but only {a.samples_per_cycle:.1f} samples a cycle",
+        "reduce output.sample_interval",
+    ),
+    Row(
+        "shorter than two waves",
+        lambda a, t: a.seconds < 2.0 * a.slowest,
+        "but the settled part holds less than two periods of the slowest wave, {a.slowest:.3g} s",
+        "run at least {a.two_waves:.3g} s",
+    ),
+    Row(
+        "relaxation",
+        lambda a, t: a.stick_cycles >= t.stick_cycles,
+        "with stick in {a.stick_cycles:.0%} of {a.cycles:.0f} cycles",
+        "",
+        Regime.RELAXATION,
+        Excitation.SELF_EXCITED,
+    ),
+    Row(
+        "quasi-harmonic",
+        lambda a, t: a.stick_cycles <= 1.0 - t.stick_cycles and _regular(a, t),
+        "{a.sticks}: {a.lines}",
+        "",
+        Regime.QUASI_HARMONIC,
+        Excitation.SELF_EXCITED,
+    ),
+    Row(
+        "irregular",
+        lambda a, t: True,
+        "irregular: stick in {a.stick_cycles:.0%} of the cycles, {a.lines}",
+        "run longer, or look at the spectrum",
+    ),
+)
+
+
+def decide(answers: Answers, thresholds: Thresholds) -> Decision:
+    """What the first row says whose condition holds."""
+    found = _first((*CONTACT, *(ROUGH if answers.waves else SMOOTH)), answers, thresholds)
+    if found.excitation is not Excitation.SELF_EXCITED:
+        return found
+    look = _first(LOOKS, answers, thresholds)
+    return look._replace(reason=f"{found.reason}, {look.reason}", row=f"{found.row}: {look.row}")
+
+
+def _first(rows: tuple[Row, ...], answers: Answers, thresholds: Thresholds) -> Decision:
+    return next(row for row in rows if row.holds(answers, thresholds)).decision(answers)

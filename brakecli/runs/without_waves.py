@@ -1,0 +1,48 @@
+"""What becomes of a motion without the waves: continued from its last state on the smooth wheel."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from brakecli.analysis.regime.measure import Continued
+from brakecli.analysis.regime.table import Fate
+from brakecli.analysis.stability.modes import growth, is_undamped
+from brakecli.branches.begin import UNKNOWN, End, on_rough_pads, on_smooth_pads
+from brakecli.branches.line import Shoe
+from brakecli.errors import CaseError
+from brakecli.solver.automaton import STICK
+from brakecli.solver.compile import Floats
+from brakecli.solver.roughness import surface
+from brakecli.solver.steady_sliding import steady_sliding
+from brakecli.solver.system import System
+
+
+def without_waves(system: System, state: Floats) -> Continued:
+    """What the motion from a state (x, y, v_x, v_y) comes to on the smooth wheel, at constant speed and load.
+
+    Where steady sliding is unstable, and it does not come near it, it lasts, whatever it comes to.
+    """
+    flat = replace(system, wheel=surface(), tangents=False)
+    if flat.belt_speed == 0.0:
+        return Continued()
+    end = _on_a_rough_shoe(flat, state) if flat.shoe.g.size else on_smooth_pads(Shoe.of(flat), state)
+    if end.lasts is None:
+        return Continued(Fate.UNKNOWN if end.state is None else Fate.LASTS)
+    if end.orbit is None or end.rate is None:
+        return Continued(Fate.LASTS if end.lasts else Fate.DIES)
+    orbit = end.orbit
+    return Continued(Fate.LASTS, orbit.amplitude, end.rate, orbit.period, orbit.word.count(STICK))
+
+
+def _on_a_rough_shoe(flat: System, state: Floats) -> End:
+    """The end of a motion whose force is a curve of y alone; unknown where no dashpot makes it settle."""
+    if is_undamped(flat.coefficients):
+        return UNKNOWN
+    try:
+        rest = steady_sliding(flat)
+    except CaseError:
+        return UNKNOWN
+    if growth(flat.coefficients, rest.stiffness, math.copysign(flat.coefficients.phi, flat.belt_speed)) > 0.0:
+        return End(None, state)
+    return on_rough_pads(flat, state, [np.array([rest.x, rest.y, 0.0, 0.0])])
