@@ -25,6 +25,7 @@ from brakecli.runs.without_waves import without_waves
 from brakecli.solver.history import History
 from brakecli.solver.system import System
 from brakecli.solver.tangent import Exponent
+from brakecli.solver.track import Track
 
 _DEFAULT = Thresholds()
 
@@ -34,6 +35,7 @@ def verdict_on(
     system: System,
     failure: str | None,
     exponent: Exponent | None = None,
+    track: Track | None = None,
     thresholds: Thresholds = _DEFAULT,
     continued: Callable[[], Continued] | None = None,
     *,
@@ -51,6 +53,7 @@ def verdict_on(
         context(system),
         thresholds,
         exponent=exponent,
+        track=track,
         continued=continued or computed,
         failure=failure,
         in_full=in_full,
@@ -63,7 +66,7 @@ def classify_result(path: Path, thresholds: Thresholds) -> dict[str, Any]:
         failure = attributes.get("failure")
         found = {"over_time": None if failure else over_time(history, system)}
         exponent, continued = _stored(attributes, evidence)
-        verdict = verdict_on(history, system, failure, exponent, thresholds, continued)
+        verdict = verdict_on(history, system, failure, exponent, None, thresholds, continued)
         shown = {field.name: attributes.get(field.name) for field in fields.EXPONENT}
         return {**numbers_of(verdict, failure), **shown, "vibrations": fields.VIBRATIONS.read(found)}
 

@@ -92,7 +92,7 @@ def run(
             if not np.isfinite(astuple(motion.energy)).all():  # compiled code overflows silently
                 raise FloatingPointError("an energy overflows")
             history = History(system.interval, result.rows("history"), partial(result.read, "history"))
-            verdict = verdict_on(history, system, motion.work.failure_sentence, motion.exponent)
+            verdict = verdict_on(history, system, motion.work.failure_sentence, motion.exponent, motion.track)
             top = _write_spectrum(result, history, verdict)
             changing = None if motion.work.failed else over_time(history, system)
             if changing:
@@ -109,8 +109,9 @@ def run(
 
 
 def asked(system: System) -> System:
-    """The same, whose motion carries a disturbance along where waves shake it for ever: verdicts ask for that."""
-    return replace(system, tangents=system.steady and system.belt_speed != 0.0 and system.wheel.g.size > 0)
+    """The same, whose motion carries along what verdicts ask for: events; a disturbance where waves shake it."""
+    shaken = system.steady and system.belt_speed != 0.0 and system.wheel.g.size > 0
+    return replace(system, tracked=True, tangents=shaken)
 
 
 def motion_of(
@@ -132,7 +133,9 @@ def verdict_in_memory(motion: Motion, system: System, *, in_full: bool = True) -
     """The verdict on a motion whose samples are in memory."""
     _refuse_overflow(motion.rows)
     history = array_history(system.interval, motion.rows)
-    return verdict_on(history, system, motion.work.failure_sentence, motion.exponent, in_full=in_full)
+    return verdict_on(
+        history, system, motion.work.failure_sentence, motion.exponent, motion.track, in_full=in_full
+    )
 
 
 def _refuse_overflow(rows: NDArray[np.float64]) -> None:

@@ -42,7 +42,8 @@ class Powers(NamedTuple):
     """Mean powers over a part of a run, W; signs as in `energy.EnergyAccount`.
 
     `friction` is what friction gives to the vibration, the mean of F_x ẋ: the belt's work less the heat. `stored`
-    is the change of kinetic energy and of the energies of links and contact, `closing` what does not add up.
+    is the change of kinetic energy and of the energies of links and contact, `closing` what does not add up. Beside
+    them the change of the contact's energy alone (W), and the mean velocities (m/s).
     """
 
     friction: float
@@ -52,6 +53,9 @@ class Powers(NamedTuple):
     scheme: float
     stored: float
     closing: float
+    contact: float
+    v_x: float
+    v_y: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +69,7 @@ class Track:
     times: Floats  # s
     works: Floats  # J
     stored: Floats  # J
+    places: Floats  # x and y at the marks, m
     counts: NDArray[np.int64]
     since: float  # all events later than that are kept, s
     kept: Events
@@ -84,7 +89,9 @@ class Track:
         belt, heat, dashpots, load, roughness, scheme = ((self.works[last] - self.works[first]) / span).tolist()
         stored = float((self.stored[last] - self.stored[first]).sum()) / span
         passed = (belt - heat) + roughness - dashpots - load - scheme
-        return Powers(belt - heat, roughness, dashpots, load, scheme, stored, stored - passed)
+        contact = float(self.stored[last, 2] - self.stored[first, 2]) / span
+        moved = ((self.places[last] - self.places[first]) / span).tolist()
+        return Powers(belt - heat, roughness, dashpots, load, scheme, stored, stored - passed, contact, *moved)
 
 
 def follow(t: Any, v_x: float) -> None:
@@ -104,7 +111,8 @@ def tracked(t: Any, c: Coefficients, s: Weights, energies: Callable[..., Mechani
     order = np.argsort(t.event_times[:n], kind="stable")
     kept = Events(t.event_times[order], t.event_kinds[order], t.event_places[order])
     stored = np.column_stack([kinetic, links, contact])
-    return Track(t.times[: t.marks].copy(), works, stored, t.counts.copy(), float(t.since), kept)
+    places = np.column_stack([x, y])
+    return Track(t.times[: t.marks].copy(), works, stored, places, t.counts.copy(), float(t.since), kept)
 
 
 def events_from_samples(time: Floats, x: Floats, vx: Floats, state: Floats) -> Events:

@@ -14,6 +14,7 @@ from brakecli.analysis.regime.verdict import Verdict
 from brakecli.solver.history import History
 from brakecli.solver.quantities import ContactState
 from brakecli.solver.tangent import Exponent
+from brakecli.solver.track import Track
 
 _DEFAULT = Thresholds()
 _ELSEWHERE = ("amplitude", "duration", "seconds", "slowest", "locks", "ringing")  # numbers of the case or verdict
@@ -25,17 +26,18 @@ def classify(
     thresholds: Thresholds = _DEFAULT,
     *,
     exponent: Exponent | None = None,
+    track: Track | None = None,
     continued: Callable[[], Continued] = Continued,
     failure: str | None = None,
     in_full: bool = True,
 ) -> Verdict:
     """The regime of a run's history by the table of docs/regimes.md.
 
-    `exponent` of its small disturbances, and what it comes to where it is `continued` on the smooth wheel, are
-    asked of the case. Where not `in_full`, evidence and numbers that a sweep does not keep are left out; all
-    others are the same.
+    `exponent` of its small disturbances, what the loop noted in its `track`, and what it comes to where it is
+    `continued` on the smooth wheel, are asked of the case. Where not `in_full`, evidence and numbers that a sweep
+    does not keep are left out; all others are the same.
     """
-    shown = Shown(history, context, thresholds)
+    shown = Shown(history, context, thresholds, track)
     found = answers(shown, exponent, continued, failure or "")
     decision = decide(found, thresholds)
     what = lasting(shown, found, decision, in_full=in_full)

@@ -5,16 +5,15 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brakecli.analysis.regime.evidence import LINE_BINS, Part
 from brakecli.analysis.regime.spectra import Array, upward_crossings
 from brakecli.solver.quantities import ContactState
+from brakecli.solver.track import KINDS, LIFT, SLIP, STICK, TOUCH, Events, events_from_samples
 
 _HARMONICS = 5
 _MOST_RISES_PER_CYCLE = 4
 _GROUPS = 10  # of neighbouring cycles, of which a median is taken
-_ENDS = (ContactState.STICK, ContactState.SEPARATED)
 _MIDDLE = np.array([1.0 / 6.0, 0.5, 5.0 / 6.0])  # quantiles
 _TREND = 3.0  # standard errors of the slope of ten medians, beyond which an amplitude drifts
 _BANDS = (0.3, 0.5, 0.15)  # of the standard deviation of vx: ripple within it does not count
@@ -22,7 +21,7 @@ _BETWEEN = 1e-3  # of the energy of vx, between the lines of one rise, that make
 _SEEN = 0.85  # least part of a force's swing in every other sample that all samples see
 SIZE_OFF, _PERIOD_OFF = 3.5, 0.2  # of an amplitude and a period, per step in a contact: most that impacts were off
 _ALIKE = 0.5  # of a sample that no cycle has seen, beyond which all cycles are seen at the same places
-_ROUNDING = 1e-9  # of the wheel's speed
+_EARLY = 1 / 8  # of a cycle: where it begins with a stick, samples may place that before its begin
 _SAME = 0.02  # squared difference, over twice the variance, between one period of the mean of vx and the next
 
 
@@ -61,65 +60,51 @@ class Cycles:
     amplitude_spread: float
     stick_fraction: float
     contact_loss_fraction: float
-    may_stick: float  # part of the cycles that stick, or may between two samples
-    limited: float  # part of the groups of cycles in which the shoe sticks, leaves the wheel or overtakes it
     drift: "Drift"  # of the amplitude
     detuning: "Drift"  # of the period
     force_variation: float | None  # N, peak to peak of the friction force
 
 
 def cycles_of(
-    part: Part,
-    slip: ContactState | None = None,
-    step: float = 0.0,
-    belt: float = 0.0,
-    waves: Sequence[tuple[float, float]] = (),
+    part: Part, events: Events | None = None, step: float = 0.0, waves: Sequence[tuple[float, float]] = ()
 ) -> Cycles | None:
-    """The cycles of a part; None if there are none. `slip` is the side to which the shoe slips in steady sliding.
+    """The cycles of a part with its events, which samples show as far as none are given; None without cycles.
 
-    The spreads hold what a step (s) may change, with which the motion was computed, on a wheel of speed `belt`
-    (m/s) whose `waves` (Hz, m) pass. Stick, loss of contact and frequency are medians of ten groups of cycles, so
-    that it does not matter how samples fall into each cycle.
+    The spreads hold what a step (s) may change, with which the motion was computed, on a wheel whose `waves` (Hz,
+    m) pass. Stick, loss of contact and frequency are medians of ten groups of cycles.
 
     `kick`: where contact begins (or ends) a part s ≤ 1/2 into a step h, the force at its middle pushes by
     K v h² s²/2 too little, and likewise from the other end: by 1/24 in the mean over s, and by up to 1/8 where all
     cycles meet the step alike. With Ω² = K/m that is (Ω h)² times as much of the speed v, and a contact takes
     half a period of Ω.
     """
-    velocity = part.last("vx")
+    velocity, interval = part.last("vx"), part.history.interval
     crossings, rises = _beginnings(part, velocity, waves)
     if len(crossings) < 4:
         return None
-    cycles = len(crossings) - 1
+    cycles, first = len(crossings) - 1, part.stop - len(velocity)
     edges = np.linspace(0, cycles, min(cycles, _GROUPS) + 1).astype(int)
     groups = crossings[edges]
     period, period_spread = median(np.diff(groups) / np.diff(edges))
-    state = part.history.read("state", part.stop - len(velocity), part.stop)
-    sticks = np.flatnonzero((state[1:] == ContactState.STICK) & (state[:-1] != ContactState.STICK)) + 1
-    unseen, step = _unseen(crossings)[0], step / part.history.interval
-    raw = part.history.read("vx", part.stop - len(velocity), part.stop)
-    hidden = _hidden_sticks(raw, state, belt)
-    per_cycle, may = (np.histogram(each, crossings)[0] for each in (sticks, np.concatenate([sticks, hidden])))
-    begin, end = groups[:-1].astype(int), groups[1:].astype(int) + 1
-
-    def shares(found: NDArray[np.bool_]) -> Array:
-        """Part of the samples of each group."""
-        count = np.concatenate([[0], np.cumsum(found)])
-        return np.asarray((count[end] - count[begin]) / (end - begin))
-
+    unseen, step = 0.0 if events else _unseen(crossings)[0], step / interval
+    if events is None:
+        x, v_x, state = (part.history.read(name, first, part.stop) for name in ("x", "vx", "state"))
+        events = events_from_samples(interval * np.arange(first, part.stop, dtype=np.float64), x, v_x, state)
+    places = {kind: events.time[events.kind == kind] / interval - first for kind in range(len(KINDS))}
+    per_cycle = np.histogram(places[STICK], crossings - _EARLY * period)[0]
     turn, contact = 2.0 * np.pi * step / period, contact_length(part)
     impact = step / contact
 
-    def time_in(which: ContactState) -> tuple[float, float]:
-        """Part of a cycle, and its spread, with the step, and the part of a sample that no cycle has seen."""
-        there = state == which
-        middle, spread = median(shares(there))
-        begins = float(np.sum(there[1:] & ~there[:-1])) + (len(hidden) if which == ContactState.STICK else 0)
+    def time_in(begin: int, end: int) -> tuple[float, float]:
+        """Part of a cycle between two kinds of events, and its spread, with the step, and what samples miss."""
+        spent = np.diff(_time_in(places[begin], places[end], groups)) / np.diff(groups)
+        middle, spread = median(spent)
+        begins = np.count_nonzero((places[begin] > groups[0]) & (places[begin] < groups[-1]))
         missed = 1.0 if unseen > _ALIKE else unseen
         return middle, max(spread, (missed + step) * begins / cycles / period)
 
-    (stick, stick_spread), (loss, loss_spread) = (time_in(which) for which in _ENDS)
-    frequency = 1.0 / (period * part.history.interval)
+    (stick, stick_spread), (loss, loss_spread) = time_in(STICK, SLIP), time_in(LIFT, TOUCH)
+    frequency = 1.0 / (period * interval)
     evidence = {
         "cycles": float(cycles),
         "samples_per_cycle": period,
@@ -131,41 +116,30 @@ def cycles_of(
         "stick_spread": stick_spread,
         "contact_loss_spread": loss_spread,
     }
-    limited = float(np.mean(shares(state != slip) > 0.0))
     sizes, periods = swings(part, crossings), np.diff(crossings)
     changes = _drift(sizes), _drift(periods)
-    force = part.history.read("friction_force", part.stop - len(velocity), part.stop)
+    force = part.history.read("friction_force", first, part.stop)
     amplitude, spread = median(sizes)
     missed = 3.0 / 128.0 * (2.0 * np.pi / period) ** 4 * amplitude  # of a crest between two samples: parabola
-    spread = max(spread, unseen * missed) + (0.25 * turn**2 + SIZE_OFF * impact) * amplitude
-    medians = amplitude, spread, stick, loss, float(np.mean(may > 0))
-    varies = _force_variation(force, crossings, groups)
+    spread = max(spread, _unseen(crossings)[0] * missed) + (0.25 * turn**2 + SIZE_OFF * impact) * amplitude
     off = frequency * (turn**2 / 8.0 + _PERIOD_OFF * impact)
     alike = _unseen(crossings / step)[0] if step else 0.0
     kick = (1.0 - loss) * period / contact * (np.pi * impact) ** 2 * (1.0 + 2.0 * alike) / 24.0  # of all impacts
-    return Cycles(evidence, frequency, off, kick, *medians, limited, *changes, varies)
+    varies = _force_variation(force, crossings, groups)
+    return Cycles(evidence, frequency, off, kick, amplitude, spread, stick, loss, *changes, varies)
 
 
-def _crests(values: Array) -> Array:
-    """The most that values may reach behind each sample, where they have a crest there; otherwise -infinity.
-
-    Beside a crest they lie below the tangents at the two samples, by parabolas through the three on either side.
-    """
-    earlier, before, first, last, after, later = (values[i : len(values) - 5 + i] for i in range(6))
-    rises, falls = (1.5 * x - 2.0 * y + 0.5 * z for x, y, z in ((first, before, earlier), (last, after, later)))
-    crest = (rises > 0.0) & (falls > 0.0)
-    meet = np.clip((last + falls - first) / np.where(crest, rises + falls, 1.0), 0.0, 1.0)
-    met = np.where(crest, np.minimum(first + rises * meet, last + falls * (1.0 - meet)), -np.inf)
-    return np.pad(met, (2, 3), constant_values=-np.inf)
-
-
-def _hidden_sticks(velocity: Array, state: Array, belt: float) -> NDArray[np.intp]:
-    """The samples before which the shoe may stick unseen: its velocity (m/s) may reach the wheel's between two."""
-    faster, least = np.sign(belt) * velocity - abs(belt), _ROUNDING * abs(belt)
-    reached = (np.maximum(faster[:-1], faster[1:]) < least) & (_crests(faster)[:-1] >= -least)
-    touches = np.minimum(state[:-1], state[1:]) < ContactState.SEPARATED
-    slips = (state[:-1] != ContactState.STICK) & (state[1:] != ContactState.STICK)
-    return np.flatnonzero(reached & touches & slips) + 1
+def _time_in(begins: Array, ends: Array, times: Array) -> Array:
+    """The time spent between begins and ends up to some times; what begins before all of them begins with them."""
+    if len(ends) and not (len(begins) and begins[0] <= ends[0]):
+        begins = np.concatenate([[min(times[0], ends[0])], begins])
+    if len(begins) == 0:
+        return np.zeros(len(times))
+    lasts = np.concatenate([ends, [np.inf] * (len(begins) - len(ends))])[: len(begins)] - begins
+    before = np.concatenate([[0.0], np.cumsum(lasts[:-1])])
+    last = np.searchsorted(begins, times, "right") - 1
+    at = np.maximum(last, 0)
+    return np.where(last < 0, 0.0, before[at] + np.minimum(times - begins[at], lasts[at]))
 
 
 def in_lines(part: Part, frequency: float, period: float) -> dict[str, Any]:

@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, cached_property
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +17,9 @@ from brakecli.analysis.stability.linear import Linear
 from brakecli.solver.history import History
 from brakecli.solver.quantities import ContactState
 from brakecli.solver.tangent import Exponent
+from brakecli.solver.track import Track
 
+_PIECES = 8  # of the part that is judged, by which powers vary
 _NOTHING = 1e-3  # of a beat over the slowest wave, that is rounding
 
 
@@ -33,9 +36,9 @@ class Continued(NamedTuple):
 class Shown:
     """What a history shows."""
 
-    def __init__(self, history: History, context: Context, limits: Thresholds) -> None:
-        """Take a history and what is known of its case."""
-        self.history, self.context, self.limits = history, context, limits
+    def __init__(self, history: History, context: Context, limits: Thresholds, track: Track | None = None) -> None:
+        """Take a history, what is known of its case, and what the loop has noted."""
+        self.history, self.context, self.limits, self.track = history, context, limits, track
         self.duration = history.samples * history.interval
         self.whole = Part(history, 0, history.samples)
         self.half = replace(self.whole, start=history.samples // 2)
@@ -78,8 +81,10 @@ class Shown:
     @cached_property
     def cycles(self) -> Cycles | None:
         """The cycles of the part that is judged."""
-        known, theory = self.context, self.context.linear() if not self.context.forced else None
-        return cycles_of(self.judged, theory.slip if theory else None, known.step, known.belt_speed, known.waves)
+        begin = self.judged.start * self.history.interval
+        whole = self.track is not None and self.track.since < begin
+        events = self.track.events() if whole and self.track else None
+        return cycles_of(self.judged, events, self.context.step, self.context.waves)
 
     def slowest(self, amplitude: float) -> float:
         """Period (s) of the slowest wave that counts beside an amplitude of x (m) and beside the others; or 0."""
@@ -103,7 +108,19 @@ class Shown:
         return float(np.abs(sizes[0] / np.maximum(sizes[1], 1e-300) - 1.0).max())
 
     def power(self) -> tuple[float, float, float]:
-        """Powers (W) that friction and the roughness give, and their error."""
+        """Powers (W) that friction and the roughness give, and their error; by the loop's account."""
+        if self.track is not None:
+            begin, end = self.judged.start * self.history.interval, float(self.track.times[-1])
+            force = np.array([self.judged.mean("friction_force"), self.judged.mean("normal_force")])
+            ends = np.linspace(begin, end, _PIECES + 1).tolist()
+            parts = [self.track.powers(*each) for each in ((begin, end), *pairwise(ends))]
+            # What the means of the forces do, and what the contact stores, is none of the vibration's.
+            given = [
+                (each.friction - force[0] * each.v_x, each.roughness - each.contact - force[1] * each.v_y)
+                for each in parts
+            ]
+            off = float(np.std(given[1:], axis=0).max()) / math.sqrt(_PIECES)
+            return *given[0], max(off, abs(parts[0].closing))
         friction, off = self.judged.power("friction_force", "vx")
         roughness, off_too = self.judged.power("normal_force", "vy")
         lost = self.context.powers(self.judged).get("power_dashpots", friction + roughness)
