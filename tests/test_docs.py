@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from brakecli.analysis.regime import verdict
+from brakecli.analysis.regime.table import Thresholds
 from brakecli.analysis.stability.report import stability
 from brakecli.case.read import parse_case, starters
 from brakecli.case.system import system_of
@@ -71,7 +71,7 @@ def test_the_tables_of_the_pages_are_those_of_the_declaration() -> None:
 
 def test_every_threshold_stands_in_the_documentation_with_its_default() -> None:
     page = (ROOT / "docs" / "regimes.md").read_text()
-    for name, value in vars(verdict.Thresholds()).items():
+    for name, value in vars(Thresholds()).items():
         assert f"| `{name}` | {value:g} |" in page
 
 
