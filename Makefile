@@ -21,7 +21,7 @@ PYTEST_ARGS ?=
 .DELETE_ON_ERROR:
 .NOTPARALLEL: # two installations into one .venv at a time would collide
 .PHONY: help demo test campaign lowest lint format types imports derivations tables docs cases check \
-    accuracy promises promise-cost statistics picture lock-in branch-picture loop-picture paper extremes bench bench-sweep bench-million bench-contact bench-branch clean
+    accuracy promises promise-cost statistics picture lock-in branch-picture loop-picture regime-pictures paper extremes bench bench-sweep bench-million bench-contact bench-branch clean
 
 help: ## list the targets (this text)
 	@echo "make TARGET, where TARGET is one of"
@@ -153,6 +153,9 @@ loop-picture: $(DEV_STAMP) ## draw docs/loop.png, from the starter of branches, 
 	$(BIN)/brakecli new branch --output results/branch.toml --force --quiet
 	$(BIN)/brakecli sweep docs/loop.toml --force --quiet -o results/loop.h5
 	$(BIN)/brakecli plot results/loop.h5 --select solver.duration=200 --force --output docs/loop.png
+
+regime-pictures: $(DEV_STAMP) ## draw docs/regimes-*.png, an example of each verdict; fails where a verdict has changed (a minute)
+	$(BIN)/python docs/regime_pictures.py
 
 paper: $(DEV_STAMP) ## reproduce the paper's claims into docs/paper-claims.md, with pictures (some minutes)
 	$(BIN)/python docs/paper_claims.py

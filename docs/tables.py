@@ -1,16 +1,24 @@
-"""The tables of the documentation that list what a result holds, from brakecli/files/fields.py: `make tables`.
+"""The tables of the documentation that the program declares: `make tables`.
 
-A table stands between `<!-- fields NAME … -->` and `<!-- end of fields -->`, where each NAME is one of that file.
-With --check nothing is written: the exit code is 1 where a page does not agree with the declaration.
+What a result holds stands between `<!-- fields NAME … -->` and `<!-- end of fields -->`, where each NAME is one of
+brakecli/files/fields.py. The rows by which a verdict is found stand between `<!-- rows NAME -->` and
+`<!-- end of rows -->`, where NAME is one of brakecli/analysis/regime/table.py. Their second column, where a row
+holds, is written by hand; a new row has a `?` there.
+
+With --check nothing is written: the exit code is 1 where a page does not agree with the program, or has a `?`.
 """
 
 import re
 import sys
 from pathlib import Path
 
+from brakecli.analysis.regime import table as verdicts
 from brakecli.files import fields
 
 PLACE = re.compile(r"(<!-- fields ([A-Z_ ]+) -->\n).*?(<!-- end of fields -->)", re.DOTALL)
+ROWS = re.compile(r"(<!-- rows ([A-Z]+) -->\n)(.*?)(<!-- end of rows -->)", re.DOTALL)
+CELLS = re.compile(r"^\| ([^|]+) \| ([^|]+) \|", re.MULTILINE)
+UNKNOWN = "?"
 PAGES = ("result-format", "results", "regimes", "sweeps", "accuracy", "stability", "branches")
 
 
@@ -23,6 +31,23 @@ def table(names: str) -> str:
     return "\n".join([*lines, "", ""])
 
 
+def rows(name: str, old: str) -> str:
+    """The rows of a table of verdicts, with the words of the old page on where each holds."""
+    words = dict(CELLS.findall(old))
+    lines = ["", "| row | where | verdict | what to do |", "|---|---|---|---|"]
+    for row in getattr(verdicts, name):
+        where, remedy = words.get(row.name, UNKNOWN), re.sub(r"\{.*?\}", "…", row.remedy)
+        lines.append(f"| {row.name} | {where} | {verdict(row)} | {remedy} |".replace("|  |", "| |"))
+    return "\n".join([*lines, "", ""])
+
+
+def verdict(row: verdicts.Row) -> str:
+    """What a row says."""
+    if (row.regime, row.excitation) == (verdicts.Regime.UNDECIDED, verdicts.Excitation.SELF_EXCITED):
+        return "self-excited; see its look"
+    return str(row.regime) if row.excitation is verdicts.Excitation.NONE else f"{row.regime}, {row.excitation}"
+
+
 def main() -> int:
     """Write the pages, or compare them."""
     code, check = 0, "--check" in sys.argv
@@ -30,11 +55,15 @@ def main() -> int:
         page = Path(__file__).parent / f"{name}.md"
         old = page.read_text()
         new = PLACE.sub(lambda place: place[1] + table(place[2]) + place[3], old)
+        new = ROWS.sub(lambda place: place[1] + rows(place[2], place[3]) + place[4], new)
         if new != old and check:
-            print(f"docs/{page.name}: differs from brakecli/files/fields.py; run make tables")  # noqa: T201
+            print(f"docs/{page.name}: differs from what the program declares; run make tables")  # noqa: T201
             code = 1
         elif new != old:
             page.write_text(new)
+        for row in re.findall(rf"^\| ([^|]+) \| {re.escape(UNKNOWN)} \|", new, re.MULTILINE):
+            print(f"docs/{page.name}: write in the second column where the row {row!r} holds")  # noqa: T201
+            code = 1
     return code
 
 

@@ -1,10 +1,13 @@
 """The documentation names what files and commands give."""
 
+import importlib
 import subprocess
 import sys
 from pathlib import Path
 
-from brakecli.analysis.regime import verdict
+import pytest
+
+from brakecli.analysis.regime.table import Thresholds
 from brakecli.analysis.stability.report import stability
 from brakecli.case.read import parse_case, starters
 from brakecli.case.system import system_of
@@ -16,6 +19,7 @@ from brakecli.files.read import open_result
 from brakecli.runs.run import run
 from brakecli.sweeps.plan import parse_sweep
 from brakecli.sweeps.workers.task import compute_units
+from tests.campaign import campaign
 from tests.commands import ROOT
 from tests.sweeps.helpers import inline
 
@@ -67,8 +71,16 @@ def test_the_tables_of_the_pages_are_those_of_the_declaration() -> None:
 
 def test_every_threshold_stands_in_the_documentation_with_its_default() -> None:
     page = (ROOT / "docs" / "regimes.md").read_text()
-    for name, value in vars(verdict.Thresholds()).items():
+    for name, value in vars(Thresholds()).items():
         assert f"| `{name}` | {value:g} |" in page
+
+
+@campaign
+def test_every_example_of_the_regimes_has_the_verdict_in_its_picture(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(ROOT / "docs")  # where `make regime-pictures` finds it
+    pictures = importlib.import_module("regime_pictures")
+    for example in (*pictures.SMOOTH, *pictures.ROUGH, *pictures.LOOKS):
+        pictures.both(example._replace(after=0.0))  # ends where another row has decided
 
 
 def test_every_name_of_stability_is_documented() -> None:

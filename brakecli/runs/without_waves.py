@@ -32,7 +32,7 @@ def without_waves(system: System, state: Floats) -> Continued:
     if end.orbit is None or end.rate is None:
         return Continued(Fate.LASTS if end.lasts else Fate.DIES)
     orbit = end.orbit
-    return Continued(Fate.LASTS, orbit.amplitude, end.rate, orbit.period, orbit.word.count(STICK))
+    return Continued(Fate.LASTS, orbit.amplitude, end.rate, orbit.period, float(orbit.word.count(STICK)))
 
 
 def _on_a_rough_shoe(flat: System, state: Floats) -> End:
