@@ -42,8 +42,7 @@ class Powers(NamedTuple):
     """Mean powers over a part of a run, W; signs as in `energy.EnergyAccount`.
 
     `friction` is what friction gives to the vibration, the mean of F_x ẋ: the belt's work less the heat. `stored`
-    is the change of kinetic energy and of the energies of links and contact, `closing` what does not add up. Beside
-    them the change of the contact's energy alone (W), and the mean velocities (m/s).
+    is the change of kinetic energy and of the energies of links and contact, `closing` what does not add up.
     """
 
     friction: float
@@ -53,9 +52,6 @@ class Powers(NamedTuple):
     scheme: float
     stored: float
     closing: float
-    contact: float
-    v_x: float
-    v_y: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,9 +85,20 @@ class Track:
         belt, heat, dashpots, load, roughness, scheme = ((self.works[last] - self.works[first]) / span).tolist()
         stored = float((self.stored[last] - self.stored[first]).sum()) / span
         passed = (belt - heat) + roughness - dashpots - load - scheme
-        contact = float(self.stored[last, 2] - self.stored[first, 2]) / span
-        moved = ((self.places[last] - self.places[first]) / span).tolist()
-        return Powers(belt - heat, roughness, dashpots, load, scheme, stored, stored - passed, contact, *moved)
+        return Powers(belt - heat, roughness, dashpots, load, scheme, stored, stored - passed)
+
+    def given(self, begin: float, force: Floats) -> tuple[Floats, float]:
+        """What friction and the roughness give to a vibration in each part from a time (s) on (W, two columns).
+
+        What the means of the forces F_x and F_y (N) do, and what the contact stores, is none of the vibration's.
+        Also what does not add up (W).
+        """
+        first = min(int(np.abs(self.times - begin).argmin()), len(self.times) - 2)
+        spans = np.diff(self.times[first:])[:, None]
+        works, moved = np.diff(self.works[first:], axis=0), np.diff(self.places[first:], axis=0) * force
+        stored = np.diff(self.stored[first:, 2])
+        found = np.column_stack([works[:, 0] - works[:, 1] - moved[:, 0], works[:, 4] - stored - moved[:, 1]])
+        return found / spans, self.powers(begin, float(self.times[-1])).closing
 
 
 def follow(t: Any, v_x: float) -> None:

@@ -96,12 +96,8 @@ class Part:
 
         Four overlapping pieces of the last samples, under a window that weighs cut cycles at the ends little.
         """
-        f, v = self.last(force), self.last(velocity)
-        size = max(2 * len(f) // 5, 1)
-        window = np.hanning(size + 2)[1:-1]
-        starts = np.linspace(0, len(f) - size, 4).astype(int)
-        means = [window @ (f[i : i + size] * v[i : i + size]) / window.sum() for i in starts]
-        return float(np.mean(means)), float(np.std(means)) / 2.0
+        means = windowed((self.last(force) * self.last(velocity))[:, None])
+        return float(means.mean()), float(means.std()) / 2.0
 
     @cached_property
     def _spectrum(self) -> tuple[Array, Array, float]:
@@ -213,6 +209,14 @@ def line(x: Array, y: Array) -> tuple[float, float]:
     slope = float(away @ rest / (away @ away))
     rest = rest - slope * away
     return slope, math.sqrt(float(rest @ rest / (away @ away)) / (len(x) - 2))
+
+
+def windowed(values: Array) -> Array:
+    """Means of the rows in four overlapping pieces, under a window that weighs cut cycles at the ends little."""
+    size = max(2 * len(values) // 5, 1)
+    window = np.hanning(size + 2)[1:-1] / np.hanning(size + 2).sum()
+    starts = np.linspace(0, len(values) - size, 4).astype(int)
+    return np.array([window @ values[i : i + size] for i in starts])
 
 
 def level_change(levels: Array) -> tuple[float, float]:

@@ -4,14 +4,13 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, cached_property
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from brakecli.analysis.regime.context import Context
 from brakecli.analysis.regime.cycles import Cycles, cycles_of
-from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, WINDOWS, Envelope, Part, level_change
+from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, WINDOWS, Envelope, Part, level_change, windowed
 from brakecli.analysis.regime.table import Answers, Fate, Thresholds
 from brakecli.analysis.stability.linear import Linear
 from brakecli.solver.history import History
@@ -19,7 +18,6 @@ from brakecli.solver.quantities import ContactState
 from brakecli.solver.tangent import Exponent
 from brakecli.solver.track import Track
 
-_PIECES = 8  # of the part that is judged, by which powers vary
 _NOTHING = 1e-3  # of a beat over the slowest wave, that is rounding
 
 
@@ -110,17 +108,11 @@ class Shown:
     def power(self) -> tuple[float, float, float]:
         """Powers (W) that friction and the roughness give, and their error; by the loop's account."""
         if self.track is not None:
-            begin, end = self.judged.start * self.history.interval, float(self.track.times[-1])
+            begin = self.judged.start * self.history.interval
             force = np.array([self.judged.mean("friction_force"), self.judged.mean("normal_force")])
-            ends = np.linspace(begin, end, _PIECES + 1).tolist()
-            parts = [self.track.powers(*each) for each in ((begin, end), *pairwise(ends))]
-            # What the means of the forces do, and what the contact stores, is none of the vibration's.
-            given = [
-                (each.friction - force[0] * each.v_x, each.roughness - each.contact - force[1] * each.v_y)
-                for each in parts
-            ]
-            off = float(np.std(given[1:], axis=0).max()) / math.sqrt(_PIECES)
-            return *given[0], max(off, abs(parts[0].closing))
+            given, closing = self.track.given(begin, force)
+            means = windowed(given)
+            return *means.mean(axis=0).tolist(), max(float(means.std(axis=0).max()) / 2.0, abs(closing))
         friction, off = self.judged.power("friction_force", "vx")
         roughness, off_too = self.judged.power("normal_force", "vy")
         lost = self.context.powers(self.judged).get("power_dashpots", friction + roughness)
