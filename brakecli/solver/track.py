@@ -65,7 +65,7 @@ class Track:
     times: Floats  # s
     works: Floats  # J
     stored: Floats  # J
-    places: Floats  # x and y at the marks, m
+    places: Floats  # x at the marks, m
     counts: NDArray[np.int64]
     since: float  # all events later than that are kept, s
     kept: Events
@@ -87,17 +87,15 @@ class Track:
         passed = (belt - heat) + roughness - dashpots - load - scheme
         return Powers(belt - heat, roughness, dashpots, load, scheme, stored, stored - passed)
 
-    def given(self, begin: float, force: Floats) -> tuple[Floats, float]:
+    def given(self, begin: float, force: float) -> tuple[Floats, float]:
         """What friction and the roughness give to a vibration in each part from a time (s) on (W, two columns).
 
-        What the means of the forces F_x and F_y (N) do, and what the contact stores, is none of the vibration's.
-        Also what does not add up (W).
+        What the mean of the friction force F_x (N) does is none of the vibration's. Also what does not add up (W).
         """
         first = min(int(np.abs(self.times - begin).argmin()), len(self.times) - 2)
+        works, moved = np.diff(self.works[first:], axis=0), np.diff(self.places[first:])
+        found = np.column_stack([works[:, 0] - works[:, 1] - force * moved, works[:, 4]])
         spans = np.diff(self.times[first:])[:, None]
-        works, moved = np.diff(self.works[first:], axis=0), np.diff(self.places[first:], axis=0) * force
-        stored = np.diff(self.stored[first:, 2])
-        found = np.column_stack([works[:, 0] - works[:, 1] - moved[:, 0], works[:, 4] - stored - moved[:, 1]])
         return found / spans, self.powers(begin, float(self.times[-1])).closing
 
 
@@ -118,8 +116,7 @@ def tracked(t: Any, c: Coefficients, s: Weights, energies: Callable[..., Mechani
     order = np.argsort(t.event_times[:n], kind="stable")
     kept = Events(t.event_times[order], t.event_kinds[order], t.event_places[order])
     stored = np.column_stack([kinetic, links, contact])
-    places = np.column_stack([x, y])
-    return Track(t.times[: t.marks].copy(), works, stored, places, t.counts.copy(), float(t.since), kept)
+    return Track(t.times[: t.marks].copy(), works, stored, x, t.counts.copy(), float(t.since), kept)
 
 
 def events_from_samples(time: Floats, x: Floats, vx: Floats, state: Floats) -> Events:

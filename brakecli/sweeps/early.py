@@ -22,7 +22,7 @@ from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, WINDOWS
 from brakecli.analysis.regime.table import Answers, Fate, Thresholds, decide
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.stability.linear import Linear, linear_theory
-from brakecli.analysis.stability.modes import is_undamped, slowest_of_cycles
+from brakecli.analysis.stability.modes import is_undamped
 from brakecli.runs.certificate import ROUNDING, Certificate
 from brakecli.solver.compile import Floats
 from brakecli.solver.flow.seek import FOUND, GOING_ON, LINEAR, Pursuit
@@ -36,7 +36,6 @@ _CYCLES = 5.0  # in a window of its envelope: of fewer, windows differ by where 
 _SAMPLES = 40.0  # in a cycle, so that its shape is seen
 _SEEN = 1.2  # samples in a stick, or off the wheel: one falls into each, also where the orbit is not reached yet
 _GRAZES = 0.01  # of the wheel's speed: nearer to it, samples leave open whether the shoe sticks
-_WINDOW = 0.05  # of the run, by which a whole run may see the settled part begin earlier or later
 
 
 class Ending(NamedTuple):
@@ -133,7 +132,7 @@ def _cycle(system: System, theory: Linear, motion: Pursuit) -> tuple[Verdict, li
         return None
     rate = -math.log(max(factor, 1e-300)) / period
     start = float(o.fell[0]) + max(math.log(max(float(o.away), 1e-300) / _SETTLED), 0.0) / rate
-    part, slow = end - start, min(abs(theory.mode.growth), slowest_of_cycles(system.coefficients))
+    part = end - start
     stick, clear = orbit.stick_fraction * period, orbit.contact_loss_fraction * period
     limited = period - float(o.spent[o.sliding])
     hidden = (
@@ -146,9 +145,6 @@ def _cycle(system: System, theory: Linear, motion: Pursuit) -> tuple[Verdict, li
     )
     if rate * part < _POWERS or hidden:
         return None
-    lasts = slow * (part - _WINDOW * end) >= 1.0
-    if not lasts and (theory.direction < 0 or slow * end >= 1.0):
-        return None  # whether the vibration lasts depends on where exactly a whole run sees it settled
     c = system.coefficients
     force = (c.c_xx * float(o.mean_x) + c.c_xy * float(o.mean_y)) / period + system.load_at_start * c.sin_beta
     answers = Answers(
@@ -167,5 +163,5 @@ def _cycle(system: System, theory: Linear, motion: Pursuit) -> tuple[Verdict, li
     )
     decision = decide(answers, Thresholds())._replace(frequency=orbit.frequency)
     numbers = orbit.amplitude, orbit.stick_fraction, orbit.contact_loss_fraction, force, system.radius * force
-    evidence = {"row": decision.row, "rate_without_waves": rate}
-    return Verdict(decision, *numbers, start, lasts, evidence), list(orbit.state)
+    evidence = {"row": decision.row, "rate_without_waves": rate, "largest_multiplier": factor}
+    return Verdict(decision, *numbers, start, True, evidence), list(orbit.state)

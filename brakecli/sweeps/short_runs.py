@@ -19,8 +19,6 @@ MOST = 1000
 """Undecided points that are looked at, some milliseconds each."""
 SETTLING = 3.0
 """Powers of e by which a vibration that has grown comes to its cycle, as the verdict on a run counts them."""
-FADING = 4.0
-"""Powers of e by which a vibration could die out in a run: one within its last quarter, which is judged."""
 ROUNDING = float(np.finfo(float).eps)
 
 
@@ -28,13 +26,11 @@ def on_short_runs(journal: Journal) -> Iterator[str]:
     """Where runs of a followed motion are too short, and how long they should be; on smooth pads.
 
     A point begins where the one before has ended. Its loop is that of the branches if every motion comes to what
-    attracts it within its run. Let sliding grow at the rate s there, by eigenvalues.
-
-    - s > 0: sliding attracts nothing. A disturbance grows like exp(s t) as long as the motion is linear, that is,
-      until it reaches the speed of the wheel or opens the pad. A motion smaller than that is not a vibration yet:
-      it begins later than it should, or never. One disturbance is there however long the runs are: from point to
-      point steady sliding moves by e. From e to the size A that ends the linear motion it takes ln(A/e) / s.
-    - s < 0: a vibration may still die out. A run shows that it does not once it could have done so, s t < -4.
+    attracts it within its run. Where sliding grows at a rate s > 0, by eigenvalues, it attracts nothing. A
+    disturbance grows like exp(s t) as long as the motion is linear, that is, until it reaches the speed of the
+    wheel or opens the pad. A motion smaller than that is not a vibration yet: it begins later than it should, or
+    never. One disturbance is there however long the runs are: from point to point steady sliding moves by e. From
+    e to the size A that ends the linear motion it takes ln(A/e) / s.
 
     A regime that is decided has been shown by its run. An undecided one in a longer run has another reason.
     """
@@ -42,31 +38,26 @@ def on_short_runs(journal: Journal) -> Iterator[str]:
     if plan.followed is None or not plan.sweep.axis[plan.followed].numeric:
         return
     undecided = (journal.column("regime") == b"undecided") & (journal.column("status") == b"done")
-    amplitudes, growing, fading = journal.column("amplitude").ravel(), [], []
+    amplitudes, growing = journal.column("amplitude").ravel(), list[tuple[float, float]]()
     for index in np.flatnonzero(undecided.ravel())[:MOST].tolist():
         point = index % plan.points
         found = _theory(plan, point)
         if found is None:
             continue
-        theory, duration = found
-        rate, value = theory.mode.growth, plan.sweep.axis[plan.followed].value(plan.places(point)[plan.followed])
+        theory, rate = found, found.mode.growth
+        value = plan.sweep.axis[plan.followed].value(plan.places(point)[plan.followed])
         if rate > 0.0 and amplitudes[index] < _reach(theory):
             before = _theory(plan, _before(plan, point, down=index >= plan.points))
-            seconds = _growing(theory, before[0] if before else theory) + SETTLING / rate
+            seconds = _growing(theory, before or theory) + SETTLING / rate
             growing.append((value, QUARTER * seconds))
-        elif rate < 0.0 and -rate * duration < FADING:
-            fading.append((value, FADING / -rate))
     if growing:
         late = "sliding is unstable, but the runs end before a vibration has grown"
         loop = "the loop seems to begin too late, or not at all"
         yield f"{_where(plan, growing)} {late}: {loop}; {_remedy(growing)}"
-    if fading:
-        late = "the runs end while a vibration may still die out"
-        yield f"{_where(plan, fading)} {late}: where the loop ends is not known; {_remedy(fading)}"
 
 
-def _theory(plan: Plan, point: int) -> tuple[Linear, float] | None:
-    """Small motions about steady sliding at a point, with the duration (s) of its run; None where unknown."""
+def _theory(plan: Plan, point: int) -> Linear | None:
+    """Small motions about steady sliding at a point; None where they are not known."""
     try:
         with within_range():
             system = system_of(plan.case(plan.settings(point)))
@@ -74,7 +65,7 @@ def _theory(plan: Plan, point: int) -> tuple[Linear, float] | None:
             theory = linear_theory(system, system.belt_speed) if known else None
     except BrakecliError:
         return None
-    return (theory, system.duration) if theory and theory.direction and theory.slip is not None else None
+    return theory if theory and theory.direction and theory.slip is not None else None
 
 
 def _before(plan: Plan, point: int, *, down: bool) -> int:

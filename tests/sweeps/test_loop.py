@@ -26,7 +26,7 @@ WIDE = 48  # of the shoes that it draws: vibrates from 0.150 on, and by itself f
 OTHERS = [10, 46, 66]
 NARROW = [0.44, 0.455, 0.47, 0.48, 0.49, 0.5, 0.505, 0.515, 0.525]
 """Values around the second of them, in steps that are no strong push."""
-GROWN, FADES = "sliding is unstable, but the runs end before", "the runs end while a vibration may still die out"
+GROWN = "sliding is unstable, but the runs end before"
 
 
 @dataclass
@@ -39,7 +39,7 @@ class Loop:
     @property
     def told(self) -> list[str]:
         """Of runs that are too short."""
-        return [text for text in self.findings if GROWN in text or FADES in text]
+        return [text for text in self.findings if GROWN in text]
 
 
 @dataclass
@@ -94,12 +94,11 @@ def test_the_loop_opens_at_the_critical_value_and_closes_at_the_fold(tmp_path: P
 def test_runs_that_are_too_short_are_told_with_the_duration_that_is_enough(tmp_path: Path) -> None:
     shoe = Followed(tmp_path, WIDE)
     values = np.linspace(0.7 * shoe.lower, 1.25 * shoe.critical, 25).tolist()
-    last_below, first_above = (value for value in values if abs(value - shoe.critical) < values[1] - values[0])
+    first_above = next(value for value in values if value > shoe.critical)
     short = shoe.loop(values, 0.26)
-    growing, fading = short.told
+    (growing,) = short.told
     # the second one is where the way down begins, from the start of the case
     assert f"at 2 points, {FRICTION} = {first_above:.9g} to {values[-1]:.9g}, {GROWN}" in growing
-    assert f"at 1 point, {FRICTION} = {last_below:.9g}, {FADES}" in fading
     assert min(short.vibrates["up"]) > first_above
     long = shoe.loop(values, max(_enough(text) for text in short.told))
     assert long.told == []

@@ -61,7 +61,7 @@ def lasting(shown: Shown, answers: Answers, decision: Decision, *, in_full: bool
     elif decision.excitation is Excitation.SELF_EXCITED and shown.cycles:
         found = _self_excited(shown, answers, shown.cycles)
     else:
-        part = shown.judged
+        part = shown.half if answers.linear else shown.judged
         return _with_force(shown, replace(Lasting(part, False, part.amplitude("x")), settled=answers.settled))
     if forced and found.settled and found.forced is None:  # its neighbours come together: nothing else is left
         found.forced = found.amplitude

@@ -105,18 +105,21 @@ class Shown:
         sizes = [np.array([each.deviation("vx"), each.amplitude("x")]) for each in (before, self.last)]
         return float(np.abs(sizes[0] / np.maximum(sizes[1], 1e-300) - 1.0).max())
 
-    def power(self) -> tuple[float, float, float]:
-        """Powers (W) that friction and the roughness give, and their error; by the loop's account."""
+    def powers(self) -> dict[str, float]:
+        """Powers (W) that friction and the roughness give, with their errors; of runs by the loop's account."""
         if self.track is not None:
             begin = self.judged.start * self.history.interval
-            force = np.array([self.judged.mean("friction_force"), self.judged.mean("normal_force")])
-            given, closing = self.track.given(begin, force)
+            given, open_by = self.track.given(begin, self.judged.mean("friction_force"))
             means = windowed(given)
-            return *means.mean(axis=0).tolist(), max(float(means.std(axis=0).max()) / 2.0, abs(closing))
-        friction, off = self.judged.power("friction_force", "vx")
-        roughness, off_too = self.judged.power("normal_force", "vy")
-        lost = self.context.powers(self.judged).get("power_dashpots", friction + roughness)
-        return friction, roughness, max(math.hypot(off, off_too), abs(friction + roughness - lost))
+            (friction, roughness), (off, off_too) = means.mean(axis=0).tolist(), (means.std(axis=0) / 2.0).tolist()
+        else:
+            friction, off = self.judged.power("friction_force", "vx")
+            roughness, off_too = self.judged.power("normal_force", "vy")
+            lost = self.context.powers(self.judged).get("power_dashpots", friction + roughness)
+            open_by = friction + roughness - lost
+        found = {"power_of_friction": friction, "power_of_roughness": roughness}
+        errors = {"friction_error": max(off, abs(open_by)), "roughness_error": max(off_too, abs(open_by))}
+        return found | errors
 
 
 def answers(

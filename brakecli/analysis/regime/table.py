@@ -95,7 +95,8 @@ class Answers:
     sticks_without_waves: float = math.nan  # in a period
     power_of_friction: float = math.nan  # power that friction gives, W
     power_of_roughness: float = math.nan  # that the roughness gives
-    power_error: float = math.nan
+    friction_error: float = math.nan
+    roughness_error: float = math.nan
     seconds: float = math.nan  # of the settled part
     settled: bool = False  # whether such a part was found
     cycles: float = 0.0  # in it
@@ -227,15 +228,13 @@ def _smaller(a: Answers, t: Thresholds) -> bool:
 
 
 def _gives(a: Answers, t: Thresholds) -> bool:
-    return a.power_of_friction > t.sure_errors * a.power_error
+    return a.power_of_friction > t.sure_errors * a.friction_error
 
 
-def _friction_gives_more(a: Answers, t: Thresholds) -> bool:
-    return a.power_of_friction - max(a.power_of_roughness, 0.0) > t.sure_errors * a.power_error
-
-
-def _roughness_gives(a: Answers, t: Thresholds) -> bool:
-    return a.power_of_roughness - max(a.power_of_friction, 0.0) > t.sure_errors * a.power_error
+def _gives_more(a: Answers, t: Thresholds) -> float:
+    """1 where friction surely gives more than the roughness, -1 where it gives less, otherwise 0."""
+    more = max(a.power_of_friction, 0.0) - max(a.power_of_roughness, 0.0)
+    return math.copysign(abs(more) > t.sure_errors * math.hypot(a.friction_error, a.roughness_error), more)
 
 
 def _regular(a: Answers, t: Thresholds) -> bool:
@@ -243,7 +242,7 @@ def _regular(a: Answers, t: Thresholds) -> bool:
 
 
 def _takes(a: Answers, t: Thresholds) -> bool:
-    return a.power_of_friction < -t.sure_errors * a.power_error
+    return a.power_of_friction < -t.sure_errors * a.friction_error
 
 
 def _decays(a: Answers, t: Thresholds) -> bool:
@@ -466,7 +465,7 @@ ROUGH: tuple[Row, ...] = (
     ),
     Row(
         "forced, roughness gives",
-        lambda a, t: _together(a, t) and _steady(a, t) and _roughness_gives(a, t) and not a.undamped,
+        lambda a, t: _together(a, t) and _steady(a, t) and _gives_more(a, t) < 0.0 and not a.undamped,
         "only the roughness shakes the shoe: it gives {a.power_of_roughness:.2g} W, friction "
         "{a.power_of_friction:.2g} W, and neighbours come together at {a.exponent:.3g} 1/s",
         "",
@@ -513,7 +512,7 @@ ROUGH: tuple[Row, ...] = (
             and _together(a, t)
             and _steady(a, t)
             and _same(a, t)
-            and _friction_gives_more(a, t)
+            and _gives_more(a, t) > 0.0
         ),
         "the vibration lasts without the roughness at the same level, and is locked to it",
         "",
