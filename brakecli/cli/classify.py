@@ -86,7 +86,7 @@ class Options:
 
     def _of_result(self, source: str) -> dict[str, Any]:
         from brakecli.analysis.regime.table import Thresholds
-        from brakecli.runs.judge import classify_result
+        from brakecli.runs.stored import classify_result
 
         try:
             limits = changed(Thresholds, self.thresholds)

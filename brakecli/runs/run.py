@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from brakecli import __version__
 from brakecli.analysis.regime.over_time import OverTime, over_time
 from brakecli.analysis.regime.spectra import peak, spectrum
+from brakecli.analysis.regime.table import Thresholds
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.case.read import LoadedCase
 from brakecli.case.system import system_of
@@ -129,7 +130,9 @@ def motion_of(
     return certified
 
 
-def verdict_in_memory(motion: Motion, system: System, *, in_full: bool = True) -> Verdict:
+def verdict_in_memory(
+    motion: Motion, system: System, thresholds: Thresholds | None = None, *, in_full: bool = True
+) -> Verdict:
     """The verdict on a motion whose samples are in memory."""
     _refuse_overflow(motion.rows)
     history = array_history(system.interval, motion.rows)

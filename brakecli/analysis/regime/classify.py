@@ -2,14 +2,14 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import fields
+from dataclasses import replace
 from typing import Any
 
 from brakecli.analysis.regime.context import Context
 from brakecli.analysis.regime.lasting import Lasting, lasting
 from brakecli.analysis.regime.measure import Continued, Shown, answers
 from brakecli.analysis.regime.spectra import segment
-from brakecli.analysis.regime.table import Answers, Excitation, Regime, Thresholds, decide
+from brakecli.analysis.regime.table import Excitation, Regime, Thresholds, decide
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.solver.history import History
 from brakecli.solver.quantities import ContactState
@@ -17,7 +17,6 @@ from brakecli.solver.tangent import Exponent
 from brakecli.solver.track import Track
 
 _DEFAULT = Thresholds()
-_ELSEWHERE = ("amplitude", "duration", "seconds", "slowest", "locks", "ringing")  # numbers of the case or verdict
 
 
 def classify(
@@ -44,7 +43,8 @@ def classify(
     part, radius, cycles = what.part, context.radius, what.cycles
     if decision.excitation is Excitation.SELF_EXCITED and cycles:
         decision = decision._replace(frequency=what.frequency)
-    evidence = {"row": decision.row, **_evidence(found), **what.evidence}
+        found = replace(found, frequency=what.frequency or math.nan)
+    evidence = {"row": decision.row, **found.known(), **what.evidence}
     if in_full:
         evidence |= _further(shown, what, context)
     friction = part.mean("friction_force")
@@ -71,13 +71,6 @@ def classify(
         evidence=evidence,
         thresholds=thresholds,
     )
-
-
-def _evidence(found: Answers) -> dict[str, Any]:
-    """The answers that are known."""
-    values = {each.name: getattr(found, each.name) for each in fields(found) if each.name not in _ELSEWHERE}
-    known = {name: value for name, value in values.items() if type(value) is float and math.isfinite(value)}
-    return {**known, "without_waves": str(found.without_waves)}
 
 
 def _further(shown: Shown, what: Lasting, context: Context) -> dict[str, Any]:

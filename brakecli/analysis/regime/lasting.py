@@ -12,7 +12,7 @@ from brakecli.analysis.regime.cycles import SIZE_OFF, Cycles, Drift, contact_len
 from brakecli.analysis.regime.evidence import WINDOWS, Part, line
 from brakecli.analysis.regime.measure import Shown
 from brakecli.analysis.regime.spectra import Array
-from brakecli.analysis.regime.table import Answers, Decision, Excitation
+from brakecli.analysis.regime.table import Answers, Decision, Excitation, Regime
 from brakecli.analysis.stability.linear import Linear
 
 _LIKELY = 16  # waves, of which one moves x most
@@ -62,7 +62,8 @@ def lasting(shown: Shown, answers: Answers, decision: Decision, *, in_full: bool
         found = _self_excited(shown, answers, shown.cycles)
     else:
         part = shown.half if answers.linear else shown.judged
-        return _with_force(shown, replace(Lasting(part, False, part.amplitude("x")), settled=answers.settled))
+        found = Lasting(part, answers.settled, part.amplitude("x"))
+        return _with_force(shown, found, lasts=decision.regime is not Regime.UNDECIDED)
     if forced and found.settled and found.forced is None:  # its neighbours come together: nothing else is left
         found.forced = found.amplitude
     if in_full and found.cycles and shown.context.forced and _holds_two(shown, found.part):
@@ -74,7 +75,7 @@ def lasting(shown: Shown, answers: Answers, decision: Decision, *, in_full: bool
     if found.spread is not None and 0.0 < found.amplitude <= found.spread:  # then not even its order is known
         found.notes["settled"] = found.notes.get("settled") or (_VAGUE if found.settled else None)
         found.spread, found.settled = None, False
-    return _with_force(shown, found)
+    return _with_force(shown, found, lasts=True)
 
 
 def _wave(shown: Shown, part: Part) -> float | None:
@@ -278,7 +279,7 @@ def _add_ripple(shown: Shown, found: Lasting, lines: Sequence[float]) -> None:
         found.notes["ripple"], found.settled = ripple.sentence, False
 
 
-def _with_force(shown: Shown, found: Lasting) -> Lasting:
+def _with_force(shown: Shown, found: Lasting, *, lasts: bool) -> Lasting:
     """The same with the variation of the friction force, and why it is missing or may be too small."""
     part, interval, pattern = found.part, shown.history.interval, shown.context.pattern
     late = replace(part, start=max(part.start, found.force_from))
@@ -295,7 +296,7 @@ def _with_force(shown: Shown, found: Lasting) -> Lasting:
         longer = QUARTER * (shown.duration + found.force_rings)
         text = f"the friction force still rings, and torque_variation is missing: run at least {longer:.3g} s"
         found.notes["torque_variation"] = text
-    elif shown.context.steady and (late.stop - late.start) * interval < 0.999 * pattern:
+    elif lasts and shown.context.steady and (late.stop - late.start) * interval < 0.999 * pattern:
         found.notes["torque_variation"] = (
             f"torque_variation needs {pattern:.3g} s, until the waves repeat: run longer"
         )

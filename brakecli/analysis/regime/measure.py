@@ -174,16 +174,10 @@ def answers(
         names = ("without_waves", *(f"{name}_without_waves" for name in Continued._fields[1:]))
         found |= dict(zip(names, alone, strict=True))
     if waves:
-        friction, roughness, error = shown.power()
-        found |= {
-            "power_of_friction": friction,
-            "power_of_roughness": roughness,
-            "power_error": error,
-            "touches": context.touches(),
-        }
+        found |= shown.powers() | {"touches": context.touches()}
     if cycles := shown.cycles:
         names = ("cycles", "samples_per_cycle", "stick_cycles", "harmonic_share")
-        found |= {name: cycles.evidence[name] for name in names}
+        found |= {name: cycles.evidence[name] for name in names} | {"frequency": cycles.frequency}
         near = _sticks(continued(), cycles, found["amplitude"], shown.limits.settled_within)
         if not waves and near is not None:
             found["stick_cycles"] = near

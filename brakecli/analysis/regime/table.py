@@ -5,8 +5,8 @@ says that the motion lasts by itself leaves it to the rows of `LOOKS` how it loo
 """
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
 from enum import StrEnum
 from typing import Any, NamedTuple
 
@@ -58,6 +58,7 @@ class Answers:
     """What is known of a motion, in SI units; nan where a number is not known."""
 
     failure: str = ""  # why the run has failed
+    unasked: str = ""  # the command that asks what an older file does not hold
     duration: float = math.nan
     samples: int = 0
     few_samples: bool = False  # too few for an envelope
@@ -100,11 +101,27 @@ class Answers:
     seconds: float = math.nan  # of the settled part
     settled: bool = False  # whether such a part was found
     cycles: float = 0.0  # in it
+    frequency: float = math.nan  # of them
     samples_per_cycle: float = 0.0
     steps_per_cycle: float = math.inf  # where the case gives a step
     stick_cycles: float = math.nan
     harmonic_share: float = math.nan  # of one line and its multiples
     band_share: float = math.nan  # in three narrow bands, where the frequency does not wander
+
+    def known(self) -> dict[str, Any]:
+        """What is known, by name: numbers, texts, and 1 for what holds."""
+        found = {each.name: getattr(self, each.name) for each in fields(self)}
+        kept = {name: value for name, value in found.items() if value != _UNKNOWN[name]}
+        return {
+            name: str(value) if isinstance(value, str) else float(value)
+            for name, value in kept.items()
+            if isinstance(value, str) or math.isfinite(value)
+        }
+
+    @classmethod
+    def of(cls, known: Mapping[str, Any]) -> "Answers":
+        """The record of what is known by name; what else there is does not matter."""
+        return cls(**{name: type(value)(known[name]) for name, value in _UNKNOWN.items() if name in known})
 
     def powers(self, rate: float) -> float:
         """Powers of e by which something changes in half of the run."""
@@ -172,6 +189,9 @@ class Answers:
     def word(self) -> str:
         """Which way the level changes."""
         return "grows" if self.change > 0.0 else "falls"
+
+
+_UNKNOWN: dict[str, Any] = {each.name: each.default for each in fields(Answers)}
 
 
 class Decision(NamedTuple):
@@ -263,6 +283,7 @@ _LINEAR = "full contact and slip to one side make the motion linear"
 
 CONTACT: tuple[Row, ...] = (
     Row("failed", lambda a, t: a.failure, "the run failed: {a.failure}"),
+    Row("older file", lambda a, t: a.unasked, "the file is older than the questions that decide", "{a.unasked}"),
     Row("never touched", lambda a, t: a.never, "the shoe has never touched the wheel", _CHECK),
     Row("lost", lambda a, t: a.lost, "the shoe has lost contact for good", _CHECK),
     Row(

@@ -1,0 +1,85 @@
+"""The verdict on the run in a result file: what `brakecli classify RESULT.h5` does."""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from brakecli.analysis.regime.over_time import over_time
+from brakecli.analysis.regime.table import Answers, Excitation, Regime, Thresholds, decide
+from brakecli.case.read import parse_case
+from brakecli.case.system import system_of
+from brakecli.errors import CaseError, UnreadableResultError
+from brakecli.files import fields
+from brakecli.files.field import plain, values_of
+from brakecli.files.read import open_result
+from brakecli.runs.limits import check
+from brakecli.runs.run import asked, motion_of, verdict_in_memory
+from brakecli.solver.history import History
+from brakecli.solver.system import System
+
+MOST_SECONDS = 60.0
+"""Time for which the case of an older file is run again, as it has no record of answers."""
+
+
+class Stored(NamedTuple):
+    """A stored run."""
+
+    system: System
+    history: History
+    attributes: Mapping[str, Any]
+    evidence: Mapping[str, Any]
+
+
+def classify_result(path: Path, thresholds: Thresholds) -> dict[str, Any]:
+    """Names and values of the verdict on a stored run; raises UnreadableResultError for anything else.
+
+    The record of answers that the run has stored decides, with these thresholds. The numbers are those of the run.
+    """
+    with stored_run(path) as run:
+        failure, system = run.attributes.get("failure"), run.system
+        numbers = {each.name: plain(run.attributes.get(each.name)) for each in fields.VERDICT}
+        evidence = {name: plain(value) for name, value in run.evidence.items()}
+        changing = over_time(run.history, system) if not failure and not system.steady else None
+        shown = {each.name: run.attributes.get(each.name) for each in fields.EXPONENT}
+        shown |= {"failure": failure, "vibrations": fields.VIBRATIONS.read({"over_time": changing})}
+        if "row" not in evidence:
+            found = check(system)
+            if failure is None and found.seconds <= MOST_SECONDS:
+                motion, _ = motion_of(asked(system))
+                verdict = verdict_in_memory(motion, system, thresholds)
+                return values_of(fields.VERDICT, {"verdict": verdict}) | shown
+            evidence = {"unasked": f"brakecli run {path.name} -o NEW.h5"}
+    answers = Answers.of(evidence)
+    decision = decide(answers, thresholds)
+    own = decision.excitation is Excitation.SELF_EXCITED
+    notes = (numbers["reasons"] or [])[1:]
+    return (
+        numbers
+        | shown
+        | {
+            "regime": str(decision.regime),
+            "excitation": str(decision.excitation),
+            "frequency": answers.known().get("frequency") if own else None,
+            "settled": int(bool(numbers["settled"]) and decision.regime is not Regime.UNDECIDED),
+            "reasons": [decision.sentence, *notes],
+            "evidence": evidence | {"row": decision.row},
+            "thresholds": plain(thresholds),
+        }
+    )
+
+
+@contextmanager
+def stored_run(path: Path) -> Iterator[Stored]:
+    """A stored run; raises UnreadableResultError for anything else."""
+    with open_result(path, kind="run") as result:
+        try:
+            system = system_of(parse_case(result.text("resolved_toml"), str(path)).case)
+        except (CaseError, KeyError) as error:
+            raise UnreadableResultError(f"{path}: holds no case of this version; run its case again") from error
+        time = result.variables("history").get("time")
+        if time is None or time.shape[0] < 1:
+            raise UnreadableResultError(f"{path}: has no history; run its case again")
+        history = History(system.interval, time.shape[0], partial(result.read, "history"))
+        yield Stored(system, history, result.attributes, result.group_attributes("regime/evidence"))
