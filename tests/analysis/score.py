@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import islice
 from pathlib import Path
@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
+from brakecli.analysis.regime.table import Answers, Thresholds, decide
 from brakecli.case.read import parse_case
 from brakecli.files.read import open_result
 from brakecli.runs.run import run
@@ -101,6 +102,28 @@ def verdict(tables: Tables, folder: Path) -> tuple[Tables, dict[str, Any], Array
     return None
 
 
+MOVED = [
+    Thresholds(**{name: value})
+    for name, values in {
+        "settled_within": (0.025, 0.1),
+        "sure_errors": (1.5, 6.0),
+        "comes_together": (0.5, 2.0),
+        "same_level": (0.15, 0.6),
+        "fewest_cycles": (5.0, 20.0),
+        "samples_per_cycle": (4.0, 16.0),
+        "band_share": (0.95, 0.8),
+    }.items()
+    for value in values
+]
+"""Each threshold half and twice as large; of a share that is near 1 what it lacks. The others define words."""
+
+
+def moved(numbers: dict[str, Any], limits: Thresholds) -> dict[str, Any]:
+    """What is said with other thresholds, by the record of answers."""
+    found = decide(Answers.of(numbers["evidence"]), limits)
+    return {**numbers, "regime": str(found.regime), "excitation": str(found.excitation)}
+
+
 BESIDE = ("neutral", "grows", "swells", "carried", "gone")  # answers of which nothing else may be said
 
 
@@ -110,7 +133,9 @@ class Score:
 
     said: Counter[tuple[str, str]]
     mistakes: list[tuple[Tables, dict[str, Any], Answer, str]]
-    undecided: list[tuple[Tables, str, Answer]]  # with the reason, where more might be said
+    undecided: list[tuple[Tables, str, Answer]]  # with the reason, where more can be said
+    open: int = 0  # undecided where the answer is not known either
+    moved: list[tuple[Thresholds, Tables, str]] = field(default_factory=list)  # wrong with other thresholds
     failed: int = 0
 
     @property
@@ -135,9 +160,14 @@ def score(stratum: str, count: int, seed: int) -> Score:
                 true = replace(true, name="swells")
             found.said[true.name, said(numbers)] += 1
             neutral = Shoe.of(tables).rate == 0.0 and not Shoe.of(tables).b.any()
-            more = not neutral and true.name not in BESIDE
-            if more and said(numbers) == "undecided":
-                found.undecided.append((tables, numbers["reasons"][0], true))
+            if said(numbers) == "undecided" and not neutral and true.name not in BESIDE:
+                if true.name == "no answer":
+                    found.open += 1
+                else:
+                    found.undecided.append((tables, numbers["reasons"][0], true))
+            for limits in MOVED:
+                if why := wrong(tables, moved(numbers, limits), rows, true):
+                    found.moved.append((limits, tables, why))
             if why := wrong(tables, numbers, rows, true):
                 found.mistakes.append((tables, numbers, true, why))
     return found

@@ -100,33 +100,37 @@ def test_no_verdict_contradicts_an_independent_answer(stratum: str, count: int) 
     assert not found.mistakes, told_of(found)
 
 
-MOST_UNDECIDED = {"smooth": 0.08, "slow": 0.02, "full": 0.11, "open": 0.20, "frictionless": 0.02}
-"""Parts that may stay undecided, beside the neutral and those that still grow.
+MOST_UNDECIDED = {"smooth": 0.03, "slow": 0.02, "full": 0.05, "open": 0.12, "frictionless": 0.02}
+"""Parts that may stay undecided of the shoes whose answer is known, beside the neutral and those that still grow.
 
-What is left has no answer in a run of its length: a strong start that still decays (a run need not hold
-the few powers of e that this takes), an amplitude that drifts by more than 5 %, stick in a quarter to
-three quarters of the cycles, and on surfaces that open vibrations that lose a part of their level
-without friction. Of most of these the independent answer, from runs eight times longer, does not know
-either. They are a tenth of the shoes in full contact and a sixth of those that open. The bounds leave
-one shoe in forty for other processors, on which a chaotic motion ends elsewhere.
+What is left has no answer in a run of its length: a strong start that still decays, a chaotic vibration of which
+friction gives now more and now less than it takes, and stick in a quarter to three quarters of the cycles. The
+bounds leave one shoe in forty for other processors, on which a chaotic motion ends elsewhere.
 """
 
 
 @campaign
 def test_few_shoes_stay_undecided_that_are_neither_neutral_nor_still_growing() -> None:
-    """At most 8 % of all, and of each kind what `MOST_UNDECIDED` explains; the score is printed (-s)."""
+    """Of each kind at most what `MOST_UNDECIDED` explains; the score is printed (-s)."""
     scores = {stratum: score(stratum, count, SEED) for stratum, count in MANY.items()}
     said_of = sum((found.said for found in scores.values()), Counter[tuple[str, str]]())
     table = [f"{true:18s} {word:10s} {count:4d}" for (true, word), count in sorted(said_of.items())]
     for stratum, found in scores.items():
         counts = f"{len(found.mistakes)} wrong, {len(found.undecided)} undecided of {found.judged}"
-        table.append(f"{STRATA[stratum]}: {counts}; {found.failed} failed")
+        more = f"{found.open} more without an answer, {found.failed} failed"
+        table.append(f"{STRATA[stratum]}: {counts}; {more}; {len(found.moved)} wrong with a threshold moved")
     sys.stdout.write("\n".join(["", *table, ""]))
     assert sum(count for (true, _), count in said_of.items() if true != "no answer") >= 500
     for stratum, most in MOST_UNDECIDED.items():
         assert len(scores[stratum].undecided) <= most * scores[stratum].judged, stratum
-    judged = sum(found.judged for found in scores.values())
-    assert sum(len(found.undecided) for found in scores.values()) <= 0.08 * judged
+
+
+@campaign
+@pytest.mark.parametrize("stratum", MANY)
+def test_no_threshold_twice_as_large_or_half_makes_a_verdict_wrong(stratum: str) -> None:
+    found = score(stratum, MANY[stratum], SEED).moved
+    told = [f"{why}: {limits}: {tables}" for limits, tables, why in found]
+    assert not told, "\n".join(told)
 
 
 def test_every_stratum_draws_what_it_names() -> None:

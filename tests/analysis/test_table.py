@@ -1,0 +1,174 @@
+"""The table: each row and each threshold by a record of answers that trips it."""
+
+import math
+from dataclasses import fields, replace
+from typing import Any
+
+import pytest
+
+from brakecli.analysis.regime.table import (
+    CONTACT,
+    LOOKS,
+    ROUGH,
+    SMOOTH,
+    Answers,
+    Excitation,
+    Fate,
+    Regime,
+    Thresholds,
+    decide,
+)
+
+LIMITS = Thresholds()
+MOVING = Answers(
+    duration=10.0, samples=10_000, growth=-1.0, ringing=100.0, change=0.0, change_error=0.01, amplitude=1.0,
+    seconds=5.0, settled=True, cycles=100.0, frequency=100.0, samples_per_cycle=20.0, stick_cycles=0.0, harmonic_share=1.0,
+)  # fmt: skip
+LASTS: dict[str, Any] = {"without_waves": Fate.LASTS, "amplitude_without_waves": 1.0}
+SHAKEN: dict[str, Any] = {
+    "waves": True, "slowest": 1.0, "exponent": 0.0, "exponent_error": 0.01, "even": 0.0, "even_error": 0.01,
+    "power_of_friction": 1.0, "friction_error": 0.1, "power_of_roughness": 0.1, "roughness_error": 0.1,
+}  # fmt: skip
+FADING: dict[str, Any] = {**SHAKEN, "exponent": -1.0}
+SMOOTH_ROWS: dict[str, dict[str, Any]] = {
+    "failed": {"failure": "it broke"},
+    "older file": {"unasked": "run it"},
+    "never touched": {"never": True, "lost": True},
+    "lost": {"lost": True},
+    "left": {"left": True},
+    "at rest": {"carried": True, "stands": True},
+    "not held": {"carried": True, "held": False},
+    "locks itself": {"carried": True, "locks": 0.5},
+    "carried": {"carried": True},
+    "few samples": {"few_samples": True},
+    "changes": {"steady": False},
+    "nothing moves yet": {"moves": False, "growth": 1.0},
+    "nothing moves": {"moves": False},
+    "standing wheel": {"stands": True},
+    "standing wheel, no dashpots": {"stands": True, "undamped": True},
+    "linear, held by the steps": {"linear": True, "growth": 1.0, "steadier": "take half weights"},
+    "linear, grows": {"linear": True, "growth": 1.0, "to_limit": 3.0},
+    "linear, decays": {"linear": True},
+    "linear, neutral": {"linear": True, "growth": 0.0},
+    "no friction": {"frictionless": True},
+    "no friction, no dashpots": {"frictionless": True, "undamped": True},
+    "no dashpots": {"undamped": True, "growth": 0.0},
+    "fades": {"without_waves": Fate.DIES},
+    "lasts: quasi-harmonic": LASTS,
+    "on its way: quasi-harmonic": {**LASTS, "amplitude_without_waves": 2.0},
+    "lasts, irregular: quasi-harmonic": {"without_waves": Fate.LASTS},
+    "undecided": {"change": 0.5},
+}
+ROUGH_ROWS: dict[str, dict[str, Any]] = {
+    "failed": {"failure": "it broke"},
+    "shorter than a wave": {"slowest": 11.0},
+    "linear, held by the steps": {"linear": True, "growth": 1.0, "steadier": "take half weights"},
+    "linear, forced": {"linear": True},
+    "linear, grows": {"linear": True, "growth": 1.0, "to_limit": 3.0},
+    "linear, open": {"linear": True, "growth_error": 2.0},
+    "forced, no friction": {"frictionless": True},
+    "no friction, no dashpots": {"frictionless": True, "undamped": True},
+    "bounces": {"touches": False},
+    "forced, neighbours": {**FADING, "without_waves": Fate.DIES, "change": 0.5},
+    "forced, steady": {"without_waves": Fate.DIES},
+    "forced, friction takes": {"power_of_friction": -1.0},
+    "forced, roughness gives": {**FADING, "power_of_roughness": 3.0},
+    "forced, held down": {**FADING, **LASTS, "amplitude_without_waves": 2.0},
+    "dies out, not yet": {"without_waves": Fate.DIES, "change": 0.5},
+    "no dashpots, rough": {"undamped": True},
+    "self-excited: quasi-harmonic": LASTS,
+    "locked to the waves: quasi-harmonic": {**FADING, **LASTS},
+    "still changes": {"change": 0.5},
+    "either": {},
+}
+LOOK_ROWS: dict[str, dict[str, Any]] = {
+    "few cycles": {"cycles": 9.0},
+    "few steps in a cycle": {"steps_per_cycle": 7.0},
+    "few samples in a cycle": {"samples_per_cycle": 7.0},
+    "shorter than two waves": {"slowest": 3.0},
+    "relaxation": {"stick_cycles": 0.9},
+    "quasi-harmonic": {},
+    "irregular": {"stick_cycles": 0.5},
+}
+FORCED = Regime.DAMPED, Excitation.FORCED
+
+
+def answers(**changes: Any) -> Answers:
+    return replace(MOVING, **changes)
+
+
+@pytest.mark.parametrize("row", SMOOTH_ROWS)
+def test_each_row_of_a_smooth_wheel_decides_where_it_holds(row: str) -> None:
+    assert decide(answers(**SMOOTH_ROWS[row]), LIMITS).row == row
+
+
+@pytest.mark.parametrize("row", ROUGH_ROWS)
+def test_each_row_of_a_rough_wheel_decides_where_it_holds(row: str) -> None:
+    found = decide(answers(**{**SHAKEN, **ROUGH_ROWS[row]}), LIMITS)
+    assert found.row == row
+    assert ((found.regime, found.excitation) == FORCED) is (row.startswith("forced") or row == "linear, forced")
+
+
+@pytest.mark.parametrize("row", LOOK_ROWS)
+def test_each_row_of_looks_decides_where_it_holds(row: str) -> None:
+    found = decide(answers(**{**LASTS, **LOOK_ROWS[row]}), LIMITS)
+    assert found.row == f"lasts: {row}"
+    assert found.excitation is (
+        Excitation.SELF_EXCITED if row in ("relaxation", "quasi-harmonic") else Excitation.NONE
+    )
+
+
+def test_every_row_has_a_record_that_trips_it() -> None:
+    tried = {name.partition(":")[0] for name in (*SMOOTH_ROWS, *ROUGH_ROWS)} | {*LOOK_ROWS}
+    assert {row.name for row in (*CONTACT, *SMOOTH, *ROUGH, *LOOKS)} == tried
+
+
+def test_the_last_row_of_each_part_always_holds() -> None:
+    assert all(rows[-1].holds(Answers(), LIMITS) for rows in (SMOOTH, ROUGH, LOOKS))
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "changes", "rows"),
+    [
+        ("settled_within", 0.3, {"change": 0.5, "without_waves": Fate.LASTS}, ("undecided", "lasts, irregular")),
+        ("sure_errors", 60.0, {"change": 0.5, "without_waves": Fate.LASTS}, ("undecided", "lasts, irregular")),
+        ("same_level", 0.6, {**LASTS, "amplitude_without_waves": 2.0}, ("on its way", "lasts")),
+        ("comes_together", 6.0, {**FADING, **LASTS}, ("locked to the waves", "self-excited")),
+        ("fewest_cycles", 200.0, LASTS, ("quasi-harmonic", "few cycles")),
+        ("samples_per_cycle", 30.0, LASTS, ("quasi-harmonic", "few samples in a cycle")),
+        ("stick_cycles", 0.4, {**LASTS, "stick_cycles": 0.5}, ("irregular", "relaxation")),
+        ("harmonic_share", 0.4, {**LASTS, "harmonic_share": 0.5}, ("irregular", "quasi-harmonic")),
+        (
+            "band_share",
+            0.7,
+            {**LASTS, "harmonic_share": 0.5, "band_share": 0.8},
+            ("irregular", "quasi-harmonic"),
+        ),
+    ],
+)
+def test_each_threshold_moves_what_it_stands_for(
+    name: str, value: float, changes: dict[str, Any], rows: tuple[str, str]
+) -> None:
+    found = [decide(answers(**changes), limits).row for limits in (LIMITS, replace(LIMITS, **{name: value}))]
+    for row, expected in zip(found, rows, strict=True):
+        assert expected in (row, *row.split(": "))
+
+
+def test_no_threshold_is_left_out_and_there_are_no_more_than_twelve() -> None:
+    mark = test_each_threshold_moves_what_it_stands_for.pytestmark[0]  # type: ignore[attr-defined]
+    assert {each[0] for each in mark.args[1]} == {each.name for each in fields(Thresholds)}
+    assert len(fields(Thresholds)) <= 12
+
+
+@pytest.mark.parametrize("changes", [*SMOOTH_ROWS.values(), *({**SHAKEN, **each} for each in ROUGH_ROWS.values())])
+def test_a_record_that_was_stored_decides_the_same(changes: dict[str, Any]) -> None:
+    given = answers(**changes)
+    stored = given.known()
+    assert all(isinstance(value, str) or math.isfinite(value) for value in stored.values())
+    assert decide(Answers.of(stored), LIMITS) == decide(given, LIMITS)
+
+
+def test_a_number_that_is_missing_is_in_no_sentence_of_a_decision() -> None:
+    for changes in (*SMOOTH_ROWS.values(), *({**SHAKEN, **each} for each in ROUGH_ROWS.values())):
+        found = decide(answers(**changes), LIMITS)
+        assert "nan" not in found.sentence.split(), found
