@@ -13,9 +13,15 @@ from brakecli.branches.line import Shoe
 from brakecli.errors import CaseError
 from brakecli.solver.automaton import STICK
 from brakecli.solver.compile import Floats
+from brakecli.solver.flow.repeating import Orbit
+from brakecli.solver.motion import solve
+from brakecli.solver.records import V_X
 from brakecli.solver.roughness import surface
 from brakecli.solver.steady_sliding import steady_sliding
-from brakecli.solver.system import System
+from brakecli.solver.system import Initial, System
+
+SAMPLES = 256
+"""Of a period, by which its level is found."""
 
 
 def without_waves(system: System, state: Floats) -> Continued:
@@ -32,7 +38,17 @@ def without_waves(system: System, state: Floats) -> Continued:
     if end.orbit is None or end.rate is None:
         return Continued(Fate.LASTS if end.lasts else Fate.DIES)
     orbit = end.orbit
-    return Continued(Fate.LASTS, orbit.amplitude, end.rate, orbit.period, float(orbit.word.count(STICK)))
+    numbers = orbit.amplitude, _level(flat, orbit), end.rate, orbit.period, float(orbit.word.count(STICK))
+    return Continued(Fate.LASTS, *numbers)
+
+
+def _level(flat: System, orbit: Orbit) -> float:
+    """Standard deviation (m/s) of vx in a period of a limit cycle."""
+    exact = replace(flat.method, scheme="piecewise-exact", step=orbit.period)
+    x, y, v_x, v_y = orbit.state
+    beginning, interval = Initial(x, y, v_x, v_y), orbit.period / SAMPLES
+    once = replace(flat, method=exact, initial=beginning, interval=interval, duration=orbit.period, tracked=False)
+    return float(solve(once).rows[1:, V_X].std())
 
 
 def _on_a_rough_shoe(flat: System, state: Floats) -> End:

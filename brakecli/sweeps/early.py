@@ -152,7 +152,8 @@ def _cycle(system: System, theory: Linear, motion: Pursuit) -> tuple[Verdict, li
         growth=theory.mode.growth,
         undamped=is_undamped(c),
         without_waves=Fate.LASTS,
-        amplitude=orbit.amplitude,
+        level=1.0,  # the same as on the orbit
+        level_without_waves=1.0,
         amplitude_without_waves=orbit.amplitude,
         settled=True,
         seconds=part,

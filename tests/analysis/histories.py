@@ -36,6 +36,6 @@ def verdict_of(case: Any) -> Verdict:
 
 def lasting(history: History, context: Context, thresholds: Thresholds | None = None) -> Verdict:
     """The verdict on a history that is known to last, as its end is, where it is continued on the smooth wheel."""
-    end = history.read("x", 3 * history.samples // 4, history.samples)
-    lasts = Continued(Fate.LASTS, 0.5 * float(np.ptp(end)), math.inf)
+    x, v_x = (history.read(name, 3 * history.samples // 4, history.samples) for name in ("x", "vx"))
+    lasts = Continued(Fate.LASTS, 0.5 * float(np.ptp(x)), float(v_x.std()), math.inf)
     return classify(history, context, thresholds or Thresholds(), continued=lambda: lasts)

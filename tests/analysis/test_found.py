@@ -249,7 +249,9 @@ def test_what_lies_on_sums_of_three_waves_is_not_what_the_shoe_adds() -> None:
 def test_cycles_of_whole_samples_know_a_flight_to_a_sample() -> None:
     verdict = judged("leaves the wheel for 13 of 20 samples")
     assert verdict.settled
-    assert abs(verdict.contact_loss_fraction - 0.6041) <= verdict.evidence["contact_loss_spread"]  # located events
+    assert (
+        abs(verdict.contact_loss_fraction - 0.60416) <= 5e-6 + verdict.evidence["contact_loss_spread"]
+    )  # located events
 
 
 def test_an_impact_between_the_samples_of_most_cycles_counts_for_the_torque() -> None:
@@ -293,9 +295,12 @@ def test_the_spread_of_a_motion_under_an_opening_pad_knows_that_three_waves_beat
 
 def test_a_vibration_that_is_locked_to_the_waves_is_not_called_forced() -> None:
     """Without the roughness it goes on for good: 0.37 m/s beside 0.32 m/s, after 64 times as long."""
-    for times in (1.0, 4.0):
-        verdict = judged("locked to the waves", times)
-        assert verdict.regime is Regime.UNDECIDED
+    assert judged("locked to the waves").regime is Regime.UNDECIDED
+    later = judged("locked to the waves", 4.0)
+    assert (later.excitation, later.evidence["row"]) == (
+        Excitation.SELF_EXCITED,
+        "locked to the waves: quasi-harmonic",
+    )
 
 
 def test_a_cycle_is_not_doubled_because_its_samples_repeat_after_two() -> None:
@@ -312,7 +317,7 @@ def test_a_forced_motion_far_below_the_limit_cycle_beside_it_is_not_called_self_
     """At a fifth of the critical friction the first swings by 0.72 of this, by another integrator."""
     verdict = judged(name)
     assert (verdict.regime, verdict.excitation) == (Regime.DAMPED, Excitation.FORCED)
-    assert verdict.amplitude < 0.3 * verdict.evidence["amplitude_without_waves"]
+    assert verdict.evidence["level"] < 0.3 * verdict.evidence["level_without_waves"]
 
 
 def test_a_shoe_that_bounces_off_the_wheel_for_good_is_not_called_forced() -> None:
@@ -451,8 +456,8 @@ def test_the_spreads_of_impacts_hold_what_shorter_steps_and_another_integrator_c
 )
 def test_a_ring_down_on_or_near_lines_of_the_roughness_is_still_decaying(name: str, rate: float) -> None:
     verdict = judged(name)
-    assert (verdict.regime, verdict.excitation) == (Regime.UNDECIDED, Excitation.NONE)
-    assert "its level still falls" in verdict.reasons[0]
+    assert (verdict.regime, verdict.excitation) == (Regime.DAMPED, Excitation.FORCED)
+    assert (verdict.settled, verdict.amplitude_spread) == (False, None)
     half = 0.5 * SHOES[name]["solver"]["duration"]
     assert -verdict.evidence["change"] / half == pytest.approx(rate, rel=0.2)
 
@@ -513,8 +518,8 @@ def test_where_an_amplitude_ends_is_not_said_of_a_run_that_does_not_show_it(name
 @pytest.mark.parametrize(
     ("name", "says", "not_this"),
     [
-        ("friction feeds a line beside the wave", "friction gives 14 W and the roughness 0.3 W", "decays"),
-        ("friction takes energy", "its level still falls", "keep it up"),
+        ("friction feeds a line beside the wave", "friction gives 1\\d W and the roughness", "decays"),
+        ("friction takes energy", "its level does not grow", "keep it up"),
         ("a beat opens the pad again", "which may open the pad again", None),
         ("without friction, ahead of the wheel", "make the motion linear", None),
         ("falls without a dashpot", "no dashpot damps", "at least"),

@@ -22,9 +22,10 @@ from brakecli.analysis.regime.table import (
 LIMITS = Thresholds()
 MOVING = Answers(
     duration=10.0, samples=10_000, growth=-1.0, ringing=100.0, change=0.0, change_error=0.01, amplitude=1.0,
-    seconds=5.0, settled=True, cycles=100.0, frequency=100.0, samples_per_cycle=20.0, stick_cycles=0.0, harmonic_share=1.0,
+    level=1.0, seconds=5.0, settled=True, cycles=100.0, frequency=100.0, samples_per_cycle=20.0, stick_cycles=0.0,
+    harmonic_share=1.0,
 )  # fmt: skip
-LASTS: dict[str, Any] = {"without_waves": Fate.LASTS, "amplitude_without_waves": 1.0}
+LASTS: dict[str, Any] = {"without_waves": Fate.LASTS, "amplitude_without_waves": 1.0, "level_without_waves": 1.0}
 SHAKEN: dict[str, Any] = {
     "waves": True, "slowest": 1.0, "exponent": 0.0, "exponent_error": 0.01, "even": 0.0, "even_error": 0.01,
     "power_of_friction": 1.0, "friction_error": 0.1, "power_of_roughness": 0.1, "roughness_error": 0.1,
@@ -55,7 +56,7 @@ SMOOTH_ROWS: dict[str, dict[str, Any]] = {
     "no dashpots": {"undamped": True, "growth": 0.0},
     "fades": {"without_waves": Fate.DIES},
     "lasts: quasi-harmonic": LASTS,
-    "on its way: quasi-harmonic": {**LASTS, "amplitude_without_waves": 2.0},
+    "on its way: quasi-harmonic": {**LASTS, "level_without_waves": 2.0},
     "lasts, irregular: quasi-harmonic": {"without_waves": Fate.LASTS},
     "undecided": {"change": 0.5},
 }
@@ -70,10 +71,10 @@ ROUGH_ROWS: dict[str, dict[str, Any]] = {
     "no friction, no dashpots": {"frictionless": True, "undamped": True},
     "bounces": {"touches": False},
     "forced, neighbours": {**FADING, "without_waves": Fate.DIES, "change": 0.5},
-    "forced, steady": {"without_waves": Fate.DIES},
+    "forced, level": {"without_waves": Fate.DIES, "change": -0.5},
     "forced, friction takes": {"power_of_friction": -1.0},
     "forced, roughness gives": {**FADING, "power_of_roughness": 3.0},
-    "forced, held down": {**FADING, **LASTS, "amplitude_without_waves": 2.0},
+    "forced, another level": {**FADING, **LASTS, "level_without_waves": 2.0},
     "dies out, not yet": {"without_waves": Fate.DIES, "change": 0.5},
     "no dashpots, rough": {"undamped": True},
     "self-excited: quasi-harmonic": LASTS,
@@ -132,7 +133,7 @@ def test_the_last_row_of_each_part_always_holds() -> None:
     [
         ("settled_within", 0.3, {"change": 0.5, "without_waves": Fate.LASTS}, ("undecided", "lasts, irregular")),
         ("sure_errors", 60.0, {"change": 0.5, "without_waves": Fate.LASTS}, ("undecided", "lasts, irregular")),
-        ("same_level", 0.6, {**LASTS, "amplitude_without_waves": 2.0}, ("on its way", "lasts")),
+        ("same_level", 0.6, {**LASTS, "level_without_waves": 2.0}, ("on its way", "lasts")),
         ("comes_together", 6.0, {**FADING, **LASTS}, ("locked to the waves", "self-excited")),
         ("fewest_cycles", 200.0, LASTS, ("quasi-harmonic", "few cycles")),
         ("samples_per_cycle", 30.0, LASTS, ("quasi-harmonic", "few samples in a cycle")),
@@ -155,7 +156,7 @@ def test_each_threshold_moves_what_it_stands_for(
 
 
 def test_no_threshold_is_left_out_and_there_are_no_more_than_twelve() -> None:
-    mark = test_each_threshold_moves_what_it_stands_for.pytestmark[0]  # type: ignore[attr-defined]
+    mark = test_each_threshold_moves_what_it_stands_for.pytestmark[0]
     assert {each[0] for each in mark.args[1]} == {each.name for each in fields(Thresholds)}
     assert len(fields(Thresholds)) <= 12
 

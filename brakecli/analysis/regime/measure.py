@@ -26,6 +26,7 @@ class Continued(NamedTuple):
 
     fate: Fate = Fate.UNKNOWN
     amplitude: float = math.nan
+    level: float = math.nan  # standard deviation of vx
     rate: float = math.nan  # at which its slowest disturbance fades
     period: float = math.nan
     sticks: float = math.nan  # in a period
@@ -159,6 +160,7 @@ def answers(
         "change": change,
         "change_error": change_error,
         "amplitude": last.amplitude("x"),
+        "level": last.deviation("vx"),
         "settled": shown.settled is not None,
         "seconds": (history.samples - shown.judged.start) * history.interval,
     }

@@ -90,7 +90,9 @@ class Answers:
     even_error: float = math.nan
     without_waves: Fate = Fate.UNKNOWN  # of the motion on the smooth wheel
     amplitude: float = math.nan  # of x at the end
+    level: float = math.nan  # standard deviation of vx there
     amplitude_without_waves: float = math.nan  # that it comes to on the smooth wheel
+    level_without_waves: float = math.nan  # and the standard deviation of vx
     rate_without_waves: float = math.nan  # at which it does
     period_without_waves: float = math.nan  # of the limit cycle that this is
     sticks_without_waves: float = math.nan  # in a period
@@ -238,13 +240,8 @@ def _together(a: Answers, t: Thresholds) -> bool:
 
 
 def _same(a: Answers, t: Thresholds) -> bool:
-    """The motion has the amplitude that it would have on the smooth wheel."""
-    return abs(a.amplitude - a.amplitude_without_waves) <= t.same_level * a.amplitude_without_waves
-
-
-def _smaller(a: Answers, t: Thresholds) -> bool:
-    """The motion is smaller than it would be on the smooth wheel."""
-    return a.amplitude < (1.0 - t.same_level) * a.amplitude_without_waves
+    """The motion has the level that it would have on the smooth wheel."""
+    return abs(a.level - a.level_without_waves) <= t.same_level * a.level_without_waves
 
 
 def _gives(a: Answers, t: Thresholds) -> bool:
@@ -471,15 +468,15 @@ ROUGH: tuple[Row, ...] = (
         *_FORCED,
     ),
     Row(
-        "forced, steady",
-        lambda a, t: a.without_waves == Fate.DIES and _steady(a, t) and not a.undamped,
-        "only the roughness shakes the shoe: without it the vibration dies out, and its level does not change",
+        "forced, level",
+        lambda a, t: a.without_waves == Fate.DIES and (_steady(a, t) or a.change < 0.0) and not a.undamped,
+        "only the roughness shakes the shoe: without it the vibration dies out, and its level does not grow",
         "",
         *_FORCED,
     ),
     Row(
         "forced, friction takes",
-        lambda a, t: _takes(a, t) and _steady(a, t) and not a.undamped,
+        lambda a, t: _takes(a, t) and (_steady(a, t) or a.without_waves == Fate.DIES) and not a.undamped,
         "only the roughness shakes the shoe: friction takes {a.power_of_friction:.2g} W from the vibration",
         "",
         *_FORCED,
@@ -493,17 +490,23 @@ ROUGH: tuple[Row, ...] = (
         *_FORCED,
     ),
     Row(
-        "forced, held down",
-        lambda a, t: _together(a, t) and _steady(a, t) and _smaller(a, t) and not a.undamped,
-        "only the roughness shakes the shoe: neighbours come together at {a.exponent:.3g} 1/s, far below the "
-        "amplitude of {a.amplitude_without_waves:.3g} m that the vibration would come to without it",
+        "forced, another level",
+        lambda a, t: (
+            _together(a, t)
+            and _steady(a, t)
+            and math.isfinite(a.level_without_waves)
+            and not _same(a, t)
+            and not a.undamped
+        ),
+        "only the roughness shakes the shoe: neighbours come together at {a.exponent:.3g} 1/s, and vx has "
+        "{a.level:.3g} m/s, not the {a.level_without_waves:.3g} m/s to which it would come without the roughness",
         "",
         *_FORCED,
     ),
     Row(
         "dies out, not yet",
         lambda a, t: a.without_waves == Fate.DIES,
-        "without the roughness the vibration dies out, but its level still {a.word} by e^{a.change:.2g} in the "
+        "without the roughness the vibration dies out, but its level still grows by e^{a.change:.2g} in the "
         "second half",
         "run at least {a.waited:.3g} s",
     ),
