@@ -141,7 +141,7 @@ ROUGH = (
     ),
     Example(
         "Only the waves, and weak dashpots",
-        "forced, steady",
+        "forced, level",
         "rough-partly-open",
         "link1.damping=10.0 link2.damping=5.0 solver.duration=1.0",
         1.5,
@@ -170,7 +170,7 @@ ROUGH = (
     ),
     Example(
         "High waves hold the vibration down",
-        "forced, held down",
+        "forced, another level",
         "quasi-harmonic",
         f"{HIGH.format(0.0115, '600e-6')} solver.duration=1.0",
         2.0,
