@@ -44,9 +44,9 @@ def classify(
     if decision.excitation is Excitation.SELF_EXCITED and cycles:
         decision = decision._replace(frequency=what.frequency)
         found = replace(found, frequency=what.frequency or math.nan)
-    evidence = {"row": decision.row, **found.known(), **what.evidence}
+    evidence: dict[str, Any] = {"row": decision.row}
     if in_full:
-        evidence |= _further(shown, what, context)
+        evidence |= found.known() | what.evidence | _further(shown, what, context)
     friction = part.mean("friction_force")
     theory = shown.linear if found.linear else None
     return Verdict(

@@ -224,7 +224,7 @@ def level_change(levels: Array) -> tuple[float, float]:
 
     The error is that of the means of ten batches.
     """
-    means = np.array([part.mean() for part in np.array_split(levels, _BATCHES)])
+    means = levels[len(levels) % _BATCHES :].reshape(_BATCHES, -1).mean(axis=1)
     if not means.min() > 0.0:
         return math.nan, math.nan
     return line((np.arange(_BATCHES) + 0.5) / _BATCHES, np.log(means))
