@@ -150,7 +150,7 @@ ROUGH = (
         "Only the waves, but not settled yet",
         "dies out, not yet",
         "rough-partly-open",
-        "solver.duration=0.3",
+        'initial={at="equilibrium"} solver.duration=0.2',
         0.5,
     ),
     Example(
@@ -293,7 +293,7 @@ def answers(numbers: dict[str, Any]) -> str:
         lines.append(f"theory: {numbers['growth_rate']:.3g} 1/s")
     elif "exponent" in evidence:
         lines.append(f"neighbours: {evidence['exponent']:.2g} ± {evidence['exponent_error']:.1g} 1/s")
-    if evidence["without_waves"] != "unknown":
+    if "without_waves" in evidence:
         size = evidence.get("amplitude_without_waves")
         word = "dies out" if evidence["without_waves"] == "dies" else "lasts"
         lines.append(f"smooth wheel: {word}{f', {1e6 * size:.3g} µm' if size else ''}")

@@ -50,7 +50,10 @@ VERDICT = within(
 )
 MEASURED_UNITS = {"displacement": "m", "velocity": "m/s", "force": "N", "torque": "N m"}
 MEASURED_UNITS |= {"acceleration": "m/s²", "pressure": "Pa"}
-EVIDENCE_UNITS = dict.fromkeys(("growth", "exponent", "even", "rate_"), "1/s") | {"amplitude_v": "m/s", "level": "m/s"}
+EVIDENCE_UNITS = dict.fromkeys(("growth", "exponent", "even", "rate_"), "1/s") | {
+    "amplitude_v": "m/s",
+    "level": "m/s",
+}
 EVIDENCE_UNITS |= dict.fromkeys(("frequency", "line_freq", "ringing"), "Hz") | {"amplitude": "m"}
 EVIDENCE_UNITS |= dict.fromkeys(("power_", "friction_error", "roughness_error"), "W")
 EVIDENCE_UNITS |= dict.fromkeys(("duration", "seconds", "slowest", "period_", "to_limit"), "s")

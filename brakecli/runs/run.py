@@ -13,7 +13,7 @@ import scipy
 from numpy.typing import NDArray
 
 from brakecli import __version__
-from brakecli.analysis.regime.over_time import OverTime, over_time
+from brakecli.analysis.over_time import OverTime, over_time
 from brakecli.analysis.regime.spectra import peak, spectrum
 from brakecli.analysis.regime.table import Thresholds
 from brakecli.analysis.regime.verdict import Verdict

@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from brakecli.analysis.regime.over_time import over_time
+from brakecli.analysis.over_time import over_time
 from brakecli.analysis.regime.table import Answers, Excitation, Regime, Thresholds, decide
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of

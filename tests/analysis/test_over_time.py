@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from brakecli.analysis.regime.over_time import LOUD, over_time
+from brakecli.analysis.over_time import LOUD, over_time
 from brakecli.case.read import parse_case, read_text
 from brakecli.case.system import system_of
 from brakecli.files.read import open_result

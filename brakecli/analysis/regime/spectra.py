@@ -18,9 +18,7 @@ SEGMENTS_WANTED = 8
 SHORTEST_SEGMENT = 16
 FEWEST_CYCLES = 5  # of a line in the record, and bins below it: what is slower is not told from drift
 _FEWEST_BINS = 3
-_MOST_COMBINED = 6  # waves whose frequencies are combined by threes
 _MOST_PAIRED = 2000  # waves; sums of two are lines where there are no more
-_COMBINATIONS = [(i, j, k) for i in range(-2, 3) for j in range(-2, 3) for k in (-1, 0, 1)]
 SPECTRAL = ("x", "y", "vx", "vy", "friction_force", "normal_force", "contact_fraction")
 
 
@@ -127,13 +125,3 @@ def forced_lines(belt_speed: float, waves_per_metre: tuple[float, ...], highest:
     found = [np.outer(np.arange(1, 11), base), np.add.outer(few, few), np.abs(np.subtract.outer(few, few))]
     lines = np.unique(np.concatenate([each.ravel() for each in found]))
     return tuple(lines[(lines > 0.0) & (lines <= highest)].tolist())
-
-
-@lru_cache(maxsize=4)
-def subharmonics(belt_speed: float, waves_per_metre: tuple[float, ...], highest: float) -> tuple[float, ...]:
-    """Halves, thirds and quarters of the passing frequencies, their multiples, and sums of up to three."""
-    base = [abs(belt_speed) * waves for waves in waves_per_metre]
-    parts = {k * f / n for f in base for n in (2, 3, 4) for k in range(1, 4 * n)}
-    few = base if len(base) <= _MOST_COMBINED else []
-    sums = {abs(i * f + j * g + k * h) for f in few for g in few for h in few for i, j, k in _COMBINATIONS}
-    return tuple(sorted(f for f in parts | sums if 0.0 < f <= highest))
