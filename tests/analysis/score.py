@@ -109,6 +109,7 @@ MOVED = [
         "sure_errors": (1.5, 6.0),
         "comes_together": (0.5, 2.0),
         "same_level": (0.15, 0.6),
+        "most": (1.0, 4.0),
         "fewest_cycles": (5.0, 20.0),
         "samples_per_cycle": (4.0, 16.0),
         "band_share": (0.95, 0.8),

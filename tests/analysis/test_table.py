@@ -135,6 +135,7 @@ def test_the_last_row_of_each_part_always_holds() -> None:
         ("sure_errors", 60.0, {"change": 0.5, "without_waves": Fate.LASTS}, ("undecided", "lasts, irregular")),
         ("same_level", 0.6, {**LASTS, "level_without_waves": 2.0}, ("on its way", "lasts")),
         ("comes_together", 6.0, {**FADING, **LASTS}, ("locked to the waves", "self-excited")),
+        ("most", 20.0, {**FADING, **LASTS}, ("locked to the waves", "either")),
         ("fewest_cycles", 200.0, LASTS, ("quasi-harmonic", "few cycles")),
         ("samples_per_cycle", 30.0, LASTS, ("quasi-harmonic", "few samples in a cycle")),
         ("stick_cycles", 0.4, {**LASTS, "stick_cycles": 0.5}, ("irregular", "relaxation")),

@@ -46,6 +46,7 @@ class Thresholds:
     sure_errors: float = 3.0  # standard errors beyond which a change is no chance
     comes_together: float = 1.0  # powers of e by which neighbours that come together do so in half of the run
     same_level: float = 0.3  # part by which two motions of the same level may differ
+    most: float = 2.0  # times the power of the other, of what gives most of the energy
     fewest_cycles: float = 10.0  # in the settled part
     samples_per_cycle: float = 8.0
     stick_cycles: float = 0.8  # part of the cycles that stick in relaxation; in 1 less it, others may
@@ -248,10 +249,14 @@ def _gives(a: Answers, t: Thresholds) -> bool:
     return a.power_of_friction > t.sure_errors * a.friction_error
 
 
-def _gives_more(a: Answers, t: Thresholds) -> float:
-    """1 where friction surely gives more than the roughness, -1 where it gives less, otherwise 0."""
-    more = max(a.power_of_friction, 0.0) - max(a.power_of_roughness, 0.0)
-    return math.copysign(abs(more) > t.sure_errors * math.hypot(a.friction_error, a.roughness_error), more)
+def _friction_gives_most(a: Answers, t: Thresholds) -> bool:
+    error = math.hypot(a.friction_error, t.most * a.roughness_error)
+    return a.power_of_friction - t.most * max(a.power_of_roughness, 0.0) > t.sure_errors * error
+
+
+def _roughness_gives_most(a: Answers, t: Thresholds) -> bool:
+    error = math.hypot(a.roughness_error, t.most * a.friction_error)
+    return a.power_of_roughness - t.most * max(a.power_of_friction, 0.0) > t.sure_errors * error
 
 
 def _regular(a: Answers, t: Thresholds) -> bool:
@@ -483,7 +488,7 @@ ROUGH: tuple[Row, ...] = (
     ),
     Row(
         "forced, roughness gives",
-        lambda a, t: _together(a, t) and _steady(a, t) and _gives_more(a, t) < 0.0 and not a.undamped,
+        lambda a, t: _together(a, t) and _steady(a, t) and _roughness_gives_most(a, t) and not a.undamped,
         "only the roughness shakes the shoe: it gives {a.power_of_roughness:.2g} W, friction "
         "{a.power_of_friction:.2g} W, and neighbours come together at {a.exponent:.3g} 1/s",
         "",
@@ -536,7 +541,7 @@ ROUGH: tuple[Row, ...] = (
             and _together(a, t)
             and _steady(a, t)
             and _same(a, t)
-            and _gives_more(a, t) > 0.0
+            and _friction_gives_most(a, t)
         ),
         "the vibration lasts without the roughness at the same level, and is locked to it",
         "",
