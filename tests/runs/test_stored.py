@@ -1,0 +1,61 @@
+"""`classify` decides from the record of answers that a run has stored."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+import tomli_w
+
+from brakecli.analysis.regime.table import Thresholds
+from brakecli.case.read import parse_case
+from brakecli.runs import stored
+from brakecli.runs.run import run
+from tests.examples import ROUGH
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    found = tmp_path_factory.mktemp("stored") / "rough.h5"
+    overrides = ["solver.duration=0.5", "solver.step=2e-5"]
+    run(parse_case(tomli_w.dumps(ROUGH), "rough", overrides), found, force=False)
+    return found
+
+
+def without_answers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Files look as those of an older version do."""
+    whole = stored.stored_run
+
+    @contextmanager
+    def older(path: Path) -> Iterator[stored.Stored]:
+        with whole(path) as found:
+            yield found._replace(evidence={"envelope_final": 1.0})
+
+    monkeypatch.setattr(stored, "stored_run", older)
+
+
+def test_other_thresholds_decide_anew_and_the_numbers_stay(path: Path) -> None:
+    numbers = stored.classify_result(path, Thresholds())
+    strict = stored.classify_result(path, Thresholds(comes_together=1e9, settled_within=0.0, sure_errors=0.0))
+    assert (numbers["regime"], numbers["excitation"]) == ("damped", "forced")
+    assert strict["evidence"]["row"] != numbers["evidence"]["row"]
+    assert strict["amplitude"] == numbers["amplitude"]
+    assert strict["thresholds"]["comes_together"] == 1e9
+
+
+def test_an_older_file_is_run_again_where_that_takes_a_minute_at_most(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = stored.classify_result(path, Thresholds())
+    without_answers(monkeypatch)
+    again = stored.classify_result(path, Thresholds())
+    for name in ("regime", "excitation", "reasons", "settled", "frequency"):
+        assert again[name] == now[name]
+    assert again["evidence"].keys() == now["evidence"].keys()
+    for name in ("amplitude", "amplitude_spread", "forced_frequency", "braking_torque"):
+        assert again[name] == pytest.approx(now[name], rel=1e-12)
+    monkeypatch.setattr(stored, "MOST_SECONDS", 0.0)
+    late = stored.classify_result(path, Thresholds())
+    assert (late["regime"], late["settled"]) == ("undecided", 0)
+    assert late["reasons"][0].endswith(f"brakecli run {path.name} -o NEW.h5")
+    assert late["amplitude"] == now["amplitude"]

@@ -1,0 +1,74 @@
+"""What becomes of a motion on the smooth wheel, beside long runs."""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from brakecli.analysis.regime.measure import Continued
+from brakecli.analysis.regime.table import Fate
+from brakecli.case.system import system_of
+from brakecli.runs.without_waves import without_waves
+from brakecli.solver.motion import solve
+from brakecli.solver.steady_sliding import steady_sliding
+from brakecli.solver.system import System
+from tests.examples import SQUEAL, make
+
+WAVES = {"wheel": {"amplitudes": [2e-5], "wavelengths": [0.03]}}
+BUMPS = {"shoe": {"amplitudes": [2e-6], "wavelengths": [0.05]}}
+
+
+def system(**changes: Any) -> System:
+    return system_of(make(SQUEAL, friction__coefficient=0.7, **changes))
+
+
+def continued(shoe: System) -> Continued:
+    """From the start of a case."""
+    start = shoe.initial
+    return without_waves(shoe, np.array([start.x, start.y, start.vx, start.vy]))
+
+
+@pytest.mark.parametrize("roughness", [{}, {"roughness__wheel": WAVES["wheel"]}])
+@pytest.mark.parametrize("omega", [0.1, 2.0])
+def test_a_vibration_comes_to_the_limit_cycle_of_a_long_run(roughness: dict[str, Any], omega: float) -> None:
+    """By stick, and by loss of contact; the waves of the wheel do not matter."""
+    found = continued(system(**roughness, wheel__angular_speed=omega))
+    assert found.fate is Fate.LASTS
+    interval = found.period / 100.0
+    changes: dict[str, Any] = {"solver__step": 0.02 * interval, "output__sample_interval": interval}
+    rows = solve(system(wheel__angular_speed=omega, **changes, solver__duration=1.0)).rows[-2000:]
+    assert found.amplitude == pytest.approx(0.5 * float(np.ptp(rows[:, 0])), rel=0.01)
+    assert found.level == pytest.approx(float(rows[:, 2].std()), rel=0.01)
+    assert found.sticks == (1.0 if omega == 0.1 else 0.0)
+    assert found.rate > 0.0
+
+
+def test_below_the_critical_friction_it_dies_out_from_any_start() -> None:
+    shoe = replace(system(), coefficients=system().coefficients._replace(phi=0.3))
+    for speed in (1e-5, 0.05, 1.0):
+        assert without_waves(shoe, np.array([0.0, 0.0, speed, 0.0])) == Continued(Fate.DIES)
+
+
+def test_what_comes_near_unstable_sliding_is_not_said_to_last() -> None:
+    """A disturbance that grows at 1e-4 of the rate has no event for longer than a run."""
+    shoe = system()
+    rest = steady_sliding(shoe)
+    found = without_waves(shoe, np.array([rest.x, rest.y, 1e-300, 0.0]))
+    assert found.fate is Fate.UNKNOWN
+    assert math.isnan(found.amplitude)
+
+
+def test_on_a_standing_wheel_nothing_is_asked() -> None:
+    assert continued(system(wheel__angular_speed=0.0)) == Continued()
+
+
+@pytest.mark.parametrize(("friction", "fate"), [(0.3, Fate.DIES), (0.7, Fate.LASTS)])
+def test_a_rough_shoe_is_continued_by_the_curve_of_its_force(friction: float, fate: Fate) -> None:
+    shoe = system_of(make(SQUEAL | {"roughness": {**WAVES, **BUMPS}}, friction__coefficient=friction))
+    assert continued(shoe).fate is fate
+    flat = system_of(make(SQUEAL | {"roughness": BUMPS}, friction__coefficient=friction, solver__duration=2.0))
+    speeds = solve(flat).rows[:, 2]
+    late, early = speeds[-1000:].std(), speeds[: len(speeds) // 8].std()
+    assert bool(late > 0.5 * early) == (fate is Fate.LASTS)
