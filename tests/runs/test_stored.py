@@ -52,7 +52,7 @@ def test_an_older_file_is_run_again_where_that_takes_a_minute_at_most(
     for name in ("regime", "excitation", "reasons", "settled", "frequency"):
         assert again[name] == now[name]
     assert again["evidence"].keys() == now["evidence"].keys()
-    for name in ("amplitude", "amplitude_spread", "forced_frequency", "braking_torque"):
+    for name in ("amplitude", "forced_frequency", "mean_friction_force", "braking_torque"):
         assert again[name] == pytest.approx(now[name], rel=1e-12)
     monkeypatch.setattr(stored, "MOST_SECONDS", 0.0)
     late = stored.classify_result(path, Thresholds())
