@@ -79,8 +79,8 @@ class End(NamedTuple):
 FADES, UNKNOWN = End(False), End(None)
 
 
-def on_smooth_pads(shoe: Shoe, state: Array) -> End:
-    """What the motion from a state (x, y, v_x, v_y) comes to at constant speed and load.
+def on_smooth_pads(shoe: Shoe, state: Array, longest: float = math.inf) -> End:
+    """What the motion from a state (x, y, v_x, v_y) comes to at constant speed and load, in a `longest` time (s).
 
     It fades once its modes can bring about no event any more, and lasts once it nears an orbit that attracts it.
     Where sliding is unstable it cannot fade; one that is still vibrating when it is given up has a `state`.
@@ -95,7 +95,7 @@ def on_smooth_pads(shoe: Shoe, state: Array) -> End:
     except np.linalg.LinAlgError:  # modes that are alike
         return UNKNOWN
     rate = float(values.real.max())
-    while motion.path.steps < MOST_STEPS:
+    while motion.path.steps < MOST_STEPS and motion.way.time < longest:
         if rate > 0.0:  # near steady sliding nothing happens for long, as a disturbance grows slowly
             motion.way.duration = motion.way.time + max(NEARS / rate, AHEAD * motion.path.h)
         outcome = motion.seek()
@@ -171,8 +171,8 @@ class _Calm:
         return math.sqrt(float(np.einsum("ni,ij,nj->n", apart, self.span.weights, apart).max()))
 
 
-def on_rough_pads(system: System, state: Array, calm: Sequence[Array]) -> End:
-    """What the motion from a state at t = 0 comes to, at constant speed and load.
+def on_rough_pads(system: System, state: Array, calm: Sequence[Array], longest: float = math.inf) -> End:
+    """What the motion from a state at t = 0 comes to, at constant speed and load, in a `longest` time (s).
 
     `calm`: states at t = 0 of the stable motions that are no vibrations: of steady sliding on a smooth wheel, else
     of what the waves force. The motion fades once it follows the linear equations of one of them. It lasts once
@@ -190,7 +190,7 @@ def on_rough_pads(system: System, state: Array, calm: Sequence[Array]) -> End:
     last, far, drawn = np.array(state, float), list[float](), 0
     spans = [SETTLING / (slowest_of_cycles(system.coefficients) * span.length)]
     spans += [NOTICED / -math.log(each.radius) for each in known if 0.0 < each.radius < 1.0]
-    while known and span.taken < MOST_ROUGH_STEPS:
+    while known and span.taken < MOST_ROUGH_STEPS and len(far) * span.length < longest:
         flown = span(last, False)
         if flown is None:
             break

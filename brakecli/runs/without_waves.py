@@ -20,6 +20,8 @@ from brakecli.solver.roughness import surface
 from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import Initial, System
 
+LONGEST = 16.0
+"""Times as long as the run, after which a motion is given up."""
 SAMPLES = 256
 """Of a period, by which its level is found."""
 
@@ -32,7 +34,11 @@ def without_waves(system: System, state: Floats) -> Continued:
     flat = replace(system, wheel=surface(), tangents=False)
     if flat.belt_speed == 0.0:
         return Continued()
-    end = _on_a_rough_shoe(flat, state) if flat.shoe.g.size else on_smooth_pads(Shoe.of(flat), state)
+    end = (
+        _on_a_rough_shoe(flat, state)
+        if flat.shoe.g.size
+        else on_smooth_pads(Shoe.of(flat), state, LONGEST * system.sampled_duration)
+    )
     if end.lasts is None:
         return Continued(Fate.UNKNOWN if end.state is None else Fate.LASTS)
     if end.orbit is None or end.rate is None:
@@ -61,4 +67,4 @@ def _on_a_rough_shoe(flat: System, state: Floats) -> End:
         return UNKNOWN
     if growth(flat.coefficients, rest.stiffness, math.copysign(flat.coefficients.phi, flat.belt_speed)) > 0.0:
         return End(None, state)
-    return on_rough_pads(flat, state, [np.array([rest.x, rest.y, 0.0, 0.0])])
+    return on_rough_pads(flat, state, [np.array([rest.x, rest.y, 0.0, 0.0])], LONGEST * flat.sampled_duration)

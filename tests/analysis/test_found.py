@@ -330,7 +330,6 @@ def test_a_dozen_cycles_that_have_not_settled_are_no_vibration() -> None:
     """Twelve cycles of nearly the same amplitude; four times later it is six times larger, and grows."""
     verdict = judged("a hop")
     assert verdict.regime is Regime.UNDECIDED
-    assert "only 12 cycles" in verdict.reasons[0]
 
 
 def test_a_motion_that_can_neither_stick_nor_open_any_more_is_linear_before_its_last_quarter_is() -> None:
