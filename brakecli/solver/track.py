@@ -87,6 +87,14 @@ class Track:
         passed = (belt - heat) + roughness - dashpots - load - scheme
         return Powers(belt - heat, roughness, dashpots, load, scheme, stored, stored - passed)
 
+    def account(self, begin: float) -> dict[str, float]:
+        """Mean powers (W) from a time (s) on: of the belt, what becomes of it, and what is left."""
+        first = min(int(np.abs(self.times - begin).argmin()), len(self.times) - 2)
+        span = float(self.times[-1] - self.times[first])
+        means = ((self.works[-1, :4] - self.works[first, :4]) / span).tolist()
+        names = ("power_belt", "power_friction", "power_dashpots", "power_load")
+        return dict(zip(names, means, strict=True)) | {"power_rest": means[0] - sum(means[1:])}
+
     def given(self, begin: float, force: float) -> tuple[Floats, float]:
         """What friction and the roughness give to a vibration in each part from a time (s) on (W, two columns).
 

@@ -79,4 +79,7 @@ def _further(shown: Shown, what: Lasting, context: Context) -> dict[str, Any]:
     evidence: dict[str, Any] = {f"amplitude_{name}": part.amplitude(name) for name in ("y", "vx", "vy")}
     if belt != 0.0:
         evidence["largest_vx_over_belt_speed"] = part.extremes("vx")[int(belt > 0.0)] / belt
-    return evidence | part.lines(context.forced, context.quiet) | (context.powers(part) if context.steady else {})
+    if context.steady:
+        track, begin = shown.track, part.start * shown.history.interval
+        evidence |= track.account(begin) if track and len(track.times) > 1 else context.powers(part)
+    return evidence | part.lines(context.forced, context.quiet)

@@ -108,7 +108,7 @@ class Shown:
 
     def powers(self) -> dict[str, float]:
         """Powers (W) that friction and the roughness give, with their errors; of runs by the loop's account."""
-        if self.track is not None:
+        if self.track is not None and len(self.track.times) > 1:
             begin = self.judged.start * self.history.interval
             given, open_by = self.track.given(begin, self.judged.mean("friction_force"))
             means = windowed(given)
