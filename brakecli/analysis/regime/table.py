@@ -389,7 +389,7 @@ SMOOTH: tuple[Row, ...] = (
     ),
     Row(
         "no dashpots",
-        lambda a, t: a.undamped and not a.growth > 0.0 and a.without_waves != Fate.LASTS,
+        lambda a, t: a.undamped and not a.growth > 0.0,
         "sliding is stable, and no dashpot makes a large vibration settle",
         _DASHPOT,
     ),
