@@ -205,7 +205,6 @@ def view_of_itself(name: str) -> Callable[[h5py.File], object]:
         (replaced("history/x", np.zeros(7)), "variable x in group history has the shape (7,)"),
         (replaced("history/time", np.zeros(201)), "variable time in group history does not increase"),
         (replaced("history/time", np.full(201, 1e308)), "not finite, or too large"),
-        (replaced("history/vx", np.full(201, 1e308)), "not finite, or too large"),
         (replaced("history/vx", np.full(201, b"x")), "variable vx in group history is not what belongs there"),
         (replaced("spectrum/vx", None, shape=(3 * 10**8,), dtype="f8", chunks=(1000,)), "claims 300000000 values"),
         (
@@ -224,6 +223,17 @@ def test_a_forgery_is_named(
         change(file)
     done = tried(tmp_path, "f.h5", ["classify"])
     assert done.told(4, "f.h5: cannot be read as a result: ", reason, "has no digest").count("\n") == 2
+
+
+def test_samples_that_are_too_large_are_told_by_what_reads_them(results: Path, tmp_path: Path) -> None:
+    """`classify` decides by the record of answers, and reads none."""
+    shutil.copy(results / "run.h5", tmp_path / "f.h5")
+    with h5py.File(tmp_path / "f.h5", "r+") as file:
+        replaced("history/vx", np.full(201, 1e308))(file)
+    tried(tmp_path, "f.h5", ["plot", "-q"]).told(
+        4, "f.h5: cannot be read as a result: ", "not finite, or too large"
+    )
+    tried(tmp_path, "f.h5", ["classify"]).told(0)
 
 
 def test_a_view_of_itself_is_no_signal_and_does_no_harm_in_a_result(results: Path, tmp_path: Path) -> None:
