@@ -74,7 +74,6 @@ def test_a_vibration_that_hardly_dies_has_no_amplitude_that_lasts(name: str) -> 
     ("name", "later"),
     [  # amplitude (m) and frequency (Hz) eight or four times later, by another integrator
         ("drifts, one link damped", (7.5e-5, 72.3)),
-        pytest.param("grows for ever so slowly", (1.585e-5, 34.43), marks=campaign),
         pytest.param("its frequency drifts", (7.44e-4, 209.67), marks=campaign),
     ],
 )
@@ -346,7 +345,6 @@ def test_a_motion_that_can_neither_stick_nor_open_any_more_is_linear_before_its_
     assert (fractions[first:] == 1.0).all()
 
 
-RATE = re.compile(r"still (?:growing|decaying) at ([\d.e+-]+) 1/s; ")
 ASKED = re.compile(r"run at least ([\d.e+-]+) s( longer)?")
 
 
@@ -386,7 +384,6 @@ def test_a_shoe_that_winds_up_its_links_does_not_vibrate_for_good() -> None:
     ("name", "frequency", "amplitude"),  # by another integrator, with half the step as well
     [
         ("shifted by impacts of 18 steps", 398.11, 8.448e-7),
-        pytest.param("shifted by impacts of 24 steps", 114.07, 7.14e-5, marks=campaign),
     ],
 )
 def test_a_cycle_that_impacts_shift_has_settled_with_the_step_that_is_asked_for(
@@ -407,6 +404,23 @@ def test_a_cycle_that_impacts_shift_has_settled_with_the_step_that_is_asked_for(
 
 
 @campaign
+def test_what_grows_for_ever_so_slowly_is_not_called_damped() -> None:
+    """Friction gives 3e-7 W, which the account knows to 4e-7 W."""
+    assert judged("grows for ever so slowly").regime is not Regime.DAMPED
+
+
+@campaign
+def test_a_cycle_that_impacts_shift_by_less_than_half_has_spreads_that_hold_it() -> None:
+    """By another integrator 114.07 Hz and 71.4 micrometres."""
+    verdict = judged("shifted by impacts of 24 steps")
+    assert verdict.frequency is not None
+    assert verdict.amplitude_spread is not None
+    assert not verdict.settled
+    assert abs(verdict.frequency - 114.07) <= verdict.evidence["frequency_spread"]
+    assert abs(verdict.amplitude - 7.14e-5) <= verdict.amplitude_spread
+
+
+@campaign
 def test_the_time_that_a_verdict_asks_for_is_enough_or_the_new_one_has_another_reason() -> None:
     tried, kinds = 0, [random_shoes(stratum, 5) for stratum in ("smooth", "full", "open")]
     for tables in chain.from_iterable(zip(*kinds, strict=True)):
@@ -419,8 +433,11 @@ def test_the_time_that_a_verdict_asks_for_is_enough_or_the_new_one_has_another_r
             continue
         again = verdict_of(make(tables, solver__duration=needed))
         reasons = [re.sub(r"[\d.e+-]+", "", ASKED.sub("", each.reasons[0])) for each in (first, again)]
-        slower = [float(rate[1]) for each in (first, again) if (rate := RATE.search(each.reasons[0]))]
-        explained = reasons[0] != reasons[1] or (len(slower) == 2 and slower[1] < 0.8 * slower[0])
+        rates = [
+            abs(each.evidence.get("change", 0.0)) / time
+            for each, time in zip((first, again), (duration, needed), strict=True)
+        ]
+        explained = reasons[0] != reasons[1] or rates[1] < 0.8 * rates[0]
         assert again.regime is not Regime.UNDECIDED or explained, (tables, first.reasons, again.reasons)
         if (tried := tried + 1) == 10:
             return
