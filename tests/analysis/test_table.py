@@ -58,6 +58,7 @@ SMOOTH_ROWS: dict[str, dict[str, Any]] = {
     "lasts: quasi-harmonic": LASTS,
     "on its way: quasi-harmonic": {**LASTS, "level_without_waves": 2.0},
     "lasts, irregular: quasi-harmonic": {"without_waves": Fate.LASTS},
+    "comes and goes": {"change": math.nan, "change_error": math.nan},
     "undecided": {"change": 0.5},
 }
 ROUGH_ROWS: dict[str, dict[str, Any]] = {
@@ -79,6 +80,7 @@ ROUGH_ROWS: dict[str, dict[str, Any]] = {
     "no dashpots, rough": {"undamped": True},
     "self-excited: quasi-harmonic": LASTS,
     "locked to the waves: quasi-harmonic": {**FADING, **LASTS},
+    "comes and goes": {"change": math.nan, "change_error": math.nan},
     "still changes": {"change": 0.5},
     "either": {},
 }
@@ -174,3 +176,15 @@ def test_a_number_that_is_missing_is_in_no_sentence_of_a_decision() -> None:
     for changes in (*SMOOTH_ROWS.values(), *({**SHAKEN, **each} for each in ROUGH_ROWS.values())):
         found = decide(answers(**changes), LIMITS)
         assert "nan" not in found.sentence.split(), found
+
+
+def test_where_theory_does_not_know_the_growth_neighbours_decide_and_say_how_fast() -> None:
+    for rate, row, word in (
+        (-0.4, "linear, forced", "decays at 0.4 1/s"),
+        (0.4, "linear, grows", "growing at 0.4 1/s"),
+    ):
+        given = answers(**{**SHAKEN, "linear": True, "growth": math.nan, "even": rate})
+        found = decide(Answers.of(given.known()), LIMITS)
+        assert found.row == row
+        assert word in found.sentence
+        assert "nan" not in found.sentence

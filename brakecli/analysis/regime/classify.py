@@ -55,7 +55,7 @@ def classify(
         amplitude_forced=what.forced,
         amplitude_own=what.own,
         forced_frequency=what.forced_frequency,
-        growth_rate=theory.mode.growth if theory else None,
+        growth_rate=found.own if theory and math.isfinite(found.own) else None,
         ringing_frequency=theory.mode.frequency if theory else None,
         frequency_resolution=1.0 / (segment(part.stop - part.start) * history.interval),
         torque_variation=radius * what.variation if what.variation is not None else None,

@@ -56,7 +56,7 @@ def lasting(shown: Shown, answers: Answers, decision: Decision, *, in_full: bool
     forced = decision.excitation is Excitation.FORCED
     lines: Sequence[float] = shown.context.forced if forced else ()
     if forced:
-        closed = _forced_linear(shown, shown.linear) if shown.linear else None
+        closed = _forced_linear(shown, shown.linear, answers.decay) if shown.linear else None
         found = closed or _forced(shown, answers)
     elif decision.excitation is Excitation.SELF_EXCITED and shown.cycles:
         found = _self_excited(shown, answers, shown.cycles)
@@ -95,14 +95,14 @@ def _holds_two(shown: Shown, part: Part) -> bool:
     return (part.stop - part.start) * shown.history.interval * slow >= 2.0
 
 
-def _forced_linear(shown: Shown, theory: Linear) -> Lasting | None:
-    """The forced motion in closed form, with the settled part in which the shoe's own part has gone.
+def _forced_linear(shown: Shown, theory: Linear, decay: float) -> Lasting | None:
+    """The forced motion in closed form, with the settled part in which what the shoe adds has died away.
 
     None where the waves force more than the closed form has.
     """
     whole, samples, interval = shown.whole, shown.history.samples, shown.history.interval
     forced, lasting, own, time = theory.parts(*whole.places())
-    first, level, end, stays = _gone(shown, theory, own, forced)
+    first, level, end, stays = _gone(shown, decay, own, forced)
     if stays and end >= _REST * forced:
         return None
     found = Lasting(shown.judged, False, forced, None, forced)
@@ -110,13 +110,13 @@ def _forced_linear(shown: Shown, theory: Linear) -> Lasting | None:
     if first <= WINDOWS - 10 and shown.duration - begin * interval >= 2.0 * slow:
         found.part, found.settled = replace(whole, start=begin), True
         force, rings = theory.force_parts(*whole.places("y"))
-        first, level, end, _ = _gone(shown, theory, rings, force)
+        first, level, end, _ = _gone(shown, decay, rings, force)
         if first <= WINDOWS - 10:
             found.force_from = first * samples // WINDOWS
         elif theory.slip is not None:
-            found.force_rings = _wait(theory, end, level)
+            found.force_rings = _wait(decay, end, level)
     else:
-        late = shown.duration + _wait(theory, end, level)
+        late = shown.duration + _wait(decay, end, level)
         needed = max(_LONGER * late, 1.05 * (late + 2.0 * slow))
         found.notes["settled"] = f"what the shoe adds has not died away yet: run at least {needed:.3g} s"
     seconds = samples * interval - max(min(shown.last.start * interval, shown.duration - slow), 0.0)
@@ -128,12 +128,12 @@ def _forced_linear(shown: Shown, theory: Linear) -> Lasting | None:
     return found
 
 
-def _wait(theory: Linear, end: float, level: float) -> float:
-    """Time (s) until the slowest mode has taken what is left to a level."""
-    return math.log(max(end / max(level, 1e-300), 1.0)) / -theory.mode.growth
+def _wait(decay: float, end: float, level: float) -> float:
+    """Time (s) until what is left, which decays at this rate (1/s), has come to a level."""
+    return math.log(max(end / max(level, 1e-300), 1.0)) / decay
 
 
-def _gone(shown: Shown, theory: Linear, own: Array, forced: float) -> tuple[int, float, float, bool]:
+def _gone(shown: Shown, decay: float, own: Array, forced: float) -> tuple[int, float, float, bool]:
     """The window from which on what the shoe adds has gone beside what is forced, and to which level.
 
     Also what is left in the last quarter, and whether it stays: then it is forced, and missing in the closed form.
@@ -142,8 +142,8 @@ def _gone(shown: Shown, theory: Linear, own: Array, forced: float) -> tuple[int,
     left = 0.5 * (np.maximum.reduceat(own, starts) - np.minimum.reduceat(own, starts))
     end = 0.5 * float(np.ptp(own[starts[-10] :]))  # a window may be shorter than a period
     slope = line(np.arange(0.5 * WINDOWS), np.log(np.maximum(left[WINDOWS // 2 :], 1e-300)))[0]
-    decay = theory.mode.growth * shown.duration / WINDOWS
-    stays = 0.25 * WINDOWS * decay < -_RELAXED and slope > 0.25 * decay
+    lost = decay * shown.duration / WINDOWS
+    stays = 0.25 * WINDOWS * lost > _RELAXED and slope > -0.25 * lost
     level = shown.limits.settled_within * forced
     if end < _REST * forced and stays:
         level = max(level, 1.2 * end)

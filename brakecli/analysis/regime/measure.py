@@ -165,8 +165,9 @@ def answers(
         "seconds": (history.samples - shown.judged.start) * history.interval,
     }
     if (theory := shown.linear) is not None:
-        found |= {"linear": True, "growth": theory.mode.growth, "growth_error": theory.known_to}
-        found |= {"ringing": theory.mode.frequency}
+        found |= {"linear": True, "ringing": theory.mode.frequency}
+        if math.isfinite(theory.known_to):  # otherwise only neighbours tell
+            found |= {"growth": theory.mode.growth, "growth_error": theory.known_to}
         if theory.direction > 0:
             found |= {"to_limit": theory.seconds_to_limit(*shown.end), "steadier": context.steadier()}
         return Answers(**found)

@@ -143,9 +143,15 @@ class Answers:
         return 4.0 / 3.0 * (self.duration + 3.0 / max(rate, 1e-300))
 
     @property
+    def own(self) -> float:
+        """Growth rate (1/s) of what a linear motion holds beside the forced one."""
+        return self.rate(0.0)[0]
+
+    @property
     def grown(self) -> float:
         """Duration after which what grows has come to its limits."""
-        return 4.0 / 3.0 * (self.duration + self.to_limit + 3.0 / self.growth)
+        limit = self.to_limit if math.isfinite(self.to_limit) else 0.0
+        return 4.0 / 3.0 * (self.duration + limit + 3.0 / self.own)
 
     @property
     def waited(self) -> float:
@@ -154,8 +160,8 @@ class Answers:
 
     @property
     def decay(self) -> float:
-        """Rate (1/s) at which a disturbance fades."""
-        return -self.growth
+        """Rate (1/s) at which it fades."""
+        return -self.own
 
     @property
     def sticks(self) -> str:
@@ -353,17 +359,23 @@ CONTACT: tuple[Row, ...] = (
     ),
     Row("standing wheel, no dashpots", lambda a, t: a.stands, "the wheel stands, but no dashpot damps", _DASHPOT),
 )
+COMES_AND_GOES = Row(
+    "comes and goes",
+    lambda a, t: not math.isfinite(a.change),
+    "the motion comes and goes: in a part of the second half nothing moves",
+    "run longer",
+)
 SMOOTH: tuple[Row, ...] = (
     Row(
         "linear, held by the steps",
         lambda a, t: a.linear and _grows(a, t) and a.steadier,
-        _LINEAR + ": it grows at {a.growth:.3g} 1/s, but the scheme's steps damp it",
+        _LINEAR + ": it grows at {a.own:.3g} 1/s, but the scheme's steps damp it",
         "{a.steadier}",
     ),
     Row(
         "linear, grows",
         lambda a, t: a.linear and _grows(a, t),
-        _LINEAR + ": still growing at {a.growth:.3g} 1/s ({a.ringing:.4g} Hz)",
+        _LINEAR + ": still growing at {a.own:.3g} 1/s ({a.ringing:.4g} Hz)",
         "run at least {a.grown:.3g} s",
     ),
     Row(
@@ -421,6 +433,7 @@ SMOOTH: tuple[Row, ...] = (
         "",
         *_OWN,
     ),
+    COMES_AND_GOES,
     Row(
         "undecided",
         lambda a, t: True,
@@ -547,6 +560,7 @@ ROUGH: tuple[Row, ...] = (
         "",
         *_OWN,
     ),
+    COMES_AND_GOES,
     Row(
         "still changes",
         lambda a, t: not _steady(a, t),
