@@ -7,7 +7,6 @@ from brakecli.analysis.regime.context import context
 from brakecli.analysis.regime.measure import Continued
 from brakecli.analysis.regime.table import Thresholds
 from brakecli.analysis.regime.verdict import Verdict
-from brakecli.runs.without_waves import without_waves
 from brakecli.solver.history import History
 from brakecli.solver.system import System
 from brakecli.solver.tangent import Exponent
@@ -29,6 +28,8 @@ def verdict_on(
     """The verdict on a motion; where a row may need it, it is continued on the smooth wheel."""
 
     def continued() -> Continued:
+        from brakecli.runs.without_waves import without_waves  # kernels that a linear motion does not need
+
         last = history.samples - 1
         state = [float(history.read(name, last, last + 1)[0]) for name in ("x", "y", "vx", "vy")]
         return without_waves(system, np.array(state))

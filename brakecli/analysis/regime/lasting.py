@@ -62,7 +62,7 @@ def lasting(shown: Shown, answers: Answers, decision: Decision, *, in_full: bool
         found = _self_excited(shown, answers, shown.cycles)
     else:
         part = shown.half if answers.linear else shown.judged
-        found = Lasting(part, answers.settled, part.amplitude("x"))
+        found = Lasting(part, answers.settled and not answers.linear, part.amplitude("x"))
         return _with_force(shown, found, lasts=decision.regime is not Regime.UNDECIDED)
     if forced and found.settled and found.forced is None:  # its neighbours come together: nothing else is left
         found.forced = found.amplitude
