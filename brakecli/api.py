@@ -274,7 +274,7 @@ def classify(
         quantity: what was measured, as `brakecli classify --quantity` has it; None for a result.
         belt_speed: speed of the wheel's surface (m/s), if known.
         stiffness: stiffness behind a measured force (N/m), if known.
-        thresholds: limits of the rules to change.
+        thresholds: those to change, by name.
         force_read: look at a result whose digest does not fit; a warning says so.
         reading: how a file is read: `column`, `time_column`, `sample_rate` (Hz), `unit`, `time_unit`.
 

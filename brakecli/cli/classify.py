@@ -22,7 +22,7 @@ _GONE = {
     "trend_errors": "it is called sure_errors",
     "forced_share": "lines of the roughness decide nothing any more",
 }
-THRESHOLD = option("Change a threshold of the rules; repeatable.", "NAME=VALUE", "--threshold")
+THRESHOLD = option("Change a threshold of the verdict; repeatable.", "NAME=VALUE", "--threshold")
 
 
 @with_measured

@@ -45,8 +45,14 @@ VERDICT = within(
         label="lost contact",
     ),
     Field("reasons", "", "why the regime is as it is", OBJECT),
-    Field("evidence", "", "numbers by which the rules decided", OBJECT, group="regime/evidence"),
-    Field("thresholds", "", "limits of the rules", OBJECT, group="regime/thresholds"),
+    Field(
+        "evidence",
+        "",
+        "answers by which a row of the table decided, and numbers beside them",
+        OBJECT,
+        group="regime/evidence",
+    ),
+    Field("thresholds", "", "numbers that decide a verdict", OBJECT, group="regime/thresholds"),
 )
 MEASURED_UNITS = {"displacement": "m", "velocity": "m/s", "force": "N", "torque": "N m"}
 MEASURED_UNITS |= {"acceleration": "m/s²", "pressure": "Pa"}

@@ -182,7 +182,7 @@ def _regime(result: StoredResult) -> list[Any]:
     reasons = Texts([f"{reason[:1].upper()}{reason[1:]}." for reason in map(str, found.get("reasons", ()))])
     intervals, head = _vibrations(result), [each.meaning for each in fields.VIBRATION]
     beats = [Table([[shown(*each) for each in zip(row, _UNITS, strict=True)] for row in intervals], head)]
-    shown_on_demand = Table(proof, ("evidence", "value"), "All numbers by which the rules decided")
+    shown_on_demand = Table(proof, ("evidence", "value"), "All numbers by which the table decided")
     return [reasons, *beats * bool(intervals), Table(rows), shown_on_demand]
 
 

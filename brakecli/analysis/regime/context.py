@@ -56,7 +56,7 @@ class Context:
 
 
 def context(system: System) -> Context:
-    """What the rules have to know of a system."""
+    """What a verdict has to know of a system."""
     belt, c = float(value_at(system.belt, system.sampled_duration)), system.coefficients
     compression = float(np.abs(system.load["value"]).max()) / (c.c_yy + system.contact_stiffness)
 

@@ -1,4 +1,4 @@
-"""What the rules of the regimes go by: envelope, stick, lines and powers of a history."""
+"""What verdicts go by: envelope, stick, lines and powers of a history."""
 
 import math
 from collections.abc import Iterator, Sequence
