@@ -77,15 +77,10 @@ class Velocity:
         x = c if self.measured else (c[m:] - c[:-m]) / m
         return 0.5 * float(np.median([np.ptp(part) for part in np.array_split(x[start:], windows)]))
 
-    def trend(self, m: int, start: int, windows: int) -> tuple[Array, float, float]:
-        """Envelope from a sample on, without noise, last third over first, and rank correlation with time."""
+    def levels(self, m: int, start: int, windows: int) -> Array:
+        """Standard deviations in windows from a sample on, smoothed over m samples, without the noise."""
         parts = np.array_split(self.smoothed(m)[start:], windows)
-        envelope = np.sqrt(np.maximum([float(p.var()) - self.noise_at(m) for p in parts], 0.0))
-        if float(np.ptp(envelope)) == 0.0:
-            return envelope, 1.0, 0.0
-        third, ranks = max(1, windows // 3), np.argsort(np.argsort(envelope)).astype(float)
-        ratio = float(envelope[-third:].mean()) / max(float(envelope[:third].mean()), 1e-300)
-        return envelope, ratio, float(np.corrcoef(ranks, np.arange(windows))[0, 1])
+        return np.sqrt(np.maximum([float(p.var()) - self.noise_at(m) for p in parts], 0.0))
 
     def denoised(self, *, hann: bool = False) -> tuple[Array, Array]:
         """The velocity made of those lines only that stand out of the noise, and their power over rfft's bins."""
@@ -107,9 +102,9 @@ def cleaned(values: Array, order: int) -> tuple[Velocity, list[str]]:
     notes: list[str] = []
     first = 0
     if len(values) >= _SHORTEST and not np.isfinite(values).all():
-        cycle = _cycle(_velocity(_bridged(values), order > 0))
+        cycle = _cycle(_velocity(bridged(values), order > 0))
         values, first = _longest_piece(values, max(1.0, 0.25 * cycle), notes)
-        values = _bridged(values)
+        values = bridged(values)
     if len(values) >= _SHORTEST:
         values = _without_spikes(values, order > 0, notes)
     found = replace(_velocity(values, order > 0), first=first)
@@ -163,7 +158,7 @@ def _without_slow(values: Array) -> Array:
     return values - mean
 
 
-def _bridged(values: Array) -> Array:
+def bridged(values: Array) -> Array:
     """Gaps filled by straight lines."""
     good, places = np.isfinite(values), np.arange(len(values))
     return values if good.all() else np.interp(places, places[good], values[good])
@@ -196,7 +191,7 @@ def _without_spikes(values: Array, is_velocity: bool, notes: list[str]) -> Array
     count = int(np.sum(spikes))
     if count == 0:
         return values
-    without = _bridged(np.where(spikes, np.nan, values))
+    without = bridged(np.where(spikes, np.nan, values))
     if is_velocity and count >= 5 and abs(float(np.mean(np.sign(away[spikes])))) > 0.6:
         power = np.abs(np.fft.rfft(_without_slow(_handy(without)))) ** 2
         if line_share(power) < _LINES_LEFT:  # nothing is left without them

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter, uniform_filter1d
 
 from brakecli.analysis.regime.cleaning import NOISE_SHARE, Velocity
+from brakecli.analysis.regime.signal_table import FEWEST_SAMPLES
 from brakecli.analysis.regime.spectra import Array, rises
 
 _PARTS = 7
@@ -50,6 +51,11 @@ class Slips:
         return len(self.places)
 
     @property
+    def often(self) -> float:
+        """How many there are in a sample."""
+        return (self.count - 1) / float(self.places[-1] - self.places[0])
+
+    @property
     def enough(self) -> bool:
         """Whether they are enough to look at their shape."""
         return self.count >= _FEWEST
@@ -68,6 +74,8 @@ class Slips:
 
 def seek(velocity: Velocity, certain: float) -> Slips:
     """The slips at the smoothing that shows them best, if the skewness is `certain`; otherwise at a quiet one."""
+    if len(velocity.values) < FEWEST_SAMPLES:
+        return Slips()
     found, sign, scale, chosen = 0.0, 1.0, velocity.quiet, velocity
     for candidate, least in [(velocity, 1), (_filtered(velocity), 8)][: 1 if velocity.measured else 2]:
         for m in _scales(candidate, least):
