@@ -54,16 +54,12 @@ class Velocity:
     @cached_property
     def variances(self) -> list[tuple[int, float]]:
         """Smoothings m = 1, 2, 4 … with the variance there, up to where the motion itself is smoothed away."""
-        found, most = [], 0.0
-        for m in (1 << k for k in range(max(1, len(self.values) // 100).bit_length())):
-            variance = float(self.thinned(m).var())
-            if self.noise_at(m) >= NOISE_SHARE * variance:  # little but noise
-                continue
-            most = max(most, variance - self.noise_at(m))
-            if variance - self.noise_at(m) < _SMOOTHED_AWAY * most:
-                break
-            found.append((m, variance))
-        return found
+        every = [1 << k for k in range(max(1, len(self.values) // 100).bit_length())]
+        sizes = [(m, float(self.thinned(m).var())) for m in every]
+        clear = [(m, size) for m, size in sizes if self.noise_at(m) < NOISE_SHARE * size]
+        moves = np.array([size - self.noise_at(m) for m, size in clear])
+        kept = moves >= _SMOOTHED_AWAY * np.maximum.accumulate(moves)
+        return clear[: int(np.argmin([*kept, False]))]
 
     @cached_property
     def quiet(self) -> int:

@@ -128,10 +128,9 @@ def _judge(
         spring = math.nan if stiffness is None else stiffness
     belt = math.nan if belt_speed is None else abs(belt_speed) * spring * step ** (1 - order) / size
     slips = seek(velocity, certain)
-    cycle = slips.period if slips.stick_slip and slips.skewness >= certain else 0.0
-    velocity = without_drift(velocity, cycle, notes)
-    if not slips.enough or slips.skewness < certain:
-        slips = seek(velocity, certain)  # drift may have hidden them
+    sure = slips.stick_slip and slips.skewness >= certain
+    velocity = without_drift(velocity, len(velocity.smoothed(slips.scale)) / slips.count if sure else 0.0, notes)
+    slips = slips if sure else seek(velocity, certain)  # drift may have hidden them
     heard = Heard(velocity, slips, belt, thresholds)
     found = answers(heard, has_belt=quantity is not Measurand.PRESSURE)
     decision = decide(found, thresholds)
@@ -143,7 +142,6 @@ def _judge(
     begin = found.steady_from if decision.regime in _SUSTAINED else 0.0
     amplitude = heard.amplitude(begin) * size * step**order / spring if found.heard else math.nan
     known = {name: each for name, each in asdict(found).items() if type(each) is float and math.isfinite(each)}
-    shape = {"slip_lasts": slips.lasts, "slip_returns": slips.returns, "slip_swings": slips.swings}
     noise = size * step ** max(order - 1, 0) * velocity.noise
     verdict = SignalVerdict(
         regime=decision.regime,
@@ -152,7 +150,7 @@ def _judge(
         amplitude=amplitude if math.isfinite(amplitude) else None,
         stick_fraction=stick,
         bursts=(),
-        evidence={"row": decision.row, **known, **shape, "noise": noise},
+        evidence={"row": decision.row, **known, "noise": noise},
         warnings=(*signal.notes, *notes),
         thresholds=thresholds,
     )

@@ -120,6 +120,7 @@ def answers(heard: Heard, *, has_belt: bool) -> SignalAnswers:
     if heard.heard:
         found |= {"smoothed_over": float(heard.smoothing), "cycles": heard.cycles}
         found |= {"samples_per_cycle": heard.samples / heard.cycles, "skewness": slips.skewness}
-        found |= {"events": float(slips.count), "slips": slips.stick_slip, "knows_belt": math.isfinite(heard.belt)}
+        found |= {"events": float(slips.count), "slips": slips.stick_slip}
+        found |= {"slip_lasts": slips.lasts, "slip_swings": slips.swings, "knows_belt": math.isfinite(heard.belt)}
         found |= heard.level() | heard.harmony() | heard.stay()
     return SignalAnswers(**found, heard=heard.heard, has_belt=has_belt)

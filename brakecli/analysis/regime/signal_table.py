@@ -46,6 +46,8 @@ class SignalAnswers:
     change_error: float = math.nan
     skewness: float = math.nan  # of the velocity
     events: float = math.nan  # of what skews it
+    slip_lasts: float = math.nan  # part of a slip that is left a quarter of a cycle later
+    slip_swings: float = math.nan  # how far the velocity goes the other way, over the slip
     slips: bool = False  # whether these are slips between sticks, by their shape
     overtones: float = math.nan  # part of the energy in the third to eighth multiple of the line
     beyond_lines: float = math.nan  # that three lines leave
