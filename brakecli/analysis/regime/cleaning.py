@@ -11,13 +11,14 @@ from brakecli.analysis.regime.spectra import Array, line_share, rises
 CERTAIN = 15.0  # a line's power over the mean of the noise, which reaches it in one bin of three million
 _RIPPLE = 0.3  # ripple within this part of the mean size of the velocity does not count as a cycle
 _SPIKES = (8.0, 0.35)  # deviations, and part of the signal's range, by which a spike leaves its neighbours' median
-NOISE_SHARE = 0.6
-_SMOOTHED_AWAY = 0.15
-_QUIET = 0.02
-_DRIFT_CYCLES = 8.0
+_NOISE_SHARE = 0.6  # most of the variance that noise may be where slips are sought
+_SLOWEST = 60  # parts of the record over which is smoothed at most
+_MOVES = 0.15  # of the largest change of displacement over m samples: what is less has been smoothed away
+_QUIET = 0.02  # and where all else is looked at
+_DRIFT_CYCLES = 8.0  # over which drift is averaged
 _COARSE = 24  # whatever is slower than this part of the record is left out where cycles are estimated
-_SHORTEST = 8
-_LINES_LEFT = 0.5
+_SHORTEST = 8  # samples in which noise can be told
+_LINES_LEFT = 0.5  # part of the energy on three lines that would be left without pulses that are no slips
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,7 @@ class Velocity:
     """A velocity per sample, which is the difference of a displacement or force, and the noise in it."""
 
     values: Array
-    raw: Array  # the same with its mean and drift
+    mean: float  # that was taken from it
     noise: float  # standard deviation of one sample of the signal
     measured: bool  # otherwise it is the difference of what was measured
     first: int = 0  # of its samples in the record, of which gaps may have left a part
@@ -52,19 +53,21 @@ class Velocity:
         return self.noise**2 / m if self.measured else 2.0 * self.noise**2 / m**3
 
     @cached_property
-    def variances(self) -> list[tuple[int, float]]:
-        """Smoothings m = 1, 2, 4 … with the variance there, up to where the motion itself is smoothed away."""
-        every = [1 << k for k in range(max(1, len(self.values) // 100).bit_length())]
-        sizes = [(m, float(self.thinned(m).var())) for m in every]
-        clear = [(m, size) for m, size in sizes if self.noise_at(m) < NOISE_SHARE * size]
-        moves = np.array([size - self.noise_at(m) for m, size in clear])
-        kept = moves >= _SMOOTHED_AWAY * np.maximum.accumulate(moves)
-        return clear[: int(np.argmin([*kept, False]))]
+    def scales(self) -> list[tuple[int, float]]:
+        """Smoothings m = 1, 2, 4 … that leave the motion above the noise, with the part of the noise."""
+        every = [1 << k for k in range(max(1, len(self.values) // _SLOWEST).bit_length())]
+        sizes = {m: float(self.thinned(m).var()) for m in every}
+        noise = {m: self.noise_at(m) / max(size, 1e-300) for m, size in sizes.items()}
+        # The noise of high frequencies would hide in a velocity what the displacement shows.
+        moves = {m: size if self.measured else m * m * size for m, size in sizes.items()}
+        clear = [m for m in every if noise[m] < _NOISE_SHARE]
+        most = max((moves[m] for m in (clear if self.measured else every)), default=0.0)
+        return [(m, noise[m]) for m in clear if moves[m] >= (_MOVES if self.measured else _MOVES**2) * most]
 
     @cached_property
     def quiet(self) -> int:
         """The least smoothing at which noise is a small part of the variance; otherwise the quietest."""
-        parts = [(self.noise_at(m) / variance, m) for m, variance in self.variances]
+        parts = [(part, m) for m, part in self.scales]
         return next((m for part, m in parts if part <= _QUIET), min(parts, default=(1.0, 1))[1])
 
     def amplitude(self, m: int, start: int, windows: int) -> float:
@@ -104,7 +107,7 @@ def cleaned(values: Array, order: int) -> tuple[Velocity, list[str]]:
     if len(values) >= _SHORTEST:
         values = _without_spikes(values, order > 0, notes)
     found = replace(_velocity(values, order > 0), first=first)
-    if order < 2 or not found.variances:  # the sum of noise would not look like noise
+    if order < 2 or not found.scales:  # the sum of noise would not look like noise
         return found, notes
     values = np.cumsum(found.values)
     width = int(_DRIFT_CYCLES * _cycle(found))
@@ -127,13 +130,14 @@ def without_drift(velocity: Velocity, cycle: float, notes: list[str]) -> Velocit
 def _velocity(values: Array, is_velocity: bool) -> Velocity:
     """Velocity with its noise, the lesser of what third differences and the spectrum's floor allow."""
     raw, noise = values if is_velocity else np.diff(values), 0.0
+    mean = float(raw.mean()) if len(raw) else 0.0
     if len(values) >= _SHORTEST:
         rough, some = np.diff(values, 3), _handy(values)
         local = float(np.median(np.abs(rough - np.median(rough)))) / 0.6745 / np.sqrt(20.0)
         line = np.linspace(some[0], some[-1], len(some))
         floor = np.median(np.abs(np.fft.rfft(some - line)) ** 2) / np.log(2.0) / len(some)
         noise = float(min(local, np.sqrt(floor)))
-    return Velocity(raw - raw.mean() if len(raw) else raw, raw, noise, is_velocity)
+    return Velocity(raw - mean, mean, noise, is_velocity)
 
 
 def _cycle(velocity: Velocity) -> float:

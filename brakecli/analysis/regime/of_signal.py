@@ -88,7 +88,7 @@ def look(
     stiffness: float | None = None,
     thresholds: SignalThresholds = _DEFAULT,
 ) -> SignalLook:
-    """The verdict with the velocity that it rests on; that of the longest burst where all else is silence.
+    """The verdict with the velocity that it rests on; that of the strongest burst where all else is silence.
 
     `belt_speed` in m/s, `stiffness` in N/m (of a force) where known.
     """
@@ -104,8 +104,8 @@ def look(
         margin = int(_INSIDE * (end - begin))
         part = replace(signal, values=signal.values[begin + margin : end - margin])
         inside = _judge(part, *known).verdict if np.isfinite(part.values).any() else verdict
-        level = inside.evidence.get("steady_from"), inside.evidence.get("change", math.inf)
-        if inside.regime in _SUSTAINED and level[0] == 0.0 and abs(level[1]) < _LEVEL:
+        sustained = inside.regime in _SUSTAINED and inside.evidence["steady_from"] == 0.0
+        if sustained and abs(inside.evidence["change"]) < _LEVEL:
             when = f"in a burst from {burst.start:.4g} to {burst.end:.4g} s: {inside.reasons[0]}"
             line = burst.frequency if inside.regime is Regime.QUASI_HARMONIC else inside.frequency
             verdict = replace(inside, reasons=(when,), frequency=line, bursts=tones, warnings=verdict.warnings)
@@ -123,9 +123,8 @@ def _judge(
     size = float(np.nanmax(np.abs(signal.values), initial=0.0)) or 1.0  # squares of the smallest must not vanish
     order, step, certain = quantity.order, signal.interval, thresholds.skewness_certain
     velocity, notes = cleaned(signal.values / size, order)
-    spring = math.nan if quantity in (Measurand.PRESSURE, Measurand.TORQUE) else 1.0
-    if quantity is Measurand.FORCE:
-        spring = math.nan if stiffness is None else stiffness
+    known = {Measurand.FORCE: stiffness, Measurand.TORQUE: None, Measurand.PRESSURE: None}.get(quantity, 1.0)
+    spring = math.nan if known is None else known
     belt = math.nan if belt_speed is None else abs(belt_speed) * spring * step ** (1 - order) / size
     slips = seek(velocity, certain)
     sure = slips.stick_slip and slips.skewness >= certain
@@ -141,7 +140,7 @@ def _judge(
             stick = slips.stick if slipping else found.sticks if decision.regime is Regime.RELAXATION else 0.0
     begin = found.steady_from if decision.regime in _SUSTAINED else 0.0
     amplitude = heard.amplitude(begin) * size * step**order / spring if found.heard else math.nan
-    known = {name: each for name, each in asdict(found).items() if type(each) is float and math.isfinite(each)}
+    numbers = {name: each for name, each in asdict(found).items() if type(each) is float and math.isfinite(each)}
     noise = size * step ** max(order - 1, 0) * velocity.noise
     verdict = SignalVerdict(
         regime=decision.regime,
@@ -150,7 +149,7 @@ def _judge(
         amplitude=amplitude if math.isfinite(amplitude) else None,
         stick_fraction=stick,
         bursts=(),
-        evidence={"row": decision.row, **known, "noise": noise},
+        evidence={"row": decision.row, **numbers, "noise": noise},
         warnings=(*signal.notes, *notes),
         thresholds=thresholds,
     )

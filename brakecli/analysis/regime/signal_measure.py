@@ -27,7 +27,7 @@ class Heard:
         self.samples = len(velocity.values)
         certain = slips.skewness >= limits.skewness_certain and slips.stick_slip
         self.smoothing = slips.scale if certain else velocity.quiet
-        self.heard = self.samples >= FEWEST_SAMPLES and (certain or bool(velocity.variances))
+        self.heard = self.samples >= FEWEST_SAMPLES and (certain or bool(velocity.scales))
         if self.heard:
             self.clean, self.power = velocity.denoised()
             self.strongest = int(np.argmax(self.power))
@@ -88,7 +88,7 @@ class Heard:
 
     def stay(self) -> dict[str, Any]:
         """How long the velocity stays at that of the belt, or at an extreme one."""
-        finer, mean = int(np.ceil(_FINE * self.cycles / self.samples)), self.velocity.raw.mean()
+        finer, mean = int(np.ceil(_FINE * self.cycles / self.samples)), self.velocity.mean
         clean = self.clean[: _PLATEAU_SAMPLES // finer]
         clean = finer * np.fft.irfft(np.fft.rfft(clean), finer * len(clean))
         reach = 0.5 * float(np.ptp(np.quantile(clean, [0.01, 0.99]))) or 1.0

@@ -12,13 +12,11 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter, uniform_filter1d
 
-from brakecli.analysis.regime.cleaning import NOISE_SHARE, Velocity
+from brakecli.analysis.regime.cleaning import Velocity
 from brakecli.analysis.regime.signal_table import FEWEST_SAMPLES
 from brakecli.analysis.regime.spectra import Array, rises
 
 _PARTS = 7
-_SLOWEST = 60  # parts of the record over which is smoothed at most
-_MOVES = 0.15  # of the largest change of displacement over m samples: what is less has been smoothed away
 _BULK = 3.0  # robust deviations that a slip leaves the velocity in stick by
 _FEWEST = 10
 _STRONG = 0.4  # of the tenth largest slip: the shape of smaller ones is not looked at
@@ -65,7 +63,7 @@ def seek(velocity: Velocity, certain: float) -> Slips:
         return Slips()
     found, sign, scale, chosen = 0.0, 1.0, velocity.quiet, velocity
     for candidate, least in [(velocity, 1), (_filtered(velocity), 8)][: 1 if velocity.measured else 2]:
-        for m in _scales(candidate, least):
+        for m in (m for m, _ in candidate.scales if m >= least):
             skewness = _skewness(candidate.thinned(m))
             if abs(skewness) > max(found, 4.0 * np.sqrt(6.0 * m / len(velocity.values))):
                 found, sign, scale, chosen = abs(skewness), -np.sign(skewness), m, candidate
@@ -89,17 +87,6 @@ def _filtered(velocity: Velocity) -> Velocity:
     """The velocity of a displacement after a median of five, which takes impulses and leaves slips."""
     displacement = np.concatenate([[0.0], np.cumsum(velocity.values)])
     return replace(velocity, values=np.diff(median_filter(displacement, 5, mode="nearest")))
-
-
-def _scales(velocity: Velocity, least: int) -> list[int]:
-    """Smoothings at which the velocity exceeds its noise, and the motion is not smoothed away."""
-    every = [1 << k for k in range(max(1, len(velocity.values) // _SLOWEST).bit_length())]
-    sizes = {m: float(velocity.thinned(m).var()) for m in every}
-    clear = {m: v for m, v in sizes.items() if m >= least and velocity.noise_at(m) < NOISE_SHARE * v}
-    if velocity.measured:  # otherwise noise of high frequencies would hide what a displacement shows
-        return [m for m, v in clear.items() if v >= _MOVES * max(clear.values())]
-    moved = _MOVES**2 * max(m * m * v for m, v in sizes.items())
-    return [m for m, v in clear.items() if m * m * v >= moved]
 
 
 def _skewness(values: Array) -> float:
