@@ -76,7 +76,7 @@ class Options:
         if quantity is None:
             numbers = self._of_result(source)
         else:
-            from brakecli.analysis.regime.signal_rules import SignalThresholds
+            from brakecli.analysis.regime.signal_table import SignalThresholds
 
             limits = changed(SignalThresholds, self.thresholds)
             found = self.measured.look_at(source, limits).verdict

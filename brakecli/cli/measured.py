@@ -14,7 +14,7 @@ from brakecli.errors import UsageError, printable
 
 if TYPE_CHECKING:
     from brakecli.analysis.regime.of_signal import SignalLook
-    from brakecli.analysis.regime.signal_rules import SignalThresholds
+    from brakecli.analysis.regime.signal_table import SignalThresholds
 
 WHAT = "What was measured: displacement, velocity, acceleration, force, torque or pressure (of .wav, if left out)."
 UNIT = "Unit of the signal, as mm/s or g; SI, or that of the file, if left out."
@@ -61,7 +61,7 @@ class Measured:
         """What the signal of a file shows."""
         from brakecli.analysis.regime.of_signal import Measurand, look
         from brakecli.analysis.regime.signal_file import read_signal
-        from brakecli.analysis.regime.signal_rules import SignalThresholds
+        from brakecli.analysis.regime.signal_table import SignalThresholds
 
         name, reading = self.quantity_of(source), asdict(self)
         if name not in set(Measurand):

@@ -15,7 +15,6 @@ _STANDS_OUT = 20.0  # power of a tone's bin over the mean of the noise, which re
 _SHARE = 0.3  # part of the energy of a frame in its tone
 _FAINT = 1e-3  # part of the power of the strongest tone
 _SAME = 0.06  # part of its frequency by which a tone may move from frame to frame
-_STEEP = 0.4  # of its mean amplitude, in its first and last fifth: otherwise it rings down, or grows
 _MOST = 32
 
 
@@ -27,7 +26,6 @@ class Burst:
     end: float  # s
     frequency: float  # Hz, its peak
     level: float  # RMS, in the unit of the quantity
-    steep: bool  # it begins and ends soon; otherwise it rings down, or grows
 
     @property
     def energy(self) -> float:
@@ -91,13 +89,10 @@ def _burst(values: Array, interval: float, size: int, group: list[tuple[int, flo
     first, last = first + _edge(amplitude[first : first + size]), last - _edge(amplitude[last - size : last][::-1])
     if (last - first) * frequency < _CYCLES / 2:
         return None
-    amplitude = amplitude[first:last]
-    fifth = max(1, len(amplitude) // 5)
-    steep = min(amplitude[:fifth].mean(), amplitude[-fifth:].mean()) >= _STEEP * amplitude.mean()
     turn = np.angle(np.vdot(tone[first : last - 1], tone[first + 1 : last]))
-    level = float(np.sqrt(0.5 * np.mean(amplitude**2)))
+    level = float(np.sqrt(0.5 * np.mean(amplitude[first:last] ** 2)))
     times = (low + first) * interval, (low + last) * interval
-    return Burst(*times, float(turn) / (2.0 * np.pi * interval), level, bool(steep))
+    return Burst(*times, float(turn) / (2.0 * np.pi * interval), level)
 
 
 def _edge(amplitude: Array) -> int:

@@ -11,13 +11,14 @@ from brakecli.analysis.regime.spectra import Array, line_share, rises
 CERTAIN = 15.0  # a line's power over the mean of the noise, which reaches it in one bin of three million
 _RIPPLE = 0.3  # ripple within this part of the mean size of the velocity does not count as a cycle
 _SPIKES = (8.0, 0.35)  # deviations, and part of the signal's range, by which a spike leaves its neighbours' median
-NOISE_SHARE = 0.6
-_SMOOTHED_AWAY = 0.15
-_QUIET = 0.02
-_DRIFT_CYCLES = 8.0
+_NOISE_SHARE = 0.6  # most of the variance that noise may be where slips are sought
+_SLOWEST = 60  # parts of the record over which is smoothed at most
+_MOVES = 0.15  # of the largest change of displacement over m samples: what is less has been smoothed away
+_QUIET = 0.02  # and where all else is looked at
+_DRIFT_CYCLES = 8.0  # over which drift is averaged
 _COARSE = 24  # whatever is slower than this part of the record is left out where cycles are estimated
-_SHORTEST = 8
-_LINES_LEFT = 0.5
+_SHORTEST = 8  # samples in which noise can be told
+_LINES_LEFT = 0.5  # part of the energy on three lines that would be left without pulses that are no slips
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,7 @@ class Velocity:
     """A velocity per sample, which is the difference of a displacement or force, and the noise in it."""
 
     values: Array
-    raw: Array  # the same with its mean and drift
+    mean: float  # that was taken from it
     noise: float  # standard deviation of one sample of the signal
     measured: bool  # otherwise it is the difference of what was measured
     first: int = 0  # of its samples in the record, of which gaps may have left a part
@@ -52,23 +53,21 @@ class Velocity:
         return self.noise**2 / m if self.measured else 2.0 * self.noise**2 / m**3
 
     @cached_property
-    def variances(self) -> list[tuple[int, float]]:
-        """Smoothings m = 1, 2, 4 … with the variance there, up to where the motion itself is smoothed away."""
-        found, most = [], 0.0
-        for m in (1 << k for k in range(max(1, len(self.values) // 100).bit_length())):
-            variance = float(self.thinned(m).var())
-            if self.noise_at(m) >= NOISE_SHARE * variance:  # little but noise
-                continue
-            most = max(most, variance - self.noise_at(m))
-            if variance - self.noise_at(m) < _SMOOTHED_AWAY * most:
-                break
-            found.append((m, variance))
-        return found
+    def scales(self) -> list[tuple[int, float]]:
+        """Smoothings m = 1, 2, 4 … that leave the motion above the noise, with the part of the noise."""
+        every = [1 << k for k in range(max(1, len(self.values) // _SLOWEST).bit_length())]
+        sizes = {m: float(self.thinned(m).var()) for m in every}
+        noise = {m: self.noise_at(m) / max(size, 1e-300) for m, size in sizes.items()}
+        # The noise of high frequencies would hide in a velocity what the displacement shows.
+        moves = {m: size if self.measured else m * m * size for m, size in sizes.items()}
+        clear = [m for m in every if noise[m] < _NOISE_SHARE]
+        most = max((moves[m] for m in (clear if self.measured else every)), default=0.0)
+        return [(m, noise[m]) for m in clear if moves[m] >= (_MOVES if self.measured else _MOVES**2) * most]
 
     @cached_property
     def quiet(self) -> int:
         """The least smoothing at which noise is a small part of the variance; otherwise the quietest."""
-        parts = [(self.noise_at(m) / variance, m) for m, variance in self.variances]
+        parts = [(part, m) for m, part in self.scales]
         return next((m for part, m in parts if part <= _QUIET), min(parts, default=(1.0, 1))[1])
 
     def amplitude(self, m: int, start: int, windows: int) -> float:
@@ -77,15 +76,10 @@ class Velocity:
         x = c if self.measured else (c[m:] - c[:-m]) / m
         return 0.5 * float(np.median([np.ptp(part) for part in np.array_split(x[start:], windows)]))
 
-    def trend(self, m: int, start: int, windows: int) -> tuple[Array, float, float]:
-        """Envelope from a sample on, without noise, last third over first, and rank correlation with time."""
+    def levels(self, m: int, start: int, windows: int) -> Array:
+        """Standard deviations in windows from a sample on, smoothed over m samples, without the noise."""
         parts = np.array_split(self.smoothed(m)[start:], windows)
-        envelope = np.sqrt(np.maximum([float(p.var()) - self.noise_at(m) for p in parts], 0.0))
-        if float(np.ptp(envelope)) == 0.0:
-            return envelope, 1.0, 0.0
-        third, ranks = max(1, windows // 3), np.argsort(np.argsort(envelope)).astype(float)
-        ratio = float(envelope[-third:].mean()) / max(float(envelope[:third].mean()), 1e-300)
-        return envelope, ratio, float(np.corrcoef(ranks, np.arange(windows))[0, 1])
+        return np.sqrt(np.maximum([float(p.var()) - self.noise_at(m) for p in parts], 0.0))
 
     def denoised(self, *, hann: bool = False) -> tuple[Array, Array]:
         """The velocity made of those lines only that stand out of the noise, and their power over rfft's bins."""
@@ -107,13 +101,13 @@ def cleaned(values: Array, order: int) -> tuple[Velocity, list[str]]:
     notes: list[str] = []
     first = 0
     if len(values) >= _SHORTEST and not np.isfinite(values).all():
-        cycle = _cycle(_velocity(_bridged(values), order > 0))
+        cycle = _cycle(_velocity(bridged(values), order > 0))
         values, first = _longest_piece(values, max(1.0, 0.25 * cycle), notes)
-        values = _bridged(values)
+        values = bridged(values)
     if len(values) >= _SHORTEST:
         values = _without_spikes(values, order > 0, notes)
     found = replace(_velocity(values, order > 0), first=first)
-    if order < 2 or not found.variances:  # the sum of noise would not look like noise
+    if order < 2 or not found.scales:  # the sum of noise would not look like noise
         return found, notes
     values = np.cumsum(found.values)
     width = int(_DRIFT_CYCLES * _cycle(found))
@@ -136,13 +130,14 @@ def without_drift(velocity: Velocity, cycle: float, notes: list[str]) -> Velocit
 def _velocity(values: Array, is_velocity: bool) -> Velocity:
     """Velocity with its noise, the lesser of what third differences and the spectrum's floor allow."""
     raw, noise = values if is_velocity else np.diff(values), 0.0
+    mean = float(raw.mean()) if len(raw) else 0.0
     if len(values) >= _SHORTEST:
         rough, some = np.diff(values, 3), _handy(values)
         local = float(np.median(np.abs(rough - np.median(rough)))) / 0.6745 / np.sqrt(20.0)
         line = np.linspace(some[0], some[-1], len(some))
         floor = np.median(np.abs(np.fft.rfft(some - line)) ** 2) / np.log(2.0) / len(some)
         noise = float(min(local, np.sqrt(floor)))
-    return Velocity(raw - raw.mean() if len(raw) else raw, raw, noise, is_velocity)
+    return Velocity(raw - mean, mean, noise, is_velocity)
 
 
 def _cycle(velocity: Velocity) -> float:
@@ -163,7 +158,7 @@ def _without_slow(values: Array) -> Array:
     return values - mean
 
 
-def _bridged(values: Array) -> Array:
+def bridged(values: Array) -> Array:
     """Gaps filled by straight lines."""
     good, places = np.isfinite(values), np.arange(len(values))
     return values if good.all() else np.interp(places, places[good], values[good])
@@ -196,7 +191,7 @@ def _without_spikes(values: Array, is_velocity: bool, notes: list[str]) -> Array
     count = int(np.sum(spikes))
     if count == 0:
         return values
-    without = _bridged(np.where(spikes, np.nan, values))
+    without = bridged(np.where(spikes, np.nan, values))
     if is_velocity and count >= 5 and abs(float(np.mean(np.sign(away[spikes])))) > 0.6:
         power = np.abs(np.fft.rfft(_without_slow(_handy(without)))) ** 2
         if line_share(power) < _LINES_LEFT:  # nothing is left without them

@@ -1,13 +1,16 @@
 """The regime of a measured signal, which carries no flags: see docs/measured-signals.md."""
 
-from dataclasses import dataclass, replace
+import math
+from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
+from typing import Any
 
 import numpy as np
 
 from brakecli.analysis.regime.bursts import Burst, bursts
-from brakecli.analysis.regime.cleaning import Velocity, cleaned, without_drift
-from brakecli.analysis.regime.signal_rules import FEWEST_SAMPLES, SignalRules, SignalThresholds
+from brakecli.analysis.regime.cleaning import Velocity, bridged, cleaned, without_drift
+from brakecli.analysis.regime.signal_measure import Heard, answers
+from brakecli.analysis.regime.signal_table import SignalThresholds, decide
 from brakecli.analysis.regime.spectra import Array
 from brakecli.analysis.regime.stick import Slips, seek
 from brakecli.analysis.regime.table import Excitation, Regime
@@ -15,7 +18,7 @@ from brakecli.analysis.regime.table import Excitation, Regime
 _MOST_OF_IT = 0.9  # of the record: a burst that fills as much is the record
 _MOST_ENERGY = 0.5  # of all bursts in one that speaks for the record
 _INSIDE = 0.05  # of a burst, left out at either end
-_LEVEL = 1.33  # its last third over its first, or the reverse; a ring-down that is cut at half has 1.5
+_LEVEL = 0.3  # change of its logarithm in a burst; a ring-down that is cut at half has 0.7
 _DEFAULT = SignalThresholds()
 _SUSTAINED = (Regime.RELAXATION, Regime.QUASI_HARMONIC)
 
@@ -59,7 +62,7 @@ class SignalVerdict:
     amplitude: float | None  # m, half of peak to peak of x
     stick_fraction: float | None
     bursts: tuple[Burst, ...]  # when a tone stands out
-    evidence: dict[str, float]
+    evidence: dict[str, Any]  # row that decided, and the answers that are known
     warnings: tuple[str, ...]
     thresholds: SignalThresholds
     excitation: Excitation = Excitation.NONE  # a measurement does not show where the energy comes from,
@@ -85,26 +88,24 @@ def look(
     stiffness: float | None = None,
     thresholds: SignalThresholds = _DEFAULT,
 ) -> SignalLook:
-    """The verdict with the velocity that it rests on; that of the longest burst where all else is silence.
+    """The verdict with the velocity that it rests on; that of the strongest burst where all else is silence.
 
     `belt_speed` in m/s, `stiffness` in N/m (of a force) where known.
     """
-    step, good = signal.interval, np.flatnonzero(np.isfinite(signal.values))
-    found = _judge(signal, quantity, belt_speed, stiffness, thresholds)
-    filled = np.interp(np.arange(len(signal.values)), good, signal.values[good]) if len(good) else signal.values
-    tones = tuple(bursts(filled, step))
+    step, known = signal.interval, (quantity, belt_speed, stiffness, thresholds)
+    found = _judge(signal, *known)
+    tones = tuple(bursts(bridged(signal.values), step))
     verdict = replace(found.verdict, bursts=tones)
-    steep = [tone for tone in tones if tone.steep and tone.end - tone.start < _MOST_OF_IT * len(filled) * step]
-    burst = max(steep, key=lambda tone: tone.energy, default=None)
+    short = [tone for tone in tones if tone.end - tone.start < _MOST_OF_IT * len(signal.values) * step]
+    burst = max(short, key=lambda tone: tone.energy, default=None)
     rare = burst and burst.energy >= _MOST_ENERGY * sum(tone.energy for tone in tones)
-    if not burst or not rare or verdict.regime in _SUSTAINED:
-        return replace(found, verdict=verdict)
-    begin, end = (int(time / step) for time in (burst.start, burst.end))
-    margin = int(_INSIDE * (end - begin))
-    part = replace(signal, values=signal.values[begin + margin : end - margin])
-    if np.isfinite(part.values).sum() >= FEWEST_SAMPLES:
-        inside = _judge(part, quantity, belt_speed, stiffness, thresholds).verdict
-        if inside.regime in _SUSTAINED and 1.0 / _LEVEL < inside.evidence["envelope_ratio"] < _LEVEL:
+    if burst and rare and verdict.regime not in _SUSTAINED:
+        begin, end = (int(time / step) for time in (burst.start, burst.end))
+        margin = int(_INSIDE * (end - begin))
+        part = replace(signal, values=signal.values[begin + margin : end - margin])
+        inside = _judge(part, *known).verdict if np.isfinite(part.values).any() else verdict
+        sustained = inside.regime in _SUSTAINED and inside.evidence["steady_from"] == 0.0
+        if sustained and abs(inside.evidence["change"]) < _LEVEL:
             when = f"in a burst from {burst.start:.4g} to {burst.end:.4g} s: {inside.reasons[0]}"
             line = burst.frequency if inside.regime is Regime.QUASI_HARMONIC else inside.frequency
             verdict = replace(inside, reasons=(when,), frequency=line, bursts=tones, warnings=verdict.warnings)
@@ -120,34 +121,36 @@ def _judge(
 ) -> SignalLook:
     """The verdict on a whole signal."""
     size = float(np.nanmax(np.abs(signal.values), initial=0.0)) or 1.0  # squares of the smallest must not vanish
-    order, step = quantity.order, signal.interval
+    order, step, certain = quantity.order, signal.interval, thresholds.skewness_certain
     velocity, notes = cleaned(signal.values / size, order)
-    spring = np.nan if quantity in (Measurand.PRESSURE, Measurand.TORQUE) else 1.0
-    if quantity is Measurand.FORCE:
-        spring = np.nan if stiffness is None else stiffness
-    belt = np.nan if belt_speed is None else abs(belt_speed) * spring * step ** (1 - order) / size
-    enough = len(velocity.values) >= FEWEST_SAMPLES
-    slips = seek(velocity, thresholds.skewness_certain) if enough else Slips()
-    certain = slips.skewness >= thresholds.skewness_certain and slips.enough
-    velocity = without_drift(velocity, slips.period if certain and slips.stick_slip else 0.0, notes)
-    if enough and not certain:
-        slips = seek(velocity, thresholds.skewness_certain)  # drift may have hidden them
-    rules = SignalRules(velocity, slips, step, belt, thresholds)
-    rules.has_belt = quantity is not Measurand.PRESSURE
-    decision = rules.short() or rules.unsettled() or rules.sticking() or rules.without_stick()
-    amplitude = np.nan
-    if rules.above_noise:
-        moved = velocity.amplitude(rules.smoothing, rules.start, rules.windows)
-        amplitude = moved * size * step**order / spring
+    known = {Measurand.FORCE: stiffness, Measurand.TORQUE: None, Measurand.PRESSURE: None}.get(quantity, 1.0)
+    spring = math.nan if known is None else known
+    belt = math.nan if belt_speed is None else abs(belt_speed) * spring * step ** (1 - order) / size
+    slips = seek(velocity, certain)
+    sure = slips.stick_slip and slips.skewness >= certain
+    velocity = without_drift(velocity, len(velocity.smoothed(slips.scale)) / slips.count if sure else 0.0, notes)
+    slips = slips if sure else seek(velocity, certain)  # drift may have hidden them
+    heard = Heard(velocity, slips, belt, thresholds)
+    found = answers(heard, has_belt=quantity is not Measurand.PRESSURE)
+    decision = decide(found, thresholds)
+    per_second, stick, slipping = None, None, decision.row == "slips"
+    if decision.regime in _SUSTAINED:
+        per_second = (slips.often if slipping else heard.line) / step
+        if slipping or found.knows_belt:
+            stick = slips.stick if slipping else found.sticks if decision.regime is Regime.RELAXATION else 0.0
+    begin = found.steady_from if decision.regime in _SUSTAINED else 0.0
+    amplitude = heard.amplitude(begin) * size * step**order / spring if found.heard else math.nan
+    numbers = {name: each for name, each in asdict(found).items() if type(each) is float and math.isfinite(each)}
+    noise = size * step ** max(order - 1, 0) * velocity.noise
     verdict = SignalVerdict(
         regime=decision.regime,
         reasons=(decision.sentence,),
-        frequency=decision.frequency,
-        amplitude=amplitude if np.isfinite(amplitude) else None,
-        stick_fraction=decision.stick_fraction,
+        frequency=per_second,
+        amplitude=amplitude if math.isfinite(amplitude) else None,
+        stick_fraction=stick,
         bursts=(),
-        evidence={**rules.evidence, "noise": size * step ** max(order - 1, 0) * velocity.noise},
+        evidence={"row": decision.row, **numbers, "noise": noise},
         warnings=(*signal.notes, *notes),
         thresholds=thresholds,
     )
-    return SignalLook(verdict, signal, quantity, velocity, slips, rules.smoothing)
+    return SignalLook(verdict, signal, quantity, velocity, slips, heard.smoothing)

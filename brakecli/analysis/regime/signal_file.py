@@ -71,32 +71,33 @@ def read_signal(
     try:
         if time_unit is not None and time_column is None:
             raise UsageError("--time-unit: is for a column of times; leave it out, or name one with --time-column")
+        times, name, wanted = [], "", _SI[quantity]
         if path.suffix.lower() in (".wav", ".wave") and inside is None:
             if time_column is not None:
                 raise UsageError("--time-column: a sound file has no column of times; leave it out")
             values, sample_rate = _sound(path, column, sample_rate)
-            return Signal(_numbers(values) * _size(None, unit, *_SI[quantity]), 1.0 / sample_rate)
-        if (sample_rate is None) == (time_column is None):
+            size = _size(None, unit, *wanted)
+        elif (sample_rate is None) == (time_column is None):
             given = "are not given" if time_column is None else "are given twice"
             raise UsageError(f"the times of the samples {given}; give --sample-rate HZ or --time-column NAME")
-        if inside is not None:
-            if column is not None or time_column is not None:
-                raise UsageError("a dataset has no columns; leave out --column, and give --sample-rate HZ")
-            values, written = _dataset(path, inside)
-            times, size, name = [], _size(_written(written, unit, quantity), unit, *_SI[quantity]), inside
-        else:
+        elif inside is None:
             table = TextTable(path, "a CSV file, or FILE.h5:/path of an HDF5 file")
             values, *times = table.columns_of(column, time_column)
             place, *clock = table.places
-            size = _size(table.unit(place, *_SI[quantity]), unit, *_SI[quantity])
+            size = _size(table.unit(place, *wanted), unit, *wanted)
             times = [time * _size(table.unit(clock[0], "second"), time_unit, "second") for time in times]
             name = table.names[place] if table.names else ""
+        elif column is not None or time_column is not None:
+            raise UsageError("a dataset has no columns; leave out --column, and give --sample-rate HZ")
+        else:
+            values, written = _dataset(path, name := inside)
+            size = _size(_written(written, unit, quantity), unit, *wanted)
         values = _numbers(values) * size
-        signal = Signal(values, 1.0 / sample_rate) if sample_rate is not None else _evenly(values, *times)
-        of_contact = any(word in name for word in ("friction_force", "normal_force"))
-        jumps = [_JUMPS] * (of_contact and quantity is Measurand.FORCE)
+        signal = _evenly(values, *times) if sample_rate is None else Signal(values, 1.0 / sample_rate)
         near = f"its samples lie {signal.interval:g} s apart; check the unit of the times"
         _require(_NEAREST <= signal.interval <= _FARTHEST, near)
+        of_contact = any(word in name for word in ("friction_force", "normal_force"))
+        jumps = [_JUMPS] * (of_contact and quantity is Measurand.FORCE)
         return replace(signal, notes=(*signal.notes, *jumps))
     except (UsageError, UnreadableResultError) as error:
         raise type(error)(f"{source}: {error}") from error
@@ -128,9 +129,9 @@ def _size(found: tuple[float, str] | None, option: str | None, *wanted: str) -> 
 def _written(text: str, option: str | None, quantity: Measurand) -> tuple[float, str] | None:
     """The unit that a dataset says it has."""
     text = text.partition(":")[0].strip()  # what follows explains
-    if text in ("", "-", "1") or (option is not None and si(text) is None):
-        return None
     found = si(text)
+    if text in ("", "-", "1") or (option is not None and found is None):
+        return None
     _require(found is not None, f"there is no unit {printable(text)}; say with --unit what it means")
     fits = found and found[1] in _SI[quantity]
     _require(fits, f"its unit {printable(text)} is no {quantity}; correct --quantity")
@@ -171,17 +172,15 @@ def _sound(path: Path, column: str | None, sample_rate: float | None) -> tuple[A
     if sample_rate not in (None, rate):
         raise UsageError(f"--sample-rate {sample_rate:g}: the file has {rate} Hz; leave the option out")
     _require(len(values) <= _MOST_SAMPLES, f"it has {len(values)} samples, {_MOST_SAMPLES} are the most; {_PART}")
-    channels = 1 if values.ndim == 1 else values.shape[1]
-    number = int(column) if column is not None and column.isascii() and column.isdigit() else 0
-    if column is None and channels == 1:
-        number = 1
-    if not 1 <= number <= channels:
-        raise UsageError(f"which channel is the signal? give --column NUMBER; there are {channels}, from 1")
-    chosen = values if values.ndim == 1 else values[:, number - 1]
+    rows = np.atleast_2d(values.T)
+    chosen = column or "1" * (len(rows) == 1)
+    number = int(chosen) if chosen.isascii() and chosen.isdigit() else 0
+    if not 1 <= number <= len(rows):
+        raise UsageError(f"which channel is the signal? give --column NUMBER; there are {len(rows)}, from 1")
     if values.dtype.kind == "f":
-        return chosen.astype(np.float64), float(rate)
+        return rows[number - 1].astype(np.float64), float(rate)
     middle = 128.0 if values.dtype.kind == "u" else 0.0
-    return (chosen - middle) / (128.0 if middle else -float(np.iinfo(values.dtype).min)), float(rate)
+    return (rows[number - 1] - middle) / (middle or -float(np.iinfo(values.dtype).min)), float(rate)
 
 
 def _dataset(path: Path, inside: str) -> tuple[Array, str]:

@@ -12,22 +12,21 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter, uniform_filter1d
 
-from brakecli.analysis.regime.cleaning import NOISE_SHARE, Velocity
+from brakecli.analysis.regime.cleaning import Velocity
+from brakecli.analysis.regime.signal_table import FEWEST_SAMPLES
 from brakecli.analysis.regime.spectra import Array, rises
 
 _PARTS = 7
-_SLOWEST = 60  # parts of the record over which is smoothed at most
-_MOVES = 0.15  # of the largest change of displacement over m samples: what is less has been smoothed away
 _BULK = 3.0  # robust deviations that a slip leaves the velocity in stick by
 _FEWEST = 10
 _STRONG = 0.4  # of the tenth largest slip: the shape of smaller ones is not looked at
 _MOST = 512  # slips whose shape is averaged
-_LASTS, _RETURNS, _SWINGS = 0.55, (-1.0, -0.4, 0.2), (0.2, 0.45)
+_LASTS = 0.55  # least part of a slip that is left a quarter of a cycle later
+_SWINGS = 0.6  # most that goes the other way
 _AROUND = 5  # widths of a slip in which it would swing
 _NARROW = 2  # samples of a pulse of velocity that may be a spike
 _REGULAR = 0.3  # of the median: quartiles of the times between pulses that spikes do not keep
 _LOADED = (0.4, 2.5)  # correlation of slips with the time before or after them, and that times √n
-_SLOPE = 0.2  # of that, where 1 is proportional
 
 
 @dataclass(frozen=True)
@@ -38,11 +37,9 @@ class Slips:
     scale: int = 1  # samples over which the velocity is smoothed to see them
     places: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, np.intp), repr=False)  # the last before
     stick: float = 0.0  # part of the time between slips
-    lasts: float = 1.0  # part of a slip that is left a quarter of a cycle later; 0 for a ring-down, or a spike
-    returns: float = 0.0  # what swings back at once, over the slip; 0 for stick, nearly 1 for a ring-down
-    swings: float = 0.0  # the largest velocity the other way around the mean slip, over that in the slip
-    loaded: bool = True  # whether slips go with the time that has loaded them; random spikes do not
-    period: float = 0.0  # samples from one to the next, in the mean
+    lasts: float = 0.0  # part of a slip that is left a quarter of a cycle later; 0 for a ring-down, or a spike
+    swings: float = 0.0  # how far the velocity goes the other way beside, between and around slips, over them
+    loaded: bool = False  # whether slips go with the time that has loaded them; random spikes do not
 
     @property
     def count(self) -> int:
@@ -50,33 +47,30 @@ class Slips:
         return len(self.places)
 
     @property
-    def enough(self) -> bool:
-        """Whether they are enough to look at their shape."""
-        return self.count >= _FEWEST
-
-    @property
-    def swings_back(self) -> bool:
-        """Whether the velocity swings as far the other way beside them, or between them, as after an impact."""
-        least, low, most = _RETURNS
-        return not least <= self.returns <= most or self.swings > _SWINGS[self.returns >= low]
+    def often(self) -> float:
+        """How many there are in a sample."""
+        return (self.count - 1) / float(self.places[-1] - self.places[0])
 
     @property
     def stick_slip(self) -> bool:
         """Whether they can be slips between sticks."""
-        return self.enough and self.lasts >= _LASTS and not self.swings_back and self.loaded
+        return self.lasts >= _LASTS and self.swings <= _SWINGS and self.loaded
 
 
 def seek(velocity: Velocity, certain: float) -> Slips:
     """The slips at the smoothing that shows them best, if the skewness is `certain`; otherwise at a quiet one."""
+    if len(velocity.values) < FEWEST_SAMPLES:
+        return Slips()
     found, sign, scale, chosen = 0.0, 1.0, velocity.quiet, velocity
     for candidate, least in [(velocity, 1), (_filtered(velocity), 8)][: 1 if velocity.measured else 2]:
-        for m in _scales(candidate, least):
+        for m in (m for m, _ in candidate.scales if m >= least):
             skewness = _skewness(candidate.thinned(m))
             if abs(skewness) > max(found, 4.0 * np.sqrt(6.0 * m / len(velocity.values))):
                 found, sign, scale, chosen = abs(skewness), -np.sign(skewness), m, candidate
     if found < certain:
         scale, chosen = velocity.quiet, velocity
-    values = sign * chosen.smoothed(scale)
+    chosen = replace(chosen, values=sign * chosen.values)
+    values = chosen.smoothed(scale)
     values = values - values.mean()
     bulk = values[values > 0.0]
     if not len(bulk):
@@ -86,10 +80,7 @@ def seek(velocity: Velocity, certain: float) -> Slips:
     high = max(0.5 * middle, 4.0 * noise, spread)
     places = rises(-values, -0.25 * middle, high)
     slips = Slips(found, scale, places, stick=float(np.mean(values > -high)))
-    slips = replace(slips, period=len(values) / max(1, len(places)))
-    if len(places) < _FEWEST:
-        return slips
-    return _shaped(slips, replace(chosen, values=sign * chosen.values), places)
+    return _shaped(slips, chosen) if slips.count >= _FEWEST else slips
 
 
 def _filtered(velocity: Velocity) -> Velocity:
@@ -98,46 +89,33 @@ def _filtered(velocity: Velocity) -> Velocity:
     return replace(velocity, values=np.diff(median_filter(displacement, 5, mode="nearest")))
 
 
-def _scales(velocity: Velocity, least: int) -> list[int]:
-    """Smoothings at which the velocity exceeds its noise, and the motion is not smoothed away."""
-    every = [1 << k for k in range(max(1, len(velocity.values) // _SLOWEST).bit_length())]
-    sizes = {m: float(velocity.thinned(m).var()) for m in every}
-    clear = {m: v for m, v in sizes.items() if m >= least and velocity.noise_at(m) < NOISE_SHARE * v}
-    if velocity.measured:  # otherwise noise of high frequencies would hide what a displacement shows
-        return [m for m, v in clear.items() if v >= _MOVES * max(clear.values())]
-    moved = _MOVES**2 * max(m * m * v for m, v in sizes.items())
-    return [m for m, v in clear.items() if m * m * v >= moved]
-
-
 def _skewness(values: Array) -> float:
     """Median of the parts of the record, which a single jump does not change."""
     parts = [part - part.mean() for part in np.array_split(values, _PARTS)]
     return float(np.median([np.mean(p * p * p) / max(float(np.mean(p * p)), 1e-100) ** 1.5 for p in parts]))
 
 
-def _shaped(slips: Slips, velocity: Velocity, places: NDArray[np.intp]) -> Slips:
-    """What is left of the strong slips, what swings back at once, and whether time has loaded them."""
+def _shaped(slips: Slips, velocity: Velocity) -> Slips:
+    """What is left of the strong slips, what swings back, and whether time has loaded them."""
     scale = slips.scale
     x = np.concatenate([[0.0], np.cumsum(velocity.values)])
-    starts, depths, strong = _falls(x, places, scale)
     # Where impulses and noise make the largest falls, a smoothed displacement shows where slips are.
-    calm_starts, calm_depths, calm = _falls(uniform_filter1d(x, 1 + scale // 2), places, scale)
-    if min(strong.sum(), calm.sum()) < 3:
-        return replace(slips, lasts=0.0)
-    lasts = _lasting(x, calm_starts[calm], scale) / max(float(calm_depths[calm].mean()), 1e-300)
+    starts, depths = _falls(uniform_filter1d(x, 1 + scale // 2), slips.places, scale)
+    strong = depths >= _STRONG * np.sort(depths)[-min(_FEWEST, len(depths)) :][0] if len(depths) else depths > 0.0
+    if strong.sum() < 3:
+        return slips
+    lasts = _lasting(x, starts[strong], scale) / max(float(depths[strong].mean()), 1e-300)
     returns = _returning(x, starts[strong], min(velocity.quiet, scale), scale)
     loaded = not velocity.measured or _loaded(velocity.values, starts, depths, scale)
-    swings = _swinging(velocity.smoothed(scale), starts[strong])
-    return replace(slips, lasts=lasts, returns=returns, swings=swings, loaded=loaded)
+    swings = abs(returns) + _swinging(velocity.smoothed(scale), starts[strong])
+    return replace(slips, lasts=lasts, swings=swings, loaded=loaded)
 
 
-def _falls(x: Array, places: NDArray[np.intp], scale: int) -> tuple[NDArray[np.intp], Array, NDArray[np.bool_]]:
-    """Where the displacement falls most behind each place, by how much, and which falls are strong."""
+def _falls(x: Array, places: NDArray[np.intp], scale: int) -> tuple[NDArray[np.intp], Array]:
+    """Where the displacement falls most behind each place, and by how much."""
     falls = sliding_window_view(x[:-scale] - x[scale:], 5 * scale)
     near = falls[places[places < len(falls)]]
-    starts, depths = places[: len(near)] + near.argmax(axis=1), near.max(axis=1)
-    tenth = float(np.sort(depths)[-_FEWEST:][0]) if len(depths) else 0.0
-    return starts, depths, depths >= _STRONG * max(tenth, 0.0)
+    return places[: len(near)] + near.argmax(axis=1), near.max(axis=1)
 
 
 def _returning(x: Array, starts: NDArray[np.intp], fine: int, scale: int) -> float:
@@ -155,29 +133,30 @@ def _returning(x: Array, starts: NDArray[np.intp], fine: int, scale: int) -> flo
     return float((high - most) / max(least - low, 0.25 * (most - least), 1e-300))
 
 
+def _around(values: Array, starts: NDArray[np.intp], before: int, after: int) -> Array:
+    """Mean of the values around starts, in which hum and noise cancel; empty where the record is too short."""
+    inside = starts[(starts >= before) & (starts + after < len(values))]
+    few = inside[:: 1 + len(inside) // _MOST]
+    return np.mean([values[i - before : i + after + 1] for i in few], axis=0) if len(few) else np.zeros(0)
+
+
 def _swinging(values: Array, starts: NDArray[np.intp]) -> float:
-    """The largest velocity the other way around the mean slip, in which hum and noise cancel, over that in it."""
-    wide, starts = 1, starts[:: 1 + len(starts) // _MOST]
-    while True:
-        inside = starts[(starts >= wide) & (starts + wide < len(values))]
-        if not len(inside):
-            return 0.0
-        mean = np.mean([values[i - wide : i + wide + 1] for i in inside], axis=0)
-        mean -= np.median(mean)
-        deepest = float(-mean.min())
-        if wide >= _AROUND * np.sum(mean < -0.5 * deepest):
-            return float(mean.max()) / max(deepest, 1e-300)
+    """The largest velocity the other way around the mean slip, over that in it."""
+    wide = 1
+    while len(mean := _around(values, starts, wide, wide)):
+        mean = mean - np.median(mean)
+        if wide >= _AROUND * np.sum(mean < 0.5 * mean.min()):
+            return float(mean.max() / max(-mean.min(), 1e-300))
         wide *= 2
+    return 0.0
 
 
 def _lasting(x: Array, starts: NDArray[np.intp], scale: int) -> float:
     """Mean fall of the displacement over slips, beside a common slope, seen from a quarter of a cycle around."""
     wide = int(max(3 * scale, 0.25 * len(x) / len(starts)))
-    inside = starts[(starts >= wide) & (starts + scale + wide < len(x))]
-    if not len(inside):
+    if not len(mean := _around(x, starts, wide, scale + wide)):
         return 0.0
     time = np.arange(-wide, scale + wide + 1)
-    mean = np.mean([x[i + time] for i in inside[:: max(1, len(inside) // _MOST)]], axis=0)
     away = (time <= -(scale // 2)) | (time >= scale + scale // 2)
     terms = np.stack([np.ones(len(time)), time, time > 0.5 * scale], axis=1).astype(np.float64)
     return -float(np.linalg.lstsq(terms[away], mean[away] - mean[0], rcond=None)[0][2])
@@ -192,10 +171,5 @@ def _loaded(values: Array, starts: NDArray[np.intp], depths: Array, scale: int) 
     width = np.median((pulses < 0.5 * pulses.min(axis=1, keepdims=True)).sum(axis=1))
     if width > _NARROW or last - first < _REGULAR * median:
         return True
-    rows, mean = np.stack([depths[1:], depths[:-1]]), waits.mean()
-    rows, waits = rows / depths.mean() - 1.0, waits / mean - 1.0
-    spread = max(float(waits.std()), 1e-300)
-    slopes = np.mean(rows * waits, axis=1) / spread**2  # 1 if a slip is what the time has loaded
-    along = slopes * spread / np.maximum(rows.std(axis=1), 1e-300)  # correlation
-    enough = max(_LOADED[0], _LOADED[1] / np.sqrt(len(waits)))
-    return bool(np.any((along >= enough) & (slopes >= _SLOPE)))
+    along = np.corrcoef([depths[1:], depths[:-1], waits])[2, :2]
+    return bool(np.nanmax(along) >= max(_LOADED[0], _LOADED[1] / np.sqrt(len(waits))))

@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from enum import StrEnum
-from typing import Any, NamedTuple
+from typing import Any, Generic, NamedTuple, TypeVar
 
 _ROUNDING = math.log(1e9)  # powers of e from rounding to the size of a motion
 
@@ -220,17 +220,21 @@ class Decision(NamedTuple):
         return f"{self.reason}; {self.advice}" if self.advice else self.reason
 
 
-class Row(NamedTuple):
+A = TypeVar("A")  # the answers
+T = TypeVar("T")  # and the thresholds of a table
+
+
+class Row(NamedTuple, Generic[A, T]):
     """A row: its name, its condition, what it says, and what to do. `{…}` are attributes of the answers."""
 
     name: str
-    holds: Callable[[Answers, Thresholds], Any]
+    holds: Callable[[A, T], Any]
     sentence: str
     remedy: str = ""
     regime: Regime = Regime.UNDECIDED
     excitation: Excitation = Excitation.NONE
 
-    def decision(self, answers: Answers) -> Decision:
+    def decision(self, answers: A) -> Decision:
         """What it says of these answers."""
         reason, advice = (text.format(a=answers) for text in (self.sentence, self.remedy))
         return Decision(reason, self.regime, self.excitation, advice=advice, row=self.name)
@@ -289,7 +293,8 @@ _DASHPOT = "a dashpot would decide"
 _CHECK = "check load.force, and the angles of the links"
 _LINEAR = "full contact and slip to one side make the motion linear"
 
-CONTACT: tuple[Row, ...] = (
+Rows = tuple[Row[Answers, Thresholds], ...]
+CONTACT: Rows = (
     Row("failed", lambda a, t: a.failure, "the run failed: {a.failure}"),
     Row("older file", lambda a, t: a.unasked, "the file is older than the questions that decide", "{a.unasked}"),
     Row("never touched", lambda a, t: a.never, "the shoe has never touched the wheel", _CHECK),
@@ -359,13 +364,13 @@ CONTACT: tuple[Row, ...] = (
     ),
     Row("standing wheel, no dashpots", lambda a, t: a.stands, "the wheel stands, but no dashpot damps", _DASHPOT),
 )
-COMES_AND_GOES = Row(
+COMES_AND_GOES: Row[Answers, Thresholds] = Row(
     "comes and goes",
     lambda a, t: not math.isfinite(a.change),
     "the motion comes and goes: in a part of the second half nothing moves",
     "run longer",
 )
-SMOOTH: tuple[Row, ...] = (
+SMOOTH: Rows = (
     Row(
         "linear, held by the steps",
         lambda a, t: a.linear and _grows(a, t) and a.steadier,
@@ -441,7 +446,7 @@ SMOOTH: tuple[Row, ...] = (
         "run at least {a.longer:.3g} s",
     ),
 )
-ROUGH: tuple[Row, ...] = (
+ROUGH: Rows = (
     Row(
         "shorter than a wave",
         lambda a, t: a.duration < a.slowest,
@@ -575,7 +580,7 @@ ROUGH: tuple[Row, ...] = (
         "{a.exponent:.2g} 1/s; without the roughness it {a.without_waves}",
     ),
 )
-LOOKS: tuple[Row, ...] = (
+LOOKS: Rows = (
     Row(
         "few cycles",
         lambda a, t: not a.cycles or a.cycles < (1.0 if a.settled else 1.5) * t.fewest_cycles,
@@ -627,12 +632,13 @@ LOOKS: tuple[Row, ...] = (
 
 def decide(answers: Answers, thresholds: Thresholds) -> Decision:
     """What the first row says whose condition holds."""
-    found = _first((*CONTACT, *(ROUGH if answers.waves else SMOOTH)), answers, thresholds)
+    found = first((*CONTACT, *(ROUGH if answers.waves else SMOOTH)), answers, thresholds)
     if found.excitation is not Excitation.SELF_EXCITED:
         return found
-    look = _first(LOOKS, answers, thresholds)
+    look = first(LOOKS, answers, thresholds)
     return look._replace(reason=f"{found.reason}, {look.reason}", row=f"{found.row}: {look.row}")
 
 
-def _first(rows: tuple[Row, ...], answers: Answers, thresholds: Thresholds) -> Decision:
+def first(rows: tuple[Row[A, T], ...], answers: A, thresholds: T) -> Decision:
+    """What the first row of a table says whose condition holds."""
     return next(row for row in rows if row.holds(answers, thresholds)).decision(answers)

@@ -1,0 +1,126 @@
+"""The record of answers to the questions of `signal_table`, from a velocity and its slips."""
+
+import math
+from functools import cached_property
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from brakecli.analysis.regime.cleaning import CERTAIN, Velocity
+from brakecli.analysis.regime.evidence import level_change
+from brakecli.analysis.regime.signal_table import FEWEST_SAMPLES, SignalAnswers, SignalThresholds, steady
+from brakecli.analysis.regime.spectra import Array, interpolated, line_share
+from brakecli.analysis.regime.stick import Slips
+
+_FINE = 1000.0  # samples of a cycle, after interpolation, among which a plateau is sought
+_PLATEAU_SAMPLES = 1 << 20  # most samples in which a plateau is sought
+_SHORTEST_PLATEAU = 0.03  # of the time
+
+
+class Heard:
+    """What a velocity shows."""
+
+    def __init__(self, velocity: Velocity, slips: Slips, belt: float, limits: SignalThresholds) -> None:
+        """Take a velocity, its slips, and the belt's speed as the velocity would show it; nan if not known."""
+        self.velocity, self.slips, self.belt, self.limits = velocity, slips, belt, limits
+        self.samples = len(velocity.values)
+        certain = slips.skewness >= limits.skewness_certain and slips.stick_slip
+        self.smoothing = slips.scale if certain else velocity.quiet
+        self.heard = self.samples >= FEWEST_SAMPLES and (certain or bool(velocity.scales))
+        if self.heard:
+            self.clean, self.power = velocity.denoised()
+            self.strongest = int(np.argmax(self.power))
+            self.heard = certain or self.strongest > 0
+            self.cycles = float(slips.count) if certain else self.strongest * self.samples / len(self.clean)
+
+    @property
+    def windows(self) -> int:
+        """How many windows hold three cycles or more each."""
+        return int(np.clip(self.cycles / 3.0, 1, 40))
+
+    def amplitude(self, begin: float) -> float:
+        """Half of peak to peak of the displacement, from some part of the record on."""
+        return self.velocity.amplitude(self.smoothing, int(begin * self.samples), self.windows)
+
+    @cached_property
+    def lines(self) -> Array:
+        """Power of the lines above the noise, under a Hann window."""
+        return self.velocity.denoised(hann=True)[1]
+
+    @property
+    def line(self) -> float:
+        """Cycles per sample of the strongest line, interpolated between those of the spectrum."""
+        near = max(self.strongest - 1, 0)
+        place = near + int(np.argmax(self.lines[near : near + 3]))
+        return interpolated(np.arange(len(self.lines)) / len(self.clean), self.lines, place)
+
+    def level(self) -> dict[str, Any]:
+        """Whether it lasts."""
+        velocity, windows = self.velocity, max(self.windows, 10)
+        levels = velocity.levels(self.smoothing, 0, windows)
+        largest = max(float(np.sort(levels)[-3]), 1e-300)
+        died_to = float(levels[-(windows // 4) :].mean()) / largest
+        hidden = min(0.2, 0.5 * float(np.sqrt(velocity.noise_at(self.smoothing))) / largest)
+        least = max(self.limits.negligible, hidden) * largest
+        for steady_from in (0.0, 0.5):
+            there = velocity.levels(self.smoothing, int(steady_from * self.samples), windows)
+            change, error = level_change(np.maximum(there, least))
+            if steady(change, error, self.limits):
+                break
+        was_loud = bool(levels[: windows // 2].max() >= largest)
+        found = {"died_to": died_to, "hidden": hidden, "was_loud": was_loud}
+        return {**found, "steady_from": steady_from, "change": change, "change_error": error}
+
+    def harmony(self) -> dict[str, float]:
+        """Parts of the energy that tell lines in step from stick."""
+        total, n = max(float(self.power.sum()), 1e-300), np.arange(3, 9)
+        first, last = (0.97 * n * self.strongest).astype(int), (1.03 * n * self.strongest).astype(int) + 2
+        turn = 2.0 * np.pi * min(4.0 * self.cycles / self.samples, 0.5)
+        gain = 1.0 if self.velocity.measured else 2.0 - 2.0 * np.cos(turn)
+        noise = CERTAIN * self.samples * self.velocity.noise**2 * gain
+        return {
+            "overtones": sum(float(self.power[i:j].sum()) for i, j in zip(first, last, strict=True)) / total,
+            "beyond_lines": 1.0 - line_share(self.lines),
+            "noise_share": min(float(noise) / total, 1.0),
+            "line_share": line_share(self.power),
+        }
+
+    def stay(self) -> dict[str, Any]:
+        """How long the velocity stays at that of the belt, or at an extreme one."""
+        finer, mean = int(np.ceil(_FINE * self.cycles / self.samples)), self.velocity.mean
+        clean = self.clean[: _PLATEAU_SAMPLES // finer]
+        clean = finer * np.fft.irfft(np.fft.rfft(clean), finer * len(clean))
+        reach = 0.5 * float(np.ptp(np.quantile(clean, [0.01, 0.99]))) or 1.0
+        levels = np.array([self.belt, -self.belt]) - mean
+        if not math.isfinite(self.belt):
+            # the most frequent values of the lower and of the upper quarter of the range
+            edges = clean.min() + 0.01 * reach * np.arange(float(np.ptp(clean)) / (0.01 * reach) + 2.0)
+            counts, quarter = np.histogram(clean, edges)[0], max(1, len(edges) // 4)
+            places = np.array([np.argmax(counts[:quarter]), len(counts) - quarter + np.argmax(counts[-quarter:])])
+            levels = 0.5 * (edges[places] + edges[places + 1])
+        times = [(0.0, 1.0)]  # at a level, and next to it
+        for level, width in product(levels, (0.02, 0.01, 0.005)):
+            away = np.abs(clean - level) / reach
+            if (there := float(np.mean(away <= width))) >= _SHORTEST_PLATEAU:
+                times.append((there, float(np.mean(away <= 3.0 * width)) - there))
+        top, beside = max(times, key=lambda time: time[0] / max(time[1], 1e-9))
+        least, most = np.quantile(self.clean + mean, [0.01, 0.99])
+        return {
+            "plateau": top / max(beside, 1e-9),
+            "sticks": max(0.0, top - 0.5 * beside),
+            "reaches": any(0.95 * self.belt <= v <= 1.2 * self.belt for v in (-least, most)),
+        }
+
+
+def answers(heard: Heard, *, has_belt: bool) -> SignalAnswers:
+    """The record of answers."""
+    slips = heard.slips
+    found: dict[str, Any] = {"samples": float(heard.samples)}
+    if heard.heard:
+        found |= {"smoothed_over": float(heard.smoothing), "cycles": heard.cycles}
+        found |= {"samples_per_cycle": heard.samples / heard.cycles, "skewness": slips.skewness}
+        found |= {"events": float(slips.count), "slips": slips.stick_slip}
+        found |= {"slip_lasts": slips.lasts, "slip_swings": slips.swings, "knows_belt": math.isfinite(heard.belt)}
+        found |= heard.level() | heard.harmony() | heard.stay()
+    return SignalAnswers(**found, heard=heard.heard, has_belt=has_belt)

@@ -1,0 +1,178 @@
+"""The table of measured signals: what is said of one, by one record of answers. See docs/measured-signals.md.
+
+Nothing here looks at a signal. Rows are tried from the top, and the first whose condition holds decides.
+"""
+
+import math
+from dataclasses import dataclass
+
+from brakecli.analysis.regime.table import Decision, Regime, Row, first
+
+FEWEST_SAMPLES = 64
+
+
+@dataclass(frozen=True)
+class SignalThresholds:
+    """The only numbers that decide the verdict on a signal; every verdict carries them."""
+
+    fewest_cycles: float = 10.0
+    samples_per_cycle: float = 8.0
+    negligible: float = 0.05  # part of a level that counts as nothing: a steady one may change by it twice
+    sure_errors: float = 3.0  # standard errors beyond which a change is no chance
+    skewness_certain: float = 0.9  # of the velocity; two lines in step reach 0.816 and no more
+    skewness_lines: float = 1.5  # three lines in step reach 1.4 and no more
+    overtones: float = 0.03  # part of the energy in the third to eighth multiple, which two lines in step lack
+    beyond_lines: float = 0.003  # part of the energy that three lines in step leave
+    plateau: float = 2.6  # time at the belt's speed, over that next to it, that shows stick; a sine reaches 2.41
+    line_share: float = 0.7  # part of the energy of the velocity in three narrow bands
+
+
+@dataclass(frozen=True)
+class SignalAnswers:
+    """What is known of a measured motion; nan where a number is not known."""
+
+    samples: float = 0.0  # without a gap
+    heard: bool = False  # whether anything rises above the noise
+    has_belt: bool = True  # whether the belt's speed can be given,
+    knows_belt: bool = False  # and is
+    smoothed_over: float = math.nan  # samples
+    cycles: float = math.nan
+    samples_per_cycle: float = math.nan
+    died_to: float = math.nan  # level of the last quarter over the largest
+    hidden: float = math.nan  # part of the largest level that noise hides
+    was_loud: bool = False  # whether the largest level lies in the first half
+    steady_from: float = math.nan  # part of the record from which on the change is that of the level: 0 or 1/2
+    change: float = math.nan  # of its logarithm
+    change_error: float = math.nan
+    skewness: float = math.nan  # of the velocity
+    events: float = math.nan  # of what skews it
+    slip_lasts: float = math.nan  # part of a slip that is left a quarter of a cycle later
+    slip_swings: float = math.nan  # how far the velocity goes the other way, over the slip
+    slips: bool = False  # whether these are slips between sticks, by their shape
+    overtones: float = math.nan  # part of the energy in the third to eighth multiple of the line
+    beyond_lines: float = math.nan  # that three lines leave
+    noise_share: float = math.nan  # that a line among the noise may have unseen
+    plateau: float = math.nan  # time at the belt's speed, or at an extreme velocity, over that next to it
+    sticks: float = math.nan  # part of the time at that velocity beyond what a smooth motion has
+    reaches: bool = False  # the belt's speed, just so
+    line_share: float = math.nan  # part of the energy in three narrow bands
+
+    @property
+    def word(self) -> str:
+        """Which way the level changes."""
+        return "grows" if self.change > 0.0 else "falls"
+
+    @property
+    def unseen(self) -> str:
+        """What stays unknown without the belt's speed."""
+        return "; short stick would show only by --belt-speed" * (self.has_belt and not self.knows_belt)
+
+    @property
+    def give_belt(self) -> str:
+        """What to do where the belt's speed would decide."""
+        return "give --belt-speed" * self.has_belt
+
+
+def steady(change: float, error: float, t: SignalThresholds) -> bool:
+    """Whether the level does not change, but for chance."""
+    return abs(change) <= max(t.sure_errors * error, 2.0 * t.negligible)
+
+
+def _skewed(a: SignalAnswers, t: SignalThresholds) -> bool:
+    """What may be slips skews the velocity."""
+    some = a.slips or a.skewness < t.skewness_certain  # two lines in step may hide the shape of slips
+    return a.events >= t.fewest_cycles and a.skewness > 0.0 and some
+
+
+def _lacks(a: SignalAnswers, t: SignalThresholds) -> float:
+    """The part of the energy that stick would have and lines in step lack, where it is not there; otherwise 0."""
+    if a.skewness < t.skewness_certain and a.overtones <= t.overtones:
+        return t.overtones
+    return t.beyond_lines if a.skewness < t.skewness_lines and a.beyond_lines <= t.beyond_lines else 0.0
+
+
+_LONGER = "measure longer"
+ROWS: tuple[Row[SignalAnswers, SignalThresholds], ...] = (
+    Row(
+        "few samples",
+        lambda a, t: a.samples < FEWEST_SAMPLES,
+        "only {a.samples:.0f} samples without a gap",
+        _LONGER,
+    ),
+    Row(
+        "noise",
+        lambda a, t: not a.heard,
+        "the vibration is hidden by noise",
+        "measure closer to the shoe, or with less noise",
+    ),
+    Row("few cycles", lambda a, t: a.cycles < t.fewest_cycles, "only {a.cycles:.0f} cycles", _LONGER),
+    Row(
+        "few samples in a cycle",
+        lambda a, t: a.samples_per_cycle < t.samples_per_cycle,
+        "only {a.samples_per_cycle:.1f} samples a cycle",
+        "measure at a higher rate",
+    ),
+    Row(
+        "died out",
+        lambda a, t: a.was_loud and a.died_to <= max(t.negligible, a.hidden),
+        "the vibration has died out: down to {a.died_to:.2g} of its largest",
+        "",
+        Regime.DAMPED,
+    ),
+    Row(
+        "still changes",
+        lambda a, t: not steady(a.change, a.change_error, t),
+        "the level {a.word} by e^{a.change:.2g} in the second half",
+        "measure longer, until it does not",
+    ),
+    Row(
+        "slips or lines",
+        lambda a, t: _skewed(a, t) and a.noise_share > _lacks(a, t) / 3.0 > 0.0,
+        "stick, or lines in phase, have skewed the velocity, and noise hides which of them",
+        "measure with less noise, or for longer",
+    ),
+    Row(
+        "slips",
+        lambda a, t: _skewed(a, t) and a.slips and not _lacks(a, t),
+        "{a.events:.0f} events of stick and slip: skewness of the velocity {a.skewness:.2g}",
+        "",
+        Regime.RELAXATION,
+    ),
+    Row(
+        "stays at the belt's speed",
+        lambda a, t: a.plateau > t.plateau and a.knows_belt,
+        "the velocity is that of the belt for {a.sticks:.0%} of the time, in most cycles or in all",
+        "",
+        Regime.RELAXATION,
+    ),
+    Row(
+        "stays at one speed",
+        lambda a, t: a.plateau > t.plateau,
+        "the velocity has a plateau on one side, which short stick can cause",
+        "{a.give_belt}",
+    ),
+    Row(
+        "reaches the belt's speed",
+        lambda a, t: a.reaches,
+        "the velocity just reaches that of the belt",
+        "with less noise it would show whether it stays",
+    ),
+    Row(
+        "irregular",
+        lambda a, t: a.line_share < t.line_share,
+        "irregular without stick: {a.line_share:.0%} of the energy in three lines",
+        _LONGER,
+    ),
+    Row(
+        "lines",
+        lambda a, t: True,
+        "sustained without stick: {a.line_share:.0%} of the energy in at most three lines{a.unseen}",
+        "",
+        Regime.QUASI_HARMONIC,
+    ),
+)
+
+
+def decide(answers: SignalAnswers, thresholds: SignalThresholds) -> Decision:
+    """What the first row says whose condition holds."""
+    return first(ROWS, answers, thresholds)
