@@ -6,7 +6,7 @@ from itertools import groupby, pairwise
 
 import numpy as np
 
-from brakecli.analysis.regime.spectra import Array, peak
+from brakecli.analysis.spectrum import Array, peak
 from brakecli.solver.history import History
 from brakecli.solver.quantities import ContactState
 from brakecli.solver.schedules import value_at

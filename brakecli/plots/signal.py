@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from brakecli.analysis.regime.of_signal import Measurand, SignalLook
-from brakecli.analysis.regime.spectra import segment
+from brakecli.analysis.spectrum import segment
 from brakecli.files.fields import MEASURED_UNITS
 from brakecli.plots import style
 from brakecli.plots.run import COLUMNS, CYCLES, FEW, MOST_DETAIL, envelope

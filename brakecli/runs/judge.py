@@ -10,7 +10,7 @@ from brakecli.analysis.regime.verdict import Verdict
 from brakecli.solver.history import History
 from brakecli.solver.system import System
 from brakecli.solver.tangent import Exponent
-from brakecli.solver.track import Track
+from brakecli.solver.track import UNTRACKED, Track
 
 _DEFAULT = Thresholds()
 
@@ -39,7 +39,7 @@ def verdict_on(
         context(system),
         thresholds,
         exponent=exponent,
-        track=track,
+        track=track or UNTRACKED,
         continued=continued,
         failure=failure,
         in_full=in_full,

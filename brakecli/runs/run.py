@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from brakecli import __version__
 from brakecli.analysis.over_time import OverTime, over_time
-from brakecli.analysis.regime.spectra import peak, spectrum
 from brakecli.analysis.regime.table import Thresholds
 from brakecli.analysis.regime.verdict import Verdict
+from brakecli.analysis.spectrum import peak, spectrum
 from brakecli.case.read import LoadedCase
 from brakecli.case.system import system_of
 from brakecli.files import fields

@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 from brakecli.solver import automaton
 from brakecli.solver.compile import Floats, kernel
 from brakecli.solver.energy import Mechanical
-from brakecli.solver.quantities import ContactState
 from brakecli.solver.records import MOST_EVENTS, PARTS, TRACK_TYPE, WORK_TYPE, Coefficients, Weights
 
 MAX, MIN, STICK, SLIP, LIFT, TOUCH = range(6)
@@ -88,7 +87,9 @@ class Track:
         return Powers(belt - heat, roughness, dashpots, load, scheme, stored, stored - passed)
 
     def account(self, begin: float) -> dict[str, float]:
-        """Mean powers (W) from a time (s) on: of the belt, what becomes of it, and what is left."""
+        """Mean powers (W) from a time (s) on: the belt's, what becomes of it, and what is left; or nothing."""
+        if len(self.times) < 2:
+            return {}
         first = min(int(np.abs(self.times - begin).argmin()), len(self.times) - 2)
         span = float(self.times[-1] - self.times[first])
         means = ((self.works[-1, :4] - self.works[first, :4]) / span).tolist()
@@ -99,12 +100,28 @@ class Track:
         """What friction and the roughness give to a vibration in each part from a time (s) on (W, two columns).
 
         What the mean of the friction force F_x (N) does is none of the vibration's. Also what does not add up (W).
+        NaN without any part.
         """
+        if len(self.times) < 2:
+            return np.full((1, 2), math.nan), math.nan
         first = min(int(np.abs(self.times - begin).argmin()), len(self.times) - 2)
         works, moved = np.diff(self.works[first:], axis=0), np.diff(self.places[first:])
         found = np.column_stack([works[:, 0] - works[:, 1] - force * moved, works[:, 4]])
         spans = np.diff(self.times[first:])[:, None]
         return found / spans, self.powers(begin, float(self.times[-1])).closing
+
+
+_NONE = np.zeros(0)
+UNTRACKED = Track(
+    _NONE,
+    np.zeros((0, 6)),
+    np.zeros((0, 3)),
+    _NONE,
+    np.zeros(len(KINDS), np.int64),
+    -math.inf,
+    Events(_NONE, np.zeros(0, np.int8), _NONE),
+)
+"""Of a motion of which nothing has been noted."""
 
 
 def follow(t: Any, v_x: float) -> None:
@@ -125,36 +142,6 @@ def tracked(t: Any, c: Coefficients, s: Weights, energies: Callable[..., Mechani
     kept = Events(t.event_times[order], t.event_kinds[order], t.event_places[order])
     stored = np.column_stack([kinetic, links, contact])
     return Track(t.times[: t.marks].copy(), works, stored, x, t.counts.copy(), float(t.since), kept)
-
-
-def events_from_samples(time: Floats, x: Floats, vx: Floats, state: Floats) -> Events:
-    """The events that samples at equal intervals tell of.
-
-    An extreme lies on the parabola through three samples, a change of the contact's state midway between two. What
-    begins and ends between two samples is not seen.
-    """
-    interval = float(time[1] - time[0])
-    ways = np.sign(vx)
-    moving = np.flatnonzero(ways)
-    before, after = moving[:-1], moving[1:]
-    turning = ways[before] * ways[after] < 0.0
-    before, after, way = before[turning], after[turning], ways[before[turning]]
-    middle = np.clip(np.where(way * x[before] >= way * x[after], before, after), 1, len(x) - 2)
-    rise, bend = x[middle + 1] - x[middle - 1], x[middle - 1] - 2.0 * x[middle] + x[middle + 1]
-    part = np.clip(-0.5 * rise / np.where(bend == 0.0, np.inf, bend), -1.0, 1.0)
-    found = [(time[middle] + part * interval, np.where(way > 0.0, MAX, MIN), x[middle] + 0.25 * part * rise)]
-    was, now = state[:-1], state[1:]
-    for kind, of, begins in (
-        (STICK, ContactState.STICK, True),
-        (SLIP, ContactState.STICK, False),
-        (LIFT, ContactState.SEPARATED, True),
-        (TOUCH, ContactState.SEPARATED, False),
-    ):
-        i = np.flatnonzero((was != now) & ((now if begins else was) == of))
-        found.append((time[i] + 0.5 * interval, np.full(len(i), kind), 0.5 * (x[i] + x[i + 1])))
-    times, kinds, places = (np.concatenate(each) for each in zip(*found, strict=True))
-    order = np.argsort(times, kind="stable")
-    return Events(times[order], kinds[order].astype(np.int8), places[order])
 
 
 @kernel(types.Array(float64, 1, "C")(TRACK_TYPE, WORK_TYPE, int64, int64, float64, float64), inlined=False)

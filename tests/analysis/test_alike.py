@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from brakecli.analysis.regime.context import Context
-from brakecli.analysis.regime.spectra import peak, spectrum
 from brakecli.analysis.regime.table import Excitation, Regime
+from brakecli.analysis.spectrum import peak, spectrum
 from brakecli.case.system import system_of
 from brakecli.solver.quantities import ContactState
 from tests.analysis.histories import INTERVAL, history_of, lasting, verdict_of

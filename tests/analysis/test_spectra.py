@@ -7,8 +7,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import welch
 
-from brakecli.analysis.regime import spectra
-from brakecli.analysis.regime.spectra import SPECTRAL, peak, spectrum, upward_crossings
+from brakecli.analysis import spectrum as spectra
+from brakecli.analysis.spectrum import SPECTRAL, peak, spectrum
 from brakecli.solver.history import History
 from tests.analysis.histories import INTERVAL, history_of
 
@@ -74,21 +74,6 @@ def test_constant_signals_have_no_density_and_no_nan(value: float, samples: int)
 def test_the_smallest_signals_keep_their_shape() -> None:
     scaled = spectrum(history(sine(173.3, amplitude=1e-140)), 0)
     assert peak(scaled.frequency, scaled.density["vx"]) == pytest.approx(173.3, abs=0.5)
-
-
-def test_cycles_are_counted_through_ripple() -> None:
-    t = INTERVAL * np.arange(20000)
-    signal = np.sin(2 * np.pi * 20.0 * t - 0.1) + 0.15 * np.sin(2 * np.pi * 900.0 * t)
-    crossings = upward_crossings(signal, 0.3)
-    assert len(crossings) == 39  # the first lies too near the start to have left the band
-    assert np.mean(np.diff(crossings)) == pytest.approx(500.0, abs=2.0)
-
-
-def test_crossings_of_a_sine_are_interpolated() -> None:
-    crossings = upward_crossings(sine(100.37), 0.01)
-    # Linear interpolation between samples x apart errs by (ωx)³/60 of a sample at most here.
-    period = (crossings[-1] - crossings[0]) / (len(crossings) - 1)
-    assert 1.0 / (period * INTERVAL) == pytest.approx(100.37, rel=1e-6)
 
 
 @pytest.mark.parametrize("samples", [2, 17, 100, 1001, 20000])

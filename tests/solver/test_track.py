@@ -13,7 +13,8 @@ from brakecli.case.system import system_of
 from brakecli.solver.motion import Motion, solve
 from brakecli.solver.quantities import ContactState
 from brakecli.solver.records import MOST_EVENTS, PARTS, WORK
-from brakecli.solver.track import KINDS, LIFT, MAX, MIN, SLIP, STICK, TOUCH, Track, events_from_samples
+from brakecli.solver.track import KINDS, LIFT, MAX, MIN, SLIP, STICK, TOUCH, Track
+from tests.analysis.histories import events_from_samples
 from tests.analysis.shoes import Tables, random_shoes
 from tests.examples import COULOMB, MODE_COUPLING, ROUGH, SQUEAL, make
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from brakecli.analysis.regime.spectra import Array, interpolated
+from brakecli.analysis.spectrum import Array, interpolated
 
 _FRAMES = 64  # parts of the record, half of which overlap; each holds
 _CYCLES = 8  # cycles of its strongest line at least

@@ -8,13 +8,13 @@ from typing import Any
 from brakecli.analysis.regime.context import Context
 from brakecli.analysis.regime.lasting import Lasting, lasting
 from brakecli.analysis.regime.measure import Continued, Shown, answers
-from brakecli.analysis.regime.spectra import segment
 from brakecli.analysis.regime.table import Excitation, Regime, Thresholds, decide
 from brakecli.analysis.regime.verdict import Verdict
+from brakecli.analysis.spectrum import segment
 from brakecli.solver.history import History
 from brakecli.solver.quantities import ContactState
 from brakecli.solver.tangent import Exponent
-from brakecli.solver.track import Track
+from brakecli.solver.track import UNTRACKED, Track
 
 _DEFAULT = Thresholds()
 
@@ -25,7 +25,7 @@ def classify(
     thresholds: Thresholds = _DEFAULT,
     *,
     exponent: Exponent | None = None,
-    track: Track | None = None,
+    track: Track = UNTRACKED,
     continued: Callable[[], Continued] = Continued,
     failure: str | None = None,
     in_full: bool = True,
@@ -80,6 +80,5 @@ def _further(shown: Shown, what: Lasting, context: Context) -> dict[str, Any]:
     if belt != 0.0:
         evidence["largest_vx_over_belt_speed"] = part.extremes("vx")[int(belt > 0.0)] / belt
     if context.steady:
-        track, begin = shown.track, part.start * shown.history.interval
-        evidence |= track.account(begin) if track and len(track.times) > 1 else context.powers(part)
+        evidence |= shown.track.account(part.start * shown.history.interval)
     return evidence | part.lines(context.forced, context.quiet)

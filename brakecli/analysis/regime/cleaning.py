@@ -6,7 +6,8 @@ from functools import cached_property
 import numpy as np
 from scipy.ndimage import median_filter, uniform_filter1d
 
-from brakecli.analysis.regime.spectra import Array, line_share, rises
+from brakecli.analysis.regime.spectra import line_share, rises
+from brakecli.analysis.spectrum import Array
 
 CERTAIN = 15.0  # a line's power over the mean of the noise, which reaches it in one bin of three million
 _RIPPLE = 0.3  # ripple within this part of the mean size of the velocity does not count as a cycle

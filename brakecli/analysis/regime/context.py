@@ -39,7 +39,6 @@ class Context:
     steadier: Callable[[], str] = str  # what to do where the steps damp what grows in theory; empty if they do not
     ripple: Callable[[Part, Sequence[float]], Ripple | None] = lambda part, lines: None  # of the nodes
     detuned: Callable[[Part, Sequence[float]], float] = lambda part, lines: 0.0  # part of a forced amplitude
-    powers: Callable[[Part], dict[str, float]] = lambda part: {}  # W, what becomes of the power of the belt
     radius: float = 1.0  # R, m
     step: float = 0.0  # s; 0 where steps are chosen to keep an error
 
@@ -95,7 +94,6 @@ def context(system: System) -> Context:
         steadier=lambda: _steadier(system),
         ripple=lambda part, lines: ripple(system, belt, stiffness(), part, lines),
         detuned=lambda part, lines: detuned(system, belt, stiffness(), part, lines),
-        powers=partial(_powers, system, belt),
     )
 
 
@@ -104,18 +102,3 @@ def _steadier(system: System) -> str:
     k, phi = system.contact_stiffness, system.coefficients.phi
     grows = system.method.own_steps or spectral_radius(system, k, phi) > 1.0
     return "" if grows else without_damping(system.method)
-
-
-def _powers(system: System, belt: float, part: Part) -> dict[str, float]:
-    """Mean powers (W) at constant U (m/s) and Q (N): the belt's, what becomes of it, and what is left."""
-    c, sums = system.coefficients, np.zeros(4)
-    for v_x, v_y, friction in zip(*map(part.pieces, ("vx", "vy", "friction_force")), strict=True):
-        sums += (
-            belt * friction.sum(),
-            -float(friction @ (v_x - belt)),
-            float(c.b_xx * v_x @ v_x + 2.0 * c.b_xy * v_x @ v_y + c.b_yy * v_y @ v_y),
-            system.load_at_start * (c.sin_beta * v_x.sum() + c.cos_beta * v_y.sum()),
-        )
-    means = sums / (part.stop - part.start)
-    names = ("power_belt", "power_friction", "power_dashpots", "power_load", "power_rest")
-    return dict(zip(names, [*means.tolist(), float(np.subtract.reduce(means))], strict=True))

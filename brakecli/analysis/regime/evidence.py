@@ -10,14 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.analysis.regime.spectra import FEWEST_CYCLES, Array, interpolated, line_share
+from brakecli.analysis.regime.spectra import line_share
+from brakecli.analysis.spectrum import FEWEST_CYCLES, Array, interpolated
 from brakecli.solver.history import History
 from brakecli.solver.quantities import ContactState
 
 FEWEST_SAMPLES = 160  # of a history that has an envelope
 WINDOWS = 40
 _LAST = slice(-10, None)  # windows that give the final values
-_LONGEST = 1 << 20  # samples read at a time; cycles and lines are sought in at most so many, the last ones
+LONGEST = 1 << 20  # samples read at a time; cycles and lines are sought in at most so many, the last ones
 LINE_BINS = 4  # on either side of a line: the Hann window's main lobe, and the line's drift within the record
 _MOST_LINES = 8
 _LEAST_LINE = 1e-3  # part of the energy
@@ -38,12 +39,12 @@ class Part:
 
     def pieces(self, name: str) -> Iterator[Array]:
         """A variable, piece by piece."""
-        for begin in range(self.start, self.stop, _LONGEST):
-            yield self.history.read(name, begin, min(begin + _LONGEST, self.stop))
+        for begin in range(self.start, self.stop, LONGEST):
+            yield self.history.read(name, begin, min(begin + LONGEST, self.stop))
 
     def last(self, name: str) -> Array:
         """The last samples of a variable, as many as can be read at a time, without their mean."""
-        values = self.history.read(name, max(self.start, self.stop - _LONGEST), self.stop)
+        values = self.history.read(name, max(self.start, self.stop - LONGEST), self.stop)
         return np.asarray(values - values.mean())
 
     def mean(self, name: str) -> float:
@@ -84,20 +85,12 @@ class Part:
         """Evenly spaced samples of a variable, not too many, and their times (s)."""
         stride = -(-(self.stop - self.start) // _MOST_PLACES)
         picked, first = [], self.start
-        for begin in range(self.start, self.stop, _LONGEST):
-            values = self.history.read(name, begin, min(begin + _LONGEST, self.stop))
+        for begin in range(self.start, self.stop, LONGEST):
+            values = self.history.read(name, begin, min(begin + LONGEST, self.stop))
             picked.append(values[first - begin :: stride])
             first += stride * len(picked[-1])
         x = np.concatenate(picked)
         return x, np.asarray(self.history.interval * (self.start + stride * np.arange(len(x))), np.float64)
-
-    def power(self, force: str, velocity: str) -> tuple[float, float]:
-        """Mean power (W) that the deviation of a force gives to the vibration, and its standard error.
-
-        Four overlapping pieces of the last samples, under a window that weighs cut cycles at the ends little.
-        """
-        means = windowed((self.last(force) * self.last(velocity))[:, None])
-        return float(means.mean()), float(means.std()) / 2.0
 
     @cached_property
     def _spectrum(self) -> tuple[Array, Array, float]:
@@ -106,11 +99,8 @@ class Part:
 
     def share(self, lines: Sequence[float], bins: int = LINE_BINS) -> float:
         """Part of the energy of vx that lies on lines (Hz), with so many bins on either side."""
-        return _share(self._spectrum, lines, bins)
-
-    def mean_share(self, lines: Sequence[float], bins: int = LINE_BINS) -> float:
-        """The same of the mean of vx between two samples, whose jumps are aliased much less."""
-        return _share(_spectrum(np.diff(self.last("x")), self.history.interval), lines, bins)
+        frequencies, power, total = self._spectrum
+        return float(power[_near(lines, frequencies, bins)].sum()) / total if lines and total else 0.0
 
     @property
     def strongest(self) -> tuple[float, float]:
@@ -186,14 +176,6 @@ def _spectrum(values: Array, interval: float) -> tuple[Array, Array, float]:
     return frequencies, power, float(power.sum())
 
 
-def _share(spectrum: tuple[Array, Array, float], lines: Sequence[float], bins: int) -> float:
-    """Part of the energy of a spectrum that lies on lines (Hz), with so many bins on either side."""
-    frequencies, power, total = spectrum
-    if not lines or total == 0.0:
-        return 0.0
-    return float(power[_near(lines, frequencies, bins)].sum()) / total
-
-
 def _near(lines: Sequence[float], frequencies: NDArray[Any], bins: int = LINE_BINS) -> NDArray[np.bool_]:
     """Which frequencies of a spectrum belong to lines (Hz)."""
     chosen = np.zeros(len(frequencies), dtype=bool)
@@ -236,7 +218,7 @@ class Envelope:
     def __init__(self, history: History) -> None:
         """Take a history of at least `FEWEST_SAMPLES`."""
         edges = np.linspace(0, history.samples, WINDOWS + 1).astype(int)
-        if history.samples > _LONGEST:
+        if history.samples > LONGEST:
             windows = [Part(history, begin, end) for begin, end in pairwise(edges)]
             self.vx, *self._x = np.array([(each.deviation("vx"), *each.extremes("x")) for each in windows]).T
         else:

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from brakecli.analysis.regime.cycles import SIZE_OFF, Cycles, Drift, contact_length, in_lines, median, swings
+from brakecli.analysis.regime.cycles import SIZE_OFF, Cycles, Drift, contact_time, in_lines, median, swings
 from brakecli.analysis.regime.evidence import WINDOWS, Part, line
 from brakecli.analysis.regime.measure import Shown
-from brakecli.analysis.regime.spectra import Array
 from brakecli.analysis.regime.table import Answers, Decision, Excitation, Regime
+from brakecli.analysis.spectrum import Array
 from brakecli.analysis.stability.linear import Linear
 
 _LIKELY = 16  # waves, of which one moves x most
@@ -167,12 +167,15 @@ def _forced(shown: Shown, answers: Answers) -> Lasting:
         found.notes["settled"] = f"{text}: run at least {needed:.3g} s to see the amplitude that lasts"
     elif found.settled and seconds < (beat := shown.beat()):
         found.settled, found.notes["beat"] = False, f"the waves beat every {beat:.3g} s: run longer"
-    samples = len(part.last("x"))
-    period = max(min(shown.beat() / interval, samples - 1), 1.0)
-    edges = np.asarray(samples - period * np.arange(int(samples / period), -1, -1), np.float64)
-    found.amplitude, spread = median(swings(part, edges))
+    end, times = part.stop * interval, shown.events.time
+    begin = max(part.start * interval, shown.track.since)
+    period = max(min(shown.beat(), end - begin), interval)
+    edges = np.asarray(end - period * np.arange(int((end - begin) / period), -1, -1), np.float64)
+    turns = np.searchsorted(times, edges)
+    sizes = swings(shown.events, edges) if len(times) and np.diff(turns).min() else np.array([part.amplitude("x")])
+    found.amplitude, spread = median(sizes)
     if (found.settled or not fading) and len(edges) >= 3 - found.settled:
-        off = SIZE_OFF * found.amplitude * shown.context.step / interval / contact_length(part)
+        off = SIZE_OFF * found.amplitude * shown.context.step / contact_time(shown.events, begin, end)
         found.spread = off + max(spread, _beating(shown, part) * part.amplitude("x") - found.amplitude)
     _settle_force(shown, found, history.samples)
     return found
@@ -256,7 +259,7 @@ def _self_excited(shown: Shown, answers: Answers, cycles: Cycles) -> Lasting:
         found.frequency, width = part.strongest
         found.evidence |= {
             "frequency_spread": width,
-            **in_lines(part, found.frequency, 1.0 / found.frequency / interval),
+            **in_lines(part, found.frequency),
         }
     short = seconds < shown.slowest(0.0) or abs(answers.change) > shown.limits.settled_within
     if lasts or not short:  # otherwise the run does not show where it ends

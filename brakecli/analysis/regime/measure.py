@@ -10,13 +10,21 @@ import numpy as np
 
 from brakecli.analysis.regime.context import Context
 from brakecli.analysis.regime.cycles import Cycles, cycles_of
-from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, WINDOWS, Envelope, Part, level_change, windowed
+from brakecli.analysis.regime.evidence import (
+    FEWEST_SAMPLES,
+    LONGEST,
+    WINDOWS,
+    Envelope,
+    Part,
+    level_change,
+    windowed,
+)
 from brakecli.analysis.regime.table import Answers, Fate, Thresholds
 from brakecli.analysis.stability.linear import Linear
 from brakecli.solver.history import History
 from brakecli.solver.quantities import ContactState
 from brakecli.solver.tangent import Exponent
-from brakecli.solver.track import Track
+from brakecli.solver.track import Events, Track
 
 _NOTHING = 1e-3  # of a beat over the slowest wave, that is rounding
 
@@ -35,7 +43,7 @@ class Continued(NamedTuple):
 class Shown:
     """What a history shows."""
 
-    def __init__(self, history: History, context: Context, limits: Thresholds, track: Track | None = None) -> None:
+    def __init__(self, history: History, context: Context, limits: Thresholds, track: Track) -> None:
         """Take a history, what is known of its case, and what the loop has noted."""
         self.history, self.context, self.limits, self.track = history, context, limits, track
         self.duration = history.samples * history.interval
@@ -80,10 +88,13 @@ class Shown:
     @cached_property
     def cycles(self) -> Cycles | None:
         """The cycles of the part that is judged."""
-        begin = self.judged.start * self.history.interval
-        whole = self.track is not None and self.track.since < begin
-        events = self.track.events() if whole and self.track else None
-        return cycles_of(self.judged, events, self.context.step, self.context.waves)
+        return cycles_of(self.judged, self.events, self.context.step)
+
+    @cached_property
+    def events(self) -> Events:
+        """The events of the part that is judged, as far as the loop keeps them and spectra are taken."""
+        first = max(self.judged.start, self.history.samples - LONGEST)
+        return self.track.events(first * self.history.interval)
 
     def slowest(self, amplitude: float) -> float:
         """Period (s) of the slowest wave that counts beside an amplitude of x (m) and beside the others; or 0."""
@@ -107,17 +118,11 @@ class Shown:
         return float(np.abs(sizes[0] / np.maximum(sizes[1], 1e-300) - 1.0).max())
 
     def powers(self) -> dict[str, float]:
-        """Powers (W) that friction and the roughness give, with their errors; of runs by the loop's account."""
-        if self.track is not None and len(self.track.times) > 1:
-            begin = self.judged.start * self.history.interval
-            given, open_by = self.track.given(begin, self.judged.mean("friction_force"))
-            means = windowed(given)
-            (friction, roughness), (off, off_too) = means.mean(axis=0).tolist(), (means.std(axis=0) / 2.0).tolist()
-        else:
-            friction, off = self.judged.power("friction_force", "vx")
-            roughness, off_too = self.judged.power("normal_force", "vy")
-            lost = self.context.powers(self.judged).get("power_dashpots", friction + roughness)
-            open_by = friction + roughness - lost
+        """Powers (W) that friction and the roughness give, with their errors, by the loop's account."""
+        begin = self.judged.start * self.history.interval
+        given, open_by = self.track.given(begin, self.judged.mean("friction_force"))
+        means = windowed(given)
+        (friction, roughness), (off, off_too) = means.mean(axis=0).tolist(), (means.std(axis=0) / 2.0).tolist()
         found = {"power_of_friction": friction, "power_of_roughness": roughness}
         errors = {"friction_error": max(off, abs(open_by)), "roughness_error": max(off_too, abs(open_by))}
         return found | errors
@@ -181,19 +186,8 @@ def answers(
     if cycles := shown.cycles:
         names = ("cycles", "samples_per_cycle", "stick_cycles", "harmonic_share")
         found |= {name: cycles.evidence[name] for name in names} | {"frequency": cycles.frequency}
-        near = _sticks(continued(), cycles, found["amplitude"], shown.limits.settled_within)
-        if not waves and near is not None:
-            found["stick_cycles"] = near
         if cycles.evidence["frequency_spread"] <= shown.limits.settled_within * cycles.frequency:
             found["band_share"] = shown.judged.narrow()
         if context.step:
             found["steps_per_cycle"] = 1.0 / (cycles.frequency * context.step)
     return Answers(**found)
-
-
-def _sticks(limit: Continued, cycles: Cycles, amplitude: float, within: float) -> float | None:
-    """The part of the cycles that stick, where the motion has come to its limit cycle: samples may miss some."""
-    turns = limit.period * cycles.frequency
-    if not abs(amplitude - limit.amplitude) <= within * limit.amplitude or not turns >= 0.5:
-        return None
-    return min(limit.sticks / round(turns), 1.0)

@@ -11,9 +11,9 @@ from brakecli.analysis.regime.bursts import Burst, bursts
 from brakecli.analysis.regime.cleaning import Velocity, bridged, cleaned, without_drift
 from brakecli.analysis.regime.signal_measure import Heard, answers
 from brakecli.analysis.regime.signal_table import SignalThresholds, decide
-from brakecli.analysis.regime.spectra import Array
 from brakecli.analysis.regime.stick import Slips, seek
 from brakecli.analysis.regime.table import Excitation, Regime
+from brakecli.analysis.spectrum import Array
 
 _MOST_OF_IT = 0.9  # of the record: a burst that fills as much is the record
 _MOST_ENERGY = 0.5  # of all bursts in one that speaks for the record

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from brakecli.analysis.regime.of_signal import Measurand, Signal
-from brakecli.analysis.regime.spectra import Array
+from brakecli.analysis.spectrum import Array
 from brakecli.errors import UnreadableResultError, UsageError, printable
 from brakecli.files.opening import contents, opened
 from brakecli.files.table import LARGEST, TextTable, si

@@ -10,8 +10,9 @@ import numpy as np
 from brakecli.analysis.regime.cleaning import CERTAIN, Velocity
 from brakecli.analysis.regime.evidence import level_change
 from brakecli.analysis.regime.signal_table import FEWEST_SAMPLES, SignalAnswers, SignalThresholds, steady
-from brakecli.analysis.regime.spectra import Array, interpolated, line_share
+from brakecli.analysis.regime.spectra import line_share
 from brakecli.analysis.regime.stick import Slips
+from brakecli.analysis.spectrum import Array, interpolated
 
 _FINE = 1000.0  # samples of a cycle, after interpolation, among which a plateau is sought
 _PLATEAU_SAMPLES = 1 << 20  # most samples in which a plateau is sought

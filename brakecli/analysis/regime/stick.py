@@ -14,7 +14,8 @@ from scipy.ndimage import median_filter, uniform_filter1d
 
 from brakecli.analysis.regime.cleaning import Velocity
 from brakecli.analysis.regime.signal_table import FEWEST_SAMPLES
-from brakecli.analysis.regime.spectra import Array, rises
+from brakecli.analysis.regime.spectra import rises
+from brakecli.analysis.spectrum import Array
 
 _PARTS = 7
 _BULK = 3.0  # robust deviations that a slip leaves the velocity in stick by
