@@ -61,6 +61,16 @@ def add_places(y: float, places: Floats, weights: Floats, layer: Layer, sums: Fl
         sums[2] += weights[i] * contact.fraction
 
 
+@kernel(void(vector, vector, LAYER, vector))
+def forces_along(heights: Floats, places: Floats, layer: Layer, forces: Floats) -> None:
+    """The normal force (N) at each height (m) and place of the wheel (m)."""
+    layer = borrowed(layer)
+    for i in range(places.size):
+        turn(places[i], 0.0, layer)
+        _evaluate_at(layer.evaluate)(0.0, heights[i], layer)
+        forces[i] = layer.contact.normal_force
+
+
 def averaged_length(system: System) -> float:
     """Travel of the wheel (m) that an average is taken over."""
     return _LONGEST / float(system.wheel.turns.min()) if len(system.wheel.g) else 0.0

@@ -71,7 +71,7 @@ class Part:
         first, total, square = float(self.history.read(name, self.start, self.start + 1)[0]), 0.0, 0.0
         for piece in self.pieces(name):
             values = piece - first
-            total, square = total + float(values.sum()), square + float(values @ values)
+            total, square = total + float(values.sum()), square + float(np.square(values).sum())  # no threads
         count = self.stop - self.start
         return float(np.sqrt(max(square / count - (total / count) ** 2, 0.0)))
 

@@ -15,7 +15,7 @@ import numpy as np
 from brakecli.analysis.regime.evidence import Part
 from brakecli.analysis.stability.modes import first_order, stiffness_matrix
 from brakecli.solver.contact.pad import build_layer, build_pad
-from brakecli.solver.steady_sliding import add_places
+from brakecli.solver.steady_sliding import forces_along
 from brakecli.solver.system import System
 
 _FINER = 4
@@ -69,10 +69,9 @@ def ripple(system: System, belt: float, stiffness: float, part: Part, lines: Seq
     names = ("x", "y", "vx", "vy", "normal_force")
     x, y, v_x, v_y, force = (part.history.read(name, end.start, end.stop) for name in names)
     travel = belt * part.history.interval * np.arange(end.start, end.stop) - x
-    finer = np.zeros((samples, 3))
-    for i, sums in enumerate(finer):
-        add_places(y[i], travel[i : i + 1], np.ones(1), layer, sums)
-    c, window, added = system.coefficients, np.hanning(samples), force - finer[:, 0]
+    finer = np.zeros(samples)
+    forces_along(np.ascontiguousarray(y), travel, layer, finer)
+    c, window, added = system.coefficients, np.hanning(samples), force - finer
     grip = math.copysign(c.phi, belt)
     meets = v_y - v_y.mean() + grip * (v_x - v_x.mean())
     power = float(window @ ((added - added.mean()) * meets) / window.sum())
