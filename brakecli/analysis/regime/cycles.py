@@ -15,8 +15,14 @@ _MOST_RISES_PER_CYCLE = 4
 _GROUPS = 10  # of neighbouring cycles, of which a median is taken
 _MIDDLE = np.array([1.0 / 6.0, 0.5, 5.0 / 6.0])  # quantiles
 _TREND = 3.0  # standard errors of the slope of ten medians, beyond which an amplitude drifts
-_BANDS = (0.2, 0.33, 0.1)  # of the standard deviation of vx, in the mean of a rise: slower ripple does not count
-_SAME = 0.06  # squared difference, over twice the variance, between one period of the mean of vx and the next
+_BANDS = (
+    0.2,
+    0.35,
+    0.6,
+    0.1,
+)  # of the standard deviation of vx, in the mean of a rise: slower ripple does not count
+_SAME = 0.03  # squared difference, over twice the variance, between one period of the mean of vx and the next
+_AS_SAME = 4.0  # times the least of these, up to which a shorter period is the period
 _SEEN = 0.85  # least part of a force's swing in every other sample that all samples see
 _EARLY = 1 / 8  # of a cycle: where it begins with a stick, a step may place that before its begin
 SIZE_OFF, _PERIOD_OFF = 3.5, 0.2  # of an amplitude and a period, per step in a contact: most that impacts were off
@@ -30,9 +36,11 @@ def median(values: Array) -> tuple[float, float]:
 
 
 def swings(events: Events, edges: Array) -> Array:
-    """Half of peak to peak of x (m) between times (s), by its turning points: some lie between each two times."""
+    """Half of peak to peak of x (m) between times (s), by its turning points; empty where some hold none."""
     turns = events.kind <= MIN
     places = np.searchsorted(events.time[turns], edges)
+    if not np.diff(places).all():
+        return np.zeros(0)
     x, first = events.x[turns][: places[-1]], places[:-1]
     return np.asarray(0.5 * (np.maximum.reduceat(x, first) - np.minimum.reduceat(x, first)))
 
@@ -181,10 +189,12 @@ def _beginnings(part: Part, events: Events) -> tuple[Array, int]:
     speed = np.diff(events.x[turning]) / np.maximum(np.diff(time), 1e-300)
     everywhere = [time[1 + rises(speed, -band * level, band * level)] for band in _BANDS]
     for begins in (each for each in everywhere if len(each) > 1):
-        rise = (begins[-1] - begins[0]) / (len(begins) - 1) / interval
-        for lag in range(1, _MOST_RISES_PER_CYCLE + 1):
-            if 1.0 <= lag * rise < len(mean) // 2 and _unlike(mean, lag * rise) <= _SAME:
-                return begins[::lag], lag
+        rise = max((begins[-1] - begins[0]) / (len(begins) - 1) / interval, 1.0)
+        lags = np.arange(1, _MOST_RISES_PER_CYCLE + 1)
+        unlike = np.array([_unlike(mean, lag * rise) for lag in lags if lag * rise < len(mean) // 2])
+        if len(unlike) and unlike.min() <= _SAME:
+            lag = 1 + int(np.argmax(unlike <= max(_SAME, _AS_SAME * unlike.min())))
+            return begins[::lag], lag
     return everywhere[0], 1
 
 

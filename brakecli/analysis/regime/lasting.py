@@ -167,13 +167,12 @@ def _forced(shown: Shown, answers: Answers) -> Lasting:
         found.notes["settled"] = f"{text}: run at least {needed:.3g} s to see the amplitude that lasts"
     elif found.settled and seconds < (beat := shown.beat()):
         found.settled, found.notes["beat"] = False, f"the waves beat every {beat:.3g} s: run longer"
-    end, times = part.stop * interval, shown.events.time
+    end = part.stop * interval
     begin = max(part.start * interval, shown.track.since)
     period = max(min(shown.beat(), end - begin), interval)
     edges = np.asarray(end - period * np.arange(int((end - begin) / period), -1, -1), np.float64)
-    turns = np.searchsorted(times, edges)
-    sizes = swings(shown.events, edges) if len(times) and np.diff(turns).min() else np.array([part.amplitude("x")])
-    found.amplitude, spread = median(sizes)
+    sizes = swings(shown.events, edges)
+    found.amplitude, spread = median(sizes if len(sizes) else np.array([part.amplitude("x")]))
     if (found.settled or not fading) and len(edges) >= 3 - found.settled:
         off = SIZE_OFF * found.amplitude * shown.context.step / contact_time(shown.events, begin, end)
         found.spread = off + max(spread, _beating(shown, part) * part.amplitude("x") - found.amplitude)
