@@ -72,7 +72,7 @@ ROUGH_ROWS: dict[str, dict[str, Any]] = {
     "no friction, no dashpots": {"frictionless": True, "undamped": True},
     "bounces": {"touches": False},
     "forced, neighbours": {**FADING, "without_waves": Fate.DIES, "change": 0.5},
-    "forced, level": {"without_waves": Fate.DIES, "change": -0.5},
+    "forced, level": {"without_waves": Fate.DIES, "change": -0.5, "power_of_friction": 0.1},
     "forced, friction takes": {"power_of_friction": -1.0},
     "forced, roughness gives": {**FADING, "power_of_roughness": 3.0},
     "forced, another level": {**FADING, **LASTS, "level_without_waves": 2.0},
@@ -136,7 +136,7 @@ def test_the_last_row_of_each_part_always_holds() -> None:
         ("settled_within", 0.3, {"change": 0.5, "without_waves": Fate.LASTS}, ("undecided", "lasts, irregular")),
         ("sure_errors", 60.0, {"change": 0.5, "without_waves": Fate.LASTS}, ("undecided", "lasts, irregular")),
         ("same_level", 0.6, {**LASTS, "level_without_waves": 2.0}, ("on its way", "lasts")),
-        ("comes_together", 6.0, {**FADING, **LASTS}, ("locked to the waves", "self-excited")),
+        ("comes_together", 6.0, {**FADING, **LASTS}, ("locked to the waves", "either")),
         ("most", 20.0, {**FADING, **LASTS}, ("locked to the waves", "either")),
         ("fewest_cycles", 200.0, LASTS, ("quasi-harmonic", "few cycles")),
         ("samples_per_cycle", 30.0, LASTS, ("quasi-harmonic", "few samples in a cycle")),
@@ -156,6 +156,18 @@ def test_each_threshold_moves_what_it_stands_for(
     found = [decide(answers(**changes), limits).row for limits in (LIMITS, replace(LIMITS, **{name: value}))]
     for row, expected in zip(found, rows, strict=True):
         assert expected in (row, *row.split(": "))
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {**LASTS, "exponent": -0.08},  # neighbours come together, but by less than a power of e
+        {**LASTS, "level_without_waves": 2.0},  # sliding is stable, and may be what the waves shake
+        {"without_waves": Fate.DIES},  # and yet friction keeps it up, with a phase of its own
+    ],
+)
+def test_what_shows_neither_a_phase_of_its_own_nor_that_waves_lead_is_undecided(changes: dict[str, Any]) -> None:
+    assert decide(answers(**{**SHAKEN, **changes}), LIMITS).row == "either"
 
 
 def test_no_threshold_is_left_out_and_there_are_no_more_than_twelve() -> None:

@@ -250,9 +250,19 @@ def _together(a: Answers, t: Thresholds) -> bool:
     return a.powers(a.exponent) < -max(t.comes_together, t.sure_errors * a.powers(a.exponent_error))
 
 
+def _apart(a: Answers, t: Thresholds) -> bool:
+    """Nothing shows that neighbours come together, however slowly: the motion may have a phase of its own."""
+    return a.exponent >= -t.sure_errors * a.exponent_error
+
+
 def _same(a: Answers, t: Thresholds) -> bool:
     """The motion has the level that it would have on the smooth wheel."""
     return abs(a.level - a.level_without_waves) <= t.same_level * a.level_without_waves
+
+
+def _another(a: Answers, t: Thresholds) -> bool:
+    """It has another level than it would come to on the smooth wheel."""
+    return math.isfinite(a.level_without_waves) and not _same(a, t)
 
 
 def _gives(a: Answers, t: Thresholds) -> bool:
@@ -492,7 +502,12 @@ ROUGH: Rows = (
     ),
     Row(
         "forced, level",
-        lambda a, t: a.without_waves == Fate.DIES and (_steady(a, t) or a.change < 0.0) and not a.undamped,
+        lambda a, t: (
+            a.without_waves == Fate.DIES
+            and (_steady(a, t) or a.change < 0.0)
+            and not _friction_gives_most(a, t)
+            and not a.undamped
+        ),
         "only the roughness shakes the shoe: without it the vibration dies out, and its level does not grow",
         "",
         *_FORCED,
@@ -514,13 +529,7 @@ ROUGH: Rows = (
     ),
     Row(
         "forced, another level",
-        lambda a, t: (
-            _together(a, t)
-            and _steady(a, t)
-            and math.isfinite(a.level_without_waves)
-            and not _same(a, t)
-            and not a.undamped
-        ),
+        lambda a, t: _together(a, t) and _steady(a, t) and _another(a, t) and not a.undamped,
         "only the roughness shakes the shoe: neighbours come together at {a.exponent:.3g} 1/s, and vx has "
         "{a.level:.3g} m/s, not the {a.level_without_waves:.3g} m/s to which it would come without the roughness",
         "",
@@ -528,8 +537,8 @@ ROUGH: Rows = (
     ),
     Row(
         "dies out, not yet",
-        lambda a, t: a.without_waves == Fate.DIES,
-        "without the roughness the vibration dies out, but its level still grows by e^{a.change:.2g} in the "
+        lambda a, t: a.without_waves == Fate.DIES and not _steady(a, t),
+        "without the roughness the vibration dies out, but its level still {a.word} by e^{a.change:.2g} in the "
         "second half",
         "run at least {a.waited:.3g} s",
     ),
@@ -543,8 +552,8 @@ ROUGH: Rows = (
         "self-excited",
         lambda a, t: (
             a.without_waves == Fate.LASTS
-            and not _together(a, t)
-            and (_steady(a, t) or a.growth > 0.0)
+            and _apart(a, t)
+            and (a.growth > 0.0 or (_steady(a, t) and not _another(a, t)))
             and _gives(a, t)
             and not a.undamped
         ),
