@@ -70,11 +70,11 @@ SMOOTH = (
         f"friction.coefficient=0.5 {HARD} solver.duration=0.05",
         0.2,
     ),
-    Example("Lasts, with stick in each cycle", "lasts: relaxation", "relaxation", "solver.duration=0.3", 0.15),
-    Example("Lasts without stick", "lasts: quasi-harmonic", "quasi-harmonic", "solver.duration=1.0", 0.5),
+    Example("Lasts, with stick in each cycle", "lasts: limit cycle with stick", "relaxation", "solver.duration=0.3", 0.15),
+    Example("Lasts without stick", "lasts: limit cycle without stick", "quasi-harmonic", "solver.duration=1.0", 0.5),
     Example(
         "Lasts, but falls for long",
-        "on its way: quasi-harmonic",
+        "on its way: limit cycle without stick",
         "quasi-harmonic",
         "friction.coefficient=0.58 initial.vx=-12.0 initial.vy=3.0 link1.damping=30.0 link2.damping=30.0 "
         "solver.duration=0.5",
@@ -206,11 +206,11 @@ ROUGH = (
 )
 LOOKS = (
     Example(
-        "Relaxation: stick in each cycle", "lasts: relaxation", "relaxation", "output.sample_interval=1e-5", 0.0
+        "Relaxation: stick in each cycle", "lasts: limit cycle with stick", "relaxation", "output.sample_interval=1e-5", 0.0
     ),
     Example(
         "Quasi-harmonic: one line, no stick",
-        "lasts: quasi-harmonic",
+        "lasts: limit cycle without stick",
         "quasi-harmonic",
         "output.sample_interval=1e-5",
         0.0,

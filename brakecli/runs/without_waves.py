@@ -41,7 +41,7 @@ def without_waves(system: System, state: Floats) -> Continued:
     )
     if end.lasts is None:
         return Continued(Fate.UNKNOWN if end.state is None else Fate.LASTS)
-    if end.orbit is None or end.rate is None:
+    if end.orbit is None or end.rate is None or is_undamped(flat.coefficients):  # then none is sure to stay
         return Continued(Fate.LASTS if end.lasts else Fate.DIES)
     orbit = end.orbit
     numbers = orbit.amplitude, _level(flat, orbit), end.rate, orbit.period, float(orbit.word.count(STICK))

@@ -85,6 +85,9 @@ ROUGH_ROWS: dict[str, dict[str, Any]] = {
     "either": {},
 }
 LOOK_ROWS: dict[str, dict[str, Any]] = {
+    "limit cycle with stick": {"sticks_without_waves": 1.0, "period_without_waves": 0.01, "cycles": 0.0},
+    "limit cycle without stick": {"sticks_without_waves": 0.0, "period_without_waves": 0.01, "cycles": 0.0},
+    "on its way": {**SHAKEN, "growth": 1.0, "change": 0.5},
     "few cycles": {"cycles": 9.0},
     "few steps in a cycle": {"steps_per_cycle": 7.0},
     "few samples in a cycle": {"samples_per_cycle": 7.0},
@@ -115,10 +118,8 @@ def test_each_row_of_a_rough_wheel_decides_where_it_holds(row: str) -> None:
 @pytest.mark.parametrize("row", LOOK_ROWS)
 def test_each_row_of_looks_decides_where_it_holds(row: str) -> None:
     found = decide(answers(**{**LASTS, **LOOK_ROWS[row]}), LIMITS)
-    assert found.row == f"lasts: {row}"
-    assert found.excitation is (
-        Excitation.SELF_EXCITED if row in ("relaxation", "quasi-harmonic") else Excitation.NONE
-    )
+    assert found.row.partition(": ")[2] == row
+    assert (found.excitation is Excitation.SELF_EXCITED) == (found.regime is not Regime.UNDECIDED)
 
 
 def test_every_row_has_a_record_that_trips_it() -> None:
@@ -156,6 +157,17 @@ def test_each_threshold_moves_what_it_stands_for(
     found = [decide(answers(**changes), limits).row for limits in (LIMITS, replace(LIMITS, **{name: value}))]
     for row, expected in zip(found, rows, strict=True):
         assert expected in (row, *row.split(": "))
+
+
+@pytest.mark.parametrize(("sticks", "regime"), [(0.0, Regime.QUASI_HARMONIC), (1.0, Regime.RELAXATION)])
+def test_what_still_grows_on_a_rough_wheel_looks_as_the_limit_cycle_to_which_it_comes(
+    sticks: float, regime: Regime
+) -> None:
+    """Its own cycles are those of a transient."""
+    changes = {**SHAKEN, **LASTS, "growth": 1.0, "change": 0.5, "stick_cycles": 1.0 - sticks}
+    assert decide(answers(**changes), LIMITS).row == "self-excited: on its way"
+    known = {"sticks_without_waves": sticks, "period_without_waves": 0.01}
+    assert decide(answers(**changes, **known), LIMITS).regime is regime
 
 
 @pytest.mark.parametrize(

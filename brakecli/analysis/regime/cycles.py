@@ -1,11 +1,11 @@
 """What the cycles of a vibration show: amplitude, frequency, stick, force, and how far they drift."""
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from brakecli.analysis.regime.evidence import Part
+from brakecli.analysis.regime.evidence import Part, level_change
 from brakecli.analysis.regime.spectra import rises
 from brakecli.analysis.spectrum import Array
 from brakecli.solver.track import LIFT, MIN, SLIP, STICK, TOUCH, Events
@@ -14,7 +14,6 @@ _HARMONICS = 5
 _MOST_RISES_PER_CYCLE = 4
 _GROUPS = 10  # of neighbouring cycles, of which a median is taken
 _MIDDLE = np.array([1.0 / 6.0, 0.5, 5.0 / 6.0])  # quantiles
-_TREND = 3.0  # standard errors of the slope of ten medians, beyond which an amplitude drifts
 _BANDS = (
     0.2,
     0.35,
@@ -57,8 +56,8 @@ class Cycles:
     amplitude_spread: float
     stick_fraction: float
     contact_loss_fraction: float
-    drift: "Drift"  # of the amplitude
-    detuning: "Drift"  # of the period
+    drift: tuple[float, float]  # change of the logarithm of the amplitude, with its error
+    detuning: tuple[float, float]  # the same of the period
     force_variation: float | None  # N, peak to peak of the friction force
 
 
@@ -119,8 +118,8 @@ def cycles_of(part: Part, events: Events, step: float = 0.0) -> Cycles | None:
         amplitude_spread=spread + (0.25 * turn**2 + SIZE_OFF * impact) * amplitude,
         stick_fraction=stick,
         contact_loss_fraction=loss,
-        drift=_drift(sizes),
-        detuning=_drift(np.diff(begins)),
+        drift=level_change(sizes),
+        detuning=level_change(np.diff(begins)),
         force_variation=_force_variation(part, begins / interval, groups / interval),
     )
 
@@ -208,21 +207,3 @@ def _unlike(values: Array, lag: float) -> float:
     weights = [-outer * (a - 2.0), inner * (a - 1.0), -inner * a, outer * (a + 1.0)]
     later = np.convolve(values[first:], weights[::-1], "valid")
     return float(np.mean((later - values[: len(later)]) ** 2)) / (2.0 * float(values.var()) or 1.0)
-
-
-class Drift(NamedTuple):
-    """Part of itself by which a number changes from the first third of the cycles to the last."""
-
-    part: float
-    sure: bool  # whether it is more than chance
-
-
-def _drift(sizes: Array) -> Drift:
-    """The drift of a number, one for each cycle."""
-    first, *_, last = (median(third)[0] for third in np.array_split(sizes, 3) if len(third))
-    groups = np.array([median(group)[0] for group in np.array_split(sizes, min(len(sizes), _GROUPS))])
-    places = np.arange(len(groups)) - 0.5 * (len(groups) - 1)
-    slope = float(places @ groups / (places @ places))
-    rest = groups - groups.mean() - slope * places
-    error = float(np.std(rest) / (np.std(places) * np.sqrt(max(len(groups) - 2, 1))))
-    return Drift(last / first - 1.0 if first > 0.0 else 0.0, abs(slope) > _TREND * error)

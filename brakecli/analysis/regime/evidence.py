@@ -204,12 +204,13 @@ def windowed(values: Array) -> Array:
 def level_change(levels: Array) -> tuple[float, float]:
     """Change of the logarithm of a level over its record, with its standard error; nan where there is none.
 
-    The error is that of the means of ten batches.
+    The error is that of the means of ten batches, or of three levels or more where there are fewer.
     """
-    means = levels[len(levels) % _BATCHES :].reshape(_BATCHES, -1).mean(axis=1)
+    batches = min(_BATCHES, len(levels))
+    means = levels[len(levels) % batches :].reshape(batches, -1).mean(axis=1)
     if not means.min() > 0.0:
         return math.nan, math.nan
-    return line((np.arange(_BATCHES) + 0.5) / _BATCHES, np.log(means))
+    return line((np.arange(batches) + 0.5) / batches, np.log(means))
 
 
 class Envelope:

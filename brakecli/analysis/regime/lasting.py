@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from brakecli.analysis.regime.cycles import SIZE_OFF, Cycles, Drift, contact_time, in_lines, median, swings
+from brakecli.analysis.regime.cycles import SIZE_OFF, Cycles, contact_time, in_lines, median, swings
 from brakecli.analysis.regime.evidence import WINDOWS, Part, line
 from brakecli.analysis.regime.measure import Shown
-from brakecli.analysis.regime.table import Answers, Decision, Excitation, Regime
+from brakecli.analysis.regime.table import Answers, Decision, Excitation, Regime, Thresholds
 from brakecli.analysis.spectrum import Array
 from brakecli.analysis.stability.linear import Linear
 
@@ -62,7 +62,8 @@ def lasting(shown: Shown, answers: Answers, decision: Decision, *, in_full: bool
         found = _self_excited(shown, answers, shown.cycles)
     else:
         part = shown.half if answers.linear else shown.judged
-        found = Lasting(part, answers.settled and not answers.linear, part.amplitude("x"))
+        stays = not answers.moves or answers.carried  # all else dies, or is not known
+        found = Lasting(part, answers.settled and stays, part.amplitude("x"))
         return _with_force(shown, found, lasts=decision.regime is not Regime.UNDECIDED)
     if forced and found.settled and found.forced is None:  # its neighbours come together: nothing else is left
         found.forced = found.amplitude
@@ -219,7 +220,7 @@ def _self_excited(shown: Shown, answers: Answers, cycles: Cycles) -> Lasting:
     lasts = answers.settled and rate * seconds >= _RELAXED
     found = Lasting(part, lasts, cycles.amplitude, cycles=cycles)
     found.evidence = cycles.evidence | {"stick_cycles": answers.stick_cycles}
-    changed = max((abs(drift.part) for drift in (cycles.drift, cycles.detuning) if drift.sure), default=0.0)
+    changed = max(_surely(cycles.drift, shown.limits), _surely(cycles.detuning, shown.limits))
     off = abs(answers.amplitude - answers.amplitude_without_waves)
     turns = answers.period_without_waves * cycles.frequency
     far = not off <= shown.limits.settled_within * answers.amplitude_without_waves  # also where it is not known
@@ -241,13 +242,13 @@ def _self_excited(shown: Shown, answers: Answers, cycles: Cycles) -> Lasting:
         text += " for numbers that last"
     found.settled, found.notes["settled"] = lasts and text is None, text
 
-    def held(spread: float, value: float, drift: Drift) -> float | None:
+    def held(spread: float, value: float, drift: tuple[float, float]) -> float | None:
         """A spread with what a drift becomes until small disturbances have changed by a factor of e."""
         if lasts:
-            return spread + (abs(drift.part) * value if drift.sure else 0.0)
+            return spread + _surely(drift, shown.limits) * value
         if answers.undamped:
             return None  # there is no end to it
-        return min(spread + abs(drift.part) * value / max(min(rate * seconds, 1.0), 1e-9), value)
+        return min(spread + abs(drift[0]) * value / max(min(rate * seconds, 1.0), 1e-9), value)
 
     wander = cycles.evidence["frequency_spread"]
     spread = held(wander, cycles.frequency, cycles.detuning)
@@ -268,6 +269,11 @@ def _self_excited(shown: Shown, answers: Answers, cycles: Cycles) -> Lasting:
         if far and not answers.waves and found.spread is not None and math.isfinite(off):
             found.spread += off
     return found
+
+
+def _surely(change: tuple[float, float], limits: Thresholds) -> float:
+    """The size of a change with its error, as far as it is no chance."""
+    return abs(change[0]) if abs(change[0]) > limits.sure_errors * change[1] else 0.0
 
 
 def _add_ripple(shown: Shown, found: Lasting, lines: Sequence[float]) -> None:

@@ -185,8 +185,12 @@ class Answers:
         """What it comes to on the smooth wheel."""
         if not math.isfinite(self.amplitude_without_waves):
             return "no limit cycle that was found"
-        frequency = 1.0 / self.period_without_waves
-        return f"an amplitude of {self.amplitude_without_waves:.4g} m in a cycle of {frequency:.4g} Hz"
+        return f"an amplitude of {self.amplitude_without_waves:.4g} m in a cycle of {self.ends_at:.4g} Hz"
+
+    @property
+    def ends_at(self) -> float:
+        """Frequency (Hz) of the limit cycle on the smooth wheel."""
+        return 1.0 / self.period_without_waves
 
     @property
     def or_longer(self) -> str:
@@ -263,6 +267,11 @@ def _same(a: Answers, t: Thresholds) -> bool:
 def _another(a: Answers, t: Thresholds) -> bool:
     """It has another level than it would come to on the smooth wheel."""
     return math.isfinite(a.level_without_waves) and not _same(a, t)
+
+
+def _comes_to_it(a: Answers, t: Thresholds) -> bool:
+    """What it will look like is how the limit cycle of the smooth wheel looks, and not yet its own cycles."""
+    return not a.waves or not _steady(a, t)
 
 
 def _gives(a: Answers, t: Thresholds) -> bool:
@@ -590,6 +599,28 @@ ROUGH: Rows = (
     ),
 )
 LOOKS: Rows = (
+    Row(
+        "limit cycle with stick",
+        lambda a, t: a.sticks_without_waves >= 1.0 and _comes_to_it(a, t),
+        "in a limit cycle of {a.ends_at:.4g} Hz with stick",
+        "",
+        Regime.RELAXATION,
+        Excitation.SELF_EXCITED,
+    ),
+    Row(
+        "limit cycle without stick",
+        lambda a, t: a.sticks_without_waves == 0.0 and _comes_to_it(a, t),
+        "in a limit cycle of {a.ends_at:.4g} Hz without stick",
+        "",
+        Regime.QUASI_HARMONIC,
+        Excitation.SELF_EXCITED,
+    ),
+    Row(
+        "on its way",
+        lambda a, t: a.waves and not _steady(a, t),
+        "but its level still {a.word} by e^{a.change:.2g} in the second half, which changes how it looks",
+        "run at least {a.longer:.3g} s",
+    ),
     Row(
         "few cycles",
         lambda a, t: not a.cycles or a.cycles < (1.0 if a.settled else 1.5) * t.fewest_cycles,
