@@ -70,8 +70,16 @@ SMOOTH = (
         f"friction.coefficient=0.5 {HARD} solver.duration=0.05",
         0.2,
     ),
-    Example("Lasts, with stick in each cycle", "lasts: limit cycle with stick", "relaxation", "solver.duration=0.3", 0.15),
-    Example("Lasts without stick", "lasts: limit cycle without stick", "quasi-harmonic", "solver.duration=1.0", 0.5),
+    Example(
+        "Lasts, with stick in each cycle",
+        "lasts: limit cycle with stick",
+        "relaxation",
+        "solver.duration=0.3",
+        0.15,
+    ),
+    Example(
+        "Lasts without stick", "lasts: limit cycle without stick", "quasi-harmonic", "solver.duration=1.0", 0.5
+    ),
     Example(
         "Lasts, but falls for long",
         "on its way: limit cycle without stick",
@@ -206,7 +214,11 @@ ROUGH = (
 )
 LOOKS = (
     Example(
-        "Relaxation: stick in each cycle", "lasts: limit cycle with stick", "relaxation", "output.sample_interval=1e-5", 0.0
+        "Relaxation: stick in each cycle",
+        "lasts: limit cycle with stick",
+        "relaxation",
+        "output.sample_interval=1e-5",
+        0.0,
     ),
     Example(
         "Quasi-harmonic: one line, no stick",

@@ -102,8 +102,8 @@ def verdict(tables: Tables, folder: Path) -> tuple[Tables, dict[str, Any], Array
     return None
 
 
-MOVED = [
-    Thresholds(**{name: value})
+MOVED = {
+    (name, value): Thresholds(**{name: value})
     for name, values in {
         "settled_within": (0.025, 0.1),
         "sure_errors": (1.5, 6.0),
@@ -115,7 +115,7 @@ MOVED = [
         "band_share": (0.95, 0.8),
     }.items()
     for value in values
-]
+}
 """Each threshold half and twice as large; of a share that is near 1 what it lacks. The others define words."""
 
 
@@ -137,6 +137,7 @@ class Score:
     undecided: list[tuple[Tables, str, Answer]]  # with the reason, where more can be said
     open: int = 0  # undecided where the answer is not known either
     moved: list[tuple[Thresholds, Tables, str]] = field(default_factory=list)  # wrong with other thresholds
+    fewer: Counter[tuple[str, float]] = field(default_factory=Counter)  # decided no more, by threshold and value
     failed: int = 0
 
     @property
@@ -166,8 +167,10 @@ def score(stratum: str, count: int, seed: int) -> Score:
                     found.open += 1
                 else:
                     found.undecided.append((tables, numbers["reasons"][0], true))
-            for limits in MOVED:
-                if why := wrong(tables, moved(numbers, limits), rows, true):
+            for named, limits in MOVED.items():
+                other = moved(numbers, limits)
+                found.fewer[named] += said(other) == "undecided" != said(numbers)
+                if why := wrong(tables, other, rows, true):
                     found.moved.append((limits, tables, why))
             if why := wrong(tables, numbers, rows, true):
                 found.mistakes.append((tables, numbers, true, why))

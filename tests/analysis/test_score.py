@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from tests.analysis.answers import answer
-from tests.analysis.score import Score, said, score, verdict, wrong
+from tests.analysis.score import MOVED, Score, said, score, verdict, wrong
 from tests.analysis.shoes import STRATA, Shoe, random_shoes
 from tests.campaign import campaign
 
@@ -119,6 +119,10 @@ def test_few_shoes_stay_undecided_that_are_neither_neutral_nor_still_growing() -
         counts = f"{len(found.mistakes)} wrong, {len(found.undecided)} undecided of {found.judged}"
         more = f"{found.open} more without an answer, {found.failed} failed"
         table.append(f"{STRATA[stratum]}: {counts}; {more}; {len(found.moved)} wrong with a threshold moved")
+    for name, value in MOVED:
+        turned = sum(getattr(limits, name) == value for found in scores.values() for limits, *_ in found.moved)
+        lost = sum(found.fewer[name, value] for found in scores.values())
+        table.append(f"{name} = {value}: {turned} wrong, {lost} undecided that are decided by the default")
     sys.stdout.write("\n".join(["", *table, ""]))
     assert sum(count for (true, _), count in said_of.items() if true != "no answer") >= 500
     for stratum, most in MOST_UNDECIDED.items():
