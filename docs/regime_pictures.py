@@ -305,6 +305,8 @@ def answers(numbers: dict[str, Any]) -> str:
         lines.append(f"theory: {numbers['growth_rate']:.3g} 1/s")
     elif "exponent" in evidence:
         lines.append(f"neighbours: {evidence['exponent']:.2g} ± {evidence['exponent_error']:.1g} 1/s")
+    if evidence.get("growth") and "linear" not in evidence:
+        lines.append(f"sliding: {'unstable' if evidence['growth'] > 0.0 else 'stable'}")
     if "without_waves" in evidence:
         size = evidence.get("amplitude_without_waves")
         word = "dies out" if evidence["without_waves"] == "dies" else "lasts"

@@ -24,6 +24,7 @@ from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.stability.linear import Linear, linear_theory
 from brakecli.analysis.stability.modes import is_undamped
 from brakecli.runs.certificate import ROUNDING, Certificate
+from brakecli.solver.automaton import STICK
 from brakecli.solver.compile import Floats
 from brakecli.solver.flow.seek import FOUND, GOING_ON, LINEAR, Pursuit
 from brakecli.solver.motion import Work
@@ -128,7 +129,7 @@ def _cycle(system: System, theory: Linear, motion: Pursuit) -> tuple[Verdict, li
     """The verdict on an orbit that the motion has come to well before the end of the run, and a state on it."""
     o, orbit, factor = motion.way, motion.orbit, motion.multiplier
     end, period, interval = system.sampled_duration, orbit.period, system.interval
-    if not factor < 1.0:
+    if not factor < 1.0 or is_undamped(system.coefficients):  # without dashpots no orbit is sure to stay
         return None
     rate = -math.log(max(factor, 1e-300)) / period
     start = float(o.fell[0]) + max(math.log(max(float(o.away), 1e-300) / _SETTLED), 0.0) / rate
@@ -150,17 +151,14 @@ def _cycle(system: System, theory: Linear, motion: Pursuit) -> tuple[Verdict, li
     answers = Answers(
         duration=end,
         growth=theory.mode.growth,
-        undamped=is_undamped(c),
         without_waves=Fate.LASTS,
         level=1.0,  # the same as on the orbit
         level_without_waves=1.0,
         amplitude_without_waves=orbit.amplitude,
         settled=True,
+        period_without_waves=period,
+        sticks_without_waves=float(orbit.word.count(STICK)),
         seconds=part,
-        cycles=part / period,
-        samples_per_cycle=period / interval,
-        stick_cycles=1.0 if stick > 0.0 else 0.0,
-        harmonic_share=1.0,
     )
     decision = decide(answers, Thresholds())._replace(frequency=orbit.frequency)
     numbers = orbit.amplitude, orbit.stick_fraction, orbit.contact_loss_fraction, force, system.radius * force
