@@ -159,6 +159,8 @@ def _cycle(system: System, theory: Linear, motion: Pursuit) -> tuple[Verdict, li
         period_without_waves=period,
         sticks_without_waves=float(orbit.word.count(STICK)),
         seconds=part,
+        cycles=part / period,
+        samples_per_cycle=period / interval,
     )
     decision = decide(answers, Thresholds())._replace(frequency=orbit.frequency)
     numbers = orbit.amplitude, orbit.stick_fraction, orbit.contact_loss_fraction, force, system.radius * force

@@ -85,8 +85,8 @@ ROUGH_ROWS: dict[str, dict[str, Any]] = {
     "either": {},
 }
 LOOK_ROWS: dict[str, dict[str, Any]] = {
-    "limit cycle with stick": {"sticks_without_waves": 1.0, "period_without_waves": 0.01, "cycles": 0.0},
-    "limit cycle without stick": {"sticks_without_waves": 0.0, "period_without_waves": 0.01, "cycles": 0.0},
+    "limit cycle with stick": {"sticks_without_waves": 1.0, "period_without_waves": 0.01},
+    "limit cycle without stick": {"sticks_without_waves": 0.0, "period_without_waves": 0.01},
     "on its way": {**SHAKEN, "growth": 1.0, "change": 0.5},
     "few cycles": {"cycles": 9.0},
     "few steps in a cycle": {"steps_per_cycle": 7.0},

@@ -41,9 +41,9 @@ def classify(
     decision = decide(found, thresholds)
     what = lasting(shown, found, decision, in_full=in_full)
     part, radius, cycles = what.part, context.radius, what.cycles
-    if decision.excitation is Excitation.SELF_EXCITED:
-        frequency = what.frequency or found.ends_at  # in too few cycles of a run to tell
-        decision, found = decision._replace(frequency=frequency), replace(found, frequency=frequency)
+    if decision.excitation is Excitation.SELF_EXCITED and cycles:
+        decision = decision._replace(frequency=what.frequency)
+        found = replace(found, frequency=what.frequency or math.nan)
     evidence: dict[str, Any] = {"row": decision.row}
     if in_full:
         evidence |= found.known() | what.evidence | _further(shown, what, context)

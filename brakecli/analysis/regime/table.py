@@ -600,28 +600,6 @@ ROUGH: Rows = (
 )
 LOOKS: Rows = (
     Row(
-        "limit cycle with stick",
-        lambda a, t: a.sticks_without_waves >= 1.0 and _comes_to_it(a, t),
-        "in a limit cycle of {a.ends_at:.4g} Hz with stick",
-        "",
-        Regime.RELAXATION,
-        Excitation.SELF_EXCITED,
-    ),
-    Row(
-        "limit cycle without stick",
-        lambda a, t: a.sticks_without_waves == 0.0 and _comes_to_it(a, t),
-        "in a limit cycle of {a.ends_at:.4g} Hz without stick",
-        "",
-        Regime.QUASI_HARMONIC,
-        Excitation.SELF_EXCITED,
-    ),
-    Row(
-        "on its way",
-        lambda a, t: a.waves and not _steady(a, t),
-        "but its level still {a.word} by e^{a.change:.2g} in the second half, which changes how it looks",
-        "run at least {a.longer:.3g} s",
-    ),
-    Row(
         "few cycles",
         lambda a, t: not a.cycles or a.cycles < (1.0 if a.settled else 1.5) * t.fewest_cycles,
         "but only {a.cycles:.0f} cycles in {a.seconds:.3g} s",
@@ -644,6 +622,28 @@ LOOKS: Rows = (
         lambda a, t: a.seconds < 2.0 * a.slowest,
         "but the settled part holds less than two periods of the slowest wave, {a.slowest:.3g} s",
         "run at least {a.two_waves:.3g} s",
+    ),
+    Row(
+        "limit cycle with stick",
+        lambda a, t: a.sticks_without_waves >= 1.0 and _comes_to_it(a, t),
+        "in a limit cycle of {a.ends_at:.4g} Hz with stick",
+        "",
+        Regime.RELAXATION,
+        Excitation.SELF_EXCITED,
+    ),
+    Row(
+        "limit cycle without stick",
+        lambda a, t: a.sticks_without_waves == 0.0 and _comes_to_it(a, t),
+        "in a limit cycle of {a.ends_at:.4g} Hz without stick",
+        "",
+        Regime.QUASI_HARMONIC,
+        Excitation.SELF_EXCITED,
+    ),
+    Row(
+        "on its way",
+        lambda a, t: a.waves and not _steady(a, t),
+        "but its level still {a.word} by e^{a.change:.2g} in the second half, which changes how it looks",
+        "run at least {a.longer:.3g} s",
     ),
     Row(
         "relaxation",
