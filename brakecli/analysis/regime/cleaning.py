@@ -84,7 +84,7 @@ class Velocity:
 
     def denoised(self, *, hann: bool = False) -> tuple[Array, Array]:
         """The velocity made of those lines only that stand out of the noise, and their power over rfft's bins."""
-        values = _handy(self.values)
+        values = self.values
         window = np.hanning(len(values)) if hann else np.ones(1)
         spectrum = np.fft.rfft(values * window)
         turn = np.linspace(0.0, np.pi, len(spectrum))
@@ -133,10 +133,10 @@ def _velocity(values: Array, is_velocity: bool) -> Velocity:
     raw, noise = values if is_velocity else np.diff(values), 0.0
     mean = float(raw.mean()) if len(raw) else 0.0
     if len(values) >= _SHORTEST:
-        rough, some = np.diff(values, 3), _handy(values)
+        rough = np.diff(values, 3)
         local = float(np.median(np.abs(rough - np.median(rough)))) / 0.6745 / np.sqrt(20.0)
-        line = np.linspace(some[0], some[-1], len(some))
-        floor = np.median(np.abs(np.fft.rfft(some - line)) ** 2) / np.log(2.0) / len(some)
+        line = np.linspace(values[0], values[-1], len(values))
+        floor = np.median(np.abs(np.fft.rfft(values - line)) ** 2) / np.log(2.0) / len(values)
         noise = float(min(local, np.sqrt(floor)))
     return Velocity(raw - mean, mean, noise, is_velocity)
 
@@ -147,11 +147,6 @@ def _cycle(velocity: Velocity) -> float:
     values = velocity.smoothed(velocity.quiet)
     band = _RIPPLE * float(np.abs(values).mean())
     return len(values) / max(1, len(rises(-values, -band, band)))
-
-
-def _handy(values: Array) -> Array:
-    """The values, of many only so many that their Fourier transform is fast."""
-    return values[: len(values) - len(values) % 1024] if len(values) > 1 << 16 else values
 
 
 def _without_slow(values: Array) -> Array:
@@ -194,7 +189,7 @@ def _without_spikes(values: Array, is_velocity: bool, notes: list[str]) -> Array
         return values
     without = bridged(np.where(spikes, np.nan, values))
     if is_velocity and count >= 5 and abs(float(np.mean(np.sign(away[spikes])))) > 0.6:
-        power = np.abs(np.fft.rfft(_without_slow(_handy(without)))) ** 2
+        power = np.abs(np.fft.rfft(_without_slow(without))) ** 2
         if line_share(power) < _LINES_LEFT:  # nothing is left without them
             return values
     notes.append(f"spikes removed: {count}")

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter, uniform_filter1d
+from scipy.ndimage import uniform_filter1d
 
 from brakecli.analysis.regime.cleaning import Velocity
 from brakecli.analysis.regime.signal_table import FEWEST_SAMPLES
@@ -62,15 +62,13 @@ def seek(velocity: Velocity, certain: float) -> Slips:
     """The slips at the smoothing that shows them best, if the skewness is `certain`; otherwise at a quiet one."""
     if len(velocity.values) < FEWEST_SAMPLES:
         return Slips()
-    found, sign, scale, chosen = 0.0, 1.0, velocity.quiet, velocity
-    for candidate, least in [(velocity, 1), (_filtered(velocity), 8)][: 1 if velocity.measured else 2]:
-        for m in (m for m, _ in candidate.scales if m >= least):
-            skewness = _skewness(candidate.thinned(m))
-            if abs(skewness) > max(found, 4.0 * np.sqrt(6.0 * m / len(velocity.values))):
-                found, sign, scale, chosen = abs(skewness), -np.sign(skewness), m, candidate
-    if found < certain:
-        scale, chosen = velocity.quiet, velocity
-    chosen = replace(chosen, values=sign * chosen.values)
+    found, sign, scale = 0.0, 1.0, velocity.quiet
+    for m, _ in velocity.scales:
+        skewness = _skewness(velocity.thinned(m))
+        if abs(skewness) > max(found, 4.0 * np.sqrt(6.0 * m / len(velocity.values))):
+            found, sign, scale = abs(skewness), -np.sign(skewness), m
+    scale = scale if found >= certain else velocity.quiet
+    chosen = replace(velocity, values=sign * velocity.values)
     values = chosen.smoothed(scale)
     values = values - values.mean()
     bulk = values[values > 0.0]
@@ -82,12 +80,6 @@ def seek(velocity: Velocity, certain: float) -> Slips:
     places = rises(-values, -0.25 * middle, high)
     slips = Slips(found, scale, places, stick=float(np.mean(values > -high)))
     return _shaped(slips, chosen) if slips.count >= _FEWEST else slips
-
-
-def _filtered(velocity: Velocity) -> Velocity:
-    """The velocity of a displacement after a median of five, which takes impulses and leaves slips."""
-    displacement = np.concatenate([[0.0], np.cumsum(velocity.values)])
-    return replace(velocity, values=np.diff(median_filter(displacement, 5, mode="nearest")))
 
 
 def _skewness(values: Array) -> float:
