@@ -187,7 +187,7 @@ def _beginnings(part: Part, events: Events) -> tuple[Array, int]:
     time, mean = events.time[turning], np.diff(part.last("x"))
     speed = np.diff(events.x[turning]) / np.maximum(np.diff(time), 1e-300)
     everywhere = [time[1 + rises(speed, -band * level, band * level)] for band in _BANDS]
-    for begins in (each for each in everywhere if len(each) > 1):
+    for begins in {len(each): each for each in everywhere if len(each) > 1}.values():
         rise = max((begins[-1] - begins[0]) / (len(begins) - 1) / interval, 1.0)
         lags = np.arange(1, _MOST_RISES_PER_CYCLE + 1)
         unlike = np.array([_unlike(mean, lag * rise) for lag in lags if lag * rise < len(mean) // 2])
