@@ -14,13 +14,9 @@ _HARMONICS = 5
 _MOST_RISES_PER_CYCLE = 4
 _GROUPS = 10  # of neighbouring cycles, of which a median is taken
 _MIDDLE = np.array([1.0 / 6.0, 0.5, 5.0 / 6.0])  # quantiles
-_BANDS = (
-    0.2,
-    0.35,
-    0.6,
-    0.1,
-)  # of the standard deviation of vx, in the mean of a rise: slower ripple does not count
-_SAME = 0.03  # squared difference, over twice the variance, between one period of the mean of vx and the next
+_BANDS = (0.2, 0.35, 0.6, 0.1)  # of the standard deviation of vx, in the mean of a rise: what is slower is ripple
+_SAME = 0.035  # squared difference, over twice the variance, between one period of the mean of vx and the next:
+# where vx jumps, interpolation between eight samples of a cycle makes 0.031 of it
 _AS_SAME = 4.0  # times the least of these, up to which a shorter period is the period
 _SEEN = 0.85  # least part of a force's swing in every other sample that all samples see
 _EARLY = 1 / 8  # of a cycle: where it begins with a stick, a step may place that before its begin
@@ -103,17 +99,13 @@ def cycles_of(part: Part, events: Events, step: float = 0.0) -> Cycles | None:
     amplitude, spread = median(sizes)
     contact, turn = contact_time(events, groups[0], groups[-1]), 2.0 * np.pi * step / period
     impact = step / contact
+    kicked = (np.pi * impact) ** 2 / contact / 24.0  # in a second of contact
     alike = _unseen(begins / step)[0] if step else 0.0
     return Cycles(
         evidence,
         frequency,
         frequency_off=frequency * (turn**2 / 8.0 + _PERIOD_OFF * impact),
-        kick=(1.0 - loss)
-        * period
-        / contact
-        * (np.pi * impact) ** 2
-        * (1.0 + 2.0 * alike)
-        / 24.0,  # of all impacts
+        kick=(1.0 - loss) * period * kicked * (1.0 + 2.0 * alike),
         amplitude=amplitude,
         amplitude_spread=spread + (0.25 * turn**2 + SIZE_OFF * impact) * amplitude,
         stick_fraction=stick,

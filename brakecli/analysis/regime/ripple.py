@@ -26,13 +26,12 @@ _STIFFNESSES = np.geomspace(0.8, 1.25, 33)  # of a pad that opens, over the mean
 
 
 class Ripple(NamedTuple):
-    """Parts of the deviations of x, vx and the friction force, half of peak to peak of x (m), its power (W)."""
+    """Parts of the deviations of x, vx and the friction force, and half of peak to peak of x (m)."""
 
     x: float
     vx: float
     force: float
     size: float
-    power: float
     nodes: int
 
     @property
@@ -41,16 +40,11 @@ class Ripple(NamedTuple):
         return max(self[:3]) >= _LEAST
 
     @property
-    def advice(self) -> str:
-        """What to do: it falls with the square of the number of nodes."""
-        enough = self.nodes * 2 ** math.ceil(0.5 * math.log2(max(self[:3]) / _LEAST) + 0.5)
-        return f"take contact.nodes = {enough}"
-
-    @property
     def sentence(self) -> str:
-        """What it is, and what to do."""
+        """What it is, and what to do: it falls with the square of the number of nodes."""
+        enough = self.nodes * 2 ** math.ceil(0.5 * math.log2(max(self[:3]) / _LEAST) + 0.5)
         parts = f"{self.x:.0%} of x, {self.vx:.0%} of vx and {self.force:.0%} of the friction force"
-        return f"ripple of the contact's {self.nodes} nodes is {parts}; {self.advice}"
+        return f"ripple of the contact's {self.nodes} nodes is {parts}; take contact.nodes = {enough}"
 
 
 def ripple(system: System, belt: float, stiffness: float, part: Part, lines: Sequence[float]) -> Ripple | None:
@@ -66,15 +60,13 @@ def ripple(system: System, belt: float, stiffness: float, part: Part, lines: Seq
         return None
     pad = build_pad(system.layer_stiffness, system.half_length, system.shoe, system.wheel, _FINER * system.nodes)
     layer = build_layer(system.evaluate, pad, moving=True)
-    names = ("x", "y", "vx", "vy", "normal_force")
-    x, y, v_x, v_y, force = (part.history.read(name, end.start, end.stop) for name in names)
+    names = ("x", "y", "vx", "normal_force")
+    x, y, v_x, force = (part.history.read(name, end.start, end.stop) for name in names)
     travel = belt * part.history.interval * np.arange(end.start, end.stop) - x
     finer = np.zeros(samples)
     forces_along(np.ascontiguousarray(y), travel, layer, finer)
     c, window, added = system.coefficients, np.hanning(samples), force - finer
     grip = math.copysign(c.phi, belt)
-    meets = v_y - v_y.mean() + grip * (v_x - v_x.mean())
-    power = float(window @ ((added - added.mean()) * meets) / window.sum())
     omega = 2.0 * math.pi * np.fft.rfftfreq(samples, part.history.interval)
     off, *seen = (np.fft.rfft((each - each.mean()) * window) for each in (added, x, v_x, force))
     (s_xx, s_xy), (s_yx, s_yy) = stiffness_matrix(c, stiffness, grip)
@@ -92,7 +84,7 @@ def ripple(system: System, belt: float, stiffness: float, part: Part, lines: Seq
     if lines and max(in_x, in_vx, in_force) >= _LEAST:
         (beside, own), (vx, _), (pressing, _) = (part.beside(name, lines) for name in ("x", "vx", "normal_force"))
         in_x, in_vx, in_force, swing = max(in_x, beside), max(in_vx, vx), max(in_force, pressing), max(swing, own)
-    return Ripple(in_x, in_vx, in_force, swing, power, system.nodes)
+    return Ripple(in_x, in_vx, in_force, swing, system.nodes)
 
 
 def detuned(system: System, belt: float, stiffness: float, part: Part, lines: Sequence[float]) -> float:
