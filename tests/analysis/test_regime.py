@@ -130,6 +130,12 @@ def test_a_decay_to_nothing_is_damped() -> None:
     assert classified(history, Context(1.0), continued=lambda: Continued(Fate.DIES)).regime is Regime.DAMPED
 
 
+def test_what_dies_has_no_settled_amplitude_however_slowly_it_does() -> None:
+    known = Continued(Fate.DIES)
+    verdict = classified(made(np.sin(2 * np.pi * 170.0 * TIME)), Context(1.0), continued=lambda: known)
+    assert (verdict.regime, verdict.settled) == (Regime.DAMPED, False)
+
+
 def test_stick_in_some_cycles_only_is_irregular() -> None:
     vx = 0.02 * np.sin(2 * np.pi * 170.0 * TIME)
     state = np.where((vx > 0.019) & (np.floor(170.0 * TIME) % 3 == 0), 0.0, -1.0)

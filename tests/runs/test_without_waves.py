@@ -9,8 +9,10 @@ import pytest
 
 from brakecli.analysis.regime.measure import Continued
 from brakecli.analysis.regime.table import Fate
+from brakecli.branches.begin import on_smooth_pads
+from brakecli.branches.line import Shoe
 from brakecli.case.system import system_of
-from brakecli.runs.without_waves import without_waves
+from brakecli.runs.without_waves import LONGEST, without_waves
 from brakecli.solver.motion import solve
 from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import System
@@ -72,3 +74,27 @@ def test_a_rough_shoe_is_continued_by_the_curve_of_its_force(friction: float, fa
     speeds = solve(flat).rows[:, 2]
     late, early = speeds[-1000:].std(), speeds[: len(speeds) // 8].std()
     assert bool(late > 0.5 * early) == (fate is Fate.LASTS)
+
+
+def test_without_dashpots_no_limit_cycle_is_sure_to_stay() -> None:
+    """A vibration that grazes stick: after a run it repeats, and after four it no longer sticks in each cycle."""
+    tables: dict[str, Any] = {
+        "shoe": {"mass": 2.3817},
+        "wheel": {"radius": 0.5, "angular_speed": 0.46506086},
+        "link1": {"stiffness": 80585672.6, "damping": 0.0},
+        "link2": {"stiffness": 106870640.4, "damping": 0.0, "angle_deg": 32.5635463},
+        "load": {"force": 12579.0207},
+        "friction": {"coefficient": 3.36713022},
+        "contact": {"half_length": 0.01372914764, "stiffness": 1024694741.47},
+        "initial": {
+            "at": "equilibrium", "x": -8.926775e-5, "y": -9.953954e-5, "vx": -0.085592141, "vy": 0.057690159,
+        },
+        "solver": {"duration": 0.0911},
+        "output": {"sample_interval": 3.424e-5},
+    }  # fmt: skip
+    shoe = system_of(make(tables))
+    state = solve(shoe).rows[-1, :4]
+    assert on_smooth_pads(Shoe.of(shoe), state, LONGEST * shoe.sampled_duration).orbit is not None
+    found = without_waves(shoe, state)
+    assert found.fate is Fate.LASTS
+    assert math.isnan(found.amplitude)
