@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from brakecli.analysis.regime.answers import Fate
 from brakecli.analysis.regime.measure import Continued
-from brakecli.analysis.regime.table import Fate
 from brakecli.analysis.stability.modes import growth, is_undamped
 from brakecli.branches.begin import UNKNOWN, End, on_rough_pads, on_smooth_pads
 from brakecli.branches.line import Shoe

@@ -18,8 +18,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from brakecli.analysis.regime.answers import Answers, Fate
 from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, WINDOWS
-from brakecli.analysis.regime.table import Answers, Fate, Thresholds, decide
+from brakecli.analysis.regime.table import Thresholds, decide
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.stability.linear import Linear, linear_theory
 from brakecli.analysis.stability.modes import is_undamped

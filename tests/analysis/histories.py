@@ -6,10 +6,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from brakecli.analysis.regime.answers import Fate
 from brakecli.analysis.regime.classify import classify
 from brakecli.analysis.regime.context import Context
 from brakecli.analysis.regime.measure import Continued
-from brakecli.analysis.regime.table import Fate, Thresholds
+from brakecli.analysis.regime.table import Thresholds
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.case.system import system_of
 from brakecli.runs.run import asked, verdict_in_memory

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from brakecli.analysis.regime.table import Answers, Thresholds, decide
+from brakecli.analysis.regime.answers import Answers
+from brakecli.analysis.regime.table import Thresholds, decide
 from brakecli.case.read import parse_case
 from brakecli.files.read import open_result
 from brakecli.runs.run import run

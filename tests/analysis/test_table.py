@@ -6,14 +6,13 @@ from typing import Any
 
 import pytest
 
+from brakecli.analysis.regime.answers import Answers, Fate
 from brakecli.analysis.regime.table import (
     CONTACT,
     LOOKS,
     ROUGH,
     SMOOTH,
-    Answers,
     Excitation,
-    Fate,
     Regime,
     Thresholds,
     decide,

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from brakecli.analysis.regime.answers import Fate
 from brakecli.analysis.regime.measure import Continued
-from brakecli.analysis.regime.table import Fate
 from brakecli.branches.begin import on_smooth_pads
 from brakecli.branches.line import Shoe
 from brakecli.case.system import system_of

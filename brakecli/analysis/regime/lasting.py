@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from brakecli.analysis.regime.answers import Answers
 from brakecli.analysis.regime.cycles import SIZE_OFF, Cycles, contact_time, in_lines, median, swings
 from brakecli.analysis.regime.evidence import WINDOWS, Part, line
 from brakecli.analysis.regime.measure import Shown
-from brakecli.analysis.regime.table import Answers, Decision, Excitation, Regime, Thresholds
+from brakecli.analysis.regime.table import Decision, Excitation, Regime, Thresholds
 from brakecli.analysis.spectrum import Array
 from brakecli.analysis.stability.linear import Linear
 

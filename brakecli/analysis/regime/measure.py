@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from brakecli.analysis.regime.answers import Answers, Fate
 from brakecli.analysis.regime.context import Context
 from brakecli.analysis.regime.cycles import Cycles, cycles_of
 from brakecli.analysis.regime.evidence import (
@@ -19,7 +20,7 @@ from brakecli.analysis.regime.evidence import (
     level_change,
     windowed,
 )
-from brakecli.analysis.regime.table import Answers, Fate, Thresholds
+from brakecli.analysis.regime.table import Thresholds
 from brakecli.analysis.stability.linear import Linear
 from brakecli.solver.history import History
 from brakecli.solver.quantities import ContactState

@@ -5,12 +5,12 @@ says that the motion lasts by itself leaves it to the rows of `LOOKS` how it loo
 """
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Callable
+from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Generic, NamedTuple, TypeVar
 
-_ROUNDING = math.log(1e9)  # powers of e from rounding to the size of a motion
+from brakecli.analysis.regime.answers import Answers, Fate
 
 
 class Regime(StrEnum):
@@ -30,14 +30,6 @@ class Excitation(StrEnum):
     NONE = "none"
 
 
-class Fate(StrEnum):
-    """What becomes of a motion on the smooth wheel."""
-
-    DIES = "dies"
-    LASTS = "lasts"
-    UNKNOWN = "unknown"
-
-
 @dataclass(frozen=True)
 class Thresholds:
     """The only numbers that decide a verdict: see docs/regimes.md, and `make statistics` for what each moves."""
@@ -52,159 +44,6 @@ class Thresholds:
     stick_cycles: float = 0.8  # part of the cycles that stick in relaxation; in 1 less it, others may
     harmonic_share: float = 0.8  # part of the energy on one line and its multiples
     band_share: float = 0.9  # part of it in three narrow bands, which chaos may have, too
-
-
-@dataclass(frozen=True)
-class Answers:
-    """What is known of a motion, in SI units; nan where a number is not known."""
-
-    failure: str = ""  # why the run has failed
-    unasked: str = ""  # the command that asks what an older file does not hold
-    duration: float = math.nan
-    samples: int = 0
-    few_samples: bool = False  # too few for an envelope
-    steady: bool = True  # whether the wheel's speed and the load are constant
-    stands: bool = False  # whether the wheel stands
-    waves: bool = False  # whether the roughness of a turning wheel shakes the shoe
-    slowest: float = 0.0  # period of the slowest wave that counts
-    frictionless: bool = False
-    undamped: bool = False
-    locks: float = math.nan  # friction coefficient from which on the shoe locks itself, where its own is larger
-    held: bool = True  # whether a link holds the shoe along the wheel
-    touches: bool = True  # whether the shoe touches the wheel where it slides steadily
-    growth: float = math.nan  # of a small disturbance of steady sliding, 1/s
-    growth_error: float = 0.0  # by which the slopes of the waves may change it
-    ringing: float = math.nan  # frequency of that disturbance
-    steadier: str = ""  # what to do where the steps damp what grows
-    never: bool = False  # the shoe has never touched the wheel
-    lost: bool = False  # no contact in the second half
-    left: bool = False  # no contact in the last quarter
-    carried: bool = False  # stick in the second half, of a standing wheel in the last quarter
-    moves: bool = True  # beyond rounding
-    linear: bool = False  # slips to one side in full contact, at last
-    to_limit: float = math.nan  # time until stick or loss of contact limits what grows
-    change: float = math.nan  # of the logarithm of the level within the second half
-    change_error: float = math.nan
-    exponent: float = math.nan  # of neighbours, 1/s
-    exponent_error: float = math.nan
-    even: float = math.nan  # the same of a linear motion, by a line
-    even_error: float = math.nan
-    without_waves: Fate = Fate.UNKNOWN  # of the motion on the smooth wheel
-    amplitude: float = math.nan  # of x at the end
-    level: float = math.nan  # standard deviation of vx there
-    amplitude_without_waves: float = math.nan  # that it comes to on the smooth wheel
-    level_without_waves: float = math.nan  # and the standard deviation of vx
-    rate_without_waves: float = math.nan  # at which it does
-    period_without_waves: float = math.nan  # of the limit cycle that this is
-    sticks_without_waves: float = math.nan  # in a period
-    power_of_friction: float = math.nan  # power that friction gives, W
-    power_of_roughness: float = math.nan  # that the roughness gives
-    friction_error: float = math.nan
-    roughness_error: float = math.nan
-    seconds: float = math.nan  # of the settled part
-    settled: bool = False  # whether such a part was found
-    cycles: float = 0.0  # in it
-    frequency: float = math.nan  # of them
-    samples_per_cycle: float = 0.0
-    steps_per_cycle: float = math.inf  # where the case gives a step
-    stick_cycles: float = math.nan
-    harmonic_share: float = math.nan  # of one line and its multiples
-    band_share: float = math.nan  # in three narrow bands, where the frequency does not wander
-
-    def known(self) -> dict[str, Any]:
-        """What is known, by name: numbers, texts, and 1 for what holds."""
-        found = {each.name: getattr(self, each.name) for each in fields(self)}
-        kept = {name: value for name, value in found.items() if value != _UNKNOWN[name]}
-        return {
-            name: str(value) if isinstance(value, str) else float(value)
-            for name, value in kept.items()
-            if isinstance(value, str) or math.isfinite(value)
-        }
-
-    @classmethod
-    def of(cls, known: Mapping[str, Any]) -> "Answers":
-        """The record of what is known by name; what else there is does not matter."""
-        return cls(**{name: type(value)(known[name]) for name, value in _UNKNOWN.items() if name in known})
-
-    def powers(self, rate: float) -> float:
-        """Powers of e by which something changes in half of the run."""
-        return 0.5 * rate * self.duration
-
-    def rate(self, errors: float) -> tuple[float, float]:
-        """Growth rate of what a linear motion holds beside the forced one, and how far it may be off."""
-        if abs(self.growth) > self.growth_error or not math.isfinite(self.even):
-            return self.growth, self.growth_error
-        return self.even, errors * self.even_error
-
-    @property
-    def longer(self) -> float:
-        """Duration after which a change has come to its end: its last quarter is judged."""
-        rate = abs(self.change) / (0.5 * self.duration)
-        return 4.0 / 3.0 * (self.duration + 3.0 / max(rate, 1e-300))
-
-    @property
-    def own(self) -> float:
-        """Growth rate (1/s) of what a linear motion holds beside the forced one."""
-        return self.rate(0.0)[0]
-
-    @property
-    def grown(self) -> float:
-        """Duration after which what grows has come to its limits."""
-        limit = self.to_limit if math.isfinite(self.to_limit) else 0.0
-        return 4.0 / 3.0 * (self.duration + limit + 3.0 / self.own)
-
-    @property
-    def waited(self) -> float:
-        """Duration after which neighbours have come together."""
-        return 4.0 / 3.0 * (self.duration + 3.0 / max(abs(self.exponent), 1e-300))
-
-    @property
-    def decay(self) -> float:
-        """Rate (1/s) at which it fades."""
-        return -self.own
-
-    @property
-    def sticks(self) -> str:
-        """How often the motion sticks."""
-        return f"with stick in {self.stick_cycles:.0%} of the cycles" if self.stick_cycles else "without stick"
-
-    @property
-    def two_waves(self) -> float:
-        """Duration whose settled part holds two periods of the slowest wave."""
-        return 2.8 * self.slowest
-
-    @property
-    def lines(self) -> str:
-        """Where the energy of vx lies."""
-        if self.band_share > self.harmonic_share:
-            return f"{self.band_share:.0%} of the energy of vx in three narrow bands"
-        return f"{self.harmonic_share:.0%} of the energy of vx in one line and its harmonics"
-
-    @property
-    def limit(self) -> str:
-        """What it comes to on the smooth wheel."""
-        if not math.isfinite(self.amplitude_without_waves):
-            return "no limit cycle that was found"
-        return f"an amplitude of {self.amplitude_without_waves:.4g} m in a cycle of {self.ends_at:.4g} Hz"
-
-    @property
-    def ends_at(self) -> float:
-        """Frequency (Hz) of the limit cycle on the smooth wheel."""
-        return 1.0 / self.period_without_waves
-
-    @property
-    def or_longer(self) -> str:
-        """How long it takes to grow from rounding to the size of a motion, if that is longer than the run."""
-        seconds = _ROUNDING / self.growth
-        return f", or run at least {seconds:.2g} s" if seconds > self.duration else ""
-
-    @property
-    def word(self) -> str:
-        """Which way the level changes."""
-        return "grows" if self.change > 0.0 else "falls"
-
-
-_UNKNOWN: dict[str, Any] = {each.name: each.default for each in fields(Answers)}
 
 
 class Decision(NamedTuple):
