@@ -109,6 +109,9 @@ class Motion:
     energy: EnergyAccount
     exponent: Exponent | None = None  # of small disturbances, where they are carried along
     track: Track | None = None  # works of parts, and events, where the loop notes them
+    own: Floats | None = (
+        None  # largest errors in each part, by steps, by nodes, and of both, where they are carried along
+    )
 
 
 def solve(
@@ -167,6 +170,7 @@ class Stepping:
         self._plant_at = self._memory.ctypes.data
         self.scheme.hold(self.plant, self._plant_at)
         self._begin()
+        self.tangent.knows, self.tangent.unsure = int(system.knowing), math.inf
         if system.tracked:
             follow(self.track, self.plant.state.v_x)
         self._start_energy = self._energy()
@@ -205,7 +209,8 @@ class Stepping:
         track = None
         if self.system.tracked:
             track = tracked(self.track, self.plant.c, self.plant.s, self.scheme.mechanical_energy, light)
-        return Motion(self.system, np.concatenate(kept), work, energy, found, track)
+        own = self.tangent.worst.copy() if self.system.knowing else None
+        return Motion(self.system, np.concatenate(kept), work, energy, found, track, own)
 
     def block(self, stop: int) -> Floats:
         """Step to level `stop`; the samples on the way."""

@@ -102,6 +102,25 @@ def _press_halves(x: float, y: float, layer: Layer) -> tuple[float, float]:
     return force, touching
 
 
+@kernel(float64(float64, LAYER), inlined=False)
+def left_out(y: float, layer: Layer) -> float:
+    """What the rule leaves out of F_y (N) at the edges of patches, with the heights of the last `evaluate`.
+
+    An edge at the part θ of the way between two nodes, whose gaps are g > 0 and g' < 0, cuts a cell: where the gap
+    is straight, it holds (g - g')(θ - 1/2)²/2 spacings more than its mean. With θ = g/(g - g') that is
+    (g + g')²/8(g - g'). What is left falls with the third power of the spacing.
+    """
+    pad, n, total = layer.pad, layer.pad.nodes, 0.0
+    f1, f2 = layer.tables[pad.nodes_at : pad.nodes_at + n], layer.scratch[BESIDE : BESIDE + n]
+    before = f2[0] - f1[0] - y
+    for j in range(1, n):
+        gap = f2[j] - f1[j] - y
+        if gap * before < 0.0:
+            total += (gap + before) ** 2 / abs(gap - before)
+        before = gap
+    return pad.k * (2.0 * pad.half_length / n) * 0.125 * total  # type: ignore[no-any-return]
+
+
 @kernel(EVALUATE)
 def press(x: float, y: float, layer: Layer) -> None:
     """`evaluate` where normal force, stiffness and fraction are enough; the same but for rounding."""

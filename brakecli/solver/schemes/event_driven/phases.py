@@ -111,7 +111,7 @@ def press(p: Shoe, x: float, y: float, phase: int) -> float:
         contact.store = 0.5 * contact.stiffness * y * y
         return contact.normal_force  # type: ignore[no-any-return]
     full, m = coverage(y, pad) == FULL, p.motion
-    light = m.light == 1 and p.tangent.on == 0
+    light = m.light == 1 and p.tangent.on == 0 and p.tangent.knows == 0
     if not full or p.layer.window.rows > 0:
         _evaluate_at(p.layer.press if light else p.layer.evaluate)(x, y, p.layer)
         if full:  # the sum over nodes is the closed form
@@ -200,7 +200,10 @@ def take_hold(p: Shoe) -> None:
     against_x, _ = resistance(c, m.load, m.x, m.y, m.belt, m.v_y)
     needed, (along, _) = c.m * m.belt_slope + against_x, rounding(p)
     m.phase = held(bound - needed, bound + needed, along, along)
-    p.tangent.v_x *= kept(needed, bound)
+    part = kept(needed, bound)
+    p.tangent.v_x *= part
+    p.tangent.error[0, V_X] *= part
+    p.tangent.error[1, V_X] *= part
     if m.phase == STICK:
         m.anchor, m.anchor_low = anchored(m.x, m.travel, m.travel_low)
         m.v_x = m.belt

@@ -3,15 +3,16 @@
 import math
 from typing import Any
 
-from numba import float64, int64, types, void
+from numba import float64, int64, void
 
-from brakecli.solver.automaton import OPEN, STICK, UNDECIDED, counted, side_of, sliding_phase, stalled
+from brakecli.solver.automaton import OPEN, STICK, UNDECIDED, counted, sliding_phase, stalled
 from brakecli.solver.compile import kernel
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.quantities import BOUND, Failure
 from brakecli.solver.records import DRIVE, GRID, KNOTS, MOTION_TYPE, POWERED, STAGES, V_X, V_Y, Drive, Grid, X, Y
 from brakecli.solver.schedules import Schedule, segment
 from brakecli.solver.schemes.event_driven import phases, runge_kutta
+from brakecli.solver.schemes.event_driven.error import carried, grow
 from brakecli.solver.schemes.event_driven.locate import NONE, first_event
 from brakecli.solver.schemes.event_driven.phases import EPSILON, SHOE, Shoe
 from brakecli.solver.schemes.event_driven.runge_kutta import END_STAGE, NODES, ORDER, USED, A
@@ -40,7 +41,6 @@ _NEAR = 1e-3
 _TINY = 1e-300  # no division by zero where nothing moves
 
 STEP = int64(SHOE, DRIVE, GRID)
-_SLOPES = types.UniTuple(float64, 2)
 
 _NONE, _, _DIVERGED, _NOT_CLOSED, _, _STALLED = (int(failure) for failure in Failure)
 
@@ -183,34 +183,6 @@ def _passed(m: Any, item: int) -> float:
     return total
 
 
-@kernel(_SLOPES(SHOE, int64, float64, float64, float64, float64))
-def _slopes(p: Shoe, stage: int, x: float, y: float, v_x: float, v_y: float) -> tuple[float, float]:
-    """Accelerations of a disturbance at a stage."""
-    c, m, (stiffness, tangential) = p.c, p.motion, p.motion.touch[stage]
-    force = tangential * x - stiffness * y
-    against_x, against_y = phases.resistance(c, 0.0, x, y, v_x, v_y)
-    along = -side_of(m.phase) * c.phi * force - against_x if m.phase != STICK else 0.0
-    return along / c.m, (force - against_y) / c.m
-
-
-@kernel(void(SHOE, float64), inlined=False)
-def _disturb(p: Shoe, h: float) -> None:
-    """Carry the disturbance along the step that has been made: by its derivative, and on to an event behind it."""
-    m, t, k, step = p.motion, p.tangent, p.motion.disturbed, p.motion.step_done
-    for stage in range(END_STAGE + 1):
-        if USED[m.pair] <= stage < END_STAGE:
-            continue
-        x, y, v_x, v_y = 0.0, 0.0, 0.0, 0.0
-        for j in range(min(stage, USED[m.pair])):
-            a = A[m.pair, stage, j]
-            x, y, v_x, v_y = x + a * k[j, X], y + a * k[j, Y], v_x + a * k[j, V_X], v_y + a * k[j, V_Y]
-        x, y, v_x, v_y = t.x + step * x, t.y + step * y, t.v_x + step * v_x, t.v_y + step * v_y
-        a_x, a_y = _slopes(p, stage, x, y, v_x, v_y)
-        k[stage, X], k[stage, Y], k[stage, V_X], k[stage, V_Y] = v_x, v_y, a_x, a_y
-    rest = h - step
-    t.x, t.y, t.v_x, t.v_y = x + rest * v_x, y + rest * v_y, v_x + rest * a_x, v_y + rest * a_y
-
-
 @kernel(void(SHOE), inlined=False)
 def _meet(p: Shoe) -> None:
     """Note where in the step that has been made a rough pad comes to the wheel or leaves it.
@@ -259,8 +231,11 @@ def _follow(p: Shoe) -> None:
 def _take(p: Shoe, drive: Drive, grid: Grid, h: float, last: int) -> None:
     """Take the step that has been made; `last` is 1 where it reaches the end of the run."""
     m, work, interval = p.motion, p.work, grid.interval
-    if p.tangent.on == 1:
-        _disturb(p, h)
+    t = p.tangent
+    if t.on == 1:
+        t.x, t.y, t.v_x, t.v_y = carried(p, h, t.x, t.y, t.v_x, t.v_y)
+    if t.knows == 1:
+        grow(p, h, grid)
     if p.track.on == 1:
         _follow(p)
     m.time_done, m.tau_done, m.phase_done = m.time, m.tau, m.phase
