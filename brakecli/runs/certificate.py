@@ -12,7 +12,6 @@ from brakecli.solver.motion import Motion
 from brakecli.solver.system import System
 
 ROUNDING = 1e-12  # least estimate: runs that share their rounding agree better than they are right
-ORDER = 8  # of the steps of event-driven runs
 DISPLACED = 64.0 * float(np.finfo(float).eps)
 """How far a replica starts away, over its distances: the roundings of 64² steps add up to that at random."""
 
@@ -63,26 +62,6 @@ class Apart:
         late = np.flatnonzero((limit * self.size < self.of.T).any(axis=1)) if self.error > limit else np.zeros(0)
         last: int = (int(late[0]) if len(late) else len(self.of.T)) - 1
         return float(max(last, 0) * self.interval)
-
-
-def coarser(ratio: float) -> float:
-    """The error of the coarser of two event-driven runs, over what they differ by; `ratio` of their tolerances.
-
-    Local errors are as large as the tolerance, and steps are as long as its eighth root. The errors of a motion
-    thus fall as its power 7/8, and |e| <= |e - e'| + |e'|.
-    """
-    return 1.0 / (1.0 - math.pow(ratio, 1.0 - 1.0 / ORDER))
-
-
-def coarser_by_steps(coarse: Motion, fine: Motion) -> float:
-    """The error of the coarser of two event-driven runs, over what they differ by, from the steps that they took.
-
-    Steps may be limited by passing waves and not by the tolerance. Two runs then take the same steps, share their
-    errors, and differ by next to nothing. Errors fall with the seventh power of the number of steps, which is the
-    power 7/8 of the tolerance where that alone sets them. Infinite where the finer run takes no more steps.
-    """
-    fall = math.pow(coarse.work.steps / max(fine.work.steps, 1), ORDER - 1.0)
-    return 1.0 / (1.0 - fall) if fall < 1.0 else math.inf
 
 
 def replica(system: System) -> System:

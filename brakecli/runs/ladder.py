@@ -3,17 +3,16 @@
 import math
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
-from brakecli.runs.certificate import ROUNDING, Certificate, Certified, Rounding, coarser, compare, replica
+from brakecli.runs.certificate import ROUNDING, Certificate, Certified, Rounding, compare, replica
 from brakecli.solver.contact import EVALUATORS
 from brakecli.solver.contact.pad import default_nodes
 from brakecli.solver.motion import Motion
 from brakecli.solver.system import System
 
-FIRST_ON_NODES, NODES_RATIO = 0.2, 0.1  # first tolerance there over the requested one; from one to the next
 FIRST_TURN = 15.0  # square of the turn (rad) of the fastest motion in a first step, over the tolerance
 # Two halvings leave a sixth of the tolerance: (1/12, 10/12, 1/12) takes a sixth of that square off a velocity.
 LONGEST_TURN = 0.4  # rad, in a first step
@@ -86,45 +85,26 @@ class _Nodes(_Axis):
     margin: ClassVar[float] = 2.0
 
 
-@dataclass
-class _Tolerances(_Axis):
-    """Of steps that are found: local tolerances, each a tenth of the one before."""
-
-    growth: ClassVar[float] = 0.2
-    margin: ClassVar[float] = coarser(NODES_RATIO)
-
-    @property
-    def error(self) -> float:
-        """What the last two runs differ by, which is the error of the coarser one.
-
-        Two may agree by luck: no less is left than a twentieth of what the two before differed by.
-        """
-        return self.margin * (max(self.last, self.before / 20.0) if self.before < math.inf else self.last)
-
-
 def ladder(
     system: System, is_left: Callable[[Motion, float], bool] = lambda run, more: False, kind: type[_Axis] = _Axis
 ) -> Generator[System, Motion, Certified]:
-    """Runs with steps half as long, or a tenth of the local tolerance, or twice the nodes: what is needed more.
+    """Runs with steps half as long, or twice the nodes: what is needed more.
 
     It yields what is to be run, receives its motion, and returns the last one with its certificate. The errors of
     steps and of nodes add up, and each is estimated apart. A replica of the first run shows what the motion makes
     of rounding, and up to when the promise can be kept. The first steps may pass over samples, the last ones may
     not, nor over what speed or load do between two knots, as no run would see it.
     """
-    wanted, events = system.method.tolerance, system.method.own_steps
-    (first, every), fineness = first_rung(system, kind), "tolerance" if events else "step"
+    wanted, (first, every) = system.method.tolerance, first_rung(system, kind)
     longest = min(_shortest_span(system) / STEPS_BETWEEN_KNOTS, system.interval) * (1.0 + 1e-9)
-    nodes, steps, quadrature = first_nodes(system), _Tolerances() if events else kind(), _Nodes()
+    nodes, steps, quadrature = first_nodes(system), kind(), _Nodes()
     before, finer, seconds, rounding = None, steps, 0.0, Rounding(0.0, system.sampled_duration, wanted)
     while True:
-        at = first * (NODES_RATIO if events else 0.5) ** steps.doublings
-        changes: dict[str, Any] = {"nodes": nodes << quadrature.doublings, fineness: at}
+        method = replace(system.method, nodes=nodes << quadrature.doublings, step=first * 0.5**steps.doublings)
         interval = max(1, every >> steps.doublings) * system.interval
-        rung = replace(system, interval=interval, method=replace(system.method, **changes))
-        # Steps that are found differ in a replica by as much as their tolerance: one run is its own replica there.
-        beside = (yield replica(rung)) if before is None and not events else None
-        run = yield replica(rung) if before is None and events else rung
+        rung = replace(system, interval=interval, method=method)
+        beside = (yield replica(rung)) if before is None else None
+        run = yield rung
         spent, failed = run.work.solve_seconds, run.work.failed
         if beside:
             seconds, failed = seconds + beside.work.solve_seconds, failed or beside.work.failed
@@ -135,15 +115,14 @@ def ladder(
         before = before if failed else run
         opens = set(run.work.evaluators) != {"closed-form"}
         used = quadrature if nodes and opens else _Axis(0, 0.0, 0.0)
-        margin = JUMPS if not events and (run.work.turns or not system.steady) else 1.0
+        margin = JUMPS if run.work.turns or not system.steady else 1.0
         jump = _jump_error(run)
         error = math.inf if failed else margin * steps.error + used.error + jump
-        short = events or run.system.step <= longest
+        short = run.system.step <= longest
         if kept := short and error <= rounding.left:
             break
         coarse = failed or not short or jump > 0.5 * rounding.left
-        # Found steps are nearly the same on other nodes: the first tolerance is enough to tell nodes apart.
-        finer = steps if coarse or (margin * steps.error, not events) > (used.error, False) else quadrature
+        finer = steps if coarse or margin * steps.error >= used.error else quadrature
         late = run.system.interval == system.interval and seconds + 2.2 * spent > MOST_SECONDS
         more = 2.0 * steps.more(0.5 * rounding.left / margin) * used.more(0.5 * rounding.left)
         if finer.doublings == MOST_DOUBLINGS or late or is_left(run, more):
@@ -153,8 +132,8 @@ def ladder(
     if not (certified := kept and error <= wanted):
         error = max(error, wanted * 1.0000001) if short and error < math.inf else 1.0
     with_nodes = f" and {run.system.nodes} nodes" if used is quadrature else ""
-    finest = f"local tolerances of {at:.0e}" if events else f"steps of {run.system.step:.3g} s"
-    how = f"{system.method.scheme} runs down to {finest}{with_nodes}, and a replica of the first"
+    finest = f"steps of {run.system.step:.3g} s{with_nodes}"
+    how = f"{system.method.scheme} runs down to {finest}, and a replica of the first"
     return Certified(run, Certificate(wanted, certified, error, rounding.until if kept else 0.0, how))
 
 
@@ -176,12 +155,7 @@ def _jump_error(run: Motion) -> float:
 
 
 def first_rung(system: System, kind: type[_Axis] = _Axis) -> tuple[float, int]:
-    """The steps (s) that a ladder begins with, and how many samples each passes over, a power of two.
-
-    Where steps are found it is the local tolerance that the ladder begins with.
-    """
-    if system.method.own_steps:
-        return FIRST_ON_NODES * system.method.tolerance, 1
+    """The steps (s) that a ladder begins with, and how many samples each passes over, a power of two."""
     interval, fastest = system.interval, 2.0 * math.pi * max(system.natural_frequencies[1], 1e-300)
     wanted = kind.turn(system.method.tolerance) / fastest
     wanted = min(wanted, 1.0 / (FIRST_PER_WAVE * max(system.passing_frequency, 1e-300)))

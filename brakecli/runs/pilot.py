@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from brakecli.runs.cost import evaluation_seconds, start_seconds
 from brakecli.runs.ladder import first_nodes, first_rung
-from brakecli.runs.tolerance import NODES_FROM, SECOND_RUN, first_event_tolerance
+from brakecli.runs.own_error import first_of
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.motion import Stepping
 from brakecli.solver.system import System
@@ -16,7 +16,7 @@ SECONDS = 0.15
 MOST_EVALUATION, MOST_AT_NODES = 0.02, 2e-3
 """Guessed time (s) of an evaluation of the contact, exact and by nodes, beyond which no step is tried."""
 FINER, RUNGS = 4, 16.0  # steps of the last run of a ladder, and time of all of its runs, over the first one's
-FINER_FOUND, RUNGS_FOUND = 2, 9.0  # the same where steps are found
+FINER_FOUND, RUNGS_FOUND = 1.5, 4.0  # the same of runs that know their error
 FEW = 20  # steps, the first of which are shorter than those that follow
 SLOWER = 2.0  # pace of the latter half of a pilot run over the mean pace, beyond which the rest may be slower yet
 
@@ -38,23 +38,15 @@ def measured(system: System) -> Price | None:
         return _begun(system)
     if not method.own_steps:
         return _ladder(system)
-    first = replace(system, method=replace(method, tolerance=first_event_tolerance(system)))
-    events = _begun(first)
-    events = Price(int(events.steps * SECOND_RUN), events.seconds * (1.0 + SECOND_RUN), events.at_least)
-    if not method.automatic or method.tolerance < NODES_FROM or system.smooth:
-        return events
-    ladder = _ladder(replace(system, method=replace(method, evaluator="midpoint")))
-    return ladder if ladder.seconds < events.seconds else events._replace(at_least=True)
+    found = _begun(first_of(system))
+    return Price(int(FINER_FOUND * found.steps), RUNGS_FOUND * found.seconds, at_least=True)
 
 
 def _ladder(system: System) -> Price:
     """A ladder of steps and nodes, each refined twice at least."""
-    found_steps, first = system.method.own_steps, first_rung(system)[0]
-    method = replace(system.method, nodes=first_nodes(system))
-    method = replace(method, tolerance=first) if found_steps else replace(method, step=first)
+    method = replace(system.method, nodes=first_nodes(system), step=first_rung(system)[0])
     found = _begun(replace(system, method=method))
-    finer, rungs = (FINER_FOUND, RUNGS_FOUND) if found_steps else (FINER, RUNGS)
-    return Price(finer * found.steps, rungs * found.seconds, at_least=True)
+    return Price(FINER * found.steps, RUNGS * found.seconds, at_least=True)
 
 
 def _begun(system: System) -> Price:

@@ -4,6 +4,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from numba import float64, int64, void
@@ -96,6 +97,13 @@ class Work:
         return when + self.failure.sentence if self.failed else None
 
 
+class OwnError(NamedTuple):
+    """What a run knows of its error: the largest of each component in each part of the run (m, m/s)."""
+
+    worst: Floats  # parts, by steps, nodes and both, x y vx vy
+    unsure: float  # s, from which on it may be another, as an event may have been missed; infinite where none
+
+
 @dataclass(frozen=True)
 class Motion:
     """A finished motion: its system with the method used, its samples (rows of `quantities.HISTORY`), its cost.
@@ -109,9 +117,7 @@ class Motion:
     energy: EnergyAccount
     exponent: Exponent | None = None  # of small disturbances, where they are carried along
     track: Track | None = None  # works of parts, and events, where the loop notes them
-    own: Floats | None = (
-        None  # largest errors in each part, by steps, by nodes, and of both, where they are carried along
-    )
+    own: OwnError | None = None  # where it is carried along
 
 
 def solve(
@@ -171,6 +177,7 @@ class Stepping:
         self.scheme.hold(self.plant, self._plant_at)
         self._begin()
         self.tangent.knows, self.tangent.unsure = int(system.knowing), math.inf
+        self.tangent.margin = self.tangent.margin_before = -math.inf
         if system.tracked:
             follow(self.track, self.plant.state.v_x)
         self._start_energy = self._energy()
@@ -209,7 +216,7 @@ class Stepping:
         track = None
         if self.system.tracked:
             track = tracked(self.track, self.plant.c, self.plant.s, self.scheme.mechanical_energy, light)
-        own = self.tangent.worst.copy() if self.system.knowing else None
+        own = OwnError(self.tangent.worst.copy(), float(self.tangent.unsure)) if self.system.knowing else None
         return Motion(self.system, np.concatenate(kept), work, energy, found, track, own)
 
     def block(self, stop: int) -> Floats:

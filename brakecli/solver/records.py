@@ -98,6 +98,7 @@ TANGENT = record(
     "rate",  # rad/s, by which places count beside velocities in its size
     "side",  # of the friction law that the motion follows, 0 in stick
     "unsure",  # s, from which on the error may be another, as an event may have been missed; or infinite
+    "margin margin_before moved",  # at the last two places, m/s or N, and what the error moved the last one by
     on=int,  # 1 where it is carried along
     knows=int,  # 1 where the error of the motion is
     placed=int,  # events that were placed inside steps of a difference scheme

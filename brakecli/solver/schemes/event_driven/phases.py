@@ -26,13 +26,15 @@ from brakecli.solver.automaton import (
 from brakecli.solver.compile import at_address, kernel
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.contact.closed_form import FULL, clear, coverage, full_contact, full_press
-from brakecli.solver.records import COEFFICIENTS, V_X, V_Y, Coefficients, Drive, Layer, Y
+from brakecli.solver.records import COEFFICIENTS, V_X, V_Y, Coefficients, Drive, Layer, X, Y
 from brakecli.solver.roughness import turn
 from brakecli.solver.schedules import integral_at, slope_at, value_at
 from brakecli.solver.schemes.event_driven.runge_kutta import END_STAGE, interpolated
 from brakecli.solver.tangent import kept
 
 EPSILON = 2.220446049250313e-16
+NEAR = 3.0
+"""Times what the error moves a margin by: one that comes nearer to zero may be an event, or none."""
 
 
 class Shoe(NamedTuple):
@@ -111,7 +113,7 @@ def press(p: Shoe, x: float, y: float, phase: int) -> float:
         contact.store = 0.5 * contact.stiffness * y * y
         return contact.normal_force  # type: ignore[no-any-return]
     full, m = coverage(y, pad) == FULL, p.motion
-    light = m.light == 1 and p.tangent.on == 0 and p.tangent.knows == 0
+    light = m.light == 1 and p.tangent.on == 0
     if not full or p.layer.window.rows > 0:
         _evaluate_at(p.layer.press if light else p.layer.evaluate)(x, y, p.layer)
         if full:  # the sum over nodes is the closed form
@@ -189,6 +191,18 @@ def margin_slope(p: Shoe, which: int) -> float:
     return bound - needed if which == PULL else bound + needed  # type: ignore[no-any-return]
 
 
+@kernel(_PAIR(SHOE, *[float64] * 5), inlined=False)
+def cone(p: Shoe, since: float, x: float, y: float, v_x: float, v_y: float) -> tuple[float, float]:
+    """How far the force that stick takes is within the friction cone (N), and what the error moves that by."""
+    c, m, e, n = p.c, p.motion, p.tangent.error[0], p.tangent.error[1]
+    against, _ = resistance(c, m.load + m.load_slope * since, x, y, v_x, v_y)
+    d_x, d_y = e[X] + n[X], e[Y] + n[Y]
+    more, _ = resistance(c, 0.0, d_x, d_y, e[V_X] + n[V_X], e[V_Y] + n[V_Y])
+    pressed = p.layer.contact.tangential * d_x - p.layer.contact.stiffness * d_y
+    within = c.phi * p.layer.contact.normal_force - abs(c.m * m.belt_slope + against)
+    return within, abs(more) + c.phi * abs(pressed)
+
+
 @kernel(void(SHOE), inlined=False)
 def take_hold(p: Shoe) -> None:
     """The phase of a touching shoe that moves with the wheel: stick if friction can hold it, Eqs. (3)-(5).
@@ -200,10 +214,12 @@ def take_hold(p: Shoe) -> None:
     against_x, _ = resistance(c, m.load, m.x, m.y, m.belt, m.v_y)
     needed, (along, _) = c.m * m.belt_slope + against_x, rounding(p)
     m.phase = held(bound - needed, bound + needed, along, along)
-    part = kept(needed, bound)
-    p.tangent.v_x *= part
-    p.tangent.error[0, V_X] *= part
-    p.tangent.error[1, V_X] *= part
+    part, t = kept(needed, bound), p.tangent
+    if t.knows == 1:
+        margin, moved = cone(p, 0.0, m.x, m.y, m.belt, m.v_y)
+        if abs(margin) < NEAR * moved:
+            t.unsure = min(t.unsure, m.time + m.tau)
+    t.v_x, t.error[0, V_X], t.error[1, V_X] = part * t.v_x, part * t.error[0, V_X], part * t.error[1, V_X]
     if m.phase == STICK:
         m.anchor, m.anchor_low = anchored(m.x, m.travel, m.travel_low)
         m.v_x = m.belt
@@ -213,6 +229,7 @@ def take_hold(p: Shoe) -> None:
 def switch(p: Shoe, which: int) -> None:
     """Enter the phase that follows where a margin has run out."""
     m = p.motion
+    p.tangent.margin = p.tangent.margin_before = -math.inf
     if which == HEIGHT:
         m.y = p.layer.pad.clear_from  # 0 on smooth surfaces, as it must be
     m.phase = following(m.phase, which, m.v_x - m.belt)

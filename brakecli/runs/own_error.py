@@ -1,0 +1,107 @@
+"""Runs that know their own error: one is made and, while its error is too large, one as much finer as it says.
+
+The error is carried along with the motion, that of steps and that of nodes apart (`event_driven.error`). A run
+that is too coarse says how fine the next one has to be, and one that is fine enough needs no other.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from brakecli.runs.certificate import ROUNDING, Certificate, Certified, sizes
+from brakecli.runs.cost import evaluation_seconds
+from brakecli.runs.ladder import MOST_SECONDS, first_nodes
+from brakecli.solver.compile import Floats
+from brakecli.solver.motion import Motion
+from brakecli.solver.system import MOST_TABLE_BYTES, System
+
+SAFETY = 1.5
+"""What is promised, over the error that a run knows; `make statistics` compares that with true ones."""
+FIRST = 0.2
+"""Tolerance of the first run over the requested one."""
+AIM = 0.4
+"""Part of the promise that a finer run leaves to steps, and to nodes."""
+_MOST_RUNS = 8
+_FINEST, _LEAST, _MOST = 1e-13, 1e-3, 8.0  # tolerance; factors by which tolerance and nodes change at once
+_SURER = 0.03  # of its error, that the next run is to have where an event may have been missed
+_EXACT = 3.0  # evaluations of the exact contact for one by nodes, as steps are shorter and of higher order
+
+
+class Known(NamedTuple):
+    """The error that a run knows, relative to the largest values of x, y, vx and vy."""
+
+    of: Floats  # in each part of the run: by steps, by nodes, and both
+    unsure: float  # s, from which on it may be another, as an event may have been missed; infinite where none
+
+    @classmethod
+    def of_run(cls, run: Motion) -> "Known":
+        """What a run has carried along."""
+        assert run.own is not None
+        largest = np.abs(run.rows[:, :4]).max(axis=0, initial=0.0)
+        return cls((run.own.worst / sizes(run.system, largest, largest)).max(axis=2), run.own.unsure)
+
+    def until(self, limit: float, duration: float) -> float:
+        """Up to when (s) it is surely below a limit."""
+        over = np.flatnonzero(~(self.of[:, 2] <= limit))
+        parts = len(self.of)
+        return min(duration, self.unsure, duration * (int(over[0]) if len(over) else parts) / parts)
+
+
+def certify_by_own_error(system: System, run: Callable[[System], Motion]) -> Certified:
+    """The motion to the tolerance of its method, by runs each of which says how fine the next one has to be.
+
+    On nodes, where the method leaves that open, unless so many were needed that the exact contact is cheaper.
+    """
+    wanted, seconds, rung = system.method.tolerance, 0.0, first_of(system)
+    for left in range(_MOST_RUNS, 0, -1):
+        motion = run(rung)
+        seconds += motion.work.solve_seconds
+        known = Known.of_run(motion)
+        steps, by_nodes, both = known.of.max(axis=0).tolist()
+        error, failed = max(SAFETY * both, ROUNDING), motion.work.failed
+        until = known.until(wanted / SAFETY, system.sampled_duration)
+        certified = not failed and error <= wanted and until >= system.sampled_duration
+        if certified or failed or seconds > MOST_SECONDS or left == 1:
+            break
+        surer, aim = _SURER if known.unsure < system.sampled_duration else 1.0, AIM * wanted / SAFETY
+        at = rung.method
+        tolerance = max(at.tolerance * min(max(min(surer, aim / max(steps, 1e-300)), _LEAST), 1.0), _FINEST)
+        more = min(max(1.0 / surer, by_nodes / aim) ** 0.5, _MOST)
+        finer = _run(system, tolerance, 64 * -int(-rung.nodes * more // 64))
+        if finer.method == at:
+            break
+        rung = finer
+    motion.work.solve_seconds = seconds
+    if not certified:
+        error = max(error, wanted * 1.0000001) if error < np.inf else 1.0
+    with_nodes = f" and {motion.system.nodes} nodes" if motion.system.nodes else ""
+    how = f"the error that is carried along with steps to {motion.system.method.tolerance:.0e}{with_nodes}"
+    return Certified(motion, Certificate(wanted, certified, error, until if not failed else 0.0, how))
+
+
+def first_of(system: System) -> System:
+    """The first run."""
+    return _run(system, FIRST * system.method.tolerance, first_nodes(_on_nodes(system)))
+
+
+def _run(system: System, tolerance: float, nodes: int) -> System:
+    """A run to a tolerance on nodes, or with the exact contact where that is cheaper, or without nodes."""
+    exact = replace(system, knowing=True, method=replace(system.method, tolerance=tolerance))
+    on_nodes = _on_nodes(replace(exact, method=replace(exact.method, nodes=nodes))) if nodes else exact
+    return exact if exact_is_cheaper(on_nodes, system) else on_nodes
+
+
+def exact_is_cheaper(on_nodes: System, system: System) -> bool:
+    """Whether so many nodes cost more than the exact contact, if the latter finds patches at all."""
+    if not system.finds_patches:
+        return False
+    dear = evaluation_seconds(on_nodes) > _EXACT * evaluation_seconds(system)
+    return dear or on_nodes.table_bytes > MOST_TABLE_BYTES
+
+
+def _on_nodes(system: System) -> System:
+    """The same on nodes, where the method leaves that open."""
+    open_ = system.method.automatic and not system.smooth
+    return replace(system, method=replace(system.method, evaluator="midpoint")) if open_ else system
