@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from brakecli.runs.certificate import ROUNDING, Certificate, Certified, sizes
+from brakecli.runs.certificate import ROUNDING, Certificate, Certified, displacement, sizes
 from brakecli.runs.cost import evaluation_seconds
 from brakecli.runs.ladder import MOST_SECONDS, first_nodes
 from brakecli.solver.compile import Floats
@@ -88,7 +88,8 @@ def first_of(system: System) -> System:
 
 def _run(system: System, tolerance: float, nodes: int) -> System:
     """A run to a tolerance on nodes, or with the exact contact where that is cheaper, or without nodes."""
-    exact = replace(system, knowing=True, method=replace(system.method, tolerance=tolerance))
+    method, start = replace(system.method, tolerance=tolerance), displacement(system)
+    exact = replace(system, start_error=start, method=method)
     on_nodes = _on_nodes(replace(exact, method=replace(exact.method, nodes=nodes))) if nodes else exact
     return exact if exact_is_cheaper(on_nodes, system) else on_nodes
 

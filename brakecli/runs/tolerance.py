@@ -1,7 +1,7 @@
 """Choose scheme, nodes and step so that the error of the histories stays below the requested tolerance.
 
-Runs whose steps are exact, and event-driven ones, know their own error. Runs of difference schemes are compared, and
-the finest one is the answer: what two of them differ by is the error of the coarser one.
+Runs whose steps are exact, and event-driven ones, know their own error. Runs of difference schemes are compared,
+and the finest one is the answer: what two of them differ by is the error of the coarser one.
 """
 
 from dataclasses import replace

@@ -176,8 +176,10 @@ class Stepping:
         self._plant_at = self._memory.ctypes.data
         self.scheme.hold(self.plant, self._plant_at)
         self._begin()
-        self.tangent.knows, self.tangent.unsure = int(system.knowing), math.inf
-        self.tangent.margin = self.tangent.margin_before = -math.inf
+        if system.start_error is not None:
+            self.tangent.knows, self.tangent.unsure = 1, math.inf
+            self.tangent.margin = self.tangent.margin_before = -math.inf
+            self.tangent.error[0, :2] = system.start_error
         if system.tracked:
             follow(self.track, self.plant.state.v_x)
         self._start_energy = self._energy()
@@ -216,7 +218,8 @@ class Stepping:
         track = None
         if self.system.tracked:
             track = tracked(self.track, self.plant.c, self.plant.s, self.scheme.mechanical_energy, light)
-        own = OwnError(self.tangent.worst.copy(), float(self.tangent.unsure)) if self.system.knowing else None
+        known = self.tangent.knows == 1
+        own = OwnError(self.tangent.worst.copy(), float(self.tangent.unsure)) if known else None
         return Motion(self.system, np.concatenate(kept), work, energy, found, track, own)
 
     def block(self, stop: int) -> Floats:

@@ -75,7 +75,7 @@ class System:
     notes: tuple[str, ...] = ()  # where surfaces come from
     tangents: bool = False  # whether a small disturbance is carried along with a motion
     tracked: bool = False  # whether the loop notes works of parts, and events
-    knowing: bool = False  # whether the error of a motion is carried along with it
+    start_error: tuple[float, float] | None = None  # of x and y, m; where given, the error is carried along
 
     @cached_property
     def pad(self) -> Pad:

@@ -1,8 +1,8 @@
 """What is carried along with an event-driven motion: a small disturbance, and the motion's own error.
 
-The error e of a motion u obeys e' = A(t) e + u' - f(u). What the continuous solution of each step misses of (6)-(7),
-and what the rule for the contact leaves out of its force, is carried on as a disturbance is. A step is cut into as
-many parts as Gauss's rule has places: in each, A and what is missed are those of its place.
+The error e of a motion u obeys e' = A(t) e + u' - f(u). What the continuous solution of each step misses of
+(6)-(7), and what the rule for the contact leaves out of its force, is carried on as a disturbance is. A step is cut
+into as many parts as Gauss's rule has places: in each, A and what is missed are those of its place.
 """
 
 import numpy as np
