@@ -177,8 +177,7 @@ class Stepping:
         self.scheme.hold(self.plant, self._plant_at)
         self._begin()
         if system.start_error is not None:
-            self.tangent.knows, self.tangent.unsure = 1, math.inf
-            self.tangent.margin = self.tangent.margin_before = -math.inf
+            self.tangent.knows, self.tangent.unsure, self.tangent.moved = 1, math.inf, math.inf
             self.tangent.error[0, :2] = system.start_error
         if system.tracked:
             follow(self.track, self.plant.state.v_x)

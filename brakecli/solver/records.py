@@ -98,7 +98,7 @@ TANGENT = record(
     "rate",  # rad/s, by which places count beside velocities in its size
     "side",  # of the friction law that the motion follows, 0 in stick
     "unsure",  # s, from which on the error may be another, as an event may have been missed; or infinite
-    "margin margin_before moved",  # at the last two places, m/s or N, and what the error moved the last one by
+    "moved",  # what the error moves the margin of slip (m/s) or stick (N) by, at most in the last step
     on=int,  # 1 where it is carried along
     knows=int,  # 1 where the error of the motion is
     placed=int,  # events that were placed inside steps of a difference scheme
@@ -197,6 +197,7 @@ MOTION = record(
     "tolerance",  # of a step
     "pressed_x pressed_y pressed",  # where full contact has been computed in this step, and its force, N
     "step",  # to try next, s
+    "lowest",  # what the margin of slip or stick falls to in the last step, and rises again
     "events_time",  # since which `events` are counted, s
     "step_done time_done tau_done",  # the step of the continuous solution and its begin,
     "belt_done belt_slope_done load_done load_slope_done",  # what acted from outside at its begin,

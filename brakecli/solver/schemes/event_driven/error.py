@@ -1,14 +1,14 @@
 """What is carried along with an event-driven motion: a small disturbance, and the motion's own error.
 
 The error e of a motion u obeys e' = A(t) e + u' - f(u). What the continuous solution of each step misses of
-(6)-(7), and what the rule for the contact leaves out of its force, is carried on as a disturbance is. A step is cut
-into as many parts as Gauss's rule has places: in each, A and what is missed are those of its place.
+(6)-(7), and what the rule for the contact leaves out of its force, is carried on as a disturbance is. A step is
+cut into as many parts as Gauss's rule has places: in each, A and what is missed are those of its place.
 """
 
 import numpy as np
 from numba import float64, int64, types, void
 
-from brakecli.solver.automaton import OPEN, STICK, side_of
+from brakecli.solver.automaton import STICK, side_of
 from brakecli.solver.compile import kernel
 from brakecli.solver.contact import MIDPOINT
 from brakecli.solver.contact.midpoint import left_out
@@ -80,22 +80,6 @@ def _ahead(p: Shoe, tau: float) -> None:
         e[X], e[Y], e[V_X], e[V_Y] = x, y, u, w
 
 
-@kernel(void(SHOE, *[float64] * 5), inlined=False)
-def _see_margin(p: Shoe, since: float, x: float, y: float, v_x: float, v_y: float) -> None:
-    """See whether a margin of slip or stick has been lowest where the error may turn it into an event."""
-    m, t = p.motion, p.tangent
-    if m.phase == OPEN:
-        return
-    if m.phase == STICK:
-        margin, moved = phases.cone(p, since, x, y, v_x, v_y)
-    else:
-        margin = abs(v_x - m.belt - m.belt_slope * since)
-        moved = abs(t.error[0, V_X] + t.error[1, V_X])
-    if t.margin_before > t.margin and t.margin <= margin and t.margin < phases.NEAR * t.moved:
-        t.unsure = min(t.unsure, m.time + m.tau)
-    t.margin_before, t.margin, t.moved = t.margin, margin, moved
-
-
 @kernel(void(SHOE, float64, GRID), inlined=False)
 def grow(p: Shoe, h: float, grid: Grid) -> None:
     """Carry the error of the motion along the step that has been made, and add what the step makes of its own."""
@@ -104,7 +88,7 @@ def grow(p: Shoe, h: float, grid: Grid) -> None:
     m.light = 0
     if m.touch[0, 0] != m.touch[END_STAGE, 0]:
         rule = 2
-    e, n, begin = t.error[0], t.error[1], 0.0
+    e, n, begin, t.moved = t.error[0], t.error[1], 0.0, 0.0
     worst = t.worst[min(m.level * PARTS // grid.samples, PARTS - 1)]
     for place in range(POINTS[rule]):
         theta, part = PLACES[rule, place], step * SHARES[rule, place]
@@ -123,12 +107,17 @@ def grow(p: Shoe, h: float, grid: Grid) -> None:
         e[V_Y] += part * (slope_v_y / step - m.slopes[_AT, V_Y])
         n[V_X] += part * side_of(m.phase) * c.phi * missing
         n[V_Y] -= part * missing
+        moved = abs(e[V_X] + n[V_X])
+        if m.phase == STICK:
+            moved = phases.cone(p, theta * step, at_x, at_y, at_v_x, at_v_y)[1]
+        t.moved = max(t.moved, moved)
         _ahead(p, part - before * step)
         begin += SHARES[rule, place]
-        _see_margin(p, theta * step, at_x, at_y, at_v_x, at_v_y)
         for i in range(4):
             worst[0, i] = max(worst[0, i], abs(e[i]))
             worst[1, i] = max(worst[1, i], abs(n[i]))
             worst[2, i] = max(worst[2, i], abs(e[i] + n[i]))
     _ahead(p, h - step)
+    if m.lowest < phases.NEAR * t.moved:
+        t.unsure = min(t.unsure, m.time + m.tau)
     m.light = light

@@ -4,10 +4,10 @@ import math
 
 from numba import float64, int64, types
 
-from brakecli.solver.automaton import OPEN, STICK, side_of
+from brakecli.solver.automaton import HEIGHT, OPEN, STICK, side_of
 from brakecli.solver.compile import kernel
 from brakecli.solver.records import V_X, Y
-from brakecli.solver.schemes.event_driven.phases import EPSILON, SHOE, Shoe, margins, rounding
+from brakecli.solver.schemes.event_driven.phases import EPSILON, NEAR, SHOE, Shoe, margins, rounding
 from brakecli.solver.schemes.event_driven.runge_kutta import reach
 
 NONE = -1
@@ -15,6 +15,8 @@ LOOKS = 8
 """Places of a step at which the margins are looked at; a step is at most two radians of the fastest motion."""
 
 _NEAR = 1e-12
+_BESIDE = 1e-3
+"""Part of a step over which a margin rises or falls at its ends."""
 _GOLDEN = 0.3819660112501051
 
 
@@ -62,7 +64,7 @@ def _root(p: Shoe, which: int, h: float, left: float, right: float) -> float:
 
 
 @kernel(types.UniTuple(float64, 2)(SHOE, int64, float64, float64, float64), inlined=False)
-def _lowest(p: Shoe, which: int, h: float, left: float, right: float) -> tuple[float, float]:
+def lowest(p: Shoe, which: int, h: float, left: float, right: float) -> tuple[float, float]:
     """Where a margin is lowest between left and right, and its value; by the golden section, until below zero."""
     a, b = left + _GOLDEN * (right - left), right - _GOLDEN * (right - left)
     at_a, at_b = margins(p, h, a)[which], margins(p, h, b)[which]
@@ -84,12 +86,16 @@ def _lowest(p: Shoe, which: int, h: float, left: float, right: float) -> tuple[f
 def first_event(p: Shoe, h: float) -> tuple[int, float]:
     """The margin that runs out first and the part of the step at which it does; 0 where it never was positive.
 
-    None does where the continuous solution cannot get that far from the begin of the step. Between three places a
-    margin may also dip below zero: it is followed down where a parabola says that it may.
+    None does where the continuous solution cannot get that far from the begin of the step. A margin may also dip
+    between two places: it is followed down beside the ends of the step, and where a parabola says that it comes so
+    `near` to zero. How low it gets without an event is kept, as the error of the motion may make one of it.
     """
     m, sliding = p.motion, side_of(p.motion.phase) * (p.motion.begin[V_X] - p.motion.belt)
+    near = 2.0 * NEAR * p.tangent.moved if p.tangent.knows == 1 else 0.0
+    far = reach(m, V_X) + abs(m.belt_slope) * h + near
+    m.lowest = math.inf
     stays = abs(m.begin[Y] - p.layer.pad.clear_from) > reach(m, Y)
-    if stays and (m.phase == OPEN or (m.phase != STICK and sliding > reach(m, V_X) + abs(m.belt_slope) * h)):
+    if stays and (m.phase == OPEN or (m.phase != STICK and sliding > far)):
         return NONE, 1.0
     allowed = _allowances(p)
     before_last = last = margins(p, h, 0.0)
@@ -97,7 +103,7 @@ def first_event(p: Shoe, h: float) -> tuple[int, float]:
         theta, found, first = look / LOOKS, NONE, math.inf
         now = margins(p, h, theta)
         for which in range(3):
-            left, right = (look - 1) / LOOKS, 0.0
+            left, right, dip, until = (look - 1) / LOOKS, 0.0, -1.0, 0.0
             bend, rise = before_last[which] - 2.0 * last[which] + now[which], now[which] - before_last[which]
             if now[which] < -allowed[which]:
                 right = theta
@@ -109,15 +115,21 @@ def first_event(p: Shoe, h: float) -> tuple[int, float]:
                             break
                     else:
                         return which, 0.0
-            elif (
-                look > 1
-                and before_last[which] > last[which] <= now[which]
-                and rise * rise > 7.0 * bend * last[which]
-            ):
-                # The parabola falls to an eighth of the place in the middle.
-                place, value = _lowest(p, which, h, (look - 2) / LOOKS, theta)
+            elif look == 1 and allowed[which] < last[which] <= now[which]:
+                if margins(p, h, _BESIDE)[which] < last[which]:
+                    dip, until = 0.0, theta
+            elif before_last[which] > last[which] <= now[which]:
+                if rise * rise > 7.0 * bend * (last[which] - near):  # it falls to an eighth of the middle
+                    dip, until = theta - 2.0 / LOOKS, theta
+            if right == 0.0 and dip < 0.0 and look == LOOKS and now[which] <= last[which]:
+                if margins(p, h, 1.0 - _BESIDE)[which] < now[which]:
+                    dip, until = left, theta
+            if dip >= 0.0:
+                place, value = lowest(p, which, h, dip, until)
                 if value < -allowed[which]:
-                    left, right = (look - 2) / LOOKS, place
+                    left, right = dip, place
+                elif which != HEIGHT:
+                    m.lowest = min(m.lowest, value)
             if right > 0.0:
                 root = _root(p, which, h, left, right)
                 if root < first:

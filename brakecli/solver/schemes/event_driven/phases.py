@@ -229,7 +229,7 @@ def take_hold(p: Shoe) -> None:
 def switch(p: Shoe, which: int) -> None:
     """Enter the phase that follows where a margin has run out."""
     m = p.motion
-    p.tangent.margin = p.tangent.margin_before = -math.inf
+    p.tangent.moved = math.inf
     if which == HEIGHT:
         m.y = p.layer.pad.clear_from  # 0 on smooth surfaces, as it must be
     m.phase = following(m.phase, which, m.v_x - m.belt)
