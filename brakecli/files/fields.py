@@ -130,6 +130,13 @@ RUN = (
     ratio("tolerance", "largest relative error of the histories that is asked for", "certificate."),
     integer("certified", "whether the error is certain to stay below the tolerance (0, 1)", "certificate."),
     ratio("estimated_error", "relative error of the histories, where the case gives no step", "certificate."),
+    ratio("error_by_steps", "part of it by the steps, where a run knows its own error", "certificate.by_steps"),
+    ratio("error_by_nodes", "part of it by the contact's nodes, likewise", "certificate.by_nodes"),
+    ratio(
+        "error_amplification",
+        "largest error over the sum of all parts of it, likewise",
+        "certificate.amplification",
+    ),
     Field("certified_until", "s", "up to here the error stays below the tolerance", at="certificate."),
     Field("certified_by", "", "how the error was determined", TEXT, at="certificate.method"),
     Field("evaluators", "", "steps that each evaluator took", OBJECT, "motion.work.", group="evaluators"),

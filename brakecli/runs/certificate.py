@@ -25,6 +25,9 @@ class Certificate:
     estimated_error: float  # relative to the largest value of each of x, y, vx and vy
     certified_until: float  # s; up to here they keep the tolerance where they do not to the end
     method: str
+    by_steps: float | None = None  # what steps make of the error, where the run knows its own,
+    by_nodes: float | None = None  # what nodes make of it,
+    amplification: float | None = None  # and the largest error over all that they have added to it
 
     def sentence(self) -> str:
         """The certificate in words."""

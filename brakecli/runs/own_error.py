@@ -32,7 +32,7 @@ _EXACT = 3.0  # evaluations of the exact contact for one by nodes, as steps are 
 class Known(NamedTuple):
     """The error that a run knows, relative to the largest values of x, y, vx and vy."""
 
-    of: Floats  # in each part of the run: by steps, by nodes, and both
+    of: Floats  # in each span of the run: by steps, by nodes, and both
     unsure: float  # s, from which on it may be another, as an event may have been missed; infinite where none
 
     @classmethod
@@ -45,8 +45,8 @@ class Known(NamedTuple):
     def until(self, limit: float, duration: float) -> float:
         """Up to when (s) it is surely below a limit."""
         over = np.flatnonzero(~(self.of[:, 2] <= limit))
-        parts = len(self.of)
-        return min(duration, self.unsure, duration * (int(over[0]) if len(over) else parts) / parts)
+        spans = len(self.of)
+        return min(duration, self.unsure, duration * (int(over[0]) if len(over) else spans) / spans)
 
 
 def certify_by_own_error(system: System, run: Callable[[System], Motion]) -> Certified:
@@ -78,12 +78,14 @@ def certify_by_own_error(system: System, run: Callable[[System], Motion]) -> Cer
         error = max(error, wanted * 1.0000001) if error < np.inf else 1.0
     with_nodes = f" and {motion.system.nodes} nodes" if motion.system.nodes else ""
     how = f"the error that is carried along with steps to {motion.system.method.tolerance:.0e}{with_nodes}"
-    return Certified(motion, Certificate(wanted, certified, error, until if not failed else 0.0, how))
+    assert motion.own is not None
+    apart = SAFETY * steps, SAFETY * by_nodes, motion.own.amplification
+    return Certified(motion, Certificate(wanted, certified, error, until if not failed else 0.0, how, *apart))
 
 
 def first_of(system: System) -> System:
     """The first run."""
-    return _run(system, FIRST * system.method.tolerance, first_nodes(_on_nodes(system)))
+    return _run(system, FIRST * system.method.tolerance, 2 * first_nodes(_on_nodes(system)))
 
 
 def _run(system: System, tolerance: float, nodes: int) -> System:

@@ -98,10 +98,11 @@ class Work:
 
 
 class OwnError(NamedTuple):
-    """What a run knows of its error: the largest of each component in each part of the run (m, m/s)."""
+    """What a run knows of its error: the largest of each component in each span of the run (m, m/s)."""
 
-    worst: Floats  # parts, by steps, nodes and both, x y vx vy
+    worst: Floats  # spans, by steps, nodes and both, x y vx vy
     unsure: float  # s, from which on it may be another, as an event may have been missed; infinite where none
+    amplification: float  # the largest error over all that steps and nodes have added to it
 
 
 @dataclass(frozen=True)
@@ -169,9 +170,9 @@ class Stepping:
             beside=Beside(new(STATE), new(PROBLEM), new(CONTACT), new(WORK)),
             track=self.track,
         )
+        self.tangent.rate = 2.0 * math.pi * system.natural_frequencies[1]
         if system.tangents:
-            fastest = 2.0 * math.pi * system.natural_frequencies[1]
-            seed(self.tangent, self.plant.beside.state, fastest, self.plant.s.h)
+            seed(self.tangent, self.plant.beside.state, self.plant.s.h)
         self._memory = np.zeros(LARGEST, np.int8)
         self._plant_at = self._memory.ctypes.data
         self.scheme.hold(self.plant, self._plant_at)
@@ -179,6 +180,7 @@ class Stepping:
         if system.start_error is not None:
             self.tangent.knows, self.tangent.unsure, self.tangent.moved = 1, math.inf, math.inf
             self.tangent.error[0, :2] = system.start_error
+            self.tangent.added = self.tangent.most = self.tangent.rate * math.hypot(*system.start_error)
         if system.tracked:
             follow(self.track, self.plant.state.v_x)
         self._start_energy = self._energy()
@@ -217,8 +219,10 @@ class Stepping:
         track = None
         if self.system.tracked:
             track = tracked(self.track, self.plant.c, self.plant.s, self.scheme.mechanical_energy, light)
-        known = self.tangent.knows == 1
-        own = OwnError(self.tangent.worst.copy(), float(self.tangent.unsure)) if known else None
+        own = None
+        if self.tangent.knows == 1:
+            added = max(float(self.tangent.added), 1e-300)
+            own = OwnError(self.tangent.worst.copy(), float(self.tangent.unsure), float(self.tangent.most) / added)
         return Motion(self.system, np.concatenate(kept), work, energy, found, track, own)
 
     def block(self, stop: int) -> Floats:

@@ -48,10 +48,10 @@ class Exponent(NamedTuple):
     even_error: float = math.nan  # motion is linear: it swings about an exponential function
 
 
-def seed(t: Any, state: Any, rate: float, h: float) -> None:
+def seed(t: Any, state: Any, h: float) -> None:
     """Begin with a disturbance of size one in no particular direction; `state` is that of a difference scheme."""
-    t.on, t.rate = 1, rate
-    t.x, t.y, t.v_x, t.v_y = state.x, state.y, state.v_x, state.v_y = 0.5 / rate, 0.5 / rate, 0.5, -0.5
+    t.on = 1
+    t.x, t.y, t.v_x, t.v_y = state.x, state.y, state.v_x, state.v_y = 0.5 / t.rate, 0.5 / t.rate, 0.5, -0.5
     state.x_old, state.y_old = state.x - h * state.v_x, state.y - h * state.v_y
 
 
@@ -125,15 +125,21 @@ def solve(c: Coefficients, beside: Beside, of: Any, side: float, stiffness: floa
     b.d, b.e, b.normal_force = d + d_slope * force, e + e_slope * force, force
 
 
+@kernel(float64(TANGENT_TYPE, *[float64] * 4))
+def size(t: Any, x: float, y: float, v_x: float, v_y: float) -> float:
+    """The size of a disturbance, m/s: of its velocity, and of its places times the rate of the fastest motion."""
+    return math.sqrt(t.rate * t.rate * (x * x + y * y) + (v_x * v_x + v_y * v_y))
+
+
 @kernel(float64(TANGENT_TYPE, int64, int64))
 def renew(t: Any, number: int, samples: int) -> float:
     """Note the growth up to a sample, and go on with a disturbance of size one; what it was multiplied by."""
-    size = math.sqrt(t.rate * t.rate * (t.x * t.x + t.y * t.y) + (t.v_x * t.v_x + t.v_y * t.v_y))
+    now = size(t, t.x, t.y, t.v_x, t.v_y)
     if number > 0:
-        t.logs[(number - 1) * PARTS // samples] += math.log(min(max(size, LEAST), MOST))
-    if not LEAST < size < MOST:
+        t.logs[(number - 1) * PARTS // samples] += math.log(min(max(now, LEAST), MOST))
+    if not LEAST < now < MOST:
         t.x, t.y, t.v_x, t.v_y = 1.0 / t.rate, 0.0, 0.0, 0.0
         return 0.0
-    part = 1.0 / size
+    part = 1.0 / now
     t.x, t.y, t.v_x, t.v_y = part * t.x, part * t.y, part * t.v_x, part * t.v_y
     return part

@@ -5,6 +5,8 @@ without a loop. Reassociation lets it keep several partial sums side by side; no
 zeros or on the order of additions. Both together make it about as fast as C for one number of waves and nodes.
 """
 
+import math
+
 from numba import float64, types, void
 
 from brakecli.solver.compile import FAST, Floats, borrowed, kernel, stopped, vector
@@ -108,17 +110,26 @@ def left_out(y: float, layer: Layer) -> float:
 
     An edge at the part θ of the way between two nodes, whose gaps are g > 0 and g' < 0, cuts a cell: where the gap
     is straight, it holds (g - g')(θ - 1/2)²/2 spacings more than its mean. With θ = g/(g - g') that is
-    (g + g')²/8(g - g'). What is left falls with the third power of the spacing.
+    (g + g')²/8(g - g'). What is left falls with the third power of the spacing. A patch, or a hole, that lies
+    between nodes is that of a parabola with the bend d = g_1 - 2 g_2 + g_3 and the extreme value m: it holds
+    4/3 |m| √(2|m/d|) spacings. The mean of its cell is d/24 above the gap in the middle.
     """
-    pad, n, total = layer.pad, layer.pad.nodes, 0.0
+    pad, n, edges, hidden = layer.pad, layer.pad.nodes, 0.0, 0.0
     f1, f2 = layer.tables[pad.nodes_at : pad.nodes_at + n], layer.scratch[BESIDE : BESIDE + n]
-    before = f2[0] - f1[0] - y
-    for j in range(1, n):
-        gap = f2[j] - f1[j] - y
-        if gap * before < 0.0:
-            total += (gap + before) ** 2 / abs(gap - before)
-        before = gap
-    return pad.k * (2.0 * pad.half_length / n) * 0.125 * total  # type: ignore[no-any-return]
+    before, gap = f2[0] - f1[0] - y, f2[1] - f1[1] - y
+    if gap * before < 0.0:
+        edges += (gap + before) ** 2 / abs(gap - before)
+    for j in range(2, n):
+        after = f2[j] - f1[j] - y
+        bend = before - 2.0 * gap + after
+        if after * gap < 0.0:
+            edges += (after + gap) ** 2 / abs(after - gap)
+        elif 6.0 * abs(gap) < abs(bend) and bend * gap > 0.0 and gap * before > 0.0:
+            extreme = gap - bend / 24.0 - 0.125 * (after - before) ** 2 / bend
+            if extreme * gap < 0.0:
+                hidden += abs(extreme) * math.sqrt(2.0 * abs(extreme / bend))
+        before, gap = gap, after
+    return pad.k * (2.0 * pad.half_length / n) * (0.125 * edges + 4.0 / 3.0 * hidden)  # type: ignore[no-any-return]
 
 
 @kernel(EVALUATE)

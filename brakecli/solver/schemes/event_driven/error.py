@@ -8,14 +8,15 @@ cut into as many parts as Gauss's rule has places: in each, A and what is missed
 import numpy as np
 from numba import float64, int64, types, void
 
-from brakecli.solver.automaton import STICK, side_of
+from brakecli.solver.automaton import OPEN, STICK, side_of
 from brakecli.solver.compile import kernel
 from brakecli.solver.contact import MIDPOINT
 from brakecli.solver.contact.midpoint import left_out
-from brakecli.solver.records import GRID, PARTS, STAGES, V_X, V_Y, Grid, X, Y
+from brakecli.solver.records import GRID, SPANS, STAGES, V_X, V_Y, Grid, X, Y
 from brakecli.solver.schemes.event_driven import phases, runge_kutta
 from brakecli.solver.schemes.event_driven.phases import SHOE, Shoe
 from brakecli.solver.schemes.event_driven.runge_kutta import END_STAGE, USED, A
+from brakecli.solver.tangent import size
 
 _RULES = [np.polynomial.legendre.leggauss(points) for points in (5, 3, 12)]
 POINTS = np.array([len(places) for places, _ in _RULES])
@@ -86,10 +87,11 @@ def grow(p: Shoe, h: float, grid: Grid) -> None:
     c, m, t, step = p.c, p.motion, p.tangent, p.motion.step_done
     rule, light = m.pair, m.light
     m.light = 0
-    if m.touch[0, 0] != m.touch[END_STAGE, 0]:
+    opens = m.phase != OPEN and m.begin[Y] + runge_kutta.reach(m, Y) > p.layer.pad.full_up_to
+    if m.touch[0, 0] != m.touch[END_STAGE, 0] or (m.pair == 0 and opens):
         rule = 2
     e, n, begin, t.moved = t.error[0], t.error[1], 0.0, 0.0
-    worst = t.worst[min(m.level * PARTS // grid.samples, PARTS - 1)]
+    worst = t.worst[min(m.level * SPANS // grid.samples, SPANS - 1)]
     for place in range(POINTS[rule]):
         theta, part = PLACES[rule, place], step * SHARES[rule, place]
         at_x, slope_x = runge_kutta.interpolated_both(m, X, theta)
@@ -100,13 +102,15 @@ def grow(p: Shoe, h: float, grid: Grid) -> None:
         missing = left_out(at_y, p.layer) / c.m if p.layer.contact.kind == MIDPOINT else 0.0
         before = theta - begin
         _ahead(p, before * step)
-        if m.phase != STICK:
-            e[X] += part * (slope_x / step - m.slopes[_AT, X])
-            e[V_X] += part * (slope_v_x / step - m.slopes[_AT, V_X])
-        e[Y] += part * (slope_y / step - m.slopes[_AT, Y])
-        e[V_Y] += part * (slope_v_y / step - m.slopes[_AT, V_Y])
-        n[V_X] += part * side_of(m.phase) * c.phi * missing
-        n[V_Y] -= part * missing
+        d_x, d_y = part * (slope_x / step - m.slopes[_AT, X]), part * (slope_y / step - m.slopes[_AT, Y])
+        d_u, d_w = part * (slope_v_x / step - m.slopes[_AT, V_X]), part * (slope_v_y / step - m.slopes[_AT, V_Y])
+        n_u, n_w = part * side_of(m.phase) * c.phi * missing, -part * missing
+        if m.phase == STICK:
+            d_x = d_u = 0.0
+        e[X], e[Y], e[V_X], e[V_Y] = e[X] + d_x, e[Y] + d_y, e[V_X] + d_u, e[V_Y] + d_w
+        n[V_X], n[V_Y] = n[V_X] + n_u, n[V_Y] + n_w
+        t.added += size(t, d_x, d_y, d_u + n_u, d_w + n_w)
+        t.most = max(t.most, size(t, e[X] + n[X], e[Y] + n[Y], e[V_X] + n[V_X], e[V_Y] + n[V_Y]))
         moved = abs(e[V_X] + n[V_X])
         if m.phase == STICK:
             moved = phases.cone(p, theta * step, at_x, at_y, at_v_x, at_v_y)[1]

@@ -116,14 +116,14 @@ def first_event(p: Shoe, h: float) -> tuple[int, float]:
                     else:
                         return which, 0.0
             elif look == 1 and allowed[which] < last[which] <= now[which]:
-                if margins(p, h, _BESIDE)[which] < last[which]:
-                    dip, until = 0.0, theta
-            elif before_last[which] > last[which] <= now[which]:
-                if rise * rise > 7.0 * bend * (last[which] - near):  # it falls to an eighth of the middle
-                    dip, until = theta - 2.0 / LOOKS, theta
+                dip, until = 0.0 if margins(p, h, _BESIDE)[which] < last[which] else -1.0, theta
+            elif (
+                before_last[which] > last[which] <= now[which]
+                and rise * rise > 7.0 * bend * (last[which] - near)  # it falls to an eighth of the middle
+            ):
+                dip, until = theta - 2.0 / LOOKS, theta
             if right == 0.0 and dip < 0.0 and look == LOOKS and now[which] <= last[which]:
-                if margins(p, h, 1.0 - _BESIDE)[which] < now[which]:
-                    dip, until = left, theta
+                dip, until = left if margins(p, h, 1.0 - _BESIDE)[which] < now[which] else -1.0, theta
             if dip >= 0.0:
                 place, value = lowest(p, which, h, dip, until)
                 if value < -allowed[which]:
