@@ -134,7 +134,7 @@ RUN = (
     ratio("error_by_nodes", "part of it by the contact's nodes, likewise", "certificate.by_nodes"),
     ratio(
         "error_amplification",
-        "largest error over the sum of all parts of it, likewise",
+        "by how much the motion multiplies an error of its start, at most",
         "certificate.amplification",
     ),
     Field("certified_until", "s", "up to here the error stays below the tolerance", at="certificate."),

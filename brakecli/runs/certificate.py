@@ -27,7 +27,7 @@ class Certificate:
     method: str
     by_steps: float | None = None  # what steps make of the error, where the run knows its own,
     by_nodes: float | None = None  # what nodes make of it,
-    amplification: float | None = None  # and the largest error over all that they have added to it
+    amplification: float | None = None  # and by how much the motion multiplies a disturbance of its start, at most
 
     def sentence(self) -> str:
         """The certificate in words."""

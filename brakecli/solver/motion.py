@@ -102,7 +102,7 @@ class OwnError(NamedTuple):
 
     worst: Floats  # spans, by steps, nodes and both, x y vx vy
     unsure: float  # s, from which on it may be another, as an event may have been missed; infinite where none
-    amplification: float  # the largest error over all that steps and nodes have added to it
+    amplification: float | None  # of a small disturbance of the start, at most, where one is carried along
 
 
 @dataclass(frozen=True)
@@ -180,7 +180,6 @@ class Stepping:
         if system.start_error is not None:
             self.tangent.knows, self.tangent.unsure, self.tangent.moved = 1, math.inf, math.inf
             self.tangent.error[0, :2] = system.start_error
-            self.tangent.added = self.tangent.most = self.tangent.rate * math.hypot(*system.start_error)
         if system.tracked:
             follow(self.track, self.plant.state.v_x)
         self._start_energy = self._energy()
@@ -221,8 +220,8 @@ class Stepping:
             track = tracked(self.track, self.plant.c, self.plant.s, self.scheme.mechanical_energy, light)
         own = None
         if self.tangent.knows == 1:
-            added = max(float(self.tangent.added), 1e-300)
-            own = OwnError(self.tangent.worst.copy(), float(self.tangent.unsure), float(self.tangent.most) / added)
+            grown = math.exp(min(max(0.0, float(np.cumsum(self.tangent.logs).max())), 700.0)) if carried else None
+            own = OwnError(self.tangent.worst.copy(), float(self.tangent.unsure), grown)
         return Motion(self.system, np.concatenate(kept), work, energy, found, track, own)
 
     def block(self, stop: int) -> Floats:

@@ -93,6 +93,8 @@ COUNTS = record(
 PARTS = 512
 """Parts of a run in which the growth of a disturbance, and the works, are kept apart."""
 
+DISTURBED = 2
+"""Row of the disturbance behind the errors."""
 SPANS = 64
 """Spans of a run, in each of which the largest error is kept."""
 
@@ -101,13 +103,15 @@ TANGENT = record(
     "rate",  # rad/s, by which places count beside velocities in its size
     "side",  # of the friction law that the motion follows, 0 in stick
     "unsure",  # s, from which on the error may be another, as an event may have been missed; or infinite
-    "added most",  # sizes of what steps and nodes have made of it, in all, and of the largest error, m/s
     "moved",  # what the error moves the margin of slip (m/s) or stick (N) by, at most in the last step
     on=int,  # 1 where it is carried along
     knows=int,  # 1 where the error of the motion is
     placed=int,  # events that were placed inside steps of a difference scheme
     logs=(float, PARTS),  # ln of its growth in each part of the run
-    error=(float, (2, 4)),  # of the motion, by its steps and by the nodes
+    error=(
+        float,
+        (DISTURBED + 1, 4),
+    ),  # of the motion, by its steps and by the nodes; and the disturbance, in a step
     worst=(float, (SPANS, 3, 4)),  # their largest size in each span of the run, and that of their sum
 )
 """A disturbance, and the error of a motion, that are carried along with it, see `solver.tangent`."""
@@ -220,7 +224,6 @@ MOTION = record(
     slopes=(float, (STAGES, 4)),  # derivatives of the components by time, at each stage
     touch=(float, (STAGES, 2)),  # stiffness of the contact and ∂F_y/∂x, N/m
     stores=(float, STAGES),  # energy of the contact, J, unless it is found without
-    disturbed=(float, (STAGES, 4)),  # slopes of a disturbance
     powers=(float, (POWERS, 4)),  # coefficients of the continuous solution
     work_rates=(float, (STAGES, POWERED)),  # powers of the energy account, W
 )

@@ -125,21 +125,15 @@ def solve(c: Coefficients, beside: Beside, of: Any, side: float, stiffness: floa
     b.d, b.e, b.normal_force = d + d_slope * force, e + e_slope * force, force
 
 
-@kernel(float64(TANGENT_TYPE, *[float64] * 4))
-def size(t: Any, x: float, y: float, v_x: float, v_y: float) -> float:
-    """The size of a disturbance, m/s: of its velocity, and of its places times the rate of the fastest motion."""
-    return math.sqrt(t.rate * t.rate * (x * x + y * y) + (v_x * v_x + v_y * v_y))
-
-
 @kernel(float64(TANGENT_TYPE, int64, int64))
 def renew(t: Any, number: int, samples: int) -> float:
     """Note the growth up to a sample, and go on with a disturbance of size one; what it was multiplied by."""
-    now = size(t, t.x, t.y, t.v_x, t.v_y)
+    size = math.sqrt(t.rate * t.rate * (t.x * t.x + t.y * t.y) + (t.v_x * t.v_x + t.v_y * t.v_y))
     if number > 0:
-        t.logs[(number - 1) * PARTS // samples] += math.log(min(max(now, LEAST), MOST))
-    if not LEAST < now < MOST:
+        t.logs[(number - 1) * PARTS // samples] += math.log(min(max(size, LEAST), MOST))
+    if not LEAST < size < MOST:
         t.x, t.y, t.v_x, t.v_y = 1.0 / t.rate, 0.0, 0.0, 0.0
         return 0.0
-    part = 1.0 / now
+    part = 1.0 / size
     t.x, t.y, t.v_x, t.v_y = part * t.x, part * t.y, part * t.v_x, part * t.v_y
     return part

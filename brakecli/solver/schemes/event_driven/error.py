@@ -6,17 +6,16 @@ cut into as many parts as Gauss's rule has places: in each, A and what is missed
 """
 
 import numpy as np
-from numba import float64, int64, types, void
+from numba import float64, void
 
 from brakecli.solver.automaton import OPEN, STICK, side_of
 from brakecli.solver.compile import kernel
 from brakecli.solver.contact import MIDPOINT
 from brakecli.solver.contact.midpoint import left_out
-from brakecli.solver.records import GRID, SPANS, STAGES, V_X, V_Y, Grid, X, Y
+from brakecli.solver.records import DISTURBED, GRID, SPANS, STAGES, V_X, V_Y, Grid, X, Y
 from brakecli.solver.schemes.event_driven import phases, runge_kutta
 from brakecli.solver.schemes.event_driven.phases import SHOE, Shoe
-from brakecli.solver.schemes.event_driven.runge_kutta import END_STAGE, USED, A
-from brakecli.solver.tangent import size
+from brakecli.solver.schemes.event_driven.runge_kutta import END_STAGE
 
 _RULES = [np.polynomial.legendre.leggauss(points) for points in (5, 3, 12)]
 POINTS = np.array([len(places) for places, _ in _RULES])
@@ -27,49 +26,17 @@ _TERMS = 4
 """Of the series, over 0.22 of a step at most, in which the fastest motion turns by less than half a radian."""
 _AT = STAGES - 1
 
-_FOUR = types.UniTuple(float64, 4)
-
-
-@kernel(_FOUR(SHOE, int64, *[float64] * 4))
-def _rate(p: Shoe, stage: int, x: float, y: float, v_x: float, v_y: float) -> tuple[float, float, float, float]:
-    """How a disturbance changes at a stage, A(t) e."""
-    c, m = p.c, p.motion
-    force = m.touch[stage, 1] * x - m.touch[stage, 0] * y
-    against_x, against_y = phases.resistance(c, 0.0, x, y, v_x, v_y)
-    along = -side_of(m.phase) * c.phi * force - against_x if m.phase != STICK else 0.0
-    return v_x, v_y, along / c.m, (force - against_y) / c.m
-
-
-@kernel(_FOUR(SHOE, float64, *[float64] * 4), inlined=False)
-def carried(p: Shoe, h: float, x: float, y: float, v_x: float, v_y: float) -> tuple[float, float, float, float]:
-    """A disturbance along the step that has been made, by its derivative, and on to an event behind it."""
-    m, k, step = p.motion, p.motion.disturbed, p.motion.step_done
-    at_x, at_y, at_v_x, at_v_y = x, y, v_x, v_y
-    for stage in range(END_STAGE + 1):
-        if USED[m.pair] <= stage < END_STAGE:
-            continue
-        at_x, at_y, at_v_x, at_v_y = 0.0, 0.0, 0.0, 0.0
-        for j in range(min(stage, USED[m.pair])):
-            a = A[m.pair, stage, j]
-            at_x, at_y = at_x + a * k[j, X], at_y + a * k[j, Y]
-            at_v_x, at_v_y = at_v_x + a * k[j, V_X], at_v_y + a * k[j, V_Y]
-        at_x, at_y, at_v_x, at_v_y = x + step * at_x, y + step * at_y, v_x + step * at_v_x, v_y + step * at_v_y
-        k[stage, X], k[stage, Y], k[stage, V_X], k[stage, V_Y] = _rate(p, stage, at_x, at_y, at_v_x, at_v_y)
-    rest, last = h - step, END_STAGE
-    at_x, at_y = at_x + rest * k[last, X], at_y + rest * k[last, Y]
-    return at_x, at_y, at_v_x + rest * k[last, V_X], at_v_y + rest * k[last, V_Y]
-
 
 @kernel(void(SHOE, float64), inlined=False)
 def _ahead(p: Shoe, tau: float) -> None:
-    """Carry both errors by exp(A τ), with the contact at the last place."""
+    """Carry errors and disturbance by exp(A τ), with the contact at the last place."""
     c, m = p.c, p.motion
     grip, stiffness, tangential = -side_of(m.phase) * c.phi, m.touch[_AT, 0], m.touch[_AT, 1]
     free, whole = 0.0 if m.phase == STICK else 1.0 / c.m, 1.0 / c.m
     x_x, x_y = free * (grip * tangential - c.c_xx), free * (-grip * stiffness - c.c_xy)
     y_x, y_y = whole * (tangential - c.c_xy), whole * (-stiffness - c.c_yy)
     x_u, x_w, y_u, y_w = -free * c.b_xx, -free * c.b_xy, -whole * c.b_xy, -whole * c.b_yy
-    for kind in range(2):
+    for kind in range(DISTURBED + p.tangent.on):
         e = p.tangent.error[kind]
         x, y, u, w = e[X], e[Y], e[V_X], e[V_Y]
         d_x, d_y, d_u, d_w = x, y, u, w
@@ -83,14 +50,15 @@ def _ahead(p: Shoe, tau: float) -> None:
 
 @kernel(void(SHOE, float64, GRID), inlined=False)
 def grow(p: Shoe, h: float, grid: Grid) -> None:
-    """Carry the error of the motion along the step that has been made, and add what the step makes of its own."""
+    """Carry error and disturbance along the step that has been made, and add what the step makes of its own."""
     c, m, t, step = p.c, p.motion, p.tangent, p.motion.step_done
     rule, light = m.pair, m.light
     m.light = 0
     opens = m.phase != OPEN and m.begin[Y] + runge_kutta.reach(m, Y) > p.layer.pad.full_up_to
     if m.touch[0, 0] != m.touch[END_STAGE, 0] or (m.pair == 0 and opens):
         rule = 2
-    e, n, begin, t.moved = t.error[0], t.error[1], 0.0, 0.0
+    e, n, w, begin, t.moved = t.error[0], t.error[1], t.error[DISTURBED], 0.0, 0.0
+    w[X], w[Y], w[V_X], w[V_Y] = t.x, t.y, t.v_x, t.v_y
     worst = t.worst[min(m.level * SPANS // grid.samples, SPANS - 1)]
     for place in range(POINTS[rule]):
         theta, part = PLACES[rule, place], step * SHARES[rule, place]
@@ -109,8 +77,6 @@ def grow(p: Shoe, h: float, grid: Grid) -> None:
             d_x = d_u = 0.0
         e[X], e[Y], e[V_X], e[V_Y] = e[X] + d_x, e[Y] + d_y, e[V_X] + d_u, e[V_Y] + d_w
         n[V_X], n[V_Y] = n[V_X] + n_u, n[V_Y] + n_w
-        t.added += size(t, d_x, d_y, d_u + n_u, d_w + n_w)
-        t.most = max(t.most, size(t, e[X] + n[X], e[Y] + n[Y], e[V_X] + n[V_X], e[V_Y] + n[V_Y]))
         moved = abs(e[V_X] + n[V_X])
         if m.phase == STICK:
             moved = phases.cone(p, theta * step, at_x, at_y, at_v_x, at_v_y)[1]
@@ -124,4 +90,5 @@ def grow(p: Shoe, h: float, grid: Grid) -> None:
     _ahead(p, h - step)
     if m.lowest < phases.NEAR * t.moved:
         t.unsure = min(t.unsure, m.time + m.tau)
+    t.x, t.y, t.v_x, t.v_y = w[X], w[Y], w[V_X], w[V_Y]
     m.light = light

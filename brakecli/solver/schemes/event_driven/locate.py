@@ -17,6 +17,8 @@ LOOKS = 8
 _NEAR = 1e-12
 _BESIDE = 1e-3
 """Part of a step over which a margin rises or falls at its ends."""
+_APART = 0.05
+"""Part of a step between the places of a parabola."""
 _GOLDEN = 0.3819660112501051
 
 
@@ -82,13 +84,23 @@ def lowest(p: Shoe, which: int, h: float, left: float, right: float) -> tuple[fl
     return (a, at_a) if at_a < at_b else (b, at_b)
 
 
+@kernel(float64(SHOE, int64, float64, float64), inlined=False)
+def _depth(p: Shoe, which: int, h: float, root: float) -> float:
+    """How far below zero a margin would fall behind its root, if the phase went on: by a parabola; or infinity."""
+    apart = 0.5 * min(root, 2.0 * _APART)
+    one, two = margins(p, h, root - apart)[which], margins(p, h, root - 2.0 * apart)[which]
+    fall, bend = 2.0 * one - 0.5 * two, two - 2.0 * one
+    return 0.5 * fall * fall / bend if bend > 0.0 else math.inf
+
+
 @kernel(types.Tuple((int64, float64))(SHOE, float64), inlined=False)
 def first_event(p: Shoe, h: float) -> tuple[int, float]:
     """The margin that runs out first and the part of the step at which it does; 0 where it never was positive.
 
     None does where the continuous solution cannot get that far from the begin of the step. A margin may also dip
     between two places: it is followed down beside the ends of the step, and where a parabola says that it comes so
-    `near` to zero. How low it gets without an event is kept, as the error of the motion may make one of it.
+    `near` to zero. How low it gets without an event is kept, and how far it would fall behind one, as the error of
+    the motion may make an event of it, or none.
     """
     m, sliding = p.motion, side_of(p.motion.phase) * (p.motion.begin[V_X] - p.motion.belt)
     near = 2.0 * NEAR * p.tangent.moved if p.tangent.knows == 1 else 0.0
@@ -135,6 +147,8 @@ def first_event(p: Shoe, h: float) -> tuple[int, float]:
                 if root < first:
                     found, first = which, root
         if found != NONE:
+            if found != HEIGHT:
+                m.lowest = min(m.lowest, _depth(p, found, h, first))
             return found, first
         before_last, last = last, now
     return NONE, 1.0

@@ -113,7 +113,7 @@ def press(p: Shoe, x: float, y: float, phase: int) -> float:
         contact.store = 0.5 * contact.stiffness * y * y
         return contact.normal_force  # type: ignore[no-any-return]
     full, m = coverage(y, pad) == FULL, p.motion
-    light = m.light == 1 and p.tangent.on == 0
+    light = m.light == 1
     if not full or p.layer.window.rows > 0:
         _evaluate_at(p.layer.press if light else p.layer.evaluate)(x, y, p.layer)
         if full:  # the sum over nodes is the closed form

@@ -12,7 +12,7 @@ from brakecli.solver.quantities import BOUND, Failure
 from brakecli.solver.records import DRIVE, GRID, KNOTS, MOTION_TYPE, POWERED, STAGES, V_X, V_Y, Drive, Grid, X, Y
 from brakecli.solver.schedules import Schedule, segment
 from brakecli.solver.schemes.event_driven import phases, runge_kutta
-from brakecli.solver.schemes.event_driven.error import carried, grow
+from brakecli.solver.schemes.event_driven.error import grow
 from brakecli.solver.schemes.event_driven.locate import NONE, first_event
 from brakecli.solver.schemes.event_driven.phases import EPSILON, SHOE, Shoe
 from brakecli.solver.schemes.event_driven.runge_kutta import END_STAGE, NODES, ORDER, USED, A
@@ -231,10 +231,7 @@ def _follow(p: Shoe) -> None:
 def _take(p: Shoe, drive: Drive, grid: Grid, h: float, last: int) -> None:
     """Take the step that has been made; `last` is 1 where it reaches the end of the run."""
     m, work, interval = p.motion, p.work, grid.interval
-    t = p.tangent
-    if t.on == 1:
-        t.x, t.y, t.v_x, t.v_y = carried(p, h, t.x, t.y, t.v_x, t.v_y)
-    if t.knows == 1:
+    if p.tangent.on == 1 or p.tangent.knows == 1:
         grow(p, h, grid)
     if p.track.on == 1:
         _follow(p)

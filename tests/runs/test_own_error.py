@@ -1,0 +1,161 @@
+"""The error that an event-driven run carries along, against closed forms, finer runs and the exact contact."""
+
+import math
+from dataclasses import replace
+from importlib import import_module
+from itertools import islice
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from brakecli.case.case import Case
+from brakecli.case.system import system_of
+from brakecli.runs import own_error
+from brakecli.runs.own_error import SAFETY, Known, certify_by_own_error
+from brakecli.solver.motion import Motion, solve
+from brakecli.solver.system import System
+from tests.campaign import counts
+from tests.examples import ROUGH, SQUEAL, make
+from tests.runs.test_tolerance import OPEN, promised
+
+cases: Any = import_module("benchmarks.statistics.cases")  # benchmarks are not type-checked
+
+
+def knowing(system: System, start_error: tuple[float, float] = (0.0, 0.0), **changes: Any) -> Motion:
+    """A run that carries its error along."""
+    return solve(replace(system, start_error=start_error, method=replace(system.method, **changes)))
+
+
+def true_error(run: Motion, exact: Motion) -> float:
+    """The largest deviation, relative to the largest values."""
+    size = np.abs(run.rows[:, :4]).max(axis=0)
+    return float((np.abs(run.rows[:, :4] - exact.rows[:, :4]) / size).max())
+
+
+def sliding_matrix(system: System) -> Any:
+    """A of z' = A z for backward slip on smooth surfaces, Eqs. (6) and (7)."""
+    c, stiffness, a = system.coefficients, system.contact_stiffness, np.zeros((4, 4))
+    a[0, 2] = a[1, 3] = 1.0
+    a[2] = np.array([-c.c_xx, -c.c_xy - c.phi * stiffness, -c.b_xx, -c.b_xy]) / c.m
+    a[3] = np.array([-c.c_xy, -c.c_yy - stiffness, -c.b_xy, -c.b_yy]) / c.m
+    return a
+
+
+def test_an_error_grows_as_the_matrix_exponential_says() -> None:
+    """Slip to one side on smooth surfaces is linear: e(t) = exp(A t) e(0). Steps add 1e-13 of the motion."""
+    case = make(SQUEAL, solver__scheme="event-driven", solver__step=None, solver__tolerance=1e-12)
+    system, start = system_of(case), (3e-9, -2e-9)
+    run = knowing(replace(system, initial=replace(system.initial, from_equilibrium=True)), start)
+    assert not {*run.rows[:, 7]} - {-1.0}  # slip backward throughout
+    step, e, exact = expm(sliding_matrix(system) * system.interval / 10.0), np.array([*start, 0.0, 0.0]), []
+    for _ in range(10 * system.samples + 1):
+        exact.append(np.abs(e))
+        e = step @ e
+    assert run.own is not None
+    assert run.own.worst[:, 0].max(axis=0) == pytest.approx(np.max(exact, axis=0), rel=0.02)  # at places of steps
+    assert run.own.worst[:, 1].max() == 0.0
+
+
+def test_a_run_knows_its_error_and_what_is_of_the_nodes() -> None:
+    system = system_of(promised(OPEN, 1e-3, solver__duration=0.01))
+    exact = solve(replace(system, method=replace(system.method, tolerance=1e-10)))
+    runs = {
+        (nodes, tolerance): knowing(system, evaluator="midpoint", nodes=nodes, tolerance=tolerance)
+        for nodes, tolerance in ((128, 1e-9), (512, 1e-9), (4096, 3e-4), (256, 3e-4))
+    }
+    for run in runs.values():
+        error = Known.of_run(run).of[:, 2].max()
+        assert error == pytest.approx(true_error(run, exact), rel=0.25)
+    for nodes in (128, 512):  # steps are far better
+        steps, by_nodes, _ = Known.of_run(runs[nodes, 1e-9]).of.max(axis=0)
+        assert steps < 1e-4 * by_nodes
+    steps, by_nodes, _ = Known.of_run(runs[4096, 3e-4]).of.max(axis=0)
+    assert by_nodes < 0.1 * steps
+
+
+@pytest.mark.parametrize("many", counts(2, 40))
+@pytest.mark.parametrize("stratum", ["open", "full", "smooth"])
+def test_random_shoes_know_their_errors(stratum: str, many: int) -> None:
+    from tests.analysis.shoes import random_shoes
+
+    for tables in islice(random_shoes(stratum, 41), many):
+        tables["solver"] = {"duration": tables["solver"]["duration"], "tolerance": 1e-3, "scheme": "event-driven"}
+        system = system_of(Case.model_validate(tables))
+        duration = min(system.sampled_duration, 40.0 / system.natural_frequencies[1])
+        interval = min(system.interval, 0.05 / system.natural_frequencies[1])
+        system = replace(system, duration=duration, interval=interval)
+        run = knowing(system, evaluator="auto" if system.smooth else "midpoint", nodes=0 if system.smooth else 512)
+        exact = solve(replace(system, method=replace(system.method, tolerance=1e-9)))
+        known, error = Known.of_run(run), true_error(run, exact)
+        if run.work.failed or exact.work.failed or error > 1e-2:
+            continue
+        assert error <= SAFETY * known.of[:, 2].max() + 1e-8 or known.unsure < duration
+
+
+def test_a_dip_beside_the_end_of_a_step_is_no_longer_stepped_over() -> None:
+    """The sliding velocity falls below zero for a twentieth of a step, right where one ends."""
+    system = system_of(Case.model_validate(cases.draw("near grazing", 7, 28).tables))
+    assert system.evaluator == "exact"
+    system = replace(system, duration=1e-3, tracked=True)
+    sticks = [
+        solve(replace(system, method=replace(system.method, tolerance=tolerance))).track.counts[2]  # type: ignore[union-attr]
+        for tolerance in (1.9236e-10, 1e-12)
+    ]
+    assert sticks == [1, 1]
+
+
+def test_an_event_that_may_have_been_missed_is_known() -> None:
+    """It misses stick, or does not, by 1e-8 of the wheel's speed: coarse steps cannot tell, and say so."""
+    system = system_of(Case.model_validate(cases.draw("near grazing", 7, 28).tables))
+    coarse, fine = (Known.of_run(knowing(system, tolerance=tolerance)).unsure for tolerance in (1e-4, 1e-12))
+    assert coarse < 1e-3
+    assert math.isinf(fine)
+
+
+def test_a_run_says_how_fine_the_next_one_has_to_be() -> None:
+    for tolerance, most in ((1e-2, 1), (1e-3, 2), (1e-5, 3), (1e-7, 3)):
+        system, tried = system_of(promised(OPEN, tolerance, solver__duration=0.01)), list[System]()
+
+        def run(rung: System, tried: list[System] = tried) -> Motion:
+            tried.append(rung)
+            return solve(rung)
+
+        found = certify_by_own_error(system, run).certificate
+        assert found.certified
+        assert len(tried) <= most
+        assert found.by_steps is not None
+        assert found.by_nodes is not None
+        assert 0.03 * tolerance < found.estimated_error <= found.by_steps + found.by_nodes
+
+
+def test_a_promise_that_no_run_keeps_is_not_certified(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(own_error, "_MOST_RUNS", 1)
+    found = certify_by_own_error(system_of(promised(OPEN, 1e-6, solver__duration=0.01)), solve).certificate
+    assert not found.certified
+    assert found.estimated_error > 1e-6
+    assert 0.0 <= found.certified_until < 0.01
+
+
+@pytest.mark.parametrize("friction", [0.2, 0.7])
+def test_a_motion_says_by_how_much_it_amplifies(friction: float) -> None:
+    """By exp(A t) from the disturbance that the loop begins with; the size of places is by the fastest motion."""
+    settings = {"friction__coefficient": friction, "initial__at": "equilibrium", "initial__x": 1e-8}
+    case = promised(SQUEAL, 1e-6, solver__duration=0.5, solver__scheme="event-driven", **settings)
+    system = replace(system_of(case), tangents=True)
+    rate, a = 2.0 * math.pi * system.natural_frequencies[1], sliding_matrix(system)
+    weights, start = np.array([rate, rate, 1.0, 1.0]), np.array([0.5 / rate, 0.5 / rate, 0.5, -0.5])
+    ends = 0.5 * np.arange(1, 513) / 512  # of the parts in which growth is noted
+    exact = max(1.0, *(float(np.linalg.norm(weights * (expm(a * end) @ start))) for end in ends))
+    found = certify_by_own_error(system, solve).certificate
+    assert found.amplification == pytest.approx(exact, rel=0.02)
+
+
+def test_where_so_many_nodes_are_needed_the_exact_contact_is_taken() -> None:
+    system = system_of(promised(OPEN, 1e-9, solver__duration=0.001))
+    found = certify_by_own_error(system, solve)
+    assert found.certificate.certified
+    assert found.motion.system.evaluator == "exact"
+    assert found.certificate.by_nodes == 0.0
+    assert system_of(make(ROUGH)).finds_patches is False
