@@ -12,7 +12,7 @@ from benchmarks.statistics.cases import KINDS
 from benchmarks.statistics.judging import Judged, judged
 from benchmarks.statistics.page import PAGE, page
 
-RUNS, SEED = 420, 1
+RUNS, SEED = 4000, 1
 
 
 def main() -> None:

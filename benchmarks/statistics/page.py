@@ -58,13 +58,14 @@ def _scale(each: Judged) -> int:
 def _method(each: Judged) -> str:
     """How the error was estimated."""
     for sign, name in (
-        ("nodes", "events on nodes"),
+        ("nodes", "the error carried along, on nodes"),
+        ("carried", "the error carried along, exact or closed-form contact"),
         ("rounding", "exact steps"),
         ("piecewise", "exact steps, twice"),
     ):
         if sign in each.method:
             return name
-    return "events, exact or closed-form contact" if each.method.startswith("event-driven") else "steps"
+    return "steps"
 
 
 def _summary(found: Sequence[Judged], unknown: int) -> str:

@@ -25,6 +25,8 @@ PLACES, SHARES = (np.array([np.resize(0.5 * each[i] + 0.5 * (1 - i), 12) for eac
 _TERMS = 4
 """Of the series, over 0.22 of a step at most, in which the fastest motion turns by less than half a radian."""
 _AT = STAGES - 1
+_MUCH = 0.3
+"""Part of the pad that comes or goes in a step, from which on more places are looked at."""
 
 
 @kernel(void(SHOE, float64), inlined=False)
@@ -54,9 +56,12 @@ def grow(p: Shoe, h: float, grid: Grid) -> None:
     c, m, t, step = p.c, p.motion, p.tangent, p.motion.step_done
     rule, light = m.pair, m.light
     m.light = 0
-    opens = m.phase != OPEN and m.begin[Y] + runge_kutta.reach(m, Y) > p.layer.pad.full_up_to
-    if m.touch[0, 0] != m.touch[END_STAGE, 0] or (m.pair == 0 and opens):
+    pad, changes = p.layer.pad, abs(m.touch[0, 0] - m.touch[END_STAGE, 0])
+    opens = m.phase != OPEN and m.begin[Y] + runge_kutta.reach(m, Y) > pad.full_up_to
+    if changes > _MUCH * 2.0 * pad.half_length * pad.k or (m.pair == 0 and opens):
         rule = 2
+    elif changes > 0.0:
+        rule = 0
     e, n, w, begin, t.moved = t.error[0], t.error[1], t.error[DISTURBED], 0.0, 0.0
     w[X], w[Y], w[V_X], w[V_Y] = t.x, t.y, t.v_x, t.v_y
     worst = t.worst[min(m.level * SPANS // grid.samples, SPANS - 1)]
