@@ -93,7 +93,7 @@ def grow(p: Shoe, h: float, grid: Grid) -> None:
             worst[1, i] = max(worst[1, i], abs(n[i]))
             worst[2, i] = max(worst[2, i], abs(e[i] + n[i]))
     _ahead(p, h - step)
-    if m.lowest < phases.NEAR * t.moved:
+    if c.phi > 0.0 and m.lowest < phases.NEAR * t.moved:  # without friction nothing happens there
         t.unsure = min(t.unsure, m.time + m.tau)
     t.x, t.y, t.v_x, t.v_y = w[X], w[Y], w[V_X], w[V_Y]
     m.light = light

@@ -215,7 +215,7 @@ def take_hold(p: Shoe) -> None:
     needed, (along, _) = c.m * m.belt_slope + against_x, rounding(p)
     m.phase = held(bound - needed, bound + needed, along, along)
     part, t = kept(needed, bound), p.tangent
-    if t.knows == 1:
+    if t.knows == 1 and bound > 0.0:
         margin, moved = cone(p, 0.0, m.x, m.y, m.belt, m.v_y)
         if abs(margin) < NEAR * moved:
             t.unsure = min(t.unsure, m.time + m.tau)
