@@ -71,7 +71,8 @@ REASONS = {
     ),
     "promise": (
         "A promise on B: a run that knows its error looks at the contact at three to twelve more places of a step,"
-        " and takes 2.6 times as long as one that does not. Over 20 ms half of the time goes into making and closing it."
+        " and takes 2.6 times as long as one that does not. Over 20 ms half of the time goes into making and"
+        " closing it."
     ),
     "one evaluation": (
         "One evaluation: the compiler does not know the number of waves; and ours counts the nodes that are near"
