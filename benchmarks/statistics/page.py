@@ -13,6 +13,7 @@ from benchmarks.statistics.judging import BETTER, Judged
 PAGE = Path(__file__).parents[2] / "docs" / "statistics.md"
 QUANTILES = (0.0, 0.05, 0.5, 0.95)
 BAR = 40  # signs of the longest bar
+MOST = 10  # half decades of the largest ratios that are told apart: a shoe at rest has no error
 INTRODUCTION = """# Estimates and errors
 
 `make statistics` writes this page. It draws {runs} random cases of ten kinds. Each has a random tolerance
@@ -111,13 +112,14 @@ def _by(found: Sequence[Judged], head: str, names: Sequence[str], name_of: Calla
 
 def _histogram(found: Sequence[Judged]) -> str:
     """How many runs have a ratio in each half decade. Errors that the reference cannot see stand apart."""
-    seen = Counter(math.floor(2.0 * math.log10(each.ratio)) for each in found if each.error > each.own)
-    unseen = Counter(math.floor(2.0 * math.log10(each.ratio)) for each in found if each.error <= each.own)
+    binned = [(min(math.floor(2.0 * math.log10(each.ratio)), MOST), each.error > each.own) for each in found]
+    seen, unseen = (Counter(n for n, known in binned if known == is_seen) for is_seen in (True, False))
     most = max(seen[n] + unseen[n] for n in {*seen, *unseen})
     lines = ["| estimate / error | runs | of these at least | |", "|---|---|---|---|"]
     for n in range(min({*seen, *unseen}), max({*seen, *unseen}) + 1):
         bar = "█" * math.ceil(BAR * (seen[n] + unseen[n]) / most)
         low, high = 10.0 ** (n / 2.0), 10.0 ** ((n + 1) / 2.0)
-        lines.append(f"| {low:.2g} to {high:.2g} | {seen[n] + unseen[n]} | {unseen[n]} | {bar} |")
+        ratio = f"{low:.2g} to {high:.2g}" if n < MOST else f"{low:.2g} and more"
+        lines.append(f"| {ratio} | {seen[n] + unseen[n]} | {unseen[n]} | {bar} |")
     note = "The third column counts errors below that of the reference: their ratio is larger."
     return "\n".join([*lines, "", note, ""])
