@@ -129,7 +129,7 @@ def test_surfaces_that_open_keep_their_tolerance_too(tolerance: float) -> None:
     found = certify(system_of(case))
     assert found.certificate.certified
     assert kept(found, case, 1e-4 * tolerance) <= tolerance
-    assert found.motion.system.evaluator == "midpoint"
+    assert found.motion.system.evaluator == ("midpoint" if tolerance > 1e-6 else "exact")  # by what is cheaper
 
 
 def test_nodes_that_agree_by_luck_are_doubled_again() -> None:
