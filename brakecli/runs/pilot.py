@@ -16,7 +16,7 @@ SECONDS = 0.15
 MOST_EVALUATION, MOST_AT_NODES = 0.02, 2e-3
 """Guessed time (s) of an evaluation of the contact, exact and by nodes, beyond which no step is tried."""
 FINER, RUNGS = 4, 16.0  # steps of the last run of a ladder, and time of all of its runs, over the first one's
-FINER_FOUND, RUNGS_FOUND = 1.5, 4.0  # the same of runs that know their error
+FINER_FOUND, RUNGS_FOUND = 1.2, 1.7  # the same of runs that know their error: one or two
 FEW = 20  # steps, the first of which are shorter than those that follow
 SLOWER = 2.0  # pace of the latter half of a pilot run over the mean pace, beyond which the rest may be slower yet
 
@@ -39,7 +39,7 @@ def measured(system: System) -> Price | None:
     if not method.own_steps:
         return _ladder(system)
     found = _begun(first_of(system))
-    return Price(int(FINER_FOUND * found.steps), RUNGS_FOUND * found.seconds, at_least=True)
+    return found._replace(steps=int(FINER_FOUND * found.steps), seconds=RUNGS_FOUND * found.seconds)
 
 
 def _ladder(system: System) -> Price:

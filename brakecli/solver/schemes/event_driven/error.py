@@ -9,7 +9,7 @@ import numpy as np
 from numba import float64, void
 
 from brakecli.solver.automaton import OPEN, STICK, side_of
-from brakecli.solver.compile import kernel
+from brakecli.solver.compile import kernel, stopped
 from brakecli.solver.contact import MIDPOINT
 from brakecli.solver.contact.midpoint import left_out
 from brakecli.solver.records import DISTURBED, GRID, SPANS, STAGES, V_X, V_Y, Grid, X, Y
@@ -66,6 +66,8 @@ def grow(p: Shoe, h: float, grid: Grid) -> None:
     w[X], w[Y], w[V_X], w[V_Y] = t.x, t.y, t.v_x, t.v_y
     worst = t.worst[min(m.level * SPANS // grid.samples, SPANS - 1)]
     for place in range(POINTS[rule]):
+        if stopped(pad.signals):  # an evaluation may take as long as a step
+            break
         theta, part = PLACES[rule, place], step * SHARES[rule, place]
         at_x, slope_x = runge_kutta.interpolated_both(m, X, theta)
         at_y, slope_y = runge_kutta.interpolated_both(m, Y, theta)
