@@ -31,7 +31,6 @@ MOST_SECONDS = 900.0  # time of the loop after which no finer run is begun
 class _Axis:
     """How often steps were halved, or nodes doubled, and what the last two times changed."""
 
-    growth: ClassVar[float] = 0.5  # power of the error's fall with which the work grows
     margin: ClassVar[float] = 1.0
     order: ClassVar[int] = 2  # with which errors fall at least
     doublings: int = 0
@@ -60,16 +59,11 @@ class _Axis:
         left = max(least, 3.0 * self.last / (self.before / self.last - 1.0))
         return self.margin * left
 
-    def more(self, tolerance: float) -> float:
-        """By how much the work is likely to grow until the error is below the tolerance."""
-        return max(1.0, self.last / tolerance) ** self.growth if self.last < math.inf else 2.0
-
 
 @dataclass
 class InLanes(_Axis):
     """Of the steps of runs in lanes, whose errors fall with h³ at least."""
 
-    growth: ClassVar[float] = 0.3
     order: ClassVar[int] = 3
 
     @staticmethod
@@ -86,7 +80,7 @@ class _Nodes(_Axis):
 
 
 def ladder(
-    system: System, is_left: Callable[[Motion, float], bool] = lambda run, more: False, kind: type[_Axis] = _Axis
+    system: System, is_left: Callable[[Motion], bool] = lambda run: False, kind: type[_Axis] = _Axis
 ) -> Generator[System, Motion, Certified]:
     """Runs with steps half as long, or twice the nodes: what is needed more.
 
@@ -124,8 +118,7 @@ def ladder(
         coarse = failed or not short or jump > 0.5 * rounding.left
         finer = steps if coarse or margin * steps.error >= used.error else quadrature
         late = run.system.interval == system.interval and seconds + 2.2 * spent > MOST_SECONDS
-        more = 2.0 * steps.more(0.5 * rounding.left / margin) * used.more(0.5 * rounding.left)
-        if finer.doublings == MOST_DOUBLINGS or late or is_left(run, more):
+        if finer.doublings == MOST_DOUBLINGS or late or is_left(run):
             break
         finer.doublings += 1
     error += rounding.error

@@ -40,7 +40,10 @@ class Known(NamedTuple):
         """What a run has carried along."""
         assert run.own is not None
         largest = np.abs(run.rows[:, :4]).max(axis=0, initial=0.0)
-        return cls((run.own.worst / sizes(run.system, largest, largest)).max(axis=2), run.own.unsure)
+        size = sizes(run.system, largest, largest)
+        with np.errstate(invalid="ignore"):  # nothing moves where a size is infinite
+            of = np.where(np.isfinite(size), run.own.worst / size, 0.0)
+        return cls(of.max(axis=2), run.own.unsure)
 
     def until(self, limit: float, duration: float) -> float:
         """Up to when (s) it is surely below a limit."""

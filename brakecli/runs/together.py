@@ -23,7 +23,7 @@ TOGETHER = 32
 
 
 def _ladder(system: System) -> Generator[System, Motion, Certified]:
-    def is_left(run: Motion, more: float) -> bool:
+    def is_left(run: Motion) -> bool:
         """Whether a run that knows its error is cheaper: always where the pad does not open."""
         closed = set(run.work.evaluators) == {"closed-form"}
         return closed or exact_is_cheaper(run.system, system)

@@ -1,10 +1,11 @@
 """A small disturbance of a motion, carried along with it: does it grow or fade, and how fast?
 
-Within a phase it follows the derivative of the steps of the motion. Where the shoe comes to the wheel's velocity,
-and nowhere else, a force jumps: there the disturbance of the sliding velocity is multiplied by the ratio of its
-accelerations behind and before, which is 0 where the shoe sticks. That is all of the saltation matrix (R. I. Leine
-and H. Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems, Springer 2004, chapter 7): the normal
-of the event is that of the sliding velocity, and only the acceleration along the wheel jumps.
+Within a phase it follows the derivative of the steps of the motion, or of the equations where the contact changes
+within a step (`schemes.event_driven.error`). Where the shoe comes to the wheel's velocity, and nowhere else, a
+force jumps: there the disturbance of the sliding velocity is multiplied by the ratio of its accelerations behind
+and before, which is 0 where the shoe sticks. That is all of the saltation matrix (R. I. Leine and H. Nijmeijer,
+Dynamics and Bifurcations of Non-Smooth Mechanical Systems, Springer 2004, chapter 7): the normal of the event is
+that of the sliding velocity, and only the acceleration along the wheel jumps.
 
 At such an event the derivative of a step of a difference scheme says nothing. The step knows of the event to a
 step only, so that its end is a saw of the state at its begin, whose slope is not that of the motion. Instead the

@@ -130,6 +130,15 @@ def test_a_run_says_how_fine_the_next_one_has_to_be() -> None:
         assert 0.03 * tolerance < found.estimated_error <= found.by_steps + found.by_nodes
 
 
+@pytest.mark.parametrize("displaced", [1e290, 1e308])
+def test_an_error_that_overflows_is_no_promise(monkeypatch: pytest.MonkeyPatch, displaced: float) -> None:
+    monkeypatch.setattr(own_error, "displacement", lambda system: (displaced, -displaced))
+    found = certify_by_own_error(system_of(promised(OPEN, 1e-2, solver__duration=0.001)), solve).certificate
+    assert not found.certified
+    assert found.estimated_error > 1e-2
+    assert found.certified_until == 0.0
+
+
 def test_a_promise_that_no_run_keeps_is_not_certified(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(own_error, "_MOST_RUNS", 1)
     found = certify_by_own_error(system_of(promised(OPEN, 1e-6, solver__duration=0.01)), solve).certificate

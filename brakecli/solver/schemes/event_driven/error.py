@@ -5,6 +5,8 @@ The error e of a motion u obeys e' = A(t) e + u' - f(u). What the continuous sol
 cut into as many parts as Gauss's rule has places: in each, A and what is missed are those of its place.
 """
 
+import math
+
 import numpy as np
 from numba import float64, void
 
@@ -50,6 +52,12 @@ def _ahead(p: Shoe, tau: float) -> None:
         e[X], e[Y], e[V_X], e[V_Y] = x, y, u, w
 
 
+@kernel(float64(float64))
+def _size(error: float) -> float:
+    """Its absolute value; infinite where a motion has amplified it beyond all numbers."""
+    return abs(error) if abs(error) < math.inf else math.inf
+
+
 @kernel(void(SHOE, float64, GRID), inlined=False)
 def grow(p: Shoe, h: float, grid: Grid) -> None:
     """Carry error and disturbance along the step that has been made, and add what the step makes of its own."""
@@ -91,9 +99,9 @@ def grow(p: Shoe, h: float, grid: Grid) -> None:
         _ahead(p, part - before * step)
         begin += SHARES[rule, place]
         for i in range(4):
-            worst[0, i] = max(worst[0, i], abs(e[i]))
-            worst[1, i] = max(worst[1, i], abs(n[i]))
-            worst[2, i] = max(worst[2, i], abs(e[i] + n[i]))
+            worst[0, i] = max(worst[0, i], _size(e[i]))
+            worst[1, i] = max(worst[1, i], _size(n[i]))
+            worst[2, i] = max(worst[2, i], _size(e[i] + n[i]))
     _ahead(p, h - step)
     if c.phi > 0.0 and m.lowest < phases.NEAR * t.moved:  # without friction nothing happens there
         t.unsure = min(t.unsure, m.time + m.tau)
