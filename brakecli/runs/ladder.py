@@ -1,7 +1,7 @@
 """The ladder of runs that keep a tolerance: steps and nodes are refined apart, each as far as is needed."""
 
 import math
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -16,8 +16,6 @@ from brakecli.solver.system import System
 FIRST_TURN = 15.0  # square of the turn (rad) of the fastest motion in a first step, over the tolerance
 # Two halvings leave a sixth of the tolerance: (1/12, 10/12, 1/12) takes a sixth of that square off a velocity.
 LONGEST_TURN = 0.4  # rad, in a first step
-# In lanes errors grow with nearly the fourth power of such steps; two halvings leave a tenth of the tolerance.
-FIRST_TURN_IN_LANES, LONGEST_TURN_IN_LANES = 60.0, 0.5
 FIRST_PER_WAVE = 8.0  # first steps to a passing wave, at least
 FINEST_FIRST = 4e-4  # tolerance from which on a quarter of the usual nodes is enough to begin with
 MOST_SPARSE = 4  # halvings of a first step before it has reached the sample interval, at most
@@ -32,15 +30,9 @@ class _Axis:
     """How often steps were halved, or nodes doubled, and what the last two times changed."""
 
     margin: ClassVar[float] = 1.0
-    order: ClassVar[int] = 2  # with which errors fall at least
     doublings: int = 0
     before: float = math.inf
     last: float = math.inf
-
-    @staticmethod
-    def turn(tolerance: float) -> float:
-        """By which angle (rad) the fastest motion turns in a first step."""
-        return min(LONGEST_TURN, math.sqrt(FIRST_TURN * tolerance))
 
     @property
     def error(self) -> float:
@@ -54,22 +46,9 @@ class _Axis:
             return self.last
         if math.isinf(self.before) or self.last >= self.before:
             return math.inf
-        fall = 2.0**self.order
-        least = max(self.last, 3.0 * self.before / (fall * fall - fall))
+        least = max(self.last, 3.0 * self.before / 12.0)
         left = max(least, 3.0 * self.last / (self.before / self.last - 1.0))
         return self.margin * left
-
-
-@dataclass
-class InLanes(_Axis):
-    """Of the steps of runs in lanes, whose errors fall with h³ at least."""
-
-    order: ClassVar[int] = 3
-
-    @staticmethod
-    def turn(tolerance: float) -> float:
-        """As of other steps, longer by the order."""
-        return min(LONGEST_TURN_IN_LANES, math.sqrt(math.sqrt(FIRST_TURN_IN_LANES * tolerance)))
 
 
 @dataclass
@@ -79,9 +58,7 @@ class _Nodes(_Axis):
     margin: ClassVar[float] = 2.0
 
 
-def ladder(
-    system: System, is_left: Callable[[Motion], bool] = lambda run: False, kind: type[_Axis] = _Axis
-) -> Generator[System, Motion, Certified]:
+def ladder(system: System) -> Generator[System, Motion, Certified]:
     """Runs with steps half as long, or twice the nodes: what is needed more.
 
     It yields what is to be run, receives its motion, and returns the last one with its certificate. The errors of
@@ -89,9 +66,9 @@ def ladder(
     of rounding, and up to when the promise can be kept. The first steps may pass over samples, the last ones may
     not, nor over what speed or load do between two knots, as no run would see it.
     """
-    wanted, (first, every) = system.method.tolerance, first_rung(system, kind)
+    wanted, (first, every) = system.method.tolerance, first_rung(system)
     longest = min(_shortest_span(system) / STEPS_BETWEEN_KNOTS, system.interval) * (1.0 + 1e-9)
-    nodes, steps, quadrature = first_nodes(system), kind(), _Nodes()
+    nodes, steps, quadrature = first_nodes(system), _Axis(), _Nodes()
     before, finer, seconds, rounding = None, steps, 0.0, Rounding(0.0, system.sampled_duration, wanted)
     while True:
         method = replace(system.method, nodes=nodes << quadrature.doublings, step=first * 0.5**steps.doublings)
@@ -118,7 +95,7 @@ def ladder(
         coarse = failed or not short or jump > 0.5 * rounding.left
         finer = steps if coarse or margin * steps.error >= used.error else quadrature
         late = run.system.interval == system.interval and seconds + 2.2 * spent > MOST_SECONDS
-        if finer.doublings == MOST_DOUBLINGS or late or is_left(run):
+        if finer.doublings == MOST_DOUBLINGS or late:
             break
         finer.doublings += 1
     error += rounding.error
@@ -147,10 +124,10 @@ def _jump_error(run: Motion) -> float:
     return jump / fastest if fastest > 0.0 else math.inf
 
 
-def first_rung(system: System, kind: type[_Axis] = _Axis) -> tuple[float, int]:
+def first_rung(system: System) -> tuple[float, int]:
     """The steps (s) that a ladder begins with, and how many samples each passes over, a power of two."""
     interval, fastest = system.interval, 2.0 * math.pi * max(system.natural_frequencies[1], 1e-300)
-    wanted = kind.turn(system.method.tolerance) / fastest
+    wanted = min(LONGEST_TURN, math.sqrt(FIRST_TURN * system.method.tolerance)) / fastest
     wanted = min(wanted, 1.0 / (FIRST_PER_WAVE * max(system.passing_frequency, 1e-300)))
     wanted = min(wanted, max(_shortest_span(system) / STEPS_BETWEEN_KNOTS, wanted / 2**MOST_DOUBLINGS))
     if interval > wanted:

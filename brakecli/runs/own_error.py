@@ -4,8 +4,9 @@ The error is carried along with the motion, that of steps and that of nodes apar
 that is too coarse says how fine the next one has to be, and one that is fine enough needs no other.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -27,6 +28,10 @@ _MOST_RUNS = 8
 _FINEST, _LEAST, _MOST = 1e-13, 1e-3, 8.0  # tolerance; factors by which tolerance and nodes change at once
 _SURER = 0.03  # of its error, that the next run is to have where an event may have been missed
 _EXACT = 3.0  # evaluations of the exact contact for one by nodes, as steps are shorter and of higher order
+
+
+Finer = Callable[[System, float, float], System | None]
+"""Makes a finer run of which errors by steps and by nodes are less by these factors; None where there is none."""
 
 
 class Known(NamedTuple):
@@ -53,37 +58,65 @@ class Known(NamedTuple):
 
 
 def certify_by_own_error(system: System, run: Callable[[System], Motion]) -> Certified:
-    """The motion to the tolerance of its method, by runs each of which says how fine the next one has to be.
+    """The motion to the tolerance of its method, by event-driven runs.
 
     On nodes, where the method leaves that open, unless so many were needed that the exact contact is cheaper.
     """
-    wanted, seconds, rung = system.method.tolerance, 0.0, first_of(system)
+    return last_of(promised(system, first_of(system), partial(_finer, system)), run)
+
+
+def last_of(runs: Generator[System, Motion, Certified], run: Callable[[System], Motion]) -> Certified:
+    """What comes of runs that are made one after the other."""
+    rung = next(runs)
+    while True:
+        try:
+            rung = runs.send(run(rung))
+        except StopIteration as end:
+            return end.value  # type: ignore[no-any-return]
+
+
+def promised(
+    system: System, rung: System, finer: Finer, safety: float = SAFETY
+) -> Generator[System, Motion, Certified]:
+    """Runs, each of which says how fine the next one has to be; the first one is given.
+
+    It yields what is to be run, receives its motion, and returns the last one with its certificate. `safety` is
+    what is promised, over the error that a run knows.
+    """
+    wanted, seconds, next_one = system.method.tolerance, 0.0, rung
     for left in range(_MOST_RUNS, 0, -1):
-        motion = run(rung)
+        rung = next_one
+        motion = yield rung
         seconds += motion.work.solve_seconds
         known = Known.of_run(motion)
         steps, by_nodes, both = known.of.max(axis=0).tolist()
-        error, failed = max(SAFETY * both, ROUNDING), motion.work.failed
-        until = known.until(wanted / SAFETY, system.sampled_duration)
+        error, failed = max(safety * both, ROUNDING), motion.work.failed
+        until = known.until(wanted / safety, system.sampled_duration)
         certified = not failed and error <= wanted and until >= system.sampled_duration
         if certified or failed or seconds > MOST_SECONDS or left == 1:
             break
-        surer, aim = _SURER if known.unsure < system.sampled_duration else 1.0, AIM * wanted / SAFETY
-        at = rung.method
-        tolerance = max(at.tolerance * min(max(min(surer, aim / max(steps, 1e-300)), _LEAST), 1.0), _FINEST)
-        more = min(max(1.0 / surer, by_nodes / aim) ** 0.5, _MOST)
-        finer = _run(system, tolerance, 64 * -int(-rung.nodes * more // 64))
-        if finer.method == at:
+        surer, aim = 1.0 / _SURER if known.unsure < system.sampled_duration else 1.0, AIM * wanted / safety
+        found = finer(rung, max(surer, steps / aim), max(surer, by_nodes / aim))
+        if found is None:
             break
-        rung = finer
+        next_one = found
     motion.work.solve_seconds = seconds
     if not certified:
         error = max(error, wanted * 1.0000001) if error < np.inf else 1.0
-    with_nodes = f" and {motion.system.nodes} nodes" if motion.system.nodes else ""
-    how = f"the error that is carried along with steps to {motion.system.method.tolerance:.0e}{with_nodes}"
+    method, with_nodes = rung.method, f" and {rung.nodes} nodes" if rung.nodes else ""
+    steps_of = f"to {method.tolerance:.0e}" if method.own_steps else f"of {rung.step:.3g} s"
+    how = f"the error that is carried along with steps {steps_of}{with_nodes}"
     assert motion.own is not None
-    apart = SAFETY * steps, SAFETY * by_nodes, motion.own.amplification
+    apart = safety * steps, safety * by_nodes, motion.own.amplification
     return Certified(motion, Certificate(wanted, certified, error, until if not failed else 0.0, how, *apart))
+
+
+def _finer(system: System, rung: System, steps: float, by_nodes: float) -> System | None:
+    """A finer event-driven run."""
+    at = rung.method
+    tolerance = max(at.tolerance * max(1.0 / steps, _LEAST), _FINEST)
+    found = _run(system, tolerance, 64 * -int(-rung.nodes * min(by_nodes**0.5, _MOST) // 64))
+    return found if found.method != at else None
 
 
 def first_of(system: System) -> System:

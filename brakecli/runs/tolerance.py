@@ -20,7 +20,7 @@ from brakecli.runs.certificate import (
 )
 from brakecli.runs.cost import evaluation_seconds
 from brakecli.runs.ladder import ladder
-from brakecli.runs.own_error import certify_by_own_error
+from brakecli.runs.own_error import certify_by_own_error, last_of
 from brakecli.solver.motion import Motion, Progress, solve
 from brakecli.solver.system import System
 
@@ -42,7 +42,7 @@ def certify(system: System, progress: Progress = lambda samples: None) -> Certif
         return _by_phases(system, progress)
     if system.method.own_steps:
         return certify_by_own_error(system, lambda rung: _solved(rung, progress))
-    return _by_steps(system, progress)
+    return last_of(ladder(system), lambda rung: _solved(rung, progress))
 
 
 def begins_with_steps(system: System) -> bool:
@@ -88,14 +88,3 @@ def _by_phases(system: System, progress: Progress) -> Certified:
     steps = f"{run.system.step:.3g} and {other.system.step:.3g} s (displaced by {DISPLACED:.0e})"
     how = f"piecewise-exact runs with steps of {steps}"
     return Certified(run, Certificate(wanted, certified, error, until, how))
-
-
-def _by_steps(system: System, progress: Progress) -> Certified:
-    """The runs of a ladder, one after the other."""
-    runs = ladder(system)
-    rung = next(runs)
-    while True:
-        try:
-            rung = runs.send(_solved(rung, progress))
-        except StopIteration as end:
-            return end.value  # type: ignore[no-any-return]

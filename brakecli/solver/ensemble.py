@@ -19,8 +19,9 @@ from brakecli.errors import CaseError
 from brakecli.solver.compile import Floats
 from brakecli.solver.contact.pad import BESIDE, TILE, aligned, build_pad
 from brakecli.solver.energy import NOT_KEPT
-from brakecli.solver.lanes import LANE, LANES, THETA_1, WAVES, Shared, advance
-from brakecli.solver.motion import Motion, Work
+from brakecli.solver.lanes import advance
+from brakecli.solver.lanes.records import DISTURBED, LANE, LANES, STEPS, THETA_1, WAVES, Shared
+from brakecli.solver.motion import Motion, OwnError, Work
 from brakecli.solver.quantities import HISTORY
 from brakecli.solver.records import PARTS, Coefficients
 from brakecli.solver.roughness import Surface
@@ -51,7 +52,8 @@ def fits(system: System) -> Hashable | None:
     if system.passing_frequency * system.sampled_duration > _MOST_PASSED:
         return None
     grid = system.interval, system.per_sample, system.samples
-    return system.half_length, system.shoe, wheel, system.nodes, *grid, system.tangents
+    carried = system.tangents, system.start_error is None
+    return system.half_length, system.shoe, wheel, system.nodes, *grid, *carried
 
 
 @lru_cache(maxsize=4)
@@ -73,7 +75,8 @@ def _tables(half_length: float, shoe: Surface, wheel: Surface, nodes: int) -> tu
 def run_together(systems: Sequence[System]) -> list[Motion | None]:
     """The motions of systems that fit together; None where one has to be solved alone.
 
-    Their energy is not accounted for. Where the systems ask for `tangents`, the motions have an exponent.
+    Their energy is not accounted for. Where the systems ask for `tangents`, the motions have an exponent. Where
+    they have a `start_error`, the motions know their own error.
     """
     firsts = range(0, len(systems), LANES)
     return [found for first in firsts for found in _run_lanes(list(systems[first : first + LANES]))]
@@ -88,7 +91,8 @@ def _run_lanes(systems: list[System]) -> list[Motion | None]:
     carried = alike.tangents and alike.samples >= FEWEST_SAMPLES
     sizes = np.ones((PARTS if carried else 0, LANES))
     grid = alike.step, alike.interval, alike.per_sample, alike.nodes
-    advance(o, Shared._make((*grid, *surfaces, signals)), rows, sizes)
+    kinds = DISTURBED if alike.start_error is None else STEPS, DISTURBED + carried
+    advance(o, Shared._make((*grid, *surfaces, signals, *kinds)), rows, sizes)
     exponents = _exponents(sizes, alike.sampled_duration) if carried else repeat(None)
     seconds, motions = (time.perf_counter() - begin) / number, list[Motion | None]()
     for n, (system, exponent) in enumerate(zip(systems, exponents, strict=False)):
@@ -96,7 +100,9 @@ def _run_lanes(systems: list[System]) -> list[Motion | None]:
         kinds = {kind: count for kind, count in (("closed-form", closed), ("midpoint", steps - closed)) if count}
         work = Work(steps=steps, contact_evaluations=int(o.evaluations[n]), evaluators=kinds)
         work.solve_seconds = seconds
-        motions.append(Motion(system, rows[n].T, work, NOT_KEPT, exponent) if o.out[n] == 0.0 else None)
+        own = OwnError(o.worst[None, :, :, n], 0.0 if o.unsure[n] else math.inf, None)
+        known = own if system.start_error else None
+        motions.append(Motion(system, rows[n].T, work, NOT_KEPT, exponent, own=known) if o.out[n] == 0.0 else None)
     return motions
 
 
@@ -130,6 +136,9 @@ def _filled(systems: Sequence[System]) -> Any:
     for name, value in values.items():
         o[name] = value
     o.rate[: len(wheel.g)] = np.outer(wheel.turns, belt)
+    if systems[0].start_error is not None:
+        o.t_x[STEPS], o.t_y[STEPS] = np.transpose([each.start_error for each in systems])
+        o.t_x_old[STEPS], o.t_y_old[STEPS] = o.t_x[STEPS], o.t_y[STEPS]
     if systems[0].tangents:
         _seed(o, np.sqrt((c.c_xx + c.c_yy + 2.0 * systems[0].half_length * k) / c.m), h)
     return o
@@ -137,10 +146,10 @@ def _filled(systems: Sequence[System]) -> Any:
 
 def _seed(o: Any, rate: Floats, h: float) -> None:
     """Begin with disturbances as `tangent.seed` does; the forces of their first levels know nothing of them."""
-    o.t_x[:] = o.t_y[:] = 0.5 / rate
-    o.t_d[:] = o.t_d_old[:] = 0.5
-    o.t_e[:] = o.t_e_old[:] = -0.5
-    o.t_x_old[:], o.t_y_old[:] = o.t_x - 0.5 * h, o.t_y + 0.5 * h
+    o.t_x[DISTURBED] = o.t_y[DISTURBED] = 0.5 / rate
+    o.t_d[DISTURBED] = o.t_d_old[DISTURBED] = 0.5
+    o.t_e[DISTURBED] = o.t_e_old[DISTURBED] = -0.5
+    o.t_x_old[DISTURBED], o.t_y_old[DISTURBED] = o.t_x[DISTURBED] - 0.5 * h, o.t_y[DISTURBED] + 0.5 * h
 
 
 def _start(system: System) -> tuple[float, float, float, float]:

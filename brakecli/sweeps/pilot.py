@@ -17,7 +17,7 @@ from brakecli.runs.cost import beside_seconds, stability_seconds
 from brakecli.runs.limits import Check, within_range
 from brakecli.runs.pilot import measured
 from brakecli.runs.together import TOGETHER, certify_together, loops
-from brakecli.solver.lanes import LANES
+from brakecli.solver.lanes.records import LANES
 from brakecli.solver.system import MOST_STEPS
 from brakecli.sweeps.early import may_be_early
 from brakecli.sweeps.plan import Plan

@@ -8,7 +8,7 @@ import pytest
 
 from brakecli.case.system import system_of
 from brakecli.solver.ensemble import LEFT, fits, run_together
-from brakecli.solver.lanes import LANES
+from brakecli.solver.lanes.records import LANES
 from brakecli.solver.method import Method
 from brakecli.solver.motion import Motion, solve
 from brakecli.solver.schemes import NUMEROV, QUARTERS

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from brakecli.solver.ensemble import fits, run_together
-from brakecli.solver.lanes import LANES
+from brakecli.solver.lanes.records import LANES
 from brakecli.solver.motion import Motion, solve
 from brakecli.solver.system import System
 from brakecli.solver.tangent import Exponent

@@ -8,76 +8,25 @@ A lane knows slip to one side at constant speed and load, and an iteration like 
 that is good enough for most steps. A run that sticks, turns, blows up or needs many evaluations is `out`.
 """
 
-import math
-from typing import Any, NamedTuple
+from typing import Any
 
-import numba
 import numpy as np
 from numba import float64, int64, types, void
 from numpy.typing import NDArray
 
-from brakecli.solver.compile import FAST, Floats, borrowed, kernel, stopped, vector
+from brakecli.solver.compile import FAST, Floats, borrowed, kernel, stopped
 from brakecli.solver.friction import observed
+from brakecli.solver.lanes.carried import carry, renew
+from brakecli.solver.lanes.records import LANE_TYPE, LANES, SHARED, THETA_1, THETA_2, THETA_3, WAVES, Shared
 from brakecli.solver.quantities import BOUND
-from brakecli.solver.records import PARTS, Coefficients, record
 from brakecli.solver.roughness import TWO_PI
-from brakecli.solver.schemes import NUMEROV
 from brakecli.solver.sine import sine_cosine
-from brakecli.solver.tangent import LEAST, MOST
 
-LANES, WAVES = 16, 5
-"""Runs side by side, and waves of the wheel, at most."""
-THETA_1, THETA_2, THETA_3 = NUMEROV
-
+_PAIR = types.UniTuple(float64, 2)
 _MOST = 8  # evaluations of the contact in a step
 
 
-def _lanes(names: str) -> dict[str, Any]:
-    return dict.fromkeys(names.split(), (float, LANES))
-
-
-LANE = record(
-    **_lanes(" ".join(Coefficients._fields) + " load belt"),  # given: Q, N, and U, m/s
-    **_lanes("side grip k"),  # sign of the sliding velocity, F_x/F_y, stiffness of the layer, N/m²
-    **_lanes("i_11 i_12 i_22 limit"),  # inverse of a, s/kg; change of the force (N) at which (13) goes on
-    **_lanes("answer"),  # what a force of 1 N in a step takes off the force of a pad that touches everywhere, N
-    **_lanes("x y x_old y_old d e d_old e_old"),  # the motion, as in `records.STATE`
-    **_lanes("force before earlier touching touched"),  # at x, x_old and the level before; parts that touch
-    **_lanes("g_1 g_2"),  # a step, as in `records.PROBLEM`
-    **_lanes("v_x v_y friction state"),  # a sample
-    **_lanes("at_x at_y found touches partly"),  # where the contact is evaluated, its force, the part that touches
-    **_lanes("guess done out evaluations closed"),  # of the force; 1 where it is right; 1 without a result; counts
-    rate=(float, (WAVES, LANES)),  # waves that pass in a second
-    sine=(float, (WAVES, LANES)),  # of a wave at the middle of the pad
-    cosine=(float, (WAVES, LANES)),
-    **_lanes("t_x t_y t_x_old t_y_old t_d t_e t_d_old t_e_old"),  # a disturbance, a level behind the motion
-    **_lanes("t_force t_before"),  # its part of the normal force, at the same levels as t_x and t_x_old
-    **_lanes("t_kept"),  # part of it that is left at a sample
-)
-_LANE = numba.from_dtype(LANE)
-_PAIR = types.UniTuple(float64, 2)
-
-
-class Shared(NamedTuple):
-    """What the runs have in common: their grid of time, surfaces and nodes; lengths in m."""
-
-    h: float  # s
-    interval: float  # between samples, s
-    per_sample: int
-    nodes: int
-    length: float  # of the pad
-    full_up_to: float
-    clear_from: float
-    shoe_mean: float
-    waves: Floats  # of each: wavenumber, phase, and its part of the force in full contact over k sin, m²
-    table: Floats  # of each node: f1, and g sin(ωξ), g cos(ωξ) of all waves
-    signals: int
-
-
-_SHARED = types.NamedTuple([float64, float64, int64, int64, *[float64] * 4, vector, vector, int64], Shared)
-
-
-@kernel(void(_LANE, _SHARED, int64, float64), fastmath=FAST)
+@kernel(void(LANE_TYPE, SHARED, int64, float64), fastmath=FAST)
 def _pass(o: Any, shared: Shared, i: int, t: float) -> None:
     """Sine and cosine of a wave of the wheel."""
     omega, phase = shared.waves[3 * i], shared.waves[3 * i + 1]
@@ -87,7 +36,7 @@ def _pass(o: Any, shared: Shared, i: int, t: float) -> None:
         o.sine[i, n], o.cosine[i, n] = sine_cosine(angle)
 
 
-@kernel(void(_LANE, _SHARED), fastmath=FAST)
+@kernel(void(LANE_TYPE, SHARED), fastmath=FAST)
 def _add_nodes(o: Any, shared: Shared) -> None:
     """The midpoint sum of the gaps (m), and how many nodes touch."""
     table, at = shared.table, 0
@@ -106,7 +55,7 @@ def _add_nodes(o: Any, shared: Shared) -> None:
             o.touches[n] += 1.0 if gap > 0.0 else 0.0
 
 
-@kernel(void(_LANE, _SHARED, float64), fastmath=FAST, inlined=False)
+@kernel(void(LANE_TYPE, SHARED, float64), fastmath=FAST, inlined=False)
 def _touch(o: Any, shared: Shared, t: float) -> None:
     """The normal force, (2), and the part that touches: in closed form where a bound proves it, or by nodes."""
     shared = borrowed(shared)
@@ -129,7 +78,7 @@ def _touch(o: Any, shared: Shared, t: float) -> None:
         o.touches[n] = part * o.touches[n] if o.partly[n] > 0.0 else 1.0 if o.at_y[n] <= full else 0.0
 
 
-@kernel(_PAIR(_LANE, int64, *[float64] * 5))
+@kernel(_PAIR(LANE_TYPE, int64, *[float64] * 5))
 def _acceleration(o: Any, n: int, x: float, y: float, v_x: float, v_y: float, force: float) -> tuple[float, float]:
     """By (6) and (7) without the load."""
     a_x = o.grip[n] * force - o.b_xx[n] * v_x - o.b_xy[n] * v_y - o.c_xx[n] * x - o.c_xy[n] * y
@@ -137,7 +86,7 @@ def _acceleration(o: Any, n: int, x: float, y: float, v_x: float, v_y: float, fo
     return a_x / o.m[n], a_y / o.m[n]
 
 
-@kernel(void(_LANE, _SHARED), inlined=False)
+@kernel(void(LANE_TYPE, SHARED), inlined=False)
 def _begin(o: Any, shared: Shared) -> None:
     """The second level from the first, x¹ = x⁰ + h v⁰ + h² (2 a⁰ + a¹)/6, where `g_1` and `g_2` hold a."""
     h = shared.h
@@ -156,13 +105,16 @@ def _begin(o: Any, shared: Shared) -> None:
             if not late:
                 o.before[n], o.touched[n] = o.found[n], o.touches[n]
                 o.d_old[n], o.e_old[n] = v_x - h * a_x, v_y - h * a_y
+                o.even_x[0, n], o.even_y[0, n], o.even_force[0, n] = o.x_old[n], o.y_old[n], o.found[n]
+                o.even_d[0, n], o.even_d[1, n] = v_x, v_x - 2.0 * h * a_x
+                o.even_e[0, n], o.even_e[1, n] = v_y, v_y - 2.0 * h * a_y
     _touch(o, shared, h)
     for n in range(LANES):
         o.x[n], o.y[n], o.force[n], o.touching[n] = o.at_x[n], o.at_y[n], o.found[n], o.touches[n]
         o.earlier[n] = 2.0 * o.before[n] - o.force[n]
 
 
-@kernel(void(_LANE, _SHARED), fastmath=FAST)
+@kernel(void(LANE_TYPE, SHARED), fastmath=FAST)
 def _prepare(o: Any, shared: Shared) -> None:
     """The known part of (6) and (7) over three levels, and the guess of the force as in `loop.advance`.
 
@@ -186,7 +138,7 @@ def _prepare(o: Any, shared: Shared) -> None:
         o.done[n] = o.out[n]
 
 
-@kernel(void(_LANE, _SHARED, float64), fastmath=FAST)
+@kernel(void(LANE_TYPE, SHARED, float64), fastmath=FAST)
 def _iterate(o: Any, shared: Shared, t: float) -> None:
     """The force of the next level in `guess`: as (13), until what is left is below the bound."""
     h = shared.h
@@ -210,7 +162,7 @@ def _iterate(o: Any, shared: Shared, t: float) -> None:
             return
 
 
-@kernel(void(_LANE, _SHARED))
+@kernel(void(LANE_TYPE, SHARED))
 def _finish(o: Any, shared: Shared) -> None:
     """The next level; a lane is out where the shoe slips to its side no more, or (13) did not converge."""
     h = shared.h
@@ -226,64 +178,7 @@ def _finish(o: Any, shared: Shared) -> None:
         o.closed[n] += 1.0 - o.partly[n]
 
 
-@kernel(void(_LANE, _SHARED), fastmath=FAST, inlined=False)
-def _disturb(o: Any, shared: Shared) -> None:
-    """Carry the disturbance to the older level of the motion, by the derivative of its steps.
-
-    Along the motion dF_y/dt = ∂F_y/∂x (v_x - U) + ∂F_y/∂y v_y. This gives ∂F_y/∂x without another sum over nodes,
-    as the sliding velocity never vanishes in a lane. All three rates are differences over two steps: a constant
-    ∂F_y/∂x is exact, any other is right to h².
-    """
-    h, length = shared.h, shared.length
-    for n in range(LANES):
-        inertia, x_old, y_old = o.m[n] * (2.0 / (h * h)), o.t_x_old[n], o.t_y_old[n]
-        x = THETA_2 * o.t_x[n] + (THETA_3 + THETA_1) * x_old
-        y = THETA_2 * o.t_y[n] + (THETA_3 + THETA_1) * y_old
-        v_x, v_y = THETA_1 * (2.0 * o.t_d[n] - o.t_d_old[n]), THETA_1 * (2.0 * o.t_e[n] - o.t_e_old[n])
-        known = THETA_2 * o.t_force[n] + THETA_3 * o.t_before[n]
-        g_1 = inertia * (o.t_x[n] - x_old) - o.c_xx[n] * x - o.c_xy[n] * y
-        g_2 = inertia * (o.t_y[n] - y_old) - o.c_yy[n] * y - o.c_xy[n] * x
-        g_1 += o.grip[n] * known - o.b_xx[n] * v_x - o.b_xy[n] * v_y
-        g_2 += known - o.b_xy[n] * v_x - o.b_yy[n] * v_y
-        d, e = o.i_11[n] * g_1 + o.i_12[n] * g_2, o.i_12[n] * g_1 + o.i_22[n] * g_2
-        d_slope = THETA_1 * (o.i_11[n] * o.grip[n] + o.i_12[n])  # by the force of the next level
-        e_slope = THETA_1 * (o.i_12[n] * o.grip[n] + o.i_22[n])
-        stiffness, sliding = o.k[n] * length * o.touched[n], o.d[n] - o.belt[n]
-        tangential = 0.5 / h * (o.force[n] - o.earlier[n]) + stiffness * o.e[n]
-        stiffness *= sliding  # both slopes are multiplied by the sliding velocity, which saves a division
-        x, y = x_old + 2.0 * h * d, y_old + 2.0 * h * e
-        feedback = sliding - 2.0 * h * (tangential * d_slope - stiffness * e_slope)
-        force = (tangential * x - stiffness * y) / feedback if feedback != 0.0 else 0.0
-        d, e = d + d_slope * force, e + e_slope * force
-        o.t_x_old[n], o.t_y_old[n], o.t_d_old[n], o.t_e_old[n] = o.t_x[n], o.t_y[n], o.t_d[n], o.t_e[n]
-        o.t_x[n], o.t_y[n], o.t_d[n], o.t_e[n] = x_old + 2.0 * h * d, y_old + 2.0 * h * e, d, e
-        o.t_before[n], o.t_force[n] = o.t_force[n], force
-
-
-@kernel(void(_LANE, _SHARED, float64[:, ::1], int64, int64), inlined=False)
-def _renew(o: Any, shared: Shared, sizes: Floats, number: int, samples: int) -> None:
-    """At a sample that ends a part of the run, note the sizes, and go on with disturbances of size one.
-
-    The square of a size is twice the energy over the mass where the pad touches everywhere. It hardly swings then.
-    """
-    part = (number - 1) * PARTS // samples
-    if number == 0 or (number < samples and number * PARTS // samples == part):
-        return
-    for n in range(LANES):
-        x, y, d, e = o.t_x_old[n], o.t_y_old[n], o.t_d[n], o.t_e[n]
-        springs = o.c_xx[n] * x * x + 2.0 * o.c_xy[n] * x * y + (o.c_yy[n] + o.k[n] * shared.length) * y * y
-        size = math.sqrt(max(springs, 0.0) / o.m[n] + d * d + e * e)
-        sizes[part, n] = size
-        o.t_kept[n] = 1.0 / size if LEAST < size < MOST else 0.0
-    for each in (o.t_x, o.t_y, o.t_x_old, o.t_y_old, o.t_d, o.t_e, o.t_d_old, o.t_e_old, o.t_force, o.t_before):
-        for n in range(LANES):
-            each[n] = o.t_kept[n] * each[n] if o.t_kept[n] > 0.0 else 0.0
-    for n in range(LANES):
-        if o.t_kept[n] == 0.0:
-            o.t_d[n], o.t_x[n] = 1.0, shared.h
-
-
-@kernel(void(_LANE, _SHARED, float64[:, :, ::1], int64), fastmath=FAST)
+@kernel(void(LANE_TYPE, SHARED, float64[:, :, ::1], int64), fastmath=FAST)
 def _sample(o: Any, shared: Shared, rows: NDArray[np.float64], number: int) -> None:
     """The sample at the older level, as `loop.sample` has it; d without h²/6 of its second derivative."""
     h = shared.h
@@ -305,7 +200,7 @@ def _sample(o: Any, shared: Shared, rows: NDArray[np.float64], number: int) -> N
         row[4], row[5], row[6], row[7] = o.friction[n], o.before[n], o.touched[n], o.state[n]
 
 
-@kernel(void(_LANE, _SHARED, float64[:, :, ::1], float64[:, ::1]))
+@kernel(void(LANE_TYPE, SHARED, float64[:, :, ::1], float64[:, ::1]))
 def advance(o: Any, shared: Shared, rows: NDArray[np.float64], sizes: Floats) -> None:
     """Run all lanes; `rows` gets the samples of each, variable by variable.
 
@@ -316,7 +211,7 @@ def advance(o: Any, shared: Shared, rows: NDArray[np.float64], sizes: Floats) ->
     for number in range(rows.shape[2]):
         _sample(o, shared, rows, number)
         if sizes.shape[0] > 0:
-            _renew(o, shared, sizes, number, rows.shape[2] - 1)
+            renew(o, shared, sizes, number, rows.shape[2] - 1)
         left = 0.0
         for n in range(LANES):
             left += 1.0 - o.out[n]
@@ -326,5 +221,5 @@ def advance(o: Any, shared: Shared, rows: NDArray[np.float64], sizes: Floats) ->
             _prepare(o, shared)
             _iterate(o, shared, number * shared.interval + (step + 2) * shared.h)
             _finish(o, shared)
-            if sizes.shape[0] > 0:
-                _disturb(o, shared)
+            if shared.first < shared.beyond:
+                carry(o, shared, number * shared.per_sample + step)

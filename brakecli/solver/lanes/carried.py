@@ -1,0 +1,252 @@
+"""What lanes carry along with their motions: a small disturbance, and the errors that steps and nodes make.
+
+An error obeys the derivative of the steps, as a disturbance does, with what each step adds. Of the steps that is
+what the motion misses of the scheme with steps twice as long, over what such steps miss more than these. Every
+second level has one, and counts twice: one at every level would add up to nothing where a patch opens or closes.
+Of the nodes it is what `contact.midpoint.left_out` finds at every second level.
+"""
+
+import math
+from typing import Any
+
+from numba import float64, int64, void
+
+from brakecli.solver.compile import FAST, Floats, kernel
+from brakecli.solver.lanes.records import (
+    DISTURBED,
+    LANE_TYPE,
+    LANES,
+    NODES,
+    SHARED,
+    STEPS,
+    THETA_1,
+    THETA_2,
+    THETA_3,
+    Shared,
+)
+from brakecli.solver.records import PARTS
+from brakecli.solver.tangent import LEAST, MOST
+
+_MORE = 7.0  # times that steps twice as long miss more, as errors fall with h³ at least
+_START = 14.0  # the same of x after a start twice as long, over what a start is off by, as that falls with h⁴
+NEAR = 3.0
+"""Sliding velocity over its error, from which on a stick may have been missed."""
+
+
+@kernel(void(LANE_TYPE, SHARED), fastmath=FAST)
+def _miss(o: Any, shared: Shared) -> None:
+    """What the motion misses of (6) and (7) with steps twice as long, between the last three even levels."""
+    h = 2.0 * shared.h
+    for n in range(LANES):
+        o.even_x[2, n], o.even_x[1, n], o.even_x[0, n] = o.even_x[1, n], o.even_x[0, n], o.x[n]
+        o.even_y[2, n], o.even_y[1, n], o.even_y[0, n] = o.even_y[1, n], o.even_y[0, n], o.y[n]
+        o.even_force[2, n], o.even_force[1, n], o.even_force[0, n] = (
+            o.even_force[1, n],
+            o.even_force[0, n],
+            o.force[n],
+        )
+        o.even_d[2, n], o.even_d[1, n] = o.even_d[1, n], o.even_d[0, n]
+        o.even_e[2, n], o.even_e[1, n] = o.even_e[1, n], o.even_e[0, n]
+    for n in range(LANES):
+        x, y = o.even_x[1, n], o.even_y[1, n]
+        d, e = 0.5 / h * (o.x[n] - o.even_x[2, n]), 0.5 / h * (o.y[n] - o.even_y[2, n])
+        o.even_d[0, n], o.even_e[0, n] = d, e
+        a_x, a_y = (o.x[n] - 2.0 * x + o.even_x[2, n]) / (h * h), (o.y[n] - 2.0 * y + o.even_y[2, n]) / (h * h)
+        d -= THETA_1 * (d - 2.0 * o.even_d[1, n] + o.even_d[2, n])
+        e -= THETA_1 * (e - 2.0 * o.even_e[1, n] + o.even_e[2, n])
+        x = THETA_2 * x + THETA_1 * o.x[n] + THETA_3 * o.even_x[2, n]
+        y = THETA_2 * y + THETA_1 * o.y[n] + THETA_3 * o.even_y[2, n]
+        force = THETA_2 * o.even_force[1, n] + THETA_1 * o.force[n] + THETA_3 * o.even_force[2, n]
+        x_side = o.grip[n] * force - o.b_xx[n] * d - o.b_xy[n] * e - o.c_xx[n] * x - o.c_xy[n] * y
+        y_side = force - o.b_xy[n] * d - o.b_yy[n] * e - o.c_xy[n] * x - o.c_yy[n] * y
+        o.source_x[n] = 2.0 / _MORE * (x_side - o.load[n] * o.sin_beta[n] - o.m[n] * a_x)
+        o.source_y[n] = 2.0 / _MORE * (y_side - o.load[n] * o.cos_beta[n] - o.m[n] * a_y)
+
+
+@kernel(void(LANE_TYPE, SHARED), fastmath=FAST)
+def _begin(o: Any, shared: Shared) -> None:
+    """At the second level: the error of the first one, by a start with a step twice as long."""
+    h = 2.0 * shared.h
+    for n in range(LANES):
+        x, y, v_x, v_y = o.even_x[0, n], o.even_y[0, n], o.even_d[0, n], o.even_e[0, n]
+        d, e = 2.0 / h * (o.x[n] - x) - v_x, 2.0 / h * (o.y[n] - y) - v_y
+        f_x = o.grip[n] * (2.0 * o.even_force[0, n] + o.force[n]) - 3.0 * o.load[n] * o.sin_beta[n]
+        f_y = 2.0 * o.even_force[0, n] + o.force[n] - 3.0 * o.load[n] * o.cos_beta[n]
+        f_x -= o.b_xx[n] * (2.0 * v_x + d) + o.b_xy[n] * (2.0 * v_y + e)
+        f_x -= o.c_xx[n] * (2.0 * x + o.x[n]) + o.c_xy[n] * (2.0 * y + o.y[n])
+        f_y -= o.b_xy[n] * (2.0 * v_x + d) + o.b_yy[n] * (2.0 * v_y + e)
+        f_y -= o.c_xy[n] * (2.0 * x + o.x[n]) + o.c_yy[n] * (2.0 * y + o.y[n])
+        part = h * h / 6.0 / o.m[n]
+        o.t_x[STEPS, n] += (x + h * v_x + part * f_x - o.x[n]) / _START
+        o.t_y[STEPS, n] += (y + h * v_y + part * f_y - o.y[n]) / _START
+        o.even_x[1, n], o.even_x[0, n], o.even_y[1, n], o.even_y[0, n] = x, o.x[n], y, o.y[n]
+        o.even_force[1, n], o.even_force[0, n] = o.even_force[0, n], o.force[n]
+
+
+@kernel(void(LANE_TYPE), fastmath=FAST, inlined=False)
+def _edge(o: Any) -> None:
+    """Add what the last cells leave out, in spacings: at an edge, or in a patch between nodes."""
+    for n in range(LANES):
+        gap, bend = o.gap[n] - o.rise[n], o.bend[n]
+        before = gap - o.rise[n] + bend
+        if o.gap[n] * gap < 0.0:
+            o.missing[n] += 0.125 * (o.gap[n] + gap) ** 2 / abs(o.rise[n])
+        elif 6.0 * abs(gap) < abs(bend) and bend * gap > 0.0 and gap * before > 0.0:
+            extreme = gap - bend / 24.0 - 0.125 * (o.gap[n] - before) ** 2 / bend
+            if extreme * gap < 0.0:
+                o.missing[n] += 4.0 / 3.0 * abs(extreme) * math.sqrt(2.0 * abs(extreme / bend))
+
+
+@kernel(void(LANE_TYPE, SHARED), fastmath=FAST, inlined=False)
+def _leave_out(o: Any, shared: Shared) -> None:
+    """`contact.midpoint.left_out` of pads that touch in part, where the contact was evaluated last."""
+    table, at, part = shared.table, 0, shared.length / shared.nodes
+    for n in range(LANES):
+        o.missing[n] = o.gap[n] = o.rise[n] = 0.0
+    for _ in range(shared.nodes):
+        f1, s_0, s_1, s_2 = table[at], table[at + 1], table[at + 2], table[at + 3]
+        s_3, s_4, c_0, c_1 = table[at + 4], table[at + 5], table[at + 6], table[at + 7]
+        c_2, c_3, c_4 = table[at + 8], table[at + 9], table[at + 10]
+        at += 11
+        some = 0.0
+        for n in range(LANES):
+            gap = o.cosine[0, n] * s_0 + o.sine[0, n] * c_0 + o.cosine[1, n] * s_1 + o.sine[1, n] * c_1
+            gap += o.cosine[2, n] * s_2 + o.sine[2, n] * c_2 + o.cosine[3, n] * s_3 + o.sine[3, n] * c_3
+            gap += o.cosine[4, n] * s_4 + o.sine[4, n] * c_4 - f1 - o.at_y[n]
+            change, cut = gap - o.gap[n], gap * o.gap[n] < 0.0
+            bend = change - o.rise[n]
+            some += (1.0 if cut else 0.0) + (1.0 if 6.0 * abs(o.gap[n]) < abs(bend) else 0.0)
+            o.bend[n], o.rise[n], o.gap[n] = bend, change, gap
+        if some > 0.0:
+            _edge(o)
+    for n in range(LANES):
+        o.missing[n] = part * o.k[n] * o.missing[n] if o.partly[n] > 0.0 else 0.0
+
+
+@kernel(void(LANE_TYPE, SHARED), fastmath=FAST)
+def _contact(o: Any, shared: Shared) -> None:
+    """The derivative of the contact force at the older level of the motion.
+
+    Along the motion dF_y/dt = ∂F_y/∂x (v_x - U) + ∂F_y/∂y v_y. This gives ∂F_y/∂x without another sum over nodes,
+    as the sliding velocity never vanishes in a lane. All three rates are differences over two steps: a constant
+    ∂F_y/∂x is exact, any other is right to h².
+    """
+    h = shared.h
+    for n in range(LANES):
+        d_slope = THETA_1 * (o.i_11[n] * o.grip[n] + o.i_12[n])  # by the force of the next level
+        e_slope = THETA_1 * (o.i_12[n] * o.grip[n] + o.i_22[n])
+        stiffness, sliding = o.k[n] * shared.length * o.touched[n], o.d[n] - o.belt[n]
+        o.tangential[n] = 0.5 / h * (o.force[n] - o.earlier[n]) + stiffness * o.e[n]
+        o.stiffness[n] = stiffness * sliding  # both slopes are multiplied by the sliding velocity
+        feedback = sliding - 2.0 * h * (o.tangential[n] * d_slope - o.stiffness[n] * e_slope)
+        o.feedback[n] = 1.0 / feedback if feedback != 0.0 else 0.0
+
+
+@kernel(void(LANE_TYPE, SHARED, int64), fastmath=FAST)
+def _move(o: Any, shared: Shared, kind: int) -> None:
+    """Carry one of them to the older level of the motion, by the derivative of its steps."""
+    h, by_steps, by_nodes = shared.h, 1.0 if kind == STEPS else 0.0, 2.0 if kind == NODES else 0.0
+    for n in range(LANES):
+        inertia, x_old, y_old = o.m[n] * (2.0 / (h * h)), o.t_x_old[kind, n], o.t_y_old[kind, n]
+        x = THETA_2 * o.t_x[kind, n] + (THETA_3 + THETA_1) * x_old
+        y = THETA_2 * o.t_y[kind, n] + (THETA_3 + THETA_1) * y_old
+        v_x, v_y = o.t_d[kind, n], o.t_e[kind, n]
+        v_x, v_y = THETA_1 * (2.0 * v_x - o.t_d_old[kind, n]), THETA_1 * (2.0 * v_y - o.t_e_old[kind, n])
+        known = THETA_2 * o.t_force[kind, n] + THETA_3 * o.t_before[kind, n]
+        g_1 = inertia * (o.t_x[kind, n] - x_old) - o.c_xx[n] * x - o.c_xy[n] * y + by_steps * o.source_x[n]
+        g_2 = inertia * (o.t_y[kind, n] - y_old) - o.c_yy[n] * y - o.c_xy[n] * x + by_steps * o.source_y[n]
+        g_1 += o.grip[n] * known - o.b_xx[n] * v_x - o.b_xy[n] * v_y
+        g_2 += known - o.b_xy[n] * v_x - o.b_yy[n] * v_y
+        d, e = o.i_11[n] * g_1 + o.i_12[n] * g_2, o.i_12[n] * g_1 + o.i_22[n] * g_2
+        d_slope = THETA_1 * (o.i_11[n] * o.grip[n] + o.i_12[n])
+        e_slope = THETA_1 * (o.i_12[n] * o.grip[n] + o.i_22[n])
+        x, y = x_old + 2.0 * h * d, y_old + 2.0 * h * e
+        own = by_nodes * o.missing[n] * (o.d[n] - o.belt[n])
+        force = (o.tangential[n] * x - o.stiffness[n] * y - own) * o.feedback[n]
+        d, e = d + d_slope * force, e + e_slope * force
+        o.t_x_old[kind, n], o.t_y_old[kind, n] = o.t_x[kind, n], o.t_y[kind, n]
+        o.t_d_old[kind, n], o.t_e_old[kind, n] = o.t_d[kind, n], o.t_e[kind, n]
+        o.t_x[kind, n], o.t_y[kind, n], o.t_d[kind, n], o.t_e[kind, n] = (
+            x_old + 2.0 * h * d,
+            y_old + 2.0 * h * e,
+            d,
+            e,
+        )
+        o.t_before[kind, n], o.t_force[kind, n] = o.t_force[kind, n], force
+
+
+@kernel(float64(float64))
+def _size(error: float) -> float:
+    """Its absolute value; infinite where a motion has amplified it beyond all numbers."""
+    return abs(error) if abs(error) < math.inf else math.inf
+
+
+@kernel(void(LANE_TYPE), fastmath=FAST)
+def _note(o: Any) -> None:
+    """The largest errors, and whether the shoe may have stuck for less than a step.
+
+    That of the nodes is known from every second level, by chance too large or too small: it takes nothing off that
+    of the steps.
+    """
+    for n in range(LANES):
+        x, y = _size(o.t_x[STEPS, n]), _size(o.t_y[STEPS, n])
+        d, e = _size(o.t_d[STEPS, n]), _size(o.t_e[STEPS, n])
+        o.worst[0, 0, n], o.worst[0, 1, n] = max(o.worst[0, 0, n], x), max(o.worst[0, 1, n], y)
+        o.worst[0, 2, n], o.worst[0, 3, n] = max(o.worst[0, 2, n], d), max(o.worst[0, 3, n], e)
+        x_n, y_n = _size(o.t_x[NODES, n]), _size(o.t_y[NODES, n])
+        d_n, e_n = _size(o.t_d[NODES, n]), _size(o.t_e[NODES, n])
+        o.worst[1, 0, n], o.worst[1, 1, n] = max(o.worst[1, 0, n], x_n), max(o.worst[1, 1, n], y_n)
+        o.worst[1, 2, n], o.worst[1, 3, n] = max(o.worst[1, 2, n], d_n), max(o.worst[1, 3, n], e_n)
+        x, y, d, e = x + x_n, y + y_n, d + d_n, e + e_n
+        o.worst[2, 0, n], o.worst[2, 1, n] = max(o.worst[2, 0, n], x), max(o.worst[2, 1, n], y)
+        o.worst[2, 2, n], o.worst[2, 3, n] = max(o.worst[2, 2, n], d), max(o.worst[2, 3, n], e)
+        change = o.d[n] - o.d_old[n]
+        dip = (1.0 / 8.0 + 1.0 / 6.0) * abs(change - o.change[n])  # of vx between two steps, and of d beside vx
+        o.change[n] = change
+        o.unsure[n] = 1.0 if o.side[n] * (o.d[n] - o.belt[n]) < dip + NEAR * d else o.unsure[n]
+
+
+@kernel(void(LANE_TYPE, SHARED, int64), inlined=False)
+def carry(o: Any, shared: Shared, step: int) -> None:
+    """Carry all that is carried along to the older level of the motion, behind a step that has been made."""
+    _contact(o, shared)
+    even, own = step % 2 == 0, shared.first == STEPS
+    if own and even and step > 0:
+        _miss(o, shared)
+    for kind in range(shared.first, shared.beyond):
+        _move(o, shared, kind)
+    if not own:
+        return
+    if step == 0:
+        _begin(o, shared)
+    _note(o)
+    some = 0.0
+    for n in range(LANES):
+        o.source_x[n] = o.source_y[n] = o.missing[n] = 0.0
+        some += o.partly[n]
+    if even and some > 0.0:
+        _leave_out(o, shared)
+
+
+@kernel(void(LANE_TYPE, SHARED, float64[:, ::1], int64, int64), inlined=False)
+def renew(o: Any, shared: Shared, sizes: Floats, number: int, samples: int) -> None:
+    """At a sample that ends a part of the run, note the sizes, and go on with disturbances of size one.
+
+    The square of a size is twice the energy over the mass where the pad touches everywhere. It hardly swings then.
+    """
+    part = (number - 1) * PARTS // samples
+    if number == 0 or (number < samples and number * PARTS // samples == part):
+        return
+    for n in range(LANES):
+        x, y = o.t_x_old[DISTURBED, n], o.t_y_old[DISTURBED, n]
+        d, e = o.t_d[DISTURBED, n], o.t_e[DISTURBED, n]
+        springs = o.c_xx[n] * x * x + 2.0 * o.c_xy[n] * x * y + (o.c_yy[n] + o.k[n] * shared.length) * y * y
+        size = math.sqrt(max(springs, 0.0) / o.m[n] + d * d + e * e)
+        sizes[part, n] = size
+        o.t_kept[n] = 1.0 / size if LEAST < size < MOST else 0.0
+    for each in (o.t_x, o.t_y, o.t_x_old, o.t_y_old, o.t_d, o.t_e, o.t_d_old, o.t_e_old, o.t_force, o.t_before):
+        for n in range(LANES):
+            each[DISTURBED, n] = o.t_kept[n] * each[DISTURBED, n] if o.t_kept[n] > 0.0 else 0.0
+    for n in range(LANES):
+        if o.t_kept[n] == 0.0:
+            o.t_d[DISTURBED, n], o.t_x[DISTURBED, n] = 1.0, shared.h
