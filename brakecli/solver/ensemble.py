@@ -91,8 +91,8 @@ def _run_lanes(systems: list[System]) -> list[Motion | None]:
     carried = alike.tangents and alike.samples >= FEWEST_SAMPLES
     sizes = np.ones((PARTS if carried else 0, LANES))
     grid = alike.step, alike.interval, alike.per_sample, alike.nodes
-    kinds = DISTURBED if alike.start_error is None else STEPS, DISTURBED + carried
-    advance(o, Shared._make((*grid, *surfaces, signals, *kinds)), rows, sizes)
+    carrying = DISTURBED if alike.start_error is None else STEPS, DISTURBED + carried
+    advance(o, Shared._make((*grid, *surfaces, signals, *carrying)), rows, sizes)
     exponents = _exponents(sizes, alike.sampled_duration) if carried else repeat(None)
     seconds, motions = (time.perf_counter() - begin) / number, list[Motion | None]()
     for n, (system, exponent) in enumerate(zip(systems, exponents, strict=False)):
