@@ -309,6 +309,7 @@ def test_a_run_waits_for_no_library_that_it_does_not_need(tmp_path: Path) -> Non
     loaded = loaded_by(["run", "tiny.toml"], tmp_path)
     assert {"numba", "h5py", "brakecli.solver.loop"} <= loaded
     unused = {"scipy.signal", "scipy.stats", "scipy.interpolate", "scipy.optimize", "scipy.ndimage"}
+    unused |= {"scipy.linalg", "numpy.f2py"}
     assert loaded.isdisjoint({*unused, "matplotlib", "pint", "brakecli.sweeps", "brakecli.comparison"})
 
 

@@ -95,6 +95,28 @@ def test_a_kernel_for_kernels_alone_cannot_be_called_from_python() -> None:
         implicit_step._try_force(None, None, 0.0)  # type: ignore[arg-type]
 
 
+LOADED = """
+from brakecli.solver import implicit_step
+print(len(implicit_step.newton.overloads), len(implicit_step._try_force.overloads))
+"""
+
+
+def test_a_kernel_for_kernels_alone_is_compiled_with_its_caller_and_never_loaded(tmp_path: Path) -> None:
+    assert [python(LOADED, tmp_path) for _ in range(2)] == ["1 1\n", "1 0\n"]
+
+
+@pytest.mark.parametrize(("before", "found"), [("", "False"), ("import scipy.linalg.cython_blas", "True")])
+def test_kernels_load_no_blas_and_leave_it_to_those_of_others(tmp_path: Path, before: str, found: str) -> None:
+    dot = "numba.njit(lambda a: numpy.dot(a, a))(numpy.ones(3))"
+    program = f"""
+{before}
+import sys, numba, numpy
+from brakecli.solver import friction
+print("scipy.linalg" in sys.modules, {dot}, "scipy.linalg.cython_blas" in sys.modules)
+"""
+    assert python(program, tmp_path).split() == [found, "3.0", "True"]
+
+
 def test_kernels_compile_where_no_cache_can_be_made(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way")
     out = python(COUNT.format(limit=""), tmp_path / "file")
