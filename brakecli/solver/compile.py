@@ -246,6 +246,8 @@ def address(function: Any) -> int:
         if function not in _functions:
             _functions.append(function)
         return _functions.index(function)
+    if not function.overloads:  # no kernel that has been compiled here calls it by its name
+        _compile(function, function.signature)
     (compiled,) = function.overloads.values()
     return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))
 

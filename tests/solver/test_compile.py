@@ -8,10 +8,13 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from brakecli.solver import implicit_step
+from brakecli.solver.compile import address
+from brakecli.solver.schemes import event_driven
 from tests.campaign import campaign
 
 COUNT = """
@@ -103,6 +106,12 @@ print(len(implicit_step.newton.overloads), len(implicit_step._try_force.overload
 
 def test_a_kernel_for_kernels_alone_is_compiled_with_its_caller_and_never_loaded(tmp_path: Path) -> None:
     assert [python(LOADED, tmp_path) for _ in range(2)] == ["1 1\n", "1 0\n"]
+
+
+def test_a_kernel_that_is_called_by_its_address_is_there_with_its_scheme() -> None:
+    kernel: Any = event_driven.solve
+    (compiled,) = kernel.overloads.values()
+    assert address(kernel) == compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name) != 0
 
 
 @pytest.mark.parametrize(("before", "found"), [("", "False"), ("import scipy.linalg.cython_blas", "True")])
