@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from brakecli.branches.bar import Bound, located
+from brakecli.branches.bar import WIDEST, Bound, located
 from brakecli.branches.explore import FORCED, SLIDING, Explored, Followed, Mark, crossing, span
 from brakecli.branches.follow import RUNS_AGAIN
 from brakecli.branches.line import Line
@@ -18,8 +18,6 @@ from brakecli.branches.sliding import Slide
 
 NARROWEST = 1e-6
 """Part of the range below which an interval is that of rounding."""
-WIDEST = 1.0 / 3.0
-"""Part of the range that an error bar with an answer may have."""
 MEET = 1e-3
 """Part of the range, and of their states, by which two ends of branches differ at most that are one motion."""
 Span = tuple[float, float]

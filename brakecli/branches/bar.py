@@ -25,6 +25,8 @@ ROUNDS = 24
 """Motions that are computed to locate an end between two others."""
 LOCATED = 1e-7
 """Change of p below which it is located."""
+WIDEST = 1.0 / 3.0
+"""Part of the range that an error bar with an answer may have."""
 
 
 class Bound(NamedTuple):

@@ -10,6 +10,7 @@ import hashlib
 import io
 import os
 import stat
+import sys
 import time
 import zlib
 from collections.abc import Callable, Iterator
@@ -40,6 +41,20 @@ config: Any = numba_config  # its settings come from the environment, so type ch
 caching: Any = numba_caching  # has no types
 events: Any = numba_events  # has no types
 F = TypeVar("F", bound=Callable[..., Any])
+
+
+def _leave_out_blas() -> None:
+    """Load Numba's functions of arrays without SciPy's BLAS: its import takes 0.1 s, and no kernel calls it."""
+    name = "scipy.linalg.cython_blas"
+    if name not in sys.modules:
+        sys.modules[name] = None  # type: ignore[assignment]  # whoever imports it learns that there is none
+        from numba.np import arraymath
+
+        del sys.modules[name]
+        arraymath._HAVE_BLAS = True  # kernels of others find it as before
+
+
+_leave_out_blas()
 
 
 def source_hash(folder: Path = Path(__file__).parent) -> str:
@@ -92,11 +107,23 @@ events.register("numba:compile", _Compiling())
 
 
 class _ForKernels(CPUDispatcher):
-    """A kernel without a wrapper for calls from Python, which would otherwise end the process."""
+    """A kernel for other kernels alone: a run whose kernels are all in the cache never loads it.
+
+    It has no wrapper for calls from Python, which would otherwise end the process.
+    """
+
+    signature: Any
+    _can_compile: bool
 
     def __call__(self, *arguments: Any) -> None:
         name = vars(self)["__name__"]
         raise TypeError(f"{name} has no wrapper for calls from Python: only other kernels can call it")
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """What the compiler asks for where another kernel calls this one."""
+        if self._can_compile:
+            _compile(self, self.signature)
+        return super().get_call_template(args, kws)
 
 
 class _CheckedFiles(caching.IndexDataCacheFile):  # type: ignore[misc]
@@ -159,20 +186,32 @@ def _checksum(path: str, contents: bytes) -> bytes:
     return zlib.crc32(contents, zlib.crc32(Path(path).name.encode())).to_bytes(4)
 
 
-def _compiled(signature: Any, function: Any, options: dict[str, Any]) -> Any:
-    """The machine code of a function: of the cache, if that can be used."""
+def _not_compiled(function: Any, options: dict[str, Any]) -> Any:
+    """A kernel that is not compiled yet, with its place in the cache, if that can be used."""
     if CACHE is not None:
         before = config.CACHE_DIR, caching.IndexDataCacheFile
         config.CACHE_DIR, caching.IndexDataCacheFile = str(CACHE), _CheckedFiles
         try:
-            return njit(signature, cache=True, **options)(function)
-        except Exception:  # the cache cannot be written, on a full disk: do without
+            return njit(cache=True, **options)(function)
+        except Exception:  # the cache cannot be used after all: do without
             pass
         finally:
             config.CACHE_DIR, caching.IndexDataCacheFile = before
-            while _held:
-                os.close(_held.pop())
-    return njit(signature, **options)(function)
+    return njit(**options)(function)
+
+
+def _compile(dispatcher: Any, signature: Any) -> None:
+    """Compile a kernel for one signature, or load it from the cache."""
+    outermost = not _held  # those that it calls may be compiled on the way
+    try:
+        dispatcher.compile(signature)
+    except Exception:  # the cache cannot be written, on a full disk: do without
+        dispatcher._cache = caching.NullCache()
+        dispatcher.compile(signature)
+    finally:
+        while outermost and _held:
+            os.close(_held.pop())
+    dispatcher.disable_compile()
 
 
 def kernel(signature: Any, *, fastmath: frozenset[str] = frozenset(), inlined: bool = True) -> Callable[[F], F]:
@@ -187,9 +226,11 @@ def kernel(signature: Any, *, fastmath: frozenset[str] = frozenset(), inlined: b
         private = not inlined or function.__name__.startswith("_")
         options: dict[str, Any] = {"fastmath": set(fastmath), "forceinline": inlined, "no_cfunc_wrapper": True}
         options["no_cpython_wrapper"] = private
-        compiled: Any = _compiled(signature, function, options)
+        compiled: Any = _not_compiled(function, options)
         if private and not config.DISABLE_JIT:
-            compiled.__class__ = _ForKernels
+            compiled.__class__, compiled.signature = _ForKernels, signature
+        elif not config.DISABLE_JIT:
+            _compile(compiled, signature)
         return compiled  # type: ignore[no-any-return]
 
     return compile_
@@ -205,6 +246,8 @@ def address(function: Any) -> int:
         if function not in _functions:
             _functions.append(function)
         return _functions.index(function)
+    if not function.overloads:  # no kernel that has been compiled here calls it by its name
+        _compile(function, function.signature)
     (compiled,) = function.overloads.values()
     return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))
 

@@ -10,10 +10,8 @@ from brakecli.case.system import system_of
 from brakecli.errors import CaseError, RefusedError, key_text
 from brakecli.runs.cost import duration_text
 from brakecli.runs.limits import MOST_BYTES, check, refuse, within_range
-from brakecli.solver.flow.rough import default_steps
 from brakecli.solver.period import common_period
 from brakecli.sweeps.early import may_be_early
-from brakecli.sweeps.lyapunov import exponent_length
 from brakecli.sweeps.pilot import Pilot
 from brakecli.sweeps.plan import Plan, Settings, label
 from brakecli.sweeps.tables import Critical
@@ -106,6 +104,9 @@ def _noted(plan: Plan, point: int, failing: list[str]) -> Iterator[None]:
 
 def _forced_seconds(plan: Plan, settings: Settings, critical: Critical) -> float:
     """The time (s) of a search along what a rough wheel forces; 0 where it forces nothing."""
+    from brakecli.solver.flow.rough import default_steps  # only searches wait for its kernels
+    from brakecli.sweeps.lyapunov import exponent_length
+
     seconds = 0.0
     for value in (critical.lower, critical.upper):
         with suppress(CaseError):

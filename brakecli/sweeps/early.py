@@ -14,7 +14,7 @@ stick, a settled part that is too short), there is no early verdict, and the run
 
 import math
 from dataclasses import replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -27,9 +27,11 @@ from brakecli.analysis.stability.modes import is_undamped
 from brakecli.runs.certificate import ROUNDING, Certificate
 from brakecli.solver.automaton import STICK
 from brakecli.solver.compile import Floats
-from brakecli.solver.flow.seek import FOUND, GOING_ON, LINEAR, Pursuit
 from brakecli.solver.motion import Work
 from brakecli.solver.system import System
+
+if TYPE_CHECKING:
+    from brakecli.solver.flow.seek import Pursuit
 
 _SETTLED = 0.02  # of the size of a cycle: a motion so near to its orbit is settled
 _POWERS = 10.0  # of e, by which what is left then fades until the end: drift is seen no more
@@ -61,6 +63,9 @@ def early(system: System) -> Early | None:
     theory = _theory(system)
     if theory is None:
         return None
+    # Rough pads do not wait for these kernels.
+    from brakecli.solver.flow.seek import FOUND, GOING_ON, LINEAR, Pursuit
+
     acting = system.contact_stiffness, system.belt_speed, system.load_at_start
     modes = theory.values, theory.vectors
     try:
@@ -98,7 +103,7 @@ def _theory(system: System) -> Linear | None:
     return theory if theory is not None and theory.direction != 0 else None
 
 
-def _linear(system: System, theory: Linear, motion: Pursuit) -> tuple[Verdict, list[float]] | None:
+def _linear(system: System, theory: Linear, motion: "Pursuit") -> tuple[Verdict, list[float]] | None:
     """The verdict on a motion that is linear from its first half on, and its last state."""
     o = motion.way
     start, end = (system.samples + 1) // 2 * system.interval, system.sampled_duration
@@ -126,7 +131,7 @@ def _linear(system: System, theory: Linear, motion: Pursuit) -> tuple[Verdict, l
     ), last.tolist()
 
 
-def _cycle(system: System, theory: Linear, motion: Pursuit) -> tuple[Verdict, list[float]] | None:
+def _cycle(system: System, theory: Linear, motion: "Pursuit") -> tuple[Verdict, list[float]] | None:
     """The verdict on an orbit that the motion has come to well before the end of the run, and a state on it."""
     o, orbit, factor = motion.way, motion.orbit, motion.multiplier
     end, period, interval = system.sampled_duration, orbit.period, system.interval

@@ -29,7 +29,6 @@ from brakecli.runs.together import TOGETHER, certify_together
 from brakecli.solver.motion import Motion
 from brakecli.solver.roughness import TWO_PI, wheel_angles
 from brakecli.solver.schedules import integral_at
-from brakecli.sweeps.critical import search
 from brakecli.sweeps.early import Ending, early
 from brakecli.sweeps.plan import Plan, Settings
 
@@ -245,6 +244,8 @@ def computed(
         outcome = judged(point.case, point.check, certified, whole=False)
         values = values_of(fields.POINT, outcome)
         if (critical := plan.sweep.critical) is not None:
+            from brakecli.sweeps.critical import search  # only searches wait for the kernels of branches
+
             path = key_path(critical.parameter)
             with within_range():
                 own = Line(point.case, [critical.parameter], critical.lower, critical.upper).own

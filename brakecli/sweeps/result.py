@@ -21,7 +21,6 @@ from brakecli.runs.run import origin
 from brakecli.sweeps.journal import Journal
 from brakecli.sweeps.plan import LoadedSweep, Plan, label
 from brakecli.sweeps.point import Status
-from brakecli.sweeps.read_off import LIGHT
 from brakecli.sweeps.short_runs import on_short_runs
 from brakecli.sweeps.tables import Axis
 
@@ -219,6 +218,8 @@ def _on_no_dashpots(plan: Plan) -> Iterator[str]:
     system = system_of(plan.case({}))
     by_runs = plan.sweep.critical is not None and plan.sweep.critical.method == "simulation"
     if by_runs and len(system.wheel.g) and is_undamped(system.coefficients):
+        from brakecli.sweeps.read_off import LIGHT  # only searches wait for its kernels
+
         none = f"growth that a damping ratio of {LIGHT:g} would stop counts as none"
         yield f"no dashpot acts: {none}; give the links the damping that they have"
 

@@ -6,7 +6,7 @@ from enum import StrEnum
 from itertools import pairwise
 from typing import NamedTuple
 
-from brakecli.branches.answers import WIDEST
+from brakecli.branches.bar import WIDEST
 from brakecli.sweeps.tables import Critical
 
 

@@ -8,10 +8,13 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from brakecli.solver import implicit_step
+from brakecli.solver.compile import address
+from brakecli.solver.schemes import event_driven
 from tests.campaign import campaign
 
 COUNT = """
@@ -93,6 +96,34 @@ def test_kernels_compile_without_a_cache_where_the_disk_is_full(tmp_path: Path) 
 def test_a_kernel_for_kernels_alone_cannot_be_called_from_python() -> None:
     with pytest.raises(TypeError, match="has no wrapper for calls from Python"):
         implicit_step._try_force(None, None, 0.0)  # type: ignore[arg-type]
+
+
+LOADED = """
+from brakecli.solver import implicit_step
+print(len(implicit_step.newton.overloads), len(implicit_step._try_force.overloads))
+"""
+
+
+def test_a_kernel_for_kernels_alone_is_compiled_with_its_caller_and_never_loaded(tmp_path: Path) -> None:
+    assert [python(LOADED, tmp_path) for _ in range(2)] == ["1 1\n", "1 0\n"]
+
+
+def test_a_kernel_that_is_called_by_its_address_is_there_with_its_scheme() -> None:
+    kernel: Any = event_driven.solve
+    (compiled,) = kernel.overloads.values()
+    assert address(kernel) == compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name) != 0
+
+
+@pytest.mark.parametrize(("before", "found"), [("", "False"), ("import scipy.linalg.cython_blas", "True")])
+def test_kernels_load_no_blas_and_leave_it_to_those_of_others(tmp_path: Path, before: str, found: str) -> None:
+    dot = "numba.njit(lambda a: numpy.dot(a, a))(numpy.ones(3))"
+    program = f"""
+{before}
+import sys, numba, numpy
+from brakecli.solver import friction
+print("scipy.linalg" in sys.modules, {dot}, "scipy.linalg.cython_blas" in sys.modules)
+"""
+    assert python(program, tmp_path).split() == [found, "3.0", "True"]
 
 
 def test_kernels_compile_where_no_cache_can_be_made(tmp_path: Path) -> None:

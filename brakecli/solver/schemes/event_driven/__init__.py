@@ -8,7 +8,7 @@ from numba import float64, int64, void
 
 from brakecli.solver import own_steps
 from brakecli.solver.automaton import OPEN, STICK, side_of
-from brakecli.solver.compile import Floats, at_address, from_memory, into_memory, kernel
+from brakecli.solver.compile import Floats, address, at_address, from_memory, into_memory, kernel
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.friction import observed
 from brakecli.solver.quantities import Failure
@@ -28,6 +28,7 @@ _PLANT = plant_type(MOTION)
 hold, _plant_at = into_memory(_PLANT), from_memory(_PLANT)
 _evaluate_at = at_address(EVALUATE)
 _step_at = at_address(STEP)  # compiled in its own place: otherwise `advance` would compile it again
+address(solve)  # compiled here, like all other kernels of a run: before anything is timed
 
 _BUDGET, _EXACT = 4096, 64
 """Steps of one call on smooth surfaces, and as how many one counts that finds patches; the square of the number of
