@@ -17,6 +17,7 @@ CASES := $(sort $(wildcard cases/*.toml))
 PYTEST := -m pytest --numprocesses 3 --dist loadfile
 PYTEST_ARGS ?=
 BENCH_ARGS ?=
+POINTS ?=
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -178,8 +179,8 @@ bench: $(PEERS_STAMP) ## measure brakecli beside general solvers and write docs/
 bench-sweep: $(DEV_STAMP) ## what a sweep costs beside its points; needs two idle cores (some minutes)
 	$(BIN)/python -m benchmarks.sweep
 
-bench-million: $(DEV_STAMP) ## a million made-up points over two dask workers: what handing out and writing cost (two minutes)
-	$(BIN)/python -m benchmarks.million
+bench-million: $(DEV_STAMP) ## a million points, made up and of a rough shoe, over dask workers, some killed; POINTS=20000 (an hour)
+	$(BIN)/python -m benchmarks.million $(POINTS)
 
 bench-contact: $(DEV_STAMP) ## what the contact costs, against C; needs gcc and an idle core (some minutes)
 	$(BIN)/python -m benchmarks.contact
