@@ -16,6 +16,8 @@ CASES := $(sort $(wildcard cases/*.toml))
 # Two processes: one test waits for what it has started while another computes. PYTEST_ARGS=-n0 takes one alone.
 PYTEST := -m pytest --numprocesses 3 --dist loadfile
 PYTEST_ARGS ?=
+BENCH_ARGS ?=
+POINTS ?=
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -171,14 +173,14 @@ statistics: $(DEV_STAMP) ## large draws, once per change that may move them, and
 	$(BIN)/python $(PYTEST) -m statistics $(PYTEST_ARGS)
 	$(BIN)/python $(PYTEST) -m campaign -n0 -s -k "few_shoes_stay or threshold_twice" tests/analysis/test_score.py
 
-bench: $(PEERS_STAMP) ## measure brakecli beside general solvers and write docs/performance.md (ten minutes)
-	$(PEERS)/bin/python -m benchmarks.performance
+bench: $(PEERS_STAMP) ## measure brakecli beside general solvers and write docs/performance.md; fails where it lost ground (ten minutes)
+	$(PEERS)/bin/python -m benchmarks.performance $(BENCH_ARGS)
 
 bench-sweep: $(DEV_STAMP) ## what a sweep costs beside its points; needs two idle cores (some minutes)
 	$(BIN)/python -m benchmarks.sweep
 
-bench-million: $(DEV_STAMP) ## a million made-up points over two dask workers: what handing out and writing cost (two minutes)
-	$(BIN)/python -m benchmarks.million
+bench-million: $(DEV_STAMP) ## a million points, made up and of a rough shoe, over dask workers, some killed; POINTS=20000 (an hour)
+	$(BIN)/python -m benchmarks.million $(POINTS)
 
 bench-contact: $(DEV_STAMP) ## what the contact costs, against C; needs gcc and an idle core (some minutes)
 	$(BIN)/python -m benchmarks.contact

@@ -1,9 +1,10 @@
 """Speed beside general solvers at matched errors, and what is to be reached: writes docs/performance.md.
 
-    python -m benchmarks.performance [PART ...]
+    python -m benchmarks.performance [--keep] [PART ...]
 
 Needs the extra `bench`. Programs that are not installed are named on the page. Parts, by words in their names, are
-printed and leave the page alone.
+printed and leave the page alone. It fails where a ratio fell far below what has been reached, see `reached`; where
+none did, `--keep` takes over those that are higher.
 """
 
 import os
@@ -15,7 +16,7 @@ from functools import partial
 
 os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false")
 
-from benchmarks.performance import ensembles, in_c, page, peers, rows, taylor
+from benchmarks.performance import ensembles, in_c, page, peers, reached, rows, taylor
 from benchmarks.performance.matching import (
     TARGETS,
     US,
@@ -92,6 +93,11 @@ REASONS = {
     "critical: an open": "Critical values of open pads: growth is measured by runs, one after the other.",
 }
 """Why a goal is missed, by the beginning of its name; the first that fits."""
+GUARD = (
+    "How many times longer others take, larger is better. `make bench` fails where a ratio is more than"
+    f" {100 * reached.LOSS:.0f} % below what was reached; `make bench BENCH_ARGS=--keep` raises that, and no"
+    " command lowers it. Times by themselves are not guarded."
+)
 
 
 @dataclass
@@ -100,7 +106,9 @@ class Report:
 
     begin: float  # s
     load: float  # of the machine at the start
+    before: reached.Ratios = field(default_factory=reached.read)
     goals: list[Goal] = field(default_factory=list)
+    ratios: dict[str, float] = field(default_factory=dict)  # those that are guarded
     motions: dict[tuple[str, float], list[Entry]] = field(default_factory=dict)
     ensemble: list[Entry] = field(default_factory=list)  # case B for the duration of the ensembles
     rates: list[ensembles.Rate] = field(default_factory=list)
@@ -114,6 +122,7 @@ class Report:
         if self.left:
             lines += [f"The run was interrupted: not measured are {', '.join(self.left)}.", ""]
         lines += ["## To reach", "", *page.goals(self.goals, REASONS)]
+        lines += ["## What has been reached", "", GUARD, "", *reached.lines(self.before, self.ratios)]
         lines += ["## Motions side by side", "", *page.absent(self.motions)] if self.motions else []
         for (name, duration), entries in self.motions.items():
             lines += page.side_by_side(f"{name}: {CASES[name]}", duration, entries)
@@ -156,6 +165,7 @@ def motions(report: Report, name: str) -> None:
         entries = measure(everyone(Problem(part), name, begin), begin, TURN_SECONDS)
         if duration in DURATIONS:
             report.motions[name, duration] = entries
+            report.ratios |= reached.side_by_side(f"{name}, {duration:g} s", entries)
         else:
             report.ensemble = entries
     report.goals += motion_goals(report.motions, name)
@@ -203,6 +213,7 @@ def relaxation(report: Report) -> None:
         f"{number(1e3 * entries[0].time)} ms against {number(1e3 * best.time)} ms at an error of {best.error:.0e}"
     )
     value = best.time / entries[0].time
+    report.ratios["heyoka.py: relaxation.toml, 2 s at 1e-08"] = value
     what = "heyoka.py: relaxation.toml, 2 s at 1e-8, 200 samples"
     report.goals.append((what, "≥ 3", f"{number(value)}: {times}", value >= 3))
 
@@ -239,6 +250,10 @@ def many(report: Report) -> None:
         found.insert(0, ensembles.ours(200, what, f"solver={solver}", f"contact.nodes={method.nodes}", interval))
     promised = f"solver={{tolerance=1e-3, duration={ensembles.DURATION}}}"
     found.insert(0, ensembles.ours(10_000, "sweep with verdicts, `tolerance = 1e-3`", promised, interval))
+    for each in found[1:]:
+        if each.who in reached.GUARDED:
+            name = f"{each.who}: map on B, a core"
+            report.ratios[name] = found[0].per_cpu_second / each.per_cpu_second
     speed = found[0].per_second
     report.goals.append(("map on B: points/s", "≥ 2,500", number(speed), speed >= 2500))
 
@@ -254,6 +269,7 @@ def promises(report: Report) -> None:
     for duration, entries in ((0.02, report.motions["B", 0.02]), (0.2, report.ensemble)):
         seconds, least = rows.promise(duration, entries)
         told = f"{number(seconds / least)} ({number(1e3 * seconds)} ms against {number(1e3 * least)} ms)"
+        report.ratios[f"cheapest entry against a promise: B, {duration:g} s at 1e-03"] = least / seconds
         report.goals.append((f"promise: 1e-3 on B, {duration:g} s", "≤ 10", told, seconds <= 10 * least))
 
 
@@ -261,6 +277,8 @@ def beside_c(report: Report) -> None:
     report.missing = in_c.unavailable()
     if not report.missing:
         report.single = in_c.beside_c(partial(rows.load, "accuracy/B.toml"))
+        for each in report.single:
+            report.ratios[f"in C: {each.what.partition(',')[0]}"] = each.theirs / each.ours
         value = report.single[0].ours / report.single[0].theirs
         report.goals.append(("one evaluation: 256 nodes, against C", "≤ 1.15", number(value), value <= 1.15))
 
@@ -290,7 +308,9 @@ def main() -> None:
     stages |= {"promises": promises, "single steps": beside_c, "maps": maps, "case C": partial(motions, name="C")}
     stages |= {"ensembles": many, "growth of cost": growth}
     stages |= {"critical values of a smooth point": critical_smooth, "of an open point": critical_open}
-    wanted = sys.argv[1:]
+    wanted = [word for word in sys.argv[1:] if word != "--keep"]
+    if wanted and "--keep" in sys.argv:
+        sys.exit("--keep needs a run of all parts")
     stages = {name: stage for name, stage in stages.items() if not wanted or any(word in name for word in wanted)}
     report.left = list(stages)
     for name, stage in stages.items():
@@ -300,6 +320,10 @@ def main() -> None:
         if not wanted:
             page.write(report.lines())  # an interrupted run leaves what it has found
     print("\n".join(report.lines()))
+    if fell := reached.fallen(report.before, report.ratios, whole=not wanted):
+        sys.exit("\n".join(["less than what has been reached:", *fell]))
+    if "--keep" in sys.argv:
+        reached.FILE.write_text(reached.written(reached.raised(report.before, report.ratios)), encoding="utf-8")
 
 
 if __name__ == "__main__":

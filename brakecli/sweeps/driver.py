@@ -27,6 +27,8 @@ from brakecli.sweeps.workers.task import Engine, Task, compute_units
 
 TASK_SECONDS = 0.2  # of work in a task, so that handing it out costs little,
 TASKS_A_SECOND = 100.0  # and more where workers would ask for more tasks than this; a scheduler hands out 500
+LONGEST_TASK = 1.0  # s of work, in the middle of long sweeps: a task costs a cluster some 5 ms of a core,
+PART_OF_REST = 0.01  # and no more than this part of what a worker has still to do: all end at about the same time
 LARGEST_TASK = 1000  # points, for up to a hundred workers; in proportion for more
 
 
@@ -42,7 +44,9 @@ class TaskQueue:
         """
         edges = np.flatnonzero(np.diff(finished, prepend=True, append=True)).reshape(-1, 2).tolist()
         self._tasks = deque([Task(first, end - first) for first, end in edges][::order])
+        self._left = sum(task.size for task in self._tasks)
         self._size, self._least, self._task_seconds = size, least, max(TASK_SECONDS, workers / TASKS_A_SECOND)
+        self._part_of_rest = PART_OF_REST / workers
         self._most = max(LARGEST_TASK, LARGEST_TASK * workers // 100)
         self.seconds, self.units = 0.0, 0  # computed so far
 
@@ -51,8 +55,11 @@ class TaskQueue:
         if not self._tasks:
             return None
         task = self._tasks.popleft()
-        by_time = math.ceil(min(self._task_seconds * self.units / max(self.seconds, 1e-9), self._most))
-        size = min(task.size, self._size or max(self._least, by_time))
+        rate = self.units / max(self.seconds, 1e-9)
+        by_rest = int(min(LONGEST_TASK * rate, self._part_of_rest * self._left, self._most))
+        by_time = math.ceil(min(self._task_seconds * rate, self._most))
+        size = min(task.size, self._size or max(self._least, by_time, by_rest))
+        self._left -= size
         if size < task.size:
             self._tasks.appendleft(Task(task.first + size, task.size - size))
         return task._replace(size=size)
@@ -66,6 +73,7 @@ class TaskQueue:
         """Queue the units of a task that has failed once more, one by one; False if that was their last try."""
         if not task.last_try:
             units = range(task.first, task.first + task.size)
+            self._left += task.size
             self._tasks.extendleft(Task(unit, 1, last_try=True) for unit in reversed(units))
         return not task.last_try
 

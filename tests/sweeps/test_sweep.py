@@ -354,6 +354,18 @@ def test_tasks_are_as_long_as_their_work_is_short() -> None:
     assert [together.next_task() for _ in range(3)] == [Task(0, 32), Task(32, 8), None]
 
 
+def test_tasks_of_long_sweeps_last_a_second_and_get_shorter_towards_the_end() -> None:
+    queue, sizes = TaskQueue(np.zeros(10**5, dtype=bool), None, workers=4), list[int]()
+    queue.note_time(Task(0, 1000), 4.0)
+    while (task := queue.next_task()) is not None:
+        sizes.append(task.size)
+        left = 10**5 - sum(sizes)
+        assert task.size in (250, 50) or task.size <= 0.01 / 4 * (left + task.size) or not left
+    assert sum(sizes) == 10**5
+    assert sizes == sorted(sizes, reverse=True)
+    assert (sizes[0], sizes[-2]) == (250, 50)  # 1 s and 0.2 s of 4 ms each
+
+
 def test_a_thousand_workers_ask_for_no_more_tasks_than_a_scheduler_hands_out() -> None:
     queue = TaskQueue(np.zeros(10**6, dtype=bool), None, workers=1000)
     queue.note_time(Task(0, 1000), 2.0)
