@@ -4,8 +4,6 @@ import math
 from functools import lru_cache
 from typing import Any
 
-import numpy as np
-
 from brakecli.solver.records import Coefficients
 
 Pair = tuple[Any, Any]
@@ -35,9 +33,10 @@ def tensor(one: Any, two: Any, beta: Pair, alpha: Pair) -> tuple[Any, Any, Any]:
 @lru_cache(maxsize=256)  # the points of a block are asked for again and again
 def natural_frequencies(c: Coefficients, contact_stiffness: float) -> tuple[float, float]:
     """Undamped natural frequencies (Hz, rising) of the shoe on its links and a contact stiffness (N/m)."""
-    stiffness = np.array([[c.c_xx, c.c_xy], [c.c_xy, c.c_yy + contact_stiffness]])
-    low, high = np.sqrt(np.maximum(np.linalg.eigvalsh(stiffness / c.m), 0.0)) / (2.0 * math.pi)
-    return float(low), float(high)
+    s_xx, s_xy, s_yy = c.c_xx, c.c_xy, c.c_yy + contact_stiffness
+    high = 0.5 * (s_xx + s_yy) + math.hypot(0.5 * (s_xx - s_yy), s_xy)
+    low = (s_xx * s_yy - s_xy**2) / high if high > 0.0 else 0.0
+    return math.sqrt(max(low, 0.0) / c.m) / (2.0 * math.pi), math.sqrt(max(high, 0.0) / c.m) / (2.0 * math.pi)
 
 
 def sin_cos(degrees: float) -> tuple[float, float]:

@@ -92,8 +92,8 @@ def context(system: System) -> Context:
         growth=lambda: growth(c, stiffness(), grip),
         linear=theory,
         steadier=lambda: _steadier(system),
-        ripple=lambda part, lines: ripple(system, belt, stiffness(), part, lines),
-        detuned=lambda part, lines: detuned(system, belt, stiffness(), part, lines),
+        ripple=lambda part, lines: ripple(system, belt, stiffness, part, lines),
+        detuned=lambda part, lines: detuned(system, belt, stiffness, part, lines),
     )
 
 

@@ -49,8 +49,8 @@ class Shown:
         self.history, self.context, self.limits, self.track = history, context, limits, track
         self.duration = history.samples * history.interval
         self.whole = Part(history, 0, history.samples)
-        self.half = replace(self.whole, start=history.samples // 2)
-        self.last = replace(self.whole, start=history.samples * (WINDOWS - 10) // WINDOWS)
+        self.half = Part(history, history.samples // 2, history.samples)
+        self.last = Part(history, history.samples * (WINDOWS - 10) // WINDOWS, history.samples)
 
     @cached_property
     def envelope(self) -> Envelope | None:

@@ -7,7 +7,7 @@ linear equations with the mean stiffness of the contact.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -47,7 +47,9 @@ class Ripple(NamedTuple):
         return f"ripple of the contact's {self.nodes} nodes is {parts}; take contact.nodes = {enough}"
 
 
-def ripple(system: System, belt: float, stiffness: float, part: Part, lines: Sequence[float]) -> Ripple | None:
+def ripple(
+    system: System, belt: float, stiffness_of: Callable[[], float], part: Part, lines: Sequence[float]
+) -> Ripple | None:
     """The ripple in the last samples of a part, at a mean stiffness (N/m); None where it is not known.
 
     Where the part is forced on `lines` (Hz), what lies beside them is ripple: the mean stiffness of an open pad
@@ -65,6 +67,7 @@ def ripple(system: System, belt: float, stiffness: float, part: Part, lines: Seq
     travel = belt * part.history.interval * np.arange(end.start, end.stop) - x
     finer = np.zeros(samples)
     forces_along(np.ascontiguousarray(y), travel, layer, finer)
+    stiffness = stiffness_of()
     c, window, added = system.coefficients, np.hanning(samples), force - finer
     grip = math.copysign(c.phi, belt)
     omega = 2.0 * math.pi * np.fft.rfftfreq(samples, part.history.interval)
@@ -87,7 +90,9 @@ def ripple(system: System, belt: float, stiffness: float, part: Part, lines: Seq
     return Ripple(in_x, in_vx, in_force, swing, system.nodes)
 
 
-def detuned(system: System, belt: float, stiffness: float, part: Part, lines: Sequence[float]) -> float:
+def detuned(
+    system: System, belt: float, stiffness: Callable[[], float], part: Part, lines: Sequence[float]
+) -> float:
     """Part of the amplitude of a motion forced on `lines` (Hz) by which the step may move it past resonances.
 
     At half weights the step turns ω into 2/h tan(ωh/2): det(iω - A) changes by (ωh)²/12 Σ ω/|iω - λ| of itself.
@@ -98,7 +103,7 @@ def detuned(system: System, belt: float, stiffness: float, part: Part, lines: Se
     size = np.abs(np.fft.rfft(x * np.hanning(len(x)))[1:]) ** 2
     found = np.fft.rfftfreq(len(x), part.history.interval)[1:]
     energy = np.bincount(np.searchsorted(0.5 * (ordered[1:] + ordered[:-1]), found), size, len(ordered))
-    held = np.minimum(_STIFFNESSES * stiffness, system.contact_stiffness)
+    held = np.minimum(_STIFFNESSES * stiffness(), system.contact_stiffness)
     grip, omega = math.copysign(c.phi, belt), 2.0 * math.pi * ordered[:, None, None]
     values = np.linalg.eigvals([first_order(c, stiffness_matrix(c, each, grip) / c.m) for each in held])
     beside = (omega / np.maximum(np.abs(1j * omega - values), 1e-9 * omega)).sum(axis=2).max(axis=1)
