@@ -4,6 +4,7 @@ The error is carried along with the motion, that of steps and that of nodes apar
 that is too coarse says how fine the next one has to be, and one that is fine enough needs no other.
 """
 
+import math
 from collections.abc import Callable, Generator
 from dataclasses import replace
 from functools import partial
@@ -95,8 +96,9 @@ def promised(
         certified = not failed and error <= wanted and until >= system.sampled_duration
         if certified or failed or seconds > MOST_SECONDS or left == 1:
             break
-        surer, aim = 1.0 / _SURER if known.unsure < system.sampled_duration else 1.0, AIM * wanted / safety
-        found = finer(rung, max(surer, steps / aim), max(surer, by_nodes / aim))
+        surer = _SURER if known.unsure < system.sampled_duration else math.inf
+        aim = min(AIM * wanted / safety, surer * both)
+        found = finer(rung, max(1.0, steps / aim), max(1.0, by_nodes / aim))
         if found is None:
             break
         next_one = found
