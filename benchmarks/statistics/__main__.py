@@ -6,11 +6,12 @@ import os
 import pickle
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 from benchmarks.statistics.cases import KINDS
 from benchmarks.statistics.judging import Judged, judged
-from benchmarks.statistics.page import PAGE, page
+from benchmarks.statistics.page import PAGE, by_tolerance, page
 
 RUNS, SEED = 4000, 1
 
@@ -24,13 +25,19 @@ def main() -> None:
     parser.add_argument(
         "--save", type=Path, default=None, help="a file for all that was found, instead of the page"
     )
+    parser.add_argument(
+        "--lanes",
+        action="store_true",
+        help="as points of a map, as many as stay in a lane: a table, instead of the page",
+    )
     given = parser.parse_args()
     kinds = [given.only] if given.only else KINDS
+    task = partial(judged, lanes=given.lanes)
     work = [(kinds[n % len(kinds)], given.seed, n // len(kinds)) for n in range(given.runs)]
     found, unknown, begin = list[Judged](), 0, time.perf_counter()
-    judged((KINDS[0], given.seed, 0))  # kernels are compiled here: workers on a cold cache would each do it
+    task((KINDS[3], given.seed, 0))  # kernels are compiled here: workers on a cold cache would each do it
     with multiprocessing.get_context("spawn").Pool(given.workers) as pool:
-        for number, one in enumerate(pool.imap_unordered(judged, work), 1):
+        for number, one in enumerate(pool.imap_unordered(task, work), 1):
             if one is None:
                 unknown += 1
             else:
@@ -43,6 +50,8 @@ def main() -> None:
     found.sort(key=lambda each: (KINDS.index(each.drawn.kind), each.drawn.seed))
     if given.save:
         given.save.write_bytes(pickle.dumps(found))
+    elif given.lanes:
+        print(by_tolerance(found), f"\n{unknown} of {len(work)} left their lanes.")
     else:
         PAGE.write_text(page(found, unknown), encoding="utf-8")
 

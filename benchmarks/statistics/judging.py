@@ -9,6 +9,7 @@ from benchmarks.statistics.cases import Drawn, draw
 from benchmarks.statistics.reference import SHARE, reference
 from brakecli.case.case import Case
 from brakecli.case.system import system_of
+from brakecli.runs.together import certify_together
 from brakecli.runs.tolerance import certify
 
 BETTER = 10.0  # the reference is at least so much better than the promise
@@ -63,12 +64,19 @@ class Judged:
         return f"{place}: {said}, estimate {self.estimate:.2e}; {true}; {self.method}"
 
 
-def judge(drawn: Drawn, share: float = SHARE) -> Judged | None:
-    """Run and judge a case by a reference whose steps are so much better; None where it has no reference."""
+def judge(drawn: Drawn, share: float = SHARE, *, lanes: bool = False) -> Judged | None:
+    """Run and judge a case by a reference whose steps are so much better; None where it has no reference.
+
+    In `lanes` as the point of a map is run; None where it leaves its lane.
+    """
+    system = system_of(Case.model_validate(drawn.tables))
+    found = certify_together([system])[0] if lanes else None
+    if lanes and found is None:
+        return None
     exact = reference(drawn.tables, share * drawn.tolerance)
     if exact is None:
         return None
-    run = certify(system_of(Case.model_validate(drawn.tables)))
+    run = found or certify(system)
     said, rows = run.certificate, np.asarray(run.motion.rows[:, :4])
     good = exact.good(drawn.tolerance / BETTER)
     kept = min(good, 1 + math.floor(said.certified_until / exact.interval + 1e-6))
@@ -87,6 +95,6 @@ def judge(drawn: Drawn, share: float = SHARE) -> Judged | None:
     )
 
 
-def judged(work: tuple[str, int, int]) -> Judged | None:
+def judged(work: tuple[str, int, int], *, lanes: bool = False) -> Judged | None:
     """Draw and judge the case of a kind, a seed and a number: the task of a worker."""
-    return judge(draw(*work))
+    return judge(draw(*work), lanes=lanes)

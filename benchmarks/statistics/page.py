@@ -42,13 +42,18 @@ def page(found: Sequence[Judged], unknown: int) -> str:
     """The page; `unknown` is the number of cases without a reference."""
     parts = [INTRODUCTION.format(runs=len(found) + unknown, better=BETTER), _summary(found, unknown)]
     parts += ["## By kind\n", _by(found, "kind", KINDS, lambda each: each.drawn.kind)]
-    scales = tuple(f"{10.0**-n:g} to {10.0 ** -(n + 2):g}" for n in (2, 4, 6, 8))
-    parts += ["## By tolerance\n", _by(found, "tolerance", scales, lambda each: scales[_scale(each)])]
+    parts += ["## By tolerance\n", by_tolerance(found)]
     parts += ["## By method\n", _by(found, "method", tuple(sorted({_method(each) for each in found})), _method)]
     parts += ["## The ratio of estimate to error\n", _histogram(found)]
     if faults := [each for each in found if each.faulty]:
         parts += ["## Exceptions\n", *(f"- {each}" for each in faults), ""]
     return "\n".join(parts)
+
+
+def by_tolerance(found: Sequence[Judged]) -> str:
+    """A table with a row for each pair of decades."""
+    scales = tuple(f"{10.0**-n:g} to {10.0 ** -(n + 2):g}" for n in (2, 4, 6, 8))
+    return _by(found, "tolerance", scales, lambda each: scales[_scale(each)])
 
 
 def _scale(each: Judged) -> int:

@@ -18,7 +18,9 @@ MOST_EVALUATION, MOST_AT_NODES = 0.02, 2e-3
 FINER, RUNGS = 4, 16.0  # steps of the last run of a ladder, and time of all of its runs, over the first one's
 FINER_FOUND, RUNGS_FOUND = 1.2, 1.7  # the same of runs that know their error: one or two
 FEW = 20  # steps, the first of which are shorter than those that follow
-SLOWER = 2.0  # pace of the latter half of a pilot run over the mean pace, beyond which the rest may be slower yet
+SLOWER = 2.0
+"""Evaluations for a second of motion in the latter half of a pilot run, over their mean, from which on the rest may
+take more yet. They are counted: the seconds of a busy machine say nothing."""
 
 
 class Price(NamedTuple):
@@ -59,20 +61,20 @@ def _begun(system: System) -> Price:
     stepping = Stepping(system)
     counts, state, ready, size = stepping.counts, stepping.plant.state, process_time(), 1
     first, last = int(counts.level), system.steps + stepping.scheme.LAG
-    marks = [(0.0, 0.0)]  # seconds spent, and time that has been reached
+    marks = [(0.0, 0.0, 0)]  # seconds spent, time that has been reached, and evaluations
     while counts.level < last and not stepping.work.failed and marks[-1][0] < SECONDS:
         stepping.block(min(last, int(counts.level) + size))
         reached = float(state.time + state.tau) if own else (counts.level - first) * system.step
-        marks.append((process_time() - ready, reached))
+        marks.append((process_time() - ready, reached, int(counts.evaluations)))
         size = 2 * size if marks[-1][0] < SECONDS / 8.0 else size
-    steps, (seconds, reached) = int(counts.kinds.sum()), marks[-1]
+    steps, (seconds, reached, evaluated) = int(counts.kinds.sum()), marks[-1]
     start = ready - begin + (slow_start if slow_start > SECONDS else 0.0)
     if counts.level >= last or stepping.work.failed:
         return Price(steps, start + seconds, at_least=False)
     length = max(reached / steps, state.step if own and steps < FEW else 0.0)  # the first steps are short
     more = float(1.0 + (system.sampled_duration - reached) / max(length * steps, 1e-300))
     about = int(float(f"{min(steps * more, 1e300):.2g}")) if own else system.steps
-    before, reached_before = max(mark for mark in marks if mark[0] <= 0.5 * seconds)
-    slower = (seconds - before) * reached > SLOWER * seconds * (reached - reached_before)
+    _, reached_before, before = max(mark for mark in marks if mark[0] <= 0.5 * seconds)
+    slower = (evaluated - before) * reached > SLOWER * evaluated * (reached - reached_before)
     may_open = own and not system.smooth and int(counts.kinds[CLOSED_FORM]) == steps
     return Price(about, start + seconds * more, at_least=slower or may_open)

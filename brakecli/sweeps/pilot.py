@@ -80,7 +80,12 @@ class Pilot:
                 self.start += 2.0 * min(process_time() - begin, MOST_LOADING)
                 self.points.clear()
             begin = process_time()
-            self.times.append(self._place(shape, place))
+            seconds = self._place(shape, place)
+            if seconds > UNEVEN * max(self.times, default=math.inf):  # kernels may have been loaded there
+                looked_at = len(self.points)
+                seconds = min(seconds, self._place(shape, place))
+                del self.points[looked_at:]
+            self.times.append(seconds)
             spent += process_time() - begin
             limit = min(SECONDS, PART * self.sweep_seconds(self.seconds))
             few = len(self.times) < FEWEST and spent < SECONDS
