@@ -19,8 +19,8 @@ FINER, RUNGS = 4, 16.0  # steps of the last run of a ladder, and time of all of 
 FINER_FOUND, RUNGS_FOUND = 1.2, 1.7  # the same of runs that know their error: one or two
 FEW = 20  # steps, the first of which are shorter than those that follow
 SLOWER = 2.0
-"""Evaluations for a second of motion in the latter half of a pilot run, over their mean, from which on the rest may
-take more yet. They are counted: the seconds of a busy machine say nothing."""
+"""Evaluations for a second of motion in the latter half of a pilot run, over their mean, from which on the rest
+may take more yet. They are counted: the seconds of a busy machine say nothing."""
 
 
 class Price(NamedTuple):
