@@ -9,6 +9,7 @@ import pytest
 from scipy.linalg import expm
 
 from brakecli.runs.own_error import Known
+from brakecli.runs.together import SAFETY
 from brakecli.solver.ensemble import fits, run_together
 from brakecli.solver.lanes.records import LANES
 from brakecli.solver.method import Method
@@ -57,6 +58,7 @@ def test_it_is_the_true_one(step: float, nodes: int, many: int) -> None:
     """Of steps where nodes are many, and of nodes where steps are short.
 
     Errors by steps are taken to fall with h³. Where the pad does not open they fall with h⁴: 15/7 times too much.
+    `SAFETY` times it is promised, so that it has to be more than so small a part of the true one.
     """
     rng, ratios = np.random.default_rng(21), list[float]()
     for _ in range(many):
@@ -70,7 +72,7 @@ def test_it_is_the_true_one(step: float, nodes: int, many: int) -> None:
         if (run.rows[:, 6] < 1.0).mean() > 0.1:
             assert (by_nodes > 5.0 * steps) if nodes == 256 else (steps > by_nodes)
     assert len(ratios) > 0.6 * many
-    assert min(ratios) > 0.6
+    assert min(ratios) > 1.0 / SAFETY
     assert max(ratios) < 7.0
     assert 0.8 < float(np.median(ratios)) < 2.3
 
