@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 from importlib import import_module
 from itertools import islice
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from scipy.linalg import expm
 
 from brakecli.case.case import Case
 from brakecli.case.system import system_of
+from brakecli.cli.inputs import load_case
 from brakecli.runs import own_error
 from brakecli.runs.own_error import SAFETY, Known, certify_by_own_error
 from brakecli.solver.motion import Motion, solve
@@ -21,6 +23,9 @@ from tests.examples import ROUGH, SQUEAL, make
 from tests.runs.test_tolerance import OPEN, promised
 
 cases: Any = import_module("benchmarks.statistics.cases")  # benchmarks are not type-checked
+
+
+CASE_C = Path(__file__).parents[2] / "cases" / "accuracy" / "C.toml"
 
 
 def knowing(system: System, start_error: tuple[float, float] = (0.0, 0.0), **changes: Any) -> Motion:
@@ -168,3 +173,11 @@ def test_where_so_many_nodes_are_needed_the_exact_contact_is_taken() -> None:
     assert found.motion.system.evaluator == "exact"
     assert found.certificate.by_nodes == 0.0
     assert system_of(make(ROUGH)).finds_patches is False
+
+
+@pytest.mark.parametrize(("friction", "speed"), [(0.4571428571428572, 0.94), (0.2326530612244898, 0.72)])
+def test_an_event_at_a_loose_tolerance_is_where_the_motion_has_it(friction: float, speed: float) -> None:
+    """A step to an event may come to another place than the continuous solution: left there, no phase goes on."""
+    changes = [f"friction.coefficient={friction}", f"wheel.angular_speed={speed}", "output.sample_interval=2.5e-4"]
+    case = load_case(str(CASE_C), [*changes, "solver={tolerance=1e-3, duration=0.12}"]).case
+    assert not solve(own_error.first_of(system_of(case))).work.failed

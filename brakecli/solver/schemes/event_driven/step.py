@@ -38,6 +38,8 @@ _LOOSE = 2e-5
 """Tolerance from which on steps of order five are cheaper, where the contact is that of nodes."""
 _NEAR = 1e-3
 """The last change of a place on the continuous solution by Newton's iteration, whose error is about its square."""
+_AGAIN = 8
+"""Steps that are made to where an event is, at most."""
 _TINY = 1e-300  # no division by zero where nothing moves
 
 STEP = int64(SHOE, DRIVE, GRID)
@@ -159,19 +161,24 @@ def _try(p: Shoe, h: float, allowed: float) -> float:
 def _to_event(p: Shoe, which: int, h: float) -> float:
     """Make the step that ends at an event, located to rounding; its length, or 0 where the contact is not closed.
 
-    A step to where the continuous solution has it, and from there one of Newton's, so short that it is exact.
+    A step to where the continuous solution has it, and from there one of Newton's, so short that it is exact. Where
+    a loose tolerance lets the step come to another place, it is made anew.
     """
-    m = p.motion
-    if _try(p, h, math.inf) == math.inf:
-        return 0.0
-    margin = phases.margins(p, h, 1.0)[which]
-    slope = phases.margin_slope(p, which)
-    rest = -margin / slope if slope != 0.0 else 0.0
-    if not abs(rest) <= 1e-3 * h:
-        return h
-    for i in range(4):
-        m.end[i] += rest * m.slopes[END_STAGE, i]
-    return h + rest
+    m, longest = p.motion, p.motion.step_done
+    for _ in range(_AGAIN):
+        if _try(p, h, math.inf) == math.inf:
+            return 0.0
+        margin = phases.margins(p, h, 1.0)[which]
+        slope = phases.margin_slope(p, which)
+        rest = -margin / slope if slope != 0.0 else 0.0
+        if abs(rest) <= 1e-3 * h:
+            for i in range(4):
+                m.end[i] += rest * m.slopes[END_STAGE, i]
+            return h + rest
+        if not 0.0 < h + rest <= longest:
+            break
+        h += rest
+    return m.step_done  # type: ignore[no-any-return]
 
 
 @kernel(float64(MOTION_TYPE, int64))
