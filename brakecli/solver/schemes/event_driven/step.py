@@ -161,8 +161,8 @@ def _try(p: Shoe, h: float, allowed: float) -> float:
 def _to_event(p: Shoe, which: int, h: float) -> float:
     """Make the step that ends at an event, located to rounding; its length, or 0 where the contact is not closed.
 
-    A step to where the continuous solution has it, and from there one of Newton's, so short that it is exact. Where
-    a loose tolerance lets the step come to another place, it is made anew.
+    A step to where the continuous solution has it, and from there one of Newton's, so short that it is exact.
+    Where a loose tolerance lets the step come to another place, it is made anew.
     """
     m, longest = p.motion, p.motion.step_done
     for _ in range(_AGAIN):
