@@ -84,9 +84,8 @@ def promised(
     It yields what is to be run, receives its motion, and returns the last one with its certificate. `safety` is
     what is promised, over the error that a run knows.
     """
-    wanted, seconds, next_one = system.method.tolerance, 0.0, rung
+    wanted, seconds = system.method.tolerance, 0.0
     for left in range(_MOST_RUNS, 0, -1):
-        rung = next_one
         motion = yield rung
         seconds += motion.work.solve_seconds
         known = Known.of_run(motion)
@@ -101,7 +100,7 @@ def promised(
         found = finer(rung, max(1.0, steps / aim), max(1.0, by_nodes / aim))
         if found is None:
             break
-        next_one = found
+        rung = found
     motion.work.solve_seconds = seconds
     if not certified:
         error = max(error, wanted * 1.0000001) if error < np.inf else 1.0

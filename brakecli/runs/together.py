@@ -25,7 +25,7 @@ FIRST_TURN = 0.12
 FIRST_PER_WAVE = 8.0
 """First steps to a passing wave, at least."""
 SAFETY = 3.0
-"""What is promised, over the error that a run in a lane knows: it is known less well than in a run of its own."""
+"""What is promised, over the error that a run in a lane knows; docs/accuracy.md compares that with true ones."""
 ORDER = 3
 """With which errors by steps fall, at least."""
 _MOST = 16.0  # times as fine, beyond which a run of its own is cheaper
@@ -58,31 +58,31 @@ def _few(least: float) -> float:
 
 
 def loops(systems: Sequence[System]) -> int:
-    """How many loops of lanes begin the ladders of systems; 0 where all have to be certified alone."""
+    """How many loops of lanes begin the runs of systems; 0 where all have to be certified alone."""
     alike = Counter(fits(next(_runs(system))) for system in systems if begins_with_steps(system))
     return sum(math.ceil(number / LANES) for key, number in alike.items() if key is not None)
 
 
 def certify_together(systems: Sequence[System]) -> list[Certified | None]:
-    """What `certify` finds for each system, with ladders that are climbed side by side.
+    """What `certify` finds for each system, with runs that are made and refined side by side.
 
     None where that is not certain, or cannot be computed in a lane: such a system has to be certified alone.
     """
     found: list[Certified | None] = [None] * len(systems)
-    ladders = {i: _runs(system) for i, system in enumerate(systems) if begins_with_steps(system)}
+    runs = {i: _runs(system) for i, system in enumerate(systems) if begins_with_steps(system)}
     rungs = dict[int, System]()
 
-    def climb(i: int, motion: Motion | None) -> None:
-        """To the next rung. Numbers that no brake has end a ladder, and concern none of the others."""
+    def go_on(i: int, motion: Motion | None) -> None:
+        """To the next run. Numbers that no brake has end the runs of a case, and concern none of the others."""
         try:
-            rungs[i] = next(ladders[i]) if motion is None else ladders[i].send(motion)
+            rungs[i] = next(runs[i]) if motion is None else runs[i].send(motion)
         except StopIteration as end:
             found[i] = end.value if end.value.certificate.certified else None
         except (BrakecliError, ArithmeticError, np.linalg.LinAlgError):
             pass
 
-    for i in ladders:
-        climb(i, None)
+    for i in runs:
+        go_on(i, None)
     while rungs:
         alike, ready = defaultdict[Hashable, list[int]](list), rungs
         for i, rung in ready.items():
@@ -94,5 +94,5 @@ def certify_together(systems: Sequence[System]) -> list[Certified | None]:
                 motions = run_together([ready[i] for i in members])
             for i, motion in zip(members, motions, strict=True):
                 if motion is not None:
-                    climb(i, motion)
+                    go_on(i, motion)
     return found

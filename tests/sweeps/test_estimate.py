@@ -1,5 +1,6 @@
 """What a sweep is said to cost: which of its points are computed for it, and when it says "at least"."""
 
+from collections.abc import Sequence
 from itertools import islice
 from pathlib import Path
 
@@ -37,6 +38,25 @@ def test_the_estimate_computes_points_inside_the_grid_and_few_of_them(tmp_path: 
     assert len(pilot.times) == len(pilot.points) >= 3
     assert len(pilot.points) <= min(MOST, DRAWN * plan.points)
     assert ((rows > 0) & (rows < 19) & (columns > 0) & (columns < 19)).any()
+
+
+def test_kernels_that_are_loaded_at_a_later_place_are_no_part_of_its_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pilot = Pilot(write_sweep(tmp_path, frictions(40)).plan, 2, with_searches=True)
+    taken = iter(
+        [1e-3, 1e-3, 9.0, *[1e-3] * 99]
+    )  # to load the first ones; a place; one that loads others; the rest
+
+    def place(shape: Sequence[int], place: Sequence[int], most: int = 1) -> float:
+        pilot.points.append(place[0])
+        return next(taken)
+
+    monkeypatch.setattr(pilot, "_place", place)
+    pilot.look()
+    assert {*pilot.times} == {1e-3}
+    assert len(pilot.times) == len(pilot.points) >= 3
+    assert not pilot.at_least
 
 
 def test_a_sweep_of_one_point_is_estimated_too(tmp_path: Path) -> None:

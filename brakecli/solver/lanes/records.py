@@ -62,8 +62,8 @@ class Shared(NamedTuple):
     waves: Floats  # of each: wavenumber, phase, and its part of the force in full contact over k sin, m²
     table: Floats  # of each node: f1, and g sin(ωξ), g cos(ωξ) of all waves
     signals: int
-    first: int  # kind that is carried along
-    beyond: int  # the last one
+    first: int  # kind of what is carried along
+    beyond: int  # the kind behind the last one that is
 
 
 SHARED = types.NamedTuple([float64, float64, int64, int64, *[float64] * 4, vector, vector, *[int64] * 3], Shared)
