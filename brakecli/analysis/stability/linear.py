@@ -8,8 +8,10 @@ in that phase changes f by the slope of the surface times that motion: see `with
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from brakecli.analysis.stability.modes import (
     Complex,
@@ -25,10 +27,11 @@ from brakecli.solver.quantities import ContactState
 from brakecli.solver.system import System
 
 _BEYOND = 64.0  # times as long as the run
-_DENSE, _MOST_DENSE = 128, 1024  # blocks of time for each wave, and times in each of them
+_DENSE, _MOST_DENSE = 128, 1024  # blocks of time for each wave at most, and times in each of them
 _SCATTERED: Array = np.arange(_MOST_DENSE, dtype=np.float64) * 0.6180339887498949 % 1.0  # evenly, without a period
 _NEAR: Array = np.linspace(-1.0, 1.0, 33) / 8.0  # periods of the fastest wave: a block has a time in each eighth
 _HIGHEST = 32  # blocks that are looked at so closely
+_FEW = 32  # blocks of one product, which is so small that it wakes no threads
 _ROUNDING = 1e-12  # of the largest eigenvalue: what a growth rate of zero may be off
 _WEAK = 0.25  # square of what waves answer a mode by, below which the second order is enough
 _ROUNDING_WITH_SLOPES = 1e-9  # the same where the passing waves enter it
@@ -84,8 +87,10 @@ class Linear:
         """
         if not len(self.waves):
             return self
-        into = np.linalg.lstsq(self.vectors, self.push.astype(complex), rcond=None)[0]
-        residues = self.vectors[0] * into
+        try:
+            residues = self.vectors[0] * np.linalg.solve(self.vectors, self.push)
+        except np.linalg.LinAlgError:  # two modes have met
+            return replace(self, direction=0, known_to=math.inf)
         turns = 2j * math.pi * np.concatenate([self.passing, -self.passing])
         slopes = np.abs(np.tile(self.slopes, 2))
         bends = self.wavenumbers * self.waves[:, 0]
@@ -119,15 +124,14 @@ class Linear:
     def _extremes(self, span: float) -> tuple[float, float]:
         """Largest and least x (m) that the waves force within a time (s).
 
-        Where many meet is rare: blocks of time are scattered over it, and the highest are looked at closely.
+        Where many meet is rare: blocks of time fill it, and the highest are looked at closely.
         """
-        begins, turns, near = _blocks(tuple(self.passing.tolist()), span)
+        begins, turns, parts, near = _blocks(tuple(self.passing.tolist()), span)
         begins = self.waves[:, :1] * begins
         rows = np.concatenate([begins.imag, begins.real]).T.astype(np.float32)
-        few = rows.reshape(-1, 32, rows.shape[1])  # products so small wake no threads
-        x = (few @ np.concatenate([turns.real, turns.imag], dtype=np.float32)).reshape(len(rows), -1)
+        x = (rows.reshape(-1, _FEW, rows.shape[1]) @ parts).reshape(len(rows), -1)
         each, ups, downs = np.arange(len(x)), x.argmax(axis=1), x.argmin(axis=1)  # in half the time of max and min
-        high, low = np.argsort(x[each, ups])[-_HIGHEST:], np.argsort(x[each, downs])[:_HIGHEST]
+        high, low = x[each, ups].argsort()[-_HIGHEST:], x[each, downs].argsort()[:_HIGHEST]
         tops = begins[:, high] * turns[:, ups[high]], begins[:, low] * turns[:, downs[low]]
         found = [(top.T @ near).imag for top in tops]
         return float(found[0].max()), float(found[1].min())
@@ -172,13 +176,20 @@ class Linear:
 
 
 @lru_cache(maxsize=1)  # the points of a sweep ask for the same ones
-def _blocks(frequencies: tuple[float, ...], span: float) -> tuple[Complex, Complex, Complex]:
-    """e^iωt of waves (Hz) where blocks of time begin within a span (s), then in a block, and near a time in it."""
+def _blocks(frequencies: tuple[float, ...], span: float) -> tuple[Complex, Complex, NDArray[np.float32], Complex]:
+    """e^iωt of waves (Hz) where blocks of time begin within a span (s), then in a block, and near a time in it.
+
+    Where so many blocks do not fill the span, they are scattered over it. The third are both parts of the second.
+    """
     speeds, size = 2.0 * math.pi * np.array(frequencies), min(_DENSE * len(frequencies), _MOST_DENSE)
-    period = 1.0 / max(map(abs, frequencies))
-    times = span * _SCATTERED[:size], 0.125 * period * np.arange(size), period * _NEAR
-    begins, turns, near = (np.exp(1j * np.outer(speeds, each)) for each in times)
-    return begins, turns, near
+    apart = 0.125 / max(map(abs, frequencies))
+    count = min(size, _FEW * math.ceil(span / (apart * size * _FEW)))
+    filled = apart * size * count >= span
+    times, size = _SCATTERED[:count], min(size, math.ceil(span / (apart * count)))
+    begins = span * (np.arange(count) / count if filled else times)
+    found = (np.exp(1j * np.outer(speeds, each)) for each in (begins, apart * np.arange(size), 8.0 * apart * _NEAR))
+    first, turns, near = found
+    return first, turns, np.concatenate([turns.real, turns.imag], dtype=np.float32), near
 
 
 @lru_cache(maxsize=4)  # the points of a sweep ask for the same ones
@@ -186,6 +197,14 @@ def _turns(frequencies: tuple[float, ...], time: bytes) -> Array:
     """Sines, then cosines of waves (Hz) at times (s)."""
     angles = 2.0 * math.pi * (np.outer(frequencies, np.frombuffer(time)) % 1.0)
     return np.concatenate([np.sin(angles), np.cos(angles)])
+
+
+def _solved(s: Any, f: Array) -> Any:
+    """S⁻¹ f by Cramer's rule, for one or more matrices of two rows; not finite where there is none."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        determinant = s[..., 0, 0] * s[..., 1, 1] - s[..., 0, 1] * s[..., 1, 0]
+        first, second = s[..., 1, 1] * f[0] - s[..., 0, 1] * f[1], s[..., 0, 0] * f[1] - s[..., 1, 0] * f[0]
+        return np.stack([first, second], axis=-1) / determinant[..., None]
 
 
 def linear_theory(system: System, belt: float) -> Linear | None:
@@ -201,19 +220,15 @@ def linear_theory(system: System, belt: float) -> Linear | None:
         forces = tables[first : first + system.wheel.g.size]
     s, load = stiffness_matrix(c, stiffness, grip), system.load_at_start
     damping = np.array([[c.b_xx, c.b_xy], [c.b_xy, c.b_yy]])
-    try:
-        rest = np.linalg.solve(s, offset * push - load * np.array([c.sin_beta, c.cos_beta]))
-        wheel, passing = system.wheel, -belt * system.wheel.turns
-        omega = 2.0 * math.pi * passing
-        at = omega[:, None, None]
-        responses = np.linalg.solve(s - c.m * at * at * np.eye(2) + 1j * at * damping, push[:, None])
-    except np.linalg.LinAlgError:
-        return None
+    wheel, passing = system.wheel, -belt * system.wheel.turns
+    rest = _solved(s, offset * push - load * np.array([c.sin_beta, c.cos_beta]))
+    at = (2.0 * math.pi * passing)[:, None, None]
+    responses = _solved(s - c.m * at * at * np.eye(2) + 1j * at * damping, push)
     force = offset - stiffness * rest[1]
-    if not (np.isfinite(rest).all() and force > 0.0):
+    if not (np.isfinite(rest).all() and np.isfinite(responses).all() and force > 0.0):
         return None
     phases = forces * np.exp(1j * (wheel.omega * rest[0] + wheel.phase))
-    waves = responses.reshape(-1, 2) * phases[:, None]
+    waves = responses * phases[:, None]
     values, vectors = eigensystem(c, stiffness, grip)
     mode, known_to = modes(c, stiffness, grip)[0], 0.0 if is_undamped(c) else _ROUNDING * np.abs(values).max()
     direction = int(np.sign(mode.growth)) if abs(mode.growth) > known_to else 0
