@@ -17,6 +17,7 @@ from brakecli.runs.cost import evaluation_seconds
 from brakecli.runs.ladder import MOST_SECONDS, first_nodes
 from brakecli.solver.compile import Floats
 from brakecli.solver.motion import Motion
+from brakecli.solver.quantities import Failure
 from brakecli.solver.system import MOST_TABLE_BYTES, System
 
 SAFETY = 1.5
@@ -25,8 +26,11 @@ FIRST = 0.2
 """Tolerance of the first run over the requested one."""
 AIM = 0.4
 """Part of the promise that a finer run leaves to steps, and to nodes."""
+_FAR = 2.0
+"""Error of steps over the promised one, beyond which a run ends early: a finer one has to follow anyway."""
 _MOST_RUNS = 8
 _FINEST, _LEAST, _MOST = 1e-13, 1e-3, 8.0  # tolerance; factors by which tolerance and nodes change at once
+_BEYOND = 1e-3  # times the finest: a tolerance that no run has, as errors may fall faster than it
 _SURER = 0.03  # of its error, that the next run is to have where an event may have been missed
 _EXACT = 3.0  # evaluations of the exact contact for one by nodes, as steps are shorter and of higher order
 
@@ -84,23 +88,31 @@ def promised(
     It yields what is to be run, receives its motion, and returns the last one with its certificate. `safety` is
     what is promised, over the error that a run knows.
     """
-    wanted, seconds = system.method.tolerance, 0.0
+    wanted, duration, seconds = system.method.tolerance, system.sampled_duration, 0.0
+    most = _FAR * wanted / safety
     for left in range(_MOST_RUNS, 0, -1):
-        motion = yield rung
+        most = most if left > 1 else math.inf
+        motion = yield replace(rung, most_error=most)
         seconds += motion.work.solve_seconds
         known = Known.of_run(motion)
         steps, by_nodes, both = known.of.max(axis=0).tolist()
-        error, failed = max(safety * both, ROUNDING), motion.work.failed
-        until = known.until(wanted / safety, system.sampled_duration)
-        certified = not failed and error <= wanted and until >= system.sampled_duration
-        if certified or failed or seconds > MOST_SECONDS or left == 1:
+        coarse = most < math.inf and motion.work.failure is Failure.COARSE
+        reached = float(motion.work.failure_time or 0.0) if coarse else duration
+        error, failed = max(safety * both, ROUNDING), motion.work.failed and not coarse
+        until = known.until(wanted / safety, duration)
+        certified = not (failed or coarse) and error <= wanted and until >= duration
+        late = seconds > MOST_SECONDS
+        if certified or failed or most == math.inf or (late and not coarse):
             break
-        surer = _SURER if known.unsure < system.sampled_duration else math.inf
-        aim = min(AIM * wanted / safety, surer * both)
-        found = finer(rung, max(1.0, steps / aim), max(1.0, by_nodes / aim))
-        if found is None:
+        surer = _SURER if known.unsure < duration else math.inf
+        aim, rest = min(AIM * wanted / safety, surer * both), 1.0
+        if coarse:  # errors of steps add up, those of nodes at random; half the aim, as that is a guess
+            aim, rest = 0.5 * aim, duration / reached
+        found = None if late else finer(rung, max(1.0, rest * steps / aim), max(1.0, rest**0.5 * by_nodes / aim))
+        if found is None and not coarse:
             break
-        rung = found
+        most = math.inf if found is None else most  # nothing finer helps: the whole of it is worth having
+        rung = found or rung
     motion.work.solve_seconds = seconds
     if not certified:
         error = max(error, wanted * 1.0000001) if error < np.inf else 1.0
@@ -115,6 +127,8 @@ def promised(
 def _finer(system: System, rung: System, steps: float, by_nodes: float) -> System | None:
     """A finer event-driven run."""
     at = rung.method
+    if at.tolerance < _BEYOND * _FINEST * steps:
+        return None
     tolerance = max(at.tolerance * max(1.0 / steps, _LEAST), _FINEST)
     found = _run(system, tolerance, 64 * -int(-rung.nodes * min(by_nodes**0.5, _MOST) // 64))
     return found if found.method != at else None

@@ -179,7 +179,7 @@ class Stepping:
         self._begin()
         if system.start_error is not None:
             self.tangent.knows, self.tangent.unsure, self.tangent.moved = 1, math.inf, math.inf
-            self.tangent.error[0, :2] = system.start_error
+            self.tangent.error[0, :2], self.tangent.most = system.start_error, system.most_error
         if system.tracked:
             follow(self.track, self.plant.state.v_x)
         self._start_energy = self._energy()

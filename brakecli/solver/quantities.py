@@ -93,3 +93,4 @@ class Failure(IntEnum):
         "the tolerance is below the accuracy of the forces; increase solver.tolerance, or take two layers "
         "with a step",
     )
+    COARSE = 6, "the error that is carried along is more than the tolerance allows; reduce solver.tolerance"

@@ -104,8 +104,10 @@ TANGENT = record(
     "side",  # of the friction law that the motion follows, 0 in stick
     "unsure",  # s, from which on the error may be another, as an event may have been missed; or infinite
     "moved",  # what the error moves the margin of slip (m/s) or stick (N) by, at most in the last step
+    "most",  # of the error over the largest x, y, vx or vy so far: beyond it the run is not worth going on
     on=int,  # 1 where it is carried along
     knows=int,  # 1 where the error of the motion is
+    beyond=int,  # 1 where it is more than the most
     placed=int,  # events that were placed inside steps of a difference scheme
     logs=(float, PARTS),  # ln of its growth in each part of the run
     error=(

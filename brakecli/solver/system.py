@@ -76,6 +76,7 @@ class System:
     tangents: bool = False  # whether a small disturbance is carried along with a motion
     tracked: bool = False  # whether the loop notes works of parts, and events
     start_error: tuple[float, float] | None = None  # of x and y, m; where given, the error is carried along
+    most_error: float = math.inf  # relative to the motion so far, beyond which such a run ends
 
     @cached_property
     def pad(self) -> Pad:

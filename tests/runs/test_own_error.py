@@ -17,6 +17,7 @@ from brakecli.cli.inputs import load_case
 from brakecli.runs import own_error
 from brakecli.runs.own_error import SAFETY, Known, certify_by_own_error
 from brakecli.solver.motion import Motion, solve
+from brakecli.solver.quantities import Failure
 from brakecli.solver.system import System
 from tests.campaign import counts
 from tests.examples import ROUGH, SQUEAL, make
@@ -133,6 +134,44 @@ def test_a_run_says_how_fine_the_next_one_has_to_be() -> None:
         assert found.by_steps is not None
         assert found.by_nodes is not None
         assert 0.03 * tolerance < found.estimated_error <= found.by_steps + found.by_nodes
+
+
+def test_a_run_that_is_too_coarse_by_far_ends_early() -> None:
+    changes = ["solver={tolerance = 1e-3, duration = 0.2}", "output.sample_interval=2.5e-4"]
+    system, tried = system_of(load_case(CASE_C, [*changes, "friction.coefficient=0.5"]).case), list[Motion]()
+
+    def run(rung: System) -> Motion:
+        tried.append(solve(rung))
+        return tried[-1]
+
+    found = certify_by_own_error(system, run)
+    first, last = tried[0], tried[-1]
+    assert found.certificate.certified
+    assert len(tried) == 2
+    assert first.work.failure is Failure.COARSE
+    assert first.work.failure_time == pytest.approx((len(first.rows) - 1) * system.interval)
+    assert system.samples // 16 <= len(first.rows) < system.samples // 2
+    assert len(last.rows) == system.samples + 1
+    whole = solve(replace(first.system, most_error=math.inf))
+    assert (whole.rows[: len(first.rows) - 1] == first.rows[:-1]).all()
+    assert true_error(last, solve(replace(last.system, method=replace(last.system.method, tolerance=1e-9)))) < 1e-3
+
+
+def test_where_nothing_finer_helps_the_last_run_is_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(own_error, "_FINEST", 1e-3)  # times `_BEYOND` it is what the first run has
+    system, failures = system_of(promised(OPEN, 1e-5, solver__duration=0.01)), list[Failure]()
+
+    def run(rung: System) -> Motion:
+        motion = solve(rung)
+        failures.append(motion.work.failure)
+        return motion
+
+    found = certify_by_own_error(replace(system, interval=system.interval / 4.0), run)
+    assert failures == [Failure.COARSE, Failure.NONE]
+    assert not found.certificate.certified
+    assert found.motion.work.failure is Failure.NONE
+    assert len(found.motion.rows) == found.motion.system.samples + 1
+    assert 0.0 < found.certificate.certified_until < 0.01
 
 
 @pytest.mark.parametrize("displaced", [1e290, 1e308])

@@ -34,7 +34,7 @@ _BUDGET, _EXACT = 4096, 64
 """Steps of one call on smooth surfaces, and as how many one counts that finds patches; the square of the number of
 waves adds to both. An interruption need not wait for a sample."""
 
-_NONE = int(Failure.NONE)
+_NONE, _COARSE = int(Failure.NONE), int(Failure.COARSE)
 
 
 def order(s: Weights, start: str) -> int:
@@ -111,6 +111,8 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
         if counts.level == stop or steps >= _BUDGET:
             return _NONE
         failure: int = _step_at(p.plug.solve)(shoe, drive, grid)
+        if p.tangent.beyond == 1:
+            failure = _COARSE
         steps += 1 + waves * waves // 2000 if p.layer.contact.kind == CLOSED_FORM else _EXACT + waves * waves // 3
         if failure != _NONE:
             for column in range(rows.shape[1]):

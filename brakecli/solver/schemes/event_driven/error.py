@@ -8,7 +8,7 @@ cut into as many parts as Gauss's rule has places: in each, A and what is missed
 import math
 
 import numpy as np
-from numba import float64, void
+from numba import float64, int64, void
 
 from brakecli.solver.automaton import OPEN, STICK, side_of
 from brakecli.solver.compile import kernel, stopped
@@ -27,6 +27,8 @@ PLACES, SHARES = (np.array([np.resize(0.5 * each[i] + 0.5 * (1 - i), 12) for eac
 _TERMS = 4
 """Of the series, over 0.22 of a step at most, in which the fastest motion turns by less than half a radian."""
 _AT = STAGES - 1
+_FIRST, _ROUNDING = 16, 1e-12
+"""Part of a run in which no error is too large, and what of the largest place is rounding."""
 _MUCH = 0.3
 """Part of the pad that comes or goes in a step, from which on more places are looked at."""
 
@@ -56,6 +58,18 @@ def _ahead(p: Shoe, tau: float) -> None:
 def _size(error: float) -> float:
     """Its absolute value; infinite where a motion has amplified it beyond all numbers."""
     return abs(error) if abs(error) < math.inf else math.inf
+
+
+@kernel(int64(SHOE, GRID))
+def _beyond(p: Shoe, grid: Grid) -> int:
+    """1 where the error is more than the most; at first, when the motion is small, it says nothing."""
+    m, t = p.motion, p.tangent
+    rounding = _ROUNDING * max(m.largest[X], m.largest[Y])
+    for i in range(4):
+        size, error = max(m.largest[i], abs(m.end[i])), abs(t.error[0, i])
+        if size > rounding * (t.rate if i >= V_X else 1.0) and not error <= t.most * size:
+            return 1 if m.level > grid.samples // _FIRST else 0
+    return 0
 
 
 @kernel(void(SHOE, float64, GRID), inlined=False)
@@ -106,4 +120,5 @@ def grow(p: Shoe, h: float, grid: Grid) -> None:
     if c.phi > 0.0 and m.lowest < phases.NEAR * t.moved:  # without friction nothing happens there
         t.unsure = min(t.unsure, m.time + m.tau)
     t.x, t.y, t.v_x, t.v_y = w[X], w[Y], w[V_X], w[V_Y]
+    t.beyond = _beyond(p, grid)
     m.light = light

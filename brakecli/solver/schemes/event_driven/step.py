@@ -44,7 +44,8 @@ _TINY = 1e-300  # no division by zero where nothing moves
 
 STEP = int64(SHOE, DRIVE, GRID)
 
-_NONE, _, _DIVERGED, _NOT_CLOSED, _, _STALLED = (int(failure) for failure in Failure)
+_NONE, _DIVERGED, _STALLED = (int(each) for each in (Failure.NONE, Failure.DIVERGED, Failure.STALLED))
+_NOT_CLOSED = int(Failure.NOT_CLOSED)
 
 
 @kernel(float64(KNOTS, float64))

@@ -63,7 +63,7 @@ Four = tuple[float, float, float, float]
 _FOUR = types.UniTuple(float64, 4)
 _PLANT = plant_type(FLOW)
 hold, _plant_at = into_memory(_PLANT), from_memory(_PLANT)
-_NONE, _, _DIVERGED, _, _, _STALLED = (int(failure) for failure in Failure)
+_NONE, _DIVERGED, _STALLED = (int(each) for each in (Failure.NONE, Failure.DIVERGED, Failure.STALLED))
 
 
 def order(s: Weights, start: str) -> int:
