@@ -84,12 +84,16 @@ def check(system: System, *, begin: bool = False, written: bool = True) -> Check
     return replace(found, warnings=tuple(_warnings(found)))
 
 
-def refuse(found: Check, free_bytes: float = math.inf) -> None:
-    """Raise RefusedError where a run would be too large, or unstable by its scheme."""
+def refuse(found: Check, free_bytes: float = math.inf, *, timed: bool = True) -> None:
+    """Raise RefusedError where a run would be too large, or unstable by its scheme.
+
+    Unless `timed`, its text holds no number that was measured, and differs each time.
+    """
     system, growth = found.system, found.limits.growth
     room = f"{found.memory / 1e6:.0f} MB of memory, a file of {found.file_size / 1e6:.3g} MB"
     least = "at least " if found.at_least else ""
     size = f"about {found.steps:.3g} steps, {least}{duration_text(found.seconds)}, {room}"
+    size = size if timed else f"more than {duration_text(MOST_SECONDS)} or {MOST_STEPS:.0e} steps"
     coarser = "solver.tolerance" if found.step is None else "solver.step"
     remedy = f"reduce solver.duration, or increase {coarser} or output.sample_interval"
     if found.steps > MOST_STEPS or found.seconds > MOST_SECONDS:

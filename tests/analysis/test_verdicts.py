@@ -205,6 +205,22 @@ def test_the_amplitude_of_many_waves_is_that_of_their_highest_meeting(waves: int
     assert theory.parts(np.zeros(2), np.array([0.0, 4.0]))[0] == pytest.approx(swing, rel=0.01)
 
 
+@pytest.mark.parametrize("duration", [0.003, 0.05, 1.0])
+def test_a_forced_swing_is_one_within_its_time(duration: float) -> None:
+    """64 runs, by a scan of all of their time.
+
+    The last place may lie a quarter of a fast wave, 0.4 ms, beyond it. In it the slow one, of 2.5 Hz, changes by 0.6 %.
+    """
+    wheel = {"amplitudes": [2e-6, 3e-6, 1e-6], "wavelengths": [2.0, 0.008, float(np.sqrt(2e-4))]}
+    system = system_of(make(SQUEAL | {"roughness": {"wheel": wheel}}, wheel__angular_speed=10.0))
+    theory = linear_theory(system, system.belt_speed)
+    assert theory is not None
+    time = np.linspace(0.0, 64.0 * duration, 400_000)
+    x = np.imag(theory.waves[:, 0] @ np.exp(2j * np.pi * np.outer(theory.passing, time)))
+    swing = theory.parts(np.zeros(2), np.array([0.0, duration]))[0]
+    assert swing == pytest.approx(0.5 * np.ptp(x), rel=6e-3)
+
+
 @pytest.mark.parametrize("shoes", counts(6, 100))
 def test_without_friction_nothing_is_self_excited(shoes: int) -> None:
     rng = np.random.default_rng(3)

@@ -1,6 +1,7 @@
 """The error that an event-driven run carries along, against closed forms, finer runs and the exact contact."""
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from importlib import import_module
 from itertools import islice
@@ -136,18 +137,22 @@ def test_a_run_says_how_fine_the_next_one_has_to_be() -> None:
         assert 0.03 * tolerance < found.estimated_error <= found.by_steps + found.by_nodes
 
 
-def test_a_run_that_is_too_coarse_by_far_ends_early() -> None:
+def far_too_coarse() -> tuple[System, Callable[[System], Motion], list[Motion]]:
+    """A shoe whose first run is, how it is run, and its runs."""
     changes = ["solver={tolerance = 1e-3, duration = 0.2}", "output.sample_interval=2.5e-4"]
-    system, tried = system_of(load_case(CASE_C, [*changes, "friction.coefficient=0.5"]).case), list[Motion]()
+    tried = list[Motion]()
 
     def run(rung: System) -> Motion:
         tried.append(solve(rung))
         return tried[-1]
 
-    found = certify_by_own_error(system, run)
-    first, last = tried[0], tried[-1]
-    assert found.certificate.certified
-    assert len(tried) == 2
+    return system_of(load_case(str(CASE_C), [*changes, "friction.coefficient=0.5"]).case), run, tried
+
+
+def test_a_run_that_is_too_coarse_by_far_ends_early() -> None:
+    system, run, tried = far_too_coarse()
+    assert certify_by_own_error(system, run).certificate.certified
+    first, last = tried
     assert first.work.failure is Failure.COARSE
     assert first.work.failure_time == pytest.approx((len(first.rows) - 1) * system.interval)
     assert system.samples // 16 <= len(first.rows) < system.samples // 2
@@ -158,20 +163,14 @@ def test_a_run_that_is_too_coarse_by_far_ends_early() -> None:
 
 
 def test_where_nothing_finer_helps_the_last_run_is_whole(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(own_error, "_FINEST", 1e-3)  # times `_BEYOND` it is what the first run has
-    system, failures = system_of(promised(OPEN, 1e-5, solver__duration=0.01)), list[Failure]()
-
-    def run(rung: System) -> Motion:
-        motion = solve(rung)
-        failures.append(motion.work.failure)
-        return motion
-
-    found = certify_by_own_error(replace(system, interval=system.interval / 4.0), run)
-    assert failures == [Failure.COARSE, Failure.NONE]
+    monkeypatch.setattr(own_error, "_FINEST", 1.0)  # times `_BEYOND` it is more than the first run has
+    system, run, tried = far_too_coarse()
+    found = certify_by_own_error(system, run)
+    assert [each.work.failure for each in tried] == [Failure.COARSE, Failure.NONE]
     assert not found.certificate.certified
-    assert found.motion.work.failure is Failure.NONE
-    assert len(found.motion.rows) == found.motion.system.samples + 1
-    assert 0.0 < found.certificate.certified_until < 0.01
+    assert found.motion is tried[-1]
+    assert len(found.motion.rows) == system.samples + 1
+    assert 0.0 < found.certificate.certified_until < 0.1
 
 
 @pytest.mark.parametrize("displaced", [1e290, 1e308])

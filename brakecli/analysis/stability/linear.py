@@ -185,10 +185,10 @@ def _blocks(frequencies: tuple[float, ...], span: float) -> tuple[Complex, Compl
     apart = 0.125 / max(map(abs, frequencies))
     count = min(size, _FEW * math.ceil(span / (apart * size * _FEW)))
     filled = apart * size * count >= span
-    times, size = _SCATTERED[:count], min(size, math.ceil(span / (apart * count)))
-    begins = span * (np.arange(count) / count if filled else times)
-    found = (np.exp(1j * np.outer(speeds, each)) for each in (begins, apart * np.arange(size), 8.0 * apart * _NEAR))
-    first, turns, near = found
+    size = min(size, math.ceil(span / (apart * count)))
+    begins = span * (np.arange(count) / count if filled else _SCATTERED[:count])
+    times = (begins, apart * np.arange(size), 8.0 * apart * _NEAR)
+    first, turns, near = (np.exp(1j * np.outer(speeds, each)) for each in times)
     return first, turns, np.concatenate([turns.real, turns.imag], dtype=np.float32), near
 
 
