@@ -209,7 +209,7 @@ def test_the_amplitude_of_many_waves_is_that_of_their_highest_meeting(waves: int
 def test_a_forced_swing_is_one_within_its_time(duration: float) -> None:
     """64 runs, by a scan of all of their time.
 
-    The last place may lie a quarter of a fast wave, 0.4 ms, beyond it. In it the slow one, of 2.5 Hz, changes by 0.6 %.
+    The last place may lie a quarter of a fast wave, 0.4 ms, beyond it. The slow one changes by 0.6 % there.
     """
     wheel = {"amplitudes": [2e-6, 3e-6, 1e-6], "wavelengths": [2.0, 0.008, float(np.sqrt(2e-4))]}
     system = system_of(make(SQUEAL | {"roughness": {"wheel": wheel}}, wheel__angular_speed=10.0))
