@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from brakecli.case.read import LoadedCase
+    from brakecli.sweeps.listed import Listed
     from brakecli.sweeps.plan import LoadedSweep
     from brakecli.sweeps.tables import Axis
 
@@ -204,20 +205,23 @@ def sweep(
     settings: "Settings | None" = None,
     *,
     axes: "Mapping[str | tuple[str, ...], Iterable[Any]] | None" = None,
+    points: "Mapping[str, Iterable[Any]] | None" = None,
     critical: "Settings | None" = None,
     output: "str | PathLike[str] | None" = None,
     jobs: int | None = None,
     force: bool = False,
 ) -> "xr.Dataset":
-    """Simulate a grid of cases, or search for critical values: a dataset with a dimension for each axis.
+    """Simulate a grid or a list of cases, or search for critical values: a dataset with a dimension for each axis.
 
     A script that calls this needs `if __name__ == "__main__":` around its work, as workers are new processes that
     run it anew; not with `jobs=1`, which computes in this process.
 
     Args:
-        source: path of a sweep file, or what `load` gave; with `axes` or `critical` a case.
+        source: path of a sweep file, or what `load` gave; with `axes`, `points` or `critical` a case.
         settings: keys of the base case to change.
         axes: values of each key, as `{"friction.coefficient": [0.3, 0.5]}`; a tuple of keys takes the same values.
+        points: points in place of a grid: the values of each key at all of them, as `{"shoe.mass": [10.0, 12.0],
+            "friction.coefficient": [0.3, 0.5]}` or as a data frame; the dataset has the dimension `point`.
         critical: the keys of `[critical]`, as `{"parameter": "friction.coefficient", "lower": 0, "upper": 2}`.
         output: a result file to keep; with it, an interrupted sweep goes on where it was.
         jobs: worker processes; one for each core if left out. Where the environment names a dask cluster in
@@ -236,12 +240,17 @@ def sweep(
         from brakecli.files.as_xarray import opened
         from brakecli.runs.run import load_kernels
         from brakecli.sweeps.driver import choose_engine, sweep
+        from brakecli.sweeps.listed import GIVEN
         from brakecli.sweeps.plan import LoadedSweep, sweep_of
 
-        if axes is not None or critical is not None:
+        if axes is not None or points is not None or critical is not None:
             tables = [{"parameter": keys, "values": values} for keys, values in _mapping(axes, "axes").items()]
+            listed = _listed(points)
             given = _plain({"case": "-", "axis": tables, "critical": critical or {}}, "sweep")
-            loaded = sweep_of({name: each for name, each in given.items() if each}, _case(source, settings))
+            given |= {"points": GIVEN} if listed else {}
+            loaded = sweep_of(
+                {name: each for name, each in given.items() if each}, _case(source, settings), listed
+            )
         elif isinstance(source, LoadedSweep):
             loaded = source
         else:
@@ -302,6 +311,24 @@ def classify(
         numbers = Options(measured, changes).verdict(str(source))
     _warn(numbers.get("warnings", ()))
     return dataset(VERDICT, numbers)
+
+
+def _listed(points: "Mapping[str, Iterable[Any]] | None") -> "Listed | None":
+    """Points that are given by columns; a data frame has them as well."""
+    from brakecli.case.read import key_path
+    from brakecli.sweeps.listed import Listed
+
+    if points is None:
+        return None
+    if not hasattr(points, "keys"):
+        raise UsageError("points: are no columns; write them as {'friction.coefficient': [0.3, 0.5]}")
+    columns = _plain({key: points[key] for key in points}, "points")
+    if wrong := [key for key in columns if not key_path(key)]:
+        raise UsageError(f"points: {wrong[0]!r} is no key path; name a key as in 'link2.angle_deg'")
+    lists = [each for each in columns.values() if isinstance(each, list)]
+    if len(lists) < len(columns) or len({*map(len, lists)}) != 1 or not all(lists):
+        raise UsageError("points: need a value of each key at each point, and one point at least")
+    return Listed.of([*columns], columns.values())
 
 
 @contextmanager

@@ -218,6 +218,11 @@ def _points_table(report: SweepReport) -> str:
         columns["way"] = [("up", "down")[point // plan.points] for point in range(found.points)]
     for number, axis in enumerate(plan.sweep.axis):
         columns[axis.parameter[0]] = [label(axis.value(place[number])) for place in places]
+    if plan.listed is not None:
+        columns |= {
+            key: [label(each) for each in column]
+            for key, column in zip(plan.listed.keys, plan.listed.columns, strict=True)
+        }
     known = POINTS if found.critical is None else CRITICAL_POINTS
     for field in known:
         values = np.ravel(np.array((found.variables or {})[field.name], object))

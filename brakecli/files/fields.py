@@ -220,6 +220,7 @@ DIFFERENCE = (integer("hysteresis", "whether the motions on the way up and down 
 DIRECTION = Field("direction", "", "direction in which the motion was followed", TEXT)
 WINDOW = Field("window", "1", "number of an interval of instability, from 0")
 BASE_POINT = Field("point", "1", "the base case")
+LISTED_POINT = integer("point", "number of the point in its table, from 0")
 SWEEP = (
     Field("title", "", "title of the sweep, or of its case", TEXT, at="loaded."),
     integer("points", "number of points", "findings."),

@@ -233,6 +233,8 @@ def identity(plan: Plan) -> dict[str, Any]:
     for path, record in sorted({str(Path(path).absolute()): each for path, each in plan.records.items()}.items()):
         checksum = zlib.crc32(record.height, zlib.crc32(record.place, record.is_angle))
         measured[f"checksum of {Path(path).name}"].append(checksum)
+    if plan.listed is not None:
+        measured["checksum of the points"] = [plan.listed.checksum]
     return {**fingerprint(), **case, **measured, **{f"sweep {key}": each for key, each in sweep.items()}}
 
 

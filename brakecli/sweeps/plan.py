@@ -20,6 +20,7 @@ from brakecli.case.tables import Table
 from brakecli.errors import CaseError, KeyPath, Problem
 from brakecli.files import fields
 from brakecli.files.toml_lines import Located, innermost, parse
+from brakecli.sweeps.listed import GIVEN, Listed, read_listed
 from brakecli.sweeps.tables import Axis, Sweep
 
 MOST_TRIED = 1000  # listed numbers of an axis that are tried before the sweep starts; of a range it is both ends
@@ -36,23 +37,28 @@ class Plan:
 
     Both texts hold the keys that were given, overrides applied: a default that follows from another key follows it
     at every point. `records` are the measured profiles that points need: no file is opened where points are
-    computed, and what becomes of a file meanwhile does not matter.
+    computed, and what becomes of a file meanwhile does not matter. `listed` are the points of a sweep without axes
+    that has a table of them.
     """
 
     def __init__(
-        self, sweep_text: str, case_text: str, records: Mapping[str, Record] = MappingProxyType({})
+        self,
+        sweep_text: str,
+        case_text: str,
+        records: Mapping[str, Record] = MappingProxyType({}),
+        listed: Listed | None = None,
     ) -> None:
         """Read the sweep and the keys of its case."""
-        self.sweep_text, self.case_text, self.records = sweep_text, case_text, records
+        self.sweep_text, self.case_text, self.records, self.listed = sweep_text, case_text, records, listed
         self.sweep, self.case_keys = parse_table(Sweep, sweep_text, "the sweep"), parse(case_text, "the case")
         axes = self.sweep.axis
-        self.shape = tuple(axis.size for axis in axes)
+        self.shape = tuple(axis.size for axis in axes) if listed is None else (listed.size,)
         self.points = math.prod(self.shape)  # of the grid
         # the axis along which the motion is followed, and how often that is: twice both up and down
         self.followed = next((index for index, axis in enumerate(axes) if axis.direction), None)
         self._valid = dict[str, Table]()  # tables of the case that no point has changed
         self.passes = 2 if any(axis.direction == "both" for axis in axes) else 1
-        sizes = {axis.name: axis.size for axis in axes} or {"point": 1}
+        sizes = {axis.name: axis.size for axis in axes} or {"point": self.points}
         self.dimensions = {"direction": 2, **sizes} if self.passes == 2 else sizes  # of the result
         self.fields = fields.POINT + (fields.CRITICAL if self.sweep.critical is not None else ())  # of a point
         # units are what tasks consist of: single points, or lines along the followed axis
@@ -60,8 +66,8 @@ class Plan:
         self.units = self.passes * self.points // self.unit_length
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Travel as two texts and the measured profiles."""
-        return plan_of, (self.sweep_text, self.case_text, tuple(self.records.items()))
+        """Travel as two texts, the measured profiles and the listed points."""
+        return plan_of, (self.sweep_text, self.case_text, tuple(self.records.items()), self.listed)
 
     def places(self, point: int) -> tuple[int, ...]:
         """Where a point lies along each axis; points are counted with the last axis fastest."""
@@ -69,8 +75,13 @@ class Plan:
         return tuple(point // stride % size for stride, size in zip(strides, self.shape, strict=True))
 
     def settings(self, point: int) -> Settings:
-        """What the axes set at a point."""
+        """What the axes, or the table, set at a point."""
         found: Settings = {}
+        if self.listed is not None:
+            return {
+                key_path(key): column[point]
+                for key, column in zip(self.listed.keys, self.listed.columns, strict=True)
+            }
         for axis, place in zip(self.sweep.axis, self.places(point), strict=True):
             found |= dict.fromkeys((key_path(text) for text in axis.parameter), axis.value(place))
         return found
@@ -112,10 +123,12 @@ def _tables(data: dict[str, Any]) -> dict[str, Any]:
 
 
 @lru_cache(maxsize=4)
-def plan_of(sweep_text: str, case_text: str, records: tuple[tuple[str, Record], ...] = ()) -> Plan:
+def plan_of(
+    sweep_text: str, case_text: str, records: tuple[tuple[str, Record], ...] = (), listed: Listed | None = None
+) -> Plan:
     """The plan of what travels; a worker meets the same one again and again."""
     # `lru_cache(Plan)` would inherit `__reduce__`, and could not be sent
-    return Plan(sweep_text, case_text, dict(records))
+    return Plan(sweep_text, case_text, dict(records), listed)
 
 
 @dataclass(frozen=True)
@@ -148,28 +161,44 @@ def parse_sweep(text: str, name: str, folder: Path, overrides: Sequence[str] = (
         at = Problem(("case",), "", "", name, innermost(Located(text, name).lines, ("case",), 0))
         wrong = (replace(at, what=f"{each.where} {each.what}", remedy=each.remedy) for each in error.problems)
         raise CaseError([*wrong]) from error
-    return _checked(sweep, text, name, parse_case(case_text, source, others))
+    base, listed = parse_case(case_text, source, others), None
+    if sweep.points is not None:
+        listed = read_listed(folder / sweep.points, name)
+    return _checked(sweep, text, name, base, listed)
 
 
-def sweep_of(tables: dict[str, Any], base: LoadedCase) -> LoadedSweep:
+def sweep_of(tables: dict[str, Any], base: LoadedCase, listed: Listed | None = None) -> LoadedSweep:
     """The sweep of the tables that its file would have, over a case at hand. Raises `CaseError`."""
     text, name = tomli_w.dumps(tables), "the sweep"
-    return _checked(parse_table(Sweep, text, name), text, name, base)
+    return _checked(parse_table(Sweep, text, name), text, name, base, listed)
 
 
-def _checked(sweep: Sweep, text: str, name: str, base: LoadedCase) -> LoadedSweep:
-    """A sweep over a case; raises `CaseError` where its axes do not fit."""
+def _checked(sweep: Sweep, text: str, name: str, base: LoadedCase, listed: Listed | None) -> LoadedSweep:
+    """A sweep over a case; raises `CaseError` where its axes, or its listed points, do not fit."""
     given = tomli_w.dumps(sweep.model_dump(mode="json", exclude_unset=True, exclude_none=True))
     keys = [key_path(text) for axis in sweep.axis if not axis.direction for text in axis.parameter]
     keys += [key_path(sweep.critical.parameter)] if sweep.critical else []
+    keys += map(key_path, listed.keys if listed else ())
     # Other keys leave the sines of a measured profile as they are, and along a line the wheel keeps its waves.
     anew = any(path[0] == "roughness" or path in (("wheel",), ("wheel", "radius")) for path in keys)
-    plan = Plan(given, given_toml(base.case, profiles=anew), Records(base.records if anew else {}))
-    if problems := _wrong_values(plan, text, name):
+    plan = Plan(given, given_toml(base.case, profiles=anew), Records(base.records if anew else {}), listed)
+    if problems := _wrong_values(plan, text, name) + _wrong_points(plan):
         raise CaseError(problems)
     plan.records = dict(plan.records)  # which reads nothing any more
     resolved = tomli_w.dumps(sweep.model_dump(mode="json", exclude_none=True))
     return LoadedSweep(sweep, text, resolved, base, plan)
+
+
+def _wrong_points(plan: Plan) -> list[Problem]:
+    """What is wrong with the first of the listed points that are tried, at the line of each in its table."""
+    if plan.listed is None:
+        return []
+    for point in range(min(plan.points, MOST_TRIED)):
+        if problems := plan.problems(plan.settings(point)):
+            file = plan.sweep.points
+            where = (f"point {point}", 0) if file in (None, GIVEN) else (file, plan.listed.lines[point])
+            return [replace(each, source=where[0], line=where[1]) for each in problems]
+    return []
 
 
 def kind_of(text: str) -> str:
@@ -180,7 +209,7 @@ def kind_of(text: str) -> str:
         return ""
     if "shoe" in keys:
         return "" if keys & {"axis", "critical"} else "case"
-    return "sweep" if keys & {"case", "axis", "critical"} else ""
+    return "sweep" if keys & {"case", "axis", "critical", "points"} else ""
 
 
 def label(value: Any) -> str:
@@ -199,7 +228,7 @@ def _wrong_values(plan: Plan, text: str, name: str) -> list[Problem]:
     if (critical := plan.sweep.critical) is not None:
         axes["critical",] = Axis(parameter=(critical.parameter,), values=(critical.lower, critical.upper))
     lines = Located(text, name).lines
-    corners = [plan.settings(0), plan.settings(plan.points - 1)]
+    corners = [plan.settings(0), plan.settings(plan.points - 1)] if plan.listed is None else [{}]
     problems: dict[tuple[int, str], Problem] = {}
     for path, axis in axes.items():
         line = innermost(lines, (*path, "parameter"), 0)

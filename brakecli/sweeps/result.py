@@ -1,7 +1,8 @@
 """The result of a sweep: what its file holds, and what the command reports of it."""
 
+import math
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -109,12 +110,12 @@ def write(result: ResultFile, report: SweepReport, journal: Journal) -> None:
     if "direction" in found.dimensions:
         result.axis("/", fields.DIRECTION, np.array(["up", "down"]))
     for axis in plan.sweep.axis:
-        about, given = key_schema(Case, key_path(axis.parameter[0])), {*map(type, _values(axis))}
-        number = "i8" if given == {int} and about.get("type") == "integer" else "f8"
-        data = np.array(_values(axis), number) if axis.numeric else np.array([*map(label, _values(axis))])
-        field = Field(axis.name, unit(axis.parameter[0]), ", ".join(axis.parameter), number)
-        result.variable("/", field, (axis.name,), data, parameters=list(axis.parameter))
-    if not plan.sweep.axis:
+        _write_along(result, axis.name, axis.parameter, axis.name, _values(axis))
+    if plan.listed is not None:
+        result.axis("/", fields.LISTED_POINT, np.arange(plan.points))
+        for key, column in zip(plan.listed.keys, plan.listed.columns, strict=True):
+            _write_along(result, key.replace(".", "_"), [key], fields.LISTED_POINT.name, column)
+    elif not plan.sweep.axis:
         result.axis("/", fields.BASE_POINT, np.zeros(1))
     windows, critical = 0, plan.sweep.critical
     if critical is not None:
@@ -136,6 +137,19 @@ def write(result: ResultFile, report: SweepReport, journal: Journal) -> None:
             result.fill(field.name, where, values.reshape(*shape, *values.shape[1:]))
     if found.hysteresis is not None:
         result.column(*fields.DIFFERENCE, found.dimensions[1:], found.hysteresis)
+
+
+def _write_along(
+    result: ResultFile, name: str, keys: Sequence[str], dimension: str, values: Sequence[Any]
+) -> None:
+    """The values that keys take along a dimension."""
+    about, given = key_schema(Case, key_path(keys[0])), {*map(type, values)}
+    number = "i8" if given == {int} and about.get("type") == "integer" else "f8"
+    numeric = all(type(each) in (int, float) and math.isfinite(each) for each in values)
+    data = np.array(values, number) if numeric else np.array([*map(label, values)])
+    result.variable(
+        "/", Field(name, unit(keys[0]), ", ".join(keys), number), (dimension,), data, parameters=[*keys]
+    )
 
 
 def unit(parameter: str) -> str:

@@ -109,11 +109,18 @@ class Sweep(Table):
     title: Title = ""
     case: str = described("the base case's file, seen from the sweep's own", min_length=1)
     axis: Annotated[tuple[Axis, ...], *from_list] = described("the axes of the grid; the last varies fastest", ())
+    points: str | None = described(
+        "a table of points in place of axes, .csv, seen from the sweep's own file: a column for each key path",
+        None,
+    )
     critical: Critical | None = described("the critical parameter to find at each point", None)
 
     def _broken_rules(self) -> Iterator[Problem]:
-        if not self.axis and self.critical is None:
-            yield Problem(("axis",), MISSING, "give at least one [[axis]], or [critical]", instead=("critical",))
+        if not self.axis and self.critical is None and self.points is None:
+            remedy = "give at least one [[axis]], points, or [critical]"
+            yield Problem(("axis",), MISSING, remedy, instead=("points", "critical"))
+        if self.axis and self.points is not None:
+            yield self.wrong("points", "is given together with [[axis]]", "keep one of the two")
         taken: set[tuple[str, ...]] = set()
         for index, text in ((index, text) for index, axis in enumerate(self.axis) for text in axis.parameter):
             if key_path(text) in taken:
