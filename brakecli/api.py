@@ -231,10 +231,7 @@ def sweep(
     Raises:
         CaseError, UsageError, RefusedError, CannotWriteError: as `brakecli sweep`.
     """
-    if jobs is not None and not (isinstance(jobs, int) and 1 <= jobs <= 4096):
-        raise UsageError(f"jobs {jobs}: is no number of workers from 1 to 4096")
-    if getattr(multiprocessing.current_process(), "_inheriting", False):  # a worker that is being started
-        os._exit(os.EX_USAGE)  # which tells the caller that there is no guard
+    _refuse_jobs(jobs)
     with _interruptible(), _readings(), _target(output) as path:
         from brakecli.cli.inputs import load_sweep
         from brakecli.files.as_xarray import opened
@@ -264,6 +261,56 @@ def sweep(
             failed = f"{report.findings.failed} of {report.findings.points} points failed"
             _warn([f"{failed}, the first: {found[0]['reason']}"])
         return opened(path, own=True).to_dataset()
+
+
+def scatter(
+    source: "str | PathLike[str]",
+    settings: "Settings | None" = None,
+    *,
+    output: "str | PathLike[str] | None" = None,
+    jobs: int | None = None,
+    force: bool = False,
+) -> "xr.Dataset":
+    """How likely brakes squeal that are not built to their drawing: samples of a study, and what they say.
+
+    The dataset has the dimensions `sample` (values of the keys, growth rate, frequency, critical friction or
+    regime), `outcome` (`probability` with its 95 % interval) and `parameter` (Sobol indices); attributes are those
+    that `brakecli scatter --json` prints. Runs need a guard in a script, as `sweep` does.
+
+    Args:
+        source: path of a study file.
+        settings: keys of the study to change, as `{"samples": 4096}`, or of its case.
+        output: a result file to keep; with it, an interrupted study of runs goes on where it was.
+        jobs: worker processes; one for each core if left out.
+        force: replace that file if it exists.
+
+    Raises:
+        CaseError, UsageError, RefusedError, CannotWriteError: as `brakecli scatter`.
+    """
+    _refuse_jobs(jobs)
+    with _interruptible(), _readings(), _target(output) as path:
+        from functools import partial
+
+        from brakecli.cli.inputs import load_study
+        from brakecli.files.as_xarray import opened
+        from brakecli.scattering.scatter import engine_for, scatter
+
+        loaded = load_study(str(source), _overrides(settings))
+        engine_of = partial(engine_for, jobs=jobs, scheduler=os.environ.get("DASK_SCHEDULER_ADDRESS") or None)
+        report = scatter(loaded, path, partial(engine_of, in_caller=True), force=force)
+        if report.failed:
+            _warn(
+                [f"{report.failed} of {report.samples} samples have no answer, the first: {report.first_failure}"]
+            )
+        return opened(path, own=True).to_dataset()
+
+
+def _refuse_jobs(jobs: int | None) -> None:
+    """Raise UsageError for a wrong number of workers, and end a worker that is being started by a script."""
+    if jobs is not None and not (isinstance(jobs, int) and 1 <= jobs <= 4096):
+        raise UsageError(f"jobs {jobs}: is no number of workers from 1 to 4096")
+    if getattr(multiprocessing.current_process(), "_inheriting", False):
+        os._exit(os.EX_USAGE)  # which tells the caller that there is no guard
 
 
 def classify(

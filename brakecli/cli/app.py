@@ -22,7 +22,7 @@ from brakecli.files.trust import readings
 from brakecli.solver import compiling
 
 COMMANDS = (
-    *("run", "sweep", "classify", "compare-schemes", "stability", "branch", "advise", "check"),
+    *("run", "sweep", "classify", "compare-schemes", "stability", "branch", "scatter", "advise", "check"),
     *("new", "schema", "plot", "report", "info", "diff", "export"),
 )
 """In the order in which `--help` lists them."""

@@ -13,6 +13,7 @@ from brakecli.files.opening import is_hdf5
 
 if TYPE_CHECKING:
     from brakecli.case.read import LoadedCase
+    from brakecli.scattering.study import LoadedStudy
     from brakecli.sweeps.plan import LoadedSweep
 
 
@@ -54,6 +55,21 @@ def load_sweep(source: str, overrides: list[str] | None) -> "LoadedSweep":
         if kind_of(text) == "case":
             remedy = f"simulate it with: brakecli run {as_argument(source)}"
             raise UsageError(f"{name}: this is a case; {remedy}") from error
+        raise
+
+
+def load_study(source: str, overrides: list[str] | None) -> "LoadedStudy":
+    """The study of a study file."""
+    from brakecli.scattering.study import parse_study
+    from brakecli.sweeps.plan import kind_of
+
+    text, name = _text(source)
+    try:
+        folder = Path(source).parent if os.path.isfile(source) else Path()  # noqa: PTH113 - pathlib's may raise
+        return parse_study(text, name, folder, overrides or ())
+    except CaseError as error:
+        if kind_of(text) == "case":
+            raise UsageError(f"{name}: this is a case; use: brakecli run {as_argument(source)}") from error
         raise
 
 

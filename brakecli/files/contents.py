@@ -10,7 +10,7 @@ import numpy as np
 
 from brakecli.errors import CaseError, UnreadableResultError, UsageError, printable
 from brakecli.files.field import flat, plain
-from brakecli.files.fields import BRANCH, COMPARISON, LOCK_IN, RUN, SWEEP, WELCH
+from brakecli.files.fields import BRANCH, COMPARISON, LOCK_IN, RUN, SCATTER, SWEEP, WELCH
 from brakecli.files.read import StoredResult, Variable
 from brakecli.files.toml_lines import parse
 from brakecli.files.write import FILL
@@ -20,7 +20,14 @@ _APART = {"case_toml", "sweep_toml", *_CASES, "title", "kind", "format", "format
 _BLOCK = 1 << 20  # rows read at a time
 _RISING = ("time", "frequency")  # axes along which values are interpolated
 _ROUNDING = 1e-9  # of the largest value, which interpolation may add
-_DECLARED = {"run": RUN, "sweep": SWEEP, "comparison": COMPARISON, "stability": LOCK_IN, "branch": BRANCH}
+_DECLARED = {
+    "run": RUN,
+    "sweep": SWEEP,
+    "comparison": COMPARISON,
+    "stability": LOCK_IN,
+    "branch": BRANCH,
+    "scatter": SCATTER,
+}
 
 
 def contents(result: StoredResult) -> dict[str, Any]:

@@ -384,6 +384,75 @@ BRANCH = (
     Field("branches", "", "all branches", OBJECT, in_file=False, rows=ONE_BRANCH),
 )
 
+# Scatter
+
+SCATTER = (
+    integer("samples", "brakes that were drawn"),
+    integer("failed", "samples without an answer, such as those without steady sliding"),
+    Field("first_failure", "", "why the first of them has none", TEXT),
+    Field(
+        "probability",
+        "",
+        "of each regime (or of stable and unstable sliding), of squeal, and that the critical"
+        " friction lies below the own",
+        OBJECT,
+        in_file=False,
+    ),
+    Field("probability_lower", "", "lower ends of their 95 % intervals", OBJECT, in_file=False),
+    Field("probability_upper", "", "upper ends", OBJECT, in_file=False),
+    Field(
+        "quantiles",
+        "",
+        "of critical friction, growth rate, frequency and amplitude: 5, 25, 50, 75 and 95 %",
+        OBJECT,
+        in_file=False,
+    ),
+    Field("indices_of", "", "what the Sobol indices are about", TEXT, "indices.of"),
+    Field(
+        "first_order",
+        "",
+        "part of its variance that each parameter makes alone",
+        OBJECT,
+        "indices.",
+        in_file=False,
+    ),
+    Field(
+        "total",
+        "",
+        "part of its variance that is gone where the parameter does not scatter",
+        OBJECT,
+        "indices.",
+        in_file=False,
+    ),
+    Field(
+        "total_error", "", "half of the 95 % interval of the total index", OBJECT, "indices.error", in_file=False
+    ),
+    Field("notes", "", "what is to be known of the numbers", OBJECT),
+    Field("sentence", "", "the answer in words", TEXT),
+)
+SAMPLE = integer("sample", "number of the sample, from 0")
+SET = integer("set", "number of its sequence: sets know nothing of each other")
+SCATTERED = (
+    *named(POINT, "status", "regime", "excitation"),
+    Field("frequency", "Hz", "of the vibration, or of the mode that counts"),
+    Field("amplitude", "m", "half of peak to peak of x"),
+    Field("growth_rate", "1/s", "of the mode that counts: one that squeals, or the one that grows fastest"),
+    ratio("critical_friction", "least friction coefficient at which stability ends; missing where none does"),
+    Field("reason", "", "why the regime is as it is, or why there is no answer", SENTENCE),
+)
+OUTCOME = Field("outcome", "", "what a sample comes to", TEXT)
+PROBABILITY = (
+    ratio("probability", "part of the samples"),
+    ratio("probability_lower", "lower end of its 95 % interval"),
+    ratio("probability_upper", "upper end"),
+)
+SCATTERING = Field("parameter", "", "first key path of a parameter", TEXT)
+INDEX = (
+    ratio("first_order", "part of the variance that the parameter makes alone"),
+    ratio("total", "part of the variance that is gone where it does not scatter"),
+    ratio("total_error", "half of the 95 % interval of the latter"),
+)
+
 # Advice, in JSON alone
 
 SENSITIVITY = (

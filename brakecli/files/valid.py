@@ -35,6 +35,7 @@ _ATTRIBUTES = {
     ("stability", "/"): fields.LOCK_IN,
     ("branch", "/"): fields.BRANCH,
     ("branch", "/branch_*"): fields.ONE_BRANCH,
+    ("scatter", "/"): fields.SCATTER,
 }
 _VARIABLES = {  # the first of a kind, of a sweep its status, has the length of all
     ("run", "history"): fields.HISTORY,
@@ -47,6 +48,7 @@ _VARIABLES = {  # the first of a kind, of a sweep its status, has the length of 
     ("comparison", "/"): (fields.ENTRY_PLACE, *fields.ENTRY),
     ("stability", "/"): (*fields.VARIED, *fields.MODES),
     ("branch", "branch_*"): fields.BRANCH_POINT,
+    ("scatter", "/"): (fields.SAMPLE, *fields.SCATTERED),
     ("branch", "branch_*/special"): fields.SPECIAL,
 }
 _OBJECTS = {f"/{each.group}": each for each in fields.RUN if each.group}  # whose items are attributes of a group

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from brakecli.errors import BrakecliError, CannotWriteError
 from brakecli.files.os_signals import Interrupted
-from brakecli.files.write import new_result
+from brakecli.files.write import ResultFile, new_result
 from brakecli.runs.limits import free_bytes
 from brakecli.sweeps.cost import Estimate, estimate, refuse_sweep
 from brakecli.sweeps.journal import Journal, open_journal
@@ -23,7 +23,7 @@ from brakecli.sweeps.plan import LoadedSweep, Plan
 from brakecli.sweeps.point import Status, blank, unsound
 from brakecli.sweeps.result import Findings, SweepReport, write
 from brakecli.sweeps.workers.local import CallerEngine, LocalEngine
-from brakecli.sweeps.workers.task import Engine, Task, compute_units
+from brakecli.sweeps.workers.task import Compute, Engine, Task, compute_units
 
 TASK_SECONDS = 0.2  # of work in a task, so that handing it out costs little,
 TASKS_A_SECOND = 100.0  # and more where workers would ask for more tasks than this; a scheduler hands out 500
@@ -85,12 +85,13 @@ def choose_engine(
     scheduler_file: str | None = None,
     *,
     in_caller: bool = False,
+    compute: Compute | None = None,
 ) -> Engine:
     """The engine for a sweep: workers here, or those of a dask scheduler. Raises UsageError.
 
-    `in_caller`: a single worker is this process itself.
+    `in_caller`: a single worker is this process itself. `compute` is what it computes, in place of points.
     """
-    compute = partial(compute_units, plan)
+    compute = compute or partial(compute_units, plan)
     if scheduler is None and scheduler_file is None:
         workers = min(jobs or cores(), plan.units)
         return CallerEngine(compute) if in_caller and jobs == 1 else LocalEngine(compute, workers)
@@ -117,12 +118,14 @@ def sweep(
     order: int = 1,
     begin: Callable[[Estimate, int], None] = lambda found, resumed: None,
     progress: Callable[[int, int], None] = lambda done, failed: None,
+    write: Callable[[ResultFile, SweepReport, Journal], None] = write,
 ) -> SweepReport:
     """Compute every point of a sweep that is not yet there, and write its result file.
 
     `begin` is called before the start with the estimate and the number of points that an earlier run has left,
-    `progress` often, with the points that are done and that have failed. Raises RefusedError, CannotWriteError or
-    UsageError before anything is computed, CannotWriteError also later; a point that fails is marked and reported.
+    `progress` often, with the points that are done and that have failed, and `write` at the end. Raises
+    RefusedError, CannotWriteError or UsageError before anything is computed, CannotWriteError also later; a point
+    that fails is marked and reported.
     """
     plan, start = loaded.plan, time.perf_counter()
     found = estimate(plan, engine.workers)

@@ -202,13 +202,15 @@ def _wrong_points(plan: Plan) -> list[Problem]:
 
 
 def kind_of(text: str) -> str:
-    """What a text is meant to be, by its keys at the top: "case", "sweep", or neither."""
+    """What a text is meant to be, by its keys at the top: "case", "sweep", "study", or none of them."""
     try:
         keys = set(Located(text).data)
     except CaseError:
         return ""
     if "shoe" in keys:
         return "" if keys & {"axis", "critical"} else "case"
+    if "parameter" in keys:
+        return "study"
     return "sweep" if keys & {"case", "axis", "critical", "points"} else ""
 
 

@@ -1,0 +1,1 @@
+"""Brakes are not built to their drawing: how likely they vibrate, and which scatter decides on it."""

@@ -1,0 +1,82 @@
+"""What samples say: probabilities with 95 % intervals, distributions, Sobol indices."""
+
+import math
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from brakecli.solver.compile import Floats
+
+LEVEL = 0.95
+SHARES = (0.05, 0.25, 0.5, 0.75, 0.95)
+"""Of samples below the quantiles that are told."""
+_RESAMPLED = 200  # times, for what chance makes of indices
+
+
+class Probability(NamedTuple):
+    """A probability with its 95 % interval."""
+
+    value: float
+    lower: float
+    upper: float
+
+    @classmethod
+    def of(cls, hits: NDArray[np.bool_]) -> "Probability":
+        """By which of the samples, in sets that know nothing of each other: by what these differ by (Student's t).
+
+        Of a single set, whose samples are independent, and where no set differs: Wilson's interval.
+        """
+        shares = hits.mean(axis=1)
+        value, spread = float(shares.mean()), float(shares.std(ddof=1)) if len(shares) > 1 else 0.0
+        if spread == 0.0:
+            wilson = stats.binomtest(int(hits.sum()), hits.size).proportion_ci(LEVEL, method="wilson")
+            return cls(value, float(wilson.low), float(wilson.high))
+        half = float(stats.t.ppf(0.5 + 0.5 * LEVEL, len(shares) - 1)) * spread / math.sqrt(len(shares))
+        return cls(value, max(value - half, 0.0), min(value + half, 1.0))
+
+
+@dataclass(frozen=True)
+class Indices:
+    """By which part the scatter of each parameter makes an answer vary: alone, and with all others."""
+
+    of: str
+    first_order: dict[str, float] = field(default_factory=dict)
+    total: dict[str, float] = field(default_factory=dict)
+    error: dict[str, float] = field(
+        default_factory=dict
+    )  # half of the 95 % interval of the total index, by resampling
+    note: str = ""  # why there are none
+
+    @classmethod
+    def find(cls, of: str, names: tuple[str, ...], answers: Floats, seed: int) -> "Indices":
+        """From the answers of the samples of `draw.for_indices`: sets, samples."""
+        missing = int(np.isnan(answers).sum())
+        if missing:
+            none = "have no critical friction" if of == "critical_friction" else "have no answer"
+            other = "squeal" if of == "critical_friction" else "limits for the parameters"
+            return cls(of, note=f"{missing} of {answers.size} samples {none}; ask for {other}")
+        if np.ptp(answers) == 0.0:
+            return cls(of, note=f"all samples have the same {of.replace('_', ' ')}")
+        if len(names) == 1:
+            return cls(of, {names[0]: 1.0}, {names[0]: 1.0}, {names[0]: 0.0})
+        first, total = _indices(answers)
+        rng, many = np.random.default_rng([seed, len(names)]), answers.shape[1]
+        again = [_indices(answers[:, rng.integers(many, size=many)])[1] for _ in range(_RESAMPLED)]
+        errors = stats.norm.ppf(0.5 + 0.5 * LEVEL) * np.std(again, axis=0)
+        named = [dict(zip(names, each.tolist(), strict=True)) for each in (first, total, errors)]
+        return cls(of, named[0], named[1], named[2])
+
+
+def _indices(answers: Floats) -> tuple[Floats, Floats]:
+    a, b, mixed = answers[0][None], answers[1][None], answers[2:, None]
+    found = stats.sobol_indices(func={"f_A": a, "f_B": b, "f_AB": mixed}, n=answers.shape[1])
+    return np.ravel(found.first_order), np.ravel(found.total_order)
+
+
+def quantiles(values: Floats) -> list[float]:
+    """The values below which the known ones lie with the probabilities of `SHARES`; empty where none is known."""
+    known = values[np.isfinite(values)]
+    return np.quantile(known, SHARES).tolist() if len(known) else []

@@ -1,0 +1,86 @@
+"""Samples by eigenvalues: growth of steady sliding, its frequency, and the critical friction coefficient."""
+
+import math
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brakecli.analysis.stability.modes import Mode, modes
+from brakecli.analysis.stability.report import changes, mean_stiffness
+from brakecli.case.system import system_of
+from brakecli.errors import BrakecliError, CaseError, Problem
+from brakecli.runs.limits import within_range
+from brakecli.solver.motion import Counted
+from brakecli.solver.steady_sliding import UNPRESSED, steady_sliding
+from brakecli.solver.system import System
+from brakecli.sweeps.driver import TaskQueue
+from brakecli.sweeps.plan import Plan
+from brakecli.sweeps.workers.task import Compute, Engine
+
+ASKED = np.dtype([("growth_rate", "f8"), ("frequency", "f8"), ("critical_friction", "f8"), ("reason", "S160")])
+"""Of a sample: growth (1/s) and frequency (Hz) of the mode that counts, and φ; NaN where it failed."""
+
+
+def asking(plan: Plan, band: tuple[float, float] | None) -> Compute:
+    """What workers compute."""
+    return partial(_compute, plan, band)
+
+
+def ask(engine: Engine, count: int, tell: Counted) -> NDArray[Any]:
+    """The answers of all samples, in their order."""
+    found, finished = np.zeros(count, ASKED), np.zeros(count, np.bool_)
+    queue = TaskQueue(finished, None, workers=engine.workers)
+    for task, records, seconds, failure in engine.run(queue.next_task):
+        if task is None:
+            continue
+        if records is None:
+            if not queue.retry(task):
+                place = slice(task.first, task.first + task.size)
+                found[place], finished[place] = _failed(failure), True
+            continue
+        queue.note_time(task, seconds)
+        place = slice(task.first, task.first + task.size)
+        found[place], finished[place] = np.frombuffer(records, ASKED), True
+        tell("samples", int(finished.sum()), count)
+    if not finished.all():
+        raise BrakecliError("samples are missing; run the same command again")
+    return found
+
+
+def _compute(plan: Plan, band: tuple[float, float] | None, first: int, count: int) -> bytes:
+    found = np.zeros(count, ASKED)
+    for place in range(count):
+        try:
+            with within_range():
+                found[place] = (*_asked(system_of(plan.case(plan.settings(first + place))), band), b"")
+        except BrakecliError as error:
+            found[place] = _failed(str(error))
+    return found.tobytes()
+
+
+def _failed(reason: str) -> tuple[float, float, float, bytes]:
+    return math.nan, math.nan, math.nan, reason.encode()[:160].decode(errors="ignore").encode()
+
+
+def _asked(system: System, band: tuple[float, float] | None) -> tuple[float, float, float]:
+    """Growth, frequency and critical friction of a shoe that slides steadily; raises CaseError where none does."""
+    c, belt = system.coefficients, system.belt_speed
+    if belt == 0.0:
+        raise CaseError([Problem(("wheel",), "the wheel stands, so that nothing slides", "give it a speed")])
+    rest = steady_sliding(system)
+    if not rest.is_pressed(system.load_at_start):
+        raise CaseError([Problem(("load",), UNPRESSED, "press the shoe onto the wheel")])
+    mode = _counting(modes(c, rest.stiffness, math.copysign(c.phi, belt)), band)
+    lost = next((each for each in changes(system, mean_stiffness(system, rest.stiffness)) if each.lost), None)
+    return mode.growth, mode.frequency, lost.friction if lost else math.nan
+
+
+def _counting(found: list[Mode], band: tuple[float, float] | None) -> Mode:
+    """The mode that grows fastest; of those in the band where one of them grows."""
+    low, high = band or (0.0, math.inf)
+    squeals = [
+        each for each in found if each.growth > 0.0 and each.frequency > 0.0 and low <= each.frequency <= high
+    ]
+    return squeals[0] if squeals else found[0]

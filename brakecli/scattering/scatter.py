@@ -1,0 +1,309 @@
+"""A study from its tables to its answers: draw samples, ask each of them, and write what they say."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brakecli.analysis.regime.table import Excitation, Regime
+from brakecli.case.system import system_of
+from brakecli.errors import CaseError
+from brakecli.files import fields
+from brakecli.files.field import Field, values_of
+from brakecli.files.write import ResultFile, new_result
+from brakecli.runs.run import origin
+from brakecli.scattering.answers import Indices, Probability, quantiles
+from brakecli.scattering.draw import drawn, for_indices
+from brakecli.scattering.eigen import ask, asking
+from brakecli.scattering.study import SCRAMBLINGS, LoadedStudy, Study
+from brakecli.solver.compile import Floats
+from brakecli.solver.motion import Counted
+from brakecli.sweeps.driver import choose_engine, sweep
+from brakecli.sweeps.journal import Journal
+from brakecli.sweeps.listed import GIVEN, Listed
+from brakecli.sweeps.plan import LoadedSweep, Plan, sweep_of
+from brakecli.sweeps.result import SweepReport, unit
+from brakecli.sweeps.workers.task import Compute, Engine
+
+_SMOOTH_SECONDS, _ROUGH_SECONDS, _FEW_SECONDS = 4e-4, 0.1, 2.0
+"""What the eigenvalues of a sample take, about; below which time no workers are started."""
+_CRITICAL = {"parameter": "friction.coefficient", "lower": 0.0, "upper": 10.0, "method": "eigenvalue"}
+
+
+class Distribution(NamedTuple):
+    """Quantiles of a number of the samples."""
+
+    name: str
+    units: str
+    quantiles: list[float]  # of `answers.SHARES`
+
+
+@dataclass(frozen=True)
+class ScatterReport:
+    """Everything that a study has found; `fields.SCATTER` says where each number is."""
+
+    output: Path
+    loaded: LoadedStudy
+    samples: int
+    failed: int
+    first_failure: str
+    probabilities: dict[str, Probability]
+    distributions: list[Distribution]
+    indices: Indices
+    columns: dict[str, NDArray[Any]]  # of the samples, by name
+    values: Floats  # of the parameters: sets, samples, parameters
+    notes: list[str]
+
+    @property
+    def quantiles(self) -> dict[str, list[float]]:
+        """Those of each number, by its name."""
+        return {each.name: each.quantiles for each in self.distributions}
+
+    @property
+    def probability(self) -> dict[str, float]:
+        """Each probability."""
+        return {name: each.value for name, each in self.probabilities.items()}
+
+    @property
+    def probability_lower(self) -> dict[str, float]:
+        """The lower end of its 95 % interval."""
+        return {name: each.lower for name, each in self.probabilities.items()}
+
+    @property
+    def probability_upper(self) -> dict[str, float]:
+        """The upper end of its 95 % interval."""
+        return {name: each.upper for name, each in self.probabilities.items()}
+
+    @property
+    def sentence(self) -> str:
+        """The answer in a sentence."""
+        squeal, low, high = self.probabilities["squeal"]
+        found = f"{squeal:.1%} of such brakes squeal (95 %: {low:.1%} to {high:.1%})"
+        if total := self.indices.total:
+            first = max(total, key=lambda name: total[name])
+            found += f"; {first} decides most on {self.indices.of.replace('_', ' ')}, by {total[first]:.0%}"
+        return found
+
+    def numbers(self) -> dict[str, Any]:
+        """Names and values as `--json` gives them."""
+        return values_of(fields.SCATTER, self)
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """What is to be computed: the samples, and those of the indices."""
+
+    values: Floats  # sets, samples, parameters
+    others: Floats | None  # the same of the indices
+    sweep: LoadedSweep  # of the samples, and behind them of the indices, if those are asked for the same
+    by_eigenvalues: LoadedSweep | None  # of the indices, if those are asked for eigenvalues beside runs
+
+
+def draw(loaded: LoadedStudy) -> Drawing:
+    """Draw the samples of a study; raises CaseError where its keys do not fit its case."""
+    study = loaded.study
+    wanted = study.indices_of != "none" and study.correlation is None
+    values, others = drawn(study), for_indices(study) if wanted else None
+    beside = others is not None and study.method == "run" and study.indices_of != "squeal"
+    together = [values] if others is None or beside else [values, others]
+    tables = {"critical": _CRITICAL} if study.method == "run" else {}
+    apart = _sweep(loaded, [others]) if others is not None and beside else None
+    return Drawing(values, others, _sweep(loaded, together, tables), apart)
+
+
+def _sweep(loaded: LoadedStudy, sets: list[Floats], tables: dict[str, Any] | None = None) -> LoadedSweep:
+    """The samples as the points of a sweep."""
+    parameters = loaded.study.parameter
+    rows = np.concatenate([each.reshape(-1, len(parameters)) for each in sets])
+    keys = [key for each in parameters for key in each.paths]
+    columns = [rows[:, n].tolist() for n, each in enumerate(parameters) for _ in each.paths]
+    try:
+        return sweep_of({"case": GIVEN, "points": GIVEN, **(tables or {})}, loaded.base, Listed.of(keys, columns))
+    except CaseError as error:
+        remedy = "limit its distribution by low and high"
+        wrong = (
+            replace(each, source=each.source.replace("point", "sample"), remedy=remedy) for each in error.problems
+        )
+        raise CaseError([*wrong]) from error
+
+
+def scatter(
+    loaded: LoadedStudy,
+    output: Path,
+    engine_of: Callable[..., Engine],
+    *,
+    force: bool,
+    tell: Counted = lambda what, done, total: None,
+) -> ScatterReport:
+    """Ask all samples of a study, and write its result file.
+
+    `engine_of(plan, compute=...)` gives what computes. Samples that are run are kept in a journal as points of a
+    sweep are, and the same call goes on with them. Raises CaseError, RefusedError, UsageError or CannotWriteError
+    before anything is computed.
+    """
+    drawing, study = draw(loaded), loaded.study
+    plan = drawing.sweep.plan
+
+    def by_eigenvalues(sweep: LoadedSweep) -> dict[str, NDArray[Any]]:
+        with engine_of(sweep.plan, compute=asking(sweep.plan, study.band)) as engine:
+            found = ask(engine, sweep.plan.points, tell)
+        return {name: found[name] for name in found.dtype.names or ()}
+
+    if study.method == "eigenvalue":
+        with new_result(output, force=force) as result:
+            report = _report(loaded, output, drawing, by_eigenvalues(drawing.sweep), None)
+            _write(result, report)
+            result.commit()
+        return report
+    beside = by_eigenvalues(drawing.by_eigenvalues) if drawing.by_eigenvalues else None
+    reports = list[ScatterReport]()
+
+    def write(result: ResultFile, found: SweepReport, journal: Journal) -> None:
+        columns = {name: journal.column(name) for name in (*_OF_RUNS, "critical")}
+        columns["critical_friction"] = columns.pop("critical")
+        reports.append(_report(loaded, output, drawing, columns, beside))
+        _write(result, reports[0])
+
+    def progress(done: int, failed: int) -> None:
+        tell("samples", done, plan.points)
+
+    with engine_of(plan) as engine:
+        sweep(drawing.sweep, output, engine, force=force, progress=progress, write=write)
+    return reports[0]
+
+
+def engine_for(
+    plan: Plan,
+    jobs: int | None = None,
+    scheduler: str | None = None,
+    scheduler_file: str | None = None,
+    *,
+    in_caller: bool = False,
+    compute: Compute | None = None,
+) -> Engine:
+    """The engine for the samples of a plan: this process where workers would take as long to start."""
+    each = _SMOOTH_SECONDS if system_of(plan.case({})).smooth else _ROUGH_SECONDS
+    few = compute is not None and plan.points * each < _FEW_SECONDS
+    if few and jobs is None and scheduler is None and scheduler_file is None:
+        jobs, in_caller = 1, True
+    return choose_engine(plan, jobs, scheduler, scheduler_file, in_caller=in_caller, compute=compute)
+
+
+def _report(
+    loaded: LoadedStudy,
+    output: Path,
+    drawing: Drawing,
+    columns: dict[str, NDArray[Any]],
+    beside: dict[str, NDArray[Any]] | None,
+) -> ScatterReport:
+    """What the answers say; those of the indices stand behind the others, or `beside`."""
+    study, (sets, many, _) = loaded.study, drawing.values.shape
+    count = sets * many
+    hits = {name: each.reshape(sets, many) for name, each in _outcomes(study, drawing, columns, count).items()}
+    failed = hits["failed"].ravel()
+    index = Indices(study.indices_of, note=_without(study))
+    if drawing.others is not None:
+        rest = {name: each[count:] for name, each in columns.items()} if beside is None else beside
+        of = _squeals(study, rest).astype(float) if study.indices_of == "squeal" else rest[study.indices_of]
+        answers = of.reshape(drawing.others.shape[:2])
+        index = Indices.find(study.indices_of, study.names, answers, study.seed)
+    kept = {name: each[:count] for name, each in columns.items()}
+    squeals = hits["squeal"].ravel()
+    told = [
+        Distribution(name, units, quantiles(np.where(squeals | (name not in _OF_SQUEAL), kept[name], np.nan)))
+        for name, units in _TOLD
+        if name in kept
+    ]
+    return ScatterReport(
+        output=output,
+        loaded=loaded,
+        samples=count,
+        failed=int(failed.sum()),
+        first_failure=kept["reason"][failed][0].decode() if failed.any() else "",
+        probabilities={
+            name: Probability.of(each) for name, each in hits.items() if name != "failed" or each.any()
+        },
+        distributions=[each for each in told if each.quantiles],
+        indices=index,
+        columns=kept,
+        values=drawing.values,
+        notes=_notes(study, count, index),
+    )
+
+
+def _outcomes(
+    study: Study, drawing: Drawing, columns: dict[str, NDArray[Any]], count: int
+) -> dict[str, NDArray[np.bool_]]:
+    """Which of the samples come to what."""
+    kept = {name: each[:count] for name, each in columns.items()}
+    if study.method == "run":
+        failed = kept["status"] != b"done"
+        found = {each.value: (kept["regime"] == each.value.encode()) & ~failed for each in Regime}
+    else:
+        growth = kept["growth_rate"]
+        failed, found = np.isnan(growth), {"stable": growth <= 0.0, "unstable": growth > 0.0}
+    path = ("friction", "coefficient")
+    own = np.array([drawing.sweep.plan.settings(n).get(path, np.nan) for n in range(count)])
+    own = np.where(np.isnan(own), drawing.sweep.plan.case({}).friction.coefficient, own)
+    with np.errstate(invalid="ignore"):
+        below = kept["critical_friction"] < own
+    return found | {"squeal": _squeals(study, kept), "critical_below": below, "failed": failed}
+
+
+def _squeals(study: Study, columns: dict[str, NDArray[Any]]) -> NDArray[np.bool_]:
+    """Which samples vibrate by themselves with a frequency in the band, or have an unstable mode there."""
+    low, high = study.band or (0.0, math.inf)
+    frequency = columns["frequency"]
+    with np.errstate(invalid="ignore"):
+        within = (frequency > 0.0) & (frequency >= low) & (frequency <= high)
+        if study.method == "run":
+            return np.asarray(within & (columns["excitation"] == Excitation.SELF_EXCITED.value.encode()))
+        return np.asarray(within & (columns["growth_rate"] > 0.0))
+
+
+def _without(study: Study) -> str:
+    if study.correlation is not None and study.indices_of != "none":
+        return "no indices: with correlations, the share of one parameter is not its own"
+    return ""
+
+
+def _notes(study: Study, count: int, index: Indices) -> list[str]:
+    notes = [index.note] if index.note else []
+    if count != study.samples:
+        notes.append(f"{count} samples in place of {study.samples}: as many as {SCRAMBLINGS} sequences need")
+    return notes
+
+
+def _write(result: ResultFile, report: ScatterReport) -> None:
+    """Everything that the file holds."""
+    loaded, study = report.loaded, report.loaded.study
+    result.set_attributes({**origin("scatter", loaded.title, loaded.base), "study_toml": loaded.text})
+    result.set_fields(fields.SCATTER, report.numbers())
+    result.axis("/", fields.SAMPLE, np.arange(report.samples))
+    sets, many, _ = report.values.shape
+    result.variable("/", fields.SET, ("sample",), np.repeat(np.arange(sets), many))
+    for number, scattering in enumerate(study.parameter):
+        name, keys = scattering.paths[0].replace(".", "_"), [*scattering.paths]
+        data = report.values[..., number].ravel()
+        result.variable("/", Field(name, unit(keys[0]), ", ".join(keys)), ("sample",), data, parameters=keys)
+    for each in fields.SCATTERED:
+        if each.name in report.columns:
+            values = report.columns[each.name]
+            result.column(each, ("sample",), np.char.decode(values) if values.dtype.kind == "S" else values)
+    result.axis("/", fields.OUTCOME, np.array([*report.probabilities]))
+    for name, field in zip(("value", "lower", "upper"), fields.PROBABILITY, strict=True):
+        result.column(field, ("outcome",), [getattr(each, name) for each in report.probabilities.values()])
+    if report.indices.total:
+        result.axis("/", fields.SCATTERING, np.array([*report.indices.total]))
+        parts = report.indices.first_order, report.indices.total, report.indices.error
+        for field, part in zip(fields.INDEX, parts, strict=True):
+            result.column(field, ("parameter",), [*part.values()])
+
+
+_OF_RUNS = ("status", "regime", "excitation", "frequency", "amplitude", "reason")
+_OF_SQUEAL = ("frequency", "amplitude")  # which only a vibration has
+_TOLD = (("critical_friction", ""), ("growth_rate", "1/s"), ("frequency", "Hz"), ("amplitude", "m"))

@@ -1,0 +1,201 @@
+"""A study's tables: which keys scatter, how, and how samples are drawn."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field
+from scipy import stats
+
+from brakecli.case.read import LoadedCase, key_path, parse_case, parse_table, read_text
+from brakecli.case.tables import Number, Positive, Table, Title, described, from_list
+from brakecli.errors import CaseError, Problem, found
+from brakecli.solver.compile import Floats
+
+SCRAMBLINGS = 8
+"""Sequences of a study, each with its own scrambling: what they differ by gives the intervals."""
+MOST_SAMPLES = 10_000_000
+_LIMIT = 3.0  # deviations from the mean to a limit, where only limits are given: 99.7 % lie between
+_LEAST_EIGENVALUE = 1e-9
+
+
+class Parameter(Table):
+    """One quantity that scatters: the key paths that take its value, and its distribution."""
+
+    alternatives = (("key",), ("keys",))
+
+    key: str | None = described("key path of the case", None)
+    keys: Annotated[tuple[str, ...], Field(min_length=1), *from_list] | None = described(
+        "key paths that take the same value", None
+    )
+    distribution: Literal["uniform", "normal", "lognormal", "triangular"] = described("its distribution")
+    low: Number | None = described("least value; of a normal one without a mean, three deviations below it", None)
+    high: Number | None = described("largest value", None)
+    mean: Number | None = described("mean", None)
+    deviation: Positive | None = described("standard deviation", None)
+    mode: Number | None = described('where "triangular" is likeliest; the middle if left out', None)
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """The key paths that it sets."""
+        return self.keys if self.keys is not None else (self.key or "",)
+
+    def _broken_rules(self) -> Iterator[Problem]:
+        yield from super()._broken_rules()
+        for name in ("key", "keys"):
+            for text in self.paths if getattr(self, name) is not None else ():
+                if not key_path(text):
+                    yield Problem((name,), "is not a key path" + found(text), 'write it as in "link2.angle_deg"')
+        bounded, spread = self.distribution in ("uniform", "triangular"), self.mean is not None
+        for one, other in (("low", "high"), ("mean", "deviation")):
+            alone = [name for name in (one, other) if getattr(self, name) is not None]
+            if len(alone) == 1:
+                yield self.wrong(alone[0], "is given alone", f"give {one} and {other} together")
+        if self.low is None and self.mean is None:
+            yield Problem(("low",), "is missing", "give low and high, or mean and deviation", instead=("mean",))
+        if bounded and spread and self.low is not None:
+            yield self.wrong("mean", "is given together with low and high", "keep one of the two")
+        if self.low is not None and self.high is not None and not self.low < self.high:
+            yield self.wrong("high", "is not above low", "give a range")
+        if self.mode is not None:
+            if self.distribution != "triangular" or self.low is None or self.high is None:
+                yield self.wrong("mode", "is only for a triangular distribution with low and high", "leave it out")
+            elif not self.low <= self.mode <= self.high:
+                yield self.wrong("mode", "is not between low and high", "give a value between them")
+        if self.distribution == "lognormal":
+            for name in ("low", "mean"):
+                value = getattr(self, name)
+                if value is not None and value <= 0.0:
+                    yield self.wrong(name, "is not above 0", "a lognormal value is above 0")
+
+    @cached_property
+    def _law(self) -> tuple[Any, float, float]:
+        """The distribution, and the probabilities below both ends of what is kept of it."""
+        low, high, mean, deviation = self.low, self.high, self.mean, self.deviation
+        if self.distribution in ("uniform", "triangular"):
+            if low is None or high is None:
+                assert mean is not None
+                assert deviation is not None
+                half = deviation * math.sqrt(3.0 if self.distribution == "uniform" else 6.0)
+                low, high = mean - half, mean + half
+            width, mode = high - low, 0.5 * (low + high) if self.mode is None else self.mode
+            if self.distribution == "uniform":
+                return stats.uniform(low, width), 0.0, 1.0
+            return stats.triang((mode - low) / width, low, width), 0.0, 1.0
+        normal = self.distribution == "normal"
+        if mean is None or deviation is None:
+            assert low is not None
+            assert high is not None
+            ends = (low, high) if normal else (math.log(low), math.log(high))
+            middle, spread = 0.5 * (ends[0] + ends[1]), (ends[1] - ends[0]) / (2.0 * _LIMIT)
+            law = stats.norm(middle, spread) if normal else stats.lognorm(spread, scale=math.exp(middle))
+            return law, 0.0, 1.0
+        if normal:
+            law = stats.norm(mean, deviation)
+        else:
+            spread = math.sqrt(math.log1p((deviation / mean) ** 2))
+            law = stats.lognorm(spread, scale=mean * math.exp(-0.5 * spread**2))
+        if low is None or high is None:
+            return law, 0.0, 1.0
+        return law, float(law.cdf(low)), float(law.cdf(high))
+
+    def values(self, parts: Floats) -> Floats:
+        """The values below which it lies with these probabilities."""
+        law, below, above = self._law
+        return np.asarray(law.ppf(below + parts * (above - below)), np.float64)
+
+
+_Row = Annotated[tuple[Number, ...], *from_list]
+
+
+class Study(Table):
+    """A case whose keys scatter, and what is asked of it."""
+
+    title: Title = ""
+    case: str = described("the case's file, seen from the study's own", min_length=1)
+    samples: Annotated[int, Field(ge=SCRAMBLINGS, le=MOST_SAMPLES)] = described("how many brakes are drawn", 1024)
+    seed: Annotated[int, Field(ge=0)] = described("of the random numbers", 0)
+    sampling: Literal["sobol", "latin-hypercube", "random"] = described("how samples are drawn", "sobol")
+    method: Literal["run", "eigenvalue"] = described(
+        "whether samples are run, or only their eigenvalues are asked", "eigenvalue"
+    )
+    band: Annotated[tuple[Positive, Positive], *from_list] | None = described(
+        "frequencies (Hz) between which a self-excited vibration is squeal; any if left out", None
+    )
+    indices_of: Literal["critical_friction", "growth_rate", "squeal", "none"] = described(
+        'what the Sobol indices are about; "none" leaves them out', "critical_friction"
+    )
+    parameter: Annotated[tuple[Parameter, ...], Field(min_length=1), *from_list] = described("what scatters")
+    correlation: Annotated[tuple[_Row, ...], *from_list] | None = described(
+        "correlations of the parameters' normal scores, in their order: a list of rows", None
+    )
+
+    def _broken_rules(self) -> Iterator[Problem]:
+        if self.band is not None and not self.band[0] < self.band[1]:
+            yield self.wrong("band", "does not rise", "give the lower frequency first")
+        taken: set[tuple[str, ...]] = set()
+        for index, each in enumerate(self.parameter):
+            for text in each.paths:
+                if key_path(text) in taken:
+                    remedy = "let each key path scatter once"
+                    yield Problem(("parameter", index, "key"), "is set twice" + found(text), remedy)
+                taken.add(key_path(text))
+        if self.correlation is not None:
+            yield from self._wrong_correlation()
+
+    def _wrong_correlation(self) -> Iterator[Problem]:
+        rows, count = self.correlation or (), len(self.parameter)
+        what = ""
+        if [*map(len, rows)] != [count] * count:
+            what = f"is no matrix with {count} rows of {count} numbers"
+        else:
+            matrix = np.array(rows)
+            if not (np.diag(matrix) == 1.0).all() or not (matrix == matrix.T).all():
+                what = "is not symmetric with ones on its diagonal"
+            elif not np.linalg.eigvalsh(matrix)[0] > _LEAST_EIGENVALUE:
+                what = "contradicts itself: no quantities correlate so"
+        if what:
+            yield Problem(
+                ("correlation",), what, "give the correlation of each parameter with each, a row for each"
+            )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The first key path of each parameter."""
+        return tuple(each.paths[0] for each in self.parameter)
+
+
+@dataclass(frozen=True)
+class LoadedStudy:
+    """A study with the text that it was read from, and its case."""
+
+    study: Study
+    text: str
+    base: LoadedCase
+
+    @property
+    def title(self) -> str:
+        """The title of the study, otherwise that of its case."""
+        return self.study.title or self.base.case.title
+
+
+def parse_study(text: str, name: str, folder: Path, overrides: Sequence[str] = ()) -> LoadedStudy:
+    """Make a study of its text; the path of its case begins at `folder`. Raises `CaseError`.
+
+    Overrides of its own keys belong to the study, all others to its case.
+    """
+    own = [each for each in overrides if key_path(each.partition("=")[0])[:1] in _OWN]
+    study = parse_table(Study, text, name, own)
+    try:
+        case_text, source = read_text(str(folder / study.case))
+    except CaseError as error:
+        wrong = (Problem(("case",), f"{each.where} {each.what}", each.remedy, name) for each in error.problems)
+        raise CaseError([*wrong]) from error
+    return LoadedStudy(study, text, parse_case(case_text, source, [each for each in overrides if each not in own]))
+
+
+_OWN = {(key,) for key in Study.model_fields if key != "title"}

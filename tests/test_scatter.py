@@ -1,0 +1,321 @@
+"""Brakes that are not built to their drawing: distributions, intervals, indices, and the whole study."""
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import stats
+
+import brakecli
+from brakecli.analysis.stability.report import stability
+from brakecli.case.system import system_of
+from brakecli.cli.inputs import load_case, load_study
+from brakecli.errors import BrakecliError, CaseError
+from brakecli.files.read import open_result
+from brakecli.scattering.answers import Indices, Probability, quantiles
+from brakecli.scattering.draw import drawn, for_indices
+from brakecli.scattering.study import SCRAMBLINGS, Parameter, Study
+from tests.campaign import counts
+from tests.commands import ROOT, TINY, left_in
+from tests.commands import brakecli as command
+
+pytestmark = pytest.mark.usefixtures("compiled")
+CASE = ROOT / "cases" / "relaxation.toml"
+FRICTION = """\
+[[parameter]]
+key = "friction.coefficient"
+distribution = "uniform"
+low = 0.3
+high = 0.8
+"""
+ANGLE = """\
+[[parameter]]
+key = "link2.angle_deg"
+distribution = "normal"
+mean = 5.0
+deviation = 0.5
+"""
+DAMPING = """\
+[[parameter]]
+keys = ["link1.damping", "link2.damping"]
+distribution = "triangular"
+low = 200.0
+high = 400.0
+"""
+
+
+def write_study(folder: Path, *tables: str, case: str | None = None) -> Path:
+    """A study of a shoe that may flutter, in study.toml."""
+    (folder / "shoe.toml").write_text(case or CASE.read_text())
+    path = folder / "study.toml"
+    path.write_text("\n".join(('case = "shoe.toml"', *sorted(tables, key=lambda each: each.startswith("[[")))))
+    return path
+
+
+def scattering(**tables: Any) -> Parameter:
+    """A parameter of the friction coefficient."""
+    return Parameter.model_validate({"key": "friction.coefficient", **tables})
+
+
+def study_of(*parameters: dict[str, Any], **tables: Any) -> Study:
+    """A study of made-up keys."""
+    rows = [{"key": f"key.{number}", **each} for number, each in enumerate(parameters)]
+    return Study.model_validate({"case": "-", "parameter": rows, **tables})
+
+
+NORMAL: dict[str, Any] = {"distribution": "normal", "mean": 0.0, "deviation": 1.0}
+
+
+@pytest.mark.parametrize(
+    ("tables", "mean", "deviation"),
+    [
+        ({"distribution": "uniform", "low": 1.0, "high": 3.0}, 2.0, 2.0 / math.sqrt(12.0)),
+        ({"distribution": "uniform", "mean": 2.0, "deviation": 0.3}, 2.0, 0.3),
+        ({"distribution": "triangular", "low": 1.0, "high": 3.0}, 2.0, 1.0 / math.sqrt(6.0)),
+        (
+            {"distribution": "triangular", "low": 0.0, "high": 3.0, "mode": 0.0},
+            1.0,
+            3.0 / math.sqrt(18.0),
+        ),
+        ({"distribution": "triangular", "mean": 2.0, "deviation": 0.3}, 2.0, 0.3),
+        ({"distribution": "normal", "mean": 2.0, "deviation": 0.3}, 2.0, 0.3),
+        ({"distribution": "normal", "low": 1.1, "high": 2.9}, 2.0, 0.3),
+        ({"distribution": "lognormal", "mean": 2.0, "deviation": 0.7}, 2.0, 0.7),
+        (  # limits three deviations of the logarithm away
+            {"distribution": "lognormal", "low": math.exp(-0.6), "high": math.exp(0.6)},
+            math.exp(0.02),
+            math.exp(0.02) * math.sqrt(math.expm1(0.04)),
+        ),
+        (  # cut on both sides
+            {"distribution": "normal", "mean": 0.0, "deviation": 1.0, "low": -1.0, "high": 1.0},
+            0.0,
+            math.sqrt(1.0 - 2.0 * stats.norm.pdf(1.0) / (2.0 * stats.norm.cdf(1.0) - 1.0)),
+        ),
+    ],
+)
+def test_a_distribution_has_its_mean_and_deviation(tables: dict[str, Any], mean: float, deviation: float) -> None:
+    """By the midpoint rule over its quantile function, in a million cells."""
+    values = scattering(**tables).values((np.arange(1e6) + 0.5) / 1e6)
+    assert values.mean() == pytest.approx(mean, abs=1e-4)
+    assert values.std() == pytest.approx(deviation, rel=2e-3)
+
+
+@pytest.mark.parametrize("sampling", ["sobol", "latin-hypercube", "random"])
+def test_samples_repeat_by_their_seed_and_sets_differ(sampling: str) -> None:
+    one, again, other = (
+        drawn(study_of(NORMAL, NORMAL, samples=200, sampling=sampling, seed=s)) for s in (1, 1, 2)
+    )
+    assert (one == again).all()
+    assert (one != other).any()
+    assert one.shape == (
+        (1, 200, 2) if sampling == "random" else (SCRAMBLINGS, 32 if sampling == "sobol" else 25, 2)
+    )
+    if sampling != "random":
+        assert len(np.unique(one[:, :, 0])) == one[:, :, 0].size
+
+
+def test_correlations_are_those_of_the_matrix() -> None:
+    matrix = [[1.0, 0.8, 0.0], [0.8, 1.0, -0.3], [0.0, -0.3, 1.0]]
+    values = drawn(study_of(NORMAL, NORMAL, NORMAL, samples=1 << 14, correlation=matrix)).reshape(-1, 3)
+    assert np.corrcoef(values.T) == pytest.approx(np.array(matrix), abs=0.01)  # 1/√16384, and less for Sobol's
+
+
+def test_indices_of_a_linear_margin_are_its_shares() -> None:
+    """Of Σ c x with deviations s, both indices are c² s²/Σ c² s²."""
+    weights, deviations = np.array([1.0, 2.0, 0.5]), (1.0, 0.5, 0.1)
+    study = study_of(*({**NORMAL, "deviation": each} for each in deviations), samples=4096)
+    shares = (weights * deviations) ** 2 / ((weights * deviations) ** 2).sum()
+    found = Indices.find("growth_rate", study.names, for_indices(study) @ weights, 0)
+    assert [*found.first_order.values()] == pytest.approx(shares.tolist(), abs=0.01)
+    assert [*found.total.values()] == pytest.approx(shares.tolist(), abs=0.01)
+    assert (abs(np.array([*found.total.values()]) - shares) <= 2.0 * np.array([*found.error.values()])).all()
+
+
+def test_indices_of_the_ishigami_function_are_those_of_its_closed_form() -> None:
+    """sin x1 + 7 sin² x2 + 0.1 x3⁴ sin x1; T. Ishigami and T. Homma, ISUMA 1990: the variances of its parts."""
+    a, b = 7.0, 0.1
+    parts = {
+        "1": 0.5 * (1.0 + b * math.pi**4 / 5.0) ** 2,
+        "2": a**2 / 8.0,
+        "13": b**2 * math.pi**8 * (1.0 / 18.0 - 1.0 / 50.0),
+    }
+    whole = sum(parts.values())
+    limits = {"distribution": "uniform", "low": -math.pi, "high": math.pi}
+    study = study_of(limits, limits, limits, samples=4096, seed=3)
+    x = for_indices(study)
+    answers = np.sin(x[..., 0]) + a * np.sin(x[..., 1]) ** 2 + b * x[..., 2] ** 4 * np.sin(x[..., 0])
+    found = Indices.find("growth_rate", study.names, answers, 0)
+    first = [parts["1"] / whole, parts["2"] / whole, 0.0]
+    total = [(parts["1"] + parts["13"]) / whole, parts["2"] / whole, parts["13"] / whole]
+    assert [*found.first_order.values()] == pytest.approx(first, abs=0.02)
+    assert [*found.total.values()] == pytest.approx(total, abs=0.02)
+
+
+@pytest.mark.parametrize("sampling", ["sobol", "latin-hypercube", "random"])
+@pytest.mark.parametrize("margin", [0.5, 2.0])
+@pytest.mark.parametrize("replications", counts(60, 400))
+def test_intervals_cover_the_truth(sampling: str, margin: float, replications: int) -> None:
+    """Of a linear margin under normal scatter, whose probability is Φ(-margin/σ).
+
+    A 95 % interval covers at least 92 % of 400; of 60, whose share has a deviation of 2.8 %, at least 85 %. Of
+    simple random samples it is as wide as Wald's, 2 · 1.96 √(p q/n), times 1.5 at most; others are narrower.
+    """
+    probability, weights = float(stats.norm.cdf(-margin)), np.array([0.6, 0.8])
+    covered, widths = 0, []
+    for seed in range(replications):
+        study = study_of(NORMAL, NORMAL, samples=1024, sampling=sampling, seed=seed)
+        found = Probability.of(drawn(study) @ weights < -margin)
+        covered += found.lower <= probability <= found.upper
+        widths.append(found.upper - found.lower)
+    assert covered >= (0.92 if replications >= 400 else 0.85) * replications
+    wald = 2.0 * 1.96 * math.sqrt(probability * (1.0 - probability) / 1024)
+    assert np.mean(widths) <= (1.5 if sampling == "random" else 1.2) * wald
+
+
+def test_where_no_sample_differs_the_interval_is_wilsons() -> None:
+    found = Probability.of(np.zeros((8, 128), np.bool_))
+    z = stats.norm.ppf(0.975) ** 2
+    assert found == pytest.approx((0.0, 0.0, z / (1024 + z)))
+
+
+def test_a_study_finds_what_each_of_its_shoes_is_alone(tmp_path: Path) -> None:
+    report = brakecli.scatter(write_study(tmp_path, FRICTION, ANGLE, DAMPING, "samples = 64"))
+    assert report.sizes["sample"] == 64
+    for n in range(0, 64, 7):
+        angle, damping = (float(report[name][n]) for name in ("link2_angle_deg", "link1_damping"))
+        keys = [f"link2.angle_deg={angle!r}", f"link1.damping={damping!r}", f"link2.damping={damping!r}"]
+        own = float(report.friction_coefficient[n])
+        alone = stability(system_of(load_case(str(CASE), [*keys, f"friction.coefficient={own!r}"]).case))
+        assert alone.critical is not None
+        assert float(report.critical_friction[n]) == alone.critical.friction
+        assert float(report.growth_rate[n]) == alone.modes[0].growth
+    p = dict(zip(report.outcome.to_numpy().tolist(), report.probability.to_numpy().tolist(), strict=True))
+    below = (report.critical_friction < report.friction_coefficient).mean()
+    assert p["critical_below"] == pytest.approx(float(below))
+    assert p["unstable"] == pytest.approx(float((report.growth_rate > 0.0).mean()))
+    assert p["stable"] + p["unstable"] == pytest.approx(1.0)
+
+
+def test_a_band_tells_squeal_from_other_vibration(tmp_path: Path) -> None:
+    path = write_study(tmp_path, FRICTION, ANGLE)
+    shares = []
+    for band in ([1.0, 100.0], [100.0, 250.0]):
+        report = brakecli.scatter(path, {"band": band, "samples": 64})
+        shares.append(float(report.probability.sel(outcome="squeal")))
+    assert shares[0] == 0.0
+    assert shares[1] == float(report.probability.sel(outcome="unstable")) > 0.0
+
+
+def test_runs_and_eigenvalues_agree_on_a_shoe_that_flutters(tmp_path: Path) -> None:
+    """Its vibration grows by e in 0.1 s where friction is 2 % above the critical one, and dies as fast below."""
+    path = write_study(tmp_path, FRICTION, "samples = 16", "seed = 5", 'indices_of = "none"')
+    shares = []
+    for method in ("eigenvalue", "run"):
+        report = brakecli.scatter(path, {"method": method, "solver.duration": 4.0}, jobs=1)
+        shares.append(report.probability.sel(outcome=["squeal", "critical_below"]).to_numpy().tolist())
+    assert shares[0] == shares[1]
+    regimes = {*report.regime.to_numpy().tolist()}
+    assert regimes <= {"damped", "relaxation", "quasi-harmonic", "undecided"}
+
+
+def test_a_study_of_runs_goes_on_where_it_was_and_gives_the_same_bytes(tmp_path: Path) -> None:
+    write_study(tmp_path, FRICTION, "samples = 8", 'method = "run"', 'indices_of = "squeal"', case=TINY)
+    command("scatter", "study.toml", "-j", "1", "-q", cwd=tmp_path)
+    whole = (tmp_path / "study.h5").read_bytes()
+    command("scatter", "study.toml", "-j", "2", "-q", "--force", cwd=tmp_path)
+    assert (tmp_path / "study.h5").read_bytes() == whole
+    assert left_in(tmp_path) == {"shoe.toml", "study.toml", "study.h5"}
+
+
+def test_what_is_said_is_what_the_file_holds(tmp_path: Path) -> None:
+    write_study(tmp_path, FRICTION, ANGLE, "samples = 64")
+    told = json.loads(command("scatter", "study.toml", "--json", cwd=tmp_path).out)
+    with open_result(tmp_path / "study.h5", kind="scatter") as result:
+        outcomes = [*result.read("/", "outcome")]
+        for name in ("probability", "probability_lower", "probability_upper"):
+            assert told[name] == dict(zip(outcomes, result.read("/", name).tolist(), strict=True))
+        keys = [*result.read("/", "parameter")]
+        assert keys == ["friction.coefficient", "link2.angle_deg"]
+        for name in ("first_order", "total", "total_error"):
+            assert told[name] == dict(zip(keys, result.read("/", name).tolist(), strict=True))
+        assert result.attributes["sentence"] == told["sentence"]
+    shown = command("scatter", "study.toml", "--force", cwd=tmp_path).out
+    assert "critical friction below own" in shown
+    assert "What decides on critical friction" in shown
+
+
+def test_with_correlations_there_are_no_indices(tmp_path: Path) -> None:
+    path = write_study(tmp_path, "samples = 16", "correlation = [[1.0, 0.5], [0.5, 1.0]]", FRICTION, ANGLE)
+    report = brakecli.scatter(path)
+    assert "parameter" not in report.sizes
+    assert "with correlations" in str(report.attrs["notes"])
+
+
+def test_samples_without_an_answer_are_counted_and_named(tmp_path: Path) -> None:
+    """A load that pulls the shoe off the wheel at half of the samples."""
+    load = '[[parameter]]\nkey = "load.force"\ndistribution = "uniform"\nlow = -100.0\nhigh = 100.0\n'
+    path = write_study(tmp_path, load, "samples = 64")
+    with pytest.warns(UserWarning, match="of 64 samples have no answer"):
+        report = brakecli.scatter(path)
+    assert float(report.probability.sel(outcome="failed")) == pytest.approx(0.5, abs=0.02)
+    assert "samples have no" in str(report.attrs["notes"])
+
+
+def test_where_no_friction_is_critical_the_indices_say_so(tmp_path: Path) -> None:
+    report = brakecli.scatter(
+        write_study(tmp_path, FRICTION, "samples = 16"), {"link1.angle_deg": 0.0, "link2.angle_deg": 0.0}
+    )
+    assert "have no critical friction; ask for squeal" in str(report.attrs["notes"])
+
+
+@pytest.mark.parametrize(
+    ("tables", "said"),
+    [
+        ((FRICTION, FRICTION), "study.toml:9: parameter[1].key: is set twice"),
+        ((FRICTION.replace("high = 0.8", ""),), "low: is given alone"),
+        ((FRICTION.replace("low = 0.3\nhigh = 0.8", ""),), "give low and high, or mean and deviation"),
+        ((FRICTION.replace("0.8", "0.2"),), "high: is not above low"),
+        ((FRICTION + "mean = 0.5\ndeviation = 0.1",), "mean: is given together with low and high"),
+        ((FRICTION + "mode = 0.5",), "mode: is only for a triangular distribution"),
+        ((DAMPING + "mode = 0.5",), "mode: is not between low and high"),
+        ((ANGLE.replace('"normal"', '"lognormal"').replace("5.0", "-5.0"),), "mean: is not above 0"),
+        ((ANGLE.replace("0.5", "0"),), "deviation: is out of range"),
+        ((FRICTION.replace("friction", "frction"),), "frction: is unknown"),
+        ((FRICTION.replace("0.3", "-0.3"),), "limit its distribution by low and high"),
+        (("samples = 4", FRICTION), "samples: is out of range"),
+        (("band = [2.0, 1.0]", FRICTION), "band: does not rise"),
+        (("correlation = [[1.0, 0.5]]", FRICTION, ANGLE), "is no matrix with 2 rows of 2 numbers"),
+        (("correlation = [[1.0, 0.5], [0.4, 1.0]]", FRICTION, ANGLE), "is not symmetric"),
+        (("correlation = [[1.0, 1.1], [1.1, 1.0]]", FRICTION, ANGLE), "contradicts itself"),
+        (("method = 1", FRICTION), "method: "),
+        ((), "parameter: is missing"),
+    ],
+)
+def test_a_wrong_study_is_refused_with_its_line(tmp_path: Path, tables: tuple[str, ...], said: str) -> None:
+    with pytest.raises(CaseError) as refused:
+        brakecli.scatter(write_study(tmp_path, *tables))
+    assert said in str(refused.value)
+
+
+def test_other_files_are_told_from_studies(tmp_path: Path) -> None:
+    path = write_study(tmp_path, FRICTION)
+    command("scatter", "shoe.toml", cwd=tmp_path).told(2, "this is a case; use: brakecli run shoe.toml")
+    command("run", "study.toml", cwd=tmp_path).told(2, "study.toml: ")
+    with pytest.raises(BrakecliError):
+        brakecli.sweep(path, jobs=1)
+    (tmp_path / "shoe.toml").unlink()
+    with pytest.raises(CaseError, match=r"study\.toml: case: "):
+        load_study(str(path), None)
+
+
+def test_a_single_parameter_decides_alone(tmp_path: Path) -> None:
+    report = brakecli.scatter(write_study(tmp_path, ANGLE, "samples = 16"))
+    assert float(report.first_order[0]) == float(report.total[0]) == 1.0
+
+
+def test_quantiles_are_of_what_is_known() -> None:
+    assert quantiles(np.array([np.nan, 1.0, 3.0, np.nan])) == pytest.approx([1.1, 1.5, 2.0, 2.5, 2.9])
+    assert quantiles(np.array([np.nan])) == []
