@@ -23,7 +23,7 @@ POINTS ?=
 .DELETE_ON_ERROR:
 .NOTPARALLEL: # two installations into one .venv at a time would collide
 .PHONY: help demo test campaign lowest lint format types imports derivations tables docs cases check \
-    accuracy promises promise-cost statistics picture lock-in branch-picture loop-picture regime-pictures paper extremes bench bench-sweep bench-million bench-contact bench-branch clean
+    accuracy promises promise-cost statistics picture lock-in branch-picture scatter-picture loop-picture regime-pictures paper extremes bench bench-sweep bench-million bench-contact bench-branch clean
 
 help: ## list the targets (this text)
 	@echo "make TARGET, where TARGET is one of"
@@ -149,6 +149,12 @@ branch-picture: $(DEV_STAMP) ## draw docs/branch.png, from the starter of branch
 	$(BIN)/brakecli new branch --output results/branch.toml --force --quiet
 	$(BIN)/brakecli branch results/branch.toml --parameter friction.coefficient=0:1 --force --quiet -o results/branch.h5
 	$(BIN)/brakecli plot results/branch.h5 --force --output docs/branch.png
+
+scatter-picture: $(DEV_STAMP) ## draw docs/scatter.png, from the starter of scatter
+	@mkdir -p results
+	$(BIN)/brakecli new scatter --output results/scatter.toml --force --quiet
+	$(BIN)/brakecli scatter results/scatter.toml --force --quiet -o results/scatter.h5
+	$(BIN)/brakecli plot results/scatter.h5 --force --output docs/scatter.png
 
 loop-picture: $(DEV_STAMP) ## draw docs/loop.png, from the starter of branches, followed up and down
 	@mkdir -p results

@@ -19,7 +19,7 @@ PLACE = re.compile(r"(<!-- fields ([A-Z_ ]+) -->\n).*?(<!-- end of fields -->)",
 ROWS = re.compile(r"(<!-- rows ([A-Z]+) -->\n)(.*?)(<!-- end of rows -->)", re.DOTALL)
 CELLS = re.compile(r"^\| ([^|]+) \| ([^|]+) \|", re.MULTILINE)
 UNKNOWN = "?"
-PAGES = ("result-format", "results", "regimes", "sweeps", "accuracy", "stability", "branches")
+PAGES = ("result-format", "results", "regimes", "sweeps", "accuracy", "stability", "branches", "scatter")
 
 
 def table(names: str) -> str:

@@ -247,6 +247,22 @@ def test_what_is_said_is_what_the_file_holds(tmp_path: Path) -> None:
     assert "What decides on critical friction" in shown
 
 
+def test_a_study_is_drawn_reported_and_written_as_a_starter(tmp_path: Path) -> None:
+    assert "run it with: brakecli scatter scatter.toml" in command("new", "scatter", cwd=tmp_path).out
+    few = ("--set", "samples=64")
+    command("scatter", "scatter.toml", *few, "-q", cwd=tmp_path)
+    assert "scatter.png: written" in command("plot", "scatter.h5", cwd=tmp_path).out
+    command("report", "scatter.h5", cwd=tmp_path)
+    page = (tmp_path / "scatter.html").read_text()
+    for text in ("How likely do such brakes squeal", "brakecli scatter STUDY.toml", "[[parameter]]"):
+        assert text in page
+    command("scatter", "scatter.toml", *few, "--set", 'indices_of="none"', "-q", "--force", cwd=tmp_path)
+    command("plot", "scatter.h5", "--force", cwd=tmp_path)
+    assert "no difference" in command("diff", "scatter.h5", "scatter.h5", cwd=tmp_path).out
+    assert command("export", "scatter.h5", "-o", "s.csv", cwd=tmp_path).out
+    assert (tmp_path / "s.csv").read_text().startswith("sample,")
+
+
 def test_with_correlations_there_are_no_indices(tmp_path: Path) -> None:
     path = write_study(tmp_path, "samples = 16", "correlation = [[1.0, 0.5], [0.5, 1.0]]", FRICTION, ANGLE)
     report = brakecli.scatter(path)

@@ -45,5 +45,6 @@ def command(
     if not quiet:
         shown = f"brakecli branch {as_argument(path)} --parameter friction.coefficient=0:1"
         follows = text == texts["branch"]
-        how = shown if follows else f"brakecli {'sweep' if is_sweep else 'run'} {as_argument(path)}"
+        verb = "scatter" if text == texts["scatter"] else "sweep" if is_sweep else "run"
+        how = shown if follows else f"brakecli {verb} {as_argument(path)}"
         show(f"{' and '.join(map(str, written))}: written; run it with: {how}")

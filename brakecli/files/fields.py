@@ -434,6 +434,7 @@ SAMPLE = integer("sample", "number of the sample, from 0")
 SET = integer("set", "number of its sequence: sets know nothing of each other")
 SCATTERED = (
     *named(POINT, "status", "regime", "excitation"),
+    integer("squeal", "whether it squeals (0, 1)"),
     Field("frequency", "Hz", "of the vibration, or of the mode that counts"),
     Field("amplitude", "m", "half of peak to peak of x"),
     Field("growth_rate", "1/s", "of the mode that counts: one that squeals, or the one that grows fastest"),

@@ -69,15 +69,16 @@ def _opened(
 
 def draw(result: StoredResult, select: Sequence[str] = (), variable: str = "") -> "Figure":
     """The picture of an open result, drawn with the style that is set."""
-    from brakecli.plots import branch, comparison, curves, lock_in, maps, run, sweep
+    from brakecli.plots import branch, comparison, curves, lock_in, maps, run, scatter, sweep
 
     kind = str(result.attributes.get("kind"))
     if kind == "sweep":
         picture = sweep.gather(result, select, variable)
         return curves.draw(picture) if len(picture.axes) == 1 else maps.draw(picture)
-    others = {"comparison": comparison.draw, "stability": lock_in.draw, "branch": branch.draw}
+    others = {"comparison": comparison.draw, "stability": lock_in.draw}
+    others |= {"branch": branch.draw, "scatter": scatter.draw}
     if kind != "run" and kind not in others:
-        known = "a run, of a sweep, of a comparison, of stability or of branches"
+        known = "a run, of a sweep, of a comparison, of stability, of branches or of scatter"
         raise UsageError(f"{result.path}: holds a result of kind {printable(kind)}; name the result of {known}")
     if select:
         raise UsageError(f"{result.path}: --select is for sweeps (found {select[0]!r}); leave it out for a {kind}")

@@ -116,6 +116,8 @@ def panels(figure: Figure, rows: int, columns: int, **options: Any) -> Array:
     """Panels in rows and columns; in a narrow figure all below each other, but in an array of this shape."""
     if is_narrow():
         options.pop("width_ratios", None)
+        if heights := options.get("height_ratios"):
+            options["height_ratios"] = np.repeat(heights, columns)
         return np.asarray(figure.subplots(rows * columns, 1, squeeze=False, **options)).reshape(rows, columns)
     return np.asarray(figure.subplots(rows, columns, squeeze=False, **options))
 

@@ -1,4 +1,4 @@
-"""The parts of a page about sweeps, comparisons of schemes, stability along a key, and branches."""
+"""The parts of a page about sweeps, comparisons of schemes, stability along a key, branches, and scatter."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -28,12 +28,14 @@ _COMMANDS = {
     "comparison": "compare-schemes CASE.toml",
     "stability": "stability CASE.toml --vary …",
     "branch": "branch CASE.toml --parameter …",
+    "scatter": "scatter STUDY.toml",
 }
 _QUESTIONS = {
     "sweep": "Where does this shoe vibrate, and in which way?",
     "critical": "From which value of {} on does steady sliding lose its stability?",
     "stability": "Which modes meet, where, and how fast does the motion grow?",
     "branch": "From which value on does it squeal by itself, and from which on can it squeal?",
+    "scatter": "How likely do such brakes squeal, and which scatter decides on it?",
     "comparison": "Which scheme and which step reach the wanted error at the least cost?",
 }
 
@@ -94,9 +96,13 @@ def _answer(found: SweepPicture) -> Iterator[str]:
 
 
 def part_of_other(result: StoredResult) -> Part:
-    """What a page says of a comparison, of stability along a key, or of branches; raises UnreadableResultError."""
+    """What a page says of a comparison, of stability along a key, of branches or of scatter.
+
+    Raises UnreadableResultError.
+    """
     kind = str(result.attributes["kind"])
-    known = {"stability": fields.LOCK_IN, "branch": fields.BRANCH}.get(kind, fields.COMPARISON)
+    declared = {"stability": fields.LOCK_IN, "branch": fields.BRANCH, "scatter": fields.SCATTER}
+    known = declared.get(kind, fields.COMPARISON)
     apart = ("title", "recommended", "sentence")
     rows = rows_of((each for each in known if each.name not in apart and each.in_file), result.attributes)
     drawn = picture("Picture of the result", partial(draw, result))
@@ -105,7 +111,7 @@ def part_of_other(result: StoredResult) -> Part:
         where = ", ".join(f"{value:.6g}" for value in np.ravel(result.attributes.get("critical_values", ())))
         key = ", ".join(map(str, result.attributes.get("parameters", ())))
         answer = [f"Along {key}, stability {f'changes at {where}' if where else 'does not change'}."]
-    if kind == "branch":
+    if kind in ("branch", "scatter"):
         sentence = str(result.attributes.get("sentence", ""))
         answer = [f"{sentence[:1].upper()}{sentence[1:]}."]
     best = result.attributes.get("recommended")
@@ -121,7 +127,7 @@ def _plain(
 ) -> Part:
     """A part with what is said of every result."""
     loaded, attributes = case_of(result), result.attributes
-    given = str(attributes.get("sweep_toml") or attributes.get("case_toml", ""))
+    given = str(attributes.get("sweep_toml") or attributes.get("study_toml") or attributes.get("case_toml", ""))
     again = repeat(result, f"brakecli {_COMMANDS[kind]} -o again.h5", given)
     sections += [Section("Case", case_blocks(loaded)), Section("How to repeat it", again)]
     title, name = str(attributes.get("title", "")) or "Result without a title", escaped(result.path.name)

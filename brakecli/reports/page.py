@@ -37,7 +37,7 @@ def write_report(results: Sequence[Path], target: Path, *, force: bool, progress
         kind = str(stored.attributes.get("kind"))
         if kind == "run":
             return part_of_run(stored, progress)
-        if kind not in ("sweep", "comparison", "stability", "branch"):
+        if kind not in ("sweep", "comparison", "stability", "branch", "scatter"):
             what = f"holds a result of kind {printable(kind)}, of which there is no report"
             raise UsageError(f"{stored.path}: {what}")
         return part_of_sweep(stored) if kind == "sweep" else part_of_other(stored)

@@ -229,7 +229,7 @@ def _report(
         },
         distributions=[each for each in told if each.quantiles],
         indices=index,
-        columns=kept,
+        columns={**kept, "squeal": squeals.astype(np.int64)},
         values=drawing.values,
         notes=_notes(study, count, index),
     )

@@ -1,0 +1,113 @@
+"""A study of scatter: probabilities with their intervals, what decides, and how the numbers are distributed."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from brakecli.files.read import StoredResult
+from brakecli.plots import style
+
+_WIDTH, _ROW, _BINS = 9.6, 0.36, 40  # inches; of a bar; bins of a histogram, at most
+_SQUEALS, _OTHERS = style.VERMILION, style.BLUE
+_NAMES = {"critical_below": "critical friction below own"}
+
+
+def draw(result: StoredResult) -> Figure:
+    """The figure: bars above, histograms below. Raises UnreadableResultError."""
+    known = result.variables("/")
+    if not {"outcome", "probability", "probability_lower", "probability_upper"} <= known.keys():
+        raise style.unreadable(result, "its probabilities are missing")
+    shares = [
+        style.read_column(result, name) for name in ("probability", "probability_lower", "probability_upper")
+    ]
+    outcomes, indexed = [*map(str, result.read("/", "outcome"))], "total" in known and "parameter" in known
+    columns = _columns(result)
+    if not len(outcomes) or any(each.shape != (len(outcomes),) for each in shares):
+        raise style.unreadable(result, "its probabilities do not fit its outcomes")
+    attributes, rows = result.attributes, max(len(outcomes), 3)
+    figure = style.headed(
+        _WIDTH, 1.6 + _ROW * rows + 2.4, str(attributes.get("title", "")), str(attributes.get("sentence", ""))
+    )
+    upper, lower = style.panels(figure, 2, 2, height_ratios=[0.5 + _ROW * rows, 2.6])
+    _probabilities(upper[0], outcomes, *shares)
+    if indexed:
+        _tornado(upper[1], result, str(attributes.get("indices_of", "")))
+    else:
+        upper[1].set_visible(False)
+    for axes, (name, (values, whose)) in zip(lower, columns.items(), strict=False):
+        _histogram(axes, values, name, style.unit_of(known[name].attributes), whose)
+    for axes in lower[len(columns) :]:
+        axes.set_visible(False)
+    return figure
+
+
+def _columns(result: StoredResult) -> dict[str, tuple[style.Array, str]]:
+    """The two numbers that are shown, and whose they are: critical friction, and how high it squeals or grows."""
+    found, known = dict[str, tuple[style.Array, str]](), result.variables("/")
+    squeals = style.read_column(result, "squeal") == 1 if "squeal" in known else np.zeros(0, np.bool_)
+    for name in ("critical_friction", "frequency" if squeals.any() else "growth_rate", "amplitude"):
+        if name in known and len(found) < 2:
+            values, only = style.read_column(result, name), name in ("frequency", "amplitude") and squeals.any()
+            if only and values.shape != squeals.shape:
+                raise style.unreadable(result, "its samples do not fit each other")
+            values = values[squeals] if only else values
+            if np.isfinite(values).any():
+                found[name] = values[np.isfinite(values)], "samples that squeal" if only else "samples"
+    return found
+
+
+def _probabilities(axes: Axes, names: list[str], value: style.Array, low: style.Array, high: style.Array) -> None:
+    """A bar for each outcome, with its interval."""
+    places = np.arange(len(names))[::-1]
+    colours = [_SQUEALS if name == "squeal" else _OTHERS for name in names]
+    off = np.clip(np.array([value - low, high - value]), 0.0, None)
+    axes.barh(places, value, height=0.62, color=colours, xerr=off, error_kw={"ecolor": style.DARK, "capsize": 3.0})
+    axes.set_yticks(places, labels=[_NAMES.get(name, name) for name in names], parse_math=False)
+    axes.set_xlim(0.0, min(1.0, 1.1 * float(high.max())) or 1.0)
+    axes.xaxis.set_major_formatter(lambda each, _: f"{100.0 * each:.3g} %")
+    axes.set_title("probability, with its 95 % interval")
+    axes.grid(visible=False, axis="y")
+
+
+def _tornado(axes: Axes, result: StoredResult, of: str) -> None:
+    """Total indices, the largest on top, and within them the first-order ones."""
+    names = np.array([*map(str, result.read("/", "parameter"))])
+    first, total, error = (style.read_column(result, name) for name in ("first_order", "total", "total_error"))
+    if not len(names) == len(first) == len(total) == len(error):
+        raise style.unreadable(result, "its indices do not fit its parameters")
+    order = np.argsort(total)
+    places = np.arange(len(names))
+    look = {"ecolor": style.DARK, "capsize": 3.0}
+    axes.barh(
+        places,
+        total[order],
+        height=0.62,
+        color="#9CCBE8",
+        xerr=error[order],
+        error_kw=look,
+        label="with all others",
+    )
+    axes.barh(places, np.clip(first[order], 0.0, None), height=0.3, color=style.BLUE, label="alone")
+    axes.set_yticks(places, labels=[*names[order]], parse_math=False)
+    axes.set_xlim(0.0, None)
+    axes.set_title(f"what decides on {of.replace('_', ' ')}", parse_math=False)
+    axes.grid(visible=False, axis="y")
+    axes.legend(loc="lower right")
+
+
+def _histogram(axes: Axes, values: style.Array, name: str, units: str, whose: str) -> None:
+    """How many samples have a number about so large; the median is marked."""
+    low, high = np.quantile(values, (0.005, 0.995))
+    inside = values[(values >= low) & (values <= high)]
+    axes.hist(inside, bins=min(_BINS, 5 + int(len(inside) ** 0.5)), color=_OTHERS, alpha=0.85)
+    middle = float(np.median(values))
+    axes.axvline(
+        middle,
+        color=style.DARK,
+        lw=1.1,
+        ls=style.DOTS,
+        label=f"median {style.readable(middle, 4)} {units}".rstrip(),
+    )
+    style.set_ticks(axes.xaxis, float(inside.min()), float(inside.max()), units, name.replace("_", " "))
+    axes.set_ylabel(whose)
+    axes.legend(loc="best")
