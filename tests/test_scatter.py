@@ -252,7 +252,7 @@ def test_a_study_is_drawn_reported_and_written_as_a_starter(tmp_path: Path) -> N
     few = ("--set", "samples=64")
     command("scatter", "scatter.toml", *few, "-q", cwd=tmp_path)
     assert "scatter.png: written" in command("plot", "scatter.h5", cwd=tmp_path).out
-    command("report", "scatter.h5", cwd=tmp_path)
+    command("report", "scatter.h5", "-o", "scatter.html", cwd=tmp_path)
     page = (tmp_path / "scatter.html").read_text()
     for text in ("How likely do such brakes squeal", "brakecli scatter STUDY.toml", "[[parameter]]"):
         assert text in page
@@ -261,6 +261,30 @@ def test_a_study_is_drawn_reported_and_written_as_a_starter(tmp_path: Path) -> N
     assert "no difference" in command("diff", "scatter.h5", "scatter.h5", cwd=tmp_path).out
     assert command("export", "scatter.h5", "-o", "s.csv", cwd=tmp_path).out
     assert (tmp_path / "s.csv").read_text().startswith("sample,")
+
+
+def test_advice_under_scatter_is_that_of_a_study_of_the_changed_drawing(tmp_path: Path) -> None:
+    """Of the key that scatters, its mean is moved; of another, the case has the new value."""
+    path = write_study(tmp_path, FRICTION, ANGLE, "samples = 64")
+    keys = "link2.angle_deg,link1.stiffness"
+    said = command("advise", "shoe.toml", "--scatter", "study.toml", "--keys", keys, "--json", cwd=tmp_path).out
+    told = json.loads(said)
+    own = brakecli.scatter(path).probability.sel(outcome="squeal")
+    assert told["squeal_probability"] == float(own) > 0.0
+    left = [each["squeal_probability"] for each in told["advice"]]
+    assert left == sorted(left)
+    assert max(left) < float(own)
+    for each in told["advice"]:
+        settings = {each["parameter"]: float(f"{each['to']:.4g}")}
+        if each["parameter"] == "link2.angle_deg":
+            moved = ANGLE.replace("mean = 5.0", f"mean = {settings.pop('link2.angle_deg')!r}")
+            path = write_study(tmp_path, FRICTION, moved, "samples = 64")
+        changed = brakecli.scatter(path, settings)
+        assert each["squeal_probability"] == float(changed.probability.sel(outcome="squeal"))
+        path = write_study(tmp_path, FRICTION, ANGLE, "samples = 64")
+    shown = command("advise", "shoe.toml", "--scatter", "study.toml", cwd=tmp_path).out
+    assert "squeal under scatter" in shown
+    assert "in place of" in shown
 
 
 def test_with_correlations_there_are_no_indices(tmp_path: Path) -> None:

@@ -2,11 +2,12 @@
 
 from typing import Annotated
 
-from brakecli.cli.inputs import load_case
+from brakecli.cli.inputs import load_case, load_study
 from brakecli.cli.options import AsJson, CaseArgument, ForceRead, Overrides, Quiet, option
 from brakecli.cli.output import progress, say, show_result
 
 KEYS = "Keys that may be advised, with * for any part; masses, stiffnesses, dampings, angles and load if left out."
+STUDY = "Rank by the probability of squeal that is left where keys scatter as in a study; its case is not used."
 MARGIN = "Part of its friction by which the case is to stay stable above it."
 
 
@@ -15,12 +16,14 @@ def command(
     overrides: Overrides = None,
     keys: Annotated[str | None, option(KEYS, "KEY,…")] = None,
     margin: Annotated[float, option(MARGIN, "PART", min=0.0, max=10.0)] = 0.2,
+    scatter: Annotated[str | None, option(STUDY, "STUDY.toml", "--scatter")] = None,
     force_read: ForceRead = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
     """What moves the critical friction, and what to change."""
     loaded = load_case(case, overrides)
+    study = load_study(scatter, None) if scatter is not None else None
     from brakecli.analysis.stability.advice import KEYS as USUAL
     from brakecli.cli.stability_tables import advice_table
     from brakecli.runs.advise import advise, advise_seconds
@@ -33,4 +36,9 @@ def command(
         if (seconds := advise_seconds(loaded)) > WORTH_SAYING and not quiet:
             say(f"a rough pad: this takes about {duration_text(seconds)}")
         report = advise(loaded, keys.split(",") if keys is not None else USUAL, margin, show_progress)
+        if study is not None:
+            from brakecli.scattering.advised import under_scatter
+            from brakecli.scattering.scatter import engine_for
+
+            report = under_scatter(report, loaded, study, engine_for, show_progress)
     show_result("advise", report.numbers(), advice_table, report, as_json=as_json, quiet=quiet)

@@ -117,12 +117,18 @@ def advice_table(report: AdviceReport) -> str:
         "safe until": [_until(each) for each in report.advice],
         "a run is": [each.check or "-" for each in report.advice],
     }
+    if report.squeal:
+        left = [each.squeal.squeal_probability if each.squeal else None for each in report.advice]
+        helps["squeals"] = [text_of(each, form=".2%") for each in left]
     rows: list[Row] = [
         ("critical friction", _crossing(found.critical) if found.critical else "none"),
         *_coexisting(report.thresholds),
         (f"at φ = {found.friction:g}", _STATE[report.stable]),
         ("margin", "-" if margin is None else f"{margin:.1%}; {report.wanted_margin:.1%} is wanted"),
     ]
+    if under := report.squeal:
+        low, high = under.squeal_lower, under.squeal_upper
+        rows.append(("squeal under scatter", f"{under.squeal_probability:.2%} (95 %: {low:.2%} to {high:.2%})"))
     ends: list[Row] = [("note", report.notes())]
     if check:
         ran = f"{check.parameter} = {check.value:.6g}: {check.duration:.3g} s of motion, in {check.seconds:.2g} s"

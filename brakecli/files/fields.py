@@ -464,6 +464,11 @@ SENSITIVITY = (
     ratio("error", "relative error of both"),
     Field("growth_derivative", "1/s per unit", "growth rate at φ by the value; for lists by their factor"),
 )
+_LEFT = (
+    ratio("squeal_probability", "with a study of scatter: part of such brakes that squeal; null without one"),
+    ratio("squeal_lower", "lower end of its 95 % interval"),
+    ratio("squeal_upper", "upper end"),
+)
 CHANGE = (
     Field("parameter", "", "key of the case", TEXT),
     Field("from", "of the key", "its value", at="start"),
@@ -471,6 +476,7 @@ CHANGE = (
     Field("until", "of the key", "the end of the interval of safe values; null on rough pads"),
     ratio("critical_friction", "critical friction there; null where no friction makes it unstable"),
     Field("check", "", "regime of a run with this advice followed; null where none was made", TEXT),
+    *within("squeal.", *_LEFT),
     Field("lowest", "of the key", "least value that may be advised"),
     Field("highest", "of the key", "largest value that may be advised"),
 )
@@ -489,6 +495,7 @@ ADVICE = (
     ratio("margin", "`critical_friction` over `friction_coefficient`, less 1"),
     ratio("wanted_margin", "the margin that is asked for"),
     Field("stable", "", "whether steady sliding is stable at φ; missing where nothing slides", "?"),
+    *within("squeal.", *_LEFT),
     Field("sensitivities", "", "all numbers of the case, those that move it most first", OBJECT, rows=SENSITIVITY),
     Field(
         "advice",

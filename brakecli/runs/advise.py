@@ -10,7 +10,7 @@ from typing import Any
 from brakecli.analysis.regime.table import Regime
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.stability import advice as of_case
-from brakecli.analysis.stability.advice import Change, Sensitivity
+from brakecli.analysis.stability.advice import Change, Left, Sensitivity
 from brakecli.analysis.stability.modes import is_undamped
 from brakecli.analysis.stability.report import LARGEST_FRICTION, StabilityReport, stability
 from brakecli.branches.thresholds import Thresholds, thresholds
@@ -55,6 +55,7 @@ class AdviceReport:
     check: CheckRun | None
     thresholds: Thresholds
     left_out: str = ""  # what was not asked, as it takes too long
+    squeal: Left | None = None  # of the case itself, under scatter
 
     @property
     def margin(self) -> float | None:
@@ -125,6 +126,9 @@ class AdviceReport:
         critical = best.critical_friction
         effect = f"gives {critical:.3g}" if critical is not None else "takes the instability away"
         yield f"{best.parameter} {best.start:.4g} → {best.rounded} {effect}"
+        if self.squeal and best.squeal:
+            own, left = self.squeal.squeal_probability, best.squeal.squeal_probability
+            yield f"under scatter {left:.2%} of such brakes squeal in place of {own:.2%}"
         if best.check is None:
             yield "no run has checked that"
         elif best.check == Regime.UNDECIDED:

@@ -117,12 +117,10 @@ def draw(loaded: LoadedStudy) -> Drawing:
 
 def _sweep(loaded: LoadedStudy, sets: list[Floats], tables: dict[str, Any] | None = None) -> LoadedSweep:
     """The samples as the points of a sweep."""
-    parameters = loaded.study.parameter
-    rows = np.concatenate([each.reshape(-1, len(parameters)) for each in sets])
-    keys = [key for each in parameters for key in each.paths]
-    columns = [rows[:, n].tolist() for n, each in enumerate(parameters) for _ in each.paths]
+    columns = loaded.study.columns(np.concatenate([each.reshape(-1, each.shape[-1]) for each in sets]))
+    listed = Listed.of([*columns], columns.values())
     try:
-        return sweep_of({"case": GIVEN, "points": GIVEN, **(tables or {})}, loaded.base, Listed.of(keys, columns))
+        return sweep_of({"case": GIVEN, "points": GIVEN, **(tables or {})}, loaded.base, listed)
     except CaseError as error:
         remedy = "limit its distribution by low and high"
         wrong = (
@@ -208,13 +206,13 @@ def _report(
     index = Indices(study.indices_of, note=_without(study))
     if drawing.others is not None:
         rest = {name: each[count:] for name, each in columns.items()} if beside is None else beside
-        of = _squeals(study, rest).astype(float) if study.indices_of == "squeal" else rest[study.indices_of]
+        of = squeals(study, rest).astype(float) if study.indices_of == "squeal" else rest[study.indices_of]
         answers = of.reshape(drawing.others.shape[:2])
         index = Indices.find(study.indices_of, study.names, answers, study.seed)
     kept = {name: each[:count] for name, each in columns.items()}
-    squeals = hits["squeal"].ravel()
+    squealing = hits["squeal"].ravel()
     told = [
-        Distribution(name, units, quantiles(np.where(squeals | (name not in _OF_SQUEAL), kept[name], np.nan)))
+        Distribution(name, units, quantiles(np.where(squealing | (name not in _OF_SQUEAL), kept[name], np.nan)))
         for name, units in _TOLD
         if name in kept
     ]
@@ -229,7 +227,7 @@ def _report(
         },
         distributions=[each for each in told if each.quantiles],
         indices=index,
-        columns={**kept, "squeal": squeals.astype(np.int64)},
+        columns={**kept, "squeal": squealing.astype(np.int64)},
         values=drawing.values,
         notes=_notes(study, count, index),
     )
@@ -251,10 +249,10 @@ def _outcomes(
     own = np.where(np.isnan(own), drawing.sweep.plan.case({}).friction.coefficient, own)
     with np.errstate(invalid="ignore"):
         below = kept["critical_friction"] < own
-    return found | {"squeal": _squeals(study, kept), "critical_below": below, "failed": failed}
+    return found | {"squeal": squeals(study, kept), "critical_below": below, "failed": failed}
 
 
-def _squeals(study: Study, columns: dict[str, NDArray[Any]]) -> NDArray[np.bool_]:
+def squeals(study: Study, columns: dict[str, NDArray[Any]]) -> NDArray[np.bool_]:
     """Which samples vibrate by themselves with a frequency in the band, or have an unstable mode there."""
     low, high = study.band or (0.0, math.inf)
     frequency = columns["frequency"]

@@ -163,6 +163,11 @@ class Study(Table):
                 ("correlation",), what, "give the correlation of each parameter with each, a row for each"
             )
 
+    def columns(self, values: Floats) -> dict[str, list[float]]:
+        """Values of the parameters, which stand along the last axis, by the key paths that take them."""
+        rows = values.reshape(-1, len(self.parameter))
+        return {key: rows[:, n].tolist() for n, each in enumerate(self.parameter) for key in each.paths}
+
     @property
     def names(self) -> tuple[str, ...]:
         """The first key path of each parameter."""

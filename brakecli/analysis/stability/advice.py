@@ -69,6 +69,14 @@ class Sensitivity:
         return None if self.growth_derivative is None else 0.01 * abs(at) * self.growth_derivative
 
 
+class Left(NamedTuple):
+    """The probability that brakes squeal which are built to a drawing, but not quite, with its 95 % interval."""
+
+    squeal_probability: float
+    squeal_lower: float
+    squeal_upper: float
+
+
 @dataclass(frozen=True)
 class Change:
     """The nearest value that is safe, and what it gives; `to` is None where no value between two ends helps."""
@@ -82,6 +90,7 @@ class Change:
     highest: float
     rounded: str  # `to`, or "no help"
     check: str | None = None  # regime of a run with the change; None where there was none
+    squeal: Left | None = None  # what is left of squeal under scatter; None where it was not asked
 
     @property
     def size(self) -> float:
