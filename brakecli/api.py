@@ -372,6 +372,8 @@ def _listed(points: "Mapping[str, Iterable[Any]] | None") -> "Listed | None":
     columns = _plain({key: points[key] for key in points}, "points")
     if wrong := [key for key in columns if not key_path(key)]:
         raise UsageError(f"points: {wrong[0]!r} is no key path; name a key as in 'link2.angle_deg'")
+    if len({*map(key_path, columns)}) < len(columns):
+        raise UsageError("points: a key has two columns; keep one of them")
     lists = [each for each in columns.values() if isinstance(each, list)]
     if len(lists) < len(columns) or len({*map(len, lists)}) != 1 or not all(lists):
         raise UsageError("points: need a value of each key at each point, and one point at least")

@@ -304,6 +304,46 @@ def test_samples_without_an_answer_are_counted_and_named(tmp_path: Path) -> None
     assert "samples have no" in str(report.attrs["notes"])
 
 
+def test_a_shoe_that_locks_itself_is_unstable_and_past_its_critical_friction(tmp_path: Path) -> None:
+    """There it does not slide steadily; its critical friction is that of the same shoe with less friction."""
+    wedge = {"link2.angle_deg": -40.0, "link1.angle_deg": 20.0}
+    path = write_study(tmp_path, FRICTION.replace("0.8", "6.0"), "samples = 64", 'indices_of = "none"')
+    report = brakecli.scatter(path, wedge)
+    assert report.attrs["failed"] == 0
+    keys = [f"{key}={value}" for key, value in wedge.items()]
+    alone = stability(system_of(load_case(str(CASE), [*keys, "friction.coefficient=0.3"]).case)).critical
+    assert alone is not None
+    assert report.critical_friction.to_numpy() == pytest.approx(alone.friction)
+    beyond = (report.friction_coefficient > alone.friction).to_numpy()
+    assert 0 < beyond.sum() < 64
+    assert ((report.growth_rate > 0.0).to_numpy() == beyond).all()
+    assert float(report.probability.sel(outcome="critical_below")) == beyond.mean()
+
+
+def test_what_is_not_known_may_squeal_or_not(tmp_path: Path) -> None:
+    load = '[[parameter]]\nkey = "load.force"\ndistribution = "uniform"\nlow = -100.0\nhigh = 300.0\n'
+    path = write_study(tmp_path, load, FRICTION, "samples = 64", 'indices_of = "none"')
+    with pytest.warns(UserWarning, match="of 64 samples have no answer"):
+        squeal = (report := brakecli.scatter(path)).sel(outcome="squeal")
+    known = float(squeal.probability)
+    assert float(squeal.probability_lower) < known
+    assert float(squeal.probability_upper) > known + 0.25
+    assert "have no answer, and may squeal or not" in report.attrs["sentence"]
+    with pytest.warns(UserWarning, match="the wheel stands"):
+        report = brakecli.scatter(path, {"wheel.angular_speed": 0.0})
+    assert str(report.attrs["sentence"]).startswith("no sample has an answer: ")
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_tail_is_exact(side: float) -> None:
+    """Beyond seven deviations a normal value lies there by 1/7 in the mean, but for terms of 1/7³."""
+    limits = sorted((7.0 * side, 9.0 * side))
+    tail = scattering(distribution="normal", mean=0.0, deviation=1.0, low=limits[0], high=limits[1])
+    values = tail.values((np.arange(1e4) + 0.5) / 1e4)
+    assert len(np.unique(values)) == 10_000
+    assert abs(values.mean()) == pytest.approx(7.0 + 1.0 / 7.0 - 2.0 / 343.0, abs=1e-3)
+
+
 def test_where_no_friction_is_critical_the_indices_say_so(tmp_path: Path) -> None:
     report = brakecli.scatter(
         write_study(tmp_path, FRICTION, "samples = 16"), {"link1.angle_deg": 0.0, "link2.angle_deg": 0.0}
@@ -323,10 +363,18 @@ def test_where_no_friction_is_critical_the_indices_say_so(tmp_path: Path) -> Non
         ((DAMPING + "mode = 0.5",), "mode: is not between low and high"),
         ((ANGLE.replace('"normal"', '"lognormal"').replace("5.0", "-5.0"),), "mean: is not above 0"),
         ((ANGLE.replace("0.5", "0"),), "deviation: is out of range"),
-        ((FRICTION.replace("friction", "frction"),), "frction: is unknown"),
-        ((FRICTION.replace("0.3", "-0.3"),), "limit its distribution by low and high"),
+        (
+            (FRICTION.replace("friction", "frction"),),
+            "study.toml: frction: is unknown (found a table); did you mean",
+        ),
+        ((FRICTION.replace("0.3", "-0.3"),), "give low and high beside mean and deviation"),
+        ((ANGLE + "low = 9.2\nhigh = 12.0",), "low: and high lie where no value falls"),
+        (("band = [100.0]", FRICTION), "band: is no pair"),
+        (("band = [1.0, 2.0, 3.0]", FRICTION), "band: is no pair"),
+        (("band = [nan, 100.0]", FRICTION), "band[0]: "),
+        (('band = ["a", 100.0]', FRICTION), "band[0]: "),
         (("samples = 4", FRICTION), "samples: is out of range"),
-        (("band = [2.0, 1.0]", FRICTION), "band: does not rise"),
+        (("band = [2.0, 1.0]", FRICTION), "band: is no pair of frequencies that rise"),
         (("correlation = [[1.0, 0.5]]", FRICTION, ANGLE), "is no matrix with 2 rows of 2 numbers"),
         (("correlation = [[1.0, 0.5], [0.4, 1.0]]", FRICTION, ANGLE), "is not symmetric"),
         (("correlation = [[1.0, 1.1], [1.1, 1.0]]", FRICTION, ANGLE), "contradicts itself"),

@@ -24,6 +24,12 @@ class Probability(NamedTuple):
     upper: float
 
     @classmethod
+    def within(cls, hits: NDArray[np.bool_], unknown: NDArray[np.bool_]) -> "Probability":
+        """By samples of which some are not known: the interval reaches to where all of these are hits."""
+        found = cls.of(hits)
+        return found._replace(upper=cls.of(hits | unknown).upper) if unknown.any() else found
+
+    @classmethod
     def of(cls, hits: NDArray[np.bool_]) -> "Probability":
         """By which of the samples, in sets that know nothing of each other: by what these differ by (Student's t).
 

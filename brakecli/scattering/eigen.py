@@ -23,7 +23,7 @@ ASKED = np.dtype([("growth_rate", "f8"), ("frequency", "f8"), ("critical_frictio
 """Of a sample: growth (1/s) and frequency (Hz) of the mode that counts, and φ; NaN where it failed."""
 
 
-def asking(plan: Plan, band: tuple[float, float] | None) -> Compute:
+def asking(plan: Plan, band: tuple[float, ...] | None) -> Compute:
     """What workers compute."""
     return partial(_compute, plan, band)
 
@@ -49,7 +49,7 @@ def ask(engine: Engine, count: int, tell: Counted) -> NDArray[Any]:
     return found
 
 
-def _compute(plan: Plan, band: tuple[float, float] | None, first: int, count: int) -> bytes:
+def _compute(plan: Plan, band: tuple[float, ...] | None, first: int, count: int) -> bytes:
     found = np.zeros(count, ASKED)
     for place in range(count):
         try:
@@ -64,20 +64,27 @@ def _failed(reason: str) -> tuple[float, float, float, bytes]:
     return math.nan, math.nan, math.nan, reason.encode()[:160].decode(errors="ignore").encode()
 
 
-def _asked(system: System, band: tuple[float, float] | None) -> tuple[float, float, float]:
-    """Growth, frequency and critical friction of a shoe that slides steadily; raises CaseError where none does."""
+def _asked(system: System, band: tuple[float, ...] | None) -> tuple[float, float, float]:
+    """Growth, frequency and critical friction; raises CaseError where nothing slides.
+
+    A shoe that locks itself does not slide steadily: it is unstable, by what full contact makes of it.
+    """
     c, belt = system.coefficients, system.belt_speed
     if belt == 0.0:
         raise CaseError([Problem(("wheel",), "the wheel stands, so that nothing slides", "give it a speed")])
-    rest = steady_sliding(system)
-    if not rest.is_pressed(system.load_at_start):
+    try:
+        rest = steady_sliding(system)
+    except CaseError:
+        rest = None
+    k = rest.stiffness if rest else system.contact_stiffness
+    mode = _counting(modes(c, k, math.copysign(c.phi, belt)), band)
+    if not (rest.is_pressed(system.load_at_start) if rest else system.load_at_start > 0.0 and mode.growth > 0.0):
         raise CaseError([Problem(("load",), UNPRESSED, "press the shoe onto the wheel")])
-    mode = _counting(modes(c, rest.stiffness, math.copysign(c.phi, belt)), band)
-    lost = next((each for each in changes(system, mean_stiffness(system, rest.stiffness)) if each.lost), None)
+    lost = next((each for each in changes(system, mean_stiffness(system, k)) if each.lost), None)
     return mode.growth, mode.frequency, lost.friction if lost else math.nan
 
 
-def _counting(found: list[Mode], band: tuple[float, float] | None) -> Mode:
+def _counting(found: list[Mode], band: tuple[float, ...] | None) -> Mode:
     """The mode that grows fastest; of those in the band where one of them grows."""
     low, high = band or (0.0, math.inf)
     squeals = [

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from brakecli.analysis.regime.table import Excitation, Regime
 from brakecli.case.system import system_of
-from brakecli.errors import CaseError
+from brakecli.errors import CaseError, Problem
 from brakecli.files import fields
 from brakecli.files.field import Field, values_of
 from brakecli.files.write import ResultFile, new_result
@@ -82,7 +82,11 @@ class ScatterReport:
     def sentence(self) -> str:
         """The answer in a sentence."""
         squeal, low, high = self.probabilities["squeal"]
+        if self.failed == self.samples:
+            return f"no sample has an answer: {self.first_failure}"
         found = f"{squeal:.1%} of such brakes squeal (95 %: {low:.1%} to {high:.1%})"
+        if self.failed:
+            found += f"; {self.failed / self.samples:.1%} have no answer, and may squeal or not"
         if total := self.indices.total:
             first = max(total, key=lambda name: total[name])
             found += f"; {first} decides most on {self.indices.of.replace('_', ' ')}, by {total[first]:.0%}"
@@ -122,11 +126,15 @@ def _sweep(loaded: LoadedStudy, sets: list[Floats], tables: dict[str, Any] | Non
     try:
         return sweep_of({"case": GIVEN, "points": GIVEN, **(tables or {})}, loaded.base, listed)
     except CaseError as error:
-        remedy = "limit its distribution by low and high"
-        wrong = (
-            replace(each, source=each.source.replace("point", "sample"), remedy=remedy) for each in error.problems
-        )
-        raise CaseError([*wrong]) from error
+        raise CaseError([_of_sample(each, loaded.name) for each in error.problems]) from error
+
+
+def _of_sample(problem: Problem, name: str) -> Problem:
+    """What is wrong with a sample: with its value, or with the key that it sets."""
+    if problem.what.startswith("is out of range"):
+        remedy = "cut its distribution off: give low and high beside mean and deviation"
+        return replace(problem, source=f"{name}: {problem.source.replace('point', 'sample')}", remedy=remedy)
+    return replace(problem, source=name)
 
 
 def scatter(
@@ -223,7 +231,9 @@ def _report(
         failed=int(failed.sum()),
         first_failure=kept["reason"][failed][0].decode() if failed.any() else "",
         probabilities={
-            name: Probability.of(each) for name, each in hits.items() if name != "failed" or each.any()
+            name: Probability.within(each, hits["failed"] & ~each)
+            for name, each in hits.items()
+            if name != "failed" or each.any()
         },
         distributions=[each for each in told if each.quantiles],
         indices=index,

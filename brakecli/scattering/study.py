@@ -12,7 +12,7 @@ from pydantic import Field
 from scipy import stats
 
 from brakecli.case.read import LoadedCase, key_path, parse_case, parse_table, read_text
-from brakecli.case.tables import Number, Positive, Table, Title, described, from_list
+from brakecli.case.tables import MISSING, Number, Positive, Table, Title, described, from_list
 from brakecli.errors import CaseError, Problem, found
 from brakecli.solver.compile import Floats
 
@@ -21,6 +21,7 @@ SCRAMBLINGS = 8
 MOST_SAMPLES = 10_000_000
 _LIMIT = 3.0  # deviations from the mean to a limit, where only limits are given: 99.7 % lie between
 _LEAST_EIGENVALUE = 1e-9
+_LEAST_KEPT = 1e-12  # probability between limits
 
 
 class Parameter(Table):
@@ -50,6 +51,7 @@ class Parameter(Table):
             for text in self.paths if getattr(self, name) is not None else ():
                 if not key_path(text):
                     yield Problem((name,), "is not a key path" + found(text), 'write it as in "link2.angle_deg"')
+        normal = self.distribution == "normal"
         bounded, spread = self.distribution in ("uniform", "triangular"), self.mean is not None
         for one, other in (("low", "high"), ("mean", "deviation")):
             alone = [name for name in (one, other) if getattr(self, name) is not None]
@@ -66,6 +68,13 @@ class Parameter(Table):
                 yield self.wrong("mode", "is only for a triangular distribution with low and high", "leave it out")
             elif not self.low <= self.mode <= self.high:
                 yield self.wrong("mode", "is not between low and high", "give a value between them")
+        positive = all(value is None or value > 0.0 for value in (self.low, self.mean))
+        sound = self.low is None or self.high is None or self.low < self.high
+        cut = not bounded and None not in (self.mean, self.deviation, self.low, self.high)
+        if cut and sound and (normal or positive):
+            _, first, last, _ = self._law
+            if not abs(last - first) > _LEAST_KEPT:
+                yield self.wrong("low", "and high lie where no value falls", "take limits nearer to the mean")
         if self.distribution == "lognormal":
             for name in ("low", "mean"):
                 value = getattr(self, name)
@@ -73,8 +82,8 @@ class Parameter(Table):
                     yield self.wrong(name, "is not above 0", "a lognormal value is above 0")
 
     @cached_property
-    def _law(self) -> tuple[Any, float, float]:
-        """The distribution, and the probabilities below both ends of what is kept of it."""
+    def _law(self) -> tuple[Any, float, float, bool]:
+        """The distribution, the probabilities below both ends of what is kept of it, or, if so, above them."""
         low, high, mean, deviation = self.low, self.high, self.mean, self.deviation
         if self.distribution in ("uniform", "triangular"):
             if low is None or high is None:
@@ -84,8 +93,8 @@ class Parameter(Table):
                 low, high = mean - half, mean + half
             width, mode = high - low, 0.5 * (low + high) if self.mode is None else self.mode
             if self.distribution == "uniform":
-                return stats.uniform(low, width), 0.0, 1.0
-            return stats.triang((mode - low) / width, low, width), 0.0, 1.0
+                return stats.uniform(low, width), 0.0, 1.0, False
+            return stats.triang((mode - low) / width, low, width), 0.0, 1.0, False
         normal = self.distribution == "normal"
         if mean is None or deviation is None:
             assert low is not None
@@ -93,20 +102,25 @@ class Parameter(Table):
             ends = (low, high) if normal else (math.log(low), math.log(high))
             middle, spread = 0.5 * (ends[0] + ends[1]), (ends[1] - ends[0]) / (2.0 * _LIMIT)
             law = stats.norm(middle, spread) if normal else stats.lognorm(spread, scale=math.exp(middle))
-            return law, 0.0, 1.0
+            return law, 0.0, 1.0, False
         if normal:
             law = stats.norm(mean, deviation)
         else:
             spread = math.sqrt(math.log1p((deviation / mean) ** 2))
             law = stats.lognorm(spread, scale=mean * math.exp(-0.5 * spread**2))
         if low is None or high is None:
-            return law, 0.0, 1.0
-        return law, float(law.cdf(low)), float(law.cdf(high))
+            return law, 0.0, 1.0, False
+        above = bool(
+            low > law.median()
+        )  # there probabilities above are exact, and those below are 1 but for rounding
+        ends = (law.sf(low), law.sf(high)) if above else (law.cdf(low), law.cdf(high))
+        return law, float(ends[0]), float(ends[1]), above
 
     def values(self, parts: Floats) -> Floats:
         """The values below which it lies with these probabilities."""
-        law, below, above = self._law
-        return np.asarray(law.ppf(below + parts * (above - below)), np.float64)
+        law, first, last, above = self._law
+        within = first + parts * (last - first)
+        return np.asarray(law.isf(within) if above else law.ppf(within), np.float64)
 
 
 _Row = Annotated[tuple[Number, ...], *from_list]
@@ -123,20 +137,24 @@ class Study(Table):
     method: Literal["run", "eigenvalue"] = described(
         "whether samples are run, or only their eigenvalues are asked", "eigenvalue"
     )
-    band: Annotated[tuple[Positive, Positive], *from_list] | None = described(
+    band: Annotated[tuple[Positive, ...], *from_list] | None = described(
         "frequencies (Hz) between which a self-excited vibration is squeal; any if left out", None
     )
     indices_of: Literal["critical_friction", "growth_rate", "squeal", "none"] = described(
         'what the Sobol indices are about; "none" leaves them out', "critical_friction"
     )
-    parameter: Annotated[tuple[Parameter, ...], Field(min_length=1), *from_list] = described("what scatters")
+    parameter: Annotated[tuple[Parameter, ...], *from_list] = described("what scatters", ())
     correlation: Annotated[tuple[_Row, ...], *from_list] | None = described(
         "correlations of the parameters' normal scores, in their order: a list of rows", None
     )
 
     def _broken_rules(self) -> Iterator[Problem]:
-        if self.band is not None and not self.band[0] < self.band[1]:
-            yield self.wrong("band", "does not rise", "give the lower frequency first")
+        if not self.parameter:
+            yield Problem(("parameter",), MISSING, "give at least one [[parameter]]")
+        if self.band is not None and not (len(self.band) == 2 and self.band[0] < self.band[1]):
+            yield self.wrong(
+                "band", "is no pair of frequencies that rise", "give the lower one, then the higher one"
+            )
         taken: set[tuple[str, ...]] = set()
         for index, each in enumerate(self.parameter):
             for text in each.paths:
@@ -181,6 +199,7 @@ class LoadedStudy:
     study: Study
     text: str
     base: LoadedCase
+    name: str  # of its file
 
     @property
     def title(self) -> str:
@@ -200,7 +219,8 @@ def parse_study(text: str, name: str, folder: Path, overrides: Sequence[str] = (
     except CaseError as error:
         wrong = (Problem(("case",), f"{each.where} {each.what}", each.remedy, name) for each in error.problems)
         raise CaseError([*wrong]) from error
-    return LoadedStudy(study, text, parse_case(case_text, source, [each for each in overrides if each not in own]))
+    base = parse_case(case_text, source, [each for each in overrides if each not in own])
+    return LoadedStudy(study, text, base, name)
 
 
 _OWN = {(key,) for key in Study.model_fields if key != "title"}

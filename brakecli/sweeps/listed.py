@@ -41,18 +41,19 @@ class Listed:
         return len(self.columns[0])
 
 
-def read_listed(path: Path, source: str) -> Listed:
-    """The points of a CSV file, whose first line names key paths; raises CaseError with the line."""
+def read_listed(path: Path, source: str, at: int) -> Listed:
+    """The points of a CSV file, which a line of a sweep names; raises CaseError with the line."""
 
     def wrong(what: str, remedy: str, line: int = 0) -> NoReturn:
-        raise CaseError(
-            [Problem(("points",) if not line else (), what, remedy, str(path) if line else source, line)]
-        )
+        if line:
+            raise CaseError([Problem((), what, remedy, str(path), line)])
+        raise CaseError([Problem(("points",), what, remedy, source, at)])
 
     try:
         text = contents(path, LARGEST).decode("utf-8-sig")
     except (OSError, UnicodeDecodeError, UnreadableResultError) as error:
         reason = getattr(error, "strerror", None) or str(error)
+        reason = "it is no text in UTF-8" if isinstance(error, UnicodeDecodeError) else reason
         wrong(f"cannot be read ({path}: {reason})", "name a CSV file in UTF-8")
     reader = csv.reader(io.StringIO(text), skipinitialspace=True)
     try:
@@ -79,7 +80,7 @@ def read_listed(path: Path, source: str) -> Listed:
 
 def _value(text: str) -> Any:
     """What a cell holds: a number, true or false, or a text."""
-    for kind in (int, float):
+    for kind in (int, float) if text.isascii() and "_" not in text else ():
         with suppress(ValueError):
             return kind(text)
     return {"true": True, "false": False}.get(text, text)

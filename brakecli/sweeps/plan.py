@@ -163,7 +163,10 @@ def parse_sweep(text: str, name: str, folder: Path, overrides: Sequence[str] = (
         raise CaseError([*wrong]) from error
     base, listed = parse_case(case_text, source, others), None
     if sweep.points is not None:
-        listed = read_listed(folder / sweep.points, name)
+        listed = read_listed(folder / sweep.points, name, innermost(Located(text, name).lines, ("points",), 0))
+        if sweep.critical is not None and key_path(sweep.critical.parameter) in map(key_path, listed.keys):
+            remedy = "look for another parameter, or leave that column out"
+            raise CaseError([Problem(("critical", "parameter"), "is set by a column of points", remedy, name)])
     return _checked(sweep, text, name, base, listed)
 
 

@@ -90,6 +90,8 @@ def test_a_table_may_be_searched_for_critical_values(tmp_path: Path) -> None:
         ("shoe.mass\n", "plan.csv:1: lists no point"),
         ("", "plan.csv:1: lists no point"),
         ("shoe.mass\n\xff", "plan.csv:2: shoe.mass: "),
+        ("load.force\n5_000\n", "plan.csv:2: load.force: "),
+        ("load.force\n٠.5\n", "plan.csv:2: load.force: "),
     ],
 )
 def test_a_wrong_table_is_refused_with_its_line(tmp_path: Path, plan: str, said: str) -> None:
@@ -106,8 +108,14 @@ def test_a_table_that_cannot_be_read_is_named(tmp_path: Path) -> None:
             write_sweep(tmp_path, 'points = "no.csv"')
     (tmp_path / "no.csv").rmdir()
     (tmp_path / "no.csv").write_bytes(b"shoe.mass\n\xff\xfe\n")
-    with pytest.raises(CaseError, match="name a CSV file in UTF-8"):
+    with pytest.raises(CaseError, match=r"s\.toml:2: points: .*it is no text in UTF-8"):
         write_sweep(tmp_path, 'points = "no.csv"')
+
+
+def test_a_column_is_not_searched_for(tmp_path: Path) -> None:
+    search = '[critical]\nparameter = "friction.coefficient"\nlower = 0.0\nupper = 2.0\n'
+    with pytest.raises(CaseError, match=r"critical\.parameter: is set by a column of points"):
+        listed(tmp_path, PLAN, search)
 
 
 def test_points_and_axes_exclude_each_other(tmp_path: Path) -> None:
@@ -145,6 +153,7 @@ def test_points_from_python(tmp_path: Path) -> None:
         ({"shoe.mass": 3.0}, "a value of each key at each point"),
         ({"shoe.mass": [1.0], "friction.coefficient": [0.2, 0.3]}, "a value of each key at each point"),
         ({"a b": [1.0]}, "'a b' is no key path"),
+        ({"shoe.mass": [1.0], 'shoe."mass"': [2.0]}, "a key has two columns"),
         ({"shoe.mass": [2.0, -1.0]}, "point 1: shoe.mass: is out of range"),
     ],
 )
