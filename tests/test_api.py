@@ -33,7 +33,7 @@ def test_importing_takes_nothing_large() -> None:
     code = f"import sys, brakecli, brakecli.api; print({large} & {{*sys.modules}})"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "set()\n"
-    assert {"branch", "load", "run", "stability", "sweep", "classify"} == {*brakecli.__all__}
+    assert {"branch", "load", "run", "scatter", "stability", "sweep", "classify"} == {*brakecli.__all__}
     with pytest.raises(AttributeError, match="has no attribute 'ran'"):
         _ = brakecli.ran
 

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 def load_case(source: str, overrides: list[str] | None) -> "LoadedCase":
     """The case of a case file, or the one that a result file holds."""
     from brakecli.case.read import parse_case, parse_resolved
-    from brakecli.sweeps.plan import kind_of
 
     if not is_result(source):
         text = _text(source)
@@ -30,6 +29,8 @@ def load_case(source: str, overrides: list[str] | None) -> "LoadedCase":
             if is_sweep(source):
                 remedy = f"compute it with: brakecli sweep {as_argument(source)}"
                 raise UsageError(f"{text[1]}: this is a sweep; {remedy}") from error
+            from brakecli.sweeps.plan import kind_of
+
             if kind_of(text[0]) == "study":
                 remedy = f"compute it with: brakecli scatter {as_argument(source)}"
                 raise UsageError(f"{text[1]}: this is a study; {remedy}") from error

@@ -23,7 +23,7 @@ def command(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """How likely brakes squeal that are not built to their drawing."""
+    """How likely brakes squeal whose numbers scatter."""
     loaded = load_study(file, overrides)
     target = result_path(output, file, kind="study")
     from brakecli.cli.scatter_table import scatter_table

@@ -12,6 +12,7 @@ import pytest
 from brakecli.case.read import parse_case, starters
 from brakecli.cli import output
 from brakecli.cli.tables import grid, verdict_table
+from brakecli.scattering.study import parse_study
 from brakecli.sweeps.plan import parse_sweep
 from tests.commands import ROOT, attributes, brakecli, each, left_in
 
@@ -147,7 +148,9 @@ def test_new_lists_a_starter_for_each_kind_of_question_and_writes_it(tmp_path: P
     assert (named.told(0), named.out) == ("", "")
     assert left_in(tmp_path) == {"sweep.toml", "case.toml", "map.toml"}
     for name, text in starters().items():
-        if "case" in tomllib.loads(text):
+        if "parameter" in tomllib.loads(text):
+            assert parse_study(text, name, tmp_path).study.names
+        elif "case" in tomllib.loads(text):
             assert parse_sweep(text, name, tmp_path).plan.points > 1
         else:
             assert parse_case(text, name).case.title.startswith("Starter")

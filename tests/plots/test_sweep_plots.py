@@ -271,7 +271,7 @@ def line_at(axes: Any, label: str) -> float:
 
 def test_other_kinds_of_results_are_refused_and_select_is_for_sweeps(tmp_path: Path) -> None:
     refused: tuple[tuple[str, list[str], str], ...] = (
-        ("other", [], "a run, of a sweep, of a comparison, of stability or of branches"),
+        ("other", [], "a run, of a sweep, of a comparison, of stability, of branches or of scatter"),
         ("run", ["a=1"], "leave it out for a run"),
     )
     for kind, select, words in refused:

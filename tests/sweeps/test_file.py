@@ -145,7 +145,7 @@ AXIS = '[[axis]]\nparameter = "link2.angle_deg"\n'
         (GRID.replace('"link2.angle_deg"', '"title.x"'), "sweep.toml:3: title.x: title is not a table"),
         (CRITICAL.replace("friction.", "friktion."), "friktion: is unknown"),
         ('case = ""', 'sweep.toml:1: case: is empty (found ""); give'),
-        ("", "axis: is missing; give at least one [[axis]], or [critical]"),
+        ("", "axis: is missing; give at least one [[axis]], points, or [critical]"),
         (AXIS + "values = []", "axis[0].values: is too short"),
         (AXIS + "values = [1.0]\nstart = 1.0", "is given together with"),
         (AXIS + "start = 1.0\nstop = 2.0\nnum = 0", "axis[0].num: is out of range (found 0)"),

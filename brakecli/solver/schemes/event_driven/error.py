@@ -64,6 +64,8 @@ def _size(error: float) -> float:
 def _beyond(p: Shoe, grid: Grid) -> int:
     """1 where the error is more than the most; at first, when the motion is small, it says nothing."""
     m, t = p.motion, p.tangent
+    if t.knows == 0:
+        return 0
     rounding = _ROUNDING * max(m.largest[X], m.largest[Y])
     for i in range(4):
         size, error = max(m.largest[i], abs(m.end[i])), abs(t.error[0, i])
