@@ -2,10 +2,11 @@
 
 import os
 import shlex
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from brakecli.errors import CaseError, UnreadableResultError, UsageError
 from brakecli.files.atomic import refuse_source
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
     from brakecli.case.read import LoadedCase
     from brakecli.scattering.study import LoadedStudy
     from brakecli.sweeps.plan import LoadedSweep
+
+_Loaded = TypeVar("_Loaded")
 
 
 def load_case(source: str, overrides: list[str] | None) -> "LoadedCase":
@@ -50,31 +53,32 @@ def load_case(source: str, overrides: list[str] | None) -> "LoadedCase":
 
 def load_sweep(source: str, overrides: list[str] | None) -> "LoadedSweep":
     """The sweep of a sweep file."""
-    from brakecli.sweeps.plan import kind_of, parse_sweep
+    from brakecli.sweeps.plan import parse_sweep
 
-    text, name = _text(source)
-    try:
-        folder = Path(source).parent if os.path.isfile(source) else Path()  # noqa: PTH113 - pathlib's may raise
-        return parse_sweep(text, name, folder, overrides or ())
-    except CaseError as error:
-        if kind_of(text) == "case":
-            remedy = f"simulate it with: brakecli run {as_argument(source)}"
-            raise UsageError(f"{name}: this is a case; {remedy}") from error
-        raise
+    return _over_a_case(source, overrides, parse_sweep)
 
 
 def load_study(source: str, overrides: list[str] | None) -> "LoadedStudy":
     """The study of a study file."""
     from brakecli.scattering.study import parse_study
+
+    return _over_a_case(source, overrides, parse_study)
+
+
+def _over_a_case(
+    source: str, overrides: list[str] | None, parse: Callable[[str, str, Path, Sequence[str]], _Loaded]
+) -> _Loaded:
+    """What a file holds that names its case."""
     from brakecli.sweeps.plan import kind_of
 
     text, name = _text(source)
     try:
         folder = Path(source).parent if os.path.isfile(source) else Path()  # noqa: PTH113 - pathlib's may raise
-        return parse_study(text, name, folder, overrides or ())
+        return parse(text, name, folder, overrides or ())
     except CaseError as error:
         if kind_of(text) == "case":
-            raise UsageError(f"{name}: this is a case; use: brakecli run {as_argument(source)}") from error
+            remedy = f"simulate it with: brakecli run {as_argument(source)}"
+            raise UsageError(f"{name}: this is a case; {remedy}") from error
         raise
 
 

@@ -388,7 +388,7 @@ BRANCH = (
 
 SCATTER = (
     integer("samples", "brakes that were drawn"),
-    integer("failed", "samples without an answer, such as those without steady sliding"),
+    integer("failed", "samples without an answer, such as shoes that nothing presses onto the wheel"),
     Field("first_failure", "", "why the first of them has none", TEXT),
     Field(
         "probability",

@@ -390,7 +390,9 @@ def test_a_wrong_study_is_refused_with_its_line(tmp_path: Path, tables: tuple[st
 
 def test_other_files_are_told_from_studies(tmp_path: Path) -> None:
     path = write_study(tmp_path, FRICTION)
-    command("scatter", "shoe.toml", cwd=tmp_path).told(2, "this is a case; use: brakecli run shoe.toml")
+    command("scatter", "shoe.toml", cwd=tmp_path).told(
+        2, "this is a case; simulate it with: brakecli run shoe.toml"
+    )
     command("run", "study.toml", cwd=tmp_path).told(2, "study.toml: ")
     with pytest.raises(BrakecliError):
         brakecli.sweep(path, jobs=1)
