@@ -7,12 +7,13 @@ from brakecli.analysis.regime.context import context
 from brakecli.analysis.regime.measure import Continued
 from brakecli.analysis.regime.table import Thresholds
 from brakecli.analysis.regime.verdict import Verdict
+from brakecli.analysis.stability.linear import Theory
 from brakecli.solver.history import History
 from brakecli.solver.system import System
 from brakecli.solver.tangent import Exponent
 from brakecli.solver.track import UNTRACKED, Track
 
-_DEFAULT = Thresholds()
+DEFAULT = Thresholds()
 
 
 def verdict_on(
@@ -21,11 +22,15 @@ def verdict_on(
     failure: str | None,
     exponent: Exponent | None = None,
     track: Track | None = None,
-    thresholds: Thresholds = _DEFAULT,
+    thresholds: Thresholds = DEFAULT,
     *,
+    theory: Theory | None = None,
     in_full: bool = True,
 ) -> Verdict:
-    """The verdict on a motion; where a row may need it, it is continued on the smooth wheel."""
+    """The verdict on a motion; where a row may need it, it is continued on the smooth wheel.
+
+    `theory` is given where it is known already.
+    """
 
     def continued() -> Continued:
         from brakecli.runs.without_waves import without_waves  # kernels that a linear motion does not need
@@ -36,7 +41,7 @@ def verdict_on(
 
     return classify(
         history,
-        context(system),
+        context(system, theory),
         thresholds,
         exponent=exponent,
         track=track or UNTRACKED,

@@ -17,6 +17,7 @@ from brakecli.analysis.over_time import OverTime, over_time
 from brakecli.analysis.regime.table import Thresholds
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.spectrum import peak, spectrum
+from brakecli.analysis.stability.linear import Theory
 from brakecli.case.read import LoadedCase
 from brakecli.case.system import system_of
 from brakecli.files import fields
@@ -24,7 +25,7 @@ from brakecli.files.field import values_of
 from brakecli.files.trust import readings
 from brakecli.files.write import ResultFile, new_result
 from brakecli.runs.certificate import Certificate
-from brakecli.runs.judge import verdict_on
+from brakecli.runs.judge import DEFAULT, verdict_on
 from brakecli.runs.limits import Check, check, free_bytes, refuse, within_range
 from brakecli.runs.modelled import modelled
 from brakecli.runs.tolerance import certify
@@ -131,14 +132,18 @@ def motion_of(
 
 
 def verdict_in_memory(
-    motion: Motion, system: System, thresholds: Thresholds | None = None, *, in_full: bool = True
+    motion: Motion,
+    system: System,
+    thresholds: Thresholds = DEFAULT,
+    *,
+    theory: Theory | None = None,
+    in_full: bool = True,
 ) -> Verdict:
     """The verdict on a motion whose samples are in memory."""
     _refuse_overflow(motion.rows)
     history = array_history(system.interval, motion.rows)
-    return verdict_on(
-        history, system, motion.work.failure_sentence, motion.exponent, motion.track, in_full=in_full
-    )
+    failure, known = motion.work.failure_sentence, (motion.exponent, motion.track)
+    return verdict_on(history, system, failure, *known, thresholds, theory=theory, in_full=in_full)
 
 
 def _refuse_overflow(rows: NDArray[np.float64]) -> None:

@@ -22,7 +22,7 @@ from brakecli.analysis.regime.answers import Answers, Fate
 from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, WINDOWS
 from brakecli.analysis.regime.table import Thresholds, decide
 from brakecli.analysis.regime.verdict import Verdict
-from brakecli.analysis.stability.linear import Linear, linear_theory
+from brakecli.analysis.stability.linear import Linear, Theory, linear_theory
 from brakecli.analysis.stability.modes import is_undamped
 from brakecli.runs.certificate import ROUNDING, Certificate
 from brakecli.solver.automaton import STICK
@@ -58,28 +58,28 @@ class Early(NamedTuple):
     certificate: Certificate | None
 
 
-def early(system: System) -> Early | None:
+def early(system: System, theory: Theory | None = None) -> Early | None:
     """The verdict on the motion of a system before its end; None where none is certain."""
-    theory = _theory(system)
-    if theory is None:
+    known = _theory(system, theory)
+    if known is None:
         return None
     # Rough pads do not wait for these kernels.
     from brakecli.solver.flow.seek import FOUND, GOING_ON, LINEAR, Pursuit
 
     acting = system.contact_stiffness, system.belt_speed, system.load_at_start
-    modes = theory.values, theory.vectors
+    modes = known.values, known.vectors
     try:
-        begin, seconds = system.initial.beside(theory.rest), system.sampled_duration
-        motion = Pursuit(system.coefficients, acting, begin, theory.rest, modes, seconds)
+        begin, seconds = system.initial.beside(known.rest), system.sampled_duration
+        motion = Pursuit(system.coefficients, acting, begin, known.rest, modes, seconds)
     except np.linalg.LinAlgError:  # modes that are alike
         return None
     while (outcome := motion.seek()) == GOING_ON:
         pass
     path, o = motion.path, motion.way
     if outcome == LINEAR:
-        found = _linear(system, theory, motion)
+        found = _linear(system, known, motion)
     else:
-        found = _cycle(system, theory, motion) if outcome == FOUND else None
+        found = _cycle(system, known, motion) if outcome == FOUND else None
     if found is None:
         return None
     verdict, end = found
@@ -95,12 +95,12 @@ def may_be_early(system: System) -> bool:
     return system.smooth and system.method.row.exact and system.steady and system.samples >= FEWEST_SAMPLES
 
 
-def _theory(system: System) -> Linear | None:
+def _theory(system: System, theory: Theory | None) -> Linear | None:
     """The theory of steady sliding, where a verdict may be early and eigenvalues say which way it goes."""
     if not may_be_early(system) or system.coefficients.phi == 0.0:
         return None
-    theory = linear_theory(system, system.belt_speed)
-    return theory if theory is not None and theory.direction != 0 else None
+    found = theory() if theory else linear_theory(system, system.belt_speed)
+    return found if found is not None and found.direction != 0 else None
 
 
 def _linear(system: System, theory: Linear, motion: "Pursuit") -> tuple[Verdict, list[float]] | None:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from brakecli.analysis.regime.table import Excitation, Regime
 from brakecli.analysis.regime.verdict import Verdict
+from brakecli.analysis.stability.linear import Theory, theories_of
 from brakecli.branches.line import Line
 from brakecli.case.case import Case
 from brakecli.case.read import key_path
@@ -103,16 +104,18 @@ def checked(case: Case) -> Check:
     return found
 
 
-def judged(case: Case, found: Check, certified: Certified | None, *, whole: bool) -> PointRun:
+def judged(
+    case: Case, found: Check, certified: Certified | None, theory: Theory | None = None, *, whole: bool
+) -> PointRun:
     """The end of `simulate`, by a motion that is known already or by one that is computed."""
     motion: Motion | Ending
     system, warnings = found.system, [*found.warnings]
     with within_range():
-        if certified is None and not whole and (known := early(system)) is not None:
+        if certified is None and not whole and (known := early(system, theory)) is not None:
             verdict, motion, certificate = known
         else:
             motion, certificate = certified or motion_of(system)
-            verdict = verdict_in_memory(motion, system, in_full=whole)
+            verdict = verdict_in_memory(motion, system, theory=theory, in_full=whole)
             warnings += [note for about, note in verdict.notes.items() if about not in _UNTOLD]
     work = motion.work
     if work.unconverged_steps and not work.failed:
@@ -141,10 +144,11 @@ def compute(plan: Plan, first: int, count: int) -> NDArray[Any]:
     for start in range(first, first + count, TOGETHER):
         points = [begun(plan, plan.settings(each)) for each in range(start, min(start + TOGETHER, first + count))]
         ready = [each for each in points if isinstance(each, Begun)]
+        systems = [each.check.system for each in ready]
         with within_range():
-            found = certify_together([each.check.system for each in ready])
-        certified = dict(zip(map(id, ready), found, strict=True))
-        records += [computed(plan, each, certified.get(id(each)))[0] for each in points]
+            found = zip(certify_together(systems), theories_of(systems), strict=True)
+        known = dict(zip(map(id, ready), found, strict=True))
+        records += [computed(plan, each, *known.get(id(each), ()))[0] for each in points]
     return np.concatenate(records)
 
 
@@ -235,13 +239,13 @@ def begun(plan: Plan, settings: Settings) -> Begun | Exception:
 
 
 def computed(
-    plan: Plan, point: Begun | Exception, certified: Certified | None = None
+    plan: Plan, point: Begun | Exception, certified: Certified | None = None, theory: Theory | None = None
 ) -> tuple[NDArray[Any], PointRun | None]:
     """The record of a point and its run, which is None where it was not possible."""
     try:
         if isinstance(point, Exception):
             raise point
-        outcome = judged(point.case, point.check, certified, whole=False)
+        outcome = judged(point.case, point.check, certified, theory, whole=False)
         values = values_of(fields.POINT, outcome)
         if (critical := plan.sweep.critical) is not None:
             from brakecli.sweeps.critical import search  # only searches wait for the kernels of branches

@@ -76,7 +76,7 @@ def in_full_contact(system: System) -> Linear | None:
     if theory is None or theory.opens:
         return None
     fastest = 2.0 * math.pi * float(np.abs(theory.waves[:, 0] * theory.passing).sum())
-    return theory.with_slopes() if fastest < abs(system.belt_speed) else None
+    return theory if fastest < abs(system.belt_speed) else None
 
 
 def without_dashpots(critical: Critical, answers: Answers) -> Search:

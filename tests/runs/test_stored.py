@@ -54,6 +54,9 @@ def test_an_older_file_is_run_again_where_that_takes_a_minute_at_most(
     assert again["evidence"].keys() == now["evidence"].keys()
     for name in ("amplitude", "forced_frequency", "mean_friction_force", "braking_torque"):
         assert again[name] == pytest.approx(now[name], rel=1e-12)
+    strict = stored.classify_result(path, Thresholds(comes_together=1e9, settled_within=0.0, sure_errors=0.0))
+    assert strict["evidence"]["row"] != now["evidence"]["row"]
+    assert strict["thresholds"]["comes_together"] == 1e9
     monkeypatch.setattr(stored, "MOST_SECONDS", 0.0)
     late = stored.classify_result(path, Thresholds())
     assert (late["regime"], late["settled"]) == ("undecided", 0)

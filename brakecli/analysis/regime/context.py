@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import cache
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from brakecli.analysis.regime.evidence import Part
 from brakecli.analysis.regime.ripple import Ripple, detuned, ripple
 from brakecli.analysis.regime.spectra import forced_lines
 from brakecli.analysis.stability.discrete import spectral_radius, without_damping
-from brakecli.analysis.stability.linear import Linear, linear_theory
+from brakecli.analysis.stability.linear import Theory, theory_of
 from brakecli.analysis.stability.modes import growth, is_undamped, locks_from, slowest_of_cycles
 from brakecli.errors import CaseError
 from brakecli.solver.schedules import value_at
@@ -35,7 +35,7 @@ class Context:
     touches: Callable[[], bool] = lambda: True  # whether the shoe touches the wheel where it slides steadily
     settles: float = math.inf  # 1/s: the slowest disturbance of a limit cycle without stick decays no faster
     growth: Callable[[], float] = lambda: 0.0  # 1/s, of a small disturbance of steady sliding; below 0 it decays
-    linear: Callable[[], Linear | None] = lambda: None  # the theory of full contact
+    linear: Theory = lambda: None  # the theory of full contact
     steadier: Callable[[], str] = str  # what to do where the steps damp what grows in theory; empty if they do not
     ripple: Callable[[Part, Sequence[float]], Ripple | None] = lambda part, lines: None  # of the nodes
     detuned: Callable[[Part, Sequence[float]], float] = lambda part, lines: 0.0  # part of a forced amplitude
@@ -54,8 +54,8 @@ class Context:
         return 1.0 / slowest if passing else 0.0
 
 
-def context(system: System) -> Context:
-    """What a verdict has to know of a system."""
+def context(system: System, theory: Theory | None = None) -> Context:
+    """What a verdict has to know of a system, the theory of which may be known already."""
     belt, c = float(value_at(system.belt, system.sampled_duration)), system.coefficients
     compression = float(np.abs(system.load["value"]).max()) / (c.c_yy + system.contact_stiffness)
 
@@ -70,7 +70,7 @@ def context(system: System) -> Context:
         except CaseError:  # none: a shoe that locks itself drifts away, by what full contact makes of it
             return system.contact_stiffness
 
-    theory = cache(partial(linear_theory, system, belt))
+    theory = theory or theory_of(system)
     turns, highest = tuple(system.wheel.turns.tolist()), 0.5 / system.interval
     swings = np.abs(known.waves[:, 0]) if turns and (known := theory()) else np.ones(len(turns))
     waves = tuple((abs(belt) * turn, float(swing)) for turn, swing in zip(turns, swings, strict=True))

@@ -77,7 +77,7 @@ class Shown:
             return None
         start = max(min(self.last.start, self.history.samples - int(slow / self.history.interval)), 0)
         slides = replace(self.last, start=start).slides(theory.slip) or theory.stays(self.end[1])
-        return theory.with_slopes() if slides else None
+        return theory if slides else None
 
     @property
     def end(self) -> tuple[float, np.ndarray]:

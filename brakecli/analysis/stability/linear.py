@@ -2,13 +2,15 @@
 
 While the pad touches everywhere and the shoe slips to one side only, (6)-(7) are linear: m z̈ + B ż + S z = f.
 The waves of the wheel give f = (sign(U) φ, 1) 2ak Σ g sinc(ωa) sin(ω(x - Ut) + phase). The shoe's own small motion
-in that phase changes f by the slope of the surface times that motion: see `with_slopes`.
+in that phase changes f by the slope of the surface times that motion: see `_with_slopes`.
 """
 
 import math
+from collections import defaultdict
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from typing import Any
+from functools import cache, lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,14 +18,17 @@ from numpy.typing import NDArray
 from brakecli.analysis.stability.modes import (
     Complex,
     Mode,
+    damping_matrix,
     eigensystem,
+    first_mode,
     first_order,
     is_undamped,
-    modes,
     stiffness_matrix,
 )
 from brakecli.solver.compile import Floats as Array
 from brakecli.solver.quantities import ContactState
+from brakecli.solver.records import Coefficients
+from brakecli.solver.schedules import value_at
 from brakecli.solver.system import System
 
 _BEYOND = 64.0  # times as long as the run
@@ -52,8 +57,6 @@ class Linear:
     vectors: Complex  # of position and velocity
     passing: Array  # frequency with its sign at which each wave passes, Hz
     waves: Complex  # amplitude of x and y that each of them forces, with its phase at t = 0
-    matrix: Array  # of ż = A z for x, y, vx, vy
-    push: Array  # the same of a normal force of 1 N
     slopes: Complex  # N/m, by which each wave changes the normal force with x, with its phase at t = 0
     wavenumbers: Array  # rad/m
     heights: float  # m, by which a rough shoe may part from a wheel that touches it in the mean
@@ -75,39 +78,6 @@ class Linear:
     def opens(self) -> bool:
         """Whether waves that meet may open the pad: their heights, and how far they force y, bound that."""
         return self.depth < self.heights + float(np.abs(self.waves[:, 1]).sum())
-
-    def with_slopes(self) -> "Linear":
-        """The same with the growth that the passing waves leave to the mode by their slopes, to second order.
-
-        A small motion x(t) beside the forced one changes the normal force by S(t) x, S = Re Σ s e^{iΩt}. A mode λ
-        excites x at λ ± iΩ, by G(λ ± iΩ) s/2, which acts back on it. With the forced motion X in the phases of
-        the waves, S also has a mean, -1/2 Re Σ s conj(ωX). So λ moves by its residue in G times
-        1/4 Σ |s|² (G(λ + iΩ) + G(λ - iΩ)) + that mean. What is left is of fourth order; where a sum of a mode and
-        a wave comes near another mode, this says nothing.
-        """
-        if not len(self.waves):
-            return self
-        try:
-            residues = self.vectors[0] * np.linalg.solve(self.vectors, self.push)
-        except np.linalg.LinAlgError:  # two modes have met
-            return replace(self, direction=0, known_to=math.inf)
-        turns = 2j * math.pi * np.concatenate([self.passing, -self.passing])
-        slopes = np.abs(np.tile(self.slopes, 2))
-        bends = self.wavenumbers * self.waves[:, 0]
-        mean = -0.5 * float((self.slopes * bends.conj()).real.sum())
-        beside = self.values[:, None] + turns  # of each mode and wave
-        with np.errstate(divide="ignore", invalid="ignore"):
-            answers = (residues / (beside[:, :, None] - self.values)).sum(axis=2)
-            moved = residues * (mean + 0.25 * (answers * slopes**2).sum(axis=1))
-            strong = (0.5 * np.abs(answers) * slopes).sum(axis=1).max() + np.abs(bends).sum()
-        rates = (self.values + moved).real
-        fastest = int(np.argmax(rates))
-        if not (np.isfinite(rates).all() and strong**2 < _WEAK):
-            return replace(self, direction=0, known_to=math.inf)
-        off = float(np.abs(moved).max() * strong**2 + _ROUNDING_WITH_SLOPES * np.abs(self.values).max())
-        rate = float(rates[fastest])
-        direction = int(np.sign(rate)) if abs(rate) > off else 0
-        return replace(self, mode=replace(self.mode, growth=rate), direction=direction, known_to=off)
 
     def forced(self, time: Array) -> tuple[Array, Array]:
         """Positions and velocities (rows x, y) that the waves force."""
@@ -199,55 +169,163 @@ def _turns(frequencies: tuple[float, ...], time: bytes) -> Array:
     return np.concatenate([np.sin(angles), np.cos(angles)])
 
 
-def _solved(s: Any, f: Array) -> Any:
-    """S⁻¹ f by Cramer's rule, for one or more matrices of two rows; not finite where there is none."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        determinant = s[..., 0, 0] * s[..., 1, 1] - s[..., 0, 1] * s[..., 1, 0]
-        first, second = s[..., 1, 1] * f[0] - s[..., 0, 1] * f[1], s[..., 0, 0] * f[1] - s[..., 1, 0] * f[0]
-        return np.stack([first, second], axis=-1) / determinant[..., None]
+Theory = Callable[[], Linear | None]
+"""What gives the theory of a system, where it is asked for."""
+
+
+def theory_of(system: System) -> Theory:
+    """The theory at the speed at which a system ends."""
+    return cache(lambda: linear_theory(system, _last_speed(system)))
+
+
+def theories_of(systems: Sequence[System]) -> list[Theory]:
+    """The theories of all systems, in a third of the time; no number of one depends on the others."""
+
+    def known(theory: Linear | None) -> Theory:
+        return lambda: theory
+
+    return [known(each) for each in _by_waves(systems, [_last_speed(each) for each in systems])]
 
 
 def linear_theory(system: System, belt: float) -> Linear | None:
     """The theory at a constant speed U (m/s); None where no rest in contact exists, or friction holds the shoe."""
-    c, stiffness = system.coefficients, system.contact_stiffness
-    if belt == 0.0 and c.phi > 0.0:
-        return None
-    grip = math.copysign(c.phi, belt)
-    push, offset, forces = np.array([grip, 1.0]), 0.0, np.zeros(0)
-    if not system.smooth:
-        constants, tables = system.pad
-        first, offset = int(constants.full_at), -stiffness * float(constants.shoe_mean)
-        forces = tables[first : first + system.wheel.g.size]
-    s, load = stiffness_matrix(c, stiffness, grip), system.load_at_start
-    damping = np.array([[c.b_xx, c.b_xy], [c.b_xy, c.b_yy]])
-    wheel, passing = system.wheel, -belt * system.wheel.turns
-    rest = _solved(s, offset * push - load * np.array([c.sin_beta, c.cos_beta]))
-    at = (2.0 * math.pi * passing)[:, None, None]
-    responses = _solved(s - c.m * at * at * np.eye(2) + 1j * at * damping, push)
-    force = offset - stiffness * rest[1]
-    if not (np.isfinite(rest).all() and np.isfinite(responses).all() and force > 0.0):
-        return None
-    phases = forces * np.exp(1j * (wheel.omega * rest[0] + wheel.phase))
-    waves = responses * phases[:, None]
-    values, vectors = eigensystem(c, stiffness, grip)
-    mode, known_to = modes(c, stiffness, grip)[0], 0.0 if is_undamped(c) else _ROUNDING * np.abs(values).max()
-    direction = int(np.sign(mode.growth)) if abs(mode.growth) > known_to else 0
-    slip = ContactState.BACKWARD_SLIP if belt > 0.0 else ContactState.FORWARD_SLIP
-    return Linear(
-        belt,
-        slip if c.phi > 0.0 else None,
-        np.asarray(rest, np.float64),
-        float(force),
-        float(force / stiffness),
-        mode if direction else replace(mode, growth=0.0),
-        direction,
-        values,
-        np.concatenate([vectors, vectors * values]),
-        passing,
-        waves,
-        first_order(c, s / c.m),
-        np.concatenate([np.zeros(2), push / c.m]),
-        wheel.omega * phases,
-        wheel.omega,
-        2.0 * float(np.abs(system.shoe.g).sum()) + float(np.abs(wheel.g).sum()),
-    )
+    return _by_waves([system], [belt])[0]
+
+
+def _last_speed(system: System) -> float:
+    return float(value_at(system.belt, system.sampled_duration))
+
+
+def _by_waves(systems: Sequence[System], belts: Sequence[float]) -> list[Linear | None]:
+    """The theory of each system at its speed; those with as many waves are computed at once."""
+    found: list[Linear | None] = [None] * len(systems)
+    alike = defaultdict[int, list[int]](list)
+    for i, (system, belt) in enumerate(zip(systems, belts, strict=True)):
+        if belt != 0.0 or system.coefficients.phi == 0.0:
+            alike[len(system.wheel.g)].append(i)
+    for members in alike.values():
+        with np.errstate(all="ignore"):  # what is not finite has no theory
+            theories = _theories([systems[i] for i in members], np.array([belts[i] for i in members]))
+        for i, theory in zip(members, theories, strict=True):
+            found[i] = theory
+    return found
+
+
+def _solved(s: Any, f: Array) -> Any:
+    """S⁻¹ f by Cramer's rule, for matrices of two rows; not finite where there is none."""
+    determinant = s[..., 0, 0] * s[..., 1, 1] - s[..., 0, 1] * s[..., 1, 0]
+    first = s[..., 1, 1] * f[..., 0] - s[..., 0, 1] * f[..., 1]
+    second = s[..., 0, 0] * f[..., 1] - s[..., 1, 0] * f[..., 0]
+    return np.stack([first, second], axis=-1) / determinant[..., None]
+
+
+def _pushes(system: System) -> tuple[float, Array]:
+    """The mean height of the shoe's surface (m), and the normal force (N) of each wave in full contact."""
+    if system.smooth:
+        return 0.0, np.zeros(0)
+    constants, tables = system.pad
+    first = int(constants.full_at)
+    return float(constants.shoe_mean), tables[first : first + system.wheel.g.size]
+
+
+class _Modes(NamedTuple):
+    """Modes of systems: eigenvalues, vectors of position and velocity, growth of the first and its error (1/s)."""
+
+    values: Complex
+    vectors: Complex
+    growth: Array
+    known_to: Array
+
+
+def _theories(systems: Sequence[System], belt: Array) -> list[Linear | None]:
+    """The theories of systems with as many waves."""
+    c: Any = Coefficients(*np.array([each.coefficients for each in systems]).T)
+    stiffness, load = np.array([(each.contact_stiffness, each.load_at_start) for each in systems]).T
+    heights, forces = (np.array(each) for each in zip(*map(_pushes, systems), strict=True))
+    wheels = np.array([(each.wheel.omega, each.wheel.phase, each.wheel.turns) for each in systems])
+    (omega, phase, turns), grip = wheels.swapaxes(0, 1), np.copysign(c.phi, belt)
+    offset, passing = -stiffness * heights, -belt[:, None] * turns
+    push, s = np.stack([grip, np.ones_like(grip)], axis=-1), stiffness_matrix(c, stiffness, grip)
+    pressed = load[:, None] * np.stack([c.sin_beta, c.cos_beta], axis=-1)
+    rest = _solved(s, offset[:, None] * push - pressed)
+    speed = (2.0 * math.pi * passing)[:, :, None, None]
+    inertia, damping = c.m[:, None, None, None] * speed * speed * np.eye(2), damping_matrix(c)[:, None]
+    responses = _solved(s[:, None] - inertia + 1j * speed * damping, push[:, None])
+    force, moves = offset - stiffness * rest[:, 1], first_order(c, s / c.m[:, None, None])
+    known = np.isfinite(rest).all(axis=1) & np.isfinite(responses).all(axis=(1, 2)) & (force > 0.0)
+    known &= np.isfinite(moves).all(axis=(1, 2))
+    phases = forces * np.exp(1j * (omega * rest[:, :1] + phase))
+    waves, slopes = responses * phases[..., None], omega * phases
+    own = _modes(systems, np.where(known[:, None, None], moves, 0.0), grip)
+    if turns.size:
+        own = _with_slopes(own, push / c.m[:, None], passing, slopes, omega * waves[..., 0])
+    return [
+        Linear(
+            float(belt[i]),
+            (ContactState.BACKWARD_SLIP if belt[i] > 0.0 else ContactState.FORWARD_SLIP) if c.phi[i] else None,
+            rest[i],
+            float(force[i]),
+            float(force[i] / stiffness[i]),
+            replace(first_mode(own.values[i], own.vectors[i]), growth=float(own.growth[i])),
+            int(np.sign(own.growth[i])) if abs(own.growth[i]) > own.known_to[i] else 0,
+            own.values[i],
+            own.vectors[i],
+            passing[i],
+            waves[i],
+            slopes[i],
+            omega[i],
+            2.0 * float(np.abs(system.shoe.g).sum()) + float(np.abs(system.wheel.g).sum()),
+            float(own.known_to[i]),
+        )
+        if known[i]
+        else None
+        for i, system in enumerate(systems)
+    ]
+
+
+def _modes(systems: Sequence[System], moves: Array, grip: Array) -> _Modes:
+    """The modes of ż = A z."""
+    found, shapes = np.linalg.eig(moves)
+    values, vectors = found.astype(complex), shapes.astype(complex)
+    undamped = np.array([is_undamped(each.coefficients) for each in systems])
+    for i in np.flatnonzero(undamped).tolist():  # by square roots, without spurious growth
+        each = systems[i]
+        values[i], vectors[i, :2] = eigensystem(each.coefficients, each.contact_stiffness, float(grip[i]))
+    vectors[:, 2:] = vectors[:, :2] * values[:, None]
+    growth, known_to = values.real.max(axis=1), np.where(undamped, 0.0, _ROUNDING * np.abs(values).max(axis=1))
+    return _Modes(values, vectors, np.where(np.abs(growth) > known_to, growth, 0.0), known_to)
+
+
+def _with_slopes(own: _Modes, push: Array, passing: Array, slopes: Complex, bends: Complex) -> _Modes:
+    """The same with the growth that the passing waves leave to the mode by their slopes, to second order.
+
+    A small motion x(t) beside the forced one changes the normal force by S(t) x, S = Re Σ s e^{iΩt}. A mode λ
+    excites x at λ ± iΩ, by G(λ ± iΩ) s/2, which acts back on it. With the forced motion X in the phases of
+    the waves, S also has a mean, -1/2 Re Σ s conj(ωX). So λ moves by its residue in G times
+    1/4 Σ |s|² (G(λ + iΩ) + G(λ - iΩ)) + that mean. What is left is of fourth order; where a sum of a mode and
+    a wave comes near another mode, or two modes have met, this says nothing.
+    """
+    values, vectors = own.values, own.vectors
+    turns = 2j * math.pi * np.concatenate([passing, -passing], axis=1)
+    sizes = np.abs(np.tile(slopes, 2))[:, None]
+    mean = -0.5 * (slopes * bends.conj()).real.sum(axis=1)
+    beside = values[:, :, None] + turns[:, None]  # of each mode and wave
+    residues = vectors[:, 0] * _answers(vectors, np.concatenate([np.zeros_like(push), push], axis=1))
+    answers = (residues[:, None, None] / (beside[..., None] - values[:, None, None])).sum(axis=3)
+    moved = residues * (mean[:, None] + 0.25 * (answers * sizes**2).sum(axis=2))
+    strong = (0.5 * np.abs(answers) * sizes).sum(axis=2).max(axis=1) + np.abs(bends).sum(axis=1)
+    rates = (values + moved).real
+    known = np.isfinite(rates).all(axis=1) & (strong**2 < _WEAK)
+    off = np.abs(moved).max(axis=1) * strong**2 + _ROUNDING_WITH_SLOPES * np.abs(values).max(axis=1)
+    growth, known_to = np.where(known, rates.max(axis=1), own.growth), np.where(known, off, math.inf)
+    return own._replace(growth=growth, known_to=known_to)
+
+
+def _answers(vectors: Complex, push: Array) -> Complex:
+    """What of each mode a push moves; not a number where two modes have met."""
+    try:
+        return np.asarray(np.linalg.solve(vectors, push[..., None])[..., 0])
+    except np.linalg.LinAlgError:
+        if len(vectors) == 1:
+            return np.full_like(vectors[:, 0], math.nan)
+        return np.concatenate([_answers(*each) for each in zip(vectors[:, None], push[:, None], strict=True)])

@@ -41,16 +41,28 @@ class Crossing:
     lost: bool  # or regained
 
 
-def stiffness_matrix(c: Coefficients, contact_stiffness: float, grip: float) -> NDArray[np.float64]:
-    """S, N/m, with the contact stiffness K (N/m) and grip = sign(U) φ."""
-    return np.array([[c.c_xx, c.c_xy + grip * contact_stiffness], [c.c_xy, c.c_yy + contact_stiffness]])
+def stiffness_matrix(c: Coefficients, contact_stiffness: Any, grip: Any) -> NDArray[np.float64]:
+    """S, N/m, with the contact stiffness K (N/m) and grip = sign(U) φ, for one system or a matrix for each."""
+    return _matrix(c.c_xx, c.c_xy + grip * contact_stiffness, c.c_xy, c.c_yy + contact_stiffness)
+
+
+def damping_matrix(c: Coefficients) -> NDArray[np.float64]:
+    """B, N s/m."""
+    return _matrix(c.b_xx, c.b_xy, c.b_xy, c.b_yy)
+
+
+def _matrix(*entries: Any) -> NDArray[np.float64]:
+    """A matrix of two rows of its four entries, or one for each of their values."""
+    found = np.empty((*np.shape(entries[1]), 2, 2))
+    found[..., 0, 0], found[..., 0, 1], found[..., 1, 0], found[..., 1, 1] = entries
+    return found
 
 
 def first_order(c: Coefficients, s: NDArray[np.float64]) -> NDArray[np.float64]:
     """A of ż = A z for x, y, vx, vy, from S/m."""
-    a = np.zeros((4, 4))
-    a[0, 2] = a[1, 3] = 1.0
-    a[2:, :2], a[2:, 2:] = -s, -np.array([[c.b_xx, c.b_xy], [c.b_xy, c.b_yy]]) / c.m
+    a = np.zeros((*s.shape[:-2], 4, 4))
+    a[..., 0, 2] = a[..., 1, 3] = 1.0
+    a[..., 2:, :2], a[..., 2:, 2:] = -s, -damping_matrix(c) / np.asarray(c.m)[..., None, None]
     return a
 
 
@@ -110,17 +122,23 @@ def _null_vector(s: NDArray[np.float64], square: complex) -> Complex:
 def modes(c: Coefficients, contact_stiffness: float, grip: float) -> list[Mode]:
     """The modes, the one that grows fastest (decays slowest) first; a pair of eigenvalues is one mode."""
     values, vectors = eigensystem(c, contact_stiffness, grip)
-    found = []
-    for value, vector in zip(values, vectors.T, strict=True):
-        if value.imag < 0.0:
-            continue
-        value += 0.0  # without -0
-        moves = abs(vector[0]) > 1e-12 * abs(vector[1])
-        ratio = vector[1] / vector[0] if moves else 0.0
-        shape = (float(abs(ratio)), float(np.degrees(np.angle(ratio)))) if moves else (None, None)
-        damping_ratio = float(-value.real / abs(value)) + 0.0 if value != 0.0 else 0.0
-        found.append(Mode(float(value.real), float(value.imag / (2.0 * math.pi)), damping_ratio, *shape))
+    found = [_mode(value, vector) for value, vector in zip(values, vectors.T, strict=True) if value.imag >= 0.0]
     return sorted(found, key=lambda mode: -mode.growth)
+
+
+def first_mode(values: Complex, vectors: Complex) -> Mode:
+    """The first of the modes with these eigenvalues and vectors."""
+    first = max((i for i in range(len(values)) if values[i].imag >= 0.0), key=lambda i: values[i].real)
+    return _mode(values[first], vectors[:, first])
+
+
+def _mode(value: Any, vector: Complex) -> Mode:
+    value += 0.0  # without -0
+    moves = abs(vector[0]) > 1e-12 * abs(vector[1])
+    ratio = vector[1] / vector[0] if moves else 0.0
+    shape = (float(abs(ratio)), float(np.degrees(np.angle(ratio)))) if moves else (None, None)
+    damping_ratio = float(-value.real / abs(value)) + 0.0 if value != 0.0 else 0.0
+    return Mode(float(value.real), float(value.imag / (2.0 * math.pi)), damping_ratio, *shape)
 
 
 def routh_hurwitz(m: Any, b: Tensor, c: Tensor, k: Any, grip: Any, *, damped: bool) -> list[Any]:
