@@ -59,7 +59,8 @@ def read_listed(path: Path, source: str, at: int) -> Listed:
     try:
         rows = [(reader.line_num, [cell.strip() for cell in row]) for row in reader if any(map(str.strip, row))]
     except csv.Error as error:
-        wrong(f"is no CSV ({error})", "write a line for each point, its values with commas between them", 1)
+        line = reader.line_num
+        wrong(f"is no CSV ({error})", "write a line for each point, its values with commas between them", line)
     if len(rows) < 2:
         wrong("lists no point", "write key paths in the first line, and a line for each point", 1)
     (head, keys), *rows = rows

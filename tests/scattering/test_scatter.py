@@ -2,6 +2,8 @@
 
 import json
 import math
+import tomllib
+from importlib import import_module, resources
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +14,7 @@ from scipy import stats
 import brakecli
 from brakecli.analysis.stability.report import stability
 from brakecli.case.system import system_of
+from brakecli.case.tables import json_schema
 from brakecli.cli.inputs import load_case, load_study
 from brakecli.errors import BrakecliError, CaseError
 from brakecli.files.read import open_result
@@ -409,3 +412,10 @@ def test_a_single_parameter_decides_alone(tmp_path: Path) -> None:
 def test_quantiles_are_of_what_is_known() -> None:
     assert quantiles(np.array([np.nan, 1.0, 3.0, np.nan])) == pytest.approx([1.1, 1.5, 2.0, 2.5, 2.9])
     assert quantiles(np.array([np.nan])) == []
+
+
+def test_the_schema_of_studies_accepts_the_starter_and_no_unknown_key() -> None:
+    validator = import_module("jsonschema").Draft202012Validator(json_schema(Study))
+    text = resources.files("brakecli.case.starters").joinpath("scatter.toml").read_text(encoding="utf-8")
+    validator.validate(tomllib.loads(text))
+    assert not validator.is_valid(tomllib.loads(text.replace("samples", "sample")))

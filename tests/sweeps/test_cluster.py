@@ -15,7 +15,7 @@ import pytest
 
 from brakecli.sweeps.workers.task import compute_units
 from tests.campaign import campaign
-from tests.commands import QUICK, ROOT, brakecli, ended, left_in, run, started, wait_until
+from tests.commands import QUICK, ROOT, TINY, brakecli, ended, left_in, run, started, wait_until
 from tests.sweeps.helpers import (
     ANGLES,
     SLOWER,
@@ -110,6 +110,17 @@ def test_a_cluster_gives_the_bytes_of_a_sweep_at_home(cluster: Cluster, good: Pa
     assert done.json["points"] == 60
     assert (here / "s.h5").read_bytes() == (good / "s.h5").read_bytes()
     assert left_in(here) == {"tiny.toml", "s.toml", "s.h5"}
+
+
+@pytest.mark.parametrize("method", ["eigenvalue", "run"])
+def test_so_does_a_study_of_scatter(cluster: Cluster, tmp_path: Path, method: str) -> None:
+    (tmp_path / "case.toml").write_text(TINY)
+    scatters = '[[parameter]]\nkey = "friction.coefficient"\ndistribution = "uniform"\nlow = 0.1\nhigh = 0.9\n'
+    study = f'case = "case.toml"\nsamples = 16\nmethod = "{method}"\nindices_of = "none"\n{scatters}'
+    (tmp_path / "s.toml").write_text(study)
+    for target, options in (("a.h5", ["--jobs", "1"]), ("b.h5", ["--scheduler", cluster.address])):
+        brakecli("scatter", "s.toml", *options, "-o", target, cwd=tmp_path).told(0)
+    assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
 
 
 def test_a_scheduler_is_found_by_its_file_and_by_the_environment(cluster: Cluster, tmp_path: Path) -> None:

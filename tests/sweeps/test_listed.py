@@ -92,6 +92,7 @@ def test_a_table_may_be_searched_for_critical_values(tmp_path: Path) -> None:
         ("shoe.mass\n\xff", "plan.csv:2: shoe.mass: "),
         ("load.force\n5_000\n", "plan.csv:2: load.force: "),
         ("load.force\n٠.5\n", "plan.csv:2: load.force: "),
+        ("shoe.mass\n1.0\n" + "9" * 200_000 + "\n", "plan.csv:3: is no CSV"),
     ],
 )
 def test_a_wrong_table_is_refused_with_its_line(tmp_path: Path, plan: str, said: str) -> None:
