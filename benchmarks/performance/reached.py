@@ -6,6 +6,7 @@ a loss must be written into the file by hand. So small losses cannot add up unse
 """
 
 import tomllib
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -27,13 +28,24 @@ def side_by_side(case: str, entries: list[Entry]) -> dict[str, float]:
 
 def fallen(old: Ratios, new: Ratios, *, whole: bool = True) -> list[str]:
     """Each ratio that fell too far; in a `whole` run also those that are not there any more."""
-    lost = [f"{name}: {number(old[name])} was reached, not measured now" for name in old if name not in new]
+    measured, programs = {*map(_program, new)}, Counter(map(_program, old))
+    absent = {who: count for who, count in programs.items() if who not in measured}
+    lost = [f"{who}: none of {count} ratios was measured; install it" for who, count in absent.items()]
+    lost += [
+        f"{name}: {number(old[name])} was reached, not measured now"
+        for name in old
+        if name not in new and _program(name) not in absent
+    ]
     fell = [
         f"{name}: {number(old[name])} was reached, {number(new[name])} now ({_change(old[name], new[name])})"
         for name in old
         if name in new and not new[name] >= (1.0 - LOSS) * old[name]  # nor is NaN
     ]
     return fell + (lost if whole else [])
+
+
+def _program(name: str) -> str:
+    return name.partition(":")[0]
 
 
 def raised(old: Ratios, new: Ratios) -> dict[str, float]:

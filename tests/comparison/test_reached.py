@@ -20,12 +20,13 @@ def test_a_ratio_that_falls_by_more_than_the_limit_is_named_with_both_numbers() 
 
 
 def test_a_ratio_that_is_not_measured_any_more_fails_a_whole_run() -> None:
-    some = {"SciPy: B": 21.0}
+    some = {"SciPy: B": 21.0, "LSODA: S at 1e-02": 5.0}
     assert reached.fallen(OLD, some, whole=False) == []
-    assert reached.fallen(OLD, some) == [
-        "LSODA: S at 1e-02: 5 was reached, not measured now",
-        "LSODA: S at 1e-03: 8 was reached, not measured now",
-    ]
+    assert reached.fallen(OLD, some) == ["LSODA: S at 1e-03: 8 was reached, not measured now"]
+
+
+def test_a_program_that_was_not_there_is_named_once() -> None:
+    assert reached.fallen(OLD, {"SciPy: B": 21.0}) == ["LSODA: none of 2 ratios was measured; install it"]
 
 
 def test_many_small_losses_do_not_add_up() -> None:
