@@ -74,7 +74,8 @@ class Track:
     def events(self, begin: float = 0.0) -> Events:
         """The events from a time (s) on, as far as they are kept."""
         first = int(np.searchsorted(self.kept.time, begin))
-        return Events(*(each[first:] for each in self.kept))
+        time, kind, x, others = self.kept
+        return Events(time[first:], kind[first:], x[first:], others[first:])
 
     def powers(self, begin: float, end: float) -> Powers:
         """Mean powers between the marks nearest to two times (s), one part at least; NaN without any part."""
