@@ -13,7 +13,7 @@ from datetime import date, time
 from itertools import pairwise
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from brakecli.errors import BrakecliError, UsageError, in_python
 from brakecli.files.os_signals import Interrupted, unwinding
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from brakecli.sweeps.plan import LoadedSweep
     from brakecli.sweeps.tables import Axis
 
-    Source = str | PathLike[str] | LoadedCase
+    Source: TypeAlias = str | PathLike[str] | LoadedCase
     Settings = Mapping[str, Any]
 
 

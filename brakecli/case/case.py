@@ -6,10 +6,10 @@ The tables and keys are those of the case file, version 1. `brakecli.case.read` 
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import tomli_w
-from pydantic import Field
+from pydantic import Field, create_model
 
 from brakecli.case import tables
 from brakecli.case.roughness import NEEDLESS, Roughness, record_of
@@ -92,8 +92,22 @@ class Contact(Table):
     )
 
 
-class Initial(Table):
-    """The state at t = 0."""
+if TYPE_CHECKING:
+
+    class _Begun(Table):
+        """What begins where a run ends."""
+
+else:  # `from` is a word of Python's, which no class can name otherwise
+    _RESULT = described("result of a run, at whose end this one begins; seen from the file of the case", None)
+    _FROM = {"from": (Annotated[str, Field(min_length=1)] | None, _RESULT)}
+    _Begun = create_model("Begun", __base__=Table, **_FROM)
+
+
+class Initial(_Begun):
+    """The state at t = 0.
+
+    That at the end of a run, `from`, is read as the case is, and stands in the other keys from then on.
+    """
 
     at: Literal["rest", "equilibrium"] = described(
         "the state that x, y, vx and vy are added to: the origin, or the steady sliding of the case", "rest"
@@ -102,6 +116,12 @@ class Initial(Table):
     y: Number = quantity("m", "normal displacement", 0.0)
     vx: Number = quantity("m/s", "tangential velocity", 0.0)
     vy: Number = quantity("m/s", "normal velocity", 0.0)
+    wheel_angle: Number = quantity("rad", "angle by which the rough wheel has turned before", 0.0)
+
+    def _broken_rules(self) -> Iterator[Problem]:
+        if getattr(self, "from") is not None:
+            for key in sorted(self.model_fields_set - {"from"}):
+                yield self.wrong(key, "is given together with from", "keep one of the two")
 
 
 class Solver(Table):
@@ -176,6 +196,7 @@ class Output(Table):
     sample_interval: Positive = quantity(
         "s", "time between two samples, the time step if left out", default_factory=float
     )
+    events: bool = described("whether the result holds the events of the motion", False)
 
 
 class Case(Table):
@@ -186,6 +207,7 @@ class Case(Table):
     """
 
     needless: ClassVar = {
+        ("initial", "from"): tuple(("initial", key) for key in Initial.model_fields if key != "from"),
         ("solver", "tolerance"): (("solver", "theta"), ("solver", "iteration"), ("contact", "evaluator")),
         **{
             ("roughness", side, key): tuple(("roughness", side, other) for other in needless)
@@ -209,7 +231,8 @@ class Case(Table):
 
     def _fill(self) -> None:
         if "sample_interval" not in self.output.model_fields_set and self.solver.step is not None:
-            self.__dict__["output"] = Output(sample_interval=self.solver.step)
+            given = self.output.model_dump(exclude_unset=True)
+            self.__dict__["output"] = Output(**given, sample_interval=self.solver.step)
 
     def _put_sines(self) -> Iterator[Problem]:
         """Put sines beside measured profiles; yield a problem for each that cannot be used.
@@ -236,8 +259,21 @@ class Case(Table):
                 what, _, remedy = str(failure).rpartition("; ")
                 yield self.wrong(f"roughness.{side}.profile", what, remedy)
 
+    def _put_start(self) -> Iterator[Problem]:
+        """Put the state at the end of a run in the place of its file; yield a problem if it cannot be used."""
+        if (path := getattr(self.initial, "from")) is None:
+            return
+        from brakecli.case.restart import end_of
+
+        try:
+            self.__dict__["initial"] = Initial(at="rest", **end_of(Path(path)))
+        except BrakecliError as failure:
+            what, _, remedy = str(failure).removeprefix(f"{path}: ").rpartition("; ")
+            yield self.wrong("initial.from", what, remedy)
+
     def _broken_rules(self) -> Iterator[Problem]:
         yield from self._put_sines()
+        yield from self._put_start()
         step = self.solver.step
         if step is None and "sample_interval" not in self.output.model_fields_set:
             what = f"{tables.MISSING}, and there is no solver.step to use instead"
@@ -255,6 +291,9 @@ class Case(Table):
         if self.solver.row.exact and rough:
             what = f"is for smooth surfaces, but roughness.{rough[0]} is given"
             yield self.wrong("solver.scheme", what, 'set scheme to "event-driven", or leave the roughness out')
+        if self.output.events and not self.solver.row.own_steps:
+            what = f"is for schemes that locate events, and {self.solver.scheme} does not"
+            yield self.wrong("output.events", what, 'set scheme to "event-driven", or leave events out')
         if self.solver.start == "paper" and (self.initial.vx or self.initial.vy):
             what = "sets the second layer equal to the first, but the initial velocity is not zero"
             remedy = 'set start to "consistent", or initial.vx and initial.vy to 0'

@@ -129,6 +129,9 @@ def parse_table(kind: type[_Table], text: str, label: str, overrides: Sequence[s
     for surface in roughness.values() if isinstance(roughness, dict) else ():
         if isinstance(surface, dict) and isinstance(profile := surface.get("profile"), str) and profile:
             surface["profile"] = str(Path(label).parent / profile)  # those of overrides are seen from here
+    initial = data.get("initial")
+    if isinstance(initial, dict) and isinstance(result := initial.get("from"), str) and result:
+        initial["from"] = str(Path(label).parent / result)
     for override in overrides:
         sources.append(by := f"--set {printable(override)}")
         try:

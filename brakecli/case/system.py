@@ -6,7 +6,7 @@ from brakecli.case.case import Case
 from brakecli.case.roughness import Profile
 from brakecli.solver.links import coefficients
 from brakecli.solver.method import Method
-from brakecli.solver.roughness import Surface, surface
+from brakecli.solver.roughness import Surface, surface, turned
 from brakecli.solver.schedules import schedule
 from brakecli.solver.system import Initial, System
 
@@ -29,6 +29,8 @@ def system_of(case: Case) -> System:
         _surface_of(each, wheel.radius) if each is not None else _SMOOTH
         for each in (case.roughness.shoe, case.roughness.wheel)
     )
+    if initial.wheel_angle and wheel_surface.g.size:
+        wheel_surface = turned(wheel_surface, initial.wheel_angle * wheel.radius)
     rough = shoe.g.size or wheel_surface.g.size  # where a tolerance may change the scheme
     return System(
         coefficients=coefficients(

@@ -15,6 +15,10 @@ SELECT = "Draw the nearest value of a sweep's axis; repeatable."
 VARIABLE = (
     "Draw this number of a sweep; of a run x, y, vx, vy, friction_force, normal_force, torque or contact_fraction."
 )
+SECTION = (
+    'Draw the Poincaré section of a run: its states once in each period of a passing "wave", '
+    "or at its events stick, slip, turn, lift-off or touch."
+)
 
 
 @with_measured
@@ -23,6 +27,7 @@ def command(
     output: Annotated[Path | None, output_option("Picture", "FILE.png, here")] = None,
     select: Annotated[list[str] | None, option(SELECT, "KEY=VALUE")] = None,
     variable: Annotated[str | None, option(VARIABLE, "NAME")] = None,
+    section: Annotated[str | None, option(SECTION, "NAME")] = None,
     measured: Measured = UNMEASURED,
     force_read: ForceRead = False,
     force: Force = False,
@@ -34,8 +39,9 @@ def command(
         remedy = f"run it first, with: brakecli {'sweep' if is_sweep(result) else 'run'} {as_argument(result)}"
         raise UsageError(f"{result}: is no result yet; {remedy}")
     if measured.quantity_of(result) is not None:
-        if select or variable:
-            raise UsageError("--select and --variable: are for results; leave them out for a measured signal")
+        if select or variable or section:
+            what = "--select, --variable and --section: are for results"
+            raise UsageError(f"{what}; leave them out for a measured signal")
         from brakecli.plots.result import plot_signal
 
         look = measured.look_at(result)
@@ -46,6 +52,7 @@ def command(
         from brakecli.plots.result import plot_result
 
         with unwinding():
-            plot_result(Path(result), target, force=force, select=select or (), variable=variable or "")
+            asked = select or (), variable or "", section or ""
+            plot_result(Path(result), target, *asked, force=force)
     if not quiet:
         show(f"{target}: written")

@@ -28,6 +28,7 @@ _HEARD = 20.0  # Hz
 _FORMULAS = ("=", "+", "-", "@")  # what begins one in a spreadsheet
 _UNEVEN = 1e-3  # of the time between two samples, by which it may vary
 _TABLES = (
+    fields.EVENTS,
     fields.HISTORY,
     fields.POINT,
     fields.CRITICAL,
@@ -43,6 +44,7 @@ _AXES = {
     "over_time": ("time",),
     "spectrogram": ("time", "frequency"),
     "vibrations": ("interval",),
+    "events": ("event",),
 }
 
 
@@ -67,7 +69,8 @@ def export(
     if not numbered and group not in (None, *_AXES):
         raise UsageError(f"--group {group}: there is none; give one of {', '.join(_AXES)}")
     if group and group not in result.file:
-        raise UsageError(f"--group {group}: this run has none; it has one where speed or load change")
+        where = "with output.events = true" if group == "events" else "where speed or load change"
+        raise UsageError(f"--group {group}: this run has none; it has one {where}")
     if suffix == ".wav" and (group not in (None, "history") or len(names) > 1):
         remedy = "give one --variable and no other group"
         raise UsageError(f"{target}: a sound is one variable of the history; {remedy}")

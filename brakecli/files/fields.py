@@ -149,7 +149,7 @@ RUN = (
     Field("energy", "", "the account of energies", OBJECT, "motion.", group="energy", rows=ENERGY),
     Field("modelled", "", "parts of the model that the run has used", OBJECT),
     Field("left_out", "", "parts of the model that the run has left out, and why this is safe", OBJECT),
-    Field("adjustments", "", "how step, duration and measured profiles were made to fit", OBJECT, at="check."),
+    Field("adjustments", "", "how step, duration, start and profiles were made to fit", OBJECT, at="check."),
     Field("warnings", "", "what a careful user should know", OBJECT),
     Field("solve_seconds", "s", "time of the loop", at="motion.work.solve_seconds", in_file=False),
 )
@@ -173,6 +173,13 @@ UNCONVERGED = (
     Field("time", "s", "time of an unconverged step"),
     Field("residual", "N", "residual of an unconverged step"),
 )
+EVENTS = (
+    integer("event", "number of an event, from 0"),
+    Field("time", "s", "time of an event"),
+    Field("kind", "", "what happens: stick, slip, turn, lift-off or touch", "S8"),
+    *(Field(name, QUANTITIES[name].units, f"{name} there") for name in ("x", "y", "vx", "vy")),
+)
+EARLIER = (integer("earlier", "number of earlier events, which are not kept"),)
 
 INTERVAL = integer("interval", "interval of vibration, from 0")
 WINDOW_TIME = Field("time", "s", "middle of a window of time")

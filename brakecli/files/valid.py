@@ -30,6 +30,7 @@ _WHOLE = ("format_version", "complete")
 _ATTRIBUTES = {
     ("run", "/"): fields.RUN,
     ("run", "/spectrum"): fields.WELCH,
+    ("run", "/events"): fields.EARLIER,
     ("sweep", "/"): fields.SWEEP,
     ("comparison", "/"): fields.COMPARISON,
     ("stability", "/"): fields.LOCK_IN,
@@ -41,6 +42,7 @@ _VARIABLES = {  # the first of a kind, of a sweep its status, has the length of 
     ("run", "history"): fields.HISTORY,
     ("run", "spectrum"): (fields.FREQUENCY, *fields.SPECTRUM.values()),
     ("run", "unconverged"): fields.UNCONVERGED,
+    ("run", "events"): fields.EVENTS,
     ("run", "over_time"): (fields.WINDOW_TIME, *fields.OVER_TIME),
     ("run", "spectrogram"): (fields.WINDOW_TIME, fields.FREQUENCY, fields.SHORT_TIME),
     ("run", "vibrations"): (fields.INTERVAL, *fields.VIBRATION),
@@ -92,7 +94,7 @@ def check_variables(file: h5py.File, kind: str, length: int) -> None:
                 shape = shape[1:] if field is not fields.DIRECTION else shape[:1]
             if own[: len(own) - (len(np.dtype(field.kind).shape) if field.kind[0] == "(" else 0)] != shape:
                 raise ValueError(f"{where} has the shape {own}, and {axis} has {shape}")
-            if kind == "run" and name in _RISING and field not in fields.OVER_TIME:
+            if kind == "run" and name in _RISING and field not in (*fields.OVER_TIME, *fields.EVENTS):
                 _check_rising(node, where)
 
 

@@ -16,16 +16,17 @@ if TYPE_CHECKING:
 
 
 def plot_result(
-    result: Path, target: Path, *, force: bool, select: Sequence[str] = (), variable: str = ""
+    result: Path, target: Path, select: Sequence[str] = (), variable: str = "", section: str = "", *, force: bool
 ) -> None:
     """Draw a result of any kind into a PNG, PDF or SVG file; the suffix of `target` says which.
 
     `select` holds `KEY=VALUE` for axes of a sweep of which one value is to be drawn; `variable` names a number of
-    a sweep or a quantity of a run. Raises UsageError for another suffix, for an existing target without `force`,
-    for what cannot be drawn or selected, and where matplotlib is missing; UnreadableResultError; CannotWriteError.
+    a sweep or a quantity of a run, `section` a Poincaré section of a run. Raises UsageError for another suffix,
+    for an existing target without `force`, for what cannot be drawn or selected, and where matplotlib is missing;
+    UnreadableResultError; CannotWriteError.
     """
     with _opened(target, result, force=force) as (write, stored):
-        write(draw(stored[0], select, variable))
+        write(draw(stored[0], select, variable, section))
 
 
 def plot_two(first: Path, second: Path, target: Path, *, force: bool, variable: str = "") -> None:
@@ -67,11 +68,19 @@ def _opened(
         yield write, stored
 
 
-def draw(result: StoredResult, select: Sequence[str] = (), variable: str = "") -> "Figure":
+def draw(result: StoredResult, select: Sequence[str] = (), variable: str = "", section: str = "") -> "Figure":
     """The picture of an open result, drawn with the style that is set."""
     from brakecli.plots import branch, comparison, curves, lock_in, maps, run, scatter, sweep
+    from brakecli.plots import section as sections
 
     kind = str(result.attributes.get("kind"))
+    if section and (kind != "run" or variable):
+        what = (
+            f"is for runs, and {result.path} is a {printable(kind)}"
+            if kind != "run"
+            else "is a picture of its own"
+        )
+        raise UsageError(f"--section {section}: {what}; leave {'it' if kind != 'run' else '--variable'} out")
     if kind == "sweep":
         picture = sweep.gather(result, select, variable)
         return curves.draw(picture) if len(picture.axes) == 1 else maps.draw(picture)
@@ -82,6 +91,8 @@ def draw(result: StoredResult, select: Sequence[str] = (), variable: str = "") -
         raise UsageError(f"{result.path}: holds a result of kind {printable(kind)}; name the result of {known}")
     if select:
         raise UsageError(f"{result.path}: --select is for sweeps (found {select[0]!r}); leave it out for a {kind}")
+    if section:
+        return sections.draw(result, section)
     if kind == "run":
         return run.draw(run.RunPicture(result, variable or "vx"))
     if variable:

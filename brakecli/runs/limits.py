@@ -140,8 +140,12 @@ def _down(number: float) -> str:
 
 
 def adjustments(system: System) -> list[str]:
-    """Sentences on how a run differs from what the case asks for: surfaces, the grid of time, and nodes."""
+    """Sentences on how a run differs from the numbers of the case: surfaces, start, grid of time, and nodes."""
     method, interval, asked, found = system.method, system.interval, system.method.step, [*system.notes]
+    start = system.initial
+    if start.from_equilibrium and (start.x or start.y):
+        moved = f"x = {start.x:g} m and y = {start.y:g} m are added to the position of steady sliding"
+        found.append(f"initial: {moved}")
     if method.own_steps and asked is not None:
         kept = "which are exact" if method.row.exact else f"to a tolerance of {method.tolerance:g}"
         found.append(f"solver.step: not used, {method.scheme} finds its steps itself, {kept}")

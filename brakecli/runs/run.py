@@ -33,6 +33,7 @@ from brakecli.solver.history import History, array_history
 from brakecli.solver.motion import Counted, Motion, Progress, Sink, solve
 from brakecli.solver.quantities import HISTORY, ContactState
 from brakecli.solver.system import System
+from brakecli.solver.track import KINDS, MIN, Track
 
 
 @dataclass(frozen=True)
@@ -100,6 +101,8 @@ def run(
             if changing:
                 _write_over_time(result, changing)
             warnings = (*found.warnings, *_warnings(motion, certificate), *verdict.notes.values())
+            if loaded.case.output.events and motion.track is not None:
+                warnings += _write_events(result, motion.track)
             shown = changing, top, warnings, *modelled(motion)
             report = RunReport(loaded.case.title, output, verdict, motion, found, certificate, *shown)
             result.set_attributes(origin("run", report.title, loaded))
@@ -213,6 +216,20 @@ def _write_unconverged(result: ResultFile, events: NDArray[np.float64]) -> None:
     result.axis("unconverged", event, np.arange(len(events)))
     for field, values in zip(columns, events.T, strict=True):
         result.variable("unconverged", field, ("event",), np.nan_to_num(values, nan=np.finfo(float).max))
+
+
+def _write_events(result: ResultFile, track: Track) -> tuple[str, ...]:
+    """Write the events, but turning points of x, as far as they are kept; a warning where some are not."""
+    chosen = track.kept.kind > MIN
+    time, kind, x, others = (each[chosen] for each in track.kept)
+    event, *columns = fields.EVENTS
+    result.axis("events", event, np.arange(len(time)))
+    for field, values in zip(columns, (time, np.array(KINDS)[kind], x, *others.T), strict=True):
+        result.variable("events", field, ("event",), values)
+    earlier = int(track.counts[MIN + 1 :].sum()) - len(time)
+    result.set_attributes({"earlier": earlier}, "events")
+    kept = f"output.events: the last {len(time)} events are in the file, {earlier} earlier ones are not"
+    return (kept,) if earlier else ()
 
 
 def origin(kind: str, title: str, loaded: LoadedCase) -> dict[str, Any]:

@@ -144,7 +144,8 @@ def _follow(p: Plant, phase: int, t: float, v_before: float, before: float) -> N
         at -= force / rise if force < h * rise else h
     if phase != was:
         rest = reached - at
-        enter(track, phase, at, x - rest * (v_x - 0.5 * rest * (v_x - v_before) / h))
+        there = x - rest * (v_x - 0.5 * rest * (v_x - v_before) / h)
+        enter(track, phase, at, there, state.y, v_x, state.v_y)
     if phase == STICK:
         v_x = problem.belt
     kind = turned(track, v_x)

@@ -130,7 +130,7 @@ TRACK = record(
     marks=int,  # that have been made
     next=int,  # sample at which the next one is due
     events=int,  # that have been noted
-    counts=(int, 6),  # of each kind
+    counts=(int, 7),  # of each kind
     times=(float, PARTS + 1),  # of the marks, s
     works=(float, (PARTS + 1, 6)),  # passed up to there, as in `WORK`, J
     states=(
@@ -139,6 +139,7 @@ TRACK = record(
     ),  # there: x, y, v_x, v_y, x_old and y_old (m and m/s), energy of the contact (J)
     event_times=(float, MOST_EVENTS),  # s
     event_places=(float, MOST_EVENTS),  # x, m
+    event_others=(float, (MOST_EVENTS, 3)),  # y, v_x and v_y, of all but turning points, m and m/s
     event_kinds=(np.int8, MOST_EVENTS),
 )
 """What a loop notes of a motion beside its samples, see `solver.track`."""

@@ -100,6 +100,13 @@ def wheel_angles(waves: Floats, travel: float, travel_low: float, angles: Floats
         angles[i] = waves[i] - TWO_PI * fraction
 
 
+def turned(f: Surface, travel: float) -> Surface:
+    """The surface of a wheel that has travelled so far (m), as it then begins at xi = 0."""
+    phase = np.zeros(f.g.size)
+    wheel_angles(f.waves, travel, 0.0, phase)
+    return f._replace(phase=phase)
+
+
 @kernel(void(float64, float64, LAYER))
 def turn(travel: float, travel_low: float, layer: Layer) -> None:
     """The wheel has travelled so far (m): its phases, or its place on the grid of the window."""

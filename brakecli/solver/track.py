@@ -24,17 +24,19 @@ from brakecli.solver.compile import Floats, kernel
 from brakecli.solver.energy import Mechanical
 from brakecli.solver.records import MOST_EVENTS, PARTS, TRACK_TYPE, WORK_TYPE, Coefficients, Weights
 
-MAX, MIN, STICK, SLIP, LIFT, TOUCH = range(6)
-"""Kinds of events: turning points of x, begin and end of a stick, end and begin of contact."""
-KINDS = ("max", "min", "stick", "slip", "lift", "touch")
+MAX, MIN, STICK, SLIP, LIFT, TOUCH, TURN = range(7)
+"""Kinds of events: turning points of x, begin and end of a stick, end and begin of contact, and sliding that turns
+without a stick; difference schemes do not note the last."""
+KINDS = ("max", "min", "stick", "slip", "lift-off", "touch", "turn")
 
 
 class Events(NamedTuple):
-    """Events in the order of time: time (s), kind, and x there (m)."""
+    """Events in the order of time: time (s), kind, x (m), and of all but turning points y (m), vx and vy (m/s)."""
 
     time: Floats
     kind: NDArray[np.int8]
     x: Floats
+    others: Floats
 
 
 class Powers(NamedTuple):
@@ -72,7 +74,8 @@ class Track:
     def events(self, begin: float = 0.0) -> Events:
         """The events from a time (s) on, as far as they are kept."""
         first = int(np.searchsorted(self.kept.time, begin))
-        return Events(self.kept.time[first:], self.kept.kind[first:], self.kept.x[first:])
+        time, kind, x, others = self.kept
+        return Events(time[first:], kind[first:], x[first:], others[first:])
 
     def powers(self, begin: float, end: float) -> Powers:
         """Mean powers between the marks nearest to two times (s), one part at least; NaN without any part."""
@@ -119,7 +122,7 @@ UNTRACKED = Track(
     _NONE,
     np.zeros(len(KINDS), np.int64),
     -math.inf,
-    Events(_NONE, np.zeros(0, np.int8), _NONE),
+    Events(_NONE, np.zeros(0, np.int8), _NONE, np.zeros((0, 3))),
 )
 """Of a motion of which nothing has been noted."""
 
@@ -139,7 +142,7 @@ def tracked(t: Any, c: Coefficients, s: Weights, energies: Callable[..., Mechani
         works[:, 4] += contact - contact[:1]
     n = min(int(t.events), MOST_EVENTS)
     order = np.argsort(t.event_times[:n], kind="stable")
-    kept = Events(t.event_times[order], t.event_kinds[order], t.event_places[order])
+    kept = Events(t.event_times[order], t.event_kinds[order], t.event_places[order], t.event_others[order])
     stored = np.column_stack([kinetic, links, contact])
     return Track(t.times[: t.marks].copy(), works, stored, x, t.counts.copy(), float(t.since), kept)
 
@@ -170,10 +173,10 @@ def put(t: Any, kind: int, time: float, x: float) -> None:
     t.counts[kind] += 1
 
 
-@kernel(void(TRACK_TYPE, int64, float64, float64), inlined=False)
-def enter(t: Any, phase: int, time: float, x: float) -> None:
-    """Note the events with which a phase begins; the first one begins without any."""
-    was, t.phase = t.phase, phase
+@kernel(void(TRACK_TYPE, int64, *[float64] * 5), inlined=False)
+def enter(t: Any, phase: int, time: float, x: float, y: float, v_x: float, v_y: float) -> None:
+    """Note the events with which a phase begins, and the motion there; the first one begins without any."""
+    was, t.phase, before = t.phase, phase, t.events
     if was == automaton.UNDECIDED or was == phase:
         return
     if was == automaton.STICK:
@@ -184,6 +187,11 @@ def enter(t: Any, phase: int, time: float, x: float) -> None:
         put(t, TOUCH, time, x)
     if phase == automaton.STICK:
         put(t, STICK, time, x)
+    if t.events == before:  # from one side to the other
+        put(t, TURN, time, x)
+    for at in range(before, t.events):
+        others = t.event_others[at % MOST_EVENTS]
+        others[0], others[1], others[2] = y, v_x, v_y
 
 
 @kernel(int64(TRACK_TYPE, float64))

@@ -17,8 +17,8 @@ from brakecli.analysis.stability.linear import Theory, theories_of
 from brakecli.branches.line import Line
 from brakecli.case.case import Case
 from brakecli.case.read import key_path
+from brakecli.case.restart import initial_at
 from brakecli.case.system import system_of
-from brakecli.case.tables import SMALLEST
 from brakecli.errors import BrakecliError
 from brakecli.files import fields
 from brakecli.files.field import values_of
@@ -28,8 +28,6 @@ from brakecli.runs.limits import Check, check, refuse, within_range
 from brakecli.runs.run import asked, motion_of, verdict_in_memory
 from brakecli.runs.together import TOGETHER, certify_together
 from brakecli.solver.motion import Motion
-from brakecli.solver.roughness import TWO_PI, wheel_angles
-from brakecli.solver.schedules import integral_at
 from brakecli.sweeps.early import Ending, early
 from brakecli.sweeps.plan import Plan, Settings
 
@@ -192,25 +190,9 @@ def line_points(plan: Plan, line: int) -> list[int]:
 
 def next_start(outcome: PointRun) -> Settings:
     """The start of a case where another has ended."""
-    x, y, v_x, v_y = (_started(float(value)) for value in outcome.motion.rows[-1, :4])
-    start: Settings = {("initial",): {"x": x, "y": y, "vx": v_x, "vy": v_y}}
-    wheel = outcome.case.roughness.wheel
-    if wheel is not None:
-        system = outcome.motion.system
-        angles = np.zeros(system.wheel.g.size)
-        wheel_angles(system.wheel.waves, *integral_at(system.belt, system.sampled_duration, 0.0), angles)
-        phases = iter(angles)  # a wave without amplitude has no phase
-        turned = [math.degrees(next(phases) % TWO_PI) if g else 0.0 for g in wheel.sines()["amplitudes"]]
-        if wheel.profile is None:
-            start["roughness", "wheel", "phases_deg"] = turned
-        else:
-            start["roughness", "wheel"] = {**wheel.sines(), "phases_deg": turned}
-    return start
-
-
-def _started(value: float) -> float:
-    """A number as a case takes it: a motion that dies out comes to smaller ones than those but 0."""
-    return value if abs(value) >= SMALLEST else 0.0
+    motion = outcome.motion
+    state = motion.rows[-1, :4].tolist()
+    return {("initial",): initial_at(outcome.case, motion.system, motion.system.sampled_duration, state)}
 
 
 def verdict_of(case: Case) -> Verdict | None:

@@ -66,7 +66,7 @@ def events_from_samples(time: Array, x: Array, vx: Array, state: Array) -> Event
         found.append((time[i] + 0.5 * interval, np.full(len(i), kind), 0.5 * (x[i] + x[i + 1])))
     times, kinds, places = (np.concatenate(each) for each in zip(*found, strict=True))
     order = np.argsort(times, kind="stable")
-    return Events(times[order], kinds[order].astype(np.int8), places[order])
+    return Events(times[order], kinds[order].astype(np.int8), places[order], np.zeros((len(times), 3)))
 
 
 def track_of(history: History) -> Track:

@@ -274,7 +274,7 @@ def test_cycles_of_few_samples_have_the_right_length_and_stick(samples_per_cycle
     kind = np.concatenate([track.kept.kind[turns], np.full(len(cycle), STICK), np.full(len(cycle), SLIP)])
     x = np.concatenate([track.kept.x[turns], np.zeros(2 * len(cycle))])
     order = np.argsort(time)
-    kept = Events(time[order], kind[order].astype(np.int8), x[order])
+    kept = Events(time[order], kind[order].astype(np.int8), x[order], np.zeros((len(time), 3)))
     verdict = lasting(motion, Context(0.01), track=replace(track, kept=kept))
     assert verdict.frequency == pytest.approx(1.0 / (samples_per_cycle * INTERVAL), rel=1e-4)
     assert verdict.stick_fraction == pytest.approx(0.1, rel=2e-3)  # turning points are by samples here

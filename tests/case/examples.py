@@ -53,6 +53,7 @@ x = 0.0
 y = 0.0
 vx = 0.0
 vy = 0.0
+wheel_angle = 0.0
 [solver]
 scheme = "two-layer"
 theta = [0.5, 0.5]
@@ -74,6 +75,7 @@ EVENT_DRIVEN = (
     CONSTANT.replace('"two-layer"', '"event-driven"')
     .replace("theta = [0.5, 0.5]\n", "")
     .replace("step = 1e-5", "tolerance = 1e-10")
+    .replace("sample_interval = 1e-4", "sample_interval = 1e-4\nevents = true")
 )
 
 

@@ -184,7 +184,7 @@ def test_resolved_toml_holds_every_default_and_no_absent_key() -> None:
         "duration": 1.0,
         "allow_unconverged": False,
     }
-    assert resolved["output"] == {"sample_interval": 1e-5}
+    assert resolved["output"] == {"sample_interval": 1e-5, "events": False}
     assert resolved["wheel"] == {"radius": 0.5, "angular_speed": -4.0}
 
 

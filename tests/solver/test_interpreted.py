@@ -74,7 +74,7 @@ def histories() -> dict[str, NDArray[np.float64]]:
         found[name], track = motion.rows, motion.track
         assert track is not None
         found[f"{name} track"] = np.concatenate(
-            [*track.kept, track.times, track.works.ravel(), track.stored.ravel()]
+            [each.ravel() for each in (*track.kept, track.times, track.works, track.stored)]
         )
         found[f"{name} work"] = np.array(
             [float(work.failure), work.steps, work.contact_evaluations, motion.system.window_rows]

@@ -13,7 +13,7 @@ from brakecli.case.system import system_of
 from brakecli.solver.motion import Motion, solve
 from brakecli.solver.quantities import ContactState
 from brakecli.solver.records import MOST_EVENTS, PARTS, WORK
-from brakecli.solver.track import KINDS, LIFT, MAX, MIN, SLIP, STICK, TOUCH, Track
+from brakecli.solver.track import KINDS, LIFT, MAX, MIN, SLIP, STICK, TOUCH, TURN, Track
 from tests.analysis.histories import events_from_samples
 from tests.analysis.shoes import Tables, random_shoes
 from tests.examples import COULOMB, MODE_COUPLING, ROUGH, SQUEAL, make
@@ -74,7 +74,7 @@ def test_turning_points_of_a_damped_oscillation_lie_where_the_closed_form_has_th
     for step in STEPS if scheme in LAYERS else STEPS[:1]:
         track = track_of(by_scheme(FREE, scheme, step, link2__damping=0.2))
         time, x = of_kind(track, MAX, MIN)
-        assert track.counts.tolist() == [10, 9, 0, 0, 0, 0]
+        assert track.counts.tolist() == [10, 9, 0, 0, 0, 0, 0]
         assert track.kept.kind.tolist() == [MAX, MIN] * 9 + [MAX]
         errors.append((float(np.abs(time - times).max()), float(np.abs(x - places).max())))
     if scheme in LAYERS:
@@ -90,10 +90,18 @@ def test_a_shoe_that_turns_through_the_velocity_of_the_wheel_does_not_stick_unti
     places = np.array([math.hypot(13.0, 6.0) - 1.0 - 2.0 * n for n in range(8)]) * (-1.0) ** np.arange(8)
     times = math.atan2(6.0, 13.0) + math.pi * np.arange(8)
     track = track_of(by_scheme(COULOMB, scheme, 0.005))
-    assert track.counts.tolist() == [4, 3, 1, 0, 0, 0]
-    assert track.kept.kind.tolist() == [MAX, MIN, MAX, MIN, MAX, MIN, MAX, STICK]
-    np.testing.assert_allclose(track.kept.time, times, atol=0.015 if scheme in LAYERS else 1e-7)
-    np.testing.assert_allclose(track.kept.x, places, atol=5e-3 if scheme in LAYERS else 1e-7)
+    assert track.counts.tolist() == [4, 3, 1, 0, 0, 0, 0 if scheme in LAYERS else 7]
+    time, x = of_kind(track, MAX, MIN, STICK)
+    assert track.kept.kind[track.kept.kind < TURN].tolist() == [MAX, MIN, MAX, MIN, MAX, MIN, MAX, STICK]
+    np.testing.assert_allclose(time, times, atol=0.015 if scheme in LAYERS else 1e-7)
+    np.testing.assert_allclose(x, places, atol=5e-3 if scheme in LAYERS else 1e-7)
+    if scheme not in LAYERS:  # on a wheel at rest sliding turns where x does
+        time, x = of_kind(track, TURN)
+        np.testing.assert_allclose(time, times[:7], atol=1e-7)
+        np.testing.assert_allclose(x, places[:7], atol=1e-7)
+        y, v_x, v_y = track.kept.others[track.kept.kind >= STICK].T
+        np.testing.assert_allclose(y, -1.0, atol=1e-7)  # 11 N press, and 11 N/m bear them
+        assert np.abs([v_x, v_y]).max() < 1e-7
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
@@ -111,6 +119,9 @@ def test_a_bouncing_shoe_lifts_and_touches_when_the_closed_form_says_so(scheme: 
         track = track_of(case)
         assert track.kept.kind.tolist()[:16] == [LIFT, TOUCH] * 8
         errors.append(float(np.abs(track.kept.time[:16] - np.sort([*lifts, *(lifts + flight)])).max()))
+    y, _, v_y = track.kept.others[:16].T
+    if scheme not in LAYERS:
+        np.testing.assert_allclose([y, v_y], [np.zeros(16), [speed, -speed] * 8], atol=1e-6)
     assert falls_with_the_square(errors, 0.3) if scheme in LAYERS else errors[0] < 1e-7
 
 
@@ -126,10 +137,10 @@ def test_events_of_a_limit_cycle_that_sticks_agree_with_exact_ones(scheme: str, 
         motion = tracked(by_scheme(tables, scheme, tables["solver"]["step"] / parts))
         track = motion.track
         assert track is not None
-        assert track.counts.tolist() == exact.counts.tolist()
+        assert track.counts[:TURN].tolist() == exact.counts[:TURN].tolist()
         gaps = [
             np.abs(of_kind(track, kind)[0] - of_kind(exact, kind)[0])[:12].max()
-            for kind in range(len(KINDS))
+            for kind in range(TURN)
             if exact.counts[kind]
         ]
         errors.append(float(max(gaps)))
@@ -245,7 +256,7 @@ def test_a_ring_that_overflows_says_since_when_it_is_complete() -> None:
     assert len(track.kept.time) == MOST_EVENTS
     np.testing.assert_allclose(track.kept.time, expected[lost:], atol=1e-4)
     assert track.since == pytest.approx(expected[lost - 1], abs=1e-4)
-    time, kind, x = track.events(1e5)
+    time, kind, x, _ = track.events(1e5)
     assert time[0] == pytest.approx(expected[expected >= 1e5][0], abs=1e-4)
     assert (np.abs(x) - math.hypot(12.0, 6.0) < 1e-6).all()
     assert set(kind[::2]) | set(kind[1::2]) == {MAX, MIN}
@@ -275,7 +286,7 @@ def test_events_by_samples_of_a_sine_and_of_flags() -> None:
     time = np.linspace(0.0, 4.0, 401)
     state = np.where(time < 1.0, -1.0, np.where(time < 2.0, 0.0, np.where(time < 3.0, 2.0, 1.0)))
     vx = np.where(np.arange(401) == 50, 0.0, np.cos(np.pi * time))
-    time_, kind, x = events_from_samples(time, np.sin(np.pi * time) / np.pi, vx, state)
+    time_, kind, x, _ = events_from_samples(time, np.sin(np.pi * time) / np.pi, vx, state)
     assert kind.tolist() == [MAX, STICK, MIN, SLIP, LIFT, MAX, TOUCH, MIN]
     np.testing.assert_allclose(time_, [0.5, 0.995, 1.5, 1.995, 1.995, 2.5, 2.995, 3.5], atol=1e-6)
     np.testing.assert_allclose(x[[0, 2, 5, 7]], np.array([1.0, -1.0, 1.0, -1.0]) / np.pi, atol=1e-7)

@@ -213,6 +213,9 @@ def _meet(p: Shoe) -> None:
         m.phase if meets else OPEN,
         m.time + m.tau + theta * m.step_done,
         runge_kutta.interpolated(m, X, theta),
+        runge_kutta.interpolated(m, Y, theta),
+        runge_kutta.interpolated(m, V_X, theta),
+        runge_kutta.interpolated(m, V_Y, theta),
     )
 
 
@@ -276,7 +279,8 @@ def _enter(p: Shoe, which: int, longest: float) -> int:
     m = p.motion
     phases.switch(p, which)
     if p.track.on == 1:
-        enter(p.track, m.phase if m.touch[0, 0] > 0.0 else OPEN, m.time + m.tau, m.x)
+        phase = m.phase if m.touch[0, 0] > 0.0 else OPEN
+        enter(p.track, phase, m.time + m.tau, m.x, m.y, m.v_x, m.v_y)
     m.events_time, m.events = counted(m.events_time, m.events, m.time + m.tau, longest)
     return _STALLED if stalled(m.events) else _NONE
 

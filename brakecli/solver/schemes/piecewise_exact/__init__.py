@@ -319,7 +319,7 @@ def _through(p: Plant, t: float, to_sample: int) -> int:
             if p.tangent.on == 1 and which == SLIDING and before != OPEN and before != STICK:
                 _meet(p.c, m, p.tangent)
             if p.track.on == 1:
-                enter(p.track, m.phase, t + tau, m.z[X])
+                enter(p.track, m.phase, t + tau, m.z[X], m.z[Y], m.z[V_X], m.z[V_Y])
             _anchor(p, t, tau)
             if m.phase == STICK:
                 m.error[V_X] = 0.0

@@ -1,0 +1,47 @@
+"""The end of a run in a result file, at which another run begins."""
+
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from brakecli.case.case import Case
+from brakecli.case.system import system_of
+from brakecli.case.tables import SMALLEST
+from brakecli.errors import CaseError, UnreadableResultError, UsageError
+from brakecli.files.read import open_result
+from brakecli.files.toml_lines import parse
+from brakecli.solver.schedules import integral_at
+from brakecli.solver.system import System
+
+_STATE = ("x", "y", "vx", "vy")
+
+
+def end_of(path: Path) -> dict[str, float]:
+    """The keys of `initial` at the last sample of a run: x, y (m), vx, vy (m/s) and wheel_angle (rad).
+
+    Raises UnreadableResultError for what is no run, and UsageError for one that has failed.
+    """
+    with open_result(path, kind="run") as result:
+        if result.attributes.get("status") == "failed":
+            raise UsageError("has failed, and its last state is of no use; name a run that is done")
+        try:
+            case = Case.model_validate(parse(result.text("resolved_toml"), "its case"))
+        except (CaseError, ValidationError) as error:
+            raise UnreadableResultError("holds no case of this version; run its case again") from error
+        history = result.variables("history")
+        rows = {history[name].shape for name in ("time", *_STATE)}
+        if len(rows) != 1 or not (samples := rows.pop()[0]):
+            raise UnreadableResultError("has no history; run its case again")
+        time, *state = (float(result.read("history", name, samples - 1)[0]) for name in ("time", *_STATE))
+    return initial_at(case, system_of(case), time, state)
+
+
+def initial_at(case: Case, system: System, time: float, state: list[float]) -> dict[str, float]:
+    """The keys of `initial` by which a case goes on from a time (s), where it has this state (m, m/s).
+
+    A number that is smaller than a case takes, as of a motion that dies out, is 0.
+    """
+    travel = sum(integral_at(system.belt, time, 0.0))
+    numbers = [*state, case.initial.wheel_angle + travel / case.wheel.radius]
+    names = (*_STATE, "wheel_angle")
+    return {name: value if abs(value) >= SMALLEST else 0.0 for name, value in zip(names, numbers, strict=True)}

@@ -1,0 +1,99 @@
+"""The Poincaré section of a run: its state once in each period of a passing wave, or at each event of a kind."""
+
+import math
+
+import numpy as np
+from matplotlib.figure import Figure
+from scipy.interpolate import CubicHermiteSpline
+
+from brakecli.case.system import system_of
+from brakecli.errors import UsageError
+from brakecli.files.read import StoredResult
+from brakecli.plots import style
+from brakecli.plots.quantities import scaled
+from brakecli.plots.run import BLOCK, case_of
+
+MOST = 20_000  # points that are drawn, the last ones
+_BEHIND = 20_000  # samples of the motion that are drawn behind them, the last ones
+WAVE, KINDS = "wave", ("stick", "slip", "turn", "lift-off", "touch")
+_WITH_THE_WHEEL = KINDS[:3]  # where vx is the wheel's speed
+_FEWEST = 8  # samples in a period between which a state is certain
+_STATE = ("x", "y", "vx", "vy")
+_Points = dict[str, style.Array]
+
+
+def draw(result: StoredResult, section: str) -> Figure:
+    """The figure; raises UsageError for a section that the run does not have, and UnreadableResultError."""
+    history = result.variables("history")
+    samples = history["time"].shape[0]
+    if len({history[name].shape for name in ("time", *_STATE)}) != 1 or samples < 2:
+        raise style.unreadable(result, "its history has no times and states of equal length above 1")
+    start, end = (float(result.read("history", "time", at, at + 1)[0]) for at in (0, samples - 1))
+    time = start, end, (end - start) / (samples - 1)
+    begin = min(max(float(result.attributes.get("settled_from") or 0.0), start), end)
+    if section == WAVE:
+        points, where = _at_waves(result, time, begin)
+    elif section in KINDS:
+        points, where = _at_events(result, section, begin), f"at each {section}"
+    else:
+        known = ", ".join((WAVE, *KINDS))
+        raise UsageError(f"--section {section}: there is no such section; give one of {known}")
+    first = max(min(round((begin - start) / time[2]), samples - 2), samples - _BEHIND)
+    last = {name: result.read("history", name, first) for name in _STATE}
+    count = f"{len(points['x'])} points from {begin:.4g} s on"
+    title = case_of(result).case.title or "Case without a title"
+    figure = style.headed(10.4, 4.6, title, f"Poincaré section {where}   ·   {count}", columns=2, wspace=0.05)
+    pairs = (("x", "y"), ("x", "vy")) if section in _WITH_THE_WHEEL else (("x", "vx"), ("y", "vy"))
+    for axes, pair in zip(style.panels(figure, 1, 2).flat, pairs, strict=True):
+        looks = [scaled(name, last[name], np.r_[last[name], points[name]]) for name in pair]
+        motion, dots = (
+            [look(found[name]) for name, look in zip(pair, looks, strict=True)] for found in (last, points)
+        )
+        axes.plot(*motion, color=style.GREY, lw=0.4, label="motion")
+        axes.plot(*dots, color=style.BLUE, ls="none", marker=".", label="section")
+        axes.set(xlabel=looks[0].label, ylabel=looks[1].label, xlim=looks[0].limits, ylim=looks[1].limits)
+    return figure
+
+
+def _at_waves(result: StoredResult, time: tuple[float, float, float], begin: float) -> tuple[_Points, str]:
+    """The states once in each period of the wave that moves x most, or else of the highest one; words for it.
+
+    `time` is that of the first and of the last sample, and between two of them (s).
+    """
+    system = system_of(case_of(result).case)
+    passing = np.abs(system.belt_speed) * system.wheel.turns
+    if not system.steady or not passing.any():
+        remedy = f"give an event: {', '.join(KINDS)}"
+        raise UsageError(f"--section {WAVE}: no wave of a rough wheel passes at a constant speed; {remedy}")
+    forced = result.attributes.get("forced_frequency")
+    wave = np.argmin(np.abs(passing - forced)) if forced else np.argmax(np.abs(system.wheel.g))
+    frequency, (start, end, interval) = float(passing[wave]), time
+    if frequency * interval > 1.0 / _FEWEST:
+        what = f"samples every {interval:.3g} s do not resolve the wave of {frequency:.4g} Hz"
+        raise UsageError(
+            f"--section {WAVE}: {what}; run with output.sample_interval={1.0 / frequency / _FEWEST:.2g}"
+        )
+    times = np.arange(math.ceil(begin * frequency), math.floor(end * frequency) + 1)[-MOST:] / frequency
+    if not len(times):
+        raise UsageError(f"--section {WAVE}: less than a period from {begin:.4g} s on; run longer")
+    places, parts = np.minimum((times - start) / interval, (end - start) / interval - 1.0).astype(int), []
+    for first in range(int(places[0]), int(places[-1]) + 1, BLOCK):
+        there, part = times[(places >= first) & (places < first + BLOCK)], (first, first + BLOCK + 1)
+        known, x, y, v_x, v_y = (result.read("history", name, *part) for name in ("time", *_STATE))
+        curves = [CubicHermiteSpline(known, *each) for each in ((x, v_x), (y, v_y))]
+        parts.append([curve(there, order) for order in (0, 1) for curve in curves])
+    found = {name: np.concatenate(each) for name, each in zip(_STATE, zip(*parts, strict=True), strict=True)}
+    return found, f"in each period of the wave of {frequency:.4g} Hz"
+
+
+def _at_events(result: StoredResult, kind: str, begin: float) -> _Points:
+    """The states at the events of a kind."""
+    if "events" not in result.file:
+        remedy = "run its case again with --set output.events=true"
+        raise UsageError(f"--section {kind}: {result.path} holds no events; {remedy}")
+    there = result.read("events", "time") >= begin
+    kinds = result.read("events", "kind")[there]
+    if kind not in kinds:
+        known = f"give one of {', '.join(sorted({*kinds.tolist()}))}" if len(kinds) else "run longer"
+        raise UsageError(f"--section {kind}: {result.path} has none from {begin:.4g} s on; {known}")
+    return {name: result.read("events", name)[there][kinds == kind][-MOST:] for name in _STATE}
