@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from brakecli import __version__
+from brakecli import __released__, __version__
 from brakecli.cli.inputs import as_argument
 from brakecli.cli.options import option
 from brakecli.cli.output import announce_compilation, say, show, warn
@@ -26,6 +26,21 @@ COMMANDS = (
     *("new", "schema", "plot", "report", "info", "diff", "export"),
 )
 """In the order in which `--help` lists them."""
+
+CITATION = f"""\
+@software{{brakecli,
+  author  = {{{{The brakecli authors}}}},
+  title   = {{{{brakecli}}: friction-induced vibration of a brake shoe on a rough wheel}},
+  version = {{{__version__}}},
+  year    = {{{__released__[:4]}}}
+}}
+@unpublished{{koptovets,
+  author = {{Koptovets, A. N.}},
+  title  = {{Mathematical modelling of the vibration loading of a shoe-wheel brake}},
+  note   = {{The model that brakecli computes. In Russian, UDC 622.625.28-592.112,
+            National Mining University, Dnipropetrovsk}}
+}}"""
+"""How to cite the program and the paper, in BibTeX; CITATION.cff says the same."""
 
 LIBRARIES = 750_000_000
 """Bytes of address space to load the libraries and compile all kernels; with less, LLVM aborts or never ends.
@@ -73,11 +88,22 @@ def _print_version(wanted: bool) -> None:
         raise typer.Exit
 
 
+def _print_citation(wanted: bool) -> None:
+    if wanted:
+        show(CITATION)
+        raise typer.Exit
+
+
 VERSION = option("Print the version and exit.", None, "--version", callback=_print_version, is_eager=True)
+CITE = option(
+    "Print how to cite it, in BibTeX, and exit.", None, "--cite", callback=_print_citation, is_eager=True
+)
 
 
 @app.callback()
-def _common(context: typer.Context, version: Annotated[bool, VERSION] = False) -> None:
+def _common(
+    context: typer.Context, version: Annotated[bool, VERSION] = False, cite: Annotated[bool, CITE] = False
+) -> None:
     compiling.set_notice(announce_compilation)
     readings.begin(warn)
     context.call_on_close(readings.begin)  # a later call of the same process forgets what this one has read

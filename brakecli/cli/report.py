@@ -6,7 +6,7 @@ from typing import Annotated
 from brakecli.cli.options import Force, ForceRead, Quiet, output_option, source_argument
 from brakecli.cli.output import progress, show
 
-RESULTS = "Results of runs, sweeps, comparisons or stability."
+RESULTS = "Results of any kind; two of one kind stand beside each other."
 
 
 def command(

@@ -76,16 +76,16 @@ def difference(a: StoredResult, b: StoredResult) -> Difference:
     rows = ((field.group, row) for field in declared for row in (field.rows if field.group else [field]))
     units = {f"{group}/{row.name}": row.units for group, row in rows}
     units |= {f"spectrum/{field.name}": field.units for field in WELCH}
-    differing = [*_changed(*numbers)]
+    differing = [*changed(*numbers)]
     for each in differing:
         each["units"] = units.get(each["name"], units.get(f"/{each['name']}", ""))
     variables = [each for group in groups for each in _variables(a, b, group)]
-    of_program = [*_changed(a.versions, b.versions)]
-    return Difference([*_changed(*map(_keys, (a, b)))], differing, variables, of_program)
+    of_program = [*changed(a.versions, b.versions)]
+    return Difference([*changed(*map(keys, (a, b)))], differing, variables, of_program)
 
 
-def _keys(result: StoredResult) -> dict[str, Any]:
-    """All keys of the case and of the sweep with their values."""
+def keys(result: StoredResult) -> dict[str, Any]:
+    """All keys of the case and of the sweep with their values; raises UnreadableResultError."""
     found: dict[str, Any] = {}
     for name in _CASES:
         try:
@@ -103,7 +103,8 @@ def _finite(text: str) -> float:
     return value
 
 
-def _changed(a: dict[str, Any], b: dict[str, Any]) -> Iterator[dict[str, Any]]:
+def changed(a: dict[str, Any], b: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """Name and both values of all that differs; None stands for what one of them lacks."""
     for name in dict.fromkeys([*a, *b]):
         if a.get(name) != b.get(name):
             yield {"name": name, "a": a.get(name), "b": b.get(name)}

@@ -47,6 +47,7 @@ def _runs(results: tuple[StoredResult, StoredResult], variable: str) -> Figure:
     times = [time - (0.0 if same_end else time[-1]) for time in times]
     highest = max((picture.spectrum[2] for picture in pictures), key=style.largest)
     scale, label = style.density(highest, pictures[0].spectrum[1], VARIABLES[variable][3])
+    label = label.removeprefix("power spectral ") if style.is_narrow() else label
     for number, (result, picture, curve) in enumerate(zip(results, pictures, _LOOKS, strict=True)):
         panels[0].plot(times[number], look(picture.detail[variable]), label=_name(result), **curve)
         time, lowest, highest = envelopes[number][0], *map(whole_look, envelopes[number][1:])
@@ -64,7 +65,8 @@ def _runs(results: tuple[StoredResult, StoredResult], variable: str) -> Figure:
     panels[0].legend(loc="upper right", ncols=2)
     spans = [edge for picture in pictures for edge in picture.span]
     _along(panels[1], "time", [min(spans), max(spans)], "s")
-    panels[1].set(title=f"Whole runs: {VARIABLES[name][0]}, least and largest", ylabel=whole_look.label)
+    more = "" if style.is_narrow() else ", least and largest"
+    panels[1].set(title=f"Whole runs: {VARIABLES[name][0]}{more}", ylabel=whole_look.label)
     _spectra(panels[2], pictures, variable, scale, label)
     figure.align_ylabels()
     return figure

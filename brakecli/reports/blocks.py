@@ -1,7 +1,8 @@
 """What a page is made of: sections with tables, pictures and texts, which the template `report.html` writes."""
 
 import base64
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from io import BytesIO
 from typing import Any
@@ -12,18 +13,26 @@ from PIL import Image
 
 from brakecli.files.field import Field
 from brakecli.plots import style
+from brakecli.sweeps.result import unit
 
 _MOST_VALUES = 8  # of a list that are written
+Numbers = Mapping[str, tuple[Any, str]]
+"""What two results are compared by: values with their units, by their names."""
+
 _COLOURS, _DPI = 255, 120  # of a picture: a third of the bytes, and no difference that could be seen
 
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of texts, with a header or without; one that is `folded` under its title opens on demand."""
+    """Rows of texts, with a header or without; one that is `folded` under its title opens on demand.
+
+    Numbers of rows that are `marked` are those that a reader is to see first.
+    """
 
     rows: Sequence[Sequence[str]]
     head: Sequence[str] = ()
     folded: str = ""
+    marked: Collection[int] = ()
     kind = "table"
 
 
@@ -64,14 +73,27 @@ class Section:
 
 @dataclass(frozen=True)
 class Part:
-    """What the page says of one result."""
+    """What the page says of one result: its first page, then the `sections` of the appendix."""
 
     name: str
     title: str
     question: str
     answer: Sequence[str]
+    picture: Picture | None
+    change: Sequence[Any]  # blocks that say what to change
     sections: Sequence[Section]
+    numbers: Numbers
     versions: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two results beside each other: pictures of both together, or one of each."""
+
+    title: str
+    changed: Table
+    numbers: Table
+    pictures: Sequence[Picture]
 
 
 def picture(words: str, draw: Callable[[], Figure]) -> Picture:
@@ -104,6 +126,23 @@ def shown(value: Any, unit: str = "") -> str:
         return (", ".join(texts) or "none") + more
     factor, unit = style.prefixed(abs(float(value)), unit)
     return f"{style.readable(factor * float(value))} {unit}".rstrip().replace(" ", "\u00a0")
+
+
+def rounded(value: Any, digits: int) -> Any:
+    """A number to so many digits; anything else as it is."""
+    return float(f"{value:.{digits}g}") if isinstance(value, float) else value
+
+
+def key_unit(key: str) -> str:
+    """The unit of a key of the case; empty where it has none, or where a case has no such key."""
+    with suppress(KeyError):
+        return unit(key)
+    return ""
+
+
+def numbers_of(known: Iterable[Field], values: Mapping[str, Any]) -> Numbers:
+    """The values of some fields, None where there is none."""
+    return {each.title: (values.get(each.name), each.units) for each in known}
 
 
 def rows_of(known: Iterable[Field], values: Mapping[str, Any]) -> list[tuple[str, str, str]]:

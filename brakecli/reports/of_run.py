@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from brakecli.analysis.regime.table import Excitation, Regime
-from brakecli.analysis.stability.advice import KEYS
+from brakecli.analysis.stability.advice import KEYS, Change
 from brakecli.analysis.stability.follow import followed
 from brakecli.analysis.stability.modes import Mode, modes
 from brakecli.case.case import Case
@@ -23,7 +23,7 @@ from brakecli.files.read import StoredResult
 from brakecli.plots import lock_in, style
 from brakecli.plots.result import draw
 from brakecli.plots.run import case_of
-from brakecli.reports.blocks import Code, Part, Section, Table, Texts, picture, rows_of, shown
+from brakecli.reports.blocks import Code, Part, Section, Table, Texts, numbers_of, picture, rows_of, shown
 from brakecli.runs.advise import AdviceReport, advise
 from brakecli.solver.motion import Counted
 from brakecli.sweeps.result import unit
@@ -32,7 +32,8 @@ QUESTION = "Will this shoe vibrate, in which way, at which frequency, and what s
 PICTURE = "The motion in detail, its phase portrait, the whole history, and the spectrum of the velocity"
 MARGIN = 0.2  # of the friction, that advice aims at
 VALUES = 121  # of the friction in the lock-in diagram
-MOST_SENSITIVE, MOST_SECONDS = 6, 60.0  # keys that are shown, and what it may take to ask all
+MOST_SENSITIVE, MOST_CHANGES = 6, 5  # keys that are shown; the latter on the first page
+MOST_SECONDS = 60.0  # what it may take to ask all
 _UNITS = [each.units for each in fields.VIBRATION]
 _IDLE = ("initial.", "solver.", "output.")  # keys that stand below the others
 _WORDS = {
@@ -40,6 +41,10 @@ _WORDS = {
     Regime.QUASI_HARMONIC: "It vibrates, without stick (quasi-harmonic)",
     Regime.DAMPED: "It does not vibrate by itself: what moves it dies away (damped)",
 }
+_MAIN = (
+    *("regime", "excitation", "frequency", "amplitude", "stick_fraction", "contact_loss_fraction"),
+    *("growth_rate", "braking_torque", "torque_variation"),
+)
 _ACCURACY = (
     *("scheme", "theta", "iteration", "step", "tolerance", "certified", "estimated_error", "certified_until"),
     *("certified_by", "nodes", "steps", "contact_evaluations", "unconverged_steps", "non_unique_steps"),
@@ -55,9 +60,8 @@ def part_of_run(result: StoredResult, progress: Counted) -> Part:
         Section("Case", case_blocks(loaded)),
         Section("Stability of steady sliding", [*_stability(advice)]),
         Section("Regime, and its evidence", _regime(result)),
-        Section("Pictures", [picture(PICTURE, partial(draw, result))]),
         Section("Accuracy", [*_accuracy(result), Texts(_sentences("left out: ", found.get("left_out", ())))]),
-        Section("Warnings", [Texts(_warnings(found, advice))]),
+        Section("Warnings", [Texts(_warnings(found))]),
         Section("How to repeat it", repeat(result, again, result.text("case_toml"))),
     ]
     stretches = [
@@ -66,7 +70,40 @@ def part_of_run(result: StoredResult, progress: Counted) -> Part:
     ]
     answer = [*stretches, _sentence(found), f"By theory: {advice.conclusion()}."]
     name, title = escaped(result.path.name), loaded.case.title or "Case without a title"
-    return Part(name, title, QUESTION, answer, sections, result.versions)
+    numbers = numbers_of(named(fields.VERDICT, *_MAIN), found)
+    numbers = {**numbers, **numbers_of(named(fields.ADVICE, "critical_friction", "margin"), advice.numbers())}
+    drawn, change = picture(PICTURE, partial(draw, result)), [*_to_change(advice, found.get("regime"))]
+    return Part(name, title, QUESTION, answer, drawn, change, sections, numbers, result.versions)
+
+
+def _to_change(advice: AdviceReport, regime: Any) -> Iterator[Any]:
+    """The changes that help most, and what the advice rests on."""
+    helpful = [each for each in advice.advice if each.to is not None]
+    lines = []
+    if helpful:
+        yield _changes(helpful[:MOST_CHANGES], advice.wanted_margin)
+    elif advice.advice:
+        lines.append(f"No key alone gives a margin of {advice.wanted_margin:.0%}.")
+    elif not advice.left_out:
+        nothing = advice.stable and regime == Regime.DAMPED
+        lines.append(f"{'Nothing has to be changed' if nothing else 'No change is known'}; {advice.conclusion()}.")
+    if check := advice.check:
+        what = f"A run of the case with {check.parameter} = {check.value:.6g}, {check.duration:.3g} s of motion"
+        lines.append(f"{what}: {check.verdict.regime}: {'; '.join(check.verdict.reasons)}.")
+    yield Texts([*lines, *_sentences("", advice.notes())])
+
+
+def _changes(changes: Iterable[Change], margin: float) -> Table:
+    rows = [
+        (
+            each.parameter,
+            shown(each.start, unit(each.parameter)),
+            "no help" if each.to is None else shown(float(each.rounded), unit(each.parameter)),
+            shown(each.critical_friction and float(f"{each.critical_friction:.4g}")),
+        )
+        for each in changes
+    ]
+    return Table(rows, ("what to change", "from", f"to, for a margin of {margin:.0%}", "critical friction then"))
 
 
 def case_blocks(loaded: LoadedCase) -> list[Any]:
@@ -128,24 +165,11 @@ def _stability(advice: AdviceReport) -> Iterator[Any]:
         words = "Lock-in diagram: frequencies and growth rates of both modes over the friction coefficient"
         yield picture(words, partial(_diagram, advice))
     if advice.advice:
-        changes = [
-            (
-                each.parameter,
-                shown(each.start, unit(each.parameter)),
-                "no help" if each.to is None else shown(float(each.rounded), unit(each.parameter)),
-                shown(each.critical_friction and float(f"{each.critical_friction:.4g}")),
-            )
-            for each in advice.advice
-        ]
-        wanted = f"to, for a margin of {advice.wanted_margin:.0%}"
-        yield Table(changes, ("what to change", "from", wanted, "critical friction then"))
+        yield _changes(advice.advice, advice.wanted_margin)
     known = [each for each in advice.sensitivities if each.elasticity][:MOST_SENSITIVE]
     if known:
         moves = [(each.parameter, f"{each.elasticity:+.3g}\u00a0%".replace("-", "−")) for each in known]
         yield Table(moves, ("what moves it most", "critical friction for 1 % more"))
-    if check := advice.check:
-        what = f"A run of the case with {check.parameter} = {check.value:.6g}, {check.duration:.3g} s of motion"
-        yield Texts([f"{what}: {check.verdict.regime}: {'; '.join(check.verdict.reasons)}."])
 
 
 def _diagram(advice: AdviceReport) -> Figure:
@@ -200,9 +224,9 @@ def _accuracy(result: StoredResult) -> list[Any]:
     return [Table([*rows_of(named(fields.RUN, *_ACCURACY), result.attributes), closing])]
 
 
-def _warnings(found: Mapping[str, Any], advice: AdviceReport) -> list[str]:
-    lines = [str(each) for name in ("warnings", "adjustments") for each in found.get(name, ())]
-    return _sentences("", [*lines, *advice.notes()]) or ["There are none."]
+def _warnings(found: Mapping[str, Any]) -> list[str]:
+    lines = (str(each) for name in ("warnings", "adjustments") for each in found.get(name, ()))
+    return _sentences("", lines) or ["There are none."]
 
 
 def _sentences(begin: str, lines: Iterable[str]) -> list[str]:

@@ -1,6 +1,7 @@
 """The parts of a page about sweeps, comparisons of schemes, stability along a key, branches, and scatter."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -9,17 +10,35 @@ import numpy as np
 from brakecli.analysis.regime.table import Regime
 from brakecli.errors import UsageError, escaped
 from brakecli.files import fields
+from brakecli.files.field import Field
 from brakecli.files.read import StoredResult
+from brakecli.files.write import FILL
 from brakecli.plots import style
 from brakecli.plots.result import draw
 from brakecli.plots.run import case_of
+from brakecli.plots.scatter import NAMES
 from brakecli.plots.sweep import SweepPicture, gather, numeric
-from brakecli.reports.blocks import Part, Section, Table, Texts, picture, rows_of, shown
+from brakecli.reports.blocks import (
+    Code,
+    Numbers,
+    Part,
+    Picture,
+    Section,
+    Table,
+    Texts,
+    key_unit,
+    numbers_of,
+    picture,
+    rounded,
+    rows_of,
+    shown,
+)
 from brakecli.reports.of_run import case_blocks, repeat
 from brakecli.reports.sweep_map import MOST, maps
 from brakecli.sweeps.point import Status
 
 MOST_FAILURES = 20
+_NONE_AT_0 = ("error", "amplitude", "frequency")  # of a special point: 0 says that there is none
 _TEXTS = ("regime", "excitation", "critical_status", "sustained_status", "reason")
 _ERRORS = ("estimated_error", "critical_error", "critical_bias", "unconverged_steps")
 _IDLE = ("settled", "settled_from", "steps", "contact_evaluations", "unconverged_steps", "warning_count")
@@ -38,6 +57,14 @@ _QUESTIONS = {
     "scatter": "How likely do such brakes squeal, and which scatter decides on it?",
     "comparison": "Which scheme and which step reach the wanted error at the least cost?",
 }
+_PICTURES = {
+    "comparison": "The errors of all methods against their times",
+    "stability": "Lock-in diagram: frequencies and growth rates of both modes along the key",
+    "branch": "Amplitude and frequency of all motions along the key; stable ones full, unstable ones dashed",
+    "scatter": "Probabilities with their intervals, what decides on them, and how numbers are distributed",
+}
+_ADVISE = dict.fromkeys(("sweep", "stability", "branch"), "brakecli advise CASE.toml")
+_ADVISE["scatter"] = "brakecli advise CASE.toml --scatter STUDY.toml"
 
 
 def part_of_sweep(result: StoredResult) -> Part:
@@ -47,16 +74,18 @@ def part_of_sweep(result: StoredResult) -> Part:
     try:
         found = gather(result, more=[*names, *(name for name in _ERRORS if name in known)])
     except UsageError as error:  # more axes than a picture has, or none
-        return _plain(result, "sweep", [f"{str(error).removeprefix(f'{result.path}: ')}."], [])
+        return _plain(result, "sweep", [f"{str(error).removeprefix(f'{result.path}: ')}."], None, [], {})
     sweep = found.critical
     question = _QUESTIONS["sweep"] if sweep is None else _QUESTIONS["critical"].format(sweep.parameter)
-    blocks: list[Any] = [*maps(found, names)]
-    if not blocks:
-        blocks.append(Texts([f"Values of single points are left out above {MOST} of them; they are in the file."]))
-    blocks.append(picture(f"Picture of the sweep: {found.summary}", partial(draw, result)))
-    answer = [*_answer(found), *(f"{each[:1].upper()}{each[1:]}." for each in found.findings)]
+    points: list[Any] = [*maps(found, names)]
+    if not points:
+        points.append(Texts([f"Values of single points are left out above {MOST} of them; they are in the file."]))
+    drawn = picture(f"Picture of the sweep: {found.summary}", partial(draw, result))
+    said, numbers = _answer(found)
+    answer = [*said, *(f"{each[:1].upper()}{each[1:]}." for each in found.findings)]
     axes = [(axis.key, f"{len(axis.values)} values", f"{axis.text(0)} to {axis.text(-1)}") for axis in found.axes]
-    sections = [Section("Map and pictures", blocks), Section("Grid", [Table(axes, ("key", "values", "from, to"))])]
+    grid = Table(axes, ("key", "values", "from, to"))
+    sections = [Section("Points and their values", [grid, *points])]
     errors = {name: np.asarray(found.variables.get(name, np.nan), float) for name in _ERRORS}
     accuracy = [
         (name.replace("_", " "), shown(float(np.nanmax(np.abs(values))), found.units[name]))
@@ -70,29 +99,34 @@ def part_of_sweep(result: StoredResult) -> Part:
     lines = [f"Failed: {reason}." for reason in dict.fromkeys(reasons[failed].tolist())][:MOST_FAILURES]
     lines += [f"{warning}." for warning in dict.fromkeys(warned[warned != ""].tolist())][:MOST_FAILURES]
     sections.append(Section("Warnings", [Texts(lines or ["There are none."])]))
-    return _plain(result, "sweep", answer, sections, question)
+    return _plain(result, "sweep", answer, drawn, sections, numbers, question)
 
 
-def _answer(found: SweepPicture) -> Iterator[str]:
-    """What the points say, and at which of them the most and the least."""
+def _answer(found: SweepPicture) -> tuple[list[str], Numbers]:
+    """What the points say, and at which of them the most and the least; and the numbers of that."""
     done, name, words, end = found["status"] == Status.DONE, "amplitude", "largest amplitude", np.nanargmax
     if found.critical is not None:
         name, words, end = "critical", "least critical value", np.nanargmin
     size, values = done.size, found[name]
+    numbers: dict[str, tuple[Any, str]] = {"points": (size, "1")}
     if found.critical is None:
         lasting = np.isin(found["regime"], (Regime.RELAXATION, Regime.QUASI_HARMONIC))
         kinds, counts = np.unique(found["regime"][done], return_counts=True)
         each = ", ".join(f"{kind} at {count}" for kind, count in zip(kinds, counts, strict=True))
-        yield f"It vibrates at {lasting.sum()} of {size} points: {each}."
+        said = [f"It vibrates at {lasting.sum()} of {size} points: {each}."]
+        numbers |= {f"{kind} at": (int(count), "1") for kind, count in zip(kinds, counts, strict=True)}
         values = np.where(lasting, values, np.nan)
     else:
-        none = int(size - np.isfinite(values).sum())
-        yield f"A critical value is found at {size - none} of {size} points."
+        there = int(np.isfinite(values).sum())
+        said = [f"A critical value is found at {there} of {size} points."]
+        numbers["with a critical value"] = there, "1"
     if np.isfinite(values).any():
         place = np.unravel_index(end(values), values.shape)
         where = ", ".join(axis.named(int(at)) for axis, at in zip(found.axes, place[1:], strict=True))
-        value = shown(float(f"{values[place]:.4g}"), found.units[name])
-        yield f"The {words} is {value}, at {where}."
+        value = float(f"{values[place]:.4g}")
+        said.append(f"The {words} is {shown(value, found.units[name])}, at {where}.")
+        numbers |= {words: (value, found.units[name]), f"{words} at": (where, "")}
+    return said, numbers
 
 
 def part_of_other(result: StoredResult) -> Part:
@@ -102,10 +136,14 @@ def part_of_other(result: StoredResult) -> Part:
     """
     kind = str(result.attributes["kind"])
     declared = {"stability": fields.LOCK_IN, "branch": fields.BRANCH, "scatter": fields.SCATTER}
-    known = declared.get(kind, fields.COMPARISON)
     apart = ("title", "recommended", "sentence")
-    rows = rows_of((each for each in known if each.name not in apart and each.in_file), result.attributes)
-    drawn = picture("Picture of the result", partial(draw, result))
+    known = [
+        replace(each, units=_unit_of_key(result)) if each.units == "of the key" else each
+        for each in declared.get(kind, fields.COMPARISON)
+        if each.name not in apart and each.in_file
+    ]
+    tables, numbers = [Table(rows_of(known, result.attributes))], numbers_of(known, result.attributes)
+    drawn = picture(_PICTURES[kind], partial(draw, result))
     answer = ["No entry meets the wanted error."]
     if kind == "stability":
         where = ", ".join(f"{value:.6g}" for value in np.ravel(result.attributes.get("critical_values", ())))
@@ -114,16 +152,63 @@ def part_of_other(result: StoredResult) -> Part:
     if kind in ("branch", "scatter"):
         sentence = str(result.attributes.get("sentence", ""))
         answer = [f"{sentence[:1].upper()}{sentence[1:]}."]
+    if kind == "branch":
+        tables.append(_special(result))
+    if kind == "scatter":
+        names = fields.OUTCOME, *fields.PROBABILITY
+        rows = [(NAMES.get(name, name), *more) for name, *more in _rows(result, "/", names)]
+        tables.append(Table(rows, ("a sample is", "probability", "from", "to, with 95 %")))
+        numbers = {**{f"probability of {name}": (value, "") for name, value, *_ in rows}, **numbers}
+        if "total" in result.variables("/"):
+            head = ("parameter", "alone it makes", "with all others", "±, of the variance")
+            tables.append(Table(_rows(result, "/", (fields.SCATTERING, *fields.INDEX)), head))
     best = result.attributes.get("recommended")
     if kind == "comparison" and isinstance(best, int):
         method, step, error = (style.read_column(result, name)[best] for name in ("method", "step", "error"))
         steps = f"steps of {shown(float(step), 's')}" if np.isfinite(step) else "its own steps"
         answer = [f"Recommended: {method} with {steps}, whose error is {error:.2g}."]
-    return _plain(result, kind, answer, [Section("Picture and numbers", [drawn, Table(rows)])])
+    return _plain(result, kind, answer, drawn, [Section("Numbers", tables)], numbers)
+
+
+def _unit_of_key(result: StoredResult) -> str:
+    """The unit of the key, or of the first of the keys, along which a result was computed."""
+    keys = result.attributes.get("parameters", result.attributes.get("parameter", ""))
+    return key_unit(str(np.ravel(keys)[0]).partition(",")[0])
+
+
+def _special(result: StoredResult) -> Table:
+    """The special points of all branches."""
+    rows, groups = list[tuple[str, ...]](), [each for each in result.groups if each.endswith("/special")]
+    for group in sorted(groups, key=lambda each: (len(each), each)):  # branch_10 comes after branch_9
+        branch = group.removesuffix("/special")
+        which = f"{branch.replace('_', ' ')}, {result.group_attributes(branch).get('kind', '')}"
+        rows += [(which, *row) for row in _rows(result, group, fields.SPECIAL)]
+    return Table(rows, ("branch", "special point", "at", "error", "amplitude of x", "frequency", "why"))
+
+
+def _rows(result: StoredResult, group: str, known: Iterable[Field]) -> list[tuple[str, ...]]:
+    """The variables of a group, a row for each place along them."""
+    columns = []
+    for each in known:
+        values, missing = (
+            result.read(group, each.name).tolist(),
+            (FILL, 0.0) if each.name in _NONE_AT_0 else (FILL,),
+        )
+        units = style.unit_of(result.variables(group)[each.name].attributes)
+        columns.append(["–" if value in missing else shown(rounded(value, 5), units) for value in values])
+    if len({*map(len, columns)}) != 1:
+        raise style.unreadable(result, f"the variables of its group {group} do not fit each other")
+    return [*zip(*columns, strict=True)]
 
 
 def _plain(
-    result: StoredResult, kind: str, answer: list[str], sections: list[Section], question: str = ""
+    result: StoredResult,
+    kind: str,
+    answer: list[str],
+    drawn: Picture | None,
+    sections: list[Section],
+    numbers: Numbers,
+    question: str = "",
 ) -> Part:
     """A part with what is said of every result."""
     loaded, attributes = case_of(result), result.attributes
@@ -131,4 +216,6 @@ def _plain(
     again = repeat(result, f"brakecli {_COMMANDS[kind]} -o again.h5", given)
     sections += [Section("Case", case_blocks(loaded)), Section("How to repeat it", again)]
     title, name = str(attributes.get("title", "")) or "Result without a title", escaped(result.path.name)
-    return Part(name, title, question or _QUESTIONS[kind], answer, sections, result.versions)
+    asks, what = question or _QUESTIONS[kind], "This names the keys of such a case to change, and to which values:"
+    change = [Texts([what]), Code(_ADVISE[kind])] if kind in _ADVISE else []
+    return Part(name, title, asks, answer, drawn, change, sections, numbers, result.versions)

@@ -32,6 +32,7 @@ def write_report(results: Sequence[Path], target: Path, *, force: bool, progress
         import matplotlib.figure  # noqa: F401
     from brakecli.reports.of_run import part_of_run
     from brakecli.reports.of_sweep import part_of_other, part_of_sweep
+    from brakecli.reports.of_two import pair_of
 
     def part(stored: StoredResult) -> "Part":
         kind = str(stored.attributes.get("kind"))
@@ -43,11 +44,14 @@ def write_report(results: Sequence[Path], target: Path, *, force: bool, progress
         return part_of_sweep(stored) if kind == "sweep" else part_of_other(stored)
 
     with new_output(target, force=force) as file:
-        parts = []
+        parts, pair = [], None
         for number, result in enumerate(results):
             progress("results", number, len(results))
             with open_result(result) as stored:
                 parts.append(part(stored))
+        if len(results) == 2:
+            with open_result(results[0]) as a, open_result(results[1]) as b:
+                pair = pair_of((a, b), parts)
         script = _file("report.js")
         loader = jinja2.FunctionLoader(_file)
         environment = jinja2.Environment(
@@ -56,7 +60,7 @@ def write_report(results: Sequence[Path], target: Path, *, force: bool, progress
         environment.policies["json.dumps_kwargs"] = {"ensure_ascii": False}  # in order, and short
         digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
         page = environment.get_template("report.html").render(
-            parts=parts, script=script, digest=digest, version=__version__, mark=readings.mark()
+            parts=parts, pair=pair, script=script, digest=digest, version=__version__, mark=readings.mark()
         )
         data = page.encode()
         if len(data) >= LARGEST:

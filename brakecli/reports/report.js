@@ -43,5 +43,5 @@ for (const figure of document.querySelectorAll("figure.map")) {
   });
 }
 addEventListener("beforeprint", () => {
-  for (const each of document.querySelectorAll("details")) each.open = true;
+  for (const each of document.querySelectorAll("details:has(table)")) each.open = true;
 });

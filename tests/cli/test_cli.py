@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brakecli import __version__
+from brakecli import __released__, __version__
 from brakecli.case.read import starters
 from brakecli.solver.quantities import HISTORY
 from tests.commands import (
@@ -264,6 +264,20 @@ def test_check_reports_cost_and_limits_and_writes_nothing(tmp_path: Path) -> Non
 
 def test_the_version_is_printed() -> None:
     assert brakecli("--version", cwd=ROOT) == Done(0, f"brakecli {__version__}\n", "")
+
+
+def test_the_citation_has_version_and_year_and_says_what_its_file_says() -> None:
+    cited = brakecli("--cite", cwd=ROOT)
+    cited.told(0)
+    assert f"version = {{{__version__}}},\n  year    = {{{__released__[:4]}}}\n" in cited.out
+    assert cited.out.count("{") == cited.out.count("}")
+    of_file = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\nversion: {__version__}\ndate-released: {__released__}\n" in of_file
+    paper = re.findall(r"title: (.*)", of_file)[-1]
+    assert f"title  = {{{paper}}}" in cited.out
+    for name in ("The brakecli authors", "Koptovets", "UDC 622.625.28-592.112", "National Mining University"):
+        assert name in cited.out
+        assert name in of_file
 
 
 def test_every_command_has_help_and_a_place_in_the_documentation() -> None:

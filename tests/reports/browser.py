@@ -83,6 +83,11 @@ class Browser:
                 wrong.append(given["request"]["url"])
         return wrong
 
+    def paper(self) -> bytes:
+        """The page printed on A4, as a PDF."""
+        size = {"paperWidth": 8.27, "paperHeight": 11.69, "preferCSSPageSize": True}
+        return base64.b64decode(self.call("Page.printToPDF", printBackground=True, **size)["data"])
+
     def picture(self, path: Path) -> None:
         """A picture of the whole page."""
         found = self.call("Page.captureScreenshot", captureBeyondViewport=True)

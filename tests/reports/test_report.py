@@ -4,9 +4,10 @@ import base64
 import json
 import re
 import sys
+from collections.abc import Callable
 from html.parser import HTMLParser
 from io import BytesIO
-from itertools import product
+from itertools import pairwise, product
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +17,17 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from PIL import Image
 
+import brakecli
+from brakecli.analysis.stability.advice import KEYS
+from brakecli.analysis.stability.report import stability
 from brakecli.case.read import parse_case
-from brakecli.errors import BrakecliError, UsageError
+from brakecli.case.system import system_of
+from brakecli.errors import BrakecliError, UnreadableResultError, UsageError
+from brakecli.files.field import Field
 from brakecli.files.read import open_result
 from brakecli.files.write import new_result
 from brakecli.plots import style
-from brakecli.reports import blocks, page, sweep_map
+from brakecli.reports import blocks, of_run, of_sweep, of_two, page, sweep_map
 from brakecli.reports.page import write_report
 from brakecli.runs.advise import advise
 from brakecli.runs.run import run
@@ -35,6 +41,7 @@ from tests.reports.browser import browser
 
 HOSTILE = '</script><script>alert(1)</script><img src=x onerror=alert(2)> & "Ä"'
 COLOURS = (style.BLUE, style.ORANGE, style.VERMILION, style.GREEN, style.GREY, style.DARK)
+PAGE = re.compile(rb"/Type\s*/Page\b")  # of a PDF
 BASE = TINY.replace('"Tiny"', json.dumps(HOSTILE))
 
 
@@ -50,6 +57,7 @@ class Page(HTMLParser):
         self.found: list[tuple[str, dict[str, str | None]]] = []
         self.texts: list[str] = []
         self.scripts: list[str] = []
+        self.html = text
         self.feed(text)
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
@@ -67,10 +75,33 @@ class Page(HTMLParser):
         return [json.loads(text) for text in self.scripts if text.startswith("{")]
 
 
+def rows(html: str) -> list[tuple[bool, list[str]]]:
+    """The cells of each row of all tables, and whether the row is marked."""
+    found = re.findall(r"<tr( class=\"differs\")?>(.*?)</tr>", html, re.DOTALL)
+    cells = [re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", inner, re.DOTALL) for _, inner in found]
+    texts = [
+        ["".join(re.sub("<wbr>", "", cell).split("\n")).replace("\u00a0", " ") for cell in row] for row in cells
+    ]
+    return [(bool(mark), row) for (mark, _), row in zip(found, texts, strict=True)]
+
+
 def reported(*results: Path) -> Page:
     target = results[0].with_suffix(".html")
     write_report(results, target, force=True, progress=quiet)
     return Page(target.read_text(encoding="utf-8"))
+
+
+@pytest.fixture
+def plain(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pages whose pictures are drawn, but not painted, for tests that look at something else."""
+
+    def picture(words: str, draw: Callable[[], Figure]) -> blocks.Picture:
+        if words == of_two.PICTURE:  # it is not known beforehand whether there is one
+            draw()
+        return blocks.Picture(words, "data:,wide", "data:,narrow")
+
+    for module in (of_run, of_sweep, of_two):
+        monkeypatch.setattr(module, "picture", picture)
 
 
 @pytest.fixture(scope="module")
@@ -123,11 +154,11 @@ def test_a_report_of_a_run_answers_first_and_holds_all_that_is_promised(results:
     text = " ".join(" ".join(found.texts).split())
     with open_result(results[0]) as stored:
         attributes, evidence = dict(stored.attributes), stored.group_attributes("regime/evidence")
-    answer = text[text.index("Will this shoe vibrate") : text.index(" Case ")]
+    answer = text[text.index("Will this shoe vibrate") : text.index(" What to change ")]
     assert attributes["reasons"][0] in answer
     assert advise(parse_case(BASE, "case"), ("*.angle_deg",), 0.2, quiet).conclusion().split(";")[0] in answer
-    heads = ["Case", "Stability of steady sliding", "Regime, and its evidence", "Pictures", "Accuracy", "Warnings"]
-    places = [text.index(f" {head} ") for head in (*heads, "How to repeat it", "Versions")]
+    heads = ["What to change", "Appendix", "Case", "Stability of steady sliding", "Regime, and its evidence"]
+    places = [text.index(f" {head} ") for head in (*heads, "Accuracy", "Warnings", "How to repeat it", "Versions")]
     assert places == sorted(places)
     assert [name for name in evidence if name.replace("_", " ") not in text] == []
     for version in ("brakecli", "numpy", "scipy", "numba", "h5py", "hdf5"):
@@ -136,7 +167,134 @@ def test_a_report_of_a_run_answers_first_and_holds_all_that_is_promised(results:
     assert "critical friction for 1 % more" in text
 
 
-def test_what_a_scene_does_not_require_is_no_warning(tmp_path: Path, compiled: None) -> None:
+def test_the_first_page_has_question_answer_one_picture_and_what_to_change(
+    results: list[Path], found: Page
+) -> None:
+    first, appendix = found.html.split('<div class="appendix">')[:2]
+    places = [first.index(part) for part in ('class="answer"', "Will this shoe", "<figure>", "What to change")]
+    assert places == sorted(places)
+    assert first.count("<figure>") == 1
+    with open_result(results[0]) as stored:
+        report = advise(parse_case(stored.text("resolved_toml"), "case"), KEYS, 0.2, quiet)
+    helpful = [each for each in report.advice if each.to is not None]
+    assert len(helpful) > of_run.MOST_CHANGES
+    names = [each.parameter for each in helpful[: of_run.MOST_CHANGES]]
+    assert [cells[0] for _, cells in rows(first)] == ["what to change", *names]
+    assert {each.parameter for each in report.advice} <= {cells[0] for _, cells in rows(appendix)}
+
+
+def test_headings_are_in_order_and_each_picture_is_there_once_for_those_who_do_not_see_it(found: Page) -> None:
+    levels = [int(tag[1]) for tag, _ in found.found if tag in ("h1", "h2", "h3")]
+    assert levels[0] == 1
+    assert all(after <= before + 1 for before, after in pairwise(levels))
+    looks = [image["class"] for image in found.named("img")]  # of which a browser shows one
+    assert looks == ["of-wide", "narrow"] * (len(looks) // 2)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ("friction.coefficient=0.3", "Nothing has to be changed; stable up to 0.575"),
+        ("wheel.angular_speed=0.0", "No change is known; the wheel stands"),
+    ],
+)
+def test_without_advice_the_first_page_says_so(
+    change: str, words: str, tmp_path: Path, compiled: None, plain: None
+) -> None:
+    run(parse_case(TINY, "case", [change, "solver.duration=0.5"]), tmp_path / "r.h5", force=False)
+    assert words in " ".join(reported(tmp_path / "r.h5").texts)
+
+
+def test_advice_that_would_take_long_is_left_to_the_command(
+    results: list[Path], plain: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(of_run, "MOST_SECONDS", -1.0)
+    assert "What to change is left out: `brakecli advise` takes about" in reported(results[0]).html
+
+
+def test_two_runs_stand_beside_each_other_and_what_differs_is_marked(
+    tmp_path: Path, compiled: None, plain: None
+) -> None:
+    for name, changes in {"a": [], "b": ["friction.coefficient=0.3", "shoe.mass=12.0"]}.items():
+        run(parse_case(TINY, "case", changes), tmp_path / f"{name}.h5", force=False)
+    both = reported(tmp_path / "a.h5", tmp_path / "b.h5")
+    beside = both.html[: both.html.index('<article id="part-1">')]
+    assert re.findall(r"<h2>(.: ..h5)</h2>", beside) == ["A: a.h5", "B: b.h5"]
+    assert beside.count("By theory: ") == 2
+    assert beside.count("<figure>") == 1
+    found = {cells[0]: (marked, cells[1:]) for marked, cells in rows(beside)}
+    assert found["friction.coefficient"] == (True, ["0.6", "0.3", "−50 %"])  # 0.3 / 0.6 - 1
+    assert found["shoe.mass"] == (True, ["10 kg", "12 kg", "+20 %"])
+    assert found["lost contact"] == (False, ["0", "0", "same"])
+    for number, name in enumerate("ab"):
+        with open_result(tmp_path / f"{name}.h5") as stored:
+            torque, regime = (stored.attributes[each] for each in ("braking_torque", "regime"))
+        assert found["braking torque"][1][number] == f"{torque:.4g} N m"
+        assert found["regime"][1][number] == regime
+    assert all(marked == (cells[-1] not in ("same", "B against A")) for marked, cells in rows(beside))
+    alone = reported(tmp_path / "a.h5", tmp_path / "a.h5")
+    assert "The cases are the same" in " ".join(alone.texts)
+    assert not any(marked for marked, _ in rows(alone.html))
+
+
+def test_two_results_are_compared_by_curves_or_by_a_picture_of_each(
+    results: list[Path], tmp_path: Path, plain: None
+) -> None:
+    def pictures(*names: str) -> int:
+        html = reported(*(tmp_path / f"{name}.h5" for name in names)).html
+        return html[: html.index('<article id="part-1">')].count("<figure>")
+
+    for name in "ab":
+        write(tmp_path / f"{name}.h5", {"axis": [ANGLE], "critical": CRITICAL}, **origin())
+        write(tmp_path / f"{name}{name}.h5", {"axis": [ANGLE, SPEED]}, **origin())
+    assert (pictures("a", "b"), pictures("aa", "bb")) == (1, 2)
+    assert pictures("a", "b", "aa") == 0  # of more than two each is alone
+    assert "What differs" not in reported(*results[:2]).html  # nor are results of two kinds compared
+
+
+def test_branches_have_a_sentence_a_picture_and_their_special_points(
+    tmp_path: Path, compiled: None, plain: None
+) -> None:
+    (tmp_path / "c.toml").write_text(TINY)
+    tree = brakecli.branch(
+        tmp_path / "c.toml", parameter={"friction.coefficient": (0.5, 0.8)}, output=tmp_path / "r.h5"
+    )
+    page = reported(tmp_path / "r.h5")
+    assert f"<p>S{tree.attrs['sentence'][1:]}.</p>" in page.html  # in the answer
+    assert page.html.count("<figure>") == 1
+    assert "of the key" not in page.html
+    critical = stability(system_of(parse_case(TINY, "case").case)).critical
+    assert critical is not None
+    flutter = [cells for _, cells in rows(page.html) if cells[1:2] == ["flutter"]]
+    assert [cells[0] for cells in flutter] == ["branch 0, steady sliding", "branch 1, limit cycle"]
+    assert {cells[2] for cells in flutter} == {f"{critical.friction:.5g}"}
+    assert flutter[0][4] == "–"  # no motion has an amplitude there
+
+
+def test_a_table_whose_columns_do_not_fit_each_other_is_refused(tmp_path: Path) -> None:
+    with new_result(tmp_path / "r.h5", force=False) as result:
+        known = [Field(name, "1", name) for name in ("parameter", "total")]
+        for each, size in zip(known, (2, 3), strict=True):
+            result.variable("/", each, (each.name,), np.ones(size))
+        result.commit()
+    with open_result(tmp_path / "r.h5") as stored, pytest.raises(UnreadableResultError, match="do not fit"):
+        of_sweep._rows(stored, "/", known)
+
+
+def test_scatter_has_its_probabilities_as_a_table(tmp_path: Path, compiled: None, plain: None) -> None:
+    (tmp_path / "c.toml").write_text(TINY)
+    study = '[[parameter]]\nkey = "link2.angle_deg"\ndistribution = "uniform"\nlow = 4.0\nhigh = 6.0\n'
+    (tmp_path / "s.toml").write_text(f'case = "c.toml"\nmethod = "eigenvalue"\nsamples = 64\n{study}')
+    found = brakecli.scatter(tmp_path / "s.toml", output=tmp_path / "r.h5")
+    page = reported(tmp_path / "r.h5")
+    squeal = [cells for _, cells in rows(page.html) if cells[0] == "squeal"]
+    of = {"outcome": "squeal"}
+    names = "probability", "probability_lower", "probability_upper"
+    assert squeal == [["squeal", *(f"{float(found[name].sel(of)):.5g}" for name in names)]]
+    assert "brakecli advise CASE.toml --scatter STUDY.toml" in page.html
+
+
+def test_what_a_scene_does_not_require_is_no_warning(tmp_path: Path, compiled: None, plain: None) -> None:
     loaded = parse_case((ROOT / "cases" / "damped.toml").read_text(encoding="utf-8"), "case")
     left_out = run(loaded, tmp_path / "r.h5", force=False).left_out
     assert left_out
@@ -166,7 +324,7 @@ def test_a_map_of_too_many_points_is_a_picture_alone(tmp_path: Path, monkeypatch
     axes = [{**ANGLE, "num": 4}, {"parameter": "wheel.radius", "start": 0.1, "stop": 1.0, "num": 4}]
     alone = reported(write(tmp_path / "r.h5", {"axis": axes}, **origin()))
     assert alone.data == []
-    assert len(alone.named("img")) == 1
+    assert len(alone.named("img")) == 2  # for wide and for narrow screens
     assert "Values of single points are left out" in "".join(alone.texts)
 
 
@@ -226,8 +384,11 @@ def test_a_browser_shows_the_page_at_any_width_without_a_mouse_and_on_paper(
         for width in (400, 1600):
             window.open(target, width)
             assert window.complaints() == []
-            images = window.run("[...document.images].map(i => [i.complete, i.naturalWidth, i.width])")
+            shown = "[...document.images].filter(i => i.offsetParent)"
+            images = window.run(f"{shown}.map(i => [i.complete, i.naturalWidth, i.width])")
             assert len(images) == 2 * 2 + 3
+            wanted = "narrow" if width == 400 else "of-wide"
+            assert set(window.run(f"{shown}.map(i => i.className)")) == {wanted}
             assert all(complete and natural > 500 and 300 < shown <= width for complete, natural, shown in images)
             assert window.run("document.documentElement.scrollWidth") <= width
             letters = "parseFloat(getComputedStyle(document.querySelector('p')).fontSize)"
@@ -247,6 +408,11 @@ def test_a_browser_shows_the_page_at_any_width_without_a_mouse_and_on_paper(
         x, y = window.run(f"(b => [b.left + 0.3 * b.width, b.top + 0.3 * b.height])({box})")
         window.call("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
         assert f"regime {expected['regime'][1, 1]}" not in window.run(values)
-        paper = window.call("Page.printToPDF", printBackground=True)["data"]
-        assert len(paper) > 100_000
         assert window.complaints() == []
+        for name in ("relaxation", "run"):
+            result = tmp_path / "relaxation.h5" if name == "relaxation" else results[0]
+            write_report([result], target, force=True, progress=quiet)
+            window.open(target, 1600)
+            assert 2 <= len(PAGE.findall(window.paper())) <= 6
+            assert window.run("document.querySelectorAll('details[open]:has(table)').length") == 2
+            assert window.run("document.querySelectorAll('details[open]:has(pre)').length") == 0
