@@ -39,6 +39,7 @@ _CRITICAL = (
     *("critical_status", "critical", "critical_lower", "critical_upper", "critical_error"),
     *("critical_eigenvalue", "critical_sustained", "sustained_status"),
 )
+FORCED_PART = "amplitude_forced"
 _WINDOWS = ("critical_windows_lower", "critical_windows_upper")
 _FIRST = (*map(str, REGIMES), "by simulation", "with its error bar", "by eigenvalues")  # in the legend
 _WIDE = 20.0  # ratio of lasting amplitudes from which on their scale is logarithmic
@@ -237,7 +238,7 @@ def _variables(result: StoredResult, sweep: Sweep, shown: str, more: Sequence[st
         margin = margins(Plan(result.text("resolved_sweep_toml"), base)) if sweep.critical is None else None
     if margin is not None and margin.size == np.prod(shape[1:]):
         variables[MARGIN] = np.broadcast_to(margin.reshape(shape[1:]), shape)
-    for name in {shown, *more} - {"", *variables}:
+    for name in {shown, *more, *({FORCED_PART} & {*known})} - {"", *variables}:
         values = read(name)
         nothing = np.nan if values.dtype.kind in "if" else ""
         variables[name] = np.where(variables["status"] == Status.DONE, values, nothing)
