@@ -6,6 +6,8 @@ that all files have in common, `docs/regimes.md` the evidence, and `docs/stabili
 stability, which have the attributes of their classes.
 """
 
+from dataclasses import replace
+
 from brakecli.files.field import Field, integer, named, ratio, within
 from brakecli.solver.quantities import HISTORY as QUANTITIES
 from brakecli.solver.quantities import TIME
@@ -224,6 +226,18 @@ CRITICAL = (
 )
 """Numbers have the unit of the parameter that is looked for."""
 DIFFERENCE = (integer("hysteresis", "whether the motions on the way up and down differ (0, 1)"),)
+STARTS = (integer("attractor", "number of the attractor that the point comes to, 0 if undecided"),)
+ATTRACTOR = (
+    integer("attractor", "number of the attractor"),
+    *(replace(each, at="") for each in named(VERDICT, "regime", "excitation", "frequency")),
+    Field("amplitude", "m", "half of peak to peak of x; 0 in steady sliding", label="amplitude of x"),
+    ratio("stick_fraction", "part of the time in stick"),
+    ratio("contact_loss_fraction", "part of the time without contact"),
+    integer("points", "number of points that come to it"),
+    ratio("share", "part of the points that come to it", "share.value"),
+    ratio("share_lower", "lower end of its 95 % interval", "share.lower"),
+    ratio("share_upper", "upper end", "share.upper"),
+)
 DIRECTION = Field("direction", "", "direction in which the motion was followed", TEXT)
 WINDOW = Field("window", "1", "number of an interval of instability, from 0")
 BASE_POINT = Field("point", "1", "the base case")
@@ -235,6 +249,15 @@ SWEEP = (
     Field("failures", "", "first 100 failures, with parameters and reason", OBJECT, "findings.", in_file=False),
     integer("resumed_points", "number of points that an earlier run had finished", "resumed", in_file=False),
     Field("regimes", "", "number of points of each regime", OBJECT, at="findings.", in_file=False),
+    Field(
+        "attractors",
+        "",
+        "of a sweep over initial states: what its points come to; null for others",
+        OBJECT,
+        at="findings.attractors",
+        in_file=False,
+        rows=ATTRACTOR,
+    ),
     Field("dimensions", "", "names of the dimensions", OBJECT, at="findings.", in_file=False),
     Field("axes", "", "parameters and values along each axis", OBJECT, in_file=False),
     Field("seconds", "s", "time of the command", in_file=False),

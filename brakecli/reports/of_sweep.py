@@ -88,6 +88,7 @@ def _answer(found: SweepPicture) -> Iterator[str]:
     else:
         none = int(size - np.isfinite(values).sum())
         yield f"A critical value is found at {size - none} of {size} points."
+    yield from (f"Attractor {each}." for each in found.attractors)
     if np.isfinite(values).any():
         place = np.unravel_index(end(values), values.shape)
         where = ", ".join(axis.named(int(at)) for axis, at in zip(found.axes, place[1:], strict=True))
