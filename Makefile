@@ -23,7 +23,7 @@ POINTS ?=
 .DELETE_ON_ERROR:
 .NOTPARALLEL: # two installations into one .venv at a time would collide
 .PHONY: help demo test campaign lowest lint format types imports derivations tables docs cases check \
-    accuracy promises promise-cost statistics picture lock-in branch-picture scatter-picture loop-picture regime-pictures paper extremes bench bench-sweep bench-million bench-contact bench-branch clean
+    accuracy promises promise-cost statistics picture lock-in branch-picture scatter-picture loop-picture basin-picture regime-pictures paper extremes bench bench-sweep bench-million bench-contact bench-branch clean
 
 help: ## list the targets (this text)
 	@echo "make TARGET, where TARGET is one of"
@@ -161,6 +161,13 @@ loop-picture: $(DEV_STAMP) ## draw docs/loop.png, from the starter of branches, 
 	$(BIN)/brakecli new branch --output results/branch.toml --force --quiet
 	$(BIN)/brakecli sweep docs/loop.toml --force --quiet -o results/loop.h5
 	$(BIN)/brakecli plot results/loop.h5 --select solver.duration=200 --force --output docs/loop.png
+
+basin-picture: $(DEV_STAMP) ## draw docs/basin.png: which starts of the same shoe lead to vibration
+	@mkdir -p results
+	$(BIN)/brakecli new branch --output results/branch.toml --force --quiet
+	$(BIN)/brakecli sweep docs/basin.toml --force --quiet -o results/basin.h5 \
+	    --set 'initial.at="equilibrium"' --set solver.duration=40
+	$(BIN)/brakecli plot results/basin.h5 --force --output docs/basin.png
 
 regime-pictures: $(DEV_STAMP) ## draw docs/regimes-*.png, an example of each verdict; fails where a verdict has changed (a minute)
 	$(BIN)/python docs/regime_pictures.py

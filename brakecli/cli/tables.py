@@ -9,7 +9,7 @@ import numpy as np
 
 from brakecli.errors import escaped
 from brakecli.files import fields
-from brakecli.files.field import Field, named
+from brakecli.files.field import Field, named, values_of
 from brakecli.solver.contact import EVALUATORS
 from brakecli.solver.quantities import COEFFICIENTS
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:  # what one command prints need not wait for the modules of th
     from brakecli.comparison.result import ComparisonReport
     from brakecli.runs.limits import Check
     from brakecli.runs.run import RunReport
+    from brakecli.sweeps.attractors import Attractor
     from brakecli.sweeps.cost import Estimate
     from brakecli.sweeps.result import SweepReport
 
@@ -24,6 +25,7 @@ POINTS = named(fields.POINT, "regime", "frequency", "amplitude")
 CRITICAL_NAMES = ("critical", "critical_error", "critical_eigenvalue", "critical_sustained", "critical_status")
 CRITICAL_POINTS = (*named(fields.POINT, "regime"), *named(fields.CRITICAL, *CRITICAL_NAMES))
 IF_KNOWN = (
+    "amplitude_first",
     "forced_frequency",
     "growth_rate",
     "ringing_frequency",
@@ -203,8 +205,24 @@ def sweep_table(report: SweepReport) -> str:
         ("time", text_of(report.seconds, "s", ".3g") + cost),
         ("file", str(report.output)),
     ]
-    listed = _points_table(report) + "\n\n" if found.points <= MOST_LISTED_POINTS else ""
-    return listed + two_columns(report.loaded.title, rows)
+    listed = [_points_table(report)] if found.points <= MOST_LISTED_POINTS else []
+    listed += [_attractors_table(found.attractors)] if found.attractors else []
+    return "\n\n".join([*listed, two_columns(report.loaded.title, rows)])
+
+
+def _attractors_table(found: Iterable[Attractor]) -> str:
+    """What the points of a sweep over initial states come to."""
+    each = [values_of(fields.ATTRACTOR, one) for one in found]
+    return grid(
+        {
+            "attractor": [str(one["attractor"]) for one in each],
+            "regime": [one["regime"] for one in each],
+            "Hz": [text_of(one["frequency"], form=".5g") for one in each],
+            "amplitude of x, m": [text_of(one["amplitude"], form=".5g") for one in each],
+            "share": [f"{one['share']:.1%}" for one in each],
+            "95 % interval": [f"{one['share_lower']:.1%} to {one['share_upper']:.1%}" for one in each],
+        }
+    )
 
 
 def _points_table(report: SweepReport) -> str:
@@ -224,9 +242,10 @@ def _points_table(report: SweepReport) -> str:
             for key, column in zip(plan.listed.keys, plan.listed.columns, strict=True)
         }
     known = POINTS if found.critical is None else CRITICAL_POINTS
+    known += fields.STARTS if found.attractors is not None else ()
     for field in known:
         values = np.ravel(np.array((found.variables or {})[field.name], object))
-        header = f"{field.title}, {field.units}" if field.units else field.title
+        header = f"{field.title}, {field.units}" if field.units.strip("1") else field.title
         columns[header] = [text_of(value, form=".2g" if field.title == "±" else ".5g") for value in values]
     return grid(columns, len(columns) - len(known))
 

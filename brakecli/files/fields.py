@@ -6,6 +6,8 @@ that all files have in common, `docs/regimes.md` the evidence, and `docs/stabili
 stability, which have the attributes of their classes.
 """
 
+from dataclasses import replace
+
 from brakecli.files.field import Field, integer, named, ratio, within
 from brakecli.solver.quantities import HISTORY as QUANTITIES
 from brakecli.solver.quantities import TIME
@@ -28,7 +30,13 @@ VERDICT = within(
         "where the motion is linear: growth rate of its slowest mode, slopes of passing waves included",
     ),
     Field("ringing_frequency", "Hz", "frequency of that mode"),
-    Field("amplitude", "m", "half of peak to peak of x: median of the cycles", label="amplitude of x"),
+    Field(
+        "amplitude",
+        "m",
+        "half of peak to peak of x: median of the cycles; where it dies out, of the last tenth of the run",
+        label="amplitude of x",
+    ),
+    Field("amplitude_first", "m", "of a damped motion: half of peak to peak of x in the first tenth of the run"),
     Field("amplitude_spread", "m", "by which the amplitude varies or drifts; missing if unknown"),
     Field("amplitude_forced", "m", "on a rough wheel: what the roughness forces"),
     Field("amplitude_own", "m", "on a rough wheel: what the shoe adds"),
@@ -200,7 +208,8 @@ POINT = (
     Field("reason", "", "why the regime is as it is, or why the point failed", SENTENCE),
     Field("warning", "", "first warning of the run, empty if there is none", SENTENCE),
     integer("warning_count", "number of warnings"),
-    *named(RUN, "regime", "excitation", "frequency", "amplitude", "stick_fraction", "contact_loss_fraction"),
+    *named(RUN, "regime", "excitation", "frequency", "amplitude", "amplitude_first"),
+    *named(RUN, "amplitude_forced", "amplitude_own", "stick_fraction", "contact_loss_fraction"),
     *named(RUN, "mean_friction_force", "braking_torque", "settled", "settled_from"),
     *named(RUN, "steps", "contact_evaluations", "unconverged_steps", "estimated_error"),
 )
@@ -224,6 +233,18 @@ CRITICAL = (
 )
 """Numbers have the unit of the parameter that is looked for."""
 DIFFERENCE = (integer("hysteresis", "whether the motions on the way up and down differ (0, 1)"),)
+STARTS = (integer("attractor", "number of the attractor that the point comes to, 0 if undecided"),)
+ATTRACTOR = (
+    integer("attractor", "number of the attractor"),
+    *(replace(each, at="") for each in named(VERDICT, "regime", "excitation", "frequency")),
+    Field("amplitude", "m", "half of peak to peak of x; 0 in steady sliding", label="amplitude of x"),
+    ratio("stick_fraction", "part of the time in stick"),
+    ratio("contact_loss_fraction", "part of the time without contact"),
+    integer("points", "number of points that come to it"),
+    ratio("share", "part of the points that come to it", "share.value"),
+    ratio("share_lower", "lower end of its 95 % interval", "share.lower"),
+    ratio("share_upper", "upper end", "share.upper"),
+)
 DIRECTION = Field("direction", "", "direction in which the motion was followed", TEXT)
 WINDOW = Field("window", "1", "number of an interval of instability, from 0")
 BASE_POINT = Field("point", "1", "the base case")
@@ -235,6 +256,15 @@ SWEEP = (
     Field("failures", "", "first 100 failures, with parameters and reason", OBJECT, "findings.", in_file=False),
     integer("resumed_points", "number of points that an earlier run had finished", "resumed", in_file=False),
     Field("regimes", "", "number of points of each regime", OBJECT, at="findings.", in_file=False),
+    Field(
+        "attractors",
+        "",
+        "of a sweep over initial states: what its points come to; null for others",
+        OBJECT,
+        at="findings.attractors",
+        in_file=False,
+        rows=ATTRACTOR,
+    ),
     Field("dimensions", "", "names of the dimensions", OBJECT, at="findings.", in_file=False),
     Field("axes", "", "parameters and values along each axis", OBJECT, in_file=False),
     Field("seconds", "s", "time of the command", in_file=False),

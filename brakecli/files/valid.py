@@ -38,7 +38,7 @@ _ATTRIBUTES = {
     ("branch", "/branch_*"): fields.ONE_BRANCH,
     ("scatter", "/"): fields.SCATTER,
 }
-_VARIABLES = {  # the first of a kind, of a sweep its status, has the length of all
+_VARIABLES = {  # the first of a kind has the length of all
     ("run", "history"): fields.HISTORY,
     ("run", "spectrum"): (fields.FREQUENCY, *fields.SPECTRUM.values()),
     ("run", "unconverged"): fields.UNCONVERGED,
@@ -46,7 +46,14 @@ _VARIABLES = {  # the first of a kind, of a sweep its status, has the length of 
     ("run", "over_time"): (fields.WINDOW_TIME, *fields.OVER_TIME),
     ("run", "spectrogram"): (fields.WINDOW_TIME, fields.FREQUENCY, fields.SHORT_TIME),
     ("run", "vibrations"): (fields.INTERVAL, *fields.VIBRATION),
-    ("sweep", "/"): (*fields.POINT, *fields.CRITICAL, *fields.DIFFERENCE, fields.DIRECTION),
+    ("sweep", "/"): (
+        *fields.POINT,
+        *fields.CRITICAL,
+        *fields.STARTS,
+        *fields.DIFFERENCE,
+        fields.DIRECTION,
+    ),
+    ("sweep", "attractors"): fields.ATTRACTOR,
     ("comparison", "/"): (fields.ENTRY_PLACE, *fields.ENTRY),
     ("stability", "/"): (*fields.VARIED, *fields.MODES),
     ("branch", "branch_*"): fields.BRANCH_POINT,
@@ -87,7 +94,7 @@ def check_variables(file: h5py.File, kind: str, length: int) -> None:
             if not isinstance(node, h5py.Dataset) or node.ndim == 0 or node.dtype.kind not in kinds:
                 raise ValueError(f"{where} is not what belongs there: {field.meaning}")
             check_size(node, length, where)
-            axis = declared[0].name if kind != "sweep" else "status"
+            axis = declared[0].name
             own = shape_of(node)
             shape = shape_of(found[axis][1]) if axis in found and field is not fields.FREQUENCY else own
             if kind == "sweep" and field in (fields.DIRECTION, *fields.DIFFERENCE):

@@ -102,7 +102,9 @@ def _draw_motion(axes: Axes, picture: SweepPicture, name: str) -> None:
     wide = wide and name == "amplitude"  # drawn on a logarithmic axis
     least = max(lasting / 30.0, float(values[values > 0.0].min())) if wide else 0.0
     x, size, small = axis.values, _size(axis.values), values < least
-    shaken = picture["excitation"] == Excitation.FORCED
+    shaken, none = picture["excitation"] == Excitation.FORCED, np.full_like(values, np.nan)
+    forced = picture.variables.get(sweep.FORCED_PART, none) if name == "amplitude" else none
+    forced = np.where(forced >= least, forced, np.nan)  # beside what the shoe adds
     for number, direction in enumerate(picture.directions):
         y = factor * np.where(small[number], np.nan, values[number])
         arrow, dashes = _DIRECTIONS[direction]
@@ -116,9 +118,10 @@ def _draw_motion(axes: Axes, picture: SweepPicture, name: str) -> None:
             axes.plot(x[chosen], y[chosen], marker=arrow or marker, ms=size, **points)
             if (picture["regime"] == regime).any():  # for the legend
                 axes.plot([], [], marker="s" if direction else marker, ms=7, label=str(regime), **points)
-        if (seen := shaken[number] & np.isfinite(y)).any():
-            axes.plot(x[seen], y[seen], "o", color=style.DARK, ms=0.4 * size, mec="white", mew=0.5)
-    if shaken.any():
+        waves = np.where(shaken[number], y, factor * forced[number])
+        if (seen := np.isfinite(waves)).any():
+            axes.plot(x[seen], waves[seen], "o", color=style.DARK, ms=0.4 * size, mec="white", mew=0.5)
+    if shaken.any() or np.isfinite(forced).any():
         axes.plot([], [], "o", ms=3, color=style.DARK, label=sweep.FORCED)
     for place in np.flatnonzero(picture["hysteresis"][0]):  # `style.labels` names the first alone
         span = axis.edges[place : place + 2]

@@ -5,6 +5,7 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap, LogNorm, Normalize
@@ -17,6 +18,7 @@ from brakecli.plots import style, sweep
 from brakecli.plots.sweep import Sign, SweepPicture
 from brakecli.sweeps.point import Status
 
+_MOST_NAMED = 12  # attractors in the legend: the first of them
 _LONG_TITLE = 34  # characters of a panel's title from which on it takes two lines
 _MAP_WIDTH, _PANEL_WIDTH = 10.4, 3.0  # inches, of a figure with two columns of maps, and of each of more maps
 _MOST_NUMBERS, _LEAST_CELL = 80, 0.5  # cells with a number, and how wide they must be (inches)
@@ -41,7 +43,8 @@ def draw(picture: SweepPicture) -> Figure:
     draw_shown = _draw_critical if shown == "critical" else partial(_draw_numbers, name=shown)
     layers: dict[str, Callable[[Axes, SweepPicture, Scale], ScalarMappable]]
     layers = {"" if critical else shown.replace("_", " ").capitalize(): draw_shown}
-    layers = layers if critical else {"Regime": _draw_regimes, **layers}
+    starts = {"Attractor": _draw_attractors} if picture.attractors else {"Regime": _draw_regimes}
+    layers = layers if critical else {**starts, **layers}
     if sliced:
         pieces = slices(picture)
         width, height = max(_MAP_WIDTH, 1.2 + _PANEL_WIDTH * len(pieces)), 4.6 if critical else 7.2
@@ -125,6 +128,20 @@ def _draw_regimes(axes: Axes, picture: SweepPicture, _: Scale) -> ScalarMappable
             axes.contour(x.values, y.values, margin, [0.0], **look)
             axes.plot([], [], color="black", lw=1.8, ls=style.DASHES, label=sweep.CRITICAL_LINE)
     return mesh
+
+
+def _draw_attractors(axes: Axes, picture: SweepPicture, _: Scale) -> ScalarMappable:
+    """A colour for each attractor, the darker the larger its number: they are told apart in grey as well."""
+    numbers, count = picture[sweep.ATTRACTOR], len(picture.attractors)
+    colours = ListedColormap(colormaps["cividis_r"](np.linspace(0.05, 0.95, count)))
+    for number, label in enumerate(picture.attractors[:_MOST_NAMED]):
+        axes.plot([], [], "s", ms=9, mfc=colours(number), mec="none", label=label)
+    open_ = {"marker": "x", "color": style.DARK, "label": "no attractor known"}
+    nothing = (numbers == 0) & (picture["status"] == Status.DONE)
+    values = np.where(numbers > 0, numbers, np.nan)
+    return _mesh(
+        axes, picture, values, (nothing, open_), picture.failed(), cmap=colours, vmin=0.5, vmax=count + 0.5
+    )
 
 
 def _draw_numbers(axes: Axes, picture: SweepPicture, scale: Scale, name: str) -> ScalarMappable:

@@ -131,9 +131,9 @@ def labels(figure: Figure) -> dict[str, Any]:
     return found
 
 
-def read_column(result: StoredResult, name: str) -> Array:
-    """A variable of the root; missing numbers are NaN."""
-    values = result.read("/", name)
+def read_column(result: StoredResult, name: str, group: str = "/") -> Array:
+    """A variable of a group; missing numbers are NaN."""
+    values = result.read(group, name)
     return np.where(values == FILL, np.nan, values) if values.dtype.kind == "f" else values
 
 

@@ -39,6 +39,7 @@ _CRITICAL = (
     *("critical_status", "critical", "critical_lower", "critical_upper", "critical_error"),
     *("critical_eigenvalue", "critical_sustained", "sustained_status"),
 )
+FORCED_PART, ATTRACTOR = "amplitude_forced", "attractor"
 _WINDOWS = ("critical_windows_lower", "critical_windows_upper")
 _FIRST = (*map(str, REGIMES), "by simulation", "with its error bar", "by eigenvalues")  # in the legend
 _WIDE = 20.0  # ratio of lasting amplitudes from which on their scale is logarithmic
@@ -64,6 +65,7 @@ class SweepPicture:
     long_names: Mapping[str, str]
     critical: Critical | None
     shown: str = ""  # the variable that is asked for
+    attractors: tuple[str, ...] = ()  # of a sweep over initial states: what each is, in words
 
     def __getitem__(self, name: str) -> style.Array:
         """A variable."""
@@ -200,6 +202,8 @@ def gather(
     picture = SweepPicture(
         title, findings, (), ways, tuple(axes), variables, units, long_names, sweep.critical, shown
     )
+    if ATTRACTOR in known:
+        picture = replace(picture, attractors=tuple(_attractors(result)))
     for wanted in select:  # findings about the whole sweep need not hold for a part of it
         picture = replace(_selected(picture, wanted, result), findings=())
     for axis in picture.axes:
@@ -237,7 +241,7 @@ def _variables(result: StoredResult, sweep: Sweep, shown: str, more: Sequence[st
         margin = margins(Plan(result.text("resolved_sweep_toml"), base)) if sweep.critical is None else None
     if margin is not None and margin.size == np.prod(shape[1:]):
         variables[MARGIN] = np.broadcast_to(margin.reshape(shape[1:]), shape)
-    for name in {shown, *more} - {"", *variables}:
+    for name in {shown, *more, *({FORCED_PART, ATTRACTOR} & {*known})} - {"", *variables}:
         values = read(name)
         nothing = np.nan if values.dtype.kind in "if" else ""
         variables[name] = np.where(variables["status"] == Status.DONE, values, nothing)
@@ -246,6 +250,17 @@ def _variables(result: StoredResult, sweep: Sweep, shown: str, more: Sequence[st
     differ = result.read("/", "hysteresis") == 1 if both and "hysteresis" in known else False
     variables["hysteresis"] = np.broadcast_to(differ, shape)
     return variables
+
+
+def _attractors(result: StoredResult) -> Iterator[str]:
+    """Number, regime, frequency, amplitude and share of each attractor."""
+    names = ("regime", "frequency", "amplitude", "share")
+    columns = (style.read_column(result, name, "attractors").tolist() for name in names)
+    for number, (regime, frequency, amplitude, share) in enumerate(zip(*columns, strict=True), start=1):
+        factor, unit = style.prefixed(amplitude, "m")
+        tone = f", {frequency:.4g} Hz" if np.isfinite(frequency) else ""
+        size = f", {factor * amplitude:.3g} {unit}" if amplitude else ""
+        yield f"{number}: {regime}{tone}{size}, {share:.1%} of the points"
 
 
 def numeric(result: StoredResult) -> list[str]:

@@ -120,6 +120,7 @@ def _answer(found: SweepPicture) -> tuple[list[str], Numbers]:
         there = int(np.isfinite(values).sum())
         said = [f"A critical value is found at {there} of {size} points."]
         numbers["with a critical value"] = there, "1"
+    said += (f"Attractor {each}." for each in found.attractors)
     if np.isfinite(values).any():
         place = np.unravel_index(end(values), values.shape)
         where = ", ".join(axis.named(int(at)) for axis, at in zip(found.axes, place[1:], strict=True))

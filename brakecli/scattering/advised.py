@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from brakecli.analysis.probability import Probability
 from brakecli.analysis.stability.advice import Change, Left
 from brakecli.case.read import LoadedCase
 from brakecli.errors import CaseError
 from brakecli.runs.advise import AdviceReport
-from brakecli.scattering.answers import Probability
 from brakecli.scattering.draw import drawn
 from brakecli.scattering.eigen import ask, asking
 from brakecli.scattering.scatter import squeals

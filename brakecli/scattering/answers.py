@@ -1,47 +1,16 @@
-"""What samples say: probabilities with 95 % intervals, distributions, Sobol indices."""
+"""What samples say: distributions and Sobol indices."""
 
-import math
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
+from brakecli.analysis.probability import LEVEL
 from brakecli.solver.compile import Floats
 
-LEVEL = 0.95
 SHARES = (0.05, 0.25, 0.5, 0.75, 0.95)
 """Of samples below the quantiles that are told."""
 _RESAMPLED = 200  # times, for what chance makes of indices
-
-
-class Probability(NamedTuple):
-    """A probability with its 95 % interval."""
-
-    value: float
-    lower: float
-    upper: float
-
-    @classmethod
-    def within(cls, hits: NDArray[np.bool_], unknown: NDArray[np.bool_]) -> "Probability":
-        """By samples of which some are not known: the interval reaches to where all of these are hits."""
-        found = cls.of(hits)
-        return found._replace(upper=cls.of(hits | unknown).upper) if unknown.any() else found
-
-    @classmethod
-    def of(cls, hits: NDArray[np.bool_]) -> "Probability":
-        """By which of the samples, in sets that know nothing of each other: by what these differ by (Student's t).
-
-        Of a single set, whose samples are independent, and where no set differs: Wilson's interval.
-        """
-        shares = hits.mean(axis=1)
-        value, spread = float(shares.mean()), float(shares.std(ddof=1)) if len(shares) > 1 else 0.0
-        if spread == 0.0:
-            wilson = stats.binomtest(int(hits.sum()), hits.size).proportion_ci(LEVEL, method="wilson")
-            return cls(value, float(wilson.low), float(wilson.high))
-        half = float(stats.t.ppf(0.5 + 0.5 * LEVEL, len(shares) - 1)) * spread / math.sqrt(len(shares))
-        return cls(value, max(value - half, 0.0), min(value + half, 1.0))
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from brakecli.analysis.probability import Probability
 from brakecli.analysis.regime.table import Excitation, Regime
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError, Problem
@@ -16,7 +17,7 @@ from brakecli.files import fields
 from brakecli.files.field import Field, values_of
 from brakecli.files.write import ResultFile, new_result
 from brakecli.runs.run import origin
-from brakecli.scattering.answers import Indices, Probability, quantiles
+from brakecli.scattering.answers import Indices, quantiles
 from brakecli.scattering.draw import drawn, for_indices
 from brakecli.scattering.eigen import ask, asking
 from brakecli.scattering.study import SCRAMBLINGS, LoadedStudy, Study

@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from brakecli.analysis.regime.answers import Answers, Fate
-from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, WINDOWS
-from brakecli.analysis.regime.table import Thresholds, decide
+from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, WINDOWS, tenths
+from brakecli.analysis.regime.table import Regime, Thresholds, decide
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.stability.linear import Linear, Theory, linear_theory
 from brakecli.analysis.stability.modes import is_undamped
@@ -116,19 +116,43 @@ def _linear(system: System, theory: Linear, motion: "Pursuit") -> tuple[Verdict,
         return np.asarray(rest + (vectors @ (parts * np.exp(values * (time - o.time)))).real)
 
     last = at(end)
-    o.low = o.high = float(last[0])
-    motion.swing(at(start), end - start)
+
+    def amplitude(begin: float, until: float, *before: float) -> float:
+        """Half of peak to peak of x between two times at which the motion is linear, and of what was before."""
+        x = float(at(until)[0])
+        o.low, o.high = min(x, *before, x), max(x, *before, x)
+        motion.swing(at(begin), until - begin)
+        return 0.5 * float(o.high - o.low)
+
     fades = np.exp(values * (end - o.time)) - np.exp(values * (start - o.time))
     height = rest[1] + (vectors[1] @ (parts * fades / values)).real / (end - start)
     force = math.copysign(system.coefficients.phi, theory.belt) * -system.contact_stiffness * float(height)
     answers = Answers(duration=end, linear=True, growth=theory.mode.growth, ringing=theory.mode.frequency)
     if theory.direction > 0:
         answers = replace(answers, to_limit=theory.seconds_to_limit(end, last))
-    decision, amplitude = decide(answers, Thresholds()), 0.5 * float(o.high - o.low)
+    decision = decide(answers, Thresholds())
     evidence = {"row": decision.row, "growth": theory.mode.growth}
-    return Verdict(
-        decision, amplitude, 0.0, 0.0, force, system.radius * force, start, False, evidence
-    ), last.tolist()
+    numbers = 0.0, 0.0, force, system.radius * force, start, False, evidence
+    if decision.regime is not Regime.DAMPED:
+        return Verdict(decision, amplitude(start, end), *numbers), last.tolist()
+    first, left = (place * system.interval for place in tenths(system.samples + 1))
+    first -= system.interval  # its last sample
+    before = _swung(system, theory, min(o.time, first))
+    early = amplitude(o.time, first, *before) if o.time < first else 0.5 * (before[1] - before[0])
+    return Verdict(decision, amplitude(left, end), *numbers, amplitude_first=early), last.tolist()
+
+
+def _swung(system: System, theory: Linear, seconds: float) -> tuple[float, float]:
+    """The least and the largest x (m) in the first seconds of a motion."""
+    from brakecli.solver.flow.smooth import DONE, SmoothFlow
+
+    flow, state, least, most = SmoothFlow.of(system), system.initial.beside(theory.rest), math.inf, -math.inf
+    while True:
+        outcome = flow(state, seconds, tangents=False)
+        least, most = min(least, float(flow.path.low[0])), max(most, float(flow.path.high[0]))
+        if outcome == DONE:
+            return least, most
+        state, seconds = flow.state, seconds - float(flow.path.time)  # after many events it stops
 
 
 def _cycle(system: System, theory: Linear, motion: "Pursuit") -> tuple[Verdict, list[float]] | None:

@@ -65,6 +65,14 @@ class Plan:
         self.unit_length = 1 if self.followed is None else self.shape[self.followed]
         self.units = self.passes * self.points // self.unit_length
 
+    @property
+    def over_starts(self) -> bool:
+        """Whether the points differ in their initial states alone, which are not those of other points."""
+        keys = [text for axis in self.sweep.axis for text in axis.parameter] + [
+            *(self.listed.keys if self.listed else ())
+        ]
+        return self.followed is None and {key_path(text)[0] for text in keys} == {"initial"}
+
     def __reduce__(self) -> tuple[Any, ...]:
         """Travel as two texts, the measured profiles and the listed points."""
         return plan_of, (self.sweep_text, self.case_text, tuple(self.records.items()), self.listed)

@@ -19,6 +19,7 @@ from brakecli.files import fields
 from brakecli.files.field import Field, plain, values_of
 from brakecli.files.write import ResultFile
 from brakecli.runs.run import origin
+from brakecli.sweeps.attractors import SAME_AMPLITUDE, Attractor, Attractors
 from brakecli.sweeps.journal import Journal
 from brakecli.sweeps.plan import LoadedSweep, Plan, label
 from brakecli.sweeps.point import Status
@@ -27,8 +28,6 @@ from brakecli.sweeps.tables import Axis
 
 MOST_FAILURES = 100
 MOST_AS_JSON = 10_000  # points; of more the file alone holds every number
-SAME_AMPLITUDE = 0.05  # part by which amplitudes of the same motion, in the same regime, may differ
-
 WIDE = 0.1  # of the range, from which on an error bar is named
 _DONE = Status.DONE.encode()
 
@@ -67,9 +66,16 @@ class Findings:
             self.sentences += _on_lasting_vibration(journal, plan.sweep.critical.tolerance)
             self.sentences += _on_wide_bars(journal, plan.sweep.critical.lower, plan.sweep.critical.upper)
             self.sentences += _on_no_dashpots(plan)
+        self.attractors: list[Attractor] | None = None
+        if plan.over_starts:
+            come_to = Attractors.of(journal)
+            self.come_to, self.attractors = come_to.numbers, come_to.found
+            self.sentences += come_to.sentences
         self.variables: dict[str, Any] | None = None
         if self.points <= MOST_AS_JSON:
             self.variables = {field.name: plain(journal.column(field.name)) for field in plan.fields}
+            if self.attractors is not None:
+                self.variables[fields.STARTS[0].name] = plain(self.come_to)
 
 
 @dataclass(frozen=True)
@@ -137,6 +143,13 @@ def write(result: ResultFile, report: SweepReport, journal: Journal) -> None:
             result.fill(field.name, where, values.reshape(*shape, *values.shape[1:]))
     if found.hysteresis is not None:
         result.column(*fields.DIFFERENCE, found.dimensions[1:], found.hysteresis)
+    if found.attractors is not None:
+        result.column(*fields.STARTS, found.dimensions, found.come_to)
+        own, *others = fields.ATTRACTOR
+        result.axis("attractors", own, np.arange(1, len(found.attractors) + 1))
+        for field in others:
+            known = [field.read(each) for each in found.attractors]
+            result.column(field, (own.name,), known, "attractors")
 
 
 def _write_along(

@@ -107,6 +107,29 @@ def test_what_sticks_in_every_cycle_has_not_died_out_after_a_hard_start(speed: f
     assert (verdict.regime, verdict.excitation) == (Regime.RELAXATION, Excitation.SELF_EXCITED)
 
 
+def test_the_amplitude_of_what_dies_out_is_what_is_left_and_that_of_its_first_tenth_stands_beside_it() -> None:
+    """Of one mode, x is the real part of V exp(λ t): half of its peak to peak over both tenths."""
+    changes: dict[str, Any] = {"friction__coefficient": 0.4, "solver__duration": 0.2}
+    system = system_of(make(SQUEAL, **changes))
+    theory = linear_theory(system, system.belt_speed)
+    assert theory is not None
+    slow = int(np.argmax(theory.values.real))
+    value, vector = theory.values[slow], 1e-7 * theory.vectors[:, slow] / theory.vectors[0, slow]
+    start = dict(zip(("x", "y", "vx", "vy"), vector.real.tolist(), strict=True))
+    start = {f"initial__{name}": each for name, each in {"at": "equilibrium", **start}.items()}
+    verdict = verdict_of(make(SQUEAL, **changes, **start))
+    assert verdict.regime is Regime.DAMPED
+    tenth = np.linspace(0.0, 0.02, 20_001)
+    first, last = (0.5 * np.ptp((vector[0] * np.exp(value * (tenth + begin))).real) for begin in (0.0, 0.18))
+    assert first > 2.0 * last  # it dies out while one looks
+    assert verdict.amplitude_first == pytest.approx(first, rel=2e-3)
+    assert verdict.amplitude == pytest.approx(last, rel=2e-3)
+
+
+def test_only_what_dies_out_has_the_amplitude_of_its_first_tenth() -> None:
+    assert verdict_of(make(SQUEAL, friction__coefficient=0.9)).amplitude_first is None
+
+
 @pytest.mark.parametrize("damping", [300.0, 3000.0])
 def test_a_drum_that_swings_once_per_turn_is_forced_with_the_amplitude_that_lasts(damping: float) -> None:
     case = make(DRUM, link1__damping=damping, link2__damping=damping)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from brakecli.plots.style import applied
+from brakecli.plots.style import DARK, applied
 from tests.plots.helpers import ANGLE, CRITICAL, REGIMES, columns, drawn, gathered, legend, panels, points, write
 
 
@@ -87,6 +87,18 @@ def test_every_point_has_the_colour_of_its_regime(tmp_path: Path) -> None:
         np.testing.assert_array_equal(points(axes, "failed")[:, 0], [6.0])
     assert legend(drawn(result))[:4] == REGIMES
     assert "forced by the wheel's waves" in legend(drawn(result))
+
+
+def test_what_waves_force_is_drawn_below_what_the_shoe_adds(tmp_path: Path) -> None:
+    values = columns((8,), critical=False)
+    values["excitation"][2] = "forced"
+    values["amplitude_forced"] = np.where(np.arange(8) == 5, 2e-6, np.nan)
+    amplitude, frequency = panels(write(tmp_path / "r.h5", {"axis": [ANGLE]}, values))
+    dots = [each for each in amplitude.get_lines() if each.get_mfc() == DARK and len(each.get_xdata())]
+    (drawn_dots,) = dots
+    expected = [[3.0, 1e6 * values["amplitude"][2]], [6.0, 2.0]]  # a motion that is only forced, and a part
+    np.testing.assert_allclose(drawn_dots.get_xydata(), expected)
+    assert not [each for each in frequency.get_lines() if each.get_mfc() == DARK and len(each.get_xdata()) > 1]
 
 
 def test_both_ways_are_curves_of_their_own_and_their_difference_is_shaded(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """Pictures of sweeps over two and three axes: the colours of cells are the numbers of the file."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,10 +14,13 @@ from tests.plots.helpers import (
     columns,
     drawn,
     gathered,
+    legend,
     panels,
     points,
     write,
 )
+from tests.sweeps.helpers import axis
+from tests.sweeps.made_up import CYCLE, DAMPED, swept
 
 
 def test_maps_hold_the_values_of_their_cells(tmp_path: Path) -> None:
@@ -50,3 +54,25 @@ def test_a_short_third_axis_stands_side_by_side(tmp_path: Path) -> None:
     picture = gathered(tmp_path / "r.h5", ["solver.scheme=three-layer", "link2.angle_deg=3"])
     np.testing.assert_array_equal(picture["critical"][0], columns((7, 2, 8), critical=True)["critical"][:, 1, 2])
     assert picture.chosen == ("solver.scheme = three-layer", "link2.angle_deg = 3 deg")
+
+
+def test_each_attractor_has_a_colour_of_its_own_in_grey_as_well(tmp_path: Path) -> None:
+    sizes = [1e-6, 2e-6, 4e-6]
+    made = [DAMPED, *({**CYCLE, "amplitude": size} for size in sizes), {**CYCLE, "settled": 0}, DAMPED]
+    swept(
+        tmp_path, made, axis("initial.x", "values = [0.0, 1e-5]"), axis("initial.vy", "values = [0.0, 0.1, 0.2]")
+    )
+    figure = drawn(tmp_path / "s.h5")
+    attractor, amplitude = figure.axes[:2]
+    assert [each.get_title(loc="left") for each in (attractor, amplitude)] == ["Attractor", "Amplitude"]
+    mesh = attractor.collections[0]
+    shown = np.ma.filled(mesh.get_array().reshape(3, 2).T.astype(float), np.nan)  # type: ignore[union-attr]
+    np.testing.assert_array_equal(shown, [[1, 2, 3], [4, np.nan, 1]])
+    np.testing.assert_allclose(points(attractor, "no attractor known"), [[1e-5, 0.1]])
+    words = legend(figure)
+    assert words[:2] == ["1: damped, 33.3% of the points", "2: relaxation, 100 Hz, 1 µm, 16.7% of the points"]
+    cells = np.array(mesh.cmap(mesh.norm(np.arange(1.0, 5.0))))[:, :3]
+    assert (np.diff(cells @ [0.2126, 0.7152, 0.0722]) < -0.1).all()  # luminance
+    lines: list[Any] = attractor.get_lines()
+    keys = [each.get_mfc()[:3] for each in lines if each.get_label()[:1].isdigit()]
+    np.testing.assert_allclose(keys, cells)

@@ -239,7 +239,7 @@ def test_any_number_of_a_sweep_is_drawn(tmp_path: Path) -> None:
             shown = np.ma.filled(mesh.get_array().reshape(7, 8).T.astype(float), np.nan)  # type: ignore[union-attr]
             np.testing.assert_allclose(shown, values[name])
             assert name.replace("_", " ") in figure.axes[-1].get_ylabel()
-        with pytest.raises(UsageError, match="give one of amplitude, barrier, braking_torque"):
+        with pytest.raises(UsageError, match="give one of amplitude, amplitude_first, amplitude_forced, "):
             plot_result(result, tmp_path / "r.png", force=False, variable="regime")
 
 

@@ -12,13 +12,14 @@ import pytest
 from scipy import stats
 
 import brakecli
+from brakecli.analysis.probability import Probability
 from brakecli.analysis.stability.report import stability
 from brakecli.case.system import system_of
 from brakecli.case.tables import json_schema
 from brakecli.cli.inputs import load_case, load_study
 from brakecli.errors import BrakecliError, CaseError
 from brakecli.files.read import open_result
-from brakecli.scattering.answers import Indices, Probability, quantiles
+from brakecli.scattering.answers import Indices, quantiles
 from brakecli.scattering.draw import drawn, for_indices
 from brakecli.scattering.study import SCRAMBLINGS, Parameter, Study
 from tests.campaign import counts

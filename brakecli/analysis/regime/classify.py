@@ -51,6 +51,7 @@ def classify(
     theory = shown.linear if found.linear else None
     return Verdict(
         amplitude=what.amplitude,
+        amplitude_first=shown.tenths[0].amplitude("x") if decision.regime is Regime.DAMPED else None,
         amplitude_spread=what.spread,
         amplitude_forced=what.forced,
         amplitude_own=what.own,

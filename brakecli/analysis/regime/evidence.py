@@ -29,6 +29,11 @@ _MOST_COVERED = 0.2  # part of the band on lines, beyond which they are not told
 _LEAST_FORCED = 0.02  # of what lies beside the lines: that much of a decaying motion leaks onto them
 
 
+def tenths(samples: int) -> tuple[int, int]:
+    """The sample that ends the first tenth of so many, and the one that begins the last tenth."""
+    return -(-samples // 10), samples - -(-samples // 10)
+
+
 @dataclass(frozen=True)
 class Part:
     """The samples start … stop - 1 of a history, read in pieces that fit into memory."""

@@ -64,11 +64,12 @@ def lasting(shown: Shown, answers: Answers, decision: Decision, *, in_full: bool
     else:
         part = shown.half if answers.linear else shown.judged
         stays = not answers.moves or answers.carried  # all else dies, or is not known
-        found = Lasting(part, answers.settled and stays, part.amplitude("x"))
+        left = shown.tenths[1] if decision.regime is Regime.DAMPED else part
+        found = Lasting(part, answers.settled and stays, left.amplitude("x"))
         return _with_force(shown, found, lasts=decision.regime is not Regime.UNDECIDED)
     if forced and found.settled and found.forced is None:  # its neighbours come together: nothing else is left
         found.forced = found.amplitude
-    if in_full and found.cycles and shown.context.forced and _holds_two(shown, found.part):
+    if found.cycles and shown.context.forced and _holds_two(shown, found.part):
         split = found.part.split(shown.context.forced)
         found.forced, found.own = split if split and split[0] <= split[1] else (None, None)
     if forced and in_full:

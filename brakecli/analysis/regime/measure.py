@@ -18,6 +18,7 @@ from brakecli.analysis.regime.evidence import (
     Envelope,
     Part,
     level_change,
+    tenths,
     windowed,
 )
 from brakecli.analysis.regime.table import Thresholds
@@ -51,6 +52,8 @@ class Shown:
         self.whole = Part(history, 0, history.samples)
         self.half = Part(history, history.samples // 2, history.samples)
         self.last = Part(history, history.samples * (WINDOWS - 10) // WINDOWS, history.samples)
+        first, last = tenths(history.samples)
+        self.tenths = Part(history, 0, first), Part(history, last, history.samples)
 
     @cached_property
     def envelope(self) -> Envelope | None:

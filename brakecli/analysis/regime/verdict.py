@@ -11,7 +11,7 @@ class Verdict:
     """The regime of a motion, its numbers (SI units) over the settled part, and the reasons in plain words."""
 
     decision: Decision
-    amplitude: float  # m, half of peak to peak of x: median over the cycles
+    amplitude: float  # m, half of peak to peak of x: median over the cycles, or what is left at the end
     stick_fraction: float
     contact_loss_fraction: float
     mean_friction_force: float  # N
@@ -20,6 +20,7 @@ class Verdict:
     settled: bool  # whether the numbers are those of any longer run
     evidence: dict[str, Any]
     start: int = 0  # the sample from which on the numbers are taken
+    amplitude_first: float | None = None  # m, of a damped motion: in the first tenth of the run
     amplitude_spread: float | None = None  # m, of the amplitudes of the cycles
     amplitude_forced: float | None = None  # m, on a rough wheel: what the roughness forces
     amplitude_own: float | None = None  # m, on a rough wheel: what the shoe adds
