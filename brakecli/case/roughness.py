@@ -4,6 +4,7 @@ import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
+from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, NamedTuple
 
@@ -12,6 +13,7 @@ from pydantic import Field
 from brakecli.case import tables
 from brakecli.case.tables import MOST_SINES, SMALLEST, NonNegative, Positive, Table, Weight, described, quantity
 from brakecli.errors import Problem, UsageError
+from brakecli.solver.roughness import Surface, surface
 
 MOST_MEASURED = 2.5e8  # bytes of all measured profiles of a case or sweep, which travel to every worker
 NEEDLESS = {
@@ -166,6 +168,12 @@ class WheelProfile(Profile):
     def _broken_rules(self) -> Iterator[Problem]:
         yield from super()._broken_rules()
         yield from self.different_lengths("orders", "amplitudes")
+
+
+@lru_cache(maxsize=16)
+def surface_of(profile: Profile, radius: float) -> Surface:
+    """The sines of a profile as the solver has them; `radius` (m) is the wheel's."""
+    return surface(**profile.sines(), radius=radius)
 
 
 class Roughness(Table):

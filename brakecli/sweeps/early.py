@@ -25,6 +25,7 @@ from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.stability.linear import Linear, linear_theory
 from brakecli.analysis.stability.modes import is_undamped
 from brakecli.runs.certificate import ROUNDING, Certificate
+from brakecli.runs.settled import Judged
 from brakecli.solver.automaton import STICK
 from brakecli.solver.compile import Floats
 from brakecli.solver.motion import Work
@@ -50,15 +51,7 @@ class Ending(NamedTuple):
     work: Work
 
 
-class Early(NamedTuple):
-    """An early verdict, with what a sweep goes on with."""
-
-    verdict: Verdict
-    motion: Ending
-    certificate: Certificate | None
-
-
-def early(system: System) -> Early | None:
+def early(system: System) -> Judged[Ending] | None:
     """The verdict on the motion of a system before its end; None where none is certain."""
     theory = _theory(system)
     if theory is None:
@@ -87,7 +80,7 @@ def early(system: System) -> Early | None:
     error = max(float(o.error), ROUNDING) if outcome == FOUND else ROUNDING  # not that of an orbit given up
     certificate = Certificate(system.method.tolerance, True, error, system.sampled_duration, "the orbit itself")
     row = np.array([end])
-    return Early(verdict, Ending(system, row, work), certificate if system.method.step is None else None)
+    return Judged(verdict, Ending(system, row, work), certificate if system.method.step is None else None)
 
 
 def may_be_early(system: System) -> bool:
@@ -126,9 +119,8 @@ def _linear(system: System, theory: Linear, motion: "Pursuit") -> tuple[Verdict,
         answers = replace(answers, to_limit=theory.seconds_to_limit(end, last))
     decision, amplitude = decide(answers, Thresholds()), 0.5 * float(o.high - o.low)
     evidence = {"row": decision.row, "growth": theory.mode.growth}
-    return Verdict(
-        decision, amplitude, 0.0, 0.0, force, system.radius * force, start, False, evidence
-    ), last.tolist()
+    numbers, left = (0.0, 0.0, force, system.radius * force), math.exp(theory.mode.growth * (end - o.time))
+    return Verdict(decision, amplitude, *numbers, start, False, evidence, left=left), last.tolist()
 
 
 def _cycle(system: System, theory: Linear, motion: "Pursuit") -> tuple[Verdict, list[float]] | None:
