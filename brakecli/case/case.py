@@ -6,7 +6,7 @@ The tables and keys are those of the case file, version 1. `brakecli.case.read` 
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import tomli_w
 from pydantic import ConfigDict, Field, TypeAdapter, WrapValidator
@@ -16,10 +16,11 @@ from brakecli.case.roughness import NEEDLESS, Roughness, record_of, surface_of
 from brakecli.case.tables import NonNegative, Number, Positive, Schedule, Table, described, one_of, quantity
 from brakecli.errors import BrakecliError, Problem, found
 from brakecli.solver.contact import EVALUATORS
-from brakecli.solver.links import coefficients, natural_frequencies
 from brakecli.solver.method import MOST
-from brakecli.solver.records import Coefficients
 from brakecli.solver.schemes import SCHEMES, Scheme
+
+if TYPE_CHECKING:
+    from brakecli.solver.records import Coefficients
 
 DEFAULT_TOLERANCE = 1e-3  # relative error of the histories where a case gives neither step nor tolerance
 SETTLED: Literal["settled"] = "settled"
@@ -282,6 +283,8 @@ class Case(Table):
 
     def _interval(self) -> float:
         """Between samples (s), to two digits, by the fastest motion and the shortest wave that passes."""
+        from brakecli.solver.links import natural_frequencies
+
         wheel, (_, fastest) = self.wheel, natural_frequencies(self.coefficients, self.contact_stiffness)
         turns = [0.0] if self.roughness.wheel is None else surface_of(self.roughness.wheel, wheel.radius).turns
         speed = wheel.radius * max(map(abs, wheel.angular_speeds or (wheel.angular_speed or 0.0,)))
@@ -289,8 +292,10 @@ class Case(Table):
         return float(f"{min(max(1.0 / rate, tables.SMALLEST), tables.LARGEST):.1e}")
 
     @property
-    def coefficients(self) -> Coefficients:
+    def coefficients(self) -> "Coefficients":
         """What the links and the shoe make of the equations of motion."""
+        from brakecli.solver.links import coefficients
+
         return coefficients(
             mass=self.shoe.mass,
             c_1=self.link1.stiffness,

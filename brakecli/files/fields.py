@@ -195,6 +195,7 @@ POINT = (
     integer("warning_count", "number of warnings"),
     *named(RUN, "regime", "excitation", "frequency", "amplitude", "stick_fraction", "contact_loss_fraction"),
     *named(RUN, "mean_friction_force", "braking_torque", "settled", "settled_from"),
+    Field("duration", "s", "time that was simulated", at="motion.system.sampled_duration"),
     *named(RUN, "steps", "contact_evaluations", "unconverged_steps", "estimated_error"),
 )
 CRITICAL = (
