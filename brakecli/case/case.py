@@ -9,17 +9,33 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import tomli_w
-from pydantic import Field, create_model
+from pydantic import ConfigDict, Field, TypeAdapter, WrapValidator, create_model
 
 from brakecli.case import tables
-from brakecli.case.roughness import NEEDLESS, Roughness, record_of
+from brakecli.case.roughness import NEEDLESS, Roughness, record_of, surface_of
 from brakecli.case.tables import NonNegative, Number, Positive, Schedule, Table, described, one_of, quantity
 from brakecli.errors import BrakecliError, Problem, found
 from brakecli.solver.contact import EVALUATORS
 from brakecli.solver.method import MOST
 from brakecli.solver.schemes import SCHEMES, Scheme
 
+if TYPE_CHECKING:
+    from brakecli.solver.records import Coefficients
+
 DEFAULT_TOLERANCE = 1e-3  # relative error of the histories where a case gives neither step nor tolerance
+SETTLED: Literal["settled"] = "settled"
+"""In place of a duration: the run goes on until its verdict is decided."""
+SAMPLES_PER_CYCLE, SAMPLES_PER_WAVE = 50.0, 10.0
+"""Samples in a period of the fastest motion, and of the shortest wave that passes, where a case leaves it open."""
+_SECONDS = TypeAdapter[float](Positive, config=ConfigDict(strict=True, allow_inf_nan=False))
+
+
+def _or_settled(value: Any, handler: Any) -> Any:
+    """A duration; with the errors of a number, as those of a choice between two kinds would name both."""
+    return value if value == SETTLED else _SECONDS.validate_python(value)
+
+
+Duration = Annotated[Positive | Literal["settled"], WrapValidator(_or_settled)]
 
 
 class Shoe(Table):
@@ -149,7 +165,7 @@ class Solver(Table):
     tolerance: tables.Tolerance | None = quantity(
         "1", "largest relative error of the histories, 0.001 if there is no step either", None
     )
-    duration: Positive = quantity("s", "time to simulate")
+    duration: Duration = quantity("s", 'time to simulate, or "settled": until the verdict is decided')
     allow_unconverged: bool = described("whether a run goes on after a step that did not converge", False)
 
     def _fill(self) -> None:
@@ -194,7 +210,7 @@ class Output(Table):
     """What of the run is kept."""
 
     sample_interval: Positive = quantity(
-        "s", "time between two samples, the time step if left out", default_factory=float
+        "s", "time between two samples; the time step if left out, or by modes and waves", default_factory=float
     )
     events: bool = described("whether the result holds the events of the motion", False)
 
@@ -275,9 +291,6 @@ class Case(Table):
         yield from self._put_sines()
         yield from self._put_start()
         step = self.solver.step
-        if step is None and "sample_interval" not in self.output.model_fields_set:
-            what = f"{tables.MISSING}, and there is no solver.step to use instead"
-            yield Problem(("output", "sample_interval"), what, "give a number above 0, in s")
         if step is not None and self.output.sample_interval < step * (1 - 1e-9):
             what = f"is below the time step of {step!r} s"
             yield self.wrong("output.sample_interval", what, "make it at least one time step")
@@ -298,6 +311,46 @@ class Case(Table):
             what = "sets the second layer equal to the first, but the initial velocity is not zero"
             remedy = 'set start to "consistent", or initial.vx and initial.vy to 0'
             yield self.wrong("solver.start", what, remedy)
+        values = {"wheel.angular_speeds": self.wheel.angular_speeds, "load.forces": self.load.forces}
+        changing = [key for key, each in values.items() if len({*(each or ())}) > 1]
+        if self.solver.duration == SETTLED and changing:
+            what = f"is never reached, as {changing[0]} change with time"
+            yield self.wrong("solver.duration", what, "give a number above 0, in s")
+        if step is None and "sample_interval" not in self.output.model_fields_set:
+            # as one that is not given: it follows the case, also where that is changed
+            given, found = self.output.model_fields_set, {"sample_interval": self._interval()}
+            self.__dict__["output"] = Output.model_construct(given, **self.output.model_dump() | found)
+
+    def _interval(self) -> float:
+        """Between samples (s), to two digits, by the fastest motion and the shortest wave that passes."""
+        from brakecli.solver.links import natural_frequencies
+
+        wheel, (_, fastest) = self.wheel, natural_frequencies(self.coefficients, self.contact_stiffness)
+        turns = [0.0] if self.roughness.wheel is None else surface_of(self.roughness.wheel, wheel.radius).turns
+        speed = wheel.radius * max(map(abs, wheel.angular_speeds or (wheel.angular_speed or 0.0,)))
+        rate = max(SAMPLES_PER_CYCLE * fastest, SAMPLES_PER_WAVE * speed * float(max(turns, default=0.0)))
+        return float(f"{min(max(1.0 / rate, tables.SMALLEST), tables.LARGEST):.1e}")
+
+    @property
+    def coefficients(self) -> "Coefficients":
+        """What the links and the shoe make of the equations of motion."""
+        from brakecli.solver.links import coefficients
+
+        return coefficients(
+            mass=self.shoe.mass,
+            c_1=self.link1.stiffness,
+            b_1=self.link1.damping,
+            beta_deg=self.link1.angle_deg,
+            c_2=self.link2.stiffness,
+            b_2=self.link2.damping,
+            alpha_deg=self.link2.angle_deg,
+            phi=self.friction.coefficient,
+        )
+
+    @property
+    def contact_stiffness(self) -> float:
+        """2ak, N/m: the contact that touches everywhere."""
+        return 2.0 * self.contact.half_length * self.contact.stiffness
 
 
 def changed(case: Case, **tables: Mapping[str, object]) -> Case:

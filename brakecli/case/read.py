@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 
 from brakecli.case import wording
-from brakecli.case.case import Case, resolved_toml
+from brakecli.case.case import Case, changed, resolved_toml
 from brakecli.case.roughness import Record, Records, reading
 from brakecli.case.tables import MISSING, Table, tables_within
 from brakecli.errors import CaseError, KeyPath, Problem, key_text, printable
@@ -38,6 +38,12 @@ class LoadedCase:
     text: str
     resolved: str
     records: Mapping[str, Record] = field(default_factory=dict)
+
+
+def with_duration(loaded: LoadedCase, seconds: float) -> LoadedCase:
+    """The same, whose case is run for so many seconds."""
+    case = changed(loaded.case, solver={"duration": seconds})
+    return replace(loaded, case=case, resolved=resolved_toml(case))
 
 
 def starters() -> dict[str, str]:

@@ -4,14 +4,18 @@ import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
+from functools import lru_cache
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple
 
 from pydantic import Field
 
 from brakecli.case import tables
 from brakecli.case.tables import MOST_SINES, SMALLEST, NonNegative, Positive, Table, Weight, described, quantity
 from brakecli.errors import Problem, UsageError
+
+if TYPE_CHECKING:
+    from brakecli.solver.roughness import Surface
 
 MOST_MEASURED = 2.5e8  # bytes of all measured profiles of a case or sweep, which travel to every worker
 NEEDLESS = {
@@ -166,6 +170,14 @@ class WheelProfile(Profile):
     def _broken_rules(self) -> Iterator[Problem]:
         yield from super()._broken_rules()
         yield from self.different_lengths("orders", "amplitudes")
+
+
+@lru_cache(maxsize=16)
+def surface_of(profile: Profile, radius: float) -> "Surface":
+    """The sines of a profile as the solver has them; `radius` (m) is the wheel's."""
+    from brakecli.solver.roughness import surface  # reading a case needs no numerical library
+
+    return surface(**profile.sines(), radius=radius)
 
 
 class Roughness(Table):

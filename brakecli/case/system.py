@@ -2,11 +2,11 @@
 
 from functools import lru_cache
 
-from brakecli.case.case import Case
-from brakecli.case.roughness import Profile
-from brakecli.solver.links import coefficients
+from brakecli.case.case import SETTLED, Case
+from brakecli.case.roughness import surface_of
+from brakecli.solver.links import natural_frequencies
 from brakecli.solver.method import Method
-from brakecli.solver.roughness import Surface, surface, turned
+from brakecli.solver.roughness import surface, turned
 from brakecli.solver.schedules import schedule
 from brakecli.solver.system import Initial, System
 
@@ -14,11 +14,8 @@ _SMOOTH = surface()
 _shared = lru_cache(maxsize=4096)(schedule)
 """Schedules that the points of a sweep have in common; nobody changes them, nor surfaces."""
 EVENT_TOLERANCE = 1e-10  # of event-driven where a case gives it a step
-
-
-@lru_cache(maxsize=16)
-def _surface_of(profile: Profile, radius: float) -> Surface:
-    return surface(**profile.sines(), radius=radius)
+FIRST_CYCLES = 250.0
+"""Periods of the slowest mode in the first run of a case that is to settle: a window of its envelope holds six."""
 
 
 def system_of(case: Case) -> System:
@@ -26,23 +23,16 @@ def system_of(case: Case) -> System:
     wheel, load, initial, solver = case.wheel, case.load, case.initial, case.solver
     automatic = solver.scheme == "auto"
     shoe, wheel_surface = (
-        _surface_of(each, wheel.radius) if each is not None else _SMOOTH
+        surface_of(each, wheel.radius) if each is not None else _SMOOTH
         for each in (case.roughness.shoe, case.roughness.wheel)
     )
     if initial.wheel_angle and wheel_surface.g.size:
         wheel_surface = turned(wheel_surface, initial.wheel_angle * wheel.radius)
+    slow, fast = natural_frequencies(case.coefficients, case.contact_stiffness)
+    first = FIRST_CYCLES / (slow or fast)
     rough = shoe.g.size or wheel_surface.g.size  # where a tolerance may change the scheme
     return System(
-        coefficients=coefficients(
-            mass=case.shoe.mass,
-            c_1=case.link1.stiffness,
-            b_1=case.link1.damping,
-            beta_deg=case.link1.angle_deg,
-            c_2=case.link2.stiffness,
-            b_2=case.link2.damping,
-            alpha_deg=case.link2.angle_deg,
-            phi=case.friction.coefficient,
-        ),
+        coefficients=case.coefficients,
         belt=_shared(wheel.times or (0.0,), wheel.angular_speeds or (wheel.angular_speed or 0.0,), wheel.radius),
         load=_shared(load.times or (0.0,), load.forces or (load.force or 0.0,)),
         shoe=shoe,
@@ -52,7 +42,8 @@ def system_of(case: Case) -> System:
         layer_stiffness=case.contact.stiffness,
         initial=Initial(initial.x, initial.y, initial.vx, initial.vy, initial.at == "equilibrium"),
         interval=case.output.sample_interval,
-        duration=solver.duration,
+        duration=float(f"{first:.1e}") if solver.duration == SETTLED else solver.duration,
+        settles=solver.duration == SETTLED,
         method=Method(
             scheme=("event-driven" if rough else "piecewise-exact") if automatic else solver.scheme,
             theta=solver.theta,

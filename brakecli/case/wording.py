@@ -108,6 +108,9 @@ def _table(path: KeyPath) -> KeyPath:
 def _expected(path: KeyPath, kind: type[Table]) -> str:
     """What belongs at a key path, by its JSON Schema: "a number above 0, in kg"."""
     node = key_schema(kind, path)
+    if "anyOf" in node:  # a number, or a word in its place
+        number, word = node["anyOf"]
+        return f'{_value(number)}, in {node["unit"]}, or "{word["const"]}"'
     if "enum" in node:
         return "one of " + ", ".join(f'"{choice}"' for choice in node["enum"])
     if node["type"] == "object":

@@ -35,9 +35,9 @@ def command(
         raise UsageError("the name is empty; give one, or leave it out for case.toml")
     path = output or Path(name if name.endswith(".toml") else f"{name}.toml")
     text = texts.get(name.removesuffix(".toml"), texts["case"])
-    written, is_sweep = {path: text}, text.startswith("case = ", text.find("\n\n") + 2)
-    if is_sweep and not (base := path.parent / "case.toml").exists():
-        written[base] = texts["case"]
+    written, base = {path: text}, text.partition('\ncase = "')[2].partition('"')[0]  # a sweep or a study has one
+    if base and not (path.parent / base).exists():
+        written[path.parent / base] = texts[base.removesuffix(".toml")]
     for place, content in written.items():
         with unwinding(), new_output(place, force=force) as file:
             file.write(content.encode())
@@ -45,6 +45,6 @@ def command(
     if not quiet:
         shown = f"brakecli branch {as_argument(path)} --parameter friction.coefficient=0:1"
         follows = text == texts["branch"]
-        verb = "scatter" if text == texts["scatter"] else "sweep" if is_sweep else "run"
+        verb = "scatter" if text == texts["scatter"] else "sweep" if base else "run"
         how = shown if follows else f"brakecli {verb} {as_argument(path)}"
         show(f"{' and '.join(map(str, written))}: written; run it with: {how}")

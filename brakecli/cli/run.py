@@ -32,7 +32,7 @@ def command(
     if not quiet:
         say(*report.check.adjustments)
     warn(*report.warnings)
-    numbers = {"output": str(report.output), **origin("run", report.title, loaded), **report.numbers()}
+    numbers = {"output": str(report.output), **origin("run", report.title, report.loaded), **report.numbers()}
     show_result("run", numbers, run_table, report, as_json=as_json, quiet=quiet)
     if report.motion.work.failed:
         say(f"{report.output}: the history up to the failure was written")

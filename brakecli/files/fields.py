@@ -211,6 +211,7 @@ POINT = (
     *named(RUN, "regime", "excitation", "frequency", "amplitude", "amplitude_first"),
     *named(RUN, "amplitude_forced", "amplitude_own", "stick_fraction", "contact_loss_fraction"),
     *named(RUN, "mean_friction_force", "braking_torque", "settled", "settled_from"),
+    Field("duration", "s", "time that was simulated", at="motion.system.sampled_duration"),
     *named(RUN, "steps", "contact_evaluations", "unconverged_steps", "estimated_error"),
 )
 CRITICAL = (

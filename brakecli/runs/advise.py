@@ -21,7 +21,8 @@ from brakecli.files import fields
 from brakecli.files.field import values_of
 from brakecli.runs.cost import duration_text, stability_seconds, steps_and_seconds, table_seconds
 from brakecli.runs.run import asked, motion_of, verdict_in_memory
-from brakecli.solver.motion import Counted
+from brakecli.runs.settled import Judged, settled
+from brakecli.solver.motion import Counted, Motion
 from brakecli.solver.system import System
 
 CHECK_SECONDS, _CHECK_SAMPLES = 5.0, 1_000_000  # of a run that checks, which is cut short beyond
@@ -223,7 +224,11 @@ def _to_check(case: Case, change: Change) -> tuple[System, float] | None:
 def _checked(system: System, change: Change, progress: Counted) -> CheckRun:
     """Run a system with an advised value."""
     start = time.perf_counter()
-    motion, _ = motion_of(asked(system), lambda done: progress("steps of the check", done, system.steps))
-    verdict = verdict_in_memory(motion, system)
-    spent = time.perf_counter() - start
-    return CheckRun(change.parameter, float(change.rounded), verdict, system.sampled_duration, spent)
+
+    def run(part: System) -> Judged[Motion]:
+        motion, certificate = motion_of(part, lambda done: progress("steps of the check", done, part.steps))
+        return Judged(verdict_in_memory(motion, part), motion, certificate)
+
+    ended = settled(asked(system), run)
+    spent, duration = time.perf_counter() - start, ended.system.sampled_duration
+    return CheckRun(change.parameter, float(change.rounded), ended.judged.verdict, duration, spent)

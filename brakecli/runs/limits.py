@@ -22,6 +22,7 @@ from brakecli.analysis.stability.search import bisect
 from brakecli.errors import RefusedError
 from brakecli.runs.cost import beside_seconds, duration_text, held_bytes, stability_seconds, steps_and_seconds
 from brakecli.runs.pilot import Price, measured
+from brakecli.runs.settled import longest
 from brakecli.solver.contact.pad import NODES_PER_WAVE
 from brakecli.solver.history import ROW_BYTES
 from brakecli.solver.links import natural_frequencies
@@ -76,7 +77,7 @@ def check(system: System, *, begin: bool = False, written: bool = True) -> Check
         limits=step_limits(system),
         nodes_per_wave=system.nodes / waves if system.nodes and waves > 0.0 else None,
         seconds=price.seconds + (beside_seconds(system) if written else 0.0),
-        at_least=price.at_least,
+        at_least=price.at_least or system.settles,
         memory=2.0e8 + system.table_bytes + held_bytes(system),
         file_size=float(system.samples) * ROW_BYTES + 1e5,
         adjustments=tuple(adjustments(system)),
@@ -154,7 +155,12 @@ def adjustments(system: System) -> list[str]:
     if asked and not method.own_steps and abs(interval / asked - system.per_sample) > WHOLE * system.per_sample:
         fitted = f"{system.step:.9g} s, {system.per_sample} to the sample interval of {interval:g} s"
         found.append(f"solver.step: reduced from {asked:g} s to {fitted}")
-    if abs(system.duration / interval - system.samples) > WHOLE * system.samples:
+    if system.settles:
+        until = f"until the verdict is decided, up to {longest(system):.6g} s"
+        found.append(
+            f"solver.duration: {system.sampled_duration:.6g} s at first, then twice as long and so on, {until}"
+        )
+    elif abs(system.duration / interval - system.samples) > WHOLE * system.samples:
         end = f"the next sample at {system.sampled_duration:.9g} s"
         found.append(f"solver.duration: extended from {system.duration:g} s to {end}")
     return found

@@ -18,7 +18,7 @@ from brakecli.analysis.regime.table import Thresholds
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.spectrum import peak, spectrum
 from brakecli.analysis.stability.linear import Theory
-from brakecli.case.read import LoadedCase
+from brakecli.case.read import LoadedCase, with_duration
 from brakecli.case.system import system_of
 from brakecli.files import fields
 from brakecli.files.field import values_of
@@ -28,6 +28,7 @@ from brakecli.runs.certificate import Certificate
 from brakecli.runs.judge import DEFAULT, verdict_on
 from brakecli.runs.limits import Check, check, free_bytes, refuse, within_range
 from brakecli.runs.modelled import modelled
+from brakecli.runs.settled import Judged, settled
 from brakecli.runs.tolerance import certify
 from brakecli.solver.history import History, array_history
 from brakecli.solver.motion import Counted, Motion, Progress, Sink, solve
@@ -40,7 +41,7 @@ from brakecli.solver.track import KINDS, MIN, Track
 class RunReport:
     """Everything that a run has found out; numbers in SI units. `fields.RUN` says where each of them is."""
 
-    title: str
+    loaded: LoadedCase  # whose resolved case has the duration that the run has come to
     output: Path
     verdict: Verdict
     motion: Motion
@@ -51,6 +52,11 @@ class RunReport:
     warnings: tuple[str, ...]
     modelled: list[str]
     left_out: list[str]
+
+    @property
+    def title(self) -> str:
+        """That of the case."""
+        return self.loaded.case.title
 
     @property
     def status(self) -> str:
@@ -90,12 +96,29 @@ def run(
         with new_result(output, force=force) as result:
             refuse(found, free_bytes(output.resolve().parent))
             counted, sink = "steps" if found.step else "samples", _history_sink(result, system.interval)
-            total = system.samples if system.method.step is None else system.steps
-            motion, certificate = motion_of(system, lambda done: progress(counted, done, total), sink)
+
+            def shown_by(part: System) -> Progress:
+                total = part.samples if part.method.step is None else part.steps
+                return lambda done: progress(counted, done, total)
+
+            def held(part: System) -> Judged[Motion]:
+                motion, certificate = motion_of(part, shown_by(part))
+                return Judged(verdict_in_memory(motion, part), motion, certificate)
+
+            if system.settles:
+                (known, motion, certificate), system, doubts = settled(system, held)
+                found = check(system)
+                found = replace(found, warnings=(*found.warnings, *doubts))
+                loaded = with_duration(loaded, system.duration)
+                sink(motion.rows)
+            else:
+                known, (motion, certificate) = None, motion_of(system, shown_by(system), sink)
             if not np.isfinite(astuple(motion.energy)).all():  # compiled code overflows silently
                 raise FloatingPointError("an energy overflows")
             history = History(system.interval, result.rows("history"), partial(result.read, "history"))
-            verdict = verdict_on(history, system, motion.work.failure_sentence, motion.exponent, motion.track)
+            verdict = known or verdict_on(
+                history, system, motion.work.failure_sentence, motion.exponent, motion.track
+            )
             top = _write_spectrum(result, history, verdict)
             changing = None if motion.work.failed else over_time(history, system)
             if changing:
@@ -104,7 +127,7 @@ def run(
             if loaded.case.output.events and motion.track is not None:
                 warnings += _write_events(result, motion.track)
             shown = changing, top, warnings, *modelled(motion)
-            report = RunReport(loaded.case.title, output, verdict, motion, found, certificate, *shown)
+            report = RunReport(loaded, output, verdict, motion, found, certificate, *shown)
             result.set_attributes(origin("run", report.title, loaded))
             result.set_fields(fields.RUN, report.numbers())
             if len(motion.work.unconverged):

@@ -72,7 +72,8 @@ class System:
     interval: float
     duration: float
     method: Method
-    notes: tuple[str, ...] = ()  # where surfaces come from
+    settles: bool = False  # whether `duration` is only the first that is tried
+    notes: tuple[str, ...] = ()  # where surfaces come from, and how long a run has become
     tangents: bool = False  # whether a small disturbance is carried along with a motion
     tracked: bool = False  # whether the loop notes works of parts, and events
     start_error: tuple[float, float] | None = None  # of x and y, m; where given, the error is carried along

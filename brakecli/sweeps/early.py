@@ -25,6 +25,7 @@ from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.stability.linear import Linear, Theory, linear_theory
 from brakecli.analysis.stability.modes import is_undamped
 from brakecli.runs.certificate import ROUNDING, Certificate
+from brakecli.runs.settled import Judged
 from brakecli.solver.automaton import STICK
 from brakecli.solver.compile import Floats
 from brakecli.solver.motion import Work
@@ -50,15 +51,7 @@ class Ending(NamedTuple):
     work: Work
 
 
-class Early(NamedTuple):
-    """An early verdict, with what a sweep goes on with."""
-
-    verdict: Verdict
-    motion: Ending
-    certificate: Certificate | None
-
-
-def early(system: System, theory: Theory | None = None) -> Early | None:
+def early(system: System, theory: Theory | None = None) -> Judged[Ending] | None:
     """The verdict on the motion of a system before its end; None where none is certain."""
     known = _theory(system, theory)
     if known is None:
@@ -87,7 +80,7 @@ def early(system: System, theory: Theory | None = None) -> Early | None:
     error = max(float(o.error), ROUNDING) if outcome == FOUND else ROUNDING  # not that of an orbit given up
     certificate = Certificate(system.method.tolerance, True, error, system.sampled_duration, "the orbit itself")
     row = np.array([end])
-    return Early(verdict, Ending(system, row, work), certificate if system.method.step is None else None)
+    return Judged(verdict, Ending(system, row, work), certificate if system.method.step is None else None)
 
 
 def may_be_early(system: System) -> bool:
@@ -132,14 +125,17 @@ def _linear(system: System, theory: Linear, motion: "Pursuit") -> tuple[Verdict,
         answers = replace(answers, to_limit=theory.seconds_to_limit(end, last))
     decision = decide(answers, Thresholds())
     evidence = {"row": decision.row, "growth": theory.mode.growth}
-    numbers = 0.0, 0.0, force, system.radius * force, start, False, evidence
+    numbers, left = (0.0, 0.0, force, system.radius * force), math.exp(theory.mode.growth * (end - o.time))
+    kept: dict[str, Any] = {"evidence": evidence, "left": left}
     if decision.regime is not Regime.DAMPED:
-        return Verdict(decision, amplitude(start, end), *numbers), last.tolist()
-    first, left = (place * system.interval for place in tenths(system.samples + 1))
+        return Verdict(decision, amplitude(start, end), *numbers, start, False, **kept), last.tolist()
+    first, late = (place * system.interval for place in tenths(system.samples + 1))
     first -= system.interval  # its last sample
     before = _swung(system, theory, min(o.time, first))
     early = amplitude(o.time, first, *before) if o.time < first else 0.5 * (before[1] - before[0])
-    return Verdict(decision, amplitude(left, end), *numbers, amplitude_first=early), last.tolist()
+    return Verdict(
+        decision, amplitude(late, end), *numbers, start, False, amplitude_first=early, **kept
+    ), last.tolist()
 
 
 def _swung(system: System, theory: Linear, seconds: float) -> tuple[float, float]:

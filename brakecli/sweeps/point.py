@@ -26,8 +26,10 @@ from brakecli.files.valid import LARGEST
 from brakecli.runs.certificate import Certificate, Certified
 from brakecli.runs.limits import Check, check, refuse, within_range
 from brakecli.runs.run import asked, motion_of, verdict_in_memory
+from brakecli.runs.settled import Judged, settled
 from brakecli.runs.together import TOGETHER, certify_together
 from brakecli.solver.motion import Motion
+from brakecli.solver.system import System
 from brakecli.sweeps.early import Ending, early
 from brakecli.sweeps.plan import Plan, Settings
 
@@ -106,16 +108,20 @@ def judged(
     case: Case, found: Check, certified: Certified | None, theory: Theory | None = None, *, whole: bool
 ) -> PointRun:
     """The end of `simulate`, by a motion that is known already or by one that is computed."""
-    motion: Motion | Ending
-    system, warnings = found.system, [*found.warnings]
+
+    def run(part: System) -> Judged[Motion | Ending]:
+        motion, certificate = certified if certified and part is found.system else (None, None)
+        if motion is None and not whole and (known := early(part, theory)) is not None:
+            return known
+        if motion is None:
+            motion, certificate = motion_of(part)
+        return Judged(verdict_in_memory(motion, part, theory=theory, in_full=whole), motion, certificate)
+
     with within_range():
-        if certified is None and not whole and (known := early(system, theory)) is not None:
-            verdict, motion, certificate = known
-        else:
-            motion, certificate = certified or motion_of(system)
-            verdict = verdict_in_memory(motion, system, theory=theory, in_full=whole)
-            warnings += [note for about, note in verdict.notes.items() if about not in _UNTOLD]
-    work = motion.work
+        ended = settled(found.system, run)
+    verdict, motion, certificate = ended.judged
+    notes = [note for about, note in verdict.notes.items() if about not in _UNTOLD]
+    warnings, work = [*found.warnings, *ended.warnings, *notes], motion.work
     if work.unconverged_steps and not work.failed:
         warnings.append(f"{work.unconverged_steps} of {work.steps} steps did not converge, as the case allows")
     if certificate is not None and not certificate.certified:

@@ -178,9 +178,11 @@ def _hysteresis(journal: Journal) -> tuple[NDArray[Any], list[str]]:
     """Where the motions on the way up and on the way down differ (1), and what is to be said about that."""
     regime, amplitude = journal.column("regime"), journal.column("amplitude")
     done = (journal.column("status") == _DONE) & (regime != b"undecided")
-    known, lasting = done.all(axis=0), (regime != b"damped").any(axis=0)
+    lasting, other = (regime != b"damped").any(axis=0), regime[0] != regime[1]
     apart = np.ptp(amplitude, axis=0) > SAME_AMPLITUDE * amplitude.max(axis=0)  # not where one is missing
-    differ = known & ((regime[0] != regime[1]) | (apart & lasting))
+    on_its_way = ~other & apart & lasting & (journal.column("settled") == 0).any(axis=0)
+    known = done.all(axis=0) & ~on_its_way
+    differ = known & (other | (apart & lasting))
     count, size, decided, said = int(differ.sum()), differ.size, int(known.sum()), list[str]()
     if count:
         where = [_parameters(journal.plan, int(index)) for index in np.flatnonzero(differ.ravel())[:3]]
@@ -197,7 +199,8 @@ def _hysteresis(journal: Journal) -> tuple[NDArray[Any], list[str]]:
     if decided < size:
         doubtful = int((~known & apart).sum())
         ways = f"; the amplitudes of the two ways differ at {doubtful} of them" if doubtful else ""
-        undecided = f"{size - decided} points, which failed or are undecided in a direction"
+        which = "which failed, are undecided or still on their way in a direction"
+        undecided = f"{size - decided} points, {which}"
         said.append(f"hysteresis is not known at {undecided}{ways}")
     return differ.astype(np.int64), said
 

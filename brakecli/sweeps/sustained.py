@@ -133,7 +133,7 @@ def _by_runs(case: Case, system: System, verdict_of: Callable[[Case], Verdict | 
     linear = theory is not None and not theory.opens
     regime, amplitude = Regime.UNDECIDED, math.inf  # of the run before
     for times in DURATIONS:
-        verdict = verdict_of(changed(case, solver={"duration": times * case.solver.duration}))
+        verdict = verdict_of(changed(case, solver={"duration": times * system.duration}))
         if verdict is None or verdict.contact_loss_fraction == 1.0 or verdict.stick_fraction == 1.0:
             break
         free = verdict.contact_loss_fraction == verdict.stick_fraction == 0.0

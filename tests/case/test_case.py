@@ -2,6 +2,7 @@
 
 import io
 import json
+import math
 import subprocess
 import sys
 import tomllib
@@ -14,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from brakecli.case.case import Case, resolved_toml
+from brakecli.case.case import Case, changed, given_toml, resolved_toml
 from brakecli.case.read import parse_case, read_text, starters
 from brakecli.case.tables import json_schema, tables_within
 from brakecli.solver.method import MOST
@@ -212,6 +213,7 @@ def test_every_key_has_a_description_and_every_float_a_unit() -> None:
         for key, node in properties.items():
             kind = node.get("items", node).get("type")
             assert "description" in node or "$ref" in node, (path, key)
+            kind = node["anyOf"][0]["type"] if "anyOf" in node else kind  # or a word
             assert ("unit" in node) == (kind == "number"), (path, key)
             seen += 1
     assert seen > 50
@@ -277,8 +279,35 @@ def test_each_alternative_of_the_starter_is_valid() -> None:
     commented = [line[2:] for line in lines if line.startswith(tuple(f"# {key} = " for key in keys))]
     tables_of = ["wheel", "wheel", "load", "load", "contact", *["solver"] * 5]
     overrides = [f"{table}.{line}" for table, line in zip(tables_of, commented, strict=True)]
-    solver = parse_case(starters()["case"], "all", [*overrides, 'solver.scheme="three-layer"']).case.solver
+    overrides += ['solver.scheme="three-layer"', "solver.duration=1.0"]  # what changes does not settle
+    solver = parse_case(starters()["case"], "all", overrides).case.solver
     assert solver.theta == (0.25, 0.5, 0.25)
+
+
+UNCOUPLED = ["link1.angle_deg=0.0", "link2.angle_deg=0.0", "solver={duration=1.0}", "roughness={}"]
+WAVES = "roughness.wheel={amplitudes=[1e-6, 0.0, 1e-6], wavelengths=[0.5, 1e-6, 2e-4]}"
+
+
+@pytest.mark.parametrize(
+    ("changes", "rate"),
+    [
+        ([], 50.0 / (2.0 * math.pi) * math.sqrt((1e7 + 2.0 * 0.05 * 2e7) / 10.0)),  # y on link 1 and the contact
+        (["shoe.mass=0.1"], 50.0 / (2.0 * math.pi) * math.sqrt((1e7 + 2.0 * 0.05 * 2e7) / 0.1)),
+        (["wheel.angular_speed=-40.0", WAVES], 10.0 * 40.0 * 0.5 / 2e-4),
+        (["wheel={radius=0.5, times=[0.0, 1.0], angular_speeds=[0.0, 40.0]}", WAVES], 10.0 * 40.0 * 0.5 / 2e-4),
+    ],
+)
+def test_samples_are_taken_by_modes_and_waves_where_a_case_leaves_that_open(
+    changes: list[str], rate: float
+) -> None:
+    """Two digits are half a unit of the second one off at most: a twentieth."""
+    case = parse_case(SMALL, "open", [*UNCOUPLED, *changes]).case
+    assert case.output.sample_interval == pytest.approx(1.0 / rate, rel=0.05)
+    assert float(f"{case.output.sample_interval:.1e}") == case.output.sample_interval
+    assert parse_case(resolved_toml(case), "again").case == case
+    assert "sample_interval" not in given_toml(case)
+    light = changed(case, shoe={"mass": 1e-6 * case.shoe.mass})
+    assert light.output.sample_interval < case.output.sample_interval
 
 
 def test_the_text_is_kept_as_it_was_with_its_line_ends(tmp_path: Path) -> None:

@@ -61,7 +61,6 @@ def test_the_paper_start_needs_a_shoe_at_rest() -> None:
         ('"newton"', '"fixed-point"', "solver.iteration", "is not used by event-driven"),
         ('"consistent"', '"paper"', "solver.start", "is only for the three-layer scheme"),
         ("= false", "= true", "solver.allow_unconverged", "is not used by event-driven"),
-        ("sample_interval = 1e-4", "", "output.sample_interval", "there is no solver.step to use instead"),
         ('"auto"', '"midpoint"', "contact.evaluator", "event-driven needs no nodes"),
     ],
 )

@@ -150,7 +150,8 @@ def test_new_lists_a_starter_for_each_kind_of_question_and_writes_it(tmp_path: P
     for name, text in starters().items():
         if "parameter" in tomllib.loads(text):
             assert parse_study(text, name, tmp_path).study.names
-        elif "case" in tomllib.loads(text):
+        elif base := tomllib.loads(text).get("case"):
+            (tmp_path / base).write_text(starters()[base.removesuffix(".toml")])
             assert parse_sweep(text, name, tmp_path).plan.points > 1
         else:
             assert parse_case(text, name).case.title.startswith("Starter")

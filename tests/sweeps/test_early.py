@@ -16,12 +16,13 @@ from brakecli.case.case import Case
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
 from brakecli.errors import BrakecliError
+from brakecli.runs.settled import Judged
 from brakecli.solver.flow.smooth import DONE, SmoothFlow
 from brakecli.solver.motion import solve
 from brakecli.solver.quantities import ContactState
 from brakecli.solver.system import Initial, System
 from brakecli.sweeps.driver import journal_path
-from brakecli.sweeps.early import Early, early
+from brakecli.sweeps.early import Ending, early
 from brakecli.sweeps.plan import plan_of
 from brakecli.sweeps.point import simulate
 from brakecli.sweeps.workers.task import compute_units
@@ -38,14 +39,14 @@ def case_of(text: str, *overrides: str) -> Case:
     return parse_case(text, "a case", overrides).case
 
 
-def known(case: Case) -> tuple[System, Early]:
+def known(case: Case) -> tuple[System, Judged[Ending]]:
     system = system_of(case)
     found = early(system)
     assert found is not None
     return system, found
 
 
-def compare(found: Early, case: Case) -> None:
+def compare(found: Judged[Ending], case: Case) -> None:
     """A whole run says the same, its numbers within what its samples show of them."""
     ours, whole, system = found.verdict, simulate(case).verdict, found.motion.system
     assert (ours.regime, ours.excitation, ours.settled) == (whole.regime, whole.excitation, whole.settled)
@@ -127,7 +128,7 @@ ORBITS = {
 }
 
 
-def one_cycle(system: System, found: Early, samples: int, cycles: int = 1, moved: float = 0.0) -> Any:
+def one_cycle(system: System, found: Judged[Ending], samples: int, cycles: int = 1, moved: float = 0.0) -> Any:
     """A run from the orbit's state on, by the scheme that keeps samples and an account of energy."""
     x, y, v_x, v_y = found.motion.rows[-1].tolist()
     assert found.verdict.frequency is not None

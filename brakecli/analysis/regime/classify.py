@@ -56,6 +56,7 @@ def classify(
         amplitude_forced=what.forced,
         amplitude_own=what.own,
         forced_frequency=what.forced_frequency,
+        left=shown.envelope.final / shown.envelope.largest if shown.envelope and found.moves else 0.0,
         growth_rate=found.own if theory and math.isfinite(found.own) else None,
         ringing_frequency=theory.mode.frequency if theory else None,
         frequency_resolution=1.0 / (segment(part.stop - part.start) * history.interval),

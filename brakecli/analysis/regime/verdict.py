@@ -5,6 +5,9 @@ from typing import Any
 
 from brakecli.analysis.regime.table import Decision, Excitation, Regime, Thresholds
 
+FADED = 0.01
+"""Part of the level of a damped vibration at its strongest that is nothing any more."""
+
 
 @dataclass(frozen=True)
 class Verdict:
@@ -25,6 +28,7 @@ class Verdict:
     amplitude_forced: float | None = None  # m, on a rough wheel: what the roughness forces
     amplitude_own: float | None = None  # m, on a rough wheel: what the shoe adds
     forced_frequency: float | None = None  # Hz, of the wave that moves x most
+    left: float = 0.0  # of the level of vx at its highest, in the last quarter
     growth_rate: float | None = None  # 1/s, of the slowest mode where the motion is linear
     ringing_frequency: float | None = None  # Hz, of that mode
     frequency_resolution: float | None = None  # Hz, to which a line of the spectrum is known
@@ -46,6 +50,17 @@ class Verdict:
     def frequency(self) -> float | None:
         """Fundamental frequency of vx of a motion that lasts, Hz."""
         return self.decision.frequency
+
+    @property
+    def unfinished(self) -> bool:
+        """Whether a longer run may say more of the regime, or of numbers that last: sentences ask for it then."""
+        if self.regime is Regime.UNDECIDED:
+            asked = [self.decision.advice] if self.decision.advice else []
+        elif self.settled or self.excitation is Excitation.NONE:
+            return not self.settled and self.left > FADED
+        else:
+            asked = [self.notes[about] for about in ("settled", "beat", "ripple") if about in self.notes]
+        return not asked or any("run " in text for text in asked)
 
     @property
     def reasons(self) -> tuple[str, ...]:

@@ -1,0 +1,279 @@
+"""A run that is long enough by itself ends where its verdict is decided; a case with that duration repeats it."""
+
+import math
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from brakecli.analysis.regime.table import Decision, Excitation, Regime
+from brakecli.analysis.regime.verdict import Verdict
+from brakecli.analysis.stability.report import stability
+from brakecli.branches.thresholds import thresholds
+from brakecli.case.case import Case, resolved_toml
+from brakecli.case.read import parse_case, starters
+from brakecli.case.system import system_of
+from brakecli.files.read import open_result
+from brakecli.runs.advise import advise
+from brakecli.runs.limits import check
+from brakecli.runs.run import asked, motion_of, verdict_in_memory
+from brakecli.runs.settled import MOST_SAMPLES, Judged, Settled, longest, settled
+from brakecli.solver.motion import Motion
+from brakecli.solver.quantities import Failure
+from brakecli.solver.system import System
+from brakecli.sweeps.plan import parse_sweep
+from brakecli.sweeps.workers.task import compute_units
+from tests.commands import TINY, attributes, brakecli
+from tests.examples import ROUGH, SQUEAL, make
+from tests.sweeps.helpers import axis, inline, write_sweep
+
+pytestmark = pytest.mark.usefixtures("compiled")
+
+EXACT: dict[str, Any] = {**SQUEAL, "solver": {"tolerance": 1e-4, "duration": "settled"}}
+STEPS: dict[str, Any] = {**SQUEAL, "solver": {"step": 1e-4, "duration": "settled"}}
+OPEN = TINY.replace("duration = 0.02", 'duration = "settled"')
+
+
+def judge(part: System) -> Judged[Motion]:
+    motion, certificate = motion_of(part)
+    return Judged(verdict_in_memory(motion, part), motion, certificate)
+
+
+def settle(case: Case) -> Settled[Motion]:
+    return settled(asked(system_of(case)), judge)
+
+
+def made_up(*durations: float, failure: Failure = Failure.NONE) -> list[float]:
+    """The durations (s) of the runs of a case that takes two seconds at first, until one is of these durations."""
+    system, tried = replace(asked(system_of(make(EXACT))), duration=2.0), list[float]()
+    judged = judge(replace(system, duration=0.05))
+
+    def run(part: System) -> Judged[Motion]:
+        tried.append(part.duration)
+        open_ = Decision("", advice="" if part.duration in durations else "run longer")
+        done = Decision("", Regime.DAMPED)
+        verdict = replace(judged.verdict, decision=done if part.duration in durations else open_)
+        motion = replace(judged.motion, work=replace(judged.motion.work, failure=failure))
+        return judged._replace(verdict=replace(verdict, left=0.0), motion=motion)
+
+    settled(system, run)
+    return tried
+
+
+@pytest.mark.parametrize("base", [EXACT, STEPS])
+def test_a_damped_run_lasts_until_the_vibration_has_faded_and_no_twice_as_long(base: dict[str, Any]) -> None:
+    """The mean level of the last quarter, of one that falls as exp(-r t), lies between its ends.
+
+    It is down to a hundredth in a run of T where r T > ln 100, and not yet in half of it where 3/4 r T/2 < ln 100.
+    A tenth is for the start, which is not linear yet.
+    """
+    case = make(base, friction__coefficient=0.56)
+    found = settle(case)
+    rate = -stability(found.system).modes[0].growth
+    assert found.judged.verdict.regime is Regime.DAMPED
+    assert found.warnings == ()
+    assert math.log(100.0) < rate * found.system.duration < 1.1 * 2.0 * math.log(100.0) / 0.75
+    assert found.system.duration / system_of(case).duration == pytest.approx(2.0, rel=1e-3)
+
+
+def test_a_vibration_that_lasts_is_run_until_its_numbers_are_those_of_any_longer_run() -> None:
+    found = settle(make(EXACT))
+    verdict, long = (
+        found.judged.verdict,
+        judge(replace(found.system, duration=8.0 * found.system.duration)).verdict,
+    )
+    assert (verdict.regime, verdict.settled) == (Regime.RELAXATION, True)
+    assert verdict.amplitude == pytest.approx(long.amplitude, rel=1e-4)
+
+
+def test_runs_are_twice_as_long_each_time_until_one_is_decided() -> None:
+    assert made_up(8.0) == [2.0, 4.0, 8.0]
+    assert made_up(2.0) == [2.0]
+
+
+def test_a_run_that_fails_is_not_made_longer() -> None:
+    assert made_up(8.0, failure=Failure.DIVERGED) == [2.0]
+
+
+def test_a_run_that_cannot_keep_its_tolerance_is_not_made_longer() -> None:
+    """On rough pads, where ever finer runs have been tried; one exact run more or less does not matter."""
+    system = asked(system_of(make(ROUGH, solver__step=None, contact__nodes=None, solver__duration="settled")))
+    found = judge(replace(system, duration=0.02))
+    assert found.certificate is not None
+    broken = found._replace(
+        verdict=replace(found.verdict, decision=Decision("", advice="run longer")),
+        certificate=replace(found.certificate, certified=False),
+    )
+    ended = settled(system, lambda part: broken)
+    assert ended.system.duration == pytest.approx(system.duration, rel=1e-3)
+    assert "a longer run would not keep the tolerance" in ended.warnings[0]
+
+
+def test_the_longest_run_is_the_limit_and_is_told() -> None:
+    """Without dashpots no amplitude is that of any longer run. The verdict stays what it is."""
+    system = asked(system_of(make(EXACT, link1__damping=0.0, link2__damping=0.0, output__sample_interval=5e-4)))
+    judged = judge(replace(system, duration=0.2))
+    lasting = Decision("", Regime.QUASI_HARMONIC, Excitation.SELF_EXCITED)
+    open_ = judged._replace(verdict=replace(judged.verdict, decision=lasting, settled=False, notes={}))
+    found = settled(system, lambda part: open_)
+    assert found.judged.verdict.regime is Regime.QUASI_HARMONIC
+    assert found.system.duration == pytest.approx(longest(system))
+    assert MOST_SAMPLES / 2 < found.system.samples <= MOST_SAMPLES
+    assert "solver.duration: not settled after" in found.warnings[0]
+
+
+DAMPED = Decision("decays", Regime.DAMPED)
+BLANK = Verdict(DAMPED, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, False, {})
+UNDECIDED = Decision("grows", advice="run at least 3 s")
+LASTS = Decision("lasts", Regime.RELAXATION, Excitation.SELF_EXCITED)
+
+
+@pytest.mark.parametrize(
+    ("decision", "changes", "unfinished"),
+    [
+        (UNDECIDED, {}, True),
+        (Decision("either"), {}, True),
+        (Decision("neutral", advice="a dashpot would decide"), {}, False),
+        (DAMPED, {"left": 0.5}, True),
+        (DAMPED, {"left": 1e-3}, False),
+        (DAMPED, {"left": 0.5, "settled": True}, False),
+        (LASTS, {"settled": True}, False),
+        (LASTS, {}, True),
+        (LASTS, {"notes": {"settled": "still changes: run at least 3 s"}}, True),
+        (LASTS, {"notes": {"settled": "impacts shift it: take a solver.step of 1e-6 s"}}, False),
+        (LASTS, {"notes": {"torque_variation": "samples miss impacts"}}, True),
+    ],
+)
+def test_a_verdict_says_whether_a_longer_run_may_say_more(
+    decision: Decision, changes: dict[str, Any], unfinished: bool
+) -> None:
+    settled_, others = changes.get("settled", False), {key: changes[key] for key in changes if key != "settled"}
+    assert replace(BLANK, decision=decision, settled=settled_, **others).unfinished is unfinished
+
+
+def test_the_result_repeats_with_its_duration_as_a_number_to_the_last_bit(tmp_path: Path) -> None:
+    (tmp_path / "open.toml").write_text(OPEN)
+    done = brakecli("run", "open.toml", "--json", cwd=tmp_path)
+    numbers = done.json
+    seconds = tomllib.loads(numbers["resolved_toml"])["solver"]["duration"]
+    done.told(0, f"solver.duration: settled after {seconds:.6g} s")
+    assert 'duration = "settled"' in numbers["case_toml"]
+    brakecli("run", "open.h5", "-o", "again.h5", "-q", cwd=tmp_path).told(0)
+    brakecli("run", "open.toml", "--set", f"solver.duration={seconds!r}", "-o", "n.h5", "-q", cwd=tmp_path).told(0)
+    histories = []
+    for name in ("open.h5", "again.h5", "n.h5"):
+        with open_result(tmp_path / name, kind="run") as result:
+            histories.append([result.read("history", each, 0, None) for each in ("time", "x", "vx", "state")])
+    for others in histories[1:]:
+        for ours, theirs in zip(histories[0], others, strict=True):
+            np.testing.assert_array_equal(ours, theirs)
+    assert histories[0][0][-1] == pytest.approx(seconds, rel=1e-12)
+
+
+def test_points_of_a_sweep_settle_each_in_its_own_time(tmp_path: Path) -> None:
+    """The same as alone: one decays slowly, the other at once."""
+    values = "values = [0.3, 0.565]"
+    report = inline(
+        write_sweep(tmp_path, axis("friction.coefficient", values), case=OPEN), tmp_path / "s.h5", compute_units
+    )
+    with open_result(tmp_path / "s.h5", kind="sweep") as stored:
+        durations, regimes = stored.read("/", "duration"), stored.read("/", "regime")
+    assert report.findings.warned == 0
+    alone = [settle(parse_case(OPEN, "", [f"friction.coefficient={phi}"]).case).system for phi in (0.3, 0.565)]
+    assert durations.tolist() == pytest.approx([each.duration for each in alone])
+    assert durations[1] >= 4.0 * durations[0]
+    assert {*regimes.tolist()} == {"damped"}
+
+
+def test_check_tells_how_long_a_run_may_become_and_a_number_is_not_touched() -> None:
+    system = system_of(make(EXACT))
+    found = check(system)
+    assert found.at_least
+    assert f"up to {longest(system):.6g} s" in found.adjustments[0]
+    assert settled(replace(system, settles=False), judge).system.duration == system.duration
+
+
+def test_advice_is_checked_by_a_run_that_settles() -> None:
+    text = TINY.replace("step = 1e-5, duration = 0.02", 'duration = "settled"')
+    report = advise(parse_case(text, "case"), ["link2.angle_deg"], 0.2, lambda what, done, total: None)
+    assert report.check is not None
+    assert report.check.verdict.regime is Regime.DAMPED
+    assert not report.check.verdict.unfinished
+
+
+def test_a_tolerance_is_kept_by_a_run_that_settles() -> None:
+    text = starters()["rough"]
+    found = settle(parse_case(text, "rough").case)
+    assert found.judged.certificate is not None
+    assert found.judged.certificate.certified
+    assert found.judged.certificate.certified_until == pytest.approx(found.system.duration)
+    assert found.judged.verdict.excitation is Excitation.FORCED
+
+
+def test_what_changes_with_time_cannot_settle(tmp_path: Path) -> None:
+    (tmp_path / "open.toml").write_text(OPEN)
+    ramp = "load={times=[0.0, 1.0], forces=[0.0, 5000.0]}"
+    told = brakecli("run", "open.toml", "--set", ramp, cwd=tmp_path).told(2, "solver.duration: is never reached")
+    assert "as load.forces change with time" in told
+    assert "give a number above 0, in s" in told
+    (wrong,) = brakecli("run", "open.toml", "--set", 'solver.duration="long"', cwd=tmp_path).told(2).splitlines()
+    assert wrong.endswith('is not a number (found "long"); give a number above 0, in s, or "settled"')
+    assert 'or "settled"' in brakecli("check", "open.toml", "--set", "solver.duration=0", cwd=tmp_path).told(2)
+    constant = "load={times=[0.0, 1.0], forces=[5000.0, 5000.0]}"
+    brakecli("run", "open.toml", "--set", constant, cwd=tmp_path).told(0)
+
+
+def test_the_limit_is_told_on_the_command_line_with_the_verdict(tmp_path: Path) -> None:
+    """No dashpot: samples so far apart that a million of them are soon computed."""
+    (tmp_path / "open.toml").write_text(OPEN.replace("damping = 300.0", "damping = 0.0"))
+    few = ["--set", "output.sample_interval=1e-3", "--set", "solver.step=1e-3"]
+    done = brakecli("run", "open.toml", *few, "--set", "friction.coefficient=0.3", cwd=tmp_path)
+    told = done.told(0, "warning: solver.duration: not settled after")
+    assert "a longer run would not decide more" in told
+    assert attributes(tmp_path / "open.h5")["regime"] == "undecided"
+
+
+def test_the_starter_of_hysteresis_finds_the_loop_of_the_branch(tmp_path: Path) -> None:
+    """Vibration lasts on the way down where the limit cycle exists, on the way up where sliding is unstable."""
+    (tmp_path / "branch.toml").write_text(starters()["branch"])
+    loaded = parse_sweep(starters()["hysteresis"], "hysteresis.toml", tmp_path, [])
+    report = inline(loaded, tmp_path / "h.h5", compute_units)
+    case = loaded.base.case
+    system = system_of(case)
+    alone = stability(system)
+    found = thresholds(case, system, alone)
+    assert alone.critical is not None
+    assert found.coexists_from is not None
+    values = [loaded.sweep.axis[0].value(place) for place in range(6)]
+    loop = [int(found.coexists_from < value < alone.critical.friction) for value in values]
+    assert 1 < sum(loop) < 5
+    assert report.findings.hysteresis is not None
+    assert report.findings.hysteresis.tolist() == loop
+    assert len(report.findings.sentences) == 1
+
+
+def test_amplitudes_that_are_still_on_their_way_are_no_hysteresis(tmp_path: Path) -> None:
+    """At 0.6 a vibration grows slowly: on the way up it has not come to what it is on the way down."""
+    both = axis("friction.coefficient", "values = [0.52, 0.54, 0.56, 0.58, 0.6, 0.64]", 'direction = "both"')
+    case = TINY.replace("step = 1e-5, duration = 0.02", "duration = 1.0")
+    report = inline(write_sweep(tmp_path, both, case=case), tmp_path / "s.h5", compute_units)
+    assert report.findings.variables is not None
+    (up, down) = report.findings.variables["amplitude"]
+    assert up[4] < 0.95 * down[4]
+    assert report.findings.hysteresis is not None
+    assert report.findings.hysteresis.tolist() == [0] * 6
+    assert any("still on their way" in text for text in report.findings.sentences)
+
+
+def test_the_pad_of_the_starter_squeals_at_2_khz_as_its_modes_couple() -> None:
+    case = parse_case(starters()["pad"], "pad").case
+    found, report = settle(case), stability(system_of(case))
+    assert report.critical is not None
+    assert report.critical.friction == pytest.approx(0.324, abs=5e-4)
+    assert found.judged.verdict.regime is Regime.QUASI_HARMONIC
+    assert found.judged.verdict.frequency == pytest.approx(1950.0, abs=5.0)
+    assert found.warnings == ()
+    assert parse_case(resolved_toml(case), "again").case.output.sample_interval == case.output.sample_interval
