@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,16 +17,16 @@ if TYPE_CHECKING:
 
 
 def plot_result(
-    result: Path, target: Path, *, force: bool, select: Sequence[str] = (), variable: str = ""
-) -> None:
-    """Draw a result of any kind into a PNG, PDF or SVG file; the suffix of `target` says which.
+    result: Path, target: Path | None, *, force: bool, select: Sequence[str] = (), variable: str = ""
+) -> "Figure":
+    """Draw a result of any kind, into a PNG, PDF or SVG file if there is a `target`, whose suffix says which.
 
     `select` holds `KEY=VALUE` for axes of a sweep of which one value is to be drawn; `variable` names a number of
     a sweep or a quantity of a run. Raises UsageError for another suffix, for an existing target without `force`,
     for what cannot be drawn or selected, and where matplotlib is missing; UnreadableResultError; CannotWriteError.
     """
     with _opened(target, result, force=force) as (write, stored):
-        write(draw(stored[0], select, variable))
+        return write(draw(stored[0], select, variable))
 
 
 def plot_two(first: Path, second: Path, target: Path, *, force: bool, variable: str = "") -> None:
@@ -36,33 +37,37 @@ def plot_two(first: Path, second: Path, target: Path, *, force: bool, variable: 
         write(two.draw((stored[0], stored[1]), variable))
 
 
-def plot_signal(look: "SignalLook", source: str, target: Path, *, force: bool) -> None:
+def plot_signal(look: "SignalLook", source: str, target: Path | None, *, force: bool) -> "Figure":
     """Draw a measured signal as `plot_result` draws a result."""
     with _opened(target, force=force) as (write, _):
         from brakecli.plots import signal
 
-        write(signal.draw(look, source))
+        return write(signal.draw(look, source))
 
 
 @contextmanager
 def _opened(
-    target: Path, *results: Path, force: bool
-) -> Iterator[tuple[Callable[["Figure"], None], list[StoredResult]]]:
+    target: Path | None, *results: Path, force: bool
+) -> Iterator[tuple[Callable[["Figure"], "Figure"], list[StoredResult]]]:
     """Results for a picture, and what writes it."""
-    suffix = target.suffix.lower()
-    check_target(target, "a kind of picture", (".pdf", ".png", ".svg"), results)
+    if target:
+        check_target(target, "a kind of picture", (".pdf", ".png", ".svg"), results)
     with installed("matplotlib"):
         import matplotlib.figure  # noqa: F401
     from brakecli.plots import style
 
     with ExitStack() as stack:
         stored = [stack.enter_context(open_result(result)) for result in results]
-        file = stack.enter_context(new_output(target, force=force))
+        file = stack.enter_context(new_output(target, force=force)) if target else None
         stack.enter_context(style.applied())
 
-        def write(figure: "Figure") -> None:
-            file.write(style.rendered(figure, suffix))
-            file.publish()
+        def write(figure: "Figure") -> "Figure":
+            data = style.rendered(figure, target.suffix.lower() if target else ".png")  # which finishes the figure
+            vars(figure)["_repr_png_"] = partial(style.rendered, figure, ".png")  # notebooks ask for it
+            if file:
+                file.write(data)
+                file.publish()
+            return figure
 
         yield write, stored
 
