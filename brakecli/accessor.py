@@ -7,8 +7,6 @@ objects are JSON among its attributes; `result.brakecli` reads them.
 import base64
 import html
 import json
-import math
-from collections.abc import Iterator
 from typing import Any, TypeVar
 
 import numpy as np
@@ -25,26 +23,25 @@ from brakecli.errors import BrakecliError
 from brakecli.files import fields
 from brakecli.files.as_xarray import stored
 from brakecli.files.contents import Difference
-from brakecli.files.field import values_of
+from brakecli.files.field import Field, values_of
 from brakecli.runs.advise import AdviceReport
 from brakecli.solver.steady_sliding import SteadySliding
 
 _Record = TypeVar("_Record")
-_TOLD = (*fields.LOCK_IN, *fields.BRANCH, *fields.SCATTER, *fields.SWEEP)
-_IDLE = {
+_APART = {
+    "modes",
+    "crossings",
+    "equilibrium",
+    "discrete",
+    "eigenvalues",
     "title",
-    "warnings",
     "notes",
-    "reason",
-    "warning",
-    "warning_count",
-    "settled",
-    "settled_from",
-    "steps",
-    "set",
+    "warnings",
+    "indices_of",
 }
-_IDLE |= {"contact_evaluations", "unconverged_steps"}  # names that the table leaves out
-_MOST = 8  # values, or kinds of text, that a row shows
+_KINDS = fields.STABILITY, fields.THRESHOLDS, fields.LOCK_IN, fields.BRANCH, fields.SCATTER, fields.SWEEP
+_TOLD = {each.name: each for kind in _KINDS for each in kind if each.name not in _APART}
+"""What a table says of a result that is no verdict."""
 
 
 class Shown:
@@ -144,16 +141,20 @@ class Accessor(Shown):
         return tuple(Vibration(*map(_known, row)) for row in zip(*columns, strict=True))
 
     def table(self) -> str:
-        """What the result holds, in two columns; a verdict as `brakecli classify` shows it, without evidence."""
-        held = {str(name): _known(value) for name, value in self._found.attrs.items()}
-        held |= {str(name): _known(each.item()) for name, each in self._found.data_vars.items() if not each.ndim}
+        """Its single numbers, and what is said of it; a verdict as `brakecli classify` shows it, but no evidence."""
+        single = {name: each.item() for name, each in self._found.data_vars.items() if not each.ndim}
+        held = {str(name): _known(value) for name, value in (self._found.attrs | single).items()}
         title = str(held.get("title") or "")
         if "excitation" in held:
             lists = {name: [vars(each) for each in getattr(self, name)] for name in ("vibrations", "bursts")}
             missing = dict.fromkeys(each.name for each in fields.VERDICT)
-            known = {**missing, **held, **lists, "reasons": self.reasons, "evidence": {}}
-            return verdict_table(title, known)
-        return two_columns(title, [*self._rows()])
+            return verdict_table(title, {**missing, **held, **lists, "reasons": self.reasons, "evidence": {}})
+        told = [each for name, each in _TOLD.items() if name in held]
+        rows: list[Row] = [(each.title, _cell(held[each.name], each)) for each in told]
+        rows += [("mode", f"{each.frequency:.5g} Hz, {each.growth:+.4g} 1/s") for each in self.modes]
+        branches = [each for each in self._groups.values() if "kind" in each.attrs]
+        rows += [(str(each.name), f"{each.attrs['kind']}, {each.sizes['point']} motions") for each in branches]
+        return two_columns(title, [*rows, ("note", [*self._texts("notes"), *self.warnings])])
 
     def _repr_png_(self) -> bytes | None:
         from brakecli.plots.result import plot_result
@@ -165,35 +166,6 @@ class Accessor(Shown):
                 return picture.read_bytes()
         except BrakecliError:  # of numbers alone there is none, and matplotlib may be missing
             return None
-
-    def _rows(self) -> Iterator[Row]:
-        """What there is, of grids its range, then the records, and at the end what is said."""
-        yield (
-            "holds",
-            ", ".join(f"{size} along {name}" for name, size in self._found.sizes.items()) or "single numbers",
-        )
-        for name, each in self._found.data_vars.items():
-            if name not in _IDLE:
-                units = str(each.attrs.get("units", "")).removeprefix("1")
-                yield str(name).replace("_", " "), _range(each.values, units)
-        for mode in self.modes:
-            yield (
-                f"mode at {mode.frequency:.5g} Hz",
-                f"{mode.growth:+.4g} 1/s, damping ratio {mode.damping_ratio:.3g}",
-            )
-        for name, group in self._groups.items():
-            if "kind" in group.attrs:
-                stable = int(group["stable"].sum())
-                yield (
-                    name.replace("_", " "),
-                    f"{group.attrs['kind']}: {group.sizes['point']} motions, {stable} stable",
-                )
-        for field in _TOLD:
-            if field.name not in _IDLE and (value := self._found.attrs.get(field.name)) is not None:
-                units = field.units if field.units != "of the key" else ""
-                texts = isinstance(value, str) or not np.size(value)
-                yield field.title, str(value) if texts else _listed(value, units)
-        yield "note", [*self._texts("notes"), *self.warnings]
 
     def _texts(self, name: str) -> tuple[str, ...]:
         """A list of texts; xarray has saved one of a single text as this text."""
@@ -209,24 +181,14 @@ class Accessor(Shown):
 
 def _known(value: Any) -> Any:
     """A value without NumPy; None where there is none."""
-    value = value.item() if isinstance(value, np.generic) else value
-    return None if isinstance(value, float) and math.isnan(value) else value
+    value = value.tolist() if isinstance(value, np.generic | np.ndarray) else value
+    return None if value != value or value == "" else value  # NaN
 
 
-def _listed(value: Any, units: str) -> str:
-    return ", ".join(text_of(_known(each), units.removeprefix("1")) for each in np.ravel(value)[:_MOST])
-
-
-def _range(values: np.ndarray[Any, Any], units: str) -> str:
-    """A value with its unit; of many the least and the largest, or how often there is each text."""
-    if values.dtype.kind in "OUS":
-        texts, counts = np.unique(values.astype(str), return_counts=True)
-        if not values.ndim:
-            return str(values) or "-"
-        pairs = sorted(zip(counts.tolist(), texts.tolist(), strict=True), reverse=True)
-        return ", ".join(f"{text or 'none'} {count}" for count, text in pairs[:_MOST])
-    if not values.ndim:
-        return ("no", "yes")[bool(values)] if values.dtype.kind == "b" else text_of(_known(values[()]), units)
-    known = values[np.isfinite(values)]
-    none = f", {values.size - known.size} missing" * (known.size < values.size)
-    return f"{known.min():.6g} to {known.max():.6g} {units}".rstrip() + none if known.size else "-"
+def _cell(value: Any, field: Field) -> str:
+    """A value, or values, with their unit."""
+    if isinstance(value, list):
+        return ", ".join(_cell(each, field) for each in value) or "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return text_of(value, field.units if field.units not in ("1", "of the key") else "")

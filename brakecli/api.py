@@ -1,6 +1,5 @@
 """`import brakecli`: cases in, xarray objects out, as on the command line. Large imports wait for a call."""
 
-import hashlib
 import multiprocessing
 import os
 import signal
@@ -15,7 +14,7 @@ from functools import partial
 from itertools import pairwise
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from brakecli.errors import BrakecliError, UnreadableResultError, UsageError, in_python
 from brakecli.files.os_signals import Interrupted, unwinding
@@ -29,8 +28,6 @@ if TYPE_CHECKING:
     from brakecli.accessor import Advice, Differences
     from brakecli.case.read import LoadedCase
     from brakecli.cli.measured import Measured
-    from brakecli.files.field import Field
-    from brakecli.scattering.study import LoadedStudy
     from brakecli.solver.motion import Counted
     from brakecli.sweeps.listed import Listed
     from brakecli.sweeps.plan import LoadedSweep
@@ -41,14 +38,12 @@ if TYPE_CHECKING:
     Result = str | PathLike[str] | xr.Dataset | xr.DataTree
     Progress = bool | Callable[[str, int, int], None]
 
-_Loaded = TypeVar("_Loaded")
-
 
 def load(source: "str | PathLike[str]", settings: "Settings | None" = None, *, force_read: bool = False) -> Any:
-    """What a file holds: a case, sweep or study for the other functions, or a result as an `xarray.DataTree`.
+    """What a file holds: a case or a sweep, for the other functions, or a result as an `xarray.DataTree`.
 
     Args:
-        source: path of a case file, a sweep file, a study file, or a result file.
+        source: path of a case file, a sweep file, or a result file.
         settings: keys of the case to change, as `{"friction.coefficient": 0.4}`; of a result none.
         force_read: look at a result whose digest does not fit; its attribute `digest` and a warning say so.
 
@@ -56,16 +51,17 @@ def load(source: "str | PathLike[str]", settings: "Settings | None" = None, *, f
         CaseError: the case or a setting is wrong; holds every problem.
         UnreadableResultError: the result is damaged or of another program.
     """
-    from brakecli.cli.inputs import is_result, load_case, load_study, load_sweep, text_kind
+    from brakecli.cli.inputs import is_result, is_sweep, load_case, load_sweep
 
     name = str(source)
     with in_python(), _readings(force_read=force_read):
         if is_result(name):
             if settings:
                 raise UsageError(f"{name}: holds a result, which has no settings; give them to brakecli.run")
-            return _opened(Path(name))
-        loaders: dict[str, Callable[[str, list[str]], Any]] = {"sweep": load_sweep, "study": load_study}
-        return loaders.get(text_kind(name), load_case)(name, _overrides(settings))
+            from brakecli.files.as_xarray import opened
+
+            return opened(Path(name))
+        return (load_sweep if is_sweep(name) else load_case)(name, _overrides(settings))
 
 
 def run(
@@ -84,8 +80,8 @@ def run(
     Args:
         case: path of a case file or of a result, or what `load` gave.
         settings: keys of the case to change, as `{"friction.coefficient": 0.4}`; a table as
-            `{"solver": {"tolerance": 1e-4}}` replaces the one that the case has. A measured profile may be an array
-            of places and heights (m), as `{"roughness.wheel.profile": np.column_stack([places, heights])}`.
+            `{"solver": {"tolerance": 1e-4}}` replaces the one that the case has. A measured profile may be an
+            array of places and heights (m): `{"roughness.wheel.profile": np.column_stack([places, heights])}`.
         output: a result file to keep; none if left out.
         progress: True shows how far it is, as the command does; or a function that is called with what is counted,
             how many are done, and how many there are (0 if unknown).
@@ -99,13 +95,14 @@ def run(
     """
     with _interruptible(), _readings(), _target(output) as path, _telling(progress) as tell:
         loaded = _case(case, settings)
+        from brakecli.files.as_xarray import opened
         from brakecli.runs.run import run
 
         report = run(loaded, path, force=force, progress=tell)
         _warn(report.warnings)
         if report.motion.work.failed:
             raise BrakecliError(str(report.motion.work.failure_sentence))
-        return _opened(path, own=True)
+        return opened(path, own=True)
 
 
 def stability(
@@ -134,6 +131,7 @@ def stability(
     """
     with _interruptible(), _readings(), _telling(progress) as tell:
         loaded = _case(case, settings)
+        from brakecli.files.as_xarray import dataset, opened
         from brakecli.files.field import values_of
         from brakecli.files.fields import STABILITY, THRESHOLDS
 
@@ -148,13 +146,13 @@ def stability(
                 report = stability(system)
                 both = thresholds(loaded.case, system, report, tell)
             numbers = values_of(STABILITY, report) | values_of(THRESHOLDS, both)
-            return _dataset((*STABILITY, *THRESHOLDS), numbers)
+            return dataset((*STABILITY, *THRESHOLDS), numbers)
         from brakecli.sweeps.lock_in import lock_in, write
 
         with _target(None) as path:
             found = lock_in(loaded, _axis(vary), "vary", tell)
             write(path, loaded, found, force=False)
-            return _opened(path, own=True).to_dataset()
+            return opened(path, own=True).to_dataset()
 
 
 def branch(
@@ -192,6 +190,7 @@ def branch(
     """
     with _interruptible(), _readings(), _target(output) as path, _telling(progress) as tell:
         loaded = _case(case, settings)
+        from brakecli.files.as_xarray import opened
         from brakecli.runs.branch import branch, line_of, parsed, start_of, write
         from brakecli.runs.limits import within_range
         from brakecli.sweeps.result import unit
@@ -209,7 +208,7 @@ def branch(
             starts = [start_of(file, keys) for file in files]
         found = branch(line, tell, lambda: False, starts, switch)
         write(path, loaded, found, unit(keys[0]), force=force)
-        return _opened(path, own=True)
+        return opened(path, own=True)
 
 
 def _ends(given: Any) -> tuple[float, float]:
@@ -246,9 +245,9 @@ def sweep(
         points: points in place of a grid: the values of each key at all of them, as `{"shoe.mass": [10.0, 12.0],
             "friction.coefficient": [0.3, 0.5]}` or as a data frame; the dataset has the dimension `point`.
         critical: the keys of `[critical]`, as `{"parameter": "friction.coefficient", "lower": 0, "upper": 2}`.
-        direction: "up", "down" or "both" follows the motion along the only axis, each point from the end of the one
-            before; of several axes name one, as `{"friction.coefficient": "both"}`. With "both" the dataset also has
-            the dimension `direction`.
+        direction: "up", "down" or "both" follows the motion along the only axis, each point from the end of the
+            one before; of several axes name one, as `{"friction.coefficient": "both"}`. With "both" the dataset
+            has the dimension `direction` as well.
         output: a result file to keep; with it, an interrupted sweep goes on where it was.
         jobs: worker processes; one for each core if left out.
         scheduler: compute on a dask cluster: its client, the cluster, or the address of its scheduler. If left out
@@ -262,6 +261,7 @@ def sweep(
     _refuse_jobs(jobs)
     with _interruptible(), _readings(), _target(output) as path, _telling(progress) as tell:
         from brakecli.cli.inputs import load_sweep
+        from brakecli.files.as_xarray import opened
         from brakecli.runs.run import load_kernels
         from brakecli.sweeps.driver import choose_engine, counting, sweep
         from brakecli.sweeps.listed import GIVEN
@@ -277,8 +277,12 @@ def sweep(
             )
         elif direction is not None:
             raise UsageError("direction: is for axes; a sweep file states it in an axis of its own")
+        elif not isinstance(source, LoadedSweep):
+            loaded = load_sweep(str(source), _overrides(settings))
+        elif settings:
+            raise UsageError("settings: come too late for a sweep that was loaded; give them to brakecli.load")
         else:
-            loaded = _loaded(source, settings, LoadedSweep, load_sweep)
+            loaded = source
         load_kernels(loaded.base)
         with choose_engine(loaded.plan, jobs, _scheduler(scheduler), in_caller=True) as engine:
             report = sweep(loaded, path, engine, force=force, progress=counting(loaded.plan, tell))
@@ -286,21 +290,18 @@ def sweep(
         if found := report.findings.failures:
             failed = f"{report.findings.failed} of {report.findings.points} points failed"
             _warn([f"{failed}, the first: {found[0]['reason']}"])
-        return _opened(path, own=True).to_dataset()
+        return opened(path, own=True).to_dataset()
 
 
 def _axes(axes: Any, direction: Any) -> list[dict[str, Any]]:
     """The tables `[[axis]]` of a sweep."""
-    tables = {keys: {"parameter": keys, "values": values} for keys, values in _mapping(axes, "axes").items()}
-    if isinstance(direction, str):
-        if len(tables) != 1:
-            raise UsageError("direction: needs the name of its axis; write {'friction.coefficient': 'both'}")
-        direction = dict.fromkeys(tables, direction)
-    for keys, way in _mapping(direction, "direction").items():
-        if keys not in tables:
-            raise UsageError(f"direction: {keys!r} is not among the axes; name an axis as axes does")
-        tables[keys]["direction"] = way
-    return [*tables.values()]
+    given = _mapping(axes, "axes")
+    ways = dict.fromkeys(given, direction) if isinstance(direction, str) and len(given) == 1 else direction
+    ways = _mapping(ways, "direction")
+    if unknown := [key for key in ways if key not in given]:
+        raise UsageError(f"direction: {unknown[0]!r} is not among the axes; name an axis as axes does")
+    axis = {key: {"parameter": key, "values": values} for key, values in given.items()}
+    return [axis[key] | ({"direction": ways[key]} if key in ways else {}) for key in given]
 
 
 def _scheduler(given: Any) -> Any:
@@ -308,7 +309,7 @@ def _scheduler(given: Any) -> Any:
 
 
 def scatter(
-    source: "str | PathLike[str] | LoadedStudy",
+    source: "str | PathLike[str]",
     settings: "Settings | None" = None,
     *,
     output: "str | PathLike[str] | None" = None,
@@ -324,7 +325,7 @@ def scatter(
     that `brakecli scatter --json` prints. Runs need a guard in a script, as `sweep` does.
 
     Args:
-        source: path of a study file, or what `load` gave.
+        source: path of a study file.
         settings: keys of the study to change, as `{"samples": 4096}`, or of its case.
         output: a result file to keep; with it, an interrupted study of runs goes on where it was.
         jobs: worker processes; one for each core if left out.
@@ -337,16 +338,18 @@ def scatter(
     """
     _refuse_jobs(jobs)
     with _interruptible(), _readings(), _target(output) as path, _telling(progress) as tell:
+        from brakecli.cli.inputs import load_study
+        from brakecli.files.as_xarray import opened
         from brakecli.scattering.scatter import engine_for, scatter
 
-        loaded = _study(source, settings)
+        loaded = load_study(str(source), _overrides(settings))
         engine_of = partial(engine_for, jobs=jobs, scheduler=_scheduler(scheduler), in_caller=True)
         report = scatter(loaded, path, engine_of, force=force, tell=tell)
         if report.failed:
             _warn(
                 [f"{report.failed} of {report.samples} samples have no answer, the first: {report.first_failure}"]
             )
-        return _opened(path, own=True).to_dataset()
+        return opened(path, own=True).to_dataset()
 
 
 def advise(
@@ -355,7 +358,7 @@ def advise(
     *,
     keys: "str | Iterable[str] | None" = None,
     margin: float = 0.2,
-    scatter: "str | PathLike[str] | LoadedStudy | None" = None,
+    scatter: "str | PathLike[str] | None" = None,
     progress: "Progress" = False,
 ) -> "Advice":
     """What moves the critical friction of a case, and what to change so that it does not squeal.
@@ -368,22 +371,22 @@ def advise(
         keys: those that may be advised, with `*` for any part; masses, stiffnesses, dampings, angles and load if
             left out.
         margin: part of its friction by which the case is to stay stable above it, from 0 to 10.
-        scatter: a study, as for `scatter`: advice is ranked by the probability of squeal that is left.
+        scatter: path of a study file: advice is ranked by the probability of squeal that is left.
         progress: as for `run`.
 
     Returns:
         A record: `critical_friction`, `margin`, `stable`; `sensitivities` and `advice`, lists of records, of which
-        the first move most and help best; `check`, a run with the first advice followed; `conclusion()` and `notes()`
-        in words; `numbers()` is what `brakecli advise --json` prints. Values have the units of their keys.
+        the first move most and help best; `check`, a run with the first advice followed; `conclusion()` and
+        `notes()` in words; `numbers()` is what `brakecli advise --json` prints. Values have their keys' units.
 
     Raises:
         CaseError, UsageError, RefusedError: as `brakecli advise`.
     """
     with _interruptible(), _readings(), _telling(progress) as tell:
         loaded = _case(case, settings)
-        study = _study(scatter, None) if scatter is not None else None
         from brakecli.accessor import Advice
         from brakecli.analysis.stability.advice import KEYS
+        from brakecli.cli.inputs import load_study
         from brakecli.runs.advise import advise
         from brakecli.runs.limits import within_range
         from brakecli.runs.run import load_kernels
@@ -391,6 +394,7 @@ def advise(
         if not (isinstance(margin, int | float) and 0.0 <= margin <= 10.0):
             raise UsageError(f"margin {margin}: is no number from 0 to 10")
         patterns = keys.split(",") if isinstance(keys, str) else KEYS if keys is None else [*map(str, keys)]
+        study = load_study(str(scatter), []) if scatter is not None else None
         load_kernels(loaded)
         with within_range():
             report = advise(loaded, patterns, margin, tell)
@@ -439,8 +443,12 @@ def plot(
     from brakecli.plots.result import plot_result, plot_signal
 
     measured = _measured("plot", quantity, belt_speed, stiffness, reading)
-    path = _output(output) if output is not None else None
-    with _interruptible(), _readings(force_read=force_read), _files([result], "result") as (file,):
+    with (
+        _interruptible(),
+        _readings(force_read=force_read),
+        _target(output, "picture.png") as path,
+        _files([result], "result") as (file,),
+    ):
         if measured.quantity_of(str(file)) is None:
             chosen = [f"{key}={value}" for key, value in _mapping(select, "select").items()]
             return plot_result(file, path, force=force, select=chosen, variable=variable or "")
@@ -461,8 +469,8 @@ def report(
     """Put results on one page, answer first, as `brakecli.report(result, output="report.html")`.
 
     Args:
-        results: what other functions gave, or paths of results: of runs, sweeps, comparisons, stability with `vary`,
-            branches or scatter.
+        results: what other functions gave, or paths of results: of runs, sweeps, comparisons, stability with
+            `vary`, branches or scatter.
         output: the page to write, .html; none if left out.
         progress: as for `run`.
         force: replace that file if it exists.
@@ -517,15 +525,19 @@ def diff(
     Raises:
         UsageError, UnreadableResultError, CannotWriteError: as `brakecli diff`.
     """
-    path = _output(output) if output is not None else None
-    with _interruptible(), _readings(force_read=force_read), _files([first, second], "a", "b") as files:
+    with (
+        _interruptible(),
+        _readings(force_read=force_read),
+        _target(output) as path,
+        _files([first, second], "a", "b") as files,
+    ):
         from brakecli.accessor import Differences
         from brakecli.files.contents import difference
         from brakecli.files.read import open_result
 
         with open_result(files[0]) as a, open_result(files[1]) as b:
             found = Differences(**vars(difference(a, b)))
-        if path is not None:
+        if output is not None:
             from brakecli.plots.result import plot_two
 
             plot_two(files[0], files[1], path, force=force, variable=variable or "")
@@ -569,6 +581,7 @@ def classify(
         UsageError, UnreadableResultError: as `brakecli classify`.
     """
     from brakecli.cli.classify import Options
+    from brakecli.files.as_xarray import dataset
     from brakecli.files.fields import EXPONENT, VERDICT
 
     if "second_run" in reading:
@@ -578,7 +591,7 @@ def classify(
     with _interruptible(), _readings(force_read=force_read), _files([source], "result") as (file,):
         numbers = Options(measured, changes).verdict(str(file))
     _warn(numbers.get("warnings", ()))
-    return _dataset((*VERDICT, *EXPONENT), numbers)
+    return dataset((*VERDICT, *EXPONENT), numbers)
 
 
 def _measured(
@@ -618,6 +631,7 @@ def _listed(points: "Mapping[str, Iterable[Any]] | None") -> "Listed | None":
 @contextmanager
 def _readings(*, force_read: bool = False) -> Iterator[None]:
     """Warn of results that no digest vouches for, and forget them at the end."""
+    import brakecli.accessor  # noqa: F401 - which xarray objects have from then on
     from brakecli.case.roughness import arrays
 
     said, before = list[str](), arrays.set({})
@@ -657,17 +671,13 @@ def _interruptible() -> Iterator[None]:
         raise (KeyboardInterrupt() if asked else SystemExit(error.exit_code)) from None
 
 
-def _output(given: "str | PathLike[str]") -> Path:
-    if not isinstance(given, str | PathLike):
-        raise UsageError(f"output {given!r}: is no path; give one, or leave it out")
-    return Path(given)
-
-
 @contextmanager
 def _target(output: "str | PathLike[str] | None", name: str = "result.h5") -> Iterator[Path]:
     """Where a result goes: to a file that stays, or to one that does not."""
     if output is not None:
-        yield _output(output)
+        if not isinstance(output, str | PathLike):
+            raise UsageError(f"output {output!r}: is no path; give one, or leave it out")
+        yield Path(output)
         return
     with tempfile.TemporaryDirectory(prefix="brakecli-") as folder:
         yield Path(folder) / name
@@ -691,40 +701,6 @@ def _files(results: "Iterable[Result]", *names: str) -> Iterator[list[Path]]:
             else:
                 raise UsageError(f"{type(result).__name__}: is no result; give a path, or what a function gave")
         yield files
-
-
-def _opened(path: Path, *, own: bool = False) -> "xr.DataTree":
-    """A result file in memory, with `brakecli` as its attribute."""
-    import brakecli.accessor  # noqa: F401
-    from brakecli.files.as_xarray import opened
-
-    return opened(path, own=own)
-
-
-def _dataset(declared: "Iterable[Field]", numbers: Mapping[str, Any]) -> "xr.Dataset":
-    """Numbers as a dataset, with `brakecli` as its attribute."""
-    import brakecli.accessor  # noqa: F401
-    from brakecli.files.as_xarray import dataset
-
-    return dataset(declared, numbers)
-
-
-def _loaded(
-    source: Any, settings: "Settings | None", kind: type[_Loaded], load: Callable[..., _Loaded]
-) -> _Loaded:
-    """A sweep or study: one that `load` gave, or that of a file."""
-    if not isinstance(source, kind):
-        return load(str(source), _overrides(settings))
-    if settings:
-        raise UsageError("settings: come too late for what was loaded before; give them to brakecli.load")
-    return source
-
-
-def _study(source: Any, settings: "Settings | None") -> "LoadedStudy":
-    from brakecli.cli.inputs import load_study
-    from brakecli.scattering.study import LoadedStudy
-
-    return _loaded(source, settings, LoadedStudy, load_study)
 
 
 def _case(source: "Source | LoadedSweep", settings: "Settings | None") -> "LoadedCase":
@@ -785,7 +761,12 @@ def _axis(vary: "Mapping[str | tuple[str, ...], Iterable[float]]") -> "Axis":
 def _plain(value: Any, key: str) -> Any:
     """The value of a key without NumPy or xarray, as TOML holds it, or UsageError."""
     if key.rpartition(".")[2] == "profile" and not isinstance(value, str | PathLike):
-        return _profile(value, key)
+        from brakecli.case.profile import given
+
+        try:
+            return given(value)
+        except UnreadableResultError as error:
+            raise UsageError(f"{key}: {error}") from error
     value = value.to_numpy() if hasattr(value, "to_numpy") else value
     value = value.tolist() if hasattr(value, "tolist") else value
     if isinstance(value, Mapping):
@@ -795,20 +776,6 @@ def _plain(value: Any, key: str) -> Any:
     if not isinstance(value, str | int | float | date | time | PathLike):
         raise UsageError(f"{key}: cannot be set to {type(value).__name__}; give a number, text, list or table")
     return str(value) if isinstance(value, PathLike) else value
-
-
-def _profile(value: Any, key: str) -> str:
-    """The name of a measured profile that is given as an array."""
-    from brakecli.case.profile import given
-    from brakecli.case.roughness import arrays
-
-    try:
-        record = given(value)
-    except UnreadableResultError as error:
-        raise UsageError(f"{key}: {error}") from error
-    name = f"/numpy/array {hashlib.sha256(record.place + record.height).hexdigest()[:8]}"  # no path of a file
-    arrays.get()[name] = record
-    return name
 
 
 def _warn(texts: Iterable[str], frames: int = 3) -> None:

@@ -1,12 +1,13 @@
 """A measured profile as a sum of sines."""
 
+import hashlib
 import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from brakecli.case.roughness import MOST_MEASURED, Record
+from brakecli.case.roughness import MOST_MEASURED, Record, arrays
 from brakecli.case.tables import MOST_SINES
 from brakecli.errors import UsageError, printable
 from brakecli.files.table import Array, TextTable, require
@@ -90,8 +91,8 @@ def read(path: Path) -> Record:
     return _checked(place, height, is_angle=bool(along and along[1] == "radian"))
 
 
-def given(value: object) -> Record:
-    """The profile that an array holds: places and heights (m), as two columns or as two rows.
+def given(value: object) -> str:
+    """The name, among the `arrays`, of a profile: an array of places and heights (m), two columns or two rows.
 
     Raises UnreadableResultError.
     """
@@ -102,7 +103,10 @@ def given(value: object) -> Record:
     rows = rows.T if rows.shape[:1] == (2,) and rows.shape != (2, 2) else rows
     require(rows.ndim == 2 and rows.shape[1] == 2, "is no profile; give places and heights (m), as two columns")
     require(rows.nbytes <= MOST_MEASURED, f"takes more than {MOST_MEASURED / 1e6:g} MB; measure fewer places")
-    return _checked(rows[:, 0], rows[:, 1], is_angle=False)
+    record = _checked(rows[:, 0], rows[:, 1], is_angle=False)
+    name = f"/numpy/array {hashlib.sha256(record.place + record.height).hexdigest()[:12]}"  # absolute, and no path of a file
+    arrays.get()[name] = record
+    return name
 
 
 def _checked(place: Array, height: Array, *, is_angle: bool) -> Record:

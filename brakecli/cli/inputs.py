@@ -84,14 +84,9 @@ def _over_a_case(
 
 def is_sweep(source: str) -> bool:
     """Whether a file is meant to be a sweep."""
-    return not is_result(source) and text_kind(source) == "sweep"
-
-
-def text_kind(source: str) -> str:
-    """What a text file is meant to be: "case", "sweep", "study", or none of them."""
     from brakecli.sweeps.plan import kind_of
 
-    return kind_of(_text(source)[0])
+    return not is_result(source) and kind_of(_text(source)[0]) == "sweep"
 
 
 def as_argument(path: str | Path) -> str:

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
 
 def plot_result(
-    result: Path, target: Path | None, *, force: bool, select: Sequence[str] = (), variable: str = ""
+    result: Path, target: Path, *, force: bool, select: Sequence[str] = (), variable: str = ""
 ) -> "Figure":
-    """Draw a result of any kind, into a PNG, PDF or SVG file if there is a `target`, whose suffix says which.
+    """Draw a result of any kind into a PNG, PDF or SVG file; the suffix of `target` says which.
 
     `select` holds `KEY=VALUE` for axes of a sweep of which one value is to be drawn; `variable` names a number of
     a sweep or a quantity of a run. Raises UsageError for another suffix, for an existing target without `force`,
@@ -37,7 +37,7 @@ def plot_two(first: Path, second: Path, target: Path, *, force: bool, variable: 
         write(two.draw((stored[0], stored[1]), variable))
 
 
-def plot_signal(look: "SignalLook", source: str, target: Path | None, *, force: bool) -> "Figure":
+def plot_signal(look: "SignalLook", source: str, target: Path, *, force: bool) -> "Figure":
     """Draw a measured signal as `plot_result` draws a result."""
     with _opened(target, force=force) as (write, _):
         from brakecli.plots import signal
@@ -47,26 +47,24 @@ def plot_signal(look: "SignalLook", source: str, target: Path | None, *, force: 
 
 @contextmanager
 def _opened(
-    target: Path | None, *results: Path, force: bool
+    target: Path, *results: Path, force: bool
 ) -> Iterator[tuple[Callable[["Figure"], "Figure"], list[StoredResult]]]:
     """Results for a picture, and what writes it."""
-    if target:
-        check_target(target, "a kind of picture", (".pdf", ".png", ".svg"), results)
+    suffix = target.suffix.lower()
+    check_target(target, "a kind of picture", (".pdf", ".png", ".svg"), results)
     with installed("matplotlib"):
         import matplotlib.figure  # noqa: F401
     from brakecli.plots import style
 
     with ExitStack() as stack:
         stored = [stack.enter_context(open_result(result)) for result in results]
-        file = stack.enter_context(new_output(target, force=force)) if target else None
+        file = stack.enter_context(new_output(target, force=force))
         stack.enter_context(style.applied())
 
         def write(figure: "Figure") -> "Figure":
-            data = style.rendered(figure, target.suffix.lower() if target else ".png")  # which finishes the figure
-            vars(figure)["_repr_png_"] = partial(style.rendered, figure, ".png")  # notebooks ask for it
-            if file:
-                file.write(data)
-                file.publish()
+            file.write(style.rendered(figure, suffix))
+            file.publish()
+            vars(figure)["_repr_png_"] = partial(style.rendered, figure, ".png")  # by which notebooks show it
             return figure
 
         yield write, stored
