@@ -4,9 +4,21 @@ import os
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from brakecli.api import branch, classify, load, run, scatter, stability, sweep
+    from brakecli.api import advise, branch, classify, diff, load, plot, report, run, scatter, stability, sweep
 
-__all__ = ["branch", "classify", "load", "run", "scatter", "stability", "sweep"]
+__all__ = [
+    "advise",
+    "branch",
+    "classify",
+    "diff",
+    "load",
+    "plot",
+    "report",
+    "run",
+    "scatter",
+    "stability",
+    "sweep",
+]
 __version__ = "0.7.0"
 __released__ = "2026-11-24"
 ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")

@@ -1,12 +1,13 @@
 """A measured profile as a sum of sines."""
 
+import hashlib
 import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from brakecli.case.roughness import Record
+from brakecli.case.roughness import MOST_MEASURED, Record, arrays
 from brakecli.case.tables import MOST_SINES
 from brakecli.errors import UsageError, printable
 from brakecli.files.table import Array, TextTable, require
@@ -87,6 +88,30 @@ def read(path: Path) -> Record:
     sizes = (unit[0] if unit else 1.0 for unit in (along, up))
     with np.errstate(over="ignore"):
         place, height = (values * size for values, size in zip(table.numbers(), sizes, strict=True))
+    return _checked(place, height, is_angle=bool(along and along[1] == "radian"))
+
+
+def given(value: object) -> str:
+    """The name, among the `arrays`, of a profile: an array of places and heights (m), two columns or two rows.
+
+    Raises UnreadableResultError.
+    """
+    try:
+        rows = np.ma.array(value, np.float64).filled(np.nan)
+    except (TypeError, ValueError):
+        rows = np.empty(0)
+    rows = rows.T if rows.shape[:1] == (2,) and rows.shape != (2, 2) else rows
+    require(rows.ndim == 2 and rows.shape[1] == 2, "is no profile; give places and heights (m), as two columns")
+    require(rows.nbytes <= MOST_MEASURED, f"takes more than {MOST_MEASURED / 1e6:g} MB; measure fewer places")
+    record = _checked(rows[:, 0], rows[:, 1], is_angle=False)
+    digest = hashlib.sha256(record.place + record.height).hexdigest()[:12]
+    name = f"/numpy/array {digest}"  # absolute, and no path of a file
+    arrays.get()[name] = record
+    return name
+
+
+def _checked(place: Array, height: Array, *, is_angle: bool) -> Record:
+    """The profile of rising or falling places; raises UnreadableResultError."""
     require(len(place) > 3, f"has {len(place)} rows; measure four places or more")
     require(np.isfinite(place).all() and np.isfinite(height).all(), "a cell is empty or no number; fill it")
     for what, largest in (("place", np.abs(place).max()), ("height", np.abs(height).max())):
@@ -100,7 +125,7 @@ def read(path: Path) -> Record:
     high = float(np.ptp(height))
     require(high > 0.0, "all heights are equal; leave the surface out, which is smooth")
     require(high >= _FLATTEST, f"its heights differ by {high:.3g} m; check their unit")
-    return Record(place.tobytes(), height.tobytes(), bool(along and along[1] == "radian"))
+    return Record(place.tobytes(), height.tobytes(), is_angle)
 
 
 def _turns(place: Array, step: float, turn: float) -> tuple[int, float]:

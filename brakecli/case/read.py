@@ -17,7 +17,7 @@ from pydantic import ValidationError
 
 from brakecli.case import wording
 from brakecli.case.case import Case, changed, resolved_toml
-from brakecli.case.roughness import Record, Records, reading
+from brakecli.case.roughness import Record, Records, arrays, reading
 from brakecli.case.tables import MISSING, Table, tables_within
 from brakecli.errors import CaseError, KeyPath, Problem, key_text, printable
 from brakecli.files import toml_lines
@@ -89,9 +89,9 @@ def parse_case(
     An override reads `key.path=VALUE`, the value in TOML. It replaces what the text says, creates the tables that
     it needs, and takes effect before anything is checked. Of two keys that exclude each other, such as a constant
     load and a schedule, an override of one removes the other from the text. Measured profiles are read unless they
-    are `known`.
+    are `known`, or among the `arrays`.
     """
-    records = Records(known or {})
+    records = Records({**arrays.get({}), **(known or {})})
     with reading(records):
         case = parse_table(Case, text, label, overrides)
     resolved = resolved_toml(case)

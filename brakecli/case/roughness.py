@@ -56,6 +56,8 @@ class Records(dict[str, Record]):
 
 _known = ContextVar[Mapping[str, Record]]("measured profiles")
 
+arrays = ContextVar[dict[str, Record]]("measured profiles that come from no file, by their names")
+
 
 @contextmanager
 def reading(records: Mapping[str, Record]) -> Iterator[None]:

@@ -63,29 +63,35 @@ def announce_compilation(trouble: str) -> None:
 def progress(quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
     """Yield a function that shows what is counted, how many are done, and how many there are.
 
-    Without a terminal it says so in a line, ever less often. Within, a signal raises `Interrupted`.
+    Within, a signal raises `Interrupted`.
     """
-    with unwinding():
-        if quiet or sys.stderr is None or not sys.stderr.isatty():
-            start, due = time.monotonic(), FIRST_LINE
+    with unwinding(), telling(quiet) as tell:
+        yield tell
 
-            def tell(what: str, done: int, total: int) -> None:
-                nonlocal due
-                if not quiet and (passed := time.monotonic() - start) >= due:
-                    due = passed + min(passed, LAST_LINES)
-                    say(f"{what} {done} of {total}, {passed:.0f} s" if total else f"{what}, {passed:.0f} s")
 
-            yield tell
-            return
-        from rich import progress as rich_progress
-        from rich.console import Console
+@contextmanager
+def telling(quiet: bool, first_line: float = FIRST_LINE) -> Iterator[Callable[[str, int, int], None]]:
+    """Yield such a function: a bar; without a terminal lines, after some seconds and then ever less often."""
+    if quiet or sys.stderr is None or not sys.stderr.isatty():
+        start, due = time.monotonic(), first_line
 
-        console = Console(file=cast(TextIO, Styled(sys.stderr)))
-        columns = (*rich_progress.Progress.get_default_columns(), rich_progress.MofNCompleteColumn())
-        with rich_progress.Progress(*columns, console=console, transient=True) as bar:
-            task = bar.add_task("", visible=False)
+        def tell(what: str, done: int, total: int) -> None:
+            nonlocal due
+            if not quiet and (passed := time.monotonic() - start) >= due:
+                due = passed + min(passed, LAST_LINES)
+                say(f"{what} {done} of {total}, {passed:.0f} s" if total else f"{what}, {passed:.0f} s")
 
-            def show(what: str, done: int, total: int) -> None:
-                bar.update(task, description=what, completed=done, total=total, visible=True)
+        yield tell
+        return
+    from rich import progress as rich_progress
+    from rich.console import Console
 
-            yield show
+    console = Console(file=cast(TextIO, Styled(sys.stderr)))
+    columns = (*rich_progress.Progress.get_default_columns(), rich_progress.MofNCompleteColumn())
+    with rich_progress.Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task("", visible=False)
+
+        def show(what: str, done: int, total: int) -> None:
+            bar.update(task, description=what, completed=done, total=total, visible=True)
+
+        yield show

@@ -37,7 +37,7 @@ def command(
     from brakecli.cli.tables import sweep_table
     from brakecli.runs.run import load_kernels
     from brakecli.sweeps.cost import Estimate
-    from brakecli.sweeps.driver import choose_engine, keeping_points, sweep
+    from brakecli.sweeps.driver import choose_engine, counting, keeping_points, sweep
 
     load_kernels(loaded.base)
     with progress(quiet) as show_progress:
@@ -46,10 +46,7 @@ def command(
             if not quiet:
                 say(found.sentence() + (f"; {resumed} of them are there already" if resumed else ""))
 
-        def advance(done: int, failed: int) -> None:
-            what = f"points, {failed} failed" if failed else "points"
-            show_progress(what, done, loaded.plan.passes * loaded.plan.points)
-
+        advance = counting(loaded.plan, show_progress)
         with keeping_points(target), choose_engine(loaded.plan, jobs, scheduler, scheduler_file) as engine:
             report = sweep(loaded, target, engine, force=force, task_size=task_size, begin=begin, progress=advance)
     found = report.findings

@@ -1,18 +1,20 @@
 """Results and numbers as xarray holds them."""
 
 import json
-from collections.abc import Iterable, Mapping
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import h5py
 import xarray as xr
 
-from brakecli.errors import UnreadableResultError
+from brakecli.errors import BrakecliError, UnreadableResultError, UsageError
 from brakecli.files import valid
 from brakecli.files.field import Field
 from brakecli.files.read import StoredResult, open_result
-from brakecli.files.trust import readings
+from brakecli.files.trust import MISSING, readings
 
 
 def opened(path: Path, *, own: bool = False) -> xr.DataTree:
@@ -37,6 +39,29 @@ def opened(path: Path, *, own: bool = False) -> xr.DataTree:
         reason = repr(error) if isinstance(error, LookupError) else error
         what = f"{path}: xarray cannot read what it holds: {reason}"
         raise UnreadableResultError(f"{what}; compute the result again") from error
+
+
+@contextmanager
+def stored(found: xr.Dataset | xr.DataTree, name: str) -> Iterator[Path]:
+    """A result in memory as a file of this name, within the block; messages call it by its name.
+
+    Raises UsageError where xarray cannot write it. What comes from a file whose digest does not fit stays marked.
+    """
+    with tempfile.TemporaryDirectory(prefix="brakecli-") as folder:
+        path = Path(folder) / name
+        try:
+            found.to_netcdf(path, engine="h5netcdf")
+        except (ValueError, TypeError, OSError, RuntimeError) as error:
+            raise UsageError(f"{name}: xarray cannot write it as a file: {error}") from error
+        before = readings.unchecked
+        readings.unchecked = before | {str(path): MISSING, name: str(found.attrs.get("digest", MISSING))}
+        try:
+            yield path
+        except BrakecliError as error:
+            error.args = (str(error).replace(f"{folder}/", ""),)
+            raise
+        finally:
+            readings.unchecked = before
 
 
 def _check(result: StoredResult, *, own: bool) -> None:

@@ -168,8 +168,8 @@ def check_memory(needed: int, where: str) -> None:
 
 def axes_of(node: h5py.Dataset, name: str) -> tuple[str, ...]:
     """The names of the axes of a variable; empty where it has none."""
-    if plain_attribute(node, "CLASS") == "DIMENSION_SCALE" and node.ndim < 2:
-        return (name,)
+    if plain_attribute(node, "CLASS") == "DIMENSION_SCALE" and (node.ndim < 2 or node.dtype == "S1"):
+        return (name, f"string{node.shape[-1]}")[: node.ndim] if node.ndim else (name,)  # of texts: as xarray does
     if "DIMENSION_LIST" not in node.attrs:
         return tuple("" for _ in node.shape)
     attribute = h5a.open(node.id, b"DIMENSION_LIST")

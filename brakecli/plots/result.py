@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 def plot_result(
     result: Path, target: Path, select: Sequence[str] = (), variable: str = "", section: str = "", *, force: bool
-) -> None:
+) -> "Figure":
     """Draw a result of any kind into a PNG, PDF or SVG file; the suffix of `target` says which.
 
     `select` holds `KEY=VALUE` for axes of a sweep of which one value is to be drawn; `variable` names a number of
@@ -26,7 +27,7 @@ def plot_result(
     UnreadableResultError; CannotWriteError.
     """
     with _opened(target, result, force=force) as (write, stored):
-        write(draw(stored[0], select, variable, section))
+        return write(draw(stored[0], select, variable, section))
 
 
 def plot_two(first: Path, second: Path, target: Path, *, force: bool, variable: str = "") -> None:
@@ -37,18 +38,18 @@ def plot_two(first: Path, second: Path, target: Path, *, force: bool, variable: 
         write(two.draw((stored[0], stored[1]), variable))
 
 
-def plot_signal(look: "SignalLook", source: str, target: Path, *, force: bool) -> None:
+def plot_signal(look: "SignalLook", source: str, target: Path, *, force: bool) -> "Figure":
     """Draw a measured signal as `plot_result` draws a result."""
     with _opened(target, force=force) as (write, _):
         from brakecli.plots import signal
 
-        write(signal.draw(look, source))
+        return write(signal.draw(look, source))
 
 
 @contextmanager
 def _opened(
     target: Path, *results: Path, force: bool
-) -> Iterator[tuple[Callable[["Figure"], None], list[StoredResult]]]:
+) -> Iterator[tuple[Callable[["Figure"], "Figure"], list[StoredResult]]]:
     """Results for a picture, and what writes it."""
     suffix = target.suffix.lower()
     check_target(target, "a kind of picture", (".pdf", ".png", ".svg"), results)
@@ -61,9 +62,11 @@ def _opened(
         file = stack.enter_context(new_output(target, force=force))
         stack.enter_context(style.applied())
 
-        def write(figure: "Figure") -> None:
+        def write(figure: "Figure") -> "Figure":
             file.write(style.rendered(figure, suffix))
             file.publish()
+            vars(figure)["_repr_png_"] = partial(style.rendered, figure, ".png")  # by which notebooks show it
+            return figure
 
         yield write, stored
 

@@ -186,7 +186,7 @@ def scatter(
 def engine_for(
     plan: Plan,
     jobs: int | None = None,
-    scheduler: str | None = None,
+    scheduler: Any = None,
     scheduler_file: str | None = None,
     *,
     in_caller: bool = False,

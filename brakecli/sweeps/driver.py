@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from brakecli.errors import BrakecliError, CannotWriteError
 from brakecli.files.os_signals import Interrupted
 from brakecli.files.write import ResultFile, new_result
 from brakecli.runs.limits import free_bytes
+from brakecli.solver.motion import Counted
 from brakecli.sweeps.cost import Estimate, estimate, refuse_sweep
 from brakecli.sweeps.journal import Journal, open_journal
 from brakecli.sweeps.plan import LoadedSweep, Plan
@@ -81,7 +83,7 @@ class TaskQueue:
 def choose_engine(
     plan: Plan,
     jobs: int | None,
-    scheduler: str | None = None,
+    scheduler: Any = None,
     scheduler_file: str | None = None,
     *,
     in_caller: bool = False,
@@ -89,7 +91,8 @@ def choose_engine(
 ) -> Engine:
     """The engine for a sweep: workers here, or those of a dask scheduler. Raises UsageError.
 
-    `in_caller`: a single worker is this process itself. `compute` is what it computes, in place of points.
+    `scheduler` is its address, or a client or a cluster of dask. `in_caller`: a single worker is this process
+    itself. `compute` is what it computes, in place of points.
     """
     compute = compute or partial(compute_units, plan)
     if scheduler is None and scheduler_file is None:
@@ -145,6 +148,15 @@ def sweep(
             journal.discard()
     seconds = time.perf_counter() - start
     return replace(report, seconds=seconds, overhead=1.0 - queue.seconds / (seconds * engine.workers))
+
+
+def counting(plan: Plan, tell: Counted) -> Callable[[int, int], None]:
+    """The progress of a sweep in words: which points are done, and how many have failed."""
+
+    def progress(done: int, failed: int) -> None:
+        tell(f"points, {failed} failed" if failed else "points", done, plan.passes * plan.points)
+
+    return progress
 
 
 def journal_path(output: Path) -> Path:

@@ -14,7 +14,7 @@ stick, a settled part that is too short), there is no early verdict, and the run
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 

@@ -86,8 +86,12 @@ class Answers:
 
     @classmethod
     def of(cls, known: Mapping[str, Any]) -> "Answers":
-        """The record of what is known by name; what else there is does not matter."""
-        return cls(**{name: type(value)(known[name]) for name, value in _UNKNOWN.items() if name in known})
+        """The record of what is known by name; what else there is does not matter.
+
+        A number may be a list of one, as xarray saves it.
+        """
+        single = {name: value[0] if isinstance(value, list) and value else value for name, value in known.items()}
+        return cls(**{name: type(value)(single[name]) for name, value in _UNKNOWN.items() if name in single})
 
     def powers(self, rate: float) -> float:
         """Powers of e by which something changes in half of the run."""

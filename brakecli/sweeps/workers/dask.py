@@ -26,13 +26,17 @@ INSTALL = "; install the same version there"
 class ClusterEngine(Engine):
     """The workers of a dask scheduler. Dask gives the tasks of a worker that dies to others."""
 
-    def __init__(self, compute: Compute, address: str | None, scheduler_file: str | None) -> None:
-        """Connect to a scheduler and compare versions; raises UsageError or RefusedError."""
+    def __init__(self, compute: Compute, scheduler: Any, scheduler_file: str | None) -> None:
+        """Connect to a scheduler and compare versions; raises UsageError or RefusedError.
+
+        It is given by its address, or by a client or a cluster of dask; these stay as they are.
+        """
         self._compute, self._versions, self._shared = compute, fingerprint(), None
+        address = str(getattr(getattr(scheduler, "scheduler", None), "address", scheduler))
         option, name = ("--scheduler", address) if scheduler_file is None else ("--scheduler-file", scheduler_file)
         self._where = f"{option} {name}"
-        address = str(address) if scheduler_file is None else self._address_in(scheduler_file)
-        self._client = self._connected(address)
+        address = address if scheduler_file is None else self._address_in(scheduler_file)
+        self._client = self._connected(address, getattr(scheduler, "security", None))
         with ExitStack() as failed:
             failed.push(self)
             with self._explained(UsageError, "the scheduler does not answer"):
@@ -150,7 +154,7 @@ class ClusterEngine(Engine):
         remedy = f"start a scheduler with: dask scheduler --scheduler-file {scheduler_file}"
         raise UsageError(f"{self._where}: cannot be read: {reason}; {remedy}")
 
-    def _connected(self, address: str) -> Any:
+    def _connected(self, address: str, security: Any) -> Any:
         try:
             from distributed import Client
         except ImportError as error:
@@ -167,7 +171,7 @@ class ClusterEngine(Engine):
 
         quiet: Any = _Client
         with self._explained(UsageError, "no scheduler answers", "; start one with: dask scheduler"):
-            return quiet(address, timeout=CONNECT_SECONDS, set_as_default=False)
+            return quiet(address, timeout=CONNECT_SECONDS, security=security, set_as_default=False)
 
     def _compare(self) -> None:
         """Refuse workers of another version: their results would not be the same."""
