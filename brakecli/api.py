@@ -413,6 +413,7 @@ def plot(
     output: "str | PathLike[str] | None" = None,
     select: "Settings | None" = None,
     variable: str | None = None,
+    section: str | None = None,
     belt_speed: float | None = None,
     stiffness: float | None = None,
     force: bool = False,
@@ -428,6 +429,7 @@ def plot(
         select: values of a sweep's axes of which the nearest are drawn, as `{"friction.coefficient": 0.4}`.
         variable: a number of a sweep; of a run x, y, vx, vy, friction_force, normal_force, torque or
             contact_fraction.
+        section: a Poincaré section of a run in place of its histories, as `brakecli plot --section` has it.
         belt_speed: of a signal: speed of the wheel's surface (m/s), if known.
         stiffness: of a signal: stiffness behind a measured force (N/m), if known.
         force: replace that file if it exists.
@@ -451,9 +453,10 @@ def plot(
     ):
         if measured.quantity_of(str(file)) is None:
             chosen = [f"{key}={value}" for key, value in _mapping(select, "select").items()]
-            return plot_result(file, path, force=force, select=chosen, variable=variable or "")
-        if select or variable:
-            raise UsageError("select and variable: are for results; leave them out for a measured signal")
+            return plot_result(file, path, chosen, variable or "", section or "", force=force)
+        if select or variable or section:
+            what = "select, variable and section"
+            raise UsageError(f"{what}: are for results; leave them out for a measured signal")
         look = measured.look_at(str(file))
         _warn(look.verdict.warnings)
         return plot_signal(look, str(file), path, force=force)
