@@ -14,8 +14,9 @@ _SMOOTH = surface()
 _shared = lru_cache(maxsize=4096)(schedule)
 """Schedules that the points of a sweep have in common; nobody changes them, nor surfaces."""
 EVENT_TOLERANCE = 1e-10  # of event-driven where a case gives it a step
-FIRST_CYCLES = 250.0
-"""Periods of the slowest mode in the first run of a case that is to settle: a window of its envelope holds six."""
+FIRST_CYCLES, FIRST_SAMPLES = 250.0, 500_000.0
+"""Periods of the slowest mode in the first run of a case that is to settle, and its samples at most. A window of
+its envelope, a fortieth of it, then holds six of them."""
 
 
 def system_of(case: Case) -> System:
@@ -29,7 +30,7 @@ def system_of(case: Case) -> System:
     if initial.wheel_angle and wheel_surface.g.size:
         wheel_surface = turned(wheel_surface, initial.wheel_angle * wheel.radius)
     slow, fast = natural_frequencies(case.coefficients, case.contact_stiffness)
-    first = FIRST_CYCLES / (slow or fast)
+    first = min(FIRST_CYCLES / (slow or fast), FIRST_SAMPLES * case.output.sample_interval)
     rough = shoe.g.size or wheel_surface.g.size  # where a tolerance may change the scheme
     return System(
         coefficients=case.coefficients,

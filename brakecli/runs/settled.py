@@ -76,15 +76,14 @@ def settled(system: System, run: Callable[[System], Judged[M]]) -> Settled[M]:
         part = replace(part, duration=longer)
     if not system.settles:
         return Settled(found, system)
-    part, after = (
-        replace(part, duration=part.sampled_duration, settles=False),
-        f"after {part.sampled_duration:.6g} s",
-    )
+    part, after = replace(part, duration=part.sampled_duration, settles=False), f"{part.sampled_duration:.6g} s"
     if failed:
         return Settled(found, part)
     if not verdict.unfinished and verdict.regime is not Regime.UNDECIDED:
-        return Settled(found, replace(part, notes=(*part.notes, f"solver.duration: {SETTLED} {after}")))
-    why = f"no more than {MOST_SAMPLES:,} samples, or some {MOST_SECONDS:g} s of computing, are tried"
-    if longer <= most:
-        why = f"a longer run would not {'keep the tolerance' if verdict.unfinished else 'decide more'}"
-    return Settled(found, part, (f"solver.duration: not {SETTLED} {after}; {why}",))
+        return Settled(found, replace(part, notes=(*part.notes, f"solver.duration: {SETTLED} after {after}")))
+    why = "a longer run would not keep the tolerance"
+    if not verdict.unfinished:
+        why = "a longer run would not decide more"
+    elif longer > most:
+        why = f"no more than {MOST_SAMPLES:,} samples, or some {MOST_SECONDS:g} s of computing, are tried"
+    return Settled(found, part, (f"solver.duration: not {SETTLED} after {after}; {why}",))
