@@ -45,7 +45,8 @@ def events(path: Path) -> xr.Dataset:
 def interpolated(path: Path, name: str, times: NDArray[Any]) -> NDArray[Any]:
     """A variable of the history at other times, along straight lines."""
     with open_result(path) as result:
-        return np.interp(times, result.read("history", "time"), result.read("history", name))
+        found: NDArray[Any] = np.interp(times, result.read("history", "time"), result.read("history", name))
+        return found
 
 
 @pytest.mark.parametrize("scheme", ["event-driven", "piecewise-exact"])
