@@ -185,7 +185,7 @@ EVENTS = (
     integer("event", "number of an event, from 0"),
     Field("time", "s", "time of an event"),
     Field("kind", "", "what happens: stick, slip, turn, lift-off or touch", "S8"),
-    *(Field(name, QUANTITIES[name].units, f"{name} there") for name in ("x", "y", "vx", "vy")),
+    *(Field(name, QUANTITIES[name].units, QUANTITIES[name].long_name) for name in ("x", "y", "vx", "vy")),
 )
 EARLIER = (integer("earlier", "number of earlier events, which are not kept"),)
 

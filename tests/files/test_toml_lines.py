@@ -33,14 +33,16 @@ def test_unknown_misspelt_duplicate_and_misplaced_keys_are_reported_together_by_
         "case.toml:19: fricton: is unknown (found a table); did you mean [friction]?",
         "case.toml:20: fricton.coefficient: is out of range (found -0.45); give a number of at least 0",
         "case.toml:21: fricton.qqq: is unknown (found 2); the keys of [friction] are coefficient",
-        "case.toml:36: initial.zzz: is unknown (found 1); the keys of [initial] are at, x, y, vx, vy",
+        "case.toml:36: initial.zzz: is unknown (found 1);"
+        " the keys of [initial] are from, at, x, y, vx, vy, wheel_angle",
         "case.toml:37: load: is given twice, first in line 17; keep one of the two",
         'case.toml:38: load.at: is unknown (found "rest"); did you mean initial.at?',
         "case.toml:39: load.x: is unknown (found 0.0); did you mean initial.x?",
         "case.toml:40: load.y: is unknown (found 0.0); did you mean initial.y?",
         "case.toml:41: load.vx: is unknown (found 0.0); did you mean initial.vx?",
         "case.toml:42: load.vy: is unknown (found 0.0); did you mean initial.vy?",
-        "case.toml:49: is not valid TOML: expected newline or end of document after a statement"
+        "case.toml:43: load.wheel_angle: is unknown (found 0.0); did you mean initial.wheel_angle?",
+        "case.toml:50: is not valid TOML: expected newline or end of document after a statement"
         " (found duration = 1,0); numbers are written 1.5 or 2e-3, texts in quotes, lists as [1, 2],"
         " table headers as [table]",
     ]
@@ -156,7 +158,7 @@ def test_the_line_of_a_header_counts_where_its_key_is_missing() -> None:
 
 def test_strange_keys_and_values_are_shown_as_plain_text() -> None:
     (line,) = messages(CONSTANT + '"\\u001b[31m\\n" = "\\u009b\\u202e"\n')
-    assert line.startswith('case.toml:48: output."\\u001b[31m\\n": is unknown (found "\\u009b\\u202e")')
+    assert line.startswith('case.toml:49: output."\\u001b[31m\\n": is unknown (found "\\u009b\\u202e")')
 
 
 TREES = st.recursive(

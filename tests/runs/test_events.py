@@ -22,6 +22,7 @@ from brakecli.runs.limits import adjustments
 from brakecli.runs.run import RunReport, run
 from brakecli.solver.records import MOST_EVENTS
 from tests.examples import COULOMB, SQUEAL
+from tests.solver.test_track import BOUNCING
 
 pytestmark = pytest.mark.usefixtures("compiled")
 EVENTS = {"output": {"sample_interval": 1e-4, "events": True}}
@@ -45,7 +46,8 @@ def events(path: Path) -> xr.Dataset:
 def interpolated(path: Path, name: str, times: NDArray[Any]) -> NDArray[Any]:
     """A variable of the history at other times, along straight lines."""
     with open_result(path) as result:
-        return np.interp(times, result.read("history", "time"), result.read("history", name))
+        found: NDArray[Any] = np.interp(times, result.read("history", "time"), result.read("history", name))
+        return found
 
 
 @pytest.mark.parametrize("scheme", ["event-driven", "piecewise-exact"])
@@ -83,6 +85,26 @@ def test_flight_begins_with_a_lift_off_and_ends_with_a_touch(tmp_path: Path) -> 
     assert flights.kind.values.tolist()[:3] == ["touch", "lift-off", "touch"]
     assert np.abs(flights.y).max() < 1e-12  # the pad is flat
     assert ((flights.vy > 0.0) == (flights.kind == "lift-off")).all()
+
+
+def test_a_rough_pad_lifts_off_and_touches_on_its_motion(tmp_path: Path) -> None:
+    """A straight line between samples misses a velocity by no more than this changes from one sample to the next."""
+    output = {"sample_interval": 1e-5, "events": True}
+    solver = {"scheme": "event-driven", "duration": 0.02, "tolerance": 1e-8}
+    case = {**BOUNCING, "contact": {"half_length": 0.05, "stiffness": 5e7}, "output": output, "solver": solver}
+    written(tmp_path / "a.h5", case)
+    found = events(tmp_path / "a.h5")
+    flights = found.kind.isin(["lift-off", "touch"]).values
+    assert flights.sum() > 6
+    for place, speed in (("x", "vx"), ("y", "vy")):
+        with open_result(tmp_path / "a.h5") as result:
+            change = float(np.abs(np.diff(result.read("history", speed))).max())
+        for name, within in ((place, 1e-5 * change), (speed, change)):
+            gaps = np.abs(found[name].values - interpolated(tmp_path / "a.h5", name, found.time.values))
+            assert gaps[flights].max() < within < 0.1 * float(np.ptp(found[name].values)), name
+    with open_result(tmp_path / "a.h5") as result:
+        touching = np.concatenate([[0], np.diff(result.read("history", "normal_force") > 0.0)]).sum()
+    assert flights.sum() == pytest.approx(touching, abs=0.1 * touching)  # a flight between two samples
 
 
 def test_only_the_last_events_are_kept_and_that_is_said(tmp_path: Path) -> None:
