@@ -38,7 +38,8 @@ class Scale(NamedTuple):
 def draw(picture: SweepPicture) -> Figure:
     """The figure of a sweep over two axes, or over three: then a column of maps for each value of one of them."""
     critical, sliced = picture.critical is not None, len(picture.axes) == 3
-    shown = picture.shown or ("critical" if critical else "amplitude")
+    asked = picture.shown if picture.shown != sweep.ATTRACTOR else ""  # it has a map of its own
+    shown = asked or ("critical" if critical else "amplitude")
     scale = _amplitude_scale(picture) if shown == "amplitude" else _scale(picture, shown)
     draw_shown = _draw_critical if shown == "critical" else partial(_draw_numbers, name=shown)
     layers: dict[str, Callable[[Axes, SweepPicture, Scale], ScalarMappable]]

@@ -98,7 +98,10 @@ def _comparable(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _grouped(kinds: NDArray[Any], apart: NDArray[np.float64]) -> NDArray[np.int64]:
-    """The group of each point, from 0: first by kind, then split at every gap above 1 until there is none."""
+    """The group of each point, from 0: first by kind, then split at every gap above 1 until there is none.
+
+    Groups are counted by kind, and then by the medians of their numbers, amplitudes first.
+    """
     groups, count = np.unique(kinds, return_inverse=True)[1], 0
     while groups.max(initial=-1) + 1 > count:
         count = groups.max() + 1
@@ -106,4 +109,6 @@ def _grouped(kinds: NDArray[Any], apart: NDArray[np.float64]) -> NDArray[np.int6
             order = np.lexsort((row, groups))
             splits = (np.diff(groups[order]) > 0) | (np.diff(row[order]) > 1.0)
             groups[order] = np.concatenate([[0], np.cumsum(splits)])
-    return groups
+    middle = [np.median(apart[:, groups == group], axis=1) for group in range(count)]
+    first = np.unique(groups, return_index=True)[1]
+    return np.asarray(np.argsort(np.lexsort((*np.transpose(middle)[::-1], kinds[first])))[groups])

@@ -5,6 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from brakecli.files.read import open_result
+from brakecli.plots.result import draw
+from brakecli.plots.style import applied
 from tests.plots.helpers import (
     ANGLE,
     CRITICAL,
@@ -69,6 +72,9 @@ def test_each_attractor_has_a_colour_of_its_own_in_grey_as_well(tmp_path: Path) 
     shown = np.ma.filled(mesh.get_array().reshape(3, 2).T.astype(float), np.nan)  # type: ignore[union-attr]
     np.testing.assert_array_equal(shown, [[1, 2, 3], [4, np.nan, 1]])
     np.testing.assert_allclose(points(attractor, "no attractor known"), [[1e-5, 0.1]])
+    with open_result(tmp_path / "s.h5") as stored, applied():
+        again = draw(stored, variable="attractor").axes[:2]  # the same two maps
+    assert [each.get_title(loc="left") for each in again] == ["Attractor", "Amplitude"]
     words = legend(figure)
     assert words[:2] == ["1: damped, 33.3% of the points", "2: relaxation, 100 Hz, 1 µm, 16.7% of the points"]
     cells = np.array(mesh.cmap(mesh.norm(np.arange(1.0, 5.0))))[:, :3]

@@ -12,12 +12,13 @@ import pytest
 import tomli_w
 
 from brakecli.analysis.regime.verdict import Verdict
+from brakecli.analysis.stability.linear import linear_theory
 from brakecli.case.case import Case
-from brakecli.case.read import parse_case
+from brakecli.case.read import parse_case, starters
 from brakecli.case.system import system_of
 from brakecli.errors import BrakecliError
 from brakecli.runs.settled import Judged
-from brakecli.solver.flow.smooth import DONE, SmoothFlow
+from brakecli.solver.flow.smooth import DONE, EVENTFUL, SmoothFlow
 from brakecli.solver.motion import solve
 from brakecli.solver.quantities import ContactState
 from brakecli.solver.system import Initial, System
@@ -118,6 +119,19 @@ def test_a_map_of_regimes_is_known_early(friction: float, speed: float) -> None:
             "link2.angle_deg=-5.0",
         )
     compare(known(case)[1], case)
+
+
+def test_the_first_tenth_of_a_motion_with_many_events_is_followed_to_its_end() -> None:
+    """A vibration just below the least friction at which it could last: it leaves the wheel more than 60 times."""
+    start = 'initial={at="equilibrium",vy=-0.03}'
+    solver = "solver={tolerance=1e-3,duration=20.0}"
+    case = case_of(starters()["branch"], solver, "friction.coefficient=0.167", start)
+    system, found = known(case)
+    flow, theory = SmoothFlow.of(system), linear_theory(system, system.belt_speed)
+    assert theory is not None
+    assert flow(system.initial.beside(theory.rest), 2.0, tangents=False) == EVENTFUL
+    assert found.verdict.regime == "damped"
+    compare(found, case)
 
 
 ORBITS = {
