@@ -141,7 +141,7 @@ class Accessor(Shown):
         return tuple(Vibration(*map(_known, row)) for row in zip(*columns, strict=True))
 
     def table(self) -> str:
-        """Its single numbers, and what is said of it; a verdict as `brakecli classify` shows it, but no evidence."""
+        """Its single numbers, and what is said of it; a verdict as `brakecli classify` shows it, less evidence."""
         single = {name: each.item() for name, each in self._found.data_vars.items() if not each.ndim}
         held = {str(name): _known(value) for name, value in (self._found.attrs | single).items()}
         title = str(held.get("title") or "")
