@@ -203,7 +203,7 @@ def branch(
         keys, low, high = parsed(text, "parameter")
         with within_range():
             line = line_of(loaded, keys, low, high, "parameter")
-        given = start if isinstance(start, list | tuple) else [start] if start is not None else []
+        given: Iterable[Any] = start if isinstance(start, list | tuple) else [start] if start is not None else []
         with _files(given, "start") as files:
             starts = [start_of(file, keys) for file in files]
         found = branch(line, tell, lambda: False, starts, switch)

@@ -531,7 +531,9 @@ def test_progress_goes_to_a_function_and_to_standard_error(
         tell("points", 1, 3)
     assert capsys.readouterr().err == "brakecli: points 1 of 3, 0 s\n"
     with pytest.raises(ValueError, match="not in list"):
-        brakecli.run(CASE, {"solver.duration": 20.0}, output=tmp_path / "r.h5", progress=lambda *_: told.remove(("", 0, 0)))
+        brakecli.run(
+            CASE, {"solver.duration": 20.0}, output=tmp_path / "r.h5", progress=lambda *_: told.remove(("", 0, 0))
+        )
     assert not (tmp_path / "r.h5").exists()
 
 

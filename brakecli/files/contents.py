@@ -16,7 +16,17 @@ from brakecli.files.toml_lines import parse
 from brakecli.files.write import FILL
 
 _CASES = ("resolved_toml", "resolved_sweep_toml")
-_APART = {"_NCProperties", "case_toml", "sweep_toml", *_CASES, "title", "kind", "format", "format_version", "complete"}
+_APART = {
+    "_NCProperties",
+    "case_toml",
+    "sweep_toml",
+    *_CASES,
+    "title",
+    "kind",
+    "format",
+    "format_version",
+    "complete",
+}
 _BLOCK = 1 << 20  # rows read at a time
 _RISING = ("time", "frequency")  # axes along which values are interpolated
 _ROUNDING = 1e-9  # of the largest value, which interpolation may add
