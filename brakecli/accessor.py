@@ -7,6 +7,7 @@ objects are JSON among its attributes; `result.brakecli` reads them.
 import base64
 import html
 import json
+from collections import Counter
 from typing import Any, TypeVar
 
 import numpy as np
@@ -141,7 +142,7 @@ class Accessor(Shown):
         return tuple(Vibration(*map(_known, row)) for row in zip(*columns, strict=True))
 
     def table(self) -> str:
-        """Its single numbers, and what is said of it; a verdict as `brakecli classify` shows it."""
+        """Its single numbers, and what is said of it; a verdict as `brakecli classify` shows it, less evidence."""
         single = {name: each.item() for name, each in self._found.data_vars.items() if not each.ndim}
         held = {str(name): _known(value) for name, value in (self._found.attrs | single).items()}
         title = str(held.get("title") or "")
@@ -151,6 +152,8 @@ class Accessor(Shown):
             return verdict_table(title, {**missing, **held, **lists, "reasons": self.reasons, "evidence": {}})
         told = [each for name, each in _TOLD.items() if name in held]
         rows: list[Row] = [(each.title, _cell(held[each.name], each)) for each in told]
+        regimes = Counter(np.ravel(self._found["regime"]).astype(str).tolist() if "regime" in self._found else ())
+        rows += [(name, f"at {count} of {regimes.total()}") for name, count in regimes.most_common()]
         rows += [("mode", f"{each.frequency:.5g} Hz, {each.growth:+.4g} 1/s") for each in self.modes]
         branches = [each for each in self._groups.values() if "kind" in each.attrs]
         rows += [(str(each.name), f"{each.attrs['kind']}, {each.sizes['point']} motions") for each in branches]

@@ -6,7 +6,7 @@ import signal
 import tempfile
 import threading
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from datetime import date, time
@@ -160,7 +160,7 @@ def branch(
     settings: "Settings | None" = None,
     *,
     parameter: "Mapping[str | tuple[str, ...], tuple[float, float]]",
-    start: "Result | list[Result] | None" = None,
+    start: "Result | Sequence[Result] | None" = None,
     switch: bool = False,
     output: "str | PathLike[str] | None" = None,
     progress: "Progress" = False,
@@ -203,7 +203,7 @@ def branch(
         keys, low, high = parsed(text, "parameter")
         with within_range():
             line = line_of(loaded, keys, low, high, "parameter")
-        given = start if isinstance(start, list) else [start] if start is not None else []
+        given: Iterable[Any] = start if isinstance(start, list | tuple) else [start] if start is not None else []
         with _files(given, "start") as files:
             starts = [start_of(file, keys) for file in files]
         found = branch(line, tell, lambda: False, starts, switch)

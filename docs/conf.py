@@ -5,8 +5,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import nbformat
 from docutils.nodes import Element, SkipNode
 from latex2mathml.converter import convert
+from myst_nb.core.read import read_myst_markdown_notebook
 from sphinx.application import Sphinx
 from sphinx.writers.html5 import HTML5Translator
 
@@ -45,6 +47,17 @@ def write_commands(site: Sphinx) -> None:
     (HERE / "generated" / "commands.md").write_text("\n".join(parts))
 
 
+def write_notebook(site: Sphinx) -> None:
+    """Write the tutorial as a notebook for download; its case lies beside it, and other pages do not."""
+    text = (HERE / "tutorial.md").read_text(encoding="utf-8").replace("../cases/", "")
+    text = re.sub(r"(?:\[|\{download\}`)([^\]`]*?)(?:\]\([^)]*\)| <[^>]*>`)", r"\1", text)
+    notebook = read_myst_markdown_notebook(text)
+    for number, cell in enumerate(notebook.cells):
+        cell["id"] = f"cell-{number}"  # otherwise it is random
+    nbformat.validate(notebook)
+    nbformat.write(notebook, HERE / "generated" / "tutorial.ipynb")
+
+
 def write_math(page: HTML5Translator, node: Element) -> None:
     """Write a formula as MathML, which browsers show without a network."""
     alone = node.tagname == "math_block"
@@ -58,3 +71,4 @@ def setup(site: Sphinx) -> None:
     """Have the generated pages written before any is read."""
     site.add_html_math_renderer("mathml", (write_math, None), (write_math, None))
     site.connect("builder-inited", write_commands)
+    site.connect("builder-inited", write_notebook)

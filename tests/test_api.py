@@ -18,6 +18,7 @@ import pytest
 import xarray as xr
 
 import brakecli
+from brakecli.cli.output import telling
 from brakecli.errors import BrakecliError, CaseError, UnreadableResultError, UsageError
 from tests.commands import QUICK, ROOT, TINY
 from tests.commands import brakecli as command
@@ -33,7 +34,8 @@ def test_importing_takes_nothing_large() -> None:
     code = f"import sys, brakecli, brakecli.api; print({large} & {{*sys.modules}})"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "set()\n"
-    assert {"branch", "load", "run", "scatter", "stability", "sweep", "classify"} == {*brakecli.__all__}
+    tables = {"branch", "load", "run", "scatter", "stability", "sweep", "classify"}
+    assert {*brakecli.__all__} == tables | {"advise", "diff", "plot", "report"}
     with pytest.raises(AttributeError, match="has no attribute 'ran'"):
         _ = brakecli.ran
 
@@ -294,9 +296,11 @@ def test_errors_name_arguments_and_no_options(
 
 
 def test_a_copy_that_xarray_has_saved_opens_and_is_said_to_be_unchecked(tmp_path: Path) -> None:
+    two: dict[Any, Any] = {"friction.coefficient": [0.1, 0.2]}
     results: dict[str, Any] = {
         "run": brakecli.run(CASE, SHORT),
-        "sweep": brakecli.sweep(CASE, SHORT, axes={"friction.coefficient": [0.1, 0.2]}, jobs=1),
+        "sweep": brakecli.sweep(CASE, SHORT, axes=two, jobs=1),
+        "loop": brakecli.sweep(CASE, SHORT, axes=two, direction="both", jobs=1),
         "vary": brakecli.stability(CASE, vary={"friction.coefficient": [0.1, 0.2, 0.3]}),
     }
     for name, result in results.items():
@@ -314,6 +318,8 @@ def test_a_copy_that_xarray_has_saved_opens_and_is_said_to_be_unchecked(tmp_path
             assert brakecli.load(tmp_path / "again.nc")["/"].attrs["kind"] == copy.attrs["kind"]
         drawn = command("plot", f"{name}.nc", "-o", f"{name}.png", cwd=tmp_path)
         assert "unchecked" in drawn.told(0)
+    judged = command("classify", "run.nc", "--json", cwd=tmp_path).json
+    assert judged["frequency"] == results["run"].attrs["frequency"]
 
 
 def test_a_run_that_fails_raises_and_keeps_its_history(tmp_path: Path) -> None:
@@ -351,3 +357,250 @@ def test_an_interrupted_run_ends_soon_and_the_next_one_is_whole() -> None:
     assert time.monotonic() - start < 1.0 + QUICK
     timer.join()
     assert brakecli.run(CASE, SHORT).identical(before)
+
+
+def test_advice_is_that_of_the_command(tmp_path: Path) -> None:
+    (tmp_path / "s.toml").write_text(STUDY)
+    lines = ["advise", CASE, "--keys", "link2.*,shoe.mass", "--margin", "0.3", "--scatter", "s.toml", "--json"]
+    printed = command(*lines, cwd=tmp_path).json
+    given = {"keys": ["link2.*", "shoe.mass"], "margin": 0.3, "scatter": tmp_path / "s.toml"}
+    found = brakecli.advise(CASE, **given)  # type: ignore[arg-type]
+    numbers = found.numbers()
+    del printed["command"], printed["check"]["seconds"], numbers["check"]["seconds"]
+    assert numbers == printed
+    best = found.advice[0]
+    assert (best.parameter, best.to) == (printed["advice"][0]["parameter"], printed["advice"][0]["to"])
+    assert best.to is not None
+    assert best.squeal is not None
+    margin = brakecli.stability(CASE, {best.parameter: best.to}).critical_friction / found.stability.friction - 1.0
+    assert abs(margin - 0.3) < 1e-9
+    assert repr(found).endswith(found.conclusion().split()[-1])
+    assert brakecli.advise(CASE, keys="shoe.mass").advice[0].parameter == "shoe.mass"
+
+
+STUDY = f"""\
+case = {json.dumps(CASE)}
+samples = 64
+[[parameter]]
+key = "friction.coefficient"
+distribution = "uniform"
+low = 0.5
+high = 0.6
+"""
+
+
+def test_results_in_memory_are_drawn_compared_and_reported_like_their_files(tmp_path: Path) -> None:
+    folder = tmp_path / "files"
+    folder.mkdir()
+    a = brakecli.run(CASE, SHORT, output=folder / "a.h5")
+    b = brakecli.run(CASE, {**SHORT, "friction.coefficient": 0.72}, output=folder / "b.h5")
+    brakecli.plot(a, output=tmp_path / "own.png", variable="x")
+    command("plot", "a.h5", "--variable", "x", "-o", "a.png", cwd=folder).told(0)
+    assert (tmp_path / "own.png").read_bytes() == (folder / "a.png").read_bytes()
+    printed = command("diff", "a.h5", "b.h5", "-o", "two.png", "--json", cwd=folder).json
+    for pair in ((a, b), (folder / "a.h5", b)):
+        found = brakecli.diff(*pair, output=tmp_path / "two.png", force=True)
+        assert not found.same
+        assert found.case == printed["case"]
+        assert found.variables == printed["variables"]
+        assert found.numbers == printed["numbers"]
+    assert (tmp_path / "two.png").read_bytes() == (folder / "two.png").read_bytes()
+    assert "friction.coefficient" in repr(found)
+    assert brakecli.diff(folder / "a.h5", a).same
+    command("stability", CASE, "--vary", "friction.coefficient=0:1:5", "-o", "result.h5", cwd=folder).told(0)
+    modes = brakecli.stability(CASE, vary={"friction.coefficient": np.linspace(0.0, 1.0, 5)})
+    command("report", "result.h5", "-o", "page.html", cwd=folder).told(0)
+    page = (folder / "page.html").read_text()
+    assert brakecli.report(modes, output=tmp_path / "page.html") == page
+    assert (tmp_path / "page.html").read_text() == page
+
+
+def test_a_measured_signal_is_drawn_and_its_bursts_are_records(tmp_path: Path) -> None:
+    when = np.arange(10_000) / 1e4
+    tone = np.where((when > 0.25) & (when < 0.75), np.sin(2 * math.pi * 2000.0 * when), 0.0)
+    np.savetxt(tmp_path / "p.csv", tone + 1e-3 * np.random.default_rng(1).standard_normal(when.size))
+    how: dict[str, Any] = {"sample_rate": 1e4}
+    [burst] = brakecli.classify(tmp_path / "p.csv", "pressure", **how).brakecli.bursts
+    assert abs(burst.frequency - 2000.0) < 2.0  # a line is 1 / 0.5 s wide
+    assert abs(burst.end - burst.start - 0.5) < 0.1
+    brakecli.plot(tmp_path / "p.csv", "pressure", output=tmp_path / "own.png", **how)
+    line = ["plot", "p.csv", "--quantity", "pressure", "--sample-rate", "1e4", "-o", "p.png"]
+    command(*line, cwd=tmp_path).told(0)
+    assert (tmp_path / "own.png").read_bytes() == (tmp_path / "p.png").read_bytes()
+    with pytest.raises(UsageError, match="select and variable: are for results"):
+        brakecli.plot(tmp_path / "p.csv", "pressure", variable="x", **how)
+
+
+def test_objects_of_a_result_are_records() -> None:
+    found = brakecli.stability(CASE)
+    shown = found.brakecli
+    plain = json.loads(found.attrs["modes"])
+    assert [vars(mode) for mode in shown.modes] == plain
+    assert [(each.friction, each.lost) for each in shown.crossings] == [(float(found.critical_friction), True)]
+    assert shown.equilibrium.stiffness == float(found.contact_stiffness)
+    assert shown.discrete.step_limit is None
+    standing = brakecli.stability(CASE, {"load.force": -1.0}).brakecli
+    assert (standing.equilibrium, standing.discrete) == (None, None)
+    assert shown.reasons == ()
+
+
+def test_vibrations_while_the_wheel_stops_are_records(tmp_path: Path) -> None:
+    stop = {"wheel": {"radius": 0.5, "times": [0.0, 0.4], "angular_speeds": [0.2, 0.02]}}
+    settings = {**stop, "solver": {"tolerance": 1e-3, "duration": 0.4}}
+    tree = brakecli.run(CASE, settings, output=tmp_path / "r.h5")
+    printed = command("classify", "r.h5", "--json", cwd=tmp_path).json["vibrations"]
+    assert len(printed) > 0
+    for found in (tree, brakecli.classify(tree)):
+        assert [vars(each) for each in found.brakecli.vibrations] == printed
+
+
+def test_a_notebook_shows_the_table_and_the_picture(tmp_path: Path) -> None:
+    tree = brakecli.run(CASE, SHORT, output=tmp_path / "r.h5")
+    shown = tree.brakecli
+    table = command("classify", "r.h5", cwd=tmp_path).out.split()
+    assert repr(shown).split()[-20:] == [each for each in repr(shown).split()[-20:] if each in table]
+    assert shown.reasons[0].split(":")[0] in repr(shown)
+    page = shown._repr_html_()
+    assert page.startswith("<pre>")
+    assert 'src="data:image/png;base64,' in page
+    command("plot", "r.h5", "-o", "r.png", cwd=tmp_path).told(0)
+    assert shown._repr_png_() == (tmp_path / "r.png").read_bytes()
+    assert brakecli.plot(tree)._repr_png_().startswith(b"\x89PNG")  # type: ignore[attr-defined]
+    numbers = brakecli.stability(CASE)
+    assert numbers.brakecli._repr_png_() is None
+    assert "critical friction" in numbers.brakecli._repr_html_()
+    loaded = brakecli.load(tmp_path / "r.h5")
+    loaded.to_netcdf(tmp_path / "copy.nc", engine="h5netcdf")
+    with pytest.warns(UserWarning, match="has no digest"):
+        assert repr(brakecli.load(tmp_path / "copy.nc").brakecli) == repr(shown)
+
+
+def test_tables_say_what_results_of_other_kinds_answer() -> None:
+    branches = brakecli.branch(CASE, parameter={"friction.coefficient": (0.0, 1.0)})
+    assert branches.attrs["sentence"] in " ".join(repr(branches.brakecli).split())
+    assert "steady sliding, " in repr(branches.brakecli)
+    grid = brakecli.sweep(CASE, SHORT, axes={"friction.coefficient": [0.1, 0.2]}, jobs=1)
+    assert "points 2 failed points 0 damped at 2 of 2" in " ".join(repr(grid.brakecli).split())
+    modes = brakecli.stability(CASE, vary={"friction.coefficient": [0.1, 0.9]})
+    assert f"{modes.attrs['critical_values']:.6g}" in repr(modes.brakecli)
+
+
+def test_a_branch_begins_at_a_run_in_memory() -> None:
+    along: dict[Any, Any] = {"friction.coefficient": (0.5, 0.9)}
+    ended = brakecli.run(CASE, {"solver": {"tolerance": 1e-6, "duration": 1.0}})
+    found = [brakecli.branch(CASE, parameter=along, start=start) for start in (ended, [ended])]
+    assert found[0].identical(found[1])
+    with pytest.raises(UsageError, match=r"start: the value of friction\.coefficient in its case"):
+        brakecli.branch(CASE, parameter={"friction.coefficient": (0.0, 0.5)}, start=ended)
+
+
+def test_a_motion_is_followed_along_an_axis_as_in_a_file(tmp_path: Path) -> None:
+    (tmp_path / "c.toml").write_text(TINY)
+    axis = '[[axis]]\nparameter = "friction.coefficient"\nvalues = [0.4, 0.5]\ndirection = "both"\n'
+    (tmp_path / "s.toml").write_text(f'case = "c.toml"\n{axis}[[axis]]\nparameter = "shoe.mass"\nvalues = [9.0]\n')
+    of_file = brakecli.sweep(tmp_path / "s.toml", jobs=1)
+    axes: dict[Any, Any] = {"friction.coefficient": [0.4, 0.5], "shoe.mass": [9.0]}
+    found = brakecli.sweep(
+        tmp_path / "c.toml", axes=axes, direction={"friction.coefficient": "both"}, jobs=1, progress=False
+    )
+    assert found.sizes == {"direction": 2, "friction_coefficient": 2, "shoe_mass": 1}
+    assert {*found.data_vars} == {*of_file.data_vars}
+    for name in found.data_vars:
+        assert found[name].identical(of_file[name]), name
+    alone = brakecli.sweep(
+        tmp_path / "c.toml", axes={"friction.coefficient": [0.4, 0.5]}, direction="down", jobs=1
+    )
+    np.testing.assert_array_equal(alone.friction_coefficient, [0.4, 0.5])
+    for wrong, words in (("both", "direction: is no mapping"), ({"shoe.mas": "up"}, "not among the axes")):
+        with pytest.raises(UsageError, match=words):
+            brakecli.sweep(tmp_path / "c.toml", axes=axes, direction=wrong, jobs=1)  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match="direction: is for axes"):
+        brakecli.sweep(tmp_path / "s.toml", direction="up", jobs=1)
+    with pytest.raises(UsageError, match="settings: come too late"):
+        brakecli.sweep(brakecli.load(tmp_path / "s.toml"), {"shoe.mass": 8.0}, jobs=1)
+
+
+def test_progress_goes_to_a_function_and_to_standard_error(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "c.toml").write_text(TINY)
+    told = list[tuple[str, int, int]]()
+    axes: dict[Any, Any] = {"friction.coefficient": [0.4, 0.5, 0.6]}
+    brakecli.sweep(tmp_path / "c.toml", axes=axes, jobs=1, progress=lambda *each: told.append(each))
+    assert (told[0], told[-1]) == (("points", 0, 3), ("points", 3, 3))
+    with telling(quiet=False, first_line=0.0) as tell:
+        tell("points", 1, 3)
+    assert capsys.readouterr().err == "brakecli: points 1 of 3, 0 s\n"
+    with pytest.raises(ValueError, match="not in list"):
+        brakecli.run(
+            CASE, {"solver.duration": 20.0}, output=tmp_path / "r.h5", progress=lambda *_: told.remove(("", 0, 0))
+        )
+    assert not (tmp_path / "r.h5").exists()
+
+
+def test_a_profile_may_be_an_array(tmp_path: Path) -> None:
+    places = np.linspace(0.0, np.pi, 180, endpoint=False)  # m; a turn of a wheel of 0.5 m
+    heights = 1e-6 * np.sin(2.0 * places) + 3e-7 * np.sin(6.0 * places)
+    np.savetxt(tmp_path / "runout.csv", np.transpose([places, heights]), delimiter=",")
+    (tmp_path / "c.toml").write_text(TINY)
+    of_file = brakecli.run(tmp_path / "c.toml", {"roughness.wheel.profile": str(tmp_path / "runout.csv")})
+    columns = np.column_stack([places, heights])
+    given: list[Any] = [
+        {"roughness.wheel.profile": columns},
+        {"roughness.wheel": {"profile": (places, heights)}},
+        {"roughness": {"wheel": {"profile": xr.DataArray(columns[::-1])}}},
+    ]
+    for settings in given:
+        found = brakecli.run(tmp_path / "c.toml", settings)
+        assert (found["history"].x == of_file["history"].x).all()
+        note = found.attrs["resolved_toml"].partition('note = "')[2]
+        assert note.startswith("array ")
+    loaded = brakecli.load(tmp_path / "c.toml", given[0])
+    coarse = {"roughness.wheel.profile_error": 0.5}
+    assert brakecli.run(loaded, coarse).identical(brakecli.run(tmp_path / "c.toml", given[0] | coarse))
+    both = {"roughness.wheel.profile": columns, "roughness.shoe.profile": columns}
+    assert len(brakecli.load(tmp_path / "c.toml", both).records) == 1
+    radii: dict[Any, Any] = {"wheel.radius": [0.5, 0.499]}
+    sweep = brakecli.sweep(loaded, axes=radii, jobs=1)
+    assert sweep.amplitude[0] == found.attrs["amplitude"]
+    for wrong, words in (
+        (np.zeros(5), "is no profile"),
+        (np.zeros((5, 3)), "is no profile"),
+        (np.zeros((2, 2)), "has 2 rows"),
+        (["a", "b"], "is no profile"),
+        (np.ma.masked_less(columns, 1e-7), "a cell is empty"),
+        (columns * [1.0, 0.0], "all heights are equal"),
+    ):
+        with pytest.raises(UsageError, match=rf"^roughness\.wheel\.profile: {words}"):
+            brakecli.run(tmp_path / "c.toml", {"roughness.wheel.profile": wrong})
+
+
+def test_what_cannot_be_drawn_or_reported_is_told(tmp_path: Path) -> None:
+    tree = brakecli.run(CASE, SHORT)
+    with pytest.raises(UsageError, match=r"^result\.h5: variable z: a run has no such quantity"):
+        brakecli.plot(tree, variable="z")
+    with pytest.raises(UnreadableResultError, match=r"^result\.h5: .*it was not written by this program"):
+        brakecli.plot(brakecli.classify(tree))
+    with pytest.raises(UsageError, match=r"^a\.h5: xarray cannot write it as a file"):
+        brakecli.diff(xr.Dataset(attrs={"kind": object()}), tree)
+    with pytest.raises(UsageError, match="int: is no result"):
+        brakecli.plot(3)  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match="report: there is no result"):
+        brakecli.report()
+    with pytest.raises(UsageError, match="its suffix does not name a kind of picture"):
+        brakecli.plot(tree, output=tmp_path / "x.txt")
+    for margin in (-0.1, 11, math.nan, "1"):
+        with pytest.raises(UsageError, match="is no number from 0 to 10"):
+            brakecli.advise(CASE, margin=margin)  # type: ignore[arg-type]
+
+
+def test_what_comes_from_a_damaged_file_stays_marked(tmp_path: Path) -> None:
+    brakecli.run(CASE, SHORT, output=tmp_path / "r.h5")
+    content = bytearray((tmp_path / "r.h5").read_bytes())
+    content[-1] ^= 1  # of the digest
+    (tmp_path / "r.h5").write_bytes(content)
+    with pytest.warns(UserWarning, match="does not fit"):
+        tree = brakecli.load(tmp_path / "r.h5", force_read=True)
+    for drawn, marked in ((tree, True), (brakecli.run(CASE, SHORT), False)):
+        texts = [text.get_text() for text in brakecli.plot(drawn).texts]
+        assert ("read by force: a digest does not fit" in texts) is marked

@@ -104,8 +104,8 @@ def given(value: object) -> str:
     require(rows.ndim == 2 and rows.shape[1] == 2, "is no profile; give places and heights (m), as two columns")
     require(rows.nbytes <= MOST_MEASURED, f"takes more than {MOST_MEASURED / 1e6:g} MB; measure fewer places")
     record = _checked(rows[:, 0], rows[:, 1], is_angle=False)
-    digest = hashlib.sha256(record.place + record.height).hexdigest()[:12]
-    name = f"/numpy/array {digest}"  # absolute, and no path of a file
+    digest = hashlib.sha256(record.place + record.height).hexdigest()
+    name = f"/numpy/array {digest[:12]}"  # absolute, and no path of a file
     arrays.get()[name] = record
     return name
 

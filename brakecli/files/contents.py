@@ -16,7 +16,17 @@ from brakecli.files.toml_lines import parse
 from brakecli.files.write import FILL
 
 _CASES = ("resolved_toml", "resolved_sweep_toml")
-_APART = {"case_toml", "sweep_toml", *_CASES, "title", "kind", "format", "format_version", "complete"}
+_APART = {
+    "_NCProperties",
+    "case_toml",
+    "sweep_toml",
+    *_CASES,
+    "title",
+    "kind",
+    "format",
+    "format_version",
+    "complete",
+}
 _BLOCK = 1 << 20  # rows read at a time
 _RISING = ("time", "frequency")  # axes along which values are interpolated
 _ROUNDING = 1e-9  # of the largest value, which interpolation may add
@@ -71,7 +81,9 @@ def difference(a: StoredResult, b: StoredResult) -> Difference:
         for group in groups:
             for name, value in result.group_attributes(group).items() if group in result.groups else ():
                 if name not in _APART and not name.endswith("_version"):
-                    found[name if group == "/" else f"{group}/{name}"] = plain(value)
+                    value = plain(value)  # xarray saves a number as a list of one
+                    value = value[0] if isinstance(value, list) and len(value) == 1 else value
+                    found[name if group == "/" else f"{group}/{name}"] = value
     declared = _DECLARED.get(kinds[0], ())
     rows = ((field.group, row) for field in declared for row in (field.rows if field.group else [field]))
     units = {f"{group}/{row.name}": row.units for group, row in rows}

@@ -15,7 +15,7 @@ import pytest
 
 from brakecli.sweeps.workers.task import compute_units
 from tests.campaign import campaign
-from tests.commands import QUICK, ROOT, TINY, brakecli, ended, left_in, run, started, wait_until
+from tests.commands import QUICK, ROOT, TINY, brakecli, ended, environment, left_in, run, started, wait_until
 from tests.sweeps.helpers import (
     ANGLES,
     SLOWER,
@@ -135,6 +135,21 @@ def test_a_scheduler_is_found_by_its_file_and_by_the_environment(cluster: Cluste
     command = ["sweep", "s.toml", "-q", "--force"]
     run(*command, cwd=tmp_path, DASK_SCHEDULER_ADDRESS=cluster.address).told(0)
     assert (tmp_path / "s.h5").read_bytes() == (tmp_path / "critical.h5").read_bytes()
+
+
+def test_in_python_a_client_leads_to_its_cluster_and_stays_open(cluster: Cluster, good: Path, here: Path) -> None:
+    script = f"""
+import distributed
+import brakecli
+with distributed.Client({cluster.address!r}, set_as_default=False) as client:
+    brakecli.sweep("s.toml", output="s.h5", scheduler=client)
+    assert client.submit(abs, -3).result() == 3
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=here, env=environment(), capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    assert (here / "s.h5").read_bytes() == (good / "s.h5").read_bytes()
 
 
 # workers that die
