@@ -25,9 +25,8 @@ def draw(result: StoredResult) -> Figure:
     if not len(outcomes) or any(each.shape != (len(outcomes),) for each in shares):
         raise style.unreadable(result, "its probabilities do not fit its outcomes")
     attributes, rows = result.attributes, max(len(outcomes), 3)
-    figure = style.headed(
-        _WIDTH, 1.6 + _ROW * rows + 2.4, str(attributes.get("title", "")), str(attributes.get("sentence", ""))
-    )
+    lines = (str(attributes.get(name, "")) for name in ("title", "sentence"))
+    figure = style.headed(_WIDTH, 1.6 + _ROW * rows + 2.4, *lines, columns=2)
     upper, lower = style.panels(figure, 2, 2, height_ratios=[0.5 + _ROW * rows, 2.6])
     _probabilities(upper[0], outcomes, *shares)
     if indexed:

@@ -159,7 +159,8 @@ def part_of_other(result: StoredResult) -> Part:
         names = fields.OUTCOME, *fields.PROBABILITY
         rows = [(NAMES.get(name, name), *more) for name, *more in _rows(result, "/", names)]
         tables.append(Table(rows, ("a sample is", "probability", "from", "to, with 95 %")))
-        numbers = {**{f"probability of {name}": (value, "") for name, value, *_ in rows}, **numbers}
+        shares = zip(rows, style.read_column(result, "probability").tolist(), strict=True)
+        numbers = {**{f"probability: {name}": (share, "1") for (name, *_), share in shares}, **numbers}
         if "total" in result.variables("/"):
             head = ("parameter", "alone it makes", "with all others", "±, of the variance")
             tables.append(Table(_rows(result, "/", (fields.SCATTERING, *fields.INDEX)), head))

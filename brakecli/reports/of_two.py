@@ -24,12 +24,12 @@ def pair_of(results: tuple[StoredResult, StoredResult], parts: Sequence[Part]) -
     case = [
         (each["name"], each["a"], each["b"], key_unit(each["name"]))
         for each in changed(*map(keys, results))
-        if each["name"] != "title"
+        if each["name"] != "title" and {} not in each.values()  # which stands for a table without keys
     ]
     names = {**a.numbers, **b.numbers}
     columns = [[rounded(part.numbers.get(name, (None,))[0], DIGITS) for name in names] for part in parts]
     both = zip(names, *columns, (units for _, units in names.values()), strict=True)
-    numbers = [row for row in both if row[1:3] != (None, None)]
+    numbers = [row for row in both if {*map(str, row[1:3])} - {"None", ""}]
     try:
         pictures = [picture(PICTURE, partial(two.draw, results, ""))]
     except UsageError:  # no curves that could be drawn over each other

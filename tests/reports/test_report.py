@@ -249,7 +249,7 @@ def test_two_results_are_compared_by_curves_or_by_a_picture_of_each(
         write(tmp_path / f"{name}{name}.h5", {"axis": [ANGLE, SPEED]}, **origin())
     assert (pictures("a", "b"), pictures("aa", "bb")) == (1, 2)
     assert pictures("a", "b", "aa") == 0  # of more than two each is alone
-    assert "What differs" not in reported(*results[:2]).html  # nor are results of two kinds compared
+    assert "What was changed" not in reported(*results[:2]).html  # nor are results of two kinds compared
 
 
 def test_branches_have_a_sentence_a_picture_and_their_special_points(
