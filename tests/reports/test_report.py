@@ -245,9 +245,12 @@ def test_two_results_are_compared_by_curves_or_by_a_picture_of_each(
         return html[: html.index('<article id="part-1">')].count("<figure>")
 
     for name in "ab":
-        write(tmp_path / f"{name}.h5", {"axis": [ANGLE], "critical": CRITICAL}, **origin())
+        sought = {**CRITICAL, "lower": 0.1} if name == "b" else CRITICAL
+        write(tmp_path / f"{name}.h5", {"axis": [ANGLE], "critical": sought}, **origin())
         write(tmp_path / f"{name}{name}.h5", {"axis": [ANGLE, SPEED]}, **origin())
     assert (pictures("a", "b"), pictures("aa", "bb")) == (1, 2)
+    both = reported(tmp_path / "a.h5", tmp_path / "b.h5").html
+    assert (True, ["critical.lower", "0", "0.1", "differs"]) in rows(both)  # a key of the sweep, not of its case
     assert pictures("a", "b", "aa") == 0  # of more than two each is alone
     assert "What was changed" not in reported(*results[:2]).html  # nor are results of two kinds compared
 
