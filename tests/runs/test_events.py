@@ -88,7 +88,7 @@ def test_flight_begins_with_a_lift_off_and_ends_with_a_touch(tmp_path: Path) -> 
 
 
 def test_a_rough_pad_lifts_off_and_touches_on_its_motion(tmp_path: Path) -> None:
-    """A straight line between samples misses a velocity by no more than this changes from one sample to the next."""
+    """A straight line between samples misses a velocity by no more than it changes between them."""
     output = {"sample_interval": 1e-5, "events": True}
     solver = {"scheme": "event-driven", "duration": 0.02, "tolerance": 1e-8}
     case = {**BOUNCING, "contact": {"half_length": 0.05, "stiffness": 5e7}, "output": output, "solver": solver}
