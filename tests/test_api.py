@@ -560,6 +560,11 @@ def test_a_profile_may_be_an_array(tmp_path: Path) -> None:
     assert brakecli.run(loaded, coarse).identical(brakecli.run(tmp_path / "c.toml", given[0] | coarse))
     both = {"roughness.wheel.profile": columns, "roughness.shoe.profile": columns}
     assert len(brakecli.load(tmp_path / "c.toml", both).records) == 1
+    both["roughness.shoe.profile"] = 2.0 * columns
+    surfaces = brakecli.load(tmp_path / "c.toml", both).case.roughness
+    for side in ("shoe", "wheel"):
+        alone = {f"roughness.{side}.profile": both[f"roughness.{side}.profile"]}
+        assert getattr(brakecli.load(tmp_path / "c.toml", alone).case.roughness, side) == getattr(surfaces, side)
     radii: dict[Any, Any] = {"wheel.radius": [0.5, 0.499]}
     sweep = brakecli.sweep(loaded, axes=radii, jobs=1)
     assert sweep.amplitude[0] == found.attrs["amplitude"]
