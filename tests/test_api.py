@@ -427,7 +427,7 @@ def test_a_measured_signal_is_drawn_and_its_bursts_are_records(tmp_path: Path) -
     line = ["plot", "p.csv", "--quantity", "pressure", "--sample-rate", "1e4", "-o", "p.png"]
     command(*line, cwd=tmp_path).told(0)
     assert (tmp_path / "own.png").read_bytes() == (tmp_path / "p.png").read_bytes()
-    with pytest.raises(UsageError, match="select and variable: are for results"):
+    with pytest.raises(UsageError, match="select, variable and section: are for results"):
         brakecli.plot(tmp_path / "p.csv", "pressure", variable="x", **how)
 
 

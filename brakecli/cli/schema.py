@@ -11,7 +11,7 @@ from brakecli.errors import UsageError
 def command(
     kind: Annotated[str, typer.Argument(metavar="[case|sweep|scatter]", help="Which kind of file.")] = "case",
 ) -> None:
-    """Print the JSON Schema of case files, sweep files or studies of scatter."""
+    """Print the JSON Schema of cases, sweeps or studies."""
     from brakecli.case.case import Case
     from brakecli.case.tables import Table, json_schema
     from brakecli.scattering.study import Study

@@ -100,10 +100,10 @@ def wheel_angles(waves: Floats, travel: float, travel_low: float, angles: Floats
         angles[i] = waves[i] - TWO_PI * fraction
 
 
-def turned(f: Surface, travel: float) -> Surface:
-    """The surface of a wheel that has travelled so far (m), as it then begins at xi = 0."""
+def turned(f: Surface, travel: float, travel_low: float = 0.0) -> Surface:
+    """The surface of a wheel that has travelled so far (m, in one number or two), as it then begins at xi = 0."""
     phase = np.zeros(f.g.size)
-    wheel_angles(f.waves, travel, 0.0, phase)
+    wheel_angles(f.waves, travel, travel_low, phase)
     return f._replace(phase=phase)
 
 

@@ -29,6 +29,8 @@ from brakecli.runs.run import asked, motion_of, verdict_in_memory
 from brakecli.runs.settled import Judged, settled
 from brakecli.runs.together import TOGETHER, certify_together
 from brakecli.solver.motion import Motion
+from brakecli.solver.roughness import TWO_PI, turned
+from brakecli.solver.schedules import integral_at
 from brakecli.solver.system import System
 from brakecli.sweeps.early import Ending, early
 from brakecli.sweeps.plan import Plan, Settings
@@ -195,10 +197,23 @@ def line_points(plan: Plan, line: int) -> list[int]:
 
 
 def next_start(outcome: PointRun) -> Settings:
-    """The start of a case where another has ended."""
-    motion = outcome.motion
-    state = motion.rows[-1, :4].tolist()
-    return {("initial",): initial_at(outcome.case, motion.system, motion.system.sampled_duration, state)}
+    """The start of a case where another has ended.
+
+    Its waves go on with the phases that they have come to, also where the next case has other wavelengths.
+    """
+    system, wheel, state = outcome.motion.system, outcome.case.roughness.wheel, outcome.motion.rows[-1, :4]
+    end = initial_at(outcome.case, system, system.sampled_duration, state.tolist())
+    start: Settings = {("initial",): end}
+    if wheel is not None:
+        end["wheel_angle"] = 0.0
+        phases = iter(turned(system.wheel, *integral_at(system.belt, system.sampled_duration, 0.0)).phase)
+        sines = wheel.sines()  # a wave without amplitude has no phase in a system
+        degrees = [math.degrees(next(phases) % TWO_PI) if g else 0.0 for g in sines["amplitudes"]]
+        if wheel.profile is None:
+            start["roughness", "wheel", "phases_deg"] = degrees
+        else:
+            start["roughness", "wheel"] = {**sines, "phases_deg": degrees}
+    return start
 
 
 def verdict_of(case: Case) -> Verdict | None:

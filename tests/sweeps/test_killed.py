@@ -160,3 +160,21 @@ def test_a_point_without_memory_fails_with_the_reason_and_exit_code_1(tmp_path: 
     done = shell("ulimit -v 1200000; $B sweep s.toml --json -q -j 1", tmp_path, OPENBLAS_NUM_THREADS="1")
     done.told(1, "point 1 (solver.duration = 100.0): out of memory", "1 of 3 points failed")
     assert done.json["status"] == ["done", "failed", "done"]
+
+
+def test_workers_that_cannot_start_end_a_command_and_are_not_tried_for_each_point(tmp_path: Path) -> None:
+    """A script that fails wherever it is not the main process."""
+    write_sweep(tmp_path, frictions(500))
+    (tmp_path / "fails.py").write_text(
+        "import multiprocessing\n"
+        "assert multiprocessing.current_process().name == 'MainProcess', 'not in a worker'\n"
+        "import brakecli\n"
+        "if __name__ == '__main__':\n"
+        "    try:\n"
+        "        brakecli.sweep('s.toml', jobs=2)\n"
+        "    except brakecli.BrakecliError as error:\n"
+        "        print(error)\n"
+    )
+    done = run(cwd=tmp_path, command=[sys.executable, "fails.py"])
+    assert done.out.startswith("no worker starts: its process ended with exit code 1, 4 times; see above")
+    assert done.err.count("not in a worker") <= 6

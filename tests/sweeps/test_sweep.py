@@ -9,6 +9,7 @@ import xarray as xr
 
 from brakecli.case.case import resolved_toml
 from brakecli.case.read import parse_case
+from brakecli.case.system import system_of
 from brakecli.sweeps.driver import TaskQueue
 from brakecli.sweeps.plan import LoadedSweep, parse_sweep, plan_of
 from brakecli.sweeps.point import Status, blank, line_points, next_start, record_type, simulate
@@ -190,6 +191,18 @@ def test_the_wheel_goes_on_turning_from_one_point_to_the_next(tmp_path: Path) ->
     # Phases pass through degrees, and the second run starts anew from four numbers: rounding, times its growth.
     end, other = second.motion.rows[-1, :4], whole.motion.rows[-1, :4]
     np.testing.assert_allclose(end, other, rtol=1e-6, atol=1e-9 * np.abs(other).max())
+
+
+def test_along_wavelengths_each_wave_goes_on_with_its_phase(tmp_path: Path) -> None:
+    """What a point of the wheel meets changes in its slope there, but not in its height."""
+    waves = "roughness.wheel = { amplitudes = [2e-6], wavelengths = [0.013] }\ninitial.wheel_angle = 0.7\n"
+    text = 'case = "tiny.toml"\n[[axis]]\nparameter = "roughness.wheel.wavelengths"\nvalues = [[0.013], [0.02]]\n'
+    loaded = load(tmp_path, text, CASE + waves)
+    first = simulate(loaded.base.case)
+    nxt = system_of(loaded.plan.case({("roughness", "wheel", "wavelengths"): [0.02], **next_start(first)}))
+    system, case = first.motion.system, loaded.base.case
+    met = 0.7 * case.wheel.radius + system.belt_speed * system.sampled_duration
+    assert np.sin(nxt.wheel.phase[0]) == pytest.approx(np.sin(-2.0 * np.pi * met / 0.013), abs=1e-9)
 
 
 def test_lines_go_up_and_down_through_every_point_once() -> None:

@@ -58,6 +58,7 @@ class LocalEngine(Engine):
         self.workers = workers
         self.pool: list[Worker] = []
         self._compute = compute
+        self._lost: int | None = 0  # workers that ended before any has answered; None once one has
 
     def __exit__(self, *error: object) -> None:
         """Kill the workers."""
@@ -103,6 +104,17 @@ class LocalEngine(Engine):
             raise BrakecliError(f"{what}; {remedy}") from error
         return worker
 
+    def _refuse_starts(self, code: int) -> None:
+        """Give up where each worker ends in an error before it computes anything: the next ones would as well."""
+        if self._lost is None or code != 1:
+            return
+        self._lost += 1
+        if self._lost > self.workers + 1:
+            remedy = (
+                'see above what ends them; from a script call with jobs=1, or below  if __name__ == "__main__":'
+            )
+            raise UsageError(f"no worker starts: {_cause_of_death(code)}, {self._lost} times; {remedy}")
+
     def _remove(self, worker: Worker) -> None:
         self.pool.remove(worker)
         worker.process.join()
@@ -118,7 +130,9 @@ class LocalEngine(Engine):
                 remedy = 'call it below  if __name__ == "__main__":  , or with jobs=1'
                 what = "brakecli.sweep: its workers run the script anew, up to this call"
                 raise UsageError(f"{what}; {remedy}") from None
+            self._refuse_starts(worker.process.exitcode or 0)
             return Finished(task, failure=_cause_of_death(worker.process.exitcode or 0))
+        self._lost = None
         if finished.records is None:  # it ends itself after that
             self._remove(worker)
         return finished._replace(task=task)
